@@ -1,0 +1,36 @@
+#include "core/base/fault.h"
+
+#include <utility>
+#include <vector>
+
+#include "absl/strings/cord.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr std::string_view kPayloadUrl = "lpdeform.fault";
+
+}  // namespace
+
+absl::Status make_fault(absl::StatusCode code, Fault fault, std::string_view text) {
+  absl::Status status(code, text);
+  status.SetPayload(kPayloadUrl, absl::Cord(absl::StrCat(fault.reason, "\n", fault.element, "\n", fault.limit)));
+  return status;
+}
+
+absl::Status invalid_input(Fault fault, std::string_view text) {
+  return make_fault(absl::StatusCode::kInvalidArgument, std::move(fault), text);
+}
+
+Fault fault_of(const absl::Status& status) {
+  const auto payload = status.GetPayload(kPayloadUrl);
+  if (!payload.has_value()) return {};
+  const std::string text(*payload);
+  const std::vector<std::string> parts = absl::StrSplit(text, absl::MaxSplits('\n', 2));
+  if (parts.size() != 3) return {};
+  return {parts[0], parts[1], parts[2]};
+}
+
+}  // namespace lpdeform

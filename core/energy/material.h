@@ -1,0 +1,30 @@
+#pragma once
+
+#include "absl/status/status.h"
+#include "core/base/geometry.h"
+
+namespace lpdeform {
+
+/// How distortion is spread (p, Eq. 3) and how much it costs (stiffness).
+struct Material {
+  /// 1 <= p_i <= 64. One value for the whole surface, or one a vertex.
+  Field p = Field::Constant(1, 2.0);
+  /// 1e-6 <= s_i <= 1e6. One value, or one a vertex.
+  Field stiffness = Field::Ones(1);
+  /// The length l of mixed norms, E = sum_i s_i l^2 (E_i / l)^{p_i}, in the caller's units; 0 takes the mean rest edge
+  /// length. Without effect where p is uniform.
+  double length_unit = 0;
+
+  static constexpr double kLowestP = 1.0, kHighestP = 64.0;
+  static constexpr double kLowestStiffness = 1e-6, kHighestStiffness = 1e6;
+
+  static Material uniform(double p);
+
+  bool has_uniform_p() const;
+  bool operator==(const Material&) const;
+};
+
+/// INVALID_ARGUMENT (FIELD_SIZE, P_OUT_OF_RANGE, STIFFNESS_OUT_OF_RANGE, LENGTH_UNIT_OUT_OF_RANGE) naming the vertex.
+absl::Status check_material(const Material& material, std::int32_t vertex_count);
+
+}  // namespace lpdeform

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/energy/weights.h"
+#include "core/mesh/mesh.h"
+#include "core/mesh/report.h"
+
+namespace lpdeform {
+
+/// The undeformed mesh, ready for computing: neighbours, weights and rest edges in flat arrays. Immutable, shared
+/// between sessions and threads.
+class RestShape {
+ public:
+  /// INVALID_ARGUMENT as deformable() has it, with the element named. O(n log n).
+  static absl::StatusOr<std::shared_ptr<const RestShape>> create(const TriangleMesh& mesh,
+                                                                 WeightKind kind = WeightKind::kCotangent);
+
+  std::int32_t vertex_count() const { return static_cast<std::int32_t>(positions_.rows()); }
+
+  /// Rest positions in the caller's units, as given.
+  const Points& positions() const { return positions_; }
+  const Faces& faces() const { return faces_; }
+  const MeshReport& report() const { return report_; }
+  WeightKind weight_kind() const { return kind_; }
+
+  /// Component of each vertex, from 0; -1 where no face uses the vertex.
+  const std::vector<std::int32_t>& components() const { return components_; }
+  std::int32_t component_count() const { return component_count_; }
+
+  /// Mean length of the rest edges: the default length unit of mixed norms. > 0.
+  double mean_edge_length() const { return mean_edge_length_; }
+  /// Length of the diagonal of the bounding box of the rest positions. > 0.
+  double diagonal() const { return diagonal_; }
+
+  // One-ring of vertex i: entries offsets[i] to offsets[i + 1] of neighbours (ascending) and weights. Symmetric.
+  const std::vector<std::int32_t>& offsets() const { return offsets_; }
+  const std::vector<std::int32_t>& neighbours() const { return neighbours_; }
+  const std::vector<double>& weights() const { return weights_; }
+
+  /// Bytes held, for admission.
+  std::size_t memory_bytes() const;
+
+ private:
+  RestShape() = default;
+
+  Points positions_;
+  Faces faces_;
+  MeshReport report_;
+  WeightKind kind_ = WeightKind::kCotangent;
+  std::vector<std::int32_t> components_;
+  std::int32_t component_count_ = 0;
+  double mean_edge_length_ = 0;
+  double diagonal_ = 0;
+  std::vector<std::int32_t> offsets_;
+  std::vector<std::int32_t> neighbours_;
+  std::vector<double> weights_;
+};
+
+}  // namespace lpdeform

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <memory>
+#include <stop_token>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "core/base/workers.h"
+#include "core/energy/material.h"
+#include "core/energy/rest_shape.h"
+#include "core/solve/handles.h"
+#include "core/solve/settings.h"
+#include "core/solve/summary.h"
+
+namespace lpdeform {
+
+/// What becomes of a connected component that no handle holds.
+enum class FreeComponents {
+  kError,   // refused: the component is named
+  kStay,    // stays where the rest mesh has it
+  kFollow,  // moves rigidly with the nearest handle (nearest vertices at rest)
+};
+
+struct DeformerOptions {
+  FreeComponents free_components = FreeComponents::kError;
+  int threads = 1;
+};
+
+/// One mesh being deformed: handles, material, the present state and the factorisations that go with them. Inputs may be
+/// changed at any time between steps; each change takes effect whole or not at all. Not thread-safe: one caller at a
+/// time, which may be a different thread each time.
+///
+///   auto deformer = Deformer::create(rest_shape, {});
+///   deformer->set_handles(handles);
+///   SolveSummary summary = deformer->solve({.certify = true});
+///   use(deformer->positions(), deformer->cell_energies());
+class Deformer {
+ public:
+  static absl::StatusOr<std::unique_ptr<Deformer>> create(std::shared_ptr<const RestShape> shape,
+                                                          DeformerOptions options);
+  ~Deformer();
+
+  const RestShape& shape() const;
+  const HandleSet& handles() const;
+  const Material& material() const;
+
+  /// Replaces all handles. Numeric refactorisation where the set of held vertices changed, none where handles only moved.
+  /// Errors: as check_handles; FAILED_PRECONDITION: COMPONENT_WITHOUT_HANDLE (names the component and one vertex of it),
+  /// NO_HANDLES. Ends a running solve with kCancelled.
+  absl::Status set_handles(const HandleSet& handles);
+
+  /// Errors: as check_material. Ends a running solve with kCancelled.
+  absl::Status set_material(const Material& material);
+
+  /// Makes `positions` the present state, from which InitialGuess::kCurrent goes on. INVALID_ARGUMENT: POSITIONS_SIZE,
+  /// POSITIONS_NOT_FINITE. Ends a running solve with kCancelled.
+  absl::Status set_positions(const Points& positions);
+
+  /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P, TOLERANCE_OUT_OF_RANGE,
+  /// ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE). `stop` is looked at in every iteration.
+  absl::Status start(const SolveSettings& settings, std::stop_token stop = {});
+
+  /// One iteration. True while there is more to do; false once the summary has its stop reason.
+  bool step();
+
+  /// start, then step until the end.
+  absl::StatusOr<SolveSummary> solve(const SolveSettings& settings, std::stop_token stop = {});
+
+  /// Of the running or the last solve.
+  const SolveSummary& summary() const;
+
+  /// The best state of the running or the last solve, in the caller's units and vertex order; always finite. The rest positions
+  /// before the first solve.
+  const Points& positions() const;
+  /// E_i at positions(), in the caller's unit of length; 0 for unreferenced vertices.
+  const Field& cell_energies() const;
+
+  /// The certificate at positions(): see SolveSummary::optimality_gap.
+  double optimality_gap();
+
+  /// Bytes held, the shared rest shape left out.
+  std::size_t memory_bytes() const;
+
+ private:
+  struct Impl;
+  explicit Deformer(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace lpdeform
