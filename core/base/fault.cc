@@ -10,12 +10,12 @@
 namespace lpdeform {
 namespace {
 
-constexpr std::string_view kPayloadUrl = "lpdeform.fault";
+constexpr char kPayloadUrl[] = "lpdeform.fault";
 
 }  // namespace
 
 absl::Status make_fault(absl::StatusCode code, Fault fault, std::string_view text) {
-  absl::Status status(code, text);
+  absl::Status status(code, absl::string_view(text.data(), text.size()));
   status.SetPayload(kPayloadUrl, absl::Cord(absl::StrCat(fault.reason, "\n", fault.element, "\n", fault.limit)));
   return status;
 }
