@@ -4,7 +4,8 @@
 
 namespace lpdeform {
 
-/// A triangle mesh as its owner sees it: vertex order is never changed. Not necessarily a sound one: see check_mesh.
+/// A triangle mesh as its owner sees it: vertex order is never changed. Not necessarily a sound one: see
+/// check_mesh.
 struct TriangleMesh {
   Points vertices;
   Faces faces;

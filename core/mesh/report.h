@@ -28,7 +28,8 @@ enum class Defect {
 /// The name in reports and on the wire: "zero_area_faces".
 std::string_view defect_name(Defect defect);
 
-/// How many there are, and the first few of them by index (edges as pairs: 2 entries an edge, lower index first).
+/// How many there are, and the first few of them by index (edges as pairs: 2 entries an edge, lower index
+/// first).
 struct DefectCount {
   std::int64_t count = 0;
   std::vector<std::int32_t> first;
