@@ -22,7 +22,8 @@ TriangleMesh block_with_holes(int nx, int ny, int nz);
 TriangleMesh sphere(int levels);
 
 /// A creature-like blob: a closed surface with four legs, a neck and a tail, made from a field of blended
-/// capsules sampled on a grid of about `resolution` cells along its length. Manifold, one component.
+/// capsules sampled on a grid of `resolution` cells along its length. Manifold, one component. resolution
+/// >= 24.
 TriangleMesh creature(int resolution);
 
 }  // namespace lpdeform

@@ -1,0 +1,136 @@
+#include "core/mesh/remesh.h"
+
+#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace lpdeform {
+namespace {
+
+struct DoubleTraits : OpenMesh::DefaultTraits {
+  using Point = OpenMesh::Vec3d;
+  using Normal = OpenMesh::Vec3d;
+  VertexAttributes(OpenMesh::Attributes::Status);
+  EdgeAttributes(OpenMesh::Attributes::Status);
+  FaceAttributes(OpenMesh::Attributes::Status);
+};
+using HalfEdgeMesh = OpenMesh::TriMesh_ArrayKernelT<DoubleTraits>;
+using OpenMesh::Vec3d;
+
+HalfEdgeMesh to_half_edges(const TriangleMesh& mesh) {
+  HalfEdgeMesh result;
+  for (const auto& row : mesh.vertices.rowwise()) result.add_vertex(Vec3d(row[0], row[1], row[2]));
+  for (const auto& row : mesh.faces.rowwise()) {
+    result.add_face(result.vertex_handle(row[0]), result.vertex_handle(row[1]), result.vertex_handle(row[2]));
+  }
+  return result;
+}
+
+TriangleMesh to_triangles(const HalfEdgeMesh& mesh) {
+  TriangleMesh result;
+  result.vertices.resize(static_cast<Eigen::Index>(mesh.n_vertices()), 3);
+  for (const auto vertex : mesh.vertices()) {
+    for (int axis = 0; axis < 3; ++axis) result.vertices(vertex.idx(), axis) = mesh.point(vertex)[axis];
+  }
+  result.faces.resize(static_cast<Eigen::Index>(mesh.n_faces()), 3);
+  for (const auto face : mesh.faces()) {
+    int corner = 0;
+    for (const auto vertex : face.vertices()) result.faces(face.idx(), corner++) = vertex.idx();
+  }
+  return result;
+}
+
+Vec3d normal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+  return (b - a).cross(c - a);
+}
+
+/// Whether the faces that stay when `half_edge` collapses into its target still look the way they did.
+bool keeps_orientation(const HalfEdgeMesh& mesh, OpenMesh::SmartHalfedgeHandle half_edge) {
+  const Vec3d target = mesh.point(half_edge.to());
+  for (const auto out : half_edge.from().outgoing_halfedges()) {
+    const auto b = out.to(), c = out.next().to();
+    if (b == half_edge.to() || c == half_edge.to()) continue;
+    const Vec3d before = normal(mesh.point(out.from()), mesh.point(b), mesh.point(c));
+    const Vec3d after = normal(target, mesh.point(b), mesh.point(c));
+    // Slivers have no direction to keep; what becomes of them must not be another sliver.
+    if (before.dot(after) < 0.2 * before.norm() * after.norm()) return false;
+  }
+  return true;
+}
+
+bool collapse_short_edges(HalfEdgeMesh& mesh, double shortest_edge) {
+  bool is_changed = false;
+  for (const auto edge : mesh.edges()) {
+    if (edge.deleted() || mesh.calc_edge_length(edge) >= shortest_edge) continue;
+    for (const auto half_edge : {edge.h0(), edge.h1()}) {
+      if (!mesh.is_collapse_ok(half_edge) || !keeps_orientation(mesh, half_edge)) continue;
+      mesh.collapse(half_edge);
+      is_changed = true;
+      break;
+    }
+  }
+  mesh.garbage_collection();
+  return is_changed;
+}
+
+double angle_at(const HalfEdgeMesh& mesh, OpenMesh::VertexHandle tip, OpenMesh::VertexHandle a,
+                OpenMesh::VertexHandle b) {
+  const Vec3d u = mesh.point(a) - mesh.point(tip), v = mesh.point(b) - mesh.point(tip);
+  return std::atan2(u.cross(v).norm(), u.dot(v));
+}
+
+/// Flips where the angles opposite an edge add up to more than a half turn and the surface stays unfolded.
+void flip_towards_delaunay(HalfEdgeMesh& mesh) {
+  for (const auto edge : mesh.edges()) {
+    const auto a = edge.h0().from(), b = edge.h0().to();
+    const auto c = edge.h0().next().to(), d = edge.h1().next().to();
+    constexpr double kHalfTurn = 3.14159265358979;
+    if (angle_at(mesh, c, a, b) + angle_at(mesh, d, a, b) <= kHalfTurn || !mesh.is_flip_ok(edge)) continue;
+    const Vec3d first = normal(mesh.point(c), mesh.point(a), mesh.point(d));
+    const Vec3d second = normal(mesh.point(d), mesh.point(b), mesh.point(c));
+    if (first.dot(second) > 0.5 * first.norm() * second.norm()) mesh.flip(edge);
+  }
+}
+
+Eigen::RowVector3d onto_surface(Eigen::RowVector3d point, const ImplicitField& field, double step) {
+  for (int round = 0; round < 3; ++round) {
+    const double value = field(point);
+    Eigen::RowVector3d gradient;
+    for (int axis = 0; axis < 3; ++axis) {
+      Eigen::RowVector3d ahead = point;
+      ahead[axis] += step;
+      gradient[axis] = (field(ahead) - value) / step;
+    }
+    point -= value * gradient / std::max(gradient.squaredNorm(), 0.1);
+  }
+  return point;
+}
+
+void smooth(HalfEdgeMesh& mesh, const ImplicitField& field, double step) {
+  std::vector<Vec3d> moved;
+  moved.reserve(mesh.n_vertices());
+  for (const auto vertex : mesh.vertices()) {
+    Vec3d sum(0, 0, 0);
+    for (const auto neighbour : vertex.vertices()) sum += mesh.point(neighbour);
+    const Vec3d mean = 0.5 * mesh.point(vertex) + 0.5 * sum / static_cast<double>(vertex.valence());
+    const Eigen::RowVector3d point = onto_surface({mean[0], mean[1], mean[2]}, field, step);
+    moved.emplace_back(point[0], point[1], point[2]);
+  }
+  for (const auto vertex : mesh.vertices()) mesh.set_point(vertex, moved[vertex.idx()]);
+}
+
+}  // namespace
+
+TriangleMesh remesh(const TriangleMesh& mesh, const ImplicitField& field, double shortest_edge, int rounds) {
+  HalfEdgeMesh half_edges = to_half_edges(mesh);
+  while (collapse_short_edges(half_edges, shortest_edge)) {
+  }
+  for (int round = 0; round < rounds; ++round) {
+    flip_towards_delaunay(half_edges);
+    smooth(half_edges, field, 1e-4 * shortest_edge);
+  }
+  return to_triangles(half_edges);
+}
+
+}  // namespace lpdeform
