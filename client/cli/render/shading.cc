@@ -1,0 +1,44 @@
+#include "client/cli/render/shading.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lpdeform {
+namespace {
+
+double to_linear(std::uint8_t channel) {
+  return std::pow(channel / 255.0, 2.2);
+}
+
+std::uint8_t to_channel(double linear) {
+  return static_cast<std::uint8_t>(std::lround(255 * std::pow(std::clamp(linear, 0.0, 1.0), 1 / 2.2)));
+}
+
+/// Lambert's cosine, softened so that the terminator lies behind the silhouette of a ball.
+double soft_cosine(const Eigen::RowVector3d& normal, const Eigen::RowVector3d& light, double softness) {
+  return std::max(0.0, (normal.dot(light) + softness) / (1 + softness));
+}
+
+}  // namespace
+
+Rgb shaded(Rgb albedo, Eigen::RowVector3d normal, const Eigen::RowVector3d& towards_camera, double openness) {
+  static const Eigen::RowVector3d kKey = Eigen::RowVector3d(-0.55, 0.62, 0.56).normalized();
+  static const Eigen::RowVector3d kFill = Eigen::RowVector3d(0.80, 0.05, 0.60).normalized();
+  if (normal.dot(towards_camera) < 0) normal = -normal;
+  const double sky = 0.26 + 0.10 * normal[1];
+  const double light = 0.80 * soft_cosine(normal, kKey, 0.2) + 0.16 * soft_cosine(normal, kFill, 0) + sky;
+  const double gloss = 0.10 * std::pow(std::max(0.0, normal.dot((kKey + towards_camera).normalized())), 30);
+  const double shadow = 0.35 + 0.65 * openness;
+  Rgb colour;
+  for (int channel = 0; channel < 3; ++channel) {
+    colour[channel] = to_channel(shadow * (to_linear(albedo[channel]) * light + gloss));
+  }
+  return colour;
+}
+
+Rgb background(double down) {
+  const auto level = static_cast<std::uint8_t>(std::lround(std::lerp(250.0, 226.0, down)));
+  return {level, level, static_cast<std::uint8_t>(level + 3)};
+}
+
+}  // namespace lpdeform
