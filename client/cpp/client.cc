@@ -1,0 +1,102 @@
+#include "client/cpp/client.h"
+
+#include <utility>
+
+#include "client/cpp/lease.h"
+#include "client/cpp/link.h"
+#include "client/cpp/rpc.h"
+#include "client/cpp/upload.h"
+
+namespace lpdeform::client {
+
+Session::Session(std::unique_ptr<Link> link) : link_(std::move(link)) {}
+Session::Session(Session&&) noexcept = default;
+Session& Session::operator=(Session&&) noexcept = default;
+Session::~Session() = default;
+
+absl::StatusOr<std::uint64_t> Session::update(Update update) {
+  return link_->update(std::move(update));
+}
+
+absl::StatusOr<std::uint64_t> Session::set_handle(std::string_view name, Handle handle) {
+  Update update;
+  update.handles.emplace(name, std::move(handle));
+  return link_->update(std::move(update));
+}
+
+absl::StatusOr<std::uint64_t> Session::move(std::string_view name, Motion motion) {
+  Update update;
+  update.handles.emplace(name, std::move(motion));
+  return link_->update(std::move(update));
+}
+
+absl::StatusOr<std::uint64_t> Session::remove(std::string_view name) {
+  Update update;
+  update.handles.emplace(name, Update::Removal{});
+  return link_->update(std::move(update));
+}
+
+absl::StatusOr<std::uint64_t> Session::set(Settings settings) {
+  Update update;
+  update.settings = std::move(settings);
+  return link_->update(std::move(update));
+}
+
+absl::StatusOr<Frame> Session::next_frame(std::chrono::milliseconds timeout) {
+  return link_->next_frame(std::chrono::steady_clock::now() + timeout);
+}
+
+absl::StatusOr<std::optional<Frame>> Session::poll() {
+  return link_->poll();
+}
+
+absl::StatusOr<Frame> Session::settle(std::chrono::milliseconds timeout) {
+  return link_->settle(std::chrono::steady_clock::now() + timeout);
+}
+
+absl::StatusOr<SolveResult> Session::solve(SolveOptions options) {
+  return link_->solve(options);
+}
+
+absl::Status Session::take_over() {
+  return link_->take_over();
+}
+
+std::string Session::name() const {
+  return link_->name();
+}
+
+MeshReport Session::mesh_report() const {
+  return link_->mesh_report();
+}
+
+Connection Session::connection() const {
+  return link_->connection();
+}
+
+absl::Status Session::close() {
+  return link_->close();
+}
+
+Client::Client(std::shared_ptr<Rpc> rpc, ClientOptions options) : rpc_(std::move(rpc)), options_(options) {}
+
+absl::StatusOr<Client> Client::connect(std::string_view address, ClientOptions options) {
+  auto rpc = Rpc::connect(std::string(address), options.connect_timeout, options.call_timeout);
+  if (!rpc.ok()) return rpc.status();
+  return Client(*std::move(rpc), options);
+}
+
+absl::StatusOr<Session> Client::open(Mesh mesh, OpenOptions options) {
+  auto lease = create_session(*rpc_, mesh, options, new_request_id(), {});
+  if (!lease.ok()) return lease.status();
+  return Session(std::make_unique<Link>(rpc_, options_, std::move(options),
+                                        std::make_shared<const Mesh>(std::move(mesh)), *std::move(lease)));
+}
+
+absl::StatusOr<Session> Client::join(std::string_view session, Role role, OpenOptions options) {
+  auto lease = join_session(*rpc_, std::string(session), role, {});
+  if (!lease.ok()) return lease.status();
+  return Session(std::make_unique<Link>(rpc_, options_, std::move(options), nullptr, *std::move(lease)));
+}
+
+}  // namespace lpdeform::client

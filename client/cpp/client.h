@@ -1,0 +1,146 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "client/cpp/types.h"
+#include "core/base/fault.h"
+
+/// The C++ client of an lpdeform server.
+///
+///   auto client = Client::connect("localhost:7070");
+///   auto session = client->open(mesh);
+///   session->set_handle("base", {.vertices = base});
+///   session->set_handle("tip", {.vertices = tip, .motion = RigidMotion{.translation = {0, 0, 1}}});
+///   auto frame = session->settle(std::chrono::seconds(10));
+///
+/// Errors are absl::Status. What the server says about one is kept: fault_of(status) gives the stable reason,
+/// the element and the limit (core/base/fault.h). UNAVAILABLE: no server, or it went away. Nothing throws.
+namespace lpdeform::client {
+
+class Rpc;
+class Link;
+
+struct ClientOptions {
+  /// Of connect().
+  std::chrono::milliseconds connect_timeout = std::chrono::seconds(5);
+  /// Of every other call but Session::solve, which has its own.
+  std::chrono::milliseconds call_timeout = std::chrono::seconds(30);
+  /// A live session whose server stays away for longer gives up; next_frame then says UNAVAILABLE for good.
+  std::chrono::milliseconds reconnect_for = std::chrono::minutes(2);
+};
+
+struct OpenOptions {
+  WeightKind weights = WeightKind::kCotangent;
+  FreeComponents free_components = FreeComponents::kError;
+  Settings settings = {};
+  /// Frames that may be under way and not yet taken, 1 to 8; 0 takes the server's 2.
+  std::uint32_t credit = 0;
+  bool double_precision = false;  // of the positions in frames on the wire
+  bool without_distortion = false;
+  double max_frames_per_second = 0;  // 0 is without limit; the last frame of an update always comes
+};
+
+enum class Role { kReader, kWriter };
+
+enum class Connection { kIdle, kConnected, kReconnecting, kClosed };
+
+/// A mesh being deformed on a server. Every function may be called from any thread at any time, except that
+/// the destructor and a move must not overlap another call. Functions say whether they wait; those that do
+/// not never take longer than copying their arguments.
+///
+/// Frames come over one stream that begins with the first call of next_frame, poll or settle. While the
+/// stream is down it reconnects with growing pauses: to the same session where the server still has it,
+/// otherwise to a new one that it makes from its own copy of mesh, handles and settings. Frames of an older
+/// epoch or an older update than one that was shown are dropped.
+class Session {
+ public:
+  Session(Session&&) noexcept;
+  Session& operator=(Session&&) noexcept;
+  /// Closes.
+  ~Session();
+
+  /// Sends a change and returns its number: a frame whose input_seq is at least that takes it into account.
+  /// Does not wait: changes made faster than the connection takes them are merged, the newest value of each
+  /// handle and each setting winning. A change that the server refuses comes out of next_frame as an error,
+  /// once; the session goes on without it, and without what was merged into it. Errors: FAILED_PRECONDITION
+  /// once closed (SESSION_CLOSED) or for a reader (NOT_THE_WRITER).
+  absl::StatusOr<std::uint64_t> update(Update update);
+
+  /// Adds the handle or replaces the one of that name. As update().
+  absl::StatusOr<std::uint64_t> set_handle(std::string_view name, Handle handle);
+  /// Moves a handle. As update().
+  absl::StatusOr<std::uint64_t> move(std::string_view name, Motion motion);
+  /// Lets go of a handle. As update().
+  absl::StatusOr<std::uint64_t> remove(std::string_view name);
+  /// Changes p, stiffness, method and so on. As update().
+  absl::StatusOr<std::uint64_t> set(Settings settings);
+
+  /// The newest frame not yet taken; waits for one. Taking it tells the server to send on, so a caller who
+  /// stops asking costs a bounded number of frames. Errors: DEADLINE_EXCEEDED; what the server had to say
+  /// about an update (the session goes on); once the session is over, why (NOT_FOUND SESSION_DELETED, ABORTED
+  /// WRITER_REPLACED, UNAVAILABLE, FAILED_PRECONDITION SESSION_CLOSED), on every call.
+  absl::StatusOr<Frame> next_frame(std::chrono::milliseconds timeout);
+
+  /// The same without waiting: empty where there is no new frame.
+  absl::StatusOr<std::optional<Frame>> poll();
+
+  /// Takes frames until one is the finished result of the newest update. Waits. Errors as next_frame.
+  absl::StatusOr<Frame> settle(std::chrono::milliseconds timeout);
+
+  /// Solves for the present handles and settings on the server and returns the finished result; waits for it.
+  /// Does not need the stream of frames, but works beside it. Ends early with CANCELLED when close() is
+  /// called from another thread. Errors: what the server refuses; DEADLINE_EXCEEDED; UNAVAILABLE.
+  absl::StatusOr<SolveResult> solve(SolveOptions options = {});
+
+  /// Becomes the writer in place of whoever is, after WRITER_REPLACED or as a reader. Waits for the server.
+  absl::Status take_over();
+
+  /// "sessions/<32 hexadecimal digits>"; another one after the session had to be made anew.
+  std::string name() const;
+  /// What the server found in the mesh.
+  MeshReport mesh_report() const;
+  Connection connection() const;
+
+  /// Ends the stream and every waiting call. Deletes the session on the server where open() made it; a
+  /// failure to do so is returned, and the session expires by itself. Waits for the server at most
+  /// call_timeout. Again: OK at once.
+  absl::Status close();
+
+ private:
+  friend class Client;
+  explicit Session(std::unique_ptr<Link> link);
+  std::unique_ptr<Link> link_;
+};
+
+/// A connection to a server, shared by its sessions. Copies share it; every function may be called from any
+/// thread.
+class Client {
+ public:
+  /// Waits until the server answers. `address`: "host:port", or "unix:/path/of/socket". UNAVAILABLE
+  /// (NO_SERVER) where none does within the timeout.
+  static absl::StatusOr<Client> connect(std::string_view address, ClientOptions options = {});
+
+  /// Makes a session on the server. Waits for the mesh to be sent: in one message where it is small,
+  /// otherwise in parts with a checksum. Errors: INVALID_ARGUMENT with the first element that cannot be
+  /// deformed; RESOURCE_EXHAUSTED; UNAVAILABLE. Keeps `mesh` for as long as the session lives.
+  absl::StatusOr<Session> open(Mesh mesh, OpenOptions options = {});
+
+  /// Joins somebody's session by name: as a reader of its frames, or taking over as its writer. Such a
+  /// session is not made anew where the server loses it, and not deleted by close(). NOT_FOUND where there is
+  /// none.
+  absl::StatusOr<Session> join(std::string_view session, Role role, OpenOptions options = {});
+
+ private:
+  Client(std::shared_ptr<Rpc> rpc, ClientOptions options);
+  std::shared_ptr<Rpc> rpc_;
+  ClientOptions options_;
+};
+
+}  // namespace lpdeform::client

@@ -1,0 +1,93 @@
+#include "client/cpp/frame_assembly.h"
+
+#include <cstring>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/cpp/wire.h"
+#include "core/base/fault.h"
+
+namespace lpdeform::client {
+namespace {
+
+absl::Status misfit(std::string_view text) {
+  return make_fault(absl::StatusCode::kDataLoss, {"FRAME_PARTS", "", ""}, text);
+}
+
+/// Appends little-endian numbers of type Wire to `out`.
+template <typename Wire, typename T>
+void append_numbers(const std::string& bytes, std::vector<T>& out) {
+  const std::size_t count = bytes.size() / sizeof(Wire);
+  for (std::size_t k = 0; k < count; ++k) {
+    Wire number;
+    std::memcpy(&number, bytes.data() + k * sizeof(Wire), sizeof(Wire));
+    out.push_back(number);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<std::optional<Frame>> FrameAssembly::add(const v1::FramePart& part) {
+  absl::Status taken;
+  if (part.has_header()) taken = begin(part.header());
+  if (taken.ok()) taken = append(part);
+  if (!taken.ok()) {
+    frame_.reset();
+    return taken;
+  }
+  if (!part.last()) return std::nullopt;
+  return std::exchange(frame_, std::nullopt);
+}
+
+absl::Status FrameAssembly::begin(const v1::FrameHeader& header) {
+  if (header.vertex_count() != vertex_count_) {
+    return misfit(
+        absl::StrCat("A frame has ", header.vertex_count(), " vertices, the mesh ", vertex_count_, "."));
+  }
+  Frame& frame = frame_.emplace();
+  frame.input_seq = header.input_seq();
+  frame.frame_seq = header.frame_seq();
+  frame.epoch = header.epoch();
+  frame.skipped_inputs = header.skipped_inputs();
+  frame.iteration = header.iteration();
+  frame.energy = header.energy();
+  frame.converged = header.converged();
+  frame.stop_reason = from_wire(header.stop_reason());
+  frame.solve_seconds = header.solve_seconds();
+  frame.method = header.method();
+  frame.positions.reserve(std::size_t{3} * vertex_count_);
+  frame.distortion.reserve(vertex_count_);
+  received_ = 0;
+  scalar_bytes_ = header.scalar() == v1::SCALAR_FLOAT64 ? sizeof(double) : sizeof(float);
+  return absl::OkStatus();
+}
+
+absl::Status FrameAssembly::append(const v1::FramePart& part) {
+  if (!frame_ || part.frame_seq() != frame_->frame_seq || part.first_vertex() != received_ ||
+      part.vertex_count() > vertex_count_ - received_) {
+    return misfit(absl::StrCat("The part of frame ", part.frame_seq(), " from vertex ", part.first_vertex(),
+                               " on does not follow what came before."));
+  }
+  const std::size_t count = part.vertex_count();
+  const bool has_distortion = !part.distortion().empty();
+  if (part.positions().size() != 3 * count * scalar_bytes_ ||
+      (has_distortion && part.distortion().size() != count * sizeof(float))) {
+    return misfit(absl::StrCat("A part of frame ", part.frame_seq(), " has the wrong number of bytes for ",
+                               count, " vertices."));
+  }
+  if (scalar_bytes_ == sizeof(double)) {
+    append_numbers<double>(part.positions(), frame_->positions);
+  } else {
+    append_numbers<float>(part.positions(), frame_->positions);
+  }
+  append_numbers<float>(part.distortion(), frame_->distortion);
+  received_ += part.vertex_count();
+  if (part.last() && received_ != vertex_count_) {
+    return misfit(absl::StrCat("Frame ", part.frame_seq(), " ends after ", received_, " of ", vertex_count_,
+                               " vertices."));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace lpdeform::client

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "absl/status/statusor.h"
+#include "client/cpp/types.h"
+#include "lpdeform/v1/frame.pb.h"
+
+namespace lpdeform::client {
+
+/// Puts the parts of frames together. Not thread-safe.
+class FrameAssembly {
+ public:
+  /// Of the mesh: a frame has as many, so that a server cannot make us take memory at will.
+  explicit FrameAssembly(std::uint32_t vertex_count) : vertex_count_(vertex_count) {}
+
+  /// The frame that `part` completes; empty while parts are missing. DATA_LOSS (FRAME_PARTS) where the parts
+  /// do not fit together; the frame begun is dropped then.
+  absl::StatusOr<std::optional<Frame>> add(const v1::FramePart& part);
+
+ private:
+  absl::Status begin(const v1::FrameHeader& header);
+  absl::Status append(const v1::FramePart& part);
+
+  std::uint32_t vertex_count_;
+  std::optional<Frame> frame_;
+  std::uint32_t received_ = 0;
+  std::size_t scalar_bytes_ = 0;
+};
+
+}  // namespace lpdeform::client

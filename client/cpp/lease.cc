@@ -1,0 +1,52 @@
+#include "client/cpp/lease.h"
+
+#include <utility>
+
+#include "absl/strings/match.h"
+#include "client/cpp/upload.h"
+#include "client/cpp/wire.h"
+
+namespace lpdeform::client {
+
+absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptions& options,
+                                     const std::string& request_id, std::stop_token stop) {
+  v1::CreateSessionRequest request;
+  request.set_request_id(request_id);
+  request.set_weights(to_wire(options.weights));
+  request.set_free_components(to_wire(options.free_components));
+  Packer packer([&](std::string_view bytes) { return upload(rpc, bytes, stop); });
+  absl::Status packed = to_wire(mesh, packer, *request.mutable_mesh());
+  packed.Update(to_wire(options.settings, packer, *request.mutable_settings()));
+  if (!packed.ok()) return packed;
+
+  auto created = rpc.call(request, stop);
+  if (!created.ok()) return created.status();
+  const v1::Session& session = created->session();
+  return Lease{session.name(), created->writer_token(), session.epoch(), session.input_seq(),
+               from_wire(session.mesh())};
+}
+
+absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role role, std::stop_token stop) {
+  v1::GetSessionRequest get;
+  get.set_session(session);
+  const auto found = rpc.call(get, stop);
+  if (!found.ok()) return found.status();
+  Lease lease{session, "", found->session().epoch(), found->session().input_seq(),
+              from_wire(found->session().mesh())};
+  if (role == Role::kReader) return lease;
+
+  v1::AcquireWriterRequest acquire;
+  acquire.set_session(session);
+  const auto acquired = rpc.call(acquire, stop);
+  if (!acquired.ok()) return acquired.status();
+  lease.writer_token = acquired->writer_token();
+  lease.epoch = acquired->epoch();
+  lease.input_seq = acquired->input_seq();
+  return lease;
+}
+
+bool is_session_lost(const absl::Status& status) {
+  return absl::IsNotFound(status) && absl::StartsWith(fault_of(status).reason, "SESSION_");
+}
+
+}  // namespace lpdeform::client

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <stop_token>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "client/cpp/client.h"
+#include "client/cpp/rpc.h"
+
+namespace lpdeform::client {
+
+/// What we hold of a session on the server.
+struct Lease {
+  std::string session;
+  std::string writer_token;  // empty for a reader
+  std::uint64_t epoch = 0;
+  std::uint64_t input_seq = 0;  // the newest update that the server had taken
+  MeshReport mesh;
+};
+
+/// Makes a session. The same `request_id` gives the same one. Waits.
+absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptions& options,
+                                     const std::string& request_id, std::stop_token stop);
+
+/// Looks up a session; as its writer, takes it over. Waits.
+absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role role, std::stop_token stop);
+
+/// The server no longer has the session that a call was about.
+bool is_session_lost(const absl::Status& status);
+
+}  // namespace lpdeform::client

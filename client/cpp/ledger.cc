@@ -1,0 +1,115 @@
+#include "client/cpp/ledger.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace lpdeform::client {
+namespace {
+
+template <typename T>
+void replace_where_given(std::optional<T>& older, std::optional<T>&& newer) {
+  if (newer) older = std::move(newer);
+}
+
+void merge_change(Update::Change& older, Update::Change&& newer) {
+  auto* const added = std::get_if<Handle>(&older);
+  auto* const motion = std::get_if<Motion>(&newer);
+  if (added && motion) {
+    added->motion = std::move(*motion);
+  } else {
+    older = std::move(newer);
+  }
+}
+
+/// Leaves in `state` what is there once its motions and removals have been carried out.
+void settle_changes(Update& state) {
+  std::erase_if(state.handles,
+                [](const auto& entry) { return !std::holds_alternative<Handle>(entry.second); });
+}
+
+}  // namespace
+
+void merge(Update& older, Update newer) {
+  for (auto& [name, change] : newer.handles) {
+    const auto [place, is_new] = older.handles.try_emplace(name, std::move(change));
+    if (!is_new) merge_change(place->second, std::move(change));
+  }
+  replace_where_given(older.settings.p, std::move(newer.settings.p));
+  replace_where_given(older.settings.stiffness, std::move(newer.settings.stiffness));
+  replace_where_given(older.settings.length_unit, std::move(newer.settings.length_unit));
+  replace_where_given(older.settings.solver, std::move(newer.settings.solver));
+}
+
+std::uint64_t Ledger::add(Update update) {
+  const std::uint64_t seq = next_seq_++;
+  if (!waiting_) waiting_.emplace();
+  merge(waiting_->update, std::move(update));
+  waiting_->seq = seq;
+  return seq;
+}
+
+NumberedUpdate Ledger::send_next() {
+  auto& source = restore_ ? restore_ : waiting_;
+  in_flight_.push_back(std::move(*source));
+  source.reset();
+  return in_flight_.back();
+}
+
+void Ledger::accept(std::uint64_t seq) {
+  const auto sent = std::ranges::find(in_flight_, seq, &NumberedUpdate::seq);
+  if (sent == in_flight_.end()) return;
+  merge(accepted_.update, std::move(sent->update));
+  settle_changes(accepted_.update);
+  accepted_.seq = std::max(accepted_.seq, seq);
+  in_flight_.erase(sent);
+}
+
+void Ledger::refuse(std::uint64_t seq) {
+  std::erase_if(in_flight_, [seq](const NumberedUpdate& sent) { return sent.seq == seq; });
+}
+
+void Ledger::connection_lost() {
+  std::optional<NumberedUpdate> again;
+  for (NumberedUpdate& sent : in_flight_) {
+    if (sent.seq == accepted_.seq) {  // an unanswered restore stays on its own
+      restore_ = std::move(sent);
+      continue;
+    }
+    if (!again) again.emplace();
+    merge(again->update, std::move(sent.update));
+    again->seq = std::max(again->seq, sent.seq);
+  }
+  in_flight_.clear();
+  if (!again) return;
+  if (waiting_) {
+    merge(again->update, std::move(waiting_->update));
+    again->seq = waiting_->seq;
+  }
+  waiting_ = std::move(again);
+}
+
+void Ledger::session_lost() {
+  connection_lost();
+  if (accepted_.seq > 0) restore_ = accepted_;
+}
+
+void Ledger::drop_unaccepted() {
+  restore_.reset();
+  in_flight_.clear();
+  waiting_.reset();
+}
+
+void Ledger::count_from(std::uint64_t seq) {
+  if (next_seq_ > seq) return;
+  next_seq_ = seq + 1;
+  if (waiting_) waiting_->seq = next_seq_++;
+}
+
+std::uint64_t Ledger::newest() const {
+  if (waiting_) return waiting_->seq;
+  std::uint64_t newest = accepted_.seq;
+  for (const NumberedUpdate& sent : in_flight_) newest = std::max(newest, sent.seq);
+  return newest;
+}
+
+}  // namespace lpdeform::client

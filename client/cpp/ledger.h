@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+#include "client/cpp/types.h"
+
+namespace lpdeform::client {
+
+/// Puts `newer` on top of `older`: the newest value of each handle and each setting wins; a motion for a
+/// handle that `older` adds moves the added one.
+void merge(Update& older, Update newer);
+
+/// An update and its number, which the server knows as input_seq.
+struct NumberedUpdate {
+  std::uint64_t seq = 0;
+  Update update;
+};
+
+/// The writer's book of updates: what the server has accepted (all that is needed to make the session anew),
+/// what is on its way (at most kWindow), and what waits (merged into one). Bounded by the size of the handles
+/// and settings themselves. Not thread-safe.
+class Ledger {
+ public:
+  static constexpr std::size_t kWindow = 4;
+
+  /// Takes an update on; returns its number.
+  std::uint64_t add(Update update);
+
+  bool can_send() const { return (restore_ || waiting_) && in_flight_.size() < kWindow; }
+  bool has_waiting() const { return restore_ || waiting_; }
+  /// What send_next() gives is the state that a lost session had.
+  bool has_restore() const { return restore_.has_value(); }
+  bool has_in_flight() const { return !in_flight_.empty(); }
+
+  /// What is to be sent next, now on its way. Needs has_waiting().
+  NumberedUpdate send_next();
+
+  /// The server has taken the update of this number, or refused it. Unknown numbers are nothing to us.
+  void accept(std::uint64_t seq);
+  void refuse(std::uint64_t seq);
+
+  /// The connection is gone: what was on its way waits again. Sending it twice does no harm, it is the same
+  /// value.
+  void connection_lost();
+  /// The server has lost the session: what it had accepted is to be sent first, on its own.
+  void session_lost();
+  /// Another writer took over: what it has not taken is void.
+  void drop_unaccepted();
+
+  /// Numbers that follow are higher than `seq`, the newest that the server knows.
+  void count_from(std::uint64_t seq);
+
+  /// The newest update that was not refused; 0 where there is none.
+  std::uint64_t newest() const;
+
+ private:
+  std::uint64_t next_seq_ = 1;
+  NumberedUpdate accepted_;  // handles only as Handle, never as Motion or Removal
+  std::optional<NumberedUpdate> restore_;
+  std::deque<NumberedUpdate> in_flight_;
+  std::optional<NumberedUpdate> waiting_;
+};
+
+}  // namespace lpdeform::client

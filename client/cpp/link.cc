@@ -1,0 +1,170 @@
+#include "client/cpp/link.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/cpp/upload.h"
+#include "client/cpp/wire.h"
+
+namespace lpdeform::client {
+namespace {
+
+/// The server says something at least every 15 s; three times that and the connection is dead.
+constexpr std::chrono::seconds kLongestSilence{45};
+
+v1::DeformRequest open_request(const Lease& lease, const OpenOptions& options) {
+  v1::DeformRequest request;
+  v1::DeformOpen& open = *request.mutable_open();
+  open.set_session(lease.session);
+  open.set_writer_token(lease.writer_token);
+  v1::FrameOptions& frames = *open.mutable_options();
+  frames.set_credit(options.credit);
+  frames.set_scalar(options.double_precision ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
+  frames.set_without_distortion(options.without_distortion);
+  frames.set_max_frames_per_second(options.max_frames_per_second);
+  return request;
+}
+
+}  // namespace
+
+Link::Link(std::shared_ptr<Rpc> rpc, ClientOptions client_options, OpenOptions options,
+           std::shared_ptr<const Mesh> copy, Lease lease)
+    : rpc_(std::move(rpc)),
+      client_options_(client_options),
+      options_(std::move(options)),
+      copy_(std::move(copy)),
+      lease_(std::move(lease)),
+      request_id_(new_request_id()) {
+  ledger_.count_from(lease_.input_seq);
+}
+
+Link::~Link() {
+  close().IgnoreError();
+}
+
+void Link::start_stream() {
+  const std::scoped_lock lock(mutex_);
+  if (is_running_ || is_closing_ || thread_.joinable()) return;
+  is_running_ = true;
+  last_open_ = Clock::now();
+  thread_ = std::thread([this] { run(); });
+}
+
+void Link::run() {
+  Backoff backoff;
+  while (recover(one_stream(), backoff)) {
+  }
+}
+
+absl::Status Link::one_stream() {
+  const std::unique_ptr<DeformCall> call = rpc_->deform();
+  v1::DeformRequest open;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (is_closing_) call->cancel();
+    call_ = call.get();
+    ++stream_;
+    is_open_ = is_over_ = is_to_reopen_ = false;
+    ack_due_.reset();
+    go_away_.reset();
+    last_heard_ = Clock::now();
+    open = open_request(lease_, options_);
+  }
+  std::thread reader([this, &call] { listen(*call); });
+  if (call->write(open)) pump(*call);
+  reader.join();
+  {
+    const std::scoped_lock lock(mutex_);
+    call_ = nullptr;
+  }
+  return call->finish();
+}
+
+void Link::pump(DeformCall& call) {
+  std::unique_lock lock(mutex_);
+  while (!is_over_) {
+    if (is_open_ && send_one(call, lock)) continue;
+    const auto has_work = [this] {
+      return is_over_ || (is_open_ && (ack_due_ || (!is_solving_ && ledger_.can_send())));
+    };
+    const Clock::time_point heard = last_heard_;
+    if (changed_.wait_until(lock, heard + kLongestSilence, has_work) || last_heard_ != heard) continue;
+    call.cancel();
+    changed_.wait(lock, [this] { return is_over_; });
+  }
+}
+
+/// Sends what is due; false where nothing is. `lock` is open meanwhile.
+bool Link::send_one(DeformCall& call, std::unique_lock<std::mutex>& lock) {
+  if (ack_due_) {
+    v1::DeformRequest request;
+    request.mutable_ack()->set_frame_seq(*std::exchange(ack_due_, std::nullopt));
+    lock.unlock();
+    call.write(request);
+    lock.lock();
+    return true;
+  }
+  if (is_solving_ || !ledger_.can_send()) return false;
+  send_update(call, ledger_.send_next(), lock);
+  return true;
+}
+
+void Link::send_update(DeformCall& call, NumberedUpdate update, std::unique_lock<std::mutex>& lock) {
+  lock.unlock();
+  v1::DeformRequest request;
+  Packer packer([this](std::string_view bytes) { return upload(*rpc_, bytes, stop_.get_token()); });
+  const absl::Status packed = to_wire(update.update, update.seq, packer, *request.mutable_update());
+  if (packed.ok()) call.write(request);
+  lock.lock();
+  if (packed.ok()) return;
+  if (absl::IsUnavailable(packed)) {
+    call.cancel();  // what is in flight waits again for the next stream
+    changed_.wait(lock, [this] { return is_over_; });
+    return;
+  }
+  ledger_.refuse(update.seq);
+  box_.put_problem(packed);
+}
+
+/// After a stream has ended: pauses, makes the session anew where it is lost. False where it is all over.
+bool Link::recover(const absl::Status& ended, Backoff& backoff) {
+  std::unique_lock lock(mutex_);
+  if (is_open_) {
+    backoff.reset();
+    last_open_ = Clock::now();
+  }
+  is_open_ = false;
+  ledger_.connection_lost();
+  changed_.notify_all();
+  changed_.wait(lock, [this] { return !is_taking_over_ || is_closing_; });
+  if (is_closing_) return false;
+  if (is_to_reopen_) return true;
+
+  const Recovery recovery = recovery_after(ended, go_away_, copy_ != nullptr);
+  last_problem_ = recovery.why;
+  const bool is_too_late = Clock::now() - last_open_ > client_options_.reconnect_for;
+  if (recovery.next == NextStep::kGiveUp || is_too_late) {
+    give_up(recovery.why);
+    return false;
+  }
+  const auto pause = std::max(recovery.pause, backoff.next());
+  if (changed_.wait_for(lock, pause, [this] { return is_closing_; })) return false;
+  if (recovery.next == NextStep::kResume) return true;
+
+  const std::string lost = lease_.session;
+  lock.unlock();
+  const absl::Status made = make_anew(lost);
+  lock.lock();
+  if (made.ok() || absl::IsUnavailable(made) || absl::IsResourceExhausted(made)) return true;
+  give_up(made);
+  return false;
+}
+
+void Link::give_up(absl::Status why) {
+  ledger_.drop_unaccepted();
+  is_running_ = false;
+  if (why.ok()) why = absl::UnavailableError("The server ended the stream.");
+  box_.finish(std::move(why));
+}
+
+}  // namespace lpdeform::client

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "client/cpp/client.h"
+#include "client/cpp/frame_assembly.h"
+#include "client/cpp/frame_box.h"
+#include "client/cpp/lease.h"
+#include "client/cpp/ledger.h"
+#include "client/cpp/recovery.h"
+#include "client/cpp/rpc.h"
+
+namespace lpdeform::client {
+
+/// A Session from within: the lease on the server's session, the ledger of updates, the box of frames, and
+/// the thread that keeps a Deform stream alive between them. That thread sends; a second one, which lives as
+/// long as a stream, reads. Calls of the Session come in on any thread. One mutex guards all state; no call
+/// to the server and no callback is made under it.
+class Link {
+ public:
+  /// `copy`: what the session can be made anew from; empty for one that was joined.
+  Link(std::shared_ptr<Rpc> rpc, ClientOptions client_options, OpenOptions options,
+       std::shared_ptr<const Mesh> copy, Lease lease);
+  ~Link();
+
+  // As Session has them.
+  absl::StatusOr<std::uint64_t> update(Update update);
+  absl::StatusOr<Frame> next_frame(FrameBox::Clock::time_point deadline);
+  absl::StatusOr<std::optional<Frame>> poll();
+  absl::StatusOr<Frame> settle(FrameBox::Clock::time_point deadline);
+  absl::StatusOr<SolveResult> solve(const SolveOptions& options);
+  absl::Status take_over();
+  absl::Status close();
+  std::string name() const;
+  MeshReport mesh_report() const;
+  Connection connection() const;
+
+ private:
+  using Clock = FrameBox::Clock;
+
+  // The stream, on its thread.
+  void start_stream();
+  void run();
+  absl::Status one_stream();
+  void pump(DeformCall& call);
+  bool send_one(DeformCall& call, std::unique_lock<std::mutex>& lock);
+  void send_update(DeformCall& call, NumberedUpdate update, std::unique_lock<std::mutex>& lock);
+  bool recover(const absl::Status& ended, Backoff& backoff);
+  void give_up(absl::Status why);
+
+  // On the reading thread.
+  void listen(DeformCall& call);
+  absl::Status take(const v1::DeformResponse& response);
+  absl::Status take(const v1::StreamEvent& event);
+  absl::Status take(const v1::FramePart& part);
+  void take(const v1::StreamOpened& opened);
+  void take(const v1::Fault& fault);
+
+  // On any thread.
+  absl::StatusOr<std::optional<Frame>> take_frame(Clock::time_point deadline);
+  absl::StatusOr<SolveResult> solve_once(const SolveOptions& options);
+  absl::Status send_restore(std::unique_lock<std::mutex>& lock);
+  absl::Status make_anew(const std::string& lost);
+  absl::Status no_frame() const;
+
+  const std::shared_ptr<Rpc> rpc_;
+  const ClientOptions client_options_;
+  const OpenOptions options_;
+  const std::shared_ptr<const Mesh> copy_;
+  std::stop_source stop_;  // ends every call that is not a stream
+  FrameBox box_;
+
+  std::mutex renewing_;  // one thread at a time makes the session anew
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  Lease lease_;
+  Ledger ledger_;
+  std::string request_id_;  // of the session to be made next
+  bool is_closing_ = false;
+  bool is_solving_ = false;
+  bool is_taking_over_ = false;
+
+  std::thread thread_;
+  bool is_running_ = false;     // thread_ has work to do
+  DeformCall* call_ = nullptr;  // the stream that there is, for cancel()
+  std::uint64_t stream_ = 0;    // counts streams
+  bool is_open_ = false;        // StreamOpened came
+  bool is_over_ = false;        // nothing more comes
+  bool is_to_reopen_ = false;   // ended by us, to begin again with another token
+  std::optional<std::uint64_t> ack_due_;
+  std::optional<v1::GoAway> go_away_;
+  std::optional<FrameAssembly> assembly_;
+  Clock::time_point last_heard_;
+  Clock::time_point last_open_;
+  absl::Status last_problem_;
+};
+
+}  // namespace lpdeform::client

@@ -1,0 +1,232 @@
+// What callers ask of a Link, on their own threads.
+
+#include <utility>
+
+#include "absl/cleanup/cleanup.h"
+#include "absl/strings/str_cat.h"
+#include "client/cpp/link.h"
+#include "client/cpp/solve_call.h"
+#include "client/cpp/upload.h"
+#include "client/cpp/wire.h"
+
+namespace lpdeform::client {
+namespace {
+
+absl::Status session_closed() {
+  return make_fault(absl::StatusCode::kFailedPrecondition, {"SESSION_CLOSED", "", ""},
+                    "The session is closed.");
+}
+
+/// Whether the server may still take in an update that failed like this, so that it is to be sent again.
+bool is_undecided(const absl::Status& status) {
+  return absl::IsUnavailable(status) || absl::IsCancelled(status) || absl::IsDeadlineExceeded(status) ||
+         is_session_lost(status);
+}
+
+}  // namespace
+
+absl::StatusOr<std::uint64_t> Link::update(Update update) {
+  const std::scoped_lock lock(mutex_);
+  if (is_closing_) return session_closed();
+  if (lease_.writer_token.empty()) {
+    return make_fault(absl::StatusCode::kFailedPrecondition, {"NOT_THE_WRITER", "", ""},
+                      "A reader cannot change the session: take_over() first.");
+  }
+  const std::uint64_t seq = ledger_.add(std::move(update));
+  changed_.notify_all();
+  return seq;
+}
+
+absl::StatusOr<std::optional<Frame>> Link::take_frame(Clock::time_point deadline) {
+  start_stream();
+  absl::StatusOr<std::optional<FrameBox::Taken>> taken = box_.take(deadline);
+  if (!taken.ok()) return taken.status();
+  if (!taken->has_value()) return std::nullopt;
+  const std::scoped_lock lock(mutex_);
+  if ((*taken)->stream == stream_) {
+    ack_due_ = (*taken)->frame.frame_seq;
+    changed_.notify_all();
+  }
+  return std::move((*taken)->frame);
+}
+
+absl::StatusOr<std::optional<Frame>> Link::poll() {
+  return take_frame(Clock::now());
+}
+
+absl::StatusOr<Frame> Link::next_frame(Clock::time_point deadline) {
+  absl::StatusOr<std::optional<Frame>> frame = take_frame(deadline);
+  if (!frame.ok()) return frame.status();
+  if (!frame->has_value()) return no_frame();
+  return *std::move(*frame);
+}
+
+absl::StatusOr<Frame> Link::settle(Clock::time_point deadline) {
+  for (;;) {
+    absl::StatusOr<Frame> frame = next_frame(deadline);
+    if (!frame.ok()) return frame;
+    const std::scoped_lock lock(mutex_);
+    if (frame->converged && frame->input_seq >= ledger_.newest()) return frame;
+  }
+}
+
+absl::Status Link::no_frame() const {
+  const std::scoped_lock lock(mutex_);
+  const std::string problem = is_open_ || last_problem_.ok()
+                                  ? ""
+                                  : absl::StrCat(" The connection is down: ", last_problem_.message());
+  return make_fault(absl::StatusCode::kDeadlineExceeded, {"NO_FRAME", "", ""},
+                    absl::StrCat("No new frame came in time.", problem));
+}
+
+absl::StatusOr<SolveResult> Link::solve(const SolveOptions& options) {
+  std::unique_lock lock(mutex_);
+  const auto is_quiet = [this] { return is_closing_ || (!is_solving_ && !ledger_.has_in_flight()); };
+  if (!changed_.wait_for(lock, client_options_.call_timeout, is_quiet)) {
+    return absl::DeadlineExceededError(
+        "Another solve, or an update that the server has not answered, is under way.");
+  }
+  if (is_closing_) return session_closed();
+  is_solving_ = true;
+  const auto solved = absl::MakeCleanup([this] {
+    const std::scoped_lock relock(mutex_);
+    is_solving_ = false;
+    changed_.notify_all();
+  });
+  const std::string session = lease_.session;
+  lock.unlock();
+
+  absl::StatusOr<SolveResult> result = solve_once(options);
+  if (!is_session_lost(result.status()) || copy_ == nullptr) return result;
+  const absl::Status made = make_anew(session);
+  return made.ok() ? solve_once(options) : made;
+}
+
+absl::StatusOr<SolveResult> Link::solve_once(const SolveOptions& options) {
+  std::unique_lock lock(mutex_);
+  const absl::Status restored = send_restore(lock);
+  if (!restored.ok()) return restored;
+  std::optional<NumberedUpdate> update;
+  if (ledger_.has_waiting()) update = ledger_.send_next();
+  const Lease lease = lease_;
+  lock.unlock();
+
+  absl::StatusOr<SolveResult> result = run_solve(*rpc_, lease, update, options, stop_.get_token());
+  lock.lock();
+  if (!update) return result;
+  if (result.ok()) {
+    ledger_.accept(update->seq);
+  } else if (is_undecided(result.status())) {
+    ledger_.connection_lost();
+  } else {
+    ledger_.refuse(update->seq);
+  }
+  return result;
+}
+
+/// Gives a session made anew what the lost one had, on its own: it was accepted once and must not fall with
+/// an update that is not.
+absl::Status Link::send_restore(std::unique_lock<std::mutex>& lock) {
+  while (ledger_.has_restore()) {
+    const NumberedUpdate restore = ledger_.send_next();
+    v1::UpdateHandlesRequest request;
+    request.set_session(lease_.session);
+    request.set_writer_token(lease_.writer_token);
+    lock.unlock();
+    Packer packer([this](std::string_view bytes) { return upload(*rpc_, bytes, stop_.get_token()); });
+    absl::Status sent = to_wire(restore.update, restore.seq, packer, *request.mutable_update());
+    if (sent.ok()) sent = rpc_->call(request, stop_.get_token()).status();
+    lock.lock();
+    if (!sent.ok()) {
+      ledger_.connection_lost();
+      return sent;
+    }
+    ledger_.accept(restore.seq);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Link::make_anew(const std::string& lost) {
+  const std::scoped_lock renewing(renewing_);
+  std::string request_id;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (lease_.session != lost) return absl::OkStatus();  // another thread was faster
+    request_id = request_id_;
+  }
+  absl::StatusOr<Lease> made = create_session(*rpc_, *copy_, options_, request_id, stop_.get_token());
+  if (!made.ok()) return made.status();
+  const std::scoped_lock lock(mutex_);
+  lease_ = *std::move(made);
+  request_id_ = new_request_id();
+  ledger_.session_lost();
+  box_.begin_session();
+  return absl::OkStatus();
+}
+
+absl::Status Link::take_over() {
+  std::string session;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (is_closing_) return session_closed();
+    is_taking_over_ = true;
+    session = lease_.session;
+  }
+  absl::StatusOr<Lease> lease = join_session(*rpc_, session, Role::kWriter, stop_.get_token());
+  std::thread finished;
+  {
+    const std::scoped_lock lock(mutex_);
+    is_taking_over_ = false;
+    changed_.notify_all();
+    if (!lease.ok()) return lease.status();
+    if (is_closing_) return session_closed();
+    lease_ = *std::move(lease);
+    ledger_.count_from(lease_.input_seq);
+    box_.begin_epoch(lease_.epoch);
+    is_to_reopen_ = is_running_;
+    if (call_ != nullptr) call_->cancel();
+    if (!is_running_) finished = std::move(thread_);
+  }
+  if (finished.joinable()) finished.join();
+  box_.resume();
+  return absl::OkStatus();
+}
+
+absl::Status Link::close() {
+  bool is_ours_to_delete = false;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (is_closing_) return absl::OkStatus();
+    is_closing_ = true;
+    is_ours_to_delete = copy_ != nullptr;
+    if (call_ != nullptr) call_->cancel();
+    changed_.notify_all();
+  }
+  stop_.request_stop();
+  box_.finish(session_closed());
+  if (thread_.joinable()) thread_.join();
+  if (!is_ours_to_delete) return absl::OkStatus();
+  v1::DeleteSessionRequest request;
+  request.set_session(name());
+  return rpc_->call(request, std::stop_token()).status();
+}
+
+std::string Link::name() const {
+  const std::scoped_lock lock(mutex_);
+  return lease_.session;
+}
+
+MeshReport Link::mesh_report() const {
+  const std::scoped_lock lock(mutex_);
+  return lease_.mesh;
+}
+
+Connection Link::connection() const {
+  const std::scoped_lock lock(mutex_);
+  if (is_closing_) return Connection::kClosed;
+  if (is_open_) return Connection::kConnected;
+  if (is_running_) return Connection::kReconnecting;
+  return thread_.joinable() ? Connection::kClosed : Connection::kIdle;
+}
+
+}  // namespace lpdeform::client

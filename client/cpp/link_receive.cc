@@ -1,0 +1,93 @@
+// What comes from the server on a Deform stream: the reading thread of a Link.
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/cpp/link.h"
+#include "client/cpp/wire.h"
+
+namespace lpdeform::client {
+
+void Link::listen(DeformCall& call) {
+  v1::DeformResponse response;
+  while (call.read(response)) {
+    const absl::Status taken = take(response);
+    if (!taken.ok()) call.cancel();
+  }
+  const std::scoped_lock lock(mutex_);
+  is_over_ = true;
+  changed_.notify_all();
+}
+
+absl::Status Link::take(const v1::DeformResponse& response) {
+  {
+    const std::scoped_lock lock(mutex_);
+    last_heard_ = Clock::now();
+    if (response.has_result()) {
+      ledger_.accept(response.result().input_seq());
+      changed_.notify_all();
+    }
+  }
+  return response.has_event() ? take(response.event()) : absl::OkStatus();
+}
+
+absl::Status Link::take(const v1::StreamEvent& event) {
+  switch (event.event_case()) {
+    case v1::StreamEvent::kOpened:
+      take(event.opened());
+      break;
+    case v1::StreamEvent::kFrame:
+      return take(event.frame());
+    case v1::StreamEvent::kFault:
+      take(event.fault());
+      break;
+    case v1::StreamEvent::kGoAway: {
+      const std::scoped_lock lock(mutex_);
+      go_away_ = event.go_away();
+      break;
+    }
+    default:
+      break;  // a heartbeat, or what a newer server says
+  }
+  return absl::OkStatus();
+}
+
+void Link::take(const v1::StreamOpened& opened) {
+  assembly_.emplace(opened.vertex_count());
+  box_.begin_epoch(opened.epoch());
+  const std::scoped_lock lock(mutex_);
+  lease_.epoch = opened.epoch();
+  ledger_.count_from(opened.input_seq());
+  is_open_ = true;
+  changed_.notify_all();
+}
+
+absl::Status Link::take(const v1::FramePart& part) {
+  if (!assembly_) return absl::DataLossError("A frame came before the stream was open.");
+  absl::StatusOr<std::optional<Frame>> frame = assembly_->add(part);
+  if (!frame.ok()) return frame.status();
+  if (!frame->has_value()) return absl::OkStatus();
+
+  std::uint64_t stream = 0;
+  {
+    const std::scoped_lock lock(mutex_);
+    stream = stream_;
+  }
+  const std::uint64_t frame_seq = (*frame)->frame_seq;
+  if (box_.put(*std::move(*frame), stream)) return absl::OkStatus();
+  const std::scoped_lock lock(mutex_);
+  ack_due_ = frame_seq;  // dropped, but its credit is owed
+  changed_.notify_all();
+  return absl::OkStatus();
+}
+
+void Link::take(const v1::Fault& fault) {
+  {
+    const std::scoped_lock lock(mutex_);
+    ledger_.refuse(fault.input_seq());
+    changed_.notify_all();
+  }
+  box_.put_problem(from_wire(fault));
+}
+
+}  // namespace lpdeform::client

@@ -1,0 +1,145 @@
+#include "client/cpp/rpc.h"
+
+#include <grpcpp/grpcpp.h>
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/cpp/status_details.h"
+#include "core/base/fault.h"
+#include "lpdeform/v1/service.grpc.pb.h"
+
+namespace lpdeform::client {
+namespace {
+
+using Stub = v1::DeformService::Stub;
+
+constexpr int kFirstReconnectMs = 50;
+constexpr int kLongestReconnectMs = 2000;
+/// A part of a frame may be under way at once. More would only hide frames from the server's credit.
+constexpr int kStreamWindowBytes = 1 << 20;
+/// Switches on the time limit for unacknowledged bytes of TCP, so that a write never waits on a dead
+/// connection. Pings come rarely enough for every server.
+constexpr int kKeepaliveMs = 6 * 60 * 1000;
+constexpr int kUnacknowledgedMs = 20 * 1000;
+
+grpc::ChannelArguments channel_arguments() {
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kStreamWindowBytes);
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLongestReconnectMs);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kUnacknowledgedMs);
+  return arguments;
+}
+
+absl::Status status_of(const grpc::Status& status) {
+  if (status.ok()) return absl::OkStatus();
+  return with_details(static_cast<absl::StatusCode>(status.error_code()), status.error_message(),
+                      status.error_details());
+}
+
+class GrpcDeformCall final : public DeformCall {
+ public:
+  explicit GrpcDeformCall(Stub& stub) : stream_(stub.Deform(&context_)) {}
+
+  bool write(const v1::DeformRequest& request) override { return stream_->Write(request); }
+  bool read(v1::DeformResponse& response) override { return stream_->Read(&response); }
+  void cancel() override { context_.TryCancel(); }
+  absl::Status finish() override { return status_of(stream_->Finish()); }
+
+ private:
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReaderWriter<v1::DeformRequest, v1::DeformResponse>> stream_;
+};
+
+class GrpcRpc final : public Rpc {
+ public:
+  GrpcRpc(std::shared_ptr<grpc::Channel> channel, std::chrono::milliseconds call_timeout)
+      : stub_(v1::DeformService::NewStub(channel)), call_timeout_(call_timeout) {}
+
+  absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
+                                                std::stop_token stop) override {
+    return unary(&Stub::CreateUpload, request, std::move(stop));
+  }
+  absl::StatusOr<v1::UploadPartResponse> call(const v1::UploadPartRequest& request,
+                                              std::stop_token stop) override {
+    return unary(&Stub::UploadPart, request, std::move(stop));
+  }
+  absl::StatusOr<v1::CreateSessionResponse> call(const v1::CreateSessionRequest& request,
+                                                 std::stop_token stop) override {
+    return unary(&Stub::CreateSession, request, std::move(stop));
+  }
+  absl::StatusOr<v1::GetSessionResponse> call(const v1::GetSessionRequest& request,
+                                              std::stop_token stop) override {
+    return unary(&Stub::GetSession, request, std::move(stop));
+  }
+  absl::StatusOr<v1::DeleteSessionResponse> call(const v1::DeleteSessionRequest& request,
+                                                 std::stop_token stop) override {
+    return unary(&Stub::DeleteSession, request, std::move(stop));
+  }
+  absl::StatusOr<v1::AcquireWriterResponse> call(const v1::AcquireWriterRequest& request,
+                                                 std::stop_token stop) override {
+    return unary(&Stub::AcquireWriter, request, std::move(stop));
+  }
+  absl::StatusOr<v1::UpdateHandlesResponse> call(const v1::UpdateHandlesRequest& request,
+                                                 std::stop_token stop) override {
+    return unary(&Stub::UpdateHandles, request, std::move(stop));
+  }
+
+  absl::Status solve(const v1::SolveRequest& request, double deadline_seconds, std::stop_token stop,
+                     const std::function<absl::Status(const v1::SolveResponse&)>& on_response) override {
+    grpc::ClientContext context;
+    if (deadline_seconds > 0) {
+      const auto limit = std::chrono::duration<double>(deadline_seconds);
+      context.set_deadline(std::chrono::system_clock::now() +
+                           std::chrono::duration_cast<std::chrono::system_clock::duration>(limit));
+    }
+    const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
+    const auto reader = stub_->Solve(&context, request);
+    absl::Status taken;
+    v1::SolveResponse response;
+    while (taken.ok() && reader->Read(&response)) taken = on_response(response);
+    if (!taken.ok()) context.TryCancel();
+    const grpc::Status ended = reader->Finish();
+    return taken.ok() ? status_of(ended) : taken;
+  }
+
+  std::unique_ptr<DeformCall> deform() override { return std::make_unique<GrpcDeformCall>(*stub_); }
+
+ private:
+  template <typename Request, typename Response>
+  absl::StatusOr<Response> unary(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                              Response*),
+                                 const Request& request, std::stop_token stop) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + call_timeout_);
+    const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
+    Response response;
+    const grpc::Status status = ((*stub_).*method)(&context, request, &response);
+    if (!status.ok()) return status_of(status);
+    return response;
+  }
+
+  std::unique_ptr<Stub> stub_;
+  std::chrono::milliseconds call_timeout_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<Rpc>> Rpc::connect(const std::string& address,
+                                                  std::chrono::milliseconds connect_timeout,
+                                                  std::chrono::milliseconds call_timeout) {
+  const auto channel =
+      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), channel_arguments());
+  if (!channel->WaitForConnected(std::chrono::system_clock::now() + connect_timeout)) {
+    return make_fault(
+        absl::StatusCode::kUnavailable, {"NO_SERVER", address, ""},
+        absl::StrCat("No server answers at \"", address, "\" within ", connect_timeout.count(), " ms."));
+  }
+  return std::make_shared<GrpcRpc>(channel, call_timeout);
+}
+
+}  // namespace lpdeform::client

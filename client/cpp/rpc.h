@@ -1,0 +1,62 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "lpdeform/v1/service.pb.h"
+
+namespace lpdeform::client {
+
+/// One Deform call. read() on one thread, write() on one other; cancel() on any, as often as one likes.
+class DeformCall {
+ public:
+  virtual ~DeformCall() = default;
+  /// Waits until gRPC has taken the message. False once the call is over.
+  virtual bool write(const v1::DeformRequest& request) = 0;
+  /// Waits for a message. False once the call is over.
+  virtual bool read(v1::DeformResponse& response) = 0;
+  virtual void cancel() = 0;
+  /// How it ended. Once, when nobody reads or writes any more.
+  virtual absl::Status finish() = 0;
+};
+
+/// The server's calls over one channel, gRPC hidden behind it. Thread-safe. Each waits, for at most the call
+/// timeout where nothing else is said, and ends with CANCELLED when `stop` is requested.
+class Rpc {
+ public:
+  /// `address` as in Client::connect. Waits until the server answers: UNAVAILABLE (NO_SERVER) where it does
+  /// not.
+  static absl::StatusOr<std::shared_ptr<Rpc>> connect(const std::string& address,
+                                                      std::chrono::milliseconds connect_timeout,
+                                                      std::chrono::milliseconds call_timeout);
+  virtual ~Rpc() = default;
+
+  virtual absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
+                                                        std::stop_token stop) = 0;
+  virtual absl::StatusOr<v1::UploadPartResponse> call(const v1::UploadPartRequest& request,
+                                                      std::stop_token stop) = 0;
+  virtual absl::StatusOr<v1::CreateSessionResponse> call(const v1::CreateSessionRequest& request,
+                                                         std::stop_token stop) = 0;
+  virtual absl::StatusOr<v1::GetSessionResponse> call(const v1::GetSessionRequest& request,
+                                                      std::stop_token stop) = 0;
+  virtual absl::StatusOr<v1::DeleteSessionResponse> call(const v1::DeleteSessionRequest& request,
+                                                         std::stop_token stop) = 0;
+  virtual absl::StatusOr<v1::AcquireWriterResponse> call(const v1::AcquireWriterRequest& request,
+                                                         std::stop_token stop) = 0;
+  virtual absl::StatusOr<v1::UpdateHandlesResponse> call(const v1::UpdateHandlesRequest& request,
+                                                         std::stop_token stop) = 0;
+
+  /// Calls `on_response` for each message, on this thread; an error of it ends the call and is returned.
+  /// `deadline_seconds` 0 is without limit.
+  virtual absl::Status solve(const v1::SolveRequest& request, double deadline_seconds, std::stop_token stop,
+                             const std::function<absl::Status(const v1::SolveResponse&)>& on_response) = 0;
+
+  virtual std::unique_ptr<DeformCall> deform() = 0;
+};
+
+}  // namespace lpdeform::client

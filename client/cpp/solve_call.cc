@@ -1,0 +1,101 @@
+#include "client/cpp/solve_call.h"
+
+#include <optional>
+#include <utility>
+
+#include "client/cpp/frame_assembly.h"
+#include "client/cpp/upload.h"
+#include "client/cpp/wire.h"
+
+namespace lpdeform::client {
+namespace {
+
+absl::Status fill_request(Rpc& rpc, const Lease& lease, const std::optional<NumberedUpdate>& update,
+                          const SolveOptions& options, std::stop_token stop, v1::SolveRequest& request) {
+  request.set_session(lease.session);
+  request.set_writer_token(lease.writer_token);
+  request.set_scalar(options.double_precision ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
+  request.set_certify(options.certify);
+  request.set_trace(options.keep_trace);
+  request.set_progress(static_cast<bool>(options.on_progress));
+  Packer packer([&](std::string_view bytes) { return upload(rpc, bytes, stop); });
+  absl::Status packed;
+  if (update) packed.Update(to_wire(update->update, update->seq, packer, *request.mutable_update()));
+  if (options.initial_positions) {
+    request.mutable_initial_positions()->set_scalar(v1::SCALAR_FLOAT64);
+    packed.Update(packer.pack(bytes_of(*options.initial_positions),
+                              *request.mutable_initial_positions()->mutable_data()));
+  }
+  return packed;
+}
+
+/// Takes in the messages of a Solve call.
+class ResultBuilder {
+ public:
+  ResultBuilder(std::uint32_t vertex_count, const SolveOptions& options)
+      : assembly_(vertex_count), options_(options) {}
+
+  absl::Status take(const v1::SolveResponse& response) {
+    switch (response.message_case()) {
+      case v1::SolveResponse::kProgress:
+        show(response.progress());
+        break;
+      case v1::SolveResponse::kSummary:
+        from_wire(response.summary(), result_);
+        break;
+      case v1::SolveResponse::kTrace:
+        for (const auto& record : response.trace().records()) result_.trace.push_back(from_wire(record));
+        break;
+      case v1::SolveResponse::kFrame:
+        return take_part(response.frame());
+      default:
+        break;  // a newer server may say more
+    }
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<SolveResult> finish() && {
+    if (is_whole_) return std::move(result_);
+    return make_fault(absl::StatusCode::kDataLoss, {"FRAME_PARTS", "", ""},
+                      "The server's result came without positions.");
+  }
+
+ private:
+  void show(const v1::SolveProgress& progress) const {
+    if (options_.on_progress)
+      options_.on_progress({progress.iteration(), progress.energy(), progress.seconds()});
+  }
+
+  absl::Status take_part(const v1::FramePart& part) {
+    absl::StatusOr<std::optional<Frame>> frame = assembly_.add(part);
+    if (!frame.ok()) return frame.status();
+    if (!frame->has_value()) return absl::OkStatus();
+    result_.positions = std::move((*frame)->positions);
+    result_.distortion = std::move((*frame)->distortion);
+    is_whole_ = true;
+    return absl::OkStatus();
+  }
+
+  FrameAssembly assembly_;
+  const SolveOptions& options_;
+  SolveResult result_;
+  bool is_whole_ = false;
+};
+
+}  // namespace
+
+absl::StatusOr<SolveResult> run_solve(Rpc& rpc, const Lease& lease,
+                                      const std::optional<NumberedUpdate>& update,
+                                      const SolveOptions& options, std::stop_token stop) {
+  v1::SolveRequest request;
+  const absl::Status filled = fill_request(rpc, lease, update, options, stop, request);
+  if (!filled.ok()) return filled;
+  ResultBuilder builder(static_cast<std::uint32_t>(lease.mesh.vertices), options);
+  const absl::Status ended =
+      rpc.solve(request, options.deadline_seconds, stop,
+                [&](const v1::SolveResponse& response) { return builder.take(response); });
+  if (!ended.ok()) return ended;
+  return std::move(builder).finish();
+}
+
+}  // namespace lpdeform::client

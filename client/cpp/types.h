@@ -1,0 +1,188 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace lpdeform::client {
+
+/// A triangle mesh as flat arrays. Vertex order is never changed by anybody.
+struct Mesh {
+  /// x, y, z of each vertex, in the caller's unit of length.
+  std::vector<double> vertices = {};
+  /// Three 0-based vertex indices a triangle, counter-clockwise seen from outside.
+  std::vector<std::uint32_t> faces = {};
+
+  std::size_t vertex_count() const { return vertices.size() / 3; }
+  std::size_t face_count() const { return faces.size() / 3; }
+};
+
+/// Stays where the rest mesh has it.
+struct Fixed {};
+
+/// x = R (p - center) + center + translation for every vertex of the handle; always relative to the rest
+/// mesh.
+struct RigidMotion {
+  std::array<double, 3> axis = {0, 0, 1};  // of any length but 0
+  double angle_radians = 0;                // counter-clockwise seen against the axis
+  std::array<double, 3> center = {0, 0, 0};
+  std::array<double, 3> translation = {0, 0, 0};
+};
+
+/// Absolute positions: x, y, z for each of the handle's vertices, in their order.
+struct TargetPositions {
+  std::vector<double> positions = {};
+};
+
+using Motion = std::variant<Fixed, RigidMotion, TargetPositions>;
+
+/// A group of vertices that the user holds. A vertex belongs to one handle at most.
+struct Handle {
+  std::vector<std::uint32_t> vertices = {};
+  Motion motion = Fixed{};
+};
+
+enum class Method { kAuto, kQuasiNewton, kLineSearch, kLocalGlobal, kConic };
+
+enum class InitialGuess {
+  kCurrent,    // the session's present state; a new session's is kLaplacian
+  kLaplacian,  // the naive Laplacian deformation, no rotations
+  kRest,       // the rest mesh with the handles at their targets
+};
+
+enum class WeightKind { kCotangent, kUniform };
+
+/// What becomes of a connected component that no handle holds.
+enum class FreeComponents {
+  kError,   // the solve is refused: the component is named
+  kStay,    // stays where the rest mesh has it
+  kFollow,  // moves rigidly with the nearest handle
+};
+
+enum class StopReason {
+  kRunning,
+  kConverged,
+  kIterationLimit,
+  kTimeLimit,
+  kCancelled,
+  kStalled,             // no step lowers the energy, short of the tolerance
+  kNumericalBreakdown,  // the best state seen is kept
+};
+
+/// "iteration_limit" and so on, as in reports.
+std::string stop_reason_name(StopReason reason);
+
+/// How a solve is made and when it stops. One setting: it is replaced whole.
+struct SolverSettings {
+  Method method = Method::kAuto;
+  double tolerance = 0;              // 1e-14 to 0.1; 0 takes the server's default
+  std::uint32_t max_iterations = 0;  // 0 takes the server's default
+  double time_limit_seconds = 0;     // 0 is without limit
+  InitialGuess initial = InitialGuess::kCurrent;
+};
+
+/// The same number everywhere, or one a vertex.
+using FieldValue = std::variant<double, std::vector<double>>;
+
+/// What is left out keeps its value.
+struct Settings {
+  std::optional<FieldValue> p = {};          // 1 <= p <= 64
+  std::optional<FieldValue> stiffness = {};  // 1e-6 <= s <= 1e6
+  /// Of mixed norms, in the mesh's unit; 0 takes the mean rest edge length.
+  std::optional<double> length_unit = {};
+  std::optional<SolverSettings> solver = {};
+};
+
+/// A change of handles and settings; the server takes it whole or not at all.
+struct Update {
+  /// Lets go of the handle.
+  struct Removal {};
+  /// A Handle adds or replaces, a Motion moves the handle of that name.
+  using Change = std::variant<Handle, Motion, Removal>;
+
+  std::map<std::string, Change> handles = {};
+  Settings settings = {};
+};
+
+/// One kind of defect of a mesh.
+struct Defect {
+  std::string kind = {};  // "zero_area_faces"
+  std::int64_t count = 0;
+  std::vector<std::int32_t> first = {};  // the first few by index; an edge is two vertex indices
+};
+
+struct MeshReport {
+  std::int64_t vertices = 0;
+  std::int64_t faces = 0;
+  std::int64_t edges = 0;
+  std::int64_t components = 0;
+  std::int64_t boundary_loops = 0;
+  std::vector<Defect> defects = {};  // every kind, also those with count 0
+};
+
+/// A state of the surface on its way to the optimum.
+struct Frame {
+  std::vector<double> positions = {};  // x, y, z of each vertex
+  /// E_i of each vertex, in the mesh's unit of length; empty where it was not asked for.
+  std::vector<float> distortion = {};
+  std::uint64_t input_seq = 0;  // the newest update it answers: see Session::update; never falls
+  std::uint64_t frame_seq = 0;  // rises within an epoch
+  std::uint64_t epoch = 0;
+  std::uint64_t skipped_inputs = 0;  // updates since the frame before that no frame answers
+  std::uint32_t iteration = 0;
+  double energy = 0;       // E of the positions, Eq. 3 of the paper, in the mesh's unit
+  bool converged = false;  // the result for input_seq: no further frame until there is a new update
+  StopReason stop_reason = StopReason::kRunning;
+  double solve_seconds = 0;
+  std::string method = {};
+};
+
+struct IterationRecord {
+  std::uint32_t iteration = 0;
+  double seconds = 0;
+  double energy = 0;     // the true one
+  double objective = 0;  // what the method minimises, in its own unit
+  std::uint32_t stage = 0;
+};
+
+struct SolveProgress {
+  std::uint32_t iteration = 0;
+  double energy = 0;
+  double seconds = 0;
+};
+
+struct SolveOptions {
+  bool certify = false;          // compute SolveResult::optimality_gap
+  bool keep_trace = false;       // fill SolveResult::trace
+  bool double_precision = true;  // positions travel as float64
+  /// x, y, z of each vertex, in place of the initial guess.
+  std::optional<std::vector<double>> initial_positions = {};
+  /// Called at most ten times a second, on the thread that called solve(). May be empty.
+  std::function<void(const SolveProgress&)> on_progress = {};
+  /// Of the whole call; 0 is without limit. When it has passed, the server stops as well.
+  double deadline_seconds = 0;
+};
+
+struct SolveResult {
+  std::vector<double> positions = {};
+  std::vector<float> distortion = {};
+  std::string method = {};  // that ran
+  StopReason stop_reason = StopReason::kRunning;
+  std::uint32_t iterations = 0;
+  double initial_energy = 0;
+  double energy = 0;
+  /// (E - lower bound) / E of the convex problem with its rotations held.
+  std::optional<double> optimality_gap = {};
+  double setup_seconds = 0;
+  double solve_seconds = 0;
+  std::uint32_t threads = 0;
+  std::uint64_t input_seq = 0;
+  std::vector<IterationRecord> trace = {};
+};
+
+}  // namespace lpdeform::client

@@ -1,0 +1,229 @@
+#include "client/cpp/wire.h"
+
+#include <array>
+#include <span>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "core/base/fault.h"
+
+namespace lpdeform::client {
+namespace {
+
+template <typename... Cases>
+struct Match : Cases... {
+  using Cases::operator()...;
+};
+
+void put(const std::array<double, 3>& from, v1::Vector3* to) {
+  to->set_x(from[0]);
+  to->set_y(from[1]);
+  to->set_z(from[2]);
+}
+
+v1::Method to_wire(Method method) {
+  switch (method) {
+    case Method::kAuto:
+      return v1::METHOD_UNSPECIFIED;
+    case Method::kQuasiNewton:
+      return v1::METHOD_QUASI_NEWTON;
+    case Method::kLineSearch:
+      return v1::METHOD_LINE_SEARCH;
+    case Method::kLocalGlobal:
+      return v1::METHOD_LOCAL_GLOBAL;
+    case Method::kConic:
+      return v1::METHOD_CONIC;
+  }
+  return v1::METHOD_UNSPECIFIED;
+}
+
+v1::InitialGuess to_wire(InitialGuess guess) {
+  switch (guess) {
+    case InitialGuess::kCurrent:
+      return v1::INITIAL_GUESS_UNSPECIFIED;
+    case InitialGuess::kLaplacian:
+      return v1::INITIAL_GUESS_LAPLACIAN;
+    case InitialGuess::kRest:
+      return v1::INITIAL_GUESS_REST;
+  }
+  return v1::INITIAL_GUESS_UNSPECIFIED;
+}
+
+void to_wire(const SolverSettings& settings, v1::SolverSettings& out) {
+  out.set_method(to_wire(settings.method));
+  out.set_tolerance(settings.tolerance);
+  out.set_max_iterations(settings.max_iterations);
+  out.set_time_limit_seconds(settings.time_limit_seconds);
+  out.set_initial(to_wire(settings.initial));
+}
+
+absl::Status to_wire(const FieldValue& value, Packer& packer, v1::Field& out) {
+  if (const double* const uniform = std::get_if<double>(&value)) {
+    out.set_uniform(*uniform);
+    return absl::OkStatus();
+  }
+  out.mutable_per_vertex()->set_scalar(v1::SCALAR_FLOAT64);
+  return packer.pack(bytes_of(std::get<std::vector<double>>(value)),
+                     *out.mutable_per_vertex()->mutable_values());
+}
+
+absl::Status to_wire(const Motion& motion, Packer& packer, v1::Motion& out) {
+  const Match put_motion{[&](const Fixed&) {
+                           out.mutable_fixed();
+                           return absl::OkStatus();
+                         },
+                         [&](const RigidMotion& rigid) {
+                           v1::RigidMotion& message = *out.mutable_rigid();
+                           put(rigid.axis, message.mutable_axis());
+                           message.set_angle_radians(rigid.angle_radians);
+                           put(rigid.center, message.mutable_center());
+                           put(rigid.translation, message.mutable_translation());
+                           return absl::OkStatus();
+                         },
+                         [&](const TargetPositions& targets) {
+                           out.mutable_targets()->set_scalar(v1::SCALAR_FLOAT64);
+                           return packer.pack(bytes_of(targets.positions),
+                                              *out.mutable_targets()->mutable_positions());
+                         }};
+  return std::visit(put_motion, motion);
+}
+
+absl::Status to_wire(const Update::Change& change, Packer& packer, v1::HandleUpdate& out) {
+  const Match put_change{[&](const Handle& handle) {
+                           const absl::Status packed =
+                               packer.pack(bytes_of(handle.vertices), *out.mutable_set()->mutable_vertices());
+                           if (!packed.ok()) return packed;
+                           return to_wire(handle.motion, packer, *out.mutable_set()->mutable_motion());
+                         },
+                         [&](const Motion& motion) { return to_wire(motion, packer, *out.mutable_move()); },
+                         [&](const Update::Removal&) {
+                           out.mutable_remove();
+                           return absl::OkStatus();
+                         }};
+  return std::visit(put_change, change);
+}
+
+}  // namespace
+
+absl::Status to_wire(const Mesh& mesh, Packer& packer, v1::Mesh& out) {
+  out.set_vertex_count(static_cast<std::uint32_t>(mesh.vertex_count()));
+  out.set_face_count(static_cast<std::uint32_t>(mesh.face_count()));
+  out.set_scalar(v1::SCALAR_FLOAT64);
+  return packer.pack(bytes_of(mesh.vertices) + bytes_of(mesh.faces), *out.mutable_data());
+}
+
+absl::Status to_wire(const Settings& settings, Packer& packer, v1::SettingsUpdate& out) {
+  absl::Status packed;
+  if (settings.p) packed.Update(to_wire(*settings.p, packer, *out.mutable_p()));
+  if (settings.stiffness) packed.Update(to_wire(*settings.stiffness, packer, *out.mutable_stiffness()));
+  if (settings.length_unit) out.mutable_length_unit()->set_length(*settings.length_unit);
+  if (settings.solver) to_wire(*settings.solver, *out.mutable_solver());
+  return packed;
+}
+
+absl::Status to_wire(const Update& update, std::uint64_t seq, Packer& packer, v1::Update& out) {
+  out.set_input_seq(seq);
+  for (const auto& [name, change] : update.handles) {
+    v1::HandleUpdate& message = *out.add_handles();
+    message.set_name(name);
+    const absl::Status packed = to_wire(change, packer, message);
+    if (!packed.ok()) return packed;
+  }
+  const Settings& settings = update.settings;
+  if (!settings.p && !settings.stiffness && !settings.length_unit && !settings.solver)
+    return absl::OkStatus();
+  return to_wire(settings, packer, *out.mutable_settings());
+}
+
+v1::WeightKind to_wire(WeightKind weights) {
+  return weights == WeightKind::kUniform ? v1::WEIGHT_KIND_UNIFORM : v1::WEIGHT_KIND_COTANGENT;
+}
+
+v1::FreeComponents to_wire(FreeComponents free_components) {
+  switch (free_components) {
+    case FreeComponents::kError:
+      return v1::FREE_COMPONENTS_ERROR;
+    case FreeComponents::kStay:
+      return v1::FREE_COMPONENTS_STAY;
+    case FreeComponents::kFollow:
+      return v1::FREE_COMPONENTS_FOLLOW;
+  }
+  return v1::FREE_COMPONENTS_UNSPECIFIED;
+}
+
+MeshReport from_wire(const v1::MeshReport& report) {
+  MeshReport out{.vertices = report.vertices(),
+                 .faces = report.faces(),
+                 .edges = report.edges(),
+                 .components = report.components(),
+                 .boundary_loops = report.boundary_loops(),
+                 .defects = {}};
+  for (const v1::Defect& defect : report.defects()) {
+    out.defects.push_back({defect.kind(), defect.count(), {defect.first().begin(), defect.first().end()}});
+  }
+  return out;
+}
+
+StopReason from_wire(v1::StopReason reason) {
+  switch (reason) {
+    case v1::STOP_REASON_CONVERGED:
+      return StopReason::kConverged;
+    case v1::STOP_REASON_ITERATION_LIMIT:
+      return StopReason::kIterationLimit;
+    case v1::STOP_REASON_TIME_LIMIT:
+      return StopReason::kTimeLimit;
+    case v1::STOP_REASON_CANCELLED:
+      return StopReason::kCancelled;
+    case v1::STOP_REASON_STALLED:
+      return StopReason::kStalled;
+    case v1::STOP_REASON_NUMERICAL_BREAKDOWN:
+      return StopReason::kNumericalBreakdown;
+    default:
+      return StopReason::kRunning;
+  }
+}
+
+IterationRecord from_wire(const v1::IterationRecord& record) {
+  return {record.iteration(), record.seconds(), record.energy(), record.objective(), record.stage()};
+}
+
+void from_wire(const v1::SolveSummary& summary, SolveResult& out) {
+  out.method = summary.method();
+  out.stop_reason = from_wire(summary.stop_reason());
+  out.iterations = summary.iterations();
+  out.initial_energy = summary.initial_energy();
+  out.energy = summary.energy();
+  if (summary.has_certificate()) out.optimality_gap = summary.certificate().relative_gap();
+  out.setup_seconds = summary.setup_seconds();
+  out.solve_seconds = summary.solve_seconds();
+  out.threads = summary.threads();
+  out.input_seq = summary.input_seq();
+}
+
+absl::Status from_wire(const v1::Fault& fault) {
+  return make_fault(static_cast<absl::StatusCode>(fault.code()),
+                    {fault.reason(), fault.element(), fault.limit()}, fault.text());
+}
+
+std::string stop_reason_name(StopReason reason) {
+  switch (reason) {
+    case StopReason::kRunning:
+      return "running";
+    case StopReason::kConverged:
+      return "converged";
+    case StopReason::kIterationLimit:
+      return "iteration_limit";
+    case StopReason::kTimeLimit:
+      return "time_limit";
+    case StopReason::kCancelled:
+      return "cancelled";
+    case StopReason::kStalled:
+      return "stalled";
+    case StopReason::kNumericalBreakdown:
+      return "numerical_breakdown";
+  }
+  return "unknown";
+}
+
+}  // namespace lpdeform::client

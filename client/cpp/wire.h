@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "client/cpp/packer.h"
+#include "client/cpp/types.h"
+#include "lpdeform/v1/service.pb.h"
+
+namespace lpdeform::client {
+
+// Our plain types as messages. What can fail is an upload of the packer.
+
+absl::Status to_wire(const Mesh& mesh, Packer& packer, v1::Mesh& out);
+absl::Status to_wire(const Settings& settings, Packer& packer, v1::SettingsUpdate& out);
+absl::Status to_wire(const Update& update, std::uint64_t seq, Packer& packer, v1::Update& out);
+v1::WeightKind to_wire(WeightKind weights);
+v1::FreeComponents to_wire(FreeComponents free_components);
+
+// Messages as our plain types.
+
+MeshReport from_wire(const v1::MeshReport& report);
+StopReason from_wire(v1::StopReason reason);
+IterationRecord from_wire(const v1::IterationRecord& record);
+/// Everything but the positions, distortion and trace, which come in messages of their own.
+void from_wire(const v1::SolveSummary& summary, SolveResult& out);
+/// The error that a stream reports. Keeps reason, element and limit.
+absl::Status from_wire(const v1::Fault& fault);
+
+}  // namespace lpdeform::client
