@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <limits>
 #include <string>
 
@@ -19,6 +20,13 @@ bool is_blank(char c) {
 std::string_view without_plus(std::string_view word) {
   if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
   return word;
+}
+
+/// A number that std::from_chars left alone as too large or too small: infinite or 0.
+double beyond_double(std::string_view word) {
+  double nearest = 0;
+  absl::from_chars(word.data(), word.data() + word.size(), nearest);
+  return std::abs(nearest) > 1 ? std::copysign(std::numeric_limits<double>::infinity(), nearest) : nearest;
 }
 
 }  // namespace
@@ -84,8 +92,7 @@ std::optional<double> to_number(std::string_view word) {
   const char* const end = word.data() + word.size();
   const auto result = std::from_chars(word.data(), end, value);
   if (result.ptr != end || result.ec == std::errc::invalid_argument) return std::nullopt;
-  // The standard leaves the value alone here; Abseil's gives infinity or zero.
-  if (result.ec == std::errc::result_out_of_range) absl::from_chars(word.data(), end, value);
+  if (result.ec == std::errc::result_out_of_range) return beyond_double(word);
   return value;
 }
 
