@@ -36,6 +36,12 @@ class RestShape {
   /// Length of the diagonal of the bounding box of the rest positions. > 0.
   double diagonal() const { return diagonal_; }
 
+  /// What the solver computes with: (positions - centre) / mean_edge_length, so that nothing depends on the unit of length
+  /// or on the distance from the origin.
+  const Points& scaled_positions() const { return scaled_positions_; }
+  /// Mean of the rest positions, in the caller's units.
+  const Eigen::RowVector3d& centre() const { return centre_; }
+
   // One-ring of vertex i: entries offsets[i] to offsets[i + 1] of neighbours (ascending) and weights. Symmetric.
   const std::vector<std::int32_t>& offsets() const { return offsets_; }
   const std::vector<std::int32_t>& neighbours() const { return neighbours_; }
@@ -48,6 +54,8 @@ class RestShape {
   RestShape() = default;
 
   Points positions_;
+  Points scaled_positions_;
+  Eigen::RowVector3d centre_ = Eigen::RowVector3d::Zero();
   Faces faces_;
   MeshReport report_;
   WeightKind kind_ = WeightKind::kCotangent;

@@ -1,1 +1,116 @@
+#include "core/energy/weights.h"
 
+#include <algorithm>
+#include <numeric>
+
+#include "core/mesh/topology.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr double kFloor = 1e-6;  // of the mean weight
+
+/// One side of a face: its edge and half the cotangent of the angle opposite it.
+struct Contribution {
+  std::array<std::int32_t, 2> edge;
+  double weight;
+};
+
+std::array<double, 3> half_cotangents(const Points& vertices, const Eigen::Matrix<std::int32_t, 1, 3>& face) {
+  const Eigen::RowVector3d a = vertices.row(face[0]), b = vertices.row(face[1]), c = vertices.row(face[2]);
+  if (is_zero_area(a, b, c)) return {0, 0, 0};
+  const double twice_area = (b - a).cross(c - a).norm();
+  return {(b - a).dot(c - a) / twice_area / 2, (c - b).dot(a - b) / twice_area / 2,
+          (a - c).dot(b - c) / twice_area / 2};
+}
+
+std::vector<Contribution> contributions(const TriangleMesh& mesh) {
+  std::vector<Contribution> all;
+  all.reserve(3 * mesh.faces.rows());
+  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
+    const Eigen::Matrix<std::int32_t, 1, 3> face = mesh.faces.row(f);
+    const std::array<double, 3> cotangents = half_cotangents(mesh.vertices, face);
+    for (int corner = 0; corner < 3; ++corner) {
+      const std::int32_t u = face[(corner + 1) % 3], v = face[(corner + 2) % 3];
+      if (u != v) all.push_back({{std::min(u, v), std::max(u, v)}, cotangents[corner]});
+    }
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Contribution& l, const Contribution& r) { return l.edge < r.edge; });
+  return all;
+}
+
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::int32_t count) : parent_(count), size_(count, 1) {
+    std::iota(parent_.begin(), parent_.end(), 0);
+  }
+  std::int32_t find(std::int32_t v) {
+    while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
+    return v;
+  }
+  void join(std::int32_t u, std::int32_t v) {
+    u = find(u), v = find(v);
+    if (u == v) return;
+    if (size_[u] < size_[v]) std::swap(u, v);
+    parent_[v] = u;
+    size_[u] += size_[v];
+  }
+  std::int32_t size_of(std::int32_t v) { return size_[find(v)]; }
+
+ private:
+  std::vector<std::int32_t> parent_, size_;
+};
+
+/// Raises the edges that tie a cut-off part of the surface (mostly a single vertex) to the rest. Of the two parts that an
+/// edge joins, the vertex in the smaller one counts as floored.
+void apply_floor(std::int32_t vertex_count, EdgeWeights& result) {
+  if (result.edges.empty()) return;
+  const double total = std::accumulate(result.weights.begin(), result.weights.end(), 0.0);
+  const double floor = kFloor * total / static_cast<double>(result.weights.size());
+  DisjointSets parts(vertex_count);
+  for (std::size_t e = 0; e < result.edges.size(); ++e) {
+    if (result.weights[e] >= floor) parts.join(result.edges[e][0], result.edges[e][1]);
+  }
+  for (std::size_t e = 0; e < result.edges.size(); ++e) {
+    const auto [u, v] = result.edges[e];
+    if (result.weights[e] >= floor || parts.find(u) == parts.find(v)) continue;
+    result.weights[e] = floor;
+    result.floored_vertices.push_back(parts.size_of(u) < parts.size_of(v) ? u : v);
+  }
+  auto& floored = result.floored_vertices;
+  std::sort(floored.begin(), floored.end());
+  floored.erase(std::unique(floored.begin(), floored.end()), floored.end());
+}
+
+}  // namespace
+
+EdgeWeights edge_weights(const TriangleMesh& mesh, WeightKind kind) {
+  EdgeWeights result;
+  const std::vector<Contribution> all = contributions(mesh);
+  for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {
+    double sum = 0;
+    for (end = begin; end < all.size() && all[end].edge == all[begin].edge; ++end) sum += all[end].weight;
+    if (kind == WeightKind::kUniform) sum = 1;
+    if (sum < 0) result.clamped_edges.push_back(static_cast<std::int32_t>(result.edges.size()));
+    result.edges.push_back(all[begin].edge);
+    result.weights.push_back(std::max(0.0, sum));
+  }
+  apply_floor(static_cast<std::int32_t>(mesh.vertices.rows()), result);
+  return result;
+}
+
+void count_weight_defects(const EdgeWeights& weights, MeshReport& report) {
+  report.clamped_edges = {};
+  report.clamped_edges.count = static_cast<std::int64_t>(weights.clamped_edges.size());
+  for (std::size_t k = 0; k < weights.clamped_edges.size() && k < DefectCount::kFirstShown; ++k) {
+    const auto& edge = weights.edges[weights.clamped_edges[k]];
+    report.clamped_edges.first.insert(report.clamped_edges.first.end(), edge.begin(), edge.end());
+  }
+  report.floored_vertices = {};
+  report.floored_vertices.count = static_cast<std::int64_t>(weights.floored_vertices.size());
+  const auto shown = std::min<std::size_t>(weights.floored_vertices.size(), DefectCount::kFirstShown);
+  report.floored_vertices.first.assign(weights.floored_vertices.begin(), weights.floored_vertices.begin() + shown);
+}
+
+}  // namespace lpdeform

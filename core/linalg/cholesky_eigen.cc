@@ -1,1 +1,59 @@
+#include <Eigen/SparseCholesky>
 
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/linalg/cholesky.h"
+
+namespace lpdeform {
+namespace {
+
+using Sparse = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int32_t>;
+using Factor = Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::AMDOrdering<std::int32_t>>;
+
+Eigen::Map<const Sparse> view_of(const LowerMatrix& matrix, const double* values) {
+  return {matrix.size(), matrix.size(), static_cast<Eigen::Index>(matrix.rows.size()), matrix.columns.data(),
+          matrix.rows.data(), values};
+}
+
+}  // namespace
+
+struct SparseCholesky::Impl {
+  Factor factor;
+  std::size_t nonzeros = 0;
+};
+
+SparseCholesky::SparseCholesky(const LowerMatrix& pattern) : impl_(std::make_unique<Impl>()) {
+  const std::vector<double> ones(pattern.rows.size(), 1.0);
+  impl_->factor.analyzePattern(view_of(pattern, ones.data()));
+}
+SparseCholesky::~SparseCholesky() = default;
+SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;
+SparseCholesky& SparseCholesky::operator=(SparseCholesky&&) noexcept = default;
+
+bool SparseCholesky::factor(const LowerMatrix& matrix) {
+  const bool is_finite = std::all_of(matrix.values.begin(), matrix.values.end(), [](double v) { return std::isfinite(v); });
+  if (!is_finite) return false;
+  impl_->factor.factorize(view_of(matrix, matrix.values.data()));
+  if (impl_->factor.info() != Eigen::Success) return false;
+  impl_->nonzeros = impl_->factor.matrixL().nestedExpression().nonZeros();
+  return (impl_->factor.vectorD().array() > 0).all();
+}
+
+void SparseCholesky::solve(const Points& b, Points& x) const { x = impl_->factor.solve(b).eval(); }
+
+void SparseCholesky::solve(const Eigen::VectorXd& b, Eigen::VectorXd& x) const { x = impl_->factor.solve(b).eval(); }
+
+std::size_t SparseCholesky::memory_bytes() const {
+  return impl_->nonzeros * (sizeof(double) + sizeof(std::int32_t)) +
+         impl_->factor.cols() * (sizeof(double) + 4 * sizeof(std::int32_t));
+}
+
+const char* cholesky_backend() {
+  static const std::string name = "Eigen " + std::to_string(EIGEN_WORLD_VERSION) + "." +
+                                  std::to_string(EIGEN_MAJOR_VERSION) + "." + std::to_string(EIGEN_MINOR_VERSION);
+  return name.c_str();
+}
+
+}  // namespace lpdeform

@@ -1,1 +1,340 @@
+#include "core/solve/deformer.h"
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "core/solve/certificate.h"
+#include "core/solve/conic.h"
+#include "core/solve/line_search.h"
+#include "core/solve/local_global.h"
+#include "core/solve/quasi_newton.h"
+
+namespace lpdeform {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+absl::Status out_of_range(const std::string& reason, const std::string& name, double value, const std::string& limit) {
+  return invalid_input({reason, name, limit},
+                       absl::StrCat(name, " is ", value, "; it must satisfy ", limit));
+}
+
+absl::Status check_settings(const SolveSettings& settings) {
+  if (!(settings.tolerance >= 1e-14 && settings.tolerance <= 0.1)) {
+    return out_of_range("TOLERANCE_OUT_OF_RANGE", "tolerance", settings.tolerance, "1e-14 <= tolerance <= 0.1");
+  }
+  if (settings.max_iterations < 0) {
+    return out_of_range("ITERATIONS_OUT_OF_RANGE", "max_iterations", settings.max_iterations, "0 <= max_iterations");
+  }
+  if (!(settings.time_limit_seconds > 0)) {
+    return out_of_range("TIME_LIMIT_OUT_OF_RANGE", "time_limit_seconds", settings.time_limit_seconds,
+                        "0 < time_limit_seconds");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status check_method(Method method, const Material& material) {
+  const double lowest = material.p.minCoeff(), highest = material.p.maxCoeff();
+  const double needed = method == Method::kLocalGlobal ? 2 : method == Method::kConic ? 1 : 0;
+  if (needed == 0 || (lowest == needed && highest == needed)) return absl::OkStatus();
+  const std::string limit = absl::StrCat("p = ", needed);
+  const std::string name(method_name(method));
+  return invalid_input({"METHOD_NEEDS_P", name, limit},
+                       absl::StrCat("method ", name, " needs ", limit, " everywhere; p is ", lowest,
+                                    lowest == highest ? "" : absl::StrCat(" to ", highest)));
+}
+
+}  // namespace
+
+struct Deformer::Impl {
+  Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options)
+      : shape(std::move(rest_shape)),
+        options(deformer_options),
+        cells(shape, Workers(deformer_options.threads)),
+        metric(shape),
+        x(shape->scaled_positions()),
+        best_energies(Field::Zero(shape->vertex_count())),
+        positions(shape->positions()) {}
+
+  double unit() const { return shape->mean_edge_length(); }
+  double length_unit() const { return material.length_unit > 0 ? material.length_unit : unit(); }
+
+  Points laplacian_guess();
+  Points current_guess();
+  Points initial_guess(InitialGuess guess);
+  double typical_energy(const Points& guess);
+  std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, bool is_warm);
+  bool prepare_metric(bool needs_plain_weights);
+  double keep_if_best();
+  void record(const StepResult& result, double sum);
+  void begin(const SolveSettings& new_settings, std::stop_token new_stop);
+  void iterate();
+  void end(StopReason reason);
+  void interrupt() {
+    if (minimiser) end(StopReason::kCancelled);
+  }
+
+  std::shared_ptr<const RestShape> shape;
+  DeformerOptions options;
+  CellPass cells;
+  Metric metric;
+  HandleSet handles;
+  Material material;
+  std::optional<Constraints> constraints;
+
+  // The state, in scaled units: the best of the last solve, or what was set.
+  Points x;
+  bool has_state = false;
+  Field best_energies;  // E_i at x, the caller's units
+  Points positions;     // x in the caller's units, made when asked for
+  bool is_positions_current = true;
+
+  // The running solve.
+  SolveSettings settings;
+  std::stop_token stop;
+  std::optional<LpNorm> norm;  // true norm, and the reference of the running solve
+  std::unique_ptr<Minimiser> minimiser;
+  Clock::time_point started;
+  double best_sum = 0;
+  SolveSummary summary;
+};
+
+/// x = rest + u with u the harmonic extension of the handles' displacements: the solution of the naive Laplacian system
+/// L x = L p with the handles' positions given.
+Points Deformer::Impl::laplacian_guess() {
+  Points u = constraints->targets - shape->scaled_positions();
+  metric.extend(constraints->is_held, u);
+  return shape->scaled_positions() + u;
+}
+
+Points Deformer::Impl::current_guess() {
+  Points u = Points::Zero(x.rows(), 3);
+  bool is_moved = false;
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    if (!constraints->is_held[i]) continue;
+    u.row(i) = constraints->targets.row(i) - x.row(i);
+    is_moved = is_moved || !u.row(i).isZero(0);
+  }
+  if (!is_moved) return x;
+  metric.extend(constraints->is_held, u);
+  return x + u;
+}
+
+Points Deformer::Impl::initial_guess(InitialGuess guess) {
+  Points result;
+  if (guess == InitialGuess::kRest) result = constraints->targets;
+  else if (guess == InitialGuess::kCurrent && has_state) result = current_guess();
+  else result = laplacian_guess();
+  // Held vertices are at their targets exactly, whatever the solve rounded to.
+  for (Eigen::Index i = 0; i < result.rows(); ++i) {
+    if (constraints->is_held[i]) result.row(i) = constraints->targets.row(i);
+  }
+  return result;
+}
+
+/// The largest E_i at the guess: the reference length that keeps terms of any p in range.
+double Deformer::Impl::typical_energy(const Points& guess) {
+  cells.evaluate(guess, LpNorm(Material::uniform(2), shape->vertex_count(), unit(), 1));
+  const auto& e2 = cells.squared_energies();
+  const double largest = std::sqrt(*std::max_element(e2.begin(), e2.end()));
+  return largest > 1e-12 ? largest : 1.0;
+}
+
+std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points guess, bool is_warm) {
+  Problem problem{cells,
+                  metric,
+                  *constraints,
+                  *norm,
+                  settings.tolerance,
+                  length_unit() / unit(),
+                  shape->diagonal() / unit(),
+                  stop};
+  switch (method) {
+    case Method::kLineSearch: return std::make_unique<LineSearch>(std::move(problem), std::move(guess));
+    case Method::kLocalGlobal: return std::make_unique<LocalGlobal>(std::move(problem), std::move(guess));
+    case Method::kConic: return std::make_unique<Conic>(std::move(problem), std::move(guess));
+    case Method::kAuto:
+    case Method::kQuasiNewton: break;
+  }
+  return std::make_unique<QuasiNewton>(std::move(problem), std::move(guess), is_warm);
+}
+
+/// Factors for the present handles with equal cell weights, unless a usable factor is there. False where that fails.
+bool Deformer::Impl::prepare_metric(bool needs_plain_weights) {
+  if (metric.is_factored_for(constraints->is_held) && !needs_plain_weights) return true;
+  return metric.factor(std::vector<double>(shape->vertex_count(), 1.0), constraints->is_held);
+}
+
+/// Called with the evaluation of minimiser->x() in `cells`; returns its true sum.
+double Deformer::Impl::keep_if_best() {
+  const double sum = cells.sum(*norm);
+  if (!(sum < best_sum)) return sum;
+  best_sum = sum;
+  x = minimiser->x();
+  is_positions_current = false;
+  const auto& e2 = cells.squared_energies();
+  for (std::size_t i = 0; i < e2.size(); ++i) best_energies[i] = unit() * std::sqrt(e2[i]);
+  return sum;
+}
+
+void Deformer::Impl::record(const StepResult& result, double sum) {
+  summary.energy = norm->true_energy(best_sum);
+  summary.solve_seconds = seconds_since(started);
+  if (!settings.keep_trace) return;
+  summary.trace.push_back(
+      {summary.iterations, summary.solve_seconds, norm->true_energy(sum), result.objective, result.stage});
+}
+
+void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token new_stop) {
+  started = Clock::now();
+  settings = new_settings;
+  if (settings.method == Method::kAuto) settings.method = Method::kQuasiNewton;
+  stop = std::move(new_stop);
+  summary = {};
+  summary.method = settings.method;
+  summary.threads = cells.workers().threads();
+  const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state;
+  const bool is_factored = prepare_metric(!is_warm);
+  summary.setup_seconds = seconds_since(started);
+
+  started = Clock::now();
+  Points guess = is_factored ? initial_guess(settings.initial) : constraints->targets;
+  if (!guess.allFinite()) guess = constraints->targets;
+  const double reference = settings.method == Method::kLineSearch ? length_unit() / unit() : typical_energy(guess);
+  norm.emplace(material, shape->vertex_count(), unit(), reference);
+  cells.evaluate(guess, *norm);
+  best_sum = std::numeric_limits<double>::infinity();
+  minimiser = make_minimiser(settings.method, std::move(guess), is_warm);
+  const double sum = keep_if_best();
+  summary.initial_energy = norm->true_energy(sum);
+  record({Outcome::kProgress, sum, 0}, sum);
+  if (!is_factored) end(StopReason::kNumericalBreakdown);
+}
+
+void Deformer::Impl::iterate() {
+  const StepResult result = minimiser->step();
+  ++summary.iterations;
+  record(result, keep_if_best());
+  switch (result.outcome) {
+    case Outcome::kProgress: return;
+    case Outcome::kConverged: return end(StopReason::kConverged);
+    case Outcome::kStalled: return end(StopReason::kStalled);
+    case Outcome::kBreakdown: return end(StopReason::kNumericalBreakdown);
+  }
+}
+
+void Deformer::Impl::end(StopReason reason) {
+  minimiser.reset();
+  has_state = true;
+  summary.stop_reason = reason;
+  summary.solve_seconds = seconds_since(started);
+}
+
+Deformer::Deformer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Deformer::~Deformer() = default;
+
+absl::StatusOr<std::unique_ptr<Deformer>> Deformer::create(std::shared_ptr<const RestShape> shape,
+                                                           DeformerOptions options) {
+  if (shape == nullptr) return invalid_input({"NO_SHAPE", "", ""}, "no rest shape was given");
+  if (options.threads < 1 || options.threads > 1024) {
+    return out_of_range("THREADS_OUT_OF_RANGE", "threads", options.threads, "1 <= threads <= 1024");
+  }
+  return std::unique_ptr<Deformer>(new Deformer(std::make_unique<Impl>(std::move(shape), options)));
+}
+
+const RestShape& Deformer::shape() const { return *impl_->shape; }
+const HandleSet& Deformer::handles() const { return impl_->handles; }
+const Material& Deformer::material() const { return impl_->material; }
+const SolveSummary& Deformer::summary() const { return impl_->summary; }
+const Field& Deformer::cell_energies() const { return impl_->best_energies; }
+
+absl::Status Deformer::set_handles(const HandleSet& handles) {
+  auto constraints = make_constraints(*impl_->shape, handles, impl_->options.free_components);
+  if (!constraints.ok()) return constraints.status();
+  impl_->interrupt();
+  impl_->handles = handles;
+  impl_->constraints = *std::move(constraints);
+  return absl::OkStatus();
+}
+
+absl::Status Deformer::set_material(const Material& material) {
+  if (absl::Status status = check_material(material, impl_->shape->vertex_count()); !status.ok()) return status;
+  impl_->interrupt();
+  impl_->material = material;
+  return absl::OkStatus();
+}
+
+absl::Status Deformer::set_positions(const Points& positions) {
+  const std::int32_t n = impl_->shape->vertex_count();
+  if (positions.rows() != n) {
+    return invalid_input({"POSITIONS_SIZE", "positions", absl::StrCat(n, " positions")},
+                         absl::StrCat("there are ", positions.rows(), " positions for ", n, " vertices"));
+  }
+  const double farthest = kFarthestTarget * impl_->shape->diagonal();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if ((positions.row(i) - impl_->shape->centre()).stableNorm() <= farthest) continue;
+    return invalid_input({"POSITIONS_NOT_FINITE", absl::StrCat("vertex ", i), "1e9 diagonals of the mesh"},
+                         absl::StrCat("the position of vertex ", i,
+                                      " is not finite, or over 1e9 diagonals of the mesh away"));
+  }
+  impl_->interrupt();
+  impl_->x = (positions.rowwise() - impl_->shape->centre()) / impl_->unit();
+  impl_->positions = positions;
+  impl_->is_positions_current = true;
+  impl_->has_state = true;
+  return absl::OkStatus();
+}
+
+absl::Status Deformer::start(const SolveSettings& settings, std::stop_token stop) {
+  Impl& self = *impl_;
+  if (absl::Status status = check_settings(settings); !status.ok()) return status;
+  if (absl::Status status = check_method(settings.method, self.material); !status.ok()) return status;
+  if (!self.constraints) {
+    return make_fault(absl::StatusCode::kFailedPrecondition, {"NO_HANDLES", "", "at least 1 handle"},
+                      "there is no handle; a deformation needs at least one");
+  }
+  self.interrupt();
+  self.begin(settings, std::move(stop));
+  return absl::OkStatus();
+}
+
+bool Deformer::step() {
+  Impl& self = *impl_;
+  if (!self.minimiser) return false;
+  if (self.stop.stop_requested()) self.end(StopReason::kCancelled);
+  else if (seconds_since(self.started) >= self.settings.time_limit_seconds) self.end(StopReason::kTimeLimit);
+  else if (self.summary.iterations >= self.settings.max_iterations) self.end(StopReason::kIterationLimit);
+  else self.iterate();
+  return self.minimiser != nullptr;
+}
+
+absl::StatusOr<SolveSummary> Deformer::solve(const SolveSettings& settings, std::stop_token stop) {
+  if (absl::Status status = start(settings, std::move(stop)); !status.ok()) return status;
+  while (step()) {
+  }
+  return summary();
+}
+
+const Points& Deformer::positions() const {
+  Impl& self = *impl_;
+  if (!self.is_positions_current) {
+    self.positions = (self.x * self.unit()).rowwise() + self.shape->centre();
+    self.is_positions_current = true;
+  }
+  return self.positions;
+}
+
+std::size_t Deformer::memory_bytes() const {
+  const std::size_t points = impl_->x.size() * sizeof(double);
+  return sizeof(Impl) + impl_->cells.memory_bytes() + impl_->metric.memory_bytes() + 4 * points;
+}
+
+}  // namespace lpdeform
+namespace lpdeform { double Deformer::optimality_gap() { return 0; } }

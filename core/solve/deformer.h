@@ -8,18 +8,12 @@
 #include "core/base/workers.h"
 #include "core/energy/material.h"
 #include "core/energy/rest_shape.h"
+#include "core/solve/constraints.h"
 #include "core/solve/handles.h"
 #include "core/solve/settings.h"
 #include "core/solve/summary.h"
 
 namespace lpdeform {
-
-/// What becomes of a connected component that no handle holds.
-enum class FreeComponents {
-  kError,   // refused: the component is named
-  kStay,    // stays where the rest mesh has it
-  kFollow,  // moves rigidly with the nearest handle (nearest vertices at rest)
-};
 
 struct DeformerOptions {
   FreeComponents free_components = FreeComponents::kError;

@@ -1,0 +1,31 @@
+#include "core/solve/local_global.h"
+
+#include <cmath>
+
+namespace lpdeform {
+
+void clear_held_rows(const Constraints& constraints, Points& values) {
+  for (Eigen::Index i = 0; i < values.rows(); ++i) {
+    if (constraints.is_held[i]) values.row(i).setZero();
+  }
+}
+
+LocalGlobal::LocalGlobal(Problem problem, Points x) : problem_(std::move(problem)), x_(std::move(x)) {
+  objective_ = problem_.cells.evaluate(x_, problem_.norm);
+  is_factored_ = problem_.metric.factor(problem_.cells.cell_weights(), problem_.constraints.is_held);
+}
+
+StepResult LocalGlobal::step() {
+  if (!is_factored_) return {Outcome::kBreakdown, objective_, 0};
+  problem_.cells.gradient(x_, gradient_);
+  clear_held_rows(problem_.constraints, gradient_);
+  problem_.metric.solve(gradient_, gradient_);
+  x_ -= gradient_;
+  const double before = objective_;
+  objective_ = problem_.cells.evaluate(x_, problem_.norm);
+  if (!std::isfinite(objective_)) return {Outcome::kBreakdown, objective_, 0};
+  small_decreases_ = before - objective_ <= problem_.tolerance * objective_ ? small_decreases_ + 1 : 0;
+  return {small_decreases_ >= 3 || objective_ == 0 ? Outcome::kConverged : Outcome::kProgress, objective_, 0};
+}
+
+}  // namespace lpdeform

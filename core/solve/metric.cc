@@ -1,0 +1,81 @@
+#include "core/solve/metric.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lpdeform {
+namespace {
+
+constexpr double kLowestShare = 1e-8;
+
+LowerMatrix lower_pattern(const RestShape& shape) {
+  LowerMatrix matrix;
+  const std::int32_t n = shape.vertex_count();
+  matrix.columns.reserve(n + 1);
+  matrix.columns.push_back(0);
+  for (std::int32_t i = 0; i < n; ++i) {
+    matrix.rows.push_back(i);
+    for (std::int32_t k = shape.offsets()[i]; k < shape.offsets()[i + 1]; ++k) {
+      if (shape.neighbours()[k] > i) matrix.rows.push_back(shape.neighbours()[k]);
+    }
+    matrix.columns.push_back(static_cast<std::int32_t>(matrix.rows.size()));
+  }
+  matrix.values.assign(matrix.rows.size(), 0.0);
+  return matrix;
+}
+
+}  // namespace
+
+Metric::Metric(std::shared_ptr<const RestShape> shape)
+    : shape_(std::move(shape)), matrix_(lower_pattern(*shape_)), factor_(matrix_) {}
+
+bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held) {
+  const double largest = *std::max_element(cell_weights.begin(), cell_weights.end());
+  if (!(largest > 0) || !std::isfinite(largest)) return is_good_ = false;
+  std::vector<double> clipped(cell_weights.size());
+  std::transform(cell_weights.begin(), cell_weights.end(), clipped.begin(),
+                 [&](double weight) { return std::max(weight / largest, kLowestShare); });
+  scale_ = largest;
+  if (is_good_ && is_held == is_held_ && clipped == cell_weights_) return true;
+  cell_weights_ = std::move(clipped);
+  is_held_ = is_held;
+  for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
+    double diagonal = 0;
+    std::int32_t entry = matrix_.columns[i];
+    for (std::int32_t k = shape_->offsets()[i]; k < shape_->offsets()[i + 1]; ++k) {
+      const std::int32_t j = shape_->neighbours()[k];
+      const double weight = edge_weight(i, k);
+      diagonal += weight;
+      if (j > i) matrix_.values[++entry] = is_held[i] || is_held[j] ? 0.0 : -weight;
+    }
+    matrix_.values[matrix_.columns[i]] = is_held[i] ? 1.0 : diagonal;
+  }
+  return is_good_ = factor_.factor(matrix_);
+}
+
+void Metric::extend(const std::vector<char>& is_held, Points& u) const {
+  Points b = Points::Zero(u.rows(), 3);
+  for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
+    if (is_held[i]) {
+      b.row(i) = u.row(i);
+      continue;
+    }
+    for (std::int32_t k = shape_->offsets()[i]; k < shape_->offsets()[i + 1]; ++k) {
+      const std::int32_t j = shape_->neighbours()[k];
+      if (is_held[j]) b.row(i) += edge_weight(i, k) * u.row(j);
+    }
+  }
+  factor_.solve(b, u);
+}
+
+void Metric::solve(const Points& b, Points& x) const {
+  factor_.solve(b, x);
+  x /= scale_;
+}
+
+std::size_t Metric::memory_bytes() const {
+  return factor_.memory_bytes() + cell_weights_.capacity() * sizeof(double) + is_held_.capacity() + matrix_.columns.capacity() * sizeof(std::int32_t) +
+         matrix_.rows.capacity() * (sizeof(std::int32_t) + sizeof(double));
+}
+
+}  // namespace lpdeform

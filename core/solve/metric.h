@@ -1,0 +1,52 @@
+#pragma once
+
+#include <vector>
+
+#include "core/energy/rest_shape.h"
+#include "core/linalg/cholesky.h"
+
+namespace lpdeform {
+
+/// The Hessian of the objective with its rotations and cell weights c held, on the free vertices:
+///
+///   M = 2 * Laplacian with edge weights (c_i + c_j) w_ij,     held vertices are identity rows
+///
+/// one scalar matrix for all three coordinates. For p = 2 it is exact (the matrix of local_global); for other p it is what
+/// iteratively reweighted least squares would use. Ordering and symbolic analysis are made once, by the constructor;
+/// factor() is numeric alone.
+class Metric {
+ public:
+  explicit Metric(std::shared_ptr<const RestShape> shape);
+
+  /// `is_held` has one entry a vertex. Cell weights are clipped from below at 1e-8 of the largest used, so that the
+  /// factorisation stays healthy where cells have no weight. False where the factorisation fails.
+  /// A factor for the same held vertices and cell weights, up to a common factor, is kept.
+  [[nodiscard]] bool factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held);
+
+  /// The last factor() was for these held vertices and succeeded.
+  bool is_factored_for(const std::vector<char>& is_held) const { return is_good_ && is_held == is_held_; }
+
+  /// x = M^-1 b; b is zero at held vertices.
+  void solve(const Points& b, Points& x) const;
+
+  /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of
+  /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2. Rows of free vertices are overwritten.
+  void extend(const std::vector<char>& is_held, Points& u) const;
+
+  std::size_t memory_bytes() const;
+
+ private:
+  double edge_weight(std::int32_t i, std::int32_t k) const {
+    return 2 * (cell_weights_[i] + cell_weights_[shape_->neighbours()[k]]) * shape_->weights()[k];
+  }
+
+  std::shared_ptr<const RestShape> shape_;
+  std::vector<double> cell_weights_;  // clipped, over scale_
+  std::vector<char> is_held_;
+  double scale_ = 1;  // the largest cell weight: M = scale_ * matrix_ on the free vertices
+  bool is_good_ = false;
+  LowerMatrix matrix_;
+  SparseCholesky factor_;
+};
+
+}  // namespace lpdeform

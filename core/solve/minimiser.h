@@ -1,0 +1,56 @@
+#pragma once
+
+#include <stop_token>
+
+#include "core/energy/cell_pass.h"
+#include "core/energy/lp_norm.h"
+#include "core/solve/constraints.h"
+#include "core/solve/metric.h"
+
+namespace lpdeform {
+
+/// What a method works on; it outlives the method. Positions are in scaled units.
+struct Problem {
+  CellPass& cells;
+  Metric& metric;
+  const Constraints& constraints;
+  const LpNorm& norm;        // what is to be minimised
+  double tolerance;          // SolveSettings::tolerance
+  double length_unit;        // l in scaled units, for thresholds that the paper gives in absolute lengths
+  double diagonal;           // of the rest mesh, in scaled units
+  std::stop_token stop;      // looked at between evaluations
+
+  const RestShape& shape() const { return cells.shape(); }
+};
+
+/// How an iteration went.
+enum class Outcome {
+  kProgress,
+  kConverged,
+  kStalled,
+  kBreakdown,
+};
+
+struct StepResult {
+  Outcome outcome = Outcome::kProgress;
+  double objective = 0;  // at x(), of the method's present objective
+  int stage = 0;         // counts the objectives; within a stage the objective never rises
+};
+
+/// One algorithm: makes one iteration a call. Time, limits, cancellation, trace and the best state belong to the loop that
+/// calls it (Deformer::step).
+class Minimiser {
+ public:
+  virtual ~Minimiser() = default;
+
+  /// One iteration. Afterwards problem.cells holds the evaluation at x() (its squared energies belong to x()).
+  virtual StepResult step() = 0;
+
+  /// The present state: finite, held vertices at their targets.
+  virtual const Points& x() const = 0;
+};
+
+/// Sets the rows of held vertices to zero.
+void clear_held_rows(const Constraints& constraints, Points& values);
+
+}  // namespace lpdeform

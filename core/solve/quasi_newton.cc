@@ -1,0 +1,144 @@
+#include "core/solve/quasi_newton.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lpdeform {
+namespace {
+
+constexpr std::size_t kMemory = 10;
+constexpr int kWindow = 20;
+constexpr int kRefresh = 40;
+constexpr double kSufficientDecrease = 1e-4;
+
+double dot(const Points& a, const Points& b) { return a.cwiseProduct(b).sum(); }
+
+}  // namespace
+
+QuasiNewton::QuasiNewton(Problem problem, Points x, bool is_warm)
+    : problem_(std::move(problem)), norm_(problem_.norm), x_(std::move(x)) {
+  plan_stages(is_warm);
+  begin_stage(0);
+}
+
+void QuasiNewton::plan_stages(bool is_warm) {
+  const double lowest = problem_.norm.lowest_p(), highest = problem_.norm.highest_p();
+  const double unit = problem_.diagonal * problem_.diagonal;
+  if (lowest >= 2) {
+    if (!is_warm && highest > 2) stages_.push_back({0, 0, 10});
+    stages_.push_back({1, 0, 0});
+    return;
+  }
+  if (!is_warm) {
+    // p = 2, 1.6, 1.35, 1.2, 1.1, 1.05 on the way to 1; as much of that as the lowest p asks for.
+    for (const double p : {2.0, 1.6, 1.35, 1.2, 1.1, 1.05}) {
+      if (p > lowest) stages_.push_back({(2 - p) / (2 - lowest), 1e-6 * unit, 30});
+    }
+  }
+  for (double eps2 = is_warm ? 1e-9 : 1e-6; eps2 > 1e-14; eps2 /= 10) stages_.push_back({1, eps2 * unit, 30});
+  stages_.back().iterations = 0;
+}
+
+void QuasiNewton::begin_stage(int stage) {
+  stage_ = stage;
+  const Stage& plan = stages_[stage];
+  norm_ = (plan.share == 1 ? problem_.norm : problem_.norm.nearer_two(plan.share)).smoothed(plan.eps2);
+  objective_ = problem_.cells.evaluate(x_, norm_);
+  history_.assign(1, objective_);
+  stage_iterations_ = 0;
+  is_metric_good_ = refresh_metric();
+}
+
+bool QuasiNewton::refresh_metric() {
+  problem_.cells.gradient(x_, gradient_);
+  clear_held_rows(problem_.constraints, gradient_);
+  memory_.clear();
+  since_refresh_ = 0;
+  return problem_.metric.factor(problem_.cells.cell_weights(), problem_.constraints.is_held);
+}
+
+/// d = -H g by the two-loop recursion, H_0 = M^-1: unscaled, since M is the Hessian with rotations and weights held.
+void QuasiNewton::direction(Points& d) {
+  d = -gradient_;
+  std::vector<double> alpha(memory_.size());
+  for (std::size_t k = memory_.size(); k-- > 0;) {
+    alpha[k] = memory_[k].rho * dot(memory_[k].s, d);
+    d -= alpha[k] * memory_[k].y;
+  }
+  problem_.metric.solve(d, d);
+  for (std::size_t k = 0; k < memory_.size(); ++k) {
+    const double beta = memory_[k].rho * dot(memory_[k].y, d);
+    d += (alpha[k] - beta) * memory_[k].s;
+  }
+}
+
+/// The step length along d, 0 where none is found. problem_.cells holds the evaluation at trial_ afterwards.
+double QuasiNewton::search(const Points& d, double slope) {
+  double t = 1;
+  for (int trial = 0; trial < 40 && !problem_.stop.stop_requested(); ++trial) {
+    trial_ = x_ + t * d;
+    const double value = problem_.cells.evaluate(trial_, norm_);
+    if (value <= objective_ + kSufficientDecrease * t * slope) {
+      objective_ = value;
+      return t;
+    }
+    // The minimiser of the parabola through f(0), f'(0), f(t), kept within [t / 10, t / 2].
+    const double parabola = std::isfinite(value) ? -0.5 * slope * t * t / (value - objective_ - slope * t) : 0;
+    t = std::clamp(parabola, 0.1 * t, 0.5 * t);
+  }
+  return 0;
+}
+
+void QuasiNewton::remember(const Points& x_before, const Points& gradient_before) {
+  Pair pair{x_ - x_before, gradient_ - gradient_before, 0};
+  const double curvature = dot(pair.s, pair.y);
+  if (!(curvature > 1e-12 * pair.s.norm() * pair.y.norm())) return;
+  pair.rho = 1 / curvature;
+  memory_.push_back(std::move(pair));
+  if (memory_.size() > kMemory) memory_.pop_front();
+}
+
+bool QuasiNewton::is_stage_over() const {
+  if (history_.size() <= kWindow) return false;
+  return history_.front() - history_.back() <= problem_.tolerance * norm_.highest_p() * history_.back();
+}
+
+StepResult QuasiNewton::step() {
+  if (!is_metric_good_ || !std::isfinite(objective_)) return result(Outcome::kBreakdown);
+  const bool is_last = stage_ + 1 == static_cast<int>(stages_.size());
+  if (!is_last && (stage_iterations_ >= stages_[stage_].iterations || is_stage_over())) {
+    begin_stage(stage_ + 1);
+    if (!is_metric_good_) return result(Outcome::kBreakdown);
+  }
+  if (since_refresh_ >= kRefresh) is_metric_good_ = refresh_metric();
+  if (!is_metric_good_) return result(Outcome::kBreakdown);
+
+  direction(direction_);
+  double slope = dot(gradient_, direction_);
+  if (slope == 0) return result(is_last ? Outcome::kConverged : Outcome::kProgress);
+  const double t = slope < 0 ? search(direction_, slope) : 0;
+  if (t == 0) {
+    problem_.cells.evaluate(x_, norm_);
+    if (problem_.stop.stop_requested()) return result(Outcome::kProgress);
+    if (since_refresh_ == 0) {
+      if (!is_last) {
+        stage_iterations_ = stages_[stage_].iterations;
+        return result(Outcome::kProgress);
+      }
+      return result(Outcome::kStalled);
+    }
+    is_metric_good_ = refresh_metric();
+    return result(Outcome::kProgress);
+  }
+  x_.swap(trial_);
+  trial_gradient_.swap(gradient_);
+  problem_.cells.gradient(x_, gradient_);
+  clear_held_rows(problem_.constraints, gradient_);
+  remember(trial_, trial_gradient_);
+  ++stage_iterations_, ++since_refresh_;
+  history_.push_back(objective_);
+  if (history_.size() > kWindow + 1) history_.pop_front();
+  return result(is_last && is_stage_over() ? Outcome::kConverged : Outcome::kProgress);
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <deque>
+#include <vector>
+
+#include "core/solve/minimiser.h"
+
+namespace lpdeform {
+
+/// Limited-memory BFGS (Nocedal & Wright, algorithm 7.4) on E(x) with the reweighted Laplacian as its initial metric (after Liu
+/// et al. 2017), t = 1 first, backtracking by interpolation. The default for every p.
+///
+/// Where some p_i < 2 it runs through stages: p from 2 towards p_i, then cell energies smoothed with an eps that falls until it
+/// does not matter; where some p_i > 2 through stages of p only. Each stage begins with a metric refactored for
+/// the present cell weights and an empty memory; so does every kRefresh-th iteration. In a live session (`is_warm`) the
+/// stages before the last few are left out.
+///
+/// Converged when, in the last stage, the objective fell by at most tolerance * p * f over the last kWindow iterations, p the
+/// largest: a relative decrease of E^(1/p) of at most the tolerance.
+class QuasiNewton : public Minimiser {
+ public:
+  QuasiNewton(Problem problem, Points x, bool is_warm);
+
+  StepResult step() override;
+  const Points& x() const override { return x_; }
+
+ private:
+  struct Stage {
+    double share;     // of the way from 2 to p_i
+    double eps2;      // smoothing
+    int iterations;   // at most; the last stage has no end
+  };
+  struct Pair {
+    Points s, y;
+    double rho;  // 1 / <s, y>
+  };
+
+  void plan_stages(bool is_warm);
+  void begin_stage(int stage);
+  bool refresh_metric();
+  void direction(Points& d);
+  double search(const Points& d, double slope);
+  void remember(const Points& x_before, const Points& gradient_before);
+  bool is_stage_over() const;
+  StepResult result(Outcome outcome) const { return {outcome, objective_, stage_}; }
+
+  Problem problem_;
+  std::vector<Stage> stages_;
+  int stage_ = 0;
+  LpNorm norm_;  // of the stage
+  Points x_, gradient_, direction_, trial_, trial_gradient_;
+  double objective_ = 0;
+  std::deque<Pair> memory_;
+  std::deque<double> history_;  // objectives of the stage's last kWindow + 1 iterations
+  int stage_iterations_ = 0, since_refresh_ = 0;
+  bool is_metric_good_ = false;
+};
+
+}  // namespace lpdeform
