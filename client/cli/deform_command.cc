@@ -1,0 +1,171 @@
+#include "client/cli/deform_command.h"
+
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/field_file.h"
+#include "client/cli/handle_file.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/local_server.h"
+#include "client/cli/mesh_input.h"
+#include "client/cli/outputs.h"
+#include "client/cli/progress.h"
+#include "client/cli/report.h"
+#include "client/cli/text_file.h"
+#include "client/cpp/client.h"
+#include "core/base/fault.h"
+
+namespace lpdeform::cli {
+namespace {
+
+/// All that the command reads, read and looked through before any work is done.
+struct Inputs {
+  MeshFile file;
+  client::Update update;
+  client::FieldValue p;
+  std::optional<std::vector<double>> initial_positions;
+};
+
+absl::Status read_fields(const DeformOptions& options, std::int64_t vertex_count, Inputs& inputs) {
+  inputs.p = options.p;
+  if (options.p_field) {
+    auto p = read_field(*options.p_field, vertex_count);
+    if (!p.ok()) return p.status();
+    inputs.p = *std::move(p);
+  }
+  inputs.update.settings.p = inputs.p;
+  if (options.stiffness_field) {
+    auto stiffness = read_field(*options.stiffness_field, vertex_count);
+    if (!stiffness.ok()) return stiffness.status();
+    inputs.update.settings.stiffness = *std::move(stiffness);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status read_initial(const DeformOptions& options, Inputs& inputs) {
+  if (options.initial == "laplacian" || options.initial == "rest") return absl::OkStatus();
+  const absl::StatusOr<MeshFile> initial = read_mesh(options.initial);
+  if (!initial.ok()) return initial.status();
+  const Eigen::Index given = initial->mesh.vertices.rows(), wanted = inputs.file.mesh.vertices.rows();
+  if (given != wanted) {
+    return invalid_input({"POSITIONS_SIZE", options.initial, absl::StrCat("vertices = ", wanted)},
+                         absl::StrCat("\"", options.initial, "\" has ", given, " vertices and the mesh ",
+                                      wanted, "; an initial guess has as many as the mesh."));
+  }
+  inputs.initial_positions = flat(initial->mesh.vertices);
+  return absl::OkStatus();
+}
+
+client::SolverSettings solver_settings(const DeformOptions& options) {
+  return {
+      .method = options.method,
+      .tolerance = options.tolerance,
+      .max_iterations = options.max_iterations.value_or(0),
+      .time_limit_seconds = options.time_limit_seconds.value_or(0),
+      .initial = options.initial == "rest" ? client::InitialGuess::kRest : client::InitialGuess::kLaplacian};
+}
+
+absl::StatusOr<Inputs> read_inputs(const DeformOptions& options) {
+  absl::Status status = check_outputs(options.out);
+  if (status.ok() && options.report) status = check_folder(*options.report);
+  if (!status.ok()) return status;
+  absl::StatusOr<MeshFile> file = read_deformable(options.mesh);
+  if (!file.ok()) return file.status();
+  Inputs inputs{*std::move(file), {}, {}, {}};
+  const std::int64_t vertex_count = inputs.file.mesh.vertices.rows();
+
+  absl::StatusOr<std::vector<NamedHandle>> handles = read_handles(options.handles, vertex_count);
+  if (!handles.ok()) return handles.status();
+  for (NamedHandle& handle : *handles)
+    inputs.update.handles.emplace(std::move(handle.name), std::move(handle.handle));
+  status = read_fields(options, vertex_count, inputs);
+  if (status.ok()) status = read_initial(options, inputs);
+  if (!status.ok()) return status;
+  inputs.update.settings.length_unit = options.length_unit;
+  inputs.update.settings.solver = solver_settings(options);
+  return inputs;
+}
+
+struct Solved {
+  client::MeshReport mesh;
+  client::SolveResult result;
+};
+
+absl::StatusOr<Solved> solve_on(const std::string& address, const DeformOptions& options, Inputs& inputs,
+                                Interrupt& interrupt) {
+  Progress progress;
+  progress.show("connecting");
+  absl::StatusOr<client::Client> server = client::Client::connect(address);
+  if (!server.ok()) return server.status();
+  progress.show("sending the mesh");
+  absl::StatusOr<client::Session> session = server->open(
+      to_client(inputs.file.mesh), {.weights = options.weights, .free_components = options.free_components});
+  if (!session.ok()) return session.status();
+  interrupt.set_action([&session] { session->close().IgnoreError(); });
+
+  client::SolveOptions solve{.certify = options.report.has_value(), .keep_trace = options.report.has_value()};
+  solve.initial_positions = std::move(inputs.initial_positions);
+  solve.on_progress = [&progress](const client::SolveProgress& now) { progress.show(now); };
+  absl::StatusOr<client::SolveResult> result = absl::CancelledError();
+  if (const auto sent = session->update(std::move(inputs.update)); sent.ok())
+    result = session->solve(std::move(solve));
+  interrupt.set_action({});
+  if (!result.ok()) return result.status();
+  return Solved{session->mesh_report(), *std::move(result)};
+}
+
+absl::Status write_results(const DeformOptions& options, const Inputs& inputs, const Solved& solved) {
+  const Points positions = points_of(solved.result.positions);
+  const auto& distortion = solved.result.distortion;
+  const Field field =
+      Eigen::Map<const Eigen::VectorXf>(distortion.data(), static_cast<Eigen::Index>(distortion.size()))
+          .cast<double>();
+  for (const std::filesystem::path& path : options.out) {
+    const absl::Status written = write_output(path, inputs.file, positions, field);
+    if (!written.ok()) return written;
+    std::printf("wrote %s\n", path.c_str());
+  }
+  if (!options.report) return absl::OkStatus();
+  const absl::Status written = write_text(*options.report, report_json(solved.mesh, inputs.p, solved.result));
+  if (written.ok()) std::printf("wrote %s\n", options.report->c_str());
+  return written;
+}
+
+void print_summary(const Inputs& inputs, const client::SolveResult& result) {
+  std::printf("%s after %u iterations of %s, %.3f s: E = %.6g, from %.6g",
+              stop_reason_name(result.stop_reason).c_str(), result.iterations, result.method.c_str(),
+              result.setup_seconds + result.solve_seconds, result.energy, result.initial_energy);
+  if (const double* const p = std::get_if<double>(&inputs.p))
+    std::printf("; E^(1/p) = %.6g", std::pow(result.energy, 1 / *p));
+  std::printf("\n");
+}
+
+}  // namespace
+
+ExitStatus run_deform(const DeformOptions& options) {
+  Interrupt interrupt;
+  absl::StatusOr<Inputs> inputs = read_inputs(options);
+  if (!inputs.ok()) return complain(inputs.status());
+
+  std::unique_ptr<LocalServer> local;
+  if (!options.server) {
+    absl::StatusOr<std::unique_ptr<LocalServer>> started = LocalServer::start(options.threads);
+    if (!started.ok()) return complain(started.status());
+    local = *std::move(started);
+  }
+  const absl::StatusOr<Solved> solved =
+      solve_on(local ? local->address() : *options.server, options, *inputs, interrupt);
+  if (interrupt.happened()) return kInterrupted;
+  if (!solved.ok()) return complain(solved.status());
+
+  print_summary(*inputs, solved->result);
+  const absl::Status written = write_results(options, *inputs, *solved);
+  if (!written.ok()) return complain(written);
+  return exit_status_of(solved->result.stop_reason, options.max_iterations.has_value(),
+                        options.time_limit_seconds.has_value());
+}
+
+}  // namespace lpdeform::cli

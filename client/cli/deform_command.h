@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cli/exit_status.h"
+#include "client/cpp/types.h"
+
+namespace lpdeform::cli {
+
+struct DeformOptions {
+  std::filesystem::path mesh;
+  std::filesystem::path handles;
+  double p = 2;
+  std::optional<std::filesystem::path> p_field;          // in place of p
+  std::optional<std::filesystem::path> stiffness_field;  // in place of 1
+  double length_unit = 0;                                // 0: the mean rest edge length
+  client::Method method = client::Method::kAuto;
+  client::WeightKind weights = client::WeightKind::kCotangent;
+  std::string initial = "laplacian";  // or "rest", or a mesh file
+  client::FreeComponents free_components = client::FreeComponents::kError;
+  std::optional<std::uint32_t> max_iterations;
+  double tolerance = 0;  // 0: the server's default
+  std::optional<double> time_limit_seconds;
+  int threads = 0;  // of the server in this process; 0: all cores
+  std::vector<std::filesystem::path> out;
+  std::optional<std::filesystem::path> report;
+  std::optional<std::string> server;  // a server in this process where there is none
+};
+
+/// Deforms a mesh once and writes what was asked for. Prints one line about how the solve went and one for
+/// each file.
+ExitStatus run_deform(const DeformOptions& options);
+
+}  // namespace lpdeform::cli

@@ -1,0 +1,147 @@
+#include "client/cli/generated_shape.h"
+
+#include <functional>
+#include <numbers>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "core/base/fault.h"
+#include "core/mesh/shapes.h"
+
+namespace lpdeform::cli {
+namespace {
+
+using Point = Eigen::RowVector3d;
+
+constexpr int kMostDetail = 32;
+constexpr double kHalfCell = 0.5;
+
+double radians(double degrees) {
+  return degrees * std::numbers::pi / 180;
+}
+
+/// Adds a handle of the vertices that `is_held` picks.
+void hold(GeneratedShape& shape, const char* name, const std::function<bool(const Point&)>& is_held,
+          client::Motion motion = client::Fixed{}) {
+  NamedHandle handle{name, {{}, std::move(motion)}};
+  for (Eigen::Index vertex = 0; vertex < shape.mesh.vertices.rows(); ++vertex) {
+    if (!is_held(shape.mesh.vertices.row(vertex))) continue;
+    handle.handle.vertices.push_back(static_cast<std::uint32_t>(vertex));
+  }
+  shape.handles.push_back(std::move(handle));
+}
+
+GeneratedShape bar(int detail) {
+  const double length = 21.0 * detail, middle = length / 2, side = 4.0 * detail;
+  GeneratedShape shape{box_surface(4 * detail, 4 * detail, 21 * detail),
+                       {},
+                       "both ends stay, the middle is twisted 90 degrees"};
+  hold(shape, "end_a", [](const Point& p) { return p.z() < kHalfCell; });
+  hold(shape, "end_b", [=](const Point& p) { return p.z() > length - kHalfCell; });
+  hold(
+      shape, "middle", [=](const Point& p) { return std::abs(p.z() - middle) < detail; },
+      client::RigidMotion{.angle_radians = radians(90), .center = {side / 2, side / 2, middle}});
+  return shape;
+}
+
+GeneratedShape sheet(int detail) {
+  const double length = 60.0 * detail;
+  GeneratedShape shape{
+      box_surface(2 * detail, 30 * detail, 60 * detail), {}, "one edge stays, the other is folded over"};
+  hold(shape, "fixed", [=](const Point& p) { return p.z() < detail + kHalfCell; });
+  hold(
+      shape, "edge", [=](const Point& p) { return p.z() > length - detail - kHalfCell; },
+      client::RigidMotion{.translation = {0.33 * length, 0, -0.42 * length}});
+  return shape;
+}
+
+GeneratedShape block(int detail) {
+  const double length = 28.0 * detail;
+  GeneratedShape shape{
+      block_with_holes(28 * detail, 12 * detail, 8 * detail), {}, "one end stays, the other is pulled"};
+  hold(shape, "fixed", [](const Point& p) { return p.x() < kHalfCell; });
+  hold(
+      shape, "end", [=](const Point& p) { return p.x() > length - kHalfCell; },
+      client::RigidMotion{.translation = {length / 2, 0, 0}});
+  return shape;
+}
+
+GeneratedShape bumpy_grid(int detail) {
+  const double side = 40.0 * detail, middle = side / 2;
+  GeneratedShape shape{
+      grid(40 * detail, 40 * detail, 2.0 * detail), {}, "the rim stays, the middle is lifted"};
+  hold(shape, "rim", [=](const Point& p) {
+    const double from_middle = std::max(std::abs(p.x() - middle), std::abs(p.y() - middle));
+    return from_middle > middle - kHalfCell;
+  });
+  hold(
+      shape, "middle", [=](const Point& p) { return std::hypot(p.x() - middle, p.y() - middle) < side / 10; },
+      client::RigidMotion{.translation = {0, 0, 0.4 * side}});
+  return shape;
+}
+
+GeneratedShape ball(int detail) {
+  GeneratedShape shape{sphere(3 + detail), {}, "the bottom stays, the top is pulled up and turned"};
+  hold(shape, "bottom", [](const Point& p) { return p.z() < -0.9; });
+  hold(
+      shape, "top", [](const Point& p) { return p.z() > 0.9; },
+      client::RigidMotion{.angle_radians = radians(60), .translation = {0, 0, 0.8}});
+  return shape;
+}
+
+GeneratedShape animal(int detail) {
+  GeneratedShape shape{
+      creature(60 * detail), {}, "the feet stay, the head is lifted and turned, the tail is raised"};
+  hold(shape, "feet", [](const Point& p) { return p.z() < 0.06; });
+  hold(
+      shape, "head", [](const Point& p) { return p.x() > 0.46 && p.z() > 0.64; },
+      client::RigidMotion{.axis = {0, 0, 1},
+                          .angle_radians = radians(60),
+                          .center = {0.44, 0, 0.76},
+                          .translation = {-0.02, 0, 0.12}});
+  hold(
+      shape, "tail", [](const Point& p) { return p.x() < -0.8; },
+      client::RigidMotion{.axis = {0, 1, 0},
+                          .angle_radians = radians(50),
+                          .center = {-0.86, 0, 0.46},
+                          .translation = {0.22, 0, 0.35}});
+  return shape;
+}
+
+struct Entry {
+  const char* name;
+  GeneratedShape (*make)(int detail);
+  int most_detail;
+};
+
+constexpr Entry kShapes[] = {{"bar", bar, kMostDetail},
+                             {"sheet", sheet, kMostDetail / 2},
+                             {"block", block, kMostDetail / 2},
+                             {"grid", bumpy_grid, kMostDetail},
+                             {"sphere", ball, 6},
+                             {"creature", animal, 6}};
+
+}  // namespace
+
+absl::StatusOr<GeneratedShape> generate_shape(std::string_view name, int detail) {
+  for (const Entry& entry : kShapes) {
+    if (name != entry.name) continue;
+    if (detail >= 1 && detail <= entry.most_detail) return entry.make(detail);
+    const std::string limit = absl::StrCat("1 <= detail <= ", entry.most_detail);
+    return invalid_input(
+        {"SHAPE_DETAIL", "", limit},
+        absl::StrCat("Detail ", detail, " is not in 1 to ", entry.most_detail, " of the ", entry.name, "."));
+  }
+  return invalid_input({"SHAPE_UNKNOWN", std::string(name), ""},
+                       absl::StrCat("There is no shape \"", std::string(name), "\"; there are ",
+                                    absl::StrJoin(generated_shape_names(), ", "), "."));
+}
+
+std::vector<std::string> generated_shape_names() {
+  std::vector<std::string> names;
+  for (const Entry& entry : kShapes) names.emplace_back(entry.name);
+  return names;
+}
+
+}  // namespace lpdeform::cli

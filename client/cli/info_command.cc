@@ -1,0 +1,20 @@
+#include "client/cli/info_command.h"
+
+#include <cstdio>
+
+#include "client/cli/mesh_input.h"
+#include "client/cli/report.h"
+
+namespace lpdeform::cli {
+
+ExitStatus run_info(const InfoOptions& options) {
+  const absl::StatusOr<MeshFile> file = read_mesh(options.mesh);
+  if (!file.ok()) return complain(file.status());
+  const MeshReport report = full_report(file->mesh, WeightKind::kCotangent);
+  const client::MeshReport shown = to_client(report);
+  std::fputs((options.is_json ? mesh_json(shown) : mesh_text(shown)).c_str(), stdout);
+  const absl::Status verdict = deformable(report);
+  return verdict.ok() ? kDone : complain(verdict);
+}
+
+}  // namespace lpdeform::cli

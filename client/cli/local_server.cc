@@ -1,0 +1,1 @@
+#include "client/cli/local_server.h"

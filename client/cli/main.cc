@@ -1,0 +1,149 @@
+// The program `lpdeform`: what it takes on the command line.
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "client/cli/deform_command.h"
+#include "client/cli/generated_shape.h"
+#include "client/cli/info_command.h"
+#include "client/cli/shape_command.h"
+
+namespace lpdeform::cli {
+namespace {
+
+/// An option that takes one of some names and stores what the name stands for.
+template <typename T>
+void add_choice(CLI::App& app, const std::string& flag, T& target, const std::map<std::string, T>& choices,
+                const std::string& help) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : choices) names.push_back(name);
+  const auto store = [&target, choices](const std::string& name) { target = choices.at(name); };
+  app.add_option_function<std::string>(flag, store, help)->check(CLI::IsMember(names));
+}
+
+void add_material_options(CLI::App& app, DeformOptions& options) {
+  CLI::Option* const p =
+      app.add_option("--p", options.p,
+                     "The norm, 1 to 64: small concentrates distortion, large spreads it. Default 2")
+          ->check(CLI::Range(1.0, 64.0));
+  app.add_option("--p-field", options.p_field, "A p for each vertex: a file with one number a line")
+      ->excludes(p);
+  app.add_option(
+      "--stiffness-field", options.stiffness_field,
+      "A stiffness for each vertex, 1e-6 to 1e6: a file with one number a line. Default 1 everywhere");
+  app.add_option("--length-unit", options.length_unit,
+                 "The length that norms of different p are mixed in, in the mesh's unit. Default: the mean "
+                 "edge length")
+      ->check(CLI::PositiveNumber);
+  add_choice<client::WeightKind>(
+      app, "--weights", options.weights,
+      {{"cotangent", client::WeightKind::kCotangent}, {"uniform", client::WeightKind::kUniform}},
+      "Weights of the edges. Default cotangent");
+  add_choice<client::FreeComponents>(
+      app, "--free-components", options.free_components,
+      {{"error", client::FreeComponents::kError},
+       {"stay", client::FreeComponents::kStay},
+       {"follow", client::FreeComponents::kFollow}},
+      "What becomes of a part of the mesh that no handle holds: an error, stays where it is, "
+      "or follows the nearest handle. Default error");
+}
+
+void add_solver_options(CLI::App& app, DeformOptions& options) {
+  add_choice<client::Method>(app, "--method", options.method,
+                             {{"auto", client::Method::kAuto},
+                              {"quasi_newton", client::Method::kQuasiNewton},
+                              {"line_search", client::Method::kLineSearch},
+                              {"local_global", client::Method::kLocalGlobal},
+                              {"conic", client::Method::kConic}},
+                             "The algorithm; local_global needs p = 2, conic p = 1. Default auto");
+  app.add_option("--initial", options.initial,
+                 "Where to start: laplacian, rest, or a mesh file with as many vertices. Default laplacian");
+  app.add_option("--max-iterations", options.max_iterations, "Stop after so many")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--tolerance", options.tolerance,
+                 "Stop when so little is left to gain, relative, 1e-14 to 0.1. Default 1e-5")
+      ->check(CLI::Range(1e-14, 0.1));
+  app.add_option("--time-limit", options.time_limit_seconds, "Stop after so many seconds of solving")
+      ->check(CLI::PositiveNumber);
+}
+
+void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
+  CLI::App& app = *program.add_subcommand("deform", "Deform a mesh by its handles and write the result");
+  const auto options = std::make_shared<DeformOptions>();
+  app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required();
+  app.add_option("--handles", options->handles,
+                 "What is held and where it goes: a JSON file, see client/cli/README.md")
+      ->required();
+  add_material_options(app, *options);
+  add_solver_options(app, *options);
+  app.add_option("--out", options->out,
+                 "Where the result goes; may be given several times. By its ending: .ply with distortion and "
+                 "colours, .obj, "
+                 ".off, or a picture as .png")
+      ->allow_extra_args(false);
+  app.add_option("--report", options->report, "Where to write what was measured, as JSON");
+  CLI::Option* const threads =
+      app.add_option("--threads", options->threads, "Cores to use at most. Default all")
+          ->check(CLI::Range(1, 1024));
+  app.add_option("--server", options->server,
+                 "HOST:PORT or unix:PATH of a server. Default: solve in this process")
+      ->excludes(threads);
+  app.callback([&command, options] { command = [options] { return run_deform(*options); }; });
+  app.footer(
+      "Exit status: 0 converged, or ended by a limit that was set here; 1 broke down or stalled short of "
+      "the\n"
+      "tolerance; 2 bad input; 3 server unreachable or refusing.");
+}
+
+void add_info(CLI::App& program, std::function<ExitStatus()>& command) {
+  CLI::App& app = *program.add_subcommand("info", "Print what a mesh is made of and what is wrong with it");
+  const auto options = std::make_shared<InfoOptions>();
+  app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required();
+  app.add_flag("--json", options->is_json, "Print the object that a report calls \"mesh\"");
+  app.callback([&command, options] { command = [options] { return run_info(*options); }; });
+}
+
+void add_shape(CLI::App& program, std::function<ExitStatus()>& command) {
+  CLI::App& app =
+      *program.add_subcommand("shape", "Write a generated mesh to try things on, and handles for it");
+  const auto options = std::make_shared<ShapeOptions>();
+  app.add_option("NAME", options->name, "Which shape")
+      ->required()
+      ->check(CLI::IsMember(generated_shape_names()));
+  app.add_option("--detail", options->detail, "Multiplies the cells along each side. Default 1");
+  app.add_option("--out", options->out, "Where the mesh goes: .off, .obj, .ply, or a picture as .png")
+      ->required();
+  app.add_option("--handles", options->handles, "Where to write a handle file for it");
+  app.callback([&command, options] { command = [options] { return run_shape(*options); }; });
+}
+
+int run(int argc, char** argv) {
+  CLI::App program("Deforms surfaces by handles, with distortion in the L_p norm of one's choice.",
+                   "lpdeform");
+  program.set_version_flag("--version", "lpdeform " LPDEFORM_VERSION);
+  program.require_subcommand(1);
+  program.get_formatter()->column_width(28);
+  std::function<ExitStatus()> command;
+  add_deform(program, command);
+  add_info(program, command);
+  add_shape(program, command);
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::Success& asked_for_help) {
+    return program.exit(asked_for_help);
+  } catch (const CLI::ParseError& error) {
+    return complain(absl::InvalidArgumentError(std::string(error.what()) + " (see lpdeform --help)"));
+  }
+  return command();
+}
+
+}  // namespace
+}  // namespace lpdeform::cli
+
+int main(int argc, char** argv) {
+  return lpdeform::cli::run(argc, argv);
+}

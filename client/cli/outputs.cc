@@ -1,0 +1,44 @@
+#include "client/cli/outputs.h"
+
+#include <algorithm>
+#include <cctype>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/render/render.h"
+#include "client/cli/text_file.h"
+#include "core/base/fault.h"
+
+namespace lpdeform::cli {
+namespace {
+
+std::string ending_of(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending;
+}
+
+}  // namespace
+
+absl::Status check_outputs(std::span<const std::filesystem::path> paths) {
+  for (const std::filesystem::path& path : paths) {
+    const std::string ending = ending_of(path);
+    if (ending != ".ply" && ending != ".obj" && ending != ".off" && ending != ".png") {
+      return invalid_input(
+          {"OUT_FORMAT_UNKNOWN", path.string(), "ending = .ply, .obj, .off or .png"},
+          absl::StrCat("\"", path.string(), "\" ends in none of .ply, .obj, .off and .png."));
+    }
+    const absl::Status folder = check_folder(path);
+    if (!folder.ok()) return folder;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
+                          const Field& distortion) {
+  if (ending_of(path) == ".png") return render_png(path, file.mesh.faces, positions, distortion);
+  return write_mesh(path, file, positions, distortion);
+}
+
+}  // namespace lpdeform::cli

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/mesh/io.h"
+
+namespace lpdeform::cli {
+
+/// INVALID_ARGUMENT where one of `paths` cannot become an output: an ending other than .ply, .obj, .off and
+/// .png (OUT_FORMAT_UNKNOWN), or no such folder (FILE_NOT_WRITTEN). Asked before the solve, not after it.
+absl::Status check_outputs(std::span<const std::filesystem::path> paths);
+
+/// Writes `positions` with the faces of `file`: .ply with distortion and colours, .obj keeping all else that
+/// an OBJ input had, .off, or a picture as .png. `distortion` may be empty.
+absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
+                          const Field& distortion);
+
+}  // namespace lpdeform::cli

@@ -1,0 +1,125 @@
+#include "client/cli/report.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <variant>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/str_replace.h"
+#include "core/base/geometry.h"
+#include "core/solve/summary.h"
+
+namespace lpdeform::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json mesh_object(const client::MeshReport& mesh) {
+  ordered_json object{{"vertices", mesh.vertices},
+                      {"faces", mesh.faces},
+                      {"edges", mesh.edges},
+                      {"components", mesh.components},
+                      {"boundary_loops", mesh.boundary_loops}};
+  ordered_json first = ordered_json::object();
+  for (const client::Defect& defect : mesh.defects) {
+    object[defect.kind] = defect.count;
+    if (!defect.first.empty()) first[defect.kind] = defect.first;
+  }
+  object["first"] = std::move(first);
+  return object;
+}
+
+ordered_json p_value(const client::FieldValue& p) {
+  if (const double* const uniform = std::get_if<double>(&p)) return *uniform;
+  const auto& values = std::get<std::vector<double>>(p);
+  if (values.empty()) return nullptr;
+  const auto [lowest, highest] = std::ranges::minmax(values);
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  return {{"min", lowest}, {"mean", mean}, {"max", highest}};
+}
+
+ordered_json trace_array(const std::vector<client::IterationRecord>& trace) {
+  ordered_json array = ordered_json::array();
+  for (const client::IterationRecord& record : trace) {
+    array.push_back({{"iteration", record.iteration},
+                     {"seconds", record.seconds},
+                     {"energy", record.energy},
+                     {"objective", record.objective},
+                     {"stage", record.stage}});
+  }
+  return array;
+}
+
+ordered_json distortion_object(const std::vector<float>& distortion) {
+  const Field field =
+      Eigen::Map<const Eigen::VectorXf>(distortion.data(), static_cast<Eigen::Index>(distortion.size()))
+          .cast<double>();
+  const DistortionStatistics statistics = distortion_statistics(field);
+  return {{"min", statistics.min},
+          {"mean", statistics.mean},
+          {"max", statistics.max},
+          {"median", statistics.median},
+          {"top_5_percent_share", statistics.top_5_percent_share},
+          {"histogram", {{"edges", statistics.edges}, {"counts", statistics.counts}}}};
+}
+
+/// Edges come as pairs of vertices.
+bool is_of_edges(const std::string& kind) {
+  return kind.ends_with("edges") || kind == "inconsistent_orientation";
+}
+
+std::string first_few(const client::Defect& defect) {
+  if (!is_of_edges(defect.kind)) return absl::StrJoin(defect.first, ", ");
+  std::vector<std::string> edges;
+  for (std::size_t k = 0; k + 1 < defect.first.size(); k += 2) {
+    edges.push_back(absl::StrCat(defect.first[k], "-", defect.first[k + 1]));
+  }
+  return absl::StrJoin(edges, ", ");
+}
+
+std::string line_of(std::string_view label, std::int64_t count, const std::string& note = "") {
+  return absl::StrFormat("%-26s %10d%s\n", std::string(label), count, note);
+}
+
+}  // namespace
+
+std::string mesh_json(const client::MeshReport& mesh) {
+  return mesh_object(mesh).dump(2) + "\n";
+}
+
+std::string mesh_text(const client::MeshReport& mesh) {
+  std::string text = line_of("vertices", mesh.vertices) + line_of("faces", mesh.faces) +
+                     line_of("edges", mesh.edges) + line_of("components", mesh.components) +
+                     line_of("boundary loops", mesh.boundary_loops);
+  for (const client::Defect& defect : mesh.defects) {
+    const std::string few = first_few(defect);
+    const std::string note = few.empty() ? "" : absl::StrCat("   first: ", few);
+    text += line_of(absl::StrReplaceAll(defect.kind, {{"_", " "}}), defect.count, note);
+  }
+  return text;
+}
+
+std::string report_json(const client::MeshReport& mesh, const client::FieldValue& p,
+                        const client::SolveResult& result) {
+  ordered_json gap = nullptr;
+  if (result.optimality_gap) gap = *result.optimality_gap;
+  const ordered_json report{{"mesh", mesh_object(mesh)},
+                            {"p", p_value(p)},
+                            {"method", result.method},
+                            {"threads", result.threads},
+                            {"stop_reason", client::stop_reason_name(result.stop_reason)},
+                            {"iterations", result.iterations},
+                            {"initial_energy", result.initial_energy},
+                            {"energy", result.energy},
+                            {"optimality_gap", gap},
+                            {"setup_seconds", result.setup_seconds},
+                            {"solve_seconds", result.solve_seconds},
+                            {"trace", trace_array(result.trace)},
+                            {"distortion", distortion_object(result.distortion)}};
+  return report.dump(2) + "\n";
+}
+
+}  // namespace lpdeform::cli

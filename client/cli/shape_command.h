@@ -1,0 +1,22 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cli/exit_status.h"
+
+namespace lpdeform::cli {
+
+struct ShapeOptions {
+  std::string name;
+  int detail = 1;
+  std::filesystem::path out;
+  std::optional<std::filesystem::path> handles;
+};
+
+/// Writes a generated shape and, where asked for, a handle file that goes with it.
+ExitStatus run_shape(const ShapeOptions& options);
+
+}  // namespace lpdeform::cli

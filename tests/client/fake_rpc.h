@@ -1,0 +1,234 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cpp/rpc.h"
+
+namespace lpdeform::client {
+
+/// How long a test waits for what must come. Never reached where all is well.
+constexpr std::chrono::seconds kPatience{20};
+
+/// Both ends of a Deform call: the client's behind FakeCall, the server's in the test's hands.
+class Stream {
+ public:
+  // The server's end.
+
+  void say(v1::DeformResponse response) {
+    const std::scoped_lock lock(mutex_);
+    to_client_.push_back(std::move(response));
+    changed_.notify_all();
+  }
+
+  /// Ends the call once the client has read all.
+  void end(absl::Status status) {
+    const std::scoped_lock lock(mutex_);
+    if (!end_) end_ = std::move(status);
+    changed_.notify_all();
+  }
+
+  /// The client's next message; empty where none comes.
+  std::optional<v1::DeformRequest> hear() {
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait_for(lock, kPatience, [this] { return !to_server_.empty(); })) return std::nullopt;
+    v1::DeformRequest request = std::move(to_server_.front());
+    to_server_.pop_front();
+    return request;
+  }
+
+  /// Messages of the client that nobody has heard yet.
+  std::size_t unheard() {
+    const std::scoped_lock lock(mutex_);
+    return to_server_.size();
+  }
+
+  // The client's end.
+
+  bool write(const v1::DeformRequest& request) {
+    const std::scoped_lock lock(mutex_);
+    if (end_) return false;
+    to_server_.push_back(request);
+    changed_.notify_all();
+    return true;
+  }
+
+  bool read(v1::DeformResponse& response) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return !to_client_.empty() || end_; });
+    if (to_client_.empty()) return false;
+    response = std::move(to_client_.front());
+    to_client_.pop_front();
+    return true;
+  }
+
+  absl::Status status() {
+    const std::scoped_lock lock(mutex_);
+    return end_.value_or(absl::OkStatus());
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<v1::DeformResponse> to_client_;
+  std::deque<v1::DeformRequest> to_server_;
+  std::optional<absl::Status> end_;
+};
+
+class FakeCall final : public DeformCall {
+ public:
+  explicit FakeCall(std::shared_ptr<Stream> stream) : stream_(std::move(stream)) {}
+  bool write(const v1::DeformRequest& request) override { return stream_->write(request); }
+  bool read(v1::DeformResponse& response) override { return stream_->read(response); }
+  void cancel() override { stream_->end(absl::CancelledError("cancelled")); }
+  absl::Status finish() override { return stream_->status(); }
+
+ private:
+  std::shared_ptr<Stream> stream_;
+};
+
+/// A server without a network: sessions are names, every unary call succeeds, streams are in the test's
+/// hands.
+class FakeRpc final : public Rpc {
+ public:
+  explicit FakeRpc(std::uint32_t vertex_count) : vertex_count_(vertex_count) {}
+
+  /// The next stream that the client opens; null where it opens none.
+  std::shared_ptr<Stream> next_stream() {
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait_for(lock, kPatience, [this] { return !streams_.empty(); })) return nullptr;
+    auto stream = std::move(streams_.front());
+    streams_.pop_front();
+    return stream;
+  }
+
+  std::vector<v1::CreateSessionRequest> created() {
+    const std::scoped_lock lock(mutex_);
+    return created_;
+  }
+  std::vector<std::string> deleted() {
+    const std::scoped_lock lock(mutex_);
+    return deleted_;
+  }
+  std::vector<v1::SolveRequest> solved() {
+    const std::scoped_lock lock(mutex_);
+    return solved_;
+  }
+  std::vector<v1::UpdateHandlesRequest> restored() {
+    const std::scoped_lock lock(mutex_);
+    return restored_;
+  }
+
+  /// What Solve calls end with, in turn; OK once they are used up.
+  std::deque<absl::Status> solve_ends;
+
+  absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
+                                                std::stop_token) override {
+    const std::scoped_lock lock(mutex_);
+    upload_bytes_left_ = request.size_bytes();
+    v1::CreateUploadResponse response;
+    response.set_upload("uploads/1");
+    response.set_max_part_bytes(1 << 20);
+    return response;
+  }
+
+  absl::StatusOr<v1::UploadPartResponse> call(const v1::UploadPartRequest& request,
+                                              std::stop_token) override {
+    const std::scoped_lock lock(mutex_);
+    upload_bytes_left_ -= request.data().size();
+    v1::UploadPartResponse response;
+    response.set_finished(upload_bytes_left_ == 0);
+    return response;
+  }
+
+  absl::StatusOr<v1::CreateSessionResponse> call(const v1::CreateSessionRequest& request,
+                                                 std::stop_token) override {
+    const std::scoped_lock lock(mutex_);
+    created_.push_back(request);
+    v1::CreateSessionResponse response;
+    response.mutable_session()->set_name("sessions/" + std::to_string(created_.size()));
+    response.mutable_session()->set_epoch(1);
+    response.mutable_session()->mutable_mesh()->set_vertices(vertex_count_);
+    response.set_writer_token("token");
+    return response;
+  }
+
+  absl::StatusOr<v1::GetSessionResponse> call(const v1::GetSessionRequest& request,
+                                              std::stop_token) override {
+    v1::GetSessionResponse response;
+    response.mutable_session()->set_name(request.session());
+    response.mutable_session()->mutable_mesh()->set_vertices(vertex_count_);
+    return response;
+  }
+
+  absl::StatusOr<v1::DeleteSessionResponse> call(const v1::DeleteSessionRequest& request,
+                                                 std::stop_token) override {
+    const std::scoped_lock lock(mutex_);
+    deleted_.push_back(request.session());
+    return v1::DeleteSessionResponse();
+  }
+
+  absl::StatusOr<v1::AcquireWriterResponse> call(const v1::AcquireWriterRequest&, std::stop_token) override {
+    v1::AcquireWriterResponse response;
+    response.set_writer_token("another token");
+    response.set_epoch(2);
+    response.set_input_seq(100);
+    return response;
+  }
+
+  absl::StatusOr<v1::UpdateHandlesResponse> call(const v1::UpdateHandlesRequest& request,
+                                                 std::stop_token) override {
+    const std::scoped_lock lock(mutex_);
+    restored_.push_back(request);
+    return v1::UpdateHandlesResponse();
+  }
+
+  absl::Status solve(const v1::SolveRequest& request, double, std::stop_token,
+                     const std::function<absl::Status(const v1::SolveResponse&)>& on_response) override {
+    {
+      const std::scoped_lock lock(mutex_);
+      solved_.push_back(request);
+      if (!solve_ends.empty()) {
+        absl::Status end = std::move(solve_ends.front());
+        solve_ends.pop_front();
+        if (!end.ok()) return end;
+      }
+    }
+    v1::SolveResponse summary;
+    summary.mutable_summary()->set_stop_reason(v1::STOP_REASON_CONVERGED);
+    absl::Status taken = on_response(summary);
+    v1::SolveResponse frame;
+    frame.mutable_frame()->mutable_header()->set_vertex_count(vertex_count_);
+    frame.mutable_frame()->set_vertex_count(vertex_count_);
+    frame.mutable_frame()->set_positions(std::string(vertex_count_ * 12, '\0'));
+    frame.mutable_frame()->set_last(true);
+    taken.Update(on_response(frame));
+    return taken;
+  }
+
+  std::unique_ptr<DeformCall> deform() override {
+    const std::scoped_lock lock(mutex_);
+    streams_.push_back(std::make_shared<Stream>());
+    changed_.notify_all();
+    return std::make_unique<FakeCall>(streams_.back());
+  }
+
+ private:
+  const std::uint32_t vertex_count_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::shared_ptr<Stream>> streams_;
+  std::vector<v1::CreateSessionRequest> created_;
+  std::vector<std::string> deleted_;
+  std::vector<v1::SolveRequest> solved_;
+  std::vector<v1::UpdateHandlesRequest> restored_;
+  std::size_t upload_bytes_left_ = 0;
+};
+
+}  // namespace lpdeform::client

@@ -1,0 +1,78 @@
+#include "client/cpp/frame_assembly.h"
+
+#include <gtest/gtest.h>
+
+#include "core/base/fault.h"
+
+namespace lpdeform::client {
+namespace {
+
+template <typename T>
+std::string bytes(const std::vector<T>& numbers) {
+  return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(T)};
+}
+
+v1::FramePart part(std::uint32_t first, std::vector<float> positions, bool last) {
+  v1::FramePart part;
+  part.set_frame_seq(7);
+  part.set_first_vertex(first);
+  part.set_vertex_count(static_cast<std::uint32_t>(positions.size() / 3));
+  part.set_positions(bytes(positions));
+  part.set_distortion(bytes(std::vector<float>(positions.size() / 3, 0.5f)));
+  part.set_last(last);
+  return part;
+}
+
+v1::FramePart first_part(std::uint32_t vertex_count, std::vector<float> positions, bool last) {
+  v1::FramePart first = part(0, std::move(positions), last);
+  first.mutable_header()->set_frame_seq(7);
+  first.mutable_header()->set_input_seq(3);
+  first.mutable_header()->set_vertex_count(vertex_count);
+  first.mutable_header()->set_converged(true);
+  return first;
+}
+
+TEST(FrameAssembly, PutsPartsTogetherInOrder) {
+  FrameAssembly assembly(3);
+  const auto none = assembly.add(first_part(3, {1, 2, 3}, false));
+  ASSERT_TRUE(none.ok());
+  EXPECT_FALSE(none->has_value());
+  const auto frame = assembly.add(part(1, {4, 5, 6, 7, 8, 9}, true));
+  ASSERT_TRUE(frame.ok() && frame->has_value());
+  EXPECT_EQ((*frame)->positions, (std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8, 9}));
+  EXPECT_EQ((*frame)->distortion, (std::vector<float>{0.5f, 0.5f, 0.5f}));
+  EXPECT_EQ((*frame)->input_seq, 3u);
+  EXPECT_TRUE((*frame)->converged);
+}
+
+TEST(FrameAssembly, ReadsDoublesBitForBit) {
+  v1::FramePart whole = first_part(1, {0, 0, 0}, true);
+  whole.mutable_header()->set_scalar(v1::SCALAR_FLOAT64);
+  whole.set_positions(bytes(std::vector<double>{0.1, 1e300, -3}));
+  FrameAssembly assembly(1);
+  const auto frame = assembly.add(whole);
+  ASSERT_TRUE(frame.ok() && frame->has_value());
+  EXPECT_EQ((*frame)->positions, (std::vector<double>{0.1, 1e300, -3}));
+}
+
+TEST(FrameAssembly, RefusesPartsThatDoNotFit) {
+  const auto reason_of = [](FrameAssembly assembly, std::vector<v1::FramePart> parts) {
+    absl::Status status;
+    for (const v1::FramePart& part : parts) status.Update(assembly.add(part).status());
+    return fault_of(status).reason;
+  };
+  const std::vector<float> one = {1, 2, 3};
+  EXPECT_EQ(reason_of(FrameAssembly(2), {part(0, one, false)}), "FRAME_PARTS") << "no header";
+  EXPECT_EQ(reason_of(FrameAssembly(9), {first_part(2, one, false)}), "FRAME_PARTS") << "another mesh";
+  EXPECT_EQ(reason_of(FrameAssembly(3), {first_part(3, one, false), part(2, one, true)}), "FRAME_PARTS")
+      << "a gap";
+  EXPECT_EQ(reason_of(FrameAssembly(2), {first_part(2, one, true)}), "FRAME_PARTS") << "ends early";
+  EXPECT_EQ(reason_of(FrameAssembly(1), {first_part(1, one, false), part(1, one, true)}), "FRAME_PARTS")
+      << "too many";
+  v1::FramePart short_one = first_part(1, one, true);
+  short_one.set_positions("abc");
+  EXPECT_EQ(reason_of(FrameAssembly(1), {short_one}), "FRAME_PARTS") << "too few bytes";
+}
+
+}  // namespace
+}  // namespace lpdeform::client

@@ -1,0 +1,150 @@
+#include "client/cpp/ledger.h"
+
+#include <gtest/gtest.h>
+
+namespace lpdeform::client {
+namespace {
+
+Update adding(const std::string& name, std::vector<std::uint32_t> vertices) {
+  Update update;
+  update.handles.emplace(name, Handle{std::move(vertices), Fixed{}});
+  return update;
+}
+
+Update moving(const std::string& name, double x) {
+  Update update;
+  update.handles.emplace(name, Motion(RigidMotion{.translation = {x, 0, 0}}));
+  return update;
+}
+
+Update removing(const std::string& name) {
+  Update update;
+  update.handles.emplace(name, Update::Removal{});
+  return update;
+}
+
+Update with_p(double p) {
+  Update update;
+  update.settings.p = p;
+  return update;
+}
+
+double translation_x(const Motion& motion) {
+  return std::get<RigidMotion>(motion).translation[0];
+}
+
+TEST(Ledger, MergesWhatWaitsWithTheNewestValueWinning) {
+  Ledger ledger;
+  ledger.add(moving("tip", 1));
+  ledger.add(with_p(1.5));
+  EXPECT_EQ(ledger.add(moving("tip", 2)), 3u);
+  const NumberedUpdate sent = ledger.send_next();
+  EXPECT_EQ(sent.seq, 3u);
+  EXPECT_EQ(translation_x(std::get<Motion>(sent.update.handles.at("tip"))), 2);
+  EXPECT_EQ(std::get<double>(*sent.update.settings.p), 1.5);
+  EXPECT_FALSE(ledger.has_waiting());
+}
+
+TEST(Ledger, AMotionMovesTheHandleThatWaitsToBeAdded) {
+  Ledger ledger;
+  ledger.add(adding("tip", {7, 8}));
+  ledger.add(moving("tip", 2));
+  const NumberedUpdate sent = ledger.send_next();
+  const Handle& handle = std::get<Handle>(sent.update.handles.at("tip"));
+  EXPECT_EQ(handle.vertices, (std::vector<std::uint32_t>{7, 8}));
+  EXPECT_EQ(translation_x(handle.motion), 2);
+}
+
+TEST(Ledger, ARemovalWinsOverWhatWaits) {
+  Ledger ledger;
+  ledger.add(adding("tip", {7}));
+  ledger.add(removing("tip"));
+  const NumberedUpdate sent = ledger.send_next();
+  EXPECT_TRUE(std::holds_alternative<Update::Removal>(sent.update.handles.at("tip")));
+}
+
+TEST(Ledger, SendsNoMoreThanItsWindowAtOnce) {
+  Ledger ledger;
+  for (std::size_t k = 0; k < Ledger::kWindow; ++k) {
+    ledger.add(with_p(2));
+    ASSERT_TRUE(ledger.can_send());
+    ledger.send_next();
+  }
+  ledger.add(with_p(3));
+  EXPECT_FALSE(ledger.can_send());
+  ledger.accept(1);
+  EXPECT_TRUE(ledger.can_send());
+}
+
+TEST(Ledger, SendsAgainWhatALostConnectionLeftUnanswered) {
+  Ledger ledger;
+  ledger.add(adding("tip", {7}));
+  ledger.send_next();
+  ledger.add(moving("tip", 3));
+  ledger.connection_lost();
+  EXPECT_FALSE(ledger.has_in_flight());
+  const NumberedUpdate again = ledger.send_next();
+  EXPECT_EQ(again.seq, 2u);
+  EXPECT_EQ(translation_x(std::get<Handle>(again.update.handles.at("tip")).motion), 3);
+}
+
+TEST(Ledger, RestoresALostSessionFromWhatWasAcceptedAlone) {
+  Ledger ledger;
+  ledger.add(adding("base", {1}));
+  ledger.add(adding("tip", {7}));
+  ledger.accept(ledger.send_next().seq);
+  ledger.add(moving("tip", 5));
+  ledger.accept(ledger.send_next().seq);
+  ledger.add(removing("base"));
+  ledger.accept(ledger.send_next().seq);
+  ledger.add(adding("bad", {999}));
+  ledger.send_next();
+
+  ledger.session_lost();
+  ASSERT_TRUE(ledger.has_restore());
+  const NumberedUpdate restore = ledger.send_next();
+  EXPECT_EQ(restore.seq, 4u);
+  ASSERT_EQ(restore.update.handles.size(), 1u);
+  EXPECT_EQ(translation_x(std::get<Handle>(restore.update.handles.at("tip")).motion), 5);
+
+  const NumberedUpdate unanswered = ledger.send_next();
+  EXPECT_EQ(unanswered.seq, 5u);
+  EXPECT_TRUE(unanswered.update.handles.contains("bad"));
+}
+
+TEST(Ledger, KeepsARestoreApartWhenTheConnectionIsLostAgain) {
+  Ledger ledger;
+  ledger.add(adding("tip", {7}));
+  ledger.accept(ledger.send_next().seq);
+  ledger.session_lost();
+  ledger.send_next();
+  ledger.add(with_p(6));
+  ledger.connection_lost();
+  ASSERT_TRUE(ledger.has_restore());
+  EXPECT_FALSE(ledger.send_next().update.settings.p.has_value());
+  EXPECT_TRUE(ledger.send_next().update.settings.p.has_value());
+}
+
+TEST(Ledger, ForgetsWhatWasRefused) {
+  Ledger ledger;
+  ledger.add(adding("tip", {7}));
+  ledger.accept(ledger.send_next().seq);
+  ledger.add(with_p(0.5));
+  ledger.refuse(ledger.send_next().seq);
+  EXPECT_EQ(ledger.newest(), 1u);
+  ledger.session_lost();
+  EXPECT_FALSE(ledger.send_next().update.settings.p.has_value());
+}
+
+TEST(Ledger, CountsOnFromWhatTheServerKnows) {
+  Ledger ledger;
+  ledger.add(with_p(2));
+  ledger.count_from(41);
+  EXPECT_EQ(ledger.send_next().seq, 42u);
+  EXPECT_EQ(ledger.add(with_p(3)), 43u);
+  ledger.count_from(10);
+  EXPECT_EQ(ledger.add(with_p(3)), 44u);
+}
+
+}  // namespace
+}  // namespace lpdeform::client

@@ -1,0 +1,83 @@
+#include "client/cpp/wire.h"
+
+#include <gtest/gtest.h>
+
+#include "client/cpp/status_details.h"
+#include "core/base/crc32c.h"
+#include "core/base/fault.h"
+
+namespace lpdeform::client {
+namespace {
+
+TEST(Packer, KeepsSmallRunsInTheMessageAndUploadsWhatDoesNotFit) {
+  std::vector<std::size_t> uploaded;
+  Packer packer([&](std::string_view bytes) {
+    uploaded.push_back(bytes.size());
+    return absl::StatusOr<std::string>("uploads/x");
+  });
+  v1::Buffer first, second, third;
+  ASSERT_TRUE(packer.pack(std::string(Packer::kInlineBytes - 10, 'a'), first).ok());
+  ASSERT_TRUE(packer.pack(std::string(20, 'b'), second).ok());
+  ASSERT_TRUE(packer.pack(std::string(10, 'c'), third).ok());
+  EXPECT_EQ(first.source_case(), v1::Buffer::kInline);
+  EXPECT_EQ(second.upload(), "uploads/x");
+  EXPECT_EQ(third.source_case(), v1::Buffer::kInline);
+  EXPECT_EQ(uploaded, std::vector<std::size_t>{20});
+}
+
+TEST(Wire, AnUpdateWithoutSettingsChangesNone) {
+  Update update;
+  update.handles.emplace("tip", Update::Removal{});
+  Packer packer([](std::string_view) { return absl::InternalError("not needed"); });
+  v1::Update message;
+  ASSERT_TRUE(to_wire(update, 9, packer, message).ok());
+  EXPECT_EQ(message.input_seq(), 9u);
+  EXPECT_FALSE(message.has_settings());
+  ASSERT_EQ(message.handles_size(), 1);
+  EXPECT_EQ(message.handles(0).change_case(), v1::HandleUpdate::kRemove);
+}
+
+TEST(Wire, AFaultOfAStreamKeepsReasonElementAndLimit) {
+  v1::Fault fault;
+  fault.set_code(3);
+  fault.set_reason("P_OUT_OF_RANGE");
+  fault.set_text("p is 0.5.");
+  fault.set_element("p");
+  fault.set_limit("1 <= p <= 64");
+  const absl::Status status = from_wire(fault);
+  EXPECT_TRUE(absl::IsInvalidArgument(status));
+  EXPECT_EQ(fault_of(status), (Fault{"P_OUT_OF_RANGE", "p", "1 <= p <= 64"}));
+}
+
+/// A length-delimited protobuf field of less than 128 bytes, written by hand.
+std::string field(int number, const std::string& bytes) {
+  return std::string{static_cast<char>(number << 3 | 2), static_cast<char>(bytes.size())} + bytes;
+}
+
+TEST(StatusDetails, FindsReasonElementAndLimitInAnErrorInfo) {
+  const std::string info = field(1, "MESH_NOT_FINITE") + field(2, "lpdeform") +
+                           field(3, field(1, "element") + field(2, "vertex 17")) +
+                           field(3, field(1, "limit") + field(2, "finite"));
+  const std::string details = field(3, field(1, "type.googleapis.com/google.rpc.BadRequest") + field(2, "")) +
+                              field(3, field(1, "type.googleapis.com/google.rpc.ErrorInfo") + field(2, info));
+  const absl::Status status = with_details(absl::StatusCode::kInvalidArgument, "Vertex 17 is NaN.", details);
+  EXPECT_EQ(fault_of(status), (Fault{"MESH_NOT_FINITE", "vertex 17", "finite"}));
+  EXPECT_EQ(status.message(), "Vertex 17 is NaN.");
+}
+
+TEST(StatusDetails, LeavesOutWhatItCannotRead) {
+  const absl::Status status = with_details(absl::StatusCode::kUnavailable, "gone", "\xff\xff\xff");
+  EXPECT_TRUE(absl::IsUnavailable(status));
+  EXPECT_EQ(fault_of(status), Fault{});
+}
+
+// The check value of the CRC catalogue, and one of RFC 3720, B.4.
+TEST(Crc32c, AgreesWithPublishedValuesAndContinuesOverParts) {
+  EXPECT_EQ(crc32c("123456789"), 0xe3069283u);
+  EXPECT_EQ(crc32c(std::string(32, '\0')), 0x8a9136aau);
+  EXPECT_EQ(crc32c("456789", crc32c("123")), 0xe3069283u);
+  EXPECT_EQ(crc32c(""), 0u);
+}
+
+}  // namespace
+}  // namespace lpdeform::client
