@@ -112,7 +112,8 @@ TEST(Shapes, CreatureHasWellShapedTriangles) {
 }
 
 TEST(Shapes, FinerCreaturesEncloseTheSameVolume) {
-  // Chords cut off a share of the volume that falls with the square of the spacing: 3 % at 40, about 1 % at 70.
+  // Chords cut off a share of the volume that falls with the square of the spacing: 3 % at 40, about 1 %
+  // at 70.
   EXPECT_NEAR(signed_volume(creature(70)) / signed_volume(creature(140)), 1, 0.015);
 }
 

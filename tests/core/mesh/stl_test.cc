@@ -52,8 +52,8 @@ TEST(Stl, ABinaryFileMayHaveBytesBehindItsFaces) {
 }
 
 TEST(Stl, WeldsAsciiCornersInOrderOfFirstAppearance) {
-  expect_welded("solid a b\n" + facet("1 1 0", "0 0 0", "1.0 0 0e9") +
-                facet("0 -0 0", "1e0 1 0", "0 1 .0") + "endsolid a b\n");
+  expect_welded("solid a b\n" + facet("1 1 0", "0 0 0", "1.0 0 0e9") + facet("0 -0 0", "1e0 1 0", "0 1 .0") +
+                "endsolid a b\n");
 }
 
 TEST(Stl, ReadsUpperCaseAndSeveralSolids) {
