@@ -1,7 +1,8 @@
-// A program with a data race on purpose. ThreadSanitizer has to report it with tests/support/tsan.supp in
-// force: it shows that neither the suppressions nor the thread pool hide races in our own code.
+// seeded_race threads|workers: a race between two threads, or between two threads of the pool. See
+// seeded_race.h.
 
-#include <atomic>
+#include "tests/support/seeded_race.h"
+
 #include <cstdio>
 #include <string_view>
 #include <thread>
@@ -9,20 +10,6 @@
 #include "core/base/workers.h"
 
 namespace {
-
-volatile int shared_count = 0;
-
-// Returns once both threads are here, or after many tries. Relaxed, so that it orders nothing between the
-// two.
-void meet(std::atomic<int>& arrived) {
-  arrived.fetch_add(1, std::memory_order_relaxed);
-  for (int tries = 0; tries < 100000000 && arrived.load(std::memory_order_relaxed) < 2; ++tries) {
-  }
-}
-
-void count_up() {
-  for (int step = 0; step < 1000; ++step) shared_count = shared_count + 1;
-}
 
 void race_between_threads() {
   std::atomic<int> arrived = 0;
