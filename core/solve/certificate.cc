@@ -1,1 +1,165 @@
+#include "core/solve/certificate.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace lpdeform {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// t of the maximum in f*(y) = max_t y t - k t^p, for p > 1: |y| = k p t^{p - 1}.
+double conjugate_point(double y, double k, double p) { return std::pow(y / (k * p), 1 / (p - 1)); }
+
+/// argmin over t >= 0 of k t^p + (rho / 2) (t - v)^2.
+double shrink(double v, double k, double p, double rho) {
+  if (p == 1) return std::max(0.0, v - k / rho);
+  if (p == 2) return v / (1 + 2 * k / rho);
+  double low = 0, high = v;
+  for (int step = 0; step < 60 && high - low > 1e-15 * v; ++step) {
+    const double t = 0.5 * (low + high);
+    (t + k * p / rho * std::pow(t, p - 1) < v ? low : high) = t;
+  }
+  return 0.5 * (low + high);
+}
+
+/// The dual side of one convex step.
+class DualBound {
+ public:
+  DualBound(const Problem& problem, const EdgeVectors& z) : problem_(problem), shape_(problem.shape()), z_(z) {}
+
+  /// max over theta >= 0 of D(theta y), for y with A^T y = 0.
+  double scaled_bound(const EdgeVectors& y) {
+    norms_.resize(shape_.vertex_count());
+    double longest_theta = 2;
+    for (std::int32_t i = 0; i < shape_.vertex_count(); ++i) {
+      norms_[i] = cell_norm(shape_, y, i);
+      if (p(i) == 1 && norms_[i] > 0) longest_theta = std::min(longest_theta, k(i) / norms_[i]);
+    }
+    inner_ = y.cwiseProduct(z_).sum();
+    double low = 0, high = longest_theta;
+    for (int step = 0; step < 60; ++step) {
+      const double theta = step == 0 ? high : 0.5 * (low + high);
+      if (slope(theta) >= 0) low = theta;
+      else high = theta;
+      if (low == high) break;
+    }
+    return value(low);
+  }
+
+  double p(std::int32_t i) const { return problem_.norm.p(i); }
+  double k(std::int32_t i) const { return problem_.norm.coefficient(i); }
+
+ private:
+  double slope(double theta) const {
+    double sum = inner_;
+    for (std::int32_t i = 0; i < shape_.vertex_count(); ++i) {
+      if (p(i) > 1 && norms_[i] > 0) sum -= norms_[i] * conjugate_point(theta * norms_[i], k(i), p(i));
+    }
+    return sum;
+  }
+  double value(double theta) const {
+    double sum = theta * inner_;
+    for (std::int32_t i = 0; i < shape_.vertex_count(); ++i) {
+      if (p(i) == 1 || norms_[i] == 0) continue;
+      const double t = conjugate_point(theta * norms_[i], k(i), p(i));
+      sum -= (p(i) - 1) * k(i) * std::pow(t, p(i));
+    }
+    return std::isfinite(sum) ? sum : -kInfinity;
+  }
+
+  const Problem& problem_;
+  const RestShape& shape_;
+  const EdgeVectors& z_;
+  std::vector<double> norms_;
+  double inner_ = 0;
+};
+
+/// Solves (A^T A) u = A^T y: with equal cell weights 1 the metric is 2 A^T A.
+Points least_squares(const Problem& problem, const EdgeVectors& y) {
+  Points u;
+  apply_edges_transposed(problem.shape(), y, problem.constraints.is_held, u);
+  problem.metric.solve(u, u);
+  return 2 * u;
+}
+
+/// y - A (A^T A)^-1 A^T y.
+EdgeVectors project(const Problem& problem, const EdgeVectors& y) {
+  EdgeVectors image;
+  apply_edges(problem.shape(), least_squares(problem, y), image);
+  return y - image;
+}
+
+/// The terms' gradients, y_i = k_i p_i |z_i|^{p_i - 2} z_i, smoothed near 0 where p_i < 2.
+EdgeVectors term_gradients(const Problem& problem, const DualBound& dual, const EdgeVectors& z, double eps) {
+  const RestShape& shape = problem.shape();
+  EdgeVectors y = z;
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    const double p = dual.p(i), size = cell_norm(shape, z, i);
+    const double smoothed = p < 2 ? std::hypot(size, eps) : size;
+    const double factor = smoothed > 0 ? dual.k(i) * p * std::pow(smoothed, p - 2) : 0;
+    y.middleRows(shape.offsets()[i], shape.offsets()[i + 1] - shape.offsets()[i]) *= factor;
+  }
+  return y;
+}
+
+/// A penalty that treats the 90th percentile of the cells alike in primal and dual: k p E^{p - 2} there.
+double penalty(const Problem& problem, const DualBound& dual) {
+  const auto& e2 = problem.cells.squared_energies();
+  std::vector<std::pair<double, std::int32_t>> cells;
+  for (std::size_t i = 0; i < e2.size(); ++i) cells.emplace_back(e2[i], static_cast<std::int32_t>(i));
+  const auto percentile = cells.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(cells.size()));
+  std::nth_element(cells.begin(), percentile, cells.end());
+  const double energy = std::sqrt(std::max(percentile->first, 1e-20));
+  const std::int32_t i = percentile->second;
+  return dual.k(i) * dual.p(i) * std::pow(energy, dual.p(i) - 2);
+}
+
+/// ADMM on min sum f_i(z_i), z = A x - b, from the present residuals r and multipliers y. Returns the best bound seen.
+double polish(const Problem& problem, DualBound& dual, EdgeVectors r, EdgeVectors y, double best, double enough,
+              int max_steps) {
+  const RestShape& shape = problem.shape();
+  const double rho = penalty(problem, dual);
+  EdgeVectors image;
+  for (int step = 0; step < max_steps && best < enough && !problem.stop.stop_requested(); ++step) {
+    const EdgeVectors v = r + y / rho;
+    EdgeVectors z = v;
+    for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+      const double size = cell_norm(shape, v, i);
+      const double factor = size > 0 ? shrink(size, dual.k(i), dual.p(i), rho) / size : 0;
+      z.middleRows(shape.offsets()[i], shape.offsets()[i + 1] - shape.offsets()[i]) *= factor;
+    }
+    y = rho * (v - z);
+    // x minimises |r - z + y / rho|; what remains of that vector, times rho, has A^T (.) = 0: a dual point.
+    apply_edges(shape, least_squares(problem, r - z + y / rho), image);
+    r -= image;
+    if (step % 5 == 4) best = std::max(best, dual.scaled_bound(rho * (r - z) + y));
+  }
+  return best;
+}
+
+}  // namespace
+
+double relative_gap(const Problem& problem, const Points& x, const CertificateSettings& settings) {
+  const double primal = problem.cells.sum(problem.norm);
+  if (!(primal > problem.zero_objective)) return 0;
+  const std::vector<double> equal(problem.shape().vertex_count(), 1.0);
+  if (!problem.metric.factor(equal, problem.constraints.is_held)) return 1;
+
+  EdgeVectors z;
+  residuals(problem.shape(), x, problem.cells.rotations(), z);
+  DualBound dual(problem, z);
+  const double enough = (1 - settings.good_enough) * primal;
+  double best = dual.scaled_bound(project(problem, term_gradients(problem, dual, z, 0)));
+  if (best < enough && problem.norm.lowest_p() < 2) {
+    const EdgeVectors smoothed = term_gradients(problem, dual, z, 1e-4 * problem.diagonal);
+    best = std::max(best, dual.scaled_bound(project(problem, smoothed)));
+    best = polish(problem, dual, z, smoothed, best, enough, settings.max_steps);
+  }
+  return std::clamp((primal - best) / primal, 0.0, 1.0);
+}
+
+}  // namespace lpdeform

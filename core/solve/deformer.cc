@@ -17,6 +17,8 @@
 namespace lpdeform {
 namespace {
 
+constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
+
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
@@ -70,6 +72,8 @@ struct Deformer::Impl {
   Points current_guess();
   Points initial_guess(InitialGuess guess);
   double typical_energy(const Points& guess);
+  double zero_objective() const;
+  Problem make_problem();
   std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, bool is_warm);
   bool prepare_metric(bool needs_plain_weights);
   double keep_if_best();
@@ -77,6 +81,7 @@ struct Deformer::Impl {
   void begin(const SolveSettings& new_settings, std::stop_token new_stop);
   void iterate();
   void end(StopReason reason);
+  double gap();
   void interrupt() {
     if (minimiser) end(StopReason::kCancelled);
   }
@@ -147,15 +152,28 @@ double Deformer::Impl::typical_energy(const Points& guess) {
   return largest > 1e-12 ? largest : 1.0;
 }
 
+/// The objective where every E_i is what rounding leaves of it.
+double Deformer::Impl::zero_objective() const {
+  const double rounding = kRounding * (1 + constraints->targets.cwiseAbs().maxCoeff());
+  double sum = 0;
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) sum += norm->term(i, rounding * rounding).value;
+  return sum;
+}
+
+Problem Deformer::Impl::make_problem() {
+  return {cells,
+          metric,
+          *constraints,
+          *norm,
+          settings.tolerance,
+          length_unit() / unit(),
+          shape->diagonal() / unit(),
+          zero_objective(),
+          stop};
+}
+
 std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points guess, bool is_warm) {
-  Problem problem{cells,
-                  metric,
-                  *constraints,
-                  *norm,
-                  settings.tolerance,
-                  length_unit() / unit(),
-                  shape->diagonal() / unit(),
-                  stop};
+  Problem problem = make_problem();
   switch (method) {
     case Method::kLineSearch: return std::make_unique<LineSearch>(std::move(problem), std::move(guess));
     case Method::kLocalGlobal: return std::make_unique<LocalGlobal>(std::move(problem), std::move(guess));
@@ -234,7 +252,14 @@ void Deformer::Impl::end(StopReason reason) {
   minimiser.reset();
   has_state = true;
   summary.stop_reason = reason;
+  if (settings.certify && reason != StopReason::kCancelled) summary.optimality_gap = gap();
   summary.solve_seconds = seconds_since(started);
+}
+
+double Deformer::Impl::gap() {
+  if (!constraints || !norm) return 1;
+  cells.evaluate(x, *norm);
+  return relative_gap(make_problem(), x);
 }
 
 Deformer::Deformer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -331,10 +356,14 @@ const Points& Deformer::positions() const {
   return self.positions;
 }
 
+double Deformer::optimality_gap() {
+  impl_->interrupt();
+  return impl_->gap();
+}
+
 std::size_t Deformer::memory_bytes() const {
   const std::size_t points = impl_->x.size() * sizeof(double);
   return sizeof(Impl) + impl_->cells.memory_bytes() + impl_->metric.memory_bytes() + 4 * points;
 }
 
 }  // namespace lpdeform
-namespace lpdeform { double Deformer::optimality_gap() { return 0; } }

@@ -69,7 +69,8 @@ class Deformer {
   /// E_i at positions(), in the caller's unit of length; 0 for unreferenced vertices.
   const Field& cell_energies() const;
 
-  /// The certificate at positions(): see SolveSummary::optimality_gap.
+  /// The certificate at positions() for the material of the last solve: see SolveSummary::optimality_gap. 1 before the first
+  /// solve. Ends a running solve with kCancelled.
   double optimality_gap();
 
   /// Bytes held, the shared rest shape left out.

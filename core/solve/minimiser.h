@@ -18,6 +18,7 @@ struct Problem {
   double tolerance;          // SolveSettings::tolerance
   double length_unit;        // l in scaled units, for thresholds that the paper gives in absolute lengths
   double diagonal;           // of the rest mesh, in scaled units
+  double zero_objective;     // an unsmoothed objective that is 0 to rounding
   std::stop_token stop;      // looked at between evaluations
 
   const RestShape& shape() const { return cells.shape(); }
