@@ -28,8 +28,8 @@ class Rpc;
 class Link;
 
 struct ClientOptions {
-  /// Of connect().
-  std::chrono::milliseconds connect_timeout = std::chrono::seconds(5);
+  /// Of connect(), which does not wait where the address refuses at once.
+  std::chrono::milliseconds connect_timeout = std::chrono::seconds(10);
   /// Of every other call but Session::solve, which has its own.
   std::chrono::milliseconds call_timeout = std::chrono::seconds(30);
   /// A live session whose server stays away for longer gives up; next_frame then says UNAVAILABLE for good.
@@ -123,8 +123,8 @@ class Session {
 /// thread.
 class Client {
  public:
-  /// Waits until the server answers. `address`: "host:port", or "unix:/path/of/socket". UNAVAILABLE
-  /// (NO_SERVER) where none does within the timeout.
+  /// Waits until the server answers or its address refuses. `address`: "host:port", or
+  /// "unix:/path/of/socket". UNAVAILABLE (NO_SERVER).
   static absl::StatusOr<Client> connect(std::string_view address, ClientOptions options = {});
 
   /// Makes a session on the server. Waits for the mesh to be sent: in one message where it is small,

@@ -41,6 +41,16 @@ absl::Status status_of(const grpc::Status& status) {
                       status.error_details());
 }
 
+/// False as soon as every address has refused: waiting would only hide that nobody is there.
+bool answers(grpc::Channel& channel, std::chrono::system_clock::time_point deadline) {
+  for (;;) {
+    const grpc_connectivity_state state = channel.GetState(true);
+    if (state == GRPC_CHANNEL_READY) return true;
+    if (state == GRPC_CHANNEL_TRANSIENT_FAILURE || state == GRPC_CHANNEL_SHUTDOWN) return false;
+    if (!channel.WaitForStateChange(state, deadline)) return false;
+  }
+}
+
 class GrpcDeformCall final : public DeformCall {
  public:
   explicit GrpcDeformCall(Stub& stub) : stream_(stub.Deform(&context_)) {}
@@ -134,10 +144,9 @@ absl::StatusOr<std::shared_ptr<Rpc>> Rpc::connect(const std::string& address,
                                                   std::chrono::milliseconds call_timeout) {
   const auto channel =
       grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), channel_arguments());
-  if (!channel->WaitForConnected(std::chrono::system_clock::now() + connect_timeout)) {
-    return make_fault(
-        absl::StatusCode::kUnavailable, {"NO_SERVER", address, ""},
-        absl::StrCat("No server answers at \"", address, "\" within ", connect_timeout.count(), " ms."));
+  if (!answers(*channel, std::chrono::system_clock::now() + connect_timeout)) {
+    return make_fault(absl::StatusCode::kUnavailable, {"NO_SERVER", address, ""},
+                      absl::StrCat("No server answers at \"", address, "\"."));
   }
   return std::make_shared<GrpcRpc>(channel, call_timeout);
 }

@@ -29,8 +29,8 @@ class DeformCall {
 /// timeout where nothing else is said, and ends with CANCELLED when `stop` is requested.
 class Rpc {
  public:
-  /// `address` as in Client::connect. Waits until the server answers: UNAVAILABLE (NO_SERVER) where it does
-  /// not.
+  /// `address` as in Client::connect. Waits until the server answers or the address refuses:
+  /// UNAVAILABLE (NO_SERVER).
   static absl::StatusOr<std::shared_ptr<Rpc>> connect(const std::string& address,
                                                       std::chrono::milliseconds connect_timeout,
                                                       std::chrono::milliseconds call_timeout);
