@@ -1,5 +1,37 @@
 #pragma once
+
+#include <optional>
+
+#include "core/solve/conic_step.h"
 #include "core/solve/minimiser.h"
+
 namespace lpdeform {
-class Conic : public Minimiser { public: Conic(Problem p, Points x):p_(std::move(p)),x_(std::move(x)){} StepResult step() override {return {Outcome::kStalled,0,0};} const Points& x() const override {return x_;} Problem p_; Points x_; };
-}
+
+/// The paper's section 3.3 for p = 1: a second-order cone program for the positions (ConicStep) and a rotation fit, in turn. An
+/// iteration is one of the interior-point method; a stage is one cone program, solved to a relative duality gap of
+/// 1e-8 (1e-6 counts where rounding allows no more). The state is the best point of the stage.
+///
+/// Converged when a whole stage's root-mean-square displacement is below 0.01 l * tolerance / SolveSettings::kDefaultTolerance
+/// (the paper's epsilon_C at the default).
+class Conic : public Minimiser {
+ public:
+  /// Needs p = 1 everywhere.
+  Conic(Problem problem, Points x);
+
+  StepResult step() override;
+  const Points& x() const override { return x_; }
+
+  static constexpr double kDisplacement = 0.01, kGap = 1e-8, kAcceptableGap = 1e-6;
+
+ private:
+  void begin_stage();
+  StepResult end_stage();
+
+  Problem problem_;
+  Points x_, stage_start_;
+  std::optional<ConicStep> cone_;
+  double objective_ = 0;  // of x_ with the stage's rotations
+  int stage_ = -1;
+};
+
+}  // namespace lpdeform

@@ -103,33 +103,25 @@ bool QuasiNewton::is_stage_over() const {
   return history_.front() - history_.back() <= problem_.tolerance * norm_.highest_p() * history_.back();
 }
 
-StepResult QuasiNewton::step() {
-  if (!is_metric_good_ || !std::isfinite(objective_)) return result(Outcome::kBreakdown);
-  const bool is_last = stage_ + 1 == static_cast<int>(stages_.size());
-  if (!is_last && (stage_iterations_ >= stages_[stage_].iterations || is_stage_over())) {
-    begin_stage(stage_ + 1);
-    if (!is_metric_good_) return result(Outcome::kBreakdown);
-  }
-  if (since_refresh_ >= kRefresh) is_metric_good_ = refresh_metric();
-  if (!is_metric_good_) return result(Outcome::kBreakdown);
+bool QuasiNewton::is_at_zero() const { return problem_.cells.sum(problem_.norm) <= problem_.zero_objective; }
 
-  direction(direction_);
-  double slope = dot(gradient_, direction_);
-  if (slope == 0) return result(is_last ? Outcome::kConverged : Outcome::kProgress);
-  const double t = slope < 0 ? search(direction_, slope) : 0;
-  if (t == 0) {
-    problem_.cells.evaluate(x_, norm_);
-    if (problem_.stop.stop_requested()) return result(Outcome::kProgress);
-    if (since_refresh_ == 0) {
-      if (!is_last) {
-        stage_iterations_ = stages_[stage_].iterations;
-        return result(Outcome::kProgress);
-      }
-      return result(Outcome::kStalled);
-    }
+/// Where no step along d lowers the objective: another metric, the next stage, or the end.
+StepResult QuasiNewton::give_up(double slope) {
+  problem_.cells.evaluate(x_, norm_);
+  if (problem_.stop.stop_requested()) return result(Outcome::kProgress);
+  if (since_refresh_ > 0) {
     is_metric_good_ = refresh_metric();
     return result(Outcome::kProgress);
   }
+  if (!is_last_stage()) {
+    begin_stage(stage_ + 1);
+    return result(Outcome::kProgress);
+  }
+  const bool is_good = -0.5 * slope <= problem_.tolerance * norm_.highest_p() * objective_;
+  return result(is_good ? Outcome::kConverged : Outcome::kStalled);
+}
+
+void QuasiNewton::accept() {
   x_.swap(trial_);
   trial_gradient_.swap(gradient_);
   problem_.cells.gradient(x_, gradient_);
@@ -138,7 +130,20 @@ StepResult QuasiNewton::step() {
   ++stage_iterations_, ++since_refresh_;
   history_.push_back(objective_);
   if (history_.size() > kWindow + 1) history_.pop_front();
-  return result(is_last && is_stage_over() ? Outcome::kConverged : Outcome::kProgress);
+}
+
+StepResult QuasiNewton::step() {
+  if (is_at_zero()) return result(Outcome::kConverged);
+  const bool is_stage_done = stage_iterations_ >= stages_[stage_].iterations || is_stage_over();
+  if (!is_last_stage() && is_stage_done) begin_stage(stage_ + 1);
+  else if (since_refresh_ >= kRefresh) is_metric_good_ = refresh_metric();
+  if (!is_metric_good_ || !std::isfinite(objective_)) return result(Outcome::kBreakdown);
+
+  direction(direction_);
+  const double slope = dot(gradient_, direction_);
+  if (!(slope < 0) || search(direction_, slope) == 0) return give_up(slope);
+  accept();
+  return result(is_last_stage() && is_stage_over() ? Outcome::kConverged : Outcome::kProgress);
 }
 
 }  // namespace lpdeform

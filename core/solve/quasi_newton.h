@@ -11,12 +11,12 @@ namespace lpdeform {
 /// et al. 2017), t = 1 first, backtracking by interpolation. The default for every p.
 ///
 /// Where some p_i < 2 it runs through stages: p from 2 towards p_i, then cell energies smoothed with an eps that falls until it
-/// does not matter; where some p_i > 2 through stages of p only. Each stage begins with a metric refactored for
-/// the present cell weights and an empty memory; so does every kRefresh-th iteration. In a live session (`is_warm`) the
-/// stages before the last few are left out.
+/// does not matter. Each stage begins with a metric refactored for the present cell weights and an empty memory; so
+/// does every 40th iteration. In a live session (`is_warm`) it starts at p_i with a small eps.
 ///
-/// Converged when, in the last stage, the objective fell by at most tolerance * p * f over the last kWindow iterations, p the
-/// largest: a relative decrease of E^(1/p) of at most the tolerance.
+/// Converged when, in the last stage, the objective f fell over 20 iterations by at most tolerance * p * f, p the largest p_i (a
+/// relative decrease of E^(1/p) of at most the tolerance); or when no step lowers f and the decrease that the fresh
+/// metric promises, -<gradient, direction> / 2, is at most that; or when E is 0 to rounding.
 class QuasiNewton : public Minimiser {
  public:
   QuasiNewton(Problem problem, Points x, bool is_warm);
@@ -41,7 +41,11 @@ class QuasiNewton : public Minimiser {
   void direction(Points& d);
   double search(const Points& d, double slope);
   void remember(const Points& x_before, const Points& gradient_before);
+  void accept();
+  StepResult give_up(double slope);
   bool is_stage_over() const;
+  bool is_last_stage() const { return stage_ + 1 == static_cast<int>(stages_.size()); }
+  bool is_at_zero() const;
   StepResult result(Outcome outcome) const { return {outcome, objective_, stage_}; }
 
   Problem problem_;
