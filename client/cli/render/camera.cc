@@ -10,7 +10,8 @@ namespace {
 
 constexpr double kTurnRadians = 0.60, kRiseRadians = 0.38;
 constexpr double kDistanceInRadii = 4.5;
-constexpr double kMargin = 0.08;  // of the picture's width and height, on each side
+constexpr double kMargin = 0.08,
+                 kBottomMargin = 0.12;  // of the picture's width and height; a legend needs room
 
 struct Axes {
   int facing;  // across the widest side
@@ -56,11 +57,12 @@ Camera::Camera(const Points& points, int width, int height) {
     left_bottom = left_bottom.cwiseMin(slope);
     right_top = right_top.cwiseMax(slope);
   }
-  const Eigen::RowVector2d room = (1 - 2 * kMargin) * Eigen::RowVector2d(width, height);
+  const Eigen::RowVector2d room((1 - 2 * kMargin) * width, (1 - kMargin - kBottomMargin) * height);
   const Eigen::RowVector2d size = (right_top - left_bottom).cwiseMax(1e-9);
   scale_ = room.cwiseQuotient(size).minCoeff();
   const Eigen::RowVector2d middle = (left_bottom + right_top) / 2;
-  shift_ = Eigen::RowVector2d(width / 2.0 - scale_ * middle[0], height / 2.0 + scale_ * middle[1]);
+  shift_ = Eigen::RowVector2d(0.5 * width - scale_ * middle[0],
+                              kMargin * height + 0.5 * room[1] + scale_ * middle[1]);
 }
 
 Eigen::RowVector3d Camera::project(const Eigen::RowVector3d& point) const {

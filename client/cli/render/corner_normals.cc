@@ -44,7 +44,8 @@ FacesAtVertices faces_at_vertices(Eigen::Index vertices, const Faces& faces) {
 
 Points corner_normals(const Points& positions, const Faces& faces) {
   const Points weighted = area_normals(positions, faces);
-  const Points units = weighted.rowwise().normalized();
+  Points units = weighted;
+  for (auto unit : units.rowwise()) unit.normalize();
   const FacesAtVertices at = faces_at_vertices(positions.rows(), faces);
   Points normals(3 * faces.rows(), 3);
   for (Eigen::Index corner = 0; corner < normals.rows(); ++corner) {
@@ -58,7 +59,7 @@ Points corner_normals(const Points& positions, const Faces& faces) {
       normals.row(corner) += (cosine > 0 ? 1 : -1) * weighted.row(other);
     }
   }
-  normals.rowwise().normalize();
+  for (auto normal : normals.rowwise()) normal.normalize();
   return normals;
 }
 

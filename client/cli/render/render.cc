@@ -6,10 +6,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "client/cli/render/camera.h"
-#include "client/cli/render/corner_normals.h"
 #include "client/cli/render/legend.h"
-#include "client/cli/render/raster.h"
+#include "client/cli/render/scene.h"
 #include "client/cli/render/shading.h"
 #include "core/base/check.h"
 #include "core/base/fault.h"
@@ -19,7 +17,6 @@ namespace lpdeform {
 namespace {
 
 constexpr int kLargestSide = 16384;
-constexpr Rgb kPlain{196, 190, 180};
 
 /// Samples along each side of a pixel: 3, or fewer where that would be more samples than memory is to hold.
 int samples_per_side(std::int64_t width, std::int64_t height) {
@@ -41,68 +38,23 @@ Faces drawable(const Faces& faces, const Points& positions) {
   return faces(kept, Eigen::all);
 }
 
-Points corners_of(const Faces& faces, const Points& positions) {
-  Points corners(3 * faces.rows(), 3);
-  for (Eigen::Index corner = 0; corner < corners.rows(); ++corner) {
-    corners.row(corner) = positions.row(faces(corner / 3, corner % 3));
+/// Moved and scaled so that what `faces` use lies within [-1, 1]: squares of lengths then stay in range.
+Points to_unit_size(const Faces& faces, const Points& positions) {
+  Eigen::RowVector3d low = positions.row(faces(0, 0)), high = low;
+  for (const std::int32_t v : faces.reshaped()) {
+    low = low.cwiseMin(positions.row(v));
+    high = high.cwiseMax(positions.row(v));
   }
-  return corners;
+  const double half_size = (high / 2 - low / 2).maxCoeff();
+  return (positions.rowwise() - (high / 2 + low / 2)) / (half_size > 0 ? half_size : 1);
 }
 
-/// Everything that the colour of a sample depends on.
-class Scene {
- public:
-  Scene(const Faces& faces, const Points& positions, const Field& distortion, int width, int height)
-      : faces_(faces),
-        corners_(corners_of(faces, positions)),
-        normals_(corner_normals(positions, faces)),
-        camera_(corners_, width, height),
-        raster_(width, height) {
-    const double red = distortion.size() > 0 ? distortion_of_red(distortion) : 0;
-    heat_ = red > 0 ? (distortion / red).cwiseMin(1).eval() : Field::Zero(distortion.size()).eval();
-    Points projected(corners_.rows(), 3);
-    for (Eigen::Index corner = 0; corner < corners_.rows(); ++corner) {
-      projected.row(corner) = camera_.project(corners_.row(corner));
-    }
-    for (Eigen::Index f = 0; f < faces.rows(); ++f) {
-      raster_.draw(static_cast<std::int32_t>(f),
-                   {projected.row(3 * f), projected.row(3 * f + 1), projected.row(3 * f + 2)});
-    }
-  }
-
-  Rgb colour_at(int x, int y) const {
-    const Raster::Sample& sample = raster_.at(x, y);
-    if (sample.face < 0) return background((y + 0.5) / raster_.height());
-    const Eigen::RowVector3d point = inside(corners_, sample);
-    const Eigen::RowVector3d normal = camera_.turn(inside(normals_, sample)).normalized();
-    return shaded(albedo(sample), normal, camera_.towards_camera(point), 1);
-  }
-
- private:
-  static Eigen::RowVector3d inside(const Points& corner_values, const Raster::Sample& sample) {
-    const Eigen::Index first = 3 * Eigen::Index{sample.face};
-    return (1 - sample.b - sample.c) * corner_values.row(first) + sample.b * corner_values.row(first + 1) +
-           sample.c * corner_values.row(first + 2);
-  }
-
-  Rgb albedo(const Raster::Sample& sample) const {
-    if (heat_.size() == 0) return kPlain;
-    const auto face = faces_.row(sample.face);
-    return blue_to_red((1 - sample.b - sample.c) * heat_[face[0]] + sample.b * heat_[face[1]] +
-                       sample.c * heat_[face[2]]);
-  }
-
-  const Faces& faces_;
-  Points corners_, normals_;  // 3 f + k for corner k of face f
-  Camera camera_;
-  Raster raster_;
-  Field heat_;  // 0 to 1 a vertex; empty: plain
-};
-
+/// The colour of a pixel of side x side samples.
 Rgb mean_colour(const Scene& scene, int x, int y, int side) {
+  const double openness = scene.openness_at(side * x + side / 2, side * y + side / 2);
   std::array<int, 3> sum{};
   for (int k = 0; k < side * side; ++k) {
-    const Rgb colour = scene.colour_at(side * x + k % side, side * y + k / side);
+    const Rgb colour = scene.colour_at(side * x + k % side, side * y + k / side, openness);
     for (int channel = 0; channel < 3; ++channel) sum[channel] += colour[channel];
   }
   const int count = side * side;
@@ -111,6 +63,13 @@ Rgb mean_colour(const Scene& scene, int x, int y, int side) {
     mean[channel] = static_cast<std::uint8_t>((sum[channel] + count / 2) / count);
   }
   return mean;
+}
+
+/// 0 to 1 from blue to red, as distortion_colours has it.
+Field heat_of(const Field& distortion) {
+  const double red = distortion_of_red(distortion);
+  if (!(red > 0)) return Field::Zero(distortion.size());
+  return (distortion / red).cwiseMin(1);
 }
 
 Image empty_picture(int width, int height) {
@@ -129,7 +88,7 @@ Image render(const Faces& faces, const Points& positions, const Field& distortio
   const Faces kept = drawable(faces, positions);
   if (kept.rows() == 0) return empty_picture(width, height);
   const int side = samples_per_side(width, height);
-  const Scene scene(kept, positions, distortion, side * width, side * height);
+  const Scene scene(kept, to_unit_size(kept, positions), heat_of(distortion), side * width, side * height);
   Image image(width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) image.set(x, y, mean_colour(scene, x, y, side));

@@ -21,10 +21,10 @@ double soft_cosine(const Eigen::RowVector3d& normal, const Eigen::RowVector3d& l
 
 }  // namespace
 
-Rgb shaded(Rgb albedo, Eigen::RowVector3d normal, const Eigen::RowVector3d& towards_camera, double openness) {
+Rgb shaded(Rgb albedo, const Eigen::RowVector3d& normal, const Eigen::RowVector3d& towards_camera,
+           double openness) {
   static const Eigen::RowVector3d kKey = Eigen::RowVector3d(-0.55, 0.62, 0.56).normalized();
   static const Eigen::RowVector3d kFill = Eigen::RowVector3d(0.80, 0.05, 0.60).normalized();
-  if (normal.dot(towards_camera) < 0) normal = -normal;
   const double sky = 0.26 + 0.10 * normal[1];
   const double light = 0.80 * soft_cosine(normal, kKey, 0.2) + 0.16 * soft_cosine(normal, kFill, 0) + sky;
   const double gloss = 0.10 * std::pow(std::max(0.0, normal.dot((kKey + towards_camera).normalized())), 30);

@@ -1,0 +1,108 @@
+#include "client/cli/render/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "client/cli/render/corner_normals.h"
+#include "client/cli/render/shading.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr Rgb kPlain{196, 190, 180};
+constexpr double kReachInDiagonals = 0.05;
+constexpr double kReachInHeights = 0.06;  // the same distance on the picture, about
+
+Points at_corners(const Faces& faces, const Points& positions) {
+  Points corners(3 * faces.rows(), 3);
+  for (Eigen::Index corner = 0; corner < corners.rows(); ++corner) {
+    corners.row(corner) = positions.row(faces(corner / 3, corner % 3));
+  }
+  return corners;
+}
+
+Field at_corners(const Faces& faces, const Field& heat) {
+  Field corners(heat.size() > 0 ? 3 * faces.rows() : 0);
+  for (Eigen::Index corner = 0; corner < corners.size(); ++corner) {
+    corners[corner] = heat[faces(corner / 3, corner % 3)];
+  }
+  return corners;
+}
+
+double diagonal(const Points& points) {
+  return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
+}
+
+/// An angle that looks random from one pixel to the next.
+double scattered_angle(int x, int y) {
+  const double seed = 52.9829189 * std::fmod(0.06711056 * x + 0.00583715 * y, 1.0);
+  return 2 * M_PI * (seed - std::floor(seed));
+}
+
+}  // namespace
+
+Scene::Scene(const Faces& faces, const Points& positions, const Field& heat, int width, int height)
+    : corners_(at_corners(faces, positions)),
+      normals_(corner_normals(positions, faces)),
+      heat_(at_corners(faces, heat)),
+      reach_(kReachInDiagonals * diagonal(corners_)),
+      camera_(corners_, width, height),
+      raster_(width, height) {
+  for (Eigen::Index first = 0; first < corners_.rows(); first += 3) {
+    raster_.draw(static_cast<std::int32_t>(first / 3),
+                 {camera_.project(corners_.row(first)), camera_.project(corners_.row(first + 1)),
+                  camera_.project(corners_.row(first + 2))});
+  }
+}
+
+Eigen::RowVector3d Scene::inside(const Points& corner_values, const Raster::Sample& sample) {
+  const Eigen::Index first = 3 * Eigen::Index{sample.face};
+  return (1 - sample.b - sample.c) * corner_values.row(first) + sample.b * corner_values.row(first + 1) +
+         sample.c * corner_values.row(first + 2);
+}
+
+Eigen::RowVector3d Scene::normal_towards_camera(const Raster::Sample& sample) const {
+  const Eigen::RowVector3d normal = inside(normals_, sample).normalized();
+  const bool is_away = camera_.turn(normal).dot(camera_.towards_camera(inside(corners_, sample))) < 0;
+  return is_away ? -normal : normal;
+}
+
+Rgb Scene::colour_at(int x, int y, double openness) const {
+  const Raster::Sample& sample = raster_.at(x, y);
+  if (sample.face < 0) return background((y + 0.5) / raster_.height());
+  Rgb albedo = kPlain;
+  if (heat_.size() > 0) {
+    const Eigen::Index first = 3 * Eigen::Index{sample.face};
+    albedo = blue_to_red((1 - sample.b - sample.c) * heat_[first] + sample.b * heat_[first + 1] +
+                         sample.c * heat_[first + 2]);
+  }
+  return shaded(albedo, camera_.turn(normal_towards_camera(sample)),
+                camera_.towards_camera(inside(corners_, sample)), openness);
+}
+
+double Scene::openness_at(int x, int y) const {
+  const Raster::Sample& sample = raster_.at(x, y);
+  if (sample.face < 0) return 1;
+  const Eigen::RowVector3d point = inside(corners_, sample), normal = normal_towards_camera(sample);
+  constexpr int kNeighbours = 40;
+  constexpr double kGoldenAngle = 2.39996322972865;
+  const double start = scattered_angle(x, y), pixels = kReachInHeights * raster_.height();
+  double hidden = 0;
+  for (int k = 0; k < kNeighbours; ++k) {
+    const double radius = pixels * (k + 0.5) / kNeighbours, angle = start + k * kGoldenAngle;
+    const int other_x = x + static_cast<int>(std::lround(radius * std::cos(angle)));
+    const int other_y = y + static_cast<int>(std::lround(radius * std::sin(angle)));
+    if (other_x < 0 || other_x >= raster_.width() || other_y < 0 || other_y >= raster_.height()) continue;
+    const Raster::Sample& other = raster_.at(other_x, other_y);
+    if (other.face < 0) continue;
+    const Eigen::RowVector3d towards = inside(corners_, other) - point;
+    const double distance = towards.norm();
+    // Below a tenth, curvature and rounding raise neighbours above the tangent plane, too.
+    const double height = std::max(0.0, normal.dot(towards) / std::max(distance, 1e-300) - 0.1);
+    hidden += height / (1 + std::pow(distance / reach_, 2));
+  }
+  return std::clamp(1 - 2.2 * hidden / kNeighbours, 0.0, 1.0);
+}
+
+}  // namespace lpdeform

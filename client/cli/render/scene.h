@@ -1,0 +1,37 @@
+#pragma once
+
+#include "client/cli/render/camera.h"
+#include "client/cli/render/raster.h"
+#include "core/base/geometry.h"
+#include "core/mesh/colour.h"
+
+namespace lpdeform {
+
+/// A mesh in front of a camera, drawn: what is to be seen at each sample of a picture of width x height
+/// samples.
+class Scene {
+ public:
+  /// At least one face; all indices in range and all their points finite. `heat` has a value from 0 (blue) to
+  /// 1 (red) for each vertex, or none: then the mesh is plain. All are copied or drawn: none needs to outlive
+  /// the call.
+  Scene(const Faces& faces, const Points& positions, const Field& heat, int width, int height);
+
+  /// `openness` as in shaded().
+  Rgb colour_at(int x, int y, double openness) const;
+
+  /// The share of the sky that the point at this sample sees, as far as the picture tells: 1 in the open and
+  /// on the background, less in holes and folds, judged by the samples around it.
+  double openness_at(int x, int y) const;
+
+ private:
+  static Eigen::RowVector3d inside(const Points& corner_values, const Raster::Sample& sample);
+  Eigen::RowVector3d normal_towards_camera(const Raster::Sample& sample) const;
+
+  Points corners_, normals_;  // 3 f + k for corner k of face f
+  Field heat_;                // the same, or empty
+  double reach_;              // how far a point shades others, in the mesh's unit of length
+  Camera camera_;
+  Raster raster_;
+};
+
+}  // namespace lpdeform
