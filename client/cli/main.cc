@@ -3,10 +3,12 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <functional>
-#include <map>
+#include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "absl/strings/str_join.h"
 #include "client/cli/deform_command.h"
 #include "client/cli/generated_shape.h"
 #include "client/cli/info_command.h"
@@ -15,41 +17,52 @@
 namespace lpdeform::cli {
 namespace {
 
+template <typename T>
+using Choices = std::vector<std::pair<std::string, T>>;
+
 /// An option that takes one of some names and stores what the name stands for.
 template <typename T>
-void add_choice(CLI::App& app, const std::string& flag, T& target, const std::map<std::string, T>& choices,
+void add_choice(CLI::App& app, const std::string& flag, T& target, const Choices<T>& choices,
                 const std::string& help) {
   std::vector<std::string> names;
   for (const auto& [name, value] : choices) names.push_back(name);
-  const auto store = [&target, choices](const std::string& name) { target = choices.at(name); };
-  app.add_option_function<std::string>(flag, store, help)->check(CLI::IsMember(names));
+  const auto store = [&target, choices](const std::string& given) {
+    for (const auto& [name, value] : choices) {
+      if (name == given) target = value;
+    }
+  };
+  app.add_option_function<std::string>(flag, store, help)
+      ->check(CLI::IsMember(names))
+      ->option_text(absl::StrJoin(names, "|"));
 }
 
 void add_material_options(CLI::App& app, DeformOptions& options) {
   CLI::Option* const p =
       app.add_option("--p", options.p,
-                     "The norm, 1 to 64: small concentrates distortion, large spreads it. Default 2")
-          ->check(CLI::Range(1.0, 64.0));
+                     "The norm, 1 to 64: small concentrates distortion, large spreads it (2)")
+          ->check(CLI::Range(1.0, 64.0))
+          ->option_text("P");
   app.add_option("--p-field", options.p_field, "A p for each vertex: a file with one number a line")
-      ->excludes(p);
-  app.add_option(
-      "--stiffness-field", options.stiffness_field,
-      "A stiffness for each vertex, 1e-6 to 1e6: a file with one number a line. Default 1 everywhere");
+      ->excludes(p)
+      ->option_text("FILE");
+  app.add_option("--stiffness-field", options.stiffness_field,
+                 "A stiffness for each vertex, 1e-6 to 1e6: a file with one number a line (1 everywhere)")
+      ->option_text("FILE");
   app.add_option("--length-unit", options.length_unit,
-                 "The length that norms of different p are mixed in, in the mesh's unit. Default: the mean "
-                 "edge length")
-      ->check(CLI::PositiveNumber);
+                 "The length that different p are mixed in, in the mesh's unit (the mean edge length)")
+      ->check(CLI::PositiveNumber)
+      ->option_text("L");
   add_choice<client::WeightKind>(
       app, "--weights", options.weights,
       {{"cotangent", client::WeightKind::kCotangent}, {"uniform", client::WeightKind::kUniform}},
-      "Weights of the edges. Default cotangent");
+      "Weights of the edges (cotangent)");
   add_choice<client::FreeComponents>(
       app, "--free-components", options.free_components,
       {{"error", client::FreeComponents::kError},
        {"stay", client::FreeComponents::kStay},
        {"follow", client::FreeComponents::kFollow}},
-      "What becomes of a part of the mesh that no handle holds: an error, stays where it is, "
-      "or follows the nearest handle. Default error");
+      "What a part of the mesh that no handle holds does: is an error, stays where it is, "
+      "follows the nearest handle (error)");
 }
 
 void add_solver_options(CLI::App& app, DeformOptions& options) {
@@ -59,41 +72,54 @@ void add_solver_options(CLI::App& app, DeformOptions& options) {
                               {"line_search", client::Method::kLineSearch},
                               {"local_global", client::Method::kLocalGlobal},
                               {"conic", client::Method::kConic}},
-                             "The algorithm; local_global needs p = 2, conic p = 1. Default auto");
+                             "The algorithm; local_global needs p = 2, conic p = 1 (auto)");
   app.add_option("--initial", options.initial,
-                 "Where to start: laplacian, rest, or a mesh file with as many vertices. Default laplacian");
+                 "Where to start; a mesh has as many vertices as MESH (laplacian)")
+      ->option_text("laplacian|rest|MESH");
   app.add_option("--max-iterations", options.max_iterations, "Stop after so many")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::PositiveNumber)
+      ->option_text("N");
   app.add_option("--tolerance", options.tolerance,
-                 "Stop when so little is left to gain, relative, 1e-14 to 0.1. Default 1e-5")
-      ->check(CLI::Range(1e-14, 0.1));
+                 "Stop when so little is left to gain, relative, 1e-14 to 0.1 (1e-5)")
+      ->check(CLI::Range(1e-14, 0.1))
+      ->option_text("T");
   app.add_option("--time-limit", options.time_limit_seconds, "Stop after so many seconds of solving")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::PositiveNumber)
+      ->option_text("SECONDS");
 }
 
 void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand("deform", "Deform a mesh by its handles and write the result");
   const auto options = std::make_shared<DeformOptions>();
-  app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required();
-  app.add_option("--handles", options->handles,
-                 "What is held and where it goes: a JSON file, see client/cli/README.md")
-      ->required();
+  app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required()->option_text(" ");
+  app.add_option("--handles", options->handles, "What is held and where it goes: JSON, see below; required")
+      ->required()
+      ->option_text("FILE");
   add_material_options(app, *options);
   add_solver_options(app, *options);
   app.add_option("--out", options->out,
                  "Where the result goes; may be given several times. By its ending: .ply with distortion and "
                  "colours, .obj, "
                  ".off, or a picture as .png")
-      ->allow_extra_args(false);
-  app.add_option("--report", options->report, "Where to write what was measured, as JSON");
-  CLI::Option* const threads =
-      app.add_option("--threads", options->threads, "Cores to use at most. Default all")
-          ->check(CLI::Range(1, 1024));
-  app.add_option("--server", options->server,
-                 "HOST:PORT or unix:PATH of a server. Default: solve in this process")
-      ->excludes(threads);
+      ->allow_extra_args(false)
+      ->option_text("FILE");
+  app.add_option("--report", options->report, "Where to write what was measured, as JSON")
+      ->option_text("FILE");
+  CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")
+                                   ->check(CLI::Range(1, 1024))
+                                   ->option_text("N");
+  app.add_option("--server", options->server, "HOST:PORT or unix:PATH of a server (solves in this process)")
+      ->excludes(threads)
+      ->option_text("ADDRESS");
   app.callback([&command, options] { command = [options] { return run_deform(*options); }; });
   app.footer(
+      "In brackets: what holds where an option is left out.\n\n"
+      "A handle file holds groups of vertices where they are, or moves them: rotated first, then "
+      "translated.\n"
+      "  {\"handles\": [{\"name\": \"base\", \"vertices\": [0, 1, 2]},\n"
+      "               {\"name\": \"tip\", \"vertices\": [7, 8], \"translate\": [0, 0, 1],\n"
+      "                \"rotate\": {\"axis\": [0, 0, 1], \"angle_degrees\": 30, \"center\": [0, 0, 0]}},\n"
+      "               {\"name\": \"free\", \"vertices\": [9], \"positions\": [[1, 2, 3]]}]}\n\n"
       "Exit status: 0 converged, or ended by a limit that was set here; 1 broke down or stalled short of "
       "the\n"
       "tolerance; 2 bad input; 3 server unreachable or refusing.");
@@ -102,7 +128,7 @@ void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
 void add_info(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand("info", "Print what a mesh is made of and what is wrong with it");
   const auto options = std::make_shared<InfoOptions>();
-  app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required();
+  app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required()->option_text(" ");
   app.add_flag("--json", options->is_json, "Print the object that a report calls \"mesh\"");
   app.callback([&command, options] { command = [options] { return run_info(*options); }; });
 }
@@ -111,13 +137,17 @@ void add_shape(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app =
       *program.add_subcommand("shape", "Write a generated mesh to try things on, and handles for it");
   const auto options = std::make_shared<ShapeOptions>();
-  app.add_option("NAME", options->name, "Which shape")
+  const std::vector<std::string> names = generated_shape_names();
+  app.add_option("NAME", options->name, absl::StrJoin(names, ", "))
       ->required()
-      ->check(CLI::IsMember(generated_shape_names()));
-  app.add_option("--detail", options->detail, "Multiplies the cells along each side. Default 1");
-  app.add_option("--out", options->out, "Where the mesh goes: .off, .obj, .ply, or a picture as .png")
-      ->required();
-  app.add_option("--handles", options->handles, "Where to write a handle file for it");
+      ->check(CLI::IsMember(names))
+      ->option_text(" ");
+  app.add_option("--detail", options->detail, "Multiplies the cells along each side (1)")->option_text("N");
+  app.add_option("--out", options->out,
+                 "Where the mesh goes: .off, .obj, .ply, or a picture as .png; required")
+      ->required()
+      ->option_text("FILE");
+  app.add_option("--handles", options->handles, "Where to write a handle file for it")->option_text("FILE");
   app.callback([&command, options] { command = [options] { return run_shape(*options); }; });
 }
 
@@ -126,7 +156,7 @@ int run(int argc, char** argv) {
                    "lpdeform");
   program.set_version_flag("--version", "lpdeform " LPDEFORM_VERSION);
   program.require_subcommand(1);
-  program.get_formatter()->column_width(28);
+  program.get_formatter()->column_width(34);
   std::function<ExitStatus()> command;
   add_deform(program, command);
   add_info(program, command);
