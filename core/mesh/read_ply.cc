@@ -10,6 +10,8 @@
 namespace lpdeform {
 namespace {
 
+constexpr double kLongestList = 4294967295.0;  // the largest number of the largest integer type
+
 /// Numbers of an ASCII file, one word each.
 class TextNumbers {
  public:
@@ -123,9 +125,10 @@ class PlyData {
     if (!value) return false;
     values_.push_back(*value);
     if (!property.length) return true;
-    if (!(*value >= 0 && *value == std::floor(*value))) return false;
+    if (!(*value >= 0 && *value <= kLongestList && *value == std::floor(*value))) return false;
+    const auto length = static_cast<std::int64_t>(*value);
     items_.clear();
-    for (double k = 0; k < *value; ++k) {
+    for (std::int64_t k = 0; k < length; ++k) {
       const auto item = numbers_.next(property.type);
       if (!item) return false;
       items_.push_back(*item);

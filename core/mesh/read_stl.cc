@@ -116,7 +116,7 @@ absl::StatusOr<TriangleMesh> parse_ascii(std::string_view text) {
       is_inside = !is_inside;
       scanner.skip_line();
     } else if (is_inside && word == "facet") {
-      if (const absl::Status status = read_facet(scanner, welder); !status.ok()) return status;
+      if (absl::Status status = read_facet(scanner, welder); !status.ok()) return status;
     } else {
       return scanner.error(is_inside ? "facet or endsolid is expected here" : "solid is expected here");
     }

@@ -32,8 +32,8 @@ struct Lattice {
     return x + (nx + 1) * (y + (ny + 1) * z);
   }
   Eigen::RowVector3d position(std::int64_t id) const {
-    const std::int64_t row = id / (nx + 1);
-    return Eigen::RowVector3d(id % (nx + 1), row % (ny + 1), row / (ny + 1));
+    const std::int64_t row = id / (nx + 1), x = id % (nx + 1), y = row % (ny + 1), z = row / (ny + 1);
+    return Eigen::RowVector3d(x, y, z);
   }
 };
 

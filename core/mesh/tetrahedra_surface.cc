@@ -46,8 +46,8 @@ class Marcher {
 
  private:
   Eigen::RowVector3d position(std::int64_t sample) const {
-    const Eigen::RowVector3d steps(sample % step_y_, sample % step_z_ / step_y_, sample / step_z_);
-    return grid_.origin + grid_.spacing * steps;
+    const std::int64_t x = sample % step_y_, y = sample % step_z_ / step_y_, z = sample / step_z_;
+    return grid_.origin + grid_.spacing * Eigen::RowVector3d(x, y, z);
   }
 
   bool is_inside(std::int64_t sample) const { return values_[sample] < 0; }
