@@ -91,7 +91,8 @@ class Session {
   /// The same without waiting: empty where there is no new frame.
   absl::StatusOr<std::optional<Frame>> poll();
 
-  /// Takes frames until one is the finished result of the newest update. Waits. Errors as next_frame.
+  /// Takes frames until one is the finished result of the newest update. Waits, in vain where that one was
+  /// taken before. Errors as next_frame.
   absl::StatusOr<Frame> settle(std::chrono::milliseconds timeout);
 
   /// Solves for the present handles and settings on the server and returns the finished result; waits for it.

@@ -49,4 +49,8 @@ bool is_session_lost(const absl::Status& status) {
   return absl::IsNotFound(status) && absl::StartsWith(fault_of(status).reason, "SESSION_");
 }
 
+bool is_taken_all_the_same(const absl::Status& status) {
+  return absl::IsFailedPrecondition(status) || absl::IsAborted(status);
+}
+
 }  // namespace lpdeform::client

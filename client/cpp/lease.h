@@ -29,4 +29,7 @@ absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role ro
 /// The server no longer has the session that a call was about.
 bool is_session_lost(const absl::Status& status);
 
+/// The error is about solving, not about the update: the server has taken that in.
+bool is_taken_all_the_same(const absl::Status& status);
+
 }  // namespace lpdeform::client

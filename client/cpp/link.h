@@ -67,6 +67,8 @@ class Link {
   void take(const v1::Fault& fault);
 
   // On any thread.
+  void acknowledge(std::uint64_t frame_seq, std::uint64_t stream);
+  absl::Status check_initial_positions(const SolveOptions& options) const;
   absl::StatusOr<std::optional<Frame>> take_frame(Clock::time_point deadline);
   absl::StatusOr<SolveResult> solve_once(const SolveOptions& options);
   absl::Status send_restore(std::unique_lock<std::mutex>& lock);

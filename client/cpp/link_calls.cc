@@ -1,5 +1,7 @@
 // What callers ask of a Link, on their own threads.
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "absl/cleanup/cleanup.h"
@@ -42,12 +44,15 @@ absl::StatusOr<std::optional<Frame>> Link::take_frame(Clock::time_point deadline
   absl::StatusOr<std::optional<FrameBox::Taken>> taken = box_.take(deadline);
   if (!taken.ok()) return taken.status();
   if (!taken->has_value()) return std::nullopt;
-  const std::scoped_lock lock(mutex_);
-  if ((*taken)->stream == stream_) {
-    ack_due_ = (*taken)->frame.frame_seq;
-    changed_.notify_all();
-  }
+  acknowledge((*taken)->frame.frame_seq, (*taken)->stream);
   return std::move((*taken)->frame);
+}
+
+void Link::acknowledge(std::uint64_t frame_seq, std::uint64_t stream) {
+  const std::scoped_lock lock(mutex_);
+  if (stream != stream_) return;
+  ack_due_ = std::max(frame_seq, ack_due_.value_or(0));
+  changed_.notify_all();
 }
 
 absl::StatusOr<std::optional<Frame>> Link::poll() {
@@ -79,7 +84,26 @@ absl::Status Link::no_frame() const {
                     absl::StrCat("No new frame came in time.", problem));
 }
 
+/// Here, so that what the server finds invalid can only be the update.
+absl::Status Link::check_initial_positions(const SolveOptions& options) const {
+  if (!options.initial_positions) return absl::OkStatus();
+  const std::vector<double>& numbers = *options.initial_positions;
+  const std::size_t wanted = 3 * static_cast<std::size_t>(mesh_report().vertices);
+  if (numbers.size() != wanted) {
+    return invalid_input(
+        {"POSITIONS_SIZE", "", absl::StrCat("numbers = ", wanted)},
+        absl::StrCat("The initial positions are ", numbers.size(), " numbers and not ", wanted, "."));
+  }
+  const auto bad = std::ranges::find_if_not(numbers, [](double number) { return std::isfinite(number); });
+  if (bad == numbers.end()) return absl::OkStatus();
+  const std::string vertex = absl::StrCat("vertex ", (bad - numbers.begin()) / 3);
+  return invalid_input({"POSITIONS_NOT_FINITE", vertex, ""},
+                       absl::StrCat("The initial position of ", vertex, " is not finite."));
+}
+
 absl::StatusOr<SolveResult> Link::solve(const SolveOptions& options) {
+  const absl::Status checked = check_initial_positions(options);
+  if (!checked.ok()) return checked;
   std::unique_lock lock(mutex_);
   const auto is_quiet = [this] { return is_closing_ || (!is_solving_ && !ledger_.has_in_flight()); };
   if (!changed_.wait_for(lock, client_options_.call_timeout, is_quiet)) {
@@ -114,7 +138,7 @@ absl::StatusOr<SolveResult> Link::solve_once(const SolveOptions& options) {
   absl::StatusOr<SolveResult> result = run_solve(*rpc_, lease, update, options, stop_.get_token());
   lock.lock();
   if (!update) return result;
-  if (result.ok()) {
+  if (result.ok() || is_taken_all_the_same(result.status())) {
     ledger_.accept(update->seq);
   } else if (is_undecided(result.status())) {
     ledger_.connection_lost();

@@ -75,19 +75,22 @@ absl::Status Link::take(const v1::FramePart& part) {
   }
   const std::uint64_t frame_seq = (*frame)->frame_seq;
   if (box_.put(*std::move(*frame), stream)) return absl::OkStatus();
-  const std::scoped_lock lock(mutex_);
-  ack_due_ = frame_seq;  // dropped, but its credit is owed
-  changed_.notify_all();
+  acknowledge(frame_seq, stream);  // dropped, but its credit is owed
   return absl::OkStatus();
 }
 
 void Link::take(const v1::Fault& fault) {
+  const absl::Status status = from_wire(fault);
   {
     const std::scoped_lock lock(mutex_);
-    ledger_.refuse(fault.input_seq());
+    if (is_taken_all_the_same(status)) {
+      ledger_.accept(fault.input_seq());
+    } else {
+      ledger_.refuse(fault.input_seq());
+    }
     changed_.notify_all();
   }
-  box_.put_problem(from_wire(fault));
+  box_.put_problem(status);
 }
 
 }  // namespace lpdeform::client

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <future>
 
 #include "core/base/fault.h"
@@ -299,6 +300,25 @@ TEST_F(LinkTest, SolveMakesALostSessionAnew) {
   EXPECT_EQ(link_->name(), "sessions/2");
   ASSERT_EQ(rpc_->restored().size(), 1u);
   EXPECT_EQ(rpc_->restored()[0].update().handles(0).name(), "tip");
+}
+
+TEST_F(LinkTest, SolveKeepsAnUpdateThatWasTakenThoughItCouldNotBeSolvedFor) {
+  open();
+  link_->update(adding("tip")).value();
+  rpc_->solve_ends.push_back(absl::FailedPreconditionError("component 1 has no handle"));
+  EXPECT_TRUE(absl::IsFailedPrecondition(link_->solve({}).status()));
+  rpc_->solve_ends.push_back(
+      make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "", ""}, "no such session"));
+  ASSERT_TRUE(link_->solve({}).ok());
+  ASSERT_EQ(rpc_->restored().size(), 1u);
+}
+
+TEST_F(LinkTest, SolveRefusesInitialPositionsThatDoNotFit) {
+  open();
+  EXPECT_EQ(fault_of(link_->solve({.initial_positions = {{1, 2}}}).status()).reason, "POSITIONS_SIZE");
+  const absl::Status status = link_->solve({.initial_positions = {{0, 0, 0, 0, NAN, 0}}}).status();
+  EXPECT_EQ(fault_of(status).element, "vertex 1");
+  EXPECT_TRUE(rpc_->solved().empty());
 }
 
 TEST_F(LinkTest, SolveForgetsAnUpdateThatIsRefused) {
