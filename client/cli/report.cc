@@ -17,6 +17,28 @@ namespace {
 
 using nlohmann::ordered_json;
 
+/// Edges come as two vertices each.
+bool is_of_edges(const std::string& kind) {
+  return kind.ends_with("edges") || kind == "inconsistent_orientation";
+}
+
+ordered_json first_few(const client::Defect& defect) {
+  if (!is_of_edges(defect.kind)) return defect.first;
+  ordered_json edges = ordered_json::array();
+  for (std::size_t k = 0; k + 1 < defect.first.size(); k += 2)
+    edges.push_back({defect.first[k], defect.first[k + 1]});
+  return edges;
+}
+
+std::string first_few_text(const client::Defect& defect) {
+  std::vector<std::string> elements;
+  for (const ordered_json& element : first_few(defect)) {
+    elements.push_back(element.is_array() ? absl::StrCat(element[0].dump(), "-", element[1].dump())
+                                          : element.dump());
+  }
+  return absl::StrJoin(elements, ", ");
+}
+
 ordered_json mesh_object(const client::MeshReport& mesh) {
   ordered_json object{{"vertices", mesh.vertices},
                       {"faces", mesh.faces},
@@ -26,7 +48,7 @@ ordered_json mesh_object(const client::MeshReport& mesh) {
   ordered_json first = ordered_json::object();
   for (const client::Defect& defect : mesh.defects) {
     object[defect.kind] = defect.count;
-    if (!defect.first.empty()) first[defect.kind] = defect.first;
+    if (!defect.first.empty()) first[defect.kind] = first_few(defect);
   }
   object["first"] = std::move(first);
   return object;
@@ -66,20 +88,6 @@ ordered_json distortion_object(const std::vector<float>& distortion) {
           {"histogram", {{"edges", statistics.edges}, {"counts", statistics.counts}}}};
 }
 
-/// Edges come as pairs of vertices.
-bool is_of_edges(const std::string& kind) {
-  return kind.ends_with("edges") || kind == "inconsistent_orientation";
-}
-
-std::string first_few(const client::Defect& defect) {
-  if (!is_of_edges(defect.kind)) return absl::StrJoin(defect.first, ", ");
-  std::vector<std::string> edges;
-  for (std::size_t k = 0; k + 1 < defect.first.size(); k += 2) {
-    edges.push_back(absl::StrCat(defect.first[k], "-", defect.first[k + 1]));
-  }
-  return absl::StrJoin(edges, ", ");
-}
-
 std::string line_of(std::string_view label, std::int64_t count, const std::string& note = "") {
   return absl::StrFormat("%-26s %10d%s\n", std::string(label), count, note);
 }
@@ -95,7 +103,7 @@ std::string mesh_text(const client::MeshReport& mesh) {
                      line_of("edges", mesh.edges) + line_of("components", mesh.components) +
                      line_of("boundary loops", mesh.boundary_loops);
   for (const client::Defect& defect : mesh.defects) {
-    const std::string few = first_few(defect);
+    const std::string few = first_few_text(defect);
     const std::string note = few.empty() ? "" : absl::StrCat("   first: ", few);
     text += line_of(absl::StrReplaceAll(defect.kind, {{"_", " "}}), defect.count, note);
   }

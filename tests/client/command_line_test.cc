@@ -92,6 +92,7 @@ TEST(Report, HasEveryKeyThatIsPromised) {
     EXPECT_TRUE(report["distortion"].contains(key)) << key;
   }
   EXPECT_EQ(report["mesh"]["clamped_edges"], 1);
+  EXPECT_EQ(report["mesh"]["first"]["clamped_edges"], nlohmann::json::parse("[[0, 1]]"));
   EXPECT_EQ(report["mesh"], nlohmann::json::parse(mesh_json(mesh)));
   EXPECT_EQ(report["p"], 1.5);
   EXPECT_EQ(report["stop_reason"], "converged");
