@@ -38,6 +38,14 @@ cholmod_sparse view_of(const LowerMatrix& matrix) {
   return view;
 }
 
+/// An L D L^T factor, which CHOLMOD also makes of an indefinite matrix, holds D where L has its ones. L L^T is checked by CHOLMOD.
+bool has_positive_diagonal(const cholmod_factor& factor) {
+  if (factor.is_ll || factor.is_super) return true;
+  const auto* columns = static_cast<const std::int32_t*>(factor.p);
+  const auto* values = static_cast<const double*>(factor.x);
+  return std::all_of(columns, columns + factor.n, [&](std::int32_t begin) { return values[begin] > 0; });
+}
+
 }  // namespace
 
 struct SparseCholesky::Impl {
@@ -95,7 +103,8 @@ bool SparseCholesky::factor(const LowerMatrix& matrix) {
   if (!is_finite) return false;
   cholmod_sparse view = view_of(matrix);
   const int ok = cholmod_factorize(&view, impl_->factor, &impl_->common);
-  return ok && impl_->common.status == CHOLMOD_OK && impl_->factor->minor == impl_->factor->n;
+  return ok && impl_->common.status == CHOLMOD_OK && impl_->factor->minor == impl_->factor->n &&
+         has_positive_diagonal(*impl_->factor);
 }
 
 void SparseCholesky::solve(const Points& b, Points& x) const {

@@ -10,6 +10,10 @@ constexpr std::size_t kMemory = 10;
 constexpr int kWindow = 20;
 constexpr int kRefresh = 40;
 constexpr double kSufficientDecrease = 1e-4;
+constexpr int kStageIterations = 30;
+constexpr double kSmoothingStep = 0.1;
+constexpr double kBias = 3e-4;
+constexpr double kLeastSmoothing = 1e-26;  // eps^2 over the squared diagonal: rounding
 
 double dot(const Points& a, const Points& b) { return a.cwiseProduct(b).sum(); }
 
@@ -17,36 +21,34 @@ double dot(const Points& a, const Points& b) { return a.cwiseProduct(b).sum(); }
 
 QuasiNewton::QuasiNewton(Problem problem, Points x, bool is_warm)
     : problem_(std::move(problem)), norm_(problem_.norm), x_(std::move(x)) {
-  plan_stages(is_warm);
-  begin_stage(0);
-}
-
-void QuasiNewton::plan_stages(bool is_warm) {
   const double lowest = problem_.norm.lowest_p();
-  const double unit = problem_.diagonal * problem_.diagonal;
-  if (lowest >= 2) {
-    // No way from p = 2 here: it leads into worse minima at large p (a bent cactus at p = 6 ends at 1.8 times the E^(1/p)).
-    stages_.push_back({1, 0, 0});
-    return;
+  if (lowest < 2) eps2_ = (is_warm ? 1e-9 : 1e-6) * problem_.diagonal * problem_.diagonal;
+  // No way from p = 2 where all p_i > 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8 times the E^(1/p)).
+  for (const double p : {2.0, 1.6, 1.35, 1.2, 1.1, 1.05}) {
+    if (!is_warm && p > lowest) shares_.push_back((2 - p) / (2 - lowest));
   }
-  if (!is_warm) {
-    // p = 2, 1.6, 1.35, 1.2, 1.1, 1.05 on the way to 1; as much of that as the lowest p asks for.
-    for (const double p : {2.0, 1.6, 1.35, 1.2, 1.1, 1.05}) {
-      if (p > lowest) stages_.push_back({(2 - p) / (2 - lowest), 1e-6 * unit, 30});
-    }
-  }
-  for (double eps2 = is_warm ? 1e-9 : 1e-6; eps2 > 1e-14; eps2 /= 10) stages_.push_back({1, eps2 * unit, 30});
-  stages_.back().iterations = 0;
+  begin_stage();
 }
 
-void QuasiNewton::begin_stage(int stage) {
-  stage_ = stage;
-  const Stage& plan = stages_[stage];
-  norm_ = (plan.share == 1 ? problem_.norm : problem_.norm.nearer_two(plan.share)).smoothed(plan.eps2);
+/// The objective of stage_: p first, then eps.
+void QuasiNewton::begin_stage() {
+  const bool is_on_the_way = stage_ < static_cast<int>(shares_.size());
+  if (stage_ > static_cast<int>(shares_.size())) eps2_ *= kSmoothingStep;
+  norm_ = (is_on_the_way ? problem_.norm.nearer_two(shares_[stage_]) : problem_.norm).smoothed(eps2_);
   objective_ = problem_.cells.evaluate(x_, norm_);
+  is_last_stage_ = !is_on_the_way && is_smooth_enough();
   history_.assign(1, objective_);
   stage_iterations_ = 0;
   is_metric_good_ = refresh_metric();
+}
+
+/// Smoothing adds up to eps^p to a cell's E_i^p: too little to matter beside the mean cell's.
+bool QuasiNewton::is_smooth_enough() const {
+  if (eps2_ <= kLeastSmoothing * problem_.diagonal * problem_.diagonal) return true;
+  double sum = 0;
+  for (const double e2 : problem_.cells.squared_energies()) sum += std::sqrt(e2);
+  const double mean = sum / static_cast<double>(x_.rows());
+  return std::pow(std::sqrt(eps2_) / mean, problem_.norm.lowest_p()) <= kBias;
 }
 
 bool QuasiNewton::refresh_metric() {
@@ -113,8 +115,9 @@ StepResult QuasiNewton::give_up(double slope) {
     is_metric_good_ = refresh_metric();
     return result(Outcome::kProgress);
   }
-  if (!is_last_stage()) {
-    begin_stage(stage_ + 1);
+  if (!is_last_stage_) {
+    ++stage_;
+    begin_stage();
     return result(Outcome::kProgress);
   }
   const bool is_good = -0.5 * slope <= problem_.tolerance * norm_.highest_p() * objective_;
@@ -134,16 +137,19 @@ void QuasiNewton::accept() {
 
 StepResult QuasiNewton::step() {
   if (is_at_zero()) return result(Outcome::kConverged);
-  const bool is_stage_done = stage_iterations_ >= stages_[stage_].iterations || is_stage_over();
-  if (!is_last_stage() && is_stage_done) begin_stage(stage_ + 1);
-  else if (since_refresh_ >= kRefresh) is_metric_good_ = refresh_metric();
+  if (!is_last_stage_ && (stage_iterations_ >= kStageIterations || is_stage_over())) {
+    ++stage_;
+    begin_stage();
+  } else if (since_refresh_ >= kRefresh) {
+    is_metric_good_ = refresh_metric();
+  }
   if (!is_metric_good_ || !std::isfinite(objective_)) return result(Outcome::kBreakdown);
 
   direction(direction_);
   const double slope = dot(gradient_, direction_);
   if (!(slope < 0) || search(direction_, slope) == 0) return give_up(slope);
   accept();
-  return result(is_last_stage() && is_stage_over() ? Outcome::kConverged : Outcome::kProgress);
+  return result(is_last_stage_ && is_stage_over() ? Outcome::kConverged : Outcome::kProgress);
 }
 
 }  // namespace lpdeform

@@ -25,18 +25,13 @@ class QuasiNewton : public Minimiser {
   const Points& x() const override { return x_; }
 
  private:
-  struct Stage {
-    double share;     // of the way from 2 to p_i
-    double eps2;      // smoothing
-    int iterations;   // at most; the last stage has no end
-  };
   struct Pair {
     Points s, y;
     double rho;  // 1 / <s, y>
   };
 
-  void plan_stages(bool is_warm);
-  void begin_stage(int stage);
+  void begin_stage();
+  bool is_smooth_enough() const;
   bool refresh_metric();
   void direction(Points& d);
   double search(const Points& d, double slope);
@@ -44,18 +39,19 @@ class QuasiNewton : public Minimiser {
   void accept();
   StepResult give_up(double slope);
   bool is_stage_over() const;
-  bool is_last_stage() const { return stage_ + 1 == static_cast<int>(stages_.size()); }
   bool is_at_zero() const;
   StepResult result(Outcome outcome) const { return {outcome, objective_, stage_}; }
 
   Problem problem_;
-  std::vector<Stage> stages_;
+  std::vector<double> shares_;  // of the way from 2 to p_i, for the first stages
+  double eps2_ = 0;             // smoothing
   int stage_ = 0;
+  bool is_last_stage_ = false;
   LpNorm norm_;  // of the stage
   Points x_, gradient_, direction_, trial_, trial_gradient_;
   double objective_ = 0;
   std::deque<Pair> memory_;
-  std::deque<double> history_;  // objectives of the stage's last kWindow + 1 iterations
+  std::deque<double> history_;  // objectives of the stage's last 21 iterations
   int stage_iterations_ = 0, since_refresh_ = 0;
   bool is_metric_good_ = false;
 };

@@ -1,0 +1,93 @@
+#include "core/linalg/cholesky.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <limits>
+#include <random>
+
+namespace lpdeform {
+namespace {
+
+/// A dense positive definite matrix with a band of `width`, and its lower triangle.
+Eigen::MatrixXd banded(int n, int width) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> value(-1, 1);
+  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = std::max(0, i - width); j < i; ++j) a(i, j) = a(j, i) = value(random);
+    a(i, i) = 2 * width + 1;
+  }
+  return a;
+}
+
+LowerMatrix lower(const Eigen::MatrixXd& a) {
+  LowerMatrix result;
+  result.columns.push_back(0);
+  for (int column = 0; column < a.cols(); ++column) {
+    for (int row = column; row < a.rows(); ++row) {
+      if (row != column && a(row, column) == 0) continue;
+      result.rows.push_back(row);
+      result.values.push_back(a(row, column));
+    }
+    result.columns.push_back(static_cast<std::int32_t>(result.rows.size()));
+  }
+  return result;
+}
+
+TEST(Cholesky, SolvesForOneAndThreeRightHandSides) {
+  const Eigen::MatrixXd a = banded(60, 4);
+  SparseCholesky cholesky(lower(a));
+  ASSERT_TRUE(cholesky.factor(lower(a)));
+  const Points expected = Points::Random(60, 3);
+  Points x;
+  cholesky.solve(Points(a * expected), x);
+  EXPECT_LT((x - expected).norm(), 1e-12);
+  Eigen::VectorXd one;
+  cholesky.solve(Eigen::VectorXd(a * expected.col(1)), one);
+  EXPECT_LT((one - expected.col(1)).norm(), 1e-12);
+}
+
+TEST(Cholesky, SolvesInPlace) {
+  const Eigen::MatrixXd a = banded(30, 2);
+  SparseCholesky cholesky(lower(a));
+  ASSERT_TRUE(cholesky.factor(lower(a)));
+  const Points expected = Points::Random(30, 3);
+  Points x = a * expected;
+  cholesky.solve(x, x);
+  EXPECT_LT((x - expected).norm(), 1e-12);
+}
+
+TEST(Cholesky, FactorsAgainOnTheSamePattern) {
+  const Eigen::MatrixXd a = banded(40, 3);
+  SparseCholesky cholesky(lower(a));
+  for (const double scale : {1.0, 7.0, 1e-6}) {
+    ASSERT_TRUE(cholesky.factor(lower(scale * a)));
+    const Points expected = Points::Random(40, 3);
+    Points x;
+    cholesky.solve(Points(scale * a * expected), x);
+    EXPECT_LT((x - expected).norm(), 1e-11);
+  }
+}
+
+TEST(Cholesky, RefusesWhatIsNotPositiveDefinite) {
+  Eigen::MatrixXd a = banded(20, 2);
+  SparseCholesky cholesky(lower(a));
+  Eigen::MatrixXd indefinite = a;
+  indefinite(10, 10) = -5;
+  EXPECT_FALSE(cholesky.factor(lower(indefinite)));
+  Eigen::MatrixXd not_finite = a;
+  not_finite(3, 3) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(cholesky.factor(lower(not_finite)));
+  EXPECT_TRUE(cholesky.factor(lower(a)));  // and recovers
+}
+
+TEST(Cholesky, CountsItsMemory) {
+  const Eigen::MatrixXd a = banded(200, 4);
+  SparseCholesky cholesky(lower(a));
+  ASSERT_TRUE(cholesky.factor(lower(a)));
+  EXPECT_GT(cholesky.memory_bytes(), 200u * 5 * sizeof(double));
+}
+
+}  // namespace
+}  // namespace lpdeform

@@ -1,0 +1,108 @@
+#include "core/solve/certificate.h"
+
+#include <gtest/gtest.h>
+
+#include "core/solve/conic_step.h"
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+/// A bar under a twist and all that a method works with.
+class CertificateTest : public testing::Test {
+ protected:
+  CertificateTest()
+      : constraints(make_constraints(*shape, bar_twist(bar), FreeComponents::kError).value()),
+        cells(shape, Workers(1)),
+        metric(shape) {}
+
+  LpNorm norm(const Material& material) const {
+    return LpNorm(material, shape->vertex_count(), shape->mean_edge_length(), 1.0);
+  }
+  Problem problem(const LpNorm& norm) {
+    return {cells, metric, constraints, norm, 1e-5, 1, shape->diagonal() / shape->mean_edge_length(), 1e-20, {}};
+  }
+  Points solved(const Material& material, double tolerance) {
+    auto solver = deformer(shape, bar_twist(bar), material);
+    SolveSettings settings;
+    settings.initial = InitialGuess::kLaplacian;
+    settings.tolerance = tolerance;
+    (void)solver->solve(settings);
+    return (solver->positions().rowwise() - shape->centre()) / shape->mean_edge_length();
+  }
+
+  const TriangleMesh bar = box_surface(4, 4, 21);
+  const std::shared_ptr<const RestShape> shape = rest_shape(bar);
+  const Constraints constraints;
+  CellPass cells;
+  Metric metric;
+};
+
+Material mixed(std::int32_t n) {
+  Material material;
+  material.p.resize(n);
+  for (std::int32_t i = 0; i < n; ++i) material.p[i] = i % 2 == 0 ? 1.5 : 3.0;
+  return material;
+}
+
+TEST_F(CertificateTest, IsTightAtTheMinimum) {
+  for (const double p : {1.0, 1.2, 1.5, 2.0, 6.0, -1.0}) {
+    const Material material = p > 0 ? Material::uniform(p) : mixed(shape->vertex_count());
+    const LpNorm norm = this->norm(material);
+    const Points x = solved(material, 1e-9);
+    cells.evaluate(x, norm);
+    EXPECT_LT(relative_gap(problem(norm), x), p == 1 ? 1e-4 : 1e-6) << "p = " << p;
+  }
+}
+
+TEST_F(CertificateTest, IsLooseAwayFromIt) {
+  for (const double p : {1.0, 1.5, 2.0, 6.0}) {
+    const LpNorm norm = this->norm(Material::uniform(p));
+    const Points x = constraints.targets;  // the rest mesh with its middle turned
+    cells.evaluate(x, norm);
+    EXPECT_GT(relative_gap(problem(norm), x), 0.01) << "p = " << p;
+  }
+}
+
+TEST_F(CertificateTest, NeverClaimsMoreThanTheConvexStepAllows) {
+  // At p = 2 the convex step has a closed solution: its value may not be below the bound, from anywhere.
+  const LpNorm norm = this->norm(Material::uniform(2));
+  const Points x = shaken(constraints.targets, 0.2);
+  Points start = x;
+  for (Eigen::Index i = 0; i < start.rows(); ++i) {
+    if (constraints.is_held[i]) start.row(i) = constraints.targets.row(i);
+  }
+  const double value = cells.evaluate(start, norm);
+  const double gap = relative_gap(problem(norm), start);
+  cells.evaluate(start, norm);
+  Points gradient;
+  cells.gradient(start, gradient);
+  clear_held_rows(constraints, gradient);
+  ASSERT_TRUE(metric.factor(cells.cell_weights(), constraints.is_held));
+  metric.solve(gradient, gradient);
+  const double optimum = cells.evaluate_held(start - gradient, norm);
+  EXPECT_NEAR((value - optimum) / value, gap, 1e-9);  // and for p = 2 it is that value
+}
+
+TEST_F(CertificateTest, BoundsWhatTheConeProgramFinds) {
+  const LpNorm norm = this->norm(Material::uniform(1));
+  const Points x = solved(Material::uniform(1), 1e-3);
+  const double energy = cells.evaluate(x, norm);
+  const std::vector<Eigen::Matrix3d> rotations = cells.rotations();
+  const double bound = energy * (1 - relative_gap(problem(norm), x));
+  ConicStep cone(problem(norm), rotations, x);
+  while (cone.relative_gap() > 1e-8 && cone.iterate()) {
+  }
+  ASSERT_LE(cone.relative_gap(), 1e-6);
+  EXPECT_LE(bound, cone.primal() * (1 + 1e-12));
+  EXPECT_LE(cone.lower_bound(), energy);
+}
+
+TEST_F(CertificateTest, IsZeroAtRest) {
+  const LpNorm norm = this->norm(Material::uniform(1));
+  cells.evaluate(shape->scaled_positions(), norm);
+  EXPECT_EQ(relative_gap(problem(norm), shape->scaled_positions()), 0);
+}
+
+}  // namespace
+}  // namespace lpdeform

@@ -1,0 +1,211 @@
+#include "core/solve/deformer.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "core/base/fault.h"
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+class DeformerTest : public testing::Test {
+ protected:
+  const TriangleMesh bar = box_surface(2, 2, 8);
+  const std::shared_ptr<const RestShape> shape = rest_shape(bar);
+
+  HandleSet ends(double degrees) const {
+    HandleSet handles;
+    (void)handles.set("bottom", {slice(bar, 2, 0, 0), Fixed{}});
+    (void)handles.set("top", {slice(bar, 2, 8, 8), turn(Eigen::Vector3d::UnitX(), degrees, {1, 1, 4})});
+    return handles;
+  }
+};
+
+TEST_F(DeformerTest, BeginsAtRest) {
+  auto solver = Deformer::create(shape, {}).value();
+  EXPECT_EQ(solver->positions(), bar.vertices);
+  EXPECT_EQ(solver->cell_energies().maxCoeff(), 0);
+  EXPECT_FALSE(solver->step());
+  EXPECT_EQ(solver->optimality_gap(), 1);
+}
+
+TEST_F(DeformerTest, RefusesBadSettingsAndNamesThem) {
+  auto solver = deformer(shape, ends(30), Material::uniform(1.5));
+  const auto reason = [&](auto change) {
+    SolveSettings settings;
+    change(settings);
+    return fault_of(solver->start(settings)).reason;
+  };
+  EXPECT_EQ(reason([](auto& s) { s.tolerance = 0; }), "TOLERANCE_OUT_OF_RANGE");
+  EXPECT_EQ(reason([](auto& s) { s.tolerance = kNan; }), "TOLERANCE_OUT_OF_RANGE");
+  EXPECT_EQ(reason([](auto& s) { s.max_iterations = -1; }), "ITERATIONS_OUT_OF_RANGE");
+  EXPECT_EQ(reason([](auto& s) { s.time_limit_seconds = 0; }), "TIME_LIMIT_OUT_OF_RANGE");
+  EXPECT_EQ(reason([](auto& s) { s.method = Method::kLocalGlobal; }), "METHOD_NEEDS_P");
+  EXPECT_EQ(reason([](auto& s) { s.method = Method::kConic; }), "METHOD_NEEDS_P");
+  EXPECT_EQ(fault_of(Deformer::create(shape, {.threads = 0}).status()).reason, "THREADS_OUT_OF_RANGE");
+  EXPECT_EQ(fault_of(Deformer::create(nullptr, {}).status()).reason, "NO_SHAPE");
+  EXPECT_EQ(fault_of(Deformer::create(shape, {}).value()->start({})).reason, "NO_HANDLES");
+}
+
+TEST_F(DeformerTest, KeepsItsStateWhereAnInputIsRefused) {
+  auto solver = deformer(shape, ends(30), Material::uniform(1.5));
+  ASSERT_TRUE(solver->solve({}).ok());
+  const Points before = solver->positions();
+  const HandleSet handles = solver->handles();
+  HandleSet bad = handles;
+  (void)bad.set("more", {{10000}, Fixed{}});
+  EXPECT_FALSE(solver->set_handles(bad).ok());
+  EXPECT_FALSE(solver->set_handles({}).ok());
+  EXPECT_FALSE(solver->set_material(Material::uniform(0)).ok());
+  EXPECT_EQ(fault_of(solver->set_positions(Points::Zero(3, 3))).reason, "POSITIONS_SIZE");
+  EXPECT_EQ(fault_of(solver->set_positions(Points::Constant(bar.vertices.rows(), 3, kNan))).reason, "POSITIONS_NOT_FINITE");
+  EXPECT_EQ(solver->positions(), before);
+  EXPECT_EQ(solver->handles(), handles);
+  EXPECT_EQ(solver->material(), Material::uniform(1.5));
+  EXPECT_EQ(solver->solve({}).value().stop_reason, StopReason::kConverged);
+}
+
+TEST_F(DeformerTest, GoesOnFromWhereItIs) {
+  auto solver = deformer(shape, ends(40), Material::uniform(2));
+  SolveSettings cold;
+  cold.initial = InitialGuess::kLaplacian;
+  const SolveSummary first = solver->solve(cold).value();
+  ASSERT_TRUE(solver->set_handles(ends(41)).ok());
+  const SolveSummary warm = solver->solve({}).value();
+  EXPECT_EQ(warm.stop_reason, StopReason::kConverged);
+  EXPECT_LT(warm.iterations, first.iterations);
+  EXPECT_LT(warm.initial_energy, 1.1 * warm.energy);
+}
+
+TEST_F(DeformerTest, ADragBackToTheStartEndsAtRest) {
+  for (const double p : {1.0, 1.5, 2.0, 6.0}) {
+    auto solver = deformer(shape, ends(0), Material::uniform(p));
+    double largest = 0;
+    for (const double degrees : {10.0, 20.0, 30.0, 20.0, 10.0, 0.0}) {
+      ASSERT_TRUE(solver->set_handles(ends(degrees)).ok());
+      largest = std::max(largest, solver->solve({}).value().energy);
+    }
+    EXPECT_LT(std::pow(solver->summary().energy / largest, 1 / p), 1e-3) << p;
+  }
+}
+
+TEST_F(DeformerTest, TakesHandlesAddedRemovedAndRegrouped) {
+  auto solver = deformer(shape, ends(40), Material::uniform(1.5));
+  ASSERT_TRUE(solver->solve({}).ok());
+  HandleSet handles = solver->handles();
+  ASSERT_TRUE(handles.set("middle", {slice(bar, 2, 4, 4), Fixed{}}).ok());
+  ASSERT_TRUE(solver->set_handles(handles).ok());
+  EXPECT_EQ(solver->solve({}).value().stop_reason, StopReason::kConverged);
+  for (const std::int32_t i : slice(bar, 2, 4, 4)) {
+    EXPECT_LT((solver->positions().row(i) - bar.vertices.row(i)).norm(), 1e-12);
+  }
+  ASSERT_TRUE(handles.remove("top"));
+  ASSERT_TRUE(handles.set("bottom", {{0}, Fixed{}}).ok());
+  ASSERT_TRUE(solver->set_handles(handles).ok());
+  SolveSettings tight;
+  tight.tolerance = 1e-9;
+  ASSERT_TRUE(solver->solve(tight).ok());
+  EXPECT_LT((solver->positions() - bar.vertices).cwiseAbs().maxCoeff(), 1e-3);  // nothing bends it any more
+}
+
+TEST_F(DeformerTest, AnInputEndsARunningSolve) {
+  auto solver = deformer(shape, ends(40), Material::uniform(2));
+  ASSERT_TRUE(solver->start({}).ok());
+  EXPECT_TRUE(solver->step());
+  ASSERT_TRUE(solver->set_handles(ends(20)).ok());
+  EXPECT_EQ(solver->summary().stop_reason, StopReason::kCancelled);
+  EXPECT_FALSE(solver->step());
+}
+
+TEST_F(DeformerTest, StartsFromTheRestMeshOrAGivenOne) {
+  auto solver = deformer(shape, ends(40), Material::uniform(2));
+  SolveSettings settings;
+  settings.initial = InitialGuess::kRest;
+  settings.max_iterations = 0;
+  ASSERT_EQ(solver->solve(settings).value().stop_reason, StopReason::kIterationLimit);
+  for (Eigen::Index i = 0; i < bar.vertices.rows(); ++i) {
+    if (bar.vertices(i, 2) == 8) continue;
+    EXPECT_LT((solver->positions().row(i) - bar.vertices.row(i)).norm(), 1e-13);
+  }
+  const Points given = shaken(bar.vertices, 0.1);
+  ASSERT_TRUE(solver->set_positions(given).ok());
+  EXPECT_EQ(solver->positions(), given);
+  EXPECT_TRUE(solver->solve({}).ok());
+}
+
+TEST_F(DeformerTest, SaysStalledWhereNoStepHelpsShortOfTheTolerance) {
+  // Rounding leaves more of the gradient than a tolerance of 1e-14 allows.
+  auto solver = deformer(shape, ends(40), Material::uniform(6));
+  SolveSettings settings;
+  settings.initial = InitialGuess::kLaplacian;
+  settings.tolerance = 1e-14;
+  const SolveSummary summary = solver->solve(settings).value();
+  EXPECT_EQ(summary.stop_reason, StopReason::kStalled);
+  EXPECT_LT(summary.energy, summary.initial_energy);
+}
+
+TEST_F(DeformerTest, KeepsTheBestStateAtANumericalBreakdown) {
+  // In units of a tiny l, E at p = 64 leaves the range of a double: the paper's line search cannot begin.
+  Material material = Material::uniform(64);
+  material.length_unit = 1e-12;
+  auto solver = deformer(shape, ends(60), material);
+  SolveSettings settings;
+  settings.method = Method::kLineSearch;
+  settings.initial = InitialGuess::kRest;
+  const SolveSummary summary = solver->solve(settings).value();
+  EXPECT_EQ(summary.stop_reason, StopReason::kNumericalBreakdown);
+  EXPECT_TRUE(solver->positions().allFinite());
+  EXPECT_TRUE(std::isfinite(summary.energy));
+}
+
+TEST_F(DeformerTest, WorksAtTheHighestP) {
+  auto solver = deformer(shape, ends(40), Material::uniform(64));
+  SolveSettings settings;
+  settings.initial = InitialGuess::kLaplacian;
+  settings.max_iterations = 300;
+  const SolveSummary summary = solver->solve(settings).value();
+  EXPECT_LT(summary.energy, summary.initial_energy);
+  EXPECT_TRUE(solver->positions().allFinite());
+}
+
+TEST_F(DeformerTest, DeformsDefectiveMeshesAndLeavesUnusedVerticesAlone) {
+  TriangleMesh mesh = bar;
+  const Eigen::Index n = mesh.vertices.rows(), m = mesh.faces.rows();
+  mesh.vertices.conservativeResize(n + 1, 3);
+  mesh.vertices.row(n) << 50, 50, 50;
+  mesh.faces.conservativeResize(m + 3, 3);
+  mesh.faces.row(m) = mesh.faces.row(0);                                       // a duplicate: its edges have more than two faces
+  mesh.faces.row(m + 1) << mesh.faces(5, 0), mesh.faces(5, 0), mesh.faces(5, 1);  // no area
+  mesh.faces.row(m + 2) << mesh.faces(0, 0), mesh.faces(0, 1), mesh.faces(40, 2);  // a fin
+  auto solver = deformer(rest_shape(mesh), ends(40), Material::uniform(1.5));
+  SolveSettings settings;
+  settings.initial = InitialGuess::kLaplacian;
+  const SolveSummary summary = solver->solve(settings).value();
+  EXPECT_LT(summary.energy, summary.initial_energy);
+  EXPECT_TRUE(solver->positions().allFinite());
+  EXPECT_LT((solver->positions().row(n) - mesh.vertices.row(n)).norm(), 1e-12);
+}
+
+TEST_F(DeformerTest, ReportsStatisticsOfItsDistortion) {
+  Field energies(40);
+  for (int i = 0; i < 40; ++i) energies[i] = i;
+  const DistortionStatistics statistics = distortion_statistics(energies, 10);
+  EXPECT_DOUBLE_EQ(statistics.median, 19.5);
+  EXPECT_DOUBLE_EQ(statistics.top_5_percent_share, (39.0 + 38.0) / 780);
+  EXPECT_EQ(statistics.edges.size(), 11u);
+  EXPECT_EQ(statistics.counts[9], 4);
+  EXPECT_DOUBLE_EQ(statistics.edges.back(), 39);
+}
+
+TEST_F(DeformerTest, CountsItsMemory) {
+  auto solver = deformer(shape, ends(40), Material::uniform(1.5));
+  ASSERT_TRUE(solver->solve({}).ok());
+  EXPECT_GT(solver->memory_bytes(), static_cast<std::size_t>(bar.vertices.rows()) * 300);
+}
+
+}  // namespace
+}  // namespace lpdeform

@@ -1,0 +1,82 @@
+#include "core/solve/metric.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+class MetricTest : public testing::Test {
+ protected:
+  MetricTest() : shape(rest_shape(box_surface(2, 2, 3))), metric(shape), is_held(shape->vertex_count(), false) {
+    is_held[0] = is_held[7] = is_held[20] = true;
+    for (std::int32_t i = 0; i < shape->vertex_count(); ++i) cell_weights.push_back(1 + i % 3);
+  }
+
+  /// M u by its definition.
+  Points apply(const Points& u) const {
+    Points result = Points::Zero(u.rows(), 3);
+    for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+      for (std::int32_t k = shape->offsets()[i]; k < shape->offsets()[i + 1]; ++k) {
+        const std::int32_t j = shape->neighbours()[k];
+        result.row(i) += 2 * (cell_weights[i] + cell_weights[j]) * shape->weights()[k] * (u.row(i) - u.row(j));
+      }
+    }
+    return result;
+  }
+
+  std::shared_ptr<const RestShape> shape;
+  Metric metric;
+  std::vector<char> is_held;
+  std::vector<double> cell_weights;
+};
+
+TEST_F(MetricTest, InvertsTheReweightedLaplacian) {
+  ASSERT_TRUE(metric.factor(cell_weights, is_held));
+  Points u = Points::Random(shape->vertex_count(), 3);
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+    if (is_held[i]) u.row(i).setZero();
+  }
+  Points b = apply(u), x;
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+    if (is_held[i]) b.row(i).setZero();
+  }
+  metric.solve(b, x);
+  EXPECT_LT((x - u).norm(), 1e-12);
+}
+
+TEST_F(MetricTest, ExtendsDisplacementsHarmonically) {
+  ASSERT_TRUE(metric.factor(cell_weights, is_held));
+  Points u = Points::Zero(shape->vertex_count(), 3);
+  u.row(0) << 1, 2, 3;
+  u.row(7) << -1, 0, 1;
+  metric.extend(is_held, u);
+  EXPECT_EQ(u.row(20), Eigen::RowVector3d(0, 0, 0));
+  EXPECT_EQ(u.row(0), Eigen::RowVector3d(1, 2, 3));
+  const Points residual = apply(u);
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+    EXPECT_TRUE(is_held[i] || residual.row(i).norm() < 1e-12) << i;
+  }
+}
+
+TEST_F(MetricTest, KnowsWhichHandlesItWasFactoredFor) {
+  EXPECT_FALSE(metric.is_factored_for(is_held));
+  ASSERT_TRUE(metric.factor(cell_weights, is_held));
+  EXPECT_TRUE(metric.is_factored_for(is_held));
+  is_held[1] = true;
+  EXPECT_FALSE(metric.is_factored_for(is_held));
+}
+
+TEST_F(MetricTest, FailsWithoutUsableWeights) {
+  EXPECT_FALSE(metric.factor(std::vector<double>(shape->vertex_count(), 0.0), is_held));
+  EXPECT_FALSE(metric.factor(std::vector<double>(shape->vertex_count(), std::nan("")), is_held));
+}
+
+TEST_F(MetricTest, StaysPositiveDefiniteWhereCellsHaveNoWeight) {
+  for (std::size_t i = 0; i < cell_weights.size(); i += 2) cell_weights[i] = 0;
+  EXPECT_TRUE(metric.factor(cell_weights, is_held));
+}
+
+}  // namespace
+}  // namespace lpdeform
