@@ -3,12 +3,12 @@
 #include <cstdio>
 #include <cstdlib>
 
-/// Stops the program where one of our own invariants is broken: on in every build. Never for a caller's mistake,
-/// which is an absl::Status, and never for how a solve ended, which is a StopReason.
-#define LPDEFORM_CHECK(condition)                                                                  \
-  do {                                                                                             \
-    if (!(condition)) {                                                                            \
-      std::fprintf(stderr, "%s:%d: broken invariant: %s\n", __FILE__, __LINE__, #condition);       \
-      std::abort();                                                                                \
-    }                                                                                              \
+/// Stops the program where one of our own invariants is broken: on in every build. Never for a caller's
+/// mistake, which is an absl::Status, and never for how a solve ended, which is a StopReason.
+#define LPDEFORM_CHECK(condition)                                                            \
+  do {                                                                                       \
+    if (!(condition)) {                                                                      \
+      std::fprintf(stderr, "%s:%d: broken invariant: %s\n", __FILE__, __LINE__, #condition); \
+      std::abort();                                                                          \
+    }                                                                                        \
   } while (false)

@@ -16,7 +16,8 @@ constexpr char kPayloadUrl[] = "lpdeform.fault";
 
 absl::Status make_fault(absl::StatusCode code, Fault fault, std::string_view text) {
   absl::Status status(code, absl::string_view(text.data(), text.size()));
-  status.SetPayload(kPayloadUrl, absl::Cord(absl::StrCat(fault.reason, "\n", fault.element, "\n", fault.limit)));
+  status.SetPayload(kPayloadUrl,
+                    absl::Cord(absl::StrCat(fault.reason, "\n", fault.element, "\n", fault.limit)));
   return status;
 }
 

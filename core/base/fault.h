@@ -11,7 +11,8 @@ namespace lpdeform {
 struct Fault {
   /// Stable, upper case, never reworded: "MESH_NOT_FINITE", "HANDLE_VERTEX_TWICE".
   std::string reason;
-  /// The first offending element: "vertex 17", "face 3", "handle \"tip\"", "component 2", "p[5]". May be empty.
+  /// The first offending element: "vertex 17", "face 3", "handle \"tip\"", "component 2", "p[5]". May be
+  /// empty.
   std::string element;
   /// The bound that was broken: "vertices < 370", "1 <= p <= 64". May be empty.
   std::string limit;

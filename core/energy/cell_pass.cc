@@ -23,7 +23,8 @@ Eigen::Matrix3d covariance(const RestShape& shape, const Points& x, std::int32_t
 }
 
 /// E_i^2 for a given rotation, as a sum of squares: no cancellation where it is small.
-double squared_energy(const RestShape& shape, const Points& x, std::int32_t i, const Eigen::Matrix3d& rotation) {
+double squared_energy(const RestShape& shape, const Points& x, std::int32_t i,
+                      const Eigen::Matrix3d& rotation) {
   const Points& rest = shape.scaled_positions();
   double sum = 0;
   for (std::int32_t k = shape.offsets()[i]; k < shape.offsets()[i + 1]; ++k) {
@@ -43,9 +44,13 @@ CellPass::CellPass(std::shared_ptr<const RestShape> shape, Workers workers)
       c_(shape_->vertex_count(), 0.0),
       chunk_sums_((shape_->vertex_count() + kChunk - 1) / kChunk) {}
 
-double CellPass::evaluate(const Points& x, const LpNorm& norm) { return evaluate_cells(x, norm, true); }
+double CellPass::evaluate(const Points& x, const LpNorm& norm) {
+  return evaluate_cells(x, norm, true);
+}
 
-double CellPass::evaluate_held(const Points& x, const LpNorm& norm) { return evaluate_cells(x, norm, false); }
+double CellPass::evaluate_held(const Points& x, const LpNorm& norm) {
+  return evaluate_cells(x, norm, false);
+}
 
 double CellPass::evaluate_cells(const Points& x, const LpNorm& norm, bool fit) {
   workers_.for_chunks(e2_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {

@@ -11,9 +11,12 @@ LpNorm::LpNorm(const Material& material, std::int32_t vertex_count, double scale
   LPDEFORM_CHECK(scaled_unit > 0 && reference > 0);
   is_uniform_ = material.p.size() == 1 && material.stiffness.size() == 1;
   const std::int32_t count = is_uniform_ ? 1 : vertex_count;
-  const auto entry = [](const Field& field, std::int32_t i) { return field.size() == 1 ? field[0] : field[i]; };
+  const auto entry = [](const Field& field, std::int32_t i) {
+    return field.size() == 1 ? field[0] : field[i];
+  };
 
-  // Where p is uniform the energy is sum E_i^p in the caller's units; where it is mixed, lengths are in units of l.
+  // Where p is uniform the energy is sum E_i^p in the caller's units; where it is mixed, lengths are in units
+  // of l.
   const bool is_mixed = !material.has_uniform_p();
   const double length = !is_mixed ? 1.0 : material.length_unit > 0 ? material.length_unit : scaled_unit;
   const double log_ratio = std::log(reference) + std::log(scaled_unit) - std::log(length);

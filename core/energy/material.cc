@@ -9,19 +9,21 @@
 namespace lpdeform {
 namespace {
 
-absl::Status check_field(const Field& field, std::int32_t vertex_count, const std::string& name, double lowest,
-                         double highest, std::string_view reason) {
+absl::Status check_field(const Field& field, std::int32_t vertex_count, const std::string& name,
+                         double lowest, double highest, std::string_view reason) {
   if (field.size() != 1 && field.size() != vertex_count) {
-    return invalid_input({"FIELD_SIZE", name, absl::StrCat("1 or ", vertex_count, " values")},
-                         absl::StrCat(name, " has ", field.size(), " values; it takes one, or one for each of the ",
-                                      vertex_count, " vertices"));
+    return invalid_input(
+        {"FIELD_SIZE", name, absl::StrCat("1 or ", vertex_count, " values")},
+        absl::StrCat(name, " has ", field.size(), " values; it takes one, or one for each of the ",
+                     vertex_count, " vertices"));
   }
   for (Eigen::Index i = 0; i < field.size(); ++i) {
     if (field[i] >= lowest && field[i] <= highest) continue;
     const std::string element = field.size() == 1 ? name : absl::StrCat(name, "[", i, "]");
     const std::string limit = absl::StrCat(lowest, " <= ", name, " <= ", highest);
-    return invalid_input({std::string(reason), element, limit},
-                         absl::StrCat(element, " is ", field[i], "; it must be from ", lowest, " to ", highest));
+    return invalid_input(
+        {std::string(reason), element, limit},
+        absl::StrCat(element, " is ", field[i], "; it must be from ", lowest, " to ", highest));
   }
   return absl::OkStatus();
 }
@@ -34,7 +36,9 @@ Material Material::uniform(double p) {
   return material;
 }
 
-bool Material::has_uniform_p() const { return p.size() == 0 || (p.array() == p[0]).all(); }
+bool Material::has_uniform_p() const {
+  return p.size() == 0 || (p.array() == p[0]).all();
+}
 
 bool Material::operator==(const Material& other) const {
   const auto equal = [](const Field& a, const Field& b) { return a.size() == b.size() && a == b; };
@@ -42,7 +46,8 @@ bool Material::operator==(const Material& other) const {
 }
 
 absl::Status check_material(const Material& material, std::int32_t vertex_count) {
-  if (auto status = check_field(material.p, vertex_count, "p", Material::kLowestP, Material::kHighestP, "P_OUT_OF_RANGE");
+  if (auto status = check_field(material.p, vertex_count, "p", Material::kLowestP, Material::kHighestP,
+                                "P_OUT_OF_RANGE");
       !status.ok()) {
     return status;
   }
@@ -53,7 +58,8 @@ absl::Status check_material(const Material& material, std::int32_t vertex_count)
   }
   if (!(material.length_unit >= 0) || !std::isfinite(material.length_unit)) {
     return invalid_input({"LENGTH_UNIT_OUT_OF_RANGE", "length_unit", "0 <= length_unit < infinity"},
-                         absl::StrCat("length_unit is ", material.length_unit, "; it must be 0 (the mean rest edge length) or a positive length"));
+                         absl::StrCat("length_unit is ", material.length_unit,
+                                      "; it must be 0 (the mean rest edge length) or a positive length"));
   }
   return absl::OkStatus();
 }

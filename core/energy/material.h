@@ -11,8 +11,8 @@ struct Material {
   Field p = Field::Constant(1, 2.0);
   /// 1e-6 <= s_i <= 1e6. One value, or one a vertex.
   Field stiffness = Field::Ones(1);
-  /// The length l of mixed norms, E = sum_i s_i l^2 (E_i / l)^{p_i}, in the caller's units; 0 takes the mean rest edge
-  /// length. Without effect where p is uniform.
+  /// The length l of mixed norms, E = sum_i s_i l^2 (E_i / l)^{p_i}, in the caller's units; 0 takes the mean
+  /// rest edge length. Without effect where p is uniform.
   double length_unit = 0;
 
   static constexpr double kLowestP = 1.0, kHighestP = 64.0;
@@ -24,7 +24,8 @@ struct Material {
   bool operator==(const Material&) const;
 };
 
-/// INVALID_ARGUMENT (FIELD_SIZE, P_OUT_OF_RANGE, STIFFNESS_OUT_OF_RANGE, LENGTH_UNIT_OUT_OF_RANGE) naming the vertex.
+/// INVALID_ARGUMENT (FIELD_SIZE, P_OUT_OF_RANGE, STIFFNESS_OUT_OF_RANGE, LENGTH_UNIT_OUT_OF_RANGE) naming the
+/// vertex.
 absl::Status check_material(const Material& material, std::int32_t vertex_count);
 
 }  // namespace lpdeform

@@ -26,13 +26,16 @@ void make_rows(std::int32_t vertex_count, const EdgeWeights& edges, std::vector<
     weights[next[row]++] = weight;
   };
   // Edges are sorted with the lower vertex first: all lower neighbours of a row come before its higher ones.
-  for (std::size_t e = 0; e < edges.edges.size(); ++e) append(edges.edges[e][1], edges.edges[e][0], edges.weights[e]);
-  for (std::size_t e = 0; e < edges.edges.size(); ++e) append(edges.edges[e][0], edges.edges[e][1], edges.weights[e]);
+  for (std::size_t e = 0; e < edges.edges.size(); ++e)
+    append(edges.edges[e][1], edges.edges[e][0], edges.weights[e]);
+  for (std::size_t e = 0; e < edges.edges.size(); ++e)
+    append(edges.edges[e][0], edges.edges[e][1], edges.weights[e]);
 }
 
 }  // namespace
 
-absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const TriangleMesh& mesh, WeightKind kind) {
+absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const TriangleMesh& mesh,
+                                                                   WeightKind kind) {
   MeshReport report = check_mesh(mesh);
   if (absl::Status status = deformable(report); !status.ok()) return status;
 
@@ -61,8 +64,8 @@ absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const Triangl
 
 std::size_t RestShape::memory_bytes() const {
   return sizeof(*this) + (positions_.size() + scaled_positions_.size()) * sizeof(double) +
-         faces_.size() * sizeof(std::int32_t) + bytes_of(components_) + bytes_of(offsets_) + bytes_of(neighbours_) +
-         bytes_of(weights_);
+         faces_.size() * sizeof(std::int32_t) + bytes_of(components_) + bytes_of(offsets_) +
+         bytes_of(neighbours_) + bytes_of(weights_);
 }
 
 }  // namespace lpdeform

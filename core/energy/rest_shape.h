@@ -11,8 +11,8 @@
 
 namespace lpdeform {
 
-/// The undeformed mesh, ready for computing: neighbours, weights and rest edges in flat arrays. Immutable, shared
-/// between sessions and threads.
+/// The undeformed mesh, ready for computing: neighbours, weights and rest edges in flat arrays. Immutable,
+/// shared between sessions and threads.
 class RestShape {
  public:
   /// INVALID_ARGUMENT as deformable() has it, with the element named. O(n log n).
@@ -36,13 +36,14 @@ class RestShape {
   /// Length of the diagonal of the bounding box of the rest positions. > 0.
   double diagonal() const { return diagonal_; }
 
-  /// What the solver computes with: (positions - centre) / mean_edge_length, so that nothing depends on the unit of length
-  /// or on the distance from the origin.
+  /// What the solver computes with: (positions - centre) / mean_edge_length, so that nothing depends on the
+  /// unit of length or on the distance from the origin.
   const Points& scaled_positions() const { return scaled_positions_; }
   /// Mean of the rest positions, in the caller's units.
   const Eigen::RowVector3d& centre() const { return centre_; }
 
-  // One-ring of vertex i: entries offsets[i] to offsets[i + 1] of neighbours (ascending) and weights. Symmetric.
+  // One-ring of vertex i: entries offsets[i] to offsets[i + 1] of neighbours (ascending) and weights.
+  // Symmetric.
   const std::vector<std::int32_t>& offsets() const { return offsets_; }
   const std::vector<std::int32_t>& neighbours() const { return neighbours_; }
   const std::vector<double>& weights() const { return weights_; }

@@ -27,12 +27,13 @@ Eigen::Matrix4d davenport(const Eigen::Matrix3d& b) {
 }
 
 double determinant(const Eigen::Matrix3d& m) {
-  return m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) - m(0, 1) * (m(1, 0) * m(2, 2) - m(1, 2) * m(2, 0)) +
+  return m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) -
+         m(0, 1) * (m(1, 0) * m(2, 2) - m(1, 2) * m(2, 0)) +
          m(0, 2) * (m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0));
 }
 
-/// Largest root of x^4 - 2 |B|^2 x^2 - 8 det(B) x + det(K), by Newton from the upper bound sqrt(3) |B|, from which it
-/// descends monotonically.
+/// Largest root of x^4 - 2 |B|^2 x^2 - 8 det(B) x + det(K), by Newton from the upper bound sqrt(3) |B|, from
+/// which it descends monotonically.
 double largest_eigenvalue(const Eigen::Matrix3d& b, const Eigen::Matrix4d& k) {
   const double c2 = -2 * b.squaredNorm(), c1 = -8 * determinant(b), c0 = k.determinant();
   double x = std::sqrt(3.0) * b.norm();
@@ -78,7 +79,8 @@ bool polish(const Eigen::Matrix3d& b, Eigen::Matrix3d& r) {
   const Eigen::Vector3d slope(m(2, 1) - m(1, 2), m(0, 2) - m(2, 0), m(1, 0) - m(0, 1));
   Eigen::Matrix3d curvature = -0.5 * (m + m.transpose());
   curvature.diagonal().array() += m.trace();
-  // At the maximum the eigenvalues are the sums of two (signed) singular values: positive where the rotation is unique.
+  // At the maximum the eigenvalues are the sums of two (signed) singular values: positive where the rotation
+  // is unique.
   const double a = curvature(0, 0), minor = a * curvature(1, 1) - curvature(0, 1) * curvature(0, 1);
   const double det = determinant(curvature), scale = m.trace();
   if (!(a > 0 && minor > 0 && det > 1e-8 * scale * scale * scale)) return false;
@@ -100,7 +102,8 @@ Eigen::Matrix3d fit_rotation(const Eigen::Matrix3d& b_any_size) {
   const Eigen::Vector4d q = null_vector(k);
   const double length = q.norm();
   if (!(length > 1e-6)) return fit_rotation_svd(b);
-  Eigen::Matrix3d r = Eigen::Quaterniond(q[0] / length, q[1] / length, q[2] / length, q[3] / length).toRotationMatrix();
+  Eigen::Matrix3d r =
+      Eigen::Quaterniond(q[0] / length, q[1] / length, q[2] / length, q[3] / length).toRotationMatrix();
   return polish(b, r) ? r : fit_rotation_svd(b);
 }
 
@@ -108,7 +111,8 @@ Eigen::Matrix3d fit_rotation_svd(const Eigen::Matrix3d& b) {
   if (!(b.cwiseAbs().maxCoeff() > 0)) return Eigen::Matrix3d::Identity();
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(b, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1;  // singular values are sorted: the smallest
+  if ((u * svd.matrixV().transpose()).determinant() < 0)
+    u.col(2) *= -1;  // singular values are sorted: the smallest
   return u * svd.matrixV().transpose();
 }
 

@@ -62,8 +62,8 @@ class DisjointSets {
   std::vector<std::int32_t> parent_, size_;
 };
 
-/// Raises the edges that tie a cut-off part of the surface (mostly a single vertex) to the rest. Of the two parts that an
-/// edge joins, the vertex in the smaller one counts as floored.
+/// Raises the edges that tie a cut-off part of the surface (mostly a single vertex) to the rest. Of the two
+/// parts that an edge joins, the vertex in the smaller one counts as floored.
 void apply_floor(std::int32_t vertex_count, EdgeWeights& result) {
   if (result.edges.empty()) return;
   const double total = std::accumulate(result.weights.begin(), result.weights.end(), 0.0);
@@ -110,7 +110,8 @@ void count_weight_defects(const EdgeWeights& weights, MeshReport& report) {
   report.floored_vertices = {};
   report.floored_vertices.count = static_cast<std::int64_t>(weights.floored_vertices.size());
   const auto shown = std::min<std::size_t>(weights.floored_vertices.size(), DefectCount::kFirstShown);
-  report.floored_vertices.first.assign(weights.floored_vertices.begin(), weights.floored_vertices.begin() + shown);
+  report.floored_vertices.first.assign(weights.floored_vertices.begin(),
+                                       weights.floored_vertices.begin() + shown);
 }
 
 }  // namespace lpdeform

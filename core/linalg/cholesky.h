@@ -8,8 +8,8 @@
 
 namespace lpdeform {
 
-/// The lower triangle, diagonal included, of a symmetric matrix by compressed columns; rows ascend within a column and
-/// begin with the diagonal.
+/// The lower triangle, diagonal included, of a symmetric matrix by compressed columns; rows ascend within a
+/// column and begin with the diagonal.
 struct LowerMatrix {
   std::vector<std::int32_t> columns;  // n + 1 offsets
   std::vector<std::int32_t> rows;
@@ -18,9 +18,10 @@ struct LowerMatrix {
   std::int32_t size() const { return static_cast<std::int32_t>(columns.size()) - 1; }
 };
 
-/// Sparse Cholesky factorisation of symmetric positive definite matrices of one pattern. The constructor orders and analyses;
-/// factor() is the numeric phase alone and may be repeated; then solve as often as you like. Behind it stands CHOLMOD or
-/// Eigen, by the build. Fill-reducing permutations stay inside. One caller at a time; different objects are independent.
+/// Sparse Cholesky factorisation of symmetric positive definite matrices of one pattern. The constructor
+/// orders and analyses; factor() is the numeric phase alone and may be repeated; then solve as often as you
+/// like. Behind it stands CHOLMOD or Eigen, by the build. Fill-reducing permutations stay inside. One caller
+/// at a time; different objects are independent.
 class SparseCholesky {
  public:
   /// Values are not looked at. O(n) memory besides the analysis.
@@ -29,7 +30,8 @@ class SparseCholesky {
   SparseCholesky(SparseCholesky&&) noexcept;
   SparseCholesky& operator=(SparseCholesky&&) noexcept;
 
-  /// False where the matrix is not positive definite to rounding, or not finite; solve() must not be called then.
+  /// False where the matrix is not positive definite to rounding, or not finite; solve() must not be called
+  /// then.
   [[nodiscard]] bool factor(const LowerMatrix& matrix);
 
   /// x = A^-1 b, three right-hand sides at once. x may be b.

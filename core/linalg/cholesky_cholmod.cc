@@ -11,8 +11,8 @@
 namespace lpdeform {
 namespace {
 
-/// Dense kernels in the supernodal factorisation must not start threads of their own: the same bits on any machine load, and
-/// sessions do not compete. Only OpenBLAS has such threads among Debian's BLAS packages.
+/// Dense kernels in the supernodal factorisation must not start threads of their own: the same bits on any
+/// machine load, and sessions do not compete. Only OpenBLAS has such threads among Debian's BLAS packages.
 void pin_blas_to_one_thread() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -38,7 +38,8 @@ cholmod_sparse view_of(const LowerMatrix& matrix) {
   return view;
 }
 
-/// An L D L^T factor, which CHOLMOD also makes of an indefinite matrix, holds D where L has its ones. L L^T is checked by CHOLMOD.
+/// An L D L^T factor, which CHOLMOD also makes of an indefinite matrix, holds D where L has its ones. L L^T
+/// is checked by CHOLMOD.
 bool has_positive_diagonal(const cholmod_factor& factor) {
   if (factor.is_ll || factor.is_super) return true;
   const auto* columns = static_cast<const std::int32_t*>(factor.p);
@@ -99,7 +100,8 @@ SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;
 SparseCholesky& SparseCholesky::operator=(SparseCholesky&&) noexcept = default;
 
 bool SparseCholesky::factor(const LowerMatrix& matrix) {
-  const bool is_finite = std::all_of(matrix.values.begin(), matrix.values.end(), [](double v) { return std::isfinite(v); });
+  const bool is_finite =
+      std::all_of(matrix.values.begin(), matrix.values.end(), [](double v) { return std::isfinite(v); });
   if (!is_finite) return false;
   cholmod_sparse view = view_of(matrix);
   const int ok = cholmod_factorize(&view, impl_->factor, &impl_->common);

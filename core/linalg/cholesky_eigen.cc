@@ -13,8 +13,8 @@ using Sparse = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int32_t>;
 using Factor = Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::AMDOrdering<std::int32_t>>;
 
 Eigen::Map<const Sparse> view_of(const LowerMatrix& matrix, const double* values) {
-  return {matrix.size(), matrix.size(), static_cast<Eigen::Index>(matrix.rows.size()), matrix.columns.data(),
-          matrix.rows.data(), values};
+  return {matrix.size(),         matrix.size(),      static_cast<Eigen::Index>(matrix.rows.size()),
+          matrix.columns.data(), matrix.rows.data(), values};
 }
 
 }  // namespace
@@ -33,7 +33,8 @@ SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;
 SparseCholesky& SparseCholesky::operator=(SparseCholesky&&) noexcept = default;
 
 bool SparseCholesky::factor(const LowerMatrix& matrix) {
-  const bool is_finite = std::all_of(matrix.values.begin(), matrix.values.end(), [](double v) { return std::isfinite(v); });
+  const bool is_finite =
+      std::all_of(matrix.values.begin(), matrix.values.end(), [](double v) { return std::isfinite(v); });
   if (!is_finite) return false;
   impl_->factor.factorize(view_of(matrix, matrix.values.data()));
   if (impl_->factor.info() != Eigen::Success) return false;
@@ -41,9 +42,13 @@ bool SparseCholesky::factor(const LowerMatrix& matrix) {
   return (impl_->factor.vectorD().array() > 0).all();
 }
 
-void SparseCholesky::solve(const Points& b, Points& x) const { x = impl_->factor.solve(b).eval(); }
+void SparseCholesky::solve(const Points& b, Points& x) const {
+  x = impl_->factor.solve(b).eval();
+}
 
-void SparseCholesky::solve(const Eigen::VectorXd& b, Eigen::VectorXd& x) const { x = impl_->factor.solve(b).eval(); }
+void SparseCholesky::solve(const Eigen::VectorXd& b, Eigen::VectorXd& x) const {
+  x = impl_->factor.solve(b).eval();
+}
 
 std::size_t SparseCholesky::memory_bytes() const {
   return impl_->nonzeros * (sizeof(double) + sizeof(std::int32_t)) +
@@ -52,7 +57,8 @@ std::size_t SparseCholesky::memory_bytes() const {
 
 const char* cholesky_backend() {
   static const std::string name = "Eigen " + std::to_string(EIGEN_WORLD_VERSION) + "." +
-                                  std::to_string(EIGEN_MAJOR_VERSION) + "." + std::to_string(EIGEN_MINOR_VERSION);
+                                  std::to_string(EIGEN_MAJOR_VERSION) + "." +
+                                  std::to_string(EIGEN_MINOR_VERSION);
   return name.c_str();
 }
 

@@ -12,7 +12,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// t of the maximum in f*(y) = max_t y t - k t^p, for p > 1: |y| = k p t^{p - 1}.
-double conjugate_point(double y, double k, double p) { return std::pow(y / (k * p), 1 / (p - 1)); }
+double conjugate_point(double y, double k, double p) {
+  return std::pow(y / (k * p), 1 / (p - 1));
+}
 
 /// argmin over t >= 0 of k t^p + (rho / 2) (t - v)^2.
 double shrink(double v, double k, double p, double rho) {
@@ -29,7 +31,8 @@ double shrink(double v, double k, double p, double rho) {
 /// The dual side of one convex step.
 class DualBound {
  public:
-  DualBound(const Problem& problem, const EdgeVectors& z) : problem_(problem), shape_(problem.shape()), z_(z) {}
+  DualBound(const Problem& problem, const EdgeVectors& z)
+      : problem_(problem), shape_(problem.shape()), z_(z) {}
 
   /// max over theta >= 0 of D(theta y), for y with A^T y = 0.
   double scaled_bound(const EdgeVectors& y) {
@@ -43,8 +46,10 @@ class DualBound {
     double low = 0, high = longest_theta;
     for (int step = 0; step < 60; ++step) {
       const double theta = step == 0 ? high : 0.5 * (low + high);
-      if (slope(theta) >= 0) low = theta;
-      else high = theta;
+      if (slope(theta) >= 0)
+        low = theta;
+      else
+        high = theta;
       if (low == high) break;
     }
     return value(low);
@@ -106,21 +111,29 @@ EdgeVectors term_gradients(const Problem& problem, const DualBound& dual, const 
   return y;
 }
 
+double mean_energy(const Problem& problem) {
+  double sum = 0;
+  for (const double e2 : problem.cells.squared_energies()) sum += std::sqrt(e2);
+  return sum / static_cast<double>(problem.shape().vertex_count());
+}
+
 /// A penalty that treats the 90th percentile of the cells alike in primal and dual: k p E^{p - 2} there.
 double penalty(const Problem& problem, const DualBound& dual) {
   const auto& e2 = problem.cells.squared_energies();
   std::vector<std::pair<double, std::int32_t>> cells;
   for (std::size_t i = 0; i < e2.size(); ++i) cells.emplace_back(e2[i], static_cast<std::int32_t>(i));
-  const auto percentile = cells.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(cells.size()));
+  const auto percentile =
+      cells.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(cells.size()));
   std::nth_element(cells.begin(), percentile, cells.end());
   const double energy = std::sqrt(std::max(percentile->first, 1e-20));
   const std::int32_t i = percentile->second;
   return dual.k(i) * dual.p(i) * std::pow(energy, dual.p(i) - 2);
 }
 
-/// ADMM on min sum f_i(z_i), z = A x - b, from the present residuals r and multipliers y. Returns the best bound seen.
-double polish(const Problem& problem, DualBound& dual, EdgeVectors r, EdgeVectors y, double best, double enough,
-              int max_steps) {
+/// ADMM on min sum f_i(z_i), z = A x - b, from the present residuals r and multipliers y. Returns the best
+/// bound seen.
+double polish(const Problem& problem, DualBound& dual, EdgeVectors r, EdgeVectors y, double best,
+              double enough, int max_steps) {
   const RestShape& shape = problem.shape();
   const double rho = penalty(problem, dual);
   EdgeVectors image;
@@ -155,9 +168,14 @@ double relative_gap(const Problem& problem, const Points& x, const CertificateSe
   const double enough = (1 - settings.good_enough) * primal;
   double best = dual.scaled_bound(project(problem, term_gradients(problem, dual, z, 0)));
   if (best < enough && problem.norm.lowest_p() < 2) {
-    const EdgeVectors smoothed = term_gradients(problem, dual, z, 1e-4 * problem.diagonal);
-    best = std::max(best, dual.scaled_bound(project(problem, smoothed)));
-    best = polish(problem, dual, z, smoothed, best, enough, settings.max_steps);
+    EdgeVectors start;
+    double start_bound = -kInfinity;
+    for (const double share : {1e-1, 1e-2, 1e-3, 1e-4}) {
+      EdgeVectors smoothed = term_gradients(problem, dual, z, share * mean_energy(problem));
+      const double bound = dual.scaled_bound(project(problem, smoothed));
+      if (bound > start_bound) start_bound = bound, start = std::move(smoothed);
+    }
+    best = polish(problem, dual, z, start, std::max(best, start_bound), enough, settings.max_steps);
   }
   return std::clamp((primal - best) / primal, 0.0, 1.0);
 }

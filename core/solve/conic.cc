@@ -6,7 +6,9 @@
 
 namespace lpdeform {
 
-Conic::Conic(Problem problem, Points x) : problem_(std::move(problem)), x_(std::move(x)) { begin_stage(); }
+Conic::Conic(Problem problem, Points x) : problem_(std::move(problem)), x_(std::move(x)) {
+  begin_stage();
+}
 
 void Conic::begin_stage() {
   ++stage_;
@@ -19,7 +21,8 @@ StepResult Conic::end_stage() {
   const double displacement = (x_ - stage_start_).norm() / std::sqrt(static_cast<double>(x_.rows()));
   const double threshold =
       kDisplacement * problem_.length_unit * problem_.tolerance / SolveSettings::kDefaultTolerance;
-  const StepResult result{displacement < threshold ? Outcome::kConverged : Outcome::kProgress, objective_, stage_};
+  const StepResult result{displacement < threshold ? Outcome::kConverged : Outcome::kProgress, objective_,
+                          stage_};
   if (result.outcome == Outcome::kProgress) begin_stage();
   return result;
 }
@@ -34,7 +37,8 @@ StepResult Conic::step() {
   }
   if (is_solved || cone_->relative_gap() <= kGap) return end_stage();
   if (is_able) return {Outcome::kProgress, objective_, stage_};
-  return cone_->relative_gap() <= kAcceptableGap ? end_stage() : StepResult{Outcome::kBreakdown, objective_, stage_};
+  return cone_->relative_gap() <= kAcceptableGap ? end_stage()
+                                                 : StepResult{Outcome::kBreakdown, objective_, stage_};
 }
 
 }  // namespace lpdeform

@@ -7,12 +7,13 @@
 
 namespace lpdeform {
 
-/// The paper's section 3.3 for p = 1: a second-order cone program for the positions (ConicStep) and a rotation fit, in turn. An
-/// iteration is one of the interior-point method; a stage is one cone program, solved to a relative duality gap of
-/// 1e-8 (1e-6 counts where rounding allows no more). The state is the best point of the stage.
+/// The paper's section 3.3 for p = 1: a second-order cone program for the positions (ConicStep) and a
+/// rotation fit, in turn. An iteration is one of the interior-point method; a stage is one cone program,
+/// solved to a relative duality gap of 1e-8 (1e-6 counts where rounding allows no more). The state is the
+/// best point of the stage.
 ///
-/// Converged when a whole stage's root-mean-square displacement is below 0.01 l * tolerance / SolveSettings::kDefaultTolerance
-/// (the paper's epsilon_C at the default).
+/// Converged when a whole stage's root-mean-square displacement is below 0.01 l * tolerance /
+/// SolveSettings::kDefaultTolerance (the paper's epsilon_C at the default).
 class Conic : public Minimiser {
  public:
   /// Needs p = 1 everywhere.

@@ -12,7 +12,9 @@ namespace {
 constexpr double kStepShare = 0.99;  // of the way to the border of the cones
 
 /// u^2 - |v|^2, without cancellation where it is small.
-double squared_distance(double head, double tail_norm) { return (head - tail_norm) * (head + tail_norm); }
+double squared_distance(double head, double tail_norm) {
+  return (head - tail_norm) * (head + tail_norm);
+}
 
 }  // namespace
 
@@ -33,8 +35,10 @@ ConicStep::ConicStep(const Problem& problem, std::vector<Eigen::Matrix3d> rotati
     for (std::int32_t k = shape().offsets()[i]; k < shape().offsets()[i + 1]; ++k) {
       is_free = is_free || free_[shape().neighbours()[k]] >= 0;
     }
-    if (is_free) cells_.push_back(i), largest = std::max(largest, size);
-    else constant_ += problem_.norm.coefficient(i) * size;
+    if (is_free)
+      cells_.push_back(i), largest = std::max(largest, size);
+    else
+      constant_ += problem_.norm.coefficient(i) * size;
   }
   largest = std::max(largest, 1e-12);
   s_.head.assign(n, 0.0);
@@ -94,7 +98,8 @@ void ConicStep::assemble() {
   std::vector<std::int32_t> members;
   std::vector<Eigen::Vector3d> spikes;
   const auto add = [&](std::int32_t a, std::int32_t b, const Eigen::Matrix3d& block) {
-    if (a >= 0 && b >= 0) a >= b ? add_block(matrix_, a, b, block) : add_block(matrix_, b, a, block.transpose());
+    if (a >= 0 && b >= 0)
+      a >= b ? add_block(matrix_, a, b, block) : add_block(matrix_, b, a, block.transpose());
   };
   for (const std::int32_t i : cells_) {
     const double share = 1 / (scaling_[i].eta * scaling_[i].eta);
@@ -114,7 +119,8 @@ void ConicStep::assemble() {
       spikes.push_back(-spike);
     }
     for (std::size_t a = 0; a < members.size(); ++a) {
-      for (std::size_t b = 0; b <= a; ++b) add(members[a], members[b], -share * kappa * spikes[a] * spikes[b].transpose());
+      for (std::size_t b = 0; b <= a; ++b)
+        add(members[a], members[b], -share * kappa * spikes[a] * spikes[b].transpose());
     }
   }
 }
@@ -158,9 +164,11 @@ void ConicStep::correct(const Cones& ds, const Cones& dw, double centre, Cones& 
   }
 }
 
-/// Newton's direction for W dw + W^-1 ds = -lambda \ target with ds = (dT, A dx), dw = (0, dw), A^T (w + dw) = 0.
+/// Newton's direction for W dw + W^-1 ds = -lambda \ target with ds = (dT, A dx), dw = (0, dw), A^T (w + dw)
+/// = 0.
 bool ConicStep::direction(const Cones& target, Points& dx, Cones& ds, Cones& dw) {
-  Cones g{std::vector<double>(s_.head.size(), 0.0), EdgeVectors::Zero(v_.rows(), 3)};  // W^-1 (lambda \ target)
+  Cones g{std::vector<double>(s_.head.size(), 0.0),
+          EdgeVectors::Zero(v_.rows(), 3)};  // W^-1 (lambda \ target)
   EdgeVectors right = w_.tail;
   for (const std::int32_t i : cells_) {
     const auto [eta, u] = scaling_[i];
@@ -220,8 +228,10 @@ double ConicStep::step_length(const Cones& point, const Cones& direction) const 
     if (root < 0) continue;
     // The smallest positive root, by the form that does not cancel.
     const double denominator = b < 0 ? -b + std::sqrt(root) : -b - std::sqrt(root);
-    if (b < 0) step = std::min(step, c / denominator);
-    else if (a < 0) step = std::min(step, denominator / a);
+    if (b < 0)
+      step = std::min(step, c / denominator);
+    else if (a < 0)
+      step = std::min(step, denominator / a);
   }
   return std::max(0.0, kStepShare * step);
 }
@@ -237,13 +247,15 @@ bool ConicStep::iterate() {
   const double affine = std::min({1.0, step_length(s_, ds) / kStepShare, step_length(w_, dw) / kStepShare});
 
   double mu = 0;
-  for (const std::int32_t i : cells_) mu += lambda_.head[i] * lambda_.head[i] + rows(lambda_.tail, i).squaredNorm();
+  for (const std::int32_t i : cells_)
+    mu += lambda_.head[i] * lambda_.head[i] + rows(lambda_.tail, i).squaredNorm();
   mu /= static_cast<double>(cells_.size());
   const double sigma = std::pow(1 - affine, 3);
   correct(ds, dw, sigma * mu, target);
   if (!direction(target, dx, ds, dw)) return false;
 
-  const double primal_step = std::min(1.0, step_length(s_, ds)), dual_step = std::min(1.0, step_length(w_, dw));
+  const double primal_step = std::min(1.0, step_length(s_, ds)),
+               dual_step = std::min(1.0, step_length(w_, dw));
   const double step = std::min(primal_step, dual_step);
   if (!(step > 1e-10)) return false;
   x_ += step * dx;

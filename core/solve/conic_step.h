@@ -9,14 +9,17 @@
 
 namespace lpdeform {
 
-/// The convex step of p = 1 as a second-order cone program (Eq. 11, the root of w_ij over the whole difference):
+/// The convex step of p = 1 as a second-order cone program (Eq. 11, the root of w_ij over the whole
+/// difference):
 ///
-///   minimise sum_i k_i T_i   subject to   T_i >= |z_i|,  z = A x - b          rotations held, k_i the norm's coefficients
+///   minimise sum_i k_i T_i   subject to   T_i >= |z_i|,  z = A x - b          rotations held, k_i the norm's
+///   coefficients
 ///
-/// by a primal-dual interior-point method with Nesterov-Todd scaling and Mehrotra's predictor-corrector (as in Vandenberghe,
-/// "The CVXOPT linear and quadratic cone program solvers", 2010). The dual cone variables are (k_i, w_i) with A^T w = 0.
-/// It starts strictly feasible on both sides (T_i > |z_i| and w = 0) and stays so: each iterate has a primal value and a
-/// lower bound. A 3n x 3n system on the two-ring pattern is factored in each iteration, with the T_i eliminated.
+/// by a primal-dual interior-point method with Nesterov-Todd scaling and Mehrotra's predictor-corrector (as
+/// in Vandenberghe, "The CVXOPT linear and quadratic cone program solvers", 2010). The dual cone variables
+/// are (k_i, w_i) with A^T w = 0. It starts strictly feasible on both sides (T_i > |z_i| and w = 0) and stays
+/// so: each iterate has a primal value and a lower bound. A 3n x 3n system on the two-ring pattern is
+/// factored in each iteration, with the T_i eliminated.
 class ConicStep {
  public:
   /// `rotations` are held; `x` is the initial guess.
@@ -37,7 +40,8 @@ class ConicStep {
     std::vector<double> head;  // one a cell
     EdgeVectors tail;          // z_i or w_i by rows of the cell
   };
-  /// Nesterov-Todd scaling of one cone: W = eta [u, v^T; v, I + v v^T / (1 + u)], (u, v) = w bar, u^2 - |v|^2 = 1.
+  /// Nesterov-Todd scaling of one cone: W = eta [u, v^T; v, I + v v^T / (1 + u)], (u, v) = w bar, u^2 - |v|^2
+  /// = 1.
   struct Scaling {
     double eta = 1, u = 1;
   };
@@ -64,10 +68,10 @@ class ConicStep {
   std::vector<std::int32_t> cells_;  // those with a free vertex; the others are constant
   std::vector<std::int32_t> free_;   // vertex -> index among the free ones, -1 where held
   Points x_;
-  Cones s_, w_;                      // (T, z) and (k, w)
+  Cones s_, w_;  // (T, z) and (k, w)
   std::vector<Scaling> scaling_;
-  EdgeVectors v_;                    // tails of w bar
-  Cones lambda_;                     // W w = W^-1 s
+  EdgeVectors v_;  // tails of w bar
+  Cones lambda_;   // W w = W^-1 s
   double primal_ = 0, constant_ = 0, lower_bound_ = 0;
   LowerMatrix matrix_;
   std::optional<SparseCholesky> factor_;

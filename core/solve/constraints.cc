@@ -23,9 +23,10 @@ absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Cons
       const std::int32_t vertex = handle.vertices[k];
       const Eigen::RowVector3d scaled = (targets.row(k) - shape.centre()) / shape.mean_edge_length();
       if (!(scaled.stableNorm() * shape.mean_edge_length() <= kFarthestTarget * shape.diagonal())) {
-        return invalid_input({"HANDLE_TARGET_TOO_FAR", absl::StrCat("vertex ", vertex), "1e9 diagonals of the mesh"},
-                             absl::StrCat("handle \"", name, "\" sends vertex ", vertex,
-                                          " over 1e9 diagonals of the mesh away"));
+        return invalid_input(
+            {"HANDLE_TARGET_TOO_FAR", absl::StrCat("vertex ", vertex), "1e9 diagonals of the mesh"},
+            absl::StrCat("handle \"", name, "\" sends vertex ", vertex,
+                         " over 1e9 diagonals of the mesh away"));
       }
       constraints.is_held[vertex] = true;
       constraints.targets.row(vertex) = scaled;
@@ -38,14 +39,16 @@ absl::Status name_free_component(const RestShape& shape, std::int32_t component)
   const auto& components = shape.components();
   const auto first = std::find(components.begin(), components.end(), component) - components.begin();
   const auto size = std::count(components.begin(), components.end(), component);
-  return make_fault(absl::StatusCode::kFailedPrecondition,
-                    {"COMPONENT_WITHOUT_HANDLE", absl::StrCat("component ", component), "at least 1 handle a component"},
-                    absl::StrCat("component ", component, " of the mesh (", size, " vertices, the first of them vertex ",
-                                 first, ") has no handle"));
+  return make_fault(
+      absl::StatusCode::kFailedPrecondition,
+      {"COMPONENT_WITHOUT_HANDLE", absl::StrCat("component ", component), "at least 1 handle a component"},
+      absl::StrCat("component ", component, " of the mesh (", size, " vertices, the first of them vertex ",
+                   first, ") has no handle"));
 }
 
 /// The rigid motion of the handle that has the vertex nearest to `point`, all at rest, in scaled units.
-RigidTransform nearest_handle_motion(const RestShape& shape, const HandleSet& handles, const Eigen::RowVector3d& point) {
+RigidTransform nearest_handle_motion(const RestShape& shape, const HandleSet& handles,
+                                     const Eigen::RowVector3d& point) {
   const Points& rest = shape.scaled_positions();
   const Handle* nearest = nullptr;
   double shortest = std::numeric_limits<double>::infinity();
@@ -106,8 +109,10 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   std::vector<char> has_handle(shape.component_count(), false);
   for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
     const std::int32_t component = shape.components()[i];
-    if (component < 0) constraints.is_held[i] = true;
-    else if (constraints.is_held[i]) has_handle[component] = true;
+    if (component < 0)
+      constraints.is_held[i] = true;
+    else if (constraints.is_held[i])
+      has_handle[component] = true;
   }
   const auto free = std::find(has_handle.begin(), has_handle.end(), false);
   if (free == has_handle.end()) return constraints;

@@ -15,8 +15,8 @@ enum class FreeComponents {
   kFollow,  // moves rigidly with the handle that has the vertex nearest to its centre at rest
 };
 
-/// The vertices that do not move freely, and where they are: handles, unreferenced vertices, and, where asked for, whole
-/// components that no handle holds.
+/// The vertices that do not move freely, and where they are: handles, unreferenced vertices, and, where asked
+/// for, whole components that no handle holds.
 struct Constraints {
   std::vector<char> is_held;  // one a vertex
   Points targets;             // scaled units; rows of free vertices are the rest positions
@@ -27,10 +27,11 @@ inline constexpr double kFarthestTarget = 1e9;
 
 /// Errors: as check_handles; INVALID_ARGUMENT: HANDLE_TARGET_TOO_FAR (over 1e9 diagonals from the rest mesh);
 /// FAILED_PRECONDITION: NO_HANDLES, COMPONENT_WITHOUT_HANDLE (the component and its lowest vertex).
-absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const HandleSet& handles, FreeComponents free_components);
+absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const HandleSet& handles,
+                                             FreeComponents free_components);
 
-/// The rotation and translation that bring points `from` nearest to points `to`: to_k = R from_k + t. For one point, or points
-/// that coincide, a translation.
+/// The rotation and translation that bring points `from` nearest to points `to`: to_k = R from_k + t. For one
+/// point, or points that coincide, a translation.
 struct RigidTransform {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::RowVector3d translation = Eigen::RowVector3d::Zero();

@@ -21,19 +21,23 @@ constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled uni
 
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
-absl::Status out_of_range(const std::string& reason, const std::string& name, double value, const std::string& limit) {
-  return invalid_input({reason, name, limit},
-                       absl::StrCat(name, " is ", value, "; it must satisfy ", limit));
+absl::Status out_of_range(const std::string& reason, const std::string& name, double value,
+                          const std::string& limit) {
+  return invalid_input({reason, name, limit}, absl::StrCat(name, " is ", value, "; it must satisfy ", limit));
 }
 
 absl::Status check_settings(const SolveSettings& settings) {
   if (!(settings.tolerance >= 1e-14 && settings.tolerance <= 0.1)) {
-    return out_of_range("TOLERANCE_OUT_OF_RANGE", "tolerance", settings.tolerance, "1e-14 <= tolerance <= 0.1");
+    return out_of_range("TOLERANCE_OUT_OF_RANGE", "tolerance", settings.tolerance,
+                        "1e-14 <= tolerance <= 0.1");
   }
   if (settings.max_iterations < 0) {
-    return out_of_range("ITERATIONS_OUT_OF_RANGE", "max_iterations", settings.max_iterations, "0 <= max_iterations");
+    return out_of_range("ITERATIONS_OUT_OF_RANGE", "max_iterations", settings.max_iterations,
+                        "0 <= max_iterations");
   }
   if (!(settings.time_limit_seconds > 0)) {
     return out_of_range("TIME_LIMIT_OUT_OF_RANGE", "time_limit_seconds", settings.time_limit_seconds,
@@ -111,8 +115,8 @@ struct Deformer::Impl {
   SolveSummary summary;
 };
 
-/// x = rest + u with u the harmonic extension of the handles' displacements: the solution of the naive Laplacian system
-/// L x = L p with the handles' positions given.
+/// x = rest + u with u the harmonic extension of the handles' displacements: the solution of the naive
+/// Laplacian system L x = L p with the handles' positions given.
 Points Deformer::Impl::laplacian_guess() {
   Points u = constraints->targets - shape->scaled_positions();
   metric.extend(constraints->is_held, u);
@@ -134,9 +138,12 @@ Points Deformer::Impl::current_guess() {
 
 Points Deformer::Impl::initial_guess(InitialGuess guess) {
   Points result;
-  if (guess == InitialGuess::kRest) result = constraints->targets;
-  else if (guess == InitialGuess::kCurrent && has_state) result = current_guess();
-  else result = laplacian_guess();
+  if (guess == InitialGuess::kRest)
+    result = constraints->targets;
+  else if (guess == InitialGuess::kCurrent && has_state)
+    result = current_guess();
+  else
+    result = laplacian_guess();
   // Held vertices are at their targets exactly, whatever the solve rounded to.
   for (Eigen::Index i = 0; i < result.rows(); ++i) {
     if (constraints->is_held[i]) result.row(i) = constraints->targets.row(i);
@@ -175,16 +182,21 @@ Problem Deformer::Impl::make_problem() {
 std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points guess, bool is_warm) {
   Problem problem = make_problem();
   switch (method) {
-    case Method::kLineSearch: return std::make_unique<LineSearch>(std::move(problem), std::move(guess));
-    case Method::kLocalGlobal: return std::make_unique<LocalGlobal>(std::move(problem), std::move(guess));
-    case Method::kConic: return std::make_unique<Conic>(std::move(problem), std::move(guess));
+    case Method::kLineSearch:
+      return std::make_unique<LineSearch>(std::move(problem), std::move(guess));
+    case Method::kLocalGlobal:
+      return std::make_unique<LocalGlobal>(std::move(problem), std::move(guess));
+    case Method::kConic:
+      return std::make_unique<Conic>(std::move(problem), std::move(guess));
     case Method::kAuto:
-    case Method::kQuasiNewton: break;
+    case Method::kQuasiNewton:
+      break;
   }
   return std::make_unique<QuasiNewton>(std::move(problem), std::move(guess), is_warm);
 }
 
-/// Factors for the present handles with equal cell weights, unless a usable factor is there. False where that fails.
+/// Factors for the present handles with equal cell weights, unless a usable factor is there. False where that
+/// fails.
 bool Deformer::Impl::prepare_metric(bool needs_plain_weights) {
   if (metric.is_factored_for(constraints->is_held) && !needs_plain_weights) return true;
   return metric.factor(std::vector<double>(shape->vertex_count(), 1.0), constraints->is_held);
@@ -225,7 +237,8 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   started = Clock::now();
   Points guess = is_factored ? initial_guess(settings.initial) : constraints->targets;
   if (!guess.allFinite()) guess = constraints->targets;
-  const double reference = settings.method == Method::kLineSearch ? length_unit() / unit() : typical_energy(guess);
+  const double reference =
+      settings.method == Method::kLineSearch ? length_unit() / unit() : typical_energy(guess);
   norm.emplace(material, shape->vertex_count(), unit(), reference);
   cells.evaluate(guess, *norm);
   best_sum = std::numeric_limits<double>::infinity();
@@ -241,10 +254,14 @@ void Deformer::Impl::iterate() {
   ++summary.iterations;
   record(result, keep_if_best());
   switch (result.outcome) {
-    case Outcome::kProgress: return;
-    case Outcome::kConverged: return end(StopReason::kConverged);
-    case Outcome::kStalled: return end(StopReason::kStalled);
-    case Outcome::kBreakdown: return end(StopReason::kNumericalBreakdown);
+    case Outcome::kProgress:
+      return;
+    case Outcome::kConverged:
+      return end(StopReason::kConverged);
+    case Outcome::kStalled:
+      return end(StopReason::kStalled);
+    case Outcome::kBreakdown:
+      return end(StopReason::kNumericalBreakdown);
   }
 }
 
@@ -274,11 +291,21 @@ absl::StatusOr<std::unique_ptr<Deformer>> Deformer::create(std::shared_ptr<const
   return std::unique_ptr<Deformer>(new Deformer(std::make_unique<Impl>(std::move(shape), options)));
 }
 
-const RestShape& Deformer::shape() const { return *impl_->shape; }
-const HandleSet& Deformer::handles() const { return impl_->handles; }
-const Material& Deformer::material() const { return impl_->material; }
-const SolveSummary& Deformer::summary() const { return impl_->summary; }
-const Field& Deformer::cell_energies() const { return impl_->best_energies; }
+const RestShape& Deformer::shape() const {
+  return *impl_->shape;
+}
+const HandleSet& Deformer::handles() const {
+  return impl_->handles;
+}
+const Material& Deformer::material() const {
+  return impl_->material;
+}
+const SolveSummary& Deformer::summary() const {
+  return impl_->summary;
+}
+const Field& Deformer::cell_energies() const {
+  return impl_->best_energies;
+}
 
 absl::Status Deformer::set_handles(const HandleSet& handles) {
   auto constraints = make_constraints(*impl_->shape, handles, impl_->options.free_components);
@@ -290,7 +317,8 @@ absl::Status Deformer::set_handles(const HandleSet& handles) {
 }
 
 absl::Status Deformer::set_material(const Material& material) {
-  if (absl::Status status = check_material(material, impl_->shape->vertex_count()); !status.ok()) return status;
+  if (absl::Status status = check_material(material, impl_->shape->vertex_count()); !status.ok())
+    return status;
   impl_->interrupt();
   impl_->material = material;
   return absl::OkStatus();
@@ -305,9 +333,9 @@ absl::Status Deformer::set_positions(const Points& positions) {
   const double farthest = kFarthestTarget * impl_->shape->diagonal();
   for (Eigen::Index i = 0; i < n; ++i) {
     if ((positions.row(i) - impl_->shape->centre()).stableNorm() <= farthest) continue;
-    return invalid_input({"POSITIONS_NOT_FINITE", absl::StrCat("vertex ", i), "1e9 diagonals of the mesh"},
-                         absl::StrCat("the position of vertex ", i,
-                                      " is not finite, or over 1e9 diagonals of the mesh away"));
+    return invalid_input(
+        {"POSITIONS_NOT_FINITE", absl::StrCat("vertex ", i), "1e9 diagonals of the mesh"},
+        absl::StrCat("the position of vertex ", i, " is not finite, or over 1e9 diagonals of the mesh away"));
   }
   impl_->interrupt();
   impl_->x = (positions.rowwise() - impl_->shape->centre()) / impl_->unit();
@@ -333,10 +361,14 @@ absl::Status Deformer::start(const SolveSettings& settings, std::stop_token stop
 bool Deformer::step() {
   Impl& self = *impl_;
   if (!self.minimiser) return false;
-  if (self.stop.stop_requested()) self.end(StopReason::kCancelled);
-  else if (seconds_since(self.started) >= self.settings.time_limit_seconds) self.end(StopReason::kTimeLimit);
-  else if (self.summary.iterations >= self.settings.max_iterations) self.end(StopReason::kIterationLimit);
-  else self.iterate();
+  if (self.stop.stop_requested())
+    self.end(StopReason::kCancelled);
+  else if (seconds_since(self.started) >= self.settings.time_limit_seconds)
+    self.end(StopReason::kTimeLimit);
+  else if (self.summary.iterations >= self.settings.max_iterations)
+    self.end(StopReason::kIterationLimit);
+  else
+    self.iterate();
   return self.minimiser != nullptr;
 }
 

@@ -20,9 +20,9 @@ struct DeformerOptions {
   int threads = 1;
 };
 
-/// One mesh being deformed: handles, material, the present state and the factorisations that go with them. Inputs may be
-/// changed at any time between steps; each change takes effect whole or not at all. Not thread-safe: one caller at a
-/// time, which may be a different thread each time.
+/// One mesh being deformed: handles, material, the present state and the factorisations that go with them.
+/// Inputs may be changed at any time between steps; each change takes effect whole or not at all. Not
+/// thread-safe: one caller at a time, which may be a different thread each time.
 ///
 ///   auto deformer = Deformer::create(rest_shape, {});
 ///   deformer->set_handles(handles);
@@ -38,20 +38,21 @@ class Deformer {
   const HandleSet& handles() const;
   const Material& material() const;
 
-  /// Replaces all handles. Numeric refactorisation where the set of held vertices changed, none where handles only moved.
-  /// Errors: as check_handles; FAILED_PRECONDITION: COMPONENT_WITHOUT_HANDLE (names the component and one vertex of it),
-  /// NO_HANDLES. Ends a running solve with kCancelled.
+  /// Replaces all handles. Numeric refactorisation where the set of held vertices changed, none where handles
+  /// only moved. Errors: as check_handles; FAILED_PRECONDITION: COMPONENT_WITHOUT_HANDLE (names the component
+  /// and one vertex of it), NO_HANDLES. Ends a running solve with kCancelled.
   absl::Status set_handles(const HandleSet& handles);
 
   /// Errors: as check_material. Ends a running solve with kCancelled.
   absl::Status set_material(const Material& material);
 
-  /// Makes `positions` the present state, from which InitialGuess::kCurrent goes on. INVALID_ARGUMENT: POSITIONS_SIZE,
-  /// POSITIONS_NOT_FINITE. Ends a running solve with kCancelled.
+  /// Makes `positions` the present state, from which InitialGuess::kCurrent goes on. INVALID_ARGUMENT:
+  /// POSITIONS_SIZE, POSITIONS_NOT_FINITE. Ends a running solve with kCancelled.
   absl::Status set_positions(const Points& positions);
 
-  /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P, TOLERANCE_OUT_OF_RANGE,
-  /// ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE). `stop` is looked at in every iteration.
+  /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P,
+  /// TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE). `stop` is looked at in every
+  /// iteration.
   absl::Status start(const SolveSettings& settings, std::stop_token stop = {});
 
   /// One iteration. True while there is more to do; false once the summary has its stop reason.
@@ -63,14 +64,14 @@ class Deformer {
   /// Of the running or the last solve.
   const SolveSummary& summary() const;
 
-  /// The best state of the running or the last solve, in the caller's units and vertex order; always finite. The rest positions
-  /// before the first solve.
+  /// The best state of the running or the last solve, in the caller's units and vertex order; always finite.
+  /// The rest positions before the first solve.
   const Points& positions() const;
   /// E_i at positions(), in the caller's unit of length; 0 for unreferenced vertices.
   const Field& cell_energies() const;
 
-  /// The certificate at positions() for the material of the last solve: see SolveSummary::optimality_gap. 1 before the first
-  /// solve. Ends a running solve with kCancelled.
+  /// The certificate at positions() for the material of the last solve: see SolveSummary::optimality_gap. 1
+  /// before the first solve. Ends a running solve with kCancelled.
   double optimality_gap();
 
   /// Bytes held, the shared rest shape left out.

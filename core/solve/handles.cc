@@ -12,7 +12,9 @@ namespace {
 
 constexpr std::size_t kLongestName = 128;
 
-std::string quoted(std::string_view name) { return absl::StrCat("handle \"", std::string(name), "\""); }
+std::string quoted(std::string_view name) {
+  return absl::StrCat("handle \"", std::string(name), "\"");
+}
 
 absl::Status not_finite(std::string_view name, const std::string& what) {
   return invalid_input({"HANDLE_MOTION_NOT_FINITE", quoted(name), "finite numbers"},
@@ -25,9 +27,9 @@ absl::Status check_rigid(std::string_view name, const RigidMotion& motion) {
   if (!motion.center.allFinite()) return not_finite(name, "the rotation centre");
   if (!motion.translation.allFinite()) return not_finite(name, "the translation");
   if (motion.angle_radians != 0 && !(motion.axis.stableNorm() > 0)) {
-    return invalid_input({"HANDLE_AXIS_ZERO", quoted(name), "|axis| > 0"},
-                         absl::StrCat(quoted(name), " turns by ", motion.angle_radians,
-                                      " radians about an axis of length 0"));
+    return invalid_input(
+        {"HANDLE_AXIS_ZERO", quoted(name), "|axis| > 0"},
+        absl::StrCat(quoted(name), " turns by ", motion.angle_radians, " radians about an axis of length 0"));
   }
   return absl::OkStatus();
 }
@@ -36,18 +38,20 @@ absl::Status check_targets(std::string_view name, const Handle& handle, const Ta
   const auto count = static_cast<Eigen::Index>(handle.vertices.size());
   if (targets.positions.rows() != count) {
     return invalid_input({"HANDLE_TARGET_COUNT", quoted(name), absl::StrCat(count, " positions")},
-                         absl::StrCat(quoted(name), " has ", count, " vertices and ", targets.positions.rows(),
-                                      " target positions"));
+                         absl::StrCat(quoted(name), " has ", count, " vertices and ",
+                                      targets.positions.rows(), " target positions"));
   }
   for (Eigen::Index row = 0; row < count; ++row) {
-    if (!targets.positions.row(row).allFinite()) return not_finite(name, absl::StrCat("target position ", row));
+    if (!targets.positions.row(row).allFinite())
+      return not_finite(name, absl::StrCat("target position ", row));
   }
   return absl::OkStatus();
 }
 
 absl::Status check_motion(std::string_view name, const Handle& handle, const HandleMotion& motion) {
   if (const auto* rigid = std::get_if<RigidMotion>(&motion)) return check_rigid(name, *rigid);
-  if (const auto* targets = std::get_if<TargetPositions>(&motion)) return check_targets(name, handle, *targets);
+  if (const auto* targets = std::get_if<TargetPositions>(&motion))
+    return check_targets(name, handle, *targets);
   return absl::OkStatus();
 }
 
@@ -95,14 +99,16 @@ absl::Status check_handles(const HandleSet& handles, std::int32_t vertex_count) 
     for (const std::int32_t vertex : handle.vertices) {
       const std::string element = absl::StrCat("vertex ", vertex);
       if (vertex < 0 || vertex >= vertex_count) {
-        return invalid_input({"HANDLE_VERTEX_OUT_OF_RANGE", element, absl::StrCat("0 <= vertex < ", vertex_count)},
-                             absl::StrCat(quoted(name), " holds vertex ", vertex, "; the mesh has ", vertex_count,
-                                          " vertices, 0 to ", vertex_count - 1));
+        return invalid_input(
+            {"HANDLE_VERTEX_OUT_OF_RANGE", element, absl::StrCat("0 <= vertex < ", vertex_count)},
+            absl::StrCat(quoted(name), " holds vertex ", vertex, "; the mesh has ", vertex_count,
+                         " vertices, 0 to ", vertex_count - 1));
       }
       const auto [entry, is_new] = owner.emplace(vertex, name);
       if (is_new) continue;
-      const std::string where = entry->second == name ? absl::StrCat("twice in ", quoted(name))
-                                                      : absl::StrCat("in ", quoted(entry->second), " and in ", quoted(name));
+      const std::string where = entry->second == name
+                                    ? absl::StrCat("twice in ", quoted(name))
+                                    : absl::StrCat("in ", quoted(entry->second), " and in ", quoted(name));
       return invalid_input({"HANDLE_VERTEX_TWICE", element, "one handle a vertex"},
                            absl::StrCat("vertex ", vertex, " is ", where));
     }

@@ -19,8 +19,8 @@ struct Fixed {
   bool operator==(const Fixed&) const = default;
 };
 
-/// x = R (p - center) + center + translation for every vertex of the handle: rotation about `center` first, then
-/// translation. `axis` need not have unit length; it may be 0 only where `angle_radians` is 0.
+/// x = R (p - center) + center + translation for every vertex of the handle: rotation about `center` first,
+/// then translation. `axis` need not have unit length; it may be 0 only where `angle_radians` is 0.
 struct RigidMotion {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
   double angle_radians = 0;
@@ -50,13 +50,13 @@ struct Handle {
 /// All handles of a session, by name. A plain value: change a copy, then give it to Deformer::set_handles.
 class HandleSet {
  public:
-  /// Adds a handle or replaces the one of that name (regrouping). Errors, INVALID_ARGUMENT: HANDLE_NAME (empty or over 128
-  /// bytes), HANDLE_EMPTY, and what set_motion has. Whether vertices exist and belong to one handle only is checked by
-  /// check_handles, when the whole set is known.
+  /// Adds a handle or replaces the one of that name (regrouping). Errors, INVALID_ARGUMENT: HANDLE_NAME
+  /// (empty or over 128 bytes), HANDLE_EMPTY, and what set_motion has. Whether vertices exist and belong to
+  /// one handle only is checked by check_handles, when the whole set is known.
   absl::Status set(std::string_view name, Handle handle);
 
-  /// Moves a handle. NOT_FOUND (HANDLE_UNKNOWN); INVALID_ARGUMENT: HANDLE_MOTION_NOT_FINITE, HANDLE_AXIS_ZERO,
-  /// HANDLE_TARGET_COUNT (number of positions is not the number of vertices).
+  /// Moves a handle. NOT_FOUND (HANDLE_UNKNOWN); INVALID_ARGUMENT: HANDLE_MOTION_NOT_FINITE,
+  /// HANDLE_AXIS_ZERO, HANDLE_TARGET_COUNT (number of positions is not the number of vertices).
   absl::Status set_motion(std::string_view name, HandleMotion motion);
 
   /// False where there was none.
@@ -69,7 +69,8 @@ class HandleSet {
   std::map<std::string, Handle, std::less<>> handles_;
 };
 
-/// INVALID_ARGUMENT: HANDLE_VERTEX_OUT_OF_RANGE, HANDLE_VERTEX_TWICE (in one handle or in two: both are named).
+/// INVALID_ARGUMENT: HANDLE_VERTEX_OUT_OF_RANGE, HANDLE_VERTEX_TWICE (in one handle or in two: both are
+/// named).
 absl::Status check_handles(const HandleSet& handles, std::int32_t vertex_count);
 
 /// Where a handle's vertices go: rows in the order of handle.vertices.

@@ -14,7 +14,8 @@ StepResult LineSearch::step() {
   if (!std::isfinite(objective_)) return {Outcome::kBreakdown, objective_, 0};
   problem_.cells.gradient(x_, gradient_);
   clear_held_rows(problem_.constraints, gradient_);
-  // The gradient with respect to positions in units of l, X = x / l, is l times the one at hand; a step in X is worth l in x.
+  // The gradient with respect to positions in units of l, X = x / l, is l times the one at hand; a step in X
+  // is worth l in x.
   const double squared_unit = problem_.length_unit * problem_.length_unit;
   const double squared_slope = squared_unit * gradient_.squaredNorm();
   if (squared_slope == 0) return {Outcome::kConverged, objective_, 0};
@@ -29,11 +30,14 @@ StepResult LineSearch::step() {
     if (t * std::sqrt(squared_slope) < 1e-15) return {Outcome::kStalled, objective_, 0};
   }
   if (!(value <= objective_)) return {Outcome::kProgress, objective_, 0};  // stopped in mid-search
+  const double full_step = std::sqrt(squared_slope / static_cast<double>(x_.rows()));
+  const double threshold = kDisplacement * problem_.tolerance / SolveSettings::kDefaultTolerance;
+  // A step so short that rounding hides its decrease says nothing of the distance to the minimum.
+  const bool is_hidden = value == objective_ && full_step >= threshold;
   x_.swap(trial_);
   objective_ = value;
-  const double displacement = t * std::sqrt(squared_slope / static_cast<double>(x_.rows()));
-  const double threshold = kDisplacement * problem_.tolerance / SolveSettings::kDefaultTolerance;
-  return {displacement < threshold ? Outcome::kConverged : Outcome::kProgress, objective_, 0};
+  if (is_hidden) return {Outcome::kStalled, objective_, 0};
+  return {t * full_step < threshold ? Outcome::kConverged : Outcome::kProgress, objective_, 0};
 }
 
 }  // namespace lpdeform

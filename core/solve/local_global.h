@@ -4,8 +4,9 @@
 
 namespace lpdeform {
 
-/// As-rigid-as-possible surface modeling (Sorkine & Alexa 2007), p = 2: rotations fitted for given positions, then positions
-/// solved for given rotations, which is one Newton step x - M^-1 grad with the constant matrix M (see Metric).
+/// As-rigid-as-possible surface modeling (Sorkine & Alexa 2007), p = 2: rotations fitted for given positions,
+/// then positions solved for given rotations, which is one Newton step x - M^-1 grad with the constant matrix
+/// M (see Metric).
 ///
 /// Converged when the decrease of the last three iterations is at most 3 * tolerance * E.
 class LocalGlobal : public Minimiser {

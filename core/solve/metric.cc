@@ -74,7 +74,8 @@ void Metric::solve(const Points& b, Points& x) const {
 }
 
 std::size_t Metric::memory_bytes() const {
-  return factor_.memory_bytes() + cell_weights_.capacity() * sizeof(double) + is_held_.capacity() + matrix_.columns.capacity() * sizeof(std::int32_t) +
+  return factor_.memory_bytes() + cell_weights_.capacity() * sizeof(double) + is_held_.capacity() +
+         matrix_.columns.capacity() * sizeof(std::int32_t) +
          matrix_.rows.capacity() * (sizeof(std::int32_t) + sizeof(double));
 }
 

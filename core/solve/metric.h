@@ -11,16 +11,16 @@ namespace lpdeform {
 ///
 ///   M = 2 * Laplacian with edge weights (c_i + c_j) w_ij,     held vertices are identity rows
 ///
-/// one scalar matrix for all three coordinates. For p = 2 it is exact (the matrix of local_global); for other p it is what
-/// iteratively reweighted least squares would use. Ordering and symbolic analysis are made once, by the constructor;
-/// factor() is numeric alone.
+/// one scalar matrix for all three coordinates. For p = 2 it is exact (the matrix of local_global); for other
+/// p it is what iteratively reweighted least squares would use. Ordering and symbolic analysis are made once,
+/// by the constructor; factor() is numeric alone.
 class Metric {
  public:
   explicit Metric(std::shared_ptr<const RestShape> shape);
 
-  /// `is_held` has one entry a vertex. Cell weights are clipped from below at 1e-8 of the largest used, so that the
-  /// factorisation stays healthy where cells have no weight. False where the factorisation fails.
-  /// A factor for the same held vertices and cell weights, up to a common factor, is kept.
+  /// `is_held` has one entry a vertex. Cell weights are clipped from below at 1e-8 of the largest used, so
+  /// that the factorisation stays healthy where cells have no weight. False where the factorisation fails. A
+  /// factor for the same held vertices and cell weights, up to a common factor, is kept.
   [[nodiscard]] bool factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held);
 
   /// The last factor() was for these held vertices and succeeded.

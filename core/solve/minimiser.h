@@ -14,12 +14,12 @@ struct Problem {
   CellPass& cells;
   Metric& metric;
   const Constraints& constraints;
-  const LpNorm& norm;        // what is to be minimised
-  double tolerance;          // SolveSettings::tolerance
-  double length_unit;        // l in scaled units, for thresholds that the paper gives in absolute lengths
-  double diagonal;           // of the rest mesh, in scaled units
-  double zero_objective;     // an unsmoothed objective that is 0 to rounding
-  std::stop_token stop;      // looked at between evaluations
+  const LpNorm& norm;     // what is to be minimised
+  double tolerance;       // SolveSettings::tolerance
+  double length_unit;     // l in scaled units, for thresholds that the paper gives in absolute lengths
+  double diagonal;        // of the rest mesh, in scaled units
+  double zero_objective;  // an unsmoothed objective that is 0 to rounding
+  std::stop_token stop;   // looked at between evaluations
 
   const RestShape& shape() const { return cells.shape(); }
 };
@@ -38,13 +38,14 @@ struct StepResult {
   int stage = 0;         // counts the objectives; within a stage the objective never rises
 };
 
-/// One algorithm: makes one iteration a call. Time, limits, cancellation, trace and the best state belong to the loop that
-/// calls it (Deformer::step).
+/// One algorithm: makes one iteration a call. Time, limits, cancellation, trace and the best state belong to
+/// the loop that calls it (Deformer::step).
 class Minimiser {
  public:
   virtual ~Minimiser() = default;
 
-  /// One iteration. Afterwards problem.cells holds the evaluation at x() (its squared energies belong to x()).
+  /// One iteration. Afterwards problem.cells holds the evaluation at x() (its squared energies belong to
+  /// x()).
   virtual StepResult step() = 0;
 
   /// The present state: finite, held vertices at their targets.

@@ -15,7 +15,9 @@ constexpr double kSmoothingStep = 0.1;
 constexpr double kBias = 3e-4;
 constexpr double kLeastSmoothing = 1e-26;  // eps^2 over the squared diagonal: rounding
 
-double dot(const Points& a, const Points& b) { return a.cwiseProduct(b).sum(); }
+double dot(const Points& a, const Points& b) {
+  return a.cwiseProduct(b).sum();
+}
 
 }  // namespace
 
@@ -23,7 +25,8 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, bool is_warm)
     : problem_(std::move(problem)), norm_(problem_.norm), x_(std::move(x)) {
   const double lowest = problem_.norm.lowest_p();
   if (lowest < 2) eps2_ = (is_warm ? 1e-9 : 1e-6) * problem_.diagonal * problem_.diagonal;
-  // No way from p = 2 where all p_i > 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8 times the E^(1/p)).
+  // No way from p = 2 where all p_i > 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8 times
+  // the E^(1/p)).
   for (const double p : {2.0, 1.6, 1.35, 1.2, 1.1, 1.05}) {
     if (!is_warm && p > lowest) shares_.push_back((2 - p) / (2 - lowest));
   }
@@ -59,7 +62,8 @@ bool QuasiNewton::refresh_metric() {
   return problem_.metric.factor(problem_.cells.cell_weights(), problem_.constraints.is_held);
 }
 
-/// d = -H g by the two-loop recursion, H_0 = M^-1: unscaled, since M is the Hessian with rotations and weights held.
+/// d = -H g by the two-loop recursion, H_0 = M^-1: unscaled, since M is the Hessian with rotations and
+/// weights held.
 void QuasiNewton::direction(Points& d) {
   d = -gradient_;
   std::vector<double> alpha(memory_.size());
@@ -85,7 +89,8 @@ double QuasiNewton::search(const Points& d, double slope) {
       return t;
     }
     // The minimiser of the parabola through f(0), f'(0), f(t), kept within [t / 10, t / 2].
-    const double parabola = std::isfinite(value) ? -0.5 * slope * t * t / (value - objective_ - slope * t) : 0;
+    const double parabola =
+        std::isfinite(value) ? -0.5 * slope * t * t / (value - objective_ - slope * t) : 0;
     t = std::clamp(parabola, 0.1 * t, 0.5 * t);
   }
   return 0;
@@ -105,7 +110,9 @@ bool QuasiNewton::is_stage_over() const {
   return history_.front() - history_.back() <= problem_.tolerance * norm_.highest_p() * history_.back();
 }
 
-bool QuasiNewton::is_at_zero() const { return problem_.cells.sum(problem_.norm) <= problem_.zero_objective; }
+bool QuasiNewton::is_at_zero() const {
+  return problem_.cells.sum(problem_.norm) <= problem_.zero_objective;
+}
 
 /// Where no step along d lowers the objective: another metric, the next stage, or the end.
 StepResult QuasiNewton::give_up(double slope) {

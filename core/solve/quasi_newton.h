@@ -7,16 +7,18 @@
 
 namespace lpdeform {
 
-/// Limited-memory BFGS (Nocedal & Wright, algorithm 7.4) on E(x) with the reweighted Laplacian as its initial metric (after Liu
-/// et al. 2017), t = 1 first, backtracking by interpolation. The default for every p.
+/// Limited-memory BFGS (Nocedal & Wright, algorithm 7.4) on E(x) with the reweighted Laplacian as its initial
+/// metric (after Liu et al. 2017), t = 1 first, backtracking by interpolation. The default for every p.
 ///
-/// Where some p_i < 2 it runs through stages: p from 2 towards p_i, then cell energies smoothed with an eps that falls until it
-/// does not matter. Each stage begins with a metric refactored for the present cell weights and an empty memory; so
-/// does every 40th iteration. In a live session (`is_warm`) it starts at p_i with a small eps.
+/// Where some p_i < 2 it runs through stages: p from 2 towards p_i, then cell energies smoothed with an eps
+/// that falls until it does not matter. Each stage begins with a metric refactored for the present cell
+/// weights and an empty memory; so does every 40th iteration. In a live session (`is_warm`) it starts at p_i
+/// with a small eps.
 ///
-/// Converged when, in the last stage, the objective f fell over 20 iterations by at most tolerance * p * f, p the largest p_i (a
-/// relative decrease of E^(1/p) of at most the tolerance); or when no step lowers f and the decrease that the fresh
-/// metric promises, -<gradient, direction> / 2, is at most that; or when E is 0 to rounding.
+/// Converged when, in the last stage, the objective f fell over 20 iterations by at most tolerance * p * f, p
+/// the largest p_i (a relative decrease of E^(1/p) of at most the tolerance); or when no step lowers f and
+/// the decrease that the fresh metric promises, -<gradient, direction> / 2, is at most that; or when E is 0
+/// to rounding.
 class QuasiNewton : public Minimiser {
  public:
   QuasiNewton(Problem problem, Points x, bool is_warm);

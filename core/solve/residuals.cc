@@ -4,7 +4,8 @@
 
 namespace lpdeform {
 
-void residuals(const RestShape& shape, const Points& x, const std::vector<Eigen::Matrix3d>& rotations, EdgeVectors& z) {
+void residuals(const RestShape& shape, const Points& x, const std::vector<Eigen::Matrix3d>& rotations,
+               EdgeVectors& z) {
   const Points& rest = shape.scaled_positions();
   z.resize(shape.neighbours().size(), 3);
   for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {

@@ -6,13 +6,14 @@
 
 namespace lpdeform {
 
-/// One vector for each entry k = (i, j) of RestShape's rows: the stacked residuals z_i of a cell are the rows offsets[i] to
-/// offsets[i + 1].
+/// One vector for each entry k = (i, j) of RestShape's rows: the stacked residuals z_i of a cell are the rows
+/// offsets[i] to offsets[i + 1].
 using EdgeVectors = Points;
 
-/// The affine map of the convex step, rotations held:  z = A x - b,  z_k = sqrt(w_ij) ((x_i - x_j) - R_i (p_i - p_j)), so that
-/// E_i = |z_i|. Scaled units.
-void residuals(const RestShape& shape, const Points& x, const std::vector<Eigen::Matrix3d>& rotations, EdgeVectors& z);
+/// The affine map of the convex step, rotations held:  z = A x - b,  z_k = sqrt(w_ij) ((x_i - x_j) - R_i (p_i
+/// - p_j)), so that E_i = |z_i|. Scaled units.
+void residuals(const RestShape& shape, const Points& x, const std::vector<Eigen::Matrix3d>& rotations,
+               EdgeVectors& z);
 
 /// A u.
 void apply_edges(const RestShape& shape, const Points& u, EdgeVectors& result);

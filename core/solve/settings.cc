@@ -5,18 +5,23 @@
 namespace lpdeform {
 namespace {
 
-constexpr std::array kMethods = {Method::kAuto, Method::kQuasiNewton, Method::kLineSearch, Method::kLocalGlobal,
-                                 Method::kConic};
+constexpr std::array kMethods = {Method::kAuto, Method::kQuasiNewton, Method::kLineSearch,
+                                 Method::kLocalGlobal, Method::kConic};
 
 }  // namespace
 
 std::string_view method_name(Method method) {
   switch (method) {
-    case Method::kAuto: return "auto";
-    case Method::kQuasiNewton: return "quasi_newton";
-    case Method::kLineSearch: return "line_search";
-    case Method::kLocalGlobal: return "local_global";
-    case Method::kConic: return "conic";
+    case Method::kAuto:
+      return "auto";
+    case Method::kQuasiNewton:
+      return "quasi_newton";
+    case Method::kLineSearch:
+      return "line_search";
+    case Method::kLocalGlobal:
+      return "local_global";
+    case Method::kConic:
+      return "conic";
   }
   return "unknown";
 }
@@ -30,22 +35,32 @@ std::optional<Method> method_named(std::string_view name) {
 
 std::string_view initial_guess_name(InitialGuess guess) {
   switch (guess) {
-    case InitialGuess::kCurrent: return "current";
-    case InitialGuess::kLaplacian: return "laplacian";
-    case InitialGuess::kRest: return "rest";
+    case InitialGuess::kCurrent:
+      return "current";
+    case InitialGuess::kLaplacian:
+      return "laplacian";
+    case InitialGuess::kRest:
+      return "rest";
   }
   return "unknown";
 }
 
 std::string_view stop_reason_name(StopReason reason) {
   switch (reason) {
-    case StopReason::kRunning: return "running";
-    case StopReason::kConverged: return "converged";
-    case StopReason::kIterationLimit: return "iteration_limit";
-    case StopReason::kTimeLimit: return "time_limit";
-    case StopReason::kCancelled: return "cancelled";
-    case StopReason::kStalled: return "stalled";
-    case StopReason::kNumericalBreakdown: return "numerical_breakdown";
+    case StopReason::kRunning:
+      return "running";
+    case StopReason::kConverged:
+      return "converged";
+    case StopReason::kIterationLimit:
+      return "iteration_limit";
+    case StopReason::kTimeLimit:
+      return "time_limit";
+    case StopReason::kCancelled:
+      return "cancelled";
+    case StopReason::kStalled:
+      return "stalled";
+    case StopReason::kNumericalBreakdown:
+      return "numerical_breakdown";
   }
   return "unknown";
 }

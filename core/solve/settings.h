@@ -15,14 +15,15 @@ enum class Method {
 };
 
 enum class InitialGuess {
-  kCurrent,    // the Deformer's state, the handles' displacement since extended harmonically; its first is kLaplacian
+  kCurrent,    // the Deformer's state, the handles' displacement since extended harmonically; its first is
+               // kLaplacian
   kLaplacian,  // the naive Laplacian deformation, no rotations (section 4)
   kRest,       // the rest mesh, handles at their targets
 };
 
 enum class StopReason {
-  kRunning,             // not stopped yet
-  kConverged,           // the tolerance is met
+  kRunning,    // not stopped yet
+  kConverged,  // the tolerance is met
   kIterationLimit,
   kTimeLimit,
   kCancelled,
@@ -30,20 +31,20 @@ enum class StopReason {
   kNumericalBreakdown,  // a factorisation failed or a number was not finite; the best state seen is kept
 };
 
-std::string_view method_name(Method method);            // "quasi_newton"
+std::string_view method_name(Method method);  // "quasi_newton"
 std::optional<Method> method_named(std::string_view name);
 std::string_view initial_guess_name(InitialGuess guess);
-std::string_view stop_reason_name(StopReason reason);   // "iteration_limit"
+std::string_view stop_reason_name(StopReason reason);  // "iteration_limit"
 
 struct SolveSettings {
   Method method = Method::kAuto;
   InitialGuess initial = InitialGuess::kCurrent;
 
-  /// Converged when the relative decrease that the method still expects is at most this; written out at each method in
-  /// core/solve/*.h. In [1e-14, 0.1]. line_search and conic stop as the paper does and scale its thresholds by
-  /// tolerance / kDefaultTolerance.
+  /// Converged when the relative decrease that the method still expects is at most this; written out at each
+  /// method in core/solve/*.h. In [1e-14, 0.1]. line_search and conic stop as the paper does and scale its
+  /// thresholds by tolerance / kDefaultTolerance.
   double tolerance = kDefaultTolerance;
-  int max_iterations = 100000;  // >= 0
+  int max_iterations = 100000;                                          // >= 0
   double time_limit_seconds = std::numeric_limits<double>::infinity();  // from start(), > 0
 
   /// Keep a record for each iteration (SolveSummary::trace). Off in live sessions.

@@ -8,7 +8,8 @@
 
 namespace lpdeform {
 
-/// One iteration. Within a stage the objective (what is being minimised: smoothed, or with rotations held) never rises.
+/// One iteration. Within a stage the objective (what is being minimised: smoothed, or with rotations held)
+/// never rises.
 struct IterationRecord {
   int iteration = 0;     // 0 is the initial guess
   double seconds = 0;    // from the start of the solve, initial guess included
@@ -24,8 +25,9 @@ struct SolveSummary {
   int iterations = 0;
   double initial_energy = 0;
   double energy = 0;  // of the state returned: the lowest seen
-  /// (E - lower bound) / E of the convex step with the rotations fitted at the result: how far the answer can be at most
-  /// from the best one for these rotations. 0 where E is 0 to rounding. Empty where it was not asked for.
+  /// (E - lower bound) / E of the convex step with the rotations fitted at the result: how far the answer can
+  /// be at most from the best one for these rotations. 0 where E is 0 to rounding. Empty where it was not
+  /// asked for.
   std::optional<double> optimality_gap;
   double setup_seconds = 0;  // factoring for this handle set; 0 where it was reused
   double solve_seconds = 0;

@@ -13,7 +13,8 @@ namespace lpdeform {
 
 /// Shapes and handles that several tests deform.
 
-inline std::shared_ptr<const RestShape> rest_shape(const TriangleMesh& mesh, WeightKind kind = WeightKind::kCotangent) {
+inline std::shared_ptr<const RestShape> rest_shape(const TriangleMesh& mesh,
+                                                   WeightKind kind = WeightKind::kCotangent) {
   return RestShape::create(mesh, kind).value();
 }
 
@@ -21,7 +22,8 @@ inline std::shared_ptr<const RestShape> rest_shape(const TriangleMesh& mesh, Wei
 inline std::vector<std::int32_t> slice(const TriangleMesh& mesh, int axis, double low, double high) {
   std::vector<std::int32_t> result;
   for (Eigen::Index i = 0; i < mesh.vertices.rows(); ++i) {
-    if (mesh.vertices(i, axis) >= low && mesh.vertices(i, axis) <= high) result.push_back(static_cast<std::int32_t>(i));
+    if (mesh.vertices(i, axis) >= low && mesh.vertices(i, axis) <= high)
+      result.push_back(static_cast<std::int32_t>(i));
   }
   return result;
 }
@@ -39,8 +41,9 @@ inline HandleSet bar_twist(const TriangleMesh& bar, double degrees = 90, double 
   HandleSet handles;
   (void)handles.set("bottom", {slice(bar, 2, at(0), at(0.01)), Fixed{}});
   (void)handles.set("top", {slice(bar, 2, at(0.99), at(1)), Fixed{}});
-  (void)handles.set("middle", {slice(bar, 2, at(0.47), at(0.53)),
-                               turn(Eigen::Vector3d::UnitZ(), degrees, scale * Eigen::Vector3d(2, 2, 10.5) + offset)});
+  (void)handles.set("middle",
+                    {slice(bar, 2, at(0.47), at(0.53)),
+                     turn(Eigen::Vector3d::UnitZ(), degrees, scale * Eigen::Vector3d(2, 2, 10.5) + offset)});
   return handles;
 }
 

@@ -45,15 +45,14 @@ TEST_P(Gradient, AgreesWithCentralDifferences) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(OfEveryP, Gradient, testing::Values(1, 1.2, 1.5, 2, 3, 6, -1),
-                         [](const auto& info) {
-                           return info.param < 0 ? std::string("Mixed")
-                                                 : testing::PrintToString(static_cast<int>(10 * info.param));
-                         });
+INSTANTIATE_TEST_SUITE_P(OfEveryP, Gradient, testing::Values(1, 1.2, 1.5, 2, 3, 6, -1), [](const auto& info) {
+  return info.param < 0 ? std::string("Mixed") : testing::PrintToString(static_cast<int>(10 * info.param));
+});
 
 TEST(CellPass, SeesNoEnergyInARigidMotion) {
   const auto shape = rest_shape(creature(24));
-  const Eigen::Matrix3d turn = Eigen::AngleAxisd(2.5, Eigen::Vector3d(1, -2, 3).normalized()).toRotationMatrix();
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(2.5, Eigen::Vector3d(1, -2, 3).normalized()).toRotationMatrix();
   Points moved = shape->scaled_positions() * turn.transpose();
   moved.rowwise() += Eigen::RowVector3d(3, 1, -2);
   CellPass cells(shape, Workers(1));
@@ -63,8 +62,8 @@ TEST(CellPass, SeesNoEnergyInARigidMotion) {
 }
 
 TEST(CellPass, ComputesEquation3InTheCallersUnits) {
-  // A single equilateral triangle stretched to twice its size: every cell's best rotation is the identity, so that
-  // E_i^2 = sum_j w_ij |p_i - p_j|^2 = 2 * (cot 60 / 2) * side^2.
+  // A single equilateral triangle stretched to twice its size: every cell's best rotation is the identity, so
+  // that E_i^2 = sum_j w_ij |p_i - p_j|^2 = 2 * (cot 60 / 2) * side^2.
   const double side = 3, h = side * std::sqrt(3.0) / 2;
   TriangleMesh mesh{Points(3, 3), Faces(1, 3)};
   mesh.vertices << 0, 0, 0, side, 0, 0, side / 2, h, 0;
@@ -92,7 +91,8 @@ TEST(CellPass, WeighsMixedNormsWithTheLengthUnit) {
   CellPass cells(shape, Workers(1));
   const double sum = cells.evaluate(2 * shape->scaled_positions(), norm);
   const double energy = std::sqrt(1 / std::sqrt(3.0)), l = 0.25;
-  const double expected = l * l * (2 * energy / l + 3 * std::pow(energy / l, 2) + 4 * std::pow(energy / l, 6));
+  const double expected =
+      l * l * (2 * energy / l + 3 * std::pow(energy / l, 2) + 4 * std::pow(energy / l, 6));
   EXPECT_NEAR(norm.true_energy(sum), expected, 1e-12 * expected);
 }
 
@@ -123,7 +123,8 @@ TEST(CellPass, HasNoGradientWhereACellIsAtZero) {
     cells.evaluate(shape->scaled_positions(), norm);
     cells.gradient(shape->scaled_positions(), gradient);
     EXPECT_TRUE(gradient.allFinite());
-    EXPECT_LT(gradient.cwiseAbs().maxCoeff(), 4.0 * 6);  // a subgradient: at most the sum of a cell's root weights
+    EXPECT_LT(gradient.cwiseAbs().maxCoeff(),
+              4.0 * 6);  // a subgradient: at most the sum of a cell's root weights
   }
 }
 

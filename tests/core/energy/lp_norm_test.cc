@@ -43,7 +43,8 @@ TEST(LpNorm, MovesEveryPTowardsTwo) {
 
 TEST(LpNorm, SmoothedIsNeverBelowTheTrueOne) {
   const LpNorm norm(Material::uniform(1), 1, 1, 1);
-  for (const double e2 : {0.0, 1e-6, 1.0}) EXPECT_GE(norm.smoothed(1e-4).term(0, e2).value, norm.term(0, e2).value);
+  for (const double e2 : {0.0, 1e-6, 1.0})
+    EXPECT_GE(norm.smoothed(1e-4).term(0, e2).value, norm.term(0, e2).value);
 }
 
 }  // namespace

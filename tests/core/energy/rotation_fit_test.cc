@@ -23,7 +23,9 @@ Matrix3d random_matrix(std::mt19937& random) {
   return Matrix3d::NullaryExpr([&] { return normal(random); });
 }
 
-double value(const Matrix3d& r, const Matrix3d& b) { return r.cwiseProduct(b).sum(); }
+double value(const Matrix3d& r, const Matrix3d& b) {
+  return r.cwiseProduct(b).sum();
+}
 
 TEST(RotationFit, AgreesWithTheSvdOnRandomMatrices) {
   std::mt19937 random(1);
@@ -37,8 +39,10 @@ TEST(RotationFit, AgreesWithTheSvdOnRandomMatrices) {
 
 TEST(RotationFit, RecoversARotationToRoundingAlsoNearHalfTurns) {
   std::mt19937 random(2);
-  for (const double angle : {0.0, 1e-9, 0.3, std::numbers::pi / 2, std::numbers::pi - 1e-9, std::numbers::pi}) {
-    for (const Vector3d& axis : {Vector3d(1, 0, 0), Vector3d(0, 1, 0), Vector3d(0, 0, 1), Vector3d(1, 2, -3)}) {
+  for (const double angle :
+       {0.0, 1e-9, 0.3, std::numbers::pi / 2, std::numbers::pi - 1e-9, std::numbers::pi}) {
+    for (const Vector3d& axis :
+         {Vector3d(1, 0, 0), Vector3d(0, 1, 0), Vector3d(0, 0, 1), Vector3d(1, 2, -3)}) {
       const Matrix3d expected = AngleAxisd(angle, axis.normalized()).toRotationMatrix();
       Matrix3d spread = random_matrix(random);
       spread = spread * spread.transpose();  // positive definite: the fit of expected * spread is expected
@@ -72,11 +76,15 @@ TEST(RotationFit, IsARotationAtRankOne) {
   }
 }
 
-TEST(RotationFit, IsTheIdentityAtRankZero) { EXPECT_EQ(fit_rotation(Matrix3d::Zero()), Matrix3d::Identity()); }
+TEST(RotationFit, IsTheIdentityAtRankZero) {
+  EXPECT_EQ(fit_rotation(Matrix3d::Zero()), Matrix3d::Identity());
+}
 
 TEST(RotationFit, IsBestUnderAllReflections) {
-  for (const Vector3d& signs : {Vector3d(-1, 1, 1), Vector3d(1, -1, 1), Vector3d(1, 1, -1), Vector3d(-1, -1, -1)}) {
-    for (const Vector3d& sizes : {Vector3d(3, 2, 1), Vector3d(1, 1, 1), Vector3d(2, 2, 1), Vector3d(2, 1, 1)}) {
+  for (const Vector3d& signs :
+       {Vector3d(-1, 1, 1), Vector3d(1, -1, 1), Vector3d(1, 1, -1), Vector3d(-1, -1, -1)}) {
+    for (const Vector3d& sizes :
+         {Vector3d(3, 2, 1), Vector3d(1, 1, 1), Vector3d(2, 2, 1), Vector3d(2, 1, 1)}) {
       const Matrix3d b = signs.cwiseProduct(sizes).asDiagonal();
       const Matrix3d r = fit_rotation(b);
       expect_rotation(r);

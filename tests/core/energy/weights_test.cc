@@ -31,7 +31,9 @@ double weight_of(const EdgeWeights& weights, std::int32_t u, std::int32_t v) {
 TEST(Weights, AreHalfTheSumOfTheOppositeCotangents) {
   // Two equilateral triangles: the shared edge sees 60 degrees twice, the others once.
   const double h = std::sqrt(3.0) / 2;
-  const EdgeWeights weights = edge_weights(mesh_of({{0, 0, 0}, {1, 0, 0}, {0.5, h, 0}, {0.5, -h, 0}}, {{0, 1, 2}, {1, 0, 3}}), WeightKind::kCotangent);
+  const EdgeWeights weights =
+      edge_weights(mesh_of({{0, 0, 0}, {1, 0, 0}, {0.5, h, 0}, {0.5, -h, 0}}, {{0, 1, 2}, {1, 0, 3}}),
+                   WeightKind::kCotangent);
   const double cotangent = 1 / std::sqrt(3.0);
   EXPECT_NEAR(weight_of(weights, 0, 1), cotangent, 1e-15);
   EXPECT_NEAR(weight_of(weights, 0, 2), cotangent / 2, 1e-15);
@@ -52,14 +54,17 @@ TEST(Weights, OfObtuseAnglesAreClampedAndCounted) {
 
 TEST(Weights, OfANonManifoldEdgeSumOverAllItsFaces) {
   const double h = std::sqrt(3.0) / 2;
-  const EdgeWeights weights = edge_weights(
-      mesh_of({{0, 0, 0}, {1, 0, 0}, {0.5, h, 0}, {0.5, -h, 0}, {0.5, 0, h}}, {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}}), WeightKind::kCotangent);
+  const EdgeWeights weights =
+      edge_weights(mesh_of({{0, 0, 0}, {1, 0, 0}, {0.5, h, 0}, {0.5, -h, 0}, {0.5, 0, h}},
+                           {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}}),
+                   WeightKind::kCotangent);
   EXPECT_NEAR(weight_of(weights, 0, 1), 1.5 / std::sqrt(3.0), 1e-15);
 }
 
 TEST(Weights, OfZeroAreaFacesAreNothing) {
-  const EdgeWeights weights = edge_weights(
-      mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.5, 0, 0}}, {{0, 1, 2}, {0, 3, 1}}), WeightKind::kCotangent);
+  const EdgeWeights weights =
+      edge_weights(mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.5, 0, 0}}, {{0, 1, 2}, {0, 3, 1}}),
+                   WeightKind::kCotangent);
   for (const double weight : weights.weights) EXPECT_TRUE(std::isfinite(weight));
   EXPECT_NEAR(weight_of(weights, 0, 1), 0.5, 1e-15);
   // Vertex 3 hangs on the zero-area face alone: the floor keeps it attached.
@@ -70,7 +75,8 @@ TEST(Weights, OfZeroAreaFacesAreNothing) {
 
 TEST(Weights, OfAVertexThatClampingCutsOffAreFloored) {
   // Vertex 4 is the hub of a flat fan of triangles so thin that every spoke sees two obtuse angles.
-  TriangleMesh mesh = mesh_of({{0, 0, 0}, {10, 0, 0}, {5, 0.2, 0}, {5, 3, 0}}, {{0, 1, 2}, {1, 3, 2}, {3, 0, 2}});
+  TriangleMesh mesh =
+      mesh_of({{0, 0, 0}, {10, 0, 0}, {5, 0.2, 0}, {5, 3, 0}}, {{0, 1, 2}, {1, 3, 2}, {3, 0, 2}});
   mesh.vertices.row(2) << 5, 0.001, 0;
   const EdgeWeights weights = edge_weights(mesh, WeightKind::kCotangent);
   double total = 0;
@@ -98,7 +104,8 @@ TEST(Weights, DoNotDependOnScale) {
     scaled.vertices *= scale;
     const EdgeWeights weights = edge_weights(scaled, WeightKind::kCotangent);
     ASSERT_EQ(weights.weights.size(), at_one.weights.size());
-    for (std::size_t e = 0; e < weights.weights.size(); ++e) EXPECT_NEAR(weights.weights[e], at_one.weights[e], 1e-9);
+    for (std::size_t e = 0; e < weights.weights.size(); ++e)
+      EXPECT_NEAR(weights.weights[e], at_one.weights[e], 1e-9);
   }
 }
 

@@ -20,7 +20,8 @@ class CertificateTest : public testing::Test {
     return LpNorm(material, shape->vertex_count(), shape->mean_edge_length(), 1.0);
   }
   Problem problem(const LpNorm& norm) {
-    return {cells, metric, constraints, norm, 1e-5, 1, shape->diagonal() / shape->mean_edge_length(), 1e-20, {}};
+    return {cells, metric, constraints, norm, 1e-5, 1, shape->diagonal() / shape->mean_edge_length(),
+            1e-20, {}};
   }
   Points solved(const Material& material, double tolerance) {
     auto solver = deformer(shape, bar_twist(bar), material);

@@ -18,7 +18,8 @@ TriangleMesh two_boxes() {
   const TriangleMesh box = box_surface(1, 1, 1);
   const Eigen::Index n = box.vertices.rows(), m = box.faces.rows();
   TriangleMesh mesh{Points(2 * n + 1, 3), Faces(2 * m, 3)};
-  mesh.vertices << box.vertices, box.vertices.rowwise() + Eigen::RowVector3d(5, 0, 0), Eigen::RowVector3d(9, 9, 9);
+  mesh.vertices << box.vertices, box.vertices.rowwise() + Eigen::RowVector3d(5, 0, 0),
+      Eigen::RowVector3d(9, 9, 9);
   mesh.faces << box.faces, (box.faces.array() + static_cast<std::int32_t>(n)).matrix();
   return mesh;
 }
@@ -40,7 +41,9 @@ TEST(Handles, RefuseEveryKindOfBadMotionAndStayAsTheyWere) {
   HandleSet handles;
   ASSERT_TRUE(handles.set("a", {{0, 1}, Fixed{}}).ok());
   const HandleSet before = handles;
-  const auto reason = [&](HandleMotion motion) { return fault_of(handles.set_motion("a", std::move(motion))).reason; };
+  const auto reason = [&](HandleMotion motion) {
+    return fault_of(handles.set_motion("a", std::move(motion))).reason;
+  };
   EXPECT_EQ(reason(RigidMotion{{0, 0, 0}, 1, {0, 0, 0}, {0, 0, 0}}), "HANDLE_AXIS_ZERO");
   EXPECT_EQ(reason(RigidMotion{{0, 0, 1}, kNan, {0, 0, 0}, {0, 0, 0}}), "HANDLE_MOTION_NOT_FINITE");
   EXPECT_EQ(reason(RigidMotion{{0, 0, kNan}, 0, {0, 0, 0}, {0, 0, 0}}), "HANDLE_MOTION_NOT_FINITE");
@@ -58,7 +61,8 @@ TEST(Handles, RefuseEveryKindOfBadMotionAndStayAsTheyWere) {
 TEST(Handles, NameAVertexThatIsOutOfRangeOrHeldTwice) {
   HandleSet handles;
   ASSERT_TRUE(handles.set("a", {{0, 9}, Fixed{}}).ok());
-  EXPECT_EQ(fault_of(check_handles(handles, 9)), (Fault{"HANDLE_VERTEX_OUT_OF_RANGE", "vertex 9", "0 <= vertex < 9"}));
+  EXPECT_EQ(fault_of(check_handles(handles, 9)),
+            (Fault{"HANDLE_VERTEX_OUT_OF_RANGE", "vertex 9", "0 <= vertex < 9"}));
   ASSERT_TRUE(handles.set("b", {{3, 0}, Fixed{}}).ok());
   const absl::Status twice = check_handles(handles, 10);
   EXPECT_EQ(fault_of(twice).reason, "HANDLE_VERTEX_TWICE");
@@ -102,7 +106,8 @@ TEST(Constraints, RefuseTargetsBeyondReason) {
   const auto shape = rest_shape(box_surface(1, 1, 1));
   HandleSet handles;
   ASSERT_TRUE(handles.set("a", {{0}, RigidMotion{{0, 0, 1}, 0, {0, 0, 0}, {1e300, 0, 0}}}).ok());
-  EXPECT_EQ(fault_of(make_constraints(*shape, handles, FreeComponents::kError).status()).reason, "HANDLE_TARGET_TOO_FAR");
+  EXPECT_EQ(fault_of(make_constraints(*shape, handles, FreeComponents::kError).status()).reason,
+            "HANDLE_TARGET_TOO_FAR");
 }
 
 TEST(Constraints, FitARigidMotionExactly) {

@@ -34,7 +34,8 @@ class EveryMethod : public testing::TestWithParam<Case> {
     result.keep_trace = true;
     return result;
   }
-  std::unique_ptr<Deformer> make(const TriangleMesh& mesh, const HandleSet& handles, DeformerOptions options = {}) const {
+  std::unique_ptr<Deformer> make(const TriangleMesh& mesh, const HandleSet& handles,
+                                 DeformerOptions options = {}) const {
     return deformer(rest_shape(mesh), handles, material_of(GetParam().p, mesh), options);
   }
 
@@ -150,7 +151,8 @@ TEST_P(EveryMethod, ChangesNothingButUnitsUnderScaleAndTranslation) {
     // Input coordinates were rounded at 2000 times the edge: 1e-13 of it, and the iterations amplify that.
     const Points back = (scaled->positions().rowwise() - offset) / scale;
     EXPECT_LT((back - at_one->positions()).cwiseAbs().maxCoeff(), 1e-6) << scale;
-    EXPECT_LT((scaled->cell_energies() / scale - at_one->cell_energies()).cwiseAbs().maxCoeff(), 1e-6) << scale;
+    EXPECT_LT((scaled->cell_energies() / scale - at_one->cell_energies()).cwiseAbs().maxCoeff(), 1e-6)
+        << scale;
   }
 }
 
@@ -185,13 +187,14 @@ std::string case_name(const testing::TestParamInfo<Case>& info) {
   return name + testing::PrintToString(static_cast<int>(10 * info.param.p));
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Methods, EveryMethod,
-    testing::Values(Case{Method::kQuasiNewton, 1}, Case{Method::kQuasiNewton, 1.5}, Case{Method::kQuasiNewton, 2},
-                    Case{Method::kQuasiNewton, 6}, Case{Method::kQuasiNewton, -1}, Case{Method::kLineSearch, 1.5},
-                    Case{Method::kLineSearch, 2}, Case{Method::kLineSearch, 6}, Case{Method::kLineSearch, -1},
-                    Case{Method::kLocalGlobal, 2}, Case{Method::kConic, 1}),
-    case_name);
+INSTANTIATE_TEST_SUITE_P(Methods, EveryMethod,
+                         testing::Values(Case{Method::kQuasiNewton, 1}, Case{Method::kQuasiNewton, 1.5},
+                                         Case{Method::kQuasiNewton, 2}, Case{Method::kQuasiNewton, 6},
+                                         Case{Method::kQuasiNewton, -1}, Case{Method::kLineSearch, 1.5},
+                                         Case{Method::kLineSearch, 2}, Case{Method::kLineSearch, 6},
+                                         Case{Method::kLineSearch, -1}, Case{Method::kLocalGlobal, 2},
+                                         Case{Method::kConic, 1}),
+                         case_name);
 
 }  // namespace
 }  // namespace lpdeform

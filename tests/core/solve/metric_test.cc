@@ -9,7 +9,8 @@ namespace {
 
 class MetricTest : public testing::Test {
  protected:
-  MetricTest() : shape(rest_shape(box_surface(2, 2, 3))), metric(shape), is_held(shape->vertex_count(), false) {
+  MetricTest()
+      : shape(rest_shape(box_surface(2, 2, 3))), metric(shape), is_held(shape->vertex_count(), false) {
     is_held[0] = is_held[7] = is_held[20] = true;
     for (std::int32_t i = 0; i < shape->vertex_count(); ++i) cell_weights.push_back(1 + i % 3);
   }
@@ -20,7 +21,8 @@ class MetricTest : public testing::Test {
     for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
       for (std::int32_t k = shape->offsets()[i]; k < shape->offsets()[i + 1]; ++k) {
         const std::int32_t j = shape->neighbours()[k];
-        result.row(i) += 2 * (cell_weights[i] + cell_weights[j]) * shape->weights()[k] * (u.row(i) - u.row(j));
+        result.row(i) +=
+            2 * (cell_weights[i] + cell_weights[j]) * shape->weights()[k] * (u.row(i) - u.row(j));
       }
     }
     return result;

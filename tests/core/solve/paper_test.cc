@@ -35,8 +35,8 @@ TEST(Paper, SmallerPConcentratesDistortion) {  // Figs. 2 and 4
 }
 
 TEST(Paper, ReachesTheBarsKnownEnergies) {
-  // Fig. 4's bar with both ends held and the middle twisted by 90 degrees. The values come from an independent prototype and,
-  // for p = 1, from an independent cone solver with the same rotations (96.48248).
+  // Fig. 4's bar with both ends held and the middle twisted by 90 degrees. The values come from an
+  // independent prototype and, for p = 1, from an independent cone solver with the same rotations (96.48248).
   const TriangleMesh bar = box_surface(4, 4, 21);
   ASSERT_EQ(bar.vertices.rows(), 370);
   ASSERT_EQ(bar.faces.rows(), 736);
@@ -44,7 +44,8 @@ TEST(Paper, ReachesTheBarsKnownEnergies) {
   (void)handles.set("a", {slice(bar, 2, 0, 0), Fixed{}});
   (void)handles.set("b", {slice(bar, 2, 21, 21), Fixed{}});
   (void)handles.set("middle", {slice(bar, 2, 10, 11), turn(Eigen::Vector3d::UnitZ(), 90, {2, 2, 10.5})});
-  for (const auto& [p, energy] : {std::pair{1.0, 96.482508}, {1.5, 56.862104}, {2.0, 31.969217}, {6.0, 0.30488778}}) {
+  for (const auto& [p, energy] :
+       {std::pair{1.0, 96.482508}, {1.5, 56.862104}, {2.0, 31.969217}, {6.0, 0.30488778}}) {
     auto solver = deformer(rest_shape(bar), handles, Material::uniform(p));
     SolveSettings settings = from_laplacian();
     settings.certify = true;
@@ -91,13 +92,15 @@ double mean_energy(const Deformer& solver, bool above) {
 TEST(Paper, AStifferHalfDistortsLess) {
   const TriangleMesh bar = box_surface(4, 4, 21);
   Material material = Material::uniform(2);
-  material.stiffness = (bar.vertices.col(2).array() > 10.5).select(Field::Constant(bar.vertices.rows(), 20.0), 1.0);
+  material.stiffness =
+      (bar.vertices.col(2).array() > 10.5).select(Field::Constant(bar.vertices.rows(), 20.0), 1.0);
   auto solver = deformer(rest_shape(bar), bar_bend(bar), material);
   ASSERT_TRUE(solver->solve(from_laplacian()).ok());
   EXPECT_LT(mean_energy(*solver, true), 0.5 * mean_energy(*solver, false));
 }
 
-TEST(Paper, AMixedNormBehavesInEachRegionAsItsOwnNorm) {  // Figs. 8 and 9: p = 1 in one region, 2 in the other
+TEST(Paper,
+     AMixedNormBehavesInEachRegionAsItsOwnNorm) {  // Figs. 8 and 9: p = 1 in one region, 2 in the other
   const TriangleMesh bar = box_surface(4, 4, 21);
   const auto shape = rest_shape(bar);
   Material mixed;
@@ -111,7 +114,8 @@ TEST(Paper, AMixedNormBehavesInEachRegionAsItsOwnNorm) {  // Figs. 8 and 9: p = 
     region.conservativeResize(region.size() + 1);
     region[region.size() - 1] = solver->cell_energies()[i];
   }
-  EXPECT_GT(distortion_statistics(low).top_5_percent_share, 1.2 * distortion_statistics(high).top_5_percent_share);
+  EXPECT_GT(distortion_statistics(low).top_5_percent_share,
+            1.2 * distortion_statistics(high).top_5_percent_share);
 }
 
 TEST(Paper, ConicAndQuasiNewtonAgreeOnTheConvexStep) {
@@ -128,7 +132,8 @@ TEST(Paper, ConicAndQuasiNewtonAgreeOnTheConvexStep) {
   Metric metric(shape);
   const Points x = (solver->positions().rowwise() - shape->centre()) / shape->mean_edge_length();
   const double energy = cells.evaluate(x, norm);
-  const Problem problem{cells, metric, constraints, norm, 1e-5, 1, shape->diagonal() / shape->mean_edge_length(), 0, {}};
+  const Problem problem{
+      cells, metric, constraints, norm, 1e-5, 1, shape->diagonal() / shape->mean_edge_length(), 0, {}};
   ConicStep cone(problem, cells.rotations(), constraints.targets);  // from elsewhere, with the same rotations
   while (cone.relative_gap() > 1e-8 && cone.iterate()) {
   }
