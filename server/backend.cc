@@ -1,0 +1,216 @@
+#include "server/backend.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "core/base/workers.h"
+#include "server/encode.h"
+#include "server/random_name.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr int kPoolThreads = 4;
+constexpr std::size_t kLongestQueue = 4096;
+constexpr std::uint32_t kDefaultPage = 100, kLargestPage = 1000;
+constexpr std::uint32_t kFacesPerVertex = 3;
+
+/// What a session is taken to need until it is known: about what a triangulated surface needs, factored by
+/// CHOLMOD.
+constexpr std::size_t kBytesPerVertex = 3000, kBytesPerFace = 100;
+
+std::shared_ptr<Timers> or_system(std::shared_ptr<Timers> timers) {
+  return timers ? std::move(timers) : std::make_shared<SystemTimers>();
+}
+
+}  // namespace
+
+Backend::Backend(const ServerOptions& options)
+    : timers(or_system(options.timers)),
+      registry(
+          std::make_shared<Registry>(timers, Registry::Limits{options.max_sessions, options.session_idle})),
+      options_(options),
+      log_(options.log ? options.log : std::make_shared<Log>("off")),
+      budget_(std::make_shared<Budget>(options.max_bytes)),
+      uploads_(std::make_shared<Uploads>(budget_, timers,
+                                         Uploads::Limits{options.max_upload_bytes, options.upload_idle})),
+      scheduler(options.runner_threads == 0 ? Scheduler::default_threads() : options.runner_threads),
+      pool(kPoolThreads, kLongestQueue) {
+  registry->on_expired = [log = log_](const Session& session) {
+    log->info("session_expired", {{"session", abbreviated(session.name())}});
+  };
+}
+
+absl::Status Backend::create_upload(const v1::CreateUploadRequest& request,
+                                    v1::CreateUploadResponse& response) {
+  const auto upload = uploads_->create(request.request_id(), request.size_bytes(), request.crc32c());
+  if (!upload.ok()) return upload.status();
+  response.set_upload((*upload)->name());
+  response.set_max_part_bytes(Upload::kMostPartBytes);
+  return absl::OkStatus();
+}
+
+absl::Status Backend::upload_part(const v1::UploadPartRequest& request, v1::UploadPartResponse& response) {
+  const auto upload = uploads_->find(request.upload());
+  if (!upload.ok()) return upload.status();
+  const auto progress = (*upload)->add(request.offset(), request.data());
+  if (!progress.ok()) return progress.status();
+  response.set_received_bytes(progress->received_bytes);
+  response.set_finished(progress->is_finished);
+  return absl::OkStatus();
+}
+
+absl::Status Backend::get_session(const v1::GetSessionRequest& request, v1::GetSessionResponse& response) {
+  const auto session = find(request.session());
+  if (!session.ok()) return session.status();
+  encode((*session)->info(), registry->idle(), timers->now(), *response.mutable_session());
+  return absl::OkStatus();
+}
+
+absl::Status Backend::list_sessions(const v1::ListSessionsRequest& request,
+                                    v1::ListSessionsResponse& response) {
+  if (request.page_size() > kLargestPage) {
+    return invalid_input(
+        {"PAGE_SIZE", "page_size", absl::StrCat("page_size <= ", kLargestPage)},
+        absl::StrCat("A page of ", request.page_size(), " sessions is over ", kLargestPage, "."));
+  }
+  const auto page =
+      registry->list(request.page_size() == 0 ? kDefaultPage : request.page_size(), request.page_token());
+  if (!page.ok()) return page.status();
+  for (const auto& session : page->sessions) {
+    encode(session->info(), registry->idle(), timers->now(), *response.add_sessions());
+  }
+  response.set_next_page_token(page->next_page_token);
+  return absl::OkStatus();
+}
+
+absl::Status Backend::delete_session(const v1::DeleteSessionRequest& request, v1::DeleteSessionResponse&) {
+  registry->remove(request.session(), EndReason::kSessionDeleted, "The session was deleted.");
+  log().info("session_deleted", {{"session", abbreviated(request.session())}});
+  return absl::OkStatus();
+}
+
+absl::Status Backend::acquire_writer(const v1::AcquireWriterRequest& request,
+                                     v1::AcquireWriterResponse& response) {
+  const auto session = find(request.session());
+  if (!session.ok()) return session.status();
+  const WriterLease lease = (*session)->acquire_writer();
+  response.set_writer_token(lease.token);
+  response.set_epoch(lease.epoch);
+  response.set_input_seq(lease.input_seq);
+  log().info("writer_replaced", {{"session", abbreviated(request.session())}, {"epoch", lease.epoch}});
+  return absl::OkStatus();
+}
+
+absl::Status Backend::update_handles(const v1::UpdateHandlesRequest& request,
+                                     v1::UpdateHandlesResponse& response) {
+  const auto session = find(request.session());
+  if (!session.ok()) return session.status();
+  const auto result = update(**session, request.writer_token(), request.update());
+  if (!result.ok()) return result.status();
+  response.mutable_result()->set_input_seq(result->input_seq);
+  response.mutable_result()->set_stale_parts(result->stale_parts);
+  return absl::OkStatus();
+}
+
+absl::Status Backend::ack_frames(const v1::AckFramesRequest& request, v1::AckFramesResponse&) {
+  const auto session = find(request.session());
+  return session.ok() ? (*session)->acknowledge(request.stream_id(), request.frame_seq()) : session.status();
+}
+
+absl::StatusOr<UpdateResult> Backend::update(Session& session, const std::string& token,
+                                             const v1::Update& update) {
+  if (absl::Status status = session.check_writer(token); !status.ok()) return status;
+  const auto decoded = Decoder(*uploads_, session.vertex_count()).update(update);
+  if (!decoded.ok()) return decoded.status();
+  const auto result = session.update(token, *decoded);
+  if (result.ok()) {
+    log().debug("update", {{"session", abbreviated(session.name())},
+                           {"input_seq", result->input_seq},
+                           {"stale_parts", std::uint64_t{result->stale_parts}}});
+  }
+  return result;
+}
+
+absl::Status Backend::solve(const v1::SolveRequest& request, SolveJob::OnProgress on_progress,
+                            SolveJob::OnDone on_done, std::shared_ptr<SolveJob>& job) {
+  const auto session = find(request.session());
+  if (!session.ok()) return session.status();
+  if (absl::Status status = (*session)->check_writer(request.writer_token()); !status.ok()) return status;
+  Decoder decoder(*uploads_, (*session)->vertex_count());
+  std::optional<Update> update;
+  if (request.has_update()) {
+    auto decoded = decoder.update(request.update());
+    if (!decoded.ok()) return decoded.status();
+    update = *std::move(decoded);
+  }
+  SolveOptions options{request.certify(), request.trace(), std::nullopt};
+  if (request.has_initial_positions()) {
+    auto positions = decoder.positions(request.initial_positions());
+    if (!positions.ok()) return positions.status();
+    options.initial_positions = *std::move(positions);
+  }
+  job = std::make_shared<SolveJob>(std::move(options), std::move(on_progress), std::move(on_done));
+  return (*session)->solve(request.writer_token(), update, job);
+}
+
+void Backend::create_session(const v1::CreateSessionRequest& request, v1::CreateSessionResponse& response,
+                             std::function<void(absl::Status)> done) {
+  const Registry::OnCreated on_created = [this, &response,
+                                          done](const absl::StatusOr<CreatedSession>& created) {
+    if (!created.ok()) return done(created.status());
+    encode(created->session->info(), registry->idle(), timers->now(), *response.mutable_session());
+    response.set_writer_token(created->writer_token);
+    done(absl::OkStatus());
+  };
+  if (!registry->begin_creation(request.request_id(), on_created)) return;
+  scheduler.run_once([this, &request, on_created] {
+    const std::string request_id = request.request_id();
+    registry->finish_creation(request_id, make_session(request), on_created);
+  });
+}
+
+absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const v1::CreateSessionRequest& request) {
+  const v1::Mesh& mesh_message = request.mesh();
+  Decoder decoder(*uploads_, mesh_message.vertex_count());
+  const std::uint32_t most_faces = kFacesPerVertex * options_.max_vertices;
+  if (absl::Status status = decoder.check_mesh_size(mesh_message, {options_.max_vertices, most_faces});
+      !status.ok()) {
+    return status;
+  }
+  const auto weights = decode_weights(request.weights());
+  if (!weights.ok()) return weights.status();
+  const auto free_components = decode_free_components(request.free_components());
+  if (!free_components.ok()) return free_components.status();
+  auto memory = budget_->reserve(kBytesPerVertex * mesh_message.vertex_count() +
+                                 kBytesPerFace * mesh_message.face_count());
+  if (!memory.ok()) return memory.status();
+
+  SessionParts parts;
+  parts.name = absl::StrCat("sessions/", random_hex_128());
+  parts.free_components = *free_components;
+  parts.memory = *std::move(memory);
+  {
+    const auto mesh = decoder.mesh(mesh_message);
+    if (!mesh.ok()) return mesh.status();
+    auto shape = RestShape::create(*mesh, *weights);
+    if (!shape.ok()) return shape.status();
+    parts.shape = *std::move(shape);
+  }
+  if (absl::Status status = decoder.handles(request.handles(), parts.beginning); !status.ok()) return status;
+  auto settings = decoder.settings(request.settings());
+  if (!settings.ok()) return settings.status();
+  parts.beginning.settings = *std::move(settings);
+  auto deformer = Deformer::create(
+      parts.shape, {*free_components, options_.threads == 0 ? available_cores() : options_.threads});
+  if (!deformer.ok()) return deformer.status();
+  parts.deformer = *std::move(deformer);
+  log().info("session_created", {{"session", abbreviated(parts.name)},
+                                 {"vertices", std::uint64_t{mesh_message.vertex_count()}},
+                                 {"faces", std::uint64_t{mesh_message.face_count()}}});
+  return Session::create(std::move(parts), {scheduler, timers, options_.heartbeat});
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "lpdeform/v1/service.pb.h"
+#include "server/budget.h"
+#include "server/call_gate.h"
+#include "server/decode.h"
+#include "server/log.h"
+#include "server/registry.h"
+#include "server/scheduler.h"
+#include "server/server.h"
+#include "server/task_pool.h"
+#include "server/upload.h"
+
+namespace lpdeform {
+
+/// All that the calls of a server share, and what they do, without gRPC: each function takes a request to its
+/// response. Called from the task pool and the scheduler, never from gRPC's threads. Thread-safe.
+class Backend {
+ public:
+  explicit Backend(const ServerOptions& options);
+
+  absl::Status create_upload(const v1::CreateUploadRequest& request, v1::CreateUploadResponse& response);
+  absl::Status upload_part(const v1::UploadPartRequest& request, v1::UploadPartResponse& response);
+  absl::Status get_session(const v1::GetSessionRequest& request, v1::GetSessionResponse& response);
+  absl::Status list_sessions(const v1::ListSessionsRequest& request, v1::ListSessionsResponse& response);
+  absl::Status delete_session(const v1::DeleteSessionRequest& request, v1::DeleteSessionResponse& response);
+  absl::Status acquire_writer(const v1::AcquireWriterRequest& request, v1::AcquireWriterResponse& response);
+  absl::Status update_handles(const v1::UpdateHandlesRequest& request, v1::UpdateHandlesResponse& response);
+  absl::Status ack_frames(const v1::AckFramesRequest& request, v1::AckFramesResponse& response);
+
+  /// Does not wait for the session to be made: `done` is called when it is, on a thread of the scheduler, or
+  /// at once. `request` and `response` must live until then.
+  void create_session(const v1::CreateSessionRequest& request, v1::CreateSessionResponse& response,
+                      std::function<void(absl::Status)> done);
+
+  absl::StatusOr<std::shared_ptr<Session>> find(const std::string& name) { return registry->find(name); }
+
+  /// Decodes an update for a session and gives it to it.
+  absl::StatusOr<UpdateResult> update(Session& session, const std::string& token, const v1::Update& update);
+
+  /// Decodes what a Solve call asks for and begins it.
+  absl::Status solve(const v1::SolveRequest& request, SolveJob::OnProgress on_progress,
+                     SolveJob::OnDone on_done, std::shared_ptr<SolveJob>& job);
+
+  const Log& log() const { return *log_; }
+
+  const std::shared_ptr<Timers> timers;
+  const std::shared_ptr<Registry> registry;
+  CallGate gate;
+
+ private:
+  absl::StatusOr<std::shared_ptr<Session>> make_session(const v1::CreateSessionRequest& request);
+
+  const ServerOptions options_;
+  const std::shared_ptr<const Log> log_;
+  const std::shared_ptr<Budget> budget_;
+  const std::shared_ptr<Uploads> uploads_;
+
+ public:
+  // Last, so that their threads end first.
+  Scheduler scheduler;
+  TaskPool pool;
+};
+
+}  // namespace lpdeform

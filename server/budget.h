@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "absl/status/statusor.h"
+
+namespace lpdeform {
+
+class Reservation;
+
+/// Bytes that may be held, counted by us because nothing else does: asked for by estimate before they are
+/// used, corrected when it is known. Thread-safe. Held by shared pointers.
+class Budget : public std::enable_shared_from_this<Budget> {
+ public:
+  explicit Budget(std::size_t most_bytes) : most_(most_bytes) {}
+
+  /// RESOURCE_EXHAUSTED MEMORY_FULL where there is no room for so many more.
+  absl::StatusOr<Reservation> reserve(std::size_t bytes);
+
+  std::size_t most() const { return most_; }
+  std::size_t used() const;
+
+ private:
+  friend class Reservation;
+  void change(std::size_t from, std::size_t to);
+
+  const std::size_t most_;
+  mutable std::mutex mutex_;
+  std::size_t used_ = 0;
+};
+
+/// A share of a budget, given back when it goes.
+class Reservation {
+ public:
+  Reservation() = default;
+  Reservation(Reservation&& other) noexcept;
+  Reservation& operator=(Reservation&& other) noexcept;
+  ~Reservation() { resize(0); }
+
+  /// Corrects it, also beyond the limit: what is there is there.
+  void resize(std::size_t bytes);
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  friend class Budget;
+  Reservation(std::shared_ptr<Budget> budget, std::size_t bytes)
+      : budget_(std::move(budget)), bytes_(bytes) {}
+
+  std::shared_ptr<Budget> budget_;
+  std::size_t bytes_ = 0;
+};
+
+}  // namespace lpdeform

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+#include "core/mesh/mesh.h"
+#include "core/solve/deformer.h"
+#include "lpdeform/v1/service.pb.h"
+#include "server/frame_stream.h"
+#include "server/update.h"
+#include "server/upload.h"
+
+namespace lpdeform {
+
+/// Turns messages of the contract into the values of core and session. Numbers from outside are hostile:
+/// every size is checked before memory is taken for it, every enum for values that we do not know; however
+/// often a message names an upload, no more numbers come out than the mesh has room for. What a value means
+/// is checked where it is used. Errors are INVALID_ARGUMENT: INLINE_TOO_LARGE, BUFFER_MISSING, BUFFER_SIZE,
+/// ENUM_UNKNOWN, FIELD_MISSING, FIELD_SIZE, POSITIONS_SIZE, HANDLE_CHANGE_MISSING, HANDLE_TOO_MANY_VERTICES,
+/// MOTION_MISSING; of uploads what Uploads::find and Upload::bytes have. For one message, one thread.
+class Decoder {
+ public:
+  /// `vertex_count`: of the mesh that the message is about.
+  Decoder(Uploads& uploads, std::uint32_t vertex_count)
+      : uploads_(uploads),
+        vertex_count_(vertex_count),
+        room_for_vertices_(vertex_count),
+        room_for_targets_(vertex_count) {}
+
+  /// Also MESH_TOO_LARGE. Does not look at coordinates and indices; a vertex index over 2^31 - 1 becomes
+  /// that.
+  struct MeshLimits {
+    std::uint32_t most_vertices;
+    std::uint32_t most_faces;
+  };
+  absl::Status check_mesh_size(const v1::Mesh& message, const MeshLimits& limits);
+  absl::StatusOr<TriangleMesh> mesh(const v1::Mesh& message);
+
+  absl::StatusOr<Update> update(const v1::Update& message);
+  absl::Status handles(const google::protobuf::RepeatedPtrField<v1::HandleUpdate>& messages, Update& out);
+  absl::StatusOr<SettingsChange> settings(const v1::SettingsUpdate& message);
+  absl::StatusOr<Points> positions(const v1::Positions& message);
+
+ private:
+  struct Bytes {
+    std::shared_ptr<const Upload> owner;  // of an upload, so that it does not expire meanwhile
+    std::string_view view;
+  };
+  absl::StatusOr<Bytes> bytes(const v1::Buffer& buffer, std::string_view what);
+  absl::StatusOr<HandleChange> handle(const v1::HandleUpdate& message);
+  absl::StatusOr<HandleMotion> motion(const v1::Motion& message);
+  absl::StatusOr<Field> field(const v1::Field& message, std::string_view what);
+  struct PackedPoints {
+    Scalar scalar;
+    Bytes bytes;
+    std::uint64_t count;
+    Points unpack() const;
+  };
+  absl::StatusOr<PackedPoints> points(v1::Scalar scalar, const v1::Buffer& buffer, std::string_view what);
+
+  absl::Status take_room(std::uint64_t& room, std::uint64_t count, std::string_view what) const;
+
+  Uploads& uploads_;
+  const std::uint32_t vertex_count_;
+  std::uint64_t room_for_vertices_;
+  std::uint64_t room_for_targets_;
+};
+
+/// CREDIT_OUT_OF_RANGE, FRAME_RATE_OUT_OF_RANGE, ENUM_UNKNOWN.
+absl::StatusOr<StreamOptions> decode_frame_options(const v1::FrameOptions& message);
+absl::StatusOr<Scalar> decode_scalar(v1::Scalar scalar);
+absl::StatusOr<WeightKind> decode_weights(v1::WeightKind weights);
+absl::StatusOr<FreeComponents> decode_free_components(v1::FreeComponents free_components);
+
+}  // namespace lpdeform

@@ -1,0 +1,298 @@
+#include "server/encode.h"
+
+#include <chrono>
+#include <limits>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "core/base/fault.h"
+
+namespace lpdeform {
+namespace {
+
+template <typename... Cases>
+struct Match : Cases... {
+  using Cases::operator()...;
+};
+
+v1::StopReason encode_stop(StopReason reason) {
+  switch (reason) {
+    case StopReason::kRunning:
+      return v1::STOP_REASON_UNSPECIFIED;
+    case StopReason::kConverged:
+      return v1::STOP_REASON_CONVERGED;
+    case StopReason::kIterationLimit:
+      return v1::STOP_REASON_ITERATION_LIMIT;
+    case StopReason::kTimeLimit:
+      return v1::STOP_REASON_TIME_LIMIT;
+    case StopReason::kCancelled:
+      return v1::STOP_REASON_CANCELLED;
+    case StopReason::kStalled:
+      return v1::STOP_REASON_STALLED;
+    case StopReason::kNumericalBreakdown:
+      return v1::STOP_REASON_NUMERICAL_BREAKDOWN;
+  }
+  return v1::STOP_REASON_UNSPECIFIED;
+}
+
+v1::Method encode_method(Method method) {
+  switch (method) {
+    case Method::kAuto:
+      return v1::METHOD_UNSPECIFIED;
+    case Method::kQuasiNewton:
+      return v1::METHOD_QUASI_NEWTON;
+    case Method::kLineSearch:
+      return v1::METHOD_LINE_SEARCH;
+    case Method::kLocalGlobal:
+      return v1::METHOD_LOCAL_GLOBAL;
+    case Method::kConic:
+      return v1::METHOD_CONIC;
+  }
+  return v1::METHOD_UNSPECIFIED;
+}
+
+v1::InitialGuess encode_initial(InitialGuess guess) {
+  switch (guess) {
+    case InitialGuess::kCurrent:
+      return v1::INITIAL_GUESS_UNSPECIFIED;
+    case InitialGuess::kLaplacian:
+      return v1::INITIAL_GUESS_LAPLACIAN;
+    case InitialGuess::kRest:
+      return v1::INITIAL_GUESS_REST;
+  }
+  return v1::INITIAL_GUESS_UNSPECIFIED;
+}
+
+v1::FreeComponents encode_free_components(FreeComponents free_components) {
+  switch (free_components) {
+    case FreeComponents::kError:
+      return v1::FREE_COMPONENTS_ERROR;
+    case FreeComponents::kStay:
+      return v1::FREE_COMPONENTS_STAY;
+    case FreeComponents::kFollow:
+      return v1::FREE_COMPONENTS_FOLLOW;
+  }
+  return v1::FREE_COMPONENTS_UNSPECIFIED;
+}
+
+v1::GoAwayReason encode_reason(EndReason reason) {
+  switch (reason) {
+    case EndReason::kSessionDeleted:
+      return v1::GO_AWAY_REASON_SESSION_DELETED;
+    case EndReason::kSessionExpired:
+      return v1::GO_AWAY_REASON_SESSION_EXPIRED;
+    case EndReason::kDraining:
+      return v1::GO_AWAY_REASON_DRAINING;
+    case EndReason::kWriterReplaced:
+      return v1::GO_AWAY_REASON_WRITER_REPLACED;
+    case EndReason::kProtocolError:
+      return v1::GO_AWAY_REASON_PROTOCOL_ERROR;
+  }
+  return v1::GO_AWAY_REASON_UNSPECIFIED;
+}
+
+void encode_field(const Field& field, v1::Field& out) {
+  if (field.size() == 1) {
+    out.set_uniform(field[0]);
+  } else {
+    out.mutable_per_vertex();
+  }
+}
+
+void encode_report(const MeshReport& report, v1::MeshReport& out) {
+  out.set_vertices(report.vertices);
+  out.set_faces(report.faces);
+  out.set_edges(report.edges);
+  out.set_components(report.components);
+  out.set_boundary_loops(report.boundary_loops);
+  for (const Defect defect : all_defects()) {
+    const DefectCount& count = report.of(defect);
+    v1::Defect& message = *out.add_defects();
+    message.set_kind(std::string(defect_name(defect)));
+    message.set_count(count.count);
+    message.mutable_first()->Add(count.first.begin(), count.first.end());
+  }
+}
+
+void encode_settings(const Inputs& inputs, v1::SettingsUpdate& out) {
+  encode_field(inputs.material->p, *out.mutable_p());
+  encode_field(inputs.material->stiffness, *out.mutable_stiffness());
+  out.mutable_length_unit()->set_length(inputs.material->length_unit);
+  v1::SolverSettings& solver = *out.mutable_solver();
+  solver.set_method(encode_method(inputs.solver.method));
+  solver.set_tolerance(inputs.solver.tolerance);
+  solver.set_max_iterations(static_cast<std::uint32_t>(inputs.solver.max_iterations));
+  const bool has_limit = inputs.solver.time_limit_seconds < std::numeric_limits<double>::infinity();
+  solver.set_time_limit_seconds(has_limit ? inputs.solver.time_limit_seconds : 0);
+  solver.set_initial(encode_initial(inputs.solver.initial));
+}
+
+void encode_header(const FramePiece& piece, v1::FrameHeader& out) {
+  const Frame& frame = *piece.frame;
+  out.set_frame_seq(frame.frame_seq);
+  out.set_input_seq(frame.input_seq);
+  out.set_epoch(frame.epoch);
+  out.set_skipped_inputs(piece.skipped_inputs);
+  out.set_iteration(frame.iteration);
+  out.set_energy(frame.energy);
+  out.set_converged(frame.converged);
+  out.set_stop_reason(encode_stop(frame.stop_reason));
+  out.set_vertex_count(frame.surface->vertex_count());
+  out.set_scalar(piece.scalar == Scalar::kFloat64 ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
+  out.set_solve_seconds(frame.solve_seconds);
+  out.set_method(std::string(method_name(frame.method)));
+}
+
+void encode_piece(const FramePiece& piece, v1::FramePart& out) {
+  if (piece.first == 0) encode_header(piece, *out.mutable_header());
+  out.set_frame_seq(piece.frame->frame_seq);
+  out.set_first_vertex(piece.first);
+  out.set_vertex_count(piece.count);
+  out.set_last(piece.is_last);
+  const std::size_t point_bytes = 3 * bytes_of(piece.scalar);
+  const std::string_view positions = piece.frame->surface->position_bytes(piece.scalar);
+  out.set_positions(std::string(positions.substr(piece.first * point_bytes, piece.count * point_bytes)));
+  if (!piece.with_distortion) return;
+  const std::string_view distortion = piece.frame->surface->distortion_bytes();
+  out.set_distortion(
+      std::string(distortion.substr(piece.first * sizeof(float), piece.count * sizeof(float))));
+}
+
+/// Bytes that a field of this many takes, its tag (of one byte) and length included; 0 where it is empty.
+std::size_t field_bytes(std::size_t size) {
+  if (size == 0) return 0;
+  std::size_t length_bytes = 1;
+  for (std::size_t rest = size >> 7; rest != 0; rest >>= 7) ++length_bytes;
+  return 1 + length_bytes + size;
+}
+
+/// Fills `part.padding` so that `part.positions` begins at a multiple of 4 bytes in `message`, which holds
+/// the part as its last field: positions and distortion are the part's last fields, and fields are written in
+/// order.
+void align_positions(const google::protobuf::MessageLite& message, v1::FramePart& part) {
+  const std::size_t after = part.positions().size() + field_bytes(part.distortion().size());
+  for (std::size_t padding = 0; padding < 8; ++padding) {
+    part.set_padding(std::string(padding, '\0'));
+    if ((message.ByteSizeLong() - after) % 4 == 0) return;
+  }
+}
+
+void encode_event(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
+                  v1::StreamEvent& out) {
+  const Match put{
+      [&](const OpenedNote& opened) {
+        v1::StreamOpened& message = *out.mutable_opened();
+        message.set_stream_id(stream.id());
+        message.set_epoch(opened.epoch);
+        message.set_input_seq(opened.input_seq);
+        message.set_vertex_count(vertex_count);
+        const StreamOptions& options = stream.options();
+        v1::FrameOptions& granted = *message.mutable_options();
+        granted.set_credit(options.credit);
+        granted.set_scalar(options.scalar == Scalar::kFloat64 ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
+        granted.set_without_distortion(!options.with_distortion);
+        granted.set_max_frames_per_second(options.max_frames_per_second);
+      },
+      [&](const FramePiece& piece) { encode_piece(piece, *out.mutable_frame()); },
+      [&](const UpdateResult&) {},  // no event: see encode() of a DeformResponse
+      [&](const FaultNote& fault) { encode(fault, *out.mutable_fault()); },
+      [&](const HeartbeatNote&) { out.mutable_heartbeat(); },
+      [&](const EndNote& end) {
+        out.mutable_go_away()->set_reason(encode_reason(end.reason));
+        out.mutable_go_away()->set_text(end.text);
+        if (end.reason == EndReason::kDraining) out.mutable_go_away()->set_reconnect_after_ms(1000);
+      }};
+  std::visit(put, note);
+}
+
+}  // namespace
+
+std::uint32_t retry_after_ms(const absl::Status& status) {
+  if (absl::IsUnavailable(status)) return 1000;
+  if (absl::IsResourceExhausted(status)) return 5000;
+  return 0;
+}
+
+void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint now, v1::Session& out) {
+  using std::chrono::duration_cast;
+  using std::chrono::milliseconds;
+  out.set_name(info.name);
+  out.set_epoch(info.epoch);
+  encode_report(info.shape->report(), *out.mutable_mesh());
+  out.set_input_seq(info.inputs.input_seq);
+  encode_settings(info.inputs, *out.mutable_settings());
+  for (const auto& [name, handle] : info.inputs.handles->handles()) {
+    v1::HandleInfo& message = *out.add_handles();
+    message.set_name(name);
+    message.set_vertex_count(static_cast<std::uint32_t>(handle.vertices.size()));
+  }
+  out.set_created_unix_ms(info.created_unix_ms);
+  const auto unix_now = std::chrono::system_clock::now().time_since_epoch();
+  out.set_expires_unix_ms(duration_cast<milliseconds>(unix_now + (info.last_used - now) + idle).count());
+  out.set_memory_bytes(info.memory_bytes);
+  out.set_weights(info.shape->weight_kind() == WeightKind::kUniform ? v1::WEIGHT_KIND_UNIFORM
+                                                                    : v1::WEIGHT_KIND_COTANGENT);
+  out.set_free_components(encode_free_components(info.free_components));
+}
+
+void encode(const FaultNote& fault, v1::Fault& out) {
+  const Fault details = fault_of(fault.status);
+  out.set_code(static_cast<int>(fault.status.code()));
+  out.set_reason(details.reason);
+  out.set_text(std::string(fault.status.message()));
+  out.set_element(details.element);
+  out.set_limit(details.limit);
+  out.set_input_seq(fault.input_seq);
+  out.set_retry_after_ms(retry_after_ms(fault.status));
+}
+
+void encode(const SolveResult& result, v1::SolveSummary& out) {
+  const SolveSummary& summary = result.summary;
+  out.set_method(std::string(method_name(summary.method)));
+  out.set_stop_reason(encode_stop(summary.stop_reason));
+  out.set_iterations(static_cast<std::uint32_t>(summary.iterations));
+  out.set_initial_energy(summary.initial_energy);
+  out.set_energy(summary.energy);
+  if (summary.optimality_gap) out.mutable_certificate()->set_relative_gap(*summary.optimality_gap);
+  out.set_setup_seconds(summary.setup_seconds);
+  out.set_solve_seconds(summary.solve_seconds);
+  out.set_threads(static_cast<std::uint32_t>(summary.threads));
+  out.set_input_seq(result.frame->input_seq);
+}
+
+void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
+            v1::DeformResponse& out) {
+  if (const auto* const result = std::get_if<UpdateResult>(&note)) {
+    out.mutable_result()->set_input_seq(result->input_seq);
+    out.mutable_result()->set_stale_parts(result->stale_parts);
+    return;
+  }
+  encode_event(note, stream, vertex_count, *out.mutable_event());
+  if (out.event().has_frame()) align_positions(out, *out.mutable_event()->mutable_frame());
+}
+
+void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
+            v1::StreamFramesResponse& out) {
+  encode_event(note, stream, vertex_count, *out.mutable_event());
+  if (out.event().has_frame()) align_positions(out, *out.mutable_event()->mutable_frame());
+}
+
+void encode(const FramePiece& piece, v1::SolveResponse& out) {
+  encode_piece(piece, *out.mutable_frame());
+  align_positions(out, *out.mutable_frame());
+}
+
+void encode_trace(const std::vector<IterationRecord>& trace, std::size_t begin, std::size_t end,
+                  v1::SolveTrace& out) {
+  for (std::size_t k = begin; k < end; ++k) {
+    v1::IterationRecord& message = *out.add_records();
+    message.set_iteration(static_cast<std::uint32_t>(trace[k].iteration));
+    message.set_seconds(trace[k].seconds);
+    message.set_energy(trace[k].energy);
+    message.set_objective(trace[k].objective);
+    message.set_stage(static_cast<std::uint32_t>(trace[k].stage));
+  }
+}
+
+}  // namespace lpdeform

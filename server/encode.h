@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+
+#include "absl/status/status.h"
+#include "lpdeform/v1/service.pb.h"
+#include "server/frame_stream.h"
+#include "server/session.h"
+#include "server/solve_job.h"
+
+namespace lpdeform {
+
+// From the values of core and session to messages of the contract.
+
+/// `idle`: how long a session lives without use.
+void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint now, v1::Session& out);
+
+/// The error inside a stream.
+void encode(const FaultNote& fault, v1::Fault& out);
+
+void encode(const SolveResult& result, v1::SolveSummary& out);
+
+/// A note of a stream: an event, or the result of an update.
+void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count, v1::DeformResponse& out);
+/// The same for a stream that takes no updates.
+void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
+            v1::StreamFramesResponse& out);
+
+/// A piece of a solve's result.
+void encode(const FramePiece& piece, v1::SolveResponse& out);
+
+/// Records [begin, end) of a trace.
+void encode_trace(const std::vector<IterationRecord>& trace, std::size_t begin, std::size_t end,
+                  v1::SolveTrace& out);
+
+/// How long a caller had better wait before it tries again, in milliseconds; 0 where trying again does not
+/// help.
+std::uint32_t retry_after_ms(const absl::Status& status);
+
+}  // namespace lpdeform

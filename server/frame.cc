@@ -1,0 +1,62 @@
+#include "server/frame.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/check.h"
+
+namespace lpdeform {
+namespace {
+
+template <typename Matrix>
+std::string float32_bytes(const Matrix& values) {
+  std::string bytes(static_cast<std::size_t>(values.size()) * sizeof(float), '\0');
+  Eigen::Map<Eigen::VectorXf>(reinterpret_cast<float*>(bytes.data()), values.size()) =
+      Eigen::Map<const Eigen::VectorXd>(values.data(), values.size()).template cast<float>();
+  return bytes;
+}
+
+}  // namespace
+
+std::size_t bytes_of(Scalar scalar) {
+  return scalar == Scalar::kFloat64 ? sizeof(double) : sizeof(float);
+}
+
+Surface::Surface(Points positions, const Field& cell_energies)
+    : positions_(std::move(positions)), distortion_(float32_bytes(cell_energies)) {
+  LPDEFORM_CHECK(cell_energies.size() == positions_.rows());
+}
+
+std::string_view Surface::position_bytes(Scalar scalar) const {
+  if (scalar == Scalar::kFloat64) {
+    return {reinterpret_cast<const char*>(positions_.data()),
+            static_cast<std::size_t>(positions_.size()) * sizeof(double)};
+  }
+  std::call_once(once_, [this] { float32_ = float32_bytes(positions_); });
+  return float32_;
+}
+
+std::size_t Surface::memory_bytes() const {
+  return static_cast<std::size_t>(positions_.size()) * (sizeof(double) + sizeof(float)) + distortion_.size();
+}
+
+FrameCutter::FrameCutter(std::shared_ptr<const Frame> frame, Scalar scalar, bool with_distortion,
+                         std::uint64_t skipped_inputs)
+    : frame_(std::move(frame)),
+      scalar_(scalar),
+      with_distortion_(with_distortion),
+      skipped_inputs_(skipped_inputs) {}
+
+FramePiece FrameCutter::next() {
+  LPDEFORM_CHECK(has_more());
+  const std::size_t vertex_bytes = 3 * bytes_of(scalar_) + (with_distortion_ ? sizeof(float) : 0);
+  const auto most = static_cast<std::uint32_t>(kMostBytes / vertex_bytes);
+  const std::uint32_t left = frame_->surface->vertex_count() - at_;
+  FramePiece piece{frame_,          at_,     std::min(most, left), left <= most,
+                   skipped_inputs_, scalar_, with_distortion_};
+  at_ += piece.count;
+  if (piece.is_last) frame_.reset();
+  return piece;
+}
+
+}  // namespace lpdeform

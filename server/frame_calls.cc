@@ -1,0 +1,189 @@
+#include "server/frame_calls.h"
+
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/base/fault.h"
+#include "server/encode.h"
+#include "server/write_pump.h"
+
+namespace lpdeform {
+namespace {
+
+/// What both calls do with a stream of frames.
+template <typename Reactor, typename Response>
+class FrameCall : public WritePump<Reactor, Response> {
+ public:
+  explicit FrameCall(Backend& backend) : backend_(backend) {}
+
+ protected:
+  using Pump = WritePump<Reactor, Response>;
+  using typename Pump::Made;
+
+  /// Opens the stream, on a thread of the pool. Ends the call where that fails.
+  void open(const std::string& session_name, const std::string& token, const v1::FrameOptions& options) {
+    absl::StatusOr<std::shared_ptr<Session>> session = backend_.find(session_name);
+    absl::Status status = session.status();
+    std::shared_ptr<FrameStream> stream;
+    if (status.ok()) {
+      const auto decoded = decode_frame_options(options);
+      auto opened = decoded.ok() ? (*session)->open_stream(token, *decoded) : decoded.status();
+      status = opened.status();
+      if (opened.ok()) stream = *std::move(opened);
+    }
+    if (stream) {
+      stream->start([weak = this->weak_from_this()] {
+        if (const auto self = weak.lock()) self->pump();
+      });
+    }
+    const std::scoped_lock lock(this->mutex_);
+    if (!status.ok()) return this->refuse_locked(status);
+    if (this->is_over_locked()) return (*session)->forget_stream(*stream);
+    session_ = *std::move(session);
+    stream_ = std::move(stream);
+    token_ = token;
+    backend_.log().info("stream_opened", {{"session", abbreviated(session_name)},
+                                          {"stream", abbreviated(stream_->id())},
+                                          {"role", std::string(token.empty() ? "reader" : "writer")}});
+    this->pump_locked();
+  }
+
+  Made make(Response& response) final {
+    if (!stream_) return Made::kNothing;
+    const std::optional<Note> note = stream_->next();
+    if (!note) return Made::kNothing;
+    encode(*note, *stream_, session_->vertex_count(), response);
+    return std::holds_alternative<EndNote>(*note) ? Made::kLastMessage : Made::kMessage;
+  }
+
+  void let_go() final {
+    if (!stream_ || std::exchange(is_forgotten_, true)) return;
+    session_->forget_stream(*stream_);
+    backend_.log().info("stream_ended",
+                        {{"session", abbreviated(session_->name())}, {"stream", abbreviated(stream_->id())}});
+  }
+
+  Backend& backend_;
+  std::shared_ptr<Session> session_;
+  std::shared_ptr<FrameStream> stream_;
+  std::string token_;
+  bool is_forgotten_ = false;
+};
+
+class StreamFramesCall final
+    : public FrameCall<grpc::ServerWriteReactor<v1::StreamFramesResponse>, v1::StreamFramesResponse> {
+ public:
+  using FrameCall::FrameCall;
+
+  void begin(const v1::StreamFramesRequest& request) {
+    auto self = std::static_pointer_cast<StreamFramesCall>(shared_from_this());
+    const auto task = [self, request] { self->open(request.session(), "", request.options()); };
+    if (!backend_.pool.try_post(task)) refuse(server_busy());
+  }
+};
+
+class DeformCall final
+    : public FrameCall<grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>, v1::DeformResponse> {
+ public:
+  using FrameCall::FrameCall;
+
+  void begin() { read(); }
+
+  void OnReadDone(bool ok) override {
+    bool is_open = true;
+    {
+      const std::scoped_lock lock(mutex_);
+      is_open = is_open_;
+      is_open_ = is_open_ || (ok && request_.has_open());
+    }
+    if (!ok) return end_of_input(is_open);
+    switch (request_.message_case()) {
+      case v1::DeformRequest::kOpen:
+        return is_open ? break_off("The stream was opened twice.") : post(&DeformCall::take_open);
+      case v1::DeformRequest::kUpdate:
+        return is_open ? post(&DeformCall::take_update) : break_off("The first message is not an open.");
+      case v1::DeformRequest::kAck:
+        return is_open ? take_ack() : break_off("The first message is not an open.");
+      default:
+        return break_off("A message is empty, or of a kind that the server does not know.");
+    }
+  }
+
+ private:
+  static constexpr std::size_t kMostAnswers = 64;
+
+  /// The next message, unless too many answers wait for the client to read them.
+  void read() {
+    const std::scoped_lock lock(mutex_);
+    read_locked();
+  }
+
+  void read_locked() {
+    if (is_over_locked()) return;
+    is_read_due_ = stream_ && stream_->answers_waiting() >= kMostAnswers;
+    if (!is_read_due_) StartRead(&request_);
+  }
+
+  void on_made() override {
+    if (is_read_due_) read_locked();
+  }
+
+  /// A client that sends no more may go on reading; one that never opened has nothing to read.
+  void end_of_input(bool is_open) {
+    if (!is_open) break_off("The stream ended before it was opened.");
+  }
+
+  void post(void (DeformCall::*task)()) {
+    auto self = std::static_pointer_cast<DeformCall>(shared_from_this());
+    if (!backend_.pool.try_post([self, task] { (*self.*task)(); })) refuse(server_busy());
+  }
+
+  void take_open() {
+    const v1::DeformOpen& open = request_.open();
+    this->open(open.session(), open.writer_token(), open.options());
+    read();
+  }
+
+  void take_update() {
+    const v1::Update& update = request_.update();
+    const auto session = backend_.find(session_->name());
+    const auto result = session.ok() ? backend_.update(**session, token_, update) : session.status();
+    if (result.ok()) {
+      stream_->answer(*result);
+    } else {
+      stream_->answer(FaultNote{result.status(), update.input_seq()});
+    }
+    read();
+  }
+
+  void take_ack() {
+    session_->touch();
+    const absl::Status status = stream_->acknowledge(request_.ack().frame_seq());
+    if (!status.ok()) return break_off(std::string(status.message()));
+    read();
+  }
+
+  /// The client does not keep to the contract: reads no more, and says so.
+  void break_off(const std::string& why) {
+    if (stream_) return stream_->end(EndReason::kProtocolError, why);
+    refuse(invalid_input({"STREAM_PROTOCOL", "", ""}, why));
+  }
+
+  v1::DeformRequest request_;
+  bool is_open_ = false;  // an open has come
+  bool is_read_due_ = false;
+};
+
+}  // namespace
+
+grpc::ServerWriteReactor<v1::StreamFramesResponse>* stream_frames(Backend& backend,
+                                                                  const v1::StreamFramesRequest& request) {
+  return begin_call<StreamFramesCall>(backend, request);
+}
+
+grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* deform(Backend& backend) {
+  return begin_call<DeformCall>(backend);
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "lpdeform/v1/service.grpc.pb.h"
+#include "server/backend.h"
+
+namespace lpdeform {
+
+// The calls that carry frames. Both belong to gRPC once made; `backend` outlives them.
+
+grpc::ServerWriteReactor<v1::StreamFramesResponse>* stream_frames(Backend& backend,
+                                                                  const v1::StreamFramesRequest& request);
+
+grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* deform(Backend& backend);
+
+}  // namespace lpdeform

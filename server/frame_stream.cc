@@ -1,0 +1,160 @@
+#include "server/frame_stream.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "server/publisher.h"
+#include "server/random_name.h"
+
+namespace lpdeform {
+
+FrameStream::FrameStream(StreamOptions options, std::shared_ptr<Publisher> publisher,
+                         std::shared_ptr<Timers> timers, Timers::Duration heartbeat, OpenedNote opened)
+    : id_(random_hex_128()),
+      options_(options),
+      publisher_(std::move(publisher)),
+      timers_(std::move(timers)),
+      heartbeat_(heartbeat),
+      opened_(opened),
+      last_frame_at_(timers_->now()),
+      last_sent_at_(last_frame_at_) {}
+
+void FrameStream::start(std::function<void()> waker) {
+  const std::scoped_lock lock(mutex_);
+  waker_ = std::move(waker);
+}
+
+void FrameStream::wake() {
+  std::function<void()> waker;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (!is_ended_) waker = waker_;
+  }
+  if (waker) waker();
+}
+
+std::optional<Note> FrameStream::next() {
+  const std::scoped_lock lock(mutex_);
+  if (is_ended_) return std::nullopt;
+  const Timers::TimePoint now = timers_->now();
+  std::optional<Note> note = next_locked(now);
+  if (note) last_sent_at_ = now;
+  if (!note) arm(is_heartbeat_armed_, last_sent_at_ + heartbeat_);
+  return note;
+}
+
+std::optional<Note> FrameStream::next_locked(Timers::TimePoint now) {
+  if (!is_opened_) {
+    is_opened_ = true;
+    return opened_;
+  }
+  if (end_) {
+    is_ended_ = true;
+    cutter_ = {};
+    return *std::move(end_);
+  }
+  if (!answers_.empty()) {
+    Note answer = std::move(answers_.front());
+    answers_.pop_front();
+    return answer;
+  }
+  if (!cutter_.has_more()) begin_frame(now);
+  if (cutter_.has_more()) return cutter_.next();
+  if (const auto standing = publisher_->standing(); standing && standing->number > last_fault_) {
+    last_fault_ = standing->number;
+    return standing->fault;
+  }
+  if (now - last_sent_at_ >= heartbeat_) return HeartbeatNote{};
+  return std::nullopt;
+}
+
+/// Takes the publisher's newest frame on, if it is new and may be sent now.
+void FrameStream::begin_frame(Timers::TimePoint now) {
+  std::shared_ptr<const Frame> newest = publisher_->newest();
+  if (!newest || newest->frame_seq <= last_seq_ || in_flight_.size() >= options_.credit) return;
+  if (const Timers::TimePoint when = next_frame_at(); now < when) return arm(is_pace_armed_, when);
+  const std::uint64_t answered = has_sent_frame_ ? newest->taken - last_taken_ : 0;
+  last_seq_ = newest->frame_seq;
+  last_taken_ = newest->taken;
+  has_sent_frame_ = true;
+  last_frame_at_ = now;
+  in_flight_.push_back(last_seq_);
+  cutter_ = FrameCutter(std::move(newest), options_.scalar, options_.with_distortion,
+                        answered > 1 ? answered - 1 : 0);
+}
+
+Timers::TimePoint FrameStream::next_frame_at() const {
+  if (!has_sent_frame_ || options_.max_frames_per_second <= 0) return Timers::TimePoint::min();
+  const std::chrono::duration<double> pause(std::min(1.0 / options_.max_frames_per_second, 3600.0));
+  return last_frame_at_ + std::chrono::duration_cast<Timers::Duration>(pause);
+}
+
+/// Sees to it that somebody asks next() again at `when`.
+void FrameStream::arm(bool& is_armed, Timers::TimePoint when) {
+  if (std::exchange(is_armed, true)) return;
+  timers_->at(when, [weak = weak_from_this(), &is_armed] {
+    const auto stream = weak.lock();
+    if (!stream) return;
+    {
+      const std::scoped_lock lock(stream->mutex_);
+      is_armed = false;
+    }
+    stream->wake();
+  });
+}
+
+absl::Status FrameStream::acknowledge(std::uint64_t frame_seq) {
+  {
+    const std::scoped_lock lock(mutex_);
+    const bool is_being_sent = cutter_.has_more() && frame_seq == last_seq_;
+    if (frame_seq > last_seq_ || is_being_sent) {
+      return invalid_input(
+          {"ACK_NOT_SENT", absl::StrCat("frame ", frame_seq), absl::StrCat("frame_seq <= ", last_seq_)},
+          absl::StrCat("Frame ", frame_seq, " was acknowledged before it was sent; the last one sent is ",
+                       last_seq_, "."));
+    }
+    while (!in_flight_.empty() && in_flight_.front() <= frame_seq) in_flight_.pop_front();
+  }
+  wake();
+  return absl::OkStatus();
+}
+
+void FrameStream::answer(UpdateResult result) {
+  {
+    const std::scoped_lock lock(mutex_);
+    answers_.emplace_back(result);
+  }
+  wake();
+}
+
+void FrameStream::answer(FaultNote fault) {
+  {
+    const std::scoped_lock lock(mutex_);
+    answers_.emplace_back(std::move(fault));
+  }
+  wake();
+}
+
+std::size_t FrameStream::answers_waiting() const {
+  const std::scoped_lock lock(mutex_);
+  return answers_.size();
+}
+
+void FrameStream::end(EndReason reason, std::string text) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (end_ || is_ended_) return;
+    end_ = EndNote{reason, std::move(text)};
+  }
+  wake();
+}
+
+bool FrameStream::wants_frame() const {
+  const std::scoped_lock lock(mutex_);
+  return !is_ended_ && !end_ && !cutter_.has_more() && in_flight_.size() < options_.credit &&
+         timers_->now() >= next_frame_at();
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "absl/status/status.h"
+#include "server/frame.h"
+#include "server/timers.h"
+#include "server/update.h"
+
+namespace lpdeform {
+
+class Publisher;
+
+/// What a reader asked for; meanings as in frame.proto.
+struct StreamOptions {
+  std::uint32_t credit = 2;
+  Scalar scalar = Scalar::kFloat32;
+  bool with_distortion = true;
+  double max_frames_per_second = 0;
+
+  static constexpr std::uint32_t kMostCredit = 8;
+};
+
+enum class EndReason { kSessionDeleted, kSessionExpired, kDraining, kWriterReplaced, kProtocolError };
+
+// What a stream may have to send.
+struct OpenedNote {
+  std::uint64_t epoch = 0;
+  std::uint64_t input_seq = 0;
+};
+struct HeartbeatNote {};
+struct FaultNote {
+  absl::Status status;
+  std::uint64_t input_seq = 0;
+};
+struct EndNote {
+  EndReason reason = EndReason::kDraining;
+  std::string text;
+};
+using Note = std::variant<OpenedNote, FramePiece, UpdateResult, FaultNote, HeartbeatNote, EndNote>;
+
+/// One reader of a session: decides what to send to it, and when. It holds at most one frame, the one that is
+/// being cut into pieces; what waits is the publisher's newest. A frame is begun only when fewer than
+/// `credit` frames are sent and not acknowledged. Thread-safe; calls no one under its lock but the publisher.
+class FrameStream : public std::enable_shared_from_this<FrameStream> {
+ public:
+  FrameStream(StreamOptions options, std::shared_ptr<Publisher> publisher, std::shared_ptr<Timers> timers,
+              Timers::Duration heartbeat, OpenedNote opened);
+
+  const std::string& id() const { return id_; }
+  const StreamOptions& options() const { return options_; }
+
+  /// `waker` is called, on any thread and under no lock, when next() may have something new. Once, before the
+  /// first next().
+  void start(std::function<void()> waker);
+
+  /// What to send now; empty where there is nothing. The caller sends it. An EndNote is the last.
+  std::optional<Note> next();
+
+  /// This frame and all before it have been received. INVALID_ARGUMENT ACK_NOT_SENT where it was not sent
+  /// yet.
+  absl::Status acknowledge(std::uint64_t frame_seq);
+
+  /// The answer to an update that came on this stream. The caller bounds how many wait.
+  void answer(UpdateResult result);
+  void answer(FaultNote fault);
+
+  std::size_t answers_waiting() const;
+
+  /// The stream is to end; the first reason counts.
+  void end(EndReason reason, std::string text);
+
+  /// Says that next() may have something new.
+  void wake();
+
+  /// Whether a frame published now could be sent at once.
+  bool wants_frame() const;
+
+ private:
+  std::optional<Note> next_locked(Timers::TimePoint now);
+  void begin_frame(Timers::TimePoint now);
+  Timers::TimePoint next_frame_at() const;
+  void arm(bool& is_armed, Timers::TimePoint when);
+
+  const std::string id_;
+  const StreamOptions options_;
+  const std::shared_ptr<Publisher> publisher_;
+  const std::shared_ptr<Timers> timers_;
+  const Timers::Duration heartbeat_;
+  const OpenedNote opened_;
+
+  mutable std::mutex mutex_;
+  std::function<void()> waker_;
+  bool is_opened_ = false;
+  bool is_ended_ = false;
+  std::deque<Note> answers_;
+  std::optional<EndNote> end_;
+  FrameCutter cutter_;
+  std::deque<std::uint64_t> in_flight_;  // frame_seqs begun and not acknowledged, ascending
+  std::uint64_t last_seq_ = 0;           // of the last frame begun
+  std::uint64_t last_taken_ = 0;
+  bool has_sent_frame_ = false;
+  std::uint64_t last_fault_ = 0;
+  Timers::TimePoint last_frame_at_;
+  Timers::TimePoint last_sent_at_;
+  bool is_heartbeat_armed_ = false;  // a timer is set; one of each kind at a time
+  bool is_pace_armed_ = false;
+};
+
+}  // namespace lpdeform

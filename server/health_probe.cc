@@ -1,0 +1,42 @@
+#include "server/health_probe.h"
+
+#include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/grpcpp.h>
+
+#include <chrono>
+#include <future>
+#include <string>
+#include <vector>
+
+namespace lpdeform {
+namespace {
+
+/// grpc.health.v1.HealthCheckResponse with status SERVING: field 1 is the varint 1. The request is empty: the
+/// server as a whole. Written by hand, because Debian's gRPC does not carry the generated message.
+constexpr char kServing[] = {0x08, 0x01};
+
+std::string bytes_of(const grpc::ByteBuffer& buffer) {
+  std::vector<grpc::Slice> slices;
+  std::string bytes;
+  if (!buffer.Dump(&slices).ok()) return bytes;
+  for (const grpc::Slice& slice : slices)
+    bytes.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
+  return bytes;
+}
+
+}  // namespace
+
+bool is_serving(const std::string& address) {
+  grpc::GenericStub stub(grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(3));
+  const grpc::Slice nothing;
+  const grpc::ByteBuffer request(&nothing, 1);
+  grpc::ByteBuffer response;
+  std::promise<grpc::Status> ended;
+  stub.UnaryCall(&context, "/grpc.health.v1.Health/Check", {}, &request, &response,
+                 [&ended](grpc::Status status) { ended.set_value(std::move(status)); });
+  return ended.get_future().get().ok() && bytes_of(response) == std::string(kServing, sizeof(kServing));
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,145 @@
+#include "server/live_solver.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+
+namespace lpdeform {
+namespace {
+
+absl::Status superseded(std::uint64_t input_seq) {
+  return make_fault(absl::StatusCode::kAborted, {"SUPERSEDED", absl::StrCat("update ", input_seq), ""},
+                    absl::StrCat("Update ", input_seq, " came before the solve was finished."));
+}
+
+absl::Status no_handles() {
+  return make_fault(absl::StatusCode::kFailedPrecondition, {"NO_HANDLES", "", "handles >= 1"},
+                    "The session has no handle; a solve needs at least one.");
+}
+
+}  // namespace
+
+LiveSolver::LiveSolver(std::unique_ptr<Deformer> deformer, const Mailbox& mailbox, Publisher& publisher,
+                       std::stop_token stop)
+    : deformer_(std::move(deformer)), mailbox_(mailbox), publisher_(publisher), stop_(std::move(stop)) {
+  publish(mailbox_.newest().handles->handles().empty());
+}
+
+bool LiveSolver::run_slice(SolveJob* job) {
+  const Inputs newest = mailbox_.newest();
+  if (job != nullptr && newest.version > job->version) job->finish(superseded(newest.input_seq));
+  if (job != nullptr && job->is_done()) job = nullptr;
+  if (newest.version != inputs_.version) take_over(newest);
+
+  const void* const wanted = job != nullptr                  ? static_cast<const void*>(job)
+                             : publisher_.reader_count() > 0 ? this
+                                                             : nullptr;
+  if (phase_ == Phase::kRunning && running_for_ != wanted) pause();
+  if (wanted == nullptr) return false;
+  if (phase_ != Phase::kRunning) {
+    if (!(job != nullptr ? begin_job(*job) : begin_live())) return false;
+    phase_ = Phase::kRunning;
+    running_for_ = wanted;
+    was_begun_ = true;
+  }
+  run_steps(job);
+  return phase_ == Phase::kRunning;
+}
+
+void LiveSolver::take_over(const Inputs& inputs) {
+  absl::Status status;
+  if (inputs.material != inputs_.material) status = deformer_->set_material(*inputs.material);
+  const bool has_handles = !inputs.handles->handles().empty();
+  if (status.ok() && has_handles && inputs.handles != held_) {
+    status = deformer_->set_handles(*inputs.handles);
+    if (status.ok()) held_ = inputs.handles;
+  }
+  inputs_ = inputs;
+  blocked_ = has_handles ? status : no_handles();
+  phase_ = blocked_.ok() ? Phase::kWaiting : Phase::kDone;
+  was_begun_ = false;
+  publisher_.set_standing(status.ok() ? std::nullopt
+                                      : std::make_optional(FaultNote{status, inputs.input_seq}));
+  if (!has_handles) publish(true);
+}
+
+/// False where the job has ended.
+bool LiveSolver::begin_job(SolveJob& job) {
+  absl::Status status = blocked_;
+  if (inputs_.handles == nullptr) status = no_handles();
+  SolveSettings settings = inputs_.solver;
+  settings.certify = job.options().certify;
+  settings.keep_trace = job.options().keep_trace;
+  if (status.ok() && job.options().initial_positions) {
+    settings.initial = InitialGuess::kCurrent;
+    status = deformer_->set_positions(*job.options().initial_positions);
+  }
+  if (status.ok()) status = deformer_->start(settings, job.stop_token());
+  if (!status.ok()) job.finish(status);
+  return status.ok();
+}
+
+/// False where there is nothing to solve for.
+bool LiveSolver::begin_live() {
+  if (phase_ != Phase::kWaiting) return false;
+  SolveSettings settings = inputs_.solver;
+  if (was_begun_) settings.initial = InitialGuess::kCurrent;
+  const absl::Status status = deformer_->start(settings, stop_);
+  if (status.ok()) return true;
+  blocked_ = status;
+  phase_ = Phase::kDone;
+  publisher_.set_standing(FaultNote{status, inputs_.input_seq});
+  return false;
+}
+
+void LiveSolver::pause() {
+  phase_ = Phase::kWaiting;
+  running_for_ = nullptr;
+}
+
+void LiveSolver::run_steps(SolveJob* job) {
+  const Clock::time_point end = Clock::now() + kSlice;
+  bool has_more = true;
+  while (has_more && Clock::now() < end) has_more = deformer_->step();
+  if (!has_more) return end_solve(job);
+  if (job != nullptr) report(*job);
+  if (publisher_.is_frame_wanted()) publish(false);
+}
+
+void LiveSolver::end_solve(SolveJob* job) {
+  if (deformer_->summary().stop_reason == StopReason::kCancelled) return pause();
+  phase_ = Phase::kDone;
+  running_for_ = nullptr;
+  const std::shared_ptr<const Frame> frame = publish(true);
+  if (job != nullptr) job->finish(SolveResult{deformer_->summary(), frame});
+}
+
+void LiveSolver::report(const SolveJob& job) {
+  const Clock::time_point now = Clock::now();
+  if (now - last_report_ < kBetweenReports) return;
+  last_report_ = now;
+  const SolveSummary& summary = deformer_->summary();
+  job.report({static_cast<std::uint32_t>(summary.iterations), summary.energy, summary.solve_seconds});
+}
+
+std::shared_ptr<const Frame> LiveSolver::publish(bool is_final) {
+  const SolveSummary& summary = deformer_->summary();
+  Frame frame;
+  frame.input_seq = inputs_.input_seq;
+  frame.taken = inputs_.taken;
+  frame.iteration = static_cast<std::uint32_t>(summary.iterations);
+  frame.energy = summary.energy;
+  frame.converged = is_final;
+  frame.stop_reason = is_final ? summary.stop_reason : StopReason::kRunning;
+  frame.solve_seconds = summary.solve_seconds;
+  frame.method = summary.method;
+  frame.surface = std::make_shared<const Surface>(deformer_->positions(), deformer_->cell_energies());
+  return publisher_.publish(std::move(frame));
+}
+
+std::size_t LiveSolver::memory_bytes() const {
+  return deformer_->memory_bytes() + publisher_.newest()->surface->memory_bytes();
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <stop_token>
+
+#include "core/solve/deformer.h"
+#include "server/mailbox.h"
+#include "server/publisher.h"
+#include "server/solve_job.h"
+
+namespace lpdeform {
+
+/// What a session does with its deformer, slice by slice: takes the newest inputs over, begins a solve where
+/// there is something new, steps, and publishes frames on the way. It works while somebody looks on or a
+/// Solve call waits, rests otherwise, and goes on from where it was. One thread at a time.
+///
+/// Inputs with no handle at all leave the surface as it is: its present state is their result. Where a
+/// component lacks a handle, no frame answers the inputs; a standing fault says so until newer inputs are
+/// better.
+class LiveSolver {
+ public:
+  /// Publishes the present state. Ends its solves when `stop` is requested.
+  LiveSolver(std::unique_ptr<Deformer> deformer, const Mailbox& mailbox, Publisher& publisher,
+             std::stop_token stop);
+
+  /// At most about kSlice, or one step where that takes longer. `job` may be null. True where there is more
+  /// to do.
+  bool run_slice(SolveJob* job);
+
+  /// Bytes held, the shared rest shape left out.
+  std::size_t memory_bytes() const;
+
+  static constexpr std::chrono::milliseconds kSlice{8};
+  static constexpr std::chrono::milliseconds kBetweenReports{100};
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  enum class Phase {
+    kDone,     // the inputs are answered, or cannot be
+    kWaiting,  // they are not yet, and no solve runs
+    kRunning,
+  };
+
+  void take_over(const Inputs& inputs);
+  bool begin_job(SolveJob& job);
+  bool begin_live();
+  void pause();
+  void run_steps(SolveJob* job);
+  void end_solve(SolveJob* job);
+  void report(const SolveJob& job);
+  std::shared_ptr<const Frame> publish(bool is_final);
+
+  const std::unique_ptr<Deformer> deformer_;
+  const Mailbox& mailbox_;
+  Publisher& publisher_;
+  const std::stop_token stop_;
+
+  Inputs inputs_;                          // taken over, or tried
+  std::shared_ptr<const HandleSet> held_;  // what the deformer has of them
+  absl::Status blocked_;                   // why they cannot be solved for
+  Phase phase_ = Phase::kDone;
+  bool was_begun_ = false;             // a solve for them, so the next one goes on from its state
+  const void* running_for_ = nullptr;  // the job, or this for the readers
+  Clock::time_point last_report_;
+};
+
+}  // namespace lpdeform

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "core/energy/material.h"
+#include "core/energy/rest_shape.h"
+#include "server/update.h"
+
+namespace lpdeform {
+
+/// The handles and settings in force: a value that nobody changes any more.
+struct Inputs {
+  std::uint64_t version = 0;    // rises with every update that is taken
+  std::uint64_t input_seq = 0;  // the newest that is in
+  std::uint64_t taken = 0;      // how many input_seqs have been the newest
+  std::shared_ptr<const HandleSet> handles;
+  std::shared_ptr<const Material> material;
+  SolveSettings solver;
+};
+
+/// Where updates meet the solver: keeps the newest value of each handle and each setting by input_seq. Which
+/// value is newest is decided for each handle and each setting by itself, so a late update of one does not
+/// undo another. An update is checked against the values it would lead to and is taken whole or not at all.
+/// Nothing queues: the solver reads what is newest when it has time. Thread-safe.
+class Mailbox {
+ public:
+  explicit Mailbox(std::shared_ptr<const RestShape> shape);
+
+  /// A part with the input_seq of the value that is there is a repetition: dropped, but not counted as stale.
+  /// Errors, INVALID_ARGUMENT: INPUT_SEQ_ZERO, HANDLE_CHANGED_TWICE (in this update), TOO_MANY_HANDLES,
+  /// HANDLE_TARGET_TOO_FAR, and what check_solver, check_handles, check_material and HandleSet have;
+  /// NOT_FOUND HANDLE_UNKNOWN. A component without a handle is no error here: handles may come one by one.
+  absl::StatusOr<UpdateResult> take(const Update& update);
+
+  /// What a session begins with: the same as an update that is older than all others.
+  absl::Status begin_with(const Update& update);
+
+  Inputs newest() const;
+
+  static constexpr std::size_t kMostHandles = 4096;
+
+ private:
+  /// The input_seq of the newest value of each part. Handles let go of are remembered so that a late change
+  /// does not bring them back; the oldest such memories are given up first, and all that is as old counts as
+  /// stale from then on.
+  struct Ages {
+    std::map<std::string, std::uint64_t, std::less<>> handles;
+    std::uint64_t forgotten = 0;  // the newest of those given up
+
+    std::uint64_t p = 0, stiffness = 0, length_unit = 0, solver = 0;
+  };
+  struct Candidate;
+
+  absl::StatusOr<UpdateResult> merge(const Update& update, bool is_beginning);
+  absl::Status change_handles(const Update& update, Candidate& next) const;
+  void change_settings(const Update& update, Candidate& next) const;
+  absl::Status check(const Candidate& next) const;
+  absl::Status check_targets(const std::string& name, const Handle& handle) const;
+
+  const std::shared_ptr<const RestShape> shape_;
+  std::mutex merging_;  // one update at a time; guards ages_
+  Ages ages_;
+  mutable std::mutex mutex_;  // guards inputs_, for moments only
+  Inputs inputs_;
+};
+
+/// Whether the method can minimise for this material: INVALID_ARGUMENT METHOD_NEEDS_P (local_global: p = 2
+/// everywhere; conic: p = 1), TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE.
+absl::Status check_solver(const SolveSettings& settings, const Material& material);
+
+}  // namespace lpdeform

@@ -1,0 +1,122 @@
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "server/health_probe.h"
+#include "server/server.h"
+
+namespace {
+
+using lpdeform::ServerOptions;
+
+struct Arguments {
+  ServerOptions server;
+  double session_idle_seconds = 600, upload_idle_seconds = 600, heartbeat_seconds = 15, grace_seconds = 20;
+  std::string log_level = "info";
+  std::string probed;
+};
+
+std::chrono::milliseconds milliseconds(double seconds) {
+  return std::chrono::milliseconds(static_cast<std::int64_t>(seconds * 1000));
+}
+
+void describe(CLI::App& app, Arguments& arguments) {
+  ServerOptions& server = arguments.server;
+  app.description(
+      "Deforms triangle meshes as a gRPC service (lpdeform.v1). Every option may also be given by the "
+      "environment "
+      "variable named beside it. SIGTERM and SIGINT stop it gracefully.");
+  app.add_option("--address", server.address, "Where to listen: HOST:PORT (port 0: a free one) or unix:/PATH")
+      ->envname("LPDEFORM_ADDRESS")
+      ->capture_default_str();
+  app.add_option("--threads", server.threads, "Threads that one solve may use; 0: all cores")
+      ->envname("LPDEFORM_THREADS")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  app.add_option("--runner-threads", server.runner_threads,
+                 "Threads that sessions take turns on, at least 2; 0: max(4, twice the cores)")
+      ->envname("LPDEFORM_RUNNER_THREADS")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  app.add_option("--max-sessions", server.max_sessions, "Sessions at a time")
+      ->envname("LPDEFORM_MAX_SESSIONS")
+      ->capture_default_str();
+  app.add_option("--max-vertices", server.max_vertices, "Vertices of one mesh; of faces, three times as many")
+      ->envname("LPDEFORM_MAX_VERTICES")
+      ->capture_default_str();
+  app.add_option("--max-bytes", server.max_bytes,
+                 "Memory of all sessions and uploads together; as 4GiB or in bytes")
+      ->envname("LPDEFORM_MAX_BYTES")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+  app.add_option("--max-upload-bytes", server.max_upload_bytes, "Size of one upload; as 256MiB or in bytes")
+      ->envname("LPDEFORM_MAX_UPLOAD_BYTES")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+  app.add_option("--session-idle", arguments.session_idle_seconds,
+                 "Seconds without use after which a session goes")
+      ->envname("LPDEFORM_SESSION_IDLE")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--upload-idle", arguments.upload_idle_seconds,
+                 "Seconds without use after which an upload goes")
+      ->envname("LPDEFORM_UPLOAD_IDLE")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--heartbeat", arguments.heartbeat_seconds,
+                 "Seconds of silence after which a stream says something")
+      ->envname("LPDEFORM_HEARTBEAT")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--grace", arguments.grace_seconds,
+                 "Seconds that calls have to end when the server is stopped")
+      ->envname("LPDEFORM_GRACE")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--log-level", arguments.log_level, "What to log on stderr, one JSON object a line")
+      ->envname("LPDEFORM_LOG_LEVEL")
+      ->check(CLI::IsMember({"debug", "info", "warning", "error", "off"}))
+      ->capture_default_str();
+  app.add_option("--healthcheck", arguments.probed,
+                 "Asks the server at this address for its health and exits: 0 where it serves, 1 where not")
+      ->type_name("ADDRESS");
+}
+
+int serve(Arguments& arguments, const sigset_t& signals) {
+  ServerOptions& options = arguments.server;
+  options.session_idle = milliseconds(arguments.session_idle_seconds);
+  options.upload_idle = milliseconds(arguments.upload_idle_seconds);
+  options.heartbeat = milliseconds(arguments.heartbeat_seconds);
+  options.log = std::make_shared<lpdeform::Log>(arguments.log_level);
+  const auto server = lpdeform::Server::start(options);
+  if (!server.ok()) {
+    std::fprintf(stderr, "lpdeform-server: %s\n", std::string(server.status().message()).c_str());
+    return 1;
+  }
+  std::printf("lpdeform-server listens on %s\n", (*server)->address().c_str());
+  std::fflush(stdout);
+  int signal = 0;
+  sigwait(&signals, &signal);
+  (*server)->drain(milliseconds(arguments.grace_seconds));
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // Blocked before any thread is made, so that only sigwait() sees them.
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+
+  Arguments arguments;
+  CLI::App app;
+  describe(app, arguments);
+  CLI11_PARSE(app, argc, argv);
+  if (!arguments.probed.empty()) return lpdeform::is_serving(arguments.probed) ? 0 : 1;
+  return serve(arguments, signals);
+}

@@ -1,0 +1,106 @@
+#include "server/publisher.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+namespace lpdeform {
+
+std::shared_ptr<const Frame> Publisher::publish(Frame frame) {
+  // Encoded here, on the solver's thread, in every form that is asked for, so that no reader's thread has to.
+  std::set<Scalar> scalars;
+  for (const auto& stream : readers()) scalars.insert(stream->options().scalar);
+  for (const Scalar scalar : scalars) frame.surface->position_bytes(scalar);
+
+  std::shared_ptr<const Frame> published;
+  {
+    const std::scoped_lock lock(mutex_);
+    frame.frame_seq = ++frames_;
+    frame.epoch = epoch_;
+    published = newest_ = std::make_shared<const Frame>(std::move(frame));
+  }
+  wake_all();
+  return published;
+}
+
+void Publisher::begin_epoch(std::uint64_t epoch) {
+  {
+    const std::scoped_lock lock(mutex_);
+    epoch_ = epoch;
+    if (newest_) {
+      Frame again = *newest_;
+      again.frame_seq = ++frames_;
+      again.epoch = epoch;
+      newest_ = std::make_shared<const Frame>(std::move(again));
+    }
+  }
+  wake_all();
+}
+
+void Publisher::set_standing(std::optional<FaultNote> fault) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (!fault && !standing_) return;
+    standing_.reset();
+    if (fault) standing_ = Standing{++faults_, *std::move(fault)};
+  }
+  wake_all();
+}
+
+std::shared_ptr<const Frame> Publisher::newest() const {
+  const std::scoped_lock lock(mutex_);
+  return newest_;
+}
+
+std::optional<Publisher::Standing> Publisher::standing() const {
+  const std::scoped_lock lock(mutex_);
+  return standing_;
+}
+
+bool Publisher::add(const std::shared_ptr<FrameStream>& stream) {
+  const std::scoped_lock lock(mutex_);
+  if (is_closed_) return false;
+  streams_.push_back(stream);
+  return true;
+}
+
+void Publisher::remove(const FrameStream& stream) {
+  const std::scoped_lock lock(mutex_);
+  std::erase_if(streams_, [&](const auto& one) { return one.get() == &stream; });
+}
+
+std::shared_ptr<FrameStream> Publisher::find(const std::string& id) const {
+  const std::scoped_lock lock(mutex_);
+  const auto found =
+      std::find_if(streams_.begin(), streams_.end(), [&](const auto& one) { return one->id() == id; });
+  return found == streams_.end() ? nullptr : *found;
+}
+
+std::size_t Publisher::reader_count() const {
+  const std::scoped_lock lock(mutex_);
+  return streams_.size();
+}
+
+bool Publisher::is_frame_wanted() const {
+  const auto all = readers();
+  return std::any_of(all.begin(), all.end(), [](const auto& stream) { return stream->wants_frame(); });
+}
+
+void Publisher::close(EndReason reason, const std::string& text) {
+  {
+    const std::scoped_lock lock(mutex_);
+    is_closed_ = true;
+  }
+  for (const auto& stream : readers()) stream->end(reason, text);
+}
+
+std::vector<std::shared_ptr<FrameStream>> Publisher::readers() const {
+  const std::scoped_lock lock(mutex_);
+  return streams_;
+}
+
+void Publisher::wake_all() const {
+  for (const auto& stream : readers()) stream->wake();
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "server/frame_stream.h"
+
+namespace lpdeform {
+
+/// Where a session's frames meet its readers: one slot with the newest frame, one with the fault that stands.
+/// Readers that are slow miss frames; the newest, and so the final one of the last input, always waits for
+/// them. Thread-safe.
+class Publisher {
+ public:
+  /// A fault that concerns every reader until the cause is gone. `number` rises with each.
+  struct Standing {
+    std::uint64_t number = 0;
+    FaultNote fault;
+  };
+
+  /// Numbers the frame within its epoch, puts it into the slot and wakes the readers.
+  std::shared_ptr<const Frame> publish(Frame frame);
+
+  /// Frames sent from now on are of this epoch, the one in the slot too.
+  void begin_epoch(std::uint64_t epoch);
+
+  /// Puts up a fault, or takes it down.
+  void set_standing(std::optional<FaultNote> fault);
+
+  std::shared_ptr<const Frame> newest() const;
+  std::optional<Standing> standing() const;
+
+  /// False, and nothing happens, once closed.
+  bool add(const std::shared_ptr<FrameStream>& stream);
+  void remove(const FrameStream& stream);
+  /// The stream of this id; null where there is none.
+  std::shared_ptr<FrameStream> find(const std::string& id) const;
+
+  std::size_t reader_count() const;
+  /// Whether any reader could be sent a frame at once.
+  bool is_frame_wanted() const;
+
+  /// Ends every stream and takes no more.
+  void close(EndReason reason, const std::string& text);
+
+ private:
+  std::vector<std::shared_ptr<FrameStream>> readers() const;
+  void wake_all() const;
+
+  mutable std::mutex mutex_;
+  std::shared_ptr<const Frame> newest_;
+  std::optional<Standing> standing_;
+  std::uint64_t faults_ = 0;
+  std::uint64_t frames_ = 0;
+  std::uint64_t epoch_ = 1;
+  bool is_closed_ = false;
+  std::vector<std::shared_ptr<FrameStream>> streams_;
+};
+
+}  // namespace lpdeform

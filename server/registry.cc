@@ -1,0 +1,164 @@
+#include "server/registry.h"
+
+#include <utility>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "server/upload.h"
+
+namespace lpdeform {
+
+Registry::Registry(std::shared_ptr<Timers> timers, Limits limits)
+    : timers_(std::move(timers)), limits_(limits) {}
+
+bool Registry::begin_creation(const std::string& request_id, OnCreated on_created) {
+  if (absl::Status status = check_request_id(request_id); !status.ok()) {
+    on_created(status);
+    return false;
+  }
+  std::unique_lock lock(mutex_);
+  if (const auto known = requests_.find(request_id); known != requests_.end()) {
+    if (known->second.name.empty()) {
+      known->second.waiting.push_back(std::move(on_created));
+      return false;
+    }
+    const CreatedSession created{sessions_.at(known->second.name).session, known->second.writer_token};
+    lock.unlock();
+    created.session->touch();
+    on_created(created);
+    return false;
+  }
+  if (sessions_.size() + being_made_ >= limits_.most_sessions) {
+    lock.unlock();
+    on_created(
+        make_fault(absl::StatusCode::kResourceExhausted,
+                   {"SESSIONS_FULL", "sessions", absl::StrCat("sessions <= ", limits_.most_sessions)},
+                   absl::StrCat("The server has all of its ", limits_.most_sessions, " sessions in use.")));
+    return false;
+  }
+  ++being_made_;
+  if (!request_id.empty()) requests_[request_id].waiting.push_back(std::move(on_created));
+  return true;
+}
+
+void Registry::finish_creation(const std::string& request_id, absl::StatusOr<std::shared_ptr<Session>> made,
+                               const OnCreated& on_created) {
+  absl::StatusOr<CreatedSession> created = made.status();
+  if (made.ok()) created = CreatedSession{*made, (*made)->lease().token};
+  std::vector<OnCreated> waiting;
+  {
+    const std::scoped_lock lock(mutex_);
+    --being_made_;
+    if (!request_id.empty()) {
+      Request& request = requests_[request_id];
+      waiting.swap(request.waiting);
+      if (made.ok()) {
+        request.name = (*made)->name();
+        request.writer_token = created->writer_token;
+      } else {
+        requests_.erase(request_id);
+      }
+    }
+    if (made.ok()) {
+      const std::string& name = (*made)->name();
+      sessions_[name] = {*made, request_id, ++numbers_};
+      by_age_[numbers_] = name;
+      watch(name, timers_->now() + limits_.idle);
+    }
+  }
+  if (request_id.empty()) on_created(created);
+  for (const OnCreated& one : waiting) one(created);
+}
+
+absl::StatusOr<std::shared_ptr<Session>> Registry::find(const std::string& name) const {
+  {
+    const std::scoped_lock lock(mutex_);
+    const auto found = sessions_.find(name);
+    if (found != sessions_.end()) {
+      found->second.session->touch();
+      return found->second.session;
+    }
+  }
+  return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""},
+                    "There is no such session; it may have expired or been deleted.");
+}
+
+absl::StatusOr<Registry::Page> Registry::list(std::size_t most, const std::string& page_token) const {
+  std::uint64_t before = 0;
+  if (!page_token.empty() && !absl::SimpleAtoi(page_token, &before)) {
+    return invalid_input({"PAGE_TOKEN", "page_token", ""},
+                         "The page token is none that this server gave out.");
+  }
+  const std::scoped_lock lock(mutex_);
+  Page page;
+  auto entry = page_token.empty() ? by_age_.end() : by_age_.lower_bound(before);
+  while (entry != by_age_.begin() && page.sessions.size() < most) {
+    --entry;
+    page.sessions.push_back(sessions_.at(entry->second).session);
+  }
+  if (entry != by_age_.begin() && !page.sessions.empty()) page.next_page_token = absl::StrCat(entry->first);
+  return page;
+}
+
+void Registry::remove(const std::string& name, EndReason reason, const std::string& text) {
+  std::shared_ptr<Session> session;
+  {
+    const std::scoped_lock lock(mutex_);
+    const auto found = sessions_.find(name);
+    if (found == sessions_.end()) return;
+    session = found->second.session;
+    by_age_.erase(found->second.number);
+    requests_.erase(found->second.request_id);
+    sessions_.erase(found);
+  }
+  session->close(reason, text);
+}
+
+void Registry::drain(const std::string& text) {
+  std::vector<std::shared_ptr<Session>> all;
+  {
+    const std::scoped_lock lock(mutex_);
+    for (const auto& [name, entry] : sessions_) all.push_back(entry.session);
+  }
+  for (const auto& session : all) session->drain(text);
+}
+
+void Registry::clear(EndReason reason, const std::string& text) {
+  std::map<std::string, Entry> all;
+  {
+    const std::scoped_lock lock(mutex_);
+    all.swap(sessions_);
+    by_age_.clear();
+    std::erase_if(requests_, [](const auto& request) { return !request.second.name.empty(); });
+  }
+  for (const auto& [name, entry] : all) entry.session->close(reason, text);
+}
+
+std::size_t Registry::size() const {
+  const std::scoped_lock lock(mutex_);
+  return sessions_.size();
+}
+
+void Registry::watch(const std::string& name, Timers::TimePoint when) {
+  timers_->at(when, [weak = weak_from_this(), name] {
+    if (const auto self = weak.lock()) self->expire(name);
+  });
+}
+
+/// Closes the session when it has been idle for long enough; looks again later where it has not.
+void Registry::expire(const std::string& name) {
+  std::shared_ptr<Session> session;
+  {
+    const std::scoped_lock lock(mutex_);
+    const auto found = sessions_.find(name);
+    if (found == sessions_.end()) return;
+    session = found->second.session;
+  }
+  const Timers::TimePoint due = session->last_used() + limits_.idle;
+  if (timers_->now() < due) return watch(name, due);
+  if (on_expired) on_expired(*session);
+  remove(name, EndReason::kSessionExpired, "The session was idle for too long.");
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/session.h"
+#include "server/timers.h"
+
+namespace lpdeform {
+
+/// A session just made, for its maker: made again by the same request_id, it is the same.
+struct CreatedSession {
+  std::shared_ptr<Session> session;
+  std::string writer_token;
+};
+
+/// All sessions of a server, by name. Those that nobody uses for a while are closed. Thread-safe. Held by a
+/// shared pointer.
+class Registry : public std::enable_shared_from_this<Registry> {
+ public:
+  using OnCreated = std::function<void(absl::StatusOr<CreatedSession>)>;
+
+  struct Limits {
+    std::size_t most_sessions;
+    Timers::Duration idle;
+  };
+
+  Registry(std::shared_ptr<Timers> timers, Limits limits);
+
+  /// Claims a place for a session to be made. True where the caller is to make it and then call
+  /// finish_creation() with the same request_id; `on_created` hears how that went. False where `on_created`
+  /// is or will be called without the caller's doing: the session exists, another caller is making it, or an
+  /// error (INVALID_ARGUMENT REQUEST_ID, RESOURCE_EXHAUSTED SESSIONS_FULL).
+  bool begin_creation(const std::string& request_id, OnCreated on_created);
+
+  /// Enters the session, or gives its place up. With an empty request_id, tells `on_created` alone.
+  void finish_creation(const std::string& request_id, absl::StatusOr<std::shared_ptr<Session>> made,
+                       const OnCreated& on_created);
+
+  /// NOT_FOUND SESSION_UNKNOWN. Counts as use.
+  absl::StatusOr<std::shared_ptr<Session>> find(const std::string& name) const;
+
+  /// Newest first, at most `most`, those after `page_token` (empty: from the beginning), with the token of
+  /// the next page (empty: there is none). INVALID_ARGUMENT PAGE_TOKEN.
+  struct Page {
+    std::vector<std::shared_ptr<Session>> sessions;
+    std::string next_page_token;
+  };
+  absl::StatusOr<Page> list(std::size_t most, const std::string& page_token) const;
+
+  /// Closes and forgets the session; nothing where there is none.
+  void remove(const std::string& name, EndReason reason, const std::string& text);
+
+  /// Ends all streams, now and from now on; Solve calls go on.
+  void drain(const std::string& text);
+
+  /// Closes and forgets all.
+  void clear(EndReason reason, const std::string& text);
+
+  /// What sessions are told of when they expire, for the log. Called under no lock.
+  std::function<void(const Session&)> on_expired;
+
+  Timers::Duration idle() const { return limits_.idle; }
+  std::size_t size() const;
+
+ private:
+  struct Entry {
+    std::shared_ptr<Session> session;
+    std::string request_id;
+    std::uint64_t number = 0;
+  };
+  struct Request {
+    std::string name;  // empty while the session is being made
+    std::string writer_token;
+    std::vector<OnCreated> waiting;
+  };
+  void watch(const std::string& name, Timers::TimePoint when);
+  void expire(const std::string& name);
+
+  const std::shared_ptr<Timers> timers_;
+  const Limits limits_;
+  mutable std::mutex mutex_;
+  std::map<std::string, Entry> sessions_;
+  std::map<std::uint64_t, std::string> by_age_;  // names, by their numbers
+  std::map<std::string, Request> requests_;
+  std::size_t being_made_ = 0;
+  std::uint64_t numbers_ = 0;
+};
+
+}  // namespace lpdeform

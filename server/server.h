@@ -1,0 +1,62 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "server/log.h"
+#include "server/timers.h"
+
+namespace lpdeform {
+
+struct ServerOptions {
+  /// "host:port", port 0 for a free one, or "unix:/path/of/socket".
+  std::string address = "127.0.0.1:0";
+
+  /// Threads that one solve may use; 0 takes all cores.
+  int threads = 0;
+  /// Threads that sessions take turns on, at least 2; 0 takes max(4, 2 * cores).
+  int runner_threads = 0;
+
+  std::size_t max_sessions = 256;
+  std::uint32_t max_vertices = 2'000'000;        // of one mesh; of faces, three times as many
+  std::size_t max_bytes = std::size_t{8} << 30;  // of all sessions and uploads together, by our own count
+  std::uint64_t max_upload_bytes = std::uint64_t{256} << 20;  // of one upload
+
+  std::chrono::milliseconds session_idle = std::chrono::minutes(10);
+  std::chrono::milliseconds upload_idle = std::chrono::minutes(10);
+  std::chrono::milliseconds heartbeat = std::chrono::seconds(15);
+
+  /// The clock of the three above; empty takes the system's.
+  std::shared_ptr<Timers> timers = {};
+  /// Empty logs nothing.
+  std::shared_ptr<Log> log = {};
+};
+
+/// The service, running: from start() until drain() or the destructor. Thread-safe.
+class Server {
+ public:
+  /// Errors: INVALID_ARGUMENT OPTION_OUT_OF_RANGE; UNAVAILABLE ADDRESS_NOT_BOUND.
+  static absl::StatusOr<std::unique_ptr<Server>> start(const ServerOptions& options);
+
+  /// Drains, waiting for nobody.
+  ~Server();
+
+  /// For clients: as in the options, with the port that was found.
+  const std::string& address() const;
+
+  /// Stops: health says NOT_SERVING, new calls are refused as UNAVAILABLE, streams get a go-away, Solve calls
+  /// may go on until `grace` has passed and are ended then. Returns when nothing runs any more. Again: at
+  /// once.
+  void drain(std::chrono::milliseconds grace);
+
+ private:
+  struct Impl;
+  explicit Server(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace lpdeform

@@ -1,0 +1,43 @@
+#pragma once
+
+#include "lpdeform/v1/service.grpc.pb.h"
+#include "server/backend.h"
+
+namespace lpdeform {
+
+/// The contract's calls as gRPC has them: each goes to the backend on a thread of the pool, and its status
+/// back through to_grpc(). `backend` outlives it.
+class Service final : public v1::DeformService::CallbackService {
+ public:
+  explicit Service(Backend& backend) : backend_(backend) {}
+
+  using Context = grpc::CallbackServerContext;
+  grpc::ServerUnaryReactor* CreateUpload(Context* context, const v1::CreateUploadRequest* request,
+                                         v1::CreateUploadResponse* response) override;
+  grpc::ServerUnaryReactor* UploadPart(Context* context, const v1::UploadPartRequest* request,
+                                       v1::UploadPartResponse* response) override;
+  grpc::ServerUnaryReactor* CreateSession(Context* context, const v1::CreateSessionRequest* request,
+                                          v1::CreateSessionResponse* response) override;
+  grpc::ServerUnaryReactor* GetSession(Context* context, const v1::GetSessionRequest* request,
+                                       v1::GetSessionResponse* response) override;
+  grpc::ServerUnaryReactor* ListSessions(Context* context, const v1::ListSessionsRequest* request,
+                                         v1::ListSessionsResponse* response) override;
+  grpc::ServerUnaryReactor* DeleteSession(Context* context, const v1::DeleteSessionRequest* request,
+                                          v1::DeleteSessionResponse* response) override;
+  grpc::ServerUnaryReactor* AcquireWriter(Context* context, const v1::AcquireWriterRequest* request,
+                                          v1::AcquireWriterResponse* response) override;
+  grpc::ServerUnaryReactor* UpdateHandles(Context* context, const v1::UpdateHandlesRequest* request,
+                                          v1::UpdateHandlesResponse* response) override;
+  grpc::ServerUnaryReactor* AckFrames(Context* context, const v1::AckFramesRequest* request,
+                                      v1::AckFramesResponse* response) override;
+  grpc::ServerWriteReactor<v1::StreamFramesResponse>* StreamFrames(
+      Context* context, const v1::StreamFramesRequest* request) override;
+  grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* Deform(Context* context) override;
+  grpc::ServerWriteReactor<v1::SolveResponse>* Solve(Context* context,
+                                                     const v1::SolveRequest* request) override;
+
+ private:
+  Backend& backend_;
+};
+
+}  // namespace lpdeform

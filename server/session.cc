@@ -1,0 +1,245 @@
+#include "server/session.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "server/random_name.h"
+#include "server/refusals.h"
+
+namespace lpdeform {
+namespace {
+
+/// A slice of a larger mesh may take long: see Scheduler.
+constexpr std::int32_t kHeavyVertices = 20000;
+
+std::int64_t unix_ms_now() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::milliseconds>(now).count();
+}
+
+/// Takes as long for a token that is nearly right as for any other.
+bool is_same_token(const std::string& a, const std::string& b) {
+  if (a.size() != b.size()) return false;
+  unsigned char difference = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) difference |= static_cast<unsigned char>(a[k] ^ b[k]);
+  return difference == 0;
+}
+
+absl::Status gone(const std::string& name) {
+  return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", name, ""},
+                    absl::StrCat("There is no ", name, "."));
+}
+
+absl::Status too_many_streams() {
+  return make_fault(absl::StatusCode::kResourceExhausted,
+                    {"STREAMS_FULL", "streams", absl::StrCat("streams <= ", Session::kMostStreams)},
+                    absl::StrCat("The session has all of its ", Session::kMostStreams, " streams in use."));
+}
+
+absl::Status ended_by(EndReason reason, const std::string& text) {
+  if (reason == EndReason::kDraining) return server_draining();
+  const char* const name = reason == EndReason::kSessionExpired ? "SESSION_EXPIRED" : "SESSION_DELETED";
+  return make_fault(absl::StatusCode::kAborted, {name, "", ""}, text);
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<Session>> Session::create(SessionParts parts, SessionServices services) {
+  const Update beginning = std::move(parts.beginning);
+  std::unique_ptr<Deformer> deformer = std::move(parts.deformer);
+  const std::shared_ptr<Session> session(new Session(std::move(parts), std::move(services)));
+  if (absl::Status status = session->mailbox_.begin_with(beginning); !status.ok()) return status;
+  session->solver_ = std::make_unique<LiveSolver>(std::move(deformer), session->mailbox_,
+                                                  *session->publisher_, session->stop_.get_token());
+  return session;
+}
+
+Session::Session(SessionParts parts, SessionServices services)
+    : Runnable(parts.shape->vertex_count() > kHeavyVertices),
+      name_(std::move(parts.name)),
+      shape_(std::move(parts.shape)),
+      free_components_(parts.free_components),
+      services_(std::move(services)),
+      created_unix_ms_(unix_ms_now()),
+      last_used_(services_.timers->now()),
+      mailbox_(shape_),
+      memory_(std::move(parts.memory)),
+      memory_bytes_(memory_.bytes()),
+      token_(random_hex_128()) {}
+
+SessionInfo Session::info() const {
+  return {name_,
+          lease().epoch,
+          shape_,
+          free_components_,
+          mailbox_.newest(),
+          created_unix_ms_,
+          last_used_.load(),
+          memory_bytes_.load()};
+}
+
+WriterLease Session::lease() const {
+  const std::scoped_lock lock(writing_);
+  return {token_, epoch_, mailbox_.newest().input_seq};
+}
+
+absl::Status Session::check_writer(const std::string& token) const {
+  const std::scoped_lock lock(writing_);
+  return check_writer_locked(token);
+}
+
+absl::Status Session::check_writer_locked(const std::string& token) const {
+  if (token.empty()) {
+    return make_fault(absl::StatusCode::kUnauthenticated, {"WRITER_TOKEN_MISSING", "writer_token", ""},
+                      "Changing a session needs its writer token.");
+  }
+  if (is_same_token(token, token_)) return absl::OkStatus();
+  return make_fault(absl::StatusCode::kPermissionDenied, {"NOT_THE_WRITER", "writer_token", ""},
+                    "The writer token is not that of the session's present writer.");
+}
+
+WriterLease Session::acquire_writer() {
+  touch();
+  WriterLease lease;
+  std::vector<std::weak_ptr<FrameStream>> before;
+  {
+    const std::scoped_lock lock(writing_);
+    token_ = random_hex_128();
+    ++epoch_;
+    before.swap(writers_);
+    publisher_->begin_epoch(epoch_);
+    lease = {token_, epoch_, mailbox_.newest().input_seq};
+  }
+  const std::string text = "Another writer took the session over.";
+  for (const auto& weak : before) {
+    if (const auto stream = weak.lock()) stream->end(EndReason::kWriterReplaced, text);
+  }
+  end_job(make_fault(absl::StatusCode::kAborted, {"WRITER_REPLACED", "", ""}, text));
+  return lease;
+}
+
+absl::StatusOr<UpdateResult> Session::update(const std::string& token, const Update& update) {
+  touch();
+  absl::StatusOr<UpdateResult> result;
+  {
+    const std::scoped_lock lock(writing_);
+    if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
+    if (is_closed_) return gone(name_);
+    result = mailbox_.take(update);
+  }
+  if (result.ok()) services_.scheduler.wake(shared_from_this());
+  return result;
+}
+
+absl::Status Session::solve(const std::string& token, const std::optional<Update>& update,
+                            const std::shared_ptr<SolveJob>& job) {
+  touch();
+  std::shared_ptr<SolveJob> before;
+  {
+    const std::scoped_lock lock(writing_);
+    if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
+    if (update) {
+      if (absl::Status status = mailbox_.take(*update).status(); !status.ok()) return status;
+    }
+    const std::scoped_lock job_lock(mutex_);
+    if (is_closed_) return gone(name_);
+    job->version = mailbox_.newest().version;
+    before = std::exchange(job_, job);
+  }
+  if (before) {
+    before->finish(make_fault(absl::StatusCode::kAborted, {"SUPERSEDED", "", ""},
+                              "Another solve of the session began before this one was finished."));
+  }
+  services_.scheduler.wake(shared_from_this());
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::shared_ptr<FrameStream>> Session::open_stream(const std::string& token,
+                                                                  const StreamOptions& options) {
+  touch();
+  std::shared_ptr<FrameStream> stream;
+  {
+    const std::scoped_lock lock(writing_);
+    if (!token.empty()) {
+      if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
+    }
+    stream = std::make_shared<FrameStream>(options, publisher_, services_.timers, services_.heartbeat,
+                                           OpenedNote{epoch_, mailbox_.newest().input_seq});
+    if (publisher_->reader_count() >= kMostStreams) return too_many_streams();
+    if (!publisher_->add(stream)) return is_draining_ && !is_closed_ ? server_draining() : gone(name_);
+    std::erase_if(writers_, [](const auto& weak) { return weak.expired(); });
+    if (!token.empty()) writers_.push_back(stream);
+  }
+  publisher_->newest()->surface->position_bytes(options.scalar);  // encodes it here, not on a reader's thread
+  services_.scheduler.wake(shared_from_this());
+  return stream;
+}
+
+void Session::forget_stream(const FrameStream& stream) {
+  publisher_->remove(stream);
+}
+
+absl::Status Session::acknowledge(const std::string& stream_id, std::uint64_t frame_seq) {
+  touch();
+  const auto stream = publisher_->find(stream_id);
+  if (stream) return stream->acknowledge(frame_seq);
+  return make_fault(absl::StatusCode::kNotFound, {"STREAM_UNKNOWN", "stream_id", ""},
+                    "The session has no stream of this id; it may have ended.");
+}
+
+void Session::drain(const std::string& text) {
+  is_draining_ = true;
+  publisher_->close(EndReason::kDraining, text);
+}
+
+void Session::close(EndReason reason, const std::string& text) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (is_closed_.exchange(true)) return;
+  }
+  stop_.request_stop();
+  end_job(ended_by(reason, text));
+  publisher_->close(reason, text);
+}
+
+void Session::touch() {
+  last_used_ = services_.timers->now();
+}
+
+Timers::TimePoint Session::last_used() const {
+  return job() ? services_.timers->now() : last_used_.load();
+}
+
+std::shared_ptr<SolveJob> Session::job() const {
+  const std::scoped_lock lock(mutex_);
+  return job_;
+}
+
+void Session::end_job(const absl::Status& why) {
+  std::shared_ptr<SolveJob> job;
+  {
+    const std::scoped_lock lock(mutex_);
+    job.swap(job_);
+  }
+  if (job) job->finish(why);
+}
+
+bool Session::run() {
+  const std::shared_ptr<SolveJob> job = this->job();
+  if (is_closed_) return false;
+  bool has_more = solver_->run_slice(job.get());
+  if (job && job->is_done()) {
+    touch();
+    const std::scoped_lock lock(mutex_);
+    if (job_ == job) job_.reset();
+    has_more = true;  // the readers' solve may have to go on
+  }
+  memory_bytes_ = shape_->memory_bytes() + solver_->memory_bytes();
+  memory_.resize(memory_bytes_);
+  return has_more;
+}
+
+}  // namespace lpdeform

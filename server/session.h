@@ -1,0 +1,144 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/solve/deformer.h"
+#include "server/budget.h"
+#include "server/live_solver.h"
+#include "server/mailbox.h"
+#include "server/publisher.h"
+#include "server/scheduler.h"
+#include "server/solve_job.h"
+#include "server/timers.h"
+
+namespace lpdeform {
+
+/// What a session is made of.
+struct SessionParts {
+  std::string name;
+  std::shared_ptr<const RestShape> shape;
+  std::unique_ptr<Deformer> deformer;
+  FreeComponents free_components = FreeComponents::kError;
+  Update beginning;    // settings and handles to begin with
+  Reservation memory;  // the estimate that it was admitted with
+};
+
+/// What everybody's sessions share.
+struct SessionServices {
+  Scheduler& scheduler;
+  std::shared_ptr<Timers> timers;
+  Timers::Duration heartbeat;
+};
+
+/// What GetSession tells.
+struct SessionInfo {
+  std::string name;
+  std::uint64_t epoch = 0;
+  std::shared_ptr<const RestShape> shape;
+  FreeComponents free_components = FreeComponents::kError;
+  Inputs inputs;
+  std::int64_t created_unix_ms = 0;
+  Timers::TimePoint last_used;
+  std::size_t memory_bytes = 0;
+};
+
+/// Who may change a session, and since when.
+struct WriterLease {
+  std::string token;
+  std::uint64_t epoch = 0;
+  std::uint64_t input_seq = 0;
+};
+
+/// A mesh being deformed for one writer and any number of readers: a mailbox that updates go into, a live
+/// solver that a scheduler's threads run, a publisher that frames come out of. Every function but run() may
+/// be called from any thread and takes no longer than looking at its arguments.
+class Session final : public Runnable, public std::enable_shared_from_this<Session> {
+ public:
+  /// Errors: what Mailbox::take has to say about the beginning.
+  static absl::StatusOr<std::shared_ptr<Session>> create(SessionParts parts, SessionServices services);
+
+  const std::string& name() const { return name_; }
+  std::uint32_t vertex_count() const { return static_cast<std::uint32_t>(shape_->vertex_count()); }
+  SessionInfo info() const;
+  WriterLease lease() const;
+
+  /// UNAUTHENTICATED WRITER_TOKEN_MISSING, PERMISSION_DENIED NOT_THE_WRITER.
+  absl::Status check_writer(const std::string& token) const;
+
+  /// A new token and a new epoch; the writer before is one no more, and its Solve and Deform calls end.
+  WriterLease acquire_writer();
+
+  /// Errors: as check_writer and Mailbox::take; NOT_FOUND SESSION_UNKNOWN once closed.
+  absl::StatusOr<UpdateResult> update(const std::string& token, const Update& update);
+
+  /// Takes `update` in, if there is one, and runs `job`; an earlier job ends with ABORTED SUPERSEDED. Errors
+  /// as update(); then the job does not begin.
+  absl::Status solve(const std::string& token, const std::optional<Update>& update,
+                     const std::shared_ptr<SolveJob>& job);
+
+  /// A new stream. With a token, it is the writer's, and ends when another takes over. Errors: as
+  /// check_writer where `token` is not empty; NOT_FOUND SESSION_UNKNOWN once closed; UNAVAILABLE DRAINING;
+  /// RESOURCE_EXHAUSTED STREAMS_FULL.
+  absl::StatusOr<std::shared_ptr<FrameStream>> open_stream(const std::string& token,
+                                                           const StreamOptions& options);
+  /// The stream has ended and is forgotten; with the last one, live solving rests.
+  void forget_stream(const FrameStream& stream);
+
+  /// NOT_FOUND STREAM_UNKNOWN, and as FrameStream::acknowledge.
+  absl::Status acknowledge(const std::string& stream_id, std::uint64_t frame_seq);
+
+  /// Ends every stream, as the server shuts down, and takes no more. A Solve call goes on.
+  void drain(const std::string& text);
+
+  /// Ends every stream and the solver. Again: nothing.
+  void close(EndReason reason, const std::string& text);
+  bool is_closed() const { return is_closed_; }
+
+  /// Somebody uses the session.
+  void touch();
+  /// The last time that anybody did; now where a Solve call runs.
+  Timers::TimePoint last_used() const;
+
+  bool run() override;
+
+  static constexpr std::size_t kMostStreams = 256;
+
+ private:
+  Session(SessionParts parts, SessionServices services);
+  absl::Status check_writer_locked(const std::string& token) const;
+  void end_job(const absl::Status& why);
+  std::shared_ptr<SolveJob> job() const;
+
+  const std::string name_;
+  const std::shared_ptr<const RestShape> shape_;
+  const FreeComponents free_components_;
+  const SessionServices services_;
+  const std::int64_t created_unix_ms_;
+  std::atomic<Timers::TimePoint> last_used_;
+  std::atomic<bool> is_closed_ = false;
+  std::atomic<bool> is_draining_ = false;
+  std::stop_source stop_;
+  Mailbox mailbox_;
+  const std::shared_ptr<Publisher> publisher_ = std::make_shared<Publisher>();
+  Reservation memory_;  // the scheduler's threads alone
+  std::atomic<std::size_t> memory_bytes_;
+  std::unique_ptr<LiveSolver> solver_;  // the scheduler's threads alone
+
+  mutable std::mutex writing_;  // an update of an old writer never comes after a new one's first
+  std::string token_;
+  std::uint64_t epoch_ = 1;
+  std::vector<std::weak_ptr<FrameStream>> writers_;
+
+  mutable std::mutex mutex_;
+  std::shared_ptr<SolveJob> job_;
+};
+
+}  // namespace lpdeform

@@ -1,0 +1,117 @@
+#include "server/solve_call.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "server/encode.h"
+#include "server/write_pump.h"
+
+namespace lpdeform {
+namespace {
+
+/// Progress while the solver runs, the newest only; then the summary, the trace, the result.
+class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveResponse>, v1::SolveResponse> {
+ public:
+  explicit SolveCall(Backend& backend) : backend_(backend) {}
+
+  void begin(const v1::SolveRequest& request) {
+    auto self = std::static_pointer_cast<SolveCall>(shared_from_this());
+    // A copy, because gRPC's goes when the call is cancelled.
+    if (!backend_.pool.try_post([self, request] { self->start(request); })) refuse(server_busy());
+  }
+
+ private:
+  static constexpr std::size_t kRecordsAMessage = 10000;  // of about 40 bytes
+
+  std::weak_ptr<SolveCall> weak() { return std::static_pointer_cast<SolveCall>(shared_from_this()); }
+
+  void start(const v1::SolveRequest& request) {
+    {
+      const std::scoped_lock lock(mutex_);
+      if (is_over_locked()) return;
+      scalar_ = request.scalar() == v1::SCALAR_FLOAT64 ? Scalar::kFloat64 : Scalar::kFloat32;
+    }
+    SolveJob::OnProgress on_progress;
+    if (request.progress()) {
+      on_progress = [weak = weak()](const SolveProgress& progress) {
+        if (const auto self = weak.lock()) self->show(progress);
+      };
+    }
+    const auto on_done = [weak = weak()](absl::StatusOr<SolveResult> result) {
+      if (const auto self = weak.lock()) self->end(std::move(result));
+    };
+    std::shared_ptr<SolveJob> job;
+    absl::Status status = decode_scalar(request.scalar()).status();
+    if (status.ok()) status = backend_.solve(request, std::move(on_progress), on_done, job);
+    if (!status.ok()) return refuse(status);
+    const std::scoped_lock lock(mutex_);
+    job_ = std::move(job);
+    if (is_over_locked()) job_->abandon();
+  }
+
+  void show(const SolveProgress& progress) {
+    const std::scoped_lock lock(mutex_);
+    progress_ = progress;
+    pump_locked();
+  }
+
+  void end(absl::StatusOr<SolveResult> result) {
+    if (!result.ok()) return refuse(result.status());
+    result->frame->surface->position_bytes(scalar_);  // encodes it on this thread
+    const std::scoped_lock lock(mutex_);
+    backend_.log().info("solved",
+                        {{"input_seq", result->frame->input_seq},
+                         {"iterations", static_cast<std::uint64_t>(result->summary.iterations)},
+                         {"seconds", result->summary.solve_seconds},
+                         {"stop_reason", std::string(stop_reason_name(result->summary.stop_reason))}});
+    progress_.reset();
+    cutter_ = FrameCutter(result->frame, scalar_, true, 0);
+    result_ = *std::move(result);
+    pump_locked();
+  }
+
+  Made make(v1::SolveResponse& response) override {
+    if (progress_) {
+      response.mutable_progress()->set_iteration(progress_->iteration);
+      response.mutable_progress()->set_energy(progress_->energy);
+      response.mutable_progress()->set_seconds(progress_->seconds);
+      progress_.reset();
+      return Made::kMessage;
+    }
+    if (!result_) return Made::kNothing;
+    const std::vector<IterationRecord>& trace = result_->summary.trace;
+    if (!std::exchange(is_summary_sent_, true)) {
+      encode(*result_, *response.mutable_summary());
+    } else if (records_sent_ < trace.size()) {
+      const std::size_t end = std::min(trace.size(), records_sent_ + kRecordsAMessage);
+      encode_trace(trace, records_sent_, end, *response.mutable_trace());
+      records_sent_ = end;
+    } else {
+      encode(cutter_.next(), response);
+      if (!cutter_.has_more()) return Made::kLastMessage;
+    }
+    return Made::kMessage;
+  }
+
+  void let_go() override {
+    if (job_) job_->abandon();
+  }
+
+  Backend& backend_;
+  Scalar scalar_ = Scalar::kFloat32;
+  std::shared_ptr<SolveJob> job_;
+  std::optional<SolveProgress> progress_;
+  std::optional<SolveResult> result_;
+  bool is_summary_sent_ = false;
+  std::size_t records_sent_ = 0;
+  FrameCutter cutter_;
+};
+
+}  // namespace
+
+grpc::ServerWriteReactor<v1::SolveResponse>* solve(Backend& backend, const v1::SolveRequest& request) {
+  return begin_call<SolveCall>(backend, request);
+}
+
+}  // namespace lpdeform

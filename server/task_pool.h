@@ -1,0 +1,38 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace lpdeform {
+
+/// A few threads that take calls off gRPC's: decoding, checks, copies. First come, first served, so nothing
+/// that factors or solves belongs here (that is the Scheduler's). Thread-safe.
+class TaskPool {
+ public:
+  using Task = std::function<void()>;
+
+  /// `threads` >= 1; at most `longest_queue` tasks wait.
+  TaskPool(int threads, std::size_t longest_queue);
+  /// Finishes what was taken on.
+  ~TaskPool();
+
+  /// False, and nothing happens, where too many wait already.
+  [[nodiscard]] bool try_post(Task task);
+
+ private:
+  void run();
+
+  const std::size_t longest_queue_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Task> tasks_;
+  bool is_stopping_ = false;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace lpdeform

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/base/geometry.h"
+#include "core/solve/handles.h"
+#include "core/solve/settings.h"
+
+namespace lpdeform {
+
+/// Lets go of a handle.
+struct Removal {};
+
+/// A change of one handle: adds or replaces it, moves it, or lets go of it.
+struct HandleChange {
+  std::string name;
+  std::variant<Handle, HandleMotion, Removal> change;
+};
+
+/// What is left out keeps its value.
+struct SettingsChange {
+  std::optional<Field> p;
+  std::optional<Field> stiffness;
+  std::optional<double> length_unit;
+  std::optional<SolveSettings> solver;
+};
+
+/// A change of handles and settings, as a writer sends it.
+struct Update {
+  std::uint64_t input_seq = 0;
+  std::vector<HandleChange> handles;
+  SettingsChange settings;
+};
+
+/// How an update was taken.
+struct UpdateResult {
+  std::uint64_t input_seq = 0;
+  std::uint32_t stale_parts = 0;
+};
+
+}  // namespace lpdeform

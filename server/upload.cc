@@ -1,0 +1,133 @@
+#include "server/upload.h"
+
+#include <algorithm>
+#include <cstring>
+#include <iterator>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/crc32c.h"
+#include "core/base/fault.h"
+#include "server/random_name.h"
+
+namespace lpdeform {
+
+absl::Status check_request_id(const std::string& request_id) {
+  if (request_id.empty() || (request_id.size() >= 8 && request_id.size() <= 64)) return absl::OkStatus();
+  return invalid_input(
+      {"REQUEST_ID", "request_id", "empty, or 8 to 64 bytes"},
+      absl::StrCat("The request_id has ", request_id.size(), " bytes; it may be empty or have 8 to 64."));
+}
+
+Upload::Upload(std::string name, std::uint64_t size_bytes, std::uint32_t crc32c, Reservation memory)
+    : name_(std::move(name)),
+      size_(size_bytes),
+      crc32c_(crc32c),
+      memory_(std::move(memory)),
+      data_(std::make_unique_for_overwrite<char[]>(size_bytes)) {}
+
+absl::StatusOr<UploadProgress> Upload::add(std::uint64_t offset, std::string_view data) {
+  if (data.empty() || data.size() > kMostPartBytes) {
+    return invalid_input(
+        {"UPLOAD_PART_SIZE", name_, absl::StrCat("1 to ", kMostPartBytes, " bytes")},
+        absl::StrCat("The part has ", data.size(), " bytes, not 1 to ", kMostPartBytes, "."));
+  }
+  if (offset > size_ || data.size() > size_ - offset) {
+    return invalid_input({"UPLOAD_PART_OUT_OF_RANGE", name_, absl::StrCat("offset + size <= ", size_)},
+                         absl::StrCat("The part of ", data.size(), " bytes at ", offset,
+                                      " does not lie within the upload's ", size_, " bytes."));
+  }
+  const std::scoped_lock lock(mutex_);
+  if (is_finished_) return UploadProgress{size_, true};
+  if (runs_.size() >= kMostGaps) {
+    return invalid_input({"UPLOAD_SCATTERED", name_, absl::StrCat("gaps < ", kMostGaps)},
+                         "The parts leave too many gaps; send them in order.");
+  }
+  std::memcpy(data_.get() + offset, data.data(), data.size());
+  mark(offset, offset + data.size());
+  if (received_ < size_) return UploadProgress{received_, false};
+  if (lpdeform::crc32c({data_.get(), size_}) != crc32c_) {
+    runs_.clear();
+    received_ = 0;
+    return make_fault(absl::StatusCode::kDataLoss, {"UPLOAD_CHECKSUM", name_, ""},
+                      "The bytes received do not have the announced checksum; send all of them again.");
+  }
+  is_finished_ = true;
+  return UploadProgress{size_, true};
+}
+
+void Upload::mark(std::uint64_t begin, std::uint64_t end) {
+  auto run = runs_.upper_bound(begin);
+  if (run != runs_.begin() && std::prev(run)->second >= begin) run = std::prev(run);
+  while (run != runs_.end() && run->first <= end) {
+    begin = std::min(begin, run->first);
+    end = std::max(end, run->second);
+    received_ -= run->second - run->first;
+    run = runs_.erase(run);
+  }
+  runs_.emplace(begin, end);
+  received_ += end - begin;
+}
+
+absl::StatusOr<std::string_view> Upload::bytes() const {
+  const std::scoped_lock lock(mutex_);
+  if (is_finished_) return std::string_view(data_.get(), size_);
+  return make_fault(absl::StatusCode::kFailedPrecondition,
+                    {"UPLOAD_UNFINISHED", name_, absl::StrCat(size_, " bytes")},
+                    absl::StrCat("The upload has ", received_, " of its ", size_, " bytes."));
+}
+
+Uploads::Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers, Limits limits)
+    : budget_(std::move(budget)), timers_(std::move(timers)), limits_(limits) {}
+
+absl::StatusOr<std::shared_ptr<Upload>> Uploads::create(const std::string& request_id,
+                                                        std::uint64_t size_bytes, std::uint32_t crc32c) {
+  if (absl::Status status = check_request_id(request_id); !status.ok()) return status;
+  if (size_bytes == 0 || size_bytes > limits_.most_bytes_each) {
+    return invalid_input({"UPLOAD_SIZE", "size_bytes", absl::StrCat("1 to ", limits_.most_bytes_each)},
+                         absl::StrCat("An upload of ", size_bytes, " bytes is not within 1 to ",
+                                      limits_.most_bytes_each, "."));
+  }
+  const std::scoped_lock lock(mutex_);
+  if (const auto known = requested_.find(request_id); known != requested_.end()) {
+    return uploads_[known->second].upload;
+  }
+  absl::StatusOr<Reservation> memory = budget_->reserve(size_bytes);
+  if (!memory.ok()) return memory.status();
+  auto upload = std::make_shared<Upload>(absl::StrCat("uploads/", random_hex_128()), size_bytes, crc32c,
+                                         *std::move(memory));
+  uploads_[upload->name()] = {upload, request_id, timers_->now()};
+  if (!request_id.empty()) requested_[request_id] = upload->name();
+  watch(upload->name(), timers_->now() + limits_.idle);
+  return upload;
+}
+
+absl::StatusOr<std::shared_ptr<Upload>> Uploads::find(const std::string& name) {
+  const std::scoped_lock lock(mutex_);
+  const auto found = uploads_.find(name);
+  if (found != uploads_.end()) {
+    found->second.last_used = timers_->now();
+    return found->second.upload;
+  }
+  return make_fault(absl::StatusCode::kNotFound, {"UPLOAD_UNKNOWN", "upload", ""},
+                    "There is no such upload; it may have expired.");
+}
+
+void Uploads::watch(const std::string& name, Timers::TimePoint when) {
+  timers_->at(when, [weak = weak_from_this(), name] {
+    if (const auto self = weak.lock()) self->expire(name);
+  });
+}
+
+/// Forgets the upload when it has been idle for long enough; looks again later where it has not.
+void Uploads::expire(const std::string& name) {
+  const std::scoped_lock lock(mutex_);
+  const auto found = uploads_.find(name);
+  if (found == uploads_.end()) return;
+  const Timers::TimePoint due = found->second.last_used + limits_.idle;
+  if (timers_->now() < due) return watch(name, due);
+  requested_.erase(found->second.request_id);
+  uploads_.erase(found);
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+#include "server/budget.h"
+#include "server/timers.h"
+
+namespace lpdeform {
+
+/// How much of an upload is there.
+struct UploadProgress {
+  std::uint64_t received_bytes = 0;
+  bool is_finished = false;
+};
+
+/// Bytes that come in parts, in any order. Thread-safe.
+class Upload {
+ public:
+  Upload(std::string name, std::uint64_t size_bytes, std::uint32_t crc32c, Reservation memory);
+
+  const std::string& name() const { return name_; }
+
+  /// The last missing part finishes it; later ones are ignored. Errors: INVALID_ARGUMENT UPLOAD_PART_SIZE
+  /// (empty, or over 1 MiB), UPLOAD_PART_OUT_OF_RANGE, UPLOAD_SCATTERED (too many gaps); DATA_LOSS
+  /// UPLOAD_CHECKSUM (all of it has to be sent again).
+  absl::StatusOr<UploadProgress> add(std::uint64_t offset, std::string_view data);
+
+  /// The whole, for as long as the upload lives. FAILED_PRECONDITION UPLOAD_UNFINISHED.
+  absl::StatusOr<std::string_view> bytes() const;
+
+  static constexpr std::uint32_t kMostPartBytes = 1u << 20;
+  static constexpr std::size_t kMostGaps = 1024;
+
+ private:
+  void mark(std::uint64_t begin, std::uint64_t end);
+
+  const std::string name_;
+  const std::uint64_t size_;
+  const std::uint32_t crc32c_;
+  const Reservation memory_;
+  mutable std::mutex mutex_;
+  std::unique_ptr<char[]> data_;
+  std::map<std::uint64_t, std::uint64_t>
+      runs_;  // begin to end of what is there; they neither touch nor overlap
+  std::uint64_t received_ = 0;
+  bool is_finished_ = false;
+};
+
+/// All uploads of a server. They go when nobody has touched them for a while. Thread-safe. Held by
+/// a shared pointer.
+class Uploads : public std::enable_shared_from_this<Uploads> {
+ public:
+  struct Limits {
+    std::uint64_t most_bytes_each;
+    Timers::Duration idle;
+  };
+
+  Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers, Limits limits);
+
+  /// Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID; RESOURCE_EXHAUSTED MEMORY_FULL.
+  absl::StatusOr<std::shared_ptr<Upload>> create(const std::string& request_id, std::uint64_t size_bytes,
+                                                 std::uint32_t crc32c);
+
+  /// NOT_FOUND UPLOAD_UNKNOWN.
+  absl::StatusOr<std::shared_ptr<Upload>> find(const std::string& name);
+
+ private:
+  struct Entry {
+    std::shared_ptr<Upload> upload;
+    std::string request_id;
+    Timers::TimePoint last_used;
+  };
+  void watch(const std::string& name, Timers::TimePoint when);
+  void expire(const std::string& name);
+
+  const std::shared_ptr<Budget> budget_;
+  const std::shared_ptr<Timers> timers_;
+  const Limits limits_;
+  std::mutex mutex_;
+  std::map<std::string, Entry> uploads_;          // by name
+  std::map<std::string, std::string> requested_;  // names, by request_id
+};
+
+/// INVALID_ARGUMENT REQUEST_ID where it is neither empty nor 8 to 64 bytes.
+absl::Status check_request_id(const std::string& request_id);
+
+}  // namespace lpdeform

@@ -1,0 +1,128 @@
+#pragma once
+
+#include <grpcpp/support/server_callback.h>
+
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "server/backend.h"
+#include "server/grpc_status.h"
+#include "server/refusals.h"
+
+namespace lpdeform {
+
+/// The writing side of a streaming call: one message under way at a time, the next made when there is one, an
+/// end after the last. `Reactor` is gRPC's. Keeps itself alive until gRPC is done with it.
+///
+/// Operations are started under the lock, so that none follows Finish(). That is safe: gRPC delivers their
+/// outcomes from its own threads' base or by its executor, never inside of the call that starts them.
+template <typename Reactor, typename Response>
+class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<Reactor, Response>> {
+ public:
+  /// To be called once, right after construction.
+  void keep(std::shared_ptr<WritePump> self, CallGate::Permit permit) {
+    self_ = std::move(self);
+    permit_ = std::move(permit);
+  }
+
+  /// Writes what there is to write, unless a write is under way. On any thread.
+  void pump() {
+    const std::scoped_lock lock(mutex_);
+    pump_locked();
+  }
+
+  /// Ends the call with an error, as soon as no write is under way. On any thread.
+  void refuse(const absl::Status& status) {
+    const std::scoped_lock lock(mutex_);
+    refuse_locked(status);
+  }
+
+  void OnWriteDone(bool ok) final {
+    const std::scoped_lock lock(mutex_);
+    is_writing_ = false;
+    if (!ok) is_cancelled_ = true;
+    pump_locked();
+  }
+
+  void OnCancel() final {
+    const std::scoped_lock lock(mutex_);
+    is_cancelled_ = true;
+    let_go();
+    pump_locked();
+  }
+
+  void OnDone() final {
+    permit_.reset();
+    self_.reset();  // may destroy this
+  }
+
+ protected:
+  enum class Made { kNothing, kMessage, kLastMessage };
+
+  /// Makes the next message. Under the lock.
+  virtual Made make(Response& response) = 0;
+
+  /// The call is over: let go of what it holds. Under the lock, at least once.
+  virtual void let_go() = 0;
+
+  /// A message has been made, so there may be room for more. Under the lock.
+  virtual void on_made() {}
+
+  void refuse_locked(const absl::Status& status) {
+    if (refusal_.ok()) refusal_ = status;
+    pump_locked();
+  }
+
+  void pump_locked() {
+    if (is_finished_ || is_writing_) return;
+    if (is_cancelled_) return finish_locked(absl::CancelledError("The call was cancelled."));
+    if (is_last_written_) return finish_locked(absl::OkStatus());
+    if (!refusal_.ok()) return finish_locked(refusal_);
+    response_.Clear();
+    const Made made = make(response_);
+    if (made == Made::kNothing) return;
+    is_writing_ = true;
+    is_last_written_ = made == Made::kLastMessage;
+    this->StartWrite(&response_);
+    on_made();
+  }
+
+  bool is_over_locked() const { return is_finished_ || is_cancelled_; }
+
+  std::mutex mutex_;
+
+ private:
+  void finish_locked(const absl::Status& status) {
+    if (std::exchange(is_finished_, true)) return;
+    let_go();
+    this->Finish(to_grpc(status));
+  }
+
+  std::shared_ptr<WritePump> self_;
+  CallGate::Permit permit_;
+  Response response_;
+  absl::Status refusal_;
+  bool is_writing_ = false;
+  bool is_last_written_ = false;
+  bool is_cancelled_ = false;
+  bool is_finished_ = false;
+};
+
+/// Makes a call and begins it with `arguments`, or refuses it where the server drains. It belongs to gRPC.
+template <typename Call, typename... Arguments>
+Call* begin_call(Backend& backend, const Arguments&... arguments) {
+  const auto call = std::make_shared<Call>(backend);
+  CallGate::Permit permit = backend.gate.enter();
+  const bool is_let_in = permit != nullptr;
+  call->keep(call, std::move(permit));
+  if (is_let_in) {
+    call->begin(arguments...);
+  } else {
+    call->refuse(server_draining());
+  }
+  return call.get();
+}
+
+}  // namespace lpdeform
