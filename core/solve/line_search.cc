@@ -6,6 +6,12 @@
 
 namespace lpdeform {
 
+namespace {
+
+constexpr double kRounding = 1e-15;  // of a sum
+
+}  // namespace
+
 LineSearch::LineSearch(Problem problem, Points x) : problem_(std::move(problem)), x_(std::move(x)) {
   objective_ = problem_.cells.evaluate(x_, problem_.norm);
 }
@@ -33,7 +39,7 @@ StepResult LineSearch::step() {
   const double full_step = std::sqrt(squared_slope / static_cast<double>(x_.rows()));
   const double threshold = kDisplacement * problem_.tolerance / SolveSettings::kDefaultTolerance;
   // A step so short that rounding hides its decrease says nothing of the distance to the minimum.
-  const bool is_hidden = value == objective_ && full_step >= threshold;
+  const bool is_hidden = objective_ - value <= kRounding * objective_ && full_step >= threshold;
   x_.swap(trial_);
   objective_ = value;
   if (is_hidden) return {Outcome::kStalled, objective_, 0};
