@@ -1,0 +1,274 @@
+// The client library against a real server in this process.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <numbers>
+
+#include "client/cli/generated_shape.h"
+#include "client/cli/mesh_input.h"
+#include "client/cpp/client.h"
+#include "core/mesh/shapes.h"
+#include "tests/client/in_process_server.h"
+
+namespace lpdeform::client {
+namespace {
+
+constexpr std::chrono::seconds kPatience{60};
+
+/// The paper's bar, both ends held, the middle twisted by `degrees`.
+class SessionTest : public testing::Test {
+ protected:
+  static Motion twist(double degrees) {
+    return RigidMotion{.angle_radians = degrees * std::numbers::pi / 180, .center = {2, 2, 10.5}};
+  }
+
+  static Update bar_handles(double degrees) {
+    Update update;
+    cli::GeneratedShape shape = cli::generate_shape("bar", 1).value();
+    for (cli::NamedHandle& handle : shape.handles) {
+      if (handle.name == "middle") handle.handle.motion = twist(degrees);
+      update.handles.emplace(std::move(handle.name), std::move(handle.handle));
+    }
+    return update;
+  }
+
+  static std::vector<std::uint32_t> vertices_of(const std::string& name) {
+    return std::get<Handle>(bar_handles(0).handles.at(name)).vertices;
+  }
+
+  static Mesh bar() { return cli::to_client(box_surface(4, 4, 21)); }
+
+  absl::StatusOr<Client> connect() { return Client::connect(server_.address()); }
+
+  /// A session of the twisted bar.
+  Session open_bar(OpenOptions options = {}) {
+    Session session = connect()->open(bar(), std::move(options)).value();
+    session.update(bar_handles(90)).value();
+    return session;
+  }
+
+  InProcessServer server_;
+};
+
+/// How far two results are apart at most, in one coordinate.
+double distance(const std::vector<double>& a, const std::vector<double>& b) {
+  double most = a.size() == b.size() ? 0 : INFINITY;
+  for (std::size_t k = 0; k < std::min(a.size(), b.size()); ++k) most = std::max(most, std::abs(a[k] - b[k]));
+  return most;
+}
+
+TEST_F(SessionTest, SettlesOnAFrameThatMeetsTheHandles) {
+  Session session = open_bar();
+  EXPECT_EQ(session.mesh_report().vertices, 370);
+  const auto frame = session.settle(kPatience);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_EQ(frame->stop_reason, StopReason::kConverged);
+  EXPECT_EQ(frame->distortion.size(), 370u);
+  const Mesh rest = bar();
+  for (const std::uint32_t vertex : vertices_of("middle")) {
+    const double x = rest.vertices[3 * vertex], y = rest.vertices[3 * vertex + 1];
+    EXPECT_NEAR(frame->positions[3 * vertex], 2 - (y - 2), 1e-6);  // float32 of at most 21
+    EXPECT_NEAR(frame->positions[3 * vertex + 1], 2 + (x - 2), 1e-6);
+  }
+}
+
+TEST_F(SessionTest, DraggingGivesTheNewestAndTheLastResultIsTheOneOfADirectSolve) {
+  Session session = open_bar();
+  std::uint64_t newest = 0, last_seen = 0;
+  for (int degrees = 0; degrees <= 60; ++degrees) {
+    newest = session.move("middle", twist(degrees)).value();
+    const auto frame = session.poll();
+    ASSERT_TRUE(frame.ok()) << frame.status();
+    if (!frame->has_value()) continue;
+    EXPECT_GE((*frame)->input_seq, last_seen);
+    last_seen = (*frame)->input_seq;
+  }
+  const auto dragged = session.settle(kPatience);
+  ASSERT_TRUE(dragged.ok()) << dragged.status();
+  EXPECT_EQ(dragged->input_seq, newest);
+
+  Session direct = connect()->open(bar()).value();
+  direct.update(bar_handles(60)).value();
+  const auto solved = direct.solve();
+  ASSERT_TRUE(solved.ok()) << solved.status();
+  EXPECT_NEAR(dragged->energy / solved->energy, 1, 1e-3);  // both within the tolerance of the same minimum
+}
+
+TEST_F(SessionTest, SolveReturnsDoublesATraceAndACertificate) {
+  Session session = open_bar();
+  int reports = 0;
+  const auto solved = session.solve(
+      {.certify = true, .keep_trace = true, .on_progress = [&](const SolveProgress&) { ++reports; }});
+  ASSERT_TRUE(solved.ok()) << solved.status();
+  EXPECT_EQ(solved->stop_reason, StopReason::kConverged);
+  EXPECT_EQ(solved->method, "quasi_newton");
+  ASSERT_TRUE(solved->optimality_gap.has_value());
+  EXPECT_LT(*solved->optimality_gap, 1e-3);
+  ASSERT_FALSE(solved->trace.empty());
+  EXPECT_EQ(solved->trace.front().energy, solved->initial_energy);
+  const Mesh rest = bar();
+  for (const std::uint32_t vertex : vertices_of("end_a")) {
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(solved->positions[3 * vertex + k], rest.vertices[3 * vertex + k]);
+  }
+}
+
+TEST_F(SessionTest, SettingsChangeInALiveSession) {
+  Session session = open_bar();
+  const double at_2 = session.settle(kPatience).value().energy;
+  const std::uint64_t changed = session.set({.p = 1.5}).value();
+  const Frame frame = session.settle(kPatience).value();
+  EXPECT_GE(frame.input_seq, changed);
+  Session other = open_bar({.settings = {.p = 1.5}});
+  EXPECT_NEAR(frame.energy / other.settle(kPatience).value().energy, 1, 1e-3);
+  EXPECT_GT(std::abs(frame.energy / at_2 - 1), 0.1);
+}
+
+TEST_F(SessionTest, AMeshThatCannotBeDeformedIsRefusedByItsFirstBadElement) {
+  Mesh mesh = bar();
+  mesh.vertices[3 * 17 + 1] = NAN;
+  const auto session = connect()->open(mesh);
+  EXPECT_TRUE(absl::IsInvalidArgument(session.status()));
+  EXPECT_EQ(fault_of(session.status()).reason, "MESH_NOT_FINITE");
+  EXPECT_EQ(fault_of(session.status()).element, "vertex 17");
+}
+
+TEST_F(SessionTest, ARefusedUpdateComesOutOnceAndTheSessionGoesOn) {
+  Session session = open_bar();
+  ASSERT_TRUE(session.settle(kPatience).ok());
+  session.set_handle("bad", {.vertices = {370}}).value();
+  absl::Status refused;
+  while (refused.ok()) refused = session.next_frame(kPatience).status();
+  EXPECT_EQ(fault_of(refused).reason, "HANDLE_VERTEX_OUT_OF_RANGE");
+  session.move("middle", twist(45)).value();
+  EXPECT_TRUE(session.settle(kPatience).ok());
+}
+
+TEST_F(SessionTest, AComponentWithoutAHandleIsNamedUntilItHasOne) {
+  Mesh two = bar();
+  const auto vertices = two.vertices;
+  const auto faces = two.faces;
+  for (const double number : vertices) two.vertices.push_back(number + 100);
+  for (const std::uint32_t index : faces) two.faces.push_back(index + 370);
+  Session session = connect()->open(two).value();
+  session.update(bar_handles(90)).value();
+  const absl::Status blocked = session.settle(kPatience).status();
+  EXPECT_TRUE(absl::IsFailedPrecondition(blocked)) << blocked;
+  EXPECT_EQ(fault_of(blocked).reason, "COMPONENT_WITHOUT_HANDLE");
+  EXPECT_EQ(fault_of(session.solve().status()).reason, "COMPONENT_WITHOUT_HANDLE");
+  session.set_handle("other", {.vertices = {400}}).value();
+  EXPECT_TRUE(session.settle(kPatience).ok());
+}
+
+TEST_F(SessionTest, AServerThatCameBackWithoutItsSessionsGetsOursAnew) {
+  Session session = open_bar({.settings = {.p = 1.5}});
+  const Frame before = session.settle(kPatience).value();
+  session.set({.stiffness = 2.0}).value();
+  const Frame stiff = session.settle(kPatience).value();
+  const std::string name = session.name();
+
+  server_.stop();
+  server_.start_again();
+  absl::StatusOr<Frame> after = absl::UnknownError("");
+  do {
+    after = session.next_frame(kPatience);
+    ASSERT_TRUE(after.ok()) << after.status();
+    EXPECT_GE(after->input_seq, stiff.input_seq);
+  } while (!after->converged);
+  EXPECT_NE(session.name(), name);
+  EXPECT_NEAR(after->energy / stiff.energy, 1, 1e-3);
+  EXPECT_GT(stiff.energy, 1.5 * before.energy);
+  session.move("middle", twist(45)).value();
+  EXPECT_LT(session.settle(kPatience).value().energy, stiff.energy);
+}
+
+TEST_F(SessionTest, UpdatesMadeWhileTheServerIsAwayArriveWhenItIsBack) {
+  Session session = open_bar();
+  ASSERT_TRUE(session.settle(kPatience).ok());
+  server_.stop();
+  for (int degrees = 80; degrees >= 0; degrees -= 10) session.move("middle", twist(degrees)).value();
+  server_.start_again();
+  const auto settled = session.settle(kPatience);
+  ASSERT_TRUE(settled.ok()) << settled.status();
+  EXPECT_LT(distance(settled->positions, bar().vertices), 1e-3);  // no twist: at rest, to the tolerance
+}
+
+TEST_F(SessionTest, SolveFindsItsSessionLostAndMakesItAnew) {
+  Session session = open_bar();
+  const double energy = session.solve().value().energy;
+  server_.stop();
+  server_.start_again();
+  const auto again = session.solve();
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_NEAR(again->energy / energy, 1, 1e-3);
+}
+
+TEST_F(SessionTest, WithoutAServerItGivesUpAfterAWhile) {
+  auto client = Client::connect(server_.address(), {.reconnect_for = std::chrono::milliseconds(200)});
+  Session session = client->open(bar()).value();
+  session.update(bar_handles(90)).value();
+  ASSERT_TRUE(session.settle(kPatience).ok());
+  server_.stop();
+  absl::Status ended;
+  while (ended.ok()) ended = session.next_frame(kPatience).status();
+  EXPECT_TRUE(absl::IsUnavailable(ended)) << ended;
+  EXPECT_EQ(session.connection(), Connection::kClosed);
+}
+
+TEST_F(SessionTest, AReaderSeesTheWritersFramesAndCannotWrite) {
+  Session writer = open_bar();
+  const Frame written = writer.settle(kPatience).value();
+  Session reader = connect()->join(writer.name(), Role::kReader).value();
+  const Frame read = reader.settle(kPatience).value();
+  EXPECT_EQ(read.positions, written.positions);
+  EXPECT_EQ(fault_of(reader.move("middle", Fixed{}).status()).reason, "NOT_THE_WRITER");
+}
+
+TEST_F(SessionTest, ANewWriterReplacesTheOldOneWhichCanTakeOverAgain) {
+  Session first = open_bar();
+  ASSERT_TRUE(first.settle(kPatience).ok());
+  Session second = connect()->join(first.name(), Role::kWriter).value();
+  second.move("middle", twist(30)).value();
+  const Frame theirs = second.settle(kPatience).value();
+
+  absl::Status replaced;
+  while (replaced.ok()) replaced = first.next_frame(kPatience).status();
+  EXPECT_EQ(fault_of(replaced).reason, "WRITER_REPLACED");
+  ASSERT_TRUE(first.take_over().ok());
+  first.move("middle", twist(60)).value();
+  const auto ours = first.settle(kPatience);
+  ASSERT_TRUE(ours.ok()) << ours.status();
+  EXPECT_GT(ours->epoch, theirs.epoch);
+  EXPECT_GT(ours->energy, theirs.energy);
+}
+
+TEST_F(SessionTest, ALargeMeshTravelsInParts) {
+  const TriangleMesh large = grid(200, 200, 1.0);  // 40,401 vertices: 1.9 MB
+  Session session = connect()->open(cli::to_client(large)).value();
+  Update update;
+  update.handles.emplace("corner", Handle{{0, 1, 201}});
+  update.handles.emplace("lifted", Handle{{40400}, RigidMotion{.translation = {0, 0, 5}}});
+  update.settings.p = std::vector<double>(40401, 2.0);
+  session.update(std::move(update)).value();
+  const auto frame = session.next_frame(kPatience);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_EQ(frame->positions.size(), 3u * 40401);
+}
+
+TEST_F(SessionTest, CloseDeletesTheSession) {
+  Session session = open_bar();
+  ASSERT_TRUE(session.settle(kPatience).ok());
+  ASSERT_TRUE(session.close().ok());
+  EXPECT_TRUE(absl::IsNotFound(connect()->join(session.name(), Role::kReader).status()));
+}
+
+TEST_F(SessionTest, NobodyAtTheAddressIsUnavailableAtOnce) {
+  const auto client = Client::connect("unix:/nowhere/socket");
+  EXPECT_TRUE(absl::IsUnavailable(client.status()));
+  EXPECT_EQ(fault_of(client.status()).reason, "NO_SERVER");
+}
+
+}  // namespace
+}  // namespace lpdeform::client
