@@ -17,6 +17,7 @@
 namespace lpdeform {
 namespace {
 
+constexpr std::size_t kWorkspace = 30;  // positions of all vertices that a solve holds at most: the memory of L-BFGS
 constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
@@ -269,8 +270,8 @@ void Deformer::Impl::end(StopReason reason) {
   minimiser.reset();
   has_state = true;
   summary.stop_reason = reason;
-  if (settings.certify && reason != StopReason::kCancelled) summary.optimality_gap = gap();
   summary.solve_seconds = seconds_since(started);
+  if (settings.certify && reason != StopReason::kCancelled) summary.optimality_gap = gap();
 }
 
 double Deformer::Impl::gap() {
@@ -395,7 +396,7 @@ double Deformer::optimality_gap() {
 
 std::size_t Deformer::memory_bytes() const {
   const std::size_t points = impl_->x.size() * sizeof(double);
-  return sizeof(Impl) + impl_->cells.memory_bytes() + impl_->metric.memory_bytes() + 4 * points;
+  return sizeof(Impl) + impl_->cells.memory_bytes() + impl_->metric.memory_bytes() + kWorkspace * points;
 }
 
 }  // namespace lpdeform

@@ -74,7 +74,7 @@ class Deformer {
   /// before the first solve. Ends a running solve with kCancelled.
   double optimality_gap();
 
-  /// Bytes held, the shared rest shape left out.
+  /// Bytes held while solving, the shared rest shape left out.
   std::size_t memory_bytes() const;
 
  private:

@@ -1,0 +1,89 @@
+// What an iteration is made of: the rotation fit beside plain SVD, the cell pass on one and two threads, the
+// metric.
+
+#include <benchmark/benchmark.h>
+
+#include <random>
+
+#include "core/energy/cell_pass.h"
+#include "core/energy/rotation_fit.h"
+#include "core/solve/metric.h"
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+std::vector<Eigen::Matrix3d> random_matrices() {
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  std::vector<Eigen::Matrix3d> result(1000);
+  for (auto& matrix : result) {
+    matrix = Eigen::Matrix3d::Identity() + 0.3 * Eigen::Matrix3d::NullaryExpr([&] { return normal(random); });
+  }
+  return result;
+}
+
+template <typename Fit>
+void fit_all(benchmark::State& state, Fit fit) {
+  const auto matrices = random_matrices();
+  for (auto _ : state) {
+    for (const auto& matrix : matrices) benchmark::DoNotOptimize(fit(matrix));
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(matrices.size()));
+}
+void fit_closed_form(benchmark::State& state) {
+  fit_all(state, fit_rotation);
+}
+void fit_svd(benchmark::State& state) {
+  fit_all(state, fit_rotation_svd);
+}
+BENCHMARK(fit_closed_form);
+BENCHMARK(fit_svd);
+
+void cell_pass(benchmark::State& state) {
+  const auto shape = rest_shape(box_surface(2, 100, 200));
+  const LpNorm norm(Material::uniform(1.5), shape->vertex_count(), shape->mean_edge_length(), 1);
+  CellPass cells(shape, Workers(static_cast<int>(state.range(0))));
+  const Points x = shaken(shape->scaled_positions(), 0.2);
+  Points gradient;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(cells.evaluate(x, norm));
+    cells.gradient(x, gradient);
+  }
+  state.SetItemsProcessed(state.iterations() * shape->vertex_count());
+}
+BENCHMARK(cell_pass)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+struct FactoredMetric {
+  explicit FactoredMetric(int side) : shape(rest_shape(grid(side, side, 2))), metric(shape) {
+    is_held.assign(shape->vertex_count(), false);
+    is_held[0] = true;
+  }
+  bool factor(double weight) {
+    std::vector<double> weights(shape->vertex_count(), 1.0);
+    weights[0] = weight;
+    return metric.factor(weights, is_held);
+  }
+  std::shared_ptr<const RestShape> shape;
+  Metric metric;
+  std::vector<char> is_held;
+};
+
+void metric_factor(benchmark::State& state) {
+  FactoredMetric test(static_cast<int>(state.range(0)));
+  double weight = 1;
+  for (auto _ : state)
+    benchmark::DoNotOptimize(test.factor(weight = 3 - weight));  // never the same twice running
+}
+BENCHMARK(metric_factor)->Arg(63)->Arg(200)->Unit(benchmark::kMillisecond);
+
+void metric_solve(benchmark::State& state) {
+  FactoredMetric test(static_cast<int>(state.range(0)));
+  if (!test.factor(1)) return state.SkipWithError("not positive definite");
+  Points x = Points::Random(test.shape->vertex_count(), 3);
+  for (auto _ : state) test.metric.solve(x, x);
+}
+BENCHMARK(metric_solve)->Arg(63)->Arg(200)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace lpdeform
