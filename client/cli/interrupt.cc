@@ -1,47 +1,64 @@
 #include "client/cli/interrupt.h"
 
-#include <pthread.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
-#include <initializer_list>
+#include <cstdint>
 #include <utility>
+
+#include "core/base/check.h"
 
 namespace lpdeform::cli {
 namespace {
 
-/// Tells the thread that nobody waits for signals any more.
-constexpr int kEnough = SIGUSR2;
+// What is written to the event tells who wrote.
+constexpr std::uint64_t kSignal = 1;
+constexpr std::uint64_t kEnough = std::uint64_t{1} << 32;
 
-sigset_t set_of(std::initializer_list<int> numbers) {
-  sigset_t signals;
-  sigemptyset(&signals);
-  for (const int number : numbers) sigaddset(&signals, number);
-  return signals;
+/// Of the one Interrupt that lives. A handler and no blocked mask: libraries start threads before main, and a
+/// signal goes to any thread that does not block it.
+std::atomic<int> event = -1;
+
+void post(std::uint64_t what) {
+  const int error = errno;
+  [[maybe_unused]] const ssize_t written = write(event, &what, sizeof what);
+  errno = error;
+}
+
+void set_handlers(void (*handler)(int)) {
+  struct sigaction action {};
+  action.sa_handler = handler;
+  action.sa_flags = SA_RESTART | static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
 }
 
 }  // namespace
 
 Interrupt::Interrupt() {
-  const sigset_t watched = set_of({SIGINT, SIGTERM, kEnough});
-  pthread_sigmask(SIG_BLOCK, &watched, nullptr);
+  event = eventfd(0, EFD_CLOEXEC);
+  LPDEFORM_CHECK(event >= 0);
   thread_ = std::thread([this] { watch(); });
+  set_handlers([](int) { post(kSignal); });
 }
 
 void Interrupt::watch() {
-  const sigset_t watched = set_of({SIGINT, SIGTERM, kEnough});
-  int signal = 0;
-  sigwait(&watched, &signal);
-  if (signal == kEnough) return;
-  const sigset_t deadly = set_of({SIGINT, SIGTERM});
-  pthread_sigmask(SIG_UNBLOCK, &deadly, nullptr);
+  std::uint64_t what = 0;
+  while (read(event, &what, sizeof what) < 0 && errno == EINTR) {
+  }
+  if (what >= kEnough) return;
   const std::scoped_lock lock(acting_);
   happened_ = true;
   if (action_) action_();
 }
 
 Interrupt::~Interrupt() {
-  pthread_kill(thread_.native_handle(), kEnough);
+  set_handlers(SIG_DFL);
+  post(kEnough);
   thread_.join();
+  close(event.exchange(-1));
 }
 
 void Interrupt::set_action(std::function<void()> action) {

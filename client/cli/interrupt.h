@@ -8,8 +8,7 @@
 namespace lpdeform::cli {
 
 /// Turns the first Ctrl-C (SIGINT) or SIGTERM into a call, for as long as it lives; a second one ends the
-/// program as ever. To be made before any other thread: it blocks both signals in the thread that makes it
-/// and in those that follow.
+/// program as ever. One at a time.
 class Interrupt {
  public:
   Interrupt();

@@ -18,7 +18,7 @@ ServerOptions options_for(const std::filesystem::path& folder, int threads) {
   ServerOptions options;
   options.address = "unix:" + (folder / "socket").string();
   options.threads = threads;
-  options.max_vertices = std::numeric_limits<std::int32_t>::max() / 6;
+  options.max_vertices = 100'000'000;
   options.max_bytes = std::numeric_limits<std::size_t>::max() / 2;
   options.max_upload_bytes = std::uint64_t{1} << 36;
   return options;

@@ -166,6 +166,10 @@ int run(int argc, char** argv) {
   } catch (const CLI::Success& asked_for_help) {
     return program.exit(asked_for_help);
   } catch (const CLI::ParseError& error) {
+    if (const auto unknown = program.remaining(); program.get_subcommands().empty() && !unknown.empty()) {
+      return complain(absl::InvalidArgumentError("There is no command \"" + unknown.front() +
+                                                 "\" (see lpdeform --help)"));
+    }
     return complain(absl::InvalidArgumentError(std::string(error.what()) + " (see lpdeform --help)"));
   }
   return command();
