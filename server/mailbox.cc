@@ -46,50 +46,18 @@ absl::Status check_solver(const SolveSettings& settings, const Material& materia
 
 /// What an update would lead to.
 struct Mailbox::Candidate {
-  std::shared_ptr<HandleSet> handles;  // our copy; empty where the update changes no handle
+  bool is_beginning = false;
+  std::shared_ptr<HandleSet> handles;  // our copy; empty where the update has no handles
   Material material;
   SolveSettings solver;
-  Ages ages;
-  bool is_beginning = false;
-  bool is_regrouped = false;  // vertices of handles changed
-  bool is_material_changed = false;
-  bool is_solver_changed = false;
-  std::vector<std::string> moved;
+  std::vector<std::string> named;  // handles that it changes
+  std::vector<std::string> moved;  // those of them that go somewhere
+  bool is_regrouped = false;       // vertices of handles changed
+  bool has_p = false, has_stiffness = false, has_length_unit = false, has_solver = false;
   std::uint32_t stale_parts = 0;
 
-  /// Whether a value of `seq` is to replace one of age `age`, which it then has.
-  bool replaces(std::uint64_t& age, std::uint64_t seq) {
-    if (seq < age) ++stale_parts;
-    if (seq <= age && !is_beginning) return false;
-    age = seq;
-    return true;
-  }
-
-  bool replaces_handle(const std::string& name, std::uint64_t seq) {
-    const auto known = ages.handles.find(name);
-    if (known != ages.handles.end()) return replaces(known->second, seq);
-    if (seq <= ages.forgotten && !is_beginning) {
-      ++stale_parts;
-      return false;
-    }
-    ages.handles.emplace(name, seq);
-    return true;
-  }
-
-  bool changes_anything() const { return handles != nullptr || is_material_changed || is_solver_changed; }
-
-  /// Gives up the ages of handles long gone, oldest first.
-  void forget_oldest() {
-    while (ages.handles.size() > kMostAges) {
-      auto oldest = ages.handles.end();
-      for (auto entry = ages.handles.begin(); entry != ages.handles.end(); ++entry) {
-        const bool is_gone = handles->handles().find(entry->first) == handles->handles().end();
-        if (is_gone && (oldest == ages.handles.end() || entry->second < oldest->second)) oldest = entry;
-      }
-      ages.forgotten = std::max(ages.forgotten, oldest->second);
-      ages.handles.erase(oldest);
-    }
-  }
+  bool has_handles() const { return is_regrouped || !moved.empty(); }
+  bool has_material() const { return has_p || has_stiffness || has_length_unit; }
 };
 
 Mailbox::Mailbox(std::shared_ptr<const RestShape> shape) : shape_(std::move(shape)) {
@@ -118,28 +86,46 @@ absl::StatusOr<UpdateResult> Mailbox::merge(const Update& update, bool is_beginn
   const std::scoped_lock merging(merging_);
   const Inputs before = newest();
   Candidate next;
+  next.is_beginning = is_beginning;
   next.material = *before.material;
   next.solver = before.solver;
-  next.ages = ages_;
-  next.is_beginning = is_beginning;
   if (!update.handles.empty()) next.handles = std::make_shared<HandleSet>(*before.handles);
   if (absl::Status status = change_handles(update, next); !status.ok()) return status;
-  if (next.moved.empty() && !next.is_regrouped) next.handles = nullptr;
   change_settings(update, next);
   if (absl::Status status = check(next); !status.ok()) return status;
 
-  ages_ = std::move(next.ages);
+  const UpdateResult result{update.input_seq, next.stale_parts};
+  put_in_force(update, next);
+  note_ages(next, update.input_seq);
+  return result;
+}
+
+void Mailbox::put_in_force(const Update& update, Candidate& next) {
   const std::scoped_lock lock(mutex_);
   const bool is_newer = update.input_seq > inputs_.input_seq;
-  if (next.changes_anything() || is_newer) ++inputs_.version;
+  if (is_newer || next.has_handles() || next.has_material() || next.has_solver) ++inputs_.version;
   if (is_newer) {
     inputs_.input_seq = update.input_seq;
     ++inputs_.taken;
   }
-  if (next.handles) inputs_.handles = std::move(next.handles);
-  if (next.is_material_changed) inputs_.material = std::make_shared<const Material>(std::move(next.material));
+  if (next.has_handles()) inputs_.handles = std::move(next.handles);
+  if (next.has_material()) inputs_.material = std::make_shared<const Material>(std::move(next.material));
   inputs_.solver = next.solver;
-  return UpdateResult{update.input_seq, next.stale_parts};
+}
+
+/// Whether the update's part replaces a value of this age.
+bool Mailbox::replaces(std::uint64_t age, const Update& update, Candidate& next) const {
+  if (next.is_beginning) return true;
+  if (update.input_seq < age) ++next.stale_parts;
+  return update.input_seq > age;
+}
+
+bool Mailbox::replaces_handle(const std::string& name, const Update& update, Candidate& next) const {
+  const auto known = ages_.handles.find(name);
+  if (known != ages_.handles.end()) return replaces(known->second, update, next);
+  const bool is_forgotten = update.input_seq <= ages_.forgotten && !next.is_beginning;
+  if (is_forgotten) ++next.stale_parts;
+  return !is_forgotten;
 }
 
 absl::Status Mailbox::change_handles(const Update& update, Candidate& next) const {
@@ -149,7 +135,8 @@ absl::Status Mailbox::change_handles(const Update& update, Candidate& next) cons
       return invalid_input({"HANDLE_CHANGED_TWICE", element_of(change.name), "one change a handle"},
                            absl::StrCat("The update changes ", element_of(change.name), " twice."));
     }
-    if (!next.replaces_handle(change.name, update.input_seq)) continue;
+    if (!replaces_handle(change.name, update, next)) continue;
+    next.named.push_back(change.name);
     absl::Status status;
     if (const auto* const handle = std::get_if<Handle>(&change.change)) {
       status = next.handles->set(change.name, *handle);
@@ -163,45 +150,59 @@ absl::Status Mailbox::change_handles(const Update& update, Candidate& next) cons
     }
     if (!status.ok()) return status;
   }
-  if (!next.handles) return absl::OkStatus();
-  if (next.handles->handles().size() > kMostHandles) {
-    return invalid_input({"TOO_MANY_HANDLES", "", absl::StrCat("handles <= ", kMostHandles)},
-                         absl::StrCat("The session would have ", next.handles->handles().size(),
-                                      " handles; it may have ", kMostHandles, "."));
-  }
-  next.forget_oldest();
   return absl::OkStatus();
 }
 
 void Mailbox::change_settings(const Update& update, Candidate& next) const {
   const SettingsChange& settings = update.settings;
-  const std::uint64_t seq = update.input_seq;
-  if (settings.p && next.replaces(next.ages.p, seq)) {
-    next.material.p = *settings.p;
-    next.is_material_changed = true;
+  next.has_p = settings.p && replaces(ages_.p, update, next);
+  next.has_stiffness = settings.stiffness && replaces(ages_.stiffness, update, next);
+  next.has_length_unit = settings.length_unit && replaces(ages_.length_unit, update, next);
+  next.has_solver = settings.solver && replaces(ages_.solver, update, next);
+  if (next.has_p) next.material.p = *settings.p;
+  if (next.has_stiffness) next.material.stiffness = *settings.stiffness;
+  if (next.has_length_unit) next.material.length_unit = *settings.length_unit;
+  if (next.has_solver) next.solver = *settings.solver;
+}
+
+void Mailbox::note_ages(const Candidate& next, std::uint64_t seq) {
+  for (const std::string& name : next.named) ages_.handles[name] = seq;
+  if (next.has_p) ages_.p = seq;
+  if (next.has_stiffness) ages_.stiffness = seq;
+  if (next.has_length_unit) ages_.length_unit = seq;
+  if (next.has_solver) ages_.solver = seq;
+  if (ages_.handles.size() > kMostAges) forget_oldest();
+}
+
+/// Gives up the ages of the older half of the handles that were let go of.
+void Mailbox::forget_oldest() {
+  const Inputs inputs = newest();
+  const auto is_gone = [&](const std::string& name) { return !inputs.handles->handles().contains(name); };
+  std::vector<std::uint64_t> gone;
+  for (const auto& [name, age] : ages_.handles) {
+    if (is_gone(name)) gone.push_back(age);
   }
-  if (settings.stiffness && next.replaces(next.ages.stiffness, seq)) {
-    next.material.stiffness = *settings.stiffness;
-    next.is_material_changed = true;
-  }
-  if (settings.length_unit && next.replaces(next.ages.length_unit, seq)) {
-    next.material.length_unit = *settings.length_unit;
-    next.is_material_changed = true;
-  }
-  if (settings.solver && next.replaces(next.ages.solver, seq)) {
-    next.solver = *settings.solver;
-    next.is_solver_changed = true;
-  }
+  if (gone.empty()) return;
+  const auto middle = gone.begin() + static_cast<std::ptrdiff_t>(gone.size() / 2);
+  std::nth_element(gone.begin(), middle, gone.end());
+  ages_.forgotten = std::max(ages_.forgotten, *middle);
+  std::erase_if(ages_.handles,
+                [&](const auto& entry) { return entry.second <= *middle && is_gone(entry.first); });
 }
 
 absl::Status Mailbox::check(const Candidate& next) const {
+  if (next.handles && next.handles->handles().size() > kMostHandles) {
+    return invalid_input({"TOO_MANY_HANDLES", "", absl::StrCat("handles <= ", kMostHandles)},
+                         absl::StrCat("The session would have ", next.handles->handles().size(),
+                                      " handles; it may have ", kMostHandles, "."));
+  }
   absl::Status status;
   if (next.is_regrouped) status.Update(check_handles(*next.handles, shape_->vertex_count()));
   for (const std::string& name : next.moved) {
     if (status.ok()) status = check_targets(name, next.handles->handles().find(name)->second);
   }
-  if (next.is_material_changed && status.ok()) status = check_material(next.material, shape_->vertex_count());
-  if (status.ok() && (next.is_material_changed || next.is_solver_changed)) {
+  if (next.has_material() && status.ok()) status = check_material(next.material, shape_->vertex_count());
+  if (status.ok() && (next.has_material() || next.has_solver)) {
     status = check_solver(next.solver, next.material);
   }
   return status;

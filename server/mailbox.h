@@ -51,16 +51,21 @@ class Mailbox {
   struct Ages {
     std::map<std::string, std::uint64_t, std::less<>> handles;
     std::uint64_t forgotten = 0;  // the newest of those given up
-
     std::uint64_t p = 0, stiffness = 0, length_unit = 0, solver = 0;
   };
   struct Candidate;
 
   absl::StatusOr<UpdateResult> merge(const Update& update, bool is_beginning);
+  bool replaces(std::uint64_t age, const Update& update, Candidate& next) const;
+  bool replaces_handle(const std::string& name, const Update& update, Candidate& next) const;
   absl::Status change_handles(const Update& update, Candidate& next) const;
   void change_settings(const Update& update, Candidate& next) const;
   absl::Status check(const Candidate& next) const;
   absl::Status check_targets(const std::string& name, const Handle& handle) const;
+
+  void note_ages(const Candidate& next, std::uint64_t seq);
+  void forget_oldest();
+  void put_in_force(const Update& update, Candidate& next);
 
   const std::shared_ptr<const RestShape> shape_;
   std::mutex merging_;  // one update at a time; guards ages_

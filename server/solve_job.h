@@ -18,7 +18,7 @@ namespace lpdeform {
 struct SolveOptions {
   bool certify = false;
   bool keep_trace = false;
-  std::optional<Points> initial_positions;
+  std::optional<Points> initial_positions = {};
 };
 
 struct SolveProgress {

@@ -1,0 +1,240 @@
+#include "server/frame_stream.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <vector>
+
+#include "core/base/fault.h"
+#include "manual_timers.h"
+#include "server/publisher.h"
+
+namespace lpdeform {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr std::uint32_t kManyVertices = 200000;
+
+class FrameStreamTest : public testing::Test {
+ protected:
+  std::shared_ptr<FrameStream> open(StreamOptions options = {}) {
+    auto stream = std::make_shared<FrameStream>(options, publisher_, timers_, seconds(15), OpenedNote{1, 0});
+    stream->start([this] { ++wakes_; });
+    EXPECT_TRUE(publisher_->add(stream));
+    EXPECT_TRUE(std::holds_alternative<OpenedNote>(stream->next().value()));
+    return stream;
+  }
+
+  std::shared_ptr<const Surface> surface(std::uint32_t vertices = 2) {
+    return std::make_shared<Surface>(Points::Constant(vertices, 3, 0.5), Field::Constant(vertices, 0.25));
+  }
+
+  /// Publishes a frame that answers `input` of as many inputs.
+  std::shared_ptr<const Frame> publish(std::uint64_t input, bool converged = false,
+                                       std::uint32_t vertices = 2) {
+    Frame frame;
+    frame.input_seq = frame.taken = input;
+    frame.converged = converged;
+    frame.surface = surface(vertices);
+    return publisher_->publish(frame);
+  }
+
+  /// The frame_seqs of all pieces that can be sent now.
+  static std::vector<FramePiece> drain(FrameStream& stream) {
+    std::vector<FramePiece> pieces;
+    while (const auto note = stream.next()) {
+      if (const auto* const piece = std::get_if<FramePiece>(&*note)) pieces.push_back(*piece);
+    }
+    return pieces;
+  }
+
+  std::shared_ptr<ManualTimers> timers_ = std::make_shared<ManualTimers>();
+  std::shared_ptr<Publisher> publisher_ = std::make_shared<Publisher>();
+  int wakes_ = 0;
+};
+
+TEST_F(FrameStreamTest, SendsNoMoreThanItsCreditAndThenTheNewest) {
+  const auto stream = open({.credit = 2});
+  std::vector<std::uint64_t> sent;
+  for (std::uint64_t input = 1; input <= 10; ++input) {
+    publish(input, input == 10);
+    for (const FramePiece& piece : drain(*stream)) sent.push_back(piece.frame->input_seq);
+  }
+  EXPECT_EQ(sent, (std::vector<std::uint64_t>{1, 2}));
+  EXPECT_FALSE(stream->wants_frame());
+  ASSERT_TRUE(stream->acknowledge(1).ok());
+  const auto next = drain(*stream);
+  ASSERT_EQ(next.size(), 1u);
+  EXPECT_EQ(next[0].frame->input_seq, 10u);
+  EXPECT_TRUE(next[0].frame->converged);
+  EXPECT_EQ(next[0].skipped_inputs, 7u);
+  EXPECT_TRUE(drain(*stream).empty());
+}
+
+TEST_F(FrameStreamTest, AcknowledgingALaterFrameAcknowledgesThoseBefore) {
+  const auto stream = open({.credit = 2});
+  publish(1);
+  drain(*stream);
+  publish(2);
+  drain(*stream);
+  ASSERT_TRUE(stream->acknowledge(2).ok());
+  publish(3);
+  EXPECT_EQ(drain(*stream).size(), 1u);
+  publish(4);
+  EXPECT_EQ(drain(*stream).size(), 1u);
+}
+
+TEST_F(FrameStreamTest, RefusesToHearOfFramesThatItHasNotSent) {
+  const auto stream = open({.credit = 1});
+  publish(1);
+  publish(2);
+  EXPECT_EQ(fault_of(stream->acknowledge(1)).reason, "ACK_NOT_SENT");
+  drain(*stream);
+  EXPECT_TRUE(stream->acknowledge(2).ok());
+  EXPECT_EQ(fault_of(stream->acknowledge(3)).reason, "ACK_NOT_SENT");
+}
+
+TEST_F(FrameStreamTest, HoldsOneFrameHoweverManyComeWhileItIsSlow) {
+  const auto stream = open({.credit = 2});
+  std::vector<std::weak_ptr<const Surface>> surfaces;
+  for (std::uint64_t input = 1; input <= 50; ++input) {
+    surfaces.push_back(publish(input, false, kManyVertices)->surface);
+    stream->next();  // one piece of several
+  }
+  int alive = 0;
+  for (const auto& one : surfaces) alive += one.expired() ? 0 : 1;
+  EXPECT_LE(alive, 2);  // the one being sent, and the newest
+}
+
+TEST_F(FrameStreamTest, CutsALargeFrameIntoPiecesWithoutGaps) {
+  const auto stream = open({.scalar = Scalar::kFloat64});
+  publish(1, true, kManyVertices);
+  const auto pieces = drain(*stream);
+  ASSERT_GT(pieces.size(), 1u);
+  std::uint32_t next = 0;
+  for (const FramePiece& piece : pieces) {
+    EXPECT_EQ(piece.first, next);
+    EXPECT_LE(piece.count * (3 * sizeof(double) + sizeof(float)), std::size_t{1} << 20);
+    next += piece.count;
+    EXPECT_EQ(piece.is_last, next == kManyVertices);
+  }
+  EXPECT_EQ(next, kManyVertices);
+}
+
+TEST_F(FrameStreamTest, SaysSomethingAfterSilence) {
+  const auto stream = open();
+  EXPECT_FALSE(stream->next());
+  timers_->advance(seconds(14));
+  EXPECT_EQ(wakes_, 0);
+  EXPECT_FALSE(stream->next());
+  timers_->advance(seconds(1));
+  EXPECT_GE(wakes_, 1);
+  const auto note = stream->next();
+  ASSERT_TRUE(note);
+  EXPECT_TRUE(std::holds_alternative<HeartbeatNote>(*note));
+  EXPECT_FALSE(stream->next());
+}
+
+TEST_F(FrameStreamTest, HasFewTimersHoweverOftenItIsAsked) {
+  const auto stream = open({.max_frames_per_second = 60});
+  for (std::uint64_t input = 1; input <= 300; ++input) {
+    publish(input);
+    for (const FramePiece& piece : drain(*stream)) {
+      EXPECT_TRUE(stream->acknowledge(piece.frame->frame_seq).ok());
+    }
+    timers_->advance(milliseconds(10));
+  }
+  EXPECT_LE(timers_->waiting(), 2u);
+}
+
+TEST_F(FrameStreamTest, KeepsToItsRateAndStillSendsTheLastFrame) {
+  const auto stream = open({.credit = 8, .max_frames_per_second = 10});
+  publish(1);
+  EXPECT_EQ(drain(*stream).size(), 1u);
+  publish(2, true);
+  EXPECT_FALSE(stream->wants_frame());
+  EXPECT_TRUE(drain(*stream).empty());
+  const int wakes = wakes_;
+  timers_->advance(milliseconds(99));
+  EXPECT_EQ(wakes_, wakes);
+  timers_->advance(milliseconds(1));
+  EXPECT_GT(wakes_, wakes);
+  const auto last = drain(*stream);
+  ASSERT_EQ(last.size(), 1u);
+  EXPECT_TRUE(last[0].frame->converged);
+}
+
+TEST_F(FrameStreamTest, EndsWithExactlyOneReasonAndThenIsSilent) {
+  const auto stream = open();
+  publish(1);
+  stream->end(EndReason::kDraining, "first");
+  stream->end(EndReason::kSessionDeleted, "second");
+  const auto note = stream->next();
+  ASSERT_TRUE(note);
+  ASSERT_TRUE(std::holds_alternative<EndNote>(*note));
+  EXPECT_EQ(std::get<EndNote>(*note).reason, EndReason::kDraining);
+  publish(2);
+  EXPECT_FALSE(stream->next());
+}
+
+TEST_F(FrameStreamTest, ShowsNoFrameOfAnOldEpoch) {
+  const auto stream = open();
+  publish(5, true);
+  publisher_->begin_epoch(2);
+  const auto pieces = drain(*stream);
+  ASSERT_EQ(pieces.size(), 1u);
+  EXPECT_EQ(pieces[0].frame->epoch, 2u);
+  EXPECT_EQ(pieces[0].frame->input_seq, 5u);
+}
+
+TEST_F(FrameStreamTest, TellsOfAStandingFaultOnceAndNotAfterItIsGone) {
+  const auto stream = open();
+  publisher_->set_standing(FaultNote{absl::FailedPreconditionError("no"), 3});
+  const auto note = stream->next();
+  ASSERT_TRUE(note && std::holds_alternative<FaultNote>(*note));
+  EXPECT_EQ(std::get<FaultNote>(*note).input_seq, 3u);
+  EXPECT_FALSE(stream->next());
+  publisher_->set_standing(FaultNote{absl::FailedPreconditionError("no"), 4});
+  publisher_->set_standing(std::nullopt);
+  EXPECT_FALSE(stream->next());
+}
+
+TEST_F(FrameStreamTest, AnswersComeBeforeFramesAndBetweenTheirPieces) {
+  const auto stream = open();
+  publish(1, true, kManyVertices);
+  ASSERT_TRUE(std::holds_alternative<FramePiece>(stream->next().value()));
+  stream->answer(UpdateResult{7, 0});
+  EXPECT_EQ(stream->answers_waiting(), 1u);
+  ASSERT_TRUE(std::holds_alternative<UpdateResult>(stream->next().value()));
+  ASSERT_TRUE(std::holds_alternative<FramePiece>(stream->next().value()));
+}
+
+TEST(Surface, HoldsBothScalarsOfEveryPosition) {
+  Points points(2, 3);
+  points << 0.1, 0.2, 0.3, 1e10, -2, 3;
+  const Surface surface(points, Field::Constant(2, 0.7));
+  const auto wide = surface.position_bytes(Scalar::kFloat64);
+  ASSERT_EQ(wide.size(), 48u);
+  EXPECT_EQ(std::memcmp(wide.data(), points.data(), 48), 0);
+  const auto narrow = surface.position_bytes(Scalar::kFloat32);
+  ASSERT_EQ(narrow.size(), 24u);
+  float number = 0;
+  std::memcpy(&number, narrow.data() + 12, sizeof(number));
+  EXPECT_EQ(number, static_cast<float>(1e10));
+  std::memcpy(&number, surface.distortion_bytes().data(), sizeof(number));
+  EXPECT_EQ(number, 0.7f);
+}
+
+TEST(Publisher, TakesNoStreamsOnceClosed) {
+  const auto timers = std::make_shared<ManualTimers>();
+  const auto publisher = std::make_shared<Publisher>();
+  publisher->close(EndReason::kSessionDeleted, "");
+  const auto stream =
+      std::make_shared<FrameStream>(StreamOptions{}, publisher, timers, seconds(15), OpenedNote{});
+  EXPECT_FALSE(publisher->add(stream));
+}
+
+}  // namespace
+}  // namespace lpdeform

@@ -1,0 +1,226 @@
+#include "server/live_solver.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <optional>
+
+#include "bar.h"
+#include "core/base/fault.h"
+#include "manual_timers.h"
+
+namespace lpdeform {
+namespace {
+
+using std::chrono::seconds;
+
+constexpr int kMostSlices = 100000;
+
+class LiveSolverTest : public testing::Test {
+ protected:
+  explicit LiveSolverTest(const TriangleMesh& mesh = bar_mesh())
+      : shape_(shape_of(mesh)), mailbox_(shape_), solver_(deformer_of(shape_), mailbox_, *publisher_, {}) {}
+
+  const Points& rest() const { return shape_->positions(); }
+
+  std::shared_ptr<FrameStream> look_on() {
+    auto stream = std::make_shared<FrameStream>(StreamOptions{.credit = 8}, publisher_, timers_, seconds(15),
+                                                OpenedNote{});
+    EXPECT_TRUE(publisher_->add(stream));
+    return stream;
+  }
+
+  void settle(SolveJob* job = nullptr) {
+    int slices = 0;
+    while (solver_.run_slice(job)) ASSERT_LT(++slices, kMostSlices);
+  }
+
+  std::shared_ptr<SolveJob> job(SolveOptions options = {}) {
+    auto made = std::make_shared<SolveJob>(
+        std::move(options), [this](const SolveProgress&) { ++reports_; },
+        [this](absl::StatusOr<SolveResult> result) { result_ = std::move(result); });
+    made->version = mailbox_.newest().version;
+    return made;
+  }
+
+  std::string failure() const { return result_ ? fault_of(result_->status()).reason : "not ended"; }
+
+  std::shared_ptr<ManualTimers> timers_ = std::make_shared<ManualTimers>();
+  std::shared_ptr<Publisher> publisher_ = std::make_shared<Publisher>();
+  std::shared_ptr<const RestShape> shape_;
+  Mailbox mailbox_;
+  LiveSolver solver_;
+  std::optional<absl::StatusOr<SolveResult>> result_;
+  int reports_ = 0;
+};
+
+TEST_F(LiveSolverTest, BeginsWithTheRestMeshAsItsResult) {
+  const auto frame = publisher_->newest();
+  EXPECT_TRUE(frame->converged);
+  EXPECT_EQ(frame->input_seq, 0u);
+  EXPECT_EQ(frame->surface->positions(), rest());
+}
+
+TEST_F(LiveSolverTest, AnswersTheNewestInputWithAConvergedFrame) {
+  const auto stream = look_on();
+  ASSERT_TRUE(mailbox_.take(hold_ends(rest(), 1, 1)).ok());
+  settle();
+  ASSERT_TRUE(mailbox_.take(move_tip(2, 3)).ok());
+  ASSERT_TRUE(mailbox_.take(move_tip(3, 5)).ok());
+  settle();
+  const auto frame = publisher_->newest();
+  EXPECT_TRUE(frame->converged);
+  EXPECT_EQ(frame->input_seq, 3u);
+  EXPECT_EQ(frame->taken, 3u);
+  EXPECT_EQ(frame->stop_reason, StopReason::kConverged);
+  const auto tip = vertices_at(rest(), highest_z(rest()));
+  EXPECT_NEAR(frame->surface->positions()(tip[0], 0), rest()(tip[0], 0) + 5, 1e-9);
+  EXPECT_FALSE(solver_.run_slice(nullptr));
+  EXPECT_EQ(publisher_->newest(), frame);
+}
+
+TEST_F(LiveSolverTest, RestsWhileNobodyLooksOn) {
+  ASSERT_TRUE(mailbox_.take(hold_ends(rest(), 1, 1)).ok());
+  const auto before = publisher_->newest();
+  EXPECT_FALSE(solver_.run_slice(nullptr));
+  EXPECT_EQ(publisher_->newest(), before);
+  const auto stream = look_on();
+  settle();
+  EXPECT_EQ(publisher_->newest()->input_seq, 1u);
+  EXPECT_TRUE(publisher_->newest()->converged);
+}
+
+TEST_F(LiveSolverTest, FramesKeepComingWhileItRefines) {
+  const auto stream = look_on();
+  Update update = hold_ends(rest(), 1, 8);
+  update.settings.solver = SolveSettings{.method = Method::kLineSearch, .tolerance = 1e-9};
+  ASSERT_TRUE(mailbox_.take(update).ok());
+  std::uint64_t seen = 0, refining = 0, last_seq = 0;
+  double energy = std::numeric_limits<double>::infinity();
+  for (int slice = 0; slice < 30 && solver_.run_slice(nullptr); ++slice) {
+    while (const auto note = stream->next()) {
+      const auto* const piece = std::get_if<FramePiece>(&*note);
+      if (piece == nullptr) continue;
+      ++seen;
+      EXPECT_GT(piece->frame->frame_seq, last_seq);
+      last_seq = piece->frame->frame_seq;
+      if (piece->frame->input_seq == 1 && !piece->frame->converged) {
+        ++refining;
+        EXPECT_LE(piece->frame->energy, energy);
+        energy = piece->frame->energy;
+      }
+      ASSERT_TRUE(stream->acknowledge(last_seq).ok());
+    }
+  }
+  EXPECT_GE(refining, 3u);
+}
+
+TEST_F(LiveSolverTest, ASolveCallRunsWithoutReadersAndReports) {
+  ASSERT_TRUE(mailbox_.take(hold_ends(rest(), 4, 2)).ok());
+  const auto solve = job({.certify = true, .keep_trace = true});
+  settle(solve.get());
+  ASSERT_TRUE(result_ && result_->ok());
+  const SolveResult& result = **result_;
+  EXPECT_EQ(result.summary.stop_reason, StopReason::kConverged);
+  EXPECT_TRUE(result.summary.optimality_gap.has_value());
+  EXPECT_EQ(result.summary.trace.size(), static_cast<std::size_t>(result.summary.iterations) + 1);
+  EXPECT_EQ(result.frame->input_seq, 4u);
+  EXPECT_TRUE(result.frame->converged);
+  EXPECT_GE(reports_, 0);
+}
+
+TEST_F(LiveSolverTest, ANewerUpdateSupersedesASolveCall) {
+  ASSERT_TRUE(mailbox_.take(hold_ends(rest(), 1, 2)).ok());
+  const auto solve = job();
+  ASSERT_TRUE(mailbox_.take(move_tip(2, 3)).ok());
+  solver_.run_slice(solve.get());
+  EXPECT_EQ(failure(), "SUPERSEDED");
+  EXPECT_TRUE(absl::IsAborted(result_->status()));
+}
+
+TEST_F(LiveSolverTest, ACancelledSolveCallStopsWithinAnIteration) {
+  Update update = hold_ends(rest(), 1, 8);
+  update.settings.solver = SolveSettings{.method = Method::kLineSearch, .tolerance = 1e-12};
+  ASSERT_TRUE(mailbox_.take(update).ok());
+  const auto solve = job();
+  ASSERT_TRUE(solver_.run_slice(solve.get()));
+  const auto before = publisher_->newest();
+  solve->finish(absl::CancelledError("enough"));
+  EXPECT_FALSE(solver_.run_slice(solve.get()));
+  EXPECT_EQ(publisher_->newest(), before);
+  EXPECT_TRUE(absl::IsCancelled(result_->status()));
+}
+
+TEST_F(LiveSolverTest, AfterACancelledSolveCallTheReadersStillGetTheirResult) {
+  Update update = hold_ends(rest(), 1, 3);
+  ASSERT_TRUE(mailbox_.take(update).ok());
+  const auto stream = look_on();
+  const auto solve = job();
+  solver_.run_slice(solve.get());
+  solve->abandon();
+  settle();
+  EXPECT_TRUE(publisher_->newest()->converged);
+  EXPECT_EQ(publisher_->newest()->input_seq, 1u);
+}
+
+TEST_F(LiveSolverTest, ASolveCallNeedsHandles) {
+  const auto solve = job();
+  settle(solve.get());
+  EXPECT_EQ(failure(), "NO_HANDLES");
+  EXPECT_TRUE(absl::IsFailedPrecondition(result_->status()));
+}
+
+TEST_F(LiveSolverTest, InitialPositionsOfTheWrongSizeAreRefused) {
+  ASSERT_TRUE(mailbox_.take(hold_ends(rest(), 1, 2)).ok());
+  const auto solve = job({.initial_positions = Points::Zero(3, 3)});
+  settle(solve.get());
+  EXPECT_EQ(failure(), "POSITIONS_SIZE");
+}
+
+TEST_F(LiveSolverTest, SettingsWithoutHandlesLeaveTheSurfaceAsItIs) {
+  const auto stream = look_on();
+  Update update;
+  update.input_seq = 1;
+  update.settings.p = Field::Constant(1, 3.0);
+  ASSERT_TRUE(mailbox_.take(update).ok());
+  settle();
+  EXPECT_TRUE(publisher_->newest()->converged);
+  EXPECT_EQ(publisher_->newest()->input_seq, 1u);
+  EXPECT_FALSE(publisher_->standing());
+}
+
+class TwoBarsTest : public LiveSolverTest {
+ protected:
+  TwoBarsTest() : LiveSolverTest(two_bars_mesh()) {}
+};
+
+TEST_F(TwoBarsTest, AComponentWithoutAHandleIsAStandingFaultUntilItHasOne) {
+  const auto stream = look_on();
+  Update one;
+  one.input_seq = 1;
+  one.handles.push_back({"left", Handle{{0, 1}, shifted(0, 1, 0)}});
+  ASSERT_TRUE(mailbox_.take(one).ok());
+  settle();
+  ASSERT_TRUE(publisher_->standing());
+  const FaultNote fault = publisher_->standing()->fault;
+  EXPECT_EQ(fault_of(fault.status).reason, "COMPONENT_WITHOUT_HANDLE");
+  EXPECT_EQ(fault.input_seq, 1u);
+  EXPECT_EQ(publisher_->newest()->input_seq, 0u);
+
+  const auto solve = job();
+  settle(solve.get());
+  EXPECT_EQ(failure(), "COMPONENT_WITHOUT_HANDLE");
+
+  Update other;
+  other.input_seq = 2;
+  const auto last = static_cast<std::int32_t>(rest().rows() - 1);
+  other.handles.push_back({"right", Handle{{last}, Fixed{}}});
+  ASSERT_TRUE(mailbox_.take(other).ok());
+  settle();
+  EXPECT_FALSE(publisher_->standing());
+  EXPECT_EQ(publisher_->newest()->input_seq, 2u);
+  EXPECT_TRUE(publisher_->newest()->converged);
+}
+
+}  // namespace
+}  // namespace lpdeform

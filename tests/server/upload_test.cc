@@ -1,0 +1,114 @@
+#include "server/upload.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "core/base/crc32c.h"
+#include "core/base/fault.h"
+#include "manual_timers.h"
+
+namespace lpdeform {
+namespace {
+
+class UploadTest : public testing::Test {
+ protected:
+  std::shared_ptr<Upload> create(const std::string& bytes, const std::string& request_id = "") {
+    auto upload = uploads_->create(request_id, bytes.size(), crc32c(bytes));
+    EXPECT_TRUE(upload.ok()) << upload.status();
+    return *upload;
+  }
+
+  static std::string reason(const absl::Status& status) { return fault_of(status).reason; }
+
+  std::shared_ptr<ManualTimers> timers_ = std::make_shared<ManualTimers>();
+  std::shared_ptr<Budget> budget_ = std::make_shared<Budget>(1000);
+  std::shared_ptr<Uploads> uploads_ =
+      std::make_shared<Uploads>(budget_, timers_, Uploads::Limits{800, std::chrono::minutes(10)});
+};
+
+TEST_F(UploadTest, TakesPartsInAnyOrderAndTwice) {
+  const auto upload = create("abcdefgh");
+  EXPECT_EQ(upload->add(4, "ef")->received_bytes, 2u);
+  EXPECT_EQ(upload->add(4, "ef")->received_bytes, 2u);
+  EXPECT_EQ(upload->add(0, "abc")->received_bytes, 5u);
+  EXPECT_EQ(reason(upload->bytes().status()), "UPLOAD_UNFINISHED");
+  EXPECT_EQ(upload->add(2, "cde")->received_bytes, 6u);
+  EXPECT_TRUE(upload->add(5, "fgh")->is_finished);
+  EXPECT_EQ(*upload->bytes(), "abcdefgh");
+  EXPECT_TRUE(upload->add(0, "zz")->is_finished);
+  EXPECT_EQ(*upload->bytes(), "abcdefgh");
+}
+
+TEST_F(UploadTest, AWrongChecksumMeansBeginningAgain) {
+  const auto upload = create("abcd");
+  EXPECT_EQ(upload->add(0, "ab")->received_bytes, 2u);
+  const auto wrong = upload->add(2, "xx");
+  EXPECT_EQ(reason(wrong.status()), "UPLOAD_CHECKSUM");
+  EXPECT_TRUE(absl::IsDataLoss(wrong.status()));
+  EXPECT_EQ(upload->add(2, "cd")->received_bytes, 2u);
+  EXPECT_TRUE(upload->add(0, "ab")->is_finished);
+}
+
+TEST_F(UploadTest, RefusesPartsThatDoNotFit) {
+  const auto upload = create("abcd");
+  EXPECT_EQ(reason(upload->add(3, "de").status()), "UPLOAD_PART_OUT_OF_RANGE");
+  EXPECT_EQ(reason(upload->add(~std::uint64_t{0}, "d").status()), "UPLOAD_PART_OUT_OF_RANGE");
+  EXPECT_EQ(reason(upload->add(0, "").status()), "UPLOAD_PART_SIZE");
+  EXPECT_EQ(reason(upload->add(0, std::string(Upload::kMostPartBytes + 1, 'x')).status()),
+            "UPLOAD_PART_SIZE");
+}
+
+TEST_F(UploadTest, RefusesSizesBeyondTheLimitsBeforeTakingMemory) {
+  EXPECT_EQ(reason(uploads_->create("", 0, 0).status()), "UPLOAD_SIZE");
+  EXPECT_EQ(reason(uploads_->create("", ~std::uint64_t{0}, 0).status()), "UPLOAD_SIZE");
+  const auto first = create(std::string(600, 'a'));
+  const auto second = uploads_->create("", 600, 0);
+  EXPECT_TRUE(absl::IsResourceExhausted(second.status()));
+  EXPECT_EQ(reason(second.status()), "MEMORY_FULL");
+}
+
+TEST_F(UploadTest, RefusesToKeepTrackOfTooManyGaps) {
+  const auto budget = std::make_shared<Budget>(1 << 20);
+  const auto uploads =
+      std::make_shared<Uploads>(budget, timers_, Uploads::Limits{1 << 20, std::chrono::minutes(10)});
+  const auto upload = *uploads->create("", 4 * Upload::kMostGaps, 0);
+  for (std::size_t k = 0; k < Upload::kMostGaps; ++k) ASSERT_TRUE(upload->add(2 * k, "x").ok());
+  EXPECT_EQ(reason(upload->add(2 * Upload::kMostGaps, "x").status()), "UPLOAD_SCATTERED");
+}
+
+TEST_F(UploadTest, TheSameRequestIdGivesTheSameUpload) {
+  const auto upload = create("abcd", "request-1");
+  EXPECT_EQ(create("abcd", "request-1"), upload);
+  EXPECT_NE(create("abcd", "request-2"), upload);
+  EXPECT_EQ(reason(uploads_->create("short", 4, 0).status()), "REQUEST_ID");
+}
+
+TEST_F(UploadTest, GoesWhenNobodyTouchesItAndGivesItsMemoryBack) {
+  const std::string name = create("abcd", "request-1")->name();
+  timers_->advance(std::chrono::minutes(9));
+  EXPECT_TRUE(uploads_->find(name).ok());
+  timers_->advance(std::chrono::minutes(9));
+  EXPECT_TRUE(uploads_->find(name).ok());
+  timers_->advance(std::chrono::minutes(10));
+  EXPECT_EQ(reason(uploads_->find(name).status()), "UPLOAD_UNKNOWN");
+  EXPECT_EQ(budget_->used(), 0u);
+  EXPECT_NE(create("abcd", "request-1")->name(), name);
+}
+
+TEST(Budget, CountsCorrectionsBeyondItsLimit) {
+  const auto budget = std::make_shared<Budget>(100);
+  {
+    auto first = budget->reserve(60);
+    ASSERT_TRUE(first.ok());
+    first->resize(150);
+    EXPECT_EQ(budget->used(), 150u);
+    EXPECT_FALSE(budget->reserve(1).ok());
+    first->resize(40);
+    EXPECT_TRUE(budget->reserve(60).ok());
+  }
+  EXPECT_EQ(budget->used(), 0u);
+}
+
+}  // namespace
+}  // namespace lpdeform
