@@ -103,15 +103,31 @@ int serve(Arguments& arguments, const sigset_t& signals) {
   return 0;
 }
 
+const pthread_t main_thread = pthread_self();
+
+void pass_to_main_thread(int signal) {
+  pthread_kill(main_thread, signal);
+}
+
+// Leaves SIGTERM and SIGINT to sigwait() in the main thread. Threads made from now on block them; those that
+// a library (OpenBLAS) made while it was loaded do not, and pass them on.
+sigset_t signals_for_sigwait() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  struct sigaction pass_on = {};
+  pass_on.sa_handler = pass_to_main_thread;
+  for (const int signal : {SIGTERM, SIGINT}) {
+    sigaddset(&signals, signal);
+    sigaction(signal, &pass_on, nullptr);
+  }
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  return signals;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Blocked before any thread is made, so that only sigwait() sees them.
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  const sigset_t signals = signals_for_sigwait();
 
   Arguments arguments;
   CLI::App app;
