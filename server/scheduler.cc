@@ -33,6 +33,7 @@ bool Scheduler::LessUsed::operator()(const std::shared_ptr<Runnable>& a,
 
 Scheduler::Scheduler(int threads) {
   LPDEFORM_CHECK(threads >= 2);
+  const std::scoped_lock lock(mutex_);  // the first threads ask already how many there are
   for (int k = 0; k < threads; ++k) threads_.emplace_back([this] { run(); });
 }
 
