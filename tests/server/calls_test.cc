@@ -1,0 +1,375 @@
+// The unary calls of the running service, and the errors of every call.
+
+#include <grpcpp/generic/generic_stub.h>
+
+#include <functional>
+#include <limits>
+#include <thread>
+
+#include "server/health_probe.h"
+#include "service_fixture.h"
+
+namespace lpdeform {
+namespace {
+
+class CallsTest : public ServiceTest {};
+
+TEST_F(CallsTest, ASessionIsCreatedDescribedListedAndDeleted) {
+  const auto created = create(bar_mesh());
+  EXPECT_EQ(created.session().name().size(), std::string("sessions/").size() + 32);
+  EXPECT_EQ(created.session().epoch(), 1u);
+  EXPECT_EQ(created.session().mesh().vertices(), 370);
+  EXPECT_EQ(created.session().mesh().faces(), 736);
+  EXPECT_EQ(created.session().mesh().components(), 1);
+  EXPECT_GT(created.session().mesh().defects_size(), 5);
+  EXPECT_EQ(created.session().settings().p().uniform(), 2.0);
+  EXPECT_GT(created.session().memory_bytes(), 370u * 24);
+  EXPECT_GT(created.session().expires_unix_ms(), created.session().created_unix_ms());
+  ASSERT_TRUE(update(created, ends_message(bar_mesh().vertices, 3, 1)).ok());
+
+  v1::GetSessionRequest get;
+  get.set_session(created.session().name());
+  v1::GetSessionResponse got;
+  grpc::ClientContext get_context, list_context;
+  ASSERT_TRUE(stub_->GetSession(&get_context, get, &got).ok());
+  EXPECT_EQ(got.session().input_seq(), 3u);
+  ASSERT_EQ(got.session().handles_size(), 2);
+  EXPECT_EQ(got.session().handles(1).name(), "tip");
+  EXPECT_EQ(got.session().handles(1).vertex_count(), 25u);
+
+  v1::ListSessionsResponse listed;
+  ASSERT_TRUE(stub_->ListSessions(&list_context, {}, &listed).ok());
+  ASSERT_EQ(listed.sessions_size(), 1);
+  EXPECT_EQ(listed.sessions(0).name(), created.session().name());
+
+  for (int times = 0; times < 2; ++times) {
+    grpc::ClientContext context;
+    v1::DeleteSessionRequest request;
+    v1::DeleteSessionResponse response;
+    request.set_session(created.session().name());
+    EXPECT_TRUE(stub_->DeleteSession(&context, request, &response).ok());
+  }
+  grpc::ClientContext again;
+  EXPECT_EQ(stub_->GetSession(&again, get, &got).error_code(), grpc::StatusCode::NOT_FOUND);
+}
+
+TEST_F(CallsTest, TheSameRequestIdCreatesOneSessionAlsoAtTheSameTime) {
+  v1::CreateSessionRequest request;
+  request.set_request_id("request-1");
+  *request.mutable_mesh() = mesh_message(bar_mesh());
+  std::vector<v1::CreateSessionResponse> responses(4);
+  std::vector<std::thread> callers;
+  for (auto& response : responses) {
+    callers.emplace_back([&] { EXPECT_TRUE(try_create(request, response).ok()); });
+  }
+  for (auto& caller : callers) caller.join();
+  for (const auto& response : responses) {
+    EXPECT_EQ(response.session().name(), responses[0].session().name());
+    EXPECT_EQ(response.writer_token(), responses[0].writer_token());
+  }
+  v1::ListSessionsResponse listed;
+  grpc::ClientContext context;
+  ASSERT_TRUE(stub_->ListSessions(&context, {}, &listed).ok());
+  EXPECT_EQ(listed.sessions_size(), 1);
+}
+
+TEST_F(CallsTest, ASessionMayBeginWithHandlesAndSettings) {
+  v1::CreateSessionRequest request;
+  *request.mutable_mesh() = mesh_message(bar_mesh());
+  request.set_weights(v1::WEIGHT_KIND_UNIFORM);
+  request.set_free_components(v1::FREE_COMPONENTS_STAY);
+  *request.mutable_handles() = ends_message(bar_mesh().vertices, 0, 2).handles();
+  request.mutable_settings()->mutable_p()->set_uniform(1.5);
+  v1::CreateSessionResponse created;
+  ASSERT_TRUE(try_create(request, created).ok());
+  EXPECT_EQ(created.session().weights(), v1::WEIGHT_KIND_UNIFORM);
+  EXPECT_EQ(created.session().free_components(), v1::FREE_COMPONENTS_STAY);
+  EXPECT_EQ(created.session().handles_size(), 2);
+  EXPECT_EQ(created.session().settings().p().uniform(), 1.5);
+  const SolveOutcome outcome = solve(solve_request(created));
+  ASSERT_TRUE(outcome.status.ok()) << outcome.status.error_message();
+  EXPECT_EQ(outcome.summary.stop_reason(), v1::STOP_REASON_CONVERGED);
+  EXPECT_GT(outcome.summary.energy(), 0);
+}
+
+TEST_F(CallsTest, EveryCallSaysNotFoundForASessionThatIsNot) {
+  v1::CreateSessionResponse nobody;
+  nobody.mutable_session()->set_name("sessions/00000000000000000000000000000000");
+  nobody.set_writer_token("token");
+  std::vector<grpc::Status> statuses = {update(nobody, tip_message(1, 1)),
+                                        solve(solve_request(nobody)).status};
+  {
+    grpc::ClientContext context;
+    v1::GetSessionRequest request;
+    v1::GetSessionResponse response;
+    statuses.push_back(stub_->GetSession(&context, request, &response));
+  }
+  {
+    grpc::ClientContext context;
+    v1::AcquireWriterRequest request;
+    v1::AcquireWriterResponse response;
+    statuses.push_back(stub_->AcquireWriter(&context, request, &response));
+  }
+  {
+    grpc::ClientContext context;
+    v1::AckFramesRequest request;
+    v1::AckFramesResponse response;
+    statuses.push_back(stub_->AckFrames(&context, request, &response));
+  }
+  {
+    grpc::ClientContext context;
+    v1::StreamFramesResponse response;
+    const auto stream = stub_->StreamFrames(&context, {});
+    EXPECT_FALSE(stream->Read(&response));
+    statuses.push_back(stream->Finish());
+  }
+  DeformClient deform(*stub_, nobody);
+  statuses.push_back(deform.read_to_end());
+  for (const grpc::Status& status : statuses) {
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
+    const ErrorDetails details = details_of(status);
+    EXPECT_EQ(details.info.reason(), "SESSION_UNKNOWN");
+    EXPECT_TRUE(details.resource.has_value());
+    EXPECT_FALSE(details.retry.has_value());
+  }
+}
+
+TEST_F(CallsTest, ChangingASessionNeedsItsToken) {
+  auto session = create(bar_mesh());
+  const std::string token = session.writer_token();
+  session.set_writer_token("");
+  EXPECT_EQ(update(session, tip_message(1, 1)).error_code(), grpc::StatusCode::UNAUTHENTICATED);
+  const SolveOutcome refused = solve(solve_request(session));
+  EXPECT_EQ(refused.status.error_code(), grpc::StatusCode::UNAUTHENTICATED);
+  EXPECT_EQ(details_of(refused.status).info.reason(), "WRITER_TOKEN_MISSING");
+  session.set_writer_token(std::string(token.size(), '0'));
+  const grpc::Status status = update(session, tip_message(1, 1));
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::PERMISSION_DENIED);
+  EXPECT_EQ(details_of(status).info.reason(), "NOT_THE_WRITER");
+  DeformClient deform(*stub_, session);
+  EXPECT_EQ(deform.read_to_end().error_code(), grpc::StatusCode::PERMISSION_DENIED);
+}
+
+TEST_F(CallsTest, AnUpdateIsAnsweredWithItsStaleParts) {
+  const auto session = create(bar_mesh());
+  ASSERT_TRUE(update(session, ends_message(bar_mesh().vertices, 5, 1)).ok());
+  v1::UpdateHandlesRequest request;
+  request.set_session(session.session().name());
+  request.set_writer_token(session.writer_token());
+  *request.mutable_update() = tip_message(4, 3);
+  v1::UpdateHandlesResponse response;
+  grpc::ClientContext context;
+  ASSERT_TRUE(stub_->UpdateHandles(&context, request, &response).ok());
+  EXPECT_EQ(response.result().input_seq(), 4u);
+  EXPECT_EQ(response.result().stale_parts(), 1u);
+}
+
+TEST_F(CallsTest, AnUploadThatWasDamagedOnTheWayIsDataLoss) {
+  v1::CreateUploadRequest announce;
+  announce.set_size_bytes(4);
+  announce.set_crc32c(1);
+  v1::CreateUploadResponse created;
+  grpc::ClientContext create_context, part_context, mesh_context;
+  ASSERT_TRUE(stub_->CreateUpload(&create_context, announce, &created).ok());
+  v1::UploadPartRequest part;
+  part.set_upload(created.upload());
+  part.set_data("abcd");
+  v1::UploadPartResponse answer;
+  const grpc::Status status = stub_->UploadPart(&part_context, part, &answer);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::DATA_LOSS);
+  EXPECT_EQ(details_of(status).info.reason(), "UPLOAD_CHECKSUM");
+}
+
+/// A wrong session, made from the bar, and the reason that it is refused for.
+struct WrongSession {
+  const char* reason;
+  const char* element;
+  std::function<void(v1::CreateSessionRequest&)> spoil;
+};
+
+std::ostream& operator<<(std::ostream& out, const WrongSession& wrong) {
+  return out << wrong.reason;
+}
+
+class WrongSessionTest : public ServiceTest, public testing::WithParamInterface<WrongSession> {};
+
+TEST_P(WrongSessionTest, IsInvalidWithItsReasonAndElement) {
+  v1::CreateSessionRequest request;
+  *request.mutable_mesh() = mesh_message(bar_mesh());
+  GetParam().spoil(request);
+  v1::CreateSessionResponse response;
+  const grpc::Status status = try_create(request, response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << status.error_message();
+  const ErrorDetails details = details_of(status);
+  EXPECT_EQ(details.info.reason(), GetParam().reason);
+  ASSERT_TRUE(details.bad_request.has_value());
+  EXPECT_EQ(details.bad_request->field_violations(0).description(), status.error_message());
+  if (*GetParam().element == '\0') return;
+  EXPECT_EQ(details.info.metadata().at("element"), GetParam().element);
+}
+
+void overwrite(v1::CreateSessionRequest& request, std::size_t at, const void* bytes, std::size_t size) {
+  std::memcpy(request.mutable_mesh()->mutable_data()->mutable_inline_()->data() + at, bytes, size);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Reasons, WrongSessionTest,
+    testing::Values(
+        WrongSession{"MESH_NOT_FINITE", "vertex 3",
+                     [](auto& request) {
+                       const double nan = std::numeric_limits<double>::quiet_NaN();
+                       overwrite(request, 3 * 24 + 8, &nan, sizeof(nan));
+                     }},
+        WrongSession{"MESH_INDEX_OUT_OF_RANGE", "face 1",
+                     [](auto& request) {
+                       const std::uint32_t far = 0xffffffff;
+                       overwrite(request, 370 * 24 + 12, &far, sizeof(far));
+                     }},
+        WrongSession{"BUFFER_SIZE", "mesh data",
+                     [](auto& request) { request.mutable_mesh()->set_vertex_count(371); }},
+        WrongSession{"MESH_TOO_LARGE", "mesh",
+                     [](auto& request) { request.mutable_mesh()->set_vertex_count(0xffffffff); }},
+        WrongSession{"BUFFER_MISSING", "mesh data",
+                     [](auto& request) { request.mutable_mesh()->clear_data(); }},
+        WrongSession{"MESH_EMPTY", "",
+                     [](auto& request) {
+                       request.mutable_mesh()->set_vertex_count(0);
+                       request.mutable_mesh()->set_face_count(0);
+                       request.mutable_mesh()->mutable_data()->set_inline_("");
+                     }},
+        WrongSession{"INLINE_TOO_LARGE", "mesh data",
+                     [](auto& request) {
+                       request.mutable_mesh()->mutable_data()->set_inline_(std::string((1u << 20) + 1, '\0'));
+                     }},
+        WrongSession{"REQUEST_ID", "request_id", [](auto& request) { request.set_request_id("short"); }},
+        WrongSession{"ENUM_UNKNOWN", "weight kind",
+                     [](auto& request) { request.set_weights(static_cast<v1::WeightKind>(77)); }},
+        WrongSession{"P_OUT_OF_RANGE", "",
+                     [](auto& request) { request.mutable_settings()->mutable_p()->set_uniform(0.5); }},
+        WrongSession{
+            "FIELD_SIZE", "p",
+            [](auto& request) {
+              request.mutable_settings()->mutable_p()->mutable_per_vertex()->mutable_values()->set_inline_(
+                  std::string(12, '\0'));
+            }},
+        WrongSession{"FIELD_MISSING", "stiffness",
+                     [](auto& request) { request.mutable_settings()->mutable_stiffness(); }},
+        WrongSession{"HANDLE_CHANGE_MISSING", "handles",
+                     [](auto& request) { request.add_handles()->set_name("a"); }},
+        WrongSession{"MOTION_MISSING", "motion",
+                     [](auto& request) { request.add_handles()->mutable_move(); }},
+        WrongSession{"HANDLE_TOO_MANY_VERTICES", "handle vertices",
+                     [](auto& request) {
+                       v1::HandleUpdate& handle = *request.add_handles();
+                       handle.set_name("a");
+                       handle.mutable_set()->mutable_vertices()->set_inline_(std::string(371 * 4, '\0'));
+                     }}),
+    [](const auto& info) { return std::string(info.param.reason); });
+
+class SmallServerTest : public ServiceTest {
+ protected:
+  void SetUp() override {
+    options_.max_sessions = 1;
+    options_.max_vertices = 400;
+    options_.max_bytes = 2'000'000;
+    start();
+  }
+};
+
+TEST_F(SmallServerTest, AFullServerSaysWhenToTryAgain) {
+  create(bar_mesh());
+  v1::CreateSessionRequest request;
+  *request.mutable_mesh() = mesh_message(bar_mesh());
+  v1::CreateSessionResponse response;
+  const grpc::Status status = try_create(request, response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  const ErrorDetails details = details_of(status);
+  EXPECT_EQ(details.info.reason(), "SESSIONS_FULL");
+  ASSERT_TRUE(details.retry.has_value());
+  EXPECT_GT(details.retry->retry_delay().seconds(), 0);
+  ASSERT_TRUE(details.quota.has_value());
+  EXPECT_EQ(details.quota->violations(0).subject(), "sessions");
+}
+
+TEST_F(SmallServerTest, TooLargeAMeshNamesTheLimit) {
+  v1::CreateSessionRequest request;
+  *request.mutable_mesh() = mesh_message(box_surface(5, 5, 20));
+  v1::CreateSessionResponse response;
+  const ErrorDetails details = details_of(try_create(request, response));
+  EXPECT_EQ(details.info.reason(), "MESH_TOO_LARGE");
+  EXPECT_EQ(details.info.metadata().at("limit"), "vertices <= 400, faces <= 1200");
+}
+
+TEST_F(SmallServerTest, MemoryIsPromisedOnceOnly) {
+  v1::CreateUploadRequest announce;
+  announce.set_size_bytes(1'500'000);
+  v1::CreateUploadResponse created;
+  grpc::ClientContext first, second;
+  EXPECT_TRUE(stub_->CreateUpload(&first, announce, &created).ok());
+  const grpc::Status status = stub_->CreateUpload(&second, announce, &created);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(details_of(status).info.reason(), "MEMORY_FULL");
+}
+
+TEST_F(CallsTest, HealthSaysServingUntilTheServerDrains) {
+  EXPECT_TRUE(is_serving(server_->address()));
+  const std::string address = server_->address();
+  server_->drain(std::chrono::milliseconds(0));
+  EXPECT_FALSE(is_serving(address));
+}
+
+TEST_F(CallsTest, ReflectionNamesTheService) {
+  grpc::GenericStub stub(grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kTestDeadline);
+  grpc::CompletionQueue queue;
+  void* tag = nullptr;
+  bool is_ok = false;
+  const auto call =
+      stub.PrepareCall(&context, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", &queue);
+  call->StartCall(nullptr);
+  ASSERT_TRUE(queue.Next(&tag, &is_ok) && is_ok);
+  // ServerReflectionRequest with list_services, field 7, "*".
+  const grpc::Slice ask(std::string("\x3a\x01*"));
+  call->Write(grpc::ByteBuffer(&ask, 1), nullptr);
+  ASSERT_TRUE(queue.Next(&tag, &is_ok) && is_ok);
+  grpc::ByteBuffer answer;
+  call->Read(&answer, nullptr);
+  ASSERT_TRUE(queue.Next(&tag, &is_ok) && is_ok);
+  std::vector<grpc::Slice> slices;
+  ASSERT_TRUE(answer.Dump(&slices).ok());
+  std::string bytes;
+  for (const grpc::Slice& slice : slices)
+    bytes.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
+  EXPECT_NE(bytes.find("lpdeform.v1.DeformService"), std::string::npos);
+  EXPECT_NE(bytes.find("grpc.health.v1.Health"), std::string::npos);
+  context.TryCancel();
+  grpc::Status status;
+  call->Finish(&status, nullptr);
+  queue.Next(&tag, &is_ok);
+}
+
+TEST_F(CallsTest, ATakenPortIsAnError) {
+  ServerOptions options;
+  options.address = server_->address();
+  const auto second = Server::start(options);
+  EXPECT_TRUE(absl::IsUnavailable(second.status())) << second.status();
+}
+
+TEST(ServerOptionsTest, AreChecked) {
+  ServerOptions options;
+  options.runner_threads = 1;
+  EXPECT_TRUE(absl::IsInvalidArgument(Server::start(options).status()));
+}
+
+TEST(ServerAddress, MayBeASocketOfTheFileSystem) {
+  ServerOptions options;
+  options.address = "unix:" + testing::TempDir() + "lpdeform_test.sock";
+  const auto server = Server::start(options);
+  ASSERT_TRUE(server.ok()) << server.status();
+  EXPECT_EQ((*server)->address(), options.address);
+  EXPECT_TRUE(is_serving(options.address));
+}
+
+}  // namespace
+}  // namespace lpdeform

@@ -1,0 +1,229 @@
+// Solve calls of the running service.
+
+#include <algorithm>
+#include <thread>
+
+#include "service_fixture.h"
+
+namespace lpdeform {
+namespace {
+
+const Points& rest() {
+  static const Points points = bar_mesh().vertices;
+  return points;
+}
+
+class SolveCallTest : public ServiceTest {
+ protected:
+  /// Reads until the first progress message.
+  static void wait_for_progress(grpc::ClientReader<v1::SolveResponse>& stream) {
+    v1::SolveResponse response;
+    ASSERT_TRUE(stream.Read(&response));
+    ASSERT_TRUE(response.has_progress());
+  }
+
+  v1::SolveRequest slow_request(const v1::CreateSessionResponse& session, std::uint64_t input_seq = 1) {
+    v1::SolveRequest request = solve_request(session);
+    *request.mutable_update() = ends_message(rest(), input_seq, 8);
+    solve_slowly(*request.mutable_update());
+    request.set_progress(true);
+    return request;
+  }
+
+  void expect_solves(const v1::CreateSessionResponse& session, std::uint64_t input_seq) {
+    v1::SolveRequest request = solve_request(session);
+    v1::Update& update = *request.mutable_update();
+    update = ends_message(rest(), input_seq, 1);
+    update.mutable_settings()->mutable_p()->set_uniform(2);
+    update.mutable_settings()->mutable_solver()->set_method(v1::METHOD_QUASI_NEWTON);
+    const SolveOutcome outcome = solve(request);
+    ASSERT_TRUE(outcome.status.ok()) << outcome.status.error_message();
+    EXPECT_EQ(outcome.summary.input_seq(), input_seq);
+    EXPECT_EQ(outcome.summary.stop_reason(), v1::STOP_REASON_CONVERGED);
+  }
+};
+
+TEST_F(SolveCallTest, BringsTheSummaryTheTraceAndTheResultInThatOrder) {
+  const auto session = create(bar_mesh());
+  v1::SolveRequest request = solve_request(session);
+  *request.mutable_update() = ends_message(rest(), 1, 4);
+  request.set_scalar(v1::SCALAR_FLOAT64);
+  request.set_certify(true);
+  request.set_trace(true);
+  request.set_progress(true);
+  const SolveOutcome outcome = solve(request);
+  ASSERT_TRUE(outcome.status.ok()) << outcome.status.error_message();
+  EXPECT_EQ(outcome.summary.method(), "quasi_newton");
+  EXPECT_EQ(outcome.summary.stop_reason(), v1::STOP_REASON_CONVERGED);
+  EXPECT_EQ(outcome.summary.input_seq(), 1u);
+  EXPECT_LT(outcome.summary.energy(), outcome.summary.initial_energy());
+  ASSERT_TRUE(outcome.summary.has_certificate());
+  EXPECT_LE(outcome.summary.certificate().relative_gap(), 1e-3);
+  ASSERT_EQ(outcome.trace.size(), outcome.summary.iterations() + 1);
+  EXPECT_EQ(outcome.trace[0].energy(), outcome.summary.initial_energy());
+  ASSERT_TRUE(outcome.frame);
+  EXPECT_TRUE(outcome.frame->header.converged());
+  EXPECT_EQ(outcome.frame->header.energy(), outcome.summary.energy());
+  const auto tip = static_cast<std::size_t>(vertices_at(rest(), 21)[0]);
+  EXPECT_NEAR(outcome.frame->position<double>(tip, 0), rest()(static_cast<Eigen::Index>(tip), 0) + 4, 1e-12);
+  const std::string order(outcome.order.begin(), outcome.order.end());
+  EXPECT_TRUE(std::is_sorted(order.begin(), order.end(), [](char a, char b) {
+    return std::string("pstf").find(a) < std::string("pstf").find(b);
+  })) << order;
+}
+
+TEST_F(SolveCallTest, ALongTraceComesInParts) {
+  const auto session = create(bar_mesh());
+  v1::SolveRequest request = slow_request(session);
+  request.mutable_update()->mutable_settings()->mutable_solver()->set_max_iterations(12000);
+  request.set_trace(true);
+  request.set_progress(false);
+  const SolveOutcome outcome = solve(request);
+  ASSERT_TRUE(outcome.status.ok()) << outcome.status.error_message();
+  EXPECT_EQ(outcome.summary.stop_reason(), v1::STOP_REASON_ITERATION_LIMIT);
+  EXPECT_EQ(outcome.summary.iterations(), 12000u);
+  EXPECT_EQ(std::count(outcome.order.begin(), outcome.order.end(), 't'), 2);
+  ASSERT_EQ(outcome.trace.size(), 12001u);
+  for (std::uint32_t k = 0; k < 12001; ++k) ASSERT_EQ(outcome.trace[k].iteration(), k);
+}
+
+TEST_F(SolveCallTest, GoesOnFromPositionsThatItIsGiven) {
+  const auto session = create(bar_mesh());
+  v1::SolveRequest request = solve_request(session);
+  *request.mutable_update() = ends_message(rest(), 1, 4);
+  request.set_scalar(v1::SCALAR_FLOAT64);
+  const SolveOutcome first = solve(request);
+  ASSERT_TRUE(first.frame);
+  const auto other = create(bar_mesh());
+  v1::SolveRequest again = solve_request(other);
+  *again.mutable_update() = ends_message(rest(), 1, 4);
+  again.mutable_initial_positions()->set_scalar(v1::SCALAR_FLOAT64);
+  again.mutable_initial_positions()->mutable_data()->set_inline_(first.frame->positions);
+  const SolveOutcome second = solve(again);
+  ASSERT_TRUE(second.status.ok());
+  EXPECT_NEAR(second.summary.initial_energy(), first.summary.energy(), 1e-9 * first.summary.energy());
+}
+
+TEST_F(SolveCallTest, NeedsHandles) {
+  const auto session = create(bar_mesh());
+  const SolveOutcome outcome = solve(solve_request(session));
+  EXPECT_EQ(outcome.status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_EQ(details_of(outcome.status).info.reason(), "NO_HANDLES");
+}
+
+TEST_F(SolveCallTest, ABadUpdateEndsItAndChangesNothing) {
+  const auto session = create(bar_mesh());
+  v1::SolveRequest request = solve_request(session);
+  *request.mutable_update() = ends_message(rest(), 1, 4);
+  request.mutable_update()->mutable_settings()->mutable_p()->set_uniform(100);
+  const SolveOutcome outcome = solve(request);
+  EXPECT_EQ(details_of(outcome.status).info.reason(), "P_OUT_OF_RANGE");
+  EXPECT_EQ(details_of(solve(solve_request(session)).status).info.reason(), "NO_HANDLES");
+}
+
+TEST_F(SolveCallTest, CancellingLetsTheSessionGoOnWithOtherThings) {
+  const auto session = create(bar_mesh());
+  grpc::ClientContext context;
+  const auto stream = stub_->Solve(&context, slow_request(session));
+  wait_for_progress(*stream);
+  context.TryCancel();
+  EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  expect_solves(session, 2);
+}
+
+TEST_F(SolveCallTest, ADeadlineEndsIt) {
+  const auto session = create(bar_mesh());
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(300));
+  const SolveOutcome outcome = solve(slow_request(session), &context);
+  EXPECT_EQ(outcome.status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  expect_solves(session, 2);
+}
+
+TEST_F(SolveCallTest, AClientThatGoesAwayEndsIt) {
+  const auto session = create(bar_mesh());
+  const v1::SolveRequest request = slow_request(session);
+  {
+    auto gone = connect();
+    grpc::ClientContext context;
+    const auto stream = gone->Solve(&context, request);
+    wait_for_progress(*stream);
+    context.TryCancel();
+    gone.reset();
+  }
+  expect_solves(session, 2);
+  // Nothing of the lost call is left over that a drain would have to wait for.
+  server_->drain(std::chrono::minutes(10));
+}
+
+TEST_F(SolveCallTest, ANewerUpdateSupersedesIt) {
+  const auto session = create(bar_mesh());
+  grpc::ClientContext context;
+  const auto stream = stub_->Solve(&context, slow_request(session));
+  wait_for_progress(*stream);
+  ASSERT_TRUE(update(session, tip_message(2, 1)).ok());
+  v1::SolveResponse response;
+  while (stream->Read(&response)) {
+  }
+  const grpc::Status status = stream->Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::ABORTED);
+  EXPECT_EQ(details_of(status).info.reason(), "SUPERSEDED");
+}
+
+TEST_F(SolveCallTest, ReadersSeeItsFramesAndItsResult) {
+  const auto session = create(bar_mesh());
+  DeformClient reader(*stub_, session, {}, false);
+  ASSERT_TRUE(reader.next_frame());
+  v1::SolveRequest request = slow_request(session);
+  request.mutable_update()->mutable_settings()->mutable_solver()->set_max_iterations(20000);
+  SolveOutcome outcome;
+  std::thread solver([&] { outcome = solve(request); });
+  const auto frame = reader.settle(1);
+  solver.join();
+  ASSERT_TRUE(frame);
+  ASSERT_TRUE(outcome.status.ok()) << outcome.status.error_message();
+  EXPECT_EQ(frame->header.energy(), outcome.summary.energy());
+  EXPECT_EQ(frame->header.frame_seq(), outcome.frame->header.frame_seq());
+  EXPECT_EQ(frame->header.stop_reason(), v1::STOP_REASON_ITERATION_LIMIT);
+  expect_invariants(reader.history, 2);
+}
+
+TEST_F(SolveCallTest, MayGoOnWhileTheServerDrainsButNothingNewBegins) {
+  const auto session = create(bar_mesh());
+  grpc::ClientContext context;
+  const auto stream = stub_->Solve(&context, slow_request(session));
+  wait_for_progress(*stream);
+  DeformClient witness(*stub_, session, {}, false);
+  ASSERT_TRUE(witness.next_frame());
+  std::thread draining([&] { server_->drain(std::chrono::minutes(10)); });
+  EXPECT_TRUE(witness.read_to_end().ok());  // its go-away says that the draining has begun
+  v1::GetSessionRequest request;
+  v1::GetSessionResponse response;
+  grpc::ClientContext refused;
+  const grpc::Status status = stub_->GetSession(&refused, request, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAVAILABLE);
+  const ErrorDetails details = details_of(status);
+  EXPECT_EQ(details.info.reason(), "DRAINING");
+  EXPECT_TRUE(details.retry.has_value());
+  v1::SolveResponse progress;
+  EXPECT_TRUE(stream->Read(&progress));
+  context.TryCancel();
+  draining.join();
+  EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+TEST_F(SolveCallTest, IsEndedWhenTheGraceIsOver) {
+  const auto session = create(bar_mesh());
+  grpc::ClientContext context;
+  const auto stream = stub_->Solve(&context, slow_request(session));
+  wait_for_progress(*stream);
+  server_->drain(std::chrono::milliseconds(0));
+  v1::SolveResponse response;
+  while (stream->Read(&response)) {
+  }
+  const auto code = stream->Finish().error_code();
+  EXPECT_TRUE(code == grpc::StatusCode::UNAVAILABLE || code == grpc::StatusCode::CANCELLED) << code;
+}
+
+}  // namespace
+}  // namespace lpdeform
