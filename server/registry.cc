@@ -45,7 +45,8 @@ bool Registry::begin_creation(const std::string& request_id, OnCreated on_create
 void Registry::finish_creation(const std::string& request_id, absl::StatusOr<std::shared_ptr<Session>> made,
                                const OnCreated& on_created) {
   absl::StatusOr<CreatedSession> created =
-      made.ok() ? absl::StatusOr<CreatedSession>(CreatedSession{*made, (*made)->lease().token}) : made.status();
+      made.ok() ? absl::StatusOr<CreatedSession>(CreatedSession{*made, (*made)->lease().token})
+                : made.status();
   std::vector<OnCreated> waiting;
   {
     const std::scoped_lock lock(mutex_);

@@ -22,7 +22,7 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
   }
 
  private:
-  static constexpr std::size_t kRecordsAMessage = 10000;  // of about 40 bytes
+  static constexpr std::size_t kRecordsAMessage = 1000;  // of about 40 bytes
 
   std::weak_ptr<SolveCall> weak() { return std::static_pointer_cast<SolveCall>(shared_from_this()); }
 

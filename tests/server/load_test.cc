@@ -34,7 +34,8 @@ TEST_F(LoadTest, HalfAMillionVerticesTravelInPartsThroughDefaultLimits) {
   const auto session = create(mesh);
   EXPECT_EQ(session.session().mesh().vertices(), 500'000);
 
-  // Everything is held, each vertex at a place of its own, so that the solve is short and the messages long.
+  // Everything is held, each vertex at a place of its own: the messages are long, and there is nothing to
+  // minimise.
   std::vector<std::int32_t> all(n);
   for (std::size_t i = 0; i < n; ++i) all[i] = static_cast<std::int32_t>(i);
   Points targets = mesh.vertices;
@@ -54,6 +55,7 @@ TEST_F(LoadTest, HalfAMillionVerticesTravelInPartsThroughDefaultLimits) {
   field.set_scalar(v1::SCALAR_FLOAT64);
   field.mutable_values()->set_upload(
       upload({reinterpret_cast<const char*>(p.data()), p.size() * sizeof(double)}));
+  update.mutable_settings()->mutable_solver()->set_max_iterations(1);
   const SolveOutcome outcome = solve(request);
   ASSERT_TRUE(outcome.status.ok()) << outcome.status.error_message();
   ASSERT_TRUE(outcome.frame);
@@ -131,21 +133,19 @@ TEST_F(LoadTest, AClientThatReadsNothingGetsTheNewestFrameWhenItResumes) {
   const auto session = create(mesh);
   DeformClient sleeper(*stub_, session), reader(*stub_, session, {}, false);
   std::uint64_t seq = 0;
-  while (seq < 30) {
+  while (seq < 8) {
     ++seq;
     ASSERT_TRUE(update(session, grid_update(mesh.vertices, seq, 0.1 * double(seq))).ok());
     ASSERT_TRUE(reader.settle(seq));
   }
-  // What the sleeper finds waiting is bounded by its credit; the one after is the newest.
-  const auto first = sleeper.next_frame(false);
-  ASSERT_TRUE(first);
-  const auto second = sleeper.next_frame(false);
-  ASSERT_TRUE(second);
-  sleeper.acknowledge(second->header.frame_seq());
-  const auto third = sleeper.next_frame(false);
-  ASSERT_TRUE(third);
-  EXPECT_EQ(third->header.input_seq(), 30u);
-  EXPECT_TRUE(third->header.converged());
+  // What is on its way to the sleeper is bounded by its credit of 2; the one after that is the newest.
+  std::optional<ReceivedFrame> frame;
+  do {
+    frame = sleeper.next_frame();
+    ASSERT_TRUE(frame);
+  } while (frame->header.input_seq() < seq);
+  EXPECT_TRUE(frame->header.converged());
+  EXPECT_LE(sleeper.history.frames.size(), 3u);
   expect_invariants(sleeper.history, 2);
   expect_invariants(reader.history, 2);
 }
