@@ -15,9 +15,10 @@ namespace {
 /// Names that ages are kept for: all handles, and as many that were let go of.
 constexpr std::size_t kMostAges = 2 * Mailbox::kMostHandles;
 
+constexpr std::size_t kLongestName = 128;
+
 std::string element_of(std::string_view name) {
-  return absl::StrCat("handle \"", absl::string_view(name.data(), std::min<std::size_t>(name.size(), 128)),
-                      "\"");
+  return absl::StrCat("handle \"", absl::string_view(name.data(), std::min(name.size(), kLongestName)), "\"");
 }
 
 }  // namespace
@@ -134,6 +135,11 @@ absl::Status Mailbox::change_handles(const Update& update, Candidate& next) cons
     if (!names.insert(change.name).second) {
       return invalid_input({"HANDLE_CHANGED_TWICE", element_of(change.name), "one change a handle"},
                            absl::StrCat("The update changes ", element_of(change.name), " twice."));
+    }
+    if (change.name.empty() || change.name.size() > kLongestName) {
+      return invalid_input(
+          {"HANDLE_NAME", element_of(change.name), absl::StrCat("1 to ", kLongestName, " bytes")},
+          absl::StrCat("A handle's name has ", change.name.size(), " bytes, not 1 to ", kLongestName, "."));
     }
     if (!replaces_handle(change.name, update, next)) continue;
     next.named.push_back(change.name);

@@ -92,6 +92,11 @@ absl::StatusOr<std::shared_ptr<Upload>> Uploads::create(const std::string& reque
   if (const auto known = requested_.find(request_id); known != requested_.end()) {
     return uploads_[known->second].upload;
   }
+  if (uploads_.size() >= kMostUploads) {
+    return make_fault(absl::StatusCode::kResourceExhausted,
+                      {"UPLOADS_FULL", "uploads", absl::StrCat("uploads <= ", kMostUploads)},
+                      absl::StrCat("The server has all of its ", kMostUploads, " uploads in use."));
+  }
   absl::StatusOr<Reservation> memory = budget_->reserve(size_bytes);
   if (!memory.ok()) return memory.status();
   auto upload = std::make_shared<Upload>(absl::StrCat("uploads/", random_hex_128()), size_bytes, crc32c,

@@ -64,12 +64,14 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
 
   Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers, Limits limits);
 
-  /// Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID; RESOURCE_EXHAUSTED MEMORY_FULL.
+  /// Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID; RESOURCE_EXHAUSTED MEMORY_FULL, UPLOADS_FULL.
   absl::StatusOr<std::shared_ptr<Upload>> create(const std::string& request_id, std::uint64_t size_bytes,
                                                  std::uint32_t crc32c);
 
   /// NOT_FOUND UPLOAD_UNKNOWN.
   absl::StatusOr<std::shared_ptr<Upload>> find(const std::string& name);
+
+  static constexpr std::size_t kMostUploads = 4096;  // small ones cost more than their bytes
 
  private:
   struct Entry {

@@ -137,12 +137,13 @@ TEST_F(MailboxTest, HandlesMayComeOneByOne) {
 
 /// A wrong update, made from one that holds both ends, and the reason that it is refused for.
 struct Wrong {
-  const char* reason;
+  const char* name;
   std::function<void(Update&)> spoil;
+  const char* reason = name;
 };
 
 std::ostream& operator<<(std::ostream& out, const Wrong& wrong) {
-  return out << wrong.reason;
+  return out << wrong.name;
 }
 
 class WrongUpdateTest : public MailboxTest, public testing::WithParamInterface<Wrong> {};
@@ -175,6 +176,11 @@ INSTANTIATE_TEST_SUITE_P(
                 u.handles.push_back({"tip", Removal{}});
               }},
         Wrong{"HANDLE_NAME", [](Update& u) { u.handles[1].name = ""; }},
+        Wrong{"HANDLE_NAME_TOO_LONG",
+              [](Update& u) {
+                u.handles[1] = {std::string(129, 'x'), Removal{}};
+              },
+              "HANDLE_NAME"},
         Wrong{"HANDLE_EMPTY", [](Update& u) { u.handles[1].change = Handle{}; }},
         Wrong{"HANDLE_UNKNOWN",
               [](Update& u) {
@@ -221,7 +227,7 @@ INSTANTIATE_TEST_SUITE_P(
                   u.handles.push_back({absl::StrCat("h", k), Handle{{5}, Fixed{}}});
                 }
               }}),
-    [](const auto& info) { return std::string(info.param.reason); });
+    [](const auto& info) { return std::string(info.param.name); });
 
 }  // namespace
 }  // namespace lpdeform

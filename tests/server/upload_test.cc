@@ -68,6 +68,14 @@ TEST_F(UploadTest, RefusesSizesBeyondTheLimitsBeforeTakingMemory) {
   EXPECT_EQ(reason(second.status()), "MEMORY_FULL");
 }
 
+TEST_F(UploadTest, RefusesTooManySmallOnes) {
+  const auto budget = std::make_shared<Budget>(1 << 20);
+  const auto uploads =
+      std::make_shared<Uploads>(budget, timers_, Uploads::Limits{1, std::chrono::minutes(10)});
+  for (std::size_t k = 0; k < Uploads::kMostUploads; ++k) ASSERT_TRUE(uploads->create("", 1, 0).ok());
+  EXPECT_EQ(reason(uploads->create("", 1, 0).status()), "UPLOADS_FULL");
+}
+
 TEST_F(UploadTest, RefusesToKeepTrackOfTooManyGaps) {
   const auto budget = std::make_shared<Budget>(1 << 20);
   const auto uploads =

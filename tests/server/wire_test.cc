@@ -1,0 +1,157 @@
+// Values to messages and back, without a network.
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+
+#include "core/base/crc32c.h"
+#include "core/base/fault.h"
+#include "manual_timers.h"
+#include "server/decode.h"
+#include "server/encode.h"
+#include "server/publisher.h"
+
+namespace lpdeform {
+namespace {
+
+std::string reason(const absl::Status& status) {
+  return fault_of(status).reason;
+}
+
+class WireTest : public testing::Test {
+ protected:
+  Decoder decoder(std::uint32_t vertex_count) { return {*uploads_, vertex_count}; }
+
+  std::string upload(const std::string& bytes) {
+    const auto upload = *uploads_->create("", bytes.size(), crc32c(bytes));
+    for (std::size_t at = 0; at < bytes.size(); at += Upload::kMostPartBytes) {
+      EXPECT_TRUE(upload->add(at, std::string_view(bytes).substr(at, Upload::kMostPartBytes)).ok());
+    }
+    return upload->name();
+  }
+
+  std::shared_ptr<ManualTimers> timers_ = std::make_shared<ManualTimers>();
+  std::shared_ptr<Budget> budget_ = std::make_shared<Budget>(std::size_t{1} << 28);
+  std::shared_ptr<Uploads> uploads_ = std::make_shared<Uploads>(
+      budget_, timers_, Uploads::Limits{std::uint64_t{1} << 26, std::chrono::minutes(10)});
+};
+
+TEST_F(WireTest, NamingAnUploadManyTimesDoesNotMultiplyItsMemory) {
+  const std::string name = upload(std::string(4 << 20, '\0'));
+  v1::Update message;
+  message.set_input_seq(1);
+  for (int k = 0; k < 1000; ++k) {
+    v1::HandleUpdate& handle = *message.add_handles();
+    handle.set_name("h");
+    handle.mutable_set()->mutable_vertices()->set_upload(name);
+  }
+  EXPECT_EQ(reason(decoder(2'000'000).update(message).status()), "HANDLE_TOO_MANY_VERTICES");
+  message.clear_handles();
+  for (int k = 0; k < 1000; ++k) {
+    v1::TargetPositions& targets = *message.add_handles()->mutable_move()->mutable_targets();
+    targets.set_scalar(v1::SCALAR_FLOAT32);
+    targets.mutable_positions()->set_upload(upload(std::string(12 * 100, '\0')));
+  }
+  EXPECT_EQ(reason(decoder(50'000).update(message).status()), "HANDLE_TOO_MANY_VERTICES");
+}
+
+TEST_F(WireTest, AMeshThatIsForgedIsRefusedBeforeMemoryIsTaken) {
+  v1::Mesh mesh;
+  mesh.set_vertex_count(0xffffffff);
+  mesh.set_face_count(0xffffffff);
+  mesh.mutable_data()->set_inline_("abc");
+  const Decoder::MeshLimits limits{0xffffffff, 0xffffffff};
+  EXPECT_EQ(reason(decoder(0xffffffff).check_mesh_size(mesh, limits)), "BUFFER_SIZE");
+  EXPECT_EQ(reason(decoder(0xffffffff).mesh(mesh).status()), "BUFFER_SIZE");
+  mesh.mutable_data()->set_upload("uploads/unknown");
+  EXPECT_EQ(reason(decoder(0xffffffff).mesh(mesh).status()), "UPLOAD_UNKNOWN");
+}
+
+TEST_F(WireTest, SizesThatAreNoWholeNumberOfNumbersAreRefused) {
+  v1::HandleUpdate update;
+  v1::Update message;
+  v1::HandleUpdate& handle = *message.add_handles();
+  handle.mutable_set()->mutable_vertices()->set_inline_("12345");
+  EXPECT_EQ(reason(decoder(10).update(message).status()), "BUFFER_SIZE");
+  v1::TargetPositions& targets = *handle.mutable_move()->mutable_targets();
+  targets.mutable_positions()->set_inline_(std::string(13, '\0'));
+  EXPECT_EQ(reason(decoder(10).update(message).status()), "BUFFER_SIZE");
+}
+
+TEST_F(WireTest, FloatsAndDoublesBothBecomeDoubles) {
+  v1::Positions message;
+  const float narrow[] = {0.1f, 2, -3};
+  message.mutable_data()->set_inline_(std::string(reinterpret_cast<const char*>(narrow), sizeof(narrow)));
+  EXPECT_EQ((*decoder(1).positions(message))(0, 0), static_cast<double>(0.1f));
+  const double wide[] = {0.1, 2, -3};
+  message.set_scalar(v1::SCALAR_FLOAT64);
+  message.mutable_data()->set_inline_(std::string(reinterpret_cast<const char*>(wide), sizeof(wide)));
+  EXPECT_EQ((*decoder(1).positions(message))(0, 0), 0.1);
+  EXPECT_EQ(reason(decoder(2).positions(message).status()), "POSITIONS_SIZE");
+}
+
+TEST_F(WireTest, AnIndexThatDoesNotFitStaysOutOfRange) {
+  v1::Update message;
+  v1::HandleUpdate& handle = *message.add_handles();
+  const std::uint32_t index = 0x80000000u;
+  handle.mutable_set()->mutable_vertices()->set_inline_(
+      std::string(reinterpret_cast<const char*>(&index), 4));
+  const auto update = decoder(10).update(message);
+  ASSERT_TRUE(update.ok());
+  EXPECT_EQ(std::get<Handle>(update->handles[0].change).vertices[0],
+            std::numeric_limits<std::int32_t>::max());
+}
+
+TEST_F(WireTest, SolverSettingsTakeTheirDefaultsFromZero) {
+  v1::SettingsUpdate message;
+  message.mutable_solver();
+  const auto settings = decoder(1).settings(message);
+  ASSERT_TRUE(settings.ok());
+  EXPECT_EQ(settings->solver->tolerance, SolveSettings::kDefaultTolerance);
+  EXPECT_EQ(settings->solver->max_iterations, SolveSettings().max_iterations);
+  EXPECT_EQ(settings->solver->time_limit_seconds, std::numeric_limits<double>::infinity());
+  message.mutable_solver()->set_method(static_cast<v1::Method>(99));
+  EXPECT_EQ(reason(decoder(1).settings(message).status()), "ENUM_UNKNOWN");
+}
+
+/// Where `part` begins within `message` when it is written.
+std::size_t offset_of(const google::protobuf::MessageLite& message, const std::string& part) {
+  return message.SerializeAsString().find(part);
+}
+
+class AlignmentTest : public testing::TestWithParam<std::uint32_t> {};
+
+TEST_P(AlignmentTest, PositionsBeginAtAMultipleOfFourBytesInEveryMessage) {
+  const std::uint32_t n = GetParam();
+  const auto timers = std::make_shared<ManualTimers>();
+  const auto publisher = std::make_shared<Publisher>();
+  Frame frame;
+  frame.surface = std::make_shared<Surface>(Points::Constant(n, 3, 1234.5678), Field::Constant(n, 1));
+  for (const std::uint64_t seq : {1u, 127u, 128u, 20000u}) {
+    for (const bool with_distortion : {true, false}) {
+      for (const std::uint32_t first : {0u, 1u}) {
+        frame.frame_seq = seq;
+        const FramePiece piece{
+            std::make_shared<Frame>(frame), first, n - first, true, seq, Scalar::kFloat32, with_distortion};
+        const FrameStream stream({}, publisher, timers, std::chrono::seconds(15), {});
+        v1::DeformResponse deform;
+        encode(piece, stream, n, deform);
+        v1::StreamFramesResponse frames;
+        encode(piece, stream, n, frames);
+        v1::SolveResponse solve;
+        encode(piece, solve);
+        const std::string& positions = solve.frame().positions();
+        EXPECT_EQ(offset_of(deform, positions) % 4, 0u);
+        EXPECT_EQ(offset_of(frames, positions) % 4, 0u);
+        EXPECT_EQ(offset_of(solve, positions) % 4, 0u);
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, AlignmentTest,
+                         testing::Values(2, 3, 5, 9, 10, 11, 340, 341, 1363, 1364, 1365, 60000));
+
+}  // namespace
+}  // namespace lpdeform
