@@ -232,6 +232,12 @@ class Deform(unittest.TestCase):
         report = self.deform("--p", 1, "--time-limit", 1e-6)
         self.assertEqual(report["stop_reason"], "time_limit")
 
+    def test_a_solve_that_stalls_short_of_its_tolerance_is_status_1_and_still_reported(self):
+        # Gradient descent has no step left that lowers the energy in double precision long before 1e-14.
+        report = self.deform("--p", 2, "--method", "line_search", "--tolerance", 1e-14, status=1)
+        self.assertEqual(report["stop_reason"], "stalled")
+        self.assertAlmostEqual(report["energy"] / self.deform("--p", 2)["energy"], 1, delta=1e-4)
+
     def test_fields_are_read_and_summed_up(self):
         ends = self.write("p.txt", "".join(f"{1 + (k % 2)}\n" for k in range(370)))
         stiff = self.write("s.txt", "2\n" * 370)
