@@ -29,6 +29,9 @@ class LiveSolver {
   /// to do.
   bool run_slice(SolveJob* job);
 
+  /// Whether a solve was ever begun: from then on memory_bytes() includes the factors.
+  bool has_solved() const { return deformer_->summary().method != Method::kAuto; }
+
   /// Bytes held, the shared rest shape left out.
   std::size_t memory_bytes() const;
 

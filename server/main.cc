@@ -131,6 +131,7 @@ int main(int argc, char** argv) {
 
   Arguments arguments;
   CLI::App app;
+  arguments.server.address = "127.0.0.1:50051";
   describe(app, arguments);
   CLI11_PARSE(app, argc, argv);
   if (!arguments.probed.empty()) return lpdeform::is_serving(arguments.probed) ? 0 : 1;

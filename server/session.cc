@@ -237,8 +237,10 @@ bool Session::run() {
     if (job_ == job) job_.reset();
     has_more = true;  // the readers' solve may have to go on
   }
-  memory_bytes_ = shape_->memory_bytes() + solver_->memory_bytes();
-  memory_.resize(memory_bytes_);
+  if (solver_->has_solved()) {  // until then the estimate stands
+    memory_bytes_ = shape_->memory_bytes() + solver_->memory_bytes();
+    memory_.resize(memory_bytes_);
+  }
   return has_more;
 }
 

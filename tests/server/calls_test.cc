@@ -311,6 +311,25 @@ TEST_F(SmallServerTest, MemoryIsPromisedOnceOnly) {
   EXPECT_EQ(details_of(status).info.reason(), "MEMORY_FULL");
 }
 
+TEST_F(CallsTest, MemoryIsEstimatedAtFirstAndKnownAfterASolve) {
+  const auto session = create(sphere(4));
+  const std::uint64_t estimate = session.session().memory_bytes();
+  v1::SolveRequest request = solve_request(session);
+  request.mutable_update()->set_input_seq(1);
+  set_handle(*request.mutable_update(), "a", {0}, 0);
+  set_handle(*request.mutable_update(), "b", {1}, 0.1);
+  ASSERT_TRUE(solve(request).status.ok());
+  v1::GetSessionRequest get;
+  get.set_session(session.session().name());
+  v1::GetSessionResponse got;
+  grpc::ClientContext context;
+  ASSERT_TRUE(stub_->GetSession(&context, get, &got).ok());
+  const std::uint64_t known = got.session().memory_bytes();
+  EXPECT_NE(known, estimate);
+  EXPECT_GT(known, estimate / 3);
+  EXPECT_LT(known, estimate);  // an estimate that is too low would let too many in
+}
+
 TEST_F(CallsTest, HealthSaysServingUntilTheServerDrains) {
   EXPECT_TRUE(is_serving(server_->address()));
   const std::string address = server_->address();
