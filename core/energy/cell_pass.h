@@ -11,10 +11,10 @@ namespace lpdeform {
 
 /// Rotations, cell energies, objective and gradient of a deformed shape x (scaled units, all vertices):
 ///
-///   E_i^2    = min over rotations R_i of sum_{j in N(i)} w_ij |(x_i - x_j) - R_i (p_i - p_j)|^2 (Eq. 2) f(x)
-///   = sum_i term_i(E_i^2)                                                                   (Eq. 3) df/dx_k
-///   = sum_{j in N(k)} 2 w_kj [ (c_k + c_j)(x_k - x_j) - (c_k R_k + c_j R_j)(p_k - p_j) ],    c_i =
-///   weight_i(E_i^2)
+///   E_i^2    = min over rotations R_i of sum_{j in N(i)} w_ij |(x_i - x_j) - R_i (p_i - p_j)|^2     (Eq. 2)
+///   f(x)     = sum_i term_i(E_i^2)                                                                  (Eq. 3)
+///   df/dx_k  = sum_{j in N(k)} 2 w_kj [(c_k + c_j)(x_k - x_j) - (c_k R_k + c_j R_j)(p_k - p_j)]
+///   c_i      = weight_i(E_i^2)
 ///
 /// The gradient is that of f with its rotations fitted: they are optimal for every p, so their own change
 /// adds nothing (envelope theorem). Runs in parallel in chunks of a fixed size, sums in chunk order: the same

@@ -13,9 +13,12 @@ namespace lpdeform {
 ///
 ///   term_i(e2) = s_i ((e2 + eps2) / r^2)^{p_i / 2} f_i ,     weight_i(e2) = d term_i / d e2
 ///
-/// eps2 smooths the kink of p < 2 at 0. The reference r and the factors f_i = (r / l)^{p_i} / max_j (r /
-/// l)^{p_j} keep the sum near the size of s, whatever p is: the true energy of Eq. 3 is a constant times the
-/// sum (true_energy).
+/// eps2 smooths the kink of p < 2 at 0. The reference r and the factors
+///
+///   f_i = (r / l)^{p_i} / max_j (r / l)^{p_j}
+///
+/// keep the sum near the size of s, whatever p is: the true energy of Eq. 3 is a constant times the sum
+/// (true_energy).
 class LpNorm {
  public:
   /// `reference` > 0: a typical E_i, in scaled units. `scaled_unit`: the caller's length of one scaled unit.

@@ -1,8 +1,11 @@
 #include "core/energy/rest_shape.h"
 
 #include <algorithm>
+#include <limits>
 
+#include "absl/strings/str_cat.h"
 #include "core/base/check.h"
+#include "core/base/fault.h"
 
 namespace lpdeform {
 namespace {
@@ -32,6 +35,46 @@ void make_rows(std::int32_t vertex_count, const EdgeWeights& edges, std::vector<
     append(edges.edges[e][0], edges.edges[e][1], edges.weights[e]);
 }
 
+/// The box and the mean of the vertices that faces use: others may lie anywhere.
+struct Extent {
+  Eigen::RowVector3d low = Eigen::RowVector3d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::RowVector3d high = -low;
+  Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
+};
+
+Extent extent_of(const Points& positions, const std::vector<std::int32_t>& components) {
+  Extent extent;
+  double count = 0;
+  for (Eigen::Index i = 0; i < positions.rows(); ++i) {
+    if (components[i] < 0) continue;
+    extent.low = extent.low.cwiseMin(positions.row(i));
+    extent.high = extent.high.cwiseMax(positions.row(i));
+    extent.mean += (positions.row(i) - extent.mean) / ++count;
+  }
+  return extent;
+}
+
+/// Within these limits no square leaves the range of a double, and no coordinate or energy that of a float.
+absl::Status check_scale(const Extent& extent) {
+  const double largest = std::max(extent.low.cwiseAbs().maxCoeff(), extent.high.cwiseAbs().maxCoeff());
+  if (largest > RestShape::kLargestCoordinate) {
+    return invalid_input({"MESH_SCALE", "", "|coordinate| <= 1e25"},
+                         absl::StrCat("The mesh's largest coordinate is ", largest, "; it may be 1e25."));
+  }
+  const double diagonal = (extent.high - extent.low).norm();
+  if (diagonal < RestShape::kSmallestDiagonal) {
+    return invalid_input({"MESH_SCALE", "", "diagonal >= 1e-25"},
+                         absl::StrCat("The mesh's diagonal is ", diagonal, "; it must be 1e-25 or more."));
+  }
+  return absl::OkStatus();
+}
+
+double mean_length(const Points& positions, const EdgeWeights& edges) {
+  double total = 0;
+  for (const auto& [u, v] : edges.edges) total += (positions.row(u) - positions.row(v)).norm();
+  return total / static_cast<double>(edges.edges.size());
+}
+
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const TriangleMesh& mesh,
@@ -40,10 +83,12 @@ absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const Triangl
   if (absl::Status status = deformable(report); !status.ok()) return status;
 
   const auto shape = std::shared_ptr<RestShape>(new RestShape);
+  shape->components_ = connected_components(mesh);
+  const Extent extent = extent_of(mesh.vertices, shape->components_);
+  if (absl::Status status = check_scale(extent); !status.ok()) return status;
   shape->positions_ = mesh.vertices;
   shape->faces_ = mesh.faces;
   shape->kind_ = kind;
-  shape->components_ = connected_components(mesh);
   shape->component_count_ = static_cast<std::int32_t>(report.components);
 
   const EdgeWeights edges = edge_weights(mesh, kind);
@@ -51,14 +96,14 @@ absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const Triangl
   shape->report_ = std::move(report);
   make_rows(shape->vertex_count(), edges, shape->offsets_, shape->neighbours_, shape->weights_);
 
-  double total_length = 0;
-  for (const auto& [u, v] : edges.edges) total_length += (mesh.vertices.row(u) - mesh.vertices.row(v)).norm();
-  shape->mean_edge_length_ = total_length / static_cast<double>(edges.edges.size());
-  shape->diagonal_ = (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).norm();
+  shape->mean_edge_length_ = mean_length(mesh.vertices, edges);
+  shape->diagonal_ = (extent.high - extent.low).norm();
+  shape->centre_ = extent.mean;
   LPDEFORM_CHECK(shape->mean_edge_length_ > 0 && shape->diagonal_ > 0);
-
-  shape->centre_ = mesh.vertices.colwise().mean();
   shape->scaled_positions_ = (mesh.vertices.rowwise() - shape->centre_) / shape->mean_edge_length_;
+  for (Eigen::Index i = 0; i < mesh.vertices.rows(); ++i) {
+    if (shape->components_[i] < 0) shape->scaled_positions_.row(i).setZero();
+  }
   return std::shared_ptr<const RestShape>(shape);
 }
 

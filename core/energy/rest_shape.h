@@ -15,9 +15,11 @@ namespace lpdeform {
 /// shared between sessions and threads.
 class RestShape {
  public:
-  /// INVALID_ARGUMENT as deformable() has it, with the element named. O(n log n).
+  /// INVALID_ARGUMENT as deformable() has it, with the element named, and MESH_SCALE. O(n log n).
   static absl::StatusOr<std::shared_ptr<const RestShape>> create(const TriangleMesh& mesh,
                                                                  WeightKind kind = WeightKind::kCotangent);
+
+  static constexpr double kLargestCoordinate = 1e25, kSmallestDiagonal = 1e-25;
 
   std::int32_t vertex_count() const { return static_cast<std::int32_t>(positions_.rows()); }
 
@@ -33,13 +35,13 @@ class RestShape {
 
   /// Mean length of the rest edges: the default length unit of mixed norms. > 0.
   double mean_edge_length() const { return mean_edge_length_; }
-  /// Length of the diagonal of the bounding box of the rest positions. > 0.
+  /// Length of the diagonal of the bounding box of the vertices that faces use. > 0.
   double diagonal() const { return diagonal_; }
 
   /// What the solver computes with: (positions - centre) / mean_edge_length, so that nothing depends on the
-  /// unit of length or on the distance from the origin.
+  /// unit of length or on the distance from the origin. 0 for vertices that no face uses.
   const Points& scaled_positions() const { return scaled_positions_; }
-  /// Mean of the rest positions, in the caller's units.
+  /// Mean of the rest positions that faces use, in the caller's units.
   const Eigen::RowVector3d& centre() const { return centre_; }
 
   // One-ring of vertex i: entries offsets[i] to offsets[i + 1] of neighbours (ascending) and weights.

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/mesh/half_edges.h"
 #include "core/mesh/topology.h"
 
 namespace lpdeform {
 namespace {
 
 constexpr double kFloor = 1e-6;  // of the mean weight
+constexpr double kSliver = 1e3;  // times the median weight
 
 /// One side of a face: its edge and half the cotangent of the angle opposite it.
 struct Contribution {
@@ -40,43 +42,34 @@ std::vector<Contribution> contributions(const TriangleMesh& mesh) {
   return all;
 }
 
-class DisjointSets {
- public:
-  explicit DisjointSets(std::int32_t count) : parent_(count), size_(count, 1) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  std::int32_t find(std::int32_t v) {
-    while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
-    return v;
-  }
-  void join(std::int32_t u, std::int32_t v) {
-    u = find(u), v = find(v);
-    if (u == v) return;
-    if (size_[u] < size_[v]) std::swap(u, v);
-    parent_[v] = u;
-    size_[u] += size_[v];
-  }
-  std::int32_t size_of(std::int32_t v) { return size_[find(v)]; }
-
- private:
-  std::vector<std::int32_t> parent_, size_;
-};
+/// The mean weight, slivers left out: those over 1000 times the median would decide it alone.
+double typical_weight(std::vector<double> weights) {
+  const auto middle = weights.begin() + static_cast<std::ptrdiff_t>(weights.size() / 2);
+  std::nth_element(weights.begin(), middle, weights.end());
+  const double median = *middle;
+  if (!(median > 0))
+    return std::accumulate(weights.begin(), weights.end(), 0.0) / static_cast<double>(weights.size());
+  const auto end =
+      std::remove_if(weights.begin(), weights.end(), [&](double w) { return w > kSliver * median; });
+  return std::accumulate(weights.begin(), end, 0.0) / static_cast<double>(end - weights.begin());
+}
 
 /// Raises the edges that tie a cut-off part of the surface (mostly a single vertex) to the rest. Of the two
 /// parts that an edge joins, the vertex in the smaller one counts as floored.
 void apply_floor(std::int32_t vertex_count, EdgeWeights& result) {
   if (result.edges.empty()) return;
-  const double total = std::accumulate(result.weights.begin(), result.weights.end(), 0.0);
-  const double floor = kFloor * total / static_cast<double>(result.weights.size());
+  const double floor = kFloor * typical_weight(result.weights);
   DisjointSets parts(vertex_count);
   for (std::size_t e = 0; e < result.edges.size(); ++e) {
-    if (result.weights[e] >= floor) parts.join(result.edges[e][0], result.edges[e][1]);
+    if (result.weights[e] >= floor) parts.unite(result.edges[e][0], result.edges[e][1]);
   }
+  std::vector<std::int32_t> sizes(vertex_count, 0);
+  for (std::int32_t vertex = 0; vertex < vertex_count; ++vertex) ++sizes[parts.find(vertex)];
   for (std::size_t e = 0; e < result.edges.size(); ++e) {
     const auto [u, v] = result.edges[e];
     if (result.weights[e] >= floor || parts.find(u) == parts.find(v)) continue;
     result.weights[e] = floor;
-    result.floored_vertices.push_back(parts.size_of(u) < parts.size_of(v) ? u : v);
+    result.floored_vertices.push_back(sizes[parts.find(u)] < sizes[parts.find(v)] ? u : v);
   }
   auto& floored = result.floored_vertices;
   std::sort(floored.begin(), floored.end());

@@ -23,9 +23,9 @@ struct EdgeWeights {
 };
 
 /// Weights of the edges of a mesh that deformable() accepts. A non-manifold edge takes half the sum of the
-/// cotangents of all its faces, then the clamp. A zero-area face adds nothing. A vertex whose weights would
-/// all be 0 (or below 1e-6 of the mean weight) is kept attached: every edge of it gets at least 1e-6 times
-/// the mean weight.
+/// cotangents of all its faces, then the clamp. A zero-area face adds nothing. A part of
+/// the surface (mostly one vertex) that hangs on edges below 1e-6 times the mean weight alone is kept attached:
+/// those edges get that much. The mean leaves out weights over 1000 times the median.
 EdgeWeights edge_weights(const TriangleMesh& mesh, WeightKind kind);
 
 /// Writes the clamped edges and floored vertices of `weights` into `report`.

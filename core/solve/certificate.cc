@@ -1,6 +1,7 @@
 #include "core/solve/certificate.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -9,6 +10,9 @@
 namespace lpdeform {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
+constexpr double kLongestSeconds = 1e6;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// t of the maximum in f*(y) = max_t y t - k t^p, for p > 1: |y| = k p t^{p - 1}.
@@ -20,12 +24,17 @@ double conjugate_point(double y, double k, double p) {
 double shrink(double v, double k, double p, double rho) {
   if (p == 1) return std::max(0.0, v - k / rho);
   if (p == 2) return v / (1 + 2 * k / rho);
-  double low = 0, high = v;
-  for (int step = 0; step < 60 && high - low > 1e-15 * v; ++step) {
-    const double t = 0.5 * (low + high);
-    (t + k * p / rho * std::pow(t, p - 1) < v ? low : high) = t;
+  // g(t) = t + a t^{p - 1} - v rises; Newton from the side on which it cannot overshoot.
+  const double a = k * p / rho;
+  double t = p > 2 ? v : std::min(0.5 * v, std::pow(0.5 * v / a, 1 / (p - 1)));
+  for (int step = 0; step < 50 && t > 0; ++step) {
+    const double power = a * std::pow(t, p - 1);
+    const double next = t - (t + power - v) / (1 + (p - 1) * power / t);
+    const bool is_done = std::abs(next - t) <= 1e-14 * v;
+    t = std::clamp(next, 0.0, v);
+    if (is_done) break;
   }
-  return 0.5 * (low + high);
+  return t;
 }
 
 /// The dual side of one convex step.
@@ -83,7 +92,7 @@ class DualBound {
   double inner_ = 0;
 };
 
-/// Solves (A^T A) u = A^T y: with equal cell weights 1 the metric is 2 A^T A.
+/// Solves (A^T C A) u = A^T y, C the cell weights that the metric is factored with: the metric is 2 A^T C A.
 Points least_squares(const Problem& problem, const EdgeVectors& y) {
   Points u;
   apply_edges_transposed(problem.shape(), y, problem.constraints.is_held, u);
@@ -91,10 +100,19 @@ Points least_squares(const Problem& problem, const EdgeVectors& y) {
   return 2 * u;
 }
 
-/// y - A (A^T A)^-1 A^T y.
+/// Rows of cell i.
+auto cell_rows(const RestShape& shape, EdgeVectors& values, std::int32_t i) {
+  return values.middleRows(shape.offsets()[i], shape.offsets()[i + 1] - shape.offsets()[i]);
+}
+
+/// y - C A (A^T C A)^-1 A^T y.
 EdgeVectors project(const Problem& problem, const EdgeVectors& y) {
+  const RestShape& shape = problem.shape();
   EdgeVectors image;
-  apply_edges(problem.shape(), least_squares(problem, y), image);
+  apply_edges(shape, least_squares(problem, y), image);
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    cell_rows(shape, image, i) *= problem.metric.cell_weight(i);
+  }
   return y - image;
 }
 
@@ -106,7 +124,7 @@ EdgeVectors term_gradients(const Problem& problem, const DualBound& dual, const 
     const double p = dual.p(i), size = cell_norm(shape, z, i);
     const double smoothed = p < 2 ? std::hypot(size, eps) : size;
     const double factor = smoothed > 0 ? dual.k(i) * p * std::pow(smoothed, p - 2) : 0;
-    y.middleRows(shape.offsets()[i], shape.offsets()[i + 1] - shape.offsets()[i]) *= factor;
+    cell_rows(shape, y, i) *= factor;
   }
   return y;
 }
@@ -130,20 +148,21 @@ double penalty(const Problem& problem, const DualBound& dual) {
   return dual.k(i) * dual.p(i) * std::pow(energy, dual.p(i) - 2);
 }
 
-/// ADMM on min sum f_i(z_i), z = A x - b, from the present residuals r and multipliers y. Returns the best
-/// bound seen.
+/// ADMM on min sum f_i(z_i), z = A x - b, from the present residuals r and multipliers y, with the metric
+/// factored for equal cell weights. Returns the best bound seen.
 double polish(const Problem& problem, DualBound& dual, EdgeVectors r, EdgeVectors y, double best,
-              double enough, int max_steps) {
+              double enough, const CertificateSettings& settings, Clock::time_point end) {
   const RestShape& shape = problem.shape();
   const double rho = penalty(problem, dual);
   EdgeVectors image;
-  for (int step = 0; step < max_steps && best < enough && !problem.stop.stop_requested(); ++step) {
+  for (int step = 0; step < settings.max_steps && best < enough; ++step) {
+    if (problem.stop.stop_requested() || Clock::now() >= end) break;
     const EdgeVectors v = r + y / rho;
     EdgeVectors z = v;
     for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
       const double size = cell_norm(shape, v, i);
       const double factor = size > 0 ? shrink(size, dual.k(i), dual.p(i), rho) / size : 0;
-      z.middleRows(shape.offsets()[i], shape.offsets()[i + 1] - shape.offsets()[i]) *= factor;
+      cell_rows(shape, z, i) *= factor;
     }
     y = rho * (v - z);
     // x minimises |r - z + y / rho|; what remains of that vector, times rho, has A^T (.) = 0: a dual point.
@@ -154,30 +173,43 @@ double polish(const Problem& problem, DualBound& dual, EdgeVectors r, EdgeVector
   return best;
 }
 
+/// The best bound from the terms' gradients, smoothed by several shares of the mean cell energy; `y` gets the
+/// gradient that gave it.
+double gradient_bound(const Problem& problem, DualBound& dual, const EdgeVectors& z, EdgeVectors& y) {
+  double best = -kInfinity;
+  const double mean = mean_energy(problem);
+  for (const double share : {0.0, 1e-4, 1e-3, 1e-2, 1e-1}) {
+    if (share > 0 && problem.norm.lowest_p() >= 2) break;
+    const double eps = share * mean;
+    problem.cells.reweigh(problem.norm.smoothed(eps * eps));
+    if (!problem.metric.factor(problem.cells.cell_weights(), problem.constraints.is_held)) continue;
+    EdgeVectors gradient = term_gradients(problem, dual, z, eps);
+    const double bound = dual.scaled_bound(project(problem, gradient));
+    if (bound > best) best = bound, y = std::move(gradient);
+  }
+  return best;
+}
+
 }  // namespace
 
 double relative_gap(const Problem& problem, const Points& x, const CertificateSettings& settings) {
   const double primal = problem.cells.sum(problem.norm);
-  if (!(primal > problem.zero_objective)) return 0;
-  const std::vector<double> equal(problem.shape().vertex_count(), 1.0);
-  if (!problem.metric.factor(equal, problem.constraints.is_held)) return 1;
+  if (primal <= problem.zero_objective) return 0;
+  if (!std::isfinite(primal)) return 1;
+  const Clock::time_point end =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                         std::chrono::duration<double>(std::min(settings.max_seconds, kLongestSeconds)));
 
-  EdgeVectors z;
+  EdgeVectors z, y;
   residuals(problem.shape(), x, problem.cells.rotations(), z);
   DualBound dual(problem, z);
   const double enough = (1 - settings.good_enough) * primal;
-  double best = dual.scaled_bound(project(problem, term_gradients(problem, dual, z, 0)));
-  if (best < enough && problem.norm.lowest_p() < 2) {
-    EdgeVectors start;
-    double start_bound = -kInfinity;
-    for (const double share : {1e-1, 1e-2, 1e-3, 1e-4}) {
-      EdgeVectors smoothed = term_gradients(problem, dual, z, share * mean_energy(problem));
-      const double bound = dual.scaled_bound(project(problem, smoothed));
-      if (bound > start_bound) start_bound = bound, start = std::move(smoothed);
-    }
-    best = polish(problem, dual, z, start, std::max(best, start_bound), enough, settings.max_steps);
+  double best = gradient_bound(problem, dual, z, y);
+  const std::vector<double> equal(problem.shape().vertex_count(), 1.0);
+  if (best < enough && y.size() > 0 && problem.metric.factor(equal, problem.constraints.is_held)) {
+    best = polish(problem, dual, z, std::move(y), best, enough, settings, end);
   }
-  return std::clamp((primal - best) / primal, 0.0, 1.0);
+  return best > -kInfinity ? std::clamp((primal - best) / primal, 0.0, 1.0) : 1;
 }
 
 }  // namespace lpdeform

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <limits>
+
 #include "core/solve/minimiser.h"
 #include "core/solve/residuals.h"
 
@@ -10,21 +12,25 @@ namespace lpdeform {
 /// vertices,
 ///
 ///   min over x of sum_i f_i(z_i(x))  >=  D(y) = <y, z> - sum_i f_i*(y_i)
-///   f_i*(y_i) = (p_i - 1) k_i (|y_i| / (k_i p_i))^{p_i / (p_i - 1)},  for p_i = 1: 0 where |y_i| <= k_i,
-///   infinite elsewhere.
+///   f_i*(y_i) = (p_i - 1) k_i (|y_i| / (k_i p_i))^{p_i / (p_i - 1)}
+///   for p_i = 1: f_i*(y_i) = 0 where |y_i| <= k_i, infinite elsewhere.
 ///
-/// y begins as the gradient of the terms, projected by one solve with the Laplacian, and is scaled so that D
-/// is largest. Where some p_i < 2 and that bound is loose, y is polished by ADMM on the convex problem, whose
-/// multipliers are feasible by construction, at one back-substitution a step; it begins with the best of
-/// several smoothed gradients k_i p_i (|z_i|^2 + eps^2)^{p_i / 2 - 1} z_i.
+/// y begins as the gradient of the terms, projected by one solve with the reweighted Laplacian,
+///
+///   y - C A (A^T C A)^-1 A^T y,   C = the cells' weights c_i,
+///
+/// and is scaled so that D is largest. Where that bound is loose, y is polished by ADMM on the convex
+/// problem, whose multipliers are feasible by construction, at one back-substitution a step; it begins with
+/// the best of several smoothed gradients k_i p_i (|z_i|^2 + eps^2)^{p_i / 2 - 1} z_i.
 struct CertificateSettings {
   double good_enough = 1e-4;  // stop polishing at this relative gap
   int max_steps = 1500;
+  double max_seconds = std::numeric_limits<double>::infinity();
 };
 
 /// (P - D) / P at x in [0, 1], P the sum of the norm's unsmoothed terms; 0 where P is 0. `problem.cells`
-/// holds the evaluation (rotations) at x; `problem.metric` is refactored with equal cell weights. 1 where no
-/// bound was found.
+/// holds the evaluation at x; `problem.metric` is refactored. 1 where no bound was found, also because P is not
+/// finite.
 double relative_gap(const Problem& problem, const Points& x, const CertificateSettings& settings = {});
 
 }  // namespace lpdeform

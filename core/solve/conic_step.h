@@ -12,10 +12,9 @@ namespace lpdeform {
 /// The convex step of p = 1 as a second-order cone program (Eq. 11, the root of w_ij over the whole
 /// difference):
 ///
-///   minimise sum_i k_i T_i   subject to   T_i >= |z_i|,  z = A x - b          rotations held, k_i the norm's
-///   coefficients
+///   minimise sum_i k_i T_i   subject to   T_i >= |z_i|,  z = A x - b
 ///
-/// by a primal-dual interior-point method with Nesterov-Todd scaling and Mehrotra's predictor-corrector (as
+/// with the rotations held and k_i the norm's coefficients, by a primal-dual interior-point method with Nesterov-Todd scaling and Mehrotra's predictor-corrector (as
 /// in Vandenberghe, "The CVXOPT linear and quadratic cone program solvers", 2010). The dual cone variables
 /// are (k_i, w_i) with A^T w = 0. It starts strictly feasible on both sides (T_i > |z_i| and w = 0) and stays
 /// so: each iterate has a primal value and a lower bound. A 3n x 3n system on the two-ring pattern is
@@ -40,8 +39,8 @@ class ConicStep {
     std::vector<double> head;  // one a cell
     EdgeVectors tail;          // z_i or w_i by rows of the cell
   };
-  /// Nesterov-Todd scaling of one cone: W = eta [u, v^T; v, I + v v^T / (1 + u)], (u, v) = w bar, u^2 - |v|^2
-  /// = 1.
+  /// Nesterov-Todd scaling of one cone, with (u, v) = w bar and u^2 - |v|^2 = 1:
+  ///   W = eta [u, v^T; v, I + v v^T / (1 + u)].
   struct Scaling {
     double eta = 1, u = 1;
   };

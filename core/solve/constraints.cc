@@ -30,6 +30,7 @@ absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Cons
       }
       constraints.is_held[vertex] = true;
       constraints.targets.row(vertex) = scaled;
+      constraints.exact.row(vertex) = targets.row(k);
     }
   }
   return absl::OkStatus();
@@ -91,6 +92,8 @@ void hold_free_components(const RestShape& shape, const HandleSet& handles, Free
     if (component < 0 || has_handle[component]) continue;
     constraints.is_held[i] = true;
     constraints.targets.row(i) = motions[component](shape.scaled_positions().row(i));
+    if (free_components == FreeComponents::kStay) continue;
+    constraints.exact.row(i) = constraints.targets.row(i) * shape.mean_edge_length() + shape.centre();
   }
 }
 
@@ -103,7 +106,8 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
     return make_fault(absl::StatusCode::kFailedPrecondition, {"NO_HANDLES", "", "at least 1 handle"},
                       "there is no handle; a deformation needs at least one");
   }
-  Constraints constraints{std::vector<char>(shape.vertex_count(), false), shape.scaled_positions()};
+  Constraints constraints{std::vector<char>(shape.vertex_count(), false), shape.scaled_positions(),
+                          shape.positions()};
   if (absl::Status status = hold_handles(shape, handles, constraints); !status.ok()) return status;
 
   std::vector<char> has_handle(shape.component_count(), false);

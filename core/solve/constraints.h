@@ -20,6 +20,7 @@ enum class FreeComponents {
 struct Constraints {
   std::vector<char> is_held;  // one a vertex
   Points targets;             // scaled units; rows of free vertices are the rest positions
+  Points exact;               // the same in the caller's units, for held vertices as they were given
 };
 
 /// No position may be farther from the rest mesh's centre than this many of its diagonals.

@@ -17,7 +17,9 @@
 namespace lpdeform {
 namespace {
 
-constexpr std::size_t kWorkspace = 30;  // positions of all vertices that a solve holds at most: the memory of L-BFGS
+constexpr double kCertificateSeconds = 1;  // it gets, whatever is left of the time limit
+constexpr std::size_t kWorkspace =
+    30;  // positions of all vertices that a solve holds at most: the memory of L-BFGS
 constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
@@ -86,7 +88,7 @@ struct Deformer::Impl {
   void begin(const SolveSettings& new_settings, std::stop_token new_stop);
   void iterate();
   void end(StopReason reason);
-  double gap();
+  double gap(double max_seconds);
   void interrupt() {
     if (minimiser) end(StopReason::kCancelled);
   }
@@ -206,8 +208,9 @@ bool Deformer::Impl::prepare_metric(bool needs_plain_weights) {
 /// Called with the evaluation of minimiser->x() in `cells`; returns its true sum.
 double Deformer::Impl::keep_if_best() {
   const double sum = cells.sum(*norm);
-  if (!(sum < best_sum)) return sum;
-  best_sum = sum;
+  const bool is_first = summary.iterations == 0;
+  if (!is_first && !(sum < best_sum)) return sum;
+  best_sum = std::isnan(sum) ? std::numeric_limits<double>::infinity() : sum;
   x = minimiser->x();
   is_positions_current = false;
   const auto& e2 = cells.squared_energies();
@@ -271,13 +274,15 @@ void Deformer::Impl::end(StopReason reason) {
   has_state = true;
   summary.stop_reason = reason;
   summary.solve_seconds = seconds_since(started);
-  if (settings.certify && reason != StopReason::kCancelled) summary.optimality_gap = gap();
+  if (!settings.certify || reason == StopReason::kCancelled) return;
+  const double rest = settings.time_limit_seconds - summary.solve_seconds;
+  summary.optimality_gap = gap(std::max(kCertificateSeconds, rest));
 }
 
-double Deformer::Impl::gap() {
+double Deformer::Impl::gap(double max_seconds) {
   if (!constraints || !norm) return 1;
   cells.evaluate(x, *norm);
-  return relative_gap(make_problem(), x);
+  return relative_gap(make_problem(), x, {.max_seconds = max_seconds});
 }
 
 Deformer::Deformer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -312,6 +317,7 @@ absl::Status Deformer::set_handles(const HandleSet& handles) {
   auto constraints = make_constraints(*impl_->shape, handles, impl_->options.free_components);
   if (!constraints.ok()) return constraints.status();
   impl_->interrupt();
+  positions();  // the present ones go with the constraints before
   impl_->handles = handles;
   impl_->constraints = *std::move(constraints);
   return absl::OkStatus();
@@ -384,6 +390,9 @@ const Points& Deformer::positions() const {
   Impl& self = *impl_;
   if (!self.is_positions_current) {
     self.positions = (self.x * self.unit()).rowwise() + self.shape->centre();
+    for (Eigen::Index i = 0; i < self.x.rows(); ++i) {
+      if (self.constraints->is_held[i]) self.positions.row(i) = self.constraints->exact.row(i);
+    }
     self.is_positions_current = true;
   }
   return self.positions;
@@ -391,7 +400,7 @@ const Points& Deformer::positions() const {
 
 double Deformer::optimality_gap() {
   impl_->interrupt();
-  return impl_->gap();
+  return impl_->gap(std::numeric_limits<double>::infinity());
 }
 
 std::size_t Deformer::memory_bytes() const {

@@ -8,7 +8,8 @@ namespace lpdeform {
 /// in units of the length l, in which that first step is taken. Rotations are fitted in every evaluation.
 ///
 /// Converged when the root-mean-square displacement of an iteration, sqrt(sum_i |dx_i|^2 / n), is below
-/// 5e-5 l * tolerance / SolveSettings::kDefaultTolerance (the paper's epsilon_L at the default).
+/// 5e-5 l * tolerance / SolveSettings::kDefaultTolerance (the paper's epsilon_L at the default), or
+/// when E is 0 to rounding.
 class LineSearch : public Minimiser {
  public:
   /// `problem.norm` must have the reference length l (see LpNorm), so that its value is E in units of l.

@@ -33,6 +33,9 @@ class Metric {
   /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2. Rows of free vertices are overwritten.
   void extend(const std::vector<char>& is_held, Points& u) const;
 
+  /// c_i as factored, clipped.
+  double cell_weight(std::int32_t i) const { return scale_ * cell_weights_[i]; }
+
   std::size_t memory_bytes() const;
 
  private:

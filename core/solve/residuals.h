@@ -10,8 +10,9 @@ namespace lpdeform {
 /// offsets[i] to offsets[i + 1].
 using EdgeVectors = Points;
 
-/// The affine map of the convex step, rotations held:  z = A x - b,  z_k = sqrt(w_ij) ((x_i - x_j) - R_i (p_i
-/// - p_j)), so that E_i = |z_i|. Scaled units.
+/// The affine map of the convex step, rotations held, in scaled units:
+///
+///   z = A x - b,   z_k = sqrt(w_ij) ((x_i - x_j) - R_i (p_i - p_j)),   so that E_i = |z_i|.
 void residuals(const RestShape& shape, const Points& x, const std::vector<Eigen::Matrix3d>& rotations,
                EdgeVectors& z);
 

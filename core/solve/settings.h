@@ -10,7 +10,7 @@ enum class Method {
   kAuto,         // kQuasiNewton today
   kQuasiNewton,  // L-BFGS on E(x) in the metric of the prefactored, reweighted Laplacian. Every p.
   kLineSearch,   // the paper's section 3.2: gradient descent with backtracking. Every p.
-  kLocalGlobal,  // Sorkine & Alexa 2007. p = 2 with uniform stiffness only.
+  kLocalGlobal,  // Sorkine & Alexa 2007. p = 2 only.
   kConic,        // the paper's section 3.3: second-order cone programs and rotation fits in turn. p = 1 only.
 };
 
@@ -45,7 +45,7 @@ struct SolveSettings {
   /// thresholds by tolerance / kDefaultTolerance.
   double tolerance = kDefaultTolerance;
   int max_iterations = 100000;                                          // >= 0
-  double time_limit_seconds = std::numeric_limits<double>::infinity();  // from start(), > 0
+  double time_limit_seconds = std::numeric_limits<double>::infinity();  // of solving, set-up aside, > 0
 
   /// Keep a record for each iteration (SolveSummary::trace). Off in live sessions.
   bool keep_trace = false;

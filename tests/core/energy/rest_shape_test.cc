@@ -46,6 +46,30 @@ TEST(RestShape, RefusesWhatCannotBeDeformed) {
   EXPECT_EQ(fault_of(RestShape::create({}).status()).reason, "MESH_EMPTY");
 }
 
+TEST(RestShape, RefusesSizesThatLeaveTheRangeOfItsNumbers) {
+  for (const double scale : {1e-200, 1e-100, 1e-26, 1e26, 1e100, 1e200}) {
+    TriangleMesh mesh = box_surface(2, 2, 2);
+    mesh.vertices *= scale;
+    EXPECT_EQ(fault_of(RestShape::create(mesh).status()).reason, "MESH_SCALE") << scale;
+  }
+  for (const double scale : {1e-24, 1e24}) {
+    TriangleMesh mesh = box_surface(2, 2, 2);
+    mesh.vertices *= scale;
+    EXPECT_TRUE(RestShape::create(mesh).ok()) << scale;
+  }
+}
+
+TEST(RestShape, IsNotStretchedByAVertexThatNoFaceUses) {
+  TriangleMesh mesh = box_surface(2, 2, 2);
+  const auto alone = RestShape::create(mesh).value();
+  mesh.vertices.conservativeResize(mesh.vertices.rows() + 1, 3);
+  mesh.vertices.bottomRows(1) << 1e300, -1e300, 0;
+  const auto shape = RestShape::create(mesh).value();
+  EXPECT_EQ(shape->diagonal(), alone->diagonal());
+  EXPECT_EQ(shape->centre(), alone->centre());
+  EXPECT_TRUE(shape->scaled_positions().allFinite());
+}
+
 TEST(RestShape, KnowsItsSize) {
   TriangleMesh mesh = box_surface(1, 1, 1);
   const auto shape = RestShape::create(mesh).value();

@@ -96,6 +96,25 @@ TEST(Weights, UniformAreOneOnEveryEdge) {
   EXPECT_TRUE(weights.clamped_edges.empty());
 }
 
+TEST(Weights, OfHealthyEdgesAreUntouchedByASliver) {
+  TriangleMesh mesh = box_surface(2, 2, 4);
+  const EdgeWeights before = edge_weights(mesh, WeightKind::kCotangent);
+  const Eigen::Index n = mesh.vertices.rows(), m = mesh.faces.rows();
+  mesh.vertices.conservativeResize(n + 1, 3);
+  mesh.faces.conservativeResize(m + 1, 3);
+  const std::int32_t u = mesh.faces(0, 0), v = mesh.faces(0, 1);
+  mesh.vertices.row(n) =
+      0.5 * (mesh.vertices.row(u) + mesh.vertices.row(v)) + 1e-10 * Eigen::RowVector3d(1, 1, 1);
+  mesh.faces.row(m) << v, u, static_cast<std::int32_t>(n);
+  const EdgeWeights after = edge_weights(mesh, WeightKind::kCotangent);
+  EXPECT_LE(after.floored_vertices.size(), 1u);
+  for (std::size_t e = 0; e < before.edges.size(); ++e) {
+    const auto [a, b] = before.edges[e];
+    if (a == std::min(u, v) && b == std::max(u, v)) continue;
+    EXPECT_EQ(weight_of(after, a, b), before.weights[e]);
+  }
+}
+
 TEST(Weights, DoNotDependOnScale) {
   TriangleMesh mesh = creature(24);
   const EdgeWeights at_one = edge_weights(mesh, WeightKind::kCotangent);

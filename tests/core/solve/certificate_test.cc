@@ -56,6 +56,29 @@ TEST_F(CertificateTest, IsTightAtTheMinimum) {
   }
 }
 
+TEST_F(CertificateTest, IsTightWithStiffnessThatVariesByMillions) {
+  for (const double p : {1.0, 2.0, 6.0}) {
+    Material material = Material::uniform(p);
+    material.stiffness.resize(shape->vertex_count());
+    for (std::int32_t i = 0; i < shape->vertex_count(); ++i) material.stiffness[i] = i % 2 == 0 ? 1e-3 : 1e3;
+    const LpNorm norm = this->norm(material);
+    const Points x = solved(material, 1e-10);
+    cells.evaluate(x, norm);
+    EXPECT_LT(relative_gap(problem(norm), x), 1e-2) << "p = " << p;
+  }
+}
+
+TEST_F(CertificateTest, WithoutTimeIsLooserAndStillABound) {
+  const LpNorm norm = this->norm(Material::uniform(1));
+  const Points x = solved(Material::uniform(1), 1e-6);
+  cells.evaluate(x, norm);
+  const double polished = relative_gap(problem(norm), x);
+  cells.evaluate(x, norm);
+  const double unpolished = relative_gap(problem(norm), x, {.good_enough = 0, .max_seconds = 0});
+  EXPECT_GE(unpolished, polished);
+  EXPECT_LT(unpolished, 1);
+}
+
 TEST_F(CertificateTest, IsLooseAwayFromIt) {
   for (const double p : {1.0, 1.5, 2.0, 6.0}) {
     const LpNorm norm = this->norm(Material::uniform(p));

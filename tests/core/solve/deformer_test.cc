@@ -193,6 +193,44 @@ TEST_F(DeformerTest, DeformsDefectiveMeshesAndLeavesUnusedVerticesAlone) {
   EXPECT_LT((solver->positions().row(n) - mesh.vertices.row(n)).norm(), 1e-12);
 }
 
+TEST_F(DeformerTest, GivesHeldAndUnusedVerticesBackBitForBit) {
+  TriangleMesh mesh = bar;
+  mesh.vertices.array() += 0.1;  // not a round number anywhere
+  const Eigen::Index n = mesh.vertices.rows();
+  mesh.vertices.conservativeResize(n + 1, 3);
+  mesh.vertices.row(n) << 1e14, 1.0 / 3, -7;
+  auto solver = deformer(rest_shape(mesh), ends(40), Material::uniform(1.5));
+  auto alone = deformer(shape, ends(40), Material::uniform(1.5));
+  SolveSettings settings;
+  settings.initial = InitialGuess::kLaplacian;
+  const SolveSummary summary = solver->solve(settings).value();
+  EXPECT_EQ(summary.stop_reason, StopReason::kConverged);
+  EXPECT_EQ(summary.iterations, alone->solve(settings).value().iterations);
+  EXPECT_EQ(solver->positions().row(n), mesh.vertices.row(n));
+  const HandleSet handles = ends(40);
+  for (const auto& [name, handle] : handles.handles()) {
+    const Points targets = target_positions(handle, mesh.vertices);
+    for (std::size_t k = 0; k < handle.vertices.size(); ++k) {
+      EXPECT_EQ(solver->positions().row(handle.vertices[k]), targets.row(k));
+    }
+  }
+}
+
+TEST_F(DeformerTest, HoldsTheHandlesAlsoWhereTheEnergyOverflows) {
+  HandleSet handles = ends(0);
+  ASSERT_TRUE(handles.set_motion("top", RigidMotion{.translation = {1e7, 0, 0}}).ok());
+  auto solver = deformer(shape, handles, Material::uniform(64));
+  SolveSettings settings;
+  settings.method = Method::kLineSearch;
+  settings.initial = InitialGuess::kLaplacian;
+  settings.certify = true;
+  const SolveSummary summary = solver->solve(settings).value();
+  EXPECT_EQ(summary.stop_reason, StopReason::kNumericalBreakdown);
+  EXPECT_EQ(summary.optimality_gap.value(), 1);
+  for (const std::int32_t i : slice(bar, 2, 8, 8))
+    EXPECT_EQ(solver->positions()(i, 0), bar.vertices(i, 0) + 1e7);
+}
+
 TEST_F(DeformerTest, ReportsStatisticsOfItsDistortion) {
   Field energies(40);
   for (int i = 0; i < 40; ++i) energies[i] = i;
