@@ -80,7 +80,10 @@ absl::Status Backend::list_sessions(const v1::ListSessionsRequest& request,
       registry->list(request.page_size() == 0 ? kDefaultPage : request.page_size(), request.page_token());
   if (!page.ok()) return page.status();
   for (const auto& session : page->sessions) {
-    encode(session->info(), registry->idle(), timers->now(), *response.add_sessions());
+    v1::Session& listed = *response.add_sessions();
+    encode(session->info(), registry->idle(), timers->now(), listed);
+    listed.clear_handles();
+    listed.mutable_mesh()->clear_defects();
   }
   response.set_next_page_token(page->next_page_token);
   return absl::OkStatus();
@@ -165,7 +168,8 @@ void Backend::create_session(const v1::CreateSessionRequest& request, v1::Create
     response.set_writer_token(created->writer_token);
     done(absl::OkStatus());
   };
-  if (!registry->begin_creation(request.request_id(), on_created)) return;
+  const std::size_t fingerprint = std::hash<std::string>()(request.SerializeAsString());
+  if (!registry->begin_creation(request.request_id(), on_created, fingerprint)) return;
   scheduler.run_once([this, &request, on_created] {
     const std::string request_id = request.request_id();
     registry->finish_creation(request_id, make_session(request), on_created);

@@ -101,16 +101,16 @@ void encode_field(const Field& field, v1::Field& out) {
 }
 
 void encode_report(const MeshReport& report, v1::MeshReport& out) {
-  out.set_vertices(report.vertices);
-  out.set_faces(report.faces);
-  out.set_edges(report.edges);
-  out.set_components(report.components);
-  out.set_boundary_loops(report.boundary_loops);
+  out.set_vertices(static_cast<std::uint32_t>(report.vertices));
+  out.set_faces(static_cast<std::uint32_t>(report.faces));
+  out.set_edges(static_cast<std::uint32_t>(report.edges));
+  out.set_components(static_cast<std::uint32_t>(report.components));
+  out.set_boundary_loops(static_cast<std::uint32_t>(report.boundary_loops));
   for (const Defect defect : all_defects()) {
     const DefectCount& count = report.of(defect);
     v1::Defect& message = *out.add_defects();
     message.set_kind(std::string(defect_name(defect)));
-    message.set_count(count.count);
+    message.set_count(static_cast<std::uint32_t>(count.count));
     message.mutable_first()->Add(count.first.begin(), count.first.end());
   }
 }
@@ -141,7 +141,7 @@ void encode_header(const FramePiece& piece, v1::FrameHeader& out) {
   out.set_vertex_count(frame.surface->vertex_count());
   out.set_scalar(piece.scalar == Scalar::kFloat64 ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
   out.set_solve_seconds(frame.solve_seconds);
-  out.set_method(std::string(method_name(frame.method)));
+  out.set_method(encode_method(frame.method));
 }
 
 void encode_piece(const FramePiece& piece, v1::FramePart& out) {
@@ -154,9 +154,9 @@ void encode_piece(const FramePiece& piece, v1::FramePart& out) {
   const std::string_view positions = piece.frame->surface->position_bytes(piece.scalar);
   out.set_positions(std::string(positions.substr(piece.first * point_bytes, piece.count * point_bytes)));
   if (!piece.with_distortion) return;
-  const std::string_view distortion = piece.frame->surface->distortion_bytes();
-  out.set_distortion(
-      std::string(distortion.substr(piece.first * sizeof(float), piece.count * sizeof(float))));
+  const std::string_view distortion = piece.frame->surface->distortion_bytes(piece.scalar);
+  const std::size_t number_bytes = bytes_of(piece.scalar);
+  out.set_distortion(std::string(distortion.substr(piece.first * number_bytes, piece.count * number_bytes)));
 }
 
 /// Bytes that a field of this many takes, its tag (of one byte) and length included; 0 where it is empty.
@@ -167,14 +167,32 @@ std::size_t field_bytes(std::size_t size) {
   return 1 + length_bytes + size;
 }
 
-/// Fills `part.padding` so that `part.positions` begins at a multiple of 4 bytes in `message`, which holds
-/// the part as its last field: positions and distortion are the part's last fields, and fields are written in
-/// order.
-void align_positions(const google::protobuf::MessageLite& message, v1::FramePart& part) {
-  const std::size_t after = part.positions().size() + field_bytes(part.distortion().size());
-  for (std::size_t padding = 0; padding < 8; ++padding) {
-    part.set_padding(std::string(padding, '\0'));
-    if ((message.ByteSizeLong() - after) % 4 == 0) return;
+/// Fills the paddings of `part` so that positions and distortion begin at multiples of `unit` bytes in
+/// `message`, which holds the part as its last field; these are the part's last fields, written in order.
+void align_buffers(const google::protobuf::MessageLite& message, v1::FramePart& part, std::size_t unit) {
+  const std::size_t positions = part.positions().size(), distortion = part.distortion().size();
+  const std::size_t distortion_head = field_bytes(distortion) - distortion;
+  std::size_t between = distortion_head;  // from the end of positions to the beginning of distortion
+  for (std::size_t padding = 0; distortion > 0 && padding < 16; ++padding) {
+    between = field_bytes(padding) + distortion_head;
+    part.set_distortion_padding(std::string(padding, '\0'));
+    if ((positions + between) % unit == 0) break;
+  }
+  const std::size_t after = positions + between + distortion;
+  for (std::size_t padding = 0; padding < 16; ++padding) {
+    part.set_positions_padding(std::string(padding, '\0'));
+    if ((message.ByteSizeLong() - after) % unit == 0) return;
+  }
+}
+
+std::size_t unit_of(const FramePiece& piece) {
+  return piece.scalar == Scalar::kFloat64 ? 8 : 4;
+}
+
+/// Aligns the frame, if there is one, of an event in `message`.
+void align_event(const Note& note, const google::protobuf::MessageLite& message, v1::StreamEvent& event) {
+  if (const auto* const piece = std::get_if<FramePiece>(&note)) {
+    align_buffers(message, *event.mutable_frame(), unit_of(*piece));
   }
 }
 
@@ -186,6 +204,8 @@ void encode_event(const Note& note, const FrameStream& stream, std::uint32_t ver
         message.set_stream_id(stream.id());
         message.set_epoch(opened.epoch);
         message.set_input_seq(opened.input_seq);
+        message.set_heartbeat_interval_ms(static_cast<std::uint32_t>(
+            std::chrono::ceil<std::chrono::milliseconds>(stream.heartbeat()).count()));
         message.set_vertex_count(vertex_count);
         const StreamOptions& options = stream.options();
         v1::FrameOptions& granted = *message.mutable_options();
@@ -249,7 +269,7 @@ void encode(const FaultNote& fault, v1::Fault& out) {
 
 void encode(const SolveResult& result, v1::SolveSummary& out) {
   const SolveSummary& summary = result.summary;
-  out.set_method(std::string(method_name(summary.method)));
+  out.set_method(encode_method(summary.method));
   out.set_stop_reason(encode_stop(summary.stop_reason));
   out.set_iterations(static_cast<std::uint32_t>(summary.iterations));
   out.set_initial_energy(summary.initial_energy);
@@ -269,18 +289,18 @@ void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_co
     return;
   }
   encode_event(note, stream, vertex_count, *out.mutable_event());
-  if (out.event().has_frame()) align_positions(out, *out.mutable_event()->mutable_frame());
+  align_event(note, out, *out.mutable_event());
 }
 
 void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
             v1::StreamFramesResponse& out) {
   encode_event(note, stream, vertex_count, *out.mutable_event());
-  if (out.event().has_frame()) align_positions(out, *out.mutable_event()->mutable_frame());
+  align_event(note, out, *out.mutable_event());
 }
 
 void encode(const FramePiece& piece, v1::SolveResponse& out) {
   encode_piece(piece, *out.mutable_frame());
-  align_positions(out, *out.mutable_frame());
+  align_buffers(out, *out.mutable_frame(), unit_of(piece));
 }
 
 void encode_trace(const std::vector<IterationRecord>& trace, std::size_t begin, std::size_t end,

@@ -16,28 +16,45 @@ std::string float32_bytes(const Matrix& values) {
   return bytes;
 }
 
+template <typename Matrix>
+std::string_view float64_bytes(const Matrix& values) {
+  return {reinterpret_cast<const char*>(values.data()),
+          static_cast<std::size_t>(values.size()) * sizeof(double)};
+}
+
 }  // namespace
 
 std::size_t bytes_of(Scalar scalar) {
   return scalar == Scalar::kFloat64 ? sizeof(double) : sizeof(float);
 }
 
-Surface::Surface(Points positions, const Field& cell_energies)
-    : positions_(std::move(positions)), distortion_(float32_bytes(cell_energies)) {
-  LPDEFORM_CHECK(cell_energies.size() == positions_.rows());
+Surface::Surface(Points positions, Field cell_energies)
+    : positions_(std::move(positions)), cell_energies_(std::move(cell_energies)) {
+  LPDEFORM_CHECK(cell_energies_.size() == positions_.rows());
 }
 
 std::string_view Surface::position_bytes(Scalar scalar) const {
-  if (scalar == Scalar::kFloat64) {
-    return {reinterpret_cast<const char*>(positions_.data()),
-            static_cast<std::size_t>(positions_.size()) * sizeof(double)};
-  }
-  std::call_once(once_, [this] { float32_ = float32_bytes(positions_); });
-  return float32_;
+  if (scalar == Scalar::kFloat64) return float64_bytes(positions_);
+  make_float32();
+  return float32_positions_;
+}
+
+std::string_view Surface::distortion_bytes(Scalar scalar) const {
+  if (scalar == Scalar::kFloat64) return float64_bytes(cell_energies_);
+  make_float32();
+  return float32_distortion_;
+}
+
+void Surface::make_float32() const {
+  std::call_once(once_, [this] {
+    float32_positions_ = float32_bytes(positions_);
+    float32_distortion_ = float32_bytes(cell_energies_);
+  });
 }
 
 std::size_t Surface::memory_bytes() const {
-  return static_cast<std::size_t>(positions_.size()) * (sizeof(double) + sizeof(float)) + distortion_.size();
+  return static_cast<std::size_t>(positions_.size() + cell_energies_.size()) *
+         (sizeof(double) + sizeof(float));
 }
 
 FrameCutter::FrameCutter(std::shared_ptr<const Frame> frame, Scalar scalar, bool with_distortion,
@@ -49,7 +66,7 @@ FrameCutter::FrameCutter(std::shared_ptr<const Frame> frame, Scalar scalar, bool
 
 FramePiece FrameCutter::next() {
   LPDEFORM_CHECK(has_more());
-  const std::size_t vertex_bytes = 3 * bytes_of(scalar_) + (with_distortion_ ? sizeof(float) : 0);
+  const std::size_t vertex_bytes = 3 * bytes_of(scalar_) + (with_distortion_ ? bytes_of(scalar_) : 0);
   const auto most = static_cast<std::uint32_t>(kMostBytes / vertex_bytes);
   const std::uint32_t left = frame_->surface->vertex_count() - at_;
   FramePiece piece{frame_,          at_,     std::min(most, left), left <= most,

@@ -12,7 +12,7 @@
 
 namespace lpdeform {
 
-/// How positions travel.
+/// How positions and distortion travel.
 enum class Scalar { kFloat32, kFloat64 };
 
 std::size_t bytes_of(Scalar scalar);
@@ -21,25 +21,27 @@ std::size_t bytes_of(Scalar scalar);
 /// numbers alone. Immutable; the float32 form is made once, when first asked for. Thread-safe.
 class Surface {
  public:
-  Surface(Points positions, const Field& cell_energies);
+  Surface(Points positions, Field cell_energies);
 
   std::uint32_t vertex_count() const { return static_cast<std::uint32_t>(positions_.rows()); }
 
   /// x, y, z of each vertex, packed, little-endian.
   std::string_view position_bytes(Scalar scalar) const;
-  /// E_i of each vertex as float32, packed, little-endian.
-  std::string_view distortion_bytes() const { return distortion_; }
+  /// E_i of each vertex, packed, little-endian.
+  std::string_view distortion_bytes(Scalar scalar) const;
 
   const Points& positions() const { return positions_; }
   std::size_t memory_bytes() const;
 
  private:
+  void make_float32() const;
+
   static_assert(std::endian::native == std::endian::little, "numbers travel as they lie in memory");
 
   const Points positions_;
-  std::string distortion_;
+  const Field cell_energies_;
   mutable std::once_flag once_;
-  mutable std::string float32_;
+  mutable std::string float32_positions_, float32_distortion_;
 };
 
 /// One state of a session on its way to its readers. Meanings as in frame.proto.

@@ -56,6 +56,7 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
 
   const std::string& id() const { return id_; }
   const StreamOptions& options() const { return options_; }
+  Timers::Duration heartbeat() const { return heartbeat_; }
 
   /// `waker` is called, on any thread and under no lock, when next() may have something new. Once, before the
   /// first next().

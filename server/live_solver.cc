@@ -32,11 +32,11 @@ bool LiveSolver::run_slice(SolveJob* job) {
   if (job != nullptr && job->is_done()) job = nullptr;
   if (newest.version != inputs_.version) take_over(newest);
 
-  const void* const wanted = job != nullptr                  ? static_cast<const void*>(job)
-                             : publisher_.reader_count() > 0 ? this
-                                                             : nullptr;
+  const std::uint64_t wanted = job != nullptr                  ? job->number()
+                               : publisher_.reader_count() > 0 ? kReaders
+                                                               : kNobody;
   if (phase_ == Phase::kRunning && running_for_ != wanted) pause();
-  if (wanted == nullptr) return false;
+  if (wanted == kNobody) return false;
   if (phase_ != Phase::kRunning) {
     if (!(job != nullptr ? begin_job(*job) : begin_live())) return false;
     phase_ = Phase::kRunning;
@@ -44,7 +44,7 @@ bool LiveSolver::run_slice(SolveJob* job) {
     was_begun_ = true;
   }
   run_steps(job);
-  return phase_ == Phase::kRunning;
+  return phase_ != Phase::kDone;  // where the solve was cancelled, somebody else may wait
 }
 
 void LiveSolver::take_over(const Inputs& inputs) {
@@ -95,7 +95,7 @@ bool LiveSolver::begin_live() {
 
 void LiveSolver::pause() {
   phase_ = Phase::kWaiting;
-  running_for_ = nullptr;
+  running_for_ = kNobody;
 }
 
 void LiveSolver::run_steps(SolveJob* job) {
@@ -110,7 +110,7 @@ void LiveSolver::run_steps(SolveJob* job) {
 void LiveSolver::end_solve(SolveJob* job) {
   if (deformer_->summary().stop_reason == StopReason::kCancelled) return pause();
   phase_ = Phase::kDone;
-  running_for_ = nullptr;
+  running_for_ = kNobody;
   const std::shared_ptr<const Frame> frame = publish(true);
   if (job != nullptr) job->finish(SolveResult{deformer_->summary(), frame});
 }

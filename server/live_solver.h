@@ -64,8 +64,9 @@ class LiveSolver {
   std::shared_ptr<const HandleSet> held_;  // what the deformer has of them
   absl::Status blocked_;                   // why they cannot be solved for
   Phase phase_ = Phase::kDone;
-  bool was_begun_ = false;             // a solve for them, so the next one goes on from its state
-  const void* running_for_ = nullptr;  // the job, or this for the readers
+  bool was_begun_ = false;  // a solve for them, so the next one goes on from its state
+  static constexpr std::uint64_t kNobody = 0, kReaders = 1;
+  std::uint64_t running_for_ = kNobody;  // the number of a job, or kReaders
   Clock::time_point last_report_;
 };
 

@@ -1,6 +1,7 @@
 #include "server/mailbox.h"
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -16,6 +17,8 @@ namespace {
 constexpr std::size_t kMostAges = 2 * Mailbox::kMostHandles;
 
 constexpr std::size_t kLongestName = 128;
+/// Room for a new writer to count on, and for languages whose integers are signed.
+constexpr std::uint64_t kHighestInputSeq = std::numeric_limits<std::int64_t>::max();
 
 std::string element_of(std::string_view name) {
   return absl::StrCat("handle \"", absl::string_view(name.data(), std::min(name.size(), kLongestName)), "\"");
@@ -72,6 +75,11 @@ Inputs Mailbox::newest() const {
 }
 
 absl::StatusOr<UpdateResult> Mailbox::take(const Update& update) {
+  if (update.input_seq > kHighestInputSeq) {
+    return invalid_input(
+        {"INPUT_SEQ_TOO_HIGH", "input_seq", "input_seq < 2^63"},
+        absl::StrCat("The update's input_seq is ", update.input_seq, "; it must be below 2^63."));
+  }
   if (update.input_seq == 0) {
     return invalid_input({"INPUT_SEQ_ZERO", "input_seq", "input_seq >= 1"},
                          "The update's input_seq is 0; numbers rise from 1.");

@@ -12,13 +12,18 @@ namespace lpdeform {
 Registry::Registry(std::shared_ptr<Timers> timers, Limits limits)
     : timers_(std::move(timers)), limits_(limits) {}
 
-bool Registry::begin_creation(const std::string& request_id, OnCreated on_created) {
+bool Registry::begin_creation(const std::string& request_id, OnCreated on_created, std::size_t fingerprint) {
   if (absl::Status status = check_request_id(request_id); !status.ok()) {
     on_created(status);
     return false;
   }
   std::unique_lock lock(mutex_);
   if (const auto known = requests_.find(request_id); known != requests_.end()) {
+    if (known->second.fingerprint != fingerprint) {
+      lock.unlock();
+      on_created(request_id_reused());
+      return false;
+    }
     if (known->second.name.empty()) {
       known->second.waiting.push_back(std::move(on_created));
       return false;
@@ -38,7 +43,11 @@ bool Registry::begin_creation(const std::string& request_id, OnCreated on_create
     return false;
   }
   ++being_made_;
-  if (!request_id.empty()) requests_[request_id].waiting.push_back(std::move(on_created));
+  if (!request_id.empty()) {
+    Request& made = requests_[request_id];
+    made.fingerprint = fingerprint;
+    made.waiting.push_back(std::move(on_created));
+  }
   return true;
 }
 

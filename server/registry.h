@@ -36,8 +36,9 @@ class Registry : public std::enable_shared_from_this<Registry> {
   /// Claims a place for a session to be made. True where the caller is to make it and then call
   /// finish_creation() with the same request_id; `on_created` hears how that went. False where `on_created`
   /// is or will be called without the caller's doing: the session exists, another caller is making it, or an
-  /// error (INVALID_ARGUMENT REQUEST_ID, RESOURCE_EXHAUSTED SESSIONS_FULL).
-  bool begin_creation(const std::string& request_id, OnCreated on_created);
+  /// error (INVALID_ARGUMENT REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED SESSIONS_FULL). `fingerprint`
+  /// differs for requests that differ: the same request_id with another one is refused.
+  bool begin_creation(const std::string& request_id, OnCreated on_created, std::size_t fingerprint = 0);
 
   /// Enters the session, or gives its place up. With an empty request_id, tells `on_created` alone.
   void finish_creation(const std::string& request_id, absl::StatusOr<std::shared_ptr<Session>> made,
@@ -76,6 +77,7 @@ class Registry : public std::enable_shared_from_this<Registry> {
     std::uint64_t number = 0;
   };
   struct Request {
+    std::size_t fingerprint = 0;
     std::string name;  // empty while the session is being made
     std::string writer_token;
     std::vector<OnCreated> waiting;

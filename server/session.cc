@@ -105,6 +105,7 @@ WriterLease Session::acquire_writer() {
   touch();
   WriterLease lease;
   std::vector<std::weak_ptr<FrameStream>> before;
+  std::shared_ptr<SolveJob> job_before;
   {
     const std::scoped_lock lock(writing_);
     token_ = random_hex_128();
@@ -112,12 +113,14 @@ WriterLease Session::acquire_writer() {
     before.swap(writers_);
     publisher_->begin_epoch(epoch_);
     lease = {token_, epoch_, mailbox_.newest().input_seq};
+    job_before = take_job();
   }
   const std::string text = "Another writer took the session over.";
   for (const auto& weak : before) {
     if (const auto stream = weak.lock()) stream->end(EndReason::kWriterReplaced, text);
   }
-  end_job(make_fault(absl::StatusCode::kAborted, {"WRITER_REPLACED", "", ""}, text));
+  if (job_before)
+    job_before->finish(make_fault(absl::StatusCode::kAborted, {"WRITER_REPLACED", "", ""}, text));
   return lease;
 }
 
@@ -218,13 +221,13 @@ std::shared_ptr<SolveJob> Session::job() const {
   return job_;
 }
 
+std::shared_ptr<SolveJob> Session::take_job() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(job_, nullptr);
+}
+
 void Session::end_job(const absl::Status& why) {
-  std::shared_ptr<SolveJob> job;
-  {
-    const std::scoped_lock lock(mutex_);
-    job.swap(job_);
-  }
-  if (job) job->finish(why);
+  if (const auto job = take_job()) job->finish(why);
 }
 
 bool Session::run() {

@@ -114,6 +114,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
  private:
   Session(SessionParts parts, SessionServices services);
   absl::Status check_writer_locked(const std::string& token) const;
+  std::shared_ptr<SolveJob> take_job();
   void end_job(const absl::Status& why);
   std::shared_ptr<SolveJob> job() const;
 

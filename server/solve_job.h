@@ -42,6 +42,8 @@ class SolveJob {
   SolveJob(SolveOptions options, OnProgress on_progress, OnDone on_done)
       : options_(std::move(options)), on_progress_(std::move(on_progress)), on_done_(std::move(on_done)) {}
 
+  /// Different for every job of the process; over 1.
+  std::uint64_t number() const { return number_; }
   const SolveOptions& options() const { return options_; }
   std::stop_token stop_token() const { return stop_.get_token(); }
   bool is_done() const { return is_done_; }
@@ -66,6 +68,12 @@ class SolveJob {
   std::uint64_t version = 0;
 
  private:
+  static std::uint64_t next_number() {
+    static std::atomic<std::uint64_t> last = 1;
+    return ++last;
+  }
+
+  const std::uint64_t number_ = next_number();
   const SolveOptions options_;
   const OnProgress on_progress_;
   const OnDone on_done_;

@@ -77,6 +77,11 @@ absl::StatusOr<std::string_view> Upload::bytes() const {
                     absl::StrCat("The upload has ", received_, " of its ", size_, " bytes."));
 }
 
+absl::Status request_id_reused() {
+  return invalid_input({"REQUEST_ID_REUSED", "request_id", ""},
+                       "The request_id was used before, with another request.");
+}
+
 Uploads::Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers, Limits limits)
     : budget_(std::move(budget)), timers_(std::move(timers)), limits_(limits) {}
 
@@ -90,7 +95,9 @@ absl::StatusOr<std::shared_ptr<Upload>> Uploads::create(const std::string& reque
   }
   const std::scoped_lock lock(mutex_);
   if (const auto known = requested_.find(request_id); known != requested_.end()) {
-    return uploads_[known->second].upload;
+    const std::shared_ptr<Upload>& upload = uploads_[known->second].upload;
+    if (upload->size() == size_bytes && upload->crc32c() == crc32c) return upload;
+    return request_id_reused();
   }
   if (uploads_.size() >= kMostUploads) {
     return make_fault(absl::StatusCode::kResourceExhausted,

@@ -26,6 +26,8 @@ class Upload {
   Upload(std::string name, std::uint64_t size_bytes, std::uint32_t crc32c, Reservation memory);
 
   const std::string& name() const { return name_; }
+  std::uint64_t size() const { return size_; }
+  std::uint32_t crc32c() const { return crc32c_; }
 
   /// The last missing part finishes it; later ones are ignored. Errors: INVALID_ARGUMENT UPLOAD_PART_SIZE
   /// (empty, or over 1 MiB), UPLOAD_PART_OUT_OF_RANGE, UPLOAD_SCATTERED (too many gaps); DATA_LOSS
@@ -64,7 +66,8 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
 
   Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers, Limits limits);
 
-  /// Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID; RESOURCE_EXHAUSTED MEMORY_FULL, UPLOADS_FULL.
+  /// Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED MEMORY_FULL,
+  /// UPLOADS_FULL.
   absl::StatusOr<std::shared_ptr<Upload>> create(const std::string& request_id, std::uint64_t size_bytes,
                                                  std::uint32_t crc32c);
 
@@ -92,5 +95,8 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
 
 /// INVALID_ARGUMENT REQUEST_ID where it is neither empty nor 8 to 64 bytes.
 absl::Status check_request_id(const std::string& request_id);
+
+/// INVALID_ARGUMENT REQUEST_ID_REUSED.
+absl::Status request_id_reused();
 
 }  // namespace lpdeform

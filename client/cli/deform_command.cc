@@ -110,8 +110,7 @@ absl::StatusOr<Solved> solve_on(const std::string& address, const DeformOptions&
   solve.initial_positions = std::move(inputs.initial_positions);
   solve.on_progress = [&progress](const client::SolveProgress& now) { progress.show(now); };
   absl::StatusOr<client::SolveResult> result = absl::CancelledError();
-  if (const auto sent = session->update(std::move(inputs.update)); sent.ok())
-    result = session->solve(std::move(solve));
+  if (const auto sent = session->update(std::move(inputs.update)); sent.ok()) result = session->solve(solve);
   interrupt.set_action({});
   if (!result.ok()) return result.status();
   return Solved{session->mesh_report(), *std::move(result)};
@@ -121,15 +120,14 @@ absl::Status write_results(const DeformOptions& options, const Inputs& inputs, c
   const Points positions = points_of(solved.result.positions);
   const auto& distortion = solved.result.distortion;
   const Field field =
-      Eigen::Map<const Eigen::VectorXf>(distortion.data(), static_cast<Eigen::Index>(distortion.size()))
-          .cast<double>();
+      Eigen::Map<const Field>(distortion.data(), static_cast<Eigen::Index>(distortion.size()));
   for (const std::filesystem::path& path : options.out) {
-    const absl::Status written = write_output(path, inputs.file, positions, field);
+    absl::Status written = write_output(path, inputs.file, positions, field);
     if (!written.ok()) return written;
     std::printf("wrote %s\n", path.c_str());
   }
   if (!options.report) return absl::OkStatus();
-  const absl::Status written = write_text(*options.report, report_json(solved.mesh, inputs.p, solved.result));
+  absl::Status written = write_text(*options.report, report_json(solved.mesh, inputs.p, solved.result));
   if (written.ok()) std::printf("wrote %s\n", options.report->c_str());
   return written;
 }

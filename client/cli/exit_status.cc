@@ -3,9 +3,12 @@
 #include <cstdio>
 #include <string>
 
+#include "core/base/fault.h"
+
 namespace lpdeform::cli {
 
 ExitStatus exit_status_of(const absl::Status& error) {
+  if (fault_of(error).reason == "FILE_NOT_WRITTEN") return kBadInput;
   switch (error.code()) {
     case absl::StatusCode::kInvalidArgument:
     case absl::StatusCode::kFailedPrecondition:

@@ -35,7 +35,11 @@ std::string key_of(const std::string& owner, const char* key) {
   return absl::StrCat("\"", key, "\" of ", owner);
 }
 
+/// `value` for a message. Not dumped where it is nested: that would recurse as deep as a hostile file likes.
 std::string shown(const json& value) {
+  const bool is_nested =
+      std::ranges::any_of(value, [](const json& inner) { return inner.is_structured() && !inner.empty(); });
+  if (value.is_structured() && is_nested) return value.is_array() ? "a nested list" : "a nested object";
   const std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
   return text.size() <= 40 ? text : text.substr(0, 37) + "...";
 }
@@ -76,7 +80,7 @@ std::string name_of(const json& object, std::size_t index) {
   if (!object.is_object()) refuse_value(place, "an object", object);
   const json& name = required(object, place, "name");
   if (!name.is_string()) refuse_value(key_of(place, "name"), "a text", name);
-  const std::string text = name.get<std::string>();
+  std::string text = name.get<std::string>();
   if (text.empty() || text.size() > 128) {
     refuse("HANDLE_NAME", place,
            absl::StrCat("The name of ", place, " has ", text.size(), " bytes; it takes 1 to 128."),

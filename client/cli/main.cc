@@ -1,6 +1,7 @@
 // The program `lpdeform`: what it takes on the command line.
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <functional>
 #include <memory>
@@ -8,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "client/cli/deform_command.h"
 #include "client/cli/generated_shape.h"
@@ -36,11 +38,36 @@ void add_choice(CLI::App& app, const std::string& flag, T& target, const Choices
       ->option_text(absl::StrJoin(names, "|"));
 }
 
+/// A number within [lowest, highest], with a message that can be read.
+CLI::Validator within(double lowest, double highest) {
+  const std::string range = absl::StrCat(lowest, " to ", highest);
+  return CLI::Validator(
+      [=](std::string& text) {
+        double value = 0;
+        const bool is_number = CLI::detail::lexical_cast(text, value);
+        if (is_number && value >= lowest && value <= highest) return std::string();
+        return absl::StrCat(text, " is not a number from ", range);
+      },
+      range);
+}
+
+/// A number above 0, not infinite.
+CLI::Validator positive() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double value = 0;
+        const bool is_number = CLI::detail::lexical_cast(text, value);
+        if (is_number && value > 0 && std::isfinite(value)) return std::string();
+        return absl::StrCat(text, " is not a number above 0");
+      },
+      "> 0");
+}
+
 void add_material_options(CLI::App& app, DeformOptions& options) {
   CLI::Option* const p =
       app.add_option("--p", options.p,
                      "The norm, 1 to 64: small concentrates distortion, large spreads it (2)")
-          ->check(CLI::Range(1.0, 64.0))
+          ->check(within(1, 64))
           ->option_text("P");
   app.add_option("--p-field", options.p_field, "A p for each vertex: a file with one number a line")
       ->excludes(p)
@@ -50,7 +77,7 @@ void add_material_options(CLI::App& app, DeformOptions& options) {
       ->option_text("FILE");
   app.add_option("--length-unit", options.length_unit,
                  "The length that different p are mixed in, in the mesh's unit (the mean edge length)")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->option_text("L");
   add_choice<client::WeightKind>(
       app, "--weights", options.weights,
@@ -66,25 +93,27 @@ void add_material_options(CLI::App& app, DeformOptions& options) {
 }
 
 void add_solver_options(CLI::App& app, DeformOptions& options) {
-  add_choice<client::Method>(app, "--method", options.method,
-                             {{"auto", client::Method::kAuto},
-                              {"quasi_newton", client::Method::kQuasiNewton},
-                              {"line_search", client::Method::kLineSearch},
-                              {"local_global", client::Method::kLocalGlobal},
-                              {"conic", client::Method::kConic}},
-                             "The algorithm; local_global needs p = 2, conic p = 1 (auto)");
+  add_choice<client::Method>(
+      app, "--method", options.method,
+      {{"auto", client::Method::kAuto},
+       {"quasi_newton", client::Method::kQuasiNewton},
+       {"line_search", client::Method::kLineSearch},
+       {"local_global", client::Method::kLocalGlobal},
+       {"conic", client::Method::kConic}},
+      "The algorithm; local_global needs p = 2, conic p = 1 and stops as the paper does, "
+      "some percent above the minimum (auto)");
   app.add_option("--initial", options.initial,
                  "Where to start; a mesh has as many vertices as MESH (laplacian)")
       ->option_text("laplacian|rest|MESH");
   app.add_option("--max-iterations", options.max_iterations, "Stop after so many")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->option_text("N");
   app.add_option("--tolerance", options.tolerance,
                  "Stop when so little is left to gain, relative, 1e-14 to 0.1 (1e-5)")
-      ->check(CLI::Range(1e-14, 0.1))
+      ->check(within(1e-14, 0.1))
       ->option_text("T");
   app.add_option("--time-limit", options.time_limit_seconds, "Stop after so many seconds of solving")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->option_text("SECONDS");
 }
 

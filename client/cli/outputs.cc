@@ -29,7 +29,7 @@ absl::Status check_outputs(std::span<const std::filesystem::path> paths) {
           {"OUT_FORMAT_UNKNOWN", path.string(), "ending = .ply, .obj, .off or .png"},
           absl::StrCat("\"", path.string(), "\" ends in none of .ply, .obj, .off and .png."));
     }
-    const absl::Status folder = check_folder(path);
+    absl::Status folder = check_folder(path);
     if (!folder.ok()) return folder;
   }
   return absl::OkStatus();

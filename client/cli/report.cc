@@ -75,10 +75,9 @@ ordered_json trace_array(const std::vector<client::IterationRecord>& trace) {
   return array;
 }
 
-ordered_json distortion_object(const std::vector<float>& distortion) {
+ordered_json distortion_object(const std::vector<double>& distortion) {
   const Field field =
-      Eigen::Map<const Eigen::VectorXf>(distortion.data(), static_cast<Eigen::Index>(distortion.size()))
-          .cast<double>();
+      Eigen::Map<const Field>(distortion.data(), static_cast<Eigen::Index>(distortion.size()));
   const DistortionStatistics statistics = distortion_statistics(field);
   return {{"min", statistics.min},
           {"mean", statistics.mean},

@@ -54,7 +54,7 @@ absl::StatusOr<Frame> Session::settle(std::chrono::milliseconds timeout) {
   return link_->settle(std::chrono::steady_clock::now() + timeout);
 }
 
-absl::StatusOr<SolveResult> Session::solve(SolveOptions options) {
+absl::StatusOr<SolveResult> Session::solve(const SolveOptions& options) {
   return link_->solve(options);
 }
 

@@ -98,7 +98,7 @@ class Session {
   /// Solves for the present handles and settings on the server and returns the finished result; waits for it.
   /// Does not need the stream of frames, but works beside it. Ends early with CANCELLED when close() is
   /// called from another thread. Errors: what the server refuses; DEADLINE_EXCEEDED; UNAVAILABLE.
-  absl::StatusOr<SolveResult> solve(SolveOptions options = {});
+  absl::StatusOr<SolveResult> solve(const SolveOptions& options = {});
 
   /// Becomes the writer in place of whoever is, after WRITER_REPLACED or as a reader. Waits for the server.
   absl::Status take_over();

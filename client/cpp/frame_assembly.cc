@@ -55,7 +55,7 @@ absl::Status FrameAssembly::begin(const v1::FrameHeader& header) {
   frame.converged = header.converged();
   frame.stop_reason = from_wire(header.stop_reason());
   frame.solve_seconds = header.solve_seconds();
-  frame.method = header.method();
+  frame.method = method_name(header.method());
   frame.positions.reserve(std::size_t{3} * vertex_count_);
   frame.distortion.reserve(vertex_count_);
   received_ = 0;
@@ -72,16 +72,17 @@ absl::Status FrameAssembly::append(const v1::FramePart& part) {
   const std::size_t count = part.vertex_count();
   const bool has_distortion = !part.distortion().empty();
   if (part.positions().size() != 3 * count * scalar_bytes_ ||
-      (has_distortion && part.distortion().size() != count * sizeof(float))) {
+      (has_distortion && part.distortion().size() != count * scalar_bytes_)) {
     return misfit(absl::StrCat("A part of frame ", part.frame_seq(), " has the wrong number of bytes for ",
                                count, " vertices."));
   }
   if (scalar_bytes_ == sizeof(double)) {
     append_numbers<double>(part.positions(), frame_->positions);
+    append_numbers<double>(part.distortion(), frame_->distortion);
   } else {
     append_numbers<float>(part.positions(), frame_->positions);
+    append_numbers<float>(part.distortion(), frame_->distortion);
   }
-  append_numbers<float>(part.distortion(), frame_->distortion);
   received_ += part.vertex_count();
   if (part.last() && received_ != vertex_count_) {
     return misfit(absl::StrCat("Frame ", part.frame_seq(), " ends after ", received_, " of ", vertex_count_,

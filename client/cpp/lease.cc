@@ -9,7 +9,7 @@
 namespace lpdeform::client {
 
 absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptions& options,
-                                     const std::string& request_id, std::stop_token stop) {
+                                     const std::string& request_id, const std::stop_token& stop) {
   v1::CreateSessionRequest request;
   request.set_request_id(request_id);
   request.set_weights(to_wire(options.weights));
@@ -26,7 +26,8 @@ absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptio
                from_wire(session.mesh())};
 }
 
-absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role role, std::stop_token stop) {
+absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role role,
+                                   const std::stop_token& stop) {
   v1::GetSessionRequest get;
   get.set_session(session);
   const auto found = rpc.call(get, stop);
@@ -47,6 +48,11 @@ absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role ro
 
 bool is_session_lost(const absl::Status& status) {
   return absl::IsNotFound(status) && absl::StartsWith(fault_of(status).reason, "SESSION_");
+}
+
+bool is_undecided(const absl::Status& status) {
+  return absl::IsUnavailable(status) || absl::IsCancelled(status) || absl::IsDeadlineExceeded(status) ||
+         absl::IsResourceExhausted(status) || is_session_lost(status);
 }
 
 bool is_taken_all_the_same(const absl::Status& status) {

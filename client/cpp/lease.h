@@ -21,13 +21,17 @@ struct Lease {
 
 /// Makes a session. The same `request_id` gives the same one. Waits.
 absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptions& options,
-                                     const std::string& request_id, std::stop_token stop);
+                                     const std::string& request_id, const std::stop_token& stop);
 
 /// Looks up a session; as its writer, takes it over. Waits.
-absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role role, std::stop_token stop);
+absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role role,
+                                   const std::stop_token& stop);
 
 /// The server no longer has the session that a call was about.
 bool is_session_lost(const absl::Status& status);
+
+/// The server may still take in an update that failed like this: it is to be sent again.
+bool is_undecided(const absl::Status& status);
 
 /// The error is about solving, not about the update: the server has taken that in.
 bool is_taken_all_the_same(const absl::Status& status);

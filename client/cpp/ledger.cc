@@ -7,8 +7,8 @@ namespace lpdeform::client {
 namespace {
 
 template <typename T>
-void replace_where_given(std::optional<T>& older, std::optional<T>&& newer) {
-  if (newer) older = std::move(newer);
+void replace_where_given(std::optional<T>& older, std::optional<T>& newer) {
+  if (newer) older.swap(newer);
 }
 
 void merge_change(Update::Change& older, Update::Change&& newer) {
@@ -34,10 +34,10 @@ void merge(Update& older, Update newer) {
     const auto [place, is_new] = older.handles.try_emplace(name, std::move(change));
     if (!is_new) merge_change(place->second, std::move(change));
   }
-  replace_where_given(older.settings.p, std::move(newer.settings.p));
-  replace_where_given(older.settings.stiffness, std::move(newer.settings.stiffness));
-  replace_where_given(older.settings.length_unit, std::move(newer.settings.length_unit));
-  replace_where_given(older.settings.solver, std::move(newer.settings.solver));
+  replace_where_given(older.settings.p, newer.settings.p);
+  replace_where_given(older.settings.stiffness, newer.settings.stiffness);
+  replace_where_given(older.settings.length_unit, newer.settings.length_unit);
+  replace_where_given(older.settings.solver, newer.settings.solver);
 }
 
 std::uint64_t Ledger::add(Update update) {

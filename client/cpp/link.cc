@@ -9,9 +9,6 @@
 namespace lpdeform::client {
 namespace {
 
-/// The server says something at least every 15 s; three times that and the connection is dead.
-constexpr std::chrono::seconds kLongestSilence{45};
-
 v1::DeformRequest open_request(const Lease& lease, const OpenOptions& options) {
   v1::DeformRequest request;
   v1::DeformOpen& open = *request.mutable_open();
@@ -88,7 +85,7 @@ void Link::pump(DeformCall& call) {
       return is_over_ || (is_open_ && (ack_due_ || (!is_solving_ && ledger_.can_send())));
     };
     const Clock::time_point heard = last_heard_;
-    if (changed_.wait_until(lock, heard + kLongestSilence, has_work) || last_heard_ != heard) continue;
+    if (changed_.wait_until(lock, heard + longest_silence_, has_work) || last_heard_ != heard) continue;
     call.cancel();
     changed_.wait(lock, [this] { return is_over_; });
   }
@@ -109,7 +106,7 @@ bool Link::send_one(DeformCall& call, std::unique_lock<std::mutex>& lock) {
   return true;
 }
 
-void Link::send_update(DeformCall& call, NumberedUpdate update, std::unique_lock<std::mutex>& lock) {
+void Link::send_update(DeformCall& call, const NumberedUpdate& update, std::unique_lock<std::mutex>& lock) {
   lock.unlock();
   v1::DeformRequest request;
   Packer packer([this](std::string_view bytes) { return upload(*rpc_, bytes, stop_.get_token()); });
@@ -117,7 +114,7 @@ void Link::send_update(DeformCall& call, NumberedUpdate update, std::unique_lock
   if (packed.ok()) call.write(request);
   lock.lock();
   if (packed.ok()) return;
-  if (absl::IsUnavailable(packed)) {
+  if (is_undecided(packed)) {
     call.cancel();  // what is in flight waits again for the next stream
     changed_.wait(lock, [this] { return is_over_; });
     return;

@@ -54,7 +54,7 @@ class Link {
   absl::Status one_stream();
   void pump(DeformCall& call);
   bool send_one(DeformCall& call, std::unique_lock<std::mutex>& lock);
-  void send_update(DeformCall& call, NumberedUpdate update, std::unique_lock<std::mutex>& lock);
+  void send_update(DeformCall& call, const NumberedUpdate& update, std::unique_lock<std::mutex>& lock);
   bool recover(const absl::Status& ended, Backoff& backoff);
   void give_up(absl::Status why);
 
@@ -104,6 +104,8 @@ class Link {
   std::optional<v1::GoAway> go_away_;
   std::optional<FrameAssembly> assembly_;
   Clock::time_point last_heard_;
+  /// After so long without a word the connection is dead: three of the heartbeats that the server announces.
+  std::chrono::milliseconds longest_silence_ = std::chrono::seconds(45);
   Clock::time_point last_open_;
   absl::Status last_problem_;
 };

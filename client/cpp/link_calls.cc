@@ -19,12 +19,6 @@ absl::Status session_closed() {
                     "The session is closed.");
 }
 
-/// Whether the server may still take in an update that failed like this, so that it is to be sent again.
-bool is_undecided(const absl::Status& status) {
-  return absl::IsUnavailable(status) || absl::IsCancelled(status) || absl::IsDeadlineExceeded(status) ||
-         is_session_lost(status);
-}
-
 }  // namespace
 
 absl::StatusOr<std::uint64_t> Link::update(Update update) {

@@ -57,6 +57,9 @@ void Link::take(const v1::StreamOpened& opened) {
   box_.begin_epoch(opened.epoch());
   const std::scoped_lock lock(mutex_);
   lease_.epoch = opened.epoch();
+  if (opened.heartbeat_interval_ms() > 0) {
+    longest_silence_ = 3 * std::chrono::milliseconds(opened.heartbeat_interval_ms());
+  }
   ledger_.count_from(opened.input_seq());
   is_open_ = true;
   changed_.notify_all();
@@ -85,7 +88,7 @@ void Link::take(const v1::Fault& fault) {
     const std::scoped_lock lock(mutex_);
     if (is_taken_all_the_same(status)) {
       ledger_.accept(fault.input_seq());
-    } else {
+    } else if (!is_session_lost(status)) {  // then it waits for the session made anew
       ledger_.refuse(fault.input_seq());
     }
     changed_.notify_all();

@@ -67,39 +67,39 @@ class GrpcDeformCall final : public DeformCall {
 
 class GrpcRpc final : public Rpc {
  public:
-  GrpcRpc(std::shared_ptr<grpc::Channel> channel, std::chrono::milliseconds call_timeout)
+  GrpcRpc(const std::shared_ptr<grpc::Channel>& channel, std::chrono::milliseconds call_timeout)
       : stub_(v1::DeformService::NewStub(channel)), call_timeout_(call_timeout) {}
 
   absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
-                                                std::stop_token stop) override {
-    return unary(&Stub::CreateUpload, request, std::move(stop));
+                                                const std::stop_token& stop) override {
+    return unary(&Stub::CreateUpload, request, stop);
   }
   absl::StatusOr<v1::UploadPartResponse> call(const v1::UploadPartRequest& request,
-                                              std::stop_token stop) override {
-    return unary(&Stub::UploadPart, request, std::move(stop));
+                                              const std::stop_token& stop) override {
+    return unary(&Stub::UploadPart, request, stop);
   }
   absl::StatusOr<v1::CreateSessionResponse> call(const v1::CreateSessionRequest& request,
-                                                 std::stop_token stop) override {
-    return unary(&Stub::CreateSession, request, std::move(stop));
+                                                 const std::stop_token& stop) override {
+    return unary(&Stub::CreateSession, request, stop);
   }
   absl::StatusOr<v1::GetSessionResponse> call(const v1::GetSessionRequest& request,
-                                              std::stop_token stop) override {
-    return unary(&Stub::GetSession, request, std::move(stop));
+                                              const std::stop_token& stop) override {
+    return unary(&Stub::GetSession, request, stop);
   }
   absl::StatusOr<v1::DeleteSessionResponse> call(const v1::DeleteSessionRequest& request,
-                                                 std::stop_token stop) override {
-    return unary(&Stub::DeleteSession, request, std::move(stop));
+                                                 const std::stop_token& stop) override {
+    return unary(&Stub::DeleteSession, request, stop);
   }
   absl::StatusOr<v1::AcquireWriterResponse> call(const v1::AcquireWriterRequest& request,
-                                                 std::stop_token stop) override {
-    return unary(&Stub::AcquireWriter, request, std::move(stop));
+                                                 const std::stop_token& stop) override {
+    return unary(&Stub::AcquireWriter, request, stop);
   }
   absl::StatusOr<v1::UpdateHandlesResponse> call(const v1::UpdateHandlesRequest& request,
-                                                 std::stop_token stop) override {
-    return unary(&Stub::UpdateHandles, request, std::move(stop));
+                                                 const std::stop_token& stop) override {
+    return unary(&Stub::UpdateHandles, request, stop);
   }
 
-  absl::Status solve(const v1::SolveRequest& request, double deadline_seconds, std::stop_token stop,
+  absl::Status solve(const v1::SolveRequest& request, double deadline_seconds, const std::stop_token& stop,
                      const std::function<absl::Status(const v1::SolveResponse&)>& on_response) override {
     grpc::ClientContext context;
     if (deadline_seconds > 0) {
@@ -123,7 +123,7 @@ class GrpcRpc final : public Rpc {
   template <typename Request, typename Response>
   absl::StatusOr<Response> unary(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
                                                               Response*),
-                                 const Request& request, std::stop_token stop) {
+                                 const Request& request, const std::stop_token& stop) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + call_timeout_);
     const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });

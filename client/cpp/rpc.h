@@ -37,23 +37,24 @@ class Rpc {
   virtual ~Rpc() = default;
 
   virtual absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
-                                                        std::stop_token stop) = 0;
+                                                        const std::stop_token& stop) = 0;
   virtual absl::StatusOr<v1::UploadPartResponse> call(const v1::UploadPartRequest& request,
-                                                      std::stop_token stop) = 0;
+                                                      const std::stop_token& stop) = 0;
   virtual absl::StatusOr<v1::CreateSessionResponse> call(const v1::CreateSessionRequest& request,
-                                                         std::stop_token stop) = 0;
+                                                         const std::stop_token& stop) = 0;
   virtual absl::StatusOr<v1::GetSessionResponse> call(const v1::GetSessionRequest& request,
-                                                      std::stop_token stop) = 0;
+                                                      const std::stop_token& stop) = 0;
   virtual absl::StatusOr<v1::DeleteSessionResponse> call(const v1::DeleteSessionRequest& request,
-                                                         std::stop_token stop) = 0;
+                                                         const std::stop_token& stop) = 0;
   virtual absl::StatusOr<v1::AcquireWriterResponse> call(const v1::AcquireWriterRequest& request,
-                                                         std::stop_token stop) = 0;
+                                                         const std::stop_token& stop) = 0;
   virtual absl::StatusOr<v1::UpdateHandlesResponse> call(const v1::UpdateHandlesRequest& request,
-                                                         std::stop_token stop) = 0;
+                                                         const std::stop_token& stop) = 0;
 
   /// Calls `on_response` for each message, on this thread; an error of it ends the call and is returned.
   /// `deadline_seconds` 0 is without limit.
-  virtual absl::Status solve(const v1::SolveRequest& request, double deadline_seconds, std::stop_token stop,
+  virtual absl::Status solve(const v1::SolveRequest& request, double deadline_seconds,
+                             const std::stop_token& stop,
                              const std::function<absl::Status(const v1::SolveResponse&)>& on_response) = 0;
 
   virtual std::unique_ptr<DeformCall> deform() = 0;

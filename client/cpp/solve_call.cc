@@ -11,7 +11,8 @@ namespace lpdeform::client {
 namespace {
 
 absl::Status fill_request(Rpc& rpc, const Lease& lease, const std::optional<NumberedUpdate>& update,
-                          const SolveOptions& options, std::stop_token stop, v1::SolveRequest& request) {
+                          const SolveOptions& options, const std::stop_token& stop,
+                          v1::SolveRequest& request) {
   request.set_session(lease.session);
   request.set_writer_token(lease.writer_token);
   request.set_scalar(options.double_precision ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
@@ -86,7 +87,7 @@ class ResultBuilder {
 
 absl::StatusOr<SolveResult> run_solve(Rpc& rpc, const Lease& lease,
                                       const std::optional<NumberedUpdate>& update,
-                                      const SolveOptions& options, std::stop_token stop) {
+                                      const SolveOptions& options, const std::stop_token& stop) {
   v1::SolveRequest request;
   const absl::Status filled = fill_request(rpc, lease, update, options, stop, request);
   if (!filled.ok()) return filled;

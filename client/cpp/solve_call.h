@@ -13,6 +13,6 @@ namespace lpdeform::client {
 /// One Solve call: sends `update` where there is one, passes progress on, puts the result together. Waits.
 absl::StatusOr<SolveResult> run_solve(Rpc& rpc, const Lease& lease,
                                       const std::optional<NumberedUpdate>& update,
-                                      const SolveOptions& options, std::stop_token stop);
+                                      const SolveOptions& options, const std::stop_token& stop);
 
 }  // namespace lpdeform::client

@@ -129,7 +129,7 @@ struct MeshReport {
 struct Frame {
   std::vector<double> positions = {};  // x, y, z of each vertex
   /// E_i of each vertex, in the mesh's unit of length; empty where it was not asked for.
-  std::vector<float> distortion = {};
+  std::vector<double> distortion = {};
   std::uint64_t input_seq = 0;  // the newest update it answers: see Session::update; never falls
   std::uint64_t frame_seq = 0;  // rises within an epoch
   std::uint64_t epoch = 0;
@@ -159,7 +159,7 @@ struct SolveProgress {
 struct SolveOptions {
   bool certify = false;          // compute SolveResult::optimality_gap
   bool keep_trace = false;       // fill SolveResult::trace
-  bool double_precision = true;  // positions travel as float64
+  bool double_precision = true;  // positions and distortion travel as float64
   /// x, y, z of each vertex, in place of the initial guess.
   std::optional<std::vector<double>> initial_positions = {};
   /// Called at most ten times a second, on the thread that called solve(). May be empty.
@@ -170,7 +170,7 @@ struct SolveOptions {
 
 struct SolveResult {
   std::vector<double> positions = {};
-  std::vector<float> distortion = {};
+  std::vector<double> distortion = {};
   std::string method = {};  // that ran
   StopReason stop_reason = StopReason::kRunning;
   std::uint32_t iterations = 0;

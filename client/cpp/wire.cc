@@ -127,7 +127,7 @@ absl::Status to_wire(const Update& update, std::uint64_t seq, Packer& packer, v1
   for (const auto& [name, change] : update.handles) {
     v1::HandleUpdate& message = *out.add_handles();
     message.set_name(name);
-    const absl::Status packed = to_wire(change, packer, message);
+    absl::Status packed = to_wire(change, packer, message);
     if (!packed.ok()) return packed;
   }
   const Settings& settings = update.settings;
@@ -184,12 +184,27 @@ StopReason from_wire(v1::StopReason reason) {
   }
 }
 
+std::string method_name(v1::Method method) {
+  switch (method) {
+    case v1::METHOD_QUASI_NEWTON:
+      return "quasi_newton";
+    case v1::METHOD_LINE_SEARCH:
+      return "line_search";
+    case v1::METHOD_LOCAL_GLOBAL:
+      return "local_global";
+    case v1::METHOD_CONIC:
+      return "conic";
+    default:
+      return "";
+  }
+}
+
 IterationRecord from_wire(const v1::IterationRecord& record) {
   return {record.iteration(), record.seconds(), record.energy(), record.objective(), record.stage()};
 }
 
 void from_wire(const v1::SolveSummary& summary, SolveResult& out) {
-  out.method = summary.method();
+  out.method = method_name(summary.method());
   out.stop_reason = from_wire(summary.stop_reason());
   out.iterations = summary.iterations();
   out.initial_energy = summary.initial_energy();

@@ -22,6 +22,8 @@ v1::FreeComponents to_wire(FreeComponents free_components);
 
 MeshReport from_wire(const v1::MeshReport& report);
 StopReason from_wire(v1::StopReason reason);
+/// "quasi_newton"; empty for none.
+std::string method_name(v1::Method method);
 IterationRecord from_wire(const v1::IterationRecord& record);
 /// Everything but the positions, distortion and trace, which come in messages of their own.
 void from_wire(const v1::SolveSummary& summary, SolveResult& out);

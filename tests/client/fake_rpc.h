@@ -129,7 +129,7 @@ class FakeRpc final : public Rpc {
   std::deque<absl::Status> solve_ends;
 
   absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
-                                                std::stop_token) override {
+                                                const std::stop_token&) override {
     const std::scoped_lock lock(mutex_);
     upload_bytes_left_ = request.size_bytes();
     v1::CreateUploadResponse response;
@@ -139,7 +139,7 @@ class FakeRpc final : public Rpc {
   }
 
   absl::StatusOr<v1::UploadPartResponse> call(const v1::UploadPartRequest& request,
-                                              std::stop_token) override {
+                                              const std::stop_token&) override {
     const std::scoped_lock lock(mutex_);
     upload_bytes_left_ -= request.data().size();
     v1::UploadPartResponse response;
@@ -148,7 +148,7 @@ class FakeRpc final : public Rpc {
   }
 
   absl::StatusOr<v1::CreateSessionResponse> call(const v1::CreateSessionRequest& request,
-                                                 std::stop_token) override {
+                                                 const std::stop_token&) override {
     const std::scoped_lock lock(mutex_);
     created_.push_back(request);
     v1::CreateSessionResponse response;
@@ -160,7 +160,7 @@ class FakeRpc final : public Rpc {
   }
 
   absl::StatusOr<v1::GetSessionResponse> call(const v1::GetSessionRequest& request,
-                                              std::stop_token) override {
+                                              const std::stop_token&) override {
     v1::GetSessionResponse response;
     response.mutable_session()->set_name(request.session());
     response.mutable_session()->mutable_mesh()->set_vertices(vertex_count_);
@@ -168,13 +168,14 @@ class FakeRpc final : public Rpc {
   }
 
   absl::StatusOr<v1::DeleteSessionResponse> call(const v1::DeleteSessionRequest& request,
-                                                 std::stop_token) override {
+                                                 const std::stop_token&) override {
     const std::scoped_lock lock(mutex_);
     deleted_.push_back(request.session());
     return v1::DeleteSessionResponse();
   }
 
-  absl::StatusOr<v1::AcquireWriterResponse> call(const v1::AcquireWriterRequest&, std::stop_token) override {
+  absl::StatusOr<v1::AcquireWriterResponse> call(const v1::AcquireWriterRequest&,
+                                                 const std::stop_token&) override {
     v1::AcquireWriterResponse response;
     response.set_writer_token("another token");
     response.set_epoch(2);
@@ -183,13 +184,13 @@ class FakeRpc final : public Rpc {
   }
 
   absl::StatusOr<v1::UpdateHandlesResponse> call(const v1::UpdateHandlesRequest& request,
-                                                 std::stop_token) override {
+                                                 const std::stop_token&) override {
     const std::scoped_lock lock(mutex_);
     restored_.push_back(request);
     return v1::UpdateHandlesResponse();
   }
 
-  absl::Status solve(const v1::SolveRequest& request, double, std::stop_token,
+  absl::Status solve(const v1::SolveRequest& request, double, const std::stop_token&,
                      const std::function<absl::Status(const v1::SolveResponse&)>& on_response) override {
     {
       const std::scoped_lock lock(mutex_);

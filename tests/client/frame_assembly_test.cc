@@ -40,7 +40,7 @@ TEST(FrameAssembly, PutsPartsTogetherInOrder) {
   const auto frame = assembly.add(part(1, {4, 5, 6, 7, 8, 9}, true));
   ASSERT_TRUE(frame.ok() && frame->has_value());
   EXPECT_EQ((*frame)->positions, (std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8, 9}));
-  EXPECT_EQ((*frame)->distortion, (std::vector<float>{0.5f, 0.5f, 0.5f}));
+  EXPECT_EQ((*frame)->distortion, (std::vector<double>{0.5, 0.5, 0.5}));
   EXPECT_EQ((*frame)->input_seq, 3u);
   EXPECT_TRUE((*frame)->converged);
 }
@@ -49,10 +49,12 @@ TEST(FrameAssembly, ReadsDoublesBitForBit) {
   v1::FramePart whole = first_part(1, {0, 0, 0}, true);
   whole.mutable_header()->set_scalar(v1::SCALAR_FLOAT64);
   whole.set_positions(bytes(std::vector<double>{0.1, 1e300, -3}));
+  whole.set_distortion(bytes(std::vector<double>{0.3}));
   FrameAssembly assembly(1);
   const auto frame = assembly.add(whole);
   ASSERT_TRUE(frame.ok() && frame->has_value());
   EXPECT_EQ((*frame)->positions, (std::vector<double>{0.1, 1e300, -3}));
+  EXPECT_EQ((*frame)->distortion, std::vector<double>{0.3});
 }
 
 TEST(FrameAssembly, RefusesPartsThatDoNotFit) {

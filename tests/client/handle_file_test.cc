@@ -46,6 +46,11 @@ TEST(HandleFile, ReadsFixedRigidAndFreeHandles) {
             (std::vector<double>{1, 2, 3}));
 }
 
+TEST(HandleFile, SurvivesAnyDepthOfNesting) {
+  const std::string deep = std::string(300'000, '[') + std::string(300'000, ']');
+  EXPECT_EQ(refusal(R"({"handles": )" + deep + "}", {}), "HANDLE_FILE_VALUE");
+}
+
 TEST(HandleFile, WhatIsWrittenReadsBack) {
   const std::vector<NamedHandle> written{
       {"base", {{0, 1}, client::Fixed{}}},

@@ -223,8 +223,11 @@ TEST(Surface, HoldsBothScalarsOfEveryPosition) {
   float number = 0;
   std::memcpy(&number, narrow.data() + 12, sizeof(number));
   EXPECT_EQ(number, static_cast<float>(1e10));
-  std::memcpy(&number, surface.distortion_bytes().data(), sizeof(number));
+  std::memcpy(&number, surface.distortion_bytes(Scalar::kFloat32).data(), sizeof(number));
   EXPECT_EQ(number, 0.7f);
+  double wide_number = 0;
+  std::memcpy(&wide_number, surface.distortion_bytes(Scalar::kFloat64).data(), sizeof(wide_number));
+  EXPECT_EQ(wide_number, 0.7);
 }
 
 TEST(Publisher, TakesNoStreamsOnceClosed) {

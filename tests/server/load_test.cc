@@ -61,7 +61,7 @@ TEST_F(LoadTest, HalfAMillionVerticesTravelInPartsThroughDefaultLimits) {
   ASSERT_TRUE(outcome.frame);
   EXPECT_GT(outcome.frame->parts, 10);
   EXPECT_EQ(outcome.frame->positions.size(), n * 24);
-  EXPECT_EQ(outcome.frame->distortion.size(), n * 4);
+  EXPECT_EQ(outcome.frame->distortion.size(), n * 8);
   for (std::size_t i = 0; i < n; i += 9973) {
     ASSERT_NEAR(outcome.frame->position<double>(i, 2), targets(static_cast<Eigen::Index>(i), 2), 1e-9) << i;
   }

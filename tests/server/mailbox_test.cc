@@ -171,6 +171,7 @@ INSTANTIATE_TEST_SUITE_P(
     Reasons, WrongUpdateTest,
     testing::Values(
         Wrong{"INPUT_SEQ_ZERO", [](Update& u) { u.input_seq = 0; }},
+        Wrong{"INPUT_SEQ_TOO_HIGH", [](Update& u) { u.input_seq = std::uint64_t{1} << 63; }},
         Wrong{"HANDLE_CHANGED_TWICE",
               [](Update& u) {
                 u.handles.push_back({"tip", Removal{}});

@@ -254,6 +254,14 @@ TEST_F(SessionTest, TheSameRequestIdGivesTheSameSessionAlsoWhileItIsBeingMade) {
   }
 }
 
+TEST_F(SessionTest, ARequestIdUsedForAnotherRequestIsRefused) {
+  absl::Status heard;
+  const auto hear = [&](const absl::StatusOr<CreatedSession>& created) { heard = created.status(); };
+  ASSERT_TRUE(registry_->begin_creation("request-1", hear, 1));
+  EXPECT_FALSE(registry_->begin_creation("request-1", hear, 2));
+  EXPECT_EQ(reason(heard), "REQUEST_ID_REUSED");
+}
+
 TEST_F(SessionTest, AFailedCreationLeavesNothingBehind) {
   absl::Status heard;
   const auto hear = [&](const absl::StatusOr<CreatedSession>& created) { heard = created.status(); };

@@ -53,7 +53,7 @@ TEST_F(SolveCallTest, BringsTheSummaryTheTraceAndTheResultInThatOrder) {
   request.set_progress(true);
   const SolveOutcome outcome = solve(request);
   ASSERT_TRUE(outcome.status.ok()) << outcome.status.error_message();
-  EXPECT_EQ(outcome.summary.method(), "quasi_newton");
+  EXPECT_EQ(outcome.summary.method(), v1::METHOD_QUASI_NEWTON);
   EXPECT_EQ(outcome.summary.stop_reason(), v1::STOP_REASON_CONVERGED);
   EXPECT_EQ(outcome.summary.input_seq(), 1u);
   EXPECT_LT(outcome.summary.energy(), outcome.summary.initial_energy());

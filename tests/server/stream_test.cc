@@ -30,7 +30,7 @@ TEST_F(StreamTest, DeformAnswersEveryUpdateAndEndsWithTheConvergedFrameOfTheLast
   ASSERT_TRUE(frame);
   EXPECT_EQ(frame->header.input_seq(), 20u);
   EXPECT_EQ(frame->header.stop_reason(), v1::STOP_REASON_CONVERGED);
-  EXPECT_EQ(frame->header.method(), "quasi_newton");
+  EXPECT_EQ(frame->header.method(), v1::METHOD_QUASI_NEWTON);
   EXPECT_GT(frame->header.energy(), 0);
   const auto tip = static_cast<std::size_t>(vertices_at(rest(), 21)[0]);
   EXPECT_NEAR(frame->position<float>(tip, 0), rest()(static_cast<Eigen::Index>(tip), 0) + 4, 1e-5);
@@ -212,7 +212,7 @@ TEST_F(StreamTest, MethodPFieldAndStiffnessChangeInALiveSession) {
   ASSERT_TRUE(client.send(third));
   const auto again = client.settle(3);
   ASSERT_TRUE(again);
-  EXPECT_EQ(again->header.method(), "local_global");
+  EXPECT_EQ(again->header.method(), v1::METHOD_LOCAL_GLOBAL);
   EXPECT_NEAR(again->header.energy(), first->header.energy(), 0.02 * first->header.energy());
 }
 

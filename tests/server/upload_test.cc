@@ -68,6 +68,17 @@ TEST_F(UploadTest, RefusesSizesBeyondTheLimitsBeforeTakingMemory) {
   EXPECT_EQ(reason(second.status()), "MEMORY_FULL");
 }
 
+TEST_F(UploadTest, RefusesAnIdThatWasUsedForAnother) {
+  const auto budget = std::make_shared<Budget>(1 << 20);
+  const auto uploads =
+      std::make_shared<Uploads>(budget, timers_, Uploads::Limits{100, std::chrono::minutes(10)});
+  const auto first = uploads->create("request-1", 10, 7);
+  ASSERT_TRUE(first.ok());
+  EXPECT_EQ(uploads->create("request-1", 10, 7).value(), *first);
+  EXPECT_EQ(reason(uploads->create("request-1", 11, 7).status()), "REQUEST_ID_REUSED");
+  EXPECT_EQ(reason(uploads->create("request-1", 10, 8).status()), "REQUEST_ID_REUSED");
+}
+
 TEST_F(UploadTest, RefusesTooManySmallOnes) {
   const auto budget = std::make_shared<Budget>(1 << 20);
   const auto uploads =

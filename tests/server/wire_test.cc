@@ -120,38 +120,46 @@ std::size_t offset_of(const google::protobuf::MessageLite& message, const std::s
   return message.SerializeAsString().find(part);
 }
 
-class AlignmentTest : public testing::TestWithParam<std::uint32_t> {};
+class AlignmentTest : public testing::TestWithParam<std::tuple<std::uint32_t, Scalar>> {};
 
-TEST_P(AlignmentTest, PositionsBeginAtAMultipleOfFourBytesInEveryMessage) {
-  const std::uint32_t n = GetParam();
+TEST_P(AlignmentTest, BuffersCanBeUsedInPlaceInEveryMessage) {
+  const auto [n, scalar] = GetParam();
+  const std::size_t unit = scalar == Scalar::kFloat64 ? 8 : 4;
   const auto timers = std::make_shared<ManualTimers>();
   const auto publisher = std::make_shared<Publisher>();
   Frame frame;
-  frame.surface = std::make_shared<Surface>(Points::Constant(n, 3, 1234.5678), Field::Constant(n, 1));
+  frame.surface = std::make_shared<Surface>(Points::Constant(n, 3, 1234.5678), Field::Constant(n, 9.25));
+  const auto expect_aligned = [&](const google::protobuf::MessageLite& message, const v1::FramePart& part) {
+    EXPECT_EQ(offset_of(message, part.positions()) % unit, 0u);
+    if (!part.distortion().empty()) {
+      EXPECT_EQ(offset_of(message, part.distortion()) % unit, 0u);
+    }
+  };
   for (const std::uint64_t seq : {1u, 127u, 128u, 20000u}) {
     for (const bool with_distortion : {true, false}) {
       for (const std::uint32_t first : {0u, 1u}) {
         frame.frame_seq = seq;
         const FramePiece piece{
-            std::make_shared<Frame>(frame), first, n - first, true, seq, Scalar::kFloat32, with_distortion};
+            std::make_shared<Frame>(frame), first, n - first, true, seq, scalar, with_distortion};
         const FrameStream stream({}, publisher, timers, std::chrono::seconds(15), {});
         v1::DeformResponse deform;
         encode(piece, stream, n, deform);
+        expect_aligned(deform, deform.event().frame());
         v1::StreamFramesResponse frames;
         encode(piece, stream, n, frames);
+        expect_aligned(frames, frames.event().frame());
         v1::SolveResponse solve;
         encode(piece, solve);
-        const std::string& positions = solve.frame().positions();
-        EXPECT_EQ(offset_of(deform, positions) % 4, 0u);
-        EXPECT_EQ(offset_of(frames, positions) % 4, 0u);
-        EXPECT_EQ(offset_of(solve, positions) % 4, 0u);
+        expect_aligned(solve, solve.frame());
       }
     }
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, AlignmentTest,
-                         testing::Values(2, 3, 5, 9, 10, 11, 340, 341, 1363, 1364, 1365, 60000));
+                         testing::Combine(testing::Values(2, 3, 5, 9, 10, 11, 31, 32, 33, 300, 340, 341, 1363,
+                                                          1364, 1365, 4095, 4096, 26000),
+                                          testing::Values(Scalar::kFloat32, Scalar::kFloat64)));
 
 }  // namespace
 }  // namespace lpdeform
