@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/solve/certificate.h"
+#include "core/solve/check_settings.h"
 #include "core/solve/conic.h"
 #include "core/solve/line_search.h"
 #include "core/solve/local_global.h"
@@ -26,38 +27,6 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-absl::Status out_of_range(const std::string& reason, const std::string& name, double value,
-                          const std::string& limit) {
-  return invalid_input({reason, name, limit}, absl::StrCat(name, " is ", value, "; it must satisfy ", limit));
-}
-
-absl::Status check_settings(const SolveSettings& settings) {
-  if (!(settings.tolerance >= 1e-14 && settings.tolerance <= 0.1)) {
-    return out_of_range("TOLERANCE_OUT_OF_RANGE", "tolerance", settings.tolerance,
-                        "1e-14 <= tolerance <= 0.1");
-  }
-  if (settings.max_iterations < 0) {
-    return out_of_range("ITERATIONS_OUT_OF_RANGE", "max_iterations", settings.max_iterations,
-                        "0 <= max_iterations");
-  }
-  if (!(settings.time_limit_seconds > 0)) {
-    return out_of_range("TIME_LIMIT_OUT_OF_RANGE", "time_limit_seconds", settings.time_limit_seconds,
-                        "0 < time_limit_seconds");
-  }
-  return absl::OkStatus();
-}
-
-absl::Status check_method(Method method, const Material& material) {
-  const double lowest = material.p.minCoeff(), highest = material.p.maxCoeff();
-  const double needed = method == Method::kLocalGlobal ? 2 : method == Method::kConic ? 1 : 0;
-  if (needed == 0 || (lowest == needed && highest == needed)) return absl::OkStatus();
-  const std::string limit = absl::StrCat("p = ", needed);
-  const std::string name(method_name(method));
-  return invalid_input({"METHOD_NEEDS_P", name, limit},
-                       absl::StrCat("method ", name, " needs ", limit, " everywhere; p is ", lowest,
-                                    lowest == highest ? "" : absl::StrCat(" to ", highest)));
 }
 
 }  // namespace
@@ -292,7 +261,8 @@ absl::StatusOr<std::unique_ptr<Deformer>> Deformer::create(std::shared_ptr<const
                                                            DeformerOptions options) {
   if (shape == nullptr) return invalid_input({"NO_SHAPE", "", ""}, "no rest shape was given");
   if (options.threads < 1 || options.threads > 1024) {
-    return out_of_range("THREADS_OUT_OF_RANGE", "threads", options.threads, "1 <= threads <= 1024");
+    return invalid_input({"THREADS_OUT_OF_RANGE", "threads", "1 <= threads <= 1024"},
+                         absl::StrCat("threads is ", options.threads, "; it must be from 1 to 1024"));
   }
   return std::unique_ptr<Deformer>(new Deformer(std::make_unique<Impl>(std::move(shape), options)));
 }
@@ -354,8 +324,7 @@ absl::Status Deformer::set_positions(const Points& positions) {
 
 absl::Status Deformer::start(const SolveSettings& settings, std::stop_token stop) {
   Impl& self = *impl_;
-  if (absl::Status status = check_settings(settings); !status.ok()) return status;
-  if (absl::Status status = check_method(settings.method, self.material); !status.ok()) return status;
+  if (absl::Status status = check_settings(settings, self.material); !status.ok()) return status;
   if (!self.constraints) {
     return make_fault(absl::StatusCode::kFailedPrecondition, {"NO_HANDLES", "", "at least 1 handle"},
                       "there is no handle; a deformation needs at least one");

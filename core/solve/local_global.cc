@@ -4,12 +4,6 @@
 
 namespace lpdeform {
 
-void clear_held_rows(const Constraints& constraints, Points& values) {
-  for (Eigen::Index i = 0; i < values.rows(); ++i) {
-    if (constraints.is_held[i]) values.row(i).setZero();
-  }
-}
-
 LocalGlobal::LocalGlobal(Problem problem, Points x) : problem_(std::move(problem)), x_(std::move(x)) {
   objective_ = problem_.cells.evaluate(x_, problem_.norm);
   is_factored_ = problem_.metric.factor(problem_.cells.cell_weights(), problem_.constraints.is_held);

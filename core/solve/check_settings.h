@@ -1,0 +1,13 @@
+#pragma once
+
+#include "absl/status/status.h"
+#include "core/energy/material.h"
+#include "core/solve/settings.h"
+
+namespace lpdeform {
+
+/// INVALID_ARGUMENT: TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE; METHOD_NEEDS_P where the
+/// method is for one p and `material` has another.
+absl::Status check_settings(const SolveSettings& settings, const Material& material);
+
+}  // namespace lpdeform
