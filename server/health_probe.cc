@@ -8,11 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
+
 namespace lpdeform {
 namespace {
 
-/// grpc.health.v1.HealthCheckResponse with status SERVING: field 1 is the varint 1. The request is empty: the
-/// server as a whole. Written by hand, because Debian's gRPC does not carry the generated message.
+/// grpc.health.v1.HealthCheckResponse with status SERVING: field 1 is the varint 1. Written by hand, because Debian's gRPC does not carry the generated message.
 constexpr char kServing[] = {0x08, 0x01};
 
 std::string bytes_of(const grpc::ByteBuffer& buffer) {
@@ -26,12 +27,15 @@ std::string bytes_of(const grpc::ByteBuffer& buffer) {
 
 }  // namespace
 
-bool is_serving(const std::string& address) {
+bool is_serving(const std::string& address, const std::string& service) {
   grpc::GenericStub stub(grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(3));
-  const grpc::Slice nothing;
-  const grpc::ByteBuffer request(&nothing, 1);
+  // HealthCheckRequest: field 1 is the name, of less than 128 bytes.
+  const std::string name =
+      service.empty() ? "" : absl::StrCat("\x0a", std::string(1, static_cast<char>(service.size())), service);
+  const grpc::Slice message(name);
+  const grpc::ByteBuffer request(&message, 1);
   grpc::ByteBuffer response;
   std::promise<grpc::Status> ended;
   stub.UnaryCall(&context, "/grpc.health.v1.Health/Check", {}, &request, &response,

@@ -83,6 +83,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& optio
     return make_fault(absl::StatusCode::kUnavailable, {"ADDRESS_NOT_BOUND", options.address, ""},
                       absl::StrCat("The server cannot listen on ", options.address, "; is it taken?"));
   }
+  impl->grpc_server->GetHealthCheckService()->SetServingStatus(v1::DeformService::service_full_name(), true);
   impl->address = with_port(options.address, port);
   impl->backend.log().info("started", {{"address", impl->address}});
   return std::unique_ptr<Server>(new Server(std::move(impl)));

@@ -332,6 +332,8 @@ TEST_F(CallsTest, MemoryIsEstimatedAtFirstAndKnownAfterASolve) {
 
 TEST_F(CallsTest, HealthSaysServingUntilTheServerDrains) {
   EXPECT_TRUE(is_serving(server_->address()));
+  EXPECT_TRUE(is_serving(server_->address(), "lpdeform.v1.DeformService"));
+  EXPECT_FALSE(is_serving(server_->address(), "lpdeform.v1.NoService"));
   const std::string address = server_->address();
   server_->drain(std::chrono::milliseconds(0));
   EXPECT_FALSE(is_serving(address));
