@@ -1,5 +1,6 @@
 #include "server/server.h"
 
+#include <grpc/grpc.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 
@@ -40,6 +41,9 @@ absl::Status check(const ServerOptions& options) {
 void prepare_grpc() {
   static std::once_flag once;
   std::call_once(once, [] {
+    // Keeps gRPC up until the process ends. Taking it down with its last server can take 10 s: it waits for a poller
+    // of its own that nothing wakes.
+    grpc_init();
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   });
