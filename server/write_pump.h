@@ -47,6 +47,8 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
   }
 
   void OnCancel() final {
+    // Held until the lock is released. gRPC keeps that order as well, but where ThreadSanitizer cannot see it.
+    const auto self = this->shared_from_this();
     const std::scoped_lock lock(mutex_);
     is_cancelled_ = true;
     let_go();

@@ -129,7 +129,7 @@ TEST_F(LoadTest, ASmallMeshKeepsItsRateBesideALargeOne) {
 }
 
 TEST_F(LoadTest, AClientThatReadsNothingGetsTheNewestFrameWhenItResumes) {
-  const TriangleMesh mesh = grid(149, 99);
+  const TriangleMesh mesh = grid(79, 49);
   const auto session = create(mesh);
   DeformClient sleeper(*stub_, session), reader(*stub_, session, {}, false);
   std::uint64_t seq = 0;

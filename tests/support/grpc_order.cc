@@ -3,12 +3,13 @@
 //
 // Debian's gRPC and abseil are not built for ThreadSanitizer: their locks and queues are invisible to it, and
 // each call would look like dozens of races. The functions below take the place of the libraries' own, which
-// they call: a lock, and the two ends of an operation on a completion queue, which the tag connects. Nothing
-// else is ordered by them, so a race in our own code is seen as before; seeded_callback_race.cc shows it.
+// they call: a lock, the two ends of an operation on a completion queue, which the tag connects, and the end of
+// a call on the server. Nothing else is ordered by them, so a race in our own code is seen as before; seeded_callback_race.cc shows it.
 
 #include <absl/synchronization/mutex.h>
 #include <dlfcn.h>
 #include <grpc/grpc.h>
+#include <grpcpp/support/server_callback.h>
 #include <sanitizer/tsan_interface.h>
 
 #include <cstdio>
@@ -83,6 +84,20 @@ bool CondVar::WaitWithDeadline(Mutex* mutex, Time deadline) {
 
 ABSL_NAMESPACE_END
 }  // namespace absl
+
+namespace grpc::internal {
+
+// How many reactions of a call are outstanding is counted in part by the library's own code. Whoever counts
+// down to 0 ends the call, and has to be told of what the others did before they counted. The count is a
+// call's third member, after its virtual table and another count.
+void ServerCallbackCall::ScheduleOnDone(bool is_inline) {
+  static const auto schedule =
+      original<void(ServerCallbackCall*, bool)>("_ZN4grpc8internal18ServerCallbackCall14ScheduleOnDoneEb");
+  __tsan_acquire(reinterpret_cast<char*>(this) + sizeof(void*) + sizeof(std::atomic_int));
+  schedule(this, is_inline);
+}
+
+}  // namespace grpc::internal
 
 extern "C" {
 
