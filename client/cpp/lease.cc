@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
 #include "client/cpp/upload.h"
 #include "client/cpp/wire.h"
 
@@ -14,7 +15,10 @@ absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptio
   request.set_request_id(request_id);
   request.set_weights(to_wire(options.weights));
   request.set_free_components(to_wire(options.free_components));
-  Packer packer([&](std::string_view bytes) { return upload(rpc, bytes, stop); });
+  int uploads = 0;  // named after the session's id, so that a second try is the same request to the last bit
+  Packer packer([&](std::string_view bytes) {
+    return upload(rpc, bytes, absl::StrCat(request_id, "-", ++uploads), stop);
+  });
   absl::Status packed = to_wire(mesh, packer, *request.mutable_mesh());
   packed.Update(to_wire(options.settings, packer, *request.mutable_settings()));
   if (!packed.ok()) return packed;
@@ -52,7 +56,8 @@ bool is_session_lost(const absl::Status& status) {
 
 bool is_undecided(const absl::Status& status) {
   return absl::IsUnavailable(status) || absl::IsCancelled(status) || absl::IsDeadlineExceeded(status) ||
-         absl::IsResourceExhausted(status) || is_session_lost(status);
+         absl::IsResourceExhausted(status) || is_session_lost(status) ||
+         fault_of(status).reason == "UPLOAD_UNKNOWN";
 }
 
 bool is_taken_all_the_same(const absl::Status& status) {

@@ -30,7 +30,8 @@ absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role ro
 /// The server no longer has the session that a call was about.
 bool is_session_lost(const absl::Status& status);
 
-/// The server may still take in an update that failed like this: it is to be sent again.
+/// The server may still take in what failed like this, an update or a session to be made: it is to be sent again. Among
+/// them a server that began anew between an upload and its use.
 bool is_undecided(const absl::Status& status);
 
 /// The error is about solving, not about the update: the server has taken that in.

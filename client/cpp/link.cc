@@ -109,7 +109,8 @@ bool Link::send_one(DeformCall& call, std::unique_lock<std::mutex>& lock) {
 void Link::send_update(DeformCall& call, const NumberedUpdate& update, std::unique_lock<std::mutex>& lock) {
   lock.unlock();
   v1::DeformRequest request;
-  Packer packer([this](std::string_view bytes) { return upload(*rpc_, bytes, stop_.get_token()); });
+  Packer packer(
+      [this](std::string_view bytes) { return upload(*rpc_, bytes, new_request_id(), stop_.get_token()); });
   const absl::Status packed = to_wire(update.update, update.seq, packer, *request.mutable_update());
   if (packed.ok()) call.write(request);
   lock.lock();
@@ -152,7 +153,7 @@ bool Link::recover(const absl::Status& ended, Backoff& backoff) {
   lock.unlock();
   const absl::Status made = make_anew(lost);
   lock.lock();
-  if (made.ok() || absl::IsUnavailable(made) || absl::IsResourceExhausted(made)) return true;
+  if (made.ok() || is_undecided(made)) return true;
   give_up(made);
   return false;
 }

@@ -151,7 +151,8 @@ absl::Status Link::send_restore(std::unique_lock<std::mutex>& lock) {
     request.set_session(lease_.session);
     request.set_writer_token(lease_.writer_token);
     lock.unlock();
-    Packer packer([this](std::string_view bytes) { return upload(*rpc_, bytes, stop_.get_token()); });
+    Packer packer(
+        [this](std::string_view bytes) { return upload(*rpc_, bytes, new_request_id(), stop_.get_token()); });
     absl::Status sent = to_wire(restore.update, restore.seq, packer, *request.mutable_update());
     if (sent.ok()) sent = rpc_->call(request, stop_.get_token()).status();
     lock.lock();

@@ -19,7 +19,7 @@ absl::Status fill_request(Rpc& rpc, const Lease& lease, const std::optional<Numb
   request.set_certify(options.certify);
   request.set_trace(options.keep_trace);
   request.set_progress(static_cast<bool>(options.on_progress));
-  Packer packer([&](std::string_view bytes) { return upload(rpc, bytes, stop); });
+  Packer packer([&](std::string_view bytes) { return upload(rpc, bytes, new_request_id(), stop); });
   absl::Status packed;
   if (update) packed.Update(to_wire(update->update, update->seq, packer, *request.mutable_update()));
   if (options.initial_positions) {

@@ -14,9 +14,10 @@ constexpr std::uint32_t kMostPartBytes = 1u << 20;
 
 }  // namespace
 
-absl::StatusOr<std::string> upload(Rpc& rpc, std::string_view bytes, const std::stop_token& stop) {
+absl::StatusOr<std::string> upload(Rpc& rpc, std::string_view bytes, const std::string& request_id,
+                                   const std::stop_token& stop) {
   v1::CreateUploadRequest create;
-  create.set_request_id(new_request_id());
+  create.set_request_id(request_id);
   create.set_size_bytes(bytes.size());
   create.set_crc32c(crc32c(bytes));
   const auto created = rpc.call(create, stop);

@@ -125,6 +125,8 @@ class FakeRpc final : public Rpc {
     return restored_;
   }
 
+  /// What CreateSession calls fail with, in turn; they succeed once these are used up.
+  std::deque<absl::Status> create_ends;
   /// What Solve calls end with, in turn; OK once they are used up.
   std::deque<absl::Status> solve_ends;
 
@@ -133,7 +135,7 @@ class FakeRpc final : public Rpc {
     const std::scoped_lock lock(mutex_);
     upload_bytes_left_ = request.size_bytes();
     v1::CreateUploadResponse response;
-    response.set_upload("uploads/1");
+    response.set_upload("uploads/" + request.request_id());
     response.set_max_part_bytes(1 << 20);
     return response;
   }
@@ -151,6 +153,11 @@ class FakeRpc final : public Rpc {
                                                  const std::stop_token&) override {
     const std::scoped_lock lock(mutex_);
     created_.push_back(request);
+    if (!create_ends.empty()) {
+      absl::Status end = std::move(create_ends.front());
+      create_ends.pop_front();
+      return end;
+    }
     v1::CreateSessionResponse response;
     response.mutable_session()->set_name("sessions/" + std::to_string(created_.size()));
     response.mutable_session()->set_epoch(1);

@@ -192,6 +192,19 @@ TEST_F(LinkTest, MakesALostSessionAnewFromWhatTheServerHadAccepted) {
   stream->say(result(1));
 }
 
+TEST_F(LinkTest, MakingASessionAnewAgainIsTheSameRequestToTheLastBit) {
+  open(200'000);  // large enough for an upload
+  rpc_->create_ends = {absl::UnavailableError("the answer was lost")};
+  opened_stream()->end(absl::NotFoundError("no such session"));
+  const auto old = rpc_->next_stream();
+  ASSERT_NE(old, nullptr);
+  old->end(absl::NotFoundError("no such session"));
+  ASSERT_NE(answered(rpc_->next_stream()), nullptr);
+  EXPECT_EQ(open_.session(), "sessions/3");
+  ASSERT_EQ(rpc_->created().size(), 3u);
+  EXPECT_EQ(rpc_->created()[1].SerializeAsString(), rpc_->created()[2].SerializeAsString());
+}
+
 TEST_F(LinkTest, NeverShowsAFrameOfAnOlderInputAndGivesItsCreditBack) {
   open();
   const auto broken = opened_stream();
@@ -275,7 +288,7 @@ TEST_F(LinkTest, ALargeMeshIsUploadedAndASmallOneIsNot) {
   open();
   EXPECT_EQ(rpc_->created()[0].mesh().data().source_case(), v1::Buffer::kInline);
   open(200'000);  // 2.4 MB of indices
-  EXPECT_EQ(rpc_->created()[1].mesh().data().upload(), "uploads/1");
+  EXPECT_EQ(rpc_->created()[1].mesh().data().source_case(), v1::Buffer::kUpload);
 }
 
 TEST_F(LinkTest, SolveSendsWhatWaitsAndWorksWithoutAStream) {
