@@ -62,6 +62,11 @@ absl::Status Backend::upload_part(const v1::UploadPartRequest& request, v1::Uplo
   return absl::OkStatus();
 }
 
+absl::Status Backend::delete_upload(const v1::DeleteUploadRequest& request, v1::DeleteUploadResponse&) {
+  uploads_->remove(request.upload());
+  return absl::OkStatus();
+}
+
 absl::Status Backend::get_session(const v1::GetSessionRequest& request, v1::GetSessionResponse& response) {
   const auto session = find(request.session());
   if (!session.ok()) return session.status();

@@ -27,6 +27,7 @@ class Backend {
 
   absl::Status create_upload(const v1::CreateUploadRequest& request, v1::CreateUploadResponse& response);
   absl::Status upload_part(const v1::UploadPartRequest& request, v1::UploadPartResponse& response);
+  absl::Status delete_upload(const v1::DeleteUploadRequest& request, v1::DeleteUploadResponse& response);
   absl::Status get_session(const v1::GetSessionRequest& request, v1::GetSessionResponse& response);
   absl::Status list_sessions(const v1::ListSessionsRequest& request, v1::ListSessionsResponse& response);
   absl::Status delete_session(const v1::DeleteSessionRequest& request, v1::DeleteSessionResponse& response);

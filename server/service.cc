@@ -52,6 +52,11 @@ grpc::ServerUnaryReactor* Service::UploadPart(Context* context, const v1::Upload
   return in_pool(backend_, *context, &Backend::upload_part, *request, *response);
 }
 
+grpc::ServerUnaryReactor* Service::DeleteUpload(Context* context, const v1::DeleteUploadRequest* request,
+                                                v1::DeleteUploadResponse* response) {
+  return in_pool(backend_, *context, &Backend::delete_upload, *request, *response);
+}
+
 grpc::ServerUnaryReactor* Service::CreateSession(Context* context, const v1::CreateSessionRequest* request,
                                                  v1::CreateSessionResponse* response) {
   return in_pool(backend_, *context, [this, request, response](auto finish) {

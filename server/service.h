@@ -16,6 +16,8 @@ class Service final : public v1::DeformService::CallbackService {
                                          v1::CreateUploadResponse* response) override;
   grpc::ServerUnaryReactor* UploadPart(Context* context, const v1::UploadPartRequest* request,
                                        v1::UploadPartResponse* response) override;
+  grpc::ServerUnaryReactor* DeleteUpload(Context* context, const v1::DeleteUploadRequest* request,
+                                         v1::DeleteUploadResponse* response) override;
   grpc::ServerUnaryReactor* CreateSession(Context* context, const v1::CreateSessionRequest* request,
                                           v1::CreateSessionResponse* response) override;
   grpc::ServerUnaryReactor* GetSession(Context* context, const v1::GetSessionRequest* request,

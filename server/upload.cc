@@ -125,6 +125,14 @@ absl::StatusOr<std::shared_ptr<Upload>> Uploads::find(const std::string& name) {
                     "There is no such upload; it may have expired.");
 }
 
+void Uploads::remove(const std::string& name) {
+  const std::scoped_lock lock(mutex_);
+  const auto found = uploads_.find(name);
+  if (found == uploads_.end()) return;
+  requested_.erase(found->second.request_id);
+  uploads_.erase(found);
+}
+
 void Uploads::watch(const std::string& name, Timers::TimePoint when) {
   timers_->at(when, [weak = weak_from_this(), name] {
     if (const auto self = weak.lock()) self->expire(name);
@@ -133,13 +141,14 @@ void Uploads::watch(const std::string& name, Timers::TimePoint when) {
 
 /// Forgets the upload when it has been idle for long enough; looks again later where it has not.
 void Uploads::expire(const std::string& name) {
-  const std::scoped_lock lock(mutex_);
-  const auto found = uploads_.find(name);
-  if (found == uploads_.end()) return;
-  const Timers::TimePoint due = found->second.last_used + limits_.idle;
-  if (timers_->now() < due) return watch(name, due);
-  requested_.erase(found->second.request_id);
-  uploads_.erase(found);
+  {
+    const std::scoped_lock lock(mutex_);
+    const auto found = uploads_.find(name);
+    if (found == uploads_.end()) return;
+    const Timers::TimePoint due = found->second.last_used + limits_.idle;
+    if (timers_->now() < due) return watch(name, due);
+  }
+  remove(name);
 }
 
 }  // namespace lpdeform

@@ -74,6 +74,9 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
   /// NOT_FOUND UPLOAD_UNKNOWN.
   absl::StatusOr<std::shared_ptr<Upload>> find(const std::string& name);
 
+  /// Forgets the upload; whoever has it keeps it. Nothing where there is none.
+  void remove(const std::string& name);
+
   static constexpr std::size_t kMostUploads = 4096;  // small ones cost more than their bytes
 
  private:

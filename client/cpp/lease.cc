@@ -15,16 +15,15 @@ absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptio
   request.set_request_id(request_id);
   request.set_weights(to_wire(options.weights));
   request.set_free_components(to_wire(options.free_components));
-  int uploads = 0;  // named after the session's id, so that a second try is the same request to the last bit
-  Packer packer([&](std::string_view bytes) {
-    return upload(rpc, bytes, absl::StrCat(request_id, "-", ++uploads), stop);
-  });
+  Uploads uploads(rpc, stop, request_id);  // so that a second try is the same request to the last bit
+  Packer packer([&](std::string_view bytes) { return uploads.add(bytes); });
   absl::Status packed = to_wire(mesh, packer, *request.mutable_mesh());
   packed.Update(to_wire(options.settings, packer, *request.mutable_settings()));
   if (!packed.ok()) return packed;
 
   auto created = rpc.call(request, stop);
   if (!created.ok()) return created.status();
+  uploads.discard();
   const v1::Session& session = created->session();
   return Lease{session.name(), created->writer_token(), session.epoch(), session.input_seq(),
                from_wire(session.mesh())};

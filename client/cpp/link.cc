@@ -63,6 +63,8 @@ absl::Status Link::one_stream() {
     ++stream_;
     is_open_ = is_over_ = is_to_reopen_ = false;
     ack_due_.reset();
+    uploads_in_use_.clear();  // these will expire
+    uploads_done_.clear();
     go_away_.reset();
     last_heard_ = Clock::now();
     open = open_request(lease_, options_);
@@ -82,7 +84,8 @@ void Link::pump(DeformCall& call) {
   while (!is_over_) {
     if (is_open_ && send_one(call, lock)) continue;
     const auto has_work = [this] {
-      return is_over_ || (is_open_ && (ack_due_ || (!is_solving_ && ledger_.can_send())));
+      return is_over_ ||
+             (is_open_ && (ack_due_ || !uploads_done_.empty() || (!is_solving_ && ledger_.can_send())));
     };
     const Clock::time_point heard = last_heard_;
     if (changed_.wait_until(lock, heard + longest_silence_, has_work) || last_heard_ != heard) continue;
@@ -101,6 +104,13 @@ bool Link::send_one(DeformCall& call, std::unique_lock<std::mutex>& lock) {
     lock.lock();
     return true;
   }
+  if (!uploads_done_.empty()) {
+    std::vector<Uploads> done = std::exchange(uploads_done_, {});
+    lock.unlock();
+    for (Uploads& uploads : done) uploads.discard();
+    lock.lock();
+    return true;
+  }
   if (is_solving_ || !ledger_.can_send()) return false;
   send_update(call, ledger_.send_next(), lock);
   return true;
@@ -109,9 +119,13 @@ bool Link::send_one(DeformCall& call, std::unique_lock<std::mutex>& lock) {
 void Link::send_update(DeformCall& call, const NumberedUpdate& update, std::unique_lock<std::mutex>& lock) {
   lock.unlock();
   v1::DeformRequest request;
-  Packer packer(
-      [this](std::string_view bytes) { return upload(*rpc_, bytes, new_request_id(), stop_.get_token()); });
+  Uploads uploads(*rpc_, stop_.get_token());
+  Packer packer([&](std::string_view bytes) { return uploads.add(bytes); });
   const absl::Status packed = to_wire(update.update, update.seq, packer, *request.mutable_update());
+  if (packed.ok() && !uploads.empty()) {
+    const std::scoped_lock keeping(mutex_);
+    uploads_in_use_.emplace(update.seq, std::move(uploads));
+  }
   if (packed.ok()) call.write(request);
   lock.lock();
   if (packed.ok()) return;
@@ -128,8 +142,8 @@ void Link::send_update(DeformCall& call, const NumberedUpdate& update, std::uniq
 bool Link::recover(const absl::Status& ended, Backoff& backoff) {
   std::unique_lock lock(mutex_);
   if (is_open_) {
-    backoff.reset();
     last_open_ = Clock::now();
+    if (last_open_ - opened_ >= Backoff::kMost) backoff.reset();  // one that breaks at once is no success
   }
   is_open_ = false;
   ledger_.connection_lost();

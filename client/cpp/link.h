@@ -3,12 +3,14 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -19,6 +21,7 @@
 #include "client/cpp/ledger.h"
 #include "client/cpp/recovery.h"
 #include "client/cpp/rpc.h"
+#include "client/cpp/upload.h"
 
 namespace lpdeform::client {
 
@@ -64,6 +67,7 @@ class Link {
   absl::Status take(const v1::StreamEvent& event);
   absl::Status take(const v1::FramePart& part);
   void take(const v1::StreamOpened& opened);
+  void note_answered(std::uint64_t input_seq);
   void take(const v1::Fault& fault);
 
   // On any thread.
@@ -101,11 +105,14 @@ class Link {
   bool is_over_ = false;        // nothing more comes
   bool is_to_reopen_ = false;   // ended by us, to begin again with another token
   std::optional<std::uint64_t> ack_due_;
+  std::map<std::uint64_t, Uploads> uploads_in_use_;  // by the updates that name them
+  std::vector<Uploads> uploads_done_;                // to be deleted
   std::optional<v1::GoAway> go_away_;
   std::optional<FrameAssembly> assembly_;
   Clock::time_point last_heard_;
   /// After so long without a word the connection is dead: three of the heartbeats that the server announces.
   std::chrono::milliseconds longest_silence_ = std::chrono::seconds(45);
+  Clock::time_point opened_;
   Clock::time_point last_open_;
   absl::Status last_problem_;
 };

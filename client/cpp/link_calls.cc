@@ -151,10 +151,11 @@ absl::Status Link::send_restore(std::unique_lock<std::mutex>& lock) {
     request.set_session(lease_.session);
     request.set_writer_token(lease_.writer_token);
     lock.unlock();
-    Packer packer(
-        [this](std::string_view bytes) { return upload(*rpc_, bytes, new_request_id(), stop_.get_token()); });
+    Uploads uploads(*rpc_, stop_.get_token());
+    Packer packer([&](std::string_view bytes) { return uploads.add(bytes); });
     absl::Status sent = to_wire(restore.update, restore.seq, packer, *request.mutable_update());
     if (sent.ok()) sent = rpc_->call(request, stop_.get_token()).status();
+    uploads.discard();
     lock.lock();
     if (!sent.ok()) {
       ledger_.connection_lost();

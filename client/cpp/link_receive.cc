@@ -25,10 +25,19 @@ absl::Status Link::take(const v1::DeformResponse& response) {
     last_heard_ = Clock::now();
     if (response.has_result()) {
       ledger_.accept(response.result().input_seq());
+      note_answered(response.result().input_seq());
       changed_.notify_all();
     }
   }
   return response.has_event() ? take(response.event()) : absl::OkStatus();
+}
+
+/// The uploads of this update are not needed any more. Under the lock.
+void Link::note_answered(std::uint64_t input_seq) {
+  const auto used = uploads_in_use_.find(input_seq);
+  if (used == uploads_in_use_.end()) return;
+  uploads_done_.push_back(std::move(used->second));
+  uploads_in_use_.erase(used);
 }
 
 absl::Status Link::take(const v1::StreamEvent& event) {
@@ -62,6 +71,7 @@ void Link::take(const v1::StreamOpened& opened) {
   }
   ledger_.count_from(opened.input_seq());
   is_open_ = true;
+  opened_ = Clock::now();
   changed_.notify_all();
 }
 
@@ -91,6 +101,7 @@ void Link::take(const v1::Fault& fault) {
     } else if (!is_session_lost(status)) {  // then it waits for the session made anew
       ledger_.refuse(fault.input_seq());
     }
+    note_answered(fault.input_seq());
     changed_.notify_all();
   }
   box_.put_problem(status);

@@ -54,6 +54,12 @@ Recovery recovery_after(const absl::Status& ended, const std::optional<v1::GoAwa
   if (go_away) return after_go_away(*go_away, has_copy);
   if (is_passing(ended.code())) return {NextStep::kResume, ended, {}};
   if (absl::IsNotFound(ended) && has_copy) return {NextStep::kMakeAnew, ended, {}};
+  if (fault_of(ended).reason == "NOT_THE_WRITER") {  // it happened while we were away
+    return {NextStep::kGiveUp,
+            make_fault(absl::StatusCode::kAborted, {"WRITER_REPLACED", "", ""},
+                       "Another writer took the session over."),
+            {}};
+  }
   return {NextStep::kGiveUp, ended, {}};
 }
 

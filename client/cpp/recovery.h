@@ -35,9 +35,10 @@ class Backoff {
   std::chrono::milliseconds next();
   void reset() { longest_ = kFirst; }
 
+  static constexpr std::chrono::milliseconds kMost{5000};
+
  private:
   static constexpr std::chrono::milliseconds kFirst{50};
-  static constexpr std::chrono::milliseconds kMost{5000};
   std::chrono::milliseconds longest_ = kFirst;
   std::minstd_rand chance_{std::random_device{}()};
 };

@@ -87,6 +87,10 @@ class GrpcRpc final : public Rpc {
                                               const std::stop_token& stop) override {
     return unary(&Stub::UploadPart, request, stop);
   }
+  absl::StatusOr<v1::DeleteUploadResponse> call(const v1::DeleteUploadRequest& request,
+                                                const std::stop_token& stop) override {
+    return unary(&Stub::DeleteUpload, request, stop);
+  }
   absl::StatusOr<v1::CreateSessionResponse> call(const v1::CreateSessionRequest& request,
                                                  const std::stop_token& stop) override {
     return unary(&Stub::CreateSession, request, stop);

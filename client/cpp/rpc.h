@@ -40,6 +40,8 @@ class Rpc {
                                                         const std::stop_token& stop) = 0;
   virtual absl::StatusOr<v1::UploadPartResponse> call(const v1::UploadPartRequest& request,
                                                       const std::stop_token& stop) = 0;
+  virtual absl::StatusOr<v1::DeleteUploadResponse> call(const v1::DeleteUploadRequest& request,
+                                                        const std::stop_token& stop) = 0;
   virtual absl::StatusOr<v1::CreateSessionResponse> call(const v1::CreateSessionRequest& request,
                                                          const std::stop_token& stop) = 0;
   virtual absl::StatusOr<v1::GetSessionResponse> call(const v1::GetSessionRequest& request,

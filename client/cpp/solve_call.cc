@@ -10,16 +10,15 @@
 namespace lpdeform::client {
 namespace {
 
-absl::Status fill_request(Rpc& rpc, const Lease& lease, const std::optional<NumberedUpdate>& update,
-                          const SolveOptions& options, const std::stop_token& stop,
-                          v1::SolveRequest& request) {
+absl::Status fill_request(const Lease& lease, const std::optional<NumberedUpdate>& update,
+                          const SolveOptions& options, Uploads& uploads, v1::SolveRequest& request) {
   request.set_session(lease.session);
   request.set_writer_token(lease.writer_token);
   request.set_scalar(options.double_precision ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
   request.set_certify(options.certify);
   request.set_trace(options.keep_trace);
   request.set_progress(static_cast<bool>(options.on_progress));
-  Packer packer([&](std::string_view bytes) { return upload(rpc, bytes, new_request_id(), stop); });
+  Packer packer([&](std::string_view bytes) { return uploads.add(bytes); });
   absl::Status packed;
   if (update) packed.Update(to_wire(update->update, update->seq, packer, *request.mutable_update()));
   if (options.initial_positions) {
@@ -89,12 +88,14 @@ absl::StatusOr<SolveResult> run_solve(Rpc& rpc, const Lease& lease,
                                       const std::optional<NumberedUpdate>& update,
                                       const SolveOptions& options, const std::stop_token& stop) {
   v1::SolveRequest request;
-  const absl::Status filled = fill_request(rpc, lease, update, options, stop, request);
+  Uploads uploads(rpc, stop);
+  const absl::Status filled = fill_request(lease, update, options, uploads, request);
   if (!filled.ok()) return filled;
   ResultBuilder builder(static_cast<std::uint32_t>(lease.mesh.vertices), options);
   const absl::Status ended =
       rpc.solve(request, options.deadline_seconds, stop,
                 [&](const v1::SolveResponse& response) { return builder.take(response); });
+  uploads.discard();
   if (!ended.ok()) return ended;
   return std::move(builder).finish();
 }

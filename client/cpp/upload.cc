@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <random>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/crc32c.h"
@@ -14,14 +15,17 @@ constexpr std::uint32_t kMostPartBytes = 1u << 20;
 
 }  // namespace
 
-absl::StatusOr<std::string> upload(Rpc& rpc, std::string_view bytes, const std::string& request_id,
-                                   const std::stop_token& stop) {
+Uploads::Uploads(Rpc& rpc, std::stop_token stop, std::string id)
+    : rpc_(&rpc), stop_(std::move(stop)), id_(std::move(id)) {}
+
+absl::StatusOr<std::string> Uploads::add(std::string_view bytes) {
   v1::CreateUploadRequest create;
-  create.set_request_id(request_id);
+  create.set_request_id(absl::StrCat(id_, "-", ++count_));
   create.set_size_bytes(bytes.size());
   create.set_crc32c(crc32c(bytes));
-  const auto created = rpc.call(create, stop);
+  const auto created = rpc_->call(create, stop_);
   if (!created.ok()) return created.status();
+  names_.push_back(created->upload());
 
   const std::size_t part_bytes = std::clamp<std::uint32_t>(created->max_part_bytes(), 1, kMostPartBytes);
   v1::UploadPartRequest part;
@@ -30,13 +34,21 @@ absl::StatusOr<std::string> upload(Rpc& rpc, std::string_view bytes, const std::
   for (std::size_t offset = 0; offset < bytes.size(); offset += part_bytes) {
     part.set_offset(offset);
     part.set_data(std::string(bytes.substr(offset, part_bytes)));
-    const auto sent = rpc.call(part, stop);
+    const auto sent = rpc_->call(part, stop_);
     if (!sent.ok()) return sent.status();
     finished = sent->finished();
   }
   if (finished) return created->upload();
   return make_fault(absl::StatusCode::kDataLoss, {"UPLOAD_INCOMPLETE", created->upload(), ""},
                     "The server misses parts of an upload that were all sent.");
+}
+
+void Uploads::discard() {
+  for (std::string& name : std::exchange(names_, {})) {
+    v1::DeleteUploadRequest request;
+    request.set_upload(std::move(name));
+    rpc_->call(request, stop_).status().IgnoreError();
+  }
 }
 
 std::string new_request_id() {

@@ -125,6 +125,13 @@ class FakeRpc final : public Rpc {
     return restored_;
   }
 
+  /// The uploads deleted, once there are so many.
+  std::vector<std::string> uploads_deleted(std::size_t count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, kPatience, [&] { return uploads_deleted_.size() >= count; });
+    return uploads_deleted_;
+  }
+
   /// What CreateSession calls fail with, in turn; they succeed once these are used up.
   std::deque<absl::Status> create_ends;
   /// What Solve calls end with, in turn; OK once they are used up.
@@ -147,6 +154,14 @@ class FakeRpc final : public Rpc {
     v1::UploadPartResponse response;
     response.set_finished(upload_bytes_left_ == 0);
     return response;
+  }
+
+  absl::StatusOr<v1::DeleteUploadResponse> call(const v1::DeleteUploadRequest& request,
+                                                const std::stop_token&) override {
+    const std::scoped_lock lock(mutex_);
+    uploads_deleted_.push_back(request.upload());
+    changed_.notify_all();
+    return v1::DeleteUploadResponse();
   }
 
   absl::StatusOr<v1::CreateSessionResponse> call(const v1::CreateSessionRequest& request,
@@ -234,6 +249,7 @@ class FakeRpc final : public Rpc {
   std::deque<std::shared_ptr<Stream>> streams_;
   std::vector<v1::CreateSessionRequest> created_;
   std::vector<std::string> deleted_;
+  std::vector<std::string> uploads_deleted_;
   std::vector<v1::SolveRequest> solved_;
   std::vector<v1::UpdateHandlesRequest> restored_;
   std::size_t upload_bytes_left_ = 0;

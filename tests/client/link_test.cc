@@ -291,6 +291,22 @@ TEST_F(LinkTest, ALargeMeshIsUploadedAndASmallOneIsNot) {
   EXPECT_EQ(rpc_->created()[1].mesh().data().source_case(), v1::Buffer::kUpload);
 }
 
+TEST_F(LinkTest, DeletesItsUploadsOnceTheyHaveServed) {
+  open(100000);
+  ASSERT_EQ(rpc_->uploads_deleted(1).size(), 1u);
+  const auto stream = opened_stream();
+  Update update;
+  update.settings.p = std::vector<double>(200000, 1.5);
+  ASSERT_TRUE(link_->update(update).ok());
+  const auto sent = stream->hear();
+  ASSERT_TRUE(sent && sent->has_update());
+  EXPECT_EQ(rpc_->uploads_deleted(0).size(), 1u);
+  stream->say(result(1));
+  const auto deleted = rpc_->uploads_deleted(2);
+  ASSERT_EQ(deleted.size(), 2u);
+  EXPECT_EQ(deleted[1], sent->update().settings().p().per_vertex().values().upload());
+}
+
 TEST_F(LinkTest, SolveSendsWhatWaitsAndWorksWithoutAStream) {
   open();
   link_->update(adding("tip")).value();

@@ -51,6 +51,15 @@ TEST(Recovery, KeepsTheReasonAndThePauseOfAGoAway) {
   EXPECT_EQ(recovery.pause, std::chrono::milliseconds(250));
 }
 
+TEST(Recovery, SaysThatAnotherWriterTookOverWhileTheConnectionWasDown) {
+  const Recovery recovery =
+      recovery_after(make_fault(absl::StatusCode::kPermissionDenied, {"NOT_THE_WRITER", "writer_token", ""},
+                                "Not the writer."),
+                     std::nullopt, true);
+  EXPECT_EQ(recovery.next, NextStep::kGiveUp);
+  EXPECT_EQ(fault_of(recovery.why).reason, "WRITER_REPLACED");
+}
+
 TEST(Backoff, GrowsFromFiftyMillisecondsToFiveSecondsAndStartsAgain) {
   Backoff backoff;
   EXPECT_LE(backoff.next(), std::chrono::milliseconds(50));

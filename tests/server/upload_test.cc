@@ -103,6 +103,16 @@ TEST_F(UploadTest, TheSameRequestIdGivesTheSameUpload) {
   EXPECT_EQ(reason(uploads_->create("short", 4, 0).status()), "REQUEST_ID");
 }
 
+TEST_F(UploadTest, DeletingItGivesItsMemoryAndItsIdBackAndMayBeRepeated) {
+  const auto first = uploads_->create("request-1", 8, 0).value();
+  const std::string name = first->name();
+  uploads_->remove(name);
+  uploads_->remove(name);
+  EXPECT_TRUE(absl::IsNotFound(uploads_->find(name).status()));
+  EXPECT_NE(uploads_->create("request-1", 4, 0).value()->name(), name);
+  EXPECT_EQ(budget_->used(), 12u);  // 8 of it as long as `first` is held
+}
+
 TEST_F(UploadTest, GoesWhenNobodyTouchesItAndGivesItsMemoryBack) {
   const std::string name = create("abcd", "request-1")->name();
   timers_->advance(std::chrono::minutes(9));
