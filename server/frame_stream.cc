@@ -55,12 +55,14 @@ std::optional<Note> FrameStream::next_locked(Timers::TimePoint now) {
     cutter_ = {};
     return *std::move(end_);
   }
-  if (!answers_.empty()) {
+  if (!cutter_.has_more()) begin_frame(now);
+  const bool is_answers_turn = !cutter_.has_more() || !std::exchange(was_answer_, false);
+  if (!answers_.empty() && is_answers_turn) {
+    was_answer_ = true;
     Note answer = std::move(answers_.front());
     answers_.pop_front();
     return answer;
   }
-  if (!cutter_.has_more()) begin_frame(now);
   if (cutter_.has_more()) return cutter_.next();
   if (const auto standing = publisher_->standing(); standing && standing->number > last_fault_) {
     last_fault_ = standing->number;

@@ -102,6 +102,7 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   bool is_opened_ = false;
   bool is_ended_ = false;
   std::deque<Note> answers_;
+  bool was_answer_ = false;  // answers go first, but take turns with the pieces of a frame
   std::optional<EndNote> end_;
   FrameCutter cutter_;
   std::deque<std::uint64_t> in_flight_;  // frame_seqs begun and not acknowledged, ascending

@@ -1,5 +1,9 @@
 #include "client/cli/text_file.h"
 
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <system_error>
@@ -41,6 +45,8 @@ absl::Status check_folder(const std::filesystem::path& path) {
     return not_written(path, absl::StrCat("there is no folder \"", folder.string(), "\"").c_str());
   }
   if (std::filesystem::is_directory(path, error)) return not_written(path, "it is a folder");
+  const std::filesystem::path& changed = std::filesystem::exists(path, error) ? path : folder;
+  if (access(changed.c_str(), W_OK) != 0) return not_written(path, std::strerror(errno));
   return absl::OkStatus();
 }
 

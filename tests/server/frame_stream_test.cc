@@ -211,6 +211,17 @@ TEST_F(FrameStreamTest, AnswersComeBeforeFramesAndBetweenTheirPieces) {
   ASSERT_TRUE(std::holds_alternative<FramePiece>(stream->next().value()));
 }
 
+TEST_F(FrameStreamTest, AFloodOfAnswersDoesNotHoldFramesUp) {
+  const auto stream = open();
+  publish(1, true, kManyVertices);
+  int pieces = 0;
+  for (int notes = 0; notes < 8; ++notes) {
+    while (stream->answers_waiting() < 2) stream->answer(UpdateResult{7, 0});
+    if (std::holds_alternative<FramePiece>(stream->next().value())) ++pieces;
+  }
+  EXPECT_EQ(pieces, 4);
+}
+
 TEST(Surface, HoldsBothScalarsOfEveryPosition) {
   Points points(2, 3);
   points << 0.1, 0.2, 0.3, 1e10, -2, 3;

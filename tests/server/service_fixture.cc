@@ -130,7 +130,12 @@ void expect_invariants(const History& history, std::size_t credit) {
     EXPECT_GE(after.input_seq(), before.input_seq());
   }
   EXPECT_LE(history.most_in_flight, credit);
-  EXPECT_LE(history.ends.size(), 1u);
+  const std::size_t reasons = history.ends.size() + (history.status && !history.status->ok() ? 1 : 0);
+  if (history.status) {
+    EXPECT_EQ(reasons, 1u) << history.status->error_message();
+  } else {
+    EXPECT_LE(reasons, 1u);
+  }
   EXPECT_EQ(history.after_end, 0);
   EXPECT_LE(history.opened, 1);
 }
@@ -165,7 +170,7 @@ bool DeformClient::acknowledge(std::uint64_t frame_seq) {
 }
 
 std::optional<v1::DeformResponse> DeformClient::read() {
-  if (status_) return std::nullopt;
+  if (history.status) return std::nullopt;
   v1::DeformResponse response;
   if (!stream_->Read(&response)) return std::nullopt;
   if (!history.ends.empty()) ++history.after_end;
@@ -203,8 +208,8 @@ std::optional<ReceivedFrame> DeformClient::settle(std::uint64_t input_seq) {
 grpc::Status DeformClient::read_to_end() {
   while (read()) {
   }
-  if (!status_) status_ = stream_->Finish();
-  return *status_;
+  if (!history.status) history.status = stream_->Finish();
+  return *history.status;
 }
 
 void ServiceTest::start() {

@@ -84,6 +84,7 @@ struct History {
   int after_end = 0;          // messages after the go-away
   std::size_t in_flight = 0;  // frames begun and not acknowledged
   std::size_t most_in_flight = 0;
+  std::optional<grpc::Status> status;  // once it was read to its end
 };
 
 /// Invariants 1, 2, 4, 6 and 8 of the service, for the history of one stream with this credit.
@@ -118,7 +119,6 @@ class DeformClient {
   grpc::ClientContext context_;
   std::unique_ptr<grpc::ClientReaderWriter<v1::DeformRequest, v1::DeformResponse>> stream_;
   FrameAssembler assembler_;
-  std::optional<grpc::Status> status_;
 };
 
 /// What a Solve call brought.
