@@ -66,19 +66,19 @@ bool Publisher::add(const std::shared_ptr<FrameStream>& stream) {
 
 void Publisher::remove(const FrameStream& stream) {
   const std::scoped_lock lock(mutex_);
-  std::erase_if(streams_, [&](const auto& one) { return one.get() == &stream; });
+  std::erase_if(streams_, [&](const auto& one) { return one.expired() || one.lock().get() == &stream; });
 }
 
 std::shared_ptr<FrameStream> Publisher::find(const std::string& id) const {
-  const std::scoped_lock lock(mutex_);
-  const auto found =
-      std::find_if(streams_.begin(), streams_.end(), [&](const auto& one) { return one->id() == id; });
-  return found == streams_.end() ? nullptr : *found;
+  const auto all = readers();
+  const auto found = std::find_if(all.begin(), all.end(), [&](const auto& one) { return one->id() == id; });
+  return found == all.end() ? nullptr : *found;
 }
 
 std::size_t Publisher::reader_count() const {
   const std::scoped_lock lock(mutex_);
-  return streams_.size();
+  return static_cast<std::size_t>(
+      std::count_if(streams_.begin(), streams_.end(), [](const auto& one) { return !one.expired(); }));
 }
 
 bool Publisher::is_frame_wanted() const {
@@ -96,7 +96,11 @@ void Publisher::close(EndReason reason, const std::string& text) {
 
 std::vector<std::shared_ptr<FrameStream>> Publisher::readers() const {
   const std::scoped_lock lock(mutex_);
-  return streams_;
+  std::vector<std::shared_ptr<FrameStream>> all;
+  for (const auto& one : streams_) {
+    if (auto stream = one.lock()) all.push_back(std::move(stream));
+  }
+  return all;
 }
 
 void Publisher::wake_all() const {

@@ -33,7 +33,7 @@ class Publisher {
   std::shared_ptr<const Frame> newest() const;
   std::optional<Standing> standing() const;
 
-  /// False, and nothing happens, once closed.
+  /// False, and nothing happens, once closed. Whoever made the stream owns it.
   bool add(const std::shared_ptr<FrameStream>& stream);
   void remove(const FrameStream& stream);
   /// The stream of this id; null where there is none.
@@ -57,7 +57,7 @@ class Publisher {
   std::uint64_t frames_ = 0;
   std::uint64_t epoch_ = 1;
   bool is_closed_ = false;
-  std::vector<std::shared_ptr<FrameStream>> streams_;
+  std::vector<std::weak_ptr<FrameStream>> streams_;  // weak, because a stream holds its publisher
 };
 
 }  // namespace lpdeform

@@ -73,8 +73,11 @@ TEST_F(SolveCallTest, BringsTheSummaryTheTraceAndTheResultInThatOrder) {
 }
 
 TEST_F(SolveCallTest, ALongTraceComesInParts) {
-  const auto session = create(bar_mesh());
-  v1::SolveRequest request = slow_request(session);
+  const TriangleMesh small = box_surface(3, 3, 15);
+  const auto session = create(small);
+  v1::SolveRequest request = solve_request(session);
+  *request.mutable_update() = ends_message(small.vertices, 1, 8);
+  solve_slowly(*request.mutable_update());
   request.mutable_update()->mutable_settings()->mutable_solver()->set_max_iterations(1500);
   request.set_trace(true);
   const SolveOutcome outcome = solve(request);
