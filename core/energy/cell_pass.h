@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "core/base/workers.h"
+#include "core/energy/cell_blocks.h"
+#include "core/energy/cell_kernel.h"
 #include "core/energy/lp_norm.h"
 #include "core/energy/rest_shape.h"
 
@@ -32,12 +34,12 @@ class CellPass {
   /// f of another norm at the x of the last evaluation; changes nothing.
   double sum(const LpNorm& norm) const;
   /// The gradient at the x, norm and rotations of the last evaluation.
-  void gradient(const Points& x, Points& result) const;
+  void gradient(Points& result) const;
 
   // Of the last evaluation.
-  const std::vector<double>& squared_energies() const { return e2_; }           // E_i^2
-  const std::vector<double>& cell_weights() const { return c_; }                // c_i
-  const std::vector<Eigen::Matrix3d>& rotations() const { return rotations_; }  // R_i
+  const std::vector<double>& squared_energies() const { return e2_; }  // E_i^2
+  const std::vector<double>& cell_weights() const { return c_; }       // c_i
+  std::vector<Eigen::Matrix3d> rotations() const;                      // R_i
 
   const RestShape& shape() const { return *shape_; }
   const Workers& workers() const { return workers_; }
@@ -46,11 +48,15 @@ class CellPass {
   static constexpr std::size_t kChunk = 512;  // cells
 
  private:
+  template <typename Body>
+  double sum_of_chunks(const Body& body) const;
+  double weigh(const LpNorm& norm, std::size_t begin, std::size_t end);
   double evaluate_cells(const Points& x, const LpNorm& norm, bool fit);
 
   std::shared_ptr<const RestShape> shape_;
   Workers workers_;
-  std::vector<Eigen::Matrix3d> rotations_;
+  CellBlocks blocks_;
+  BlockState state_;
   std::vector<double> e2_, c_;
   mutable std::vector<double> chunk_sums_;
 };

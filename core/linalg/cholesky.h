@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/geometry.h"
+#include "core/linalg/single_factor.h"
 
 namespace lpdeform {
 
@@ -38,6 +39,9 @@ class SparseCholesky {
   void solve(const Points& b, Points& x) const;
   /// x = A^-1 b, one right-hand side. x may be b.
   void solve(const Eigen::VectorXd& b, Eigen::VectorXd& x) const;
+
+  /// Writes the factor to `out` in single precision.
+  void copy_to(SingleFactor& out) const;
 
   /// Bytes of the factor and the analysis.
   std::size_t memory_bytes() const;

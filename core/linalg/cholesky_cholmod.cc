@@ -47,6 +47,47 @@ bool has_positive_diagonal(const cholmod_factor& factor) {
   return std::all_of(columns, columns + factor.n, [&](std::int32_t begin) { return values[begin] > 0; });
 }
 
+/// Supernodes in CHOLMOD's own layout: column-major blocks that begin with their triangle.
+void copy_supernodal(const cholmod_factor& factor, SingleFactor& out) {
+  const auto* const first_columns = static_cast<const std::int32_t*>(factor.super);
+  const auto* const first_rows = static_cast<const std::int32_t*>(factor.pi);
+  const auto* const first_values = static_cast<const std::int32_t*>(factor.px);
+  const auto* const rows = static_cast<const std::int32_t*>(factor.s);
+  const auto* const values = static_cast<const double*>(factor.x);
+  out.begin(static_cast<const std::int32_t*>(factor.Perm), factor.n, factor.xsize);
+  for (std::size_t k = 0; k < factor.nsuper; ++k) {
+    const std::int32_t columns = first_columns[k + 1] - first_columns[k];
+    const auto height = static_cast<std::size_t>(first_rows[k + 1] - first_rows[k]);
+    const double* const block = values + first_values[k];
+    out.add_supernode(columns, rows + first_rows[k] + columns, height - static_cast<std::size_t>(columns),
+                      [&](std::size_t r, std::size_t c) { return block[c * height + r]; });
+  }
+}
+
+/// Columns of L D L^T or L L^T, each beginning with its diagonal, rows ascending. Neighbours with the same
+/// pattern become one supernode.
+void copy_simplicial(const cholmod_factor& factor, SingleFactor& out) {
+  const auto* const begins = static_cast<const std::int32_t*>(factor.p);
+  const auto* const counts = static_cast<const std::int32_t*>(factor.nz);
+  const auto* const rows = static_cast<const std::int32_t*>(factor.i);
+  const auto* const values = static_cast<const double*>(factor.x);
+  out.begin(static_cast<const std::int32_t*>(factor.Perm), factor.n, factor.nzmax);
+  for (std::size_t first = 0, last = 0; first < factor.n; first = last + 1) {
+    last = first;
+    const auto is_same_pattern = [&](std::size_t j) {
+      return counts[j] == counts[j + 1] + 1 && rows[begins[j] + 1] == static_cast<std::int32_t>(j + 1);
+    };
+    while (last + 1 < factor.n && is_same_pattern(last)) ++last;
+    out.add_supernode(static_cast<std::int32_t>(last - first + 1), rows + begins[last] + 1,
+                      static_cast<std::size_t>(counts[last] - 1), [&](std::size_t r, std::size_t c) {
+                        const double* const column = values + begins[first + c];
+                        if (factor.is_ll) return column[r - c];
+                        const double root = std::sqrt(column[0]);
+                        return r == c ? root : root * column[r - c];
+                      });
+  }
+}
+
 }  // namespace
 
 struct SparseCholesky::Impl {
@@ -119,6 +160,14 @@ void SparseCholesky::solve(const Points& b, Points& x) const {
 void SparseCholesky::solve(const Eigen::VectorXd& b, Eigen::VectorXd& x) const {
   x.resize(b.size());
   impl_->solve(b.data(), x.data(), 1);
+}
+
+void SparseCholesky::copy_to(SingleFactor& out) const {
+  const cholmod_factor& factor = *impl_->factor;
+  if (factor.is_super)
+    copy_supernodal(factor, out);
+  else
+    copy_simplicial(factor, out);
 }
 
 std::size_t SparseCholesky::memory_bytes() const {

@@ -50,6 +50,22 @@ void SparseCholesky::solve(const Eigen::VectorXd& b, Eigen::VectorXd& x) const {
   x = impl_->factor.solve(b).eval();
 }
 
+void SparseCholesky::copy_to(SingleFactor& out) const {
+  const Factor& factor = impl_->factor;
+  const auto& l = factor.matrixL().nestedExpression();  // without its diagonal of ones
+  const Eigen::VectorXd d = factor.vectorD();
+  out.begin(factor.permutationPinv().indices().data(), static_cast<std::size_t>(l.cols()),
+            static_cast<std::size_t>(l.nonZeros() + l.cols()));
+  for (Eigen::Index j = 0; j < l.cols(); ++j) {
+    const std::int32_t begin = l.outerIndexPtr()[j], end = l.outerIndexPtr()[j + 1];
+    const double root = std::sqrt(d[j]);
+    out.add_supernode(1, l.innerIndexPtr() + begin, static_cast<std::size_t>(end - begin),
+                      [&](std::size_t r, std::size_t) {
+                        return r == 0 ? root : root * l.valuePtr()[begin + static_cast<std::int32_t>(r) - 1];
+                      });
+  }
+}
+
 std::size_t SparseCholesky::memory_bytes() const {
   return impl_->nonzeros * (sizeof(double) + sizeof(std::int32_t)) +
          impl_->factor.cols() * (sizeof(double) + 4 * sizeof(std::int32_t));

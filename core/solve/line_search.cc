@@ -19,7 +19,7 @@ LineSearch::LineSearch(Problem problem, Points x) : problem_(std::move(problem))
 StepResult LineSearch::step() {
   if (!std::isfinite(objective_)) return {Outcome::kBreakdown, objective_, 0};
   if (objective_ <= problem_.zero_objective) return {Outcome::kConverged, objective_, 0};
-  problem_.cells.gradient(x_, gradient_);
+  problem_.cells.gradient(gradient_);
   clear_held_rows(problem_.constraints, gradient_);
   // The gradient with respect to positions in units of l, X = x / l, is l times the one at hand; a step in X
   // is worth l in x.

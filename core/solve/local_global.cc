@@ -11,7 +11,7 @@ LocalGlobal::LocalGlobal(Problem problem, Points x) : problem_(std::move(problem
 
 StepResult LocalGlobal::step() {
   if (!is_factored_) return {Outcome::kBreakdown, objective_, 0};
-  problem_.cells.gradient(x_, gradient_);
+  problem_.cells.gradient(gradient_);
   clear_held_rows(problem_.constraints, gradient_);
   problem_.metric.solve(gradient_, gradient_);
   x_ -= gradient_;

@@ -37,6 +37,7 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
                  [&](double weight) { return std::max(weight / largest, kLowestShare); });
   scale_ = largest;
   if (is_good_ && is_held == is_held_ && clipped == cell_weights_) return true;
+  single_.clear();
   cell_weights_ = std::move(clipped);
   is_held_ = is_held;
   for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
@@ -73,9 +74,15 @@ void Metric::solve(const Points& b, Points& x) const {
   x /= scale_;
 }
 
+void Metric::precondition(const Points& b, Points& x) const {
+  if (single_.empty()) factor_.copy_to(single_);
+  single_.solve(b, x);
+  x /= scale_;
+}
+
 std::size_t Metric::memory_bytes() const {
-  return factor_.memory_bytes() + cell_weights_.capacity() * sizeof(double) + is_held_.capacity() +
-         matrix_.columns.capacity() * sizeof(std::int32_t) +
+  return factor_.memory_bytes() + single_.memory_bytes() + cell_weights_.capacity() * sizeof(double) +
+         is_held_.capacity() + matrix_.columns.capacity() * sizeof(std::int32_t) +
          matrix_.rows.capacity() * (sizeof(std::int32_t) + sizeof(double));
 }
 

@@ -29,6 +29,9 @@ class Metric {
   /// x = M^-1 b; b is zero at held vertices.
   void solve(const Points& b, Points& x) const;
 
+  /// The same to single precision, several times as fast.
+  void precondition(const Points& b, Points& x) const;
+
   /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of
   /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2. Rows of free vertices are overwritten.
   void extend(const std::vector<char>& is_held, Points& u) const;
@@ -50,6 +53,7 @@ class Metric {
   bool is_good_ = false;
   LowerMatrix matrix_;
   SparseCholesky factor_;
+  mutable SingleFactor single_;  // made when first asked for, empty until then
 };
 
 }  // namespace lpdeform

@@ -55,7 +55,7 @@ bool QuasiNewton::is_smooth_enough() const {
 }
 
 bool QuasiNewton::refresh_metric() {
-  problem_.cells.gradient(x_, gradient_);
+  problem_.cells.gradient(gradient_);
   clear_held_rows(problem_.constraints, gradient_);
   memory_.clear();
   since_refresh_ = 0;
@@ -71,7 +71,7 @@ void QuasiNewton::direction(Points& d) {
     alpha[k] = memory_[k].rho * dot(memory_[k].s, d);
     d -= alpha[k] * memory_[k].y;
   }
-  problem_.metric.solve(d, d);
+  problem_.metric.precondition(d, d);
   for (std::size_t k = 0; k < memory_.size(); ++k) {
     const double beta = memory_[k].rho * dot(memory_[k].y, d);
     d += (alpha[k] - beta) * memory_[k].s;
@@ -134,7 +134,7 @@ StepResult QuasiNewton::give_up(double slope) {
 void QuasiNewton::accept() {
   x_.swap(trial_);
   trial_gradient_.swap(gradient_);
-  problem_.cells.gradient(x_, gradient_);
+  problem_.cells.gradient(gradient_);
   clear_held_rows(problem_.constraints, gradient_);
   remember(trial_, trial_gradient_);
   ++stage_iterations_, ++since_refresh_;

@@ -30,7 +30,7 @@ TEST_P(Gradient, AgreesWithCentralDifferences) {
   const Points x = shaken(shape->scaled_positions(), 0.3);
   cells.evaluate(x, norm);
   Points gradient;
-  cells.gradient(x, gradient);
+  cells.gradient(gradient);
 
   // Truncation is of order step^2, rounding of order 1e-16 / step: 1e-6 balances them near 1e-9.
   const double step = 1e-5;
@@ -104,12 +104,12 @@ TEST(CellPass, GivesTheSameBitsOnOneTwoAndFourThreads) {
   ASSERT_GT(shape->vertex_count(), 4 * static_cast<std::int32_t>(CellPass::kChunk));
   Points expected;
   const double value = one.evaluate(x, norm);
-  one.gradient(x, expected);
+  one.gradient(expected);
   for (const int threads : {2, 4}) {
     CellPass several(shape, Workers(threads));
     Points gradient;
     EXPECT_EQ(several.evaluate(x, norm), value);
-    several.gradient(x, gradient);
+    several.gradient(gradient);
     EXPECT_EQ(gradient, expected);
   }
 }
@@ -121,7 +121,7 @@ TEST(CellPass, HasNoGradientWhereACellIsAtZero) {
     const LpNorm norm(Material::uniform(p), shape->vertex_count(), shape->mean_edge_length(), 1.0);
     Points gradient;
     cells.evaluate(shape->scaled_positions(), norm);
-    cells.gradient(shape->scaled_positions(), gradient);
+    cells.gradient(gradient);
     EXPECT_TRUE(gradient.allFinite());
     EXPECT_LT(gradient.cwiseAbs().maxCoeff(),
               4.0 * 6);  // a subgradient: at most the sum of a cell's root weights

@@ -48,6 +48,48 @@ TEST(Cholesky, SolvesForOneAndThreeRightHandSides) {
   EXPECT_LT((one - expected.col(1)).norm(), 1e-12);
 }
 
+// Few entries a column are factored column by column, many in supernodes.
+class SinglePrecision : public testing::TestWithParam<std::pair<int, int>> {};
+
+TEST_P(SinglePrecision, SolvesToSevenDigitsWhateverTheScale) {
+  const auto [size, width] = GetParam();
+  const Eigen::MatrixXd a = banded(size, width);
+  SparseCholesky cholesky(lower(a));
+  ASSERT_TRUE(cholesky.factor(lower(a)));
+  SingleFactor single;
+  EXPECT_TRUE(single.empty());
+  cholesky.copy_to(single);
+  EXPECT_FALSE(single.empty());
+  const Points expected = Points::Random(size, 3);
+  for (const double scale : {1.0, 1e-300, 1e300}) {
+    Points x = scale * (a * expected);
+    single.solve(x, x);
+    // The matrix is diagonally dominant: its condition is below 10.
+    EXPECT_LT((x / scale - expected).cwiseAbs().maxCoeff(), 1e-5);
+  }
+  Points zero = Points::Zero(size, 3);
+  single.solve(zero, zero);
+  EXPECT_EQ(zero, Points::Zero(size, 3));
+}
+
+INSTANTIATE_TEST_SUITE_P(Patterns, SinglePrecision,
+                         testing::Values(std::pair{1, 1}, std::pair{60, 1}, std::pair{200, 4},
+                                         std::pair{400, 100}));
+
+TEST(Cholesky, ASinglePrecisionCopyCanBeMadeAgain) {
+  SingleFactor single;
+  Points x;
+  for (const int width : {4, 7}) {
+    const Eigen::MatrixXd a = banded(80, width);
+    SparseCholesky cholesky(lower(a));
+    ASSERT_TRUE(cholesky.factor(lower(a)));
+    cholesky.copy_to(single);
+    const Points expected = Points::Random(80, 3);
+    single.solve(Points(a * expected), x);
+    EXPECT_LT((x - expected).cwiseAbs().maxCoeff(), 1e-5);
+  }
+}
+
 TEST(Cholesky, SolvesInPlace) {
   const Eigen::MatrixXd a = banded(30, 2);
   SparseCholesky cholesky(lower(a));

@@ -100,7 +100,7 @@ TEST_F(CertificateTest, NeverClaimsMoreThanTheConvexStepAllows) {
   const double gap = relative_gap(problem(norm), start);
   cells.evaluate(start, norm);
   Points gradient;
-  cells.gradient(start, gradient);
+  cells.gradient(gradient);
   clear_held_rows(constraints, gradient);
   ASSERT_TRUE(metric.factor(cells.cell_weights(), constraints.is_held));
   metric.solve(gradient, gradient);

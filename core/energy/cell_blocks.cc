@@ -1,0 +1,91 @@
+#include "core/energy/cell_blocks.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "core/base/check.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr std::size_t kLanes = CellBlocks::kLanes;
+
+/// Vertices chunk by chunk, within each by valence; each chunk filled up with -1 to whole blocks.
+std::vector<std::int32_t> cells_by_valence(const RestShape& shape, std::size_t chunk) {
+  const auto n = static_cast<std::size_t>(shape.vertex_count());
+  const auto valence = [&](std::int32_t i) { return shape.offsets()[i + 1] - shape.offsets()[i]; };
+  std::vector<std::int32_t> cells(n);
+  std::iota(cells.begin(), cells.end(), 0);
+  for (std::size_t begin = 0; begin < n; begin += chunk) {
+    const auto first = cells.begin() + static_cast<std::ptrdiff_t>(begin);
+    const auto last = cells.begin() + static_cast<std::ptrdiff_t>(std::min(n, begin + chunk));
+    std::stable_sort(first, last, [&](std::int32_t a, std::int32_t b) { return valence(a) < valence(b); });
+  }
+  cells.resize((n + kLanes - 1) / kLanes * kLanes, -1);
+  return cells;
+}
+
+}  // namespace
+
+CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_by_valence(shape, chunk)) {
+  LPDEFORM_CHECK(chunk % kLanes == 0);
+  const auto& offsets = shape.offsets();
+  first_slot.push_back(0);
+  for (std::size_t c = 0; c < cells.size(); c += kLanes) {
+    std::int32_t slots = 0;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const std::int32_t i = cells[c + lane];
+      if (i >= 0) slots = std::max(slots, offsets[i + 1] - offsets[i]);
+    }
+    first_slot.push_back(first_slot.back() + static_cast<std::uint32_t>(slots));
+  }
+
+  row.resize(cells.size());
+  rest_size.resize(cells.size());
+  neighbour_row.resize(slot_count() * kLanes);
+  weight.resize(slot_count() * kLanes);
+  rest_edge.resize(slot_count() * kLanes * 3);
+  opposite.resize(slot_count() * kLanes);
+  std::vector<std::int32_t> place_of_entry(shape.neighbours().size());  // of the k-th directed edge i to j
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    const std::size_t lane = c % kLanes, block = c / kLanes;
+    const std::int32_t i = cells[c];
+    row[c] = 3 * std::max(i, 0);
+    const std::int32_t begin = i < 0 ? 0 : offsets[i], end = i < 0 ? 0 : offsets[i + 1];
+    for (std::size_t slot = first_slot[block]; slot < first_slot[block + 1]; ++slot) {
+      const std::size_t at = slot * kLanes + lane;
+      const auto k = begin + static_cast<std::int32_t>(slot - first_slot[block]);
+      const bool is_there = k < end;
+      const std::int32_t j = is_there ? shape.neighbours()[k] : std::max(i, 0);
+      neighbour_row[at] = 3 * j;
+      opposite[at] = static_cast<std::int32_t>(slot * 3 * kLanes + lane);  // itself; mended below
+      if (!is_there) continue;
+      place_of_entry[k] = opposite[at];
+      weight[at] = shape.weights()[k];
+      const Eigen::RowVector3d edge = shape.scaled_positions().row(i) - shape.scaled_positions().row(j);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        rest_edge[(slot * 3 + axis) * kLanes + lane] = edge[static_cast<Eigen::Index>(axis)];
+      }
+      rest_size[c] += weight[at] * edge.squaredNorm();
+    }
+  }
+
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    for (std::int32_t k = offsets[i]; k < offsets[i + 1]; ++k) {
+      const std::int32_t j = shape.neighbours()[k];
+      const auto ring = shape.neighbours().begin();
+      const auto back = std::lower_bound(ring + offsets[j], ring + offsets[j + 1], i) - ring;
+      const auto place = static_cast<std::size_t>(place_of_entry[k]);
+      opposite[place / (3 * kLanes) * kLanes + place % kLanes] = place_of_entry[back];
+    }
+  }
+}
+
+std::size_t CellBlocks::memory_bytes() const {
+  return (first_slot.capacity() + cells.capacity() + row.capacity() + neighbour_row.capacity() +
+          opposite.capacity()) *
+             sizeof(std::int32_t) +
+         (rest_size.capacity() + weight.capacity() + rest_edge.capacity()) * sizeof(double);
+}
+
+}  // namespace lpdeform

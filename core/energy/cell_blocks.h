@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/energy/rest_shape.h"
+
+namespace lpdeform {
+
+/// The one-rings of a shape laid out for vector instructions: eight cells abreast, a block. Blocks lie within
+/// chunks of consecutive vertices; in a chunk the cells are sorted by valence, so that those of a block have
+/// about as many neighbours. A block has as many slots as its largest cell has neighbours; a slot holds one
+/// neighbour of each of the eight. Lanes and slots that stand for no cell or neighbour have weight 0 and the
+/// cell itself for a neighbour: they add nothing. Immutable.
+struct CellBlocks {
+  static constexpr std::size_t kLanes = 8;
+
+  /// `chunk`: a multiple of kLanes.
+  CellBlocks(const RestShape& shape, std::size_t chunk);
+
+  std::size_t block_count() const { return first_slot.size() - 1; }
+  std::size_t slot_count() const { return first_slot.back(); }
+  std::size_t memory_bytes() const;
+
+  std::vector<std::uint32_t> first_slot;  // of each block, and the end
+  std::vector<std::int32_t> cells;        // [block][lane]: vertex; -1 in lanes without a cell
+  std::vector<std::int32_t> row;          // [block][lane]: 3 * vertex; 0 in lanes without a cell
+  std::vector<double> rest_size;          // [block][lane]: sum_j w_ij |p_i - p_j|^2
+
+  std::vector<std::int32_t> neighbour_row;  // [slot][lane]: 3 * vertex
+  std::vector<double> weight;               // [slot][lane]: w_ij
+  std::vector<double> rest_edge;            // [slot][axis][lane]: p_i - p_j in scaled units
+  std::vector<std::int32_t>
+      opposite;  // [slot][lane]: where [slot][0][lane] of the edge j to i is, in such an array
+};
+
+}  // namespace lpdeform

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/energy/cell_blocks.h"
+
+namespace lpdeform {
+
+/// What the kernels leave for each block, in its lanes.
+struct BlockState {
+  explicit BlockState(const CellBlocks& blocks);
+  std::size_t memory_bytes() const;
+
+  std::vector<double> rotations;      // [block][entry, row-major][lane]: R_i; the identity to begin with
+  std::vector<double> squared;        // [block][lane]: E_i^2
+  std::vector<double> residuals;      // [slot][axis][lane]: r_ij = w_ij ((x_i - x_j) - R_i (p_i - p_j))
+  std::vector<double> residual_sums;  // [block][axis][lane]: sum_j r_ij
+};
+
+/// Rotation fit (Eq. 2, as fit_rotation has it), squared energies and residuals of blocks first to last - 1 at
+/// positions x: row-major, in scaled units. With `fit` false the rotations in `state` are held. In vector
+/// instructions, the widest that the processor has; lanes whose fit is uncertain go through fit_rotation.
+/// Different blocks may be computed at the same time.
+void evaluate_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const double* x, bool fit,
+                     BlockState& state);
+
+/// The gradient rows of the cells of these blocks, from the state of all blocks and the weights c_i by vertex:
+///
+///   df/dx_i = 2 (c_i sum_j r_ij - sum_j c_j r_ji)
+void gradient_of_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last,
+                        const BlockState& state, const double* c, double* gradient);
+
+}  // namespace lpdeform
