@@ -19,7 +19,7 @@ constexpr std::uint32_t kFacesPerVertex = 3;
 
 /// What a session is taken to need until it is known: about what a triangulated surface needs, factored by
 /// CHOLMOD.
-constexpr std::size_t kBytesPerVertex = 2000, kBytesPerFace = 100;
+constexpr std::size_t kBytesPerVertex = 2600, kBytesPerFace = 100;
 
 std::shared_ptr<Timers> or_system(std::shared_ptr<Timers> timers) {
   return timers ? std::move(timers) : std::make_shared<SystemTimers>();

@@ -13,7 +13,7 @@ import threading
 import unittest
 
 SERVER, CLI = None, None
-PATIENCE = 120  # seconds that anything may take; never reached where all is well
+PATIENCE = 280  # seconds that anything may take; never reached where all is well
 
 
 class RunningServer:

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/health_probe.h"
@@ -17,10 +18,14 @@
 namespace lpdeform {
 namespace {
 
-/// The program, running; its stdout and stderr come through one pipe.
+/// The program, running; its stdout and stderr come through one pipe. Of this process's environment it gets
+/// all but the program's own settings.
 class Program {
  public:
   explicit Program(std::vector<std::string> arguments, std::vector<std::string> environment = {}) {
+    for (char** entry = environ; *entry != nullptr; ++entry) {
+      if (!std::string_view(*entry).starts_with("LPDEFORM_")) environment.emplace_back(*entry);
+    }
     int ends[2];
     EXPECT_EQ(pipe(ends), 0);
     posix_spawn_file_actions_t actions;
