@@ -29,7 +29,9 @@ Log::Log(std::string_view level)
   logger_->flush_on(spdlog::level::info);
 }
 
-Log::~Log() = default;
+Log::~Log() {
+  thread_.reset();  // writes what waits, and ends before the logger that it writes to
+}
 
 void Log::debug(std::string_view event, Fields fields) const {
   write(spdlog::level::debug, event, fields);
