@@ -168,6 +168,7 @@ void SparseCholesky::copy_to(SingleFactor& out) const {
     copy_supernodal(factor, out);
   else
     copy_simplicial(factor, out);
+  out.finish();
 }
 
 std::size_t SparseCholesky::memory_bytes() const {

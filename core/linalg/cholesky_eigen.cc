@@ -64,6 +64,7 @@ void SparseCholesky::copy_to(SingleFactor& out) const {
                         return r == 0 ? root : root * l.valuePtr()[begin + static_cast<std::int32_t>(r) - 1];
                       });
   }
+  out.finish();
 }
 
 std::size_t SparseCholesky::memory_bytes() const {

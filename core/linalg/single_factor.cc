@@ -8,19 +8,59 @@ namespace {
 
 using Row = SingleFactor::Row;
 
+constexpr std::size_t kBranches = 16;
+constexpr std::size_t kSmallestBranch = 1 << 14;  // entries; less is not worth a task
+constexpr std::size_t kChunk = 4096;              // rows
+
 /// x = L^-1 b for a supernode's own rows: a triangle, row-major, its diagonal inverted.
 void solve_triangle(const float* values, std::int32_t columns, Row* own) {
   for (std::int32_t r = 0; r < columns; ++r, values += columns) {
-    for (std::int32_t c = 0; c < r; ++c) own[r] -= values[c] * own[c];
-    own[r] *= values[r];
+    Row sum = own[r];
+    for (std::int32_t c = 0; c < r; ++c) sum -= values[c] * own[c];
+    own[r] = sum * values[r];
   }
 }
 
 void solve_transposed_triangle(const float* values, std::int32_t columns, Row* own) {
   for (std::int32_t r = columns; r-- > 0;) {
     const float* const row = values + static_cast<std::size_t>(r) * static_cast<std::size_t>(columns);
-    own[r] *= row[r];
-    for (std::int32_t c = 0; c < r; ++c) own[c] -= row[c] * own[r];
+    const Row x = own[r] *= row[r];
+    for (std::int32_t c = 0; c < r; ++c) own[c] -= row[c] * x;
+  }
+}
+
+/// below[rows[r]] -= sum_c values[r][c] own[c]; four rows at a time, so that sums do not wait for one another.
+void add_below(const float* values, std::int32_t columns, const std::int32_t* rows, std::size_t row_count,
+               const Row* own, Row* below) {
+  std::size_t r = 0;
+  for (; r + 4 <= row_count; r += 4, values += 4 * columns) {
+    Row sum[4] = {};
+    for (std::int32_t c = 0; c < columns; ++c) {
+      for (int k = 0; k < 4; ++k) sum[k] += values[k * columns + c] * own[c];
+    }
+    for (int k = 0; k < 4; ++k) below[rows[r + k]] -= sum[k];
+  }
+  for (; r < row_count; ++r, values += columns) {
+    Row sum = {};
+    for (std::int32_t c = 0; c < columns; ++c) sum += values[c] * own[c];
+    below[rows[r]] -= sum;
+  }
+}
+
+/// own[c] -= sum_r values[r][c] below[rows[r]].
+void add_from_below(const float* values, std::int32_t columns, const std::int32_t* rows,
+                    std::size_t row_count, Row* own, const Row* below) {
+  std::size_t r = 0;
+  for (; r + 4 <= row_count; r += 4, values += 4 * columns) {
+    const Row b0 = below[rows[r]], b1 = below[rows[r + 1]], b2 = below[rows[r + 2]], b3 = below[rows[r + 3]];
+    for (std::int32_t c = 0; c < columns; ++c) {
+      own[c] -= (values[c] * b0 + values[columns + c] * b1) +
+                (values[2 * columns + c] * b2 + values[3 * columns + c] * b3);
+    }
+  }
+  for (; r < row_count; ++r, values += columns) {
+    const Row x = below[rows[r]];
+    for (std::int32_t c = 0; c < columns; ++c) own[c] -= values[c] * x;
   }
 }
 
@@ -33,7 +73,6 @@ void SingleFactor::begin(const std::int32_t* new_to_old, std::size_t size, std::
   values_.clear();
   values_.reserve(value_count);
   next_column_ = 0;
-  work_.resize(size);
 }
 
 float* SingleFactor::new_supernode(std::int32_t columns, const std::int32_t* rows, std::size_t row_count) {
@@ -44,56 +83,145 @@ float* SingleFactor::new_supernode(std::int32_t columns, const std::int32_t* row
   return values_.data() + supernodes_.back().first_value;
 }
 
-/// x = L^-1 b in place.
-void SingleFactor::solve_forward(Row* x) const {
-  for (const Supernode& node : supernodes_) {
-    Row* const own = x + node.first_column;
-    const float* values = values_.data() + node.first_value;
-    solve_triangle(values, node.columns, own);
-    values += static_cast<std::size_t>(node.columns) * static_cast<std::size_t>(node.columns);
-    for (std::size_t r = 0; r < node.row_count; ++r, values += node.columns) {
-      Row sum = x[rows_[node.first_row + r]];
-      for (std::int32_t c = 0; c < node.columns; ++c) sum -= values[c] * own[c];
-      x[rows_[node.first_row + r]] = sum;
+/// The supernode that has the first row below each, which is its parent in the elimination tree; -1 for roots.
+std::vector<std::int32_t> SingleFactor::parents() const {
+  std::vector<std::int32_t> node_of(new_to_old_.size());
+  for (std::size_t k = 0; k < supernodes_.size(); ++k) {
+    std::fill_n(node_of.begin() + supernodes_[k].first_column, supernodes_[k].columns,
+                static_cast<std::int32_t>(k));
+  }
+  std::vector<std::int32_t> result(supernodes_.size(), -1);
+  for (std::size_t k = 0; k < supernodes_.size(); ++k) {
+    if (supernodes_[k].row_count > 0) result[k] = node_of[rows_[supernodes_[k].first_row]];
+  }
+  return result;
+}
+
+/// Cuts the tree where the subtrees become small enough, and bundles them into branches of about one size.
+void SingleFactor::cut_branches() {
+  branches_.clear();
+  trunk_.clear();
+  const auto count = static_cast<std::int32_t>(supernodes_.size());
+  const std::vector<std::int32_t> parent = parents();
+  std::vector<std::size_t> work(count), nodes(count, 1);  // of the subtree below and with each
+  std::vector<std::int32_t> first(count);
+  for (std::int32_t k = 0; k < count; ++k) first[k] = k;
+  for (std::int32_t k = 0; k < count; ++k) {
+    const Supernode& node = supernodes_[k];
+    work[k] +=
+        static_cast<std::size_t>(node.columns) * (static_cast<std::size_t>(node.columns) + node.row_count);
+    if (parent[k] < 0) continue;
+    work[parent[k]] += work[k];
+    nodes[parent[k]] += nodes[k];
+    first[parent[k]] = std::min(first[parent[k]], first[k]);
+  }
+  const std::size_t most = std::max(values_.size() / kBranches, kSmallestBranch);
+  const bool is_worth_it = values_.size() >= 4 * kSmallestBranch;
+  const auto is_branch = [&](std::int32_t k) {  // a whole subtree, its supernodes next to one another
+    return is_worth_it && work[k] <= most && nodes[k] == static_cast<std::size_t>(k - first[k] + 1);
+  };
+  std::size_t bundled = most;
+  for (std::int32_t k = 0; k < count; ++k) {
+    if (is_branch(k) && parent[k] >= 0 && is_branch(parent[k])) continue;  // its parent's
+    if (!is_branch(k)) {
+      trunk_.emplace_back(k, k);
+      continue;
     }
+    if (bundled + work[k] > most) branches_.emplace_back(), bundled = 0;
+    bundled += work[k];
+    branches_.back().subtrees.emplace_back(first[k], k);
   }
 }
 
-/// x = L^-T b in place.
-void SingleFactor::solve_backward(Row* x) const {
-  for (auto node = supernodes_.rbegin(); node != supernodes_.rend(); ++node) {
-    Row* const own = x + node->first_column;
-    const float* const triangle = values_.data() + node->first_value;
-    const float* values =
-        triangle + static_cast<std::size_t>(node->columns) * static_cast<std::size_t>(node->columns);
-    for (std::size_t r = 0; r < node->row_count; ++r, values += node->columns) {
-      const Row below = x[rows_[node->first_row + r]];
-      for (std::int32_t c = 0; c < node->columns; ++c) own[c] -= values[c] * below;
+/// Gives the branch places of its own for what it adds to its ancestors.
+void SingleFactor::send_elsewhere(Branch& branch) {
+  std::vector<std::int32_t> place(new_to_old_.size(), -1);
+  for (const auto& [first, last] : branch.subtrees) {
+    const std::int32_t end = supernodes_[last].first_column + supernodes_[last].columns;
+    const std::size_t rows_end = supernodes_[last].first_row + supernodes_[last].row_count;
+    for (std::size_t r = supernodes_[first].first_row; r < rows_end; ++r) {
+      const std::int32_t row = rows_[r];
+      if (row < end) continue;
+      if (place[row] < 0) {
+        place[row] = static_cast<std::int32_t>(work_.size() + branch.owed.size());
+        branch.owed.push_back(row);
+      }
+      forward_rows_[r] = place[row];
     }
-    solve_transposed_triangle(triangle, node->columns, own);
+  }
+  work_.resize(work_.size() + branch.owed.size());
+}
+
+void SingleFactor::finish() {
+  work_.resize(new_to_old_.size());
+  forward_rows_ = rows_;
+  cut_branches();
+  for (Branch& branch : branches_) send_elsewhere(branch);
+}
+
+/// x = L^-1 b for supernodes first to last, in work_.
+void SingleFactor::solve_forward(std::size_t first, std::size_t last,
+                                 const std::vector<std::int32_t>& rows) const {
+  for (std::size_t k = first; k <= last; ++k) {
+    const Supernode& node = supernodes_[k];
+    Row* const own = work_.data() + node.first_column;
+    const float* const triangle = values_.data() + node.first_value;
+    solve_triangle(triangle, node.columns, own);
+    add_below(triangle + node.columns * node.columns, node.columns, rows.data() + node.first_row,
+              node.row_count, own, work_.data());
   }
 }
 
-void SingleFactor::solve(const Points& b, Points& x) const {
+/// x = L^-T b for supernodes last to first, in work_.
+void SingleFactor::solve_backward(std::size_t first, std::size_t last) const {
+  for (std::size_t k = last + 1; k-- > first;) {
+    const Supernode& node = supernodes_[k];
+    Row* const own = work_.data() + node.first_column;
+    const float* const triangle = values_.data() + node.first_value;
+    add_from_below(triangle + node.columns * node.columns, node.columns, rows_.data() + node.first_row,
+                   node.row_count, own, work_.data());
+    solve_transposed_triangle(triangle, node.columns, own);
+  }
+}
+
+void SingleFactor::solve(const Points& b, Points& x, const Workers& workers) const {
   // Over the largest entry, so that no size of b leaves the range of single precision.
   const double largest = b.cwiseAbs().maxCoeff(), scale = 1 / largest;
   x.resize(b.rows(), 3);
   if (!std::isfinite(scale)) return void(x.setZero());
-  for (std::size_t i = 0; i < new_to_old_.size(); ++i) {
-    const double* const row = b.data() + 3 * static_cast<std::size_t>(new_to_old_[i]);
-    work_[i] = Row{static_cast<float>(scale * row[0]), static_cast<float>(scale * row[1]),
-                   static_cast<float>(scale * row[2]), 0};
+  const std::size_t n = new_to_old_.size();
+  workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const double* const row = b.data() + 3 * static_cast<std::size_t>(new_to_old_[i]);
+      work_[i] = Row{static_cast<float>(scale * row[0]), static_cast<float>(scale * row[1]),
+                     static_cast<float>(scale * row[2]), 0};
+    }
+  });
+  std::fill(work_.begin() + static_cast<std::ptrdiff_t>(n), work_.end(), Row{});
+  workers.for_chunks(branches_.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+    for (const auto& [first, last] : branches_[k].subtrees) solve_forward(first, last, forward_rows_);
+  });
+  std::size_t place = n;
+  for (const Branch& branch : branches_) {
+    for (const std::int32_t row : branch.owed) work_[row] += work_[place++];
   }
-  solve_forward(work_.data());
-  solve_backward(work_.data());
-  for (std::size_t i = 0; i < new_to_old_.size(); ++i) {
-    double* const row = x.data() + 3 * static_cast<std::size_t>(new_to_old_[i]);
-    for (int c = 0; c < 3; ++c) row[c] = largest * static_cast<double>(work_[i][c]);
-  }
+  for (const auto& [first, last] : trunk_) solve_forward(first, last, rows_);
+  for (auto part = trunk_.rbegin(); part != trunk_.rend(); ++part) solve_backward(part->first, part->second);
+  workers.for_chunks(branches_.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+    const auto& subtrees = branches_[k].subtrees;
+    for (auto part = subtrees.rbegin(); part != subtrees.rend(); ++part)
+      solve_backward(part->first, part->second);
+  });
+  workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      double* const row = x.data() + 3 * static_cast<std::size_t>(new_to_old_[i]);
+      for (int c = 0; c < 3; ++c) row[c] = largest * static_cast<double>(work_[i][c]);
+    }
+  });
 }
 
 std::size_t SingleFactor::memory_bytes() const {
-  return (new_to_old_.capacity() + rows_.capacity()) * sizeof(std::int32_t) +
+  return (new_to_old_.capacity() + 2 * rows_.capacity()) * sizeof(std::int32_t) +
          supernodes_.capacity() * sizeof(Supernode) + values_.capacity() * sizeof(float) +
          work_.capacity() * sizeof(Row);
 }

@@ -2,18 +2,24 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/base/geometry.h"
+#include "core/base/workers.h"
 
 namespace lpdeform {
 
 /// A Cholesky factor L of a permuted matrix, P A P^T = L L^T, in single precision: half the bytes of the
 /// double one, three right-hand sides at once in vector instructions. Good to about seven digits: for
 /// metrics, not for answers. Columns with the same pattern below lie together, as supernodes.
+///
+/// Large factors are solved by several threads: what different subtrees of the elimination tree eliminate does
+/// not meet before their common ancestors. Each subtree adds what it owes to those to a place of its own, and
+/// these are added up in a fixed order: the same bits on any number of threads.
 class SingleFactor {
  public:
-  // How a backend fills it in: begin(), then its supernodes in ascending order.
+  // How a backend fills it in: begin(), its supernodes in ascending order, finish().
 
   /// For a matrix of this size; its factor will have about `value_count` entries.
   void begin(const std::int32_t* new_to_old, std::size_t size, std::size_t value_count);
@@ -31,12 +37,14 @@ class SingleFactor {
     }
   }
 
+  void finish();
+
   bool empty() const { return new_to_old_.empty(); }
   /// Memory is kept.
   void clear() { new_to_old_.clear(); }
 
   /// x = A^-1 b. x may be b. One caller at a time.
-  void solve(const Points& b, Points& x) const;
+  void solve(const Points& b, Points& x, const Workers& workers) const;
 
   std::size_t memory_bytes() const;
 
@@ -49,8 +57,16 @@ class SingleFactor {
     std::size_t first_row, row_count;  // of all rows
     std::size_t first_value;           // of all values
   };
-  void solve_forward(Row* x) const;
-  void solve_backward(Row* x) const;
+  /// Supernodes that one thread solves: whole subtrees, which lie together.
+  struct Branch {
+    std::vector<std::pair<std::int32_t, std::int32_t>> subtrees;  // first and last supernode
+    std::vector<std::int32_t> owed;                               // rows of ancestors that it adds to
+  };
+  std::vector<std::int32_t> parents() const;
+  void cut_branches();
+  void send_elsewhere(Branch& branch);
+  void solve_forward(std::size_t first, std::size_t last, const std::vector<std::int32_t>& rows) const;
+  void solve_backward(std::size_t first, std::size_t last) const;
   float* new_supernode(std::int32_t columns, const std::int32_t* rows, std::size_t row_count);
 
   std::vector<std::int32_t> new_to_old_;
@@ -59,7 +75,11 @@ class SingleFactor {
   std::vector<float> values_;  // of each supernode: its triangle's rows at full length, then those below, all
                                // row-major; the diagonal inverted
   std::int32_t next_column_ = 0;
-  mutable std::vector<Row> work_;
+  std::vector<Branch> branches_;
+  std::vector<std::pair<std::int32_t, std::int32_t>> trunk_;  // the supernodes that are in no branch
+  std::vector<std::int32_t>
+      forward_rows_;               // rows_, but those of ancestors of a branch are its places in work_
+  mutable std::vector<Row> work_;  // one for each column, then one for each row owed by each branch
 };
 
 }  // namespace lpdeform

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kCertificateSeconds = 1;  // it gets, whatever is left of the time limit
 constexpr std::size_t kWorkspace =
-    30;  // positions of all vertices that a solve holds at most: the memory of L-BFGS
+    22;  // positions of all vertices that a solve holds at most: the memory of L-BFGS
 constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
@@ -210,10 +210,10 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   started = Clock::now();
   Points guess = is_factored ? initial_guess(settings.initial) : constraints->targets;
   if (!guess.allFinite()) guess = constraints->targets;
-  const double reference =
-      settings.method == Method::kLineSearch ? length_unit() / unit() : typical_energy(guess);
+  const double typical = typical_energy(guess);
+  const double reference = settings.method == Method::kLineSearch ? length_unit() / unit() : typical;
   norm.emplace(material, shape->vertex_count(), unit(), reference);
-  cells.evaluate(guess, *norm);
+  cells.reweigh(*norm);  // typical_energy has evaluated the guess
   best_sum = std::numeric_limits<double>::infinity();
   minimiser = make_minimiser(settings.method, std::move(guess), is_warm);
   const double sum = keep_if_best();

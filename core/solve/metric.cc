@@ -74,9 +74,9 @@ void Metric::solve(const Points& b, Points& x) const {
   x /= scale_;
 }
 
-void Metric::precondition(const Points& b, Points& x) const {
+void Metric::precondition(const Points& b, Points& x, const Workers& workers) const {
   if (single_.empty()) factor_.copy_to(single_);
-  single_.solve(b, x);
+  single_.solve(b, x, workers);
   x /= scale_;
 }
 

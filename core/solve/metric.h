@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "core/base/workers.h"
 #include "core/energy/rest_shape.h"
 #include "core/linalg/cholesky.h"
 
@@ -30,7 +31,7 @@ class Metric {
   void solve(const Points& b, Points& x) const;
 
   /// The same to single precision, several times as fast.
-  void precondition(const Points& b, Points& x) const;
+  void precondition(const Points& b, Points& x, const Workers& workers) const;
 
   /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of
   /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2. Rows of free vertices are overwritten.

@@ -6,7 +6,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr std::size_t kMemory = 10;
+constexpr std::size_t kMemory = 6;
 constexpr int kWindow = 20;
 constexpr int kRefresh = 40;
 constexpr double kSufficientDecrease = 1e-4;
@@ -15,14 +15,13 @@ constexpr double kSmoothingStep = 0.1;
 constexpr double kBias = 3e-4;
 constexpr double kLeastSmoothing = 1e-26;  // eps^2 over the squared diagonal: rounding
 
-double dot(const Points& a, const Points& b) {
-  return a.cwiseProduct(b).sum();
-}
-
 }  // namespace
 
 QuasiNewton::QuasiNewton(Problem problem, Points x, bool is_warm)
-    : problem_(std::move(problem)), norm_(problem_.norm), x_(std::move(x)) {
+    : problem_(std::move(problem)),
+      norm_(problem_.norm),
+      x_(std::move(x)),
+      memory_(problem_.cells.workers(), kMemory) {
   const double lowest = problem_.norm.lowest_p();
   if (lowest < 2) eps2_ = (is_warm ? 1e-9 : 1e-6) * problem_.diagonal * problem_.diagonal;
   // No way from p = 2 where all p_i > 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8 times
@@ -33,12 +32,12 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, bool is_warm)
   begin_stage();
 }
 
-/// The objective of stage_: p first, then eps.
+/// The objective of stage_: p first, then eps. problem_.cells holds the evaluation at x_.
 void QuasiNewton::begin_stage() {
   const bool is_on_the_way = stage_ < static_cast<int>(shares_.size());
   if (stage_ > static_cast<int>(shares_.size())) eps2_ *= kSmoothingStep;
   norm_ = (is_on_the_way ? problem_.norm.nearer_two(shares_[stage_]) : problem_.norm).smoothed(eps2_);
-  objective_ = problem_.cells.evaluate(x_, norm_);
+  objective_ = problem_.cells.reweigh(norm_);
   is_last_stage_ = !is_on_the_way && is_smooth_enough();
   history_.assign(1, objective_);
   stage_iterations_ = 0;
@@ -62,20 +61,10 @@ bool QuasiNewton::refresh_metric() {
   return problem_.metric.factor(problem_.cells.cell_weights(), problem_.constraints.is_held);
 }
 
-/// d = -H g by the two-loop recursion, H_0 = M^-1: unscaled, since M is the Hessian with rotations and
-/// weights held.
-void QuasiNewton::direction(Points& d) {
-  d = -gradient_;
-  std::vector<double> alpha(memory_.size());
-  for (std::size_t k = memory_.size(); k-- > 0;) {
-    alpha[k] = memory_[k].rho * dot(memory_[k].s, d);
-    d -= alpha[k] * memory_[k].y;
-  }
-  problem_.metric.precondition(d, d);
-  for (std::size_t k = 0; k < memory_.size(); ++k) {
-    const double beta = memory_[k].rho * dot(memory_[k].y, d);
-    d += (alpha[k] - beta) * memory_[k].s;
-  }
+/// d = -H g, H_0 = M^-1: unscaled, since M is the Hessian with rotations and weights held. Returns <g, d>.
+double QuasiNewton::direction(Points& d) {
+  const auto metric = [this](Points& v) { problem_.metric.precondition(v, v, problem_.cells.workers()); };
+  return memory_.direction(gradient_, metric, d);
 }
 
 /// The step length along d, 0 where none is found. problem_.cells holds the evaluation at trial_ afterwards.
@@ -94,15 +83,6 @@ double QuasiNewton::search(const Points& d, double slope) {
     t = std::clamp(parabola, 0.1 * t, 0.5 * t);
   }
   return 0;
-}
-
-void QuasiNewton::remember(const Points& x_before, const Points& gradient_before) {
-  Pair pair{x_ - x_before, gradient_ - gradient_before, 0};
-  const double curvature = dot(pair.s, pair.y);
-  if (!(curvature > 1e-12 * pair.s.norm() * pair.y.norm())) return;
-  pair.rho = 1 / curvature;
-  memory_.push_back(std::move(pair));
-  if (memory_.size() > kMemory) memory_.pop_front();
 }
 
 bool QuasiNewton::is_stage_over() const {
@@ -136,7 +116,7 @@ void QuasiNewton::accept() {
   trial_gradient_.swap(gradient_);
   problem_.cells.gradient(gradient_);
   clear_held_rows(problem_.constraints, gradient_);
-  remember(trial_, trial_gradient_);
+  memory_.remember(x_, trial_, gradient_, trial_gradient_);
   ++stage_iterations_, ++since_refresh_;
   history_.push_back(objective_);
   if (history_.size() > kWindow + 1) history_.pop_front();
@@ -152,8 +132,7 @@ StepResult QuasiNewton::step() {
   }
   if (!is_metric_good_ || !std::isfinite(objective_)) return result(Outcome::kBreakdown);
 
-  direction(direction_);
-  const double slope = dot(gradient_, direction_);
+  const double slope = direction(direction_);
   if (!(slope < 0) || search(direction_, slope) == 0) return give_up(slope);
   accept();
   return result(is_last_stage_ && is_stage_over() ? Outcome::kConverged : Outcome::kProgress);

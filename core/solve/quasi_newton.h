@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/solve/minimiser.h"
+#include "core/solve/pair_memory.h"
 
 namespace lpdeform {
 
@@ -27,17 +28,11 @@ class QuasiNewton : public Minimiser {
   const Points& x() const override { return x_; }
 
  private:
-  struct Pair {
-    Points s, y;
-    double rho;  // 1 / <s, y>
-  };
-
   void begin_stage();
   bool is_smooth_enough() const;
   bool refresh_metric();
-  void direction(Points& d);
+  double direction(Points& d);
   double search(const Points& d, double slope);
-  void remember(const Points& x_before, const Points& gradient_before);
   void accept();
   StepResult give_up(double slope);
   bool is_stage_over() const;
@@ -52,7 +47,7 @@ class QuasiNewton : public Minimiser {
   LpNorm norm_;  // of the stage
   Points x_, gradient_, direction_, trial_, trial_gradient_;
   double objective_ = 0;
-  std::deque<Pair> memory_;
+  PairMemory memory_;
   std::deque<double> history_;  // objectives of the stage's last 21 iterations
   int stage_iterations_ = 0, since_refresh_ = 0;
   bool is_metric_good_ = false;

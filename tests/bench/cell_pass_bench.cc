@@ -91,9 +91,13 @@ void metric_precondition(benchmark::State& state) {
   if (!test.factor(1)) return state.SkipWithError("not positive definite");
   const Points b = Points::Random(test.shape->vertex_count(), 3);
   Points x;
-  for (auto _ : state) test.metric.precondition(b, x);
+  const Workers workers(static_cast<int>(state.range(1)));
+  for (auto _ : state) test.metric.precondition(b, x, workers);
 }
-BENCHMARK(metric_precondition)->Arg(63)->Arg(200)->Arg(316)->Unit(benchmark::kMillisecond);
+BENCHMARK(metric_precondition)
+    ->ArgsProduct({{63, 200, 316}, {1, 2}})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace lpdeform

@@ -63,12 +63,12 @@ TEST_P(SinglePrecision, SolvesToSevenDigitsWhateverTheScale) {
   const Points expected = Points::Random(size, 3);
   for (const double scale : {1.0, 1e-300, 1e300}) {
     Points x = scale * (a * expected);
-    single.solve(x, x);
+    single.solve(x, x, Workers(1));
     // The matrix is diagonally dominant: its condition is below 10.
     EXPECT_LT((x / scale - expected).cwiseAbs().maxCoeff(), 1e-5);
   }
   Points zero = Points::Zero(size, 3);
-  single.solve(zero, zero);
+  single.solve(zero, zero, Workers(1));
   EXPECT_EQ(zero, Points::Zero(size, 3));
 }
 
@@ -85,8 +85,41 @@ TEST(Cholesky, ASinglePrecisionCopyCanBeMadeAgain) {
     ASSERT_TRUE(cholesky.factor(lower(a)));
     cholesky.copy_to(single);
     const Points expected = Points::Random(80, 3);
-    single.solve(Points(a * expected), x);
+    single.solve(Points(a * expected), x, Workers(1));
     EXPECT_LT((x - expected).cwiseAbs().maxCoeff(), 1e-5);
+  }
+}
+
+/// The five-point Laplacian of a square, plus the identity: a tree with many branches.
+LowerMatrix square_laplacian(int side) {
+  LowerMatrix result;
+  result.columns.push_back(0);
+  const auto add = [&](int row, double value) { result.rows.push_back(row), result.values.push_back(value); };
+  for (int i = 0; i < side * side; ++i) {
+    add(i, 5);
+    if ((i + 1) % side != 0) add(i + 1, -1);
+    if (i + side < side * side) add(i + side, -1);
+    result.columns.push_back(static_cast<std::int32_t>(result.rows.size()));
+  }
+  return result;
+}
+
+TEST(SingleFactor, GivesTheSameBitsOnAnyNumberOfThreadsAndTheRightOnes) {
+  for (const int side : {60, 150}) {
+    const LowerMatrix matrix = square_laplacian(side);
+    SparseCholesky cholesky(matrix);
+    ASSERT_TRUE(cholesky.factor(matrix));
+    SingleFactor single;
+    cholesky.copy_to(single);
+    const Points b = Points::Random(side * side, 3);
+    Points expected, one, several;
+    cholesky.solve(b, expected);
+    single.solve(b, one, Workers(1));
+    EXPECT_LT((one - expected).cwiseAbs().maxCoeff(), 1e-5);
+    for (const int threads : {2, 4}) {
+      single.solve(b, several, Workers(threads));
+      EXPECT_EQ(several, one);
+    }
   }
 }
 

@@ -1,0 +1,77 @@
+// A drag in a live session: how long a handle move takes to its first useful state, E^(1/p) within 5 % of the
+// converged one, from the state that the move before had reached by then. 30 moves that bend a bumpy sheet; the
+// converged energies come from a second solver that goes along, 100 iterations a move. Percentiles in milliseconds; set-up is apart.
+
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <vector>
+
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr int kMoves = 30;
+constexpr double kUseful = 1.05;
+
+HandleSet handles_at(const TriangleMesh& mesh, int side, double share) {
+  HandleSet handles;
+  (void)handles.set("left", {slice(mesh, 0, 0, 0), Fixed{}});
+  (void)handles.set(
+      "right", {slice(mesh, 0, side, side), turn(Eigen::Vector3d::UnitY(), -90 * share, {0.5 * side, 0, 0},
+                                                 Eigen::Vector3d(0, 0, 0.2 * side * share))});
+  return handles;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Seconds until E^(1/p) <= `enough`, or to the end of the solve.
+double time_to(Deformer& deformer, const HandleSet& handles, double p, double enough) {
+  const auto start = std::chrono::steady_clock::now();
+  SolveSettings settings;
+  settings.keep_trace = false;
+  (void)deformer.set_handles(handles);
+  (void)deformer.start(settings);
+  while (std::pow(deformer.summary().energy, 1 / p) > enough && deformer.step()) {
+  }
+  benchmark::DoNotOptimize(deformer.positions().data());
+  return seconds_since(start);
+}
+
+void drag(benchmark::State& state) {
+  const auto side = static_cast<int>(state.range(0));
+  const double p = static_cast<double>(state.range(1)) / 10;
+  const TriangleMesh mesh = grid(side, side, 2);
+  const auto shape = rest_shape(mesh);
+  std::vector<double> times;
+  for (auto _ : state) {
+    const DeformerOptions options{.threads = 2};
+    auto live = deformer(shape, handles_at(mesh, side, 0), Material::uniform(p), options);
+    auto converged = deformer(shape, handles_at(mesh, side, 0), Material::uniform(p), options);
+    (void)live->solve({});
+    (void)converged->solve({});
+    for (int move = 1; move <= kMoves; ++move) {
+      const HandleSet handles = handles_at(mesh, side, double(move) / kMoves);
+      (void)converged->set_handles(handles);
+      const double best = converged->solve({.max_iterations = 100}).value().energy;
+      times.push_back(time_to(*live, handles, p, kUseful * std::pow(best, 1 / p)));
+    }
+  }
+  std::ranges::sort(times);
+  state.counters["p50_ms"] = 1e3 * times[times.size() / 2];
+  state.counters["p99_ms"] = 1e3 * times[times.size() * 99 / 100];
+  state.counters["vertices"] = shape->vertex_count();
+}
+BENCHMARK(drag)
+    ->ArgsProduct({{100, 316}, {10, 20, 60}})
+    ->ArgNames({"side", "ten_p"})
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace lpdeform
