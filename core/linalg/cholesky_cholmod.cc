@@ -21,6 +21,36 @@ void pin_blas_to_one_thread() {
   });
 }
 
+/// CHOLMOD's own loops ask OpenMP for four threads, whatever ours are. While this lives they run on the calling
+/// thread alone, which is nearly as fast.
+class WithoutOpenMp {
+ public:
+  WithoutOpenMp() {
+    if (set() == nullptr || get() == nullptr) return;
+    levels_ = get()();
+    set()(0);
+  }
+  ~WithoutOpenMp() {
+    if (levels_ >= 0) set()(levels_);
+  }
+  WithoutOpenMp(const WithoutOpenMp&) = delete;
+  WithoutOpenMp& operator=(const WithoutOpenMp&) = delete;
+
+ private:
+  using Set = void (*)(int);
+  using Get = int (*)();
+  static Set set() {
+    static const auto function = reinterpret_cast<Set>(dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
+    return function;
+  }
+  static Get get() {
+    static const auto function = reinterpret_cast<Get>(dlsym(RTLD_DEFAULT, "omp_get_max_active_levels"));
+    return function;
+  }
+
+  int levels_ = -1;
+};
+
 /// A cholmod view of our arrays; nothing is copied or owned.
 cholmod_sparse view_of(const LowerMatrix& matrix) {
   cholmod_sparse view{};
@@ -145,6 +175,7 @@ bool SparseCholesky::factor(const LowerMatrix& matrix) {
       std::all_of(matrix.values.begin(), matrix.values.end(), [](double v) { return std::isfinite(v); });
   if (!is_finite) return false;
   cholmod_sparse view = view_of(matrix);
+  const WithoutOpenMp alone;
   const int ok = cholmod_factorize(&view, impl_->factor, &impl_->common);
   return ok && impl_->common.status == CHOLMOD_OK && impl_->factor->minor == impl_->factor->n &&
          has_positive_diagonal(*impl_->factor);
