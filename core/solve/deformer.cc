@@ -91,7 +91,7 @@ struct Deformer::Impl {
 /// Laplacian system L x = L p with the handles' positions given.
 Points Deformer::Impl::laplacian_guess() {
   Points u = constraints->targets - shape->scaled_positions();
-  metric.extend(constraints->is_held, u);
+  metric.extend(constraints->is_held, u, cells.workers());
   return shape->scaled_positions() + u;
 }
 
@@ -104,7 +104,7 @@ Points Deformer::Impl::current_guess() {
     is_moved = is_moved || !u.row(i).isZero(0);
   }
   if (!is_moved) return x;
-  metric.extend(constraints->is_held, u);
+  metric.extend(constraints->is_held, u, cells.workers());
   return x + u;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace lpdeform {
 namespace {
@@ -54,7 +55,13 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
   return is_good_ = factor_.factor(matrix_);
 }
 
-void Metric::extend(const std::vector<char>& is_held, Points& u) const {
+void Metric::adopt(const std::vector<double>& cell_weights) {
+  const double present = std::accumulate(cell_weights_.begin(), cell_weights_.end(), 0.0);
+  const double wanted = std::accumulate(cell_weights.begin(), cell_weights.end(), 0.0);
+  if (wanted > 0 && std::isfinite(wanted)) scale_ = wanted / present;
+}
+
+void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& workers) const {
   Points b = Points::Zero(u.rows(), 3);
   for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
     if (is_held[i]) {
@@ -66,7 +73,10 @@ void Metric::extend(const std::vector<char>& is_held, Points& u) const {
       if (is_held[j]) b.row(i) += edge_weight(i, k) * u.row(j);
     }
   }
-  factor_.solve(b, u);
+  if (single_.empty())
+    factor_.solve(b, u);
+  else
+    single_.solve(b, u, workers);
 }
 
 void Metric::solve(const Points& b, Points& x) const {

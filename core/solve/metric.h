@@ -24,6 +24,10 @@ class Metric {
   /// factor for the same held vertices and cell weights, up to a common factor, is kept.
   [[nodiscard]] bool factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held);
 
+  /// Keeps the last factor for these cell weights as well, scaled to them on the whole: for a metric that need
+  /// not be exact. After is_factored_for().
+  void adopt(const std::vector<double>& cell_weights);
+
   /// The last factor() was for these held vertices and succeeded.
   bool is_factored_for(const std::vector<char>& is_held) const { return is_good_ && is_held == is_held_; }
 
@@ -34,8 +38,9 @@ class Metric {
   void precondition(const Points& b, Points& x, const Workers& workers) const;
 
   /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of
-  /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2. Rows of free vertices are overwritten.
-  void extend(const std::vector<char>& is_held, Points& u) const;
+  /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2. Rows of free vertices are overwritten. To single
+  /// precision where precondition() has been asked for.
+  void extend(const std::vector<char>& is_held, Points& u, const Workers& workers) const;
 
   /// c_i as factored, clipped.
   double cell_weight(std::int32_t i) const { return scale_ * cell_weights_[i]; }

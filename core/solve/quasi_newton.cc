@@ -9,6 +9,7 @@ namespace {
 constexpr std::size_t kMemory = 6;
 constexpr int kWindow = 20;
 constexpr int kRefresh = 40;
+constexpr int kTrial = 10;  // iterations for which a live session keeps the metric that it finds
 constexpr double kSufficientDecrease = 1e-4;
 constexpr int kStageIterations = 30;
 constexpr double kSmoothingStep = 0.1;
@@ -29,11 +30,11 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, bool is_warm)
   for (const double p : {2.0, 1.6, 1.35, 1.2, 1.1, 1.05}) {
     if (!is_warm && p > lowest) shares_.push_back((2 - p) / (2 - lowest));
   }
-  begin_stage();
+  begin_stage(is_warm && problem_.metric.is_factored_for(problem_.constraints.is_held));
 }
 
 /// The objective of stage_: p first, then eps. problem_.cells holds the evaluation at x_.
-void QuasiNewton::begin_stage() {
+void QuasiNewton::begin_stage(bool keeps_metric) {
   const bool is_on_the_way = stage_ < static_cast<int>(shares_.size());
   if (stage_ > static_cast<int>(shares_.size())) eps2_ *= kSmoothingStep;
   norm_ = (is_on_the_way ? problem_.norm.nearer_two(shares_[stage_]) : problem_.norm).smoothed(eps2_);
@@ -41,7 +42,7 @@ void QuasiNewton::begin_stage() {
   is_last_stage_ = !is_on_the_way && is_smooth_enough();
   history_.assign(1, objective_);
   stage_iterations_ = 0;
-  is_metric_good_ = refresh_metric();
+  is_metric_good_ = keeps_metric ? adopt_metric() : refresh_metric();
 }
 
 /// Smoothing adds up to eps^p to a cell's E_i^p: too little to matter beside the mean cell's.
@@ -53,10 +54,23 @@ bool QuasiNewton::is_smooth_enough() const {
   return std::pow(std::sqrt(eps2_) / mean, problem_.norm.lowest_p()) <= kBias;
 }
 
-bool QuasiNewton::refresh_metric() {
+/// In a live session the metric of the state before serves at first: a factorisation takes as long as several
+/// iterations.
+bool QuasiNewton::adopt_metric() {
+  begin_memory();
+  since_refresh_ = kRefresh - kTrial;
+  problem_.metric.adopt(problem_.cells.cell_weights());
+  return true;
+}
+
+void QuasiNewton::begin_memory() {
   problem_.cells.gradient(gradient_);
   clear_held_rows(problem_.constraints, gradient_);
   memory_.clear();
+}
+
+bool QuasiNewton::refresh_metric() {
+  begin_memory();
   since_refresh_ = 0;
   return problem_.metric.factor(problem_.cells.cell_weights(), problem_.constraints.is_held);
 }

@@ -28,8 +28,10 @@ class QuasiNewton : public Minimiser {
   const Points& x() const override { return x_; }
 
  private:
-  void begin_stage();
+  void begin_stage(bool keeps_metric = false);
   bool is_smooth_enough() const;
+  bool adopt_metric();
+  void begin_memory();
   bool refresh_metric();
   double direction(Points& d);
   double search(const Points& d, double slope);

@@ -53,7 +53,7 @@ TEST_F(MetricTest, ExtendsDisplacementsHarmonically) {
   Points u = Points::Zero(shape->vertex_count(), 3);
   u.row(0) << 1, 2, 3;
   u.row(7) << -1, 0, 1;
-  metric.extend(is_held, u);
+  metric.extend(is_held, u, Workers(1));
   EXPECT_EQ(u.row(20), Eigen::RowVector3d(0, 0, 0));
   EXPECT_EQ(u.row(0), Eigen::RowVector3d(1, 2, 3));
   const Points residual = apply(u);
