@@ -58,7 +58,7 @@ std::optional<Note> FrameStream::next_locked(Timers::TimePoint now) {
   if (!cutter_.has_more()) begin_frame(now);
   const bool is_answers_turn = !cutter_.has_more() || !std::exchange(was_answer_, false);
   if (!answers_.empty() && is_answers_turn) {
-    was_answer_ = true;
+    was_answer_ = cutter_.has_more();
     Note answer = std::move(answers_.front());
     answers_.pop_front();
     return answer;

@@ -127,10 +127,12 @@ absl::StatusOr<std::shared_ptr<Upload>> Uploads::find(const std::string& name) {
 
 void Uploads::remove(const std::string& name) {
   const std::scoped_lock lock(mutex_);
-  const auto found = uploads_.find(name);
-  if (found == uploads_.end()) return;
-  requested_.erase(found->second.request_id);
-  uploads_.erase(found);
+  if (const auto found = uploads_.find(name); found != uploads_.end()) forget(found);
+}
+
+void Uploads::forget(std::map<std::string, Entry>::iterator entry) {
+  requested_.erase(entry->second.request_id);
+  uploads_.erase(entry);
 }
 
 void Uploads::watch(const std::string& name, Timers::TimePoint when) {
@@ -141,14 +143,12 @@ void Uploads::watch(const std::string& name, Timers::TimePoint when) {
 
 /// Forgets the upload when it has been idle for long enough; looks again later where it has not.
 void Uploads::expire(const std::string& name) {
-  {
-    const std::scoped_lock lock(mutex_);
-    const auto found = uploads_.find(name);
-    if (found == uploads_.end()) return;
-    const Timers::TimePoint due = found->second.last_used + limits_.idle;
-    if (timers_->now() < due) return watch(name, due);
-  }
-  remove(name);
+  const std::scoped_lock lock(mutex_);
+  const auto found = uploads_.find(name);
+  if (found == uploads_.end()) return;
+  const Timers::TimePoint due = found->second.last_used + limits_.idle;
+  if (timers_->now() < due) return watch(name, due);
+  forget(found);
 }
 
 }  // namespace lpdeform

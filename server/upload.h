@@ -85,6 +85,7 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
     std::string request_id;
     Timers::TimePoint last_used;
   };
+  void forget(std::map<std::string, Entry>::iterator entry);
   void watch(const std::string& name, Timers::TimePoint when);
   void expire(const std::string& name);
 

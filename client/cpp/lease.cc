@@ -22,8 +22,8 @@ absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptio
   if (!packed.ok()) return packed;
 
   auto created = rpc.call(request, stop);
+  if (!is_undecided(created.status())) uploads.discard();
   if (!created.ok()) return created.status();
-  uploads.discard();
   const v1::Session& session = created->session();
   return Lease{session.name(), created->writer_token(), session.epoch(), session.input_seq(),
                from_wire(session.mesh())};

@@ -100,8 +100,9 @@ void Ledger::drop_unaccepted() {
 }
 
 void Ledger::count_from(std::uint64_t seq) {
-  next_seq_ = std::max(next_seq_, seq + 1);
-  if (waiting_ && waiting_->seq <= seq) waiting_->seq = next_seq_++;
+  if (next_seq_ > seq) return;
+  next_seq_ = seq + 1;
+  if (waiting_) waiting_->seq = next_seq_++;
 }
 
 std::uint64_t Ledger::newest() const {

@@ -104,15 +104,15 @@ bool Link::send_one(DeformCall& call, std::unique_lock<std::mutex>& lock) {
     lock.lock();
     return true;
   }
-  if (!uploads_done_.empty()) {
-    std::vector<Uploads> done = std::exchange(uploads_done_, {});
-    lock.unlock();
-    for (Uploads& uploads : done) uploads.discard();
-    lock.lock();
+  if (!is_solving_ && ledger_.can_send()) {
+    send_update(call, ledger_.send_next(), lock);
     return true;
   }
-  if (is_solving_ || !ledger_.can_send()) return false;
-  send_update(call, ledger_.send_next(), lock);
+  if (uploads_done_.empty()) return false;
+  std::vector<Uploads> done = std::exchange(uploads_done_, {});
+  lock.unlock();
+  for (Uploads& uploads : done) uploads.discard();
+  lock.lock();
   return true;
 }
 

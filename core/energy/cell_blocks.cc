@@ -1,6 +1,7 @@
 #include "core/energy/cell_blocks.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "core/base/check.h"
@@ -40,13 +41,15 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_
     first_slot.push_back(first_slot.back() + static_cast<std::uint32_t>(slots));
   }
 
+  LPDEFORM_CHECK(slot_count() * 3 * kLanes <= std::numeric_limits<std::uint32_t>::max());
+
   row.resize(cells.size());
   rest_size.resize(cells.size());
   neighbour_row.resize(slot_count() * kLanes);
   weight.resize(slot_count() * kLanes);
   rest_edge.resize(slot_count() * kLanes * 3);
   opposite.resize(slot_count() * kLanes);
-  std::vector<std::int32_t> place_of_entry(shape.neighbours().size());  // of the k-th directed edge i to j
+  std::vector<std::uint32_t> place_of_entry(shape.neighbours().size());  // of the k-th directed edge i to j
   for (std::size_t c = 0; c < cells.size(); ++c) {
     const std::size_t lane = c % kLanes, block = c / kLanes;
     const std::int32_t i = cells[c];
@@ -58,7 +61,7 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_
       const bool is_there = k < end;
       const std::int32_t j = is_there ? shape.neighbours()[k] : std::max(i, 0);
       neighbour_row[at] = 3 * j;
-      opposite[at] = static_cast<std::int32_t>(slot * 3 * kLanes + lane);  // itself; mended below
+      opposite[at] = static_cast<std::uint32_t>(slot * 3 * kLanes + lane);  // itself; mended below
       if (!is_there) continue;
       place_of_entry[k] = opposite[at];
       weight[at] = shape.weights()[k];
@@ -75,7 +78,7 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_
       const std::int32_t j = shape.neighbours()[k];
       const auto ring = shape.neighbours().begin();
       const auto back = std::lower_bound(ring + offsets[j], ring + offsets[j + 1], i) - ring;
-      const auto place = static_cast<std::size_t>(place_of_entry[k]);
+      const std::size_t place = place_of_entry[k];
       opposite[place / (3 * kLanes) * kLanes + place % kLanes] = place_of_entry[back];
     }
   }

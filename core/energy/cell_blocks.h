@@ -31,7 +31,7 @@ struct CellBlocks {
   std::vector<std::int32_t> neighbour_row;  // [slot][lane]: 3 * vertex
   std::vector<double> weight;               // [slot][lane]: w_ij
   std::vector<double> rest_edge;            // [slot][axis][lane]: p_i - p_j in scaled units
-  std::vector<std::int32_t>
+  std::vector<std::uint32_t>
       opposite;  // [slot][lane]: where [slot][0][lane] of the edge j to i is, in such an array
 };
 

@@ -104,22 +104,23 @@ void SingleFactor::cut_branches() {
   const auto count = static_cast<std::int32_t>(supernodes_.size());
   const std::vector<std::int32_t> parent = parents();
   std::vector<std::size_t> work(count), nodes(count, 1);  // of the subtree below and with each
+  std::vector<char> is_whole(count, true);  // its supernodes lie together, and so do those of each below it
   std::vector<std::int32_t> first(count);
   for (std::int32_t k = 0; k < count; ++k) first[k] = k;
   for (std::int32_t k = 0; k < count; ++k) {
     const Supernode& node = supernodes_[k];
     work[k] +=
         static_cast<std::size_t>(node.columns) * (static_cast<std::size_t>(node.columns) + node.row_count);
+    is_whole[k] = is_whole[k] && nodes[k] == static_cast<std::size_t>(k - first[k] + 1);
     if (parent[k] < 0) continue;
+    is_whole[parent[k]] = is_whole[parent[k]] && is_whole[k];
     work[parent[k]] += work[k];
     nodes[parent[k]] += nodes[k];
     first[parent[k]] = std::min(first[parent[k]], first[k]);
   }
   const std::size_t most = std::max(values_.size() / kBranches, kSmallestBranch);
   const bool is_worth_it = values_.size() >= 4 * kSmallestBranch;
-  const auto is_branch = [&](std::int32_t k) {  // a whole subtree, its supernodes next to one another
-    return is_worth_it && work[k] <= most && nodes[k] == static_cast<std::size_t>(k - first[k] + 1);
-  };
+  const auto is_branch = [&](std::int32_t k) { return is_worth_it && work[k] <= most && is_whole[k]; };
   std::size_t bundled = most;
   for (std::int32_t k = 0; k < count; ++k) {
     if (is_branch(k) && parent[k] >= 0 && is_branch(parent[k])) continue;  // its parent's

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kCertificateSeconds = 1;  // it gets, whatever is left of the time limit
 constexpr std::size_t kWorkspace =
-    22;  // positions of all vertices that a solve holds at most: the memory of L-BFGS
+    24;  // positions of all vertices that a solve holds at most: the memory of L-BFGS
 constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
@@ -50,7 +50,7 @@ struct Deformer::Impl {
   double typical_energy(const Points& guess);
   double zero_objective() const;
   Problem make_problem();
-  std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, bool is_warm);
+  std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, Warmth warmth);
   bool prepare_metric(bool needs_plain_weights);
   double keep_if_best();
   void record(const StepResult& result, double sum);
@@ -73,8 +73,9 @@ struct Deformer::Impl {
   // The state, in scaled units: the best of the last solve, or what was set.
   Points x;
   bool has_state = false;
-  Field best_energies;  // E_i at x, the caller's units
-  Points positions;     // x in the caller's units, made when asked for
+  bool is_metric_live = false;  // the last factor is quasi_newton's, for this material
+  Field best_energies;          // E_i at x, the caller's units
+  Points positions;             // x in the caller's units, made when asked for
   bool is_positions_current = true;
 
   // The running solve.
@@ -151,7 +152,7 @@ Problem Deformer::Impl::make_problem() {
           stop};
 }
 
-std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points guess, bool is_warm) {
+std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points guess, Warmth warmth) {
   Problem problem = make_problem();
   switch (method) {
     case Method::kLineSearch:
@@ -164,7 +165,7 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points 
     case Method::kQuasiNewton:
       break;
   }
-  return std::make_unique<QuasiNewton>(std::move(problem), std::move(guess), is_warm);
+  return std::make_unique<QuasiNewton>(std::move(problem), std::move(guess), warmth);
 }
 
 /// Factors for the present handles with equal cell weights, unless a usable factor is there. False where that
@@ -204,6 +205,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   summary.method = settings.method;
   summary.threads = cells.workers().threads();
   const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state;
+  const bool keeps_metric = is_warm && is_metric_live && metric.is_factored_for(constraints->is_held);
   const bool is_factored = prepare_metric(!is_warm);
   summary.setup_seconds = seconds_since(started);
 
@@ -215,7 +217,9 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   norm.emplace(material, shape->vertex_count(), unit(), reference);
   cells.reweigh(*norm);  // typical_energy has evaluated the guess
   best_sum = std::numeric_limits<double>::infinity();
-  minimiser = make_minimiser(settings.method, std::move(guess), is_warm);
+  const Warmth warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
+  minimiser = make_minimiser(settings.method, std::move(guess), warmth);
+  is_metric_live = settings.method == Method::kQuasiNewton;
   const double sum = keep_if_best();
   summary.initial_energy = norm->true_energy(sum);
   record({Outcome::kProgress, sum, 0}, sum);
@@ -250,6 +254,7 @@ void Deformer::Impl::end(StopReason reason) {
 
 double Deformer::Impl::gap(double max_seconds) {
   if (!constraints || !norm) return 1;
+  is_metric_live = false;  // the certificate factors for itself
   cells.evaluate(x, *norm);
   return relative_gap(make_problem(), x, {.max_seconds = max_seconds});
 }
@@ -298,6 +303,7 @@ absl::Status Deformer::set_material(const Material& material) {
     return status;
   impl_->interrupt();
   impl_->material = material;
+  impl_->is_metric_live = false;
   return absl::OkStatus();
 }
 

@@ -39,7 +39,7 @@ class Metric {
 
   /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of
   /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2. Rows of free vertices are overwritten. To single
-  /// precision where precondition() has been asked for.
+  /// precision where precondition() has been asked for since the last factor().
   void extend(const std::vector<char>& is_held, Points& u, const Workers& workers) const;
 
   /// c_i as factored, clipped.

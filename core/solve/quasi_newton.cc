@@ -18,11 +18,12 @@ constexpr double kLeastSmoothing = 1e-26;  // eps^2 over the squared diagonal: r
 
 }  // namespace
 
-QuasiNewton::QuasiNewton(Problem problem, Points x, bool is_warm)
+QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
     : problem_(std::move(problem)),
       norm_(problem_.norm),
       x_(std::move(x)),
       memory_(problem_.cells.workers(), kMemory) {
+  const bool is_warm = warmth != Warmth::kCold;
   const double lowest = problem_.norm.lowest_p();
   if (lowest < 2) eps2_ = (is_warm ? 1e-9 : 1e-6) * problem_.diagonal * problem_.diagonal;
   // No way from p = 2 where all p_i > 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8 times
@@ -30,7 +31,7 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, bool is_warm)
   for (const double p : {2.0, 1.6, 1.35, 1.2, 1.1, 1.05}) {
     if (!is_warm && p > lowest) shares_.push_back((2 - p) / (2 - lowest));
   }
-  begin_stage(is_warm && problem_.metric.is_factored_for(problem_.constraints.is_held));
+  begin_stage(warmth == Warmth::kWithMetric);
 }
 
 /// The objective of stage_: p first, then eps. problem_.cells holds the evaluation at x_.

@@ -8,13 +8,20 @@
 
 namespace lpdeform {
 
+/// What a solve finds at its beginning.
+enum class Warmth {
+  kCold,
+  kWarm,        // the state of the solve before, in a live session
+  kWithMetric,  // and the metric that it ended with
+};
+
 /// Limited-memory BFGS (Nocedal & Wright, algorithm 7.4) on E(x) with the reweighted Laplacian as its initial
 /// metric (after Liu et al. 2017), t = 1 first, backtracking by interpolation. The default for every p.
 ///
 /// Where some p_i < 2 it runs through stages: p from 2 towards p_i, then cell energies smoothed with an eps
 /// that falls until it does not matter. Each stage begins with a metric refactored for the present cell
-/// weights and an empty memory; so does every 40th iteration. In a live session (`is_warm`) it starts at p_i
-/// with a small eps.
+/// weights and an empty memory; so does every 40th iteration. In a live session it starts at p_i with a small
+/// eps, and for its first ten iterations keeps the metric that it finds.
 ///
 /// Converged when, in the last stage, the objective f fell over 20 iterations by at most tolerance * p * f, p
 /// the largest p_i (a relative decrease of E^(1/p) of at most the tolerance); or when no step lowers f and
@@ -22,7 +29,7 @@ namespace lpdeform {
 /// to rounding.
 class QuasiNewton : public Minimiser {
  public:
-  QuasiNewton(Problem problem, Points x, bool is_warm);
+  QuasiNewton(Problem problem, Points x, Warmth warmth);
 
   StepResult step() override;
   const Points& x() const override { return x_; }

@@ -107,20 +107,23 @@ TEST_F(LoadTest, ASmallMeshKeepsItsRateBesideALargeOne) {
   // The large session has only begun to factor; the small one is answered again and again meanwhile. Were the
   // small one's updates to wait for a slice of the large one, there would be one answer a slice.
   std::atomic<std::uint32_t> large_iteration = 0;
+  std::atomic<bool> is_over = false;
   std::jthread watching([&] {
     while (large_iteration < 3) {
       const auto frame = large_client.next_frame();
-      if (!frame) return;
+      if (!frame) break;
       large_iteration = frame->header.iteration();
     }
+    is_over = true;
   });
   ASSERT_TRUE(small_client.send(ends_message(bar_mesh().vertices, 1, 0)));
   std::uint64_t seq = 1;
-  while (large_iteration < 3) {
+  while (!is_over) {
     ASSERT_TRUE(small_client.send(tip_message(seq + 1, 0.05 * static_cast<double>(seq % 40))));
     ASSERT_TRUE(small_client.settle(++seq));
   }
   watching.join();
+  EXPECT_GE(large_iteration, 3u);
   EXPECT_GE(seq, 20u);
   for (const auto& frame : large_client.history.frames) {
     EXPECT_FALSE(frame.input_seq() == 1 && frame.converged());  // it was at work all the time

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <limits>
+#include <map>
 #include <random>
 
 namespace lpdeform {
@@ -90,8 +91,35 @@ TEST(Cholesky, ASinglePrecisionCopyCanBeMadeAgain) {
   }
 }
 
-/// The five-point Laplacian of a square, plus the identity: a tree with many branches.
-LowerMatrix square_laplacian(int side) {
+LowerMatrix with_shortcuts(const LowerMatrix& matrix, int count) {
+  std::mt19937 random(9);
+  std::uniform_int_distribution<int> point(0, matrix.size() - 1);
+  std::vector<std::map<int, double>> columns(static_cast<std::size_t>(matrix.size()));
+  for (std::int32_t c = 0; c < matrix.size(); ++c) {
+    for (std::int32_t k = matrix.columns[c]; k < matrix.columns[c + 1]; ++k) {
+      columns[static_cast<std::size_t>(c)][matrix.rows[k]] = matrix.values[k];
+    }
+  }
+  for (int k = 0; k < count; ++k) {
+    const int a = point(random), b = point(random);
+    if (a == b || columns[static_cast<std::size_t>(std::min(a, b))].contains(std::max(a, b))) continue;
+    columns[static_cast<std::size_t>(std::min(a, b))][std::max(a, b)] = -1;
+    columns[static_cast<std::size_t>(a)][a] += 1;
+    columns[static_cast<std::size_t>(b)][b] += 1;
+  }
+  LowerMatrix result;
+  result.columns.push_back(0);
+  for (const auto& column : columns) {
+    for (const auto& [row, value] : column) result.rows.push_back(row), result.values.push_back(value);
+    result.columns.push_back(static_cast<std::int32_t>(result.rows.size()));
+  }
+  return result;
+}
+
+/// The five-point Laplacian of a square, plus the identity: a tree with many branches. With `shortcuts` as many
+/// pairs of points are joined besides: a tree whose subtrees do not all lie together.
+LowerMatrix square_laplacian(int side, int shortcuts = 0) {
+  if (shortcuts > 0) return with_shortcuts(square_laplacian(side), shortcuts);
   LowerMatrix result;
   result.columns.push_back(0);
   const auto add = [&](int row, double value) { result.rows.push_back(row), result.values.push_back(value); };
@@ -105,8 +133,8 @@ LowerMatrix square_laplacian(int side) {
 }
 
 TEST(SingleFactor, GivesTheSameBitsOnAnyNumberOfThreadsAndTheRightOnes) {
-  for (const int side : {60, 150}) {
-    const LowerMatrix matrix = square_laplacian(side);
+  for (const auto& [side, shortcuts] : {std::pair{60, 0}, {150, 0}, {220, 300}, {220, 500}, {260, 700}}) {
+    const LowerMatrix matrix = square_laplacian(side, shortcuts);
     SparseCholesky cholesky(matrix);
     ASSERT_TRUE(cholesky.factor(matrix));
     SingleFactor single;

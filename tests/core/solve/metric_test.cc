@@ -48,6 +48,30 @@ TEST_F(MetricTest, InvertsTheReweightedLaplacian) {
   EXPECT_LT((x - u).norm(), 1e-12);
 }
 
+TEST_F(MetricTest, PreconditionsLikeSolveAlsoAfterAnotherFactorAndAfterAdoptingWeights) {
+  Points b = Points::Random(shape->vertex_count(), 3), exact, x;
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+    if (is_held[i]) b.row(i).setZero();
+  }
+  for (int round = 0; round < 2; ++round) {
+    ASSERT_TRUE(metric.factor(cell_weights, is_held));
+    metric.solve(b, exact);
+    metric.precondition(b, x, Workers(1));
+    EXPECT_LT((x - exact).norm(), 1e-5 * exact.norm());
+    cell_weights[5] += 10;
+  }
+  cell_weights[5] -= 10;
+  for (double& weight : cell_weights) weight *= 3;
+  metric.adopt(cell_weights);
+  metric.precondition(b, x, Workers(1));
+  EXPECT_LT((3 * x - exact).norm(), 1e-5 * exact.norm());
+  for (const double useless : {0.0, std::nan(""), HUGE_VAL}) {
+    metric.adopt(std::vector<double>(cell_weights.size(), useless));
+    metric.precondition(b, x, Workers(1));
+    EXPECT_LT((3 * x - exact).norm(), 1e-5 * exact.norm());
+  }
+}
+
 TEST_F(MetricTest, ExtendsDisplacementsHarmonically) {
   ASSERT_TRUE(metric.factor(cell_weights, is_held));
   Points u = Points::Zero(shape->vertex_count(), 3);
