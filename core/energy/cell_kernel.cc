@@ -73,9 +73,9 @@ HWY_INLINE void gather_edges(const CellBlocks& blocks, std::size_t block, std::s
                              double* edges, FitSums* sums) {
   constexpr std::size_t kLanes = CellBlocks::kLanes;
   const D d;
-  const Vector centre = gather(x, blocks.row.data() + block * kLanes + lane, 1);
+  const Vector centre = gather(x, blocks.row.data() + block * kLanes + lane);
   for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1]; ++slot) {
-    const Vector neighbour = gather(x, blocks.neighbour_row.data() + slot * kLanes + lane, 1);
+    const Vector neighbour = gather(x, blocks.neighbour_row.data() + slot * kLanes + lane);
     const Vector edge{hn::Sub(centre.x, neighbour.x), hn::Sub(centre.y, neighbour.y),
                       hn::Sub(centre.z, neighbour.z)};
     store(edge, edges + slot * 3 * kLanes + lane);

@@ -53,14 +53,14 @@ HWY_INLINE void store(const Vector& v, double* at) {
   hn::StoreU(v.z, d, at + 2 * CellBlocks::kLanes);
 }
 
-/// Numbers `stride` apart from where the indices say.
-HWY_INLINE Vector gather(const double* base, const std::int32_t* indices, std::size_t stride) {
+/// Rows x, y, z that begin where the indices say.
+HWY_INLINE Vector gather(const double* base, const std::int32_t* indices) {
   const D d;
   const hn::RebindToSigned<D> wide;
   const hn::Rebind<std::int32_t, D> narrow;
   const auto index = hn::PromoteTo(wide, hn::LoadU(narrow, indices));
-  return {hn::GatherIndex(d, base, index), hn::GatherIndex(d, base + stride, index),
-          hn::GatherIndex(d, base + 2 * stride, index)};
+  return {hn::GatherIndex(d, base, index), hn::GatherIndex(d, base + 1, index),
+          hn::GatherIndex(d, base + 2, index)};
 }
 
 HWY_INLINE Matrix rotation_of(const Quaternion& q) {
