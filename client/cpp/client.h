@@ -32,7 +32,8 @@ struct ClientOptions {
   std::chrono::milliseconds connect_timeout = std::chrono::seconds(10);
   /// Of every other call but Session::solve, which has its own.
   std::chrono::milliseconds call_timeout = std::chrono::seconds(30);
-  /// A live session whose server stays away for longer gives up; next_frame then says UNAVAILABLE for good.
+  /// A live session whose server stays away for longer gives up; next_frame then says UNAVAILABLE for good. A
+  /// solve under way says it too, and may be asked for again.
   std::chrono::milliseconds reconnect_for = std::chrono::minutes(2);
 };
 
@@ -96,8 +97,9 @@ class Session {
   absl::StatusOr<Frame> settle(std::chrono::milliseconds timeout);
 
   /// Solves for the present handles and settings on the server and returns the finished result; waits for it.
-  /// Does not need the stream of frames, but works beside it. Ends early with CANCELLED when close() is
-  /// called from another thread. Errors: what the server refuses; DEADLINE_EXCEEDED; UNAVAILABLE.
+  /// Does not need the stream of frames, but works beside it. Begins again where the server went away, within
+  /// the deadline and for as long as the stream would try. Ends early with CANCELLED when close() is called
+  /// from another thread. Errors: what the server refuses; DEADLINE_EXCEEDED; UNAVAILABLE.
   absl::StatusOr<SolveResult> solve(const SolveOptions& options = {});
 
   /// Becomes the writer in place of whoever is, after WRITER_REPLACED or as a reader. Waits for the server.

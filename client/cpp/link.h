@@ -74,6 +74,8 @@ class Link {
   void acknowledge(std::uint64_t frame_seq, std::uint64_t stream);
   absl::Status check_initial_positions(const SolveOptions& options) const;
   absl::StatusOr<std::optional<Frame>> take_frame(Clock::time_point deadline);
+  absl::StatusOr<SolveResult> solve_patiently(const SolveOptions& options);
+  absl::StatusOr<SolveResult> solve_or_make_anew(const SolveOptions& options);
   absl::StatusOr<SolveResult> solve_once(const SolveOptions& options);
   absl::Status send_restore(std::unique_lock<std::mutex>& lock);
   absl::Status make_anew(const std::string& lost);

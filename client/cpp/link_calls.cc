@@ -111,9 +111,37 @@ absl::StatusOr<SolveResult> Link::solve(const SolveOptions& options) {
     is_solving_ = false;
     changed_.notify_all();
   });
-  const std::string session = lease_.session;
   lock.unlock();
+  return solve_patiently(options);
+}
 
+/// Tries again while the server is away, for as long as the stream would.
+absl::StatusOr<SolveResult> Link::solve_patiently(const SolveOptions& options) {
+  const Clock::time_point start = Clock::now();
+  std::optional<Clock::time_point> latest;
+  SolveOptions left = options;
+  Backoff backoff;
+  for (;;) {
+    absl::StatusOr<SolveResult> result = solve_or_make_anew(left);
+    if (!absl::IsUnavailable(result.status())) return result;
+    const Clock::time_point now = Clock::now();
+    const auto pause = backoff.next();
+    if (!latest) latest = now + client_options_.reconnect_for;
+    if (now + pause > *latest) return result;
+    if (options.deadline_seconds > 0) {
+      left.deadline_seconds =
+          options.deadline_seconds - std::chrono::duration<double>(now + pause - start).count();
+      if (left.deadline_seconds <= 0) return result;
+    }
+    std::unique_lock lock(mutex_);
+    if (changed_.wait_for(lock, pause, [this] { return is_closing_; })) {
+      return absl::CancelledError("The session was closed.");
+    }
+  }
+}
+
+absl::StatusOr<SolveResult> Link::solve_or_make_anew(const SolveOptions& options) {
+  const std::string session = name();
   absl::StatusOr<SolveResult> result = solve_once(options);
   if (!is_session_lost(result.status()) || copy_ == nullptr) return result;
   const absl::Status made = make_anew(session);
