@@ -39,13 +39,14 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_
       if (i >= 0) slots = std::max(slots, offsets[i + 1] - offsets[i]);
     }
     first_slot.push_back(first_slot.back() + static_cast<std::uint32_t>(slots));
+    most_slots = std::max(most_slots, static_cast<std::size_t>(slots));
   }
 
-  LPDEFORM_CHECK(slot_count() * 3 * kLanes <= std::numeric_limits<std::uint32_t>::max());
+  LPDEFORM_CHECK(slot_count() * kLanes <= std::numeric_limits<std::uint32_t>::max());
 
-  row.resize(cells.size());
+  centre.resize(cells.size());
   rest_size.resize(cells.size());
-  neighbour_row.resize(slot_count() * kLanes);
+  neighbour.resize(slot_count() * kLanes);
   weight.resize(slot_count() * kLanes);
   rest_edge.resize(slot_count() * kLanes * 3);
   opposite.resize(slot_count() * kLanes);
@@ -53,15 +54,15 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_
   for (std::size_t c = 0; c < cells.size(); ++c) {
     const std::size_t lane = c % kLanes, block = c / kLanes;
     const std::int32_t i = cells[c];
-    row[c] = 3 * std::max(i, 0);
+    centre[c] = std::max(i, 0);
     const std::int32_t begin = i < 0 ? 0 : offsets[i], end = i < 0 ? 0 : offsets[i + 1];
     for (std::size_t slot = first_slot[block]; slot < first_slot[block + 1]; ++slot) {
       const std::size_t at = slot * kLanes + lane;
       const auto k = begin + static_cast<std::int32_t>(slot - first_slot[block]);
       const bool is_there = k < end;
       const std::int32_t j = is_there ? shape.neighbours()[k] : std::max(i, 0);
-      neighbour_row[at] = 3 * j;
-      opposite[at] = static_cast<std::uint32_t>(slot * 3 * kLanes + lane);  // itself; mended below
+      neighbour[at] = j;
+      opposite[at] = static_cast<std::uint32_t>(at);  // itself; mended below
       if (!is_there) continue;
       place_of_entry[k] = opposite[at];
       weight[at] = shape.weights()[k];
@@ -78,14 +79,13 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_
       const std::int32_t j = shape.neighbours()[k];
       const auto ring = shape.neighbours().begin();
       const auto back = std::lower_bound(ring + offsets[j], ring + offsets[j + 1], i) - ring;
-      const std::size_t place = place_of_entry[k];
-      opposite[place / (3 * kLanes) * kLanes + place % kLanes] = place_of_entry[back];
+      opposite[place_of_entry[k]] = place_of_entry[back];
     }
   }
 }
 
 std::size_t CellBlocks::memory_bytes() const {
-  return (first_slot.capacity() + cells.capacity() + row.capacity() + neighbour_row.capacity() +
+  return (first_slot.capacity() + cells.capacity() + centre.capacity() + neighbour.capacity() +
           opposite.capacity()) *
              sizeof(std::int32_t) +
          (rest_size.capacity() + weight.capacity() + rest_edge.capacity()) * sizeof(double);

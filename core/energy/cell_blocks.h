@@ -24,15 +24,15 @@ struct CellBlocks {
   std::size_t memory_bytes() const;
 
   std::vector<std::uint32_t> first_slot;  // of each block, and the end
+  std::size_t most_slots = 0;             // of a block
   std::vector<std::int32_t> cells;        // [block][lane]: vertex; -1 in lanes without a cell
-  std::vector<std::int32_t> row;          // [block][lane]: 3 * vertex; 0 in lanes without a cell
+  std::vector<std::int32_t> centre;       // [block][lane]: vertex; 0 in lanes without a cell
   std::vector<double> rest_size;          // [block][lane]: sum_j w_ij |p_i - p_j|^2
 
-  std::vector<std::int32_t> neighbour_row;  // [slot][lane]: 3 * vertex
-  std::vector<double> weight;               // [slot][lane]: w_ij
-  std::vector<double> rest_edge;            // [slot][axis][lane]: p_i - p_j in scaled units
-  std::vector<std::uint32_t>
-      opposite;  // [slot][lane]: where [slot][0][lane] of the edge j to i is, in such an array
+  std::vector<std::int32_t> neighbour;  // [slot][lane]: vertex; 0 in lanes without a cell
+  std::vector<double> weight;           // [slot][lane]: w_ij
+  std::vector<double> rest_edge;        // [slot][axis][lane]: p_i - p_j in scaled units
+  std::vector<std::uint32_t> opposite;  // [slot][lane]: the [slot][lane] of the edge from j to i
 };
 
 }  // namespace lpdeform

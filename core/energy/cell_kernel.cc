@@ -16,7 +16,6 @@ namespace lpdeform::HWY_NAMESPACE {
 
 /// The fit of one lane by itself, from and to memory.
 void fit_lane(const double* b, double* rotation, std::size_t lane) {
-  constexpr std::size_t kLanes = CellBlocks::kLanes;
   Eigen::Matrix3d matrix;
   for (std::size_t e = 0; e < 9; ++e) matrix(e / 3, e % 3) = b[e * kLanes + lane];
   matrix = fit_rotation(matrix);
@@ -25,7 +24,7 @@ void fit_lane(const double* b, double* rotation, std::size_t lane) {
 
 HWY_INLINE void store(const Matrix& m, double* at) {
   const D d;
-  for (std::size_t e = 0; e < 9; ++e) hn::StoreU(m.m[e / 3][e % 3], d, at + e * CellBlocks::kLanes);
+  for (std::size_t e = 0; e < 9; ++e) hn::StoreU(m.m[e / 3][e % 3], d, at + e * kLanes);
 }
 
 HWY_INLINE Matrix zero_matrix() {
@@ -39,26 +38,8 @@ HWY_INLINE Matrix zero_matrix() {
 HWY_INLINE Matrix load_matrix(const double* at) {
   const D d;
   Matrix m;
-  for (std::size_t e = 0; e < 9; ++e) m.m[e / 3][e % 3] = hn::LoadU(d, at + e * CellBlocks::kLanes);
+  for (std::size_t e = 0; e < 9; ++e) m.m[e / 3][e % 3] = hn::LoadU(d, at + e * kLanes);
   return m;
-}
-
-/// Fits the lanes from `lane` on, whose edges lie in `edges`; `moved_size` is sum_j w_ij |x_i - x_j|^2.
-HWY_INLINE void fit_lanes(const Matrix& b, V moved_size, const double* rest_size, double* rotations,
-                          std::size_t lane) {
-  const D d;
-  const V bound = hn::Sqrt(hn::Mul(moved_size, hn::LoadU(d, rest_size + lane)));
-  Matrix rotation;
-  const M is_good = fit(b, bound, rotation);
-  store(rotation, rotations + lane);
-  if (hn::AllTrue(d, is_good)) return;
-  double buffer[9 * CellBlocks::kLanes];
-  store(b, buffer + lane);
-  double good[CellBlocks::kLanes];
-  hn::StoreU(hn::IfThenElseZero(is_good, hn::Set(d, 1.0)), d, good + lane);
-  for (std::size_t k = lane; k < lane + hn::Lanes(d); ++k) {
-    if (good[k] == 0) fit_lane(buffer, rotations, k);
-  }
 }
 
 /// What the fit needs of a cell's edges.
@@ -67,92 +48,113 @@ struct FitSums {
   V moved_size;  // sum_j w_ij |x_i - x_j|^2
 };
 
-/// Edges x_i - x_j of the lanes from `lane` on, left where their residuals will be; adds to `sums` unless null.
-
-HWY_INLINE void gather_edges(const CellBlocks& blocks, std::size_t block, std::size_t lane, const double* x,
-                             double* edges, FitSums* sums) {
-  constexpr std::size_t kLanes = CellBlocks::kLanes;
+/// Edges x_i - x_j of the lanes from `lane` on, kept in `edges` as [slot][axis][lane]; what the fit needs of them.
+HWY_INLINE FitSums gather_edges(const CellBlocks& blocks, std::size_t block, std::size_t lane,
+                                const double* rows, double* edges) {
   const D d;
-  const Vector centre = gather(x, blocks.row.data() + block * kLanes + lane);
-  for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1]; ++slot) {
-    const Vector neighbour = gather(x, blocks.neighbour_row.data() + slot * kLanes + lane);
+  FitSums sums{zero_matrix(), hn::Zero(d)};
+  const Vector centre = gather(rows, blocks.centre.data() + block * kLanes + lane);
+  for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
+       ++slot, edges += 3 * kLanes) {
+    const Vector neighbour = gather(rows, blocks.neighbour.data() + slot * kLanes + lane);
     const Vector edge{hn::Sub(centre.x, neighbour.x), hn::Sub(centre.y, neighbour.y),
                       hn::Sub(centre.z, neighbour.z)};
-    store(edge, edges + slot * 3 * kLanes + lane);
-    if (sums == nullptr) continue;
+    store(edge, edges + lane);
     const V w = hn::LoadU(d, blocks.weight.data() + slot * kLanes + lane);
     const Vector rest = load(blocks.rest_edge.data() + slot * 3 * kLanes + lane);
     const Vector we{hn::Mul(w, edge.x), hn::Mul(w, edge.y), hn::Mul(w, edge.z)};
-    sums->moved_size = hn::Add(sums->moved_size, dot(we, edge));
+    sums.moved_size = hn::Add(sums.moved_size, dot(we, edge));
     const auto add = [&](int r, V scale) {
-      sums->b.m[r][0] = hn::MulAdd(scale, rest.x, sums->b.m[r][0]);
-      sums->b.m[r][1] = hn::MulAdd(scale, rest.y, sums->b.m[r][1]);
-      sums->b.m[r][2] = hn::MulAdd(scale, rest.z, sums->b.m[r][2]);
+      sums.b.m[r][0] = hn::MulAdd(scale, rest.x, sums.b.m[r][0]);
+      sums.b.m[r][1] = hn::MulAdd(scale, rest.y, sums.b.m[r][1]);
+      sums.b.m[r][2] = hn::MulAdd(scale, rest.z, sums.b.m[r][2]);
     };
     add(0, we.x);
     add(1, we.y);
     add(2, we.z);
   }
+  return sums;
 }
 
-/// Makes the edges residuals, as a sum of squares: no cancellation where E_i^2 is small.
+/// The residuals, E_i^2 as a sum of squares: no cancellation where it is small.
 HWY_INLINE void subtract_rotated(const CellBlocks& blocks, std::size_t block, std::size_t lane,
-                                 BlockState& state) {
-  constexpr std::size_t kLanes = CellBlocks::kLanes;
+                                 const double* edges, BlockState& state) {
   const D d;
   const Matrix rotation = load_matrix(state.rotations.data() + block * 9 * kLanes + lane);
   V squared = hn::Zero(d);
   Vector sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-  for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1]; ++slot) {
-    double* const residual = state.residuals.data() + slot * 3 * kLanes + lane;
+  for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
+       ++slot, edges += 3 * kLanes) {
     const V w = hn::LoadU(d, blocks.weight.data() + slot * kLanes + lane);
-    const Vector edge = load(residual);
+    const Vector edge = load(edges + lane);
     const Vector turned = times(rotation, load(blocks.rest_edge.data() + slot * 3 * kLanes + lane));
     const Vector r{hn::Sub(edge.x, turned.x), hn::Sub(edge.y, turned.y), hn::Sub(edge.z, turned.z)};
     const Vector wr{hn::Mul(w, r.x), hn::Mul(w, r.y), hn::Mul(w, r.z)};
     squared = hn::Add(squared, dot(wr, r));
     sum = {hn::Add(sum.x, wr.x), hn::Add(sum.y, wr.y), hn::Add(sum.z, wr.z)};
-    store(wr, residual);
+    store_rows(wr, state.residuals.data() + (slot * kLanes + lane) * kRow);
   }
   hn::StoreU(squared, d, state.squared.data() + block * kLanes + lane);
-  store(sum, state.residual_sums.data() + block * 3 * kLanes + lane);
+  store_rows(sum, state.residual_sums.data() + (block * kLanes + lane) * kRow);
 }
 
-void EvaluateBlocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const double* x,
-                    bool is_fit, BlockState& state) {
-  constexpr std::size_t kLanes = CellBlocks::kLanes;
+/// Fits all lanes of a block.
+HWY_INLINE void fit_block(const FitSums (&sums)[kVectors], const double* rest_size, double* rotations) {
   const D d;
-  for (std::size_t block = first; block < last; ++block) {
-    for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-      FitSums sums{zero_matrix(), hn::Zero(d)};
-      gather_edges(blocks, block, lane, x, state.residuals.data(), is_fit ? &sums : nullptr);
-      if (is_fit) {
-        fit_lanes(sums.b, sums.moved_size, blocks.rest_size.data() + block * kLanes,
-                  state.rotations.data() + block * 9 * kLanes, lane);
-      }
-      subtract_rotated(blocks, block, lane, state);
+  Matrix b[kVectors], rotation[kVectors];
+  V bound[kVectors];
+  M is_good[kVectors];
+  for (std::size_t v = 0; v < kVectors; ++v) {
+    b[v] = sums[v].b;
+    bound[v] = hn::Sqrt(hn::Mul(sums[v].moved_size, hn::LoadU(d, rest_size + v * hn::Lanes(d))));
+  }
+  fit(b, bound, rotation, is_good);
+  for (std::size_t v = 0; v < kVectors; ++v) {
+    const std::size_t lane = v * hn::Lanes(d);
+    store(rotation[v], rotations + lane);
+    if (hn::AllTrue(d, is_good[v])) continue;
+    double buffer[9 * kLanes], good[kLanes];
+    store(b[v], buffer + lane);
+    hn::StoreU(hn::IfThenElseZero(is_good[v], hn::Set(d, 1.0)), d, good + lane);
+    for (std::size_t k = lane; k < lane + hn::Lanes(d); ++k) {
+      if (good[k] == 0) fit_lane(buffer, rotations, k);
     }
+  }
+}
+
+void EvaluateBlocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const double* rows,
+                    bool is_fit, BlockState& state) {
+  const std::size_t lanes = hn::Lanes(D());
+  std::vector<double> edges(blocks.most_slots * 3 * kLanes);
+  for (std::size_t block = first; block < last; ++block) {
+    FitSums sums[kVectors];
+    for (std::size_t v = 0; v < kVectors; ++v)
+      sums[v] = gather_edges(blocks, block, v * lanes, rows, edges.data());
+    if (is_fit) {
+      fit_block(sums, blocks.rest_size.data() + block * kLanes, state.rotations.data() + block * 9 * kLanes);
+    }
+    for (std::size_t v = 0; v < kVectors; ++v)
+      subtract_rotated(blocks, block, v * lanes, edges.data(), state);
   }
 }
 
 void GradientOfBlocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const BlockState& state,
                       const double* c, double* gradient) {
-  constexpr std::size_t kLanes = CellBlocks::kLanes;
+  using Row = double __attribute__((vector_size(kRow * sizeof(double)), aligned(sizeof(double))));
+  const auto row = [](const std::vector<double>& rows, std::size_t at) -> const Row& {
+    return *reinterpret_cast<const Row*>(rows.data() + at * kRow);
+  };
   for (std::size_t block = first; block < last; ++block) {
     const std::size_t begin = blocks.first_slot[block], end = blocks.first_slot[block + 1];
     const std::int32_t* const cells = blocks.cells.data() + block * kLanes;
     for (std::size_t lane = 0; lane < kLanes && cells[lane] >= 0; ++lane) {
       const std::int32_t i = cells[lane];
-      const double* const own = state.residual_sums.data() + block * 3 * kLanes + lane;
-      double gx = c[i] * own[0], gy = c[i] * own[kLanes], gz = c[i] * own[2 * kLanes];
-      for (std::size_t slot = begin; slot < end; ++slot) {
-        const std::size_t at = slot * kLanes + lane;
-        const double cj = c[blocks.neighbour_row[at] / 3];
-        const double* const r = state.residuals.data() + blocks.opposite[at];
-        gx -= cj * r[0], gy -= cj * r[kLanes], gz -= cj * r[2 * kLanes];
+      Row sum = c[i] * row(state.residual_sums, block * kLanes + lane);
+      for (std::size_t at = begin * kLanes + lane; at < end * kLanes; at += kLanes) {
+        sum -= c[blocks.neighbour[at]] * row(state.residuals, blocks.opposite[at]);
       }
-      double* const row = gradient + 3 * i;
-      row[0] = 2 * gx, row[1] = 2 * gy, row[2] = 2 * gz;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        gradient[3 * static_cast<std::size_t>(i) + axis] = 2 * sum[axis];
     }
   }
 }
@@ -169,8 +171,8 @@ HWY_EXPORT(GradientOfBlocks);
 BlockState::BlockState(const CellBlocks& blocks)
     : rotations(blocks.cells.size() * 9),
       squared(blocks.cells.size()),
-      residuals(blocks.slot_count() * 3 * CellBlocks::kLanes),
-      residual_sums(blocks.cells.size() * 3) {
+      residuals(blocks.slot_count() * CellBlocks::kLanes * kRow),
+      residual_sums(blocks.cells.size() * kRow) {
   constexpr std::size_t kLanes = CellBlocks::kLanes;
   for (std::size_t block = 0; block < blocks.block_count(); ++block) {
     for (std::size_t entry = 0; entry < 9; entry += 4) {
@@ -184,9 +186,9 @@ std::size_t BlockState::memory_bytes() const {
          sizeof(double);
 }
 
-void evaluate_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const double* x, bool fit,
-                     BlockState& state) {
-  HWY_DYNAMIC_DISPATCH(EvaluateBlocks)(blocks, first, last, x, fit, state);
+void evaluate_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const double* rows,
+                     bool fit, BlockState& state) {
+  HWY_DYNAMIC_DISPATCH(EvaluateBlocks)(blocks, first, last, rows, fit, state);
 }
 
 void gradient_of_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last,

@@ -7,23 +7,25 @@
 
 namespace lpdeform {
 
+inline constexpr std::size_t kRow = 4;  // numbers of a vector in memory: one load
+
 /// What the kernels leave for each block, in its lanes.
 struct BlockState {
   explicit BlockState(const CellBlocks& blocks);
   std::size_t memory_bytes() const;
 
-  std::vector<double> rotations;      // [block][entry, row-major][lane]: R_i; the identity to begin with
-  std::vector<double> squared;        // [block][lane]: E_i^2
-  std::vector<double> residuals;      // [slot][axis][lane]: r_ij = w_ij ((x_i - x_j) - R_i (p_i - p_j))
-  std::vector<double> residual_sums;  // [block][axis][lane]: sum_j r_ij
+  std::vector<double> rotations;  // [block][entry, row-major][lane]: R_i; the identity to begin with
+  std::vector<double> squared;    // [block][lane]: E_i^2
+  std::vector<double> residuals;  // [slot][lane][axis, filler]: r_ij = w_ij ((x_i - x_j) - R_i (p_i - p_j))
+  std::vector<double> residual_sums;  // [block][lane][axis, filler]: sum_j r_ij
 };
 
 /// Rotation fit (Eq. 2, as fit_rotation has it), squared energies and residuals of blocks first to last - 1 at
-/// positions x: row-major, in scaled units. With `fit` false the rotations in `state` are held. In vector
+/// positions x, in scaled units: `rows` has x, y, z and a filler for each vertex. With `fit` false the rotations in `state` are held. In vector
 /// instructions, the widest that the processor has; lanes whose fit is uncertain go through fit_rotation.
 /// Different blocks may be computed at the same time.
-void evaluate_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const double* x, bool fit,
-                     BlockState& state);
+void evaluate_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const double* rows,
+                     bool fit, BlockState& state);
 
 /// The gradient rows of the cells of these blocks, from the state of all blocks and the weights c_i by vertex:
 ///

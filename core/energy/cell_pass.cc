@@ -6,6 +6,7 @@ namespace lpdeform {
 namespace {
 
 constexpr std::size_t kLanes = CellBlocks::kLanes;
+constexpr std::size_t kRowChunk = 4096;  // vertices
 
 }  // namespace
 
@@ -14,6 +15,7 @@ CellPass::CellPass(std::shared_ptr<const RestShape> shape, Workers workers)
       workers_(std::move(workers)),
       blocks_(*shape_, kChunk),
       state_(blocks_),
+      rows_(shape_->vertex_count() * kRow, 0.0),
       e2_(shape_->vertex_count(), 0.0),
       c_(shape_->vertex_count(), 0.0),
       chunk_sums_((shape_->vertex_count() + kChunk - 1) / kChunk) {}
@@ -36,9 +38,15 @@ double CellPass::sum_of_chunks(const Body& body) const {
 }
 
 double CellPass::evaluate_cells(const Points& x, const LpNorm& norm, bool fit) {
+  workers_.for_chunks(e2_.size(), kRowChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    const double* from = x.data() + 3 * begin;
+    for (double* to = rows_.data() + kRow * begin; begin < end; ++begin, to += kRow, from += 3) {
+      to[0] = from[0], to[1] = from[1], to[2] = from[2];
+    }
+  });
   return sum_of_chunks([&](std::size_t begin, std::size_t end) {
     const std::size_t first = begin / kLanes, last = (end + kLanes - 1) / kLanes;
-    evaluate_blocks(blocks_, first, last, x.data(), fit, state_);
+    evaluate_blocks(blocks_, first, last, rows_.data(), fit, state_);
     for (std::size_t k = first * kLanes; k < last * kLanes && blocks_.cells[k] >= 0; ++k) {
       e2_[blocks_.cells[k]] = state_.squared[k];
     }
@@ -89,7 +97,7 @@ std::vector<Eigen::Matrix3d> CellPass::rotations() const {
 
 std::size_t CellPass::memory_bytes() const {
   return blocks_.memory_bytes() + state_.memory_bytes() +
-         (e2_.capacity() + c_.capacity() + chunk_sums_.capacity()) * sizeof(double);
+         (rows_.capacity() + e2_.capacity() + c_.capacity() + chunk_sums_.capacity()) * sizeof(double);
 }
 
 }  // namespace lpdeform

@@ -57,6 +57,7 @@ class CellPass {
   Workers workers_;
   CellBlocks blocks_;
   BlockState state_;
+  std::vector<double> rows_;  // x, with fillers
   std::vector<double> e2_, c_;
   mutable std::vector<double> chunk_sums_;
 };

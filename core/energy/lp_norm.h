@@ -35,8 +35,9 @@ class LpNorm {
   };
   Term term(std::int32_t i, double e2) const {
     const double v = e2 + eps2_;
-    if (!(v > 0)) return {0, half_p_[at(i)] == 1 ? scale_[at(i)] / r2_ : 0};
     const double half_p = half_p_[at(i)];
+    if (half_p == 1) return {scale_[at(i)] / r2_ * v, scale_[at(i)] / r2_};
+    if (!(v > 0)) return {0, 0};
     const double value = scale_[at(i)] * power(v / r2_, half_p);
     return {value, value * half_p / v};
   }

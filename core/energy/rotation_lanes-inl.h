@@ -9,15 +9,19 @@
 
 #include <hwy/highway.h>
 
-#include "core/energy/cell_blocks.h"
+#include "core/energy/cell_kernel.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lpdeform::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using D = hn::CappedTag<double, CellBlocks::kLanes>;
+constexpr std::size_t kLanes = CellBlocks::kLanes;
+
+using D = hn::CappedTag<double, kLanes>;
 using V = hn::Vec<D>;
 using M = hn::Mask<D>;
+
+constexpr std::size_t kVectors = kLanes / hn::MaxLanes(D());  // of a block
 
 struct Vector {
   V x, y, z;
@@ -43,24 +47,40 @@ HWY_INLINE Vector times(const Matrix& a, const Vector& v) {
 /// Three vectors of lanes that lie one after the other.
 HWY_INLINE Vector load(const double* at) {
   const D d;
-  return {hn::LoadU(d, at), hn::LoadU(d, at + CellBlocks::kLanes), hn::LoadU(d, at + 2 * CellBlocks::kLanes)};
+  return {hn::LoadU(d, at), hn::LoadU(d, at + kLanes), hn::LoadU(d, at + 2 * kLanes)};
 }
 
 HWY_INLINE void store(const Vector& v, double* at) {
   const D d;
   hn::StoreU(v.x, d, at);
-  hn::StoreU(v.y, d, at + CellBlocks::kLanes);
-  hn::StoreU(v.z, d, at + 2 * CellBlocks::kLanes);
+  hn::StoreU(v.y, d, at + kLanes);
+  hn::StoreU(v.z, d, at + 2 * kLanes);
 }
 
-/// Rows x, y, z that begin where the indices say.
-HWY_INLINE Vector gather(const double* base, const std::int32_t* indices) {
+/// The rows of these vertices, kRow numbers each.
+HWY_INLINE Vector gather(const double* rows, const std::int32_t* indices) {
   const D d;
+#if HWY_TARGET == HWY_AVX2
+  const hn::FixedTag<double, 4> quad;
+  const auto row = [&](int k) { return hn::LoadU(quad, rows + kRow * static_cast<std::size_t>(indices[k])); };
+  const V r0 = row(0), r1 = row(1), r2 = row(2), r3 = row(3);
+  const V xz01 = hn::InterleaveLower(d, r0, r1), y01 = hn::InterleaveUpper(d, r0, r1);
+  const V xz23 = hn::InterleaveLower(d, r2, r3), y23 = hn::InterleaveUpper(d, r2, r3);
+  return {hn::ConcatLowerLower(d, xz23, xz01), hn::ConcatLowerLower(d, y23, y01),
+          hn::ConcatUpperUpper(d, xz23, xz01)};
+#else
   const hn::RebindToSigned<D> wide;
   const hn::Rebind<std::int32_t, D> narrow;
-  const auto index = hn::PromoteTo(wide, hn::LoadU(narrow, indices));
-  return {hn::GatherIndex(d, base, index), hn::GatherIndex(d, base + 1, index),
-          hn::GatherIndex(d, base + 2, index)};
+  const auto index = hn::ShiftLeft<2>(hn::PromoteTo(wide, hn::LoadU(narrow, indices)));
+  return {hn::GatherIndex(d, rows, index), hn::GatherIndex(d, rows + 1, index),
+          hn::GatherIndex(d, rows + 2, index)};
+#endif
+}
+
+/// Rows of kRow numbers one after the other, one a lane.
+HWY_INLINE void store_rows(const Vector& v, double* at) {
+  const D d;
+  hn::StoreInterleaved4(v.x, v.y, v.z, hn::Zero(d), d, at);
 }
 
 HWY_INLINE Matrix rotation_of(const Quaternion& q) {
@@ -125,27 +145,36 @@ HWY_INLINE V determinant(const Minors& m) {
   return hn::NegMulAdd(m.s1, m.c4, hn::NegMulAdd(m.s4, m.c1, plus));
 }
 
-/// Largest root of x^4 - 2 |B|^2 x^2 - 8 det(B) x + det(K), by Newton from an upper bound, from which it
-/// descends monotonically.
-HWY_INLINE V largest_eigenvalue(V upper_bound, V norm2, V det_b, V det_k) {
+/// x^4 - 2 |B|^2 x^2 - 8 det(B) x + det(K), of which the largest root is wanted, and a bound above it.
+struct Quartic {
+  V c2, c1, c0, bound;
+};
+
+/// The largest roots, by Newton from above: it descends monotonically. All at once, since each waits for its own
+/// divisions.
+HWY_INLINE void largest_roots(const Quartic (&q)[kVectors], V (&x)[kVectors]) {
   const D d;
-  const V c2 = hn::Mul(hn::Set(d, -2.0), norm2), c1 = hn::Mul(hn::Set(d, -8.0), det_b);
-  const V twice_c2 = hn::Add(c2, c2), four = hn::Set(d, 4.0), enough = hn::Set(d, 1e-12);
-  V x = upper_bound;
-  M is_on = hn::Eq(x, x);
-  for (int iteration = 0; iteration < 50; ++iteration) {
-    const V x2 = hn::Mul(x, x);
-    const V value = hn::MulAdd(hn::MulAdd(hn::Add(x2, c2), x, c1), x, det_k);
-    const V slope = hn::MulAdd(hn::MulAdd(four, x2, twice_c2), x, c1);
-    const V next = hn::Sub(x, hn::Div(value, slope));
-    is_on = hn::And(is_on, hn::And(hn::Gt(slope, hn::Zero(d)), hn::Lt(next, x)));
-    const V step = hn::Sub(x, next);
-    const M is_far = hn::Ge(step, hn::Mul(enough, x));
-    x = hn::IfThenElse(is_on, next, x);
-    is_on = hn::And(is_on, is_far);
-    if (hn::AllFalse(d, is_on)) break;
+  const V four = hn::Set(d, 4.0), enough = hn::Set(d, 1e-6);
+  M is_on[kVectors];
+  for (std::size_t v = 0; v < kVectors; ++v) {
+    x[v] = q[v].bound;
+    is_on[v] = hn::Eq(x[v], x[v]);
   }
-  return x;
+  for (int iteration = 0; iteration < 50; ++iteration) {
+    bool is_done = true;
+    for (std::size_t v = 0; v < kVectors; ++v) {
+      const V x2 = hn::Mul(x[v], x[v]);
+      const V value = hn::MulAdd(hn::MulAdd(hn::Add(x2, q[v].c2), x[v], q[v].c1), x[v], q[v].c0);
+      const V slope = hn::MulAdd(hn::MulAdd(four, x2, hn::Add(q[v].c2, q[v].c2)), x[v], q[v].c1);
+      const V next = hn::Sub(x[v], hn::Div(value, slope));
+      is_on[v] = hn::And(is_on[v], hn::And(hn::Gt(slope, hn::Zero(d)), hn::Lt(next, x[v])));
+      const M is_far = hn::Ge(hn::Sub(x[v], next), hn::Mul(enough, x[v]));
+      x[v] = hn::IfThenElse(is_on[v], next, x[v]);
+      is_on[v] = hn::And(is_on[v], is_far);
+      is_done = is_done && hn::AllFalse(d, is_on[v]);
+    }
+    if (is_done) break;
+  }
 }
 
 /// The null vector of the singular matrix k: the column of its adjugate with the largest diagonal entry, which
@@ -209,33 +238,46 @@ HWY_INLINE M polish(const Matrix& b, Quaternion& q) {
   const auto row = [&](V a, V b2, V c) { return hn::Mul(scale, dot({a, b2, c}, slope)); };
   const Vector w{row(ixx, ixy, ixz), row(ixy, iyy, iyz), row(ixz, iyz, izz)};
   const V size = dot(w, w);
-  is_good = hn::And(is_good, hn::Lt(size, hn::Set(d, 1e-4)));
+  is_good = hn::And(is_good, hn::Lt(size, hn::Set(d, 1e-12)));
   const V half = hn::Set(d, 0.5);
   q = product(q, {hn::Sqrt(hn::NegMulAdd(hn::Set(d, 0.25), size, hn::Set(d, 1.0))), hn::Mul(half, w.x),
                   hn::Mul(half, w.y), hn::Mul(half, w.z)});
   return is_good;
 }
 
-/// The best rotations for B = sum_j w_ij (x_i - x_j) (p_i - p_j)^T; `bound` >= <R, B> for every rotation.
-/// False in lanes where it is not certain.
-HWY_INLINE M fit(const Matrix& b_any_size, V bound, Matrix& rotation) {
+/// B over its largest entry, its Davenport matrix and the quartic of its eigenvalues. `bound` >= <R, B> for every
+/// rotation.
+struct Scaled {
+  Matrix b;
+  Davenport k;
+};
+
+HWY_INLINE Scaled scaled(const Matrix& b, V bound, Quartic& quartic) {
   const D d;
   V size = hn::Zero(d);
-  for (const auto& row : b_any_size.m) {
+  for (const auto& row : b.m) {
     for (const V& entry : row) size = hn::Max(size, hn::Abs(entry));
   }
   const V scale = hn::Div(hn::Set(d, 1.0), size);
-  Matrix b;
+  Scaled result;
   V norm2 = hn::Zero(d);
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      b.m[i][j] = hn::Mul(scale, b_any_size.m[i][j]);
-      norm2 = hn::MulAdd(b.m[i][j], b.m[i][j], norm2);
+      result.b.m[i][j] = hn::Mul(scale, b.m[i][j]);
+      norm2 = hn::MulAdd(result.b.m[i][j], result.b.m[i][j], norm2);
     }
   }
-  Davenport k = davenport(b);
-  const V upper = hn::Min(hn::Mul(scale, bound), hn::Sqrt(hn::Mul(hn::Set(d, 3.0), norm2)));
-  const V x = largest_eigenvalue(upper, norm2, determinant(b.m), determinant(minors(k)));
+  result.k = davenport(result.b);
+  quartic = {hn::Mul(hn::Set(d, -2.0), norm2), hn::Mul(hn::Set(d, -8.0), determinant(result.b.m)),
+             determinant(minors(result.k)),
+             hn::Min(hn::Mul(scale, bound), hn::Sqrt(hn::Mul(hn::Set(d, 3.0), norm2)))};
+  return result;
+}
+
+/// The rotation for the largest eigenvalue x. False in lanes where it is not certain.
+HWY_INLINE M rotation_at(const Scaled& s, V x, Matrix& rotation) {
+  const D d;
+  Davenport k = s.k;
   k.k00 = hn::Sub(k.k00, x);
   k.k11 = hn::Sub(k.k11, x);
   k.k22 = hn::Sub(k.k22, x);
@@ -244,9 +286,21 @@ HWY_INLINE M fit(const Matrix& b_any_size, V bound, Matrix& rotation) {
   const V length2 = hn::MulAdd(q.w, q.w, dot({q.x, q.y, q.z}, {q.x, q.y, q.z}));
   const V shorten = hn::Div(hn::Set(d, 1.0), hn::Sqrt(length2));
   q = {hn::Mul(q.w, shorten), hn::Mul(q.x, shorten), hn::Mul(q.y, shorten), hn::Mul(q.z, shorten)};
-  const M is_good = hn::And(hn::Gt(length2, hn::Set(d, 1e-12)), polish(b, q));
+  const M is_good = hn::And(hn::Gt(length2, hn::Set(d, 1e-12)), polish(s.b, q));
   rotation = rotation_of(q);
   return is_good;
+}
+
+/// The best rotations for B = sum_j w_ij (x_i - x_j) (p_i - p_j)^T; `bound` >= <R, B> for every rotation.
+/// False in lanes where it is not certain.
+HWY_INLINE void fit(const Matrix (&b)[kVectors], const V (&bound)[kVectors], Matrix (&rotation)[kVectors],
+                    M (&is_good)[kVectors]) {
+  Scaled s[kVectors];
+  Quartic quartic[kVectors];
+  V x[kVectors];
+  for (std::size_t v = 0; v < kVectors; ++v) s[v] = scaled(b[v], bound[v], quartic[v]);
+  largest_roots(quartic, x);
+  for (std::size_t v = 0; v < kVectors; ++v) is_good[v] = rotation_at(s[v], x[v], rotation[v]);
 }
 
 }  // namespace lpdeform::HWY_NAMESPACE

@@ -21,7 +21,8 @@ namespace {
 constexpr double kCertificateSeconds = 1;  // it gets, whatever is left of the time limit
 constexpr std::size_t kWorkspace =
     24;  // positions of all vertices that a solve holds at most: the memory of L-BFGS
-constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
+constexpr std::size_t kCopyChunk = 4096;  // vertices
+constexpr double kRounding = 1e-13;       // of the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
 
@@ -52,7 +53,7 @@ struct Deformer::Impl {
   Problem make_problem();
   std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, Warmth warmth);
   bool prepare_metric(bool needs_plain_weights);
-  double keep_if_best();
+  void keep_if_best(double sum);
   void record(const StepResult& result, double sum);
   void begin(const SolveSettings& new_settings, std::stop_token new_stop);
   void iterate();
@@ -175,17 +176,19 @@ bool Deformer::Impl::prepare_metric(bool needs_plain_weights) {
   return metric.factor(std::vector<double>(shape->vertex_count(), 1.0), constraints->is_held);
 }
 
-/// Called with the evaluation of minimiser->x() in `cells`; returns its true sum.
-double Deformer::Impl::keep_if_best() {
-  const double sum = cells.sum(*norm);
+/// Called with the evaluation of minimiser->x() in `cells`, and its true sum.
+void Deformer::Impl::keep_if_best(double sum) {
   const bool is_first = summary.iterations == 0;
-  if (!is_first && !(sum < best_sum)) return sum;
+  if (!is_first && !(sum < best_sum)) return;
   best_sum = std::isnan(sum) ? std::numeric_limits<double>::infinity() : sum;
-  x = minimiser->x();
   is_positions_current = false;
   const auto& e2 = cells.squared_energies();
-  for (std::size_t i = 0; i < e2.size(); ++i) best_energies[i] = unit() * std::sqrt(e2[i]);
-  return sum;
+  const Points& from = minimiser->x();
+  x.resize(from.rows(), 3);
+  cells.workers().for_chunks(e2.size(), kCopyChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    std::copy(from.data() + 3 * begin, from.data() + 3 * end, x.data() + 3 * begin);
+    for (std::size_t i = begin; i < end; ++i) best_energies[i] = unit() * std::sqrt(e2[i]);
+  });
 }
 
 void Deformer::Impl::record(const StepResult& result, double sum) {
@@ -220,7 +223,8 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   const Warmth warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
   minimiser = make_minimiser(settings.method, std::move(guess), warmth);
   is_metric_live = settings.method == Method::kQuasiNewton;
-  const double sum = keep_if_best();
+  const double sum = cells.sum(*norm);
+  keep_if_best(sum);
   summary.initial_energy = norm->true_energy(sum);
   record({Outcome::kProgress, sum, 0}, sum);
   if (!is_factored) end(StopReason::kNumericalBreakdown);
@@ -229,7 +233,9 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
 void Deformer::Impl::iterate() {
   const StepResult result = minimiser->step();
   ++summary.iterations;
-  record(result, keep_if_best());
+  const double sum = result.is_true ? result.objective : cells.sum(*norm);
+  keep_if_best(sum);
+  record(result, sum);
   switch (result.outcome) {
     case Outcome::kProgress:
       return;

@@ -36,6 +36,7 @@ struct StepResult {
   Outcome outcome = Outcome::kProgress;
   double objective = 0;  // at x(), of the method's present objective
   int stage = 0;         // counts the objectives; within a stage the objective never rises
+  bool is_true = false;  // the objective is problem.norm's, not a smoothed one
 };
 
 /// One algorithm: makes one iteration a call. Time, limits, cancellation, trace and the best state belong to

@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <numeric>
+#include <utility>
 
 namespace lpdeform {
 namespace {
@@ -13,81 +12,91 @@ constexpr double kLeastCurvature = 1e-12;  // <s, y> over |s| |y|
 
 }  // namespace
 
-void PairMemory::clear() {
-  std::move(pairs_.begin(), pairs_.end(), std::back_inserter(spare_));
-  pairs_.clear();
+std::vector<KeptPair> PairMemory::kept() const {
+  std::vector<KeptPair> result;
+  for (const Pair& pair : pairs_) result.push_back({pair.s.data(), pair.z.data()});
+  return result;
 }
 
-/// Adds up body(begin, end) over chunks of `count` numbers, in their order.
-template <typename Body>
-double PairMemory::sum(std::size_t count, const Body& body) {
-  chunk_sums_.assign((count + kChunk - 1) / kChunk, 0.0);
+/// What sweep_products adds up, over all chunks in their order.
+std::vector<double> PairMemory::products(const Points& gradient, const Points& gradient_before,
+                                         const Points& h, const Points& h_before, double length,
+                                         const Points& d) {
+  const auto count = static_cast<std::size_t>(gradient.size());
+  candidate_.s.resize(count);
+  candidate_.z.resize(count);
+  const NewPair pair{gradient.data(), gradient_before.data(), h.data(),           h_before.data(), d.data(),
+                     length,          candidate_.s.data(),    candidate_.z.data()};
+  const std::vector<KeptPair> old = kept();
+  const std::size_t width = kSumsBefore + kSumsOfPair * (old.size() + 1);
+  chunk_sums_.assign((count + kChunk - 1) / kChunk * width, 0.0);
   workers_.for_chunks(count, kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-    chunk_sums_[chunk] = body(begin, end);
+    sweep_products(pair, old, begin, end, chunk_sums_.data() + chunk * width);
   });
-  return std::accumulate(chunk_sums_.begin(), chunk_sums_.end(), 0.0);
+  std::vector<double> sums(width, 0.0);
+  for (std::size_t k = 0; k < chunk_sums_.size(); ++k) sums[k % width] += chunk_sums_[k];
+  return sums;
 }
 
-void PairMemory::remember(const Points& x, const Points& x_before, const Points& gradient,
-                          const Points& gradient_before) {
-  Pair pair;
-  if (!spare_.empty()) {
-    pair = std::move(spare_.back());
-    spare_.pop_back();
+/// Keeps the candidate; forgets the oldest pair where there are too many.
+void PairMemory::take_in(const std::vector<double>& sums) {
+  Pair pair = std::move(candidate_);
+  pair.sy.clear();
+  pair.zy.clear();
+  for (std::size_t at = kSumsBefore; at < sums.size(); at += kSumsOfPair) {
+    pair.sy.push_back(sums[at + 2]);
+    pair.zy.push_back(sums[at + 3]);
   }
-  pair.s.resize(x.rows(), 3);
-  pair.y.resize(x.rows(), 3);
-  const auto count = static_cast<std::size_t>(x.size());
-  const auto dot = [&](const Points& a, const Points& b) {
-    return sum(count, [&](std::size_t begin, std::size_t end) {
-      return std::inner_product(a.data() + begin, a.data() + end, b.data() + begin, 0.0);
-    });
-  };
-  const double curvature = sum(count, [&](std::size_t begin, std::size_t end) {
-    double chunk = 0;
-    for (std::size_t k = begin; k < end; ++k) {
-      const double s = x.data()[k] - x_before.data()[k], y = gradient.data()[k] - gradient_before.data()[k];
-      pair.s.data()[k] = s;
-      pair.y.data()[k] = y;
-      chunk += s * y;
-    }
-    return chunk;
-  });
-  const double size = std::sqrt(dot(pair.s, pair.s)) * std::sqrt(dot(pair.y, pair.y));
-  if (!(curvature > kLeastCurvature * size)) return spare_.push_back(std::move(pair));
-  pair.rho = 1 / curvature;
   pairs_.push_back(std::move(pair));
   if (pairs_.size() <= most_pairs_) return;
-  spare_.push_back(std::move(pairs_.front()));
-  pairs_.pop_front();
+  candidate_ = std::move(pairs_.front());
+  pairs_.erase(pairs_.begin());
+  for (Pair& younger : pairs_) {
+    younger.sy.erase(younger.sy.begin());
+    younger.zy.erase(younger.zy.begin());
+  }
 }
 
-/// d += factor * added; returns <d, other>, 0 where that is null.
-double PairMemory::add_and_dot(double factor, const Points& added, const Points* other, Points& d) {
-  return sum(static_cast<std::size_t>(d.size()), [&](std::size_t begin, std::size_t end) {
-    double* const to = d.data();
-    const double* const from = added.data();
-    for (std::size_t k = begin; k < end; ++k) to[k] += factor * from[k];
-    return other == nullptr ? 0.0 : std::inner_product(to + begin, to + end, other->data() + begin, 0.0);
-  });
-}
+double PairMemory::direction(const Points& gradient, const Points& gradient_before, const Points& h,
+                             const Points& h_before, double length, Points& d) {
+  if (length == 0) {
+    d = -h;
+    return gradient.cwiseProduct(d).sum();
+  }
+  std::vector<double> sums = products(gradient, gradient_before, h, h_before, length, d);
+  const double curvature = sums[sums.size() - 2];
+  const double size = length * std::sqrt(sums[0]) * std::sqrt(sums[1]);
+  if (curvature > kLeastCurvature * size) {
+    const bool is_full = pairs_.size() == most_pairs_;
+    take_in(sums);
+    if (is_full) sums.erase(sums.begin() + kSumsBefore, sums.begin() + kSumsBefore + kSumsOfPair);
+  }
 
-double PairMemory::direction(const Points& gradient, const std::function<void(Points&)>& metric, Points& d) {
   const std::size_t m = pairs_.size();
-  std::vector<double> alpha(m);
-  d.setZero(gradient.rows(), 3);
-  double next = add_and_dot(-1, gradient, m > 0 ? &pairs_[m - 1].s : nullptr, d);
-  for (std::size_t k = m; k-- > 0;) {
-    alpha[k] = pairs_[k].rho * next;
-    next = add_and_dot(-alpha[k], pairs_[k].y, k > 0 ? &pairs_[k - 1].s : nullptr, d);
+  const auto sg = [&](std::size_t i) { return sums[kSumsBefore + kSumsOfPair * i]; };
+  const auto zg = [&](std::size_t i) { return sums[kSumsBefore + kSumsOfPair * i + 1]; };
+  std::vector<double> a(m), b(m);
+  for (std::size_t i = m; i-- > 0;) {  // R a = S^T g
+    a[i] = sg(i);
+    for (std::size_t j = i + 1; j < m; ++j) a[i] -= pairs_[j].sy[i] * a[j];
+    a[i] /= pairs_[i].sy[i];
   }
-  metric(d);
-  next = add_and_dot(0, gradient, m > 0 ? &pairs_[0].y : &gradient, d);
-  for (std::size_t k = 0; k < m; ++k) {
-    const double beta = pairs_[k].rho * next;
-    next = add_and_dot(alpha[k] - beta, pairs_[k].s, k + 1 < m ? &pairs_[k + 1].y : &gradient, d);
+  for (std::size_t i = 0; i < m; ++i) {  // R^T b = (D + W) a - Z^T g
+    b[i] = pairs_[i].sy[i] * a[i] - zg(i);
+    for (std::size_t j = 0; j < m; ++j) b[i] += pairs_[std::max(i, j)].zy[std::min(i, j)] * a[j];
+    for (std::size_t j = 0; j < i; ++j) b[i] -= pairs_[i].sy[j] * b[j];
+    b[i] /= pairs_[i].sy[i];
   }
-  return next;
+  double slope = -sums[2];
+  for (std::size_t i = 0; i < m; ++i) slope += a[i] * zg(i) - b[i] * sg(i), a[i] = -a[i];
+
+  const std::vector<KeptPair> all = kept();
+  d.resize(gradient.rows(), 3);
+  workers_.for_chunks(static_cast<std::size_t>(d.size()), kChunk,
+                      [&](std::size_t, std::size_t begin, std::size_t end) {
+                        sweep_direction(h.data(), all, b.data(), a.data(), begin, end, d.data());
+                      });
+  return slope;
 }
 
 }  // namespace lpdeform

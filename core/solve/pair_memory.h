@@ -1,45 +1,50 @@
 #pragma once
 
 #include <cstddef>
-#include <deque>
-#include <functional>
 #include <vector>
 
 #include "core/base/geometry.h"
 #include "core/base/workers.h"
+#include "core/solve/pair_sweeps.h"
 
 namespace lpdeform {
 
-/// The memory of L-BFGS: the last pairs s = x' - x, y = g' - g of steps and changes of the gradient, and the
-/// product of the inverse Hessian that they stand for (Nocedal & Wright, algorithm 7.4). Runs in parallel in
-/// fixed chunks: the same bits on any number of threads. One caller at a time.
+/// The memory of L-BFGS and its inverse Hessian H in compact form (Byrd, Nocedal & Schnabel 1994, theorem 2.2):
+///
+///   H g = h + S R^-T ((D + W) a - Z^T g) - Z a,   a = R^-1 S^T g,   h = M^-1 g
+///
+/// with M the metric, columns s = x' - x and z = M^-1 y = h' - h of S and Z, y = g' - g, R the upper triangle of
+/// S^T Y, D its diagonal, W = Z^T Y. All vectors are swept over twice an iteration and no more. Pairs are kept in
+/// single precision: they only steer. Runs in parallel in fixed chunks: the same bits on any number of threads.
+/// One caller at a time.
 class PairMemory {
  public:
   PairMemory(Workers workers, std::size_t most_pairs)
       : workers_(std::move(workers)), most_pairs_(most_pairs) {}
 
-  void clear();
+  /// Forgets all pairs: M has changed.
+  void clear() { pairs_.clear(); }
 
-  /// Remembers a step and its change of the gradient; not where their product is not positive to rounding.
-  void remember(const Points& x, const Points& x_before, const Points& gradient,
-                const Points& gradient_before);
-
-  /// d = -H g, with `metric` for H_0: it replaces its argument by H_0 times that. Returns <g, d>.
-  double direction(const Points& gradient, const std::function<void(Points&)>& metric, Points& d);
+  /// d = -H g; returns <g, d>. `length` > 0 says that the step length * d has been made since the last call, when
+  /// gradient and h were those before: the pair is taken in, unless <s, y> is not positive to rounding. 0 where
+  /// there was none, or clear() came between.
+  double direction(const Points& gradient, const Points& gradient_before, const Points& h,
+                   const Points& h_before, double length, Points& d);
 
  private:
   struct Pair {
-    Points s, y;
-    double rho = 0;  // 1 / <s, y>
+    std::vector<float> s, z;
+    std::vector<double> sy, zy;  // <s_i, y>, <z_i, y> with this pair's y, for each older pair i and this one
   };
-  template <typename Body>
-  double sum(std::size_t count, const Body& body);
-  double add_and_dot(double factor, const Points& added, const Points* other, Points& d);
+  std::vector<KeptPair> kept() const;
+  std::vector<double> products(const Points& gradient, const Points& gradient_before, const Points& h,
+                               const Points& h_before, double length, const Points& d);
+  void take_in(const std::vector<double>& sums);
 
   Workers workers_;
   const std::size_t most_pairs_;
-  std::deque<Pair> pairs_;   // oldest first
-  std::vector<Pair> spare_;  // memory of forgotten ones
+  std::vector<Pair> pairs_;  // oldest first
+  Pair candidate_;           // where the next is swept into
   std::vector<double> chunk_sums_;
 };
 

@@ -39,6 +39,7 @@ void QuasiNewton::begin_stage(bool keeps_metric) {
   const bool is_on_the_way = stage_ < static_cast<int>(shares_.size());
   if (stage_ > static_cast<int>(shares_.size())) eps2_ *= kSmoothingStep;
   norm_ = (is_on_the_way ? problem_.norm.nearer_two(shares_[stage_]) : problem_.norm).smoothed(eps2_);
+  is_true_norm_ = !is_on_the_way && eps2_ == 0;
   objective_ = problem_.cells.reweigh(norm_);
   is_last_stage_ = !is_on_the_way && is_smooth_enough();
   history_.assign(1, objective_);
@@ -68,6 +69,7 @@ void QuasiNewton::begin_memory() {
   problem_.cells.gradient(gradient_);
   clear_held_rows(problem_.constraints, gradient_);
   memory_.clear();
+  step_length_ = 0;
 }
 
 bool QuasiNewton::refresh_metric() {
@@ -77,16 +79,21 @@ bool QuasiNewton::refresh_metric() {
 }
 
 /// d = -H g, H_0 = M^-1: unscaled, since M is the Hessian with rotations and weights held. Returns <g, d>.
-double QuasiNewton::direction(Points& d) {
-  const auto metric = [this](Points& v) { problem_.metric.precondition(v, v, problem_.cells.workers()); };
-  return memory_.direction(gradient_, metric, d);
+double QuasiNewton::direction() {
+  preconditioned_.swap(preconditioned_before_);
+  problem_.metric.precondition(gradient_, preconditioned_, problem_.cells.workers());
+  const double slope = memory_.direction(gradient_, gradient_before_, preconditioned_, preconditioned_before_,
+                                         step_length_, direction_);
+  step_length_ = 0;
+  return slope;
 }
 
-/// The step length along d, 0 where none is found. problem_.cells holds the evaluation at trial_ afterwards.
-double QuasiNewton::search(const Points& d, double slope) {
+/// The step length along direction_, 0 where none is found. problem_.cells holds the evaluation at trial_
+/// afterwards.
+double QuasiNewton::search(double slope) {
   double t = 1;
   for (int trial = 0; trial < 40 && !problem_.stop.stop_requested(); ++trial) {
-    trial_ = x_ + t * d;
+    trial_ = x_ + t * direction_;
     const double value = problem_.cells.evaluate(trial_, norm_);
     if (value <= objective_ + kSufficientDecrease * t * slope) {
       objective_ = value;
@@ -106,7 +113,8 @@ bool QuasiNewton::is_stage_over() const {
 }
 
 bool QuasiNewton::is_at_zero() const {
-  return problem_.cells.sum(problem_.norm) <= problem_.zero_objective;
+  const double sum = is_true_norm_ ? objective_ : problem_.cells.sum(problem_.norm);
+  return sum <= problem_.zero_objective;
 }
 
 /// Where no step along d lowers the objective: another metric, the next stage, or the end.
@@ -126,12 +134,12 @@ StepResult QuasiNewton::give_up(double slope) {
   return result(is_good ? Outcome::kConverged : Outcome::kStalled);
 }
 
-void QuasiNewton::accept() {
+void QuasiNewton::accept(double length) {
   x_.swap(trial_);
-  trial_gradient_.swap(gradient_);
+  gradient_.swap(gradient_before_);
   problem_.cells.gradient(gradient_);
   clear_held_rows(problem_.constraints, gradient_);
-  memory_.remember(x_, trial_, gradient_, trial_gradient_);
+  step_length_ = length;
   ++stage_iterations_, ++since_refresh_;
   history_.push_back(objective_);
   if (history_.size() > kWindow + 1) history_.pop_front();
@@ -147,9 +155,10 @@ StepResult QuasiNewton::step() {
   }
   if (!is_metric_good_ || !std::isfinite(objective_)) return result(Outcome::kBreakdown);
 
-  const double slope = direction(direction_);
-  if (!(slope < 0) || search(direction_, slope) == 0) return give_up(slope);
-  accept();
+  const double slope = direction();
+  const double length = slope < 0 ? search(slope) : 0;
+  if (length == 0) return give_up(slope);
+  accept(length);
   return result(is_last_stage_ && is_stage_over() ? Outcome::kConverged : Outcome::kProgress);
 }
 

@@ -40,13 +40,13 @@ class QuasiNewton : public Minimiser {
   bool adopt_metric();
   void begin_memory();
   bool refresh_metric();
-  double direction(Points& d);
-  double search(const Points& d, double slope);
-  void accept();
+  double direction();
+  double search(double slope);
+  void accept(double length);
   StepResult give_up(double slope);
   bool is_stage_over() const;
   bool is_at_zero() const;
-  StepResult result(Outcome outcome) const { return {outcome, objective_, stage_}; }
+  StepResult result(Outcome outcome) const { return {outcome, objective_, stage_, is_true_norm_}; }
 
   Problem problem_;
   std::vector<double> shares_;  // of the way from 2 to p_i, for the first stages
@@ -54,7 +54,11 @@ class QuasiNewton : public Minimiser {
   int stage_ = 0;
   bool is_last_stage_ = false;
   LpNorm norm_;  // of the stage
-  Points x_, gradient_, direction_, trial_, trial_gradient_;
+  bool is_true_norm_ = false;
+  Points x_, trial_, direction_;
+  Points gradient_, gradient_before_;              // before the last step
+  Points preconditioned_, preconditioned_before_;  // M^-1 times them
+  double step_length_ = 0;                         // of the last step along direction_, not yet remembered
   double objective_ = 0;
   PairMemory memory_;
   std::deque<double> history_;  // objectives of the stage's last 21 iterations
