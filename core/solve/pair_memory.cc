@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t kChunk = 12288;      // numbers
 constexpr double kLeastCurvature = 1e-12;  // <s, y> over |s| |y|
+constexpr double kLeastGamma = 0.05;
 
 }  // namespace
 
@@ -60,7 +61,7 @@ void PairMemory::take_in(const std::vector<double>& sums) {
 double PairMemory::direction(const Points& gradient, const Points& gradient_before, const Points& h,
                              const Points& h_before, double length, Points& d) {
   if (length == 0) {
-    d = -h;
+    d = -gamma_ * h;
     return gradient.cwiseProduct(d).sum();
   }
   std::vector<double> sums = products(gradient, gradient_before, h, h_before, length, d);
@@ -73,6 +74,7 @@ double PairMemory::direction(const Points& gradient, const Points& gradient_befo
   }
 
   const std::size_t m = pairs_.size();
+  if (m > 0) gamma_ = std::clamp(pairs_.back().sy.back() / pairs_.back().zy.back(), kLeastGamma, 1.0);
   const auto sg = [&](std::size_t i) { return sums[kSumsBefore + kSumsOfPair * i]; };
   const auto zg = [&](std::size_t i) { return sums[kSumsBefore + kSumsOfPair * i + 1]; };
   std::vector<double> a(m), b(m);
@@ -81,20 +83,23 @@ double PairMemory::direction(const Points& gradient, const Points& gradient_befo
     for (std::size_t j = i + 1; j < m; ++j) a[i] -= pairs_[j].sy[i] * a[j];
     a[i] /= pairs_[i].sy[i];
   }
-  for (std::size_t i = 0; i < m; ++i) {  // R^T b = (D + W) a - Z^T g
-    b[i] = pairs_[i].sy[i] * a[i] - zg(i);
-    for (std::size_t j = 0; j < m; ++j) b[i] += pairs_[std::max(i, j)].zy[std::min(i, j)] * a[j];
+  for (std::size_t i = 0; i < m; ++i) {  // R^T b = (D + gamma W) a - gamma Z^T g
+    b[i] = pairs_[i].sy[i] * a[i] - gamma_ * zg(i);
+    for (std::size_t j = 0; j < m; ++j) b[i] += gamma_ * pairs_[std::max(i, j)].zy[std::min(i, j)] * a[j];
     for (std::size_t j = 0; j < i; ++j) b[i] -= pairs_[i].sy[j] * b[j];
     b[i] /= pairs_[i].sy[i];
   }
-  double slope = -sums[2];
-  for (std::size_t i = 0; i < m; ++i) slope += a[i] * zg(i) - b[i] * sg(i), a[i] = -a[i];
+  double slope = -gamma_ * sums[2];
+  for (std::size_t i = 0; i < m; ++i) {
+    a[i] *= -gamma_;
+    slope -= a[i] * zg(i) + b[i] * sg(i);
+  }
 
   const std::vector<KeptPair> all = kept();
   d.resize(gradient.rows(), 3);
   workers_.for_chunks(static_cast<std::size_t>(d.size()), kChunk,
                       [&](std::size_t, std::size_t begin, std::size_t end) {
-                        sweep_direction(h.data(), all, b.data(), a.data(), begin, end, d.data());
+                        sweep_direction(gamma_, h.data(), all, b.data(), a.data(), begin, end, d.data());
                       });
   return slope;
 }

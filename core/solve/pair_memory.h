@@ -11,12 +11,15 @@ namespace lpdeform {
 
 /// The memory of L-BFGS and its inverse Hessian H in compact form (Byrd, Nocedal & Schnabel 1994, theorem 2.2):
 ///
-///   H g = h + S R^-T ((D + W) a - Z^T g) - Z a,   a = R^-1 S^T g,   h = M^-1 g
+///   H g = gamma h + S R^-T ((D + gamma W) a - gamma Z^T g) - gamma Z a,   a = R^-1 S^T g,   h = M^-1 g
 ///
 /// with M the metric, columns s = x' - x and z = M^-1 y = h' - h of S and Z, y = g' - g, R the upper triangle of
-/// S^T Y, D its diagonal, W = Z^T Y. All vectors are swept over twice an iteration and no more. Pairs are kept in
-/// single precision: they only steer. Runs in parallel in fixed chunks: the same bits on any number of threads.
-/// One caller at a time.
+/// S^T Y, D its diagonal, W = Z^T Y. H_0 = gamma M^-1 with gamma = <s, y> / <z, y> of the newest pair (Nocedal &
+/// Wright, 7.20), at most 1: for p > 2 the metric lacks the curvature along the residuals, (p - 1) times as much,
+/// and full steps would be too long. It outlives clear().
+///
+/// All vectors are swept over twice an iteration and no more. Pairs are kept in single precision: they only steer.
+/// Runs in parallel in fixed chunks: the same bits on any number of threads. One caller at a time.
 class PairMemory {
  public:
   PairMemory(Workers workers, std::size_t most_pairs)
@@ -46,6 +49,7 @@ class PairMemory {
   std::vector<Pair> pairs_;  // oldest first
   Pair candidate_;           // where the next is swept into
   std::vector<double> chunk_sums_;
+  double gamma_ = 1;
 };
 
 }  // namespace lpdeform

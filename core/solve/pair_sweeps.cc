@@ -84,13 +84,13 @@ void SweepProducts(const NewPair& pair, std::span<const KeptPair> kept, std::siz
   }
 }
 
-void SweepDirection(const double* h, std::span<const KeptPair> kept, const double* s_factors,
+void SweepDirection(double gamma, const double* h, std::span<const KeptPair> kept, const double* s_factors,
                     const double* z_factors, std::size_t begin, std::size_t end, double* d) {
   const D tag;
   const std::size_t lanes = hn::Lanes(tag);
   for (std::size_t at = begin; at < end; at += kStretch) {
     const std::size_t last = std::min(at + kStretch, end);
-    for (std::size_t k = at; k < last; ++k) d[k] = -h[k];
+    for (std::size_t k = at; k < last; ++k) d[k] = -gamma * h[k];
     for (std::size_t i = 0; i < kept.size(); ++i) {
       const float *const s = kept[i].s, *const z = kept[i].z;
       const V a = hn::Set(tag, s_factors[i]), b = hn::Set(tag, z_factors[i]);
@@ -120,9 +120,9 @@ void sweep_products(const NewPair& pair, std::span<const KeptPair> kept, std::si
   HWY_DYNAMIC_DISPATCH(SweepProducts)(pair, kept, begin, end, sums);
 }
 
-void sweep_direction(const double* h, std::span<const KeptPair> kept, const double* s_factors,
+void sweep_direction(double gamma, const double* h, std::span<const KeptPair> kept, const double* s_factors,
                      const double* z_factors, std::size_t begin, std::size_t end, double* d) {
-  HWY_DYNAMIC_DISPATCH(SweepDirection)(h, kept, s_factors, z_factors, begin, end, d);
+  HWY_DYNAMIC_DISPATCH(SweepDirection)(gamma, h, kept, s_factors, z_factors, begin, end, d);
 }
 
 }  // namespace lpdeform

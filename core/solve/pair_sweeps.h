@@ -25,8 +25,8 @@ void sweep_products(const NewPair& pair, std::span<const KeptPair> kept, std::si
                     double* sums);
 inline constexpr std::size_t kSumsBefore = 3, kSumsOfPair = 4;
 
-/// d = -h - sum_i (s_factors[i] s_i + z_factors[i] z_i) at numbers [begin, end).
-void sweep_direction(const double* h, std::span<const KeptPair> kept, const double* s_factors,
+/// d = -gamma h - sum_i (s_factors[i] s_i + z_factors[i] z_i) at numbers [begin, end).
+void sweep_direction(double gamma, const double* h, std::span<const KeptPair> kept, const double* s_factors,
                      const double* z_factors, std::size_t begin, std::size_t end, double* d);
 
 }  // namespace lpdeform

@@ -9,9 +9,11 @@ namespace {
 constexpr std::size_t kMemory = 6;
 constexpr int kWindow = 20;
 constexpr int kRefresh = 40;
-constexpr int kTrial = 10;  // iterations for which a live session keeps the metric that it finds
+constexpr int kSoonest = 5;         // iterations between refreshes, where one is asked for
+constexpr double kShortStep = 0.9;  // asks for one
+constexpr int kTrial = 10;          // iterations for which a live session keeps the metric that it finds
 constexpr double kSufficientDecrease = 1e-4;
-constexpr int kStageIterations = 30;
+constexpr int kStageIterations = 60;
 constexpr double kSmoothingStep = 0.1;
 constexpr double kBias = 3e-4;
 constexpr double kLeastSmoothing = 1e-26;  // eps^2 over the squared diagonal: rounding
@@ -25,7 +27,7 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
       memory_(problem_.cells.workers(), kMemory) {
   const bool is_warm = warmth != Warmth::kCold;
   const double lowest = problem_.norm.lowest_p();
-  if (lowest < 2) eps2_ = (is_warm ? 1e-9 : 1e-6) * problem_.diagonal * problem_.diagonal;
+  if (lowest < 2) eps2_ = (is_warm ? 1e-9 : 1e-8) * problem_.diagonal * problem_.diagonal;
   // No way from p = 2 where all p_i > 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8 times
   // the E^(1/p)).
   for (const double p : {2.0, 1.6, 1.35, 1.2, 1.1, 1.05}) {
@@ -139,7 +141,7 @@ void QuasiNewton::accept(double length) {
   gradient_.swap(gradient_before_);
   problem_.cells.gradient(gradient_);
   clear_held_rows(problem_.constraints, gradient_);
-  step_length_ = length;
+  step_length_ = last_length_ = length;
   ++stage_iterations_, ++since_refresh_;
   history_.push_back(objective_);
   if (history_.size() > kWindow + 1) history_.pop_front();
@@ -150,7 +152,7 @@ StepResult QuasiNewton::step() {
   if (!is_last_stage_ && (stage_iterations_ >= kStageIterations || is_stage_over())) {
     ++stage_;
     begin_stage();
-  } else if (since_refresh_ >= kRefresh) {
+  } else if (since_refresh_ >= kRefresh || (last_length_ < kShortStep && since_refresh_ >= kSoonest)) {
     is_metric_good_ = refresh_metric();
   }
   if (!is_metric_good_ || !std::isfinite(objective_)) return result(Outcome::kBreakdown);

@@ -20,8 +20,9 @@ enum class Warmth {
 ///
 /// Where some p_i < 2 it runs through stages: p from 2 towards p_i, then cell energies smoothed with an eps
 /// that falls until it does not matter. Each stage begins with a metric refactored for the present cell
-/// weights and an empty memory; so does every 40th iteration. In a live session it starts at p_i with a small
-/// eps, and for its first ten iterations keeps the metric that it finds.
+/// weights and an empty memory; so does every 40th iteration, and one after a shortened step, which says that
+/// the weights have changed. In a live session it starts at p_i with a small eps, and for its first ten
+/// iterations keeps the metric that it finds.
 ///
 /// Converged when, in the last stage, the objective f fell over 20 iterations by at most tolerance * p * f, p
 /// the largest p_i (a relative decrease of E^(1/p) of at most the tolerance); or when no step lowers f and
@@ -58,6 +59,7 @@ class QuasiNewton : public Minimiser {
   Points x_, trial_, direction_;
   Points gradient_, gradient_before_;              // before the last step
   Points preconditioned_, preconditioned_before_;  // M^-1 times them
+  double last_length_ = 1;                         // of a step
   double step_length_ = 0;                         // of the last step along direction_, not yet remembered
   double objective_ = 0;
   PairMemory memory_;
