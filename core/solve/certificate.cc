@@ -131,13 +131,13 @@ EdgeVectors term_gradients(const Problem& problem, const DualBound& dual, const 
 
 double mean_energy(const Problem& problem) {
   double sum = 0;
-  for (const double e2 : problem.cells.squared_energies()) sum += std::sqrt(e2);
+  for (const double e2 : problem.objective.cells().squared_energies()) sum += std::sqrt(e2);
   return sum / static_cast<double>(problem.shape().vertex_count());
 }
 
 /// A penalty that treats the 90th percentile of the cells alike in primal and dual: k p E^{p - 2} there.
 double penalty(const Problem& problem, const DualBound& dual) {
-  const auto& e2 = problem.cells.squared_energies();
+  const auto& e2 = problem.objective.cells().squared_energies();
   std::vector<std::pair<double, std::int32_t>> cells;
   for (std::size_t i = 0; i < e2.size(); ++i) cells.emplace_back(e2[i], static_cast<std::int32_t>(i));
   const auto percentile =
@@ -181,8 +181,8 @@ double gradient_bound(const Problem& problem, DualBound& dual, const EdgeVectors
   for (const double share : {0.0, 1e-4, 1e-3, 1e-2, 1e-1}) {
     if (share > 0 && problem.norm.lowest_p() >= 2) break;
     const double eps = share * mean;
-    problem.cells.reweigh(problem.norm.smoothed(eps * eps));
-    if (!problem.metric.factor(problem.cells.cell_weights(), problem.constraints.is_held)) continue;
+    problem.objective.reweigh(problem.norm.smoothed(eps * eps));
+    if (!problem.factor_metric()) continue;
     EdgeVectors gradient = term_gradients(problem, dual, z, eps);
     const double bound = dual.scaled_bound(project(problem, gradient));
     if (bound > best) best = bound, y = std::move(gradient);
@@ -193,7 +193,7 @@ double gradient_bound(const Problem& problem, DualBound& dual, const EdgeVectors
 }  // namespace
 
 double relative_gap(const Problem& problem, const Points& x, const CertificateSettings& settings) {
-  const double primal = problem.cells.sum(problem.norm);
+  const double primal = problem.objective.sum(problem.norm);
   if (primal <= problem.zero_objective) return 0;
   if (!std::isfinite(primal)) return 1;
   const Clock::time_point end =
@@ -201,7 +201,7 @@ double relative_gap(const Problem& problem, const Points& x, const CertificateSe
                          std::chrono::duration<double>(std::min(settings.max_seconds, kLongestSeconds)));
 
   EdgeVectors z, y;
-  residuals(problem.shape(), x, problem.cells.rotations(), z);
+  residuals(problem.shape(), x, problem.objective.cells().rotations(), z);
   DualBound dual(problem, z);
   const double enough = (1 - settings.good_enough) * primal;
   double best = gradient_bound(problem, dual, z, y);

@@ -28,7 +28,7 @@ struct CertificateSettings {
   double max_seconds = std::numeric_limits<double>::infinity();
 };
 
-/// (P - D) / P at x in [0, 1], P the sum of the norm's unsmoothed terms; 0 where P is 0. `problem.cells`
+/// (P - D) / P at x in [0, 1], P the sum of the norm's unsmoothed terms; 0 where P is 0. `problem.objective`
 /// holds the evaluation at x; `problem.metric` is refactored. 1 where no bound was found, also because P is not
 /// finite.
 double relative_gap(const Problem& problem, const Points& x, const CertificateSettings& settings = {});

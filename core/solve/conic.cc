@@ -13,8 +13,8 @@ Conic::Conic(Problem problem, Points x) : problem_(std::move(problem)), x_(std::
 void Conic::begin_stage() {
   ++stage_;
   stage_start_ = x_;
-  objective_ = problem_.cells.evaluate(x_, problem_.norm);
-  cone_.emplace(problem_, problem_.cells.rotations(), x_);
+  objective_ = problem_.objective.evaluate(x_, problem_.norm);
+  cone_.emplace(problem_, problem_.objective.cells().rotations(), x_);
 }
 
 StepResult Conic::end_stage() {
@@ -33,7 +33,7 @@ StepResult Conic::step() {
   if (cone_->primal() < objective_) {
     objective_ = cone_->primal();
     x_ = cone_->x();
-    problem_.cells.evaluate(x_, problem_.norm);
+    problem_.objective.evaluate(x_, problem_.norm);
   }
   if (is_solved || cone_->relative_gap() <= kGap) return end_stage();
   if (is_able) return {Outcome::kProgress, objective_, stage_};

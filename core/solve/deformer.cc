@@ -36,13 +36,14 @@ struct Deformer::Impl {
   Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options)
       : shape(std::move(rest_shape)),
         options(deformer_options),
-        cells(shape, Workers(deformer_options.threads)),
+        objective(shape, Workers(deformer_options.threads)),
         metric(shape),
         x(shape->scaled_positions()),
         best_energies(Field::Zero(shape->vertex_count())),
         positions(shape->positions()) {}
 
   double unit() const { return shape->mean_edge_length(); }
+  const Workers& workers() const { return objective.cells().workers(); }
   double length_unit() const { return material.length_unit > 0 ? material.length_unit : unit(); }
 
   Points laplacian_guess();
@@ -65,7 +66,7 @@ struct Deformer::Impl {
 
   std::shared_ptr<const RestShape> shape;
   DeformerOptions options;
-  CellPass cells;
+  Objective objective;
   Metric metric;
   HandleSet handles;
   Material material;
@@ -93,7 +94,7 @@ struct Deformer::Impl {
 /// Laplacian system L x = L p with the handles' positions given.
 Points Deformer::Impl::laplacian_guess() {
   Points u = constraints->targets - shape->scaled_positions();
-  metric.extend(constraints->is_held, u, cells.workers());
+  metric.extend(constraints->is_held, u, workers());
   return shape->scaled_positions() + u;
 }
 
@@ -106,7 +107,7 @@ Points Deformer::Impl::current_guess() {
     is_moved = is_moved || !u.row(i).isZero(0);
   }
   if (!is_moved) return x;
-  metric.extend(constraints->is_held, u, cells.workers());
+  metric.extend(constraints->is_held, u, workers());
   return x + u;
 }
 
@@ -127,8 +128,8 @@ Points Deformer::Impl::initial_guess(InitialGuess guess) {
 
 /// The largest E_i at the guess: the reference length that keeps terms of any p in range.
 double Deformer::Impl::typical_energy(const Points& guess) {
-  cells.evaluate(guess, LpNorm(Material::uniform(2), shape->vertex_count(), unit(), 1));
-  const auto& e2 = cells.squared_energies();
+  objective.evaluate(guess, LpNorm(Material::uniform(2), shape->vertex_count(), unit(), 1));
+  const auto& e2 = objective.cells().squared_energies();
   const double largest = std::sqrt(*std::max_element(e2.begin(), e2.end()));
   return largest > 1e-12 ? largest : 1.0;
 }
@@ -142,7 +143,7 @@ double Deformer::Impl::zero_objective() const {
 }
 
 Problem Deformer::Impl::make_problem() {
-  return {cells,
+  return {objective,
           metric,
           *constraints,
           *norm,
@@ -176,16 +177,16 @@ bool Deformer::Impl::prepare_metric(bool needs_plain_weights) {
   return metric.factor(std::vector<double>(shape->vertex_count(), 1.0), constraints->is_held);
 }
 
-/// Called with the evaluation of minimiser->x() in `cells`, and its true sum.
+/// Called with the evaluation of minimiser->x() in `objective`, and its true sum.
 void Deformer::Impl::keep_if_best(double sum) {
   const bool is_first = summary.iterations == 0;
   if (!is_first && !(sum < best_sum)) return;
   best_sum = std::isnan(sum) ? std::numeric_limits<double>::infinity() : sum;
   is_positions_current = false;
-  const auto& e2 = cells.squared_energies();
+  const auto& e2 = objective.cells().squared_energies();
   const Points& from = minimiser->x();
   x.resize(from.rows(), 3);
-  cells.workers().for_chunks(e2.size(), kCopyChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+  workers().for_chunks(e2.size(), kCopyChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     std::copy(from.data() + 3 * begin, from.data() + 3 * end, x.data() + 3 * begin);
     for (std::size_t i = begin; i < end; ++i) best_energies[i] = unit() * std::sqrt(e2[i]);
   });
@@ -206,7 +207,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   stop = std::move(new_stop);
   summary = {};
   summary.method = settings.method;
-  summary.threads = cells.workers().threads();
+  summary.threads = workers().threads();
   const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state;
   const bool keeps_metric = is_warm && is_metric_live && metric.is_factored_for(constraints->is_held);
   const bool is_factored = prepare_metric(!is_warm);
@@ -218,12 +219,12 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   const double typical = typical_energy(guess);
   const double reference = settings.method == Method::kLineSearch ? length_unit() / unit() : typical;
   norm.emplace(material, shape->vertex_count(), unit(), reference);
-  cells.reweigh(*norm);  // typical_energy has evaluated the guess
+  objective.reweigh(*norm);  // typical_energy has evaluated the guess
   best_sum = std::numeric_limits<double>::infinity();
   const Warmth warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
   minimiser = make_minimiser(settings.method, std::move(guess), warmth);
   is_metric_live = settings.method == Method::kQuasiNewton;
-  const double sum = cells.sum(*norm);
+  const double sum = objective.sum(*norm);
   keep_if_best(sum);
   summary.initial_energy = norm->true_energy(sum);
   record({Outcome::kProgress, sum, 0}, sum);
@@ -233,7 +234,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
 void Deformer::Impl::iterate() {
   const StepResult result = minimiser->step();
   ++summary.iterations;
-  const double sum = result.is_true ? result.objective : cells.sum(*norm);
+  const double sum = result.is_true ? result.objective : objective.sum(*norm);
   keep_if_best(sum);
   record(result, sum);
   switch (result.outcome) {
@@ -261,7 +262,7 @@ void Deformer::Impl::end(StopReason reason) {
 double Deformer::Impl::gap(double max_seconds) {
   if (!constraints || !norm) return 1;
   is_metric_live = false;  // the certificate factors for itself
-  cells.evaluate(x, *norm);
+  objective.evaluate(x, *norm);
   return relative_gap(make_problem(), x, {.max_seconds = max_seconds});
 }
 
@@ -386,7 +387,8 @@ double Deformer::optimality_gap() {
 
 std::size_t Deformer::memory_bytes() const {
   const std::size_t points = impl_->x.size() * sizeof(double);
-  return sizeof(Impl) + impl_->cells.memory_bytes() + impl_->metric.memory_bytes() + kWorkspace * points;
+  return sizeof(Impl) + impl_->objective.cells().memory_bytes() + impl_->metric.memory_bytes() +
+         kWorkspace * points;
 }
 
 }  // namespace lpdeform

@@ -13,14 +13,14 @@ constexpr double kRounding = 1e-15;  // of a sum
 }  // namespace
 
 LineSearch::LineSearch(Problem problem, Points x) : problem_(std::move(problem)), x_(std::move(x)) {
-  objective_ = problem_.cells.evaluate(x_, problem_.norm);
+  objective_ = problem_.objective.evaluate(x_, problem_.norm);
 }
 
 StepResult LineSearch::step() {
   if (!std::isfinite(objective_)) return {Outcome::kBreakdown, objective_, 0};
   if (objective_ <= problem_.zero_objective) return {Outcome::kConverged, objective_, 0};
-  problem_.cells.gradient(gradient_);
-  clear_held_rows(problem_.constraints, gradient_);
+  problem_.objective.gradient(gradient_);
+  restrict_to_free(problem_.constraints, gradient_);
   // The gradient with respect to positions in units of l, X = x / l, is l times the one at hand; a step in X
   // is worth l in x.
   const double squared_unit = problem_.length_unit * problem_.length_unit;
@@ -32,7 +32,7 @@ StepResult LineSearch::step() {
   for (;; t *= kBeta) {
     if (problem_.stop.stop_requested()) break;
     trial_ = x_ - (t * squared_unit) * gradient_;
-    value = problem_.cells.evaluate(trial_, problem_.norm);
+    value = problem_.objective.evaluate(trial_, problem_.norm);
     if (value <= objective_ - kAlpha * t * squared_slope) break;
     if (t * std::sqrt(squared_slope) < 1e-15) return {Outcome::kStalled, objective_, 0};
   }

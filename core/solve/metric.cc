@@ -30,17 +30,21 @@ LowerMatrix lower_pattern(const RestShape& shape) {
 Metric::Metric(std::shared_ptr<const RestShape> shape)
     : shape_(std::move(shape)), matrix_(lower_pattern(*shape_)), factor_(matrix_) {}
 
-bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held) {
+bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held,
+                    const std::vector<MatrixEntry>& entries) {
   const double largest = *std::max_element(cell_weights.begin(), cell_weights.end());
   if (!(largest > 0) || !std::isfinite(largest)) return is_good_ = false;
   std::vector<double> clipped(cell_weights.size());
   std::transform(cell_weights.begin(), cell_weights.end(), clipped.begin(),
                  [&](double weight) { return std::max(weight / largest, kLowestShare); });
+  std::vector<MatrixEntry> scaled = entries;
+  for (MatrixEntry& entry : scaled) entry.value /= largest;
   scale_ = largest;
-  if (is_good_ && is_held == is_held_ && clipped == cell_weights_) return true;
+  if (is_good_ && is_held == is_held_ && clipped == cell_weights_ && scaled == entries_) return true;
   single_.clear();
   cell_weights_ = std::move(clipped);
   is_held_ = is_held;
+  entries_ = std::move(scaled);
   for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
     double diagonal = 0;
     std::int32_t entry = matrix_.columns[i];
@@ -52,7 +56,21 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
     }
     matrix_.values[matrix_.columns[i]] = is_held[i] ? 1.0 : diagonal;
   }
+  for (const MatrixEntry& entry : entries_) add_entry(entry);
   return is_good_ = factor_.factor(matrix_);
+}
+
+void Metric::add_entry(const MatrixEntry& entry) {
+  if (is_held_[entry.row] || is_held_[entry.column]) return;
+  const auto begin = matrix_.rows.begin() + matrix_.columns[entry.column];
+  const auto end = matrix_.rows.begin() + matrix_.columns[entry.column + 1];
+  const auto found = std::lower_bound(begin, end, entry.row);
+  if (found != end && *found == entry.row) {
+    matrix_.values[found - matrix_.rows.begin()] += entry.value;
+    return;
+  }
+  for (const std::int32_t i : {entry.row, entry.column})
+    matrix_.values[matrix_.columns[i]] += std::abs(entry.value);
 }
 
 void Metric::adopt(const std::vector<double>& cell_weights) {
@@ -92,7 +110,8 @@ void Metric::precondition(const Points& b, Points& x, const Workers& workers) co
 
 std::size_t Metric::memory_bytes() const {
   return factor_.memory_bytes() + single_.memory_bytes() + cell_weights_.capacity() * sizeof(double) +
-         is_held_.capacity() + matrix_.columns.capacity() * sizeof(std::int32_t) +
+         is_held_.capacity() + entries_.capacity() * sizeof(MatrixEntry) +
+         matrix_.columns.capacity() * sizeof(std::int32_t) +
          matrix_.rows.capacity() * (sizeof(std::int32_t) + sizeof(double));
 }
 

@@ -8,11 +8,19 @@
 
 namespace lpdeform {
 
+/// A number to be added to a symmetric matrix at (row, column) and (column, row); row >= column.
+struct MatrixEntry {
+  std::int32_t row, column;
+  double value;
+
+  bool operator==(const MatrixEntry&) const = default;
+};
+
 /// The Hessian of the objective with its rotations and cell weights c held, on the free vertices:
 ///
-///   M = 2 * Laplacian with edge weights (c_i + c_j) w_ij,     held vertices are identity rows
+///   M = 2 * Laplacian with edge weights (c_i + c_j) w_ij + entries,     held vertices are identity rows
 ///
-/// one scalar matrix for all three coordinates. For p = 2 it is exact (the matrix of local_global); for other
+/// with the entries that soft terms add (SoftTerms::matrix_entries): one scalar matrix for all three coordinates. For p = 2 it is exact (the matrix of local_global); for other
 /// p it is what iteratively reweighted least squares would use. Ordering and symbolic analysis are made once,
 /// by the constructor; factor() is numeric alone.
 class Metric {
@@ -21,8 +29,10 @@ class Metric {
 
   /// `is_held` has one entry a vertex. Cell weights are clipped from below at 1e-8 of the largest used, so
   /// that the factorisation stays healthy where cells have no weight. False where the factorisation fails. A
-  /// factor for the same held vertices and cell weights, up to a common factor, is kept.
-  [[nodiscard]] bool factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held);
+  /// factor for the same held vertices, cell weights and entries, up to a common factor, is kept. `entries`
+  /// form a positive semidefinite matrix; those of vertices that no edge joins go to the diagonal.
+  [[nodiscard]] bool factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held,
+                            const std::vector<MatrixEntry>& entries = {});
 
   /// Keeps the last factor for these cell weights as well, scaled to them on the whole: for a metric that need
   /// not be exact. After is_factored_for().
@@ -51,11 +61,13 @@ class Metric {
   double edge_weight(std::int32_t i, std::int32_t k) const {
     return 2 * (cell_weights_[i] + cell_weights_[shape_->neighbours()[k]]) * shape_->weights()[k];
   }
+  void add_entry(const MatrixEntry& entry);
 
   std::shared_ptr<const RestShape> shape_;
   std::vector<double> cell_weights_;  // clipped, over scale_
   std::vector<char> is_held_;
-  double scale_ = 1;  // the largest cell weight: M = scale_ * matrix_ on the free vertices
+  std::vector<MatrixEntry> entries_;  // over scale_
+  double scale_ = 1;                  // the largest cell weight: M = scale_ * matrix_ on the free vertices
   bool is_good_ = false;
   LowerMatrix matrix_;
   SparseCholesky factor_;

@@ -2,16 +2,16 @@
 
 #include <stop_token>
 
-#include "core/energy/cell_pass.h"
 #include "core/energy/lp_norm.h"
 #include "core/solve/constraints.h"
 #include "core/solve/metric.h"
+#include "core/solve/objective.h"
 
 namespace lpdeform {
 
 /// What a method works on; it outlives the method. Positions are in scaled units.
 struct Problem {
-  CellPass& cells;
+  Objective& objective;
   Metric& metric;
   const Constraints& constraints;
   const LpNorm& norm;     // what is to be minimised
@@ -21,7 +21,15 @@ struct Problem {
   double zero_objective;  // an unsmoothed objective that is 0 to rounding
   std::stop_token stop;   // looked at between evaluations
 
-  const RestShape& shape() const { return cells.shape(); }
+  const RestShape& shape() const { return objective.cells().shape(); }
+  const Workers& workers() const { return objective.cells().workers(); }
+
+  /// Factors the metric for the weights of the objective's last evaluation. False where that fails.
+  [[nodiscard]] bool factor_metric() const;
+  /// v = M^-1 v within what the constraints allow: what it gives is a direction that they allow, for any v.
+  void solve(Points& v) const;
+  /// The same to single precision, several times as fast.
+  void precondition(const Points& b, Points& x) const;
 };
 
 /// How an iteration went.
@@ -45,7 +53,7 @@ class Minimiser {
  public:
   virtual ~Minimiser() = default;
 
-  /// One iteration. Afterwards problem.cells holds the evaluation at x() (its squared energies belong to
+  /// One iteration. Afterwards problem.objective holds the evaluation at x() (its squared energies belong to
   /// x()).
   virtual StepResult step() = 0;
 
@@ -53,7 +61,7 @@ class Minimiser {
   virtual const Points& x() const = 0;
 };
 
-/// Sets the rows of held vertices to zero.
-void clear_held_rows(const Constraints& constraints, Points& values);
+/// Leaves of `values`, a gradient or a direction, what the constraints allow: rows of held vertices become zero.
+void restrict_to_free(const Constraints& constraints, Points& values);
 
 }  // namespace lpdeform

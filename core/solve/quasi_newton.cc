@@ -24,7 +24,7 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
     : problem_(std::move(problem)),
       norm_(problem_.norm),
       x_(std::move(x)),
-      memory_(problem_.cells.workers(), kMemory) {
+      memory_(problem_.objective.cells().workers(), kMemory) {
   const bool is_warm = warmth != Warmth::kCold;
   const double lowest = problem_.norm.lowest_p();
   if (lowest < 2) eps2_ = (is_warm ? 1e-9 : 1e-8) * problem_.diagonal * problem_.diagonal;
@@ -36,13 +36,13 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
   begin_stage(warmth == Warmth::kWithMetric);
 }
 
-/// The objective of stage_: p first, then eps. problem_.cells holds the evaluation at x_.
+/// The objective of stage_: p first, then eps. problem_.objective holds the evaluation at x_.
 void QuasiNewton::begin_stage(bool keeps_metric) {
   const bool is_on_the_way = stage_ < static_cast<int>(shares_.size());
   if (stage_ > static_cast<int>(shares_.size())) eps2_ *= kSmoothingStep;
   norm_ = (is_on_the_way ? problem_.norm.nearer_two(shares_[stage_]) : problem_.norm).smoothed(eps2_);
   is_true_norm_ = !is_on_the_way && eps2_ == 0;
-  objective_ = problem_.cells.reweigh(norm_);
+  objective_ = problem_.objective.reweigh(norm_);
   is_last_stage_ = !is_on_the_way && is_smooth_enough();
   history_.assign(1, objective_);
   stage_iterations_ = 0;
@@ -53,7 +53,7 @@ void QuasiNewton::begin_stage(bool keeps_metric) {
 bool QuasiNewton::is_smooth_enough() const {
   if (eps2_ <= kLeastSmoothing * problem_.diagonal * problem_.diagonal) return true;
   double sum = 0;
-  for (const double e2 : problem_.cells.squared_energies()) sum += std::sqrt(e2);
+  for (const double e2 : problem_.objective.cells().squared_energies()) sum += std::sqrt(e2);
   const double mean = sum / static_cast<double>(x_.rows());
   return std::pow(std::sqrt(eps2_) / mean, problem_.norm.lowest_p()) <= kBias;
 }
@@ -63,13 +63,13 @@ bool QuasiNewton::is_smooth_enough() const {
 bool QuasiNewton::adopt_metric() {
   begin_memory();
   since_refresh_ = kRefresh - kTrial;
-  problem_.metric.adopt(problem_.cells.cell_weights());
+  problem_.metric.adopt(problem_.objective.cells().cell_weights());
   return true;
 }
 
 void QuasiNewton::begin_memory() {
-  problem_.cells.gradient(gradient_);
-  clear_held_rows(problem_.constraints, gradient_);
+  problem_.objective.gradient(gradient_);
+  restrict_to_free(problem_.constraints, gradient_);
   memory_.clear();
   step_length_ = 0;
 }
@@ -77,26 +77,26 @@ void QuasiNewton::begin_memory() {
 bool QuasiNewton::refresh_metric() {
   begin_memory();
   since_refresh_ = 0;
-  return problem_.metric.factor(problem_.cells.cell_weights(), problem_.constraints.is_held);
+  return problem_.factor_metric();
 }
 
 /// d = -H g, H_0 = M^-1: unscaled, since M is the Hessian with rotations and weights held. Returns <g, d>.
 double QuasiNewton::direction() {
   preconditioned_.swap(preconditioned_before_);
-  problem_.metric.precondition(gradient_, preconditioned_, problem_.cells.workers());
+  problem_.precondition(gradient_, preconditioned_);
   const double slope = memory_.direction(gradient_, gradient_before_, preconditioned_, preconditioned_before_,
                                          step_length_, direction_);
   step_length_ = 0;
   return slope;
 }
 
-/// The step length along direction_, 0 where none is found. problem_.cells holds the evaluation at trial_
+/// The step length along direction_, 0 where none is found. problem_.objective holds the evaluation at trial_
 /// afterwards.
 double QuasiNewton::search(double slope) {
   double t = 1;
   for (int trial = 0; trial < 40 && !problem_.stop.stop_requested(); ++trial) {
     trial_ = x_ + t * direction_;
-    const double value = problem_.cells.evaluate(trial_, norm_);
+    const double value = problem_.objective.evaluate(trial_, norm_);
     if (value <= objective_ + kSufficientDecrease * t * slope) {
       objective_ = value;
       return t;
@@ -115,13 +115,13 @@ bool QuasiNewton::is_stage_over() const {
 }
 
 bool QuasiNewton::is_at_zero() const {
-  const double sum = is_true_norm_ ? objective_ : problem_.cells.sum(problem_.norm);
+  const double sum = is_true_norm_ ? objective_ : problem_.objective.sum(problem_.norm);
   return sum <= problem_.zero_objective;
 }
 
 /// Where no step along d lowers the objective: another metric, the next stage, or the end.
 StepResult QuasiNewton::give_up(double slope) {
-  problem_.cells.evaluate(x_, norm_);
+  problem_.objective.evaluate(x_, norm_);
   if (problem_.stop.stop_requested()) return result(Outcome::kProgress);
   if (since_refresh_ > 0) {
     is_metric_good_ = refresh_metric();
@@ -139,8 +139,8 @@ StepResult QuasiNewton::give_up(double slope) {
 void QuasiNewton::accept(double length) {
   x_.swap(trial_);
   gradient_.swap(gradient_before_);
-  problem_.cells.gradient(gradient_);
-  clear_held_rows(problem_.constraints, gradient_);
+  problem_.objective.gradient(gradient_);
+  restrict_to_free(problem_.constraints, gradient_);
   step_length_ = last_length_ = length;
   ++stage_iterations_, ++since_refresh_;
   history_.push_back(objective_);

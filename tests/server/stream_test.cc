@@ -44,6 +44,7 @@ TEST_F(StreamTest, DeformAnswersEveryUpdateAndEndsWithTheConvergedFrameOfTheLast
 TEST_F(StreamTest, EveryInputIsAnsweredOrCountedAsSkipped) {
   const auto session = create(bar_mesh());
   DeformClient client(*stub_, session, with_credit(8));
+  ASSERT_TRUE(client.next_frame());  // the state before the first input
   ASSERT_TRUE(client.send(ends_message(rest(), 1, 1)));
   for (std::uint64_t seq = 2; seq <= 30; ++seq) ASSERT_TRUE(client.send(tip_message(seq, 0.1 * double(seq))));
   ASSERT_TRUE(client.settle(30));

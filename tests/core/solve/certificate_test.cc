@@ -13,15 +13,15 @@ class CertificateTest : public testing::Test {
  protected:
   CertificateTest()
       : constraints(make_constraints(*shape, bar_twist(bar), FreeComponents::kError).value()),
-        cells(shape, Workers(1)),
+        objective(shape, Workers(1)),
         metric(shape) {}
 
   LpNorm norm(const Material& material) const {
     return LpNorm(material, shape->vertex_count(), shape->mean_edge_length(), 1.0);
   }
   Problem problem(const LpNorm& norm) {
-    return {cells, metric, constraints, norm, 1e-5, 1, shape->diagonal() / shape->mean_edge_length(),
-            1e-20, {}};
+    return {objective, metric, constraints, norm, 1e-5, 1, shape->diagonal() / shape->mean_edge_length(),
+            1e-20,     {}};
   }
   Points solved(const Material& material, double tolerance) {
     auto solver = deformer(shape, bar_twist(bar), material);
@@ -35,7 +35,7 @@ class CertificateTest : public testing::Test {
   const TriangleMesh bar = box_surface(4, 4, 21);
   const std::shared_ptr<const RestShape> shape = rest_shape(bar);
   const Constraints constraints;
-  CellPass cells;
+  Objective objective;
   Metric metric;
 };
 
@@ -51,7 +51,7 @@ TEST_F(CertificateTest, IsTightAtTheMinimum) {
     const Material material = p > 0 ? Material::uniform(p) : mixed(shape->vertex_count());
     const LpNorm norm = this->norm(material);
     const Points x = solved(material, 1e-9);
-    cells.evaluate(x, norm);
+    objective.evaluate(x, norm);
     EXPECT_LT(relative_gap(problem(norm), x), p == 1 ? 1e-4 : 1e-6) << "p = " << p;
   }
 }
@@ -63,7 +63,7 @@ TEST_F(CertificateTest, IsTightWithStiffnessThatVariesByMillions) {
     for (std::int32_t i = 0; i < shape->vertex_count(); ++i) material.stiffness[i] = i % 2 == 0 ? 1e-3 : 1e3;
     const LpNorm norm = this->norm(material);
     const Points x = solved(material, 1e-10);
-    cells.evaluate(x, norm);
+    objective.evaluate(x, norm);
     EXPECT_LT(relative_gap(problem(norm), x), 1e-2) << "p = " << p;
   }
 }
@@ -71,9 +71,9 @@ TEST_F(CertificateTest, IsTightWithStiffnessThatVariesByMillions) {
 TEST_F(CertificateTest, WithoutTimeIsLooserAndStillABound) {
   const LpNorm norm = this->norm(Material::uniform(1));
   const Points x = solved(Material::uniform(1), 1e-6);
-  cells.evaluate(x, norm);
+  objective.evaluate(x, norm);
   const double polished = relative_gap(problem(norm), x);
-  cells.evaluate(x, norm);
+  objective.evaluate(x, norm);
   const double unpolished = relative_gap(problem(norm), x, {.good_enough = 0, .max_seconds = 0});
   EXPECT_GE(unpolished, polished);
   EXPECT_LT(unpolished, 1);
@@ -83,7 +83,7 @@ TEST_F(CertificateTest, IsLooseAwayFromIt) {
   for (const double p : {1.0, 1.5, 2.0, 6.0}) {
     const LpNorm norm = this->norm(Material::uniform(p));
     const Points x = constraints.targets;  // the rest mesh with its middle turned
-    cells.evaluate(x, norm);
+    objective.evaluate(x, norm);
     EXPECT_GT(relative_gap(problem(norm), x), 0.01) << "p = " << p;
   }
 }
@@ -96,23 +96,23 @@ TEST_F(CertificateTest, NeverClaimsMoreThanTheConvexStepAllows) {
   for (Eigen::Index i = 0; i < start.rows(); ++i) {
     if (constraints.is_held[i]) start.row(i) = constraints.targets.row(i);
   }
-  const double value = cells.evaluate(start, norm);
+  const double value = objective.evaluate(start, norm);
   const double gap = relative_gap(problem(norm), start);
-  cells.evaluate(start, norm);
+  objective.evaluate(start, norm);
   Points gradient;
-  cells.gradient(gradient);
-  clear_held_rows(constraints, gradient);
-  ASSERT_TRUE(metric.factor(cells.cell_weights(), constraints.is_held));
+  objective.gradient(gradient);
+  restrict_to_free(constraints, gradient);
+  ASSERT_TRUE(metric.factor(objective.cells().cell_weights(), constraints.is_held));
   metric.solve(gradient, gradient);
-  const double optimum = cells.evaluate_held(start - gradient, norm);
+  const double optimum = objective.evaluate_held(start - gradient, norm);
   EXPECT_NEAR((value - optimum) / value, gap, 1e-9);  // and for p = 2 it is that value
 }
 
 TEST_F(CertificateTest, BoundsWhatTheConeProgramFinds) {
   const LpNorm norm = this->norm(Material::uniform(1));
   const Points x = solved(Material::uniform(1), 1e-3);
-  const double energy = cells.evaluate(x, norm);
-  const std::vector<Eigen::Matrix3d> rotations = cells.rotations();
+  const double energy = objective.evaluate(x, norm);
+  const std::vector<Eigen::Matrix3d> rotations = objective.cells().rotations();
   const double bound = energy * (1 - relative_gap(problem(norm), x));
   ConicStep cone(problem(norm), rotations, x);
   while (cone.relative_gap() > 1e-8 && cone.iterate()) {
@@ -124,7 +124,7 @@ TEST_F(CertificateTest, BoundsWhatTheConeProgramFinds) {
 
 TEST_F(CertificateTest, IsZeroAtRest) {
   const LpNorm norm = this->norm(Material::uniform(1));
-  cells.evaluate(shape->scaled_positions(), norm);
+  objective.evaluate(shape->scaled_positions(), norm);
   EXPECT_EQ(relative_gap(problem(norm), shape->scaled_positions()), 0);
 }
 

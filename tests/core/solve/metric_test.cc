@@ -28,6 +28,12 @@ class MetricTest : public testing::Test {
     return result;
   }
 
+  void clear_held(Points& u) const {
+    for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+      if (is_held[i]) u.row(i).setZero();
+    }
+  }
+
   std::shared_ptr<const RestShape> shape;
   Metric metric;
   std::vector<char> is_held;
@@ -45,6 +51,22 @@ TEST_F(MetricTest, InvertsTheReweightedLaplacian) {
     if (is_held[i]) b.row(i).setZero();
   }
   metric.solve(b, x);
+  EXPECT_LT((x - u).norm(), 1e-12);
+}
+
+TEST_F(MetricTest, InvertsItWithEntriesAdded) {
+  const std::int32_t a = shape->faces()(9, 0), b = shape->faces()(9, 1);
+  const std::vector<MatrixEntry> entries = {{a, a, 3.0}, {std::max(a, b), std::min(a, b), -1.5}, {b, b, 2.0}};
+  ASSERT_FALSE(is_held[a] || is_held[b]);
+  ASSERT_TRUE(metric.factor(cell_weights, is_held));
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, entries));
+  Points u = Points::Random(shape->vertex_count(), 3);
+  clear_held(u);
+  Points v = apply(u), x;
+  v.row(a) += 3.0 * u.row(a) - 1.5 * u.row(b);
+  v.row(b) += 2.0 * u.row(b) - 1.5 * u.row(a);
+  clear_held(v);
+  metric.solve(v, x);
   EXPECT_LT((x - u).norm(), 1e-12);
 }
 

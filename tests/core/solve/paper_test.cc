@@ -128,13 +128,14 @@ TEST(Paper, ConicAndQuasiNewtonAgreeOnTheConvexStep) {
 
   const auto constraints = make_constraints(*shape, bar_twist(bar), FreeComponents::kError).value();
   const LpNorm norm(Material::uniform(1), shape->vertex_count(), shape->mean_edge_length(), 1.0);
-  CellPass cells(shape, Workers(1));
+  Objective objective(shape, Workers(1));
   Metric metric(shape);
   const Points x = (solver->positions().rowwise() - shape->centre()) / shape->mean_edge_length();
-  const double energy = cells.evaluate(x, norm);
+  const double energy = objective.evaluate(x, norm);
   const Problem problem{
-      cells, metric, constraints, norm, 1e-5, 1, shape->diagonal() / shape->mean_edge_length(), 0, {}};
-  ConicStep cone(problem, cells.rotations(), constraints.targets);  // from elsewhere, with the same rotations
+      objective, metric, constraints, norm, 1e-5, 1, shape->diagonal() / shape->mean_edge_length(), 0, {}};
+  ConicStep cone(problem, objective.cells().rotations(),
+                 constraints.targets);  // from elsewhere, with the same rotations
   while (cone.relative_gap() > 1e-8 && cone.iterate()) {
   }
   EXPECT_LE(cone.relative_gap(), 1e-7);

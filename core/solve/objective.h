@@ -1,0 +1,43 @@
+#pragma once
+
+#include "core/energy/cell_pass.h"
+#include "core/solve/soft_terms.h"
+
+namespace lpdeform {
+
+/// What a method minimises: the cells' terms (CellPass) and, where handles are soft, the terms of their
+/// wishes beside them,
+///
+///   f(x) = sum_i term_i(E_i^2) + sum_k soft_k(D_k^2)
+///
+/// Without soft terms it is the cell pass, bit for bit. Positions are in scaled units. One caller at a time.
+class Objective {
+ public:
+  Objective(std::shared_ptr<const RestShape> shape, Workers workers)
+      : cells_(std::move(shape), std::move(workers)) {}
+
+  void set_soft_terms(SoftTerms terms) { soft_ = std::move(terms); }
+
+  /// f at x, all rotations fitted.
+  double evaluate(const Points& x, const LpNorm& norm);
+  /// f at x with the rotations of the last evaluate.
+  double evaluate_held(const Points& x, const LpNorm& norm);
+  /// f of another norm at the x of the last evaluation; gradient() and the weights follow it.
+  double reweigh(const LpNorm& norm);
+  /// f of another norm at the x of the last evaluation; changes nothing.
+  double sum(const LpNorm& norm) const;
+  /// The gradient at the x, norm and rotations of the last evaluation.
+  void gradient(Points& result) const;
+
+  /// The cells alone, and the soft terms alone, at the last evaluation.
+  const CellPass& cells() const { return cells_; }
+  const SoftTerms& soft_terms() const { return soft_; }
+  /// What the soft terms add to the metric, for the weights of the last evaluation.
+  const std::vector<MatrixEntry>& matrix_entries() const { return soft_.matrix_entries(); }
+
+ private:
+  CellPass cells_;
+  SoftTerms soft_;
+};
+
+}  // namespace lpdeform
