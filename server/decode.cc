@@ -66,6 +66,8 @@ absl::StatusOr<Method> decode_method(v1::Method method) {
       return Method::kLocalGlobal;
     case v1::METHOD_CONIC:
       return Method::kConic;
+    case v1::METHOD_MULTIRESOLUTION:
+      return Method::kMultiresolution;
     default:
       return unknown_enum("method", method);
   }

@@ -48,6 +48,8 @@ v1::Method encode_method(Method method) {
       return v1::METHOD_LOCAL_GLOBAL;
     case Method::kConic:
       return v1::METHOD_CONIC;
+    case Method::kMultiresolution:
+      return v1::METHOD_MULTIRESOLUTION;
   }
   return v1::METHOD_UNSPECIFIED;
 }

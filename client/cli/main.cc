@@ -97,6 +97,7 @@ void add_solver_options(CLI::App& app, DeformOptions& options) {
       app, "--method", options.method,
       {{"auto", client::Method::kAuto},
        {"quasi_newton", client::Method::kQuasiNewton},
+       {"multiresolution", client::Method::kMultiresolution},
        {"line_search", client::Method::kLineSearch},
        {"local_global", client::Method::kLocalGlobal},
        {"conic", client::Method::kConic}},

@@ -47,7 +47,7 @@ struct Handle {
   Motion motion = Fixed{};
 };
 
-enum class Method { kAuto, kQuasiNewton, kLineSearch, kLocalGlobal, kConic };
+enum class Method { kAuto, kQuasiNewton, kLineSearch, kLocalGlobal, kConic, kMultiresolution };
 
 enum class InitialGuess {
   kCurrent,    // the session's present state; a new session's is kLaplacian

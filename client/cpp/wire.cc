@@ -34,6 +34,8 @@ v1::Method to_wire(Method method) {
       return v1::METHOD_LOCAL_GLOBAL;
     case Method::kConic:
       return v1::METHOD_CONIC;
+    case Method::kMultiresolution:
+      return v1::METHOD_MULTIRESOLUTION;
   }
   return v1::METHOD_UNSPECIFIED;
 }

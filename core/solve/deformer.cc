@@ -13,6 +13,7 @@
 #include "core/solve/conic.h"
 #include "core/solve/line_search.h"
 #include "core/solve/local_global.h"
+#include "core/solve/multiresolution.h"
 #include "core/solve/quasi_newton.h"
 
 namespace lpdeform {
@@ -21,8 +22,10 @@ namespace {
 constexpr double kCertificateSeconds = 1;  // it gets, whatever is left of the time limit
 constexpr std::size_t kWorkspace =
     24;  // positions of all vertices that a solve holds at most: the memory of L-BFGS
-constexpr std::size_t kCopyChunk = 4096;  // vertices
-constexpr double kRounding = 1e-13;       // of the largest coordinate, in scaled units
+constexpr std::size_t kCopyChunk = 4096;     // vertices
+constexpr std::int32_t kLargeMesh = 5000;    // vertices, from which on a coarse level pays
+constexpr std::int32_t kLargeAtTwo = 30000;  // the same where every p is 2: there is less to gain
+constexpr double kRounding = 1e-13;          // of the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
 
@@ -52,6 +55,8 @@ struct Deformer::Impl {
   double typical_energy(const Points& guess);
   double zero_objective() const;
   Problem make_problem();
+  Method chosen_method(Method asked, bool is_warm);
+  bool prepare_coarse();
   std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, Warmth warmth);
   bool prepare_metric(bool needs_plain_weights);
   void keep_if_best(double sum);
@@ -83,7 +88,8 @@ struct Deformer::Impl {
   // The running solve.
   SolveSettings settings;
   std::stop_token stop;
-  std::optional<LpNorm> norm;  // true norm, and the reference of the running solve
+  std::optional<LpNorm> norm;           // true norm, and the reference of the running solve
+  std::unique_ptr<CoarseLevel> coarse;  // made when first needed
   std::unique_ptr<Minimiser> minimiser;
   Clock::time_point started;
   double best_sum = 0;
@@ -154,6 +160,23 @@ Problem Deformer::Impl::make_problem() {
           stop};
 }
 
+/// Makes the coarse level where there is none. False where the mesh cannot have one, or the handles are not known
+/// to it.
+bool Deformer::Impl::prepare_coarse() {
+  if (!objective.soft_terms().empty()) return false;
+  if (!coarse) coarse = CoarseLevel::create(*shape, workers().threads());
+  return coarse && coarse->take_over(*shape, handles, *constraints, material).ok();
+}
+
+Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {
+  if (asked == Method::kAuto) {
+    const std::int32_t large = (material.p.array() == 2).all() ? kLargeAtTwo : kLargeMesh;
+    asked = is_warm || shape->vertex_count() < large ? Method::kQuasiNewton : Method::kMultiresolution;
+  }
+  if (asked != Method::kMultiresolution || (!is_warm && prepare_coarse())) return asked;
+  return Method::kQuasiNewton;
+}
+
 std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points guess, Warmth warmth) {
   Problem problem = make_problem();
   switch (method) {
@@ -163,6 +186,8 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points 
       return std::make_unique<LocalGlobal>(std::move(problem), std::move(guess));
     case Method::kConic:
       return std::make_unique<Conic>(std::move(problem), std::move(guess));
+    case Method::kMultiresolution:
+      return std::make_unique<Multiresolution>(std::move(problem), std::move(guess), *coarse);
     case Method::kAuto:
     case Method::kQuasiNewton:
       break;
@@ -203,12 +228,11 @@ void Deformer::Impl::record(const StepResult& result, double sum) {
 void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token new_stop) {
   started = Clock::now();
   settings = new_settings;
-  if (settings.method == Method::kAuto) settings.method = Method::kQuasiNewton;
   stop = std::move(new_stop);
   summary = {};
-  summary.method = settings.method;
   summary.threads = workers().threads();
   const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state;
+  settings.method = summary.method = chosen_method(settings.method, is_warm);
   const bool keeps_metric = is_warm && is_metric_live && metric.is_factored_for(constraints->is_held);
   const bool is_factored = prepare_metric(!is_warm);
   summary.setup_seconds = seconds_since(started);
@@ -223,7 +247,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   best_sum = std::numeric_limits<double>::infinity();
   const Warmth warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
   minimiser = make_minimiser(settings.method, std::move(guess), warmth);
-  is_metric_live = settings.method == Method::kQuasiNewton;
+  is_metric_live = settings.method == Method::kQuasiNewton || settings.method == Method::kMultiresolution;
   const double sum = objective.sum(*norm);
   keep_if_best(sum);
   summary.initial_energy = norm->true_energy(sum);
@@ -387,8 +411,8 @@ double Deformer::optimality_gap() {
 
 std::size_t Deformer::memory_bytes() const {
   const std::size_t points = impl_->x.size() * sizeof(double);
-  return sizeof(Impl) + impl_->objective.cells().memory_bytes() + impl_->metric.memory_bytes() +
-         kWorkspace * points;
+  return sizeof(Impl) + (impl_->coarse ? impl_->coarse->memory_bytes() : 0) +
+         impl_->objective.cells().memory_bytes() + impl_->metric.memory_bytes() + kWorkspace * points;
 }
 
 }  // namespace lpdeform

@@ -5,8 +5,8 @@
 namespace lpdeform {
 namespace {
 
-constexpr std::array kMethods = {Method::kAuto, Method::kQuasiNewton, Method::kLineSearch,
-                                 Method::kLocalGlobal, Method::kConic};
+constexpr std::array kMethods = {Method::kAuto,       Method::kQuasiNewton, Method::kMultiresolution,
+                                 Method::kLineSearch, Method::kLocalGlobal, Method::kConic};
 
 }  // namespace
 
@@ -16,6 +16,8 @@ std::string_view method_name(Method method) {
       return "auto";
     case Method::kQuasiNewton:
       return "quasi_newton";
+    case Method::kMultiresolution:
+      return "multiresolution";
     case Method::kLineSearch:
       return "line_search";
     case Method::kLocalGlobal:

@@ -7,11 +7,12 @@
 namespace lpdeform {
 
 enum class Method {
-  kAuto,         // kQuasiNewton today
-  kQuasiNewton,  // L-BFGS on E(x) in the metric of the prefactored, reweighted Laplacian. Every p.
-  kLineSearch,   // the paper's section 3.2: gradient descent with backtracking. Every p.
-  kLocalGlobal,  // Sorkine & Alexa 2007. p = 2 only.
-  kConic,        // the paper's section 3.3: second-order cone programs and rotation fits in turn. p = 1 only.
+  kAuto,             // kMultiresolution for cold solves of large meshes, else kQuasiNewton
+  kQuasiNewton,      // L-BFGS on E(x) in the metric of the prefactored, reweighted Laplacian. Every p.
+  kMultiresolution,  // a coarse level first, then kQuasiNewton. Every p.
+  kLineSearch,       // the paper's section 3.2: gradient descent with backtracking. Every p.
+  kLocalGlobal,      // Sorkine & Alexa 2007. p = 2 only.
+  kConic,  // the paper's section 3.3: second-order cone programs and rotation fits in turn. p = 1 only.
 };
 
 enum class InitialGuess {

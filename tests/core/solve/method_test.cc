@@ -193,7 +193,9 @@ INSTANTIATE_TEST_SUITE_P(Methods, EveryMethod,
                                          Case{Method::kQuasiNewton, -1}, Case{Method::kLineSearch, 1.5},
                                          Case{Method::kLineSearch, 2}, Case{Method::kLineSearch, 6},
                                          Case{Method::kLineSearch, -1}, Case{Method::kLocalGlobal, 2},
-                                         Case{Method::kConic, 1}),
+                                         Case{Method::kConic, 1}, Case{Method::kMultiresolution, 1},
+                                         Case{Method::kMultiresolution, 2}, Case{Method::kMultiresolution, 6},
+                                         Case{Method::kMultiresolution, -1}),
                          case_name);
 
 }  // namespace

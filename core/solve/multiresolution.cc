@@ -1,0 +1,49 @@
+#include "core/solve/multiresolution.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace lpdeform {
+namespace {
+
+constexpr double kCoarseTolerance = 1e-4;  // of E^(1/p): the levels differ by more
+
+}  // namespace
+
+Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level)
+    : problem_(std::move(problem)), x_(std::move(x)), level_(level) {
+  objective_ = problem_.objective.reweigh(problem_.norm);
+  SolveSettings settings;
+  settings.initial = InitialGuess::kLaplacian;
+  settings.tolerance = std::max(problem_.tolerance, kCoarseTolerance);
+  if (!level_.deformer().start(settings, problem_.stop).ok())
+    fine_ = std::make_unique<QuasiNewton>(problem_, x_, Warmth::kCold);
+}
+
+/// From the better of the guess and what the coarse level has found.
+void Multiresolution::begin_fine() {
+  Points found = level_.prolong(problem_.shape());
+  for (Eigen::Index i = 0; i < found.rows(); ++i) {
+    if (problem_.constraints.is_held[i]) found.row(i) = problem_.constraints.targets.row(i);
+  }
+  const bool is_better = found.allFinite() && problem_.objective.evaluate(found, problem_.norm) < objective_;
+  if (is_better) {
+    x_.swap(found);
+  } else {
+    problem_.objective.evaluate(x_, problem_.norm);
+  }
+  fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), is_better ? Warmth::kWarm : Warmth::kCold);
+}
+
+StepResult Multiresolution::step() {
+  if (fine_) {
+    StepResult result = fine_->step();
+    ++result.stage;  // 0 is the coarse level's
+    return result;
+  }
+  if (level_.deformer().step()) return {Outcome::kProgress, objective_, 0, true};
+  begin_fine();
+  return {Outcome::kProgress, problem_.objective.sum(problem_.norm), 0, true};
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "core/solve/coarse_level.h"
+#include "core/solve/minimiser.h"
+#include "core/solve/quasi_newton.h"
+
+namespace lpdeform {
+
+/// The coarse level first, by any method that suits it (a level below it included), then QuasiNewton from what it
+/// prolongs to. One iteration of the coarse level counts as one here; the state is the guess until it has ended.
+/// Where it finds nothing better than the guess, this is QuasiNewton from there. Converged as that.
+class Multiresolution : public Minimiser {
+ public:
+  /// `level` has taken the handles and the material over and outlives this.
+  Multiresolution(Problem problem, Points x, CoarseLevel& level);
+
+  StepResult step() override;
+  const Points& x() const override { return fine_ ? fine_->x() : x_; }
+
+ private:
+  void begin_fine();
+
+  Problem problem_;
+  Points x_;
+  double objective_ = 0;
+  CoarseLevel& level_;
+  std::unique_ptr<QuasiNewton> fine_;  // none while the coarse level runs
+};
+
+}  // namespace lpdeform

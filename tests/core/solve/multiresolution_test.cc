@@ -1,0 +1,102 @@
+#include "core/solve/multiresolution.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+class MultiresolutionTest : public testing::Test {
+ protected:
+  static SolveSettings settings(Method method) {
+    SolveSettings result;
+    result.method = method;
+    result.initial = InitialGuess::kLaplacian;
+    result.keep_trace = true;
+    return result;
+  }
+
+  const TriangleMesh mesh = box_surface(6, 6, 40);
+  const std::shared_ptr<const RestShape> shape = rest_shape(mesh);
+  HandleSet bend() const {
+    HandleSet handles;
+    (void)handles.set("bottom", {slice(mesh, 2, 0, 0), Fixed{}});
+    (void)handles.set("top", {slice(mesh, 2, 40, 40), turn(Eigen::Vector3d::UnitX(), 80, {3, 3, 20})});
+    return handles;
+  }
+};
+
+TEST_F(MultiresolutionTest, EndsWhereQuasiNewtonEndsOrLower) {
+  for (const double p : {1.0, 1.5, 2.0, 6.0}) {
+    auto alone = deformer(shape, bend(), Material::uniform(p));
+    auto nested = deformer(shape, bend(), Material::uniform(p));
+    const double expected = alone->solve(settings(Method::kQuasiNewton)).value().energy;
+    const SolveSummary summary = nested->solve(settings(Method::kMultiresolution)).value();
+    EXPECT_EQ(summary.method, Method::kMultiresolution);
+    EXPECT_EQ(summary.stop_reason, StopReason::kConverged);
+    EXPECT_LT(std::pow(summary.energy / expected, 1 / p), 1.005)
+        << "p = " << p;  // local minima differ a little
+  }
+}
+
+TEST_F(MultiresolutionTest, BeginsTheFineLevelNearItsMinimum) {
+  auto nested = deformer(shape, bend(), Material::uniform(2));
+  const SolveSummary summary = nested->solve(settings(Method::kMultiresolution)).value();
+  const auto begun =
+      std::find_if(summary.trace.begin(), summary.trace.end(),
+                   [&](const IterationRecord& record) { return record.energy < summary.initial_energy; });
+  ASSERT_NE(begun, summary.trace.end());
+  const double guess = std::sqrt(summary.initial_energy / summary.energy);
+  EXPECT_LT(std::sqrt(begun->energy / summary.energy) - 1, 0.3 * (guess - 1));
+}
+
+TEST_F(MultiresolutionTest, IsWhatAutoTakesForLargeMeshesAndColdStarts) {
+  const TriangleMesh large = grid(80, 80, 1.0);
+  HandleSet handles;
+  (void)handles.set("corner", {{0, 1, 81}, Fixed{}});
+  (void)handles.set("lifted", {{6560}, RigidMotion{.translation = {0, 0, 20}}});
+  auto solver = deformer(rest_shape(large), handles, Material::uniform(1.5));
+  EXPECT_EQ(solver->solve(settings(Method::kAuto)).value().method, Method::kMultiresolution);
+  (void)handles.set_motion("lifted", RigidMotion{.translation = {0, 0, 21}});
+  ASSERT_TRUE(solver->set_handles(handles).ok());
+  SolveSettings warm = settings(Method::kAuto);
+  warm.initial = InitialGuess::kCurrent;
+  EXPECT_EQ(solver->solve(warm).value().method, Method::kQuasiNewton);
+
+  auto small = deformer(shape, bend(), Material::uniform(1.5));
+  EXPECT_EQ(small->solve(settings(Method::kAuto)).value().method, Method::kQuasiNewton);
+}
+
+TEST_F(MultiresolutionTest, FallsBackWhereTheMeshCannotBeCoarsened) {
+  TriangleMesh triangle;
+  triangle.vertices.resize(3, 3);
+  triangle.vertices << 0, 0, 0, 1, 0, 0, 0, 1, 0;
+  triangle.faces.resize(1, 3);
+  triangle.faces << 0, 1, 2;
+  HandleSet handles;
+  (void)handles.set("a", {{0}, Fixed{}});
+  auto solver = deformer(rest_shape(triangle), handles, Material::uniform(2));
+  EXPECT_EQ(solver->solve(settings(Method::kMultiresolution)).value().method, Method::kQuasiNewton);
+}
+
+TEST_F(MultiresolutionTest, StopsWithinTheCoarseLevel) {
+  auto nested = deformer(shape, bend(), Material::uniform(1));
+  SolveSettings one = settings(Method::kMultiresolution);
+  one.max_iterations = 1;
+  const SolveSummary summary = nested->solve(one).value();
+  EXPECT_EQ(summary.stop_reason, StopReason::kIterationLimit);
+  EXPECT_EQ(summary.energy, summary.initial_energy);
+  EXPECT_TRUE(nested->positions().allFinite());
+}
+
+TEST_F(MultiresolutionTest, GivesTheSameBitsOnAnyNumberOfThreads) {
+  auto one = deformer(shape, bend(), Material::uniform(1.5), {.threads = 1});
+  auto two = deformer(shape, bend(), Material::uniform(1.5), {.threads = 2});
+  (void)one->solve(settings(Method::kMultiresolution));
+  (void)two->solve(settings(Method::kMultiresolution));
+  EXPECT_EQ(one->positions(), two->positions());
+}
+
+}  // namespace
+}  // namespace lpdeform
