@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
@@ -25,7 +26,9 @@ constexpr std::size_t kWorkspace =
 constexpr std::size_t kCopyChunk = 4096;     // vertices
 constexpr std::int32_t kLargeMesh = 5000;    // vertices, from which on a coarse level pays
 constexpr std::int32_t kLargeAtTwo = 30000;  // the same where every p is 2: there is less to gain
-constexpr double kRounding = 1e-13;          // of the largest coordinate, in scaled units
+constexpr double kFarthestGuess = 2;         // of the last move, how much more of it is guessed at most
+constexpr double kSameWay = 0.5;     // the squared cosine between two moves, from which on they are one drag
+constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
 
@@ -79,6 +82,7 @@ struct Deformer::Impl {
 
   // The state, in scaled units: the best of the last solve, or what was set.
   Points x;
+  Points x_before_move;  // when the last warm solve began; empty where there was none
   bool has_state = false;
   bool is_metric_live = false;  // the last factor is quasi_newton's, for this material
   Field best_energies;          // E_i at x, the caller's units
@@ -104,16 +108,30 @@ Points Deformer::Impl::laplacian_guess() {
   return shape->scaled_positions() + u;
 }
 
+/// A drag goes on as it went: where the handles move about as they did the last time, by `share` of it, the
+/// surface does too. What is left of the handles' move is extended harmonically.
 Points Deformer::Impl::current_guess() {
+  Points last = std::exchange(x_before_move, x);
+  last = last.rows() == x.rows() ? Points(x - last) : Points(Points::Zero(x.rows(), 3));
   Points u = Points::Zero(x.rows(), 3);
-  bool is_moved = false;
+  double along = 0, size = 0, left = 0;
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     if (!constraints->is_held[i]) continue;
     u.row(i) = constraints->targets.row(i) - x.row(i);
-    is_moved = is_moved || !u.row(i).isZero(0);
+    along += u.row(i).dot(last.row(i));
+    size += last.row(i).squaredNorm();
+    left += u.row(i).squaredNorm();
   }
-  if (!is_moved) return x;
+  if (left == 0) return x;
+  const double share = size > 0 ? along / size : 0;
+  const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left;
+  if (goes_on) {
+    for (Eigen::Index i = 0; i < x.rows(); ++i) {
+      if (constraints->is_held[i]) u.row(i) -= share * last.row(i);
+    }
+  }
   metric.extend(constraints->is_held, u, workers());
+  if (goes_on) u += share * last;
   return x + u;
 }
 
@@ -232,6 +250,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   summary = {};
   summary.threads = workers().threads();
   const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state;
+  if (!is_warm) x_before_move.resize(0, 3);
   settings.method = summary.method = chosen_method(settings.method, is_warm);
   const bool keeps_metric = is_warm && is_metric_live && metric.is_factored_for(constraints->is_held);
   const bool is_factored = prepare_metric(!is_warm);
@@ -352,6 +371,7 @@ absl::Status Deformer::set_positions(const Points& positions) {
         absl::StrCat("the position of vertex ", i, " is not finite, or over 1e9 diagonals of the mesh away"));
   }
   impl_->interrupt();
+  impl_->x_before_move.resize(0, 3);
   impl_->x = (positions.rowwise() - impl_->shape->centre()) / impl_->unit();
   impl_->positions = positions;
   impl_->is_positions_current = true;

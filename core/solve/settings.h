@@ -16,8 +16,8 @@ enum class Method {
 };
 
 enum class InitialGuess {
-  kCurrent,    // the Deformer's state, the handles' displacement since extended harmonically; its first is
-               // kLaplacian
+  kCurrent,  // the Deformer's state moved on as the last handle move had moved it, where this one goes the
+             // same way; the rest of the handles' displacement extended harmonically. Its first is kLaplacian
   kLaplacian,  // the naive Laplacian deformation, no rotations (section 4)
   kRest,       // the rest mesh, handles at their targets
 };
