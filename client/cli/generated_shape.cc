@@ -6,8 +6,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "client/cli/core_motion.h"
 #include "core/base/fault.h"
 #include "core/mesh/shapes.h"
+#include "core/solve/paper_poses.h"
 
 namespace lpdeform::cli {
 namespace {
@@ -32,27 +34,15 @@ void hold(GeneratedShape& shape, const char* name, const std::function<bool(cons
   shape.handles.push_back(std::move(handle));
 }
 
-GeneratedShape bar(int detail) {
-  const double length = 21.0 * detail, middle = length / 2, side = 4.0 * detail;
-  GeneratedShape shape{box_surface(4 * detail, 4 * detail, 21 * detail),
-                       {},
-                       "both ends stay, the middle is twisted 90 degrees"};
-  hold(shape, "end_a", [](const Point& p) { return p.z() < kHalfCell; });
-  hold(shape, "end_b", [=](const Point& p) { return p.z() > length - kHalfCell; });
-  hold(
-      shape, "middle", [=](const Point& p) { return std::abs(p.z() - middle) < detail; },
-      client::RigidMotion{.angle_radians = radians(90), .center = {side / 2, side / 2, middle}});
-  return shape;
-}
-
-GeneratedShape sheet(int detail) {
-  const double length = 60.0 * detail;
-  GeneratedShape shape{
-      box_surface(2 * detail, 30 * detail, 60 * detail), {}, "one edge stays, the other is folded over"};
-  hold(shape, "fixed", [=](const Point& p) { return p.z() < detail + kHalfCell; });
-  hold(
-      shape, "edge", [=](const Point& p) { return p.z() > length - detail - kHalfCell; },
-      client::RigidMotion{.translation = {0.33 * length, 0, -0.42 * length}});
+/// The paper's poses, by what core/solve/paper_poses.h makes.
+template <PaperPose (*make)(double size)>
+GeneratedShape paper_shape(int detail) {
+  PaperPose pose = make(detail);
+  GeneratedShape shape{std::move(pose.mesh), {}, std::move(pose.note)};
+  for (const auto& [name, handle] : pose.handles.handles()) {
+    std::vector<std::uint32_t> vertices(handle.vertices.begin(), handle.vertices.end());
+    shape.handles.push_back({name, {std::move(vertices), to_client(handle.motion)}});
+  }
   return shape;
 }
 
@@ -91,15 +81,8 @@ GeneratedShape ball(int detail) {
 }
 
 GeneratedShape animal(int detail) {
-  GeneratedShape shape{
-      creature(60 * detail), {}, "the feet stay, the head is lifted and turned, the tail is raised"};
-  hold(shape, "feet", [](const Point& p) { return p.z() < 0.06; });
-  hold(
-      shape, "head", [](const Point& p) { return p.x() > 0.46 && p.z() > 0.64; },
-      client::RigidMotion{.axis = {0, 0, 1},
-                          .angle_radians = radians(60),
-                          .center = {0.44, 0, 0.76},
-                          .translation = {-0.02, 0, 0.12}});
+  GeneratedShape shape = paper_shape<paper_creature>(detail);
+  shape.note += ", the tail is raised";
   hold(
       shape, "tail", [](const Point& p) { return p.x() < -0.8; },
       client::RigidMotion{.axis = {0, 1, 0},
@@ -115,12 +98,14 @@ struct Entry {
   int most_detail;
 };
 
-constexpr Entry kShapes[] = {{"bar", bar, kMostDetail},
-                             {"sheet", sheet, kMostDetail / 2},
+constexpr Entry kShapes[] = {{"bar", paper_shape<paper_bar>, kMostDetail},
+                             {"sheet", paper_shape<paper_sheet>, kMostDetail / 2},
                              {"block", block, kMostDetail / 2},
+                             {"pierced_block", paper_shape<paper_block>, 6},
                              {"grid", bumpy_grid, kMostDetail},
                              {"sphere", ball, 6},
-                             {"creature", animal, 6}};
+                             {"creature", animal, 6},
+                             {"arm", paper_shape<paper_arm>, 6}};
 
 }  // namespace
 

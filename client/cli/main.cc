@@ -14,7 +14,9 @@
 #include "client/cli/deform_command.h"
 #include "client/cli/generated_shape.h"
 #include "client/cli/info_command.h"
+#include "client/cli/reproduce_command.h"
 #include "client/cli/shape_command.h"
+#include "core/solve/paper_poses.h"
 
 namespace lpdeform::cli {
 namespace {
@@ -181,6 +183,29 @@ void add_shape(CLI::App& program, std::function<ExitStatus()>& command) {
   app.callback([&command, options] { command = [options] { return run_shape(*options); }; });
 }
 
+void add_reproduce(CLI::App& program, std::function<ExitStatus()>& command) {
+  CLI::App& app = *program.add_subcommand(
+      "reproduce", "Make the paper's table and figures again, as a page with a verdict on each claim");
+  const auto options = std::make_shared<ReproduceOptions>();
+  app.add_option("--out", options->out, "The folder for index.html, pictures and reproduce.json; required")
+      ->required()
+      ->option_text("DIR");
+  app.add_option("--size", options->size, "Multiplies the cells along each side of the shapes, 0.25 to 4 (1)")
+      ->check(within(kSmallestPoseSize, 4))
+      ->option_text("FACTOR");
+  app.add_option("--mesh", options->meshes, "Another mesh to solve for each p; may be given several times")
+      ->allow_extra_args(false)
+      ->option_text("FILE");
+  app.add_option("--handles", options->handles, "The handle file of the --mesh at the same place")
+      ->allow_extra_args(false)
+      ->option_text("FILE");
+  app.add_option("--threads", options->threads, "Cores to use at most (all)")
+      ->check(CLI::Range(1, 1024))
+      ->option_text("N");
+  app.add_flag("--force", options->is_forced, "Write into a folder that holds other files, too");
+  app.callback([&command, options] { command = [options] { return run_reproduce(*options); }; });
+}
+
 int run(int argc, char** argv) {
   CLI::App program("Deforms surfaces by handles, with distortion in the L_p norm of one's choice.",
                    "lpdeform");
@@ -191,6 +216,7 @@ int run(int argc, char** argv) {
   add_deform(program, command);
   add_info(program, command);
   add_shape(program, command);
+  add_reproduce(program, command);
   try {
     program.parse(argc, argv);
   } catch (const CLI::Success& asked_for_help) {

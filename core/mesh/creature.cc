@@ -1,22 +1,13 @@
-#include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "core/base/check.h"
-#include "core/mesh/remesh.h"
+#include "core/mesh/distance_fields.h"
 #include "core/mesh/shapes.h"
-#include "core/mesh/tetrahedra_surface.h"
 
 namespace lpdeform {
 namespace {
 
 using Point = Eigen::RowVector3d;
-
-/// A segment from a to b with a radius at each end.
-struct Capsule {
-  Point a, b;
-  double radius_a, radius_b;
-};
 
 /// x looks forward, y to the left, z up; the feet stand near z = 0.
 std::vector<Capsule> creature_parts() {
@@ -36,33 +27,17 @@ std::vector<Capsule> creature_parts() {
   return parts;
 }
 
-double distance_to(const Capsule& capsule, const Point& point) {
-  const Point along = capsule.b - capsule.a;
-  const double t = std::clamp((point - capsule.a).dot(along) / along.squaredNorm(), 0.0, 1.0);
-  return (point - capsule.a - t * along).norm() - std::lerp(capsule.radius_a, capsule.radius_b, t);
-}
-
-/// A soft minimum of the distances: -w log(sum of exp(-d / w)).
-double blended(const std::vector<Capsule>& parts, const Point& point) {
-  constexpr double kBlendWidth = 0.018;
-  double sum = 0;
-  for (const Capsule& part : parts) sum += std::exp(-distance_to(part, point) / kBlendWidth);
-  return -kBlendWidth * std::log(std::max(sum, 1e-300));
-}
-
 }  // namespace
 
 TriangleMesh creature(int resolution) {
   LPDEFORM_CHECK(resolution >= 24);
-  const Point low(-0.96, -0.28, -0.06), high(0.72, 0.28, 0.94);
-  SampleGrid grid{low, (high[0] - low[0]) / resolution, {}};
-  for (int axis = 0; axis < 3; ++axis) {
-    grid.cells[axis] = static_cast<int>(std::ceil((high[axis] - low[axis]) / grid.spacing));
-  }
+  constexpr double kBlendWidth = 0.018;
   const ImplicitField field = [parts = creature_parts()](const Point& point) {
-    return blended(parts, point);
+    std::vector<double> distances;
+    for (const Capsule& part : parts) distances.push_back(distance_to(part, point));
+    return blended_union(distances, kBlendWidth);
   };
-  return remesh(tetrahedra_surface(field, grid), field, 0.6 * grid.spacing, 8);
+  return field_surface(field, {-0.96, -0.28, -0.06}, {0.72, 0.28, 0.94}, resolution);
 }
 
 }  // namespace lpdeform

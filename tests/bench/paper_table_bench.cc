@@ -17,7 +17,8 @@
 #include <limits>
 #include <map>
 
-#include "tests/bench/paper_poses.h"
+#include "core/solve/paper_poses.h"
+#include "tests/core/poses.h"
 
 namespace lpdeform {
 namespace {

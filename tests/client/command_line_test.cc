@@ -6,6 +6,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/core_motion.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/field_file.h"
 #include "client/cli/generated_shape.h"
@@ -117,6 +118,13 @@ TEST(Report, SumsUpAFieldOfP) {
 TEST(MeshText, ShowsTheFirstOffendersWithEdgesAsPairs) {
   const client::MeshReport mesh{.vertices = 5, .defects = {{"non_manifold_edges", 2, {0, 1, 3, 4}}}};
   EXPECT_THAT(mesh_text(mesh), HasSubstr("non manifold edges                  2   first: 0-1, 3-4"));
+}
+
+TEST(CoreMotion, IsTheSameThereAndBack) {
+  const HandleMotion motions[] = {Fixed{}, RigidMotion{{1, 2, 3}, 0.5, {4, 5, 6}, {7, 8, 9}},
+                                  TargetPositions{Points::Random(2, 3)}};
+  for (const HandleMotion& motion : motions)
+    EXPECT_TRUE(to_core(to_client(motion)) == motion) << motion.index();
 }
 
 TEST(GeneratedShape, EveryOneHasHandlesThatItsMeshHolds) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client/cli/render/camera.h"
 #include "client/cli/render/legend.h"
 #include "client/cli/render/scene.h"
 #include "client/cli/render/shading.h"
@@ -38,16 +39,26 @@ Faces drawable(const Faces& faces, const Points& positions) {
   return faces(kept, Eigen::all);
 }
 
-/// Moved and scaled so that what `faces` use lies within [-1, 1]: squares of lengths then stay in range.
-Points to_unit_size(const Faces& faces, const Points& positions) {
-  Eigen::RowVector3d low = positions.row(faces(0, 0)), high = low;
-  for (const std::int32_t v : faces.reshaped()) {
-    low = low.cwiseMin(positions.row(v));
-    high = high.cwiseMax(positions.row(v));
-  }
-  const double half_size = (high / 2 - low / 2).maxCoeff();
-  return (positions.rowwise() - (high / 2 + low / 2)) / (half_size > 0 ? half_size : 1);
+/// The vertices of a mesh, of which those that no face uses may be anything.
+Points used(const Faces& faces, const Points& positions) {
+  Points result(faces.size(), 3);
+  for (Eigen::Index k = 0; k < faces.size(); ++k) result.row(k) = positions.row(faces.reshaped()[k]);
+  return result;
 }
+
+/// Moves and scales so that `frame` lies within [-1, 1]: squares of lengths then stay in range.
+struct ToUnitSize {
+  explicit ToUnitSize(const Points& frame) {
+    const Eigen::RowVector3d low = frame.colwise().minCoeff(), high = frame.colwise().maxCoeff();
+    centre = high / 2 + low / 2;
+    const double half = (high / 2 - low / 2).maxCoeff();
+    half_size = half > 0 ? half : 1;
+  }
+  Points operator()(const Points& points) const { return (points.rowwise() - centre) / half_size; }
+
+  Eigen::RowVector3d centre;
+  double half_size;
+};
 
 /// The colour of a pixel of side x side samples.
 Rgb mean_colour(const Scene& scene, int x, int y, int side) {
@@ -65,9 +76,12 @@ Rgb mean_colour(const Scene& scene, int x, int y, int side) {
   return mean;
 }
 
-/// 0 to 1 from blue to red, as distortion_colours has it.
-Field heat_of(const Field& distortion) {
-  const double red = distortion_of_red(distortion);
+double red_of(const PictureStyle& style) {
+  return style.red > 0 ? style.red : distortion_of_red(style.distortion);
+}
+
+/// 0 to 1 from blue to red.
+Field heat_of(const Field& distortion, double red) {
   if (!(red > 0)) return Field::Zero(distortion.size());
   return (distortion / red).cwiseMin(1);
 }
@@ -82,19 +96,32 @@ Image empty_picture(int width, int height) {
 
 }  // namespace
 
-Image render(const Faces& faces, const Points& positions, const Field& distortion, int width, int height) {
+Image render(const Faces& faces, const Points& positions, const PictureStyle& style) {
+  const int width = style.width, height = style.height;
   LPDEFORM_CHECK(width >= 1 && width <= kLargestSide && height >= 1 && height <= kLargestSide);
-  LPDEFORM_CHECK(distortion.size() == 0 || distortion.size() == positions.rows());
+  LPDEFORM_CHECK(style.distortion.size() == 0 || style.distortion.size() == positions.rows());
+  LPDEFORM_CHECK(style.colours.empty() || std::ssize(style.colours) == positions.rows());
   const Faces kept = drawable(faces, positions);
   if (kept.rows() == 0) return empty_picture(width, height);
   const int side = samples_per_side(width, height);
-  const Scene scene(kept, to_unit_size(kept, positions), heat_of(distortion), side * width, side * height);
+  const Points frame = style.frame.rows() > 0 ? style.frame : used(kept, positions);
+  const ToUnitSize to_unit_size(frame);
+  const Scene scene({kept, to_unit_size(positions), heat_of(style.distortion, red_of(style)), style.colours},
+                    Camera(to_unit_size(frame), side * width, side * height), side * width, side * height);
   Image image(width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) image.set(x, y, mean_colour(scene, x, y, side));
   }
-  if (distortion.size() > 0) draw_legend(image, distortion_of_red(distortion));
+  if (style.has_legend && style.distortion.size() > 0) draw_legend(image, red_of(style));
   return image;
+}
+
+Image render(const Faces& faces, const Points& positions, const Field& distortion, int width, int height) {
+  PictureStyle style;
+  style.width = width;
+  style.height = height;
+  style.distortion = distortion;
+  return render(faces, positions, style);
 }
 
 absl::Status render_png(const std::filesystem::path& path, const Faces& faces, const Points& positions,

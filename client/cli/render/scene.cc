@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "client/cli/render/corner_normals.h"
 #include "client/cli/render/shading.h"
@@ -30,6 +31,15 @@ Field at_corners(const Faces& faces, const Field& heat) {
   return corners;
 }
 
+Points at_corners(const Faces& faces, const std::vector<Rgb>& colours) {
+  Points corners(colours.empty() ? 0 : 3 * faces.rows(), 3);
+  for (Eigen::Index corner = 0; corner < corners.rows(); ++corner) {
+    const Rgb& colour = colours[faces(corner / 3, corner % 3)];
+    corners.row(corner) << colour[0], colour[1], colour[2];
+  }
+  return corners;
+}
+
 double diagonal(const Points& points) {
   return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
 }
@@ -42,12 +52,13 @@ double scattered_angle(int x, int y) {
 
 }  // namespace
 
-Scene::Scene(const Faces& faces, const Points& positions, const Field& heat, int width, int height)
-    : corners_(at_corners(faces, positions)),
-      normals_(corner_normals(positions, faces)),
-      heat_(at_corners(faces, heat)),
+Scene::Scene(const Surface& surface, Camera camera, int width, int height)
+    : corners_(at_corners(surface.faces, surface.positions)),
+      normals_(corner_normals(surface.positions, surface.faces)),
+      heat_(at_corners(surface.faces, surface.heat)),
+      colours_(at_corners(surface.faces, surface.colours)),
       reach_(kReachInDiagonals * diagonal(corners_)),
-      camera_(corners_, width, height),
+      camera_(std::move(camera)),
       raster_(width, height) {
   for (Eigen::Index first = 0; first < corners_.rows(); first += 3) {
     raster_.draw(static_cast<std::int32_t>(first / 3),
@@ -55,6 +66,10 @@ Scene::Scene(const Faces& faces, const Points& positions, const Field& heat, int
                   camera_.project(corners_.row(first + 2))});
   }
 }
+
+Scene::Scene(const Faces& faces, const Points& positions, const Field& heat, int width, int height)
+    : Scene({faces, positions, heat, {}}, Camera(at_corners(faces, positions), width, height), width,
+            height) {}
 
 Eigen::RowVector3d Scene::inside(const Points& corner_values, const Raster::Sample& sample) {
   const Eigen::Index first = 3 * Eigen::Index{sample.face};
@@ -68,16 +83,25 @@ Eigen::RowVector3d Scene::normal_towards_camera(const Raster::Sample& sample) co
   return is_away ? -normal : normal;
 }
 
+Rgb Scene::albedo_at(const Raster::Sample& sample) const {
+  if (heat_.size() > 0) {
+    const Eigen::Index first = 3 * Eigen::Index{sample.face};
+    return blue_to_red((1 - sample.b - sample.c) * heat_[first] + sample.b * heat_[first + 1] +
+                       sample.c * heat_[first + 2]);
+  }
+  if (colours_.rows() == 0) return kPlain;
+  const Eigen::RowVector3d mixed = inside(colours_, sample);
+  Rgb colour;
+  for (int channel = 0; channel < 3; ++channel) {
+    colour[channel] = static_cast<std::uint8_t>(std::lround(std::clamp(mixed[channel], 0.0, 255.0)));
+  }
+  return colour;
+}
+
 Rgb Scene::colour_at(int x, int y, double openness) const {
   const Raster::Sample& sample = raster_.at(x, y);
   if (sample.face < 0) return background((y + 0.5) / raster_.height());
-  Rgb albedo = kPlain;
-  if (heat_.size() > 0) {
-    const Eigen::Index first = 3 * Eigen::Index{sample.face};
-    albedo = blue_to_red((1 - sample.b - sample.c) * heat_[first] + sample.b * heat_[first + 1] +
-                         sample.c * heat_[first + 2]);
-  }
-  return shaded(albedo, camera_.turn(normal_towards_camera(sample)),
+  return shaded(albedo_at(sample), camera_.turn(normal_towards_camera(sample)),
                 camera_.towards_camera(inside(corners_, sample)), openness);
 }
 

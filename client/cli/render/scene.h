@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "client/cli/render/camera.h"
 #include "client/cli/render/raster.h"
 #include "core/base/geometry.h"
@@ -7,13 +9,23 @@
 
 namespace lpdeform {
 
+/// A mesh and its colours. All indices in range and all points that faces use finite.
+struct Surface {
+  Faces faces;
+  Points positions;
+  Field heat;                // a value from 0 (blue) to 1 (red) for each vertex, or none
+  std::vector<Rgb> colours;  // where there is no heat: one for each vertex, or none: then the mesh is plain
+};
+
 /// A mesh in front of a camera, drawn: what is to be seen at each sample of a picture of width x height
 /// samples.
 class Scene {
  public:
-  /// At least one face; all indices in range and all their points finite. `heat` has a value from 0 (blue) to
-  /// 1 (red) for each vertex, or none: then the mesh is plain. All are copied or drawn: none needs to outlive
-  /// the call.
+  /// At least one face. All is copied or drawn: nothing needs to outlive the call. The camera's picture has
+  /// width x height samples.
+  Scene(const Surface& surface, Camera camera, int width, int height);
+
+  /// The same without colours, before a camera that holds the points that faces use.
   Scene(const Faces& faces, const Points& positions, const Field& heat, int width, int height);
 
   /// `openness` as in shaded().
@@ -24,11 +36,13 @@ class Scene {
   double openness_at(int x, int y) const;
 
  private:
+  Rgb albedo_at(const Raster::Sample& sample) const;
   static Eigen::RowVector3d inside(const Points& corner_values, const Raster::Sample& sample);
   Eigen::RowVector3d normal_towards_camera(const Raster::Sample& sample) const;
 
   Points corners_, normals_;  // 3 f + k for corner k of face f
   Field heat_;                // the same, or empty
+  Points colours_;            // the same: red, green, blue, or empty
   double reach_;              // how far a point shades others, in the mesh's unit of length
   Camera camera_;
   Raster raster_;

@@ -64,6 +64,53 @@ TEST(Render, TheLightComesFromTheUpperLeft) {
   EXPECT_GT(brightness(image, x - step, y - step), 1.4 * brightness(image, x + step, y + step));
 }
 
+PictureStyle small_picture() {
+  PictureStyle style;
+  style.width = kWidth;
+  style.height = kHeight;
+  return style;
+}
+
+TEST(Render, AnEmptyStyleIsThePlainPicture) {
+  const TriangleMesh mesh = sphere(3);
+  EXPECT_EQ(render(mesh.faces, mesh.vertices, small_picture()).bytes, plain(mesh).bytes);
+}
+
+TEST(Render, VerticesHaveTheColoursTheyAreGiven) {
+  const TriangleMesh mesh = sphere(4);
+  PictureStyle style = small_picture();
+  style.colours.assign(mesh.vertices.rows(), {20, 200, 20});
+  const Image image = render(mesh.faces, mesh.vertices, style);
+  const Rgb middle = pixel(image, kWidth / 2, static_cast<int>(0.48 * kHeight));
+  EXPECT_GT(middle[1], 3 * middle[0]);
+  EXPECT_GT(middle[1], 3 * middle[2]);
+}
+
+TEST(Render, AFrameKeepsTheCameraWhereTheMeshIsMoved) {
+  const TriangleMesh mesh = sphere(3);
+  const Points small = 0.5 * mesh.vertices;
+  PictureStyle style = small_picture();
+  const auto covered = [&] {
+    const Image image = render(mesh.faces, small, style);
+    return count_pixels(image, [&](int x, int y) { return !is_background(image, x, y); });
+  };
+  const int alone = covered();
+  style.frame = mesh.vertices;
+  EXPECT_NEAR(covered(), 0.25 * alone, 0.04 * alone);  // half as wide; perspective aside
+}
+
+TEST(Render, ALargerRedTurnsThePictureBluer) {
+  const TriangleMesh mesh = sphere(3);
+  PictureStyle style = small_picture();
+  style.distortion = Field::Ones(mesh.vertices.rows());
+  const auto middle = [&] {
+    return pixel(render(mesh.faces, mesh.vertices, style), kWidth / 2, static_cast<int>(0.48 * kHeight));
+  };
+  EXPECT_GT(middle()[0], middle()[2]);
+  style.red = 100;
+  EXPECT_GT(middle()[2], middle()[0]);
+}
+
 TEST(Render, DistortionTurnsBlueIntoRed) {
   const TriangleMesh mesh = sphere(4);
   Field distortion = Field::Zero(mesh.vertices.rows());

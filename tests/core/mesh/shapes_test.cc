@@ -93,9 +93,12 @@ TEST(Shapes, CreatureIsAClosedManifoldOfOnePiece) {
   }
 }
 
-TEST(Shapes, CreatureHasWellShapedTriangles) {
-  const TriangleMesh mesh = creature(60);
-  double worst_degrees = 180, mean_degrees = 0;
+/// The smallest angles of the triangles, in degrees: the least of all, and their mean.
+struct SmallestAngles {
+  double worst = 180, mean = 0;
+};
+SmallestAngles smallest_angles(const TriangleMesh& mesh) {
+  SmallestAngles result;
   for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
     double smallest = 180;
     for (int k = 0; k < 3; ++k) {
@@ -104,11 +107,39 @@ TEST(Shapes, CreatureHasWellShapedTriangles) {
       const Eigen::RowVector3d v = mesh.vertices.row(mesh.faces(f, (k + 2) % 3)) - tip;
       smallest = std::min(smallest, std::atan2(u.cross(v).norm(), u.dot(v)) * 180 / std::numbers::pi);
     }
-    worst_degrees = std::min(worst_degrees, smallest);
-    mean_degrees += smallest / mesh.faces.rows();
+    result.worst = std::min(result.worst, smallest);
+    result.mean += smallest / mesh.faces.rows();
   }
-  EXPECT_GT(worst_degrees, 10);
-  EXPECT_GT(mean_degrees, 40);  // 60 would be equilateral throughout
+  return result;
+}
+
+TEST(Shapes, ThoseOfFieldsHaveWellShapedTriangles) {
+  for (const TriangleMesh& mesh : {creature(60), pierced_block(34), rocker_arm(63)}) {
+    const SmallestAngles angles = smallest_angles(mesh);
+    EXPECT_GT(angles.worst, 10);
+    EXPECT_GT(angles.mean, 40);  // 60 would be equilateral throughout
+  }
+}
+
+TEST(Shapes, PiercedBlockHasTwoCrossingTunnels) {
+  for (const int resolution : {24, 34, 47}) {
+    const TriangleMesh mesh = pierced_block(resolution);
+    expect_sound(mesh, 0, 3);
+    // Along both tunnels' axes the way is free.
+    const auto from_x_axis = mesh.vertices.rightCols<2>().rowwise().norm();
+    EXPECT_GT(from_x_axis.minCoeff(), 0.8 * PiercedBlock::kHoleRadius) << resolution;
+    EXPECT_NEAR(mesh.vertices.col(0).maxCoeff(), PiercedBlock::kHalfSide, 0.5);
+    EXPECT_NEAR(mesh.vertices.col(2).maxCoeff(), PiercedBlock::kHalfLength, 0.5);
+  }
+}
+
+TEST(Shapes, RockerArmHasOneHole) {
+  for (const int resolution : {32, 63, 90}) {
+    const TriangleMesh mesh = rocker_arm(resolution);
+    expect_sound(mesh, 0, 1);
+    EXPECT_GT(signed_volume(mesh), 0);
+    EXPECT_GT(mesh.vertices.leftCols<2>().rowwise().norm().minCoeff(), 0.8 * RockerArm::kHoleRadius);
+  }
 }
 
 TEST(Shapes, FinerCreaturesEncloseTheSameVolume) {

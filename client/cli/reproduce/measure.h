@@ -1,0 +1,84 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/solve/deformer.h"
+#include "core/solve/paper_poses.h"
+
+namespace lpdeform::reproduce {
+
+struct Settings {
+  double size = 1;                // of the generated shapes, see core/solve/paper_poses.h
+  int threads = 1;                // of a solve
+  std::vector<PaperPose> others;  // beside the paper's
+};
+
+/// Shows how far the work is, and can end it.
+struct Watch {
+  std::function<void(const std::string& task, int done, int total)> show;
+  std::stop_token stop;
+};
+
+/// A pose solved once.
+struct Solve {
+  SolveSummary summary;
+  double seconds = 0;  // set-up and solve: the median of `runs` solves
+  int runs = 1;
+  Points positions;
+  Field energies;  // E_i
+};
+
+/// A pose solved for each of the paper's p.
+struct Experiment {
+  double size = 1;  // of the settings: below 1 pictures are smaller, too
+  PaperPose pose;
+  std::shared_ptr<const RestShape> shape;
+  std::map<double, Solve> by_p;
+
+  const Points& rest() const { return shape->positions(); }
+};
+
+/// A pose solved with p = 2 in the orange region and p = 1 elsewhere.
+struct Mixed {
+  std::vector<char> is_orange;  // one a vertex
+  Solve solve;
+};
+
+struct Trace {
+  double p = 1;
+  SolveSummary summary;  // with its trace
+};
+
+/// The appendix's problem, generated.
+struct Sparse {
+  Eigen::Index rows = 0, columns = 0, rank = 0;
+  Eigen::Index non_zeros = 0, non_zeros_least_squares = 0;
+  double gap = 0;  // (value - lower bound) / value
+};
+
+struct Measurements {
+  Experiment sheet, bar, block, creature, arm;
+  std::vector<Experiment> others;
+  Mixed mixed_sheet, mixed_block;
+  std::vector<Trace> traces;  // of the bar: Fig. 1, and local_global
+  std::vector<Sparse> sparse;
+  int threads = 1;
+
+  /// The bar's trace for p by a method, which must be among those that were made.
+  const Trace& trace(double p, Method method) const;
+  /// The paper's five in Table 1's order, then the others.
+  std::vector<const Experiment*> all() const;
+};
+
+inline constexpr double kPaperP[] = {1, 1.5, 2, 6};
+
+/// All that the page shows. CANCELLED once the watch says stop; errors of `others` as Deformer has them.
+absl::StatusOr<Measurements> measure(const Settings& settings, const Watch& watch);
+
+}  // namespace lpdeform::reproduce

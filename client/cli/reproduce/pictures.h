@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+
+#include "client/cli/reproduce/figure.h"
+
+namespace lpdeform::reproduce {
+
+/// The results of one experiment are seen by one camera, so that they can be compared.
+
+/// The undeformed shape; handles are blue, as in the paper.
+Picture rest_picture(const Experiment& experiment);
+
+/// The shape solved for p, coloured by distortion from 0 (blue) to its own largest (red).
+Picture solved_picture(const Experiment& experiment, double p);
+
+/// The undeformed shape with the region of p = 2 in orange; then the solved one, coloured by distortion.
+Picture region_picture(const Experiment& experiment, const Mixed& mixed);
+Picture mixed_picture(const Experiment& experiment, const Mixed& mixed);
+
+}  // namespace lpdeform::reproduce

@@ -1,0 +1,168 @@
+#include "client/cli/reproduce_command.h"
+
+#include <unistd.h>
+
+#include <cctype>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <set>
+#include <stop_token>
+#include <system_error>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "client/cli/core_motion.h"
+#include "client/cli/handle_file.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/mesh_input.h"
+#include "client/cli/progress.h"
+#include "client/cli/reproduce/page.h"
+#include "client/cli/text_file.h"
+#include "core/base/fault.h"
+#include "core/base/workers.h"
+#include "core/mesh/whole_file.h"
+
+namespace lpdeform::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using reproduce::Figure;
+
+constexpr const char* kPage = "index.html";
+constexpr const char* kVerdicts = "reproduce.json";
+
+absl::Status not_written(const fs::path& path, std::string_view why) {
+  return invalid_input({"FILE_NOT_WRITTEN", path.string(), ""},
+                       absl::StrCat("\"", path.string(), "\" cannot be written: ", std::string(why), "."));
+}
+
+bool is_of_this_command(const fs::path& folder) {
+  const absl::StatusOr<std::string> verdicts = read_text(folder / kVerdicts);
+  return verdicts.ok() && verdicts->find(reproduce::kMadeBy) != std::string::npos;
+}
+
+/// Makes the folder where there is none. Asked before long work, not after it.
+absl::Status prepare_folder(const fs::path& folder, bool is_forced) {
+  std::error_code error;
+  if (fs::exists(folder, error) && !fs::is_directory(folder, error))
+    return not_written(folder, "it is no folder");
+  fs::create_directories(folder, error);
+  if (error) return not_written(folder, error.message());
+  if (access(folder.c_str(), W_OK | X_OK) != 0) return not_written(folder, std::strerror(errno));
+  if (is_forced || fs::is_empty(folder, error) || is_of_this_command(folder)) return absl::OkStatus();
+  return invalid_input(
+      {"OUT_NOT_OURS", folder.string(), "empty, or made by lpdeform reproduce"},
+      absl::StrCat("\"", folder.string(),
+                   "\" holds files that are not of lpdeform reproduce; --force writes beside and over "
+                   "them."));
+}
+
+/// A name for files and headings, different from all in `taken`.
+std::string name_for(const fs::path& mesh, std::set<std::string>& taken) {
+  std::string stem;
+  for (const char character : mesh.stem().string()) {
+    const bool is_plain = std::isalnum(static_cast<unsigned char>(character)) != 0;
+    stem += is_plain ? character : '_';
+  }
+  std::string name = stem;
+  for (int k = 2; !taken.insert(name).second; ++k) name = absl::StrCat(stem, "_", k);
+  return name;
+}
+
+absl::StatusOr<PaperPose> read_pose(const fs::path& mesh, const fs::path& handles, std::string name) {
+  absl::StatusOr<MeshFile> file = read_deformable(mesh);
+  if (!file.ok()) return file.status();
+  const absl::StatusOr<std::vector<NamedHandle>> named = read_handles(handles, file->mesh.vertices.rows());
+  if (!named.ok()) return named.status();
+  PaperPose pose{std::move(name), std::move(file->mesh), {}, ""};
+  for (const NamedHandle& handle : *named) {
+    std::vector<std::int32_t> vertices(handle.handle.vertices.begin(), handle.handle.vertices.end());
+    const absl::Status set =
+        pose.handles.set(handle.name, {std::move(vertices), to_core(handle.handle.motion)});
+    if (!set.ok()) return set;
+  }
+  return pose;
+}
+
+absl::StatusOr<reproduce::Settings> read_settings(const ReproduceOptions& options) {
+  if (options.meshes.size() != options.handles.size()) {
+    return invalid_input(
+        {"HANDLES_MISSING", "--handles", "one --handles for each --mesh"},
+        absl::StrCat("There are ", options.meshes.size(), " --mesh and ", options.handles.size(),
+                     " --handles; each mesh needs its handle file."));
+  }
+  reproduce::Settings settings{options.size, options.threads > 0 ? options.threads : available_cores(), {}};
+  std::set<std::string> taken{"sheet", "bar", "block", "creature", "arm"};
+  for (std::size_t k = 0; k < options.meshes.size(); ++k) {
+    absl::StatusOr<PaperPose> pose =
+        read_pose(options.meshes[k], options.handles[k], name_for(options.meshes[k], taken));
+    if (!pose.ok()) return pose.status();
+    settings.others.push_back(*std::move(pose));
+  }
+  return settings;
+}
+
+absl::StatusOr<std::vector<Figure>> make_figures(const reproduce::Settings& settings, std::stop_token stop) {
+  Progress progress;
+  const reproduce::Watch watch{[&](const std::string& task, int done, int total) {
+                                 progress.show(absl::StrFormat("%3d %%  %s", 90 * done / total, task));
+                               },
+                               stop};
+  const absl::StatusOr<reproduce::Measurements> measured = measure(settings, watch);
+  if (!measured.ok()) return measured.status();
+  std::vector<Figure> figures = all_figures(*measured, [&](const std::string& title) {
+    progress.show(absl::StrCat(" 90 %  drawing ", title));
+    return !stop.stop_requested();
+  });
+  if (stop.stop_requested()) return absl::CancelledError();
+  return figures;
+}
+
+/// The verdicts last: they say that the folder is whole.
+absl::Status write_all(const fs::path& folder, const std::vector<Figure>& figures,
+                       const reproduce::Settings& settings) {
+  for (const Figure& figure : figures) {
+    for (const reproduce::Picture& picture : figure.pictures) {
+      const absl::Status written = write_whole_file(folder / picture.file, picture.png);
+      if (!written.ok()) return written;
+    }
+  }
+  const absl::Status written = write_whole_file(folder / kPage, page_html(figures, settings));
+  if (!written.ok()) return written;
+  return write_whole_file(folder / kVerdicts, verdicts_json(figures, settings));
+}
+
+void print_summary(const fs::path& folder, const std::vector<Figure>& figures) {
+  for (const Figure& figure : figures) {
+    for (const reproduce::Claim& claim : figure.claims) {
+      std::printf("%-14s %s  %s\n", figure.id.c_str(), claim.holds ? "holds         " : "does not hold ",
+                  claim.measured.c_str());
+    }
+  }
+  std::printf("wrote %s\n", (folder / kPage).c_str());
+}
+
+}  // namespace
+
+ExitStatus run_reproduce(const ReproduceOptions& options) {
+  Interrupt interrupt;
+  const absl::StatusOr<reproduce::Settings> settings = read_settings(options);
+  if (!settings.ok()) return complain(settings.status());
+  const absl::Status folder = prepare_folder(options.out, options.is_forced);
+  if (!folder.ok()) return complain(folder);
+
+  std::stop_source stop;
+  interrupt.set_action([&stop] { stop.request_stop(); });
+  const absl::StatusOr<std::vector<Figure>> figures = make_figures(*settings, stop.get_token());
+  interrupt.set_action({});
+  if (interrupt.happened()) return kInterrupted;
+  if (!figures.ok()) return complain(figures.status());
+
+  const absl::Status written = write_all(options.out, *figures, *settings);
+  if (!written.ok()) return complain(written);
+  print_summary(options.out, *figures);
+  return kDone;
+}
+
+}  // namespace lpdeform::cli
