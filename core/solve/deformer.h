@@ -38,9 +38,9 @@ class Deformer {
   const HandleSet& handles() const;
   const Material& material() const;
 
-  /// Replaces all handles. Numeric refactorisation where the set of held vertices changed, none where handles
-  /// only moved. Errors: as check_handles; FAILED_PRECONDITION: COMPONENT_WITHOUT_HANDLE (names the component
-  /// and one vertex of it), NO_HANDLES. Ends a running solve with kCancelled.
+  /// Replaces all handles and the region of interest; where that is another one, what is outside of it is held at
+  /// positions() as they are now. Numeric refactorisation where the set of held vertices changed, none where handles
+  /// only moved. Errors: as make_constraints. Ends a running solve with kCancelled.
   absl::Status set_handles(const HandleSet& handles);
 
   /// Errors: as check_material. Ends a running solve with kCancelled.

@@ -33,7 +33,7 @@ class Objective {
   const CellPass& cells() const { return cells_; }
   const SoftTerms& soft_terms() const { return soft_; }
   /// What the soft terms add to the metric, for the weights of the last evaluation.
-  const std::vector<MatrixEntry>& matrix_entries() const { return soft_.matrix_entries(); }
+  std::vector<MatrixEntry> matrix_entries() const { return soft_.matrix_entries(); }
 
  private:
   CellPass cells_;
