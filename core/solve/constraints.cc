@@ -186,6 +186,11 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   return constraints;
 }
 
+std::size_t Constraints::memory_bytes() const {
+  return is_held.capacity() + (targets.size() + exact.size() + footprint.size()) * sizeof(double) +
+         soft.rows().capacity() * sizeof(SoftRow) + linear.memory_bytes();
+}
+
 RigidTransform fit_rigid(const Points& from, const Points& to) {
   const Eigen::RowVector3d from_mean = from.colwise().mean(), to_mean = to.colwise().mean();
   const Eigen::Matrix3d b = (to.rowwise() - to_mean).transpose() * (from.rowwise() - from_mean);

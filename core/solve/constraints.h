@@ -27,6 +27,8 @@ struct Constraints {
   SoftTerms soft;             // soft and orientation handles; its length unit is not set
   LinearConstraints linear;   // points inside faces and locks
   Field footprint;            // factors of the cells' stiffness; empty where all are 1
+
+  std::size_t memory_bytes() const;
 };
 
 /// No position may be farther from the rest mesh's centre than this many of its diagonals.

@@ -23,7 +23,7 @@ double ConvexRows::coefficient(std::int32_t i) const {
 double ConvexRows::weight(std::int32_t i) const {
   const std::int32_t n = shape_.vertex_count();
   if (i < n) return problem_.metric.cell_weight(i);
-  return is_equal_ ? 1 : soft_.weights()[i - n];
+  return soft_weights_[i - n];
 }
 
 void ConvexRows::residuals(const Points& x, EdgeVectors& z) const {
@@ -57,13 +57,13 @@ void ConvexRows::apply_transposed(const EdgeVectors& y, Points& result) const {
 }
 
 bool ConvexRows::factor() {
-  is_equal_ = false;
+  soft_weights_ = problem_.objective.soft_weights();
   return problem_.factor_metric();
 }
 
 bool ConvexRows::factor_equal() {
-  is_equal_ = true;
-  std::vector<MatrixEntry> entries = soft_.matrix_entries(std::vector<double>(soft_.size(), 1.0));
+  soft_weights_.assign(soft_.size(), 1.0);
+  std::vector<MatrixEntry> entries = soft_.matrix_entries(soft_weights_);
   problem_.constraints.linear.add_ties(2, entries);
   const std::vector<double> equal(shape_.vertex_count(), 1.0);
   return problem_.metric.factor(equal, problem_.constraints.is_held, entries);

@@ -51,7 +51,7 @@ class ConvexRows {
   const Problem& problem_;
   const RestShape& shape_;
   const SoftTerms& soft_;
-  bool is_equal_ = false;
+  std::vector<double> soft_weights_;  // C of the soft terms, as last factored
 };
 
 }  // namespace lpdeform

@@ -434,6 +434,7 @@ absl::Status Deformer::start(const SolveSettings& settings, std::stop_token stop
     return make_fault(absl::StatusCode::kFailedPrecondition, {"NO_HANDLES", "", "at least 1 handle"},
                       "there is no handle; a deformation needs at least one");
   }
+  if (absl::Status status = check_method_takes(settings.method, self.handles); !status.ok()) return status;
   self.interrupt();
   self.begin(settings, std::move(stop));
   return absl::OkStatus();
@@ -479,8 +480,10 @@ double Deformer::optimality_gap() {
 
 std::size_t Deformer::memory_bytes() const {
   const std::size_t points = impl_->x.size() * sizeof(double);
-  return sizeof(Impl) + (impl_->coarse ? impl_->coarse->memory_bytes() : 0) +
-         impl_->objective.cells().memory_bytes() + impl_->metric.memory_bytes() + kWorkspace * points;
+  const std::size_t held = impl_->constraints ? impl_->constraints->memory_bytes() : 0;
+  const std::size_t coarse = impl_->coarse ? impl_->coarse->memory_bytes() : 0;
+  return sizeof(Impl) + held + coarse + impl_->objective.cells().memory_bytes() +
+         impl_->metric.memory_bytes() + kWorkspace * points;
 }
 
 }  // namespace lpdeform

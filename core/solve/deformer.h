@@ -50,7 +50,7 @@ class Deformer {
   /// POSITIONS_SIZE, POSITIONS_NOT_FINITE. Ends a running solve with kCancelled.
   absl::Status set_positions(const Points& positions);
 
-  /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P,
+  /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P, METHOD_NEEDS_EXACT_HANDLES,
   /// TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE). `stop` is looked at in every
   /// iteration.
   absl::Status start(const SolveSettings& settings, std::stop_token stop = {});

@@ -48,7 +48,7 @@ struct Handle {
   /// In place of vertices. Exactly or Soft.
   std::vector<SurfacePoint> points = {};
   /// Radius of the surroundings that go along with the handle, in the caller's units: against the spike that a
-  /// handle of one or a few vertices makes; see Footprint. 0: none.
+  /// handle of one or a few vertices makes; see footprint.h. The energy counts their stiffness. 0: none.
   double footprint = 0;
 
   /// How many vertices or points.

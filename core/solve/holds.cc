@@ -81,6 +81,14 @@ bool holds_vertices_exactly(const HandleSet& handles) {
   });
 }
 
+bool has_equations(const HandleSet& handles) {
+  return std::any_of(handles.handles().begin(), handles.handles().end(), [](const auto& entry) {
+    const Hold& hold = entry.second.hold;
+    return std::holds_alternative<AxisLock>(hold) || std::holds_alternative<PlaneLock>(hold) ||
+           (std::holds_alternative<Exactly>(hold) && !entry.second.points.empty());
+  });
+}
+
 bool ties_component(const Handle& handle) {
   if (const auto* soft = std::get_if<Soft>(&handle.hold)) return soft->weight > 0;
   return !std::holds_alternative<Orientation>(handle.hold);

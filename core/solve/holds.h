@@ -28,6 +28,9 @@ void add_holds(const RestShape& shape, const std::string& name, const Handle& ha
 /// Whether every handle holds vertices, each Exactly.
 bool holds_vertices_exactly(const HandleSet& handles);
 
+/// Whether some handle puts equations on positions: points held exactly, and locks.
+bool has_equations(const HandleSet& handles);
+
 /// Whether `handle` keeps its component from drifting off: all do but an orientation, and a weight of 0.
 bool ties_component(const Handle& handle);
 

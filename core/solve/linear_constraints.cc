@@ -183,6 +183,11 @@ void LinearConstraints::add_ties(double stiffness, std::vector<MatrixEntry>& ent
   }
 }
 
+std::size_t LinearConstraints::memory_bytes() const {
+  const std::size_t m = rows_.size();
+  return m * sizeof(LinearRow) + m * m * sizeof(double) + is_held_.capacity();
+}
+
 bool LinearConstraints::reuse(const LinearConstraints& before) {
   if (rows_.size() != before.rows_.size() || is_held_ != before.is_held_) return false;
   for (std::size_t r = 0; r < rows_.size(); ++r) {

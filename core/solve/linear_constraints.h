@@ -20,11 +20,11 @@ struct LinearRow {
 
 /// Equations C x = t that points inside faces and locks put on the positions of vertices that are not held
 /// altogether. Exact: a state that satisfies them keeps to them along every direction that restrict() leaves,
-/// and project() gives the metric's inverse on those directions,
+/// and the metric's inverse on those directions,
 ///
 ///   P = M^-1 - M^-1 C^T (C M^-1 C^T)^-1 C M^-1 ,
 ///
-/// takes the place of M^-1. C M^-1 C^T is small and dense; it is made once for each factor of the metric, by
+/// takes the place of M^-1 (project). C M^-1 C^T is small and dense; it is made once for each factor of the metric, by
 /// one back-substitution for each three points, and a solve costs two instead of one. Without rows everything
 /// here costs nothing. One caller at a time.
 class LinearConstraints {
@@ -65,6 +65,8 @@ class LinearConstraints {
 
   /// Takes over the factorisations of `before` where its rows differ in their targets alone; false elsewhere.
   bool reuse(const LinearConstraints& before);
+
+  std::size_t memory_bytes() const;
 
   static constexpr std::size_t kMostRows = 1024;
 

@@ -7,8 +7,6 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kLowestShare = 1e-8;
-
 LowerMatrix lower_pattern(const RestShape& shape) {
   LowerMatrix matrix;
   const std::int32_t n = shape.vertex_count();

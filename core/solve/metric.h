@@ -25,6 +25,8 @@ struct MatrixEntry {
 /// by the constructor; factor() is numeric alone.
 class Metric {
  public:
+  static constexpr double kLowestShare = 1e-8;
+
   explicit Metric(std::shared_ptr<const RestShape> shape);
 
   /// `is_held` has one entry a vertex. Cell weights are clipped from below at 1e-8 of the largest used, so

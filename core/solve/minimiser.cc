@@ -6,7 +6,7 @@ namespace lpdeform {
 
 bool Problem::factor_metric() const {
   const std::vector<double>& cell_weights = objective.cells().cell_weights();
-  std::vector<MatrixEntry> entries = objective.matrix_entries();
+  std::vector<MatrixEntry> entries = objective.soft_terms().matrix_entries(objective.soft_weights());
   if (!constraints.linear.empty()) {
     const double sum = std::accumulate(cell_weights.begin(), cell_weights.end(), 0.0);
     constraints.linear.add_ties(2 * sum / static_cast<double>(cell_weights.size()), entries);

@@ -148,6 +148,5 @@ INSTANTIATE_TEST_SUITE_P(KindsAndNorms, HandleKinds,
                                                           Kind::kPlaneLock),
                                           testing::Values(1.0, 1.5, 2.0, 6.0)));
 
-
 }  // namespace
 }  // namespace lpdeform
