@@ -258,6 +258,39 @@ INSTANTIATE_TEST_SUITE_P(
                      [](auto& request) { request.add_handles()->set_name("a"); }},
         WrongSession{"MOTION_MISSING", "motion",
                      [](auto& request) { request.add_handles()->mutable_move(); }},
+        WrongSession{"HANDLE_POINT_COUNT", "barycentric",
+                     [](auto& request) {
+                       v1::HandleUpdate& handle = *request.add_handles();
+                       handle.set_name("a");
+                       v1::SurfacePoints& points = *handle.mutable_set()->mutable_points();
+                       points.mutable_faces()->set_inline_(std::string(8, '\0'));
+                       points.mutable_barycentric()->set_inline_(std::string(12, '\0'));
+                     }},
+        WrongSession{"HANDLE_LOCK_DIRECTION", "handle \"a\"",
+                     [](auto& request) {
+                       v1::HandleUpdate& handle = *request.add_handles();
+                       handle.set_name("a");
+                       handle.mutable_set()->mutable_vertices()->set_inline_(std::string(4, '\0'));
+                       handle.mutable_set()->mutable_axis_lock();
+                     }},
+        WrongSession{"REGION_EMPTY", "region",
+                     [](auto& request) {
+                       request.mutable_settings()->mutable_region()->mutable_vertices()->set_inline_("");
+                     }},
+        WrongSession{"REGION_VERTEX_OUT_OF_RANGE", "vertex 2147483647",
+                     [](auto& request) {
+                       request.mutable_settings()->mutable_region()->mutable_vertices()->set_inline_(
+                           std::string(4, '\xff'));
+                     }},
+        WrongSession{"METHOD_NEEDS_EXACT_HANDLES", "handle \"a\"",
+                     [](auto& request) {
+                       request.mutable_settings()->mutable_p()->set_uniform(1);
+                       request.mutable_settings()->mutable_solver()->set_method(v1::METHOD_CONIC);
+                       v1::HandleUpdate& handle = *request.add_handles();
+                       handle.set_name("a");
+                       handle.mutable_set()->mutable_vertices()->set_inline_(std::string(4, '\0'));
+                       handle.mutable_set()->mutable_soft();
+                     }},
         WrongSession{"HANDLE_TOO_MANY_VERTICES", "handle vertices",
                      [](auto& request) {
                        v1::HandleUpdate& handle = *request.add_handles();
