@@ -108,6 +108,22 @@ Eigen::Vector3d decode_vector(const v1::Vector3& message) {
   return {message.x(), message.y(), message.z()};
 }
 
+Hold decode_hold(const v1::Handle& message) {
+  switch (message.hold_case()) {
+    case v1::Handle::kSoft:
+      return message.soft().has_weight() ? Soft{message.soft().weight()} : Soft{};
+    case v1::Handle::kOrientation:
+      return message.orientation().has_weight() ? Orientation{message.orientation().weight()} : Orientation{};
+    case v1::Handle::kAxisLock:
+      return AxisLock{decode_vector(message.axis_lock().axis())};
+    case v1::Handle::kPlaneLock:
+      return PlaneLock{decode_vector(message.plane_lock().normal())};
+    case v1::Handle::HOLD_NOT_SET:
+      break;
+  }
+  return Exactly{};
+}
+
 std::uint64_t mesh_bytes(const v1::Mesh& message, Scalar scalar) {
   return std::uint64_t{message.vertex_count()} * 3 * bytes_of(scalar) +
          std::uint64_t{message.face_count()} * 12;
@@ -310,6 +326,68 @@ absl::StatusOr<HandleMotion> Decoder::motion(const v1::Motion& message) {
   return TargetPositions{targets->unpack()};
 }
 
+absl::StatusOr<std::vector<std::int32_t>> Decoder::indices(const v1::Buffer& buffer, std::string_view what,
+                                                           std::uint64_t& room) {
+  const auto data = bytes(buffer, what);
+  if (!data.ok()) return data.status();
+  if (data->view.size() % sizeof(std::uint32_t) != 0) {
+    return wrong_size(what, data->view.size(), "a multiple of 4");
+  }
+  const std::size_t count = data->view.size() / sizeof(std::uint32_t);
+  if (absl::Status status = take_room(room, count, what); !status.ok()) return status;
+  std::vector<std::int32_t> result(count);
+  unpack_indices(data->view, count, result.data());
+  return result;
+}
+
+absl::StatusOr<std::vector<SurfacePoint>> Decoder::surface_points(const v1::SurfacePoints& message) {
+  const auto faces = indices(message.faces(), "handle points", room_for_vertices_);
+  if (!faces.ok()) return faces.status();
+  const auto coordinates = points(message.scalar(), message.barycentric(), "barycentric coordinates");
+  if (!coordinates.ok()) return coordinates.status();
+  if (coordinates->count != faces->size()) {
+    return invalid_input({"HANDLE_POINT_COUNT", "barycentric", absl::StrCat(3 * faces->size(), " numbers")},
+                         absl::StrCat("There are ", 3 * coordinates->count, " barycentric coordinates for ",
+                                      faces->size(), " points; each takes three."));
+  }
+  const Points barycentric = coordinates->unpack();
+  std::vector<SurfacePoint> result(faces->size());
+  for (std::size_t k = 0; k < result.size(); ++k) {
+    result[k] = {(*faces)[k], barycentric.row(static_cast<Eigen::Index>(k)).transpose()};
+  }
+  return result;
+}
+
+absl::StatusOr<std::vector<std::int32_t>> Decoder::region(const v1::RegionOfInterest& message) {
+  if (!message.has_vertices()) return std::vector<std::int32_t>{};
+  auto vertices = indices(message.vertices(), "region vertices", room_for_region_);
+  if (!vertices.ok() || !vertices->empty()) return vertices;
+  return invalid_input({"REGION_EMPTY", "region", "at least 1 vertex"},
+                       "The region of interest has no vertex; nothing could move.");
+}
+
+absl::StatusOr<Handle> Decoder::group(const v1::Handle& message) {
+  Handle handle;
+  if (message.has_vertices() || !message.has_points()) {
+    auto vertices = indices(message.vertices(), "handle vertices", room_for_vertices_);
+    if (!vertices.ok()) return vertices.status();
+    handle.vertices = *std::move(vertices);
+  }
+  if (message.has_points()) {
+    auto points = surface_points(message.points());
+    if (!points.ok()) return points.status();
+    handle.points = *std::move(points);
+  }
+  if (message.has_motion()) {
+    auto moved = motion(message.motion());
+    if (!moved.ok()) return moved.status();
+    handle.motion = *std::move(moved);
+  }
+  handle.hold = decode_hold(message);
+  handle.footprint = message.footprint_radius();
+  return handle;
+}
+
 absl::StatusOr<HandleChange> Decoder::handle(const v1::HandleUpdate& message) {
   HandleChange out{message.name(), Removal{}};
   if (message.has_remove()) return out;
@@ -323,23 +401,9 @@ absl::StatusOr<HandleChange> Decoder::handle(const v1::HandleUpdate& message) {
     return invalid_input({"HANDLE_CHANGE_MISSING", "handles", ""},
                          "A change of a handle says neither set nor move nor remove.");
   }
-  const auto data = bytes(message.set().vertices(), "handle vertices");
-  if (!data.ok()) return data.status();
-  if (data->view.size() % sizeof(std::uint32_t) != 0) {
-    return wrong_size("handle vertices", data->view.size(), "a multiple of 4");
-  }
-  const std::size_t count = data->view.size() / sizeof(std::uint32_t);
-  if (absl::Status status = take_room(room_for_vertices_, count, "handle vertices"); !status.ok())
-    return status;
-  Handle handle;
-  handle.vertices.resize(count);
-  unpack_indices(data->view, handle.vertices.size(), handle.vertices.data());
-  if (message.set().has_motion()) {
-    auto moved = motion(message.set().motion());
-    if (!moved.ok()) return moved.status();
-    handle.motion = *std::move(moved);
-  }
-  out.change = std::move(handle);
+  auto handle = group(message.set());
+  if (!handle.ok()) return handle.status();
+  out.change = *std::move(handle);
   return out;
 }
 
@@ -370,6 +434,11 @@ absl::StatusOr<SettingsChange> Decoder::settings(const v1::SettingsUpdate& messa
     const auto solver = decode_solver(message.solver());
     if (!solver.ok()) return solver.status();
     change.solver = *solver;
+  }
+  if (message.has_region()) {
+    auto vertices = region(message.region());
+    if (!vertices.ok()) return vertices.status();
+    change.region = *std::move(vertices);
   }
   return change;
 }

@@ -21,7 +21,7 @@ namespace lpdeform {
 /// often a message names an upload, no more numbers come out than the mesh has room for. What a value means
 /// is checked where it is used. Errors are INVALID_ARGUMENT: INLINE_TOO_LARGE, BUFFER_MISSING, BUFFER_SIZE,
 /// ENUM_UNKNOWN, FIELD_MISSING, FIELD_SIZE, POSITIONS_SIZE, HANDLE_CHANGE_MISSING, HANDLE_TOO_MANY_VERTICES,
-/// MOTION_MISSING; of uploads what Uploads::find and Upload::bytes have. For one message, one thread.
+/// HANDLE_POINT_COUNT, REGION_EMPTY, MOTION_MISSING; of uploads what Uploads::find and Upload::bytes have. For one message, one thread.
 class Decoder {
  public:
   /// `vertex_count`: of the mesh that the message is about.
@@ -29,7 +29,8 @@ class Decoder {
       : uploads_(uploads),
         vertex_count_(vertex_count),
         room_for_vertices_(vertex_count),
-        room_for_targets_(vertex_count) {}
+        room_for_targets_(vertex_count),
+        room_for_region_(vertex_count) {}
 
   /// Also MESH_TOO_LARGE. Does not look at coordinates and indices; a vertex index over 2^31 - 1 becomes
   /// that.
@@ -52,6 +53,11 @@ class Decoder {
   };
   absl::StatusOr<Bytes> bytes(const v1::Buffer& buffer, std::string_view what);
   absl::StatusOr<HandleChange> handle(const v1::HandleUpdate& message);
+  absl::StatusOr<Handle> group(const v1::Handle& message);
+  absl::StatusOr<std::vector<std::int32_t>> indices(const v1::Buffer& buffer, std::string_view what,
+                                                    std::uint64_t& room);
+  absl::StatusOr<std::vector<SurfacePoint>> surface_points(const v1::SurfacePoints& message);
+  absl::StatusOr<std::vector<std::int32_t>> region(const v1::RegionOfInterest& message);
   absl::StatusOr<HandleMotion> motion(const v1::Motion& message);
   absl::StatusOr<Field> field(const v1::Field& message, std::string_view what);
   struct PackedPoints {
@@ -68,6 +74,7 @@ class Decoder {
   const std::uint32_t vertex_count_;
   std::uint64_t room_for_vertices_;
   std::uint64_t room_for_targets_;
+  std::uint64_t room_for_region_;
 };
 
 /// CREDIT_OUT_OF_RANGE, FRAME_RATE_OUT_OF_RANGE, ENUM_UNKNOWN.

@@ -78,6 +78,15 @@ v1::FreeComponents encode_free_components(FreeComponents free_components) {
   return v1::FREE_COMPONENTS_UNSPECIFIED;
 }
 
+v1::HandleKind encode_kind(const Hold& hold) {
+  const Match kind{[](const Exactly&) { return v1::HANDLE_KIND_EXACT; },
+                   [](const Soft&) { return v1::HANDLE_KIND_SOFT; },
+                   [](const Orientation&) { return v1::HANDLE_KIND_ORIENTATION; },
+                   [](const AxisLock&) { return v1::HANDLE_KIND_AXIS_LOCK; },
+                   [](const PlaneLock&) { return v1::HANDLE_KIND_PLANE_LOCK; }};
+  return std::visit(kind, hold);
+}
+
 v1::GoAwayReason encode_reason(EndReason reason) {
   switch (reason) {
     case EndReason::kSessionDeleted:
@@ -138,6 +147,7 @@ void encode_header(const FramePiece& piece, v1::FrameHeader& out) {
   out.set_skipped_inputs(piece.skipped_inputs);
   out.set_iteration(frame.iteration);
   out.set_energy(frame.energy);
+  out.set_soft_energy(frame.soft_energy);
   out.set_converged(frame.converged);
   out.set_stop_reason(encode_stop(frame.stop_reason));
   out.set_vertex_count(frame.surface->vertex_count());
@@ -248,6 +258,11 @@ void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint no
     v1::HandleInfo& message = *out.add_handles();
     message.set_name(name);
     message.set_vertex_count(static_cast<std::uint32_t>(handle.vertices.size()));
+    message.set_point_count(static_cast<std::uint32_t>(handle.points.size()));
+    message.set_kind(encode_kind(handle.hold));
+  }
+  if (const auto* const region = info.inputs.handles->region()) {
+    out.set_region_vertex_count(static_cast<std::uint32_t>(region->size()));
   }
   out.set_created_unix_ms(info.created_unix_ms);
   const auto unix_now = std::chrono::system_clock::now().time_since_epoch();
@@ -276,6 +291,7 @@ void encode(const SolveResult& result, v1::SolveSummary& out) {
   out.set_iterations(static_cast<std::uint32_t>(summary.iterations));
   out.set_initial_energy(summary.initial_energy);
   out.set_energy(summary.energy);
+  out.set_soft_energy(summary.soft_energy);
   if (summary.optimality_gap) out.mutable_certificate()->set_relative_gap(*summary.optimality_gap);
   out.set_setup_seconds(summary.setup_seconds);
   out.set_solve_seconds(summary.solve_seconds);

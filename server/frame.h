@@ -52,6 +52,7 @@ struct Frame {
   std::uint64_t taken = 0;  // inputs that this frame and those before it answer
   std::uint32_t iteration = 0;
   double energy = 0;
+  double soft_energy = 0;  // the part of it that soft and orientation handles have
   bool converged = false;
   StopReason stop_reason = StopReason::kRunning;
   double solve_seconds = 0;

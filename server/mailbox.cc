@@ -8,7 +8,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/solve/check_settings.h"
 #include "core/solve/constraints.h"
+#include "core/solve/holds.h"
 
 namespace lpdeform {
 namespace {
@@ -26,7 +28,7 @@ std::string element_of(std::string_view name) {
 
 }  // namespace
 
-absl::Status check_solver(const SolveSettings& settings, const Material& material) {
+absl::Status check_solver(const SolveSettings& settings, const Material& material, const HandleSet& handles) {
   if (!(settings.tolerance >= 1e-14 && settings.tolerance <= 0.1)) {
     return invalid_input({"TOLERANCE_OUT_OF_RANGE", "tolerance", "1e-14 <= tolerance <= 0.1"},
                          absl::StrCat("The tolerance is ", settings.tolerance, ", not within 1e-14 to 0.1."));
@@ -42,7 +44,9 @@ absl::Status check_solver(const SolveSettings& settings, const Material& materia
   }
   const double needed =
       settings.method == Method::kLocalGlobal ? 2.0 : (settings.method == Method::kConic ? 1.0 : 0.0);
-  if (needed == 0.0 || (material.p.array() == needed).all()) return absl::OkStatus();
+  if (needed == 0.0 || (material.p.array() == needed).all()) {
+    return check_method_takes(settings.method, handles);
+  }
   const std::string method(method_name(settings.method));
   return invalid_input({"METHOD_NEEDS_P", method, absl::StrCat("p = ", needed)},
                        absl::StrCat("Method ", method, " needs p = ", needed, " everywhere."));
@@ -56,8 +60,8 @@ struct Mailbox::Candidate {
   SolveSettings solver;
   std::vector<std::string> named;  // handles that it changes
   std::vector<std::string> moved;  // those of them that go somewhere
-  bool is_regrouped = false;       // vertices of handles changed
-  bool has_p = false, has_stiffness = false, has_length_unit = false, has_solver = false;
+  bool is_regrouped = false;       // vertices of handles, or the region, changed
+  bool has_p = false, has_stiffness = false, has_length_unit = false, has_solver = false, has_region = false;
   std::uint32_t stale_parts = 0;
 
   bool has_handles() const { return is_regrouped || !moved.empty(); }
@@ -98,10 +102,12 @@ absl::StatusOr<UpdateResult> Mailbox::merge(const Update& update, bool is_beginn
   next.is_beginning = is_beginning;
   next.material = *before.material;
   next.solver = before.solver;
-  if (!update.handles.empty()) next.handles = std::make_shared<HandleSet>(*before.handles);
+  if (!update.handles.empty() || update.settings.region) {
+    next.handles = std::make_shared<HandleSet>(*before.handles);
+  }
   if (absl::Status status = change_handles(update, next); !status.ok()) return status;
   change_settings(update, next);
-  if (absl::Status status = check(next); !status.ok()) return status;
+  if (absl::Status status = check(next, before); !status.ok()) return status;
 
   const UpdateResult result{update.input_seq, next.stale_parts};
   put_in_force(update, next);
@@ -177,6 +183,13 @@ void Mailbox::change_settings(const Update& update, Candidate& next) const {
   if (next.has_stiffness) next.material.stiffness = *settings.stiffness;
   if (next.has_length_unit) next.material.length_unit = *settings.length_unit;
   if (next.has_solver) next.solver = *settings.solver;
+  next.has_region = settings.region && replaces(ages_.region, update, next);
+  if (!next.has_region) return;
+  next.is_regrouped = true;
+  if (settings.region->empty())
+    next.handles->clear_region();
+  else
+    next.handles->set_region(*settings.region);
 }
 
 void Mailbox::note_ages(const Candidate& next, std::uint64_t seq) {
@@ -185,6 +198,7 @@ void Mailbox::note_ages(const Candidate& next, std::uint64_t seq) {
   if (next.has_stiffness) ages_.stiffness = seq;
   if (next.has_length_unit) ages_.length_unit = seq;
   if (next.has_solver) ages_.solver = seq;
+  if (next.has_region) ages_.region = seq;
   if (ages_.handles.size() > kMostAges) forget_oldest();
 }
 
@@ -204,35 +218,46 @@ void Mailbox::forget_oldest() {
                 [&](const auto& entry) { return entry.second <= *middle && is_gone(entry.first); });
 }
 
-absl::Status Mailbox::check(const Candidate& next) const {
+absl::Status Mailbox::check(const Candidate& next, const Inputs& before) const {
   if (next.handles && next.handles->handles().size() > kMostHandles) {
     return invalid_input({"TOO_MANY_HANDLES", "", absl::StrCat("handles <= ", kMostHandles)},
                          absl::StrCat("The session would have ", next.handles->handles().size(),
                                       " handles; it may have ", kMostHandles, "."));
   }
   absl::Status status;
-  if (next.is_regrouped) status.Update(check_handles(*next.handles, shape_->vertex_count()));
+  if (next.is_regrouped) status = check_groups(*next.handles);
   for (const std::string& name : next.moved) {
     if (status.ok()) status = check_targets(name, next.handles->handles().find(name)->second);
   }
   if (next.has_material() && status.ok()) status = check_material(next.material, shape_->vertex_count());
-  if (status.ok() && (next.has_material() || next.has_solver)) {
-    status = check_solver(next.solver, next.material);
+  if (status.ok() && (next.has_material() || next.has_solver || next.is_regrouped)) {
+    status = check_solver(next.solver, next.material, next.handles ? *next.handles : *before.handles);
   }
   return status;
 }
 
+/// Whether the groups exist and can be held together; where locks and points must agree, they are put together
+/// to see.
+absl::Status Mailbox::check_groups(const HandleSet& handles) const {
+  if (absl::Status status = check_handles(handles, shape_->vertex_count(), shape_->face_count());
+      !status.ok())
+    return status;
+  if (!has_equations(handles)) return absl::OkStatus();
+  return make_constraints(*shape_, handles, FreeComponents::kStay).status();
+}
+
 absl::Status Mailbox::check_targets(const std::string& name, const Handle& handle) const {
   const double farthest = kFarthestTarget * shape_->diagonal();
-  const Points targets = target_positions(handle, shape_->positions());
+  const Points targets = target_positions(handle, shape_->positions(), shape_->faces());
   for (Eigen::Index k = 0; k < targets.rows(); ++k) {
     const double distance = (targets.row(k) - shape_->centre()).stableNorm();
     if (distance <= farthest) continue;
     return invalid_input(
         {"HANDLE_TARGET_TOO_FAR", element_of(name), absl::StrCat("distance <= ", farthest)},
-        absl::StrCat("Vertex ", handle.vertices[static_cast<std::size_t>(k)], " of ", element_of(name),
-                     " would be ", distance, " from the mesh's centre, over ", kFarthestTarget,
-                     " of its diagonals."));
+        absl::StrCat(handle.points.empty() ? "Vertex " : "Point ",
+                     handle.points.empty() ? handle.vertices[static_cast<std::size_t>(k)] : k, " of ",
+                     element_of(name), " would be ", distance, " from the mesh's centre, over ",
+                     kFarthestTarget, " of its diagonals."));
   }
   return absl::OkStatus();
 }

@@ -33,7 +33,7 @@ class Mailbox {
 
   /// A part with the input_seq of the value that is there is a repetition: dropped, but not counted as stale.
   /// Errors, INVALID_ARGUMENT: INPUT_SEQ_ZERO, HANDLE_CHANGED_TWICE (in this update), TOO_MANY_HANDLES,
-  /// HANDLE_TARGET_TOO_FAR, and what check_solver, check_handles, check_material and HandleSet have;
+  /// HANDLE_TARGET_TOO_FAR, and what check_solver, make_constraints, check_material and HandleSet have;
   /// NOT_FOUND HANDLE_UNKNOWN. A component without a handle is no error here: handles may come one by one.
   absl::StatusOr<UpdateResult> take(const Update& update);
 
@@ -51,7 +51,7 @@ class Mailbox {
   struct Ages {
     std::map<std::string, std::uint64_t, std::less<>> handles;
     std::uint64_t forgotten = 0;  // the newest of those given up
-    std::uint64_t p = 0, stiffness = 0, length_unit = 0, solver = 0;
+    std::uint64_t p = 0, stiffness = 0, length_unit = 0, solver = 0, region = 0;
   };
   struct Candidate;
 
@@ -60,7 +60,8 @@ class Mailbox {
   bool replaces_handle(const std::string& name, const Update& update, Candidate& next) const;
   absl::Status change_handles(const Update& update, Candidate& next) const;
   void change_settings(const Update& update, Candidate& next) const;
-  absl::Status check(const Candidate& next) const;
+  absl::Status check(const Candidate& next, const Inputs& before) const;
+  absl::Status check_groups(const HandleSet& handles) const;
   absl::Status check_targets(const std::string& name, const Handle& handle) const;
 
   void note_ages(const Candidate& next, std::uint64_t seq);
@@ -74,8 +75,8 @@ class Mailbox {
   Inputs inputs_;
 };
 
-/// Whether the method can minimise for this material: INVALID_ARGUMENT METHOD_NEEDS_P (local_global: p = 2
-/// everywhere; conic: p = 1), TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE.
-absl::Status check_solver(const SolveSettings& settings, const Material& material);
+/// Whether the method can minimise for this material and these handles: INVALID_ARGUMENT METHOD_NEEDS_P
+/// (local_global: p = 2 everywhere; conic: p = 1), METHOD_NEEDS_EXACT_HANDLES (conic), TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE.
+absl::Status check_solver(const SolveSettings& settings, const Material& material, const HandleSet& handles);
 
 }  // namespace lpdeform

@@ -27,6 +27,8 @@ struct SettingsChange {
   std::optional<Field> stiffness;
   std::optional<double> length_unit;
   std::optional<SolveSettings> solver;
+  /// Vertices of the region of interest; none: everything may move.
+  std::optional<std::vector<std::int32_t>> region;
 };
 
 /// A change of handles and settings, as a writer sends it.

@@ -77,9 +77,11 @@ absl::StatusOr<Inputs> read_inputs(const DeformOptions& options) {
   Inputs inputs{*std::move(file), {}, {}, {}};
   const std::int64_t vertex_count = inputs.file.mesh.vertices.rows();
 
-  absl::StatusOr<std::vector<NamedHandle>> handles = read_handles(options.handles, vertex_count);
-  if (!handles.ok()) return handles.status();
-  for (NamedHandle& handle : *handles)
+  absl::StatusOr<HandleFile> held = read_handles(options.handles, vertex_count);
+  if (!held.ok()) return held.status();
+  if (!held->region.empty())
+    inputs.update.settings.region = client::RegionOfInterest{std::move(held->region)};
+  for (NamedHandle& handle : held->handles)
     inputs.update.handles.emplace(std::move(handle.name), std::move(handle.handle));
   status = read_fields(options, vertex_count, inputs);
   if (status.ok()) status = read_initial(options, inputs);

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <initializer_list>
-#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -11,69 +9,13 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
+#include "client/cli/hold_keys.h"
+#include "client/cli/json_values.h"
 #include "client/cli/text_file.h"
 #include "core/base/fault.h"
 
 namespace lpdeform::cli {
 namespace {
-
-using nlohmann::json;
-
-/// Thrown and caught inside this file only, so that reading a value can be an expression.
-struct Refusal {
-  absl::Status status;
-};
-
-[[noreturn]] void refuse(const char* reason, std::string element, std::string_view text,
-                         std::string limit = "") {
-  throw Refusal{invalid_input({reason, std::move(element), std::move(limit)}, text)};
-}
-
-/// What is being read, for messages: `handle "tip"`, then `"rotate" of handle "tip"`.
-std::string key_of(const std::string& owner, const char* key) {
-  return absl::StrCat("\"", key, "\" of ", owner);
-}
-
-/// `value` for a message. Not dumped where it is nested: that would recurse as deep as a hostile file likes.
-std::string shown(const json& value) {
-  const bool is_nested =
-      std::ranges::any_of(value, [](const json& inner) { return inner.is_structured() && !inner.empty(); });
-  if (value.is_structured() && is_nested) return value.is_array() ? "a nested list" : "a nested object";
-  const std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
-  return text.size() <= 40 ? text : text.substr(0, 37) + "...";
-}
-
-[[noreturn]] void refuse_value(const std::string& place, const char* wanted, const json& value) {
-  refuse("HANDLE_FILE_VALUE", place, absl::StrCat(place, " must be ", wanted, ", not ", shown(value), "."));
-}
-
-void check_keys(const json& object, const std::string& owner, std::initializer_list<const char*> known) {
-  if (!object.is_object()) refuse_value(owner, "an object", object);
-  for (const auto& [key, value] : object.items()) {
-    if (std::ranges::find(known, key) != known.end()) continue;
-    refuse("HANDLE_FILE_KEY", owner,
-           absl::StrCat(owner, " has the unknown key \"", key, "\"; known are ", absl::StrJoin(known, ", "),
-                        "."));
-  }
-}
-
-const json& required(const json& object, const std::string& owner, const char* key) {
-  if (!object.contains(key)) {
-    refuse("HANDLE_FILE_KEY", owner, absl::StrCat(owner, " has no \"", key, "\"."));
-  }
-  return object[key];
-}
-
-double number(const json& value, const std::string& place) {
-  if (!value.is_number()) refuse_value(place, "a number", value);
-  return value.get<double>();
-}
-
-std::array<double, 3> vector3(const json& value, const std::string& place) {
-  if (!value.is_array() || value.size() != 3) refuse_value(place, "three numbers [x, y, z]", value);
-  return {number(value[0], place), number(value[1], place), number(value[2], place)};
-}
 
 std::string name_of(const json& object, std::size_t index) {
   const std::string place = absl::StrCat("handles[", index, "]");
@@ -95,20 +37,17 @@ std::vector<std::uint32_t> vertices_of(const json& object, const std::string& ow
   const std::string place = key_of(owner, "vertices");
   if (!list.is_array()) refuse_value(place, "a list of vertex numbers", list);
   if (list.empty()) refuse("HANDLE_EMPTY", owner, absl::StrCat(owner, " has no vertices."));
-  std::vector<std::uint32_t> vertices;
-  for (const json& vertex : list) {
-    if (!vertex.is_number_integer()) refuse_value(place, "whole numbers from 0", vertex);
-    const bool is_in_range =
-        vertex.is_number_unsigned() ? vertex.get<std::uint64_t>() < std::uint64_t(vertex_count) : false;
-    if (!is_in_range) {
-      refuse("HANDLE_VERTEX_OUT_OF_RANGE", owner,
-             absl::StrCat(owner, " has vertex ", shown(vertex), ", and the mesh has vertices 0 to ",
-                          vertex_count - 1, "."),
-             absl::StrCat("0 <= vertex < ", vertex_count));
-    }
-    vertices.push_back(vertex.get<std::uint32_t>());
-  }
-  return vertices;
+  return index_list(list, owner, place, "vertex", "HANDLE_VERTEX_OUT_OF_RANGE", vertex_count);
+}
+
+/// The vertices that may move; none where the file does not say.
+std::vector<std::uint32_t> region_of(const json& file, std::int64_t vertex_count) {
+  if (!file.contains("region")) return {};
+  const json& list = file["region"];
+  if (!list.is_array()) refuse_value("\"region\"", "a list of vertex numbers", list);
+  if (list.empty())
+    refuse("REGION_EMPTY", "region", "The region of interest has no vertex; nothing could move.");
+  return index_list(list, "the region", "\"region\"", "vertex", "REGION_VERTEX_OUT_OF_RANGE", vertex_count);
 }
 
 client::Motion targets_of(const json& object, const std::string& owner, std::size_t vertex_count) {
@@ -122,7 +61,7 @@ client::Motion targets_of(const json& object, const std::string& owner, std::siz
   if (!list.is_array()) refuse_value(place, "a list of [x, y, z]", list);
   if (list.size() != vertex_count) {
     refuse("HANDLE_TARGET_COUNT", owner,
-           absl::StrCat(owner, " has ", list.size(), " positions for ", vertex_count, " vertices."),
+           absl::StrCat(owner, " has ", list.size(), " positions for ", vertex_count, " vertices or points."),
            absl::StrCat("positions = ", vertex_count));
   }
   client::TargetPositions targets;
@@ -197,13 +136,13 @@ json parse_strictly(std::string_view text) {
   }
 }
 
-std::vector<NamedHandle> handles_of(const json& file, std::int64_t vertex_count) {
-  check_keys(file, "the handle file", {"mesh", "note", "handles"});
+HandleFile handles_of(const json& file, std::int64_t vertex_count) {
+  check_keys(file, "the handle file", {"mesh", "note", "handles", "region"});
   const json& list = required(file, "the handle file", "handles");
   if (!list.is_array()) refuse_value("\"handles\"", "a list", list);
   if (list.empty())
     refuse("HANDLE_FILE_EMPTY", "", "The handle file has no handles; a deformation needs at least one.");
-  std::vector<NamedHandle> handles;
+  HandleFile result{{}, region_of(file, vertex_count)};
   std::set<std::string> names;
   Owners owners;
   for (std::size_t index = 0; index < list.size(); ++index) {
@@ -212,18 +151,25 @@ std::vector<NamedHandle> handles_of(const json& file, std::int64_t vertex_count)
     const std::string owner = absl::StrCat("handle \"", name, "\"");
     if (!names.insert(name).second)
       refuse("HANDLE_NAME_TWICE", owner, absl::StrCat("There are two handles of the name \"", name, "\"."));
-    check_keys(object, owner, {"name", "vertices", "translate", "rotate", "positions"});
-    NamedHandle& handle = handles.emplace_back(NamedHandle{name, {}});
-    handle.handle.vertices = vertices_of(object, owner, vertex_count);
-    handle.handle.motion = motion_of(object, owner, handle.handle.vertices.size());
+    check_keys(object, owner,
+               {"name", "vertices", "points", "translate", "rotate", "positions", "soft", "orientation",
+                "axis_lock", "plane_lock", "footprint"});
+    NamedHandle& handle = result.handles.emplace_back(NamedHandle{name, {}});
+    if (object.contains("points"))
+      handle.handle.points = points_of(object, owner);
+    else
+      handle.handle.vertices = vertices_of(object, owner, vertex_count);
+    const std::size_t count = handle.handle.vertices.size() + handle.handle.points.size();
+    handle.handle.motion = motion_of(object, owner, count);
+    read_hold(object, owner, handle.handle);
     owners.claim(handle);
   }
-  return handles;
+  return result;
 }
 
 }  // namespace
 
-absl::StatusOr<std::vector<NamedHandle>> parse_handles(std::string_view text, std::int64_t vertex_count) {
+absl::StatusOr<HandleFile> parse_handles(std::string_view text, std::int64_t vertex_count) {
   try {
     return handles_of(parse_strictly(text), vertex_count);
   } catch (const Refusal& refusal) {
@@ -231,8 +177,7 @@ absl::StatusOr<std::vector<NamedHandle>> parse_handles(std::string_view text, st
   }
 }
 
-absl::StatusOr<std::vector<NamedHandle>> read_handles(const std::filesystem::path& path,
-                                                      std::int64_t vertex_count) {
+absl::StatusOr<HandleFile> read_handles(const std::filesystem::path& path, std::int64_t vertex_count) {
   const absl::StatusOr<std::string> text = read_text(path);
   if (!text.ok()) return text.status();
   return parse_handles(*text, vertex_count);
@@ -242,7 +187,9 @@ std::string handle_file_text(const std::vector<NamedHandle>& handles, std::strin
                              std::string_view note) {
   nlohmann::ordered_json file{{"mesh", mesh}, {"note", note}, {"handles", nlohmann::ordered_json::array()}};
   for (const NamedHandle& handle : handles) {
-    nlohmann::ordered_json object{{"name", handle.name}, {"vertices", handle.handle.vertices}};
+    nlohmann::ordered_json object{{"name", handle.name}};
+    if (handle.handle.points.empty()) object["vertices"] = handle.handle.vertices;
+    write_hold(handle.handle, object);
     if (const auto* const rigid = std::get_if<client::RigidMotion>(&handle.handle.motion)) {
       object["translate"] = rigid->translation;
       const double degrees = rigid->angle_radians * 180 / std::numbers::pi;

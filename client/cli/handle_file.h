@@ -16,17 +16,23 @@ struct NamedHandle {
   client::Handle handle;
 };
 
-/// The handles of a handle file, in its order; README.md describes the format whole. Errors are
+struct HandleFile {
+  std::vector<NamedHandle> handles;
+  std::vector<std::uint32_t> region;  // the vertices that may move; empty: all
+};
+
+/// The handles of a handle file, in its order, and its region; README.md describes the format whole. Errors are
 /// INVALID_ARGUMENT and name the handle, the key and the value: HANDLE_FILE_SYNTAX (line and column),
 /// HANDLE_FILE_KEY (unknown, given twice or missing), HANDLE_FILE_VALUE (of the wrong kind),
 /// HANDLE_FILE_EMPTY, HANDLE_NAME, HANDLE_NAME_TWICE, HANDLE_EMPTY, HANDLE_VERTEX_OUT_OF_RANGE,
 /// HANDLE_VERTEX_TWICE, HANDLE_MOTION_TWICE (positions beside translate or rotate), HANDLE_TARGET_COUNT,
-/// HANDLE_AXIS_ZERO.
-absl::StatusOr<std::vector<NamedHandle>> parse_handles(std::string_view json, std::int64_t vertex_count);
+/// HANDLE_AXIS_ZERO, HANDLE_POINTS_AND_VERTICES, HANDLE_HOLD_TWICE, HANDLE_BARYCENTRIC, HANDLE_WEIGHT_OUT_OF_RANGE,
+/// HANDLE_LOCK_DIRECTION, HANDLE_FOOTPRINT_OUT_OF_RANGE, REGION_EMPTY, REGION_VERTEX_OUT_OF_RANGE. Faces are
+/// looked for by the server.
+absl::StatusOr<HandleFile> parse_handles(std::string_view json, std::int64_t vertex_count);
 
 /// The same from a file; also NOT_FOUND (FILE_NOT_FOUND).
-absl::StatusOr<std::vector<NamedHandle>> read_handles(const std::filesystem::path& path,
-                                                      std::int64_t vertex_count);
+absl::StatusOr<HandleFile> read_handles(const std::filesystem::path& path, std::int64_t vertex_count);
 
 /// A handle file that parse_handles reads back.
 std::string handle_file_text(const std::vector<NamedHandle>& handles, std::string_view mesh,

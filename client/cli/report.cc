@@ -121,6 +121,7 @@ std::string report_json(const client::MeshReport& mesh, const client::FieldValue
                             {"iterations", result.iterations},
                             {"initial_energy", result.initial_energy},
                             {"energy", result.energy},
+                            {"soft_energy", result.soft_energy},
                             {"optimality_gap", gap},
                             {"setup_seconds", result.setup_seconds},
                             {"solve_seconds", result.solve_seconds},

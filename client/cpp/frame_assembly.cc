@@ -52,6 +52,7 @@ absl::Status FrameAssembly::begin(const v1::FrameHeader& header) {
   frame.skipped_inputs = header.skipped_inputs();
   frame.iteration = header.iteration();
   frame.energy = header.energy();
+  frame.soft_energy = header.soft_energy();
   frame.converged = header.converged();
   frame.stop_reason = from_wire(header.stop_reason());
   frame.solve_seconds = header.solve_seconds();

@@ -38,6 +38,7 @@ void merge(Update& older, Update newer) {
   replace_where_given(older.settings.stiffness, newer.settings.stiffness);
   replace_where_given(older.settings.length_unit, newer.settings.length_unit);
   replace_where_given(older.settings.solver, newer.settings.solver);
+  replace_where_given(older.settings.region, newer.settings.region);
 }
 
 std::uint64_t Ledger::add(Update update) {

@@ -34,17 +34,63 @@ struct RigidMotion {
   std::array<double, 3> translation = {0, 0, 0};
 };
 
-/// Absolute positions: x, y, z for each of the handle's vertices, in their order.
+/// Absolute positions: x, y, z for each of the handle's vertices or points, in their order.
 struct TargetPositions {
   std::vector<double> positions = {};
 };
 
 using Motion = std::variant<Fixed, RigidMotion, TargetPositions>;
 
-/// A group of vertices that the user holds. A vertex belongs to one handle at most.
+/// A point inside a face of the rest mesh: barycentric coordinates times the face's corners, in their order. Each
+/// at least 0, their sum 1, both to 1e-6.
+struct SurfacePoint {
+  std::uint32_t face = 0;
+  std::array<double, 3> barycentric = {1.0 / 3, 1.0 / 3, 1.0 / 3};
+};
+
+// How a handle is held; a target is where its motion sends a vertex or point.
+
+/// Exactly at its target.
+struct Exactly {};
+
+/// Drawn to its target: 0 lets go, 1 is about as strong as one edge of the surface. 0 to 1e6.
+struct Soft {
+  double weight = 1;
+};
+
+/// Turned by the rotation of the handle's motion, its position free. Vertices only, no target positions. 0 to
+/// 1e6.
+struct Orientation {
+  double weight = 100;
+};
+
+/// Free along a line through its target. Vertices only.
+struct AxisLock {
+  std::array<double, 3> axis = {0, 0, 1};  // of any length but 0
+};
+
+/// Free within a plane through its target. Vertices only.
+struct PlaneLock {
+  std::array<double, 3> normal = {0, 0, 1};  // of any length but 0
+};
+
+using Hold = std::variant<Exactly, Soft, Orientation, AxisLock, PlaneLock>;
+
+/// A group of vertices, or of points inside faces, that the user holds. A vertex belongs to one handle at most.
 struct Handle {
   std::vector<std::uint32_t> vertices = {};
   Motion motion = Fixed{};
+  Hold hold = Exactly{};
+  std::vector<SurfacePoint> points = {};  // in place of vertices; exactly or soft
+  /// Radius, along the surface, of the surroundings that go along with the handle nearly rigidly: against the
+  /// spike that a handle of one or a few vertices makes. 0: none.
+  double footprint = 0;
+};
+
+/// The vertices that may move; everything outside is held where it is when the region takes effect. Empty:
+/// everything may move again.
+struct RegionOfInterest {
+  std::vector<std::uint32_t> vertices = {};
 };
 
 enum class Method { kAuto, kQuasiNewton, kLineSearch, kLocalGlobal, kConic, kMultiresolution };
@@ -96,6 +142,7 @@ struct Settings {
   /// Of mixed norms, in the mesh's unit; 0 takes the mean rest edge length.
   std::optional<double> length_unit = {};
   std::optional<SolverSettings> solver = {};
+  std::optional<RegionOfInterest> region = {};
 };
 
 /// A change of handles and settings; the server takes it whole or not at all.
@@ -135,7 +182,8 @@ struct Frame {
   std::uint64_t epoch = 0;
   std::uint64_t skipped_inputs = 0;  // updates since the frame before that no frame answers
   std::uint32_t iteration = 0;
-  double energy = 0;       // E of the positions, Eq. 3 of the paper, in the mesh's unit
+  double energy = 0;       // E of the positions, Eq. 3 of the paper, in the mesh's unit, with soft terms
+  double soft_energy = 0;  // the part of it that soft and orientation handles have
   bool converged = false;  // the result for input_seq: no further frame until there is a new update
   StopReason stop_reason = StopReason::kRunning;
   double solve_seconds = 0;
@@ -175,7 +223,8 @@ struct SolveResult {
   StopReason stop_reason = StopReason::kRunning;
   std::uint32_t iterations = 0;
   double initial_energy = 0;
-  double energy = 0;
+  double energy = 0;       // with soft terms
+  double soft_energy = 0;  // their part
   /// (E - lower bound) / E of the convex problem with its rotations held.
   std::optional<double> optimality_gap = {};
   double setup_seconds = 0;

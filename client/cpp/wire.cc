@@ -91,13 +91,42 @@ absl::Status to_wire(const Motion& motion, Packer& packer, v1::Motion& out) {
   return std::visit(put_motion, motion);
 }
 
+absl::Status to_wire(const std::vector<SurfacePoint>& points, Packer& packer, v1::SurfacePoints& out) {
+  std::vector<std::uint32_t> faces;
+  std::vector<double> barycentric;
+  for (const SurfacePoint& point : points) {
+    faces.push_back(point.face);
+    barycentric.insert(barycentric.end(), point.barycentric.begin(), point.barycentric.end());
+  }
+  out.set_scalar(v1::SCALAR_FLOAT64);
+  absl::Status packed = packer.pack(bytes_of(faces), *out.mutable_faces());
+  packed.Update(packer.pack(bytes_of(barycentric), *out.mutable_barycentric()));
+  return packed;
+}
+
+void to_wire(const Hold& hold, v1::Handle& out) {
+  const Match put_hold{
+      [](const Exactly&) {}, [&](const Soft& soft) { out.mutable_soft()->set_weight(soft.weight); },
+      [&](const Orientation& orientation) { out.mutable_orientation()->set_weight(orientation.weight); },
+      [&](const AxisLock& lock) { put(lock.axis, out.mutable_axis_lock()->mutable_axis()); },
+      [&](const PlaneLock& lock) { put(lock.normal, out.mutable_plane_lock()->mutable_normal()); }};
+  std::visit(put_hold, hold);
+}
+
+absl::Status to_wire(const Handle& handle, Packer& packer, v1::Handle& out) {
+  absl::Status packed;
+  if (!handle.vertices.empty() || handle.points.empty()) {
+    packed.Update(packer.pack(bytes_of(handle.vertices), *out.mutable_vertices()));
+  }
+  if (!handle.points.empty()) packed.Update(to_wire(handle.points, packer, *out.mutable_points()));
+  packed.Update(to_wire(handle.motion, packer, *out.mutable_motion()));
+  to_wire(handle.hold, out);
+  out.set_footprint_radius(handle.footprint);
+  return packed;
+}
+
 absl::Status to_wire(const Update::Change& change, Packer& packer, v1::HandleUpdate& out) {
-  const Match put_change{[&](const Handle& handle) {
-                           const absl::Status packed =
-                               packer.pack(bytes_of(handle.vertices), *out.mutable_set()->mutable_vertices());
-                           if (!packed.ok()) return packed;
-                           return to_wire(handle.motion, packer, *out.mutable_set()->mutable_motion());
-                         },
+  const Match put_change{[&](const Handle& handle) { return to_wire(handle, packer, *out.mutable_set()); },
                          [&](const Motion& motion) { return to_wire(motion, packer, *out.mutable_move()); },
                          [&](const Update::Removal&) {
                            out.mutable_remove();
@@ -121,6 +150,11 @@ absl::Status to_wire(const Settings& settings, Packer& packer, v1::SettingsUpdat
   if (settings.stiffness) packed.Update(to_wire(*settings.stiffness, packer, *out.mutable_stiffness()));
   if (settings.length_unit) out.mutable_length_unit()->set_length(*settings.length_unit);
   if (settings.solver) to_wire(*settings.solver, *out.mutable_solver());
+  if (settings.region) {
+    v1::RegionOfInterest& region = *out.mutable_region();
+    const auto& vertices = settings.region->vertices;
+    if (!vertices.empty()) packed.Update(packer.pack(bytes_of(vertices), *region.mutable_vertices()));
+  }
   return packed;
 }
 
@@ -133,8 +167,8 @@ absl::Status to_wire(const Update& update, std::uint64_t seq, Packer& packer, v1
     if (!packed.ok()) return packed;
   }
   const Settings& settings = update.settings;
-  if (!settings.p && !settings.stiffness && !settings.length_unit && !settings.solver)
-    return absl::OkStatus();
+  const bool has_field = settings.p || settings.stiffness || settings.length_unit;
+  if (!has_field && !settings.solver && !settings.region) return absl::OkStatus();
   return to_wire(settings, packer, *out.mutable_settings());
 }
 
@@ -211,6 +245,7 @@ void from_wire(const v1::SolveSummary& summary, SolveResult& out) {
   out.iterations = summary.iterations();
   out.initial_energy = summary.initial_energy();
   out.energy = summary.energy();
+  out.soft_energy = summary.soft_energy();
   if (summary.has_certificate()) out.optimality_gap = summary.certificate().relative_gap();
   out.setup_seconds = summary.setup_seconds();
   out.solve_seconds = summary.solve_seconds();

@@ -23,6 +23,8 @@ class RestShape {
 
   std::int32_t vertex_count() const { return static_cast<std::int32_t>(positions_.rows()); }
 
+  std::int32_t face_count() const { return static_cast<std::int32_t>(faces_.rows()); }
+
   /// Rest positions in the caller's units, as given.
   const Points& positions() const { return positions_; }
   const Faces& faces() const { return faces_; }

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/solve/convex_rows.h"
+
 namespace lpdeform {
 namespace {
 
@@ -40,15 +42,14 @@ double shrink(double v, double k, double p, double rho) {
 /// The dual side of one convex step.
 class DualBound {
  public:
-  DualBound(const Problem& problem, const EdgeVectors& z)
-      : problem_(problem), shape_(problem.shape()), z_(z) {}
+  DualBound(const ConvexRows& step, const EdgeVectors& z) : step_(step), z_(z) {}
 
   /// max over theta >= 0 of D(theta y), for y with A^T y = 0.
   double scaled_bound(const EdgeVectors& y) {
-    norms_.resize(shape_.vertex_count());
+    norms_.resize(step_.count());
     double longest_theta = 2;
-    for (std::int32_t i = 0; i < shape_.vertex_count(); ++i) {
-      norms_[i] = cell_norm(shape_, y, i);
+    for (std::int32_t i = 0; i < step_.count(); ++i) {
+      norms_[i] = step_.norm(y, i);
       if (p(i) == 1 && norms_[i] > 0) longest_theta = std::min(longest_theta, k(i) / norms_[i]);
     }
     inner_ = y.cwiseProduct(z_).sum();
@@ -64,20 +65,20 @@ class DualBound {
     return value(low);
   }
 
-  double p(std::int32_t i) const { return problem_.norm.p(i); }
-  double k(std::int32_t i) const { return problem_.norm.coefficient(i); }
+  double p(std::int32_t i) const { return step_.exponent(i); }
+  double k(std::int32_t i) const { return step_.coefficient(i); }
 
  private:
   double slope(double theta) const {
     double sum = inner_;
-    for (std::int32_t i = 0; i < shape_.vertex_count(); ++i) {
+    for (std::int32_t i = 0; i < step_.count(); ++i) {
       if (p(i) > 1 && norms_[i] > 0) sum -= norms_[i] * conjugate_point(theta * norms_[i], k(i), p(i));
     }
     return sum;
   }
   double value(double theta) const {
     double sum = theta * inner_;
-    for (std::int32_t i = 0; i < shape_.vertex_count(); ++i) {
+    for (std::int32_t i = 0; i < step_.count(); ++i) {
       if (p(i) == 1 || norms_[i] == 0) continue;
       const double t = conjugate_point(theta * norms_[i], k(i), p(i));
       sum -= (p(i) - 1) * k(i) * std::pow(t, p(i));
@@ -85,46 +86,36 @@ class DualBound {
     return std::isfinite(sum) ? sum : -kInfinity;
   }
 
-  const Problem& problem_;
-  const RestShape& shape_;
+  const ConvexRows& step_;
   const EdgeVectors& z_;
   std::vector<double> norms_;
   double inner_ = 0;
 };
 
-/// Solves (A^T C A) u = A^T y, C the cell weights that the metric is factored with: the metric is 2 A^T C A.
-Points least_squares(const Problem& problem, const EdgeVectors& y) {
+/// Solves (A^T C A) u = A^T y, C the weights that the metric is factored with: the metric is 2 A^T C A.
+Points least_squares(const Problem& problem, const ConvexRows& step, const EdgeVectors& y) {
   Points u;
-  apply_edges_transposed(problem.shape(), y, problem.constraints.is_held, u);
-  problem.metric.solve(u, u);
+  step.apply_transposed(y, u);
+  problem.solve(u, u);
   return 2 * u;
 }
 
-/// Rows of cell i.
-auto cell_rows(const RestShape& shape, EdgeVectors& values, std::int32_t i) {
-  return values.middleRows(shape.offsets()[i], shape.offsets()[i + 1] - shape.offsets()[i]);
-}
-
 /// y - C A (A^T C A)^-1 A^T y.
-EdgeVectors project(const Problem& problem, const EdgeVectors& y) {
-  const RestShape& shape = problem.shape();
+EdgeVectors project(const Problem& problem, const ConvexRows& step, const EdgeVectors& y) {
   EdgeVectors image;
-  apply_edges(shape, least_squares(problem, y), image);
-  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
-    cell_rows(shape, image, i) *= problem.metric.cell_weight(i);
-  }
+  step.apply(least_squares(problem, step, y), image);
+  for (std::int32_t i = 0; i < step.count(); ++i) step.rows(image, i) *= step.weight(i);
   return y - image;
 }
 
 /// The terms' gradients, y_i = k_i p_i |z_i|^{p_i - 2} z_i, smoothed near 0 where p_i < 2.
-EdgeVectors term_gradients(const Problem& problem, const DualBound& dual, const EdgeVectors& z, double eps) {
-  const RestShape& shape = problem.shape();
+EdgeVectors term_gradients(const ConvexRows& step, const EdgeVectors& z, double eps) {
   EdgeVectors y = z;
-  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
-    const double p = dual.p(i), size = cell_norm(shape, z, i);
+  for (std::int32_t i = 0; i < step.count(); ++i) {
+    const double p = step.exponent(i), size = step.norm(z, i);
     const double smoothed = p < 2 ? std::hypot(size, eps) : size;
-    const double factor = smoothed > 0 ? dual.k(i) * p * std::pow(smoothed, p - 2) : 0;
-    cell_rows(shape, y, i) *= factor;
+    const double factor = smoothed > 0 ? step.coefficient(i) * p * std::pow(smoothed, p - 2) : 0;
+    step.rows(y, i) *= factor;
   }
   return y;
 }
@@ -150,23 +141,22 @@ double penalty(const Problem& problem, const DualBound& dual) {
 
 /// ADMM on min sum f_i(z_i), z = A x - b, from the present residuals r and multipliers y, with the metric
 /// factored for equal cell weights. Returns the best bound seen.
-double polish(const Problem& problem, DualBound& dual, EdgeVectors r, EdgeVectors y, double best,
-              double enough, const CertificateSettings& settings, Clock::time_point end) {
-  const RestShape& shape = problem.shape();
+double polish(const Problem& problem, const ConvexRows& rows, DualBound& dual, EdgeVectors r, EdgeVectors y,
+              double best, double enough, const CertificateSettings& settings, Clock::time_point end) {
   const double rho = penalty(problem, dual);
   EdgeVectors image;
   for (int step = 0; step < settings.max_steps && best < enough; ++step) {
     if (problem.stop.stop_requested() || Clock::now() >= end) break;
     const EdgeVectors v = r + y / rho;
     EdgeVectors z = v;
-    for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
-      const double size = cell_norm(shape, v, i);
+    for (std::int32_t i = 0; i < rows.count(); ++i) {
+      const double size = rows.norm(v, i);
       const double factor = size > 0 ? shrink(size, dual.k(i), dual.p(i), rho) / size : 0;
-      cell_rows(shape, z, i) *= factor;
+      rows.rows(z, i) *= factor;
     }
     y = rho * (v - z);
     // x minimises |r - z + y / rho|; what remains of that vector, times rho, has A^T (.) = 0: a dual point.
-    apply_edges(shape, least_squares(problem, r - z + y / rho), image);
+    rows.apply(least_squares(problem, rows, r - z + y / rho), image);
     r -= image;
     if (step % 5 == 4) best = std::max(best, dual.scaled_bound(rho * (r - z) + y));
   }
@@ -175,16 +165,17 @@ double polish(const Problem& problem, DualBound& dual, EdgeVectors r, EdgeVector
 
 /// The best bound from the terms' gradients, smoothed by several shares of the mean cell energy; `y` gets the
 /// gradient that gave it.
-double gradient_bound(const Problem& problem, DualBound& dual, const EdgeVectors& z, EdgeVectors& y) {
+double gradient_bound(const Problem& problem, ConvexRows& rows, DualBound& dual, const EdgeVectors& z,
+                      EdgeVectors& y) {
   double best = -kInfinity;
   const double mean = mean_energy(problem);
   for (const double share : {0.0, 1e-4, 1e-3, 1e-2, 1e-1}) {
     if (share > 0 && problem.norm.lowest_p() >= 2) break;
     const double eps = share * mean;
     problem.objective.reweigh(problem.norm.smoothed(eps * eps));
-    if (!problem.factor_metric()) continue;
-    EdgeVectors gradient = term_gradients(problem, dual, z, eps);
-    const double bound = dual.scaled_bound(project(problem, gradient));
+    if (!rows.factor()) continue;
+    EdgeVectors gradient = term_gradients(rows, z, eps);
+    const double bound = dual.scaled_bound(project(problem, rows, gradient));
     if (bound > best) best = bound, y = std::move(gradient);
   }
   return best;
@@ -195,19 +186,19 @@ double gradient_bound(const Problem& problem, DualBound& dual, const EdgeVectors
 double relative_gap(const Problem& problem, const Points& x, const CertificateSettings& settings) {
   const double primal = problem.objective.sum(problem.norm);
   if (primal <= problem.zero_objective) return 0;
-  if (!std::isfinite(primal)) return 1;
+  if (!std::isfinite(primal) || problem.constraints.linear.has_tied_locks()) return 1;
   const Clock::time_point end =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(
                          std::chrono::duration<double>(std::min(settings.max_seconds, kLongestSeconds)));
 
   EdgeVectors z, y;
-  residuals(problem.shape(), x, problem.objective.cells().rotations(), z);
-  DualBound dual(problem, z);
+  ConvexRows rows(problem);
+  rows.residuals(x, z);
+  DualBound dual(rows, z);
   const double enough = (1 - settings.good_enough) * primal;
-  double best = gradient_bound(problem, dual, z, y);
-  const std::vector<double> equal(problem.shape().vertex_count(), 1.0);
-  if (best < enough && y.size() > 0 && problem.metric.factor(equal, problem.constraints.is_held)) {
-    best = polish(problem, dual, z, std::move(y), best, enough, settings, end);
+  double best = gradient_bound(problem, rows, dual, z, y);
+  if (best < enough && y.size() > 0 && rows.factor_equal()) {
+    best = polish(problem, rows, dual, z, std::move(y), best, enough, settings, end);
   }
   return best > -kInfinity ? std::clamp((primal - best) / primal, 0.0, 1.0) : 1;
 }

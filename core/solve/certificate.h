@@ -15,6 +15,9 @@ namespace lpdeform {
 ///   f_i*(y_i) = (p_i - 1) k_i (|y_i| / (k_i p_i))^{p_i / (p_i - 1)}
 ///   for p_i = 1: f_i*(y_i) = 0 where |y_i| <= k_i, infinite elsewhere.
 ///
+/// Soft terms are among the f_i (ConvexRows). Where points and locks put equations C x = t on the positions, A^T y
+/// need only be orthogonal to the x with C x = 0: the projection's solve becomes that of LinearConstraints.
+///
 /// y begins as the gradient of the terms, projected by one solve with the reweighted Laplacian,
 ///
 ///   y - C A (A^T C A)^-1 A^T y,   C = the cells' weights c_i,
@@ -30,7 +33,7 @@ struct CertificateSettings {
 
 /// (P - D) / P at x in [0, 1], P the sum of the norm's unsmoothed terms; 0 where P is 0. `problem.objective`
 /// holds the evaluation at x; `problem.metric` is refactored. 1 where no bound was found, also because P is not
-/// finite.
+/// finite, or where locks alone keep a component.
 double relative_gap(const Problem& problem, const Points& x, const CertificateSettings& settings = {});
 
 }  // namespace lpdeform

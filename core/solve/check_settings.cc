@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/solve/check_handle.h"
 
 namespace lpdeform {
 namespace {
@@ -41,6 +42,18 @@ absl::Status check_method(Method method, const Material& material) {
 }
 
 }  // namespace
+
+absl::Status check_method_takes(Method method, const HandleSet& handles) {
+  if (method != Method::kConic) return absl::OkStatus();
+  for (const auto& [name, handle] : handles.handles()) {
+    if (handle.points.empty() && std::holds_alternative<Exactly>(handle.hold)) continue;
+    const std::string limit = "handles that hold vertices exactly";
+    return invalid_input({"METHOD_NEEDS_EXACT_HANDLES", handle_element(name), limit},
+                         absl::StrCat("method ", std::string(method_name(method)), " takes ", limit, "; ",
+                                      handle_element(name), " is held in another way"));
+  }
+  return absl::OkStatus();
+}
 
 absl::Status check_settings(const SolveSettings& settings, const Material& material) {
   absl::Status status = check_limits(settings);

@@ -6,34 +6,88 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/energy/rotation_fit.h"
+#include "core/solve/footprint.h"
+#include "core/solve/holds.h"
 
 namespace lpdeform {
 namespace {
 
-Points rows_of(const Points& points, const std::vector<std::int32_t>& rows) {
-  Points result(rows.size(), 3);
-  for (std::size_t k = 0; k < rows.size(); ++k) result.row(k) = points.row(rows[k]);
-  return result;
+/// The handle's targets in scaled units.
+absl::StatusOr<Points> scaled_targets(const RestShape& shape, const std::string& name, const Handle& handle,
+                                      const Points& targets) {
+  const Points scaled = (targets.rowwise() - shape.centre()) / shape.mean_edge_length();
+  for (Eigen::Index k = 0; k < scaled.rows(); ++k) {
+    if (scaled.row(k).stableNorm() * shape.mean_edge_length() <= kFarthestTarget * shape.diagonal()) continue;
+    const std::string member =
+        handle.points.empty() ? absl::StrCat("vertex ", handle.vertices[k]) : absl::StrCat("point ", k);
+    return invalid_input(
+        {"HANDLE_TARGET_TOO_FAR", member, "1e9 diagonals of the mesh"},
+        absl::StrCat("handle \"", name, "\" sends ", member, " over 1e9 diagonals of the mesh away"));
+  }
+  return scaled;
 }
 
-absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Constraints& constraints) {
+absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Constraints& constraints,
+                          Holds& holds) {
   for (const auto& [name, handle] : handles.handles()) {
-    const Points targets = target_positions(handle, shape.positions());
+    const Points targets = target_positions(handle, shape.positions(), shape.faces());
+    const auto scaled = scaled_targets(shape, name, handle, targets);
+    if (!scaled.ok()) return scaled.status();
+    add_holds(shape, name, handle, *scaled, holds);
+    if (!std::holds_alternative<Exactly>(handle.hold)) continue;
     for (std::size_t k = 0; k < handle.vertices.size(); ++k) {
       const std::int32_t vertex = handle.vertices[k];
-      const Eigen::RowVector3d scaled = (targets.row(k) - shape.centre()) / shape.mean_edge_length();
-      if (!(scaled.stableNorm() * shape.mean_edge_length() <= kFarthestTarget * shape.diagonal())) {
-        return invalid_input(
-            {"HANDLE_TARGET_TOO_FAR", absl::StrCat("vertex ", vertex), "1e9 diagonals of the mesh"},
-            absl::StrCat("handle \"", name, "\" sends vertex ", vertex,
-                         " over 1e9 diagonals of the mesh away"));
-      }
       constraints.is_held[vertex] = true;
-      constraints.targets.row(vertex) = scaled;
+      constraints.targets.row(vertex) = scaled->row(k);
       constraints.exact.row(vertex) = targets.row(k);
     }
   }
   return absl::OkStatus();
+}
+
+/// Holds everything outside the region where `outside` has it, and unreferenced vertices; rows that only such
+/// vertices would meet are void.
+void hold_outside(const RestShape& shape, const std::vector<std::int32_t>* region, const Points& outside,
+                  Constraints& constraints, Holds& holds) {
+  std::vector<char> may_move(shape.vertex_count(), region == nullptr);
+  if (region != nullptr) {
+    for (const std::int32_t vertex : *region) may_move[vertex] = true;
+  }
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    if (shape.components()[i] < 0) {
+      may_move[i] = false;
+      constraints.is_held[i] = true;
+    } else if (!may_move[i]) {
+      constraints.is_held[i] = true;
+      constraints.targets.row(i) = (outside.row(i) - shape.centre()) / shape.mean_edge_length();
+      constraints.exact.row(i) = outside.row(i);
+    }
+  }
+  std::erase_if(holds.rows, [&](const LinearRow& row) {
+    return std::none_of(row.point.vertices.begin(), row.point.vertices.begin() + row.point.count,
+                        [&](std::int32_t vertex) { return may_move[vertex]; });
+  });
+}
+
+bool is_lock(const Hold& hold) {
+  return std::holds_alternative<AxisLock>(hold) || std::holds_alternative<PlaneLock>(hold);
+}
+
+/// Components that something keeps from drifting off, locks left out or not.
+std::vector<char> tied_components(const RestShape& shape, const HandleSet& handles,
+                                  const Constraints& constraints, bool with_locks) {
+  std::vector<char> is_tied(shape.component_count(), false);
+  const auto tie = [&](std::int32_t vertex) {
+    if (shape.components()[vertex] >= 0) is_tied[shape.components()[vertex]] = true;
+  };
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    if (constraints.is_held[i]) tie(i);
+  }
+  for (const auto& [name, handle] : handles.handles()) {
+    if (!ties_component(handle) || (is_lock(handle.hold) && !with_locks)) continue;
+    for (std::size_t k = 0; k < handle.size(); ++k) tie(point_form(shape, handle, k).vertices[0]);
+  }
+  return is_tied;
 }
 
 absl::Status name_free_component(const RestShape& shape, std::int32_t component) {
@@ -54,14 +108,13 @@ RigidTransform nearest_handle_motion(const RestShape& shape, const HandleSet& ha
   const Handle* nearest = nullptr;
   double shortest = std::numeric_limits<double>::infinity();
   for (const auto& [name, handle] : handles.handles()) {
-    for (const std::int32_t held : handle.vertices) {
-      const double distance = (rest.row(held) - point).squaredNorm();
-      if (distance < shortest) shortest = distance, nearest = &handle;
-    }
+    const Points from = rest_positions(handle, rest, shape.faces());
+    const double distance = (from.rowwise() - point).rowwise().squaredNorm().minCoeff();
+    if (distance < shortest) shortest = distance, nearest = &handle;
   }
-  Points to = target_positions(*nearest, shape.positions());
+  Points to = target_positions(*nearest, shape.positions(), shape.faces());
   to = (to.rowwise() - shape.centre()) / shape.mean_edge_length();
-  return fit_rigid(rows_of(rest, nearest->vertices), to);
+  return fit_rigid(rest_positions(*nearest, rest, shape.faces()), to);
 }
 
 Points component_centres(const RestShape& shape) {
@@ -100,31 +153,42 @@ void hold_free_components(const RestShape& shape, const HandleSet& handles, Free
 }  // namespace
 
 absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const HandleSet& handles,
-                                             FreeComponents free_components) {
-  if (absl::Status status = check_handles(handles, shape.vertex_count()); !status.ok()) return status;
+                                             FreeComponents free_components, const Points* outside) {
+  absl::Status status = check_handles(handles, shape.vertex_count(), shape.face_count());
+  if (!status.ok()) return status;
   if (handles.handles().empty()) {
     return make_fault(absl::StatusCode::kFailedPrecondition, {"NO_HANDLES", "", "at least 1 handle"},
                       "there is no handle; a deformation needs at least one");
   }
-  Constraints constraints{std::vector<char>(shape.vertex_count(), false), shape.scaled_positions(),
-                          shape.positions()};
-  if (absl::Status status = hold_handles(shape, handles, constraints); !status.ok()) return status;
-
-  std::vector<char> has_handle(shape.component_count(), false);
-  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
-    const std::int32_t component = shape.components()[i];
-    if (component < 0)
-      constraints.is_held[i] = true;
-    else if (constraints.is_held[i])
-      has_handle[component] = true;
+  Constraints constraints{std::vector<char>(shape.vertex_count(), false),
+                          shape.scaled_positions(),
+                          shape.positions(),
+                          {},
+                          {},
+                          footprint_stiffness(shape, handles)};
+  Holds holds;
+  if (status = hold_handles(shape, handles, constraints, holds); !status.ok()) return status;
+  hold_outside(shape, handles.region(), outside ? *outside : shape.positions(), constraints, holds);
+  const std::vector<char> is_tied = tied_components(shape, handles, constraints, true);
+  const auto free = std::find(is_tied.begin(), is_tied.end(), false);
+  if (free != is_tied.end() && free_components == FreeComponents::kError) {
+    return name_free_component(shape, static_cast<std::int32_t>(free - is_tied.begin()));
   }
-  const auto free = std::find(has_handle.begin(), has_handle.end(), false);
-  if (free == has_handle.end()) return constraints;
-  if (free_components == FreeComponents::kError) {
-    return name_free_component(shape, static_cast<std::int32_t>(free - has_handle.begin()));
+  if (free != is_tied.end()) hold_free_components(shape, handles, free_components, is_tied, constraints);
+  constraints.soft = std::move(holds.soft);
+  auto linear = LinearConstraints::create(std::move(holds.rows), constraints.is_held);
+  if (!linear.ok()) return linear.status();
+  constraints.linear = *std::move(linear);
+  if (tied_components(shape, handles, constraints, false) !=
+      std::vector<char>(shape.component_count(), true)) {
+    constraints.linear.tie_locks();
   }
-  hold_free_components(shape, handles, free_components, has_handle, constraints);
   return constraints;
+}
+
+std::size_t Constraints::memory_bytes() const {
+  return is_held.capacity() + (targets.size() + exact.size() + footprint.size()) * sizeof(double) +
+         soft.rows().capacity() * sizeof(SoftRow) + linear.memory_bytes();
 }
 
 RigidTransform fit_rigid(const Points& from, const Points& to) {

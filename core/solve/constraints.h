@@ -5,6 +5,8 @@
 #include "absl/status/statusor.h"
 #include "core/energy/rest_shape.h"
 #include "core/solve/handles.h"
+#include "core/solve/linear_constraints.h"
+#include "core/solve/soft_terms.h"
 
 namespace lpdeform {
 
@@ -15,21 +17,29 @@ enum class FreeComponents {
   kFollow,  // moves rigidly with the handle that has the vertex nearest to its centre at rest
 };
 
-/// The vertices that do not move freely, and where they are: handles, unreferenced vertices, and, where asked
-/// for, whole components that no handle holds.
+/// What handles and region of interest ask of positions. Held are the vertices that do not move: of handles that
+/// hold Exactly, outside the region, unreferenced ones, and, where asked for, whole components that nothing
+/// keeps from drifting off.
 struct Constraints {
   std::vector<char> is_held;  // one a vertex
   Points targets;             // scaled units; rows of free vertices are the rest positions
   Points exact;               // the same in the caller's units, for held vertices as they were given
+  SoftTerms soft;             // soft and orientation handles; its length unit is not set
+  LinearConstraints linear;   // points inside faces and locks
+  Field footprint;            // factors of the cells' stiffness; empty where all are 1
+
+  std::size_t memory_bytes() const;
 };
 
 /// No position may be farther from the rest mesh's centre than this many of its diagonals.
 inline constexpr double kFarthestTarget = 1e9;
 
 /// Errors: as check_handles; INVALID_ARGUMENT: HANDLE_TARGET_TOO_FAR (over 1e9 diagonals from the rest mesh);
-/// FAILED_PRECONDITION: NO_HANDLES, COMPONENT_WITHOUT_HANDLE (the component and its lowest vertex).
+/// FAILED_PRECONDITION: NO_HANDLES, COMPONENT_WITHOUT_HANDLE (the component and its lowest vertex; an orientation
+/// handle is none that keeps a component). Also as LinearConstraints::create. `outside`: where vertices outside
+/// the region of interest are held, in the caller's units; null takes the rest positions.
 absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const HandleSet& handles,
-                                             FreeComponents free_components);
+                                             FreeComponents free_components, const Points* outside = nullptr);
 
 /// The rotation and translation that bring points `from` nearest to points `to`: to_k = R from_k + t. For one
 /// point, or points that coincide, a translation.

@@ -12,6 +12,7 @@
 #include "core/solve/certificate.h"
 #include "core/solve/check_settings.h"
 #include "core/solve/conic.h"
+#include "core/solve/holds.h"
 #include "core/solve/line_search.h"
 #include "core/solve/local_global.h"
 #include "core/solve/multiresolution.h"
@@ -54,6 +55,7 @@ struct Deformer::Impl {
 
   Points laplacian_guess();
   Points current_guess();
+  SoftTerms guess_springs() const;
   Points initial_guess(InitialGuess guess);
   double typical_energy(const Points& guess);
   double zero_objective() const;
@@ -63,11 +65,13 @@ struct Deformer::Impl {
   std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, Warmth warmth);
   bool prepare_metric(bool needs_plain_weights);
   void keep_if_best(double sum);
+  Material effective_material() const;
   void record(const StepResult& result, double sum);
   void begin(const SolveSettings& new_settings, std::stop_token new_stop);
   void iterate();
   void end(StopReason reason);
   double gap(double max_seconds);
+  void replace_constraints(Constraints next);
   void interrupt() {
     if (minimiser) end(StopReason::kCancelled);
   }
@@ -79,14 +83,16 @@ struct Deformer::Impl {
   HandleSet handles;
   Material material;
   std::optional<Constraints> constraints;
+  std::shared_ptr<const Points> outside;  // where the region's surroundings are held, the caller's units
 
   // The state, in scaled units: the best of the last solve, or what was set.
   Points x;
   Points x_before_move;  // when the last warm solve began; empty where there was none
   bool has_state = false;
-  bool is_metric_live = false;  // the last factor is quasi_newton's, for this material
-  Field best_energies;          // E_i at x, the caller's units
-  Points positions;             // x in the caller's units, made when asked for
+  bool is_metric_of_rows = true;  // the last factor knows the present soft terms and linear rows
+  bool is_metric_live = false;    // the last factor is quasi_newton's, for this material
+  Field best_energies;            // E_i at x, the caller's units
+  Points positions;               // x in the caller's units, made when asked for
   bool is_positions_current = true;
 
   // The running solve.
@@ -96,24 +102,35 @@ struct Deformer::Impl {
   std::unique_ptr<CoarseLevel> coarse;  // made when first needed
   std::unique_ptr<Minimiser> minimiser;
   Clock::time_point started;
-  double best_sum = 0;
+  double best_sum = 0, best_soft_sum = 0;
   SolveSummary summary;
 };
 
+/// The soft terms as springs beside cells of weight 1 (p = 2), at the rest shape with held vertices at their
+/// targets.
+SoftTerms Deformer::Impl::guess_springs() const {
+  SoftTerms springs = constraints->soft;
+  springs.evaluate(constraints->targets, LpNorm(Material::uniform(2), shape->vertex_count(), unit(), 1));
+  return springs;
+}
+
 /// x = rest + u with u the harmonic extension of the handles' displacements: the solution of the naive
-/// Laplacian system L x = L p with the handles' positions given.
+/// Laplacian system L x = L p with the handles' positions given; soft terms as springs in it.
 Points Deformer::Impl::laplacian_guess() {
   Points u = constraints->targets - shape->scaled_positions();
-  metric.extend(constraints->is_held, u, workers());
+  Points forces = Points::Zero(u.rows(), 3);
+  guess_springs().add_gradient(forces);
+  forces = -forces;
+  metric.extend(constraints->is_held, u, workers(), &forces);
   return shape->scaled_positions() + u;
 }
 
 /// A drag goes on as it went: where the handles move about as they did the last time, by `share` of it, the
-/// surface does too. What is left of the handles' move is extended harmonically.
+/// surface does too. What is left of the handles' move, and that of soft targets, is extended harmonically.
 Points Deformer::Impl::current_guess() {
   Points last = std::exchange(x_before_move, x);
   last = last.rows() == x.rows() ? Points(x - last) : Points(Points::Zero(x.rows(), 3));
-  Points u = Points::Zero(x.rows(), 3);
+  Points u = Points::Zero(x.rows(), 3), forces = u;
   double along = 0, size = 0, left = 0;
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     if (!constraints->is_held[i]) continue;
@@ -122,15 +139,18 @@ Points Deformer::Impl::current_guess() {
     size += last.row(i).squaredNorm();
     left += u.row(i).squaredNorm();
   }
-  if (left == 0) return x;
+  const SoftTerms& before = objective.soft_terms();
+  if (constraints->soft.has_rows_of(before)) constraints->soft.add_pull(before, forces);
+  if (left == 0 && forces.isZero(0)) return x;
   const double share = size > 0 ? along / size : 0;
   const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left;
   if (goes_on) {
+    forces.setZero();  // what is soft goes along
     for (Eigen::Index i = 0; i < x.rows(); ++i) {
       if (constraints->is_held[i]) u.row(i) -= share * last.row(i);
     }
   }
-  metric.extend(constraints->is_held, u, workers());
+  metric.extend(constraints->is_held, u, workers(), &forces);
   if (goes_on) u += share * last;
   return x + u;
 }
@@ -147,14 +167,18 @@ Points Deformer::Impl::initial_guess(InitialGuess guess) {
   for (Eigen::Index i = 0; i < result.rows(); ++i) {
     if (constraints->is_held[i]) result.row(i) = constraints->targets.row(i);
   }
+  constraints->linear.satisfy_within(metric, result);
   return result;
 }
 
-/// The largest E_i at the guess: the reference length that keeps terms of any p in range.
+/// The largest E_i or D_k at the guess: the reference length that keeps terms of any p in range.
 double Deformer::Impl::typical_energy(const Points& guess) {
   objective.evaluate(guess, LpNorm(Material::uniform(2), shape->vertex_count(), unit(), 1));
   const auto& e2 = objective.cells().squared_energies();
-  const double largest = std::sqrt(*std::max_element(e2.begin(), e2.end()));
+  const auto& d2 = objective.soft_terms().squared_distances();
+  double largest = *std::max_element(e2.begin(), e2.end());
+  if (!d2.empty()) largest = std::max(largest, *std::max_element(d2.begin(), d2.end()));
+  largest = std::sqrt(largest);
   return largest > 1e-12 ? largest : 1.0;
 }
 
@@ -181,7 +205,8 @@ Problem Deformer::Impl::make_problem() {
 /// Makes the coarse level where there is none. False where the mesh cannot have one, or the handles are not known
 /// to it.
 bool Deformer::Impl::prepare_coarse() {
-  if (!objective.soft_terms().empty()) return false;
+  const bool has_footprint = constraints->footprint.size() > 0;
+  if (!holds_vertices_exactly(handles) || has_footprint) return false;  // it knows no other kind of handle
   if (!coarse) coarse = CoarseLevel::create(*shape, workers().threads());
   return coarse && coarse->take_over(*shape, handles, *constraints, material).ok();
 }
@@ -217,7 +242,21 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points 
 /// fails.
 bool Deformer::Impl::prepare_metric(bool needs_plain_weights) {
   if (metric.is_factored_for(constraints->is_held) && !needs_plain_weights) return true;
-  return metric.factor(std::vector<double>(shape->vertex_count(), 1.0), constraints->is_held);
+  std::vector<MatrixEntry> entries = guess_springs().matrix_entries();
+  constraints->linear.add_ties(2, entries);
+  return metric.factor(std::vector<double>(shape->vertex_count(), 1.0), constraints->is_held, entries);
+}
+
+/// With the footprints of handles.
+Material Deformer::Impl::effective_material() const {
+  const Field& factors = constraints->footprint;
+  if (factors.size() == 0) return material;
+  Material result = material;
+  if (material.stiffness.size() == 1)
+    result.stiffness = material.stiffness[0] * factors;
+  else
+    result.stiffness = material.stiffness.cwiseProduct(factors);
+  return result;
 }
 
 /// Called with the evaluation of minimiser->x() in `objective`, and its true sum.
@@ -225,6 +264,7 @@ void Deformer::Impl::keep_if_best(double sum) {
   const bool is_first = summary.iterations == 0;
   if (!is_first && !(sum < best_sum)) return;
   best_sum = std::isnan(sum) ? std::numeric_limits<double>::infinity() : sum;
+  best_soft_sum = objective.soft_terms().sum(*norm);
   is_positions_current = false;
   const auto& e2 = objective.cells().squared_energies();
   const Points& from = minimiser->x();
@@ -237,6 +277,7 @@ void Deformer::Impl::keep_if_best(double sum) {
 
 void Deformer::Impl::record(const StepResult& result, double sum) {
   summary.energy = norm->true_energy(best_sum);
+  summary.soft_energy = norm->true_energy(best_soft_sum);
   summary.solve_seconds = seconds_since(started);
   if (!settings.keep_trace) return;
   summary.trace.push_back(
@@ -252,16 +293,24 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state;
   if (!is_warm) x_before_move.resize(0, 3);
   settings.method = summary.method = chosen_method(settings.method, is_warm);
-  const bool keeps_metric = is_warm && is_metric_live && metric.is_factored_for(constraints->is_held);
-  const bool is_factored = prepare_metric(!is_warm);
+  const bool keeps_metric =
+      is_warm && is_metric_live && is_metric_of_rows && metric.is_factored_for(constraints->is_held);
+  const bool is_factored = prepare_metric(!is_warm || !is_metric_of_rows);
+  is_metric_of_rows = true;
   summary.setup_seconds = seconds_since(started);
 
   started = Clock::now();
   Points guess = is_factored ? initial_guess(settings.initial) : constraints->targets;
-  if (!guess.allFinite()) guess = constraints->targets;
+  if (!guess.allFinite()) {
+    guess = constraints->targets;
+    constraints->linear.satisfy(guess);
+  }
+  SoftTerms soft = constraints->soft;
+  soft.set_length_unit(length_unit() / unit());
+  objective.set_soft_terms(std::move(soft));
   const double typical = typical_energy(guess);
   const double reference = settings.method == Method::kLineSearch ? length_unit() / unit() : typical;
-  norm.emplace(material, shape->vertex_count(), unit(), reference);
+  norm.emplace(effective_material(), shape->vertex_count(), unit(), reference);
   objective.reweigh(*norm);  // typical_energy has evaluated the guess
   best_sum = std::numeric_limits<double>::infinity();
   const Warmth warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
@@ -309,6 +358,19 @@ double Deformer::Impl::gap(double max_seconds) {
   return relative_gap(make_problem(), x, {.max_seconds = max_seconds});
 }
 
+/// Keeps what is factored where only targets changed.
+void Deformer::Impl::replace_constraints(Constraints next) {
+  if (constraints) {
+    const bool has_footprint_of_before =
+        next.footprint.size() == constraints->footprint.size() && next.footprint == constraints->footprint;
+    const bool has_rows_of_before =
+        next.linear.reuse(constraints->linear) && next.soft.has_rows_of(constraints->soft);
+    if (!has_footprint_of_before) is_metric_live = false;
+    is_metric_of_rows = is_metric_of_rows && has_rows_of_before;
+  }
+  constraints = std::move(next);
+}
+
 Deformer::Deformer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Deformer::~Deformer() = default;
 
@@ -339,12 +401,18 @@ const Field& Deformer::cell_energies() const {
 }
 
 absl::Status Deformer::set_handles(const HandleSet& handles) {
-  auto constraints = make_constraints(*impl_->shape, handles, impl_->options.free_components);
+  Impl& self = *impl_;
+  std::shared_ptr<const Points> outside;
+  if (handles.region() != nullptr) {
+    outside = handles.has_region_of(self.handles) ? self.outside : std::make_shared<Points>(positions());
+  }
+  auto constraints = make_constraints(*self.shape, handles, self.options.free_components, outside.get());
   if (!constraints.ok()) return constraints.status();
-  impl_->interrupt();
+  self.interrupt();
   positions();  // the present ones go with the constraints before
-  impl_->handles = handles;
-  impl_->constraints = *std::move(constraints);
+  self.handles = handles;
+  self.outside = std::move(outside);
+  self.replace_constraints(*std::move(constraints));
   return absl::OkStatus();
 }
 
@@ -386,6 +454,7 @@ absl::Status Deformer::start(const SolveSettings& settings, std::stop_token stop
     return make_fault(absl::StatusCode::kFailedPrecondition, {"NO_HANDLES", "", "at least 1 handle"},
                       "there is no handle; a deformation needs at least one");
   }
+  if (absl::Status status = check_method_takes(settings.method, self.handles); !status.ok()) return status;
   self.interrupt();
   self.begin(settings, std::move(stop));
   return absl::OkStatus();
@@ -431,8 +500,10 @@ double Deformer::optimality_gap() {
 
 std::size_t Deformer::memory_bytes() const {
   const std::size_t points = impl_->x.size() * sizeof(double);
-  return sizeof(Impl) + (impl_->coarse ? impl_->coarse->memory_bytes() : 0) +
-         impl_->objective.cells().memory_bytes() + impl_->metric.memory_bytes() + kWorkspace * points;
+  const std::size_t held = impl_->constraints ? impl_->constraints->memory_bytes() : 0;
+  const std::size_t coarse = impl_->coarse ? impl_->coarse->memory_bytes() : 0;
+  return sizeof(Impl) + held + coarse + impl_->objective.cells().memory_bytes() +
+         impl_->metric.memory_bytes() + kWorkspace * points;
 }
 
 }  // namespace lpdeform

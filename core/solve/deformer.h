@@ -38,9 +38,9 @@ class Deformer {
   const HandleSet& handles() const;
   const Material& material() const;
 
-  /// Replaces all handles. Numeric refactorisation where the set of held vertices changed, none where handles
-  /// only moved. Errors: as check_handles; FAILED_PRECONDITION: COMPONENT_WITHOUT_HANDLE (names the component
-  /// and one vertex of it), NO_HANDLES. Ends a running solve with kCancelled.
+  /// Replaces all handles and the region of interest; where that is another one, what is outside of it is held at
+  /// positions() as they are now. Numeric refactorisation where the set of held vertices changed, none where handles
+  /// only moved. Errors: as make_constraints. Ends a running solve with kCancelled.
   absl::Status set_handles(const HandleSet& handles);
 
   /// Errors: as check_material. Ends a running solve with kCancelled.
@@ -50,7 +50,7 @@ class Deformer {
   /// POSITIONS_SIZE, POSITIONS_NOT_FINITE. Ends a running solve with kCancelled.
   absl::Status set_positions(const Points& positions);
 
-  /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P,
+  /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P, METHOD_NEEDS_EXACT_HANDLES,
   /// TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE). `stop` is looked at in every
   /// iteration.
   absl::Status start(const SolveSettings& settings, std::stop_token stop = {});

@@ -13,7 +13,7 @@ StepResult LocalGlobal::step() {
   if (!is_factored_) return {Outcome::kBreakdown, objective_, 0};
   problem_.objective.gradient(gradient_);
   restrict_to_free(problem_.constraints, gradient_);
-  problem_.solve(gradient_);
+  problem_.solve(gradient_, gradient_);
   x_ -= gradient_;
   const double before = objective_;
   objective_ = problem_.objective.evaluate(x_, problem_.norm);

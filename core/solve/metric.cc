@@ -7,8 +7,6 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kLowestShare = 1e-8;
-
 LowerMatrix lower_pattern(const RestShape& shape) {
   LowerMatrix matrix;
   const std::int32_t n = shape.vertex_count();
@@ -57,6 +55,7 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
     matrix_.values[matrix_.columns[i]] = is_held[i] ? 1.0 : diagonal;
   }
   for (const MatrixEntry& entry : entries_) add_entry(entry);
+  ++version_;
   return is_good_ = factor_.factor(matrix_);
 }
 
@@ -79,13 +78,15 @@ void Metric::adopt(const std::vector<double>& cell_weights) {
   if (wanted > 0 && std::isfinite(wanted)) scale_ = wanted / present;
 }
 
-void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& workers) const {
+void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
+                    const Points* forces) const {
   Points b = Points::Zero(u.rows(), 3);
   for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
     if (is_held[i]) {
       b.row(i) = u.row(i);
       continue;
     }
+    if (forces != nullptr) b.row(i) = forces->row(i) / scale_;
     for (std::int32_t k = shape_->offsets()[i]; k < shape_->offsets()[i + 1]; ++k) {
       const std::int32_t j = shape_->neighbours()[k];
       if (is_held[j]) b.row(i) += edge_weight(i, k) * u.row(j);

@@ -25,6 +25,8 @@ struct MatrixEntry {
 /// by the constructor; factor() is numeric alone.
 class Metric {
  public:
+  static constexpr double kLowestShare = 1e-8;
+
   explicit Metric(std::shared_ptr<const RestShape> shape);
 
   /// `is_held` has one entry a vertex. Cell weights are clipped from below at 1e-8 of the largest used, so
@@ -49,11 +51,18 @@ class Metric {
 
   /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of
   /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2. Rows of free vertices are overwritten. To single
-  /// precision where precondition() has been asked for since the last factor().
-  void extend(const std::vector<char>& is_held, Points& u, const Workers& workers) const;
+  /// precision where precondition() has been asked for since the last factor(). `forces`, where not null, pull
+  /// at the free vertices besides: the entries count as well, and <forces, u> is subtracted.
+  void extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
+              const Points* forces = nullptr) const;
 
   /// c_i as factored, clipped.
   double cell_weight(std::int32_t i) const { return scale_ * cell_weights_[i]; }
+
+  /// Changes with every numeric factorisation; 0 before the first.
+  std::uint64_t version() const { return version_; }
+  /// The common factor of M that adopt() changes: scale() M^-1 is one matrix for a version.
+  double scale() const { return scale_; }
 
   std::size_t memory_bytes() const;
 
@@ -69,6 +78,7 @@ class Metric {
   std::vector<MatrixEntry> entries_;  // over scale_
   double scale_ = 1;                  // the largest cell weight: M = scale_ * matrix_ on the free vertices
   bool is_good_ = false;
+  std::uint64_t version_ = 0;
   LowerMatrix matrix_;
   SparseCholesky factor_;
   mutable SingleFactor single_;  // made when first asked for, empty until then

@@ -1,23 +1,36 @@
 #include "core/solve/minimiser.h"
 
+#include <numeric>
+
 namespace lpdeform {
 
 bool Problem::factor_metric() const {
-  return metric.factor(objective.cells().cell_weights(), constraints.is_held, objective.matrix_entries());
+  const std::vector<double>& cell_weights = objective.cells().cell_weights();
+  std::vector<MatrixEntry> entries = objective.soft_terms().matrix_entries(objective.soft_weights());
+  if (!constraints.linear.empty()) {
+    const double sum = std::accumulate(cell_weights.begin(), cell_weights.end(), 0.0);
+    constraints.linear.add_ties(2 * sum / static_cast<double>(cell_weights.size()), entries);
+  }
+  return metric.factor(cell_weights, constraints.is_held, entries);
 }
 
-void Problem::solve(Points& v) const {
-  metric.solve(v, v);
+void Problem::solve(const Points& b, Points& x) const {
+  const auto inverse = [this](Points& v) { metric.solve(v, v); };
+  metric.solve(b, x);
+  constraints.linear.project(metric, inverse, x);
 }
 
 void Problem::precondition(const Points& b, Points& x) const {
+  const auto inverse = [this](Points& v) { metric.precondition(v, v, workers()); };
   metric.precondition(b, x, workers());
+  constraints.linear.project(metric, inverse, x);
 }
 
 void restrict_to_free(const Constraints& constraints, Points& values) {
   for (Eigen::Index i = 0; i < values.rows(); ++i) {
     if (constraints.is_held[i]) values.row(i).setZero();
   }
+  constraints.linear.restrict(values);
 }
 
 }  // namespace lpdeform

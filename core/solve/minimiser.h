@@ -26,8 +26,8 @@ struct Problem {
 
   /// Factors the metric for the weights of the objective's last evaluation. False where that fails.
   [[nodiscard]] bool factor_metric() const;
-  /// v = M^-1 v within what the constraints allow: what it gives is a direction that they allow, for any v.
-  void solve(Points& v) const;
+  /// x = M^-1 b within what the constraints allow: a direction that they allow, for any b. x may be b.
+  void solve(const Points& b, Points& x) const;
   /// The same to single precision, several times as fast.
   void precondition(const Points& b, Points& x) const;
 };
@@ -57,11 +57,12 @@ class Minimiser {
   /// x()).
   virtual StepResult step() = 0;
 
-  /// The present state: finite, held vertices at their targets.
+  /// The present state: finite, all constraints met.
   virtual const Points& x() const = 0;
 };
 
-/// Leaves of `values`, a gradient or a direction, what the constraints allow: rows of held vertices become zero.
+/// Leaves of `values`, a gradient or a direction, what the constraints allow: rows of held vertices become
+/// zero, and what linear constraints forbid is projected out.
 void restrict_to_free(const Constraints& constraints, Points& values);
 
 }  // namespace lpdeform

@@ -1,5 +1,7 @@
 #include "core/solve/objective.h"
 
+#include <algorithm>
+
 namespace lpdeform {
 
 double Objective::evaluate(const Points& x, const LpNorm& norm) {
@@ -21,6 +23,15 @@ double Objective::sum(const LpNorm& norm) const {
 void Objective::gradient(Points& result) const {
   cells_.gradient(result);
   soft_.add_gradient(result);
+}
+
+std::vector<double> Objective::soft_weights() const {
+  std::vector<double> weights = soft_.weights();
+  if (weights.empty()) return weights;
+  const std::vector<double>& cells = cells_.cell_weights();
+  const double lowest = Metric::kLowestShare * *std::max_element(cells.begin(), cells.end());
+  for (double& weight : weights) weight = std::max(weight, lowest);
+  return weights;
 }
 
 }  // namespace lpdeform

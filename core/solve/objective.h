@@ -32,8 +32,9 @@ class Objective {
   /// The cells alone, and the soft terms alone, at the last evaluation.
   const CellPass& cells() const { return cells_; }
   const SoftTerms& soft_terms() const { return soft_; }
-  /// What the soft terms add to the metric, for the weights of the last evaluation.
-  const std::vector<MatrixEntry>& matrix_entries() const { return soft_.matrix_entries(); }
+  /// The soft terms' c_k of the last evaluation for the metric: clipped from below at Metric::kLowestShare of the
+  /// largest cell's, so that the metric stays definite where a term for p > 2 is met and nothing else holds.
+  std::vector<double> soft_weights() const;
 
  private:
   CellPass cells_;

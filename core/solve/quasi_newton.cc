@@ -86,6 +86,7 @@ double QuasiNewton::direction() {
   problem_.precondition(gradient_, preconditioned_);
   const double slope = memory_.direction(gradient_, gradient_before_, preconditioned_, preconditioned_before_,
                                          step_length_, direction_);
+  problem_.constraints.linear.restrict(direction_);  // pairs are kept in single precision
   step_length_ = 0;
   return slope;
 }

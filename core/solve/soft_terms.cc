@@ -5,6 +5,16 @@
 
 namespace lpdeform {
 
+void add_square(const PointForm& point, double factor, std::vector<MatrixEntry>& entries) {
+  for (std::int32_t i = 0; i < point.count; ++i) {
+    for (std::int32_t j = 0; j <= i; ++j) {
+      entries.push_back({std::max(point.vertices[i], point.vertices[j]),
+                         std::min(point.vertices[i], point.vertices[j]),
+                         factor * point.coefficients[i] * point.coefficients[j]});
+    }
+  }
+}
+
 void SoftTerms::add(std::int32_t anchor, const std::vector<SoftRow>& rows) {
   rows_.insert(rows_.end(), rows.begin(), rows.end());
   offsets_.push_back(static_cast<std::int32_t>(rows_.size()));
@@ -64,22 +74,34 @@ void SoftTerms::add_gradient(Points& result) const {
   }
 }
 
-const std::vector<MatrixEntry>& SoftTerms::matrix_entries() const {
-  entries_.clear();
+bool SoftTerms::has_rows_of(const SoftTerms& other) const {
+  if (offsets_ != other.offsets_ || anchors_ != other.anchors_) return false;
+  return std::equal(rows_.begin(), rows_.end(), other.rows_.begin(), [](const SoftRow& a, const SoftRow& b) {
+    return a.point == b.point && a.weight == b.weight;
+  });
+}
+
+void SoftTerms::add_pull(const SoftTerms& before, Points& forces) const {
   for (std::size_t k = 0; k < size(); ++k) {
     for (std::int32_t r = offsets_[k]; r < offsets_[k + 1]; ++r) {
       const PointForm& point = rows_[r].point;
-      const double factor = 2 * c_[k] * rows_[r].weight;
-      for (std::int32_t i = 0; i < point.count; ++i) {
-        for (std::int32_t j = 0; j <= i; ++j) {
-          entries_.push_back({std::max(point.vertices[i], point.vertices[j]),
-                              std::min(point.vertices[i], point.vertices[j]),
-                              factor * point.coefficients[i] * point.coefficients[j]});
-        }
+      const Eigen::RowVector3d pull =
+          2 * before.c_[k] * rows_[r].weight * (rows_[r].target - before.rows_[r].target);
+      for (std::int32_t j = 0; j < point.count; ++j) {
+        forces.row(point.vertices[j]) += point.coefficients[j] * pull;
       }
     }
   }
-  return entries_;
+}
+
+std::vector<MatrixEntry> SoftTerms::matrix_entries(const std::vector<double>& weights) const {
+  std::vector<MatrixEntry> entries;
+  for (std::size_t k = 0; k < size(); ++k) {
+    for (std::int32_t r = offsets_[k]; r < offsets_[k + 1]; ++r) {
+      add_square(rows_[r].point, 2 * weights[k] * rows_[r].weight, entries);
+    }
+  }
+  return entries;
 }
 
 }  // namespace lpdeform

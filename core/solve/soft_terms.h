@@ -21,7 +21,11 @@ struct PointForm {
     for (std::int32_t j = 1; j < count; ++j) point += coefficients[j] * x.row(vertices[j]);
     return point;
   }
+  bool operator==(const PointForm&) const = default;
 };
+
+/// The entries of factor * b b^T, b the coefficients.
+void add_square(const PointForm& point, double factor, std::vector<MatrixEntry>& entries);
 
 /// One wish of a soft term: that the point be at `target` (scaled units).
 struct SoftRow {
@@ -45,6 +49,7 @@ class SoftTerms {
   SoftTerms() = default;
   /// `length_unit` > 0: l in scaled units.
   explicit SoftTerms(double length_unit) : length_unit_(length_unit) {}
+  void set_length_unit(double length_unit) { length_unit_ = length_unit; }
 
   /// Rows of weight >= 0, at least one.
   void add(std::int32_t anchor, const std::vector<SoftRow>& rows);
@@ -62,10 +67,19 @@ class SoftTerms {
   void add_gradient(Points& result) const;
 
   /// What the terms add to the Hessian with c_k = d soft_k / d D_k^2 held: 2 c_k w_r b_i b_j.
-  const std::vector<MatrixEntry>& matrix_entries() const;
+  std::vector<MatrixEntry> matrix_entries() const { return matrix_entries(c_); }
+  /// The same for given c_k.
+  std::vector<MatrixEntry> matrix_entries(const std::vector<double>& weights) const;
+
+  /// Whether `other` differs in its targets alone.
+  bool has_rows_of(const SoftTerms& other) const;
+  /// Adds what these targets pull more than those of `before`, which has the same rows, in its weights c_k:
+  /// 2 c_k w_r b_j (t - t_before).
+  void add_pull(const SoftTerms& before, Points& forces) const;
 
   // Of the last evaluation.
   const std::vector<double>& squared_distances() const { return d2_; }  // D_k^2
+  const std::vector<double>& weights() const { return c_; }             // c_k
 
   // Rows offsets[k] to offsets[k + 1] belong to term k.
   const std::vector<SoftRow>& rows() const { return rows_; }
@@ -85,7 +99,6 @@ class SoftTerms {
   std::vector<std::int32_t> anchors_;
   std::vector<double> d2_, c_;
   Points residuals_;
-  mutable std::vector<MatrixEntry> entries_;
 };
 
 }  // namespace lpdeform

@@ -13,7 +13,7 @@ namespace lpdeform {
 struct IterationRecord {
   int iteration = 0;     // 0 is the initial guess
   double seconds = 0;    // from the start of the solve, initial guess included
-  double energy = 0;     // the true one, Eq. 3, in the caller's units
+  double energy = 0;     // the true one, Eq. 3 and soft terms, in the caller's units
   double objective = 0;  // what the method minimises, in its own units
   int stage = 0;         // counts from 0; a new stage is a new objective
 };
@@ -24,7 +24,9 @@ struct SolveSummary {
   StopReason stop_reason = StopReason::kRunning;
   int iterations = 0;
   double initial_energy = 0;
-  double energy = 0;  // of the state returned: the lowest seen
+  double energy =
+      0;  // of the state returned: the lowest seen; with the soft terms, which are minimised as well
+  double soft_energy = 0;  // their part of it: the rest is Eq. 3
   /// (E - lower bound) / E of the convex step with the rotations fitted at the result: how far the answer can
   /// be at most from the best one for these rotations. 0 where E is 0 to rounding. Empty where it was not
   /// asked for.

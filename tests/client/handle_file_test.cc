@@ -28,13 +28,14 @@ std::string refusal_of_tip(const std::string& keys, const std::vector<std::strin
 }
 
 TEST(HandleFile, ReadsFixedRigidAndFreeHandles) {
-  const auto handles = parse_handles(R"({"mesh": "bar.off", "note": "", "handles": [
+  const auto file = parse_handles(R"({"mesh": "bar.off", "note": "", "handles": [
       {"name": "base", "vertices": [0, 1, 2]},
       {"name": "tip", "vertices": [7, 8], "translate": [0, 0, 1],
        "rotate": {"axis": [0, 0, 1], "angle_degrees": 90, "center": [1, 2, 3]}},
       {"name": "free", "vertices": [9], "positions": [[1, 2, 3]]}]})",
-                                     kVertexCount);
-  ASSERT_TRUE(handles.ok()) << handles.status();
+                                  kVertexCount);
+  ASSERT_TRUE(file.ok()) << file.status();
+  const std::vector<NamedHandle>* const handles = &file->handles;
   ASSERT_EQ(handles->size(), 3u);
   EXPECT_EQ((*handles)[0].handle.vertices, (std::vector<std::uint32_t>{0, 1, 2}));
   EXPECT_TRUE(std::holds_alternative<client::Fixed>((*handles)[0].handle.motion));
@@ -56,8 +57,9 @@ TEST(HandleFile, WhatIsWrittenReadsBack) {
       {"base", {{0, 1}, client::Fixed{}}},
       {"tip", {{7}, client::RigidMotion{.axis = {0, 1, 0}, .angle_radians = 0.25, .translation = {1, 0, 0}}}},
       {"free", {{9, 3}, client::TargetPositions{{1, 2, 3, 4, 5, 6.5}}}}};
-  const auto read = parse_handles(handle_file_text(written, "bar.off", "a note"), kVertexCount);
-  ASSERT_TRUE(read.ok()) << read.status();
+  const auto file = parse_handles(handle_file_text(written, "bar.off", "a note"), kVertexCount);
+  ASSERT_TRUE(file.ok()) << file.status();
+  const std::vector<NamedHandle>* const read = &file->handles;
   ASSERT_EQ(read->size(), 3u);
   EXPECT_EQ((*read)[2].handle.vertices, written[2].handle.vertices);
   const auto& tip = std::get<client::RigidMotion>((*read)[1].handle.motion);
@@ -65,6 +67,48 @@ TEST(HandleFile, WhatIsWrittenReadsBack) {
   EXPECT_EQ(tip.axis, (std::array<double, 3>{0, 1, 0}));
   EXPECT_EQ(std::get<client::TargetPositions>((*read)[2].handle.motion).positions,
             (std::vector<double>{1, 2, 3, 4, 5, 6.5}));
+}
+
+TEST(HandleFile, ReadsEveryKindOfHandleAndTheRegion) {
+  const auto file = parse_handles(R"({"region": [1, 2, 3], "handles": [
+      {"name": "soft", "vertices": [0], "soft": 2.5, "footprint": 1.5},
+      {"name": "points", "points": [{"face": 4, "barycentric": [0.2, 0.3, 0.5]}], "positions": [[1, 2, 3]]},
+      {"name": "turned", "vertices": [1], "orientation": 50, "rotate": {"axis": [0, 0, 1], "angle_degrees": 90}},
+      {"name": "rail", "vertices": [2], "axis_lock": [1, 0, 0]},
+      {"name": "floor", "vertices": [3], "plane_lock": [0, 1, 0]}]})",
+                                  kVertexCount);
+  ASSERT_TRUE(file.ok()) << file.status();
+  EXPECT_EQ(file->region, (std::vector<std::uint32_t>{1, 2, 3}));
+  for (const auto& handles :
+       {file->handles, parse_handles(handle_file_text(file->handles, "", ""), kVertexCount)->handles}) {
+    EXPECT_EQ(std::get<client::Soft>(handles[0].handle.hold).weight, 2.5);
+    EXPECT_EQ(handles[0].handle.footprint, 1.5);
+    ASSERT_EQ(handles[1].handle.points.size(), 1u);
+    EXPECT_EQ(handles[1].handle.points[0].face, 4u);
+    EXPECT_EQ(handles[1].handle.points[0].barycentric, (std::array<double, 3>{0.2, 0.3, 0.5}));
+    EXPECT_EQ(std::get<client::Orientation>(handles[2].handle.hold).weight, 50);
+    EXPECT_EQ(std::get<client::AxisLock>(handles[3].handle.hold).axis, (std::array<double, 3>{1, 0, 0}));
+    EXPECT_EQ(std::get<client::PlaneLock>(handles[4].handle.hold).normal, (std::array<double, 3>{0, 1, 0}));
+  }
+}
+
+TEST(HandleFile, NamesWhatIsWrongWithAKindOfHandle) {
+  EXPECT_EQ(refusal_of_tip(R"("vertices": [1], "soft": -1)", {"soft", "tip"}), "HANDLE_WEIGHT_OUT_OF_RANGE");
+  EXPECT_EQ(refusal_of_tip(R"("vertices": [1], "soft": true)", {"soft", "tip"}), "HANDLE_FILE_VALUE");
+  EXPECT_EQ(refusal_of_tip(R"("vertices": [1], "soft": 1, "axis_lock": [0, 0, 1])", {"tip"}),
+            "HANDLE_HOLD_TWICE");
+  EXPECT_EQ(refusal_of_tip(R"("vertices": [1], "plane_lock": [0, 0, 0])", {"tip"}), "HANDLE_LOCK_DIRECTION");
+  EXPECT_EQ(refusal_of_tip(R"("vertices": [1], "footprint": -2)", {"tip"}), "HANDLE_FOOTPRINT_OUT_OF_RANGE");
+  EXPECT_EQ(refusal_of_tip(R"("vertices": [1], "points": [])", {"tip"}), "HANDLE_POINTS_AND_VERTICES");
+  EXPECT_EQ(refusal_of_tip(R"("points": [])", {"tip"}), "HANDLE_EMPTY");
+  EXPECT_EQ(refusal_of_tip(R"("points": [{"face": 1, "barycentric": [0.5, 0.6, 0.5]}])", {"tip"}),
+            "HANDLE_BARYCENTRIC");
+  EXPECT_EQ(refusal_of_tip(R"("points": [{"face": -1, "barycentric": [1, 0, 0]}])", {"tip"}),
+            "HANDLE_FILE_VALUE");
+  EXPECT_EQ(refusal(R"({"region": [], "handles": [{"name": "tip", "vertices": [1]}]})", {"region"}),
+            "REGION_EMPTY");
+  EXPECT_EQ(refusal(R"({"region": [10], "handles": [{"name": "tip", "vertices": [1]}]})", {"region", "10"}),
+            "REGION_VERTEX_OUT_OF_RANGE");
 }
 
 TEST(HandleFile, NamesTheLineOfWhatIsNotJson) {

@@ -55,6 +55,24 @@ TEST(Ledger, AMotionMovesTheHandleThatWaitsToBeAdded) {
   EXPECT_EQ(translation_x(handle.motion), 2);
 }
 
+TEST(Ledger, AMotionKeepsHowTheWaitingHandleIsHeldAndTheNewestRegionWins) {
+  Ledger ledger;
+  Update soft;
+  soft.handles.emplace("tip", Handle{.vertices = {7}, .hold = Soft{3}, .footprint = 2});
+  soft.settings.region = RegionOfInterest{{1, 2, 3}};
+  ledger.add(soft);
+  ledger.add(moving("tip", 2));
+  Update wider;
+  wider.settings.region = RegionOfInterest{{1, 2, 3, 4}};
+  ledger.add(wider);
+  const NumberedUpdate sent = ledger.send_next();
+  const Handle& handle = std::get<Handle>(sent.update.handles.at("tip"));
+  EXPECT_EQ(std::get<Soft>(handle.hold).weight, 3);
+  EXPECT_EQ(handle.footprint, 2);
+  EXPECT_EQ(translation_x(handle.motion), 2);
+  EXPECT_EQ(sent.update.settings.region->vertices.size(), 4u);
+}
+
 TEST(Ledger, ARemovalWinsOverWhatWaits) {
   Ledger ledger;
   ledger.add(adding("tip", {7}));

@@ -37,6 +37,32 @@ TEST(Wire, AnUpdateWithoutSettingsChangesNone) {
   EXPECT_EQ(message.handles(0).change_case(), v1::HandleUpdate::kRemove);
 }
 
+TEST(Wire, SaysHowAHandleIsHeldAndWhatMayMove) {
+  Update update;
+  update.handles.emplace("lock", Handle{.vertices = {7}, .hold = PlaneLock{{0, 1, 2}}});
+  update.handles.emplace("points",
+                         Handle{.hold = Soft{0}, .points = {{5, {0.5, 0.25, 0.25}}}, .footprint = 3});
+  update.settings.region = RegionOfInterest{{4, 5}};
+  Packer packer([](std::string_view) { return absl::InternalError("not needed"); });
+  v1::Update message;
+  ASSERT_TRUE(to_wire(update, 1, packer, message).ok());
+  const v1::Handle &lock = message.handles(0).set(), &points = message.handles(1).set();
+  EXPECT_EQ(lock.plane_lock().normal().z(), 2);
+  EXPECT_FALSE(lock.has_points());
+  EXPECT_FALSE(points.has_vertices());
+  EXPECT_EQ(points.points().faces().inline_().size(), 4u);
+  EXPECT_EQ(points.points().barycentric().inline_().size(), 24u);
+  EXPECT_TRUE(points.soft().has_weight());  // 0 is a weight
+  EXPECT_EQ(points.footprint_radius(), 3);
+  EXPECT_EQ(message.settings().region().vertices().inline_().size(), 8u);
+
+  update.settings.region = RegionOfInterest{};
+  v1::Update removing;
+  ASSERT_TRUE(to_wire(update, 2, packer, removing).ok());
+  EXPECT_TRUE(removing.settings().has_region());
+  EXPECT_FALSE(removing.settings().region().has_vertices());
+}
+
 TEST(Wire, AFaultOfAStreamKeepsReasonElementAndLimit) {
   v1::Fault fault;
   fault.set_code(3);

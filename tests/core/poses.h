@@ -28,6 +28,14 @@ inline std::vector<std::int32_t> slice(const TriangleMesh& mesh, int axis, doubl
   return result;
 }
 
+/// Rows of `points`, in the order of `rows`.
+inline Points rows_of(const Points& points, const std::vector<std::int32_t>& rows) {
+  Points result(static_cast<Eigen::Index>(rows.size()), 3);
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    result.row(static_cast<Eigen::Index>(k)) = points.row(rows[k]);
+  return result;
+}
+
 inline RigidMotion turn(const Eigen::Vector3d& axis, double degrees, const Eigen::Vector3d& center,
                         const Eigen::Vector3d& translation = Eigen::Vector3d::Zero()) {
   return {axis, degrees * std::numbers::pi / 180, center, translation};

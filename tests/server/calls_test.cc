@@ -164,6 +164,36 @@ TEST_F(CallsTest, AnUpdateIsAnsweredWithItsStaleParts) {
   EXPECT_EQ(response.result().stale_parts(), 1u);
 }
 
+TEST_F(CallsTest, GetSessionSaysHowHandlesAreHeldAndHowMuchMayMove) {
+  const auto session = create(bar_mesh());
+  v1::Update held;
+  held.set_input_seq(1);
+  set_handle(held, "a", {0, 1, 2}, 0);
+  held.mutable_handles(0)->mutable_set()->mutable_plane_lock()->mutable_normal()->set_x(1);
+  v1::HandleUpdate& point = *held.add_handles();
+  point.set_name("b");
+  v1::SurfacePoints& points = *point.mutable_set()->mutable_points();
+  points.mutable_faces()->set_inline_(std::string(4, '\0'));
+  const float barycentric[] = {0.5F, 0.25F, 0.25F};
+  points.mutable_barycentric()->set_inline_(
+      std::string(reinterpret_cast<const char*>(barycentric), sizeof(barycentric)));
+  point.mutable_set()->mutable_soft();
+  held.mutable_settings()->mutable_region()->mutable_vertices()->set_inline_(std::string(8, '\0'));
+  ASSERT_TRUE(update(session, held).ok());
+
+  v1::GetSessionRequest get;
+  get.set_session(session.session().name());
+  v1::GetSessionResponse got;
+  grpc::ClientContext context;
+  ASSERT_TRUE(stub_->GetSession(&context, get, &got).ok());
+  ASSERT_EQ(got.session().handles_size(), 2);
+  EXPECT_EQ(got.session().handles(0).kind(), v1::HANDLE_KIND_PLANE_LOCK);
+  EXPECT_EQ(got.session().handles(0).vertex_count(), 3u);
+  EXPECT_EQ(got.session().handles(1).kind(), v1::HANDLE_KIND_SOFT);
+  EXPECT_EQ(got.session().handles(1).point_count(), 1u);
+  EXPECT_EQ(got.session().region_vertex_count(), 1u);  // vertex 0, given twice
+}
+
 TEST_F(CallsTest, AnUploadThatWasDamagedOnTheWayIsDataLoss) {
   v1::CreateUploadRequest announce;
   announce.set_size_bytes(4);
@@ -258,6 +288,39 @@ INSTANTIATE_TEST_SUITE_P(
                      [](auto& request) { request.add_handles()->set_name("a"); }},
         WrongSession{"MOTION_MISSING", "motion",
                      [](auto& request) { request.add_handles()->mutable_move(); }},
+        WrongSession{"HANDLE_POINT_COUNT", "barycentric",
+                     [](auto& request) {
+                       v1::HandleUpdate& handle = *request.add_handles();
+                       handle.set_name("a");
+                       v1::SurfacePoints& points = *handle.mutable_set()->mutable_points();
+                       points.mutable_faces()->set_inline_(std::string(8, '\0'));
+                       points.mutable_barycentric()->set_inline_(std::string(12, '\0'));
+                     }},
+        WrongSession{"HANDLE_LOCK_DIRECTION", "handle \"a\"",
+                     [](auto& request) {
+                       v1::HandleUpdate& handle = *request.add_handles();
+                       handle.set_name("a");
+                       handle.mutable_set()->mutable_vertices()->set_inline_(std::string(4, '\0'));
+                       handle.mutable_set()->mutable_axis_lock();
+                     }},
+        WrongSession{"REGION_EMPTY", "region",
+                     [](auto& request) {
+                       request.mutable_settings()->mutable_region()->mutable_vertices()->set_inline_("");
+                     }},
+        WrongSession{"REGION_VERTEX_OUT_OF_RANGE", "vertex 2147483647",
+                     [](auto& request) {
+                       request.mutable_settings()->mutable_region()->mutable_vertices()->set_inline_(
+                           std::string(4, '\xff'));
+                     }},
+        WrongSession{"METHOD_NEEDS_EXACT_HANDLES", "handle \"a\"",
+                     [](auto& request) {
+                       request.mutable_settings()->mutable_p()->set_uniform(1);
+                       request.mutable_settings()->mutable_solver()->set_method(v1::METHOD_CONIC);
+                       v1::HandleUpdate& handle = *request.add_handles();
+                       handle.set_name("a");
+                       handle.mutable_set()->mutable_vertices()->set_inline_(std::string(4, '\0'));
+                       handle.mutable_set()->mutable_soft();
+                     }},
         WrongSession{"HANDLE_TOO_MANY_VERTICES", "handle vertices",
                      [](auto& request) {
                        v1::HandleUpdate& handle = *request.add_handles();

@@ -54,6 +54,30 @@ TEST_F(MailboxTest, ALateUpdateOfOneHandleDoesNotUndoAnother) {
   EXPECT_EQ(inputs.input_seq, 3u);
 }
 
+TEST_F(MailboxTest, KeepsTheNewestRegion) {
+  Update newer = ends(5, 0), late;
+  newer.settings.region = std::vector<std::int32_t>{1, 2, 3};
+  ASSERT_TRUE(mailbox_.take(newer).ok());
+  late.input_seq = 4;
+  late.settings.region = std::vector<std::int32_t>{};
+  EXPECT_EQ(mailbox_.take(late).value().stale_parts, 1u);
+  ASSERT_NE(mailbox_.newest().handles->region(), nullptr);
+  EXPECT_EQ(mailbox_.newest().handles->region()->size(), 3u);
+  late.input_seq = 6;
+  ASSERT_TRUE(mailbox_.take(late).ok());
+  EXPECT_EQ(mailbox_.newest().handles->region(), nullptr);
+}
+
+TEST_F(MailboxTest, RefusesLocksThatContradictEachOtherWhole) {
+  ASSERT_TRUE(mailbox_.take(ends(1, 0)).ok());
+  Update twice;
+  twice.input_seq = 2;
+  twice.handles.push_back({"one", Handle{{}, Fixed{}, Exactly{}, {{100, {0.2, 0.3, 0.5}}}}});
+  twice.handles.push_back({"two", Handle{{}, Fixed{}, Exactly{}, {{100, {0.2, 0.3, 0.5}}}}});
+  EXPECT_EQ(fault_of(mailbox_.take(twice).status()).reason, "HANDLE_CONSTRAINTS_DEPENDENT");
+  EXPECT_FALSE(has("one"));
+}
+
 TEST_F(MailboxTest, SettingsAgeOneByOne) {
   Update newer;
   newer.input_seq = 5;

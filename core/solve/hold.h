@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <variant>
+
+#include "core/base/geometry.h"
+
+namespace lpdeform {
+
+/// A point inside a face of the rest mesh, sum_c barycentric[c] * (corner c of the face). Coordinates are at
+/// least 0 and add up to 1, both to 1e-6.
+struct SurfacePoint {
+  std::int32_t face = 0;
+  Eigen::Vector3d barycentric = Eigen::Vector3d::Constant(1.0 / 3);
+
+  bool operator==(const SurfacePoint&) const = default;
+};
+
+// How a handle holds its vertices or points. A target is where the handle's motion sends one.
+
+/// Exactly at its target.
+struct Exactly {
+  bool operator==(const Exactly&) const = default;
+};
+
+/// Drawn to its target: each vertex or point adds a soft term (SoftTerms) with D^2 = weight |x - target|^2.
+/// 0 lets go of it, 1 is about as strong as one edge of the surface; in [0, 1e6].
+struct Soft {
+  double weight = 1;
+
+  bool operator==(const Soft&) const = default;
+};
+
+/// Turned, its position free: the rotation R of the handle's motion is prescribed to the cells of the
+/// handle's vertices. Each adds a soft term with D^2 = weight sum_j w_ij |(x_i - x_j) - R (p_i - p_j)|^2. In
+/// [0, 1e6]. Vertices only.
+struct Orientation {
+  double weight = 100;
+
+  bool operator==(const Orientation&) const = default;
+};
+
+/// Free along `axis`, of any length but 0, on the line through its target; exact across it. Vertices only.
+struct AxisLock {
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
+
+  bool operator==(const AxisLock&) const = default;
+};
+
+/// Free within the plane through its target that `normal`, of any length but 0, stands on; exact along the
+/// normal. Vertices only.
+struct PlaneLock {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+
+  bool operator==(const PlaneLock&) const = default;
+};
+
+using Hold = std::variant<Exactly, Soft, Orientation, AxisLock, PlaneLock>;
+
+inline constexpr double kHighestSoftWeight = 1e6;
+
+}  // namespace lpdeform
