@@ -132,6 +132,8 @@ absl::StatusOr<WeightKind> decode_weights(v1::WeightKind weights) {
       return WeightKind::kCotangent;
     case v1::WEIGHT_KIND_UNIFORM:
       return WeightKind::kUniform;
+    case v1::WEIGHT_KIND_INTRINSIC_DELAUNAY:
+      return WeightKind::kIntrinsicDelaunay;
     default:
       return unknown_enum("weight kind", weights);
   }

@@ -76,6 +76,18 @@ v1::FreeComponents encode_free_components(FreeComponents free_components) {
   return v1::FREE_COMPONENTS_UNSPECIFIED;
 }
 
+v1::WeightKind encode_weights(WeightKind weights) {
+  switch (weights) {
+    case WeightKind::kCotangent:
+      return v1::WEIGHT_KIND_COTANGENT;
+    case WeightKind::kUniform:
+      return v1::WEIGHT_KIND_UNIFORM;
+    case WeightKind::kIntrinsicDelaunay:
+      return v1::WEIGHT_KIND_INTRINSIC_DELAUNAY;
+  }
+  return v1::WEIGHT_KIND_UNSPECIFIED;
+}
+
 v1::GoAwayReason encode_reason(EndReason reason) {
   switch (reason) {
     case EndReason::kSessionDeleted:
@@ -251,8 +263,7 @@ void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint no
   const auto unix_now = std::chrono::system_clock::now().time_since_epoch();
   out.set_expires_unix_ms(duration_cast<milliseconds>(unix_now + (info.last_used - now) + idle).count());
   out.set_memory_bytes(info.memory_bytes);
-  out.set_weights(info.shape->weight_kind() == WeightKind::kUniform ? v1::WEIGHT_KIND_UNIFORM
-                                                                    : v1::WEIGHT_KIND_COTANGENT);
+  out.set_weights(encode_weights(info.shape->weight_kind()));
   out.set_free_components(encode_free_components(info.free_components));
 }
 

@@ -81,8 +81,10 @@ void add_material_options(CLI::App& app, DeformOptions& options) {
       ->option_text("L");
   add_choice<client::WeightKind>(
       app, "--weights", options.weights,
-      {{"cotangent", client::WeightKind::kCotangent}, {"uniform", client::WeightKind::kUniform}},
-      "Weights of the edges (cotangent)");
+      {{"cotangent", client::WeightKind::kCotangent},
+       {"uniform", client::WeightKind::kUniform},
+       {"intrinsic_delaunay", client::WeightKind::kIntrinsicDelaunay}},
+      "Weights of the edges; intrinsic_delaunay needs no clamping where triangles are thin (cotangent)");
   add_choice<client::FreeComponents>(
       app, "--free-components", options.free_components,
       {{"error", client::FreeComponents::kError},

@@ -55,7 +55,12 @@ enum class InitialGuess {
   kRest,       // the rest mesh with the handles at their targets
 };
 
-enum class WeightKind { kCotangent, kUniform };
+/// Of a cell's edges in the energy.
+enum class WeightKind {
+  kCotangent,          // max(0, (cot a + cot b) / 2), a and b the angles opposite the edge
+  kUniform,            // 1 on every edge
+  kIntrinsicDelaunay,  // cotangents of the intrinsic Delaunay triangulation: never clamped, on any mesh
+};
 
 /// What becomes of a connected component that no handle holds.
 enum class FreeComponents {

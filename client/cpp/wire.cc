@@ -137,7 +137,15 @@ absl::Status to_wire(const Update& update, std::uint64_t seq, Packer& packer, v1
 }
 
 v1::WeightKind to_wire(WeightKind weights) {
-  return weights == WeightKind::kUniform ? v1::WEIGHT_KIND_UNIFORM : v1::WEIGHT_KIND_COTANGENT;
+  switch (weights) {
+    case WeightKind::kCotangent:
+      return v1::WEIGHT_KIND_COTANGENT;
+    case WeightKind::kUniform:
+      return v1::WEIGHT_KIND_UNIFORM;
+    case WeightKind::kIntrinsicDelaunay:
+      return v1::WEIGHT_KIND_INTRINSIC_DELAUNAY;
+  }
+  return v1::WEIGHT_KIND_UNSPECIFIED;
 }
 
 v1::FreeComponents to_wire(FreeComponents free_components) {
