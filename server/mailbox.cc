@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/solve/constraints.h"
+#include "core/solve/welded_inputs.h"
 
 namespace lpdeform {
 namespace {
@@ -54,6 +55,9 @@ struct Mailbox::Candidate {
   std::shared_ptr<HandleSet> handles;  // our copy; empty where the update has no handles
   Material material;
   SolveSettings solver;
+  // For the solver; empty where they did not change.
+  std::shared_ptr<const HandleSet> solver_handles;
+  std::shared_ptr<const Material> solver_material;
   std::vector<std::string> named;  // handles that it changes
   std::vector<std::string> moved;  // those of them that go somewhere
   bool is_regrouped = false;       // vertices of handles changed
@@ -64,9 +68,10 @@ struct Mailbox::Candidate {
   bool has_material() const { return has_p || has_stiffness || has_length_unit; }
 };
 
-Mailbox::Mailbox(std::shared_ptr<const RestShape> shape) : shape_(std::move(shape)) {
-  inputs_.handles = std::make_shared<const HandleSet>();
-  inputs_.material = std::make_shared<const Material>();
+Mailbox::Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld)
+    : shape_(std::move(shape)), weld_(std::move(weld)) {
+  inputs_.handles = inputs_.given_handles = std::make_shared<const HandleSet>();
+  inputs_.material = inputs_.given_material = std::make_shared<const Material>();
 }
 
 Inputs Mailbox::newest() const {
@@ -96,12 +101,14 @@ absl::StatusOr<UpdateResult> Mailbox::merge(const Update& update, bool is_beginn
   const Inputs before = newest();
   Candidate next;
   next.is_beginning = is_beginning;
-  next.material = *before.material;
+  next.material = *before.given_material;
   next.solver = before.solver;
-  if (!update.handles.empty()) next.handles = std::make_shared<HandleSet>(*before.handles);
+  if (!update.handles.empty()) next.handles = std::make_shared<HandleSet>(*before.given_handles);
   if (absl::Status status = change_handles(update, next); !status.ok()) return status;
   change_settings(update, next);
   if (absl::Status status = check(next); !status.ok()) return status;
+  if (absl::Status status = weld(next); !status.ok()) return status;
+  if (absl::Status status = check_targets(next); !status.ok()) return status;
 
   const UpdateResult result{update.input_seq, next.stale_parts};
   put_in_force(update, next);
@@ -117,8 +124,14 @@ void Mailbox::put_in_force(const Update& update, Candidate& next) {
     inputs_.input_seq = update.input_seq;
     ++inputs_.taken;
   }
-  if (next.has_handles()) inputs_.handles = std::move(next.handles);
-  if (next.has_material()) inputs_.material = std::make_shared<const Material>(std::move(next.material));
+  if (next.has_handles()) {
+    inputs_.given_handles = std::move(next.handles);
+    inputs_.handles = next.solver_handles ? next.solver_handles : inputs_.given_handles;
+  }
+  if (next.has_material()) {
+    inputs_.given_material = std::make_shared<const Material>(std::move(next.material));
+    inputs_.material = next.solver_material ? next.solver_material : inputs_.given_material;
+  }
   inputs_.solver = next.solver;
 }
 
@@ -211,28 +224,46 @@ absl::Status Mailbox::check(const Candidate& next) const {
                                       " handles; it may have ", kMostHandles, "."));
   }
   absl::Status status;
-  if (next.is_regrouped) status.Update(check_handles(*next.handles, shape_->vertex_count()));
-  for (const std::string& name : next.moved) {
-    if (status.ok()) status = check_targets(name, next.handles->handles().find(name)->second);
-  }
-  if (next.has_material() && status.ok()) status = check_material(next.material, shape_->vertex_count());
+  if (next.is_regrouped) status.Update(check_handles(*next.handles, vertex_count()));
+  if (next.has_material() && status.ok()) status = check_material(next.material, vertex_count());
   if (status.ok() && (next.has_material() || next.has_solver)) {
     status = check_solver(next.solver, next.material);
   }
   return status;
 }
 
-absl::Status Mailbox::check_targets(const std::string& name, const Handle& handle) const {
+/// Puts the client's vertices into the solver's.
+absl::Status Mailbox::weld(Candidate& next) const {
+  if (!weld_) return absl::OkStatus();
+  if (next.has_handles()) {
+    auto handles = welded(*next.handles, *weld_);
+    if (!handles.ok()) return handles.status();
+    next.solver_handles = std::make_shared<const HandleSet>(*std::move(handles));
+  }
+  if (next.has_material()) {
+    auto material = welded(next.material, *weld_);
+    if (!material.ok()) return material.status();
+    next.solver_material = std::make_shared<const Material>(*std::move(material));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Mailbox::check_targets(const Candidate& next) const {
   const double farthest = kFarthestTarget * shape_->diagonal();
-  const Points targets = target_positions(handle, shape_->positions());
-  for (Eigen::Index k = 0; k < targets.rows(); ++k) {
-    const double distance = (targets.row(k) - shape_->centre()).stableNorm();
-    if (distance <= farthest) continue;
-    return invalid_input(
-        {"HANDLE_TARGET_TOO_FAR", element_of(name), absl::StrCat("distance <= ", farthest)},
-        absl::StrCat("Vertex ", handle.vertices[static_cast<std::size_t>(k)], " of ", element_of(name),
-                     " would be ", distance, " from the mesh's centre, over ", kFarthestTarget,
-                     " of its diagonals."));
+  for (const std::string& name : next.moved) {
+    const HandleSet& handles = next.solver_handles ? *next.solver_handles : *next.handles;
+    const Handle& handle = handles.handles().find(name)->second;
+    const Points targets = target_positions(handle, shape_->positions());
+    for (Eigen::Index k = 0; k < targets.rows(); ++k) {
+      const double distance = (targets.row(k) - shape_->centre()).stableNorm();
+      if (distance <= farthest) continue;
+      const std::int32_t vertex = handle.vertices[static_cast<std::size_t>(k)];
+      return invalid_input(
+          {"HANDLE_TARGET_TOO_FAR", element_of(name), absl::StrCat("distance <= ", farthest)},
+          absl::StrCat("Vertex ", weld_ ? weld_->first_copy[vertex] : vertex, " of ", element_of(name),
+                       " would be ", distance, " from the mesh's centre, over ", kFarthestTarget,
+                       " of its diagonals."));
+    }
   }
   return absl::OkStatus();
 }

@@ -41,6 +41,7 @@ absl::Status check_groups(std::int64_t vertices, std::span<const std::uint32_t> 
 
 /// Copies that are not finite are left to the check of the mesh.
 absl::Status check_distances(const Points& positions, const std::vector<std::int32_t>& lowest) {
+  if (lowest.empty()) return absl::OkStatus();
   const double diagonal = (positions.colwise().maxCoeff() - positions.colwise().minCoeff()).norm();
   for (std::size_t v = 0; v < lowest.size(); ++v) {
     const double distance = (positions.row(static_cast<Eigen::Index>(v)) - positions.row(lowest[v])).norm();

@@ -56,6 +56,11 @@ TEST(Weld, ByGroupsNeedsANumberInRangeForEachVertex) {
   EXPECT_EQ(fault.element, "vertex 2");
 }
 
+TEST(Weld, OfNothingIsNothing) {
+  EXPECT_EQ(weld_by_position(Points(0, 3)).welded_count(), 0);
+  EXPECT_EQ(weld_by_groups(Points(0, 3), {})->welded_count(), 0);
+}
+
 TEST(Weld, KeepsIndicesThatAreOutOfRangeOutOfRange) {
   TriangleMesh mesh = make_mesh({{0, 0, 0}, {1, 0, 0}, {0, 0, 0}}, {{0, 1, 7}, {-1, 1, 2}});
   mesh = welded(mesh, weld_by_position(mesh.vertices));
