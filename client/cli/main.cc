@@ -134,6 +134,13 @@ void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
                  ".off, or a picture as .png")
       ->allow_extra_args(false)
       ->option_text("FILE");
+  app.add_flag("--weld", options->welds,
+               "Vertices at exactly the same position are one: for meshes split along seams of texture or "
+               "normals");
+  app.add_flag(
+      "--normals", options->normals,
+      "Write normals to .obj and .ply; those of an OBJ input are carried along, so that its hard edges "
+      "stay hard");
   app.add_option("--report", options->report, "Where to write what was measured, as JSON")
       ->option_text("FILE");
   CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")
