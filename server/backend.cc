@@ -158,7 +158,9 @@ absl::Status Backend::solve(const v1::SolveRequest& request, SolveJob::OnProgres
   if (request.has_initial_positions()) {
     auto positions = decoder.positions(request.initial_positions());
     if (!positions.ok()) return positions.status();
-    options.initial_positions = *std::move(positions);
+    auto welded = (*session)->mesh().solver_positions(*std::move(positions));
+    if (!welded.ok()) return welded.status();
+    options.initial_positions = *std::move(welded);
   }
   job = std::make_shared<SolveJob>(std::move(options), std::move(on_progress), std::move(on_done));
   return (*session)->solve(request.writer_token(), update, job);
@@ -181,6 +183,29 @@ void Backend::create_session(const v1::CreateSessionRequest& request, v1::Create
   });
 }
 
+absl::Status Backend::make_mesh(const v1::CreateSessionRequest& request, Decoder& decoder,
+                                SessionParts& parts) {
+  const auto weights = decode_weights(request.weights());
+  if (!weights.ok()) return weights.status();
+  auto mesh = decoder.mesh(request.mesh());
+  if (!mesh.ok()) return mesh.status();
+  auto normals = decoder.normals(request.normals());
+  if (!normals.ok()) return normals.status();
+  const auto weld = decoder.weld(request.weld(), mesh->vertices);
+  if (!weld.ok()) return weld.status();
+
+  auto shape = RestShape::create(*weld ? welded(*mesh, **weld) : *mesh, *weights);
+  // What is wrong is said of the client's vertices where it can be.
+  if (!shape.ok() && *weld) {
+    if (absl::Status status = deformable(check_mesh(*mesh)); !status.ok()) return status;
+  }
+  if (!shape.ok()) return shape.status();
+  parts.shape = *std::move(shape);
+  parts.mesh =
+      std::make_shared<const DrawMesh>(parts.shape, *weld, std::move(mesh->faces), *std::move(normals));
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const v1::CreateSessionRequest& request) {
   const v1::Mesh& mesh_message = request.mesh();
   Decoder decoder(*uploads_, mesh_message.vertex_count());
@@ -189,8 +214,6 @@ absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const v1::CreateS
       !status.ok()) {
     return status;
   }
-  const auto weights = decode_weights(request.weights());
-  if (!weights.ok()) return weights.status();
   const auto free_components = decode_free_components(request.free_components());
   if (!free_components.ok()) return free_components.status();
   auto memory = budget_->reserve(kBytesPerVertex * mesh_message.vertex_count() +
@@ -201,13 +224,7 @@ absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const v1::CreateS
   parts.name = absl::StrCat("sessions/", random_hex_128());
   parts.free_components = *free_components;
   parts.memory = *std::move(memory);
-  {
-    const auto mesh = decoder.mesh(mesh_message);
-    if (!mesh.ok()) return mesh.status();
-    auto shape = RestShape::create(*mesh, *weights);
-    if (!shape.ok()) return shape.status();
-    parts.shape = *std::move(shape);
-  }
+  if (absl::Status status = make_mesh(request, decoder, parts); !status.ok()) return status;
   if (absl::Status status = decoder.handles(request.handles(), parts.beginning); !status.ok()) return status;
   auto settings = decoder.settings(request.settings());
   if (!settings.ok()) return settings.status();

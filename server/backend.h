@@ -57,6 +57,9 @@ class Backend {
 
  private:
   absl::StatusOr<std::shared_ptr<Session>> make_session(const v1::CreateSessionRequest& request);
+  /// Fills in the shape and the mesh that it is drawn as.
+  static absl::Status make_mesh(const v1::CreateSessionRequest& request, Decoder& decoder,
+                                SessionParts& parts);
 
   const ServerOptions options_;
   const std::shared_ptr<const Log> log_;

@@ -150,6 +150,8 @@ absl::StatusOr<WeightKind> decode_weights(v1::WeightKind weights) {
       return WeightKind::kCotangent;
     case v1::WEIGHT_KIND_UNIFORM:
       return WeightKind::kUniform;
+    case v1::WEIGHT_KIND_INTRINSIC_DELAUNAY:
+      return WeightKind::kIntrinsicDelaunay;
     default:
       return unknown_enum("weight kind", weights);
   }
@@ -175,6 +177,7 @@ absl::StatusOr<StreamOptions> decode_frame_options(const v1::FrameOptions& messa
   StreamOptions options;
   options.scalar = *scalar;
   options.with_distortion = !message.without_distortion();
+  options.with_normals = message.with_normals();
   if (message.credit() > StreamOptions::kMostCredit) {
     return invalid_input(
         {"CREDIT_OUT_OF_RANGE", "credit", absl::StrCat("credit <= ", StreamOptions::kMostCredit)},
@@ -271,6 +274,38 @@ absl::StatusOr<Points> Decoder::positions(const v1::Positions& message) {
   return invalid_input(
       {"POSITIONS_SIZE", "positions", absl::StrCat(vertex_count_, " positions")},
       absl::StrCat("There are ", packed->count, " positions for ", vertex_count_, " vertices."));
+}
+
+absl::StatusOr<Points> Decoder::normals(const v1::Normals& message) {
+  if (!message.has_data()) return Points(0, 3);
+  const auto packed = points(message.scalar(), message.data(), "normals");
+  if (!packed.ok()) return packed.status();
+  if (packed->count != vertex_count_) {
+    return invalid_input(
+        {"NORMALS_SIZE", "normals", absl::StrCat(vertex_count_, " normals")},
+        absl::StrCat("There are ", packed->count, " normals for ", vertex_count_, " vertices."));
+  }
+  Points normals = packed->unpack();
+  for (Eigen::Index v = 0; v < normals.rows(); ++v) {
+    if (normals.row(v).allFinite()) continue;
+    return invalid_input({"NORMALS_NOT_FINITE", absl::StrCat("vertex ", v), "finite numbers"},
+                         absl::StrCat("The normal of vertex ", v, " has a NaN or infinite number."));
+  }
+  return normals;
+}
+
+absl::StatusOr<std::shared_ptr<const Weld>> Decoder::weld(const v1::Weld& message, const Points& positions) {
+  if (message.by_case() == v1::Weld::BY_NOT_SET) return nullptr;
+  if (message.has_position()) return std::make_shared<const Weld>(weld_by_position(positions));
+  const auto data = bytes(message.groups(), "weld groups");
+  if (!data.ok()) return data.status();
+  if (data->view.size() % sizeof(std::uint32_t) != 0)
+    return wrong_size("weld groups", data->view.size(), "a multiple of 4");
+  std::vector<std::uint32_t> groups(data->view.size() / sizeof(std::uint32_t));
+  unpack_indices(data->view, groups.size(), groups.data());
+  auto weld = weld_by_groups(positions, groups);
+  if (!weld.ok()) return weld.status();
+  return std::make_shared<const Weld>(*std::move(weld));
 }
 
 absl::Status Decoder::take_room(std::uint64_t& room, std::uint64_t count, std::string_view what) const {

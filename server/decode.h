@@ -8,6 +8,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/mesh/mesh.h"
+#include "core/mesh/weld.h"
 #include "core/solve/deformer.h"
 #include "lpdeform/v1/service.pb.h"
 #include "server/frame_stream.h"
@@ -21,7 +22,7 @@ namespace lpdeform {
 /// often a message names an upload, no more numbers come out than the mesh has room for. What a value means
 /// is checked where it is used. Errors are INVALID_ARGUMENT: INLINE_TOO_LARGE, BUFFER_MISSING, BUFFER_SIZE,
 /// ENUM_UNKNOWN, FIELD_MISSING, FIELD_SIZE, POSITIONS_SIZE, HANDLE_CHANGE_MISSING, HANDLE_TOO_MANY_VERTICES,
-/// HANDLE_POINT_COUNT, REGION_EMPTY, MOTION_MISSING; of uploads what Uploads::find and Upload::bytes have. For one message, one thread.
+/// HANDLE_POINT_COUNT, REGION_EMPTY, MOTION_MISSING, NORMALS_SIZE, NORMALS_NOT_FINITE; of uploads what Uploads::find and Upload::bytes have. For one message, one thread.
 class Decoder {
  public:
   /// `vertex_count`: of the mesh that the message is about.
@@ -45,6 +46,10 @@ class Decoder {
   absl::Status handles(const google::protobuf::RepeatedPtrField<v1::HandleUpdate>& messages, Update& out);
   absl::StatusOr<SettingsChange> settings(const v1::SettingsUpdate& message);
   absl::StatusOr<Points> positions(const v1::Positions& message);
+  /// No rows where the message is empty.
+  absl::StatusOr<Points> normals(const v1::Normals& message);
+  /// Null where the message is empty. Also WELD_SIZE, WELD_OUT_OF_RANGE, WELD_TOO_FAR.
+  absl::StatusOr<std::shared_ptr<const Weld>> weld(const v1::Weld& message, const Points& positions);
 
  private:
   struct Bytes {

@@ -87,6 +87,18 @@ v1::HandleKind encode_kind(const Hold& hold) {
   return std::visit(kind, hold);
 }
 
+v1::WeightKind encode_weights(WeightKind weights) {
+  switch (weights) {
+    case WeightKind::kCotangent:
+      return v1::WEIGHT_KIND_COTANGENT;
+    case WeightKind::kUniform:
+      return v1::WEIGHT_KIND_UNIFORM;
+    case WeightKind::kIntrinsicDelaunay:
+      return v1::WEIGHT_KIND_INTRINSIC_DELAUNAY;
+  }
+  return v1::WEIGHT_KIND_UNSPECIFIED;
+}
+
 v1::GoAwayReason encode_reason(EndReason reason) {
   switch (reason) {
     case EndReason::kSessionDeleted:
@@ -127,9 +139,9 @@ void encode_report(const MeshReport& report, v1::MeshReport& out) {
 }
 
 void encode_settings(const Inputs& inputs, v1::SettingsUpdate& out) {
-  encode_field(inputs.material->p, *out.mutable_p());
-  encode_field(inputs.material->stiffness, *out.mutable_stiffness());
-  out.mutable_length_unit()->set_length(inputs.material->length_unit);
+  encode_field(inputs.given_material->p, *out.mutable_p());
+  encode_field(inputs.given_material->stiffness, *out.mutable_stiffness());
+  out.mutable_length_unit()->set_length(inputs.given_material->length_unit);
   v1::SolverSettings& solver = *out.mutable_solver();
   solver.set_method(encode_method(inputs.solver.method));
   solver.set_tolerance(inputs.solver.tolerance);
@@ -165,32 +177,49 @@ void encode_piece(const FramePiece& piece, v1::FramePart& out) {
   const std::size_t point_bytes = 3 * bytes_of(piece.scalar);
   const std::string_view positions = piece.frame->surface->position_bytes(piece.scalar);
   out.set_positions(std::string(positions.substr(piece.first * point_bytes, piece.count * point_bytes)));
-  if (!piece.with_distortion) return;
-  const std::string_view distortion = piece.frame->surface->distortion_bytes(piece.scalar);
-  const std::size_t number_bytes = bytes_of(piece.scalar);
-  out.set_distortion(std::string(distortion.substr(piece.first * number_bytes, piece.count * number_bytes)));
+  if (piece.with_distortion) {
+    const std::string_view distortion = piece.frame->surface->distortion_bytes(piece.scalar);
+    const std::size_t number_bytes = bytes_of(piece.scalar);
+    out.set_distortion(
+        std::string(distortion.substr(piece.first * number_bytes, piece.count * number_bytes)));
+  }
+  if (piece.with_normals) {
+    const std::string_view normals = piece.frame->surface->normal_bytes(piece.scalar);
+    out.set_normals(std::string(normals.substr(piece.first * point_bytes, piece.count * point_bytes)));
+  }
 }
 
-/// Bytes that a field of this many takes, its tag (of one byte) and length included; 0 where it is empty.
-std::size_t field_bytes(std::size_t size) {
+/// Bytes that a field of this many takes, its tag and length included; 0 where it is empty.
+std::size_t field_bytes(std::size_t size, std::size_t tag_bytes) {
   if (size == 0) return 0;
   std::size_t length_bytes = 1;
   for (std::size_t rest = size >> 7; rest != 0; rest >>= 7) ++length_bytes;
-  return 1 + length_bytes + size;
+  return tag_bytes + length_bytes + size;
 }
 
-/// Fills the paddings of `part` so that positions and distortion begin at multiples of `unit` bytes in
-/// `message`, which holds the part as its last field; these are the part's last fields, written in order.
+/// The padding that lets a buffer of `size` bytes begin at a multiple of `unit` when the field before its
+/// padding ends `before` bytes past one; with what stands between that end and the buffer's. 0 of both where
+/// the buffer is empty.
+struct Gap {
+  std::size_t padding = 0, bytes = 0;
+};
+Gap gap_before(std::size_t size, std::size_t before, std::size_t tag_bytes, std::size_t unit) {
+  if (size == 0) return {};
+  const std::size_t head = field_bytes(size, tag_bytes) - size;
+  std::size_t padding = 0;
+  while ((before + field_bytes(padding, tag_bytes) + head) % unit != 0) ++padding;
+  return {padding, field_bytes(padding, tag_bytes) + head + size};
+}
+
+/// Fills the paddings of `part` so that positions, distortion and normals begin at multiples of `unit` bytes
+/// in `message`, which holds the part as its last field; these are the part's last fields, written in order.
 void align_buffers(const google::protobuf::MessageLite& message, v1::FramePart& part, std::size_t unit) {
-  const std::size_t positions = part.positions().size(), distortion = part.distortion().size();
-  const std::size_t distortion_head = field_bytes(distortion) - distortion;
-  std::size_t between = distortion_head;  // from the end of positions to the beginning of distortion
-  for (std::size_t padding = 0; distortion > 0 && padding < 16; ++padding) {
-    between = field_bytes(padding) + distortion_head;
-    part.set_distortion_padding(std::string(padding, '\0'));
-    if ((positions + between) % unit == 0) break;
-  }
-  const std::size_t after = positions + between + distortion;
+  const std::size_t positions = part.positions().size();
+  const Gap distortion = gap_before(part.distortion().size(), positions, 1, unit);
+  part.set_distortion_padding(std::string(distortion.padding, '\0'));
+  const Gap normals = gap_before(part.normals().size(), positions + distortion.bytes, 2, unit);
+  part.set_normals_padding(std::string(normals.padding, '\0'));
+  const std::size_t after = positions + distortion.bytes + normals.bytes;
   for (std::size_t padding = 0; padding < 16; ++padding) {
     part.set_positions_padding(std::string(padding, '\0'));
     if ((message.ByteSizeLong() - after) % unit == 0) return;
@@ -224,6 +253,7 @@ void encode_event(const Note& note, const FrameStream& stream, std::uint32_t ver
         granted.set_credit(options.credit);
         granted.set_scalar(options.scalar == Scalar::kFloat64 ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
         granted.set_without_distortion(!options.with_distortion);
+        granted.set_with_normals(options.with_normals);
         granted.set_max_frames_per_second(options.max_frames_per_second);
       },
       [&](const FramePiece& piece) { encode_piece(piece, *out.mutable_frame()); },
@@ -251,10 +281,11 @@ void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint no
   using std::chrono::milliseconds;
   out.set_name(info.name);
   out.set_epoch(info.epoch);
-  encode_report(info.shape->report(), *out.mutable_mesh());
+  encode_report(info.mesh->report(), *out.mutable_mesh());
+  out.mutable_mesh()->set_welded_vertices(info.mesh->copy_count());
   out.set_input_seq(info.inputs.input_seq);
   encode_settings(info.inputs, *out.mutable_settings());
-  for (const auto& [name, handle] : info.inputs.handles->handles()) {
+  for (const auto& [name, handle] : info.inputs.given_handles->handles()) {
     v1::HandleInfo& message = *out.add_handles();
     message.set_name(name);
     message.set_vertex_count(static_cast<std::uint32_t>(handle.vertices.size()));
@@ -268,8 +299,7 @@ void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint no
   const auto unix_now = std::chrono::system_clock::now().time_since_epoch();
   out.set_expires_unix_ms(duration_cast<milliseconds>(unix_now + (info.last_used - now) + idle).count());
   out.set_memory_bytes(info.memory_bytes);
-  out.set_weights(info.shape->weight_kind() == WeightKind::kUniform ? v1::WEIGHT_KIND_UNIFORM
-                                                                    : v1::WEIGHT_KIND_COTANGENT);
+  out.set_weights(encode_weights(info.shape->weight_kind()));
   out.set_free_components(encode_free_components(info.free_components));
 }
 

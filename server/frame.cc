@@ -28,8 +28,8 @@ std::size_t bytes_of(Scalar scalar) {
   return scalar == Scalar::kFloat64 ? sizeof(double) : sizeof(float);
 }
 
-Surface::Surface(Points positions, Field cell_energies)
-    : positions_(std::move(positions)), cell_energies_(std::move(cell_energies)) {
+Surface::Surface(Points positions, Field cell_energies, std::shared_ptr<const DrawMesh> mesh)
+    : positions_(std::move(positions)), cell_energies_(std::move(cell_energies)), mesh_(std::move(mesh)) {
   LPDEFORM_CHECK(cell_energies_.size() == positions_.rows());
 }
 
@@ -45,6 +45,25 @@ std::string_view Surface::distortion_bytes(Scalar scalar) const {
   return float32_distortion_;
 }
 
+std::string_view Surface::normal_bytes(Scalar scalar) const {
+  make_normals();
+  return scalar == Scalar::kFloat64 ? float64_bytes(normals_) : std::string_view(float32_normals_);
+}
+
+void Surface::prepare(Scalar scalar, bool with_normals) const {
+  position_bytes(scalar);
+  if (with_normals) make_normals();
+}
+
+void Surface::make_normals() const {
+  LPDEFORM_CHECK(mesh_ != nullptr);
+  std::call_once(normals_once_, [this] {
+    normals_ = mesh_->normals(positions_);
+    float32_normals_ = float32_bytes(normals_);
+    has_normals_ = true;
+  });
+}
+
 void Surface::make_float32() const {
   std::call_once(once_, [this] {
     float32_positions_ = float32_bytes(positions_);
@@ -53,24 +72,26 @@ void Surface::make_float32() const {
 }
 
 std::size_t Surface::memory_bytes() const {
-  return static_cast<std::size_t>(positions_.size() + cell_energies_.size()) *
-         (sizeof(double) + sizeof(float));
+  const Eigen::Index numbers = positions_.size() * (has_normals_ ? 2 : 1) + cell_energies_.size();
+  return static_cast<std::size_t>(numbers) * (sizeof(double) + sizeof(float));
 }
 
 FrameCutter::FrameCutter(std::shared_ptr<const Frame> frame, Scalar scalar, bool with_distortion,
-                         std::uint64_t skipped_inputs)
+                         bool with_normals, std::uint64_t skipped_inputs)
     : frame_(std::move(frame)),
       scalar_(scalar),
       with_distortion_(with_distortion),
+      with_normals_(with_normals),
       skipped_inputs_(skipped_inputs) {}
 
 FramePiece FrameCutter::next() {
   LPDEFORM_CHECK(has_more());
-  const std::size_t vertex_bytes = 3 * bytes_of(scalar_) + (with_distortion_ ? bytes_of(scalar_) : 0);
+  const std::size_t numbers = 3 + (with_distortion_ ? 1 : 0) + (with_normals_ ? 3 : 0);
+  const std::size_t vertex_bytes = numbers * bytes_of(scalar_);
   const auto most = static_cast<std::uint32_t>(kMostBytes / vertex_bytes);
   const std::uint32_t left = frame_->surface->vertex_count() - at_;
   FramePiece piece{frame_,          at_,     std::min(most, left), left <= most,
-                   skipped_inputs_, scalar_, with_distortion_};
+                   skipped_inputs_, scalar_, with_distortion_,     with_normals_};
   at_ += piece.count;
   if (piece.is_last) frame_.reset();
   return piece;

@@ -83,7 +83,7 @@ void FrameStream::begin_frame(Timers::TimePoint now) {
   has_sent_frame_ = true;
   last_frame_at_ = now;
   in_flight_.push_back(last_seq_);
-  cutter_ = FrameCutter(std::move(newest), options_.scalar, options_.with_distortion,
+  cutter_ = FrameCutter(std::move(newest), options_.scalar, options_.with_distortion, options_.with_normals,
                         answered > 1 ? answered - 1 : 0);
 }
 

@@ -23,6 +23,7 @@ struct StreamOptions {
   std::uint32_t credit = 2;
   Scalar scalar = Scalar::kFloat32;
   bool with_distortion = true;
+  bool with_normals = false;
   double max_frames_per_second = 0;
 
   static constexpr std::uint32_t kMostCredit = 8;

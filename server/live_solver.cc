@@ -21,8 +21,12 @@ absl::Status no_handles() {
 }  // namespace
 
 LiveSolver::LiveSolver(std::unique_ptr<Deformer> deformer, const Mailbox& mailbox, Publisher& publisher,
-                       std::stop_token stop)
-    : deformer_(std::move(deformer)), mailbox_(mailbox), publisher_(publisher), stop_(std::move(stop)) {
+                       std::shared_ptr<const DrawMesh> mesh, std::stop_token stop)
+    : deformer_(std::move(deformer)),
+      mailbox_(mailbox),
+      publisher_(publisher),
+      mesh_(std::move(mesh)),
+      stop_(std::move(stop)) {
   publish(mailbox_.newest().handles->handles().empty());
 }
 
@@ -52,7 +56,7 @@ void LiveSolver::take_over(const Inputs& inputs) {
   if (inputs.material != inputs_.material) status = deformer_->set_material(*inputs.material);
   const bool has_handles = !inputs.handles->handles().empty();
   if (status.ok() && has_handles && inputs.handles != held_) {
-    status = deformer_->set_handles(*inputs.handles);
+    status = mesh_->for_client(deformer_->set_handles(*inputs.handles));
     if (status.ok()) held_ = inputs.handles;
   }
   inputs_ = inputs;
@@ -135,7 +139,8 @@ std::shared_ptr<const Frame> LiveSolver::publish(bool is_final) {
   frame.stop_reason = is_final ? summary.stop_reason : StopReason::kRunning;
   frame.solve_seconds = summary.solve_seconds;
   frame.method = summary.method;
-  frame.surface = std::make_shared<const Surface>(deformer_->positions(), deformer_->cell_energies());
+  frame.surface = std::make_shared<const Surface>(mesh_->positions(deformer_->positions()),
+                                                  mesh_->distortion(deformer_->cell_energies()), mesh_);
   return publisher_.publish(std::move(frame));
 }
 

@@ -21,9 +21,9 @@ namespace lpdeform {
 /// better.
 class LiveSolver {
  public:
-  /// Publishes the present state. Ends its solves when `stop` is requested.
+  /// Publishes the present state, in the vertices of `mesh`. Ends its solves when `stop` is requested.
   LiveSolver(std::unique_ptr<Deformer> deformer, const Mailbox& mailbox, Publisher& publisher,
-             std::stop_token stop);
+             std::shared_ptr<const DrawMesh> mesh, std::stop_token stop);
 
   /// At most about kSlice, or one step where that takes longer. `job` may be null. True where there is more
   /// to do.
@@ -58,6 +58,7 @@ class LiveSolver {
   const std::unique_ptr<Deformer> deformer_;
   const Mailbox& mailbox_;
   Publisher& publisher_;
+  const std::shared_ptr<const DrawMesh> mesh_;
   const std::stop_token stop_;
 
   Inputs inputs_;                          // taken over, or tried

@@ -11,6 +11,7 @@
 #include "core/solve/check_settings.h"
 #include "core/solve/constraints.h"
 #include "core/solve/holds.h"
+#include "core/solve/welded_inputs.h"
 
 namespace lpdeform {
 namespace {
@@ -58,6 +59,9 @@ struct Mailbox::Candidate {
   std::shared_ptr<HandleSet> handles;  // our copy; empty where the update has no handles
   Material material;
   SolveSettings solver;
+  // For the solver; empty where they did not change.
+  std::shared_ptr<const HandleSet> solver_handles;
+  std::shared_ptr<const Material> solver_material;
   std::vector<std::string> named;  // handles that it changes
   std::vector<std::string> moved;  // those of them that go somewhere
   bool is_regrouped = false;       // vertices of handles, or the region, changed
@@ -68,9 +72,10 @@ struct Mailbox::Candidate {
   bool has_material() const { return has_p || has_stiffness || has_length_unit; }
 };
 
-Mailbox::Mailbox(std::shared_ptr<const RestShape> shape) : shape_(std::move(shape)) {
-  inputs_.handles = std::make_shared<const HandleSet>();
-  inputs_.material = std::make_shared<const Material>();
+Mailbox::Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld)
+    : shape_(std::move(shape)), weld_(std::move(weld)) {
+  inputs_.handles = inputs_.given_handles = std::make_shared<const HandleSet>();
+  inputs_.material = inputs_.given_material = std::make_shared<const Material>();
 }
 
 Inputs Mailbox::newest() const {
@@ -100,14 +105,16 @@ absl::StatusOr<UpdateResult> Mailbox::merge(const Update& update, bool is_beginn
   const Inputs before = newest();
   Candidate next;
   next.is_beginning = is_beginning;
-  next.material = *before.material;
+  next.material = *before.given_material;
   next.solver = before.solver;
   if (!update.handles.empty() || update.settings.region) {
-    next.handles = std::make_shared<HandleSet>(*before.handles);
+    next.handles = std::make_shared<HandleSet>(*before.given_handles);
   }
   if (absl::Status status = change_handles(update, next); !status.ok()) return status;
   change_settings(update, next);
   if (absl::Status status = check(next, before); !status.ok()) return status;
+  if (absl::Status status = weld(next); !status.ok()) return status;
+  if (absl::Status status = check_welded(next); !status.ok()) return status;
 
   const UpdateResult result{update.input_seq, next.stale_parts};
   put_in_force(update, next);
@@ -123,8 +130,14 @@ void Mailbox::put_in_force(const Update& update, Candidate& next) {
     inputs_.input_seq = update.input_seq;
     ++inputs_.taken;
   }
-  if (next.has_handles()) inputs_.handles = std::move(next.handles);
-  if (next.has_material()) inputs_.material = std::make_shared<const Material>(std::move(next.material));
+  if (next.has_handles()) {
+    inputs_.given_handles = std::move(next.handles);
+    inputs_.handles = next.solver_handles ? next.solver_handles : inputs_.given_handles;
+  }
+  if (next.has_material()) {
+    inputs_.given_material = std::make_shared<const Material>(std::move(next.material));
+    inputs_.material = next.solver_material ? next.solver_material : inputs_.given_material;
+  }
   inputs_.solver = next.solver;
 }
 
@@ -225,25 +238,50 @@ absl::Status Mailbox::check(const Candidate& next, const Inputs& before) const {
                                       " handles; it may have ", kMostHandles, "."));
   }
   absl::Status status;
-  if (next.is_regrouped) status = check_groups(*next.handles);
-  for (const std::string& name : next.moved) {
-    if (status.ok()) status = check_targets(name, next.handles->handles().find(name)->second);
-  }
-  if (next.has_material() && status.ok()) status = check_material(next.material, shape_->vertex_count());
+  if (next.is_regrouped) status = check_handles(*next.handles, vertex_count(), shape_->face_count());
+  if (next.has_material() && status.ok()) status = check_material(next.material, vertex_count());
   if (status.ok() && (next.has_material() || next.has_solver || next.is_regrouped)) {
-    status = check_solver(next.solver, next.material, next.handles ? *next.handles : *before.handles);
+    status = check_solver(next.solver, next.material, next.handles ? *next.handles : *before.given_handles);
   }
   return status;
 }
 
-/// Whether the groups exist and can be held together; where locks and points must agree, they are put together
-/// to see.
-absl::Status Mailbox::check_groups(const HandleSet& handles) const {
-  if (absl::Status status = check_handles(handles, shape_->vertex_count(), shape_->face_count());
-      !status.ok())
-    return status;
-  if (!has_equations(handles)) return absl::OkStatus();
-  return make_constraints(*shape_, handles, FreeComponents::kStay).status();
+/// Puts the client's vertices into the solver's.
+absl::Status Mailbox::weld(Candidate& next) const {
+  if (!weld_) return absl::OkStatus();
+  if (next.has_handles()) {
+    auto handles = welded(*next.handles, *weld_);
+    if (!handles.ok()) return handles.status();
+    next.solver_handles = std::make_shared<const HandleSet>(*std::move(handles));
+  }
+  if (next.has_material()) {
+    auto material = welded(next.material, *weld_);
+    if (!material.ok()) return material.status();
+    next.solver_material = std::make_shared<const Material>(*std::move(material));
+  }
+  return absl::OkStatus();
+}
+
+/// Whether the groups can be held together: where locks and points must agree, they are put together to see. And
+/// whether they go no farther than they may.
+absl::Status Mailbox::check_welded(const Candidate& next) const {
+  if (!next.has_handles()) return absl::OkStatus();
+  const HandleSet& handles = next.solver_handles ? *next.solver_handles : *next.handles;
+  absl::Status status;
+  if (next.is_regrouped && has_equations(handles)) {
+    status = make_constraints(*shape_, handles, FreeComponents::kStay).status();
+  }
+  for (const std::string& name : next.moved) {
+    if (status.ok()) status = check_targets(name, handles.handles().find(name)->second);
+  }
+  return status;
+}
+
+/// "Vertex 17" as the client counts, "Point 2" of a handle of points.
+std::string Mailbox::place_of(const Handle& handle, std::size_t k) const {
+  if (!handle.points.empty()) return absl::StrCat("Point ", k);
+  const std::int32_t vertex = handle.vertices[k];
+  return absl::StrCat("Vertex ", weld_ ? weld_->first_copy[vertex] : vertex);
 }
 
 absl::Status Mailbox::check_targets(const std::string& name, const Handle& handle) const {
@@ -254,10 +292,8 @@ absl::Status Mailbox::check_targets(const std::string& name, const Handle& handl
     if (distance <= farthest) continue;
     return invalid_input(
         {"HANDLE_TARGET_TOO_FAR", element_of(name), absl::StrCat("distance <= ", farthest)},
-        absl::StrCat(handle.points.empty() ? "Vertex " : "Point ",
-                     handle.points.empty() ? handle.vertices[static_cast<std::size_t>(k)] : k, " of ",
-                     element_of(name), " would be ", distance, " from the mesh's centre, over ",
-                     kFarthestTarget, " of its diagonals."));
+        absl::StrCat(place_of(handle, static_cast<std::size_t>(k)), " of ", element_of(name), " would be ",
+                     distance, " from the mesh's centre, over ", kFarthestTarget, " of its diagonals."));
   }
   return absl::OkStatus();
 }

@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "core/energy/material.h"
 #include "core/energy/rest_shape.h"
+#include "core/mesh/weld.h"
 #include "server/update.h"
 
 namespace lpdeform {
@@ -21,6 +22,9 @@ struct Inputs {
   std::shared_ptr<const HandleSet> handles;
   std::shared_ptr<const Material> material;
   SolveSettings solver;
+  // As the client gave them, in its vertices: the same objects where nothing is welded.
+  std::shared_ptr<const HandleSet> given_handles;
+  std::shared_ptr<const Material> given_material;
 };
 
 /// Where updates meet the solver: keeps the newest value of each handle and each setting by input_seq. Which
@@ -29,11 +33,12 @@ struct Inputs {
 /// Nothing queues: the solver reads what is newest when it has time. Thread-safe.
 class Mailbox {
  public:
-  explicit Mailbox(std::shared_ptr<const RestShape> shape);
+  /// `weld`: from the vertices that updates speak of to those of `shape`; null where they are the same.
+  explicit Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld = nullptr);
 
   /// A part with the input_seq of the value that is there is a repetition: dropped, but not counted as stale.
   /// Errors, INVALID_ARGUMENT: INPUT_SEQ_ZERO, HANDLE_CHANGED_TWICE (in this update), TOO_MANY_HANDLES,
-  /// HANDLE_TARGET_TOO_FAR, and what check_solver, make_constraints, check_material and HandleSet have;
+  /// HANDLE_TARGET_TOO_FAR, COPIES_DIFFER, and what check_solver, make_constraints, check_material and HandleSet have;
   /// NOT_FOUND HANDLE_UNKNOWN. A component without a handle is no error here: handles may come one by one.
   absl::StatusOr<UpdateResult> take(const Update& update);
 
@@ -61,14 +66,18 @@ class Mailbox {
   absl::Status change_handles(const Update& update, Candidate& next) const;
   void change_settings(const Update& update, Candidate& next) const;
   absl::Status check(const Candidate& next, const Inputs& before) const;
-  absl::Status check_groups(const HandleSet& handles) const;
+  absl::Status weld(Candidate& next) const;
+  absl::Status check_welded(const Candidate& next) const;
   absl::Status check_targets(const std::string& name, const Handle& handle) const;
+  std::string place_of(const Handle& handle, std::size_t k) const;
+  std::int32_t vertex_count() const { return weld_ ? weld_->split_count() : shape_->vertex_count(); }
 
   void note_ages(const Candidate& next, std::uint64_t seq);
   void forget_oldest();
   void put_in_force(const Update& update, Candidate& next);
 
   const std::shared_ptr<const RestShape> shape_;
+  const std::shared_ptr<const Weld> weld_;
   std::mutex merging_;  // one update at a time; guards ages_
   Ages ages_;
   mutable std::mutex mutex_;  // guards inputs_, for moments only

@@ -1,16 +1,14 @@
 #include "server/publisher.h"
 
 #include <algorithm>
-#include <set>
 #include <utility>
 
 namespace lpdeform {
 
 std::shared_ptr<const Frame> Publisher::publish(Frame frame) {
   // Encoded here, on the solver's thread, in every form that is asked for, so that no reader's thread has to.
-  std::set<Scalar> scalars;
-  for (const auto& stream : readers()) scalars.insert(stream->options().scalar);
-  for (const Scalar scalar : scalars) frame.surface->position_bytes(scalar);
+  for (const auto& stream : readers())
+    frame.surface->prepare(stream->options().scalar, stream->options().with_normals);
 
   std::shared_ptr<const Frame> published;
   {

@@ -52,8 +52,9 @@ absl::StatusOr<std::shared_ptr<Session>> Session::create(SessionParts parts, Ses
   std::unique_ptr<Deformer> deformer = std::move(parts.deformer);
   const std::shared_ptr<Session> session(new Session(std::move(parts), std::move(services)));
   if (absl::Status status = session->mailbox_.begin_with(beginning); !status.ok()) return status;
-  session->solver_ = std::make_unique<LiveSolver>(std::move(deformer), session->mailbox_,
-                                                  *session->publisher_, session->stop_.get_token());
+  session->solver_ =
+      std::make_unique<LiveSolver>(std::move(deformer), session->mailbox_, *session->publisher_,
+                                   session->mesh_, session->stop_.get_token());
   return session;
 }
 
@@ -61,11 +62,12 @@ Session::Session(SessionParts parts, SessionServices services)
     : Runnable(parts.shape->vertex_count() > kHeavyVertices),
       name_(std::move(parts.name)),
       shape_(std::move(parts.shape)),
+      mesh_(parts.mesh ? std::move(parts.mesh) : std::make_shared<const DrawMesh>(shape_)),
       free_components_(parts.free_components),
       services_(std::move(services)),
       created_unix_ms_(unix_ms_now()),
       last_used_(services_.timers->now()),
-      mailbox_(shape_),
+      mailbox_(shape_, mesh_->weld()),
       memory_(std::move(parts.memory)),
       memory_bytes_(memory_.bytes()),
       token_(random_hex_128()) {}
@@ -74,6 +76,7 @@ SessionInfo Session::info() const {
   return {name_,
           lease().epoch,
           shape_,
+          mesh_,
           free_components_,
           mailbox_.newest(),
           created_unix_ms_,
@@ -176,7 +179,7 @@ absl::StatusOr<std::shared_ptr<FrameStream>> Session::open_stream(const std::str
     std::erase_if(writers_, [](const auto& weak) { return weak.expired(); });
     if (!token.empty()) writers_.push_back(stream);
   }
-  publisher_->newest()->surface->position_bytes(options.scalar);  // encodes it here, not on a reader's thread
+  publisher_->newest()->surface->prepare(options.scalar, options.with_normals);
   services_.scheduler.wake(shared_from_this());
   return stream;
 }
@@ -241,7 +244,7 @@ bool Session::run() {
     has_more = true;  // the readers' solve may have to go on
   }
   if (solver_->has_solved()) {  // until then the estimate stands
-    memory_bytes_ = shape_->memory_bytes() + solver_->memory_bytes();
+    memory_bytes_ = shape_->memory_bytes() + mesh_->memory_bytes() + solver_->memory_bytes();
     memory_.resize(memory_bytes_);
   }
   return has_more;

@@ -26,6 +26,7 @@ struct SessionParts {
   std::string name;
   std::shared_ptr<const RestShape> shape;
   std::unique_ptr<Deformer> deformer;
+  std::shared_ptr<const DrawMesh> mesh = nullptr;  // null: the shape's own vertices
   FreeComponents free_components = FreeComponents::kError;
   Update beginning;    // settings and handles to begin with
   Reservation memory;  // the estimate that it was admitted with
@@ -43,6 +44,7 @@ struct SessionInfo {
   std::string name;
   std::uint64_t epoch = 0;
   std::shared_ptr<const RestShape> shape;
+  std::shared_ptr<const DrawMesh> mesh;
   FreeComponents free_components = FreeComponents::kError;
   Inputs inputs;
   std::int64_t created_unix_ms = 0;
@@ -66,7 +68,9 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   static absl::StatusOr<std::shared_ptr<Session>> create(SessionParts parts, SessionServices services);
 
   const std::string& name() const { return name_; }
-  std::uint32_t vertex_count() const { return static_cast<std::uint32_t>(shape_->vertex_count()); }
+  /// The client's.
+  std::uint32_t vertex_count() const { return mesh_->vertex_count(); }
+  const DrawMesh& mesh() const { return *mesh_; }
   SessionInfo info() const;
   WriterLease lease() const;
 
@@ -120,6 +124,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
 
   const std::string name_;
   const std::shared_ptr<const RestShape> shape_;
+  const std::shared_ptr<const DrawMesh> mesh_;
   const FreeComponents free_components_;
   const SessionServices services_;
   const std::int64_t created_unix_ms_;

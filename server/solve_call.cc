@@ -31,6 +31,7 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
       const std::scoped_lock lock(mutex_);
       if (is_over_locked()) return;
       scalar_ = request.scalar() == v1::SCALAR_FLOAT64 ? Scalar::kFloat64 : Scalar::kFloat32;
+      with_normals_ = request.normals();
     }
     SolveJob::OnProgress on_progress;
     if (request.progress()) {
@@ -58,7 +59,7 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
 
   void end(absl::StatusOr<SolveResult> result) {
     if (!result.ok()) return refuse(result.status());
-    result->frame->surface->position_bytes(scalar_);  // encodes it on this thread
+    result->frame->surface->prepare(scalar_, with_normals_);
     const std::scoped_lock lock(mutex_);
     backend_.log().info("solved",
                         {{"input_seq", result->frame->input_seq},
@@ -66,7 +67,7 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
                          {"seconds", result->summary.solve_seconds},
                          {"stop_reason", std::string(stop_reason_name(result->summary.stop_reason))}});
     progress_.reset();
-    cutter_ = FrameCutter(result->frame, scalar_, true, 0);
+    cutter_ = FrameCutter(result->frame, scalar_, true, with_normals_, 0);
     result_ = *std::move(result);
     pump_locked();
   }
@@ -100,6 +101,7 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
 
   Backend& backend_;
   Scalar scalar_ = Scalar::kFloat32;
+  bool with_normals_ = false;
   std::shared_ptr<SolveJob> job_;
   std::optional<SolveProgress> progress_;
   std::optional<SolveResult> result_;

@@ -103,12 +103,15 @@ absl::StatusOr<Solved> solve_on(const std::string& address, const DeformOptions&
   absl::StatusOr<client::Client> server = client::Client::connect(address);
   if (!server.ok()) return server.status();
   progress.show("sending the mesh");
-  absl::StatusOr<client::Session> session = server->open(
-      to_client(inputs.file.mesh), {.weights = options.weights, .free_components = options.free_components});
+  absl::StatusOr<client::Session> session =
+      server->open(to_client(inputs.file.mesh), {.weights = options.weights,
+                                                 .free_components = options.free_components,
+                                                 .weld = {.by_position = options.welds}});
   if (!session.ok()) return session.status();
   interrupt.set_action([&session] { session->close().IgnoreError(); });
 
   client::SolveOptions solve{.certify = options.report.has_value(), .keep_trace = options.report.has_value()};
+  solve.with_normals = options.normals;
   solve.initial_positions = std::move(inputs.initial_positions);
   solve.on_progress = [&progress](const client::SolveProgress& now) { progress.show(now); };
   absl::StatusOr<client::SolveResult> result = absl::CancelledError();
@@ -124,7 +127,10 @@ absl::Status write_results(const DeformOptions& options, const Inputs& inputs, c
   const Field field =
       Eigen::Map<const Field>(distortion.data(), static_cast<Eigen::Index>(distortion.size()));
   for (const std::filesystem::path& path : options.out) {
-    absl::Status written = write_output(path, inputs.file, positions, field);
+    absl::Status written = options.normals
+                               ? write_output_with_normals(path, inputs.file, positions, field,
+                                                           points_of(solved.result.normals), options.welds)
+                               : write_output(path, inputs.file, positions, field);
     if (!written.ok()) return written;
     std::printf("wrote %s\n", path.c_str());
   }

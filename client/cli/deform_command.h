@@ -25,7 +25,9 @@ struct DeformOptions {
   std::optional<std::uint32_t> max_iterations;
   double tolerance = 0;  // 0: the server's default
   std::optional<double> time_limit_seconds;
-  int threads = 0;  // of the server in this process; 0: all cores
+  int threads = 0;       // of the server in this process; 0: all cores
+  bool welds = false;    // vertices at one position are one
+  bool normals = false;  // in .obj and .ply
   std::vector<std::filesystem::path> out;
   std::optional<std::filesystem::path> report;
   std::optional<std::string> server;  // a server in this process where there is none

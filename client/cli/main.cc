@@ -83,8 +83,10 @@ void add_material_options(CLI::App& app, DeformOptions& options) {
       ->option_text("L");
   add_choice<client::WeightKind>(
       app, "--weights", options.weights,
-      {{"cotangent", client::WeightKind::kCotangent}, {"uniform", client::WeightKind::kUniform}},
-      "Weights of the edges (cotangent)");
+      {{"cotangent", client::WeightKind::kCotangent},
+       {"uniform", client::WeightKind::kUniform},
+       {"intrinsic_delaunay", client::WeightKind::kIntrinsicDelaunay}},
+      "Weights of the edges; intrinsic_delaunay needs no clamping where triangles are thin (cotangent)");
   add_choice<client::FreeComponents>(
       app, "--free-components", options.free_components,
       {{"error", client::FreeComponents::kError},
@@ -135,6 +137,13 @@ void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
                  ".off, or a picture as .png")
       ->allow_extra_args(false)
       ->option_text("FILE");
+  app.add_flag("--weld", options->welds,
+               "Vertices at exactly the same position are one: for meshes split along seams of texture or "
+               "normals");
+  app.add_flag(
+      "--normals", options->normals,
+      "Write normals to .obj and .ply; those of an OBJ input are carried along, so that its hard edges "
+      "stay hard");
   app.add_option("--report", options->report, "Where to write what was measured, as JSON")
       ->option_text("FILE");
   CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")

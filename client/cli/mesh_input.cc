@@ -31,7 +31,8 @@ client::MeshReport to_client(const MeshReport& report) {
                          .edges = report.edges,
                          .components = report.components,
                          .boundary_loops = report.boundary_loops,
-                         .defects = {}};
+                         .defects = {},
+                         .welded_vertices = 0};
   for (const Defect defect : all_defects()) {
     const DefectCount& found = report.of(defect);
     out.defects.push_back({std::string(defect_name(defect)), found.count, found.first});

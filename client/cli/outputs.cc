@@ -8,6 +8,7 @@
 #include "client/cli/render/render.h"
 #include "client/cli/text_file.h"
 #include "core/base/fault.h"
+#include "core/mesh/obj_normals.h"
 
 namespace lpdeform::cli {
 namespace {
@@ -39,6 +40,15 @@ absl::Status write_output(const std::filesystem::path& path, const MeshFile& fil
                           const Field& distortion) {
   if (ending_of(path) == ".png") return render_png(path, file.mesh.faces, positions, distortion);
   return write_mesh(path, file, positions, distortion);
+}
+
+absl::Status write_output_with_normals(const std::filesystem::path& path, const MeshFile& file,
+                                       const Points& positions, const Field& distortion,
+                                       const Points& normals, bool welds) {
+  const std::string ending = ending_of(path);
+  if (ending == ".obj") return write_text(path, obj_text_with_normals(file, positions, welds));
+  if (ending == ".ply") return write_mesh(path, file, positions, distortion, normals);
+  return write_output(path, file, positions, distortion);
 }
 
 }  // namespace lpdeform::cli

@@ -18,4 +18,9 @@ absl::Status check_outputs(std::span<const std::filesystem::path> paths);
 absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
                           const Field& distortion);
 
+/// The same, .obj and .ply with normals. `welds`: see obj_text_with_normals. `normals`: one a vertex, for .ply.
+absl::Status write_output_with_normals(const std::filesystem::path& path, const MeshFile& file,
+                                       const Points& positions, const Field& distortion,
+                                       const Points& normals, bool welds);
+
 }  // namespace lpdeform::cli

@@ -44,7 +44,8 @@ ordered_json mesh_object(const client::MeshReport& mesh) {
                       {"faces", mesh.faces},
                       {"edges", mesh.edges},
                       {"components", mesh.components},
-                      {"boundary_loops", mesh.boundary_loops}};
+                      {"boundary_loops", mesh.boundary_loops},
+                      {"welded_vertices", mesh.welded_vertices}};
   ordered_json first = ordered_json::object();
   for (const client::Defect& defect : mesh.defects) {
     object[defect.kind] = defect.count;
@@ -101,6 +102,7 @@ std::string mesh_text(const client::MeshReport& mesh) {
   std::string text = line_of("vertices", mesh.vertices) + line_of("faces", mesh.faces) +
                      line_of("edges", mesh.edges) + line_of("components", mesh.components) +
                      line_of("boundary loops", mesh.boundary_loops);
+  if (mesh.welded_vertices > 0) text += line_of("welded vertices", mesh.welded_vertices);
   for (const client::Defect& defect : mesh.defects) {
     const std::string few = first_few_text(defect);
     const std::string note = few.empty() ? "" : absl::StrCat("   first: ", few);

@@ -40,11 +40,13 @@ struct ClientOptions {
 struct OpenOptions {
   WeightKind weights = WeightKind::kCotangent;
   FreeComponents free_components = FreeComponents::kError;
+  Weld weld = {};
   Settings settings = {};
   /// Frames that may be under way and not yet taken, 1 to 8; 0 takes the server's 2.
   std::uint32_t credit = 0;
   bool double_precision = false;  // of the positions in frames on the wire
   bool without_distortion = false;
+  bool with_normals = false;         // fills Frame::normals
   double max_frames_per_second = 0;  // 0 is without limit; the last frame of an update always comes
 };
 

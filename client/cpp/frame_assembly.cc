@@ -72,7 +72,9 @@ absl::Status FrameAssembly::append(const v1::FramePart& part) {
   }
   const std::size_t count = part.vertex_count();
   const bool has_distortion = !part.distortion().empty();
+  const bool has_normals = !part.normals().empty();
   if (part.positions().size() != 3 * count * scalar_bytes_ ||
+      (has_normals && part.normals().size() != 3 * count * scalar_bytes_) ||
       (has_distortion && part.distortion().size() != count * scalar_bytes_)) {
     return misfit(absl::StrCat("A part of frame ", part.frame_seq(), " has the wrong number of bytes for ",
                                count, " vertices."));
@@ -80,9 +82,11 @@ absl::Status FrameAssembly::append(const v1::FramePart& part) {
   if (scalar_bytes_ == sizeof(double)) {
     append_numbers<double>(part.positions(), frame_->positions);
     append_numbers<double>(part.distortion(), frame_->distortion);
+    append_numbers<double>(part.normals(), frame_->normals);
   } else {
     append_numbers<float>(part.positions(), frame_->positions);
     append_numbers<float>(part.distortion(), frame_->distortion);
+    append_numbers<float>(part.normals(), frame_->normals);
   }
   received_ += part.vertex_count();
   if (part.last() && received_ != vertex_count_) {

@@ -18,6 +18,11 @@ absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptio
   Uploads uploads(rpc, stop, request_id);  // so that a second try is the same request to the last bit
   Packer packer([&](std::string_view bytes) { return uploads.add(bytes); });
   absl::Status packed = to_wire(mesh, packer, *request.mutable_mesh());
+  if (!mesh.normals.empty()) {
+    request.mutable_normals()->set_scalar(v1::SCALAR_FLOAT64);
+    packed.Update(packer.pack(bytes_of(mesh.normals), *request.mutable_normals()->mutable_data()));
+  }
+  packed.Update(to_wire(options.weld, packer, request));
   packed.Update(to_wire(options.settings, packer, *request.mutable_settings()));
   if (!packed.ok()) return packed;
 

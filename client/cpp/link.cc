@@ -18,6 +18,7 @@ v1::DeformRequest open_request(const Lease& lease, const OpenOptions& options) {
   frames.set_credit(options.credit);
   frames.set_scalar(options.double_precision ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
   frames.set_without_distortion(options.without_distortion);
+  frames.set_with_normals(options.with_normals);
   frames.set_max_frames_per_second(options.max_frames_per_second);
   return request;
 }

@@ -17,6 +17,7 @@ absl::Status fill_request(const Lease& lease, const std::optional<NumberedUpdate
   request.set_scalar(options.double_precision ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
   request.set_certify(options.certify);
   request.set_trace(options.keep_trace);
+  request.set_normals(options.with_normals);
   request.set_progress(static_cast<bool>(options.on_progress));
   Packer packer([&](std::string_view bytes) { return uploads.add(bytes); });
   absl::Status packed;
@@ -72,6 +73,7 @@ class ResultBuilder {
     if (!frame->has_value()) return absl::OkStatus();
     result_.positions = std::move((*frame)->positions);
     result_.distortion = std::move((*frame)->distortion);
+    result_.normals = std::move((*frame)->normals);
     is_whole_ = true;
     return absl::OkStatus();
   }

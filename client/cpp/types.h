@@ -17,6 +17,9 @@ struct Mesh {
   std::vector<double> vertices = {};
   /// Three 0-based vertex indices a triangle, counter-clockwise seen from outside.
   std::vector<std::uint32_t> faces = {};
+  /// x, y, z of a normal for each vertex as it is drawn, of any length; 0 asks for the smooth one. For frames
+  /// with normals, see OpenOptions::with_normals; may be empty.
+  std::vector<double> normals = {};
 
   std::size_t vertex_count() const { return vertices.size() / 3; }
   std::size_t face_count() const { return faces.size() / 3; }
@@ -101,13 +104,27 @@ enum class InitialGuess {
   kRest,       // the rest mesh with the handles at their targets
 };
 
-enum class WeightKind { kCotangent, kUniform };
+/// Of a cell's edges in the energy.
+enum class WeightKind {
+  kCotangent,          // max(0, (cot a + cot b) / 2), a and b the angles opposite the edge
+  kUniform,            // 1 on every edge
+  kIntrinsicDelaunay,  // cotangents of the intrinsic Delaunay triangulation: never clamped, on any mesh
+};
 
 /// What becomes of a connected component that no handle holds.
 enum class FreeComponents {
   kError,   // the solve is refused: the component is named
   kStay,    // stays where the rest mesh has it
   kFollow,  // moves rigidly with the nearest handle
+};
+
+/// Which vertices of the mesh are copies of one, as engines split them along seams of texture and normals.
+/// They are deformed as one and get the same positions to the last bit. Handles, fields and positions go on
+/// speaking of the mesh's own vertices; what is said of copies must be the same (COPIES_DIFFER).
+struct Weld {
+  bool by_position = false;  // vertices at exactly the same position are one
+  /// Otherwise one number a vertex: those with the same number are one. Empty: nothing is welded.
+  std::vector<std::uint32_t> groups = {};
 };
 
 enum class StopReason {
@@ -170,6 +187,7 @@ struct MeshReport {
   std::int64_t components = 0;
   std::int64_t boundary_loops = 0;
   std::vector<Defect> defects = {};  // every kind, also those with count 0
+  std::int64_t welded_vertices = 0;  // copies of a vertex before them
 };
 
 /// A state of the surface on its way to the optimum.
@@ -177,6 +195,9 @@ struct Frame {
   std::vector<double> positions = {};  // x, y, z of each vertex
   /// E_i of each vertex, in the mesh's unit of length; empty where it was not asked for.
   std::vector<double> distortion = {};
+  /// x, y, z of a normal of length 1 for each vertex; empty where it was not asked for. Carried from
+  /// Mesh::normals where those were given (hard edges stay hard, seams do not show), otherwise smooth.
+  std::vector<double> normals = {};
   std::uint64_t input_seq = 0;  // the newest update it answers: see Session::update; never falls
   std::uint64_t frame_seq = 0;  // rises within an epoch
   std::uint64_t epoch = 0;
@@ -207,7 +228,8 @@ struct SolveProgress {
 struct SolveOptions {
   bool certify = false;          // compute SolveResult::optimality_gap
   bool keep_trace = false;       // fill SolveResult::trace
-  bool double_precision = true;  // positions and distortion travel as float64
+  bool double_precision = true;  // positions, distortion and normals travel as float64
+  bool with_normals = false;     // fill SolveResult::normals
   /// x, y, z of each vertex, in place of the initial guess.
   std::optional<std::vector<double>> initial_positions = {};
   /// Called at most ten times a second, on the thread that called solve(). May be empty.
@@ -219,7 +241,8 @@ struct SolveOptions {
 struct SolveResult {
   std::vector<double> positions = {};
   std::vector<double> distortion = {};
-  std::string method = {};  // that ran
+  std::vector<double> normals = {};  // as Frame::normals
+  std::string method = {};           // that ran
   StopReason stop_reason = StopReason::kRunning;
   std::uint32_t iterations = 0;
   double initial_energy = 0;

@@ -144,6 +144,12 @@ absl::Status to_wire(const Mesh& mesh, Packer& packer, v1::Mesh& out) {
   return packer.pack(bytes_of(mesh.vertices) + bytes_of(mesh.faces), *out.mutable_data());
 }
 
+absl::Status to_wire(const Weld& weld, Packer& packer, v1::CreateSessionRequest& out) {
+  if (weld.by_position) out.mutable_weld()->mutable_position();
+  if (weld.by_position || weld.groups.empty()) return absl::OkStatus();
+  return packer.pack(bytes_of(weld.groups), *out.mutable_weld()->mutable_groups());
+}
+
 absl::Status to_wire(const Settings& settings, Packer& packer, v1::SettingsUpdate& out) {
   absl::Status packed;
   if (settings.p) packed.Update(to_wire(*settings.p, packer, *out.mutable_p()));
@@ -173,7 +179,15 @@ absl::Status to_wire(const Update& update, std::uint64_t seq, Packer& packer, v1
 }
 
 v1::WeightKind to_wire(WeightKind weights) {
-  return weights == WeightKind::kUniform ? v1::WEIGHT_KIND_UNIFORM : v1::WEIGHT_KIND_COTANGENT;
+  switch (weights) {
+    case WeightKind::kCotangent:
+      return v1::WEIGHT_KIND_COTANGENT;
+    case WeightKind::kUniform:
+      return v1::WEIGHT_KIND_UNIFORM;
+    case WeightKind::kIntrinsicDelaunay:
+      return v1::WEIGHT_KIND_INTRINSIC_DELAUNAY;
+  }
+  return v1::WEIGHT_KIND_UNSPECIFIED;
 }
 
 v1::FreeComponents to_wire(FreeComponents free_components) {
@@ -194,7 +208,8 @@ MeshReport from_wire(const v1::MeshReport& report) {
                  .edges = report.edges(),
                  .components = report.components(),
                  .boundary_loops = report.boundary_loops(),
-                 .defects = {}};
+                 .defects = {},
+                 .welded_vertices = report.welded_vertices()};
   for (const v1::Defect& defect : report.defects()) {
     out.defects.push_back({defect.kind(), defect.count(), {defect.first().begin(), defect.first().end()}});
   }

@@ -13,6 +13,8 @@ namespace lpdeform::client {
 // Our plain types as messages. What can fail is an upload of the packer.
 
 absl::Status to_wire(const Mesh& mesh, Packer& packer, v1::Mesh& out);
+/// Nothing where nothing is to be welded.
+absl::Status to_wire(const Weld& weld, Packer& packer, v1::CreateSessionRequest& out);
 absl::Status to_wire(const Settings& settings, Packer& packer, v1::SettingsUpdate& out);
 absl::Status to_wire(const Update& update, std::uint64_t seq, Packer& packer, v1::Update& out);
 v1::WeightKind to_wire(WeightKind weights);

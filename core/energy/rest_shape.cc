@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/fault.h"
+#include "core/mesh/half_edges.h"
 
 namespace lpdeform {
 namespace {
@@ -69,10 +70,15 @@ absl::Status check_scale(const Extent& extent) {
   return absl::OkStatus();
 }
 
-double mean_length(const Points& positions, const EdgeWeights& edges) {
-  double total = 0;
-  for (const auto& [u, v] : edges.edges) total += (positions.row(u) - positions.row(v)).norm();
-  return total / static_cast<double>(edges.edges.size());
+/// Of the mesh's own edges, whatever the weights' are.
+double mean_length(const TriangleMesh& mesh) {
+  double total = 0, count = 0;
+  const EdgeTable table(mesh.vertices.rows(), mesh.faces, [](Eigen::Index) { return true; });
+  table.for_edges([&](std::int32_t low, std::int32_t high, std::span<const HalfEdge>) {
+    total += (mesh.vertices.row(low) - mesh.vertices.row(high)).norm();
+    ++count;
+  });
+  return total / count;
 }
 
 }  // namespace
@@ -96,7 +102,7 @@ absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const Triangl
   shape->report_ = std::move(report);
   make_rows(shape->vertex_count(), edges, shape->offsets_, shape->neighbours_, shape->weights_);
 
-  shape->mean_edge_length_ = mean_length(mesh.vertices, edges);
+  shape->mean_edge_length_ = mean_length(mesh);
   shape->diagonal_ = (extent.high - extent.low).norm();
   shape->centre_ = extent.mean;
   LPDEFORM_CHECK(shape->mean_edge_length_ > 0 && shape->diagonal_ > 0);

@@ -46,8 +46,8 @@ class RestShape {
   /// Mean of the rest positions that faces use, in the caller's units.
   const Eigen::RowVector3d& centre() const { return centre_; }
 
-  // One-ring of vertex i: entries offsets[i] to offsets[i + 1] of neighbours (ascending) and weights.
-  // Symmetric.
+  // Cell of vertex i, its one-ring (of the intrinsic triangulation with kIntrinsicDelaunay): entries offsets[i]
+  // to offsets[i + 1] of neighbours (ascending) and weights. Symmetric.
   const std::vector<std::int32_t>& offsets() const { return offsets_; }
   const std::vector<std::int32_t>& neighbours() const { return neighbours_; }
   const std::vector<double>& weights() const { return weights_; }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/energy/intrinsic_delaunay.h"
 #include "core/mesh/half_edges.h"
 #include "core/mesh/topology.h"
 
@@ -12,12 +13,6 @@ namespace {
 constexpr double kFloor = 1e-6;  // of the mean weight
 constexpr double kSliver = 1e3;  // times the median weight
 
-/// One side of a face: its edge and half the cotangent of the angle opposite it.
-struct Contribution {
-  std::array<std::int32_t, 2> edge;
-  double weight;
-};
-
 std::array<double, 3> half_cotangents(const Points& vertices, const Eigen::Matrix<std::int32_t, 1, 3>& face) {
   const Eigen::RowVector3d a = vertices.row(face[0]), b = vertices.row(face[1]), c = vertices.row(face[2]);
   if (is_zero_area(a, b, c)) return {0, 0, 0};
@@ -26,8 +21,9 @@ std::array<double, 3> half_cotangents(const Points& vertices, const Eigen::Matri
           (a - c).dot(b - c) / twice_area / 2};
 }
 
-std::vector<Contribution> contributions(const TriangleMesh& mesh) {
-  std::vector<Contribution> all;
+/// For each side of each face, its edge and half the cotangent of the angle opposite it.
+std::vector<WeightedEdge> half_weights(const TriangleMesh& mesh) {
+  std::vector<WeightedEdge> all;
   all.reserve(3 * mesh.faces.rows());
   for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
     const Eigen::Matrix<std::int32_t, 1, 3> face = mesh.faces.row(f);
@@ -38,7 +34,7 @@ std::vector<Contribution> contributions(const TriangleMesh& mesh) {
     }
   }
   std::stable_sort(all.begin(), all.end(),
-                   [](const Contribution& l, const Contribution& r) { return l.edge < r.edge; });
+                   [](const WeightedEdge& l, const WeightedEdge& r) { return l.edge < r.edge; });
   return all;
 }
 
@@ -76,18 +72,40 @@ void apply_floor(std::int32_t vertex_count, EdgeWeights& result) {
   floored.erase(std::unique(floored.begin(), floored.end()), floored.end());
 }
 
-}  // namespace
-
-EdgeWeights edge_weights(const TriangleMesh& mesh, WeightKind kind) {
+/// Each edge once: the sum of what `all`, sorted, has for it, clamped.
+EdgeWeights summed(const std::vector<WeightedEdge>& all) {
   EdgeWeights result;
-  const std::vector<Contribution> all = contributions(mesh);
   for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {
     double sum = 0;
     for (end = begin; end < all.size() && all[end].edge == all[begin].edge; ++end) sum += all[end].weight;
-    if (kind == WeightKind::kUniform) sum = 1;
     if (sum < 0) result.clamped_edges.push_back(static_cast<std::int32_t>(result.edges.size()));
     result.edges.push_back(all[begin].edge);
     result.weights.push_back(std::max(0.0, sum));
+  }
+  return result;
+}
+
+bool has_zero_area_face(const TriangleMesh& mesh) {
+  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
+    if (is_zero_area(mesh.vertices.row(mesh.faces(f, 0)), mesh.vertices.row(mesh.faces(f, 1)),
+                     mesh.vertices.row(mesh.faces(f, 2))))
+      return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+EdgeWeights edge_weights(const TriangleMesh& mesh, WeightKind kind) {
+  EdgeWeights result = summed(half_weights(mesh));
+  if (kind == WeightKind::kUniform) {
+    std::fill(result.weights.begin(), result.weights.end(), 1.0);
+    result.clamped_edges.clear();
+  }
+  if (kind == WeightKind::kIntrinsicDelaunay && (!result.clamped_edges.empty() || has_zero_area_face(mesh))) {
+    IntrinsicDelaunay delaunay = intrinsic_delaunay(mesh);
+    result = summed(delaunay.edges);
+    result.flipped_edges = std::move(delaunay.flipped);
   }
   apply_floor(static_cast<std::int32_t>(mesh.vertices.rows()), result);
   return result;
@@ -99,6 +117,12 @@ void count_weight_defects(const EdgeWeights& weights, MeshReport& report) {
   for (std::size_t k = 0; k < weights.clamped_edges.size() && k < DefectCount::kFirstShown; ++k) {
     const auto& edge = weights.edges[weights.clamped_edges[k]];
     report.clamped_edges.first.insert(report.clamped_edges.first.end(), edge.begin(), edge.end());
+  }
+  report.flipped_edges = {};
+  report.flipped_edges.count = static_cast<std::int64_t>(weights.flipped_edges.size());
+  for (std::size_t k = 0; k < weights.flipped_edges.size() && k < DefectCount::kFirstShown; ++k) {
+    const auto& edge = weights.flipped_edges[k];
+    report.flipped_edges.first.insert(report.flipped_edges.first.end(), edge.begin(), edge.end());
   }
   report.floored_vertices = {};
   report.floored_vertices.count = static_cast<std::int64_t>(weights.floored_vertices.size());

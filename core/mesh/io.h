@@ -37,10 +37,11 @@ absl::StatusOr<MeshFile> parse_mesh(std::string_view bytes, MeshFormat format);
 
 /// Writes `positions` (one a vertex of `file.mesh`) with the faces of `file` as OFF, OBJ or PLY (binary,
 /// double coordinates, little-endian), by the ending of `path`. PLY carries a double property "distortion"
-/// and red, green, blue (uchar), blue to red, where `distortion` has one value a vertex; it may be empty.
+/// and red, green, blue (uchar), blue to red, where `distortion` has one value a vertex, and nx, ny, nz
+/// (float) where `normals` has a row each; both may be empty. OBJ with normals: core/mesh/obj_normals.h.
 /// Written whole or not at all (temporary file, then rename).
 absl::Status write_mesh(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
-                        const Field& distortion);
+                        const Field& distortion, const Points& normals = Points(0, 3));
 
 /// Coordinates as the shortest text that reads back to the same double.
 std::string obj_text(const MeshFile& file, const Points& positions);

@@ -15,7 +15,7 @@ struct DefectEntry {
 };
 
 /// In the order of the enum.
-constexpr std::array<DefectEntry, 10> kDefects{{
+constexpr std::array<DefectEntry, 11> kDefects{{
     {"not_finite", &MeshReport::not_finite},
     {"index_out_of_range", &MeshReport::index_out_of_range},
     {"unreferenced_vertices", &MeshReport::unreferenced_vertices},
@@ -26,6 +26,7 @@ constexpr std::array<DefectEntry, 10> kDefects{{
     {"inconsistent_orientation", &MeshReport::inconsistent_orientation},
     {"clamped_edges", &MeshReport::clamped_edges},
     {"floored_vertices", &MeshReport::floored_vertices},
+    {"flipped_edges", &MeshReport::flipped_edges},
 }};
 
 const DefectEntry& entry(Defect defect) {

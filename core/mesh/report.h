@@ -23,6 +23,7 @@ enum class Defect {
   kInconsistentOrientation,  // edge: its two faces run along it in the same direction
   kClampedEdge,              // edge: negative cotangent weight, clamped to 0
   kFlooredVertex,            // vertex: kept attached by the floor on its edges' weights
+  kFlippedEdge,              // edge: not Delaunay; gave way to another with intrinsic Delaunay weights
 };
 
 /// The name in reports and on the wire: "zero_area_faces".
@@ -48,7 +49,7 @@ struct MeshReport {
   DefectCount not_finite, index_out_of_range, unreferenced_vertices, duplicate_faces, zero_area_faces,
       non_manifold_edges, non_manifold_vertices, inconsistent_orientation;
   /// Known once weights are chosen (count_weight_defects in core/energy/weights.h); 0 before.
-  DefectCount clamped_edges, floored_vertices;
+  DefectCount clamped_edges, floored_vertices, flipped_edges;
 
   const DefectCount& of(Defect defect) const;
   DefectCount& of(Defect defect);

@@ -1,4 +1,3 @@
-#include <charconv>
 #include <cstdint>
 
 #include "absl/strings/str_cat.h"
@@ -7,26 +6,12 @@
 #include "core/mesh/byte_order.h"
 #include "core/mesh/colour.h"
 #include "core/mesh/io.h"
+#include "core/mesh/number_text.h"
 #include "core/mesh/text_scanner.h"
 #include "core/mesh/whole_file.h"
 
 namespace lpdeform {
 namespace {
-
-template <typename Number>
-void append_number(std::string& text, Number number) {
-  char digits[32];
-  const auto result = std::to_chars(digits, digits + sizeof(digits), number);
-  text.append(digits, result.ptr);
-}
-
-/// "x y z", each as the shortest text that reads back to the same double.
-void append_point(std::string& text, const Points& positions, Eigen::Index v) {
-  for (int axis = 0; axis < 3; ++axis) {
-    if (axis > 0) text += ' ';
-    append_number(text, positions(v, axis));
-  }
-}
 
 void append_face(std::string& text, std::string_view head, const Faces& faces, Eigen::Index f,
                  int first_index) {
@@ -80,9 +65,10 @@ std::string moved_obj_text(std::string_view source, const Points& positions) {
   return text;
 }
 
-std::string ply_header(Eigen::Index vertices, Eigen::Index faces, bool has_distortion) {
+std::string ply_header(Eigen::Index vertices, Eigen::Index faces, bool has_normals, bool has_distortion) {
   return absl::StrCat("ply\nformat binary_little_endian 1.0\nelement vertex ", vertices,
                       "\nproperty double x\nproperty double y\nproperty double z\n",
+                      has_normals ? "property float nx\nproperty float ny\nproperty float nz\n" : "",
                       has_distortion
                           ? "property double distortion\nproperty uchar red\nproperty uchar green\n"
                             "property uchar blue\n"
@@ -90,12 +76,15 @@ std::string ply_header(Eigen::Index vertices, Eigen::Index faces, bool has_disto
                       "element face ", faces, "\nproperty list uchar int vertex_indices\nend_header\n");
 }
 
-std::string ply_bytes(const Faces& faces, const Points& positions, const Field& distortion) {
-  const bool has_distortion = distortion.size() > 0;
+std::string ply_bytes(const Faces& faces, const Points& positions, const Field& distortion,
+                      const Points& normals) {
+  const bool has_distortion = distortion.size() > 0, has_normals = normals.rows() > 0;
   const std::vector<Rgb> colours = distortion_colours(distortion);
-  std::string bytes = ply_header(positions.rows(), faces.rows(), has_distortion);
+  std::string bytes = ply_header(positions.rows(), faces.rows(), has_normals, has_distortion);
   for (Eigen::Index v = 0; v < positions.rows(); ++v) {
     for (int axis = 0; axis < 3; ++axis) append_little_endian(bytes, positions(v, axis));
+    for (int axis = 0; has_normals && axis < 3; ++axis)
+      append_little_endian(bytes, static_cast<float>(normals(v, axis)));
     if (!has_distortion) continue;
     append_little_endian(bytes, distortion[v]);
     for (const std::uint8_t channel : colours[v]) append_little_endian(bytes, channel);
@@ -122,8 +111,9 @@ std::string obj_text(const MeshFile& file, const Points& positions) {
 }
 
 absl::Status write_mesh(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
-                        const Field& distortion) {
+                        const Field& distortion, const Points& normals) {
   LPDEFORM_CHECK(positions.rows() == file.mesh.vertices.rows());
+  LPDEFORM_CHECK(normals.rows() == 0 || normals.rows() == positions.rows());
   LPDEFORM_CHECK(distortion.size() == 0 || distortion.size() == positions.rows());
   const absl::StatusOr<MeshFormat> format = mesh_format(path);
   if (!format.ok()) return format.status();
@@ -133,7 +123,7 @@ absl::Status write_mesh(const std::filesystem::path& path, const MeshFile& file,
     case MeshFormat::kObj:
       return write_whole_file(path, obj_text(file, positions));
     case MeshFormat::kPly:
-      return write_whole_file(path, ply_bytes(file.mesh.faces, positions, distortion));
+      return write_whole_file(path, ply_bytes(file.mesh.faces, positions, distortion, normals));
     case MeshFormat::kStl:
       return cannot_write_stl(path);
   }

@@ -55,6 +55,7 @@ TEST(FrameAssembly, ReadsDoublesBitForBit) {
   ASSERT_TRUE(frame.ok() && frame->has_value());
   EXPECT_EQ((*frame)->positions, (std::vector<double>{0.1, 1e300, -3}));
   EXPECT_EQ((*frame)->distortion, std::vector<double>{0.3});
+  EXPECT_TRUE((*frame)->normals.empty());
 }
 
 TEST(FrameAssembly, RefusesPartsThatDoNotFit) {

@@ -12,6 +12,7 @@
 #include "client/cpp/client.h"
 #include "core/mesh/shapes.h"
 #include "tests/client/in_process_server.h"
+#include "tests/core/split_shapes.h"
 
 namespace lpdeform::client {
 namespace {
@@ -349,6 +350,42 @@ TEST_F(SessionTest, NobodyAtTheAddressIsUnavailableAtOnce) {
   const auto client = Client::connect("unix:/nowhere/socket");
   EXPECT_TRUE(absl::IsUnavailable(client.status()));
   EXPECT_EQ(fault_of(client.status()).reason, "NO_SERVER");
+}
+
+TEST_F(SessionTest, ASplitMeshIsWeldedAndDrawnWithItsHardEdges) {
+  const TriangleMesh split = split_at_every_corner(box_surface(2, 2, 6));
+  Mesh mesh = cli::to_client(split);
+  mesh.normals = cli::flat(flat_normals(split));
+  Session session =
+      connect()
+          ->open(mesh, {.weld = {.by_position = true}, .double_precision = true, .with_normals = true})
+          .value();
+  EXPECT_EQ(session.mesh_report().vertices, split.vertices.rows());
+  EXPECT_GT(session.mesh_report().welded_vertices, 0);
+  Update update;
+  std::vector<std::uint32_t> low, high;
+  for (Eigen::Index v = 0; v < split.vertices.rows(); ++v) {
+    if (split.vertices(v, 2) == 0) low.push_back(static_cast<std::uint32_t>(v));
+    if (split.vertices(v, 2) == 6) high.push_back(static_cast<std::uint32_t>(v));
+  }
+  update.handles.emplace("low", Handle{.vertices = low});
+  const RigidMotion turn{.angle_radians = 0.5, .center = {1, 1, 0}};
+  update.handles.emplace("high", Handle{.vertices = high, .motion = turn});
+  session.update(update).value();
+  const Frame frame = session.settle(kPatience).value();
+  const SolveResult solved = session.solve({.with_normals = true}).value();
+  EXPECT_EQ(frame.normals.size(), mesh.normals.size());
+  EXPECT_EQ(solved.normals.size(), mesh.normals.size());
+  // The end's own faces are turned about z: their normals stay along it, and those of the sides across it.
+  for (const std::uint32_t v : high) {
+    const double was = mesh.normals[3 * v + 2], is = solved.normals[3 * v + 2];
+    if (was == 1) {
+      EXPECT_NEAR(is, 1, 1e-9);
+    } else {
+      EXPECT_LT(is, 0.5);
+    }
+  }
+  EXPECT_TRUE(session.solve().value().normals.empty());
 }
 
 }  // namespace

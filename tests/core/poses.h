@@ -70,6 +70,29 @@ inline std::unique_ptr<Deformer> deformer(std::shared_ptr<const RestShape> shape
   return result;
 }
 
+/// The vertices of grid(side, side) triangulated by slivers: between two rows, each side of the one makes a
+/// triangle with the vertex `shift` places further on in the other. shift < side.
+inline TriangleMesh slanted_plate(int side, int shift) {
+  TriangleMesh mesh = grid(side, side);
+  Eigen::Index face = 0;
+  for (int y = 0; y < side; ++y) {
+    const int low = y * (side + 1), high = low + side + 1;
+    int a = 0, b = 0;  // how far each row is done
+    const auto advance_low = [&] {
+      mesh.faces.row(face++) << low + a, low + a + 1, high + b;
+      ++a;
+    };
+    const auto advance_high = [&] {
+      mesh.faces.row(face++) << low + a, high + b + 1, high + b;
+      ++b;
+    };
+    while (b < shift) advance_high();
+    while (b < side) advance_low(), advance_high();
+    while (a < side) advance_low();
+  }
+  return mesh;
+}
+
 /// The mesh with every vertex moved by up to `amount`, always the same way.
 inline Points shaken(const Points& points, double amount) {
   std::mt19937 random(7);

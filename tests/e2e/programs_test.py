@@ -209,6 +209,47 @@ class Deform(unittest.TestCase):
         kept, given = ([line for line in read_text(path).splitlines() if not line.startswith("v ")] for path in (out, source))
         self.assertEqual(kept, given)
 
+    def split_bar(self):
+        """The bar with a vertex and a normal for each corner of each face, and its handles."""
+        points = read_off(self.at("bar.off"))
+        lines = [line.split() for line in read_text(self.at("bar.off")).splitlines()]
+        faces = [tuple(map(int, words[1:])) for words in lines if len(words) == 4 and words[0] == "3"]
+        text, copies = [], {}
+        for face in faces:
+            a, b, c = (points[v] for v in face)
+            u, w = [b[k] - a[k] for k in range(3)], [c[k] - a[k] for k in range(3)]
+            normal = (u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0])
+            text.append("vn {} {} {}".format(*normal))
+            for v in face:
+                copies.setdefault(v, []).append(sum(map(len, copies.values())))
+                text.append("v {} {} {}".format(*points[v]))
+            text.append("f -3//-1 -2//-1 -1//-1")
+        handles = json.loads(read_text(self.at("bar.json")))
+        for handle in handles["handles"]:
+            handle["vertices"] = [copy for v in handle["vertices"] for copy in copies[v]]
+        return self.write("split.obj", "\n".join(text) + "\n"), self.write("split.json", json.dumps(handles)), copies
+
+    def test_a_split_obj_comes_out_in_one_piece_and_ready_to_draw(self):
+        mesh, handles, copies = self.split_bar()
+        out, report = self.at("posed.obj"), self.at("posed.json")
+        apart = run("deform", mesh, "--handles", handles, "--out", out)
+        self.assertEqual(apart.returncode, 2, "each face is a component of its own")
+        done = run("deform", mesh, "--handles", handles, "--weld", "--normals", "--out", out, "--report", report)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertGreater(json.loads(read_text(report))["mesh"]["welded_vertices"], 0)
+        self.deform("--out", self.at("whole.off"))
+        whole = read_off(self.at("whole.off"))
+        lines = read_text(out).splitlines()
+        posed = [line for line in lines if line.startswith("v ")]
+        for v, same in copies.items():
+            self.assertEqual(len({posed[copy] for copy in same}), 1)
+            for axis, word in enumerate(posed[same[0]].split()[1:]):
+                self.assertAlmostEqual(float(word), whole[v][axis], delta=0.02)
+        normals = [tuple(map(float, line.split()[1:])) for line in lines if line.startswith("vn ")]
+        self.assertEqual(len(normals), len(posed))
+        for normal in normals:
+            self.assertAlmostEqual(math.hypot(*normal), 1, delta=1e-6)
+
     def test_info_prints_the_object_that_the_report_calls_mesh(self):
         info = run("info", self.at("creature.off"), "--json")
         self.assertEqual(info.returncode, 0)
@@ -332,7 +373,7 @@ class Deform(unittest.TestCase):
         text = run("deform", "--help").stdout
         for option in ("--handles", "--p ", "--p-field", "--stiffness-field", "--length-unit", "--method", "--weights",
                        "--initial", "--free-components", "--max-iterations", "--tolerance", "--time-limit", "--threads",
-                       "--out", "--report", "--server", "Exit status"):
+                       "--weld", "--normals", "--out", "--report", "--server", "Exit status"):
             self.assertIn(option, text)
         self.assertRegex(run("--version").stdout, r"^lpdeform \d+\.\d+\.\d+\n$")
 

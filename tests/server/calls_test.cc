@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <limits>
+#include <map>
 #include <thread>
 
 #include "server/health_probe.h"
@@ -90,6 +91,27 @@ TEST_F(CallsTest, ASessionMayBeginWithHandlesAndSettings) {
   ASSERT_TRUE(outcome.status.ok()) << outcome.status.error_message();
   EXPECT_EQ(outcome.summary.stop_reason(), v1::STOP_REASON_CONVERGED);
   EXPECT_GT(outcome.summary.energy(), 0);
+}
+
+TEST_F(CallsTest, IntrinsicWeightsClampNothingAndTellWhatTheyFlipped) {
+  TriangleMesh mesh = bar_mesh();
+  mesh.vertices.col(0) *= 0.1;
+  mesh.vertices.col(2) += 2 * mesh.vertices.col(1);
+  std::map<v1::WeightKind, std::map<std::string, std::uint32_t>> counts;
+  for (const v1::WeightKind kind : {v1::WEIGHT_KIND_COTANGENT, v1::WEIGHT_KIND_INTRINSIC_DELAUNAY}) {
+    v1::CreateSessionRequest request;
+    *request.mutable_mesh() = mesh_message(mesh);
+    request.set_weights(kind);
+    v1::CreateSessionResponse created;
+    ASSERT_TRUE(try_create(request, created).ok());
+    EXPECT_EQ(created.session().weights(), kind);
+    for (const v1::Defect& defect : created.session().mesh().defects())
+      counts[kind][defect.kind()] = defect.count();
+  }
+  EXPECT_GT(counts[v1::WEIGHT_KIND_COTANGENT]["clamped_edges"], 0);
+  EXPECT_EQ(counts[v1::WEIGHT_KIND_COTANGENT]["flipped_edges"], 0);
+  EXPECT_EQ(counts[v1::WEIGHT_KIND_INTRINSIC_DELAUNAY]["clamped_edges"], 0);
+  EXPECT_GT(counts[v1::WEIGHT_KIND_INTRINSIC_DELAUNAY]["flipped_edges"], 0);
 }
 
 TEST_F(CallsTest, EveryCallSaysNotFoundForASessionThatIsNot) {

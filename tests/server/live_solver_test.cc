@@ -19,7 +19,9 @@ constexpr int kMostSlices = 100000;
 class LiveSolverTest : public testing::Test {
  protected:
   explicit LiveSolverTest(const TriangleMesh& mesh = bar_mesh())
-      : shape_(shape_of(mesh)), mailbox_(shape_), solver_(deformer_of(shape_), mailbox_, *publisher_, {}) {}
+      : shape_(shape_of(mesh)),
+        mailbox_(shape_),
+        solver_(deformer_of(shape_), mailbox_, *publisher_, std::make_shared<DrawMesh>(shape_), {}) {}
 
   const Points& rest() const { return shape_->positions(); }
 

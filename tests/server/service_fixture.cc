@@ -116,6 +116,7 @@ std::optional<ReceivedFrame> FrameAssembler::add(const v1::FramePart& part) {
   vertices_ += part.vertex_count();
   frame_.positions += part.positions();
   frame_.distortion += part.distortion();
+  frame_.normals += part.normals();
   ++frame_.parts;
   if (!part.last()) return std::nullopt;
   EXPECT_EQ(vertices_, frame_.header.vertex_count());

@@ -54,6 +54,7 @@ struct ReceivedFrame {
   v1::FrameHeader header;
   std::string positions;
   std::string distortion;
+  std::string normals;
   int parts = 0;
 
   template <typename Number>

@@ -120,6 +120,16 @@ std::size_t offset_of(const google::protobuf::MessageLite& message, const std::s
   return message.SerializeAsString().find(part);
 }
 
+/// Triangles around vertex 0, no two numbers of a vertex alike.
+std::shared_ptr<const RestShape> fan(std::uint32_t vertices) {
+  TriangleMesh mesh{Points(vertices, 3), Faces(vertices - 2, 3)};
+  for (std::uint32_t v = 0; v < vertices; ++v)
+    mesh.vertices.row(v) << std::cos(6.0 * v / vertices), std::sin(6.0 * v / vertices), 0.3 + 1e-3 * v;
+  for (std::uint32_t f = 0; f + 2 < vertices; ++f)
+    mesh.faces.row(f) << 0, static_cast<int>(f) + 1, static_cast<int>(f) + 2;
+  return RestShape::create(mesh).value();
+}
+
 class AlignmentTest : public testing::TestWithParam<std::tuple<std::uint32_t, Scalar>> {};
 
 TEST_P(AlignmentTest, BuffersCanBeUsedInPlaceInEveryMessage) {
@@ -128,19 +138,31 @@ TEST_P(AlignmentTest, BuffersCanBeUsedInPlaceInEveryMessage) {
   const auto timers = std::make_shared<ManualTimers>();
   const auto publisher = std::make_shared<Publisher>();
   Frame frame;
-  frame.surface = std::make_shared<Surface>(Points::Constant(n, 3, 1234.5678), Field::Constant(n, 9.25));
+  const auto mesh = std::make_shared<const DrawMesh>(fan(n));
+  frame.surface =
+      std::make_shared<Surface>(mesh->positions(fan(n)->positions()), Field::Constant(n, 9.25), mesh);
   const auto expect_aligned = [&](const google::protobuf::MessageLite& message, const v1::FramePart& part) {
     EXPECT_EQ(offset_of(message, part.positions()) % unit, 0u);
     if (!part.distortion().empty()) {
       EXPECT_EQ(offset_of(message, part.distortion()) % unit, 0u);
     }
+    if (!part.normals().empty()) {
+      EXPECT_EQ(offset_of(message, part.normals()) % unit, 0u);
+    }
   };
   for (const std::uint64_t seq : {1u, 127u, 128u, 20000u}) {
-    for (const bool with_distortion : {true, false}) {
+    for (const int extras : {0, 1, 2, 3}) {
       for (const std::uint32_t first : {0u, 1u}) {
+        const bool with_distortion = extras % 2 == 1, with_normals = extras >= 2;
         frame.frame_seq = seq;
-        const FramePiece piece{
-            std::make_shared<Frame>(frame), first, n - first, true, seq, scalar, with_distortion};
+        const FramePiece piece{std::make_shared<Frame>(frame),
+                               first,
+                               n - first,
+                               true,
+                               seq,
+                               scalar,
+                               with_distortion,
+                               with_normals};
         const FrameStream stream({}, publisher, timers, std::chrono::seconds(15), {});
         v1::DeformResponse deform;
         encode(piece, stream, n, deform);
@@ -157,7 +179,7 @@ TEST_P(AlignmentTest, BuffersCanBeUsedInPlaceInEveryMessage) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, AlignmentTest,
-                         testing::Combine(testing::Values(2, 3, 5, 9, 10, 11, 31, 32, 33, 300, 340, 341, 1363,
+                         testing::Combine(testing::Values(3, 4, 5, 9, 10, 11, 31, 32, 33, 300, 340, 341, 1363,
                                                           1364, 1365, 4095, 4096, 26000),
                                           testing::Values(Scalar::kFloat32, Scalar::kFloat64)));
 

@@ -58,7 +58,7 @@ TEST(CheckMesh, CountsTheDefectsOfEveryKindUnderDifferentNames) {
   EXPECT_THAT(names,
               ElementsAre("not_finite", "index_out_of_range", "unreferenced_vertices", "duplicate_faces",
                           "zero_area_faces", "non_manifold_edges", "non_manifold_vertices",
-                          "inconsistent_orientation", "clamped_edges", "floored_vertices"));
+                          "inconsistent_orientation", "clamped_edges", "floored_vertices", "flipped_edges"));
 }
 
 TEST(CheckMesh, NamesVerticesThatAreNotFinite) {

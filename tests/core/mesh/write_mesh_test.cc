@@ -71,6 +71,18 @@ TEST(WriteMesh, PlyHasDoubleCoordinatesDistortionAndColour) {
   EXPECT_EQ(file_bytes(folder / "a.ply"), expected);
 }
 
+TEST(WriteMesh, PlyHasNormalsWhereThereAreAny) {
+  const ScratchFolder folder;
+  const MeshFile file{make_mesh({{1, 2, 3}, {4, 5, 6}, {7, 8, 0.1}}, {{0, 1, 2}}), ""};
+  const Points normals = Points::Constant(3, 3, 0.5);
+  ASSERT_TRUE(write_mesh(folder / "a.ply", file, file.mesh.vertices, {}, normals).ok());
+  const std::string bytes = file_bytes(folder / "a.ply");
+  EXPECT_THAT(bytes,
+              ::testing::HasSubstr("z\nproperty float nx\nproperty float ny\nproperty float nz\nelement"));
+  const MeshFile again = read_mesh(folder / "a.ply").value();
+  EXPECT_TRUE(same_bits(again.mesh.vertices, file.mesh.vertices));
+}
+
 TEST(WriteMesh, PlyWithoutDistortionHasNoColour) {
   const ScratchFolder folder;
   const MeshFile file{sphere(0), ""};

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+
+#include "core/mesh/io.h"
+
+namespace lpdeform {
+
+/// The text of an OBJ file at `positions`, one a vertex of `file.mesh`, with normals that are ready to draw: vn
+/// lines of its own, a normal for each pair of a vertex and a normal that stand together in an f line of the
+/// source, carried along as CarriedNormals has it. So the source's hard edges, where a vertex stands with
+/// several normals, stay hard, and what shared a normal goes on sharing one. Corners without a normal get the
+/// smooth one. Texture coordinates, groups and materials stay; the source's own vn lines, which are out of
+/// date, go. A source of another format than OBJ gets smooth normals.
+///
+/// `welds`: vertices at the same position are copies of one, as in a session that welds by position. `file`
+/// is one that deformable() accepts.
+std::string obj_text_with_normals(const MeshFile& file, const Points& positions, bool welds);
+
+}  // namespace lpdeform

@@ -1,0 +1,137 @@
+#include "core/mesh/weld.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr double kFarthestCopy = 1e-6;  // of the diagonal
+
+/// From the lowest copy of each vertex.
+Weld from_lowest(const std::vector<std::int32_t>& lowest) {
+  Weld weld;
+  weld.to_welded.resize(lowest.size());
+  for (std::size_t v = 0; v < lowest.size(); ++v) {
+    const auto vertex = static_cast<std::int32_t>(v);
+    if (lowest[v] == vertex) weld.first_copy.push_back(vertex);
+    weld.to_welded[v] = lowest[v] == vertex ? weld.welded_count() - 1 : weld.to_welded[lowest[v]];
+  }
+  return weld;
+}
+
+absl::Status check_groups(std::int64_t vertices, std::span<const std::uint32_t> groups) {
+  if (static_cast<std::int64_t>(groups.size()) != vertices) {
+    return invalid_input(
+        {"WELD_SIZE", "weld", absl::StrCat(vertices, " numbers")},
+        absl::StrCat("The weld has ", groups.size(), " numbers for ", vertices, " vertices."));
+  }
+  const auto wrong = std::find_if(groups.begin(), groups.end(), [&](auto g) { return g >= vertices; });
+  if (wrong == groups.end()) return absl::OkStatus();
+  const auto vertex = wrong - groups.begin();
+  return invalid_input(
+      {"WELD_OUT_OF_RANGE", absl::StrCat("vertex ", vertex), absl::StrCat("number < ", vertices)},
+      absl::StrCat("Vertex ", vertex, " is welded under number ", *wrong, "; the mesh has ", vertices,
+                   " vertices."));
+}
+
+/// Copies that are not finite are left to the check of the mesh.
+absl::Status check_distances(const Points& positions, const std::vector<std::int32_t>& lowest) {
+  if (lowest.empty()) return absl::OkStatus();
+  const double diagonal = (positions.colwise().maxCoeff() - positions.colwise().minCoeff()).norm();
+  for (std::size_t v = 0; v < lowest.size(); ++v) {
+    const double distance = (positions.row(static_cast<Eigen::Index>(v)) - positions.row(lowest[v])).norm();
+    if (!(distance > kFarthestCopy * diagonal)) continue;
+    return invalid_input(
+        {"WELD_TOO_FAR", absl::StrCat("vertex ", v), absl::StrCat("distance <= ", kFarthestCopy * diagonal)},
+        absl::StrCat("Vertex ", v, " is ", distance, " away from vertex ", lowest[v],
+                     ", whose copy it is to be; at most ", kFarthestCopy, " of the mesh's diagonal is."));
+  }
+  return absl::OkStatus();
+}
+
+bool is_of_a_face(Defect defect) {
+  return defect == Defect::kIndexOutOfRange || defect == Defect::kDuplicateFace ||
+         defect == Defect::kZeroAreaFace;
+}
+
+}  // namespace
+
+Weld no_weld(std::int32_t vertex_count) {
+  Weld weld;
+  weld.to_welded.resize(vertex_count);
+  std::iota(weld.to_welded.begin(), weld.to_welded.end(), 0);
+  weld.first_copy = weld.to_welded;
+  return weld;
+}
+
+Weld weld_by_position(const Points& positions) {
+  std::vector<std::int32_t> order, lowest(positions.rows());
+  std::iota(lowest.begin(), lowest.end(), 0);
+  for (const std::int32_t v : lowest) {
+    if (positions.row(v).allFinite()) order.push_back(v);
+  }
+  const auto compare = [&](std::int32_t a, std::int32_t b) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (positions(a, axis) != positions(b, axis)) return positions(a, axis) < positions(b, axis) ? -1 : 1;
+    }
+    return 0;
+  };
+  std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
+    const int order_of_places = compare(a, b);
+    return order_of_places != 0 ? order_of_places < 0 : a < b;
+  });
+  for (std::size_t k = 1; k < order.size(); ++k) {
+    if (compare(order[k - 1], order[k]) == 0) lowest[order[k]] = lowest[order[k - 1]];
+  }
+  return from_lowest(lowest);
+}
+
+absl::StatusOr<Weld> weld_by_groups(const Points& positions, std::span<const std::uint32_t> groups) {
+  if (absl::Status status = check_groups(positions.rows(), groups); !status.ok()) return status;
+  std::vector<std::int32_t> first(groups.size(), -1), lowest(groups.size());
+  for (std::size_t v = 0; v < groups.size(); ++v) {
+    if (first[groups[v]] < 0) first[groups[v]] = static_cast<std::int32_t>(v);
+    lowest[v] = first[groups[v]];
+  }
+  if (absl::Status status = check_distances(positions, lowest); !status.ok()) return status;
+  return from_lowest(lowest);
+}
+
+TriangleMesh welded(const TriangleMesh& split, const Weld& weld) {
+  TriangleMesh mesh{Points(weld.welded_count(), 3), split.faces};
+  for (std::int32_t w = 0; w < weld.welded_count(); ++w)
+    mesh.vertices.row(w) = split.vertices.row(weld.first_copy[w]);
+  for (std::int32_t& index : mesh.faces.reshaped()) {
+    const bool is_in_range = index >= 0 && index < weld.split_count();
+    index = is_in_range ? weld.to_welded[index] : std::numeric_limits<std::int32_t>::max();
+  }
+  return mesh;
+}
+
+Points scattered(const Points& welded, const Weld& weld) {
+  Points split(weld.split_count(), 3);
+  for (std::int32_t v = 0; v < weld.split_count(); ++v) split.row(v) = welded.row(weld.to_welded[v]);
+  return split;
+}
+
+Field scattered(const Field& welded, const Weld& weld) {
+  Field split(weld.split_count());
+  for (std::int32_t v = 0; v < weld.split_count(); ++v) split[v] = welded[weld.to_welded[v]];
+  return split;
+}
+
+MeshReport scattered(MeshReport welded, const Weld& weld) {
+  welded.vertices = weld.split_count();
+  for (const Defect defect : all_defects()) {
+    if (is_of_a_face(defect)) continue;
+    for (std::int32_t& vertex : welded.of(defect).first) vertex = weld.first_copy[vertex];
+  }
+  return welded;
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <map>
+#include <utility>
+
+#include "core/mesh/shapes.h"
+
+namespace lpdeform {
+
+/// Every corner of every face gets a vertex of its own, as a mesh with flat faces is drawn.
+inline TriangleMesh split_at_every_corner(const TriangleMesh& mesh) {
+  TriangleMesh split{Points(3 * mesh.faces.rows(), 3), Faces(mesh.faces.rows(), 3)};
+  for (Eigen::Index corner = 0; corner < 3 * mesh.faces.rows(); ++corner) {
+    split.vertices.row(corner) = mesh.vertices.row(mesh.faces(corner / 3, corner % 3));
+    split.faces(corner / 3, corner % 3) = static_cast<std::int32_t>(corner);
+  }
+  return split;
+}
+
+/// The seam of a texture: faces on the side y > 0 of the plane y = 0 get vertices of their own along it. The
+/// copies come after all vertices of `mesh`.
+inline TriangleMesh split_along_seam(const TriangleMesh& mesh) {
+  TriangleMesh split = mesh;
+  std::map<std::int32_t, std::int32_t> copies;
+  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
+    double y = 0;
+    for (int k = 0; k < 3; ++k) y += mesh.vertices(mesh.faces(f, k), 1);
+    for (int k = 0; k < 3 && y > 0; ++k) {
+      const std::int32_t v = mesh.faces(f, k);
+      if (std::abs(mesh.vertices(v, 1)) > 1e-9) continue;
+      const auto next =
+          static_cast<std::int32_t>(mesh.vertices.rows() + static_cast<Eigen::Index>(copies.size()));
+      split.faces(f, k) = copies.try_emplace(v, next).first->second;
+    }
+  }
+  split.vertices.conservativeResize(mesh.vertices.rows() + static_cast<Eigen::Index>(copies.size()), 3);
+  for (const auto& [vertex, copy] : copies) split.vertices.row(copy) = mesh.vertices.row(vertex);
+  return split;
+}
+
+/// The normal of each corner's face, for a mesh of split_at_every_corner.
+inline Points flat_normals(const TriangleMesh& split) {
+  Points normals(split.vertices.rows(), 3);
+  for (Eigen::Index f = 0; f < split.faces.rows(); ++f) {
+    const Eigen::RowVector3d a = split.vertices.row(split.faces(f, 0)),
+                             b = split.vertices.row(split.faces(f, 1)),
+                             c = split.vertices.row(split.faces(f, 2));
+    for (int k = 0; k < 3; ++k) normals.row(split.faces(f, k)) = (b - a).cross(c - a).normalized();
+  }
+  return normals;
+}
+
+/// Bends space about the x axis, as z grows.
+inline Points bent_along_z(const Points& points, double radians_per_unit) {
+  Points result = points;
+  for (auto point : result.rowwise()) {
+    const Eigen::AngleAxisd turn(radians_per_unit * point[2], Eigen::Vector3d::UnitX());
+    const Eigen::Vector3d at(point[0], point[1], 0);
+    const double radius = 1 / radians_per_unit;
+    point = (turn * (at + Eigen::Vector3d(0, radius, 0)) - Eigen::Vector3d(0, radius, 0)).transpose();
+  }
+  return result;
+}
+
+}  // namespace lpdeform
