@@ -70,13 +70,31 @@ std::string name_for(const fs::path& mesh, std::set<std::string>& taken) {
   return name;
 }
 
+/// The paper's methods know handles that hold vertices exactly, and nothing else.
+absl::Status check_plain(const HandleFile& file) {
+  const auto refused = [](const std::string& element) {
+    return invalid_input({"HANDLE_FILE_VALUE", element, "handles that hold vertices exactly"},
+                         absl::StrCat(element,
+                                      " is not for the paper's methods, which know only handles that hold "
+                                      "vertices exactly."));
+  };
+  for (const NamedHandle& named : file.handles) {
+    const client::Handle& handle = named.handle;
+    const bool is_plain = std::holds_alternative<client::Exactly>(handle.hold) && handle.points.empty() &&
+                          handle.footprint == 0;
+    if (!is_plain) return refused(absl::StrCat("handle \"", named.name, "\""));
+  }
+  return file.region.empty() ? absl::OkStatus() : refused("\"region\"");
+}
+
 absl::StatusOr<PaperPose> read_pose(const fs::path& mesh, const fs::path& handles, std::string name) {
   absl::StatusOr<MeshFile> file = read_deformable(mesh);
   if (!file.ok()) return file.status();
-  const absl::StatusOr<std::vector<NamedHandle>> named = read_handles(handles, file->mesh.vertices.rows());
-  if (!named.ok()) return named.status();
+  const absl::StatusOr<HandleFile> held = read_handles(handles, file->mesh.vertices.rows());
+  if (!held.ok()) return held.status();
+  if (absl::Status status = check_plain(*held); !status.ok()) return status;
   PaperPose pose{std::move(name), std::move(file->mesh), {}, ""};
-  for (const NamedHandle& handle : *named) {
+  for (const NamedHandle& handle : held->handles) {
     std::vector<std::int32_t> vertices(handle.handle.vertices.begin(), handle.handle.vertices.end());
     const absl::Status set =
         pose.handles.set(handle.name, {std::move(vertices), to_core(handle.handle.motion)});
