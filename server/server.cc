@@ -4,7 +4,9 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 
+#include <algorithm>
 #include <mutex>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/match.h"
@@ -18,6 +20,9 @@ namespace {
 
 constexpr int kMostCallsAConnection = 256;
 constexpr int kKeepaliveMs = 30'000;
+/// Between the last answer and the end of the connections: who writes to a connection that has ended loses what he
+/// has not read of it yet, the reason for its end among that.
+constexpr std::chrono::milliseconds kLinger{100};
 
 absl::Status out_of_range(const std::string& name, const std::string& limit) {
   return invalid_input({"OPTION_OUT_OF_RANGE", name, limit},
@@ -113,6 +118,7 @@ void Server::drain(std::chrono::milliseconds grace) {
   impl_->grpc_server->GetHealthCheckService()->SetServingStatus(false);
   backend.registry->drain(text);
   backend.gate.wait_until_empty(std::chrono::steady_clock::now() + grace);
+  std::this_thread::sleep_for(std::min(grace, kLinger));
   backend.registry->clear(EndReason::kDraining, text);
   impl_->grpc_server->Shutdown(std::chrono::system_clock::now());  // cancels what is still under way
   impl_->grpc_server->Wait();
