@@ -131,7 +131,7 @@ absl::Status Backend::ack_frames(const v1::AckFramesRequest& request, v1::AckFra
 absl::StatusOr<UpdateResult> Backend::update(Session& session, const std::string& token,
                                              const v1::Update& update) {
   if (absl::Status status = session.check_writer(token); !status.ok()) return status;
-  const auto decoded = Decoder(*uploads_, session.vertex_count()).update(update);
+  const auto decoded = Decoder(*uploads_, session.vertex_count(), &session.features()).update(update);
   if (!decoded.ok()) return decoded.status();
   const auto result = session.update(token, *decoded);
   if (result.ok()) {
@@ -147,7 +147,7 @@ absl::Status Backend::solve(const v1::SolveRequest& request, SolveJob::OnProgres
   const auto session = find(request.session());
   if (!session.ok()) return session.status();
   if (absl::Status status = (*session)->check_writer(request.writer_token()); !status.ok()) return status;
-  Decoder decoder(*uploads_, (*session)->vertex_count());
+  Decoder decoder(*uploads_, (*session)->vertex_count(), &(*session)->features());
   std::optional<Update> update;
   if (request.has_update()) {
     auto decoded = decoder.update(request.update());
@@ -208,8 +208,10 @@ absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const v1::CreateS
     if (!shape.ok()) return shape.status();
     parts.shape = *std::move(shape);
   }
-  if (absl::Status status = decoder.handles(request.handles(), parts.beginning); !status.ok()) return status;
-  auto settings = decoder.settings(request.settings());
+  parts.features = std::make_shared<const ShapeFeatures>(parts.shape);
+  Decoder inputs(*uploads_, mesh_message.vertex_count(), parts.features.get());
+  if (absl::Status status = inputs.handles(request.handles(), parts.beginning); !status.ok()) return status;
+  auto settings = inputs.settings(request.settings());
   if (!settings.ok()) return settings.status();
   parts.beginning.settings = *std::move(settings);
   auto deformer = Deformer::create(

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "absl/status/statusor.h"
+#include "core/analysis/shape_features.h"
 #include "core/mesh/mesh.h"
 #include "core/solve/deformer.h"
 #include "lpdeform/v1/service.pb.h"
@@ -22,12 +23,18 @@ namespace lpdeform {
 /// is checked where it is used. Errors are INVALID_ARGUMENT: INLINE_TOO_LARGE, BUFFER_MISSING, BUFFER_SIZE,
 /// ENUM_UNKNOWN, FIELD_MISSING, FIELD_SIZE, POSITIONS_SIZE, HANDLE_CHANGE_MISSING, HANDLE_TOO_MANY_VERTICES,
 /// MOTION_MISSING; of uploads what Uploads::find and Upload::bytes have. For one message, one thread.
+///
+/// What a message leaves to the server to find in the geometry (AutomaticField, Resize) becomes plain fields and
+/// handles here, so that nothing behind knows of it; also STRENGTH_OUT_OF_RANGE, RESIZE_SCALE_OUT_OF_RANGE,
+/// RESIZE_ORIGIN_NOT_FINITE, RESIZE_AXES. The first such message of a session waits for ShapeFeatures.
 class Decoder {
  public:
-  /// `vertex_count`: of the mesh that the message is about.
-  Decoder(Uploads& uploads, std::uint32_t vertex_count)
+  /// `vertex_count`: of the mesh that the message is about; `features`: its geometry, needed by handles(),
+  /// settings() and update().
+  Decoder(Uploads& uploads, std::uint32_t vertex_count, const ShapeFeatures* features = nullptr)
       : uploads_(uploads),
         vertex_count_(vertex_count),
+        features_(features),
         room_for_vertices_(vertex_count),
         room_for_targets_(vertex_count) {}
 
@@ -53,7 +60,8 @@ class Decoder {
   absl::StatusOr<Bytes> bytes(const v1::Buffer& buffer, std::string_view what);
   absl::StatusOr<HandleChange> handle(const v1::HandleUpdate& message);
   absl::StatusOr<HandleMotion> motion(const v1::Motion& message);
-  absl::StatusOr<Field> field(const v1::Field& message, std::string_view what);
+  absl::StatusOr<Field> field(const v1::Field& message, std::string_view what, Field Material::*part);
+  absl::Status resize(const v1::Resize& message, Update& out) const;
   struct PackedPoints {
     Scalar scalar;
     Bytes bytes;
@@ -66,6 +74,7 @@ class Decoder {
 
   Uploads& uploads_;
   const std::uint32_t vertex_count_;
+  const ShapeFeatures* const features_;
   std::uint64_t room_for_vertices_;
   std::uint64_t room_for_targets_;
 };

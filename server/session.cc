@@ -61,6 +61,7 @@ Session::Session(SessionParts parts, SessionServices services)
     : Runnable(parts.shape->vertex_count() > kHeavyVertices),
       name_(std::move(parts.name)),
       shape_(std::move(parts.shape)),
+      features_(parts.features ? std::move(parts.features) : std::make_shared<ShapeFeatures>(shape_)),
       free_components_(parts.free_components),
       services_(std::move(services)),
       created_unix_ms_(unix_ms_now()),
