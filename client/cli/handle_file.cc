@@ -75,8 +75,8 @@ std::array<double, 3> vector3(const json& value, const std::string& place) {
   return {number(value[0], place), number(value[1], place), number(value[2], place)};
 }
 
-std::string name_of(const json& object, std::size_t index) {
-  const std::string place = absl::StrCat("handles[", index, "]");
+std::string name_of(const json& object, const char* list, std::size_t index) {
+  const std::string place = absl::StrCat(list, "[", index, "]");
   if (!object.is_object()) refuse_value(place, "an object", object);
   const json& name = required(object, place, "name");
   if (!name.is_string()) refuse_value(key_of(place, "name"), "a text", name);
@@ -198,7 +198,7 @@ json parse_strictly(std::string_view text) {
 }
 
 std::vector<NamedHandle> handles_of(const json& file, std::int64_t vertex_count) {
-  check_keys(file, "the handle file", {"mesh", "note", "handles"});
+  check_keys(file, "the handle file", {"mesh", "note", "handles", "groups"});
   const json& list = required(file, "the handle file", "handles");
   if (!list.is_array()) refuse_value("\"handles\"", "a list", list);
   if (list.empty())
@@ -208,7 +208,7 @@ std::vector<NamedHandle> handles_of(const json& file, std::int64_t vertex_count)
   Owners owners;
   for (std::size_t index = 0; index < list.size(); ++index) {
     const json& object = list[index];
-    const std::string name = name_of(object, index);
+    const std::string name = name_of(object, "handles", index);
     const std::string owner = absl::StrCat("handle \"", name, "\"");
     if (!names.insert(name).second)
       refuse("HANDLE_NAME_TWICE", owner, absl::StrCat("There are two handles of the name \"", name, "\"."));
@@ -221,7 +221,36 @@ std::vector<NamedHandle> handles_of(const json& file, std::int64_t vertex_count)
   return handles;
 }
 
+std::vector<VertexGroup> groups_of(const json& file, std::int64_t vertex_count) {
+  std::vector<VertexGroup> groups;
+  if (!file.is_object() || !file.contains("groups")) return groups;
+  const json& list = file["groups"];
+  if (!list.is_array()) refuse_value("\"groups\"", "a list", list);
+  std::set<std::string> names;
+  for (std::size_t index = 0; index < list.size(); ++index) {
+    const json& object = list[index];
+    const std::string name = name_of(object, "groups", index);
+    const std::string owner = absl::StrCat("group \"", name, "\"");
+    if (!names.insert(name).second)
+      refuse("HANDLE_NAME_TWICE", owner, absl::StrCat("There are two groups of the name \"", name, "\"."));
+    check_keys(object, owner, {"name", "vertices", "p", "stiffness"});
+    VertexGroup& group = groups.emplace_back(VertexGroup{name, vertices_of(object, owner, vertex_count)});
+    if (object.contains("p")) group.p = number(object["p"], key_of(owner, "p"));
+    if (object.contains("stiffness"))
+      group.stiffness = number(object["stiffness"], key_of(owner, "stiffness"));
+  }
+  return groups;
+}
+
 }  // namespace
+
+absl::StatusOr<std::vector<VertexGroup>> parse_groups(std::string_view text, std::int64_t vertex_count) {
+  try {
+    return groups_of(parse_strictly(text), vertex_count);
+  } catch (const Refusal& refusal) {
+    return refusal.status;
+  }
+}
 
 absl::StatusOr<std::vector<NamedHandle>> parse_handles(std::string_view text, std::int64_t vertex_count) {
   try {
@@ -231,11 +260,14 @@ absl::StatusOr<std::vector<NamedHandle>> parse_handles(std::string_view text, st
   }
 }
 
-absl::StatusOr<std::vector<NamedHandle>> read_handles(const std::filesystem::path& path,
-                                                      std::int64_t vertex_count) {
+absl::StatusOr<HandleFile> read_handle_file(const std::filesystem::path& path, std::int64_t vertex_count) {
   const absl::StatusOr<std::string> text = read_text(path);
   if (!text.ok()) return text.status();
-  return parse_handles(*text, vertex_count);
+  auto handles = parse_handles(*text, vertex_count);
+  if (!handles.ok()) return handles.status();
+  auto groups = parse_groups(*text, vertex_count);
+  if (!groups.ok()) return groups.status();
+  return HandleFile{*std::move(handles), *std::move(groups)};
 }
 
 std::string handle_file_text(const std::vector<NamedHandle>& handles, std::string_view mesh,

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,6 +17,14 @@ struct NamedHandle {
   client::Handle handle;
 };
 
+/// Vertices that share a name and, where given, a material. They are not held.
+struct VertexGroup {
+  std::string name;
+  std::vector<std::uint32_t> vertices;
+  std::optional<double> p = {};
+  std::optional<double> stiffness = {};
+};
+
 /// The handles of a handle file, in its order; README.md describes the format whole. Errors are
 /// INVALID_ARGUMENT and name the handle, the key and the value: HANDLE_FILE_SYNTAX (line and column),
 /// HANDLE_FILE_KEY (unknown, given twice or missing), HANDLE_FILE_VALUE (of the wrong kind),
@@ -24,9 +33,18 @@ struct NamedHandle {
 /// HANDLE_AXIS_ZERO.
 absl::StatusOr<std::vector<NamedHandle>> parse_handles(std::string_view json, std::int64_t vertex_count);
 
-/// The same from a file; also NOT_FOUND (FILE_NOT_FOUND).
-absl::StatusOr<std::vector<NamedHandle>> read_handles(const std::filesystem::path& path,
-                                                      std::int64_t vertex_count);
+/// The groups of a handle file, in its order; empty where it has none. Errors as parse_handles has them for
+/// names, vertices and keys; a vertex may belong to several groups.
+absl::StatusOr<std::vector<VertexGroup>> parse_groups(std::string_view json, std::int64_t vertex_count);
+
+/// What a handle file says.
+struct HandleFile {
+  std::vector<NamedHandle> handles;
+  std::vector<VertexGroup> groups;
+};
+
+/// Both from a file, which is read once (it may be a pipe); also NOT_FOUND (FILE_NOT_FOUND).
+absl::StatusOr<HandleFile> read_handle_file(const std::filesystem::path& path, std::int64_t vertex_count);
 
 /// A handle file that parse_handles reads back.
 std::string handle_file_text(const std::vector<NamedHandle>& handles, std::string_view mesh,

@@ -63,18 +63,43 @@ CLI::Validator positive() {
       "> 0");
 }
 
+/// What parse_p takes.
+CLI::Validator norm() {
+  return CLI::Validator(
+      [](std::string& text) {
+        MaterialOptions ignored;
+        if (parse_p(text, ignored)) return std::string();
+        return absl::StrCat(text,
+                            " is not a number from 1 to 64, nor auto, nor auto: and a number from 0 to 1");
+      },
+      "P");
+}
+
 void add_material_options(CLI::App& app, DeformOptions& options) {
+  MaterialOptions& material = options.material;
   CLI::Option* const p =
-      app.add_option("--p", options.p,
-                     "The norm, 1 to 64: small concentrates distortion, large spreads it (2)")
-          ->check(within(1, 64))
-          ->option_text("P");
-  app.add_option("--p-field", options.p_field, "A p for each vertex: a file with one number a line")
+      app.add_option_function<std::string>(
+             "--p", [&material](const std::string& text) { parse_p(text, material); },
+             "The norm, 1 to 64: small concentrates distortion, large spreads it (2). Or from the geometry, "
+             "p and "
+             "stiffness: joints soft, parts rigid, with a strength of 0 to 1 (auto is auto:1)")
+          ->check(norm())
+          ->option_text("P|auto[:STRENGTH]");
+  app.add_option("--p-field", material.p_field, "A p for each vertex: a file with one number a line")
       ->excludes(p)
       ->option_text("FILE");
-  app.add_option("--stiffness-field", options.stiffness_field,
+  app.add_option("--stiffness-field", material.stiffness_field,
                  "A stiffness for each vertex, 1e-6 to 1e6: a file with one number a line (1 everywhere)")
       ->option_text("FILE");
+  app.add_option(
+         "--p-group", material.p_groups,
+         "A p for the vertices of a group, of the handle file or of an OBJ mesh; may be given several times")
+      ->allow_extra_args(false)
+      ->option_text("NAME=P");
+  app.add_option("--stiffness-group", material.stiffness_groups,
+                 "A stiffness for the vertices of a group, likewise")
+      ->allow_extra_args(false)
+      ->option_text("NAME=S");
   app.add_option("--length-unit", options.length_unit,
                  "The length that different p are mixed in, in the mesh's unit (the mean edge length)")
       ->check(positive())

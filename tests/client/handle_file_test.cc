@@ -144,7 +144,7 @@ TEST(HandleFile, RefusesAnAxisWithoutADirection) {
 }
 
 TEST(HandleFile, SaysWhichFileIsNotThere) {
-  const auto handles = read_handles("/nowhere/handles.json", kVertexCount);
+  const auto handles = read_handle_file("/nowhere/handles.json", kVertexCount);
   EXPECT_EQ(handles.status().code(), absl::StatusCode::kNotFound);
   EXPECT_THAT(std::string(handles.status().message()), HasSubstr("/nowhere/handles.json"));
 }
