@@ -14,6 +14,7 @@
 #include "client/cli/deform_command.h"
 #include "client/cli/generated_shape.h"
 #include "client/cli/info_command.h"
+#include "client/cli/resize_command.h"
 #include "client/cli/shape_command.h"
 
 namespace lpdeform::cli {
@@ -188,6 +189,35 @@ void add_info(CLI::App& program, std::function<ExitStatus()>& command) {
   app.callback([&command, options] { command = [options] { return run_info(*options); }; });
 }
 
+/// Three numbers with commas between them.
+CLI::Option* add_vector(CLI::App& app, const std::string& flag, std::vector<double>& target,
+                        const std::string& help) {
+  return app.add_option(flag, target, help)->delimiter(',')->expected(3)->option_text("X,Y,Z");
+}
+
+void add_resize(CLI::App& program, std::function<ExitStatus()>& command) {
+  CLI::App& app = *program.add_subcommand(
+      "resize", "Scale a mesh by different factors along its axes; what is salient keeps its shape");
+  const auto options = std::make_shared<ResizeOptions>();
+  app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required()->option_text(" ");
+  app.add_option("OUT", options->out, "Where the result goes: .ply, .obj, .off, or a picture as .png")
+      ->required()
+      ->option_text(" ");
+  add_vector(app, "--scale", options->scale, "Factors along the three axes, each 0.01 to 100; required")
+      ->check(within(0.01, 100))
+      ->required();
+  add_vector(app, "--origin", options->origin, "What stays where it is (the middle of the bounding box)");
+  add_vector(app, "--x-axis", options->x_axis, "The direction of the first factor (1,0,0)");
+  add_vector(app, "--y-axis", options->y_axis, "The direction of the second factor (0,1,0)");
+  CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")
+                                   ->check(CLI::Range(1, 1024))
+                                   ->option_text("N");
+  app.add_option("--server", options->server, "HOST:PORT or unix:PATH of a server (solves in this process)")
+      ->excludes(threads)
+      ->option_text("ADDRESS");
+  app.callback([&command, options] { command = [options] { return run_resize(*options); }; });
+}
+
 void add_shape(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app =
       *program.add_subcommand("shape", "Write a generated mesh to try things on, and handles for it");
@@ -215,6 +245,7 @@ int run(int argc, char** argv) {
   std::function<ExitStatus()> command;
   add_deform(program, command);
   add_info(program, command);
+  add_resize(program, command);
   add_shape(program, command);
   try {
     program.parse(argc, argv);

@@ -277,6 +277,20 @@ class Deform(unittest.TestCase):
         refusal = self.refused(2, "deform", obj, "--handles", self.at("bar.json"), "--p-group", "back=1")
         self.assertIn("front, rest", refusal)
 
+    def test_resize_meets_the_scaled_extent_through_a_server_and_alone(self):
+        for options in ([], ["--server", self.server.address]):
+            out = self.at("resized.off")
+            done = run("resize", self.at("bar.off"), out, "--scale", "1,1.5,3", "--origin", "0,0,0", *options)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(done.stdout.count("converged"), 2)  # 1.5 is shared; x and z differ from it
+            positions = read_off(out)
+            for axis, extent, places in ((0, 4, 1), (1, 6, 1), (2, 63, 3)):  # the last solve holds the ends of z alone
+                self.assertAlmostEqual(min(position[axis] for position in positions), 0, places)
+                self.assertAlmostEqual(max(position[axis] for position in positions), extent, places)
+        self.assertIn("0.01 to 100", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "1,1,0"))
+        self.assertIn("axis", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "1,1,2",
+                                           "--x-axis", "0,1,0"))
+
     def test_starting_from_a_result_leaves_little_to_do(self):
         result = self.at("result.off")
         first = self.deform("--p", 2, "--out", result)
