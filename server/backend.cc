@@ -131,7 +131,9 @@ absl::Status Backend::ack_frames(const v1::AckFramesRequest& request, v1::AckFra
 absl::StatusOr<UpdateResult> Backend::update(Session& session, const std::string& token,
                                              const v1::Update& update) {
   if (absl::Status status = session.check_writer(token); !status.ok()) return status;
-  const auto decoded = Decoder(*uploads_, session.vertex_count()).update(update);
+  const auto decoded =
+      Decoder(*uploads_, session.vertex_count(), &session.features(), session.mesh().weld().get())
+          .update(update);
   if (!decoded.ok()) return decoded.status();
   const auto result = session.update(token, *decoded);
   if (result.ok()) {
@@ -147,7 +149,8 @@ absl::Status Backend::solve(const v1::SolveRequest& request, SolveJob::OnProgres
   const auto session = find(request.session());
   if (!session.ok()) return session.status();
   if (absl::Status status = (*session)->check_writer(request.writer_token()); !status.ok()) return status;
-  Decoder decoder(*uploads_, (*session)->vertex_count());
+  Decoder decoder(*uploads_, (*session)->vertex_count(), &(*session)->features(),
+                  (*session)->mesh().weld().get());
   std::optional<Update> update;
   if (request.has_update()) {
     auto decoded = decoder.update(request.update());
@@ -225,8 +228,10 @@ absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const v1::CreateS
   parts.free_components = *free_components;
   parts.memory = *std::move(memory);
   if (absl::Status status = make_mesh(request, decoder, parts); !status.ok()) return status;
-  if (absl::Status status = decoder.handles(request.handles(), parts.beginning); !status.ok()) return status;
-  auto settings = decoder.settings(request.settings());
+  parts.features = std::make_shared<const ShapeFeatures>(parts.shape);
+  Decoder inputs(*uploads_, mesh_message.vertex_count(), parts.features.get(), parts.mesh->weld().get());
+  if (absl::Status status = inputs.handles(request.handles(), parts.beginning); !status.ok()) return status;
+  auto settings = inputs.settings(request.settings());
   if (!settings.ok()) return settings.status();
   parts.beginning.settings = *std::move(settings);
   auto deformer = Deformer::create(

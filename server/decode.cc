@@ -7,7 +7,10 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/analysis/automatic_material.h"
+#include "core/base/check.h"
 #include "core/base/fault.h"
+#include "core/solve/resize.h"
 
 namespace lpdeform {
 namespace {
@@ -319,8 +322,20 @@ absl::Status Decoder::take_room(std::uint64_t& room, std::uint64_t count, std::s
                    " vertices."));
 }
 
-absl::StatusOr<Field> Decoder::field(const v1::Field& message, std::string_view what) {
+/// A field found on the welded shape, by the client's vertices.
+Field Decoder::for_client(Field found) const {
+  return weld_ == nullptr || found.size() == 1 ? std::move(found) : scattered(found, *weld_);
+}
+
+absl::StatusOr<Field> Decoder::field(const v1::Field& message, std::string_view what, Field Material::*part) {
   if (message.value_case() == v1::Field::kUniform) return Field(Field::Constant(1, message.uniform()));
+  if (message.value_case() == v1::Field::kAutomatic) {
+    const double strength = message.automatic().strength();
+    if (absl::Status status = check_strength(strength); !status.ok()) return status;
+    LPDEFORM_CHECK(features_ != nullptr);
+    const auto material = automatic_material(features_->joint(), strength);
+    return for_client(*material.*part);
+  }
   if (message.value_case() != v1::Field::kPerVertex) {
     return invalid_input({"FIELD_MISSING", std::string(what), ""},
                          absl::StrCat("The ", std::string(what), " has no value."));
@@ -455,12 +470,12 @@ absl::Status Decoder::handles(const google::protobuf::RepeatedPtrField<v1::Handl
 absl::StatusOr<SettingsChange> Decoder::settings(const v1::SettingsUpdate& message) {
   SettingsChange change;
   if (message.has_p()) {
-    auto p = field(message.p(), "p");
+    auto p = field(message.p(), "p", &Material::p);
     if (!p.ok()) return p.status();
     change.p = *std::move(p);
   }
   if (message.has_stiffness()) {
-    auto stiffness = field(message.stiffness(), "stiffness");
+    auto stiffness = field(message.stiffness(), "stiffness", &Material::stiffness);
     if (!stiffness.ok()) return stiffness.status();
     change.stiffness = *std::move(stiffness);
   }
@@ -478,6 +493,28 @@ absl::StatusOr<SettingsChange> Decoder::settings(const v1::SettingsUpdate& messa
   return change;
 }
 
+absl::Status Decoder::resize(const v1::Resize& message, Update& out) const {
+  LPDEFORM_CHECK(features_ != nullptr);
+  Scaling scaling;
+  scaling.scale = decode_vector(message.scale());
+  scaling.origin = message.has_origin() ? decode_vector(message.origin()) : box_middle(features_->shape());
+  if (message.has_x_axis() || message.has_y_axis()) {
+    const auto axes = axes_of(decode_vector(message.x_axis()), decode_vector(message.y_axis()));
+    if (!axes.ok()) return axes.status();
+    scaling.axes = *axes;
+  }
+  auto inputs = resize_inputs(*features_, scaling);
+  if (!inputs.ok()) return inputs.status();
+  if (weld_ != nullptr) {
+    for (std::int32_t& vertex : inputs->handle.vertices)
+      vertex = weld_->first_copy[vertex];  // holds all copies
+  }
+  out.handles.push_back({"resize", std::move(inputs->handle)});
+  if (!out.settings.p) out.settings.p = for_client(std::move(inputs->material.p));
+  if (!out.settings.stiffness) out.settings.stiffness = for_client(std::move(inputs->material.stiffness));
+  return absl::OkStatus();
+}
+
 absl::StatusOr<Update> Decoder::update(const v1::Update& message) {
   Update update;
   update.input_seq = message.input_seq();
@@ -485,6 +522,9 @@ absl::StatusOr<Update> Decoder::update(const v1::Update& message) {
   auto change = settings(message.settings());
   if (!change.ok()) return change.status();
   update.settings = *std::move(change);
+  if (message.has_resize()) {
+    if (absl::Status status = resize(message.resize(), update); !status.ok()) return status;
+  }
   return update;
 }
 

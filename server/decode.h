@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "absl/status/statusor.h"
+#include "core/analysis/shape_features.h"
 #include "core/mesh/mesh.h"
 #include "core/mesh/weld.h"
 #include "core/solve/deformer.h"
@@ -22,13 +23,24 @@ namespace lpdeform {
 /// often a message names an upload, no more numbers come out than the mesh has room for. What a value means
 /// is checked where it is used. Errors are INVALID_ARGUMENT: INLINE_TOO_LARGE, BUFFER_MISSING, BUFFER_SIZE,
 /// ENUM_UNKNOWN, FIELD_MISSING, FIELD_SIZE, POSITIONS_SIZE, HANDLE_CHANGE_MISSING, HANDLE_TOO_MANY_VERTICES,
-/// HANDLE_POINT_COUNT, REGION_EMPTY, MOTION_MISSING, NORMALS_SIZE, NORMALS_NOT_FINITE; of uploads what Uploads::find and Upload::bytes have. For one message, one thread.
+/// HANDLE_POINT_COUNT, REGION_EMPTY, MOTION_MISSING, NORMALS_SIZE, NORMALS_NOT_FINITE; of uploads what
+/// Uploads::find and Upload::bytes have. For one message, one thread.
+///
+/// What a message leaves to the server to find in the geometry (AutomaticField, Resize) becomes plain fields and
+/// handles here, in the client's vertices like all others, so that nothing behind knows of it; also
+/// STRENGTH_OUT_OF_RANGE, RESIZE_SCALE_OUT_OF_RANGE, RESIZE_ORIGIN_NOT_FINITE, RESIZE_AXES. The first such
+/// message of a session waits for ShapeFeatures.
 class Decoder {
  public:
-  /// `vertex_count`: of the mesh that the message is about.
-  Decoder(Uploads& uploads, std::uint32_t vertex_count)
+  /// `vertex_count`: of the client's mesh that the message is about; `features`: its geometry, needed by
+  /// handles(), settings() and update(); `weld`: from the client's vertices to those of `features`, null where
+  /// they are the same.
+  Decoder(Uploads& uploads, std::uint32_t vertex_count, const ShapeFeatures* features = nullptr,
+          const Weld* weld = nullptr)
       : uploads_(uploads),
         vertex_count_(vertex_count),
+        features_(features),
+        weld_(weld),
         room_for_vertices_(vertex_count),
         room_for_targets_(vertex_count),
         room_for_region_(vertex_count) {}
@@ -64,7 +76,9 @@ class Decoder {
   absl::StatusOr<std::vector<SurfacePoint>> surface_points(const v1::SurfacePoints& message);
   absl::StatusOr<std::vector<std::int32_t>> region(const v1::RegionOfInterest& message);
   absl::StatusOr<HandleMotion> motion(const v1::Motion& message);
-  absl::StatusOr<Field> field(const v1::Field& message, std::string_view what);
+  absl::StatusOr<Field> field(const v1::Field& message, std::string_view what, Field Material::*part);
+  absl::Status resize(const v1::Resize& message, Update& out) const;
+  Field for_client(Field found) const;
   struct PackedPoints {
     Scalar scalar;
     Bytes bytes;
@@ -77,6 +91,8 @@ class Decoder {
 
   Uploads& uploads_;
   const std::uint32_t vertex_count_;
+  const ShapeFeatures* const features_;
+  const Weld* const weld_;
   std::uint64_t room_for_vertices_;
   std::uint64_t room_for_targets_;
   std::uint64_t room_for_region_;

@@ -63,6 +63,7 @@ Session::Session(SessionParts parts, SessionServices services)
       name_(std::move(parts.name)),
       shape_(std::move(parts.shape)),
       mesh_(parts.mesh ? std::move(parts.mesh) : std::make_shared<const DrawMesh>(shape_)),
+      features_(parts.features ? std::move(parts.features) : std::make_shared<ShapeFeatures>(shape_)),
       free_components_(parts.free_components),
       services_(std::move(services)),
       created_unix_ms_(unix_ms_now()),

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/analysis/shape_features.h"
 #include "core/solve/deformer.h"
 #include "server/budget.h"
 #include "server/live_solver.h"
@@ -25,6 +26,7 @@ namespace lpdeform {
 struct SessionParts {
   std::string name;
   std::shared_ptr<const RestShape> shape;
+  std::shared_ptr<const ShapeFeatures> features = nullptr;  // of `shape`; made where left out
   std::unique_ptr<Deformer> deformer;
   std::shared_ptr<const DrawMesh> mesh = nullptr;  // null: the shape's own vertices
   FreeComponents free_components = FreeComponents::kError;
@@ -71,6 +73,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   /// The client's.
   std::uint32_t vertex_count() const { return mesh_->vertex_count(); }
   const DrawMesh& mesh() const { return *mesh_; }
+  const ShapeFeatures& features() const { return *features_; }
   SessionInfo info() const;
   WriterLease lease() const;
 
@@ -125,6 +128,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   const std::string name_;
   const std::shared_ptr<const RestShape> shape_;
   const std::shared_ptr<const DrawMesh> mesh_;
+  const std::shared_ptr<const ShapeFeatures> features_;
   const FreeComponents free_components_;
   const SessionServices services_;
   const std::int64_t created_unix_ms_;

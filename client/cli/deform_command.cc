@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "client/cli/field_file.h"
 #include "client/cli/handle_file.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/local_server.h"
@@ -28,22 +27,6 @@ struct Inputs {
   client::FieldValue p;
   std::optional<std::vector<double>> initial_positions;
 };
-
-absl::Status read_fields(const DeformOptions& options, std::int64_t vertex_count, Inputs& inputs) {
-  inputs.p = options.p;
-  if (options.p_field) {
-    auto p = read_field(*options.p_field, vertex_count);
-    if (!p.ok()) return p.status();
-    inputs.p = *std::move(p);
-  }
-  inputs.update.settings.p = inputs.p;
-  if (options.stiffness_field) {
-    auto stiffness = read_field(*options.stiffness_field, vertex_count);
-    if (!stiffness.ok()) return stiffness.status();
-    inputs.update.settings.stiffness = *std::move(stiffness);
-  }
-  return absl::OkStatus();
-}
 
 absl::Status read_initial(const DeformOptions& options, Inputs& inputs) {
   if (options.initial == "laplacian" || options.initial == "rest") return absl::OkStatus();
@@ -83,8 +66,11 @@ absl::StatusOr<Inputs> read_inputs(const DeformOptions& options) {
     inputs.update.settings.region = client::RegionOfInterest{std::move(held->region)};
   for (NamedHandle& handle : held->handles)
     inputs.update.handles.emplace(std::move(handle.name), std::move(handle.handle));
-  status = read_fields(options, vertex_count, inputs);
-  if (status.ok()) status = read_initial(options, inputs);
+  status = read_material(options.material, inputs.file, std::move(held->groups), options.welds,
+                         inputs.update.settings);
+  if (!status.ok()) return status;
+  inputs.p = *inputs.update.settings.p;
+  status = read_initial(options, inputs);
   if (!status.ok()) return status;
   inputs.update.settings.length_unit = options.length_unit;
   inputs.update.settings.solver = solver_settings(options);

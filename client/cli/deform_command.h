@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/cli/exit_status.h"
+#include "client/cli/material_input.h"
 #include "client/cpp/types.h"
 
 namespace lpdeform::cli {
@@ -14,10 +15,8 @@ namespace lpdeform::cli {
 struct DeformOptions {
   std::filesystem::path mesh;
   std::filesystem::path handles;
-  double p = 2;
-  std::optional<std::filesystem::path> p_field;          // in place of p
-  std::optional<std::filesystem::path> stiffness_field;  // in place of 1
-  double length_unit = 0;                                // 0: the mean rest edge length
+  MaterialOptions material;
+  double length_unit = 0;  // 0: the mean rest edge length
   client::Method method = client::Method::kAuto;
   client::WeightKind weights = client::WeightKind::kCotangent;
   std::string initial = "laplacian";  // or "rest", or a mesh file

@@ -92,6 +92,19 @@ GeneratedShape animal(int detail) {
   return shape;
 }
 
+GeneratedShape neck(int detail) {
+  const double length = 42.0 * detail, middle = length / 2, side = 8.0 * detail;
+  GeneratedShape shape{necked_bar(8 * detail, 42 * detail, 4 * detail, 6 * detail),
+                       {},
+                       "one end stays, the other is bent by 60 degrees"};
+  hold(shape, "bottom", [](const Point& p) { return p.z() < kHalfCell; });
+  hold(
+      shape, "top", [=](const Point& p) { return p.z() > length - kHalfCell; },
+      client::RigidMotion{
+          .axis = {1, 0, 0}, .angle_radians = radians(60), .center = {side / 2, side / 2, middle}});
+  return shape;
+}
+
 struct Entry {
   const char* name;
   GeneratedShape (*make)(int detail);
@@ -105,7 +118,8 @@ constexpr Entry kShapes[] = {{"bar", paper_shape<paper_bar>, kMostDetail},
                              {"grid", bumpy_grid, kMostDetail},
                              {"sphere", ball, 6},
                              {"creature", animal, 6},
-                             {"arm", paper_shape<paper_arm>, 6}};
+                             {"arm", paper_shape<paper_arm>, 6},
+                             {"neck", neck, kMostDetail / 2}};
 
 }  // namespace
 

@@ -17,8 +17,8 @@
 namespace lpdeform::cli {
 namespace {
 
-std::string name_of(const json& object, std::size_t index) {
-  const std::string place = absl::StrCat("handles[", index, "]");
+std::string name_of(const json& object, const char* list, std::size_t index) {
+  const std::string place = absl::StrCat(list, "[", index, "]");
   if (!object.is_object()) refuse_value(place, "an object", object);
   const json& name = required(object, place, "name");
   if (!name.is_string()) refuse_value(key_of(place, "name"), "a text", name);
@@ -136,25 +136,24 @@ json parse_strictly(std::string_view text) {
   }
 }
 
-HandleFile handles_of(const json& file, std::int64_t vertex_count) {
-  check_keys(file, "the handle file", {"mesh", "note", "handles", "region"});
+std::vector<NamedHandle> handles_of(const json& file, std::int64_t vertex_count) {
   const json& list = required(file, "the handle file", "handles");
   if (!list.is_array()) refuse_value("\"handles\"", "a list", list);
   if (list.empty())
     refuse("HANDLE_FILE_EMPTY", "", "The handle file has no handles; a deformation needs at least one.");
-  HandleFile result{{}, region_of(file, vertex_count)};
+  std::vector<NamedHandle> handles;
   std::set<std::string> names;
   Owners owners;
   for (std::size_t index = 0; index < list.size(); ++index) {
     const json& object = list[index];
-    const std::string name = name_of(object, index);
+    const std::string name = name_of(object, "handles", index);
     const std::string owner = absl::StrCat("handle \"", name, "\"");
     if (!names.insert(name).second)
       refuse("HANDLE_NAME_TWICE", owner, absl::StrCat("There are two handles of the name \"", name, "\"."));
     check_keys(object, owner,
                {"name", "vertices", "points", "translate", "rotate", "positions", "soft", "orientation",
                 "axis_lock", "plane_lock", "footprint"});
-    NamedHandle& handle = result.handles.emplace_back(NamedHandle{name, {}});
+    NamedHandle& handle = handles.emplace_back(NamedHandle{name, {}});
     if (object.contains("points"))
       handle.handle.points = points_of(object, owner);
     else
@@ -164,14 +163,40 @@ HandleFile handles_of(const json& file, std::int64_t vertex_count) {
     read_hold(object, owner, handle.handle);
     owners.claim(handle);
   }
-  return result;
+  return handles;
+}
+
+std::vector<VertexGroup> groups_of(const json& file, std::int64_t vertex_count) {
+  std::vector<VertexGroup> groups;
+  if (!file.contains("groups")) return groups;
+  const json& list = file["groups"];
+  if (!list.is_array()) refuse_value("\"groups\"", "a list", list);
+  std::set<std::string> names;
+  for (std::size_t index = 0; index < list.size(); ++index) {
+    const json& object = list[index];
+    const std::string name = name_of(object, "groups", index);
+    const std::string owner = absl::StrCat("group \"", name, "\"");
+    if (!names.insert(name).second)
+      refuse("HANDLE_NAME_TWICE", owner, absl::StrCat("There are two groups of the name \"", name, "\"."));
+    check_keys(object, owner, {"name", "vertices", "p", "stiffness"});
+    VertexGroup& group = groups.emplace_back(VertexGroup{name, vertices_of(object, owner, vertex_count)});
+    if (object.contains("p")) group.p = number(object["p"], key_of(owner, "p"));
+    if (object.contains("stiffness"))
+      group.stiffness = number(object["stiffness"], key_of(owner, "stiffness"));
+  }
+  return groups;
+}
+
+HandleFile file_of(const json& file, std::int64_t vertex_count) {
+  check_keys(file, "the handle file", {"mesh", "note", "handles", "region", "groups"});
+  return {handles_of(file, vertex_count), region_of(file, vertex_count), groups_of(file, vertex_count)};
 }
 
 }  // namespace
 
 absl::StatusOr<HandleFile> parse_handles(std::string_view text, std::int64_t vertex_count) {
   try {
-    return handles_of(parse_strictly(text), vertex_count);
+    return file_of(parse_strictly(text), vertex_count);
   } catch (const Refusal& refusal) {
     return refusal.status;
   }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,13 +17,22 @@ struct NamedHandle {
   client::Handle handle;
 };
 
+/// Vertices that share a name and, where given, a material. They are not held.
+struct VertexGroup {
+  std::string name;
+  std::vector<std::uint32_t> vertices;
+  std::optional<double> p = {};
+  std::optional<double> stiffness = {};
+};
+
 struct HandleFile {
   std::vector<NamedHandle> handles;
   std::vector<std::uint32_t> region;  // the vertices that may move; empty: all
+  std::vector<VertexGroup> groups;    // a vertex may be in several
 };
 
-/// The handles of a handle file, in its order, and its region; README.md describes the format whole. Errors are
-/// INVALID_ARGUMENT and name the handle, the key and the value: HANDLE_FILE_SYNTAX (line and column),
+/// The handles of a handle file, in its order, its region and its groups; README.md describes the format whole. Errors are
+/// INVALID_ARGUMENT and name the handle or group, the key and the value: HANDLE_FILE_SYNTAX (line and column),
 /// HANDLE_FILE_KEY (unknown, given twice or missing), HANDLE_FILE_VALUE (of the wrong kind),
 /// HANDLE_FILE_EMPTY, HANDLE_NAME, HANDLE_NAME_TWICE, HANDLE_EMPTY, HANDLE_VERTEX_OUT_OF_RANGE,
 /// HANDLE_VERTEX_TWICE, HANDLE_MOTION_TWICE (positions beside translate or rotate), HANDLE_TARGET_COUNT,
@@ -31,7 +41,7 @@ struct HandleFile {
 /// looked for by the server.
 absl::StatusOr<HandleFile> parse_handles(std::string_view json, std::int64_t vertex_count);
 
-/// The same from a file; also NOT_FOUND (FILE_NOT_FOUND).
+/// The same from a file, which is read once (it may be a pipe); also NOT_FOUND (FILE_NOT_FOUND).
 absl::StatusOr<HandleFile> read_handles(const std::filesystem::path& path, std::int64_t vertex_count);
 
 /// A handle file that parse_handles reads back.

@@ -15,6 +15,7 @@
 #include "client/cli/generated_shape.h"
 #include "client/cli/info_command.h"
 #include "client/cli/reproduce_command.h"
+#include "client/cli/resize_command.h"
 #include "client/cli/shape_command.h"
 #include "core/solve/paper_poses.h"
 
@@ -65,18 +66,43 @@ CLI::Validator positive() {
       "> 0");
 }
 
+/// What parse_p takes.
+CLI::Validator norm() {
+  return CLI::Validator(
+      [](std::string& text) {
+        MaterialOptions ignored;
+        if (parse_p(text, ignored)) return std::string();
+        return absl::StrCat(text,
+                            " is not a number from 1 to 64, nor auto, nor auto: and a number from 0 to 1");
+      },
+      "P");
+}
+
 void add_material_options(CLI::App& app, DeformOptions& options) {
+  MaterialOptions& material = options.material;
   CLI::Option* const p =
-      app.add_option("--p", options.p,
-                     "The norm, 1 to 64: small concentrates distortion, large spreads it (2)")
-          ->check(within(1, 64))
-          ->option_text("P");
-  app.add_option("--p-field", options.p_field, "A p for each vertex: a file with one number a line")
+      app.add_option_function<std::string>(
+             "--p", [&material](const std::string& text) { parse_p(text, material); },
+             "The norm, 1 to 64: small concentrates distortion, large spreads it (2). Or from the geometry, "
+             "p and "
+             "stiffness: joints soft, parts rigid, with a strength of 0 to 1 (auto is auto:1)")
+          ->check(norm())
+          ->option_text("P|auto[:STRENGTH]");
+  app.add_option("--p-field", material.p_field, "A p for each vertex: a file with one number a line")
       ->excludes(p)
       ->option_text("FILE");
-  app.add_option("--stiffness-field", options.stiffness_field,
+  app.add_option("--stiffness-field", material.stiffness_field,
                  "A stiffness for each vertex, 1e-6 to 1e6: a file with one number a line (1 everywhere)")
       ->option_text("FILE");
+  app.add_option(
+         "--p-group", material.p_groups,
+         "A p for the vertices of a group, of the handle file or of an OBJ mesh; may be given several times")
+      ->allow_extra_args(false)
+      ->option_text("NAME=P");
+  app.add_option("--stiffness-group", material.stiffness_groups,
+                 "A stiffness for the vertices of a group, likewise")
+      ->allow_extra_args(false)
+      ->option_text("NAME=S");
   app.add_option("--length-unit", options.length_unit,
                  "The length that different p are mixed in, in the mesh's unit (the mean edge length)")
       ->check(positive())
@@ -174,6 +200,35 @@ void add_info(CLI::App& program, std::function<ExitStatus()>& command) {
   app.callback([&command, options] { command = [options] { return run_info(*options); }; });
 }
 
+/// Three numbers with commas between them.
+CLI::Option* add_vector(CLI::App& app, const std::string& flag, std::vector<double>& target,
+                        const std::string& help) {
+  return app.add_option(flag, target, help)->delimiter(',')->expected(3)->option_text("X,Y,Z");
+}
+
+void add_resize(CLI::App& program, std::function<ExitStatus()>& command) {
+  CLI::App& app = *program.add_subcommand(
+      "resize", "Scale a mesh by different factors along its axes; what is salient keeps its shape");
+  const auto options = std::make_shared<ResizeOptions>();
+  app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required()->option_text(" ");
+  app.add_option("OUT", options->out, "Where the result goes: .ply, .obj, .off, or a picture as .png")
+      ->required()
+      ->option_text(" ");
+  add_vector(app, "--scale", options->scale, "Factors along the three axes, each 0.01 to 100; required")
+      ->check(within(0.01, 100))
+      ->required();
+  add_vector(app, "--origin", options->origin, "What stays where it is (the middle of the bounding box)");
+  add_vector(app, "--x-axis", options->x_axis, "The direction of the first factor (1,0,0)");
+  add_vector(app, "--y-axis", options->y_axis, "The direction of the second factor (0,1,0)");
+  CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")
+                                   ->check(CLI::Range(1, 1024))
+                                   ->option_text("N");
+  app.add_option("--server", options->server, "HOST:PORT or unix:PATH of a server (solves in this process)")
+      ->excludes(threads)
+      ->option_text("ADDRESS");
+  app.callback([&command, options] { command = [options] { return run_resize(*options); }; });
+}
+
 void add_shape(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app =
       *program.add_subcommand("shape", "Write a generated mesh to try things on, and handles for it");
@@ -224,6 +279,7 @@ int run(int argc, char** argv) {
   std::function<ExitStatus()> command;
   add_deform(program, command);
   add_info(program, command);
+  add_resize(program, command);
   add_shape(program, command);
   add_reproduce(program, command);
   try {

@@ -57,6 +57,8 @@ ordered_json mesh_object(const client::MeshReport& mesh) {
 
 ordered_json p_value(const client::FieldValue& p) {
   if (const double* const uniform = std::get_if<double>(&p)) return *uniform;
+  if (const auto* const automatic = std::get_if<client::Automatic>(&p))
+    return {{"automatic", automatic->strength}};
   const auto& values = std::get<std::vector<double>>(p);
   if (values.empty()) return nullptr;
   const auto [lowest, highest] = std::ranges::minmax(values);

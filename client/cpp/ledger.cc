@@ -6,6 +6,8 @@
 namespace lpdeform::client {
 namespace {
 
+const std::string kResizeHandle = "resize";
+
 template <typename T>
 void replace_where_given(std::optional<T>& older, std::optional<T>& newer) {
   if (newer) older.swap(newer);
@@ -27,9 +29,20 @@ void settle_changes(Update& state) {
                 [](const auto& entry) { return !std::holds_alternative<Handle>(entry.second); });
 }
 
+/// A resizing replaces the handle and the fields that it sets, and a later change of its handle replaces it.
+void merge_resize(Update& older, Update& newer) {
+  if (newer.handles.contains(kResizeHandle)) older.resize.reset();
+  if (!newer.resize) return;
+  older.handles.erase(kResizeHandle);
+  older.settings.p.reset();
+  older.settings.stiffness.reset();
+  older.resize.swap(newer.resize);
+}
+
 }  // namespace
 
 void merge(Update& older, Update newer) {
+  merge_resize(older, newer);
   for (auto& [name, change] : newer.handles) {
     const auto [place, is_new] = older.handles.try_emplace(name, std::move(change));
     if (!is_new) merge_change(place->second, std::move(change));

@@ -149,8 +149,15 @@ struct SolverSettings {
   InitialGuess initial = InitialGuess::kCurrent;
 };
 
-/// The same number everywhere, or one a vertex.
-using FieldValue = std::variant<double, std::vector<double>>;
+/// p or stiffness from the shape's geometry, found by the server: softer at joints (concave creases, and places
+/// narrower than what is around them), stiffer on rigid parts. With joint_i in [0, 1),
+/// p_i = 2 - strength (1 - joint_i) and s_i = 10^(-strength joint_i).
+struct Automatic {
+  double strength = 1;  // 0 to 1; 0 is p = 2 and stiffness 1 everywhere
+};
+
+/// The same number everywhere, one a vertex, or from the geometry.
+using FieldValue = std::variant<double, std::vector<double>, Automatic>;
 
 /// What is left out keeps its value.
 struct Settings {
@@ -162,6 +169,19 @@ struct Settings {
   std::optional<RegionOfInterest> region = {};
 };
 
+/// A scaling by different factors along three axes in which salient parts keep their shape and size. The server
+/// makes the handle "resize" of it, which holds the ends of the mesh along the scaled axes, and sets p and
+/// stiffness, where the same update does not. To end it, remove that handle and set p and stiffness.
+struct Resize {
+  /// Along the axes, relative to the rest mesh; each 0.01 to 100. A factor that all share is better given to the mesh.
+  std::array<double, 3> scale = {1, 1, 1};
+  /// Stays where it is; the middle of the mesh's bounding box where left out.
+  std::optional<std::array<double, 3>> origin = {};
+  /// The directions of the first and the second axis, of any length; x and y of the mesh where left out. Of the
+  /// second, the part across the first counts; the third is across both.
+  std::optional<std::array<std::array<double, 3>, 2>> axes = {};
+};
+
 /// A change of handles and settings; the server takes it whole or not at all.
 struct Update {
   /// Lets go of the handle.
@@ -171,6 +191,7 @@ struct Update {
 
   std::map<std::string, Change> handles = {};
   Settings settings = {};
+  std::optional<Resize> resize = {};
 };
 
 /// One kind of defect of a mesh.

@@ -65,6 +65,10 @@ absl::Status to_wire(const FieldValue& value, Packer& packer, v1::Field& out) {
     out.set_uniform(*uniform);
     return absl::OkStatus();
   }
+  if (const Automatic* const automatic = std::get_if<Automatic>(&value)) {
+    out.mutable_automatic()->set_strength(automatic->strength);
+    return absl::OkStatus();
+  }
   out.mutable_per_vertex()->set_scalar(v1::SCALAR_FLOAT64);
   return packer.pack(bytes_of(std::get<std::vector<double>>(value)),
                      *out.mutable_per_vertex()->mutable_values());
@@ -135,6 +139,14 @@ absl::Status to_wire(const Update::Change& change, Packer& packer, v1::HandleUpd
   return std::visit(put_change, change);
 }
 
+void to_wire(const Resize& resize, v1::Resize& out) {
+  put(resize.scale, out.mutable_scale());
+  if (resize.origin) put(*resize.origin, out.mutable_origin());
+  if (!resize.axes) return;
+  put((*resize.axes)[0], out.mutable_x_axis());
+  put((*resize.axes)[1], out.mutable_y_axis());
+}
+
 }  // namespace
 
 absl::Status to_wire(const Mesh& mesh, Packer& packer, v1::Mesh& out) {
@@ -172,6 +184,7 @@ absl::Status to_wire(const Update& update, std::uint64_t seq, Packer& packer, v1
     absl::Status packed = to_wire(change, packer, message);
     if (!packed.ok()) return packed;
   }
+  if (update.resize) to_wire(*update.resize, *out.mutable_resize());
   const Settings& settings = update.settings;
   const bool has_field = settings.p || settings.stiffness || settings.length_unit;
   if (!has_field && !settings.solver && !settings.region) return absl::OkStatus();

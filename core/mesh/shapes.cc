@@ -182,6 +182,17 @@ TriangleMesh block_with_holes(int nx, int ny, int nz) {
   });
 }
 
+TriangleMesh necked_bar(int side, int length, int neck_side, int neck_length) {
+  LPDEFORM_CHECK(neck_side >= 1 && neck_side <= side && (side - neck_side) % 2 == 0);
+  LPDEFORM_CHECK(neck_length >= 0 && neck_length < length);
+  const std::int64_t margin = (side - neck_side) / 2, neck_begin = (length - neck_length) / 2;
+  return solid_surface({side, side, length}, [=](std::int64_t x, std::int64_t y, std::int64_t z) {
+    if (z < 0 || z >= length) return false;
+    const std::int64_t inset = z >= neck_begin && z < neck_begin + neck_length ? margin : 0;
+    return x >= inset && x < side - inset && y >= inset && y < side - inset;
+  });
+}
+
 TriangleMesh sphere(int levels) {
   LPDEFORM_CHECK(levels >= 0);
   TriangleMesh mesh = icosahedron();

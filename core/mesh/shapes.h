@@ -18,6 +18,11 @@ TriangleMesh grid(int nx, int ny, double bump = 0.0);
 /// >= 3, nz >= 1.
 TriangleMesh block_with_holes(int nx, int ny, int nz);
 
+/// A bar of side x side x length cells whose middle `neck_length` slices are narrowed to neck_side x
+/// neck_side cells about the axis along z: two rigid parts and a joint. side - neck_side even; 1 <= neck_side
+/// <= side, 0 <= neck_length < length.
+TriangleMesh necked_bar(int side, int length, int neck_side, int neck_length);
+
 /// Unit sphere from an icosahedron subdivided `levels` times: 10 * 4^levels + 2 vertices.
 TriangleMesh sphere(int levels);
 

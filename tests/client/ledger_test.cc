@@ -45,6 +45,37 @@ TEST(Ledger, MergesWhatWaitsWithTheNewestValueWinning) {
   EXPECT_FALSE(ledger.has_waiting());
 }
 
+Update resizing(double factor) {
+  Update update;
+  update.resize = Resize{.scale = {factor, 1, 1}};
+  return update;
+}
+
+TEST(Ledger, AResizingReplacesTheFieldsBeforeItAndNotThoseAfterIt) {
+  Update state = with_p(3);
+  state.settings.stiffness = 2.0;
+  merge(state, resizing(2));
+  EXPECT_FALSE(state.settings.p || state.settings.stiffness);
+  merge(state, with_p(1.5));
+  merge(state, resizing(4));
+  EXPECT_FALSE(state.settings.p);
+  merge(state, with_p(1.25));
+  ASSERT_TRUE(state.resize);
+  EXPECT_EQ(state.resize->scale[0], 4);
+  EXPECT_EQ(std::get<double>(*state.settings.p), 1.25);
+}
+
+TEST(Ledger, AResizingEndsWithItsHandle) {
+  Ledger ledger;
+  ledger.add(resizing(2));
+  ledger.accept(ledger.send_next().seq);
+  ledger.session_lost();
+  EXPECT_TRUE(ledger.send_next().update.resize);  // made anew with it
+  Update state = resizing(2);
+  merge(state, removing("resize"));
+  EXPECT_FALSE(state.resize);
+}
+
 TEST(Ledger, AMotionMovesTheHandleThatWaitsToBeAdded) {
   Ledger ledger;
   ledger.add(adding("tip", {7, 8}));

@@ -63,6 +63,23 @@ TEST(Wire, SaysHowAHandleIsHeldAndWhatMayMove) {
   EXPECT_FALSE(removing.settings().region().has_vertices());
 }
 
+TEST(Wire, AResizingAndAutomaticFieldsGoAsTheyAre) {
+  Update update;
+  update.resize = Resize{.scale = {2, 1, 1}, .origin = {{1, 2, 3}}, .axes = {{{{0, 1, 0}, {0, 0, 1}}}}};
+  update.settings.p = Automatic{0.5};
+  Packer packer([](std::string_view) { return absl::InternalError("not needed"); });
+  v1::Update message;
+  ASSERT_TRUE(to_wire(update, 9, packer, message).ok());
+  EXPECT_EQ(message.resize().scale().x(), 2);
+  EXPECT_EQ(message.resize().origin().z(), 3);
+  EXPECT_EQ(message.resize().x_axis().y(), 1);
+  EXPECT_EQ(message.resize().y_axis().z(), 1);
+  EXPECT_EQ(message.settings().p().automatic().strength(), 0.5);
+  v1::Update bare;
+  ASSERT_TRUE(to_wire(Update{.resize = Resize{}}, 9, packer, bare).ok());
+  EXPECT_FALSE(bare.resize().has_origin() || bare.resize().has_x_axis() || bare.has_settings());
+}
+
 TEST(Wire, AFaultOfAStreamKeepsReasonElementAndLimit) {
   v1::Fault fault;
   fault.set_code(3);

@@ -288,6 +288,51 @@ class Deform(unittest.TestCase):
         doubled, plain = self.deform("--p", 2, "--stiffness-field", stiff), self.deform("--p", 2)
         self.assertAlmostEqual(doubled["energy"] / plain["energy"], 2, delta=1e-3)  # twice the tolerance's worth
 
+    def test_p_from_the_geometry_is_the_same_through_a_server_and_may_be_painted_over(self):
+        alone = self.deform("--p", "auto:0.5")
+        self.assertEqual(alone["p"], {"automatic": 0.5})
+        served = self.deform("--p", "auto:0.5", "--server", self.server.address)
+        self.assertEqual(served["energy"], alone["energy"])
+        handles = json.loads(read_text(self.at("bar.json")))
+        handles["groups"] = [{"name": "low", "vertices": [0, 1, 2], "p": 1, "stiffness": 7}]
+        painted = self.write("painted.json", json.dumps(handles))
+        out = self.at("painted_report.json")
+        done = run("deform", self.at("bar.off"), "--handles", painted, "--p", "auto:0.5", "--p-group", "low=3", "--report", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = json.loads(read_text(out))
+        self.assertEqual(report["p"]["max"], 3)
+        self.assertLess(report["p"]["min"], 1.6)  # of the geometry
+
+    def test_obj_groups_are_painted_and_an_unknown_one_is_named(self):
+        lines = [f"v {x} {y} {z}" for x, y, z in read_off(self.at("bar.off"))]
+        words = [line.split() for line in read_text(self.at("bar.off")).splitlines()]
+        faces = [line[1:] for line in words if len(line) == 4 and line[0] == "3"]
+        lines += ["g front"] + ["f " + " ".join(str(int(v) + 1) for v in face) for face in faces[:10]]
+        lines += ["g rest"] + ["f " + " ".join(str(int(v) + 1) for v in face) for face in faces[10:]]
+        obj = self.write("grouped.obj", "\n".join(lines) + "\n")
+        report_path = self.at("grouped_report.json")
+        done = run("deform", obj, "--handles", self.at("bar.json"), "--p-group", "front=1.5", "--stiffness-group",
+                   "rest=2", "--report", report_path)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = json.loads(read_text(report_path))
+        self.assertEqual((report["p"]["min"], report["p"]["max"]), (1.5, 2))
+        refusal = self.refused(2, "deform", obj, "--handles", self.at("bar.json"), "--p-group", "back=1")
+        self.assertIn("front, rest", refusal)
+
+    def test_resize_meets_the_scaled_extent_through_a_server_and_alone(self):
+        for options in ([], ["--server", self.server.address]):
+            out = self.at("resized.off")
+            done = run("resize", self.at("bar.off"), out, "--scale", "1,1.5,3", "--origin", "0,0,0", *options)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(done.stdout.count("converged"), 2)  # 1.5 is shared; x and z differ from it
+            positions = read_off(out)
+            for axis, extent, places in ((0, 4, 1), (1, 6, 1), (2, 63, 3)):  # the last solve holds the ends of z alone
+                self.assertAlmostEqual(min(position[axis] for position in positions), 0, places)
+                self.assertAlmostEqual(max(position[axis] for position in positions), extent, places)
+        self.assertIn("0.01 to 100", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "1,1,0"))
+        self.assertIn("axis", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "1,1,2",
+                                           "--x-axis", "0,1,0"))
+
     def test_starting_from_a_result_leaves_little_to_do(self):
         result = self.at("result.off")
         first = self.deform("--p", 2, "--out", result)
@@ -373,7 +418,7 @@ class Deform(unittest.TestCase):
         text = run("deform", "--help").stdout
         for option in ("--handles", "--p ", "--p-field", "--stiffness-field", "--length-unit", "--method", "--weights",
                        "--initial", "--free-components", "--max-iterations", "--tolerance", "--time-limit", "--threads",
-                       "--weld", "--normals", "--out", "--report", "--server", "Exit status"):
+                       "--weld", "--normals", "--out", "--report", "--server", "--p-group", "--stiffness-group", "Exit status"):
             self.assertIn(option, text)
         self.assertRegex(run("--version").stdout, r"^lpdeform \d+\.\d+\.\d+\n$")
 
@@ -485,6 +530,16 @@ class Reproduce(unittest.TestCase):
                 self.assertEqual(done.returncode, 2, done.stderr)
                 self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
                 self.assertIn(named, done.stderr)
+        self.assertFalse(os.path.exists(out))
+
+    def test_handles_that_the_papers_methods_do_not_know_are_refused(self):
+        mesh, soft, out = (os.path.join(self.temporary.name, name) for name in ("my bar.off", "soft.json", "soft"))
+        with open(soft, "w") as file:
+            file.write('{"handles": [{"name": "tip", "vertices": [1], "soft": 1}]}')
+        done = run("reproduce", "--out", out, "--mesh", mesh, "--handles", soft)
+        self.assertEqual(done.returncode, 2)
+        self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+        self.assertIn('handle "tip"', done.stderr)
         self.assertFalse(os.path.exists(out))
 
     def test_ctrl_c_ends_it_and_writes_nothing(self):

@@ -74,6 +74,13 @@ TEST(Shapes, BlockHasThreeTunnels) {
   EXPECT_NEAR(signed_volume(block_with_holes(14, 9, 1)), 14 * 9 - 3 * 4, 1e-9);
 }
 
+TEST(Shapes, NeckedBarIsTwoBarsAndANeck) {
+  const TriangleMesh bar = necked_bar(4, 12, 2, 4);
+  expect_sound(bar, 0, 0);
+  EXPECT_NEAR(signed_volume(bar), 8 * 16 + 4 * 4, 1e-9);
+  EXPECT_EQ(necked_bar(4, 21, 4, 5).vertices, box_surface(4, 4, 21).vertices);
+}
+
 TEST(Shapes, SphereHasUnitRadiusAndItsCounts) {
   for (const int levels : {0, 1, 3}) {
     const TriangleMesh ball = sphere(levels);

@@ -1,0 +1,131 @@
+#include "client/cli/resize_command.h"
+
+#include <array>
+#include <cstdio>
+#include <memory>
+#include <utility>
+
+#include "absl/status/statusor.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/local_server.h"
+#include "client/cli/mesh_input.h"
+#include "client/cli/outputs.h"
+#include "client/cli/progress.h"
+#include "client/cpp/client.h"
+#include "core/base/fault.h"
+#include "core/solve/resize.h"
+
+namespace lpdeform::cli {
+namespace {
+
+/// The mesh on its way, and what the last solve said.
+struct Resized {
+  MeshFile file;
+  Field distortion;
+  client::StopReason stop_reason = client::StopReason::kConverged;
+};
+
+Eigen::Vector3d vector_of(const std::vector<double>& numbers, const Eigen::Vector3d& otherwise) {
+  return numbers.size() == 3 ? Eigen::Vector3d(numbers[0], numbers[1], numbers[2]) : otherwise;
+}
+
+std::array<double, 3> array_of(const Eigen::Vector3d& vector) {
+  return {vector[0], vector[1], vector[2]};
+}
+
+absl::StatusOr<Scaling> read_scaling(const ResizeOptions& options, const TriangleMesh& mesh) {
+  if (options.x_axis.empty() != options.y_axis.empty()) {
+    return invalid_input({"RESIZE_AXES", "axes", "both or none"},
+                         "One of --x-axis and --y-axis is given without the other.");
+  }
+  const auto shape = RestShape::create(mesh);
+  if (!shape.ok()) return shape.status();
+  Scaling scaling;
+  scaling.scale = vector_of(options.scale, Eigen::Vector3d::Ones());
+  scaling.origin = vector_of(options.origin, box_middle(**shape));
+  const auto axes = axes_of(vector_of(options.x_axis, Eigen::Vector3d::UnitX()),
+                            vector_of(options.y_axis, Eigen::Vector3d::UnitY()));
+  if (!axes.ok()) return axes.status();
+  scaling.axes = *axes;
+  return scaling;
+}
+
+/// One solve on the server: along one axis, by `factor`.
+absl::Status stretch(client::Client& server, const Scaling& scaling, int axis, double factor,
+                     Interrupt& interrupt, Resized& resized) {
+  Progress progress;
+  absl::StatusOr<client::Session> session = server.open(to_client(resized.file.mesh));
+  if (!session.ok()) return session.status();
+  interrupt.set_action([&session] { session->close().IgnoreError(); });
+  client::Resize resize;
+  resize.scale[static_cast<std::size_t>(axis)] = factor;
+  resize.origin = array_of(scaling.origin);
+  resize.axes = {array_of(scaling.axes.row(0).transpose()), array_of(scaling.axes.row(1).transpose())};
+  client::SolveOptions solve;
+  Scaling plain = scaling;
+  plain.scale = Eigen::Vector3d::Ones();
+  plain.scale[axis] = factor;
+  solve.initial_positions = flat(plain(resized.file.mesh.vertices));
+  solve.on_progress = [&progress](const client::SolveProgress& now) { progress.show(now); };
+  const auto sent = session->update({.handles = {}, .settings = {}, .resize = resize});
+  const absl::StatusOr<client::SolveResult> result =
+      sent.ok() ? session->solve(solve) : absl::StatusOr<client::SolveResult>(sent.status());
+  interrupt.set_action({});
+  if (!result.ok()) return result.status();
+
+  resized.file.mesh.vertices = points_of(result->positions);
+  resized.distortion = Eigen::Map<const Field>(result->distortion.data(),
+                                               static_cast<Eigen::Index>(result->distortion.size()));
+  if (resized.stop_reason == client::StopReason::kConverged) resized.stop_reason = result->stop_reason;
+  std::printf("axis %d by %.6g: %s after %u iterations, %.3f s\n", axis + 1, factor,
+              stop_reason_name(result->stop_reason).c_str(), result->iterations,
+              result->setup_seconds + result->solve_seconds);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Resized> resize_on(const std::string& address, const Scaling& scaling, MeshFile file,
+                                  Interrupt& interrupt) {
+  absl::StatusOr<client::Client> server = client::Client::connect(address);
+  if (!server.ok()) return server.status();
+  Resized resized{std::move(file), {}};
+  const double shared = shared_factor(scaling.scale);
+  Scaling plain = scaling;
+  plain.scale.setConstant(shared);
+  resized.file.mesh.vertices = plain(resized.file.mesh.vertices);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double factor = scaling.scale[axis] / shared;
+    if (factor == 1) continue;
+    absl::Status status = stretch(*server, scaling, axis, factor, interrupt, resized);
+    if (!status.ok()) return status;
+  }
+  return resized;
+}
+
+}  // namespace
+
+ExitStatus run_resize(const ResizeOptions& options) {
+  Interrupt interrupt;
+  if (absl::Status status = check_outputs(std::array{options.out}); !status.ok()) return complain(status);
+  absl::StatusOr<MeshFile> file = read_deformable(options.mesh);
+  if (!file.ok()) return complain(file.status());
+  const absl::StatusOr<Scaling> scaling = read_scaling(options, file->mesh);
+  if (!scaling.ok()) return complain(scaling.status());
+
+  std::unique_ptr<LocalServer> local;
+  if (!options.server) {
+    absl::StatusOr<std::unique_ptr<LocalServer>> started = LocalServer::start(options.threads);
+    if (!started.ok()) return complain(started.status());
+    local = *std::move(started);
+  }
+  const absl::StatusOr<Resized> resized =
+      resize_on(local ? local->address() : *options.server, *scaling, *std::move(file), interrupt);
+  if (interrupt.happened()) return kInterrupted;
+  if (!resized.ok()) return complain(resized.status());
+  const absl::Status written =
+      write_output(options.out, resized->file, resized->file.mesh.vertices, resized->distortion);
+  if (!written.ok()) return complain(written);
+  std::printf("wrote %s\n", options.out.c_str());
+  return exit_status_of(resized->stop_reason, false, false);
+}
+
+}  // namespace lpdeform::cli

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cli/exit_status.h"
+
+namespace lpdeform::cli {
+
+struct ResizeOptions {
+  std::filesystem::path mesh;
+  std::filesystem::path out;
+  std::vector<double> scale = {1, 1, 1};  // along the axes, each 0.01 to 100
+  std::vector<double> origin;             // x, y, z; empty: the middle of the mesh's bounding box
+  std::vector<double> x_axis, y_axis;     // directions; both or none
+  int threads = 0;                        // of the server in this process; 0: all cores
+  std::optional<std::string> server;      // a server in this process where there is none
+};
+
+/// Content-aware resizing of a mesh: as core/solve/resize.h has it, the factor that two of three axes share
+/// (the middle one) by plain scaling, then one solve for each axis that differs from it, each from the result
+/// before. Prints one line a solve. The distortion written to a .ply or shown in a .png is that of the last
+/// solve.
+ExitStatus run_resize(const ResizeOptions& options);
+
+}  // namespace lpdeform::cli

@@ -1,0 +1,38 @@
+#include "core/analysis/automatic_material.h"
+
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "core/analysis/joints.h"
+#include "core/base/fault.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr double kJointP = 2;
+constexpr double kSoftening = 10;
+
+}  // namespace
+
+absl::Status check_strength(double strength) {
+  if (strength >= 0 && strength <= 1) return absl::OkStatus();
+  return invalid_input({"STRENGTH_OUT_OF_RANGE", "strength", "0 <= strength <= 1"},
+                       absl::StrCat("the strength is ", strength, "; it must be from 0 to 1"));
+}
+
+absl::StatusOr<Material> automatic_material(const Field& joint, double strength) {
+  if (absl::Status status = check_strength(strength); !status.ok()) return status;
+  Material material;
+  if (strength == 0) return material;
+  material.p = kJointP - strength * (1 - joint.array());
+  material.stiffness = (-strength * std::log(kSoftening) * joint.array()).exp();
+  return material;
+}
+
+absl::StatusOr<Material> automatic_material(const RestShape& shape, double strength, const Workers& workers) {
+  if (absl::Status status = check_strength(strength); !status.ok()) return status;
+  if (strength == 0) return Material();
+  return automatic_material(find_joints(shape, workers).joint, strength);
+}
+
+}  // namespace lpdeform

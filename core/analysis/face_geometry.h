@@ -1,0 +1,16 @@
+#pragma once
+
+#include "core/energy/rest_shape.h"
+
+namespace lpdeform {
+
+/// A face of a rest shape in scaled units.
+struct FaceGeometry {
+  Eigen::RowVector3d centre;
+  Eigen::RowVector3d normal;  // unit, outwards where the mesh is oriented so; 0 for a zero-area face
+  double area = 0;            // 0 for a zero-area face (core/mesh/topology.h)
+};
+
+FaceGeometry face_geometry(const RestShape& shape, Eigen::Index face);
+
+}  // namespace lpdeform

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "core/analysis/bending.h"
+#include "core/base/workers.h"
+#include "core/energy/rest_shape.h"
+
+namespace lpdeform {
+
+/// What is known of a shape's geometry: worked out when it is first asked for, and kept. Thread-safe; who asks
+/// while another is at work waits for it. Copies nothing of the shape.
+class ShapeFeatures {
+ public:
+  explicit ShapeFeatures(std::shared_ptr<const RestShape> shape, Workers workers = Workers(1))
+      : shape_(std::move(shape)), workers_(std::move(workers)) {}
+
+  const RestShape& shape() const { return *shape_; }
+  /// Joints::joint.
+  const Field& joint() const;
+  /// smoothed_bending of core/analysis/salience.h.
+  const BendingMeasure& bending() const;
+
+ private:
+  const std::shared_ptr<const RestShape> shape_;
+  const Workers workers_;
+  mutable std::mutex mutex_;
+  mutable std::optional<Field> joint_;
+  mutable std::optional<BendingMeasure> bending_;
+};
+
+}  // namespace lpdeform

@@ -1,0 +1,125 @@
+#include "core/solve/resize.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "absl/strings/str_cat.h"
+#include "core/analysis/salience.h"
+#include "core/base/fault.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr double kEnd = 0.01;  // of the extent
+constexpr double kStiffening = 100;
+constexpr double kSmallestSine = 1e-6;
+
+absl::Status check_scaling(const Scaling& scaling) {
+  for (int k = 0; k < 3; ++k) {
+    const double scale = scaling.scale[k];
+    if (scale >= Scaling::kLowest && scale <= Scaling::kHighest) continue;
+    return invalid_input(
+        {"RESIZE_SCALE_OUT_OF_RANGE", absl::StrCat("scale[", k, "]"), "0.01 <= scale <= 100"},
+        absl::StrCat("scale[", k, "] is ", scale, "; it must be from 0.01 to 100"));
+  }
+  if (scaling.origin.allFinite()) return absl::OkStatus();
+  return invalid_input({"RESIZE_ORIGIN_NOT_FINITE", "origin", "finite numbers"},
+                       "the origin of the resizing is not finite");
+}
+
+/// |log scale_k| over the largest of them; (1, 0, 0) where all scales are 1.
+Eigen::Vector3d stretch_shares(const Eigen::Vector3d& scale) {
+  const Eigen::Vector3d stretch = scale.array().log().abs();
+  const double largest = stretch.maxCoeff();
+  return largest > 0 ? Eigen::Vector3d(stretch / largest) : Eigen::Vector3d(1, 0, 0);
+}
+
+/// The lowest and the highest coordinate of each component along each axis.
+struct Extents {
+  std::vector<Eigen::Array3d> low, high;
+};
+
+Extents extents_of(const RestShape& shape, const Points& along) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const auto count = static_cast<std::size_t>(shape.component_count());
+  Extents extents{std::vector<Eigen::Array3d>(count, Eigen::Array3d::Constant(infinity)),
+                  std::vector<Eigen::Array3d>(count, Eigen::Array3d::Constant(-infinity))};
+  for (Eigen::Index i = 0; i < along.rows(); ++i) {
+    const std::int32_t component = shape.components()[i];
+    if (component < 0) continue;
+    extents.low[component] = extents.low[component].min(along.row(i).transpose().array());
+    extents.high[component] = extents.high[component].max(along.row(i).transpose().array());
+  }
+  return extents;
+}
+
+std::vector<std::int32_t> ends_of(const RestShape& shape, const Eigen::Matrix3d& axes,
+                                  const Eigen::Vector3d& shares) {
+  const Points along = (shape.positions().rowwise() - shape.centre()) * axes.transpose();
+  const Extents extents = extents_of(shape, along);
+  std::vector<std::int32_t> ends;
+  for (Eigen::Index i = 0; i < along.rows(); ++i) {
+    const std::int32_t component = shape.components()[i];
+    if (component < 0) continue;
+    const Eigen::Array3d low = extents.low[component], high = extents.high[component];
+    const Eigen::Array3d x = along.row(i).transpose().array(), margin = kEnd * (high - low);
+    const auto is_end = (x <= low + margin || x >= high - margin) && shares.array() > 0;
+    if (is_end.any()) ends.push_back(static_cast<std::int32_t>(i));
+  }
+  return ends;
+}
+
+}  // namespace
+
+Points Scaling::operator()(const Points& points) const {
+  const Eigen::Matrix3d matrix = axes.transpose() * scale.asDiagonal() * axes;
+  return ((points.rowwise() - origin.transpose()) * matrix).rowwise() + origin.transpose();
+}
+
+absl::StatusOr<Eigen::Matrix3d> axes_of(const Eigen::Vector3d& x_axis, const Eigen::Vector3d& y_axis) {
+  const Eigen::Vector3d x = x_axis.stableNormalized(), y = y_axis.stableNormalized();
+  const Eigen::Vector3d across = y - y.dot(x) * x;
+  const bool is_finite = x_axis.allFinite() && y_axis.allFinite();
+  if (!is_finite || !(x.norm() > 0.5) || !(across.norm() > kSmallestSine)) {
+    return invalid_input({"RESIZE_AXES", "axes", "two directions that are not parallel"},
+                         "the axes of the resizing are not finite, of length 0, or parallel");
+  }
+  Eigen::Matrix3d axes;
+  axes.row(0) = x;
+  axes.row(1) = across.normalized();
+  axes.row(2) = axes.row(0).cross(axes.row(1));
+  return axes;
+}
+
+absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling) {
+  if (absl::Status status = check_scaling(scaling); !status.ok()) return status;
+  const RestShape& shape = features.shape();
+  const Eigen::Vector3d shares = stretch_shares(scaling.scale);
+  ResizeInputs inputs;
+  inputs.handle.vertices = ends_of(shape, scaling.axes, shares);
+  const Points scaled = scaling(shape.positions());
+  Points targets(inputs.handle.vertices.size(), 3);
+  for (std::size_t k = 0; k < inputs.handle.vertices.size(); ++k)
+    targets.row(k) = scaled.row(inputs.handle.vertices[k]);
+  inputs.handle.motion = TargetPositions{std::move(targets)};
+  inputs.material = Material::uniform(1);
+  const Field stiff = salience(shape, features.bending(), scaling.axes, shares);
+  inputs.material.stiffness = (std::log(kStiffening) * stiff.array()).exp();
+  return inputs;
+}
+
+double shared_factor(const Eigen::Vector3d& scale) {
+  return std::max(std::min(scale[0], scale[1]), std::min(std::max(scale[0], scale[1]), scale[2]));
+}
+
+Eigen::Vector3d box_middle(const RestShape& shape) {
+  Eigen::AlignedBox3d box;
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    if (shape.components()[i] >= 0) box.extend(shape.positions().row(i).transpose());
+  }
+  return box.min() + 0.5 * (box.max() - box.min());
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,57 @@
+#pragma once
+
+#include "absl/status/statusor.h"
+#include "core/analysis/shape_features.h"
+#include "core/energy/material.h"
+#include "core/solve/handles.h"
+
+namespace lpdeform {
+
+/// A scaling by different factors along three axes: x -> origin + sum_k scale_k u_k u_k^T (x - origin).
+struct Scaling {
+  /// 0.01 <= scale_k <= 100.
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();
+  /// In the caller's units.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  /// u_k: rows, orthonormal.
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+
+  Points operator()(const Points& points) const;
+
+  static constexpr double kLowest = 0.01, kHighest = 100;
+};
+
+/// The axes from two directions of any length: the first, the part of the second across it, and what is
+/// across both. INVALID_ARGUMENT: RESIZE_AXES where they are not finite or too nearly parallel (a sine below
+/// 1e-6).
+absl::StatusOr<Eigen::Matrix3d> axes_of(const Eigen::Vector3d& x_axis, const Eigen::Vector3d& y_axis);
+
+/// What makes a Deformer resize: held places and a material.
+struct ResizeInputs {
+  Handle handle;
+  Material material;
+};
+
+/// Content-aware resizing (section 5 of the paper names it): the extent becomes that of the scaled shape, and
+/// what is salient keeps its shape and size, by the energy of Eq. 3 against the rest shape.
+///
+/// The handle holds the ends of each component, the vertices within 1 % of its extent from its lowest and
+/// highest along each axis whose scale is not 1, at their scaled positions; where all are 1, the ends along
+/// the first axis. The material is p = 1 and the stiffness 100^salience_i, with the salience of
+/// core/analysis/salience.h for the axes, weighted |log scale_k| / max_j |log scale_j|.
+///
+/// p = 1 matters: it gathers the stretch in places where little resists, which are straight along the
+/// stretch, so that it does not show there. p = 2 spreads it over salient places too, however stiff they are.
+/// A factor that all axes share is no change of shape: scale the mesh by it first (shared_factor), or it is a
+/// stretch like any other.
+///
+/// INVALID_ARGUMENT: RESIZE_SCALE_OUT_OF_RANGE, RESIZE_ORIGIN_NOT_FINITE. `axes` must be orthonormal.
+absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling);
+
+/// The middle one of the three factors: at most two axes differ from it.
+double shared_factor(const Eigen::Vector3d& scale);
+
+/// The middle of the bounding box of the vertices that faces use: the origin where none is given.
+Eigen::Vector3d box_middle(const RestShape& shape);
+
+}  // namespace lpdeform

@@ -1,0 +1,97 @@
+#include "core/analysis/automatic_material.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "core/analysis/shape_features.h"
+#include "core/base/fault.h"
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+TEST(AutomaticMaterial, FollowsItsFormula) {
+  const Field joint{{0, 0.5, 1}};
+  const Material material = automatic_material(joint, 0.8).value();
+  EXPECT_NEAR(material.p[0], 1.2, 1e-15);
+  EXPECT_NEAR(material.p[1], 1.6, 1e-15);
+  EXPECT_NEAR(material.p[2], 2, 1e-15);
+  EXPECT_NEAR(material.stiffness[0], 1, 1e-15);
+  EXPECT_NEAR(material.stiffness[1], std::pow(10, -0.4), 1e-15);
+  EXPECT_NEAR(material.stiffness[2], std::pow(10, -0.8), 1e-15);
+  EXPECT_TRUE(check_material(automatic_material(joint, 1).value(), 3).ok());
+}
+
+TEST(AutomaticMaterial, OfStrengthZeroIsTheSameEverywhere) {
+  const auto shape = rest_shape(necked_bar(4, 12, 2, 4));
+  EXPECT_EQ(automatic_material(*shape, 0).value(), Material::uniform(2));
+}
+
+TEST(AutomaticMaterial, RefusesAStrengthOutOfRange) {
+  const auto shape = rest_shape(box_surface(1, 1, 1));
+  for (const double strength : {-0.1, 1.1, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    const absl::Status status = automatic_material(*shape, strength).status();
+    EXPECT_EQ(fault_of(status), (Fault{"STRENGTH_OUT_OF_RANGE", "strength", "0 <= strength <= 1"}));
+  }
+}
+
+TEST(ShapeFeatures, KeepWhatTheyFound) {
+  const auto shape = rest_shape(necked_bar(4, 12, 2, 4));
+  const ShapeFeatures features(shape);
+  const Field& first = features.joint();
+  EXPECT_EQ(&first, &features.joint());
+  EXPECT_EQ(automatic_material(first, 1).value(), automatic_material(*shape, 1).value());
+}
+
+/// The bar with a neck bent by 60 degrees: how its two halves turn against each other, and what share of the
+/// distortion lies in the neck.
+struct Bend {
+  double degrees;
+  double share_in_neck;
+};
+
+Points at(const Points& points, const std::vector<std::int32_t>& vertices) {
+  Points chosen(vertices.size(), 3);
+  for (std::size_t k = 0; k < vertices.size(); ++k) chosen.row(k) = points.row(vertices[k]);
+  return chosen;
+}
+
+Bend bend(const Material& material) {
+  const TriangleMesh bar = necked_bar(8, 42, 4, 6);
+  HandleSet handles;
+  (void)handles.set("bottom", {slice(bar, 2, 0, 0), Fixed{}});
+  (void)handles.set("top", {slice(bar, 2, 42, 42), turn(Eigen::Vector3d::UnitX(), 60, {4, 4, 21})});
+  auto solver = deformer(rest_shape(bar), handles, material);
+  SolveSettings settings;
+  settings.initial = InitialGuess::kLaplacian;
+  EXPECT_EQ(solver->solve(settings).value().stop_reason, StopReason::kConverged);
+
+  const auto turn_of = [&](double low, double high) {
+    const std::vector<std::int32_t> part = slice(bar, 2, low, high);
+    return fit_rigid(at(bar.vertices, part), at(solver->positions(), part)).rotation;
+  };
+  const Eigen::Matrix3d between = turn_of(0, 17.5).transpose() * turn_of(24.5, 42);
+  double in_neck = 0;
+  for (const std::int32_t i : slice(bar, 2, 17.5, 24.5)) in_neck += solver->cell_energies()[i];
+  return {Eigen::AngleAxisd(between).angle() * 180 / std::numbers::pi,
+          in_neck / solver->cell_energies().sum()};
+}
+
+TEST(AutomaticMaterial, BendsABarAtItsNeckMoreThanTheSamePEverywhere) {
+  const auto shape = rest_shape(necked_bar(8, 42, 4, 6));
+  const Bend plain = bend(Material::uniform(2)), half = bend(automatic_material(*shape, 0.5).value()),
+             full = bend(automatic_material(*shape, 1).value());
+  EXPECT_LT(plain.share_in_neck, half.share_in_neck);
+  EXPECT_LT(half.share_in_neck, full.share_in_neck);
+  EXPECT_LT(plain.degrees, 59);
+  EXPECT_GT(full.degrees, 59.9);  // of 60: the halves are rigid
+  EXPECT_LT(plain.share_in_neck, 0.6);
+  EXPECT_GT(full.share_in_neck, 0.99);
+}
+
+}  // namespace
+}  // namespace lpdeform
