@@ -34,7 +34,7 @@ double seconds_since(Clock::time_point start) {
 /// A creature of about `vertices` vertices: the feet stay, the far end of the body is turned.
 PaperPose creature_pose(const std::string& name, double vertices) {
   const auto sample = static_cast<double>(creature(24).vertices.rows());
-  PaperPose pose{name, creature(static_cast<int>(24 * std::sqrt(vertices / sample))), {}};
+  PaperPose pose{name, creature(static_cast<int>(24 * std::sqrt(vertices / sample))), {}, ""};
   const Eigen::RowVector3d low = pose.mesh.vertices.colwise().minCoeff();
   const Eigen::RowVector3d size = pose.mesh.vertices.colwise().maxCoeff() - low;
   const std::vector<std::int32_t> feet = slice(pose.mesh, 2, low[2], low[2] + 0.05 * size[2]);
@@ -49,7 +49,7 @@ PaperPose creature_pose(const std::string& name, double vertices) {
 
 /// 40,401 vertices: the middle is lifted, the rim stays.
 PaperPose bumpy_plane() {
-  PaperPose pose{"bumpy_plane", grid(200, 200, 4), {}};
+  PaperPose pose{"bumpy_plane", grid(200, 200, 4), {}, ""};
   std::vector<std::int32_t> rim, middle;
   for (std::int32_t v = 0; v < pose.mesh.vertices.rows(); ++v) {
     const double x = pose.mesh.vertices(v, 0) - 100, y = pose.mesh.vertices(v, 1) - 100;
