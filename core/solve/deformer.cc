@@ -26,7 +26,7 @@ constexpr std::size_t kWorkspace =
     24;  // positions of all vertices that a solve holds at most: the memory of L-BFGS
 constexpr std::size_t kCopyChunk = 4096;     // vertices
 constexpr std::int32_t kLargeMesh = 5000;    // vertices, from which on a coarse level pays
-constexpr std::int32_t kLargeAtTwo = 30000;  // the same where every p is 2: there is less to gain
+constexpr std::int32_t kLargeAtTwo = 60000;  // the same where every p is 2: there is less to gain
 constexpr double kFarthestGuess = 2;         // of the last move, how much more of it is guessed at most
 constexpr double kSameWay = 0.5;     // the squared cosine between two moves, from which on they are one drag
 constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
