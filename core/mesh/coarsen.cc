@@ -1,21 +1,15 @@
 #include "core/mesh/coarsen.h"
 
-#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "core/mesh/collapsible_mesh.h"
+
 namespace lpdeform {
 namespace {
 
-struct Traits : OpenMesh::DefaultTraits {
-  using Point = OpenMesh::Vec3d;
-  using Normal = OpenMesh::Vec3d;
-  VertexAttributes(OpenMesh::Attributes::Status);
-  EdgeAttributes(OpenMesh::Attributes::Status);
-  FaceAttributes(OpenMesh::Attributes::Status);
-};
-using HalfEdgeMesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
+using HalfEdgeMesh = CollapsibleMesh;
 using HalfEdge = OpenMesh::SmartHalfedgeHandle;
 using OpenMesh::Vec3d;
 

@@ -1,21 +1,15 @@
 #include "core/mesh/remesh.h"
 
-#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "core/mesh/collapsible_mesh.h"
+
 namespace lpdeform {
 namespace {
 
-struct DoubleTraits : OpenMesh::DefaultTraits {
-  using Point = OpenMesh::Vec3d;
-  using Normal = OpenMesh::Vec3d;
-  VertexAttributes(OpenMesh::Attributes::Status);
-  EdgeAttributes(OpenMesh::Attributes::Status);
-  FaceAttributes(OpenMesh::Attributes::Status);
-};
-using HalfEdgeMesh = OpenMesh::TriMesh_ArrayKernelT<DoubleTraits>;
+using HalfEdgeMesh = CollapsibleMesh;
 using OpenMesh::Vec3d;
 
 HalfEdgeMesh to_half_edges(const TriangleMesh& mesh) {
