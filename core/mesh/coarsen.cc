@@ -17,47 +17,10 @@ constexpr double kGrowth = 1.2;  // of the longest edge collapsed, from round to
 constexpr unsigned kLargestValence = 10;
 constexpr double kLargestTurn = 0.5;  // the cosine
 
-HalfEdgeMesh to_half_edges(const TriangleMesh& mesh) {
-  HalfEdgeMesh result;
-  const auto n = static_cast<std::size_t>(mesh.vertices.rows()),
-             m = static_cast<std::size_t>(mesh.faces.rows());
-  result.reserve(n, n + m, m);
-  for (const auto& row : mesh.vertices.rowwise()) result.add_vertex(Vec3d(row[0], row[1], row[2]));
-  for (const auto& row : mesh.faces.rowwise()) {
-    const auto vertex = [&](int corner) { return result.vertex_handle(static_cast<unsigned>(row[corner])); };
-    const bool is_open = [&] {
-      for (int corner = 0; corner < 3; ++corner) {
-        const auto from = vertex(corner), to = vertex((corner + 1) % 3);
-        if (from == to || !result.is_boundary(from)) return false;
-        const auto present = result.find_halfedge(from, to);
-        if (present.is_valid() && !result.is_boundary(present)) return false;
-      }
-      return true;
-    }();
-    if (is_open) result.add_face(vertex(0), vertex(1), vertex(2));
-  }
-  return result;
-}
-
-/// Whether the faces that stay when the half-edge collapses into its target still look the way they did.
-bool keeps_orientation(const HalfEdgeMesh& mesh, HalfEdge half_edge) {
-  const Vec3d target = mesh.point(half_edge.to());
-  for (const auto out : half_edge.from().outgoing_halfedges()) {
-    if (out.is_boundary()) continue;
-    const auto b = out.to(), c = out.next().to();
-    if (b == half_edge.to() || c == half_edge.to()) continue;
-    const Vec3d side = mesh.point(c) - mesh.point(b);
-    const Vec3d before = side.cross(mesh.point(out.from()) - mesh.point(b)),
-                after = side.cross(target - mesh.point(b));
-    if (!(before.dot(after) > kLargestTurn * before.norm() * after.norm())) return false;
-  }
-  return true;
-}
-
 bool may_collapse(HalfEdgeMesh& mesh, HalfEdge half_edge) {
   if (half_edge.from().is_boundary() && !half_edge.edge().is_boundary()) return false;
   if (half_edge.from().valence() + half_edge.to().valence() > kLargestValence + 4) return false;
-  return mesh.is_collapse_ok(half_edge) && keeps_orientation(mesh, half_edge);
+  return mesh.is_collapse_ok(half_edge) && keeps_orientation(mesh, half_edge, kLargestTurn);
 }
 
 /// One round; `left` counts vertices.
@@ -97,7 +60,7 @@ std::vector<std::int32_t> collapse(HalfEdgeMesh& mesh, std::int32_t vertices) {
 }  // namespace
 
 CoarseMesh coarsen(const TriangleMesh& mesh, std::int32_t vertices) {
-  HalfEdgeMesh half_edges = to_half_edges(mesh);
+  HalfEdgeMesh half_edges = to_collapsible(mesh);
   std::vector<std::int32_t> went_into = collapse(half_edges, vertices);
   for (std::int32_t& into : went_into) {
     while (into != went_into[into]) into = went_into[into];

@@ -2,6 +2,8 @@
 
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 
+#include "core/mesh/mesh.h"
+
 namespace lpdeform {
 
 /// OpenMesh's half-edges with double coordinates and what collapses need to know of deleted elements.
@@ -13,5 +15,11 @@ struct CollapsibleTraits : OpenMesh::DefaultTraits {
   FaceAttributes(OpenMesh::Attributes::Status);
 };
 using CollapsibleMesh = OpenMesh::TriMesh_ArrayKernelT<CollapsibleTraits>;
+
+/// Faces at which the mesh is not a manifold are left out; vertices keep their numbers.
+CollapsibleMesh to_collapsible(const TriangleMesh& mesh);
+
+/// Whether the faces that stay when `half_edge` collapses into its target turn by no more than this cosine says.
+bool keeps_orientation(const CollapsibleMesh& mesh, OpenMesh::SmartHalfedgeHandle half_edge, double cosine);
 
 }  // namespace lpdeform

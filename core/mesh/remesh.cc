@@ -12,14 +12,7 @@ namespace {
 using HalfEdgeMesh = CollapsibleMesh;
 using OpenMesh::Vec3d;
 
-HalfEdgeMesh to_half_edges(const TriangleMesh& mesh) {
-  HalfEdgeMesh result;
-  for (const auto& row : mesh.vertices.rowwise()) result.add_vertex(Vec3d(row[0], row[1], row[2]));
-  for (const auto& row : mesh.faces.rowwise()) {
-    result.add_face(result.vertex_handle(row[0]), result.vertex_handle(row[1]), result.vertex_handle(row[2]));
-  }
-  return result;
-}
+constexpr double kLargestTurn = 0.2;  // the cosine
 
 TriangleMesh to_triangles(const HalfEdgeMesh& mesh) {
   TriangleMesh result;
@@ -39,26 +32,12 @@ Vec3d normal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
   return (b - a).cross(c - a);
 }
 
-/// Whether the faces that stay when `half_edge` collapses into its target still look the way they did.
-bool keeps_orientation(const HalfEdgeMesh& mesh, OpenMesh::SmartHalfedgeHandle half_edge) {
-  const Vec3d target = mesh.point(half_edge.to());
-  for (const auto out : half_edge.from().outgoing_halfedges()) {
-    const auto b = out.to(), c = out.next().to();
-    if (b == half_edge.to() || c == half_edge.to()) continue;
-    const Vec3d before = normal(mesh.point(out.from()), mesh.point(b), mesh.point(c));
-    const Vec3d after = normal(target, mesh.point(b), mesh.point(c));
-    // Slivers have no direction to keep; what becomes of them must not be another sliver.
-    if (before.dot(after) < 0.2 * before.norm() * after.norm()) return false;
-  }
-  return true;
-}
-
 bool collapse_short_edges(HalfEdgeMesh& mesh, double shortest_edge) {
   bool is_changed = false;
   for (const auto edge : mesh.edges()) {
     if (edge.deleted() || mesh.calc_edge_length(edge) >= shortest_edge) continue;
     for (const auto half_edge : {edge.h0(), edge.h1()}) {
-      if (!mesh.is_collapse_ok(half_edge) || !keeps_orientation(mesh, half_edge)) continue;
+      if (!mesh.is_collapse_ok(half_edge) || !keeps_orientation(mesh, half_edge, kLargestTurn)) continue;
       mesh.collapse(half_edge);
       is_changed = true;
       break;
@@ -117,7 +96,7 @@ void smooth(HalfEdgeMesh& mesh, const ImplicitField& field, double step) {
 }  // namespace
 
 TriangleMesh remesh(const TriangleMesh& mesh, const ImplicitField& field, double shortest_edge, int rounds) {
-  HalfEdgeMesh half_edges = to_half_edges(mesh);
+  HalfEdgeMesh half_edges = to_collapsible(mesh);
   while (collapse_short_edges(half_edges, shortest_edge)) {
   }
   for (int round = 0; round < rounds; ++round) {

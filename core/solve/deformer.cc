@@ -315,7 +315,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   best_sum = std::numeric_limits<double>::infinity();
   const Warmth warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
   minimiser = make_minimiser(settings.method, std::move(guess), warmth);
-  is_metric_live = settings.method == Method::kQuasiNewton || settings.method == Method::kMultiresolution;
+  is_metric_live = settings.method == Method::kQuasiNewton;
   const double sum = objective.sum(*norm);
   keep_if_best(sum);
   summary.initial_energy = norm->true_energy(sum);
@@ -342,6 +342,8 @@ void Deformer::Impl::iterate() {
 }
 
 void Deformer::Impl::end(StopReason reason) {
+  // Before its end the metric may still be that of the guess.
+  if (settings.method == Method::kMultiresolution) is_metric_live = reason == StopReason::kConverged;
   minimiser.reset();
   has_state = true;
   summary.stop_reason = reason;
