@@ -5,7 +5,7 @@ WORKDIR /src
 COPY deploy deploy
 RUN deploy/install build run
 COPY . .
-RUN deploy/up --build-only
+RUN deploy/up --server-only --build-only
 
 FROM debian:12
 COPY deploy/install deploy/packages.txt /opt/lpdeform/deploy/

@@ -1,0 +1,76 @@
+import type { LpdeformError } from "./errors.js";
+import type { Frame } from "./types.js";
+
+/** The newest frame not yet taken, and who waits for it. Frames of an older epoch or update than one before are dropped. */
+export class FrameBox {
+  #newest: Frame | undefined;
+  #epoch = 0;
+  #inputSeq = 0;
+  #end: LpdeformError | "closed" | undefined;
+  #waiting = new Set<() => void>();
+
+  /** False where the frame is dropped. */
+  put(frame: Frame): boolean {
+    if (frame.epoch < this.#epoch || frame.inputSeq < this.#inputSeq) return false;
+    this.#epoch = frame.epoch;
+    this.#inputSeq = frame.inputSeq;
+    if (this.#newest) frame.skippedInputs += this.#newest.skippedInputs;
+    this.#newest = frame;
+    this.#wake();
+    return true;
+  }
+
+  /** Frames of an earlier epoch are void. */
+  beginEpoch(epoch: number): void {
+    if (epoch <= this.#epoch) return;
+    this.#epoch = epoch;
+    this.#newest = undefined;
+  }
+
+  /** Epochs begin anew: another session. */
+  beginSession(): void {
+    this.#epoch = 0;
+    this.#newest = undefined;
+  }
+
+  /** Nothing more comes. */
+  finish(end: LpdeformError | "closed"): void {
+    this.#end ??= end;
+    this.#wake();
+  }
+
+  resume(): void {
+    if (this.#end !== "closed") this.#end = undefined;
+  }
+
+  /** What there is; throws why nothing more comes. */
+  take(): Frame | undefined {
+    const frame = this.#newest;
+    this.#newest = undefined;
+    if (!frame && this.#end && this.#end !== "closed") throw this.#end;
+    return frame;
+  }
+
+  get isClosed(): boolean {
+    return this.#end === "closed" && !this.#newest;
+  }
+
+  /** Waits until take() has something to say, or the signal says that nobody wants to know any more. */
+  async wait(signal?: AbortSignal): Promise<void> {
+    while (!this.#newest && !this.#end && !signal?.aborted) {
+      await new Promise<void>((resolve) => {
+        const done = () => {
+          this.#waiting.delete(done);
+          signal?.removeEventListener("abort", done);
+          resolve();
+        };
+        this.#waiting.add(done);
+        signal?.addEventListener("abort", done);
+      });
+    }
+  }
+
+  #wake(): void {
+    for (const done of [...this.#waiting]) done();
+  }
+}

@@ -1,0 +1,97 @@
+import { LpdeformError } from "./errors.js";
+import { reportFromWire } from "./fromwire.js";
+import { Packer } from "./packer.js";
+import type { Rpc } from "./rpc.js";
+import { freeComponents, meshToWire, settingsToWire, weights, weldToWire } from "./towire.js";
+import type { Mesh, MeshReport, OpenOptions } from "./types.js";
+import { Uploads } from "./upload.js";
+
+/** What a client holds of a session on the server. */
+export interface Lease {
+  session: string;
+  /** Empty for a reader. */
+  writerToken: string;
+  epoch: number;
+  inputSeq: number;
+  report: MeshReport;
+}
+
+/** Makes a session. The same request id gives the same session, however often it is tried. */
+export async function createSession(
+  rpc: Rpc,
+  mesh: Mesh,
+  options: OpenOptions,
+  requestId: string,
+  signal?: AbortSignal,
+): Promise<Lease> {
+  const uploads = new Uploads(rpc, signal, requestId);
+  const packer = new Packer();
+  const normals = mesh.normals && packer.numbers(mesh.normals);
+  const request = {
+    requestId,
+    mesh: meshToWire(mesh, packer),
+    weights: weights[options.weights ?? "cotangent"],
+    freeComponents: freeComponents[options.freeComponents ?? "error"],
+    settings: settingsToWire(options.settings ?? {}, packer),
+    ...(options.weld && { weld: weldToWire(options.weld, packer) }),
+    ...(normals && { normals: { scalar: normals.scalar, data: normals.buffer } }),
+  };
+  await packer.flush((bytes) => uploads.add(bytes));
+  try {
+    const { session, writerToken } = await rpc.call("createSession", request, signal);
+    uploads.discard();
+    if (!session?.mesh) throw new LpdeformError("internal", "The server made a session and did not say which.");
+    return {
+      session: session.name,
+      writerToken,
+      epoch: Number(session.epoch),
+      inputSeq: Number(session.inputSeq),
+      report: reportFromWire(session.mesh),
+    };
+  } catch (error) {
+    if (!isUndecided(error as LpdeformError)) uploads.discard();
+    throw error;
+  }
+}
+
+/** Joins a session by name. */
+export async function joinSession(
+  rpc: Rpc,
+  name: string,
+  role: "reader" | "writer",
+  signal?: AbortSignal,
+): Promise<Lease> {
+  const { session } = await rpc.call("getSession", { session: name }, signal);
+  if (!session?.mesh) throw new LpdeformError("internal", "The server has a session and did not say which.");
+  const lease: Lease = {
+    session: name,
+    writerToken: "",
+    epoch: Number(session.epoch),
+    inputSeq: Number(session.inputSeq),
+    report: reportFromWire(session.mesh),
+  };
+  if (role === "reader") return lease;
+  const acquired = await rpc.call("acquireWriter", { session: name }, signal);
+  return {
+    ...lease,
+    writerToken: acquired.writerToken,
+    epoch: Number(acquired.epoch),
+    inputSeq: Number(acquired.inputSeq),
+  };
+}
+
+/** The server has the session no more. */
+export function isSessionLost(error: LpdeformError): boolean {
+  return error.code === "not_found" && error.reason.startsWith("SESSION_");
+}
+
+/** Whether the server took the call is not known, or may change: it is to be tried again. */
+export function isUndecided(error: LpdeformError): boolean {
+  const passing = ["unavailable", "cancelled", "deadline_exceeded", "resource_exhausted", "unknown"];
+  return passing.includes(error.code) || isSessionLost(error) || error.reason === "UPLOAD_UNKNOWN";
+}
+
+/** The server took the update, and cannot solve for it yet. */
+export function isTakenAllTheSame(error: LpdeformError): boolean {
+  return error.code === "failed_precondition" || error.code === "aborted";
+}

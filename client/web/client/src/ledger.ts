@@ -1,0 +1,155 @@
+import type { HandleChange, Settings, Update } from "./types.js";
+
+/** An update and its number, which the server knows as input_seq. */
+export interface NumberedUpdate {
+  seq: number;
+  update: Update;
+}
+
+const resizeHandle = "resize";
+
+/** `newer` on top of `older`: the newest value of each handle and setting wins; a motion moves a handle that `older` adds. */
+export function merged(older: Update, newer: Update): Update {
+  const handles: Record<string, HandleChange> = { ...older.handles };
+  const settings: Settings = { ...older.settings };
+  let resize = older.resize;
+  if (newer.handles?.[resizeHandle]) resize = undefined;
+  if (newer.resize) {
+    resize = newer.resize;
+    delete handles[resizeHandle];
+    delete settings.p;
+    delete settings.stiffness;
+  }
+  for (const [name, change] of Object.entries(newer.handles ?? {})) {
+    const before = handles[name];
+    const moved = before && "set" in before && "move" in change;
+    handles[name] = moved ? { set: { ...before.set, motion: change.move } } : change;
+  }
+  Object.assign(settings, newer.settings);
+  return { handles, settings, ...(resize && { resize }) };
+}
+
+/** What is there once motions and removals have been carried out. */
+function settled(state: Update): Update {
+  const kept = Object.entries(state.handles ?? {}).filter(([, change]) => "set" in change);
+  return { ...state, handles: Object.fromEntries(kept) };
+}
+
+function isMovesOnly({ update }: NumberedUpdate): boolean {
+  const changes = Object.values(update.handles ?? {});
+  return !update.resize && Object.keys(update.settings ?? {}).length === 0 && changes.every((change) => "move" in change);
+}
+
+/**
+ * The writer's book of updates: what the server has accepted (all that is needed to make the session anew), what is on its
+ * way, and what waits (merged into one). Bounded by the size of the handles and settings themselves.
+ */
+export class Ledger {
+  /** Updates on their way; of these, several at a time only where all merely move handles, so that order does not matter. */
+  static readonly window = 2;
+
+  #nextSeq = 1;
+  #accepted: NumberedUpdate = { seq: 0, update: {} };
+  #restore: NumberedUpdate | undefined;
+  #inFlight: NumberedUpdate[] = [];
+  readonly #answered = new Set<number>();
+  #waiting: NumberedUpdate | undefined;
+
+  /** Takes an update on; returns its number. */
+  add(update: Update): number {
+    const seq = this.#nextSeq++;
+    this.#waiting = { seq, update: merged(this.#waiting?.update ?? {}, update) };
+    return seq;
+  }
+
+  get canSend(): boolean {
+    const next = this.#restore ?? this.#waiting;
+    if (!next) return false;
+    if (this.#inFlight.length === 0) return true;
+    return this.#inFlight.length < Ledger.window && [...this.#inFlight, next].every(isMovesOnly);
+  }
+
+  /** What sendNext() gives is the state that a lost session had. */
+  get hasRestore(): boolean {
+    return this.#restore !== undefined;
+  }
+
+  get hasWaiting(): boolean {
+    return this.#restore !== undefined || this.#waiting !== undefined;
+  }
+
+  get hasInFlight(): boolean {
+    return this.#inFlight.length > 0;
+  }
+
+  /** What is to be sent next, now on its way. */
+  sendNext(): NumberedUpdate {
+    const next = this.#restore ?? this.#waiting;
+    if (!next) throw new Error("nothing waits");
+    if (this.#restore) this.#restore = undefined;
+    else this.#waiting = undefined;
+    this.#inFlight.push(next);
+    return next;
+  }
+
+  /** The server has taken the update of this number. Taken on in the order of sending, however answers overtake each other. */
+  accept(seq: number): void {
+    this.#answered.add(seq);
+    while (this.#inFlight[0] && this.#answered.delete(this.#inFlight[0].seq)) {
+      const sent = this.#inFlight.shift()!;
+      this.#accepted = {
+        seq: Math.max(this.#accepted.seq, sent.seq),
+        update: settled(merged(this.#accepted.update, sent.update)),
+      };
+    }
+    if (this.#inFlight.length === 0) this.#answered.clear();
+  }
+
+  /** The server has refused the update of this number. */
+  refuse(seq: number): void {
+    this.#inFlight = this.#inFlight.filter((one) => one.seq !== seq);
+    const first = this.#inFlight[0];
+    if (first && this.#answered.has(first.seq)) this.accept(first.seq);
+  }
+
+  /** What was on its way waits again. Sending it twice does no harm, it is the same value. */
+  connectionLost(): void {
+    let again: NumberedUpdate | undefined;
+    for (const sent of this.#inFlight) {
+      if (sent.seq === this.#accepted.seq) this.#restore = sent; // an unanswered restore stays on its own
+      else again = { seq: sent.seq, update: merged(again?.update ?? {}, sent.update) };
+    }
+    this.#inFlight = [];
+    this.#answered.clear();
+    if (!again) return;
+    this.#waiting = this.#waiting
+      ? { seq: this.#waiting.seq, update: merged(again.update, this.#waiting.update) }
+      : again;
+  }
+
+  /** The server has lost the session: what it had accepted is to be sent first, on its own. */
+  sessionLost(): void {
+    this.connectionLost();
+    if (this.#accepted.seq > 0) this.#restore = this.#accepted;
+  }
+
+  /** Another writer took over: what the server has not taken is void. */
+  dropUnaccepted(): void {
+    this.#restore = undefined;
+    this.#inFlight = [];
+    this.#answered.clear();
+    this.#waiting = undefined;
+  }
+
+  /** Numbers that follow are higher than `seq`, the newest that the server knows. */
+  countFrom(seq: number): void {
+    if (this.#nextSeq > seq) return;
+    this.#nextSeq = seq + 1;
+    if (this.#waiting) this.#waiting = { ...this.#waiting, seq: this.#nextSeq++ };
+  }
+
+  /** The newest update that was not refused; 0 where there is none. */
+  get newest(): number {
+    return this.#waiting?.seq ?? Math.max(this.#accepted.seq, ...this.#inFlight.map((one) => one.seq));
+  }
+}

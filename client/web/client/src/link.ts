@@ -1,0 +1,294 @@
+import { FrameAssembly } from "./assembly.js";
+import { FrameBox } from "./box.js";
+import { fromFault, LpdeformError } from "./errors.js";
+import { FrameFeed } from "./feed.js";
+import type { GoAway } from "./gen/lpdeform/v1/service_pb.js";
+import { createSession, isSessionLost, isTakenAllTheSame, isUndecided, joinSession, type Lease } from "./lease.js";
+import { Ledger, type NumberedUpdate } from "./ledger.js";
+import { Packer } from "./packer.js";
+import { Backoff, recoveryAfter } from "./recovery.js";
+import type { Rpc } from "./rpc.js";
+import { updateToWire } from "./towire.js";
+import type { Connection, Frame, FrameOptions, Mesh, OpenOptions, Update } from "./types.js";
+import { newRequestId, Uploads } from "./upload.js";
+
+/** What a session that was lost can be made anew from. */
+export interface Copy {
+  mesh: Mesh;
+  options: OpenOptions;
+}
+
+export interface Watcher {
+  problem(error: LpdeformError): void;
+  connection(state: Connection): void;
+}
+
+/**
+ * A session from within: the lease on the server's session, the ledger of updates, the box of frames, and the feed that is
+ * kept alive between them.
+ */
+export class Link {
+  readonly box = new FrameBox();
+  readonly ledger = new Ledger();
+  readonly stop = new AbortController();
+  #lease: Lease;
+  #feed: FrameFeed | undefined;
+  #assembly = new FrameAssembly(0);
+  #goAway: GoAway | undefined;
+  #connection: Connection = "idle";
+  #isStreaming = false;
+  #isSending = false;
+  #solves = 0;
+  #requestId = newRequestId();
+  #making: Promise<void> | undefined;
+  #downSince: number | undefined;
+  readonly #backoff = new Backoff();
+  readonly #quiet = new Set<() => void>();
+
+  constructor(
+    readonly rpc: Rpc,
+    lease: Lease,
+    readonly frameOptions: FrameOptions,
+    readonly copy: Copy | undefined,
+    readonly watcher: Watcher,
+  ) {
+    this.#lease = lease;
+    this.ledger.countFrom(lease.inputSeq);
+  }
+
+  get lease(): Lease {
+    return this.#lease;
+  }
+
+  get connection(): Connection {
+    return this.#connection;
+  }
+
+  get isClosed(): boolean {
+    return this.stop.signal.aborted;
+  }
+
+  update(update: Update): number {
+    if (this.isClosed) throw sessionClosed();
+    if (!this.#lease.writerToken) {
+      throw new LpdeformError("failed_precondition", "A reader cannot change the session: takeOver() first.", {
+        reason: "NOT_THE_WRITER",
+      });
+    }
+    const seq = this.ledger.add(update);
+    this.#send();
+    return seq;
+  }
+
+  /** Frames come from now on. */
+  startStream(): void {
+    if (this.#isStreaming || this.isClosed) return;
+    this.#isStreaming = true;
+    this.#subscribe();
+  }
+
+  /** The newest frame not yet taken; taking it tells the server to send on. */
+  take(): Frame | undefined {
+    const frame = this.box.take();
+    if (frame) this.#feed?.acknowledge(frame.frameSeq);
+    return frame;
+  }
+
+  async close(): Promise<void> {
+    if (this.isClosed) return;
+    this.stop.abort();
+    this.#feed?.close();
+    this.#setConnection("closed");
+    this.box.finish("closed");
+    this.#wakeQuiet();
+    if (this.copy) await this.rpc.call("deleteSession", { session: this.#lease.session });
+  }
+
+  async takeOver(): Promise<void> {
+    if (this.isClosed) throw sessionClosed();
+    const lease = await joinSession(this.rpc, this.#lease.session, "writer", this.stop.signal);
+    this.#lease = lease;
+    this.ledger.countFrom(lease.inputSeq);
+    this.box.beginEpoch(lease.epoch);
+    this.box.resume();
+    this.#send();
+  }
+
+  // The stream.
+
+  #subscribe(): void {
+    this.#goAway = undefined;
+    const feed = new FrameFeed(this.rpc, this.#lease.session, this.frameOptions, {
+      opened: (opened) => {
+        this.#assembly = new FrameAssembly(opened.vertexCount);
+        this.box.beginEpoch(Number(opened.epoch));
+        this.ledger.countFrom(Number(opened.inputSeq));
+        this.#heardFromServer();
+        this.#setConnection("connected");
+        this.#send();
+      },
+      part: (part) => {
+        const frame = this.#assembly.add(part);
+        if (frame && !this.box.put(frame)) feed.acknowledge(frame.frameSeq); // dropped, but its credit is owed
+      },
+      fault: (fault) => this.watcher.problem(fromFault(fault)),
+      goAway: (goAway) => (this.#goAway = goAway),
+      ended: (error) => void this.#recover(error),
+    });
+    this.#feed = feed;
+  }
+
+  async #recover(ended: LpdeformError | undefined): Promise<void> {
+    if (this.isClosed) return;
+    this.#setConnection("reconnecting");
+    const recovery = recoveryAfter(ended, this.#goAway, this.copy !== undefined);
+    if (recovery.next === "giveUp" || this.#isTooLate()) return this.#giveUp(recovery.why);
+    await this.#pause(Math.max(recovery.pauseMs, this.#backoff.nextMs()));
+    if (this.isClosed) return;
+    if (recovery.next === "makeAnew") {
+      try {
+        await this.makeAnew(this.#lease.session);
+      } catch (error) {
+        if (!isUndecided(error as LpdeformError)) return this.#giveUp(error as LpdeformError);
+      }
+    }
+    if (!this.isClosed) this.#subscribe();
+  }
+
+  #heardFromServer(): void {
+    this.#downSince = undefined;
+    this.#backoff.reset();
+  }
+
+  #isTooLate(): boolean {
+    this.#downSince ??= performance.now();
+    return performance.now() - this.#downSince > this.rpc.reconnectForMs;
+  }
+
+  #giveUp(why: LpdeformError): void {
+    this.ledger.dropUnaccepted();
+    this.#isStreaming = false;
+    this.#setConnection("closed");
+    this.box.finish(why);
+    this.#wakeQuiet();
+  }
+
+  /** Once, however many ask. */
+  makeAnew(lost: string): Promise<void> {
+    if (this.#lease.session !== lost) return Promise.resolve();
+    this.#making ??= this.#make().finally(() => (this.#making = undefined));
+    return this.#making;
+  }
+
+  async #make(): Promise<void> {
+    const { mesh, options } = this.copy!;
+    this.#lease = await createSession(this.rpc, mesh, options, this.#requestId, this.stop.signal);
+    this.#requestId = newRequestId();
+    this.ledger.sessionLost();
+    this.ledger.countFrom(this.#lease.inputSeq);
+    this.box.beginSession();
+  }
+
+  // Updates.
+
+  #send(): void {
+    while (!this.isClosed && !this.#isSending && this.#solves === 0 && this.ledger.canSend) {
+      void this.#sendOne(this.ledger.sendNext());
+    }
+  }
+
+  async #sendOne(update: NumberedUpdate): Promise<void> {
+    try {
+      await this.sendUpdate(update);
+      this.ledger.accept(update.seq);
+      this.#heardFromServer();
+    } catch (thrown) {
+      await this.#unsent(update, thrown as LpdeformError);
+    }
+    this.#wakeQuiet();
+    this.#send();
+  }
+
+  async sendUpdate(update: NumberedUpdate): Promise<void> {
+    const packer = new Packer();
+    const uploads = new Uploads(this.rpc, this.stop.signal);
+    const message = updateToWire(update.update, update.seq, packer);
+    try {
+      await packer.flush((bytes) => uploads.add(bytes));
+      const { session, writerToken } = this.#lease;
+      await this.rpc.call("updateHandles", { session, writerToken, update: message }, this.stop.signal);
+    } finally {
+      uploads.discard();
+    }
+  }
+
+  async #unsent(update: NumberedUpdate, error: LpdeformError): Promise<void> {
+    if (this.isClosed) return;
+    const session = this.#lease.session;
+    if (isUndecided(error)) {
+      this.#isSending = true;
+      this.ledger.connectionLost();
+      try {
+        if (this.#isTooLate()) return this.#giveUp(error);
+        await this.#pause(Math.max(error.retryAfterMs, this.#backoff.nextMs()));
+        if (isSessionLost(error)) {
+          if (!this.copy) return this.#giveUp(error);
+          await this.makeAnew(session);
+        }
+      } catch (again) {
+        if (!isUndecided(again as LpdeformError)) this.#giveUp(again as LpdeformError);
+      } finally {
+        this.#isSending = false;
+      }
+      return;
+    }
+    if (isTakenAllTheSame(error)) this.ledger.accept(update.seq);
+    else this.ledger.refuse(update.seq);
+    if (error.reason === "NOT_THE_WRITER") {
+      this.ledger.dropUnaccepted();
+      this.#lease = { ...this.#lease, writerToken: "" };
+      error = new LpdeformError("aborted", "Another writer took the session over.", { reason: "WRITER_REPLACED" });
+    }
+    this.watcher.problem(error);
+  }
+
+  /** Waits until no update is on its way, and keeps others from being sent until the result is called. */
+  async holdUpdates(signal?: AbortSignal): Promise<() => void> {
+    ++this.#solves;
+    while ((this.ledger.hasInFlight || this.#isSending) && !this.isClosed && !signal?.aborted) {
+      await new Promise<void>((resolve) => this.#quiet.add(resolve));
+    }
+    return () => {
+      --this.#solves;
+      this.#wakeQuiet();
+      this.#send();
+    };
+  }
+
+  #wakeQuiet(): void {
+    for (const resolve of this.#quiet) resolve();
+    this.#quiet.clear();
+  }
+
+  #pause(milliseconds: number): Promise<void> {
+    return new Promise((resolve) => {
+      const done = () => {
+        clearTimeout(timer);
+        this.stop.signal.removeEventListener("abort", done);
+        resolve();
+      };
+      const timer = setTimeout(done, milliseconds);
+      this.stop.signal.addEventListener("abort", done);
+    });
+  }
+
+  #setConnection(state: Connection): void {
+    if (this.#connection === state) return;
+    this.#connection = state;
+    this.watcher.connection(state);
+  }
+}
+
+export function sessionClosed(): LpdeformError {
+  return new LpdeformError("failed_precondition", "The session is closed.", { reason: "SESSION_CLOSED" });
+}

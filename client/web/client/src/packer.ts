@@ -1,0 +1,60 @@
+import { create } from "@bufbuild/protobuf";
+import { type Buffer, BufferSchema, Scalar } from "./gen/lpdeform/v1/data_pb.js";
+
+export type Numbers = Float32Array | Float64Array | readonly number[];
+export type Indices = Uint32Array | readonly number[];
+
+/** Inline bytes of one message together; more goes ahead as uploads, so that no message outgrows what servers take. */
+const mostInlineBytes = 1 << 20;
+
+/** Sends bytes ahead and returns the name by which a buffer refers to them. */
+export type Upload = (bytes: Uint8Array) => Promise<string>;
+
+/** Puts runs of numbers into the buffers of one message. To be flushed before the message is sent. */
+export class Packer {
+  #left = mostInlineBytes;
+  readonly #large: { buffer: Buffer; bytes: Uint8Array }[] = [];
+
+  pack(bytes: Uint8Array): Buffer {
+    const buffer = create(BufferSchema);
+    if (bytes.byteLength <= this.#left) {
+      this.#left -= bytes.byteLength;
+      buffer.source = { case: "inline", value: bytes };
+    } else {
+      this.#large.push({ buffer, bytes });
+    }
+    return buffer;
+  }
+
+  numbers(numbers: Numbers): { scalar: Scalar; buffer: Buffer } {
+    const { scalar, bytes } = bytesOfNumbers(numbers);
+    return { scalar, buffer: this.pack(bytes) };
+  }
+
+  indices(indices: Indices): Buffer {
+    return this.pack(bytesOfIndices(indices));
+  }
+
+  /** Sends ahead what was too large. */
+  async flush(upload: Upload): Promise<void> {
+    for (const { buffer, bytes } of this.#large) {
+      buffer.source = { case: "upload", value: await upload(bytes) };
+    }
+    this.#large.length = 0;
+  }
+}
+
+/** Little-endian, as every browser keeps them. */
+export function bytesOfNumbers(numbers: Numbers): { scalar: Scalar; bytes: Uint8Array } {
+  if (numbers instanceof Float32Array) return { scalar: Scalar.FLOAT32, bytes: bytesOf(numbers) };
+  const doubles = numbers instanceof Float64Array ? numbers : Float64Array.from(numbers);
+  return { scalar: Scalar.FLOAT64, bytes: bytesOf(doubles) };
+}
+
+export function bytesOfIndices(indices: Indices): Uint8Array {
+  return bytesOf(indices instanceof Uint32Array ? indices : Uint32Array.from(indices));
+}
+
+function bytesOf(array: ArrayBufferView): Uint8Array {
+  return new Uint8Array(array.buffer, array.byteOffset, array.byteLength);
+}

@@ -1,0 +1,239 @@
+import { LpdeformError } from "./errors.js";
+import { createSession, isSessionLost, isTakenAllTheSame, isUndecided, joinSession, type Lease } from "./lease.js";
+import { type Copy, Link, sessionClosed } from "./link.js";
+import { Backoff } from "./recovery.js";
+import { Rpc } from "./rpc.js";
+import { runSolve } from "./solve.js";
+import type {
+  Connection,
+  Frame,
+  FrameOptions,
+  Handle,
+  JoinOptions,
+  Mesh,
+  MeshReport,
+  Motion,
+  OpenOptions,
+  Settings,
+  SolveOptions,
+  SolveResult,
+  Update,
+} from "./types.js";
+import { newRequestId } from "./upload.js";
+
+export interface SessionEvents {
+  /** The server refused an update, or cannot solve for it yet; the session goes on. */
+  problem: LpdeformError;
+  connection: Connection;
+}
+
+/**
+ * A mesh being deformed on a server. Functions that return no promise do not wait: changes made faster than the connection
+ * takes them are merged, the newest value of each handle and each setting winning.
+ *
+ * Frames come over a stream that begins when they are first asked for. While it is down, the session reconnects with growing
+ * pauses: to the same session where the server still has it, otherwise to a new one that it makes from its own copy of mesh,
+ * handles and settings. Frames of an older epoch or an older update than one that was shown are dropped.
+ */
+export class Session implements AsyncIterable<Frame> {
+  readonly #link: Link;
+  readonly #listeners = { problem: new Set<(e: LpdeformError) => void>(), connection: new Set<(c: Connection) => void>() };
+
+  /** @internal openSession() and joinSession() make sessions. */
+  constructor(rpc: Rpc, lease: Lease, frameOptions: FrameOptions, copy: Copy | undefined) {
+    this.#link = new Link(rpc, lease, frameOptions, copy, {
+      problem: (error) => this.#listeners.problem.forEach((listener) => listener(error)),
+      connection: (state) => this.#listeners.connection.forEach((listener) => listener(state)),
+    });
+  }
+
+  /** "sessions/<32 hexadecimal digits>"; another one after the session had to be made anew. */
+  get name(): string {
+    return this.#link.lease.session;
+  }
+
+  /** What the server found in the mesh. */
+  get meshReport(): MeshReport {
+    return this.#link.lease.report;
+  }
+
+  get connection(): Connection {
+    return this.#link.connection;
+  }
+
+  /** The newest update that was not refused; 0 where there is none. */
+  get newestInput(): number {
+    return this.#link.ledger.newest;
+  }
+
+  /** Calls `listener` at each such event, until the returned function is called. */
+  on<Name extends keyof SessionEvents>(name: Name, listener: (event: SessionEvents[Name]) => void): () => void {
+    const listeners = this.#listeners[name] as Set<typeof listener>;
+    listeners.add(listener);
+    return () => listeners.delete(listener);
+  }
+
+  /**
+   * Sends a change and returns its number: a frame whose inputSeq is at least that takes it into account. What the server
+   * refuses comes as a "problem", once; the session goes on without it. Throws once closed, or for a reader.
+   */
+  update(update: Update): number {
+    return this.#link.update(update);
+  }
+
+  /** Adds handles or replaces those of the same names. As update(). */
+  setHandles(handles: Readonly<Record<string, Handle>>): number {
+    const changes = Object.entries(handles).map(([name, handle]) => [name, { set: handle }] as const);
+    return this.update({ handles: Object.fromEntries(changes) });
+  }
+
+  setHandle(name: string, handle: Handle): number {
+    return this.update({ handles: { [name]: { set: handle } } });
+  }
+
+  /** Moves a handle. As update(). */
+  move(name: string, motion: Motion): number {
+    return this.update({ handles: { [name]: { move: motion } } });
+  }
+
+  /** Lets go of a handle. As update(). */
+  remove(name: string): number {
+    return this.update({ handles: { [name]: { remove: true } } });
+  }
+
+  /** Changes p, stiffness, method and so on. As update(). */
+  set(settings: Settings): number {
+    return this.update({ settings });
+  }
+
+  /**
+   * The newest frame not yet taken, where there is one. Taking a frame, here or by iterating, tells the server to send on, so
+   * a reader who stops asking costs a bounded number of frames. Throws why, once nothing more comes.
+   */
+  poll(): Frame | undefined {
+    this.#link.startStream();
+    return this.#link.take();
+  }
+
+  /** Frames as they come, the newest first, until the session is closed. Throws why, where the session is over otherwise. */
+  async *[Symbol.asyncIterator](): AsyncGenerator<Frame, void, undefined> {
+    for (let frame = await this.#next(); frame; frame = await this.#next()) yield frame;
+  }
+
+  /** The finished result of the newest update. Takes frames until it is there. Rejects with the first "problem". */
+  async settle(options: { timeoutMs?: number; signal?: AbortSignal } = {}): Promise<Frame> {
+    const signals = [options.signal, options.timeoutMs !== undefined && AbortSignal.timeout(options.timeoutMs)];
+    const problem = new AbortController();
+    const stopListening = this.on("problem", (error) => problem.abort(error));
+    const signal = AbortSignal.any([problem.signal, ...signals.filter((one) => one instanceof AbortSignal)]);
+    try {
+      for (;;) {
+        const frame = await this.#next(signal);
+        if (!frame) throw sessionClosed();
+        if (frame.converged && frame.inputSeq >= this.#link.ledger.newest) return frame;
+      }
+    } finally {
+      stopListening();
+    }
+  }
+
+  async #next(signal?: AbortSignal): Promise<Frame | undefined> {
+    this.#link.startStream();
+    for (;;) {
+      const frame = this.#link.take();
+      if (frame || this.#link.box.isClosed) return frame;
+      if (signal?.aborted) throw abortReason(signal);
+      await this.#link.box.wait(signal);
+    }
+  }
+
+  /**
+   * Solves for the present handles and settings on the server and returns the finished result. Works beside the stream of
+   * frames. Begins again where the server went away, for as long as the stream would. Rejects with what the server refuses.
+   */
+  async solve(options: SolveOptions = {}): Promise<SolveResult> {
+    const link = this.#link;
+    if (link.isClosed) throw sessionClosed();
+    const signal = options.signal ? AbortSignal.any([options.signal, link.stop.signal]) : link.stop.signal;
+    const release = await link.holdUpdates(signal);
+    const backoff = new Backoff();
+    const latest = performance.now() + link.rpc.reconnectForMs;
+    try {
+      for (;;) {
+        if (link.isClosed) throw sessionClosed();
+        if (signal.aborted) throw abortReason(signal);
+        try {
+          return await this.#solveOnce(options, signal);
+        } catch (thrown) {
+          const error = thrown as LpdeformError;
+          const isLost = isSessionLost(error) && link.copy !== undefined;
+          if (!isLost && error.code !== "unavailable") throw error;
+          if (performance.now() > latest) throw error;
+          if (isLost) await link.makeAnew(link.lease.session);
+          else await new Promise((resolve) => setTimeout(resolve, backoff.nextMs()));
+        }
+      }
+    } finally {
+      release();
+    }
+  }
+
+  async #solveOnce(options: SolveOptions, signal: AbortSignal): Promise<SolveResult> {
+    const { ledger, lease, rpc } = this.#link;
+    while (ledger.hasRestore) {
+      const restore = ledger.sendNext();
+      try {
+        await this.#link.sendUpdate(restore);
+        ledger.accept(restore.seq);
+      } catch (error) {
+        ledger.connectionLost();
+        throw error;
+      }
+    }
+    const update = ledger.hasWaiting ? ledger.sendNext() : undefined;
+    try {
+      const result = await runSolve(rpc, lease, update, options, signal);
+      if (update) ledger.accept(update.seq);
+      return result;
+    } catch (thrown) {
+      const error = thrown as LpdeformError;
+      if (update && isTakenAllTheSame(error)) ledger.accept(update.seq);
+      else if (update && isUndecided(error)) ledger.connectionLost();
+      else if (update) ledger.refuse(update.seq);
+      throw error;
+    }
+  }
+
+  /** Becomes the writer in place of whoever is, as a reader or after a WRITER_REPLACED. */
+  takeOver(): Promise<void> {
+    return this.#link.takeOver();
+  }
+
+  /** Ends the stream and every waiting call. Deletes the session on the server where openSession() made it. */
+  close(): Promise<void> {
+    return this.#link.close();
+  }
+}
+
+/** Makes a session on the server. Rejects with the first element of the mesh that cannot be deformed. */
+export async function openSession(mesh: Mesh, options: OpenOptions = {}): Promise<Session> {
+  const rpc = Rpc.connect(options);
+  const lease = await createSession(rpc, mesh, options, newRequestId(), options.signal);
+  return new Session(rpc, lease, options, { mesh, options });
+}
+
+/** Joins somebody's session by name. It is not made anew where the server loses it, and not deleted by close(). */
+export async function joinSessionByName(name: string, options: JoinOptions = {}): Promise<Session> {
+  const rpc = Rpc.connect(options);
+  const lease = await joinSession(rpc, name, options.role ?? "reader", options.signal);
+  return new Session(rpc, lease, options, undefined);
+}
+
+function abortReason(signal: AbortSignal): LpdeformError {
+  const { reason } = signal;
+  if (reason instanceof LpdeformError) return reason;
+  const isTimeout = reason instanceof DOMException && reason.name === "TimeoutError";
+  return isTimeout
+    ? new LpdeformError("deadline_exceeded", "No new frame came in time.", { reason: "NO_FRAME" })
+    : new LpdeformError("cancelled", "The call was aborted.", {}, reason);
+}

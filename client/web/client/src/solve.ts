@@ -1,0 +1,96 @@
+import { FrameAssembly } from "./assembly.js";
+import { fromCall, LpdeformError } from "./errors.js";
+import { methodName, stopReasonFromWire } from "./fromwire.js";
+import type { SolveResponse } from "./gen/lpdeform/v1/service_pb.js";
+import type { Lease } from "./lease.js";
+import type { NumberedUpdate } from "./ledger.js";
+import { Packer } from "./packer.js";
+import type { Rpc } from "./rpc.js";
+import { updateToWire } from "./towire.js";
+import type { IterationRecord, SolveOptions, SolveResult } from "./types.js";
+import { Uploads } from "./upload.js";
+
+/** One Solve call, from its request to the finished result. */
+export async function runSolve(
+  rpc: Rpc,
+  lease: Lease,
+  update: NumberedUpdate | undefined,
+  options: SolveOptions,
+  signal: AbortSignal,
+): Promise<SolveResult> {
+  const uploads = new Uploads(rpc, signal);
+  const packer = new Packer();
+  const initial = options.initialPositions && packer.numbers(options.initialPositions);
+  const request = {
+    session: lease.session,
+    writerToken: lease.writerToken,
+    certify: options.certify ?? false,
+    trace: options.trace ?? false,
+    progress: options.onProgress !== undefined,
+    normals: options.withNormals ?? false,
+    ...(update && { update: updateToWire(update.update, update.seq, packer) }),
+    ...(initial && { initialPositions: { scalar: initial.scalar, data: initial.buffer } }),
+  };
+  try {
+    await packer.flush((bytes) => uploads.add(bytes));
+    const calling = { signal, timeoutMs: options.deadlineMs ?? 0 };
+    const result = new ResultBuilder(lease.report.vertices, options);
+    for await (const response of rpc.client.solve(request, calling)) result.take(response);
+    return result.finish();
+  } catch (thrown) {
+    throw fromCall(thrown);
+  } finally {
+    uploads.discard();
+  }
+}
+
+class ResultBuilder {
+  readonly #assembly: FrameAssembly;
+  readonly #trace: IterationRecord[] = [];
+  #numbers: Omit<SolveResult, "positions" | "distortion" | "normals" | "trace"> | undefined;
+  #surface: Pick<SolveResult, "positions" | "distortion" | "normals"> | undefined;
+
+  constructor(
+    vertexCount: number,
+    readonly options: SolveOptions,
+  ) {
+    this.#assembly = new FrameAssembly(vertexCount);
+  }
+
+  take({ message }: SolveResponse): void {
+    switch (message.case) {
+      case "progress": {
+        const { iteration, energy, seconds } = message.value;
+        this.options.onProgress?.({ iteration, energy, seconds });
+        break;
+      }
+      case "summary": {
+        const { $typeName: _, $unknown: __, method, stopReason, certificate, inputSeq, ...numbers } = message.value;
+        this.#numbers = {
+          ...numbers,
+          method: methodName(method),
+          stopReason: stopReasonFromWire(stopReason),
+          inputSeq: Number(inputSeq),
+          ...(certificate && { optimalityGap: certificate.relativeGap }),
+        };
+        break;
+      }
+      case "trace":
+        for (const { iteration, seconds, energy, objective, stage } of message.value.records) {
+          this.#trace.push({ iteration, seconds, energy, objective, stage });
+        }
+        break;
+      case "frame":
+        this.#surface = this.#assembly.add(message.value) ?? this.#surface;
+        break;
+    }
+  }
+
+  finish(): SolveResult {
+    if (!this.#numbers || !this.#surface) {
+      throw new LpdeformError("data_loss", "The server's result came without positions.", { reason: "FRAME_PARTS" });
+    }
+    const { positions, distortion, normals } = this.#surface;
+    return { ...this.#numbers, positions, distortion, normals, trace: this.#trace };
+  }
+}

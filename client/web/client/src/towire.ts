@@ -1,0 +1,169 @@
+import { create, type MessageInitShape } from "@bufbuild/protobuf";
+import { FieldSchema, type Field, MeshSchema, type Mesh as WireMesh, WeldSchema, type Weld as WireWeld } from "./gen/lpdeform/v1/data_pb.js";
+import {
+  HandleSchema,
+  type HandleUpdateSchema,
+  InitialGuess,
+  Method,
+  type MotionSchema,
+  type SettingsUpdateSchema,
+} from "./gen/lpdeform/v1/handle_pb.js";
+import { WeightKind } from "./gen/lpdeform/v1/report_pb.js";
+import { FreeComponents, UpdateSchema, type Update as WireUpdate } from "./gen/lpdeform/v1/service_pb.js";
+import { bytesOfIndices, bytesOfNumbers, type Packer } from "./packer.js";
+import type * as api from "./types.js";
+
+// From the values of this library to messages of the contract.
+
+export const methods: Record<api.Method, Method> = {
+  auto: Method.UNSPECIFIED,
+  quasiNewton: Method.QUASI_NEWTON,
+  lineSearch: Method.LINE_SEARCH,
+  localGlobal: Method.LOCAL_GLOBAL,
+  conic: Method.CONIC,
+  multiresolution: Method.MULTIRESOLUTION,
+};
+
+const guesses: Record<api.InitialGuess, InitialGuess> = {
+  current: InitialGuess.UNSPECIFIED,
+  laplacian: InitialGuess.LAPLACIAN,
+  rest: InitialGuess.REST,
+};
+
+export const weights: Record<api.WeightKind, WeightKind> = {
+  cotangent: WeightKind.COTANGENT,
+  uniform: WeightKind.UNIFORM,
+  intrinsicDelaunay: WeightKind.INTRINSIC_DELAUNAY,
+};
+
+export const freeComponents: Record<api.FreeComponents, FreeComponents> = {
+  error: FreeComponents.ERROR,
+  stay: FreeComponents.STAY,
+  follow: FreeComponents.FOLLOW,
+};
+
+export function meshToWire(mesh: api.Mesh, packer: Packer): WireMesh {
+  const { scalar, bytes } = bytesOfNumbers(mesh.vertices);
+  const faces = bytesOfIndices(mesh.faces);
+  const data = new Uint8Array(bytes.byteLength + faces.byteLength);
+  data.set(bytes);
+  data.set(faces, bytes.byteLength);
+  return create(MeshSchema, {
+    vertexCount: mesh.vertices.length / 3,
+    faceCount: mesh.faces.length / 3,
+    scalar,
+    data: packer.pack(data),
+  });
+}
+
+export function weldToWire(weld: api.Weld, packer: Packer): WireWeld {
+  if (weld === "byPosition") return create(WeldSchema, { by: { case: "position", value: {} } });
+  return create(WeldSchema, { by: { case: "groups", value: packer.indices(weld) } });
+}
+
+export function updateToWire(update: api.Update, inputSeq: number, packer: Packer): WireUpdate {
+  return create(UpdateSchema, {
+    inputSeq: BigInt(inputSeq),
+    handles: Object.entries(update.handles ?? {}).map(([name, change]) => changeToWire(name, change, packer)),
+    ...(update.settings && { settings: settingsToWire(update.settings, packer) }),
+    ...(update.resize && { resize: resizeToWire(update.resize) }),
+  });
+}
+
+export function settingsToWire(settings: api.Settings, packer: Packer): MessageInitShape<typeof SettingsUpdateSchema> {
+  const { p, stiffness, lengthUnit, solver, region } = settings;
+  return {
+    ...(p !== undefined && { p: fieldToWire(p, packer) }),
+    ...(stiffness !== undefined && { stiffness: fieldToWire(stiffness, packer) }),
+    ...(lengthUnit !== undefined && { lengthUnit: { length: lengthUnit } }),
+    ...(solver && {
+      solver: {
+        method: methods[solver.method ?? "auto"],
+        tolerance: solver.tolerance ?? 0,
+        maxIterations: solver.maxIterations ?? 0,
+        timeLimitSeconds: solver.timeLimitSeconds ?? 0,
+        initial: guesses[solver.initial ?? "current"],
+      },
+    }),
+    ...(region && { region: region.length > 0 ? { vertices: packer.indices(region) } : {} }),
+  };
+}
+
+function fieldToWire(value: api.FieldValue, packer: Packer): Field {
+  if (typeof value === "number") return create(FieldSchema, { value: { case: "uniform", value } });
+  if ("automatic" in value) {
+    return create(FieldSchema, { value: { case: "automatic", value: { strength: value.automatic } } });
+  }
+  const { scalar, buffer } = packer.numbers(value);
+  return create(FieldSchema, { value: { case: "perVertex", value: { scalar, values: buffer } } });
+}
+
+function changeToWire(
+  name: string,
+  change: api.HandleChange,
+  packer: Packer,
+): MessageInitShape<typeof HandleUpdateSchema> {
+  if ("set" in change) return { name, change: { case: "set", value: handleToWire(change.set, packer) } };
+  if ("move" in change) return { name, change: { case: "move", value: motionToWire(change.move, packer) } };
+  return { name, change: { case: "remove", value: {} } };
+}
+
+function handleToWire(handle: api.Handle, packer: Packer): MessageInitShape<typeof HandleSchema> {
+  const points = handle.points ?? [];
+  const vertices = handle.vertices ?? [];
+  return {
+    ...((vertices.length > 0 || points.length === 0) && { vertices: packer.indices(vertices) }),
+    ...(points.length > 0 && { points: pointsToWire(points, packer) }),
+    motion: motionToWire(handle.motion ?? "fixed", packer),
+    hold: holdToWire(handle.hold ?? { kind: "exact" }),
+    footprintRadius: handle.footprint ?? 0,
+  };
+}
+
+function pointsToWire(points: readonly api.SurfacePoint[], packer: Packer) {
+  const faces = packer.indices(points.map((point) => point.face));
+  const { scalar, buffer } = packer.numbers(points.flatMap((point) => [...point.barycentric]));
+  return { faces, scalar, barycentric: buffer };
+}
+
+function holdToWire(hold: api.Hold): NonNullable<MessageInitShape<typeof HandleSchema>["hold"]> {
+  switch (hold.kind) {
+    case "exact":
+      return { case: undefined };
+    case "soft":
+      return { case: "soft", value: hold.weight === undefined ? {} : { weight: hold.weight } };
+    case "orientation":
+      return { case: "orientation", value: hold.weight === undefined ? {} : { weight: hold.weight } };
+    case "axisLock":
+      return { case: "axisLock", value: { axis: vector(hold.axis) } };
+    case "planeLock":
+      return { case: "planeLock", value: { normal: vector(hold.normal) } };
+  }
+}
+
+function motionToWire(motion: api.Motion, packer: Packer): MessageInitShape<typeof MotionSchema> {
+  if (motion === "fixed") return { kind: { case: "fixed", value: {} } };
+  if ("targets" in motion) {
+    const { scalar, buffer } = packer.numbers(motion.targets);
+    return { kind: { case: "targets", value: { scalar, positions: buffer } } };
+  }
+  const { axis = [0, 0, 1], angle = 0, center = [0, 0, 0], translation = [0, 0, 0] } = motion;
+  return {
+    kind: {
+      case: "rigid",
+      value: { axis: vector(axis), angleRadians: angle, center: vector(center), translation: vector(translation) },
+    },
+  };
+}
+
+function resizeToWire(resize: api.Resize) {
+  return {
+    scale: vector(resize.scale),
+    ...(resize.origin && { origin: vector(resize.origin) }),
+    ...(resize.axes && { xAxis: vector(resize.axes[0]), yAxis: vector(resize.axes[1]) }),
+  };
+}
+
+function vector([x, y, z]: api.Vector3) {
+  return { x, y, z };
+}

@@ -1,0 +1,49 @@
+import { crc32c } from "./crc32c.js";
+import { LpdeformError } from "./errors.js";
+import type { Rpc } from "./rpc.js";
+
+const mostPartBytes = 1 << 20;
+
+/** 128 random bits, in hexadecimal digits. */
+export function newRequestId(): string {
+  const random = crypto.getRandomValues(new Uint8Array(16));
+  return Array.from(random, (byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+/** Bytes sent ahead of a call, in parts with a checksum. */
+export class Uploads {
+  readonly #names: string[] = [];
+  #count = 0;
+
+  /** `id`: the same for every try of the same call, so that it is the same request to the last bit. */
+  constructor(
+    readonly rpc: Rpc,
+    readonly signal?: AbortSignal,
+    readonly id: string = newRequestId(),
+  ) {}
+
+  async add(bytes: Uint8Array): Promise<string> {
+    const { upload, maxPartBytes } = await this.rpc.call(
+      "createUpload",
+      { requestId: `${this.id}-${++this.#count}`, sizeBytes: BigInt(bytes.byteLength), crc32c: crc32c(bytes) },
+      this.signal,
+    );
+    this.#names.push(upload);
+    const partBytes = Math.min(Math.max(maxPartBytes, 1), mostPartBytes);
+    let finished = false;
+    for (let offset = 0; offset < bytes.byteLength; offset += partBytes) {
+      const data = bytes.subarray(offset, offset + partBytes);
+      ({ finished } = await this.rpc.call("uploadPart", { upload, offset: BigInt(offset), data }, this.signal));
+    }
+    if (finished) return upload;
+    throw new LpdeformError("data_loss", "The server misses parts of an upload that were all sent.", {
+      reason: "UPLOAD_INCOMPLETE",
+      element: upload,
+    });
+  }
+
+  /** Gives the memory back before the uploads expire; does not wait. */
+  discard(): void {
+    for (const upload of this.#names.splice(0)) this.rpc.call("deleteUpload", { upload }).catch(() => undefined);
+  }
+}
