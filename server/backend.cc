@@ -128,6 +128,30 @@ absl::Status Backend::ack_frames(const v1::AckFramesRequest& request, v1::AckFra
   return session.ok() ? (*session)->acknowledge(request.stream_id(), request.frame_seq()) : session.status();
 }
 
+absl::StatusOr<Backend::OpenStream> Backend::open_stream(const std::string& session_name,
+                                                         const std::string& token,
+                                                         const v1::FrameOptions& options,
+                                                         std::function<void()> wake) {
+  auto session = find(session_name);
+  if (!session.ok()) return session.status();
+  auto decoded = decode_frame_options(options);
+  if (!decoded.ok()) return decoded.status();
+  decoded->max_bytes_per_second = options_.max_stream_bytes_per_second;
+  auto stream = (*session)->open_stream(token, *decoded);
+  if (!stream.ok()) return stream.status();
+  (*stream)->start(std::move(wake));
+  log().info("stream_opened", {{"session", abbreviated(session_name)},
+                               {"stream", abbreviated((*stream)->id())},
+                               {"role", std::string(token.empty() ? "reader" : "writer")}});
+  return OpenStream{*std::move(session), *std::move(stream)};
+}
+
+void Backend::forget(const OpenStream& open) {
+  open.session->forget_stream(*open.stream);
+  log().info("stream_ended",
+             {{"session", abbreviated(open.session->name())}, {"stream", abbreviated(open.stream->id())}});
+}
+
 absl::StatusOr<UpdateResult> Backend::update(Session& session, const std::string& token,
                                              const v1::Update& update) {
   if (absl::Status status = session.check_writer(token); !status.ok()) return status;

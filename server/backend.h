@@ -42,6 +42,17 @@ class Backend {
 
   absl::StatusOr<std::shared_ptr<Session>> find(const std::string& name) { return registry->find(name); }
 
+  /// A stream of a session, which is found by its name; with a token, the writer's. `wake` as FrameStream::start has it.
+  struct OpenStream {
+    std::shared_ptr<Session> session;
+    std::shared_ptr<FrameStream> stream;
+  };
+  absl::StatusOr<OpenStream> open_stream(const std::string& session_name, const std::string& token,
+                                         const v1::FrameOptions& options, std::function<void()> wake);
+
+  /// Lets go of a stream that is over.
+  void forget(const OpenStream& open);
+
   /// Decodes an update for a session and gives it to it.
   absl::StatusOr<UpdateResult> update(Session& session, const std::string& token, const v1::Update& update);
 

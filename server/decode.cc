@@ -22,6 +22,21 @@ absl::Status unknown_enum(std::string_view what, int value) {
                        absl::StrCat("The server does not know ", std::string(what), " ", value, "."));
 }
 
+absl::StatusOr<Format> decode_encoding(v1::Encoding encoding, Format unspecified, Format raw) {
+  switch (encoding) {
+    case v1::ENCODING_UNSPECIFIED:
+      return unspecified;
+    case v1::ENCODING_RAW:
+      return raw;
+    case v1::ENCODING_QUANTIZED:
+      return Format::kQuantized;
+    case v1::ENCODING_COMPRESSED:
+      return Format::kCompressed;
+    default:
+      return unknown_enum("encoding", encoding);
+  }
+}
+
 absl::Status wrong_size(std::string_view what, std::uint64_t is, const std::string& should) {
   return invalid_input({"BUFFER_SIZE", std::string(what), should},
                        absl::StrCat("The ", std::string(what), " have ", is, " bytes, not ", should, "."));
@@ -177,8 +192,13 @@ absl::StatusOr<FreeComponents> decode_free_components(v1::FreeComponents free_co
 absl::StatusOr<StreamOptions> decode_frame_options(const v1::FrameOptions& message) {
   const auto scalar = decode_scalar(message.scalar());
   if (!scalar.ok()) return scalar.status();
+  const auto encoding = decode_encoding(message.encoding(), format_of(*scalar), format_of(*scalar));
+  if (!encoding.ok()) return encoding.status();
+  const auto lowest = decode_encoding(message.lowest_encoding(), *encoding, Format::kFloat32);
+  if (!lowest.ok()) return lowest.status();
   StreamOptions options;
-  options.scalar = *scalar;
+  options.format = *encoding;
+  options.lowest_format = std::max(*encoding, *lowest);
   options.with_distortion = !message.without_distortion();
   options.with_normals = message.with_normals();
   if (message.credit() > StreamOptions::kMostCredit) {

@@ -151,6 +151,27 @@ void encode_settings(const Inputs& inputs, v1::SettingsUpdate& out) {
   solver.set_initial(encode_initial(inputs.solver.initial));
 }
 
+v1::Scalar encode_scalar(Format format) {
+  return format == Format::kFloat64 ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32;
+}
+
+v1::Encoding encode_encoding(Format format) {
+  if (format == Format::kCompressed) return v1::ENCODING_COMPRESSED;
+  return format == Format::kQuantized ? v1::ENCODING_QUANTIZED : v1::ENCODING_RAW;
+}
+
+void encode_vector(const Eigen::Vector3d& vector, v1::Vector3& out) {
+  out.set_x(vector.x());
+  out.set_y(vector.y());
+  out.set_z(vector.z());
+}
+
+void encode_quantization(const Quantization& quantization, v1::Quantization& out) {
+  encode_vector(quantization.origin, *out.mutable_origin());
+  encode_vector(quantization.extent, *out.mutable_extent());
+  out.set_distortion_extent(quantization.distortion_extent);
+}
+
 void encode_header(const FramePiece& piece, v1::FrameHeader& out) {
   const Frame& frame = *piece.frame;
   out.set_frame_seq(frame.frame_seq);
@@ -163,7 +184,11 @@ void encode_header(const FramePiece& piece, v1::FrameHeader& out) {
   out.set_converged(frame.converged);
   out.set_stop_reason(encode_stop(frame.stop_reason));
   out.set_vertex_count(frame.surface->vertex_count());
-  out.set_scalar(piece.scalar == Scalar::kFloat64 ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
+  out.set_scalar(encode_scalar(piece.format));
+  out.set_encoding(encode_encoding(piece.format));
+  if (piece.format >= Format::kQuantized) {
+    encode_quantization(frame.surface->quantization(), *out.mutable_quantization());
+  }
   out.set_solve_seconds(frame.solve_seconds);
   out.set_method(encode_method(frame.method));
 }
@@ -174,19 +199,10 @@ void encode_piece(const FramePiece& piece, v1::FramePart& out) {
   out.set_first_vertex(piece.first);
   out.set_vertex_count(piece.count);
   out.set_last(piece.is_last);
-  const std::size_t point_bytes = 3 * bytes_of(piece.scalar);
-  const std::string_view positions = piece.frame->surface->position_bytes(piece.scalar);
-  out.set_positions(std::string(positions.substr(piece.first * point_bytes, piece.count * point_bytes)));
-  if (piece.with_distortion) {
-    const std::string_view distortion = piece.frame->surface->distortion_bytes(piece.scalar);
-    const std::size_t number_bytes = bytes_of(piece.scalar);
-    out.set_distortion(
-        std::string(distortion.substr(piece.first * number_bytes, piece.count * number_bytes)));
-  }
-  if (piece.with_normals) {
-    const std::string_view normals = piece.frame->surface->normal_bytes(piece.scalar);
-    out.set_normals(std::string(normals.substr(piece.first * point_bytes, piece.count * point_bytes)));
-  }
+  const Surface::Bytes bytes = piece.bytes();
+  out.set_positions(std::string(bytes.positions));
+  out.set_distortion(std::string(bytes.distortion));
+  out.set_normals(std::string(bytes.normals));
 }
 
 /// Bytes that a field of this many takes, its tag and length included; 0 where it is empty.
@@ -227,7 +243,7 @@ void align_buffers(const google::protobuf::MessageLite& message, v1::FramePart& 
 }
 
 std::size_t unit_of(const FramePiece& piece) {
-  return piece.scalar == Scalar::kFloat64 ? 8 : 4;
+  return piece.format == Format::kFloat64 ? 8 : 4;
 }
 
 /// Aligns the frame, if there is one, of an event in `message`.
@@ -239,32 +255,34 @@ void align_event(const Note& note, const google::protobuf::MessageLite& message,
 
 void encode_event(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
                   v1::StreamEvent& out) {
-  const Match put{
-      [&](const OpenedNote& opened) {
-        v1::StreamOpened& message = *out.mutable_opened();
-        message.set_stream_id(stream.id());
-        message.set_epoch(opened.epoch);
-        message.set_input_seq(opened.input_seq);
-        message.set_heartbeat_interval_ms(static_cast<std::uint32_t>(
-            std::chrono::ceil<std::chrono::milliseconds>(stream.heartbeat()).count()));
-        message.set_vertex_count(vertex_count);
-        const StreamOptions& options = stream.options();
-        v1::FrameOptions& granted = *message.mutable_options();
-        granted.set_credit(options.credit);
-        granted.set_scalar(options.scalar == Scalar::kFloat64 ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
-        granted.set_without_distortion(!options.with_distortion);
-        granted.set_with_normals(options.with_normals);
-        granted.set_max_frames_per_second(options.max_frames_per_second);
-      },
-      [&](const FramePiece& piece) { encode_piece(piece, *out.mutable_frame()); },
-      [&](const UpdateResult&) {},  // no event: see encode() of a DeformResponse
-      [&](const FaultNote& fault) { encode(fault, *out.mutable_fault()); },
-      [&](const HeartbeatNote&) { out.mutable_heartbeat(); },
-      [&](const EndNote& end) {
-        out.mutable_go_away()->set_reason(encode_reason(end.reason));
-        out.mutable_go_away()->set_text(end.text);
-        if (end.reason == EndReason::kDraining) out.mutable_go_away()->set_reconnect_after_ms(1000);
-      }};
+  const Match put{[&](const OpenedNote& opened) {
+                    v1::StreamOpened& message = *out.mutable_opened();
+                    message.set_stream_id(stream.id());
+                    message.set_epoch(opened.epoch);
+                    message.set_input_seq(opened.input_seq);
+                    message.set_heartbeat_interval_ms(static_cast<std::uint32_t>(
+                        std::chrono::ceil<std::chrono::milliseconds>(stream.heartbeat()).count()));
+                    message.set_vertex_count(vertex_count);
+                    const StreamOptions& options = stream.options();
+                    v1::FrameOptions& granted = *message.mutable_options();
+                    granted.set_credit(options.credit);
+                    granted.set_scalar(encode_scalar(options.format));
+                    granted.set_encoding(encode_encoding(options.format));
+                    granted.set_lowest_encoding(encode_encoding(options.lowest_format));
+                    granted.set_without_distortion(!options.with_distortion);
+                    granted.set_with_normals(options.with_normals);
+                    granted.set_max_frames_per_second(options.max_frames_per_second);
+                  },
+                  [&](const FramePiece& piece) { encode_piece(piece, *out.mutable_frame()); },
+                  [&](const UpdateResult&) {},  // no event: see encode() of a DeformResponse
+                  [&](const FaultNote& fault) { encode(fault, *out.mutable_fault()); },
+                  [&](const HeartbeatNote&) { out.mutable_heartbeat(); },
+                  [&](const EndNote& end) {
+                    out.mutable_go_away()->set_reason(encode_reason(end.reason));
+                    out.mutable_go_away()->set_text(end.text);
+                    if (end.reason == EndReason::kDraining)
+                      out.mutable_go_away()->set_reconnect_after_ms(1000);
+                  }};
   std::visit(put, note);
 }
 
@@ -342,6 +360,12 @@ void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_co
 
 void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
             v1::StreamFramesResponse& out) {
+  encode_event(note, stream, vertex_count, *out.mutable_event());
+  align_event(note, out, *out.mutable_event());
+}
+
+void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
+            v1::StreamSessionsResponse& out) {
   encode_event(note, stream, vertex_count, *out.mutable_event());
   align_event(note, out, *out.mutable_event());
 }

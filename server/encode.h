@@ -25,6 +25,9 @@ void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_co
 /// The same for a stream that takes no updates.
 void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
             v1::StreamFramesResponse& out);
+/// The same for one of several on a stream, whose number is set already.
+void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
+            v1::StreamSessionsResponse& out);
 
 /// A piece of a solve's result.
 void encode(const FramePiece& piece, v1::SolveResponse& out);

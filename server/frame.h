@@ -7,21 +7,27 @@
 #include <mutex>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/base/geometry.h"
 #include "core/solve/settings.h"
 #include "server/draw_mesh.h"
+#include "server/quantize.h"
 
 namespace lpdeform {
 
-/// How positions and distortion travel.
+/// How numbers lie in memory.
 enum class Scalar { kFloat32, kFloat64 };
 
 std::size_t bytes_of(Scalar scalar);
 
+/// How positions, distortion and normals travel, from the most precise to the smallest.
+enum class Format { kFloat64, kFloat32, kQuantized, kCompressed };
+
+Format format_of(Scalar scalar);
+
 /// The large part of a frame: shared by every stream that sends it, and by frames that differ in their
-/// numbers alone. Immutable; the float32 form and the normals are made once, when first asked for.
-/// Thread-safe.
+/// numbers alone. Immutable; every form but float64 is made once, when first asked for. Thread-safe.
 class Surface {
  public:
   /// One row each a vertex of the client's. `mesh` knows the normals; null where nobody will ask for them.
@@ -29,33 +35,73 @@ class Surface {
 
   std::uint32_t vertex_count() const { return static_cast<std::uint32_t>(positions_.rows()); }
 
-  /// x, y, z of each vertex, packed, little-endian.
-  std::string_view position_bytes(Scalar scalar) const;
-  /// E_i of each vertex, packed, little-endian.
-  std::string_view distortion_bytes(Scalar scalar) const;
-  /// The normal of each vertex, packed, little-endian. Needs a mesh.
-  std::string_view normal_bytes(Scalar scalar) const;
-  /// Makes what these will be asked for, now and on this thread.
-  void prepare(Scalar scalar, bool with_normals) const;
+  /// Bytes of vertices first to first + count - 1, as frame.proto has them.
+  struct Bytes {
+    std::string_view positions, distortion, normals;
+    std::size_t size() const { return positions.size() + distortion.size() + normals.size(); }
+  };
+  /// The range must begin at a multiple of vertices_a_part() and be as long, or reach to the end. Normals need a mesh.
+  Bytes bytes(Format format, std::uint32_t first, std::uint32_t count, bool with_distortion,
+              bool with_normals) const;
+  /// So many vertices fit into a message.
+  static std::uint32_t vertices_a_part(Format format, bool with_distortion, bool with_normals);
+  /// Of the whole in this format; of kCompressed what it is before that.
+  std::size_t size(Format format, bool with_distortion, bool with_normals) const;
+  /// Needs a quantized format.
+  const Quantization& quantization() const;
+  /// Makes what bytes() will be asked for, now and on this thread.
+  void prepare(Format format, bool with_normals) const;
 
   const Points& positions() const { return positions_; }
   std::size_t memory_bytes() const;
 
  private:
-  void make_float32() const;
-  void make_normals() const;
+  struct Float32 {
+    std::string positions, distortion;
+  };
+  struct Quantized {
+    Quantization quantization;
+    std::string vertices;
+  };
+  using Parts = std::vector<std::string>;  // a block for each part
+
+  /// A form of the surface: made by the first who asks, counted once it is there.
+  template <typename Value>
+  class Form {
+   public:
+    template <typename Make>
+    const Value& get(const Make& make) const {
+      std::call_once(once_, [&] { value_ = make(); });
+      return value_;
+    }
+
+   private:
+    mutable std::once_flag once_;
+    mutable Value value_;
+  };
 
   static_assert(std::endian::native == std::endian::little, "numbers travel as they lie in memory");
 
+  const Float32& float32() const;
+  const Quantized& quantized() const;
+  const Parts& compressed() const;
+  const Points& normals() const;
+  const std::string& float32_normals() const;
+  const std::string& quantized_normals() const;
+  const Parts& compressed_normals() const;
+  std::string counted(std::string form) const;
+  Parts counted(Parts form) const;
+
   const Points positions_;
   const Field cell_energies_;
-  mutable std::once_flag once_;
-  mutable std::string float32_positions_, float32_distortion_;
   const std::shared_ptr<const DrawMesh> mesh_;
-  mutable std::once_flag normals_once_;
-  mutable Points normals_;
-  mutable std::string float32_normals_;
-  mutable std::atomic<bool> has_normals_ = false;
+  mutable std::atomic<std::size_t> form_bytes_ = 0;
+  Form<Float32> float32_;
+  Form<Quantized> quantized_;
+  Form<Parts> compressed_;
+  Form<Points> normals_;
+  Form<std::string> float32_normals_, quantized_normals_;
+  Form<Parts> compressed_normals_;
 };
 
 /// One state of a session on its way to its readers. Meanings as in frame.proto.
@@ -81,27 +127,29 @@ struct FramePiece {
   std::uint32_t count = 0;
   bool is_last = false;
   std::uint64_t skipped_inputs = 0;
-  Scalar scalar = Scalar::kFloat32;
+  Format format = Format::kFloat32;
   bool with_distortion = true;
   bool with_normals = false;
+
+  Surface::Bytes bytes() const {
+    return frame->surface->bytes(format, first, count, with_distortion, with_normals);
+  }
 };
 
 /// Cuts a frame into pieces of at most 1 MiB with everything around them.
 class FrameCutter {
  public:
   FrameCutter() = default;
-  FrameCutter(std::shared_ptr<const Frame> frame, Scalar scalar, bool with_distortion, bool with_normals,
+  FrameCutter(std::shared_ptr<const Frame> frame, Format format, bool with_distortion, bool with_normals,
               std::uint64_t skipped_inputs);
 
   bool has_more() const { return frame_ != nullptr; }
   /// Needs has_more(). Lets go of the frame with its last piece.
   FramePiece next();
 
-  static constexpr std::size_t kMostBytes = (1u << 20) - 1024;  // the rest is for headers
-
  private:
   std::shared_ptr<const Frame> frame_;
-  Scalar scalar_ = Scalar::kFloat32;
+  Format format_ = Format::kFloat32;
   bool with_distortion_ = true;
   bool with_normals_ = false;
   std::uint64_t skipped_inputs_ = 0;

@@ -11,7 +11,7 @@
 namespace lpdeform {
 namespace {
 
-/// What both calls do with a stream of frames.
+/// What calls with one stream of frames do with it.
 template <typename Reactor, typename Response>
 class FrameCall : public WritePump<Reactor, Response> {
  public:
@@ -23,50 +23,31 @@ class FrameCall : public WritePump<Reactor, Response> {
 
   /// Opens the stream, on a thread of the pool. Ends the call where that fails.
   void open(const std::string& session_name, const std::string& token, const v1::FrameOptions& options) {
-    absl::StatusOr<std::shared_ptr<Session>> session = backend_.find(session_name);
-    absl::Status status = session.status();
-    std::shared_ptr<FrameStream> stream;
-    if (status.ok()) {
-      const auto decoded = decode_frame_options(options);
-      auto opened = decoded.ok() ? (*session)->open_stream(token, *decoded) : decoded.status();
-      status = opened.status();
-      if (opened.ok()) stream = *std::move(opened);
-    }
-    if (stream) {
-      stream->start([weak = this->weak_from_this()] {
-        if (const auto self = weak.lock()) self->pump();
-      });
-    }
+    auto open = backend_.open_stream(session_name, token, options, [weak = this->weak_from_this()] {
+      if (const auto self = weak.lock()) self->pump();
+    });
     const std::scoped_lock lock(this->mutex_);
-    if (!status.ok()) return this->refuse_locked(status);
-    if (this->is_over_locked()) return (*session)->forget_stream(*stream);
-    session_ = *std::move(session);
-    stream_ = std::move(stream);
+    if (!open.ok()) return this->refuse_locked(open.status());
+    if (this->is_over_locked()) return backend_.forget(*open);
+    open_ = *std::move(open);
     token_ = token;
-    backend_.log().info("stream_opened", {{"session", abbreviated(session_name)},
-                                          {"stream", abbreviated(stream_->id())},
-                                          {"role", std::string(token.empty() ? "reader" : "writer")}});
     this->pump_locked();
   }
 
   Made make(Response& response) final {
-    if (!stream_) return Made::kNothing;
-    const std::optional<Note> note = stream_->next();
+    if (!open_.stream) return Made::kNothing;
+    const std::optional<Note> note = open_.stream->next();
     if (!note) return Made::kNothing;
-    encode(*note, *stream_, session_->vertex_count(), response);
+    encode(*note, *open_.stream, open_.session->vertex_count(), response);
     return std::holds_alternative<EndNote>(*note) ? Made::kLastMessage : Made::kMessage;
   }
 
   void let_go() final {
-    if (!stream_ || std::exchange(is_forgotten_, true)) return;
-    session_->forget_stream(*stream_);
-    backend_.log().info("stream_ended",
-                        {{"session", abbreviated(session_->name())}, {"stream", abbreviated(stream_->id())}});
+    if (open_.stream && !std::exchange(is_forgotten_, true)) backend_.forget(open_);
   }
 
   Backend& backend_;
-  std::shared_ptr<Session> session_;
-  std::shared_ptr<FrameStream> stream_;
+  Backend::OpenStream open_;
   std::string token_;
   bool is_forgotten_ = false;
 };
@@ -121,7 +102,7 @@ class DeformCall final
 
   void read_locked() {
     if (is_over_locked()) return;
-    is_read_due_ = stream_ && stream_->answers_waiting() >= kMostAnswers;
+    is_read_due_ = open_.stream && open_.stream->answers_waiting() >= kMostAnswers;
     if (!is_read_due_) StartRead(&request_);
   }
 
@@ -147,26 +128,26 @@ class DeformCall final
 
   void take_update() {
     const v1::Update& update = request_.update();
-    const auto session = backend_.find(session_->name());
+    const auto session = backend_.find(open_.session->name());
     const auto result = session.ok() ? backend_.update(**session, token_, update) : session.status();
     if (result.ok()) {
-      stream_->answer(*result);
+      open_.stream->answer(*result);
     } else {
-      stream_->answer(FaultNote{result.status(), update.input_seq()});
+      open_.stream->answer(FaultNote{result.status(), update.input_seq()});
     }
     read();
   }
 
   void take_ack() {
-    session_->touch();
-    const absl::Status status = stream_->acknowledge(request_.ack().frame_seq());
+    open_.session->touch();
+    const absl::Status status = open_.stream->acknowledge(request_.ack().frame_seq());
     if (!status.ok()) return break_off(std::string(status.message()));
     read();
   }
 
   /// The client does not keep to the contract: reads no more, and says so.
   void break_off(const std::string& why) {
-    if (stream_) return stream_->end(EndReason::kProtocolError, why);
+    if (open_.stream) return open_.stream->end(EndReason::kProtocolError, why);
     refuse(invalid_input({"STREAM_PROTOCOL", "", ""}, why));
   }
 

@@ -10,6 +10,17 @@
 
 namespace lpdeform {
 
+Format StreamOptions::format_for(const Surface& surface) const {
+  Format chosen = format;
+  while (max_bytes_per_second > 0 &&
+         chosen<lowest_format&& static_cast<double>(surface.size(chosen, with_distortion, with_normals)) *
+                kLowestRate>
+             max_bytes_per_second) {
+    chosen = static_cast<Format>(static_cast<int>(chosen) + 1);
+  }
+  return chosen;
+}
+
 FrameStream::FrameStream(StreamOptions options, std::shared_ptr<Publisher> publisher,
                          std::shared_ptr<Timers> timers, Timers::Duration heartbeat, OpenedNote opened)
     : id_(random_hex_128()),
@@ -63,7 +74,7 @@ std::optional<Note> FrameStream::next_locked(Timers::TimePoint now) {
     answers_.pop_front();
     return answer;
   }
-  if (cutter_.has_more()) return cutter_.next();
+  if (cutter_.has_more()) return next_piece();
   if (const auto standing = publisher_->standing(); standing && standing->number > last_fault_) {
     last_fault_ = standing->number;
     return standing->fault;
@@ -83,13 +94,25 @@ void FrameStream::begin_frame(Timers::TimePoint now) {
   has_sent_frame_ = true;
   last_frame_at_ = now;
   in_flight_.push_back(last_seq_);
-  cutter_ = FrameCutter(std::move(newest), options_.scalar, options_.with_distortion, options_.with_normals,
-                        answered > 1 ? answered - 1 : 0);
+  last_bytes_ = 0;
+  cutter_ = FrameCutter(newest, options_.format_for(*newest->surface), options_.with_distortion,
+                        options_.with_normals, answered > 1 ? answered - 1 : 0);
+}
+
+FramePiece FrameStream::next_piece() {
+  FramePiece piece = cutter_.next();
+  last_bytes_ += piece.bytes().size();
+  return piece;
 }
 
 Timers::TimePoint FrameStream::next_frame_at() const {
-  if (!has_sent_frame_ || options_.max_frames_per_second <= 0) return Timers::TimePoint::min();
-  const std::chrono::duration<double> pause(std::min(1.0 / options_.max_frames_per_second, 3600.0));
+  double seconds = 0;
+  if (options_.max_frames_per_second > 0) seconds = 1.0 / options_.max_frames_per_second;
+  if (options_.max_bytes_per_second > 0) {
+    seconds = std::max(seconds, static_cast<double>(last_bytes_) / options_.max_bytes_per_second);
+  }
+  if (!has_sent_frame_ || seconds <= 0) return Timers::TimePoint::min();
+  const std::chrono::duration<double> pause(std::min(seconds, 3600.0));
   return last_frame_at_ + std::chrono::duration_cast<Timers::Duration>(pause);
 }
 

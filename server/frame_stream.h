@@ -21,12 +21,21 @@ class Publisher;
 /// What a reader asked for; meanings as in frame.proto.
 struct StreamOptions {
   std::uint32_t credit = 2;
-  Scalar scalar = Scalar::kFloat32;
+  Format format = Format::kFloat32;
+  /// What the server may go down to where max_bytes_per_second asks for it.
+  Format lowest_format = Format::kFloat32;
   bool with_distortion = true;
   bool with_normals = false;
   double max_frames_per_second = 0;
+  /// The server's; 0 is without limit. Lowers the frame rate first, to kLowestRate, then the precision, then the rate
+  /// again.
+  double max_bytes_per_second = 0;
 
   static constexpr std::uint32_t kMostCredit = 8;
+  static constexpr double kLowestRate = 10;
+
+  /// How a frame of this surface is to travel.
+  Format format_for(const Surface& surface) const;
 };
 
 enum class EndReason { kSessionDeleted, kSessionExpired, kDraining, kWriterReplaced, kProtocolError };
@@ -88,6 +97,7 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
  private:
   std::optional<Note> next_locked(Timers::TimePoint now);
   void begin_frame(Timers::TimePoint now);
+  FramePiece next_piece();
   Timers::TimePoint next_frame_at() const;
   void arm(bool& is_armed, Timers::TimePoint when);
 
@@ -111,6 +121,7 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   std::uint64_t last_taken_ = 0;
   bool has_sent_frame_ = false;
   std::uint64_t last_fault_ = 0;
+  std::size_t last_bytes_ = 0;  // of the last frame's numbers
   Timers::TimePoint last_frame_at_;
   Timers::TimePoint last_sent_at_;
   bool is_heartbeat_armed_ = false;  // a timer is set; one of each kind at a time

@@ -55,6 +55,13 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->envname("LPDEFORM_MAX_UPLOAD_BYTES")
       ->transform(CLI::AsSizeValue(false))
       ->capture_default_str();
+  app.add_option("--max-stream-rate", server.max_stream_bytes_per_second,
+                 "Bytes a second of one stream's frames, 0: without limit; lowers the frame rate first, to "
+                 "10 a second, "
+                 "then the precision where the client takes less")
+      ->envname("LPDEFORM_MAX_STREAM_RATE")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   app.add_option("--session-idle", arguments.session_idle_seconds,
                  "Seconds without use after which a session goes")
       ->envname("LPDEFORM_SESSION_IDLE")

@@ -7,8 +7,10 @@ namespace lpdeform {
 
 std::shared_ptr<const Frame> Publisher::publish(Frame frame) {
   // Encoded here, on the solver's thread, in every form that is asked for, so that no reader's thread has to.
-  for (const auto& stream : readers())
-    frame.surface->prepare(stream->options().scalar, stream->options().with_normals);
+  for (const auto& stream : readers()) {
+    const StreamOptions& options = stream->options();
+    frame.surface->prepare(options.format_for(*frame.surface), options.with_normals);
+  }
 
   std::shared_ptr<const Frame> published;
   {

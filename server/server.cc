@@ -5,6 +5,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -36,6 +37,9 @@ absl::Status check(const ServerOptions& options) {
   }
   if (options.max_vertices == 0 || options.max_vertices > 100'000'000)
     return out_of_range("max_vertices", "1 to 10^8");
+  if (!(options.max_stream_bytes_per_second >= 0) || std::isinf(options.max_stream_bytes_per_second)) {
+    return out_of_range("max_stream_bytes_per_second", "finite and >= 0");
+  }
   if (options.heartbeat.count() <= 0) return out_of_range("heartbeat", "more than 0");
   if (options.session_idle.count() <= 0) return out_of_range("session_idle", "more than 0");
   if (options.upload_idle.count() <= 0) return out_of_range("upload_idle", "more than 0");

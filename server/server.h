@@ -26,6 +26,9 @@ struct ServerOptions {
   std::size_t max_bytes = std::size_t{8} << 30;  // of all sessions and uploads together, by our own count
   std::uint64_t max_upload_bytes = std::uint64_t{256} << 20;  // of one upload
 
+  /// Of one stream's frames; 0 is without limit. See StreamOptions::max_bytes_per_second.
+  double max_stream_bytes_per_second = 0;
+
   std::chrono::milliseconds session_idle = std::chrono::minutes(10);
   std::chrono::milliseconds upload_idle = std::chrono::minutes(10);
   std::chrono::milliseconds heartbeat = std::chrono::seconds(15);

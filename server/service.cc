@@ -99,6 +99,11 @@ grpc::ServerWriteReactor<v1::StreamFramesResponse>* Service::StreamFrames(
   return stream_frames(backend_, *request);
 }
 
+grpc::ServerWriteReactor<v1::StreamSessionsResponse>* Service::StreamSessions(
+    Context*, const v1::StreamSessionsRequest* request) {
+  return stream_sessions(backend_, *request);
+}
+
 grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* Service::Deform(Context*) {
   return deform(backend_);
 }

@@ -34,6 +34,8 @@ class Service final : public v1::DeformService::CallbackService {
                                       v1::AckFramesResponse* response) override;
   grpc::ServerWriteReactor<v1::StreamFramesResponse>* StreamFrames(
       Context* context, const v1::StreamFramesRequest* request) override;
+  grpc::ServerWriteReactor<v1::StreamSessionsResponse>* StreamSessions(
+      Context* context, const v1::StreamSessionsRequest* request) override;
   grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* Deform(Context* context) override;
   grpc::ServerWriteReactor<v1::SolveResponse>* Solve(Context* context,
                                                      const v1::SolveRequest* request) override;

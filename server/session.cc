@@ -180,7 +180,8 @@ absl::StatusOr<std::shared_ptr<FrameStream>> Session::open_stream(const std::str
     std::erase_if(writers_, [](const auto& weak) { return weak.expired(); });
     if (!token.empty()) writers_.push_back(stream);
   }
-  publisher_->newest()->surface->prepare(options.scalar, options.with_normals);
+  const std::shared_ptr<const Surface> newest = publisher_->newest()->surface;
+  newest->prepare(options.format_for(*newest), options.with_normals);
   services_.scheduler.wake(shared_from_this());
   return stream;
 }

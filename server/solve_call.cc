@@ -30,7 +30,7 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
     {
       const std::scoped_lock lock(mutex_);
       if (is_over_locked()) return;
-      scalar_ = request.scalar() == v1::SCALAR_FLOAT64 ? Scalar::kFloat64 : Scalar::kFloat32;
+      format_ = request.scalar() == v1::SCALAR_FLOAT64 ? Format::kFloat64 : Format::kFloat32;
       with_normals_ = request.normals();
     }
     SolveJob::OnProgress on_progress;
@@ -59,7 +59,7 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
 
   void end(absl::StatusOr<SolveResult> result) {
     if (!result.ok()) return refuse(result.status());
-    result->frame->surface->prepare(scalar_, with_normals_);
+    result->frame->surface->prepare(format_, with_normals_);
     const std::scoped_lock lock(mutex_);
     backend_.log().info("solved",
                         {{"input_seq", result->frame->input_seq},
@@ -67,7 +67,7 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
                          {"seconds", result->summary.solve_seconds},
                          {"stop_reason", std::string(stop_reason_name(result->summary.stop_reason))}});
     progress_.reset();
-    cutter_ = FrameCutter(result->frame, scalar_, true, with_normals_, 0);
+    cutter_ = FrameCutter(result->frame, format_, true, with_normals_, 0);
     result_ = *std::move(result);
     pump_locked();
   }
@@ -100,7 +100,7 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
   }
 
   Backend& backend_;
-  Scalar scalar_ = Scalar::kFloat32;
+  Format format_ = Format::kFloat32;
   bool with_normals_ = false;
   std::shared_ptr<SolveJob> job_;
   std::optional<SolveProgress> progress_;

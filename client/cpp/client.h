@@ -44,7 +44,10 @@ struct OpenOptions {
   Settings settings = {};
   /// Frames that may be under way and not yet taken, 1 to 8; 0 takes the server's 2.
   std::uint32_t credit = 0;
-  bool double_precision = false;  // of the positions in frames on the wire
+  bool double_precision = false;  // of the positions in frames on the wire, where the encoding is raw
+  Encoding encoding = Encoding::kRaw;
+  /// What the server may go down to where its limit of bytes a second asks for it; the frame rate comes first.
+  Encoding lowest_encoding = Encoding::kRaw;
   bool without_distortion = false;
   bool with_normals = false;         // fills Frame::normals
   double max_frames_per_second = 0;  // 0 is without limit; the last frame of an update always comes

@@ -1,5 +1,8 @@
 #include "client/cpp/frame_assembly.h"
 
+#include <meshoptimizer.h>
+
+#include <array>
 #include <cstring>
 #include <string>
 #include <utility>
@@ -25,6 +28,25 @@ void append_numbers(const std::string& bytes, std::vector<T>& out) {
     out.push_back(number);
   }
 }
+
+/// Four 16-bit integers for each of `count` vertices; empty where `bytes` are not that.
+template <typename Integer>
+std::vector<std::array<Integer, 4>> quantized(const std::string& bytes, std::size_t count,
+                                              bool is_compressed) {
+  std::vector<std::array<Integer, 4>> out(count);
+  constexpr std::size_t size = sizeof(out[0]);
+  if (is_compressed) {
+    const auto* const block = reinterpret_cast<const unsigned char*>(bytes.data());
+    if (meshopt_decodeVertexBuffer(out.data(), count, size, block, bytes.size()) != 0) out.clear();
+  } else if (bytes.size() == count * size) {
+    std::memcpy(out.data(), bytes.data(), bytes.size());
+  } else {
+    out.clear();
+  }
+  return out;
+}
+
+constexpr double kMostUnsigned = 65535, kMostSigned = 32767;
 
 }  // namespace
 
@@ -60,6 +82,12 @@ absl::Status FrameAssembly::begin(const v1::FrameHeader& header) {
   frame.positions.reserve(std::size_t{3} * vertex_count_);
   frame.distortion.reserve(vertex_count_);
   received_ = 0;
+  quantization_ = header.quantization();
+  encoding_ = header.encoding() == v1::ENCODING_UNSPECIFIED ? v1::ENCODING_RAW : header.encoding();
+  if (encoding_ > v1::ENCODING_COMPRESSED) {
+    return misfit(absl::StrCat("A frame comes in encoding ", static_cast<int>(encoding_),
+                               ", which was not asked for."));
+  }
   scalar_bytes_ = header.scalar() == v1::SCALAR_FLOAT64 ? sizeof(double) : sizeof(float);
   return absl::OkStatus();
 }
@@ -70,14 +98,27 @@ absl::Status FrameAssembly::append(const v1::FramePart& part) {
     return misfit(absl::StrCat("The part of frame ", part.frame_seq(), " from vertex ", part.first_vertex(),
                                " on does not follow what came before."));
   }
+  const bool fits = encoding_ == v1::ENCODING_RAW ? append_raw(part) : append_quantized(part);
+  if (!fits) {
+    return misfit(absl::StrCat("A part of frame ", part.frame_seq(), " has the wrong number of bytes for ",
+                               part.vertex_count(), " vertices."));
+  }
+  received_ += part.vertex_count();
+  if (part.last() && received_ != vertex_count_) {
+    return misfit(absl::StrCat("Frame ", part.frame_seq(), " ends after ", received_, " of ", vertex_count_,
+                               " vertices."));
+  }
+  return absl::OkStatus();
+}
+
+bool FrameAssembly::append_raw(const v1::FramePart& part) {
   const std::size_t count = part.vertex_count();
   const bool has_distortion = !part.distortion().empty();
   const bool has_normals = !part.normals().empty();
   if (part.positions().size() != 3 * count * scalar_bytes_ ||
       (has_normals && part.normals().size() != 3 * count * scalar_bytes_) ||
       (has_distortion && part.distortion().size() != count * scalar_bytes_)) {
-    return misfit(absl::StrCat("A part of frame ", part.frame_seq(), " has the wrong number of bytes for ",
-                               count, " vertices."));
+    return false;
   }
   if (scalar_bytes_ == sizeof(double)) {
     append_numbers<double>(part.positions(), frame_->positions);
@@ -88,12 +129,28 @@ absl::Status FrameAssembly::append(const v1::FramePart& part) {
     append_numbers<float>(part.distortion(), frame_->distortion);
     append_numbers<float>(part.normals(), frame_->normals);
   }
-  received_ += part.vertex_count();
-  if (part.last() && received_ != vertex_count_) {
-    return misfit(absl::StrCat("Frame ", part.frame_seq(), " ends after ", received_, " of ", vertex_count_,
-                               " vertices."));
+  return true;
+}
+
+bool FrameAssembly::append_quantized(const v1::FramePart& part) {
+  const std::size_t count = part.vertex_count();
+  const bool is_compressed = encoding_ == v1::ENCODING_COMPRESSED;
+  const auto vertices = quantized<std::uint16_t>(part.positions(), count, is_compressed);
+  if (vertices.size() != count) return false;
+  const v1::Vector3& origin = quantization_.origin();
+  const v1::Vector3& extent = quantization_.extent();
+  for (const auto& [x, y, z, distortion] : vertices) {
+    frame_->positions.push_back(origin.x() + x / kMostUnsigned * extent.x());
+    frame_->positions.push_back(origin.y() + y / kMostUnsigned * extent.y());
+    frame_->positions.push_back(origin.z() + z / kMostUnsigned * extent.z());
+    frame_->distortion.push_back(distortion / kMostUnsigned * quantization_.distortion_extent());
   }
-  return absl::OkStatus();
+  if (part.normals().empty()) return true;
+  const auto normals = quantized<std::int16_t>(part.normals(), count, is_compressed);
+  for (const auto& [x, y, z, none] : normals) {
+    for (const std::int16_t component : {x, y, z}) frame_->normals.push_back(component / kMostSigned);
+  }
+  return normals.size() == count;
 }
 
 }  // namespace lpdeform::client

@@ -22,11 +22,15 @@ class FrameAssembly {
  private:
   absl::Status begin(const v1::FrameHeader& header);
   absl::Status append(const v1::FramePart& part);
+  bool append_raw(const v1::FramePart& part);
+  bool append_quantized(const v1::FramePart& part);
 
   std::uint32_t vertex_count_;
   std::optional<Frame> frame_;
   std::uint32_t received_ = 0;
   std::size_t scalar_bytes_ = 0;
+  v1::Encoding encoding_ = v1::ENCODING_RAW;
+  v1::Quantization quantization_;
 };
 
 }  // namespace lpdeform::client

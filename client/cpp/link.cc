@@ -1,5 +1,6 @@
 #include "client/cpp/link.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -17,6 +18,8 @@ v1::DeformRequest open_request(const Lease& lease, const OpenOptions& options) {
   v1::FrameOptions& frames = *open.mutable_options();
   frames.set_credit(options.credit);
   frames.set_scalar(options.double_precision ? v1::SCALAR_FLOAT64 : v1::SCALAR_FLOAT32);
+  frames.set_encoding(to_wire(options.encoding));
+  frames.set_lowest_encoding(to_wire(std::max(options.encoding, options.lowest_encoding)));
   frames.set_without_distortion(options.without_distortion);
   frames.set_with_normals(options.with_normals);
   frames.set_max_frames_per_second(options.max_frames_per_second);

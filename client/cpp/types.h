@@ -118,6 +118,15 @@ enum class FreeComponents {
   kFollow,  // moves rigidly with the nearest handle
 };
 
+/// How positions, distortion and normals travel in frames, from the most precise to the smallest.
+enum class Encoding {
+  kRaw,  // float32, or float64 with OpenOptions::double_precision
+  /// 16-bit integers: off by at most half of 1/65535 of the frame's extent along each axis, of its largest distortion, and
+  /// half of 1/32767 of a normal. Always with distortion.
+  kQuantized,
+  kCompressed,  // the same numbers, by meshoptimizer's vertex codec
+};
+
 /// Which vertices of the mesh are copies of one, as engines split them along seams of texture and normals.
 /// They are deformed as one and get the same positions to the last bit. Handles, fields and positions go on
 /// speaking of the mesh's own vertices; what is said of copies must be the same (COPIES_DIFFER).

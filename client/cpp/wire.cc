@@ -203,6 +203,18 @@ v1::WeightKind to_wire(WeightKind weights) {
   return v1::WEIGHT_KIND_UNSPECIFIED;
 }
 
+v1::Encoding to_wire(Encoding encoding) {
+  switch (encoding) {
+    case Encoding::kRaw:
+      return v1::ENCODING_RAW;
+    case Encoding::kQuantized:
+      return v1::ENCODING_QUANTIZED;
+    case Encoding::kCompressed:
+      return v1::ENCODING_COMPRESSED;
+  }
+  return v1::ENCODING_UNSPECIFIED;
+}
+
 v1::FreeComponents to_wire(FreeComponents free_components) {
   switch (free_components) {
     case FreeComponents::kError:
@@ -258,6 +270,8 @@ std::string method_name(v1::Method method) {
       return "local_global";
     case v1::METHOD_CONIC:
       return "conic";
+    case v1::METHOD_MULTIRESOLUTION:
+      return "multiresolution";
     default:
       return "";
   }

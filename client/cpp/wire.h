@@ -18,6 +18,7 @@ absl::Status to_wire(const Weld& weld, Packer& packer, v1::CreateSessionRequest&
 absl::Status to_wire(const Settings& settings, Packer& packer, v1::SettingsUpdate& out);
 absl::Status to_wire(const Update& update, std::uint64_t seq, Packer& packer, v1::Update& out);
 v1::WeightKind to_wire(WeightKind weights);
+v1::Encoding to_wire(Encoding encoding);
 v1::FreeComponents to_wire(FreeComponents free_components);
 
 // Messages as our plain types.

@@ -77,5 +77,44 @@ TEST(FrameAssembly, RefusesPartsThatDoNotFit) {
   EXPECT_EQ(reason_of(FrameAssembly(1), {short_one}), "FRAME_PARTS") << "too few bytes";
 }
 
+/// Two vertices, quantized: 0 and 65535 of everything.
+v1::FramePart quantized_part() {
+  v1::FramePart whole = first_part(2, {0, 0, 0, 0, 0, 0}, true);
+  whole.clear_distortion();
+  whole.mutable_header()->set_encoding(v1::ENCODING_QUANTIZED);
+  v1::Quantization& quantization = *whole.mutable_header()->mutable_quantization();
+  quantization.mutable_origin()->set_x(-1);
+  quantization.mutable_extent()->set_x(3);
+  quantization.mutable_extent()->set_z(0.5);
+  quantization.set_distortion_extent(8);
+  whole.set_positions(bytes(std::vector<std::uint16_t>{0, 0, 0, 0, 65535, 65535, 65535, 65535}));
+  whole.set_normals(bytes(std::vector<std::int16_t>{0, 0, 32767, 0, -32767, 0, 0, 0}));
+  return whole;
+}
+
+TEST(FrameAssembly, ReadsQuantizedNumbers) {
+  FrameAssembly assembly(2);
+  const auto frame = assembly.add(quantized_part());
+  ASSERT_TRUE(frame.ok() && frame->has_value());
+  EXPECT_EQ((*frame)->positions, (std::vector<double>{-1, 0, 0, 2, 0, 0.5}));
+  EXPECT_EQ((*frame)->distortion, (std::vector<double>{0, 8}));
+  EXPECT_EQ((*frame)->normals, (std::vector<double>{0, 0, 1, -1, 0, 0}));
+}
+
+TEST(FrameAssembly, RefusesQuantizedPartsThatAreTooShortOrNotCompressed) {
+  FrameAssembly assembly(2);
+  v1::FramePart part = quantized_part();
+  part.mutable_positions()->pop_back();
+  EXPECT_EQ(fault_of(assembly.add(part).status()).reason, "FRAME_PARTS");
+  part = quantized_part();
+  part.mutable_normals()->pop_back();
+  EXPECT_EQ(fault_of(assembly.add(part).status()).reason, "FRAME_PARTS");
+  part = quantized_part();
+  part.mutable_header()->set_encoding(v1::ENCODING_COMPRESSED);
+  EXPECT_EQ(fault_of(assembly.add(part).status()).reason, "FRAME_PARTS");
+  part.mutable_header()->set_encoding(static_cast<v1::Encoding>(9));
+  EXPECT_EQ(fault_of(assembly.add(part).status()).reason, "FRAME_PARTS");
+}
+
 }  // namespace
 }  // namespace lpdeform::client

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -386,6 +387,54 @@ TEST_F(SessionTest, ASplitMeshIsWeldedAndDrawnWithItsHardEdges) {
     }
   }
   EXPECT_TRUE(session.solve().value().normals.empty());
+}
+
+/// The finished frame of a session that another reads in this encoding.
+Frame read_as(absl::StatusOr<Client> client, const Session& session, OpenOptions options) {
+  options.with_normals = true;
+  Session reader = client->join(session.name(), Role::kReader, std::move(options)).value();
+  for (;;) {
+    Frame frame = reader.next_frame(kPatience).value();
+    if (frame.converged && frame.input_seq > 0) return frame;
+  }
+}
+
+TEST_F(SessionTest, EncodingsAreOffByHalfAStepAndCompressionByNothing) {
+  Session session = open_bar();
+  ASSERT_TRUE(session.settle(kPatience).ok());
+  const Frame exact = read_as(connect(), session, {.double_precision = true});
+  const Frame quantized = read_as(connect(), session, {.encoding = Encoding::kQuantized});
+  const Frame compressed = read_as(connect(), session, {.encoding = Encoding::kCompressed});
+  ASSERT_EQ(exact.frame_seq, quantized.frame_seq);
+  ASSERT_EQ(quantized.positions.size(), exact.positions.size());
+  const auto half_a_step = [&](std::size_t axis) {
+    double least = 1e300, most = -1e300;
+    for (std::size_t k = axis; k < exact.positions.size(); k += 3) {
+      least = std::min(least, exact.positions[k]);
+      most = std::max(most, exact.positions[k]);
+    }
+    return (most - least) / 65535 / 2 * (1 + 1e-9);
+  };
+  for (std::size_t k = 0; k < exact.positions.size(); ++k) {
+    EXPECT_NEAR(quantized.positions[k], exact.positions[k], half_a_step(k % 3));
+    EXPECT_NEAR(quantized.normals[k], exact.normals[k], 0.5 / 32767 * (1 + 1e-9));
+  }
+  const double most = *std::ranges::max_element(exact.distortion);
+  for (std::size_t k = 0; k < exact.distortion.size(); ++k) {
+    EXPECT_NEAR(quantized.distortion[k], exact.distortion[k], most / 65535 / 2 * (1 + 1e-9));
+  }
+  EXPECT_EQ(compressed.positions, quantized.positions);
+  EXPECT_EQ(compressed.distortion, quantized.distortion);
+  EXPECT_EQ(compressed.normals, quantized.normals);
+}
+
+TEST_F(SessionTest, AFlatMeshIsExactWhenQuantized) {
+  const Mesh flat{.vertices = {0, 0, 7, 1, 0, 7, 1, 1, 7, 0, 1, 7}, .faces = {0, 1, 2, 0, 2, 3}};
+  Session session = connect()->open(flat, {.encoding = Encoding::kCompressed}).value();
+  session.set_handle("all", {.vertices = {0, 1, 2, 3}}).value();
+  const auto frame = session.settle(kPatience);
+  ASSERT_TRUE(frame.ok());
+  EXPECT_EQ(frame->positions, flat.vertices);
 }
 
 }  // namespace

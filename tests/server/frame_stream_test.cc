@@ -109,7 +109,7 @@ TEST_F(FrameStreamTest, HoldsOneFrameHoweverManyComeWhileItIsSlow) {
 }
 
 TEST_F(FrameStreamTest, CutsALargeFrameIntoPiecesWithoutGaps) {
-  const auto stream = open({.scalar = Scalar::kFloat64});
+  const auto stream = open({.format = Format::kFloat64});
   publish(1, true, kManyVertices);
   const auto pieces = drain(*stream);
   ASSERT_GT(pieces.size(), 1u);
@@ -222,22 +222,68 @@ TEST_F(FrameStreamTest, AFloodOfAnswersDoesNotHoldFramesUp) {
   EXPECT_EQ(pieces, 4);
 }
 
+// 16 bytes a vertex as float32, 8 quantized, at 10 frames a second.
+TEST_F(FrameStreamTest, LowersTheFrameRateFirstAndThePrecisionSecond) {
+  constexpr std::uint32_t n = 1000;
+  const auto format_at = [&](double bytes_per_second, Format lowest = Format::kCompressed) {
+    const StreamOptions options{.lowest_format = lowest, .max_bytes_per_second = bytes_per_second};
+    return options.format_for(*surface(n));
+  };
+  EXPECT_EQ(format_at(0), Format::kFloat32);
+  EXPECT_EQ(format_at(10 * 16 * n), Format::kFloat32);
+  EXPECT_EQ(format_at(10 * 16 * n - 1), Format::kQuantized);
+  EXPECT_EQ(format_at(10 * 8 * n), Format::kQuantized);
+  EXPECT_EQ(format_at(10 * 8 * n - 1), Format::kCompressed);
+  EXPECT_EQ(format_at(1, Format::kQuantized), Format::kQuantized);
+  EXPECT_EQ(format_at(1, Format::kFloat32), Format::kFloat32);
+}
+
+TEST_F(FrameStreamTest, KeepsToItsBytesASecond) {
+  constexpr std::uint32_t n = 1000;
+  for (const auto& [bytes_per_second, frames] : {std::pair{16e3 * 20, 20}, {16e3 * 4, 4}}) {
+    const auto stream = open({.credit = 8, .max_bytes_per_second = bytes_per_second});
+    int sent = 0;
+    for (int k = 0; k < 1000; ++k) {
+      publish(static_cast<std::uint64_t>(k) + 1, false, n);
+      for (const FramePiece& piece : drain(*stream)) {
+        ++sent;
+        ASSERT_TRUE(stream->acknowledge(piece.frame->frame_seq).ok());
+      }
+      timers_->advance(milliseconds(1));
+    }
+    EXPECT_NEAR(sent, frames, 1);
+  }
+}
+
+TEST_F(FrameStreamTest, SendsALastFrameThatItsLimitHasDelayed) {
+  const auto stream = open({.max_bytes_per_second = 1000});
+  publish(1);
+  ASSERT_EQ(drain(*stream).size(), 1u);
+  publish(2, true, 1000);
+  EXPECT_TRUE(drain(*stream).empty());
+  timers_->advance(seconds(1));
+  const auto last = drain(*stream);
+  ASSERT_EQ(last.size(), 1u);
+  EXPECT_TRUE(last[0].frame->converged);
+}
+
 TEST(Surface, HoldsBothScalarsOfEveryPosition) {
   Points points(2, 3);
   points << 0.1, 0.2, 0.3, 1e10, -2, 3;
   const Surface surface(points, Field::Constant(2, 0.7));
-  const auto wide = surface.position_bytes(Scalar::kFloat64);
+  const auto wide = surface.bytes(Format::kFloat64, 0, 2, true, false).positions;
   ASSERT_EQ(wide.size(), 48u);
   EXPECT_EQ(std::memcmp(wide.data(), points.data(), 48), 0);
-  const auto narrow = surface.position_bytes(Scalar::kFloat32);
+  const auto narrow = surface.bytes(Format::kFloat32, 0, 2, true, false).positions;
   ASSERT_EQ(narrow.size(), 24u);
   float number = 0;
   std::memcpy(&number, narrow.data() + 12, sizeof(number));
   EXPECT_EQ(number, static_cast<float>(1e10));
-  std::memcpy(&number, surface.distortion_bytes(Scalar::kFloat32).data(), sizeof(number));
+  std::memcpy(&number, surface.bytes(Format::kFloat32, 0, 2, true, false).distortion.data(), sizeof(number));
   EXPECT_EQ(number, 0.7f);
   double wide_number = 0;
-  std::memcpy(&wide_number, surface.distortion_bytes(Scalar::kFloat64).data(), sizeof(wide_number));
+  std::memcpy(&wide_number, surface.bytes(Format::kFloat64, 0, 2, true, false).distortion.data(),
+              sizeof(wide_number));
   EXPECT_EQ(wide_number, 0.7);
 }
 

@@ -115,6 +115,31 @@ TEST_F(WireTest, SolverSettingsTakeTheirDefaultsFromZero) {
   EXPECT_EQ(reason(decoder(1).settings(message).status()), "ENUM_UNKNOWN");
 }
 
+TEST_F(WireTest, EncodingsAreAsAskedForAndTheLowestIsNeverAboveThem) {
+  v1::FrameOptions message;
+  const auto decoded = [&] { return *decode_frame_options(message); };
+  EXPECT_EQ(decoded().format, Format::kFloat32);
+  EXPECT_EQ(decoded().lowest_format, Format::kFloat32);
+  message.set_scalar(v1::SCALAR_FLOAT64);
+  EXPECT_EQ(decoded().format, Format::kFloat64);
+  EXPECT_EQ(decoded().lowest_format, Format::kFloat64);
+  message.set_encoding(v1::ENCODING_RAW);
+  message.set_lowest_encoding(v1::ENCODING_RAW);
+  EXPECT_EQ(decoded().format, Format::kFloat64);
+  EXPECT_EQ(decoded().lowest_format, Format::kFloat32);
+  message.set_lowest_encoding(v1::ENCODING_COMPRESSED);
+  EXPECT_EQ(decoded().lowest_format, Format::kCompressed);
+  message.set_encoding(v1::ENCODING_COMPRESSED);
+  message.set_lowest_encoding(v1::ENCODING_QUANTIZED);
+  EXPECT_EQ(decoded().format, Format::kCompressed);
+  EXPECT_EQ(decoded().lowest_format, Format::kCompressed);
+  message.set_encoding(static_cast<v1::Encoding>(9));
+  EXPECT_EQ(reason(decode_frame_options(message).status()), "ENUM_UNKNOWN");
+  message.set_encoding(v1::ENCODING_RAW);
+  message.set_lowest_encoding(static_cast<v1::Encoding>(9));
+  EXPECT_EQ(reason(decode_frame_options(message).status()), "ENUM_UNKNOWN");
+}
+
 /// Where `part` begins within `message` when it is written.
 std::size_t offset_of(const google::protobuf::MessageLite& message, const std::string& part) {
   return message.SerializeAsString().find(part);
@@ -130,11 +155,11 @@ std::shared_ptr<const RestShape> fan(std::uint32_t vertices) {
   return RestShape::create(mesh).value();
 }
 
-class AlignmentTest : public testing::TestWithParam<std::tuple<std::uint32_t, Scalar>> {};
+class AlignmentTest : public testing::TestWithParam<std::tuple<std::uint32_t, Format>> {};
 
 TEST_P(AlignmentTest, BuffersCanBeUsedInPlaceInEveryMessage) {
-  const auto [n, scalar] = GetParam();
-  const std::size_t unit = scalar == Scalar::kFloat64 ? 8 : 4;
+  const auto [n, format] = GetParam();
+  const std::size_t unit = format == Format::kFloat64 ? 8 : 4;
   const auto timers = std::make_shared<ManualTimers>();
   const auto publisher = std::make_shared<Publisher>();
   Frame frame;
@@ -160,7 +185,7 @@ TEST_P(AlignmentTest, BuffersCanBeUsedInPlaceInEveryMessage) {
                                n - first,
                                true,
                                seq,
-                               scalar,
+                               format,
                                with_distortion,
                                with_normals};
         const FrameStream stream({}, publisher, timers, std::chrono::seconds(15), {});
@@ -170,6 +195,10 @@ TEST_P(AlignmentTest, BuffersCanBeUsedInPlaceInEveryMessage) {
         v1::StreamFramesResponse frames;
         encode(piece, stream, n, frames);
         expect_aligned(frames, frames.event().frame());
+        v1::StreamSessionsResponse sessions;
+        sessions.set_stream(extras);
+        encode(piece, stream, n, sessions);
+        expect_aligned(sessions, sessions.event().frame());
         v1::SolveResponse solve;
         encode(piece, solve);
         expect_aligned(solve, solve.frame());
@@ -181,7 +210,8 @@ TEST_P(AlignmentTest, BuffersCanBeUsedInPlaceInEveryMessage) {
 INSTANTIATE_TEST_SUITE_P(Sizes, AlignmentTest,
                          testing::Combine(testing::Values(3, 4, 5, 9, 10, 11, 31, 32, 33, 300, 340, 341, 1363,
                                                           1364, 1365, 4095, 4096, 26000),
-                                          testing::Values(Scalar::kFloat32, Scalar::kFloat64)));
+                                          testing::Values(Format::kFloat32, Format::kFloat64,
+                                                          Format::kQuantized)));
 
 }  // namespace
 }  // namespace lpdeform

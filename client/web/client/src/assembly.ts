@@ -1,96 +1,99 @@
+import { decompress, float32View, uint16View } from "./decode.js";
 import { LpdeformError } from "./errors.js";
-import { stopReasonFromWire, methodName } from "./fromwire.js";
+import { WireFrame } from "./frame.js";
 import { Scalar } from "./gen/lpdeform/v1/data_pb.js";
-import type { FrameHeader, FramePart } from "./gen/lpdeform/v1/frame_pb.js";
-import type { Frame } from "./types.js";
+import { Encoding, type FrameHeader, type FramePart } from "./gen/lpdeform/v1/frame_pb.js";
+
+type Numbers = Float32Array | Uint16Array | Int16Array;
 
 /**
- * Puts the parts of frames together. A frame of one part, as up to 65,000 vertices give, becomes views of the message that
+ * Puts the parts of frames together. A frame of one part, as up to 50,000 vertices give, becomes views of the message that
  * carried it; of several parts, each is copied once as a whole. Whatever does not fit is an error (FRAME_PARTS).
  */
 export class FrameAssembly {
-  #frame: Frame | undefined;
+  #frame: WireFrame | undefined;
+  #isCompressed = false;
   #received = 0;
 
   constructor(readonly vertexCount: number) {}
 
   /** The frame, where this part makes it whole. */
-  add(part: FramePart): Frame | undefined {
-    try {
-      if (part.header) this.#begin(part.header);
-      const frame = this.#append(part);
-      frame.wireBytes += part.positions.byteLength + part.distortion.byteLength + part.normals.byteLength;
-      if (!part.last) return undefined;
-      frame.receivedAt = performance.now();
-      this.#frame = undefined;
-      return frame;
-    } catch (misfit) {
-      this.#frame = undefined;
-      throw misfit;
+  add(part: FramePart): WireFrame | undefined {
+    const frame = part.header ? this.#begin(part.header) : this.#frame;
+    this.#frame = undefined;
+    if (!frame || !this.#follows(frame, part)) {
+      throw misfit(`The part of frame ${part.frameSeq} from vertex ${part.firstVertex} on does not follow what came before.`);
     }
+    if (frame.quantized) this.#appendQuantized(frame.quantized, part);
+    else this.#appendRaw(frame, part);
+    frame.wireBytes += part.positions.byteLength + part.distortion.byteLength + part.normals.byteLength;
+    this.#received += part.vertexCount;
+    if (!part.last) {
+      this.#frame = frame;
+      return undefined;
+    }
+    if (this.#received !== this.vertexCount) {
+      throw misfit(`Frame ${part.frameSeq} ends after ${this.#received} of ${this.vertexCount} vertices.`);
+    }
+    frame.receivedAt = performance.now();
+    return frame;
   }
 
-  #begin(header: FrameHeader): void {
+  #begin(header: FrameHeader): WireFrame {
     if (header.vertexCount !== this.vertexCount) {
       throw misfit(`A frame has ${header.vertexCount} vertices, the mesh ${this.vertexCount}.`);
     }
-    if (header.scalar !== Scalar.FLOAT32) throw misfit(`A frame comes in a scalar that was not asked for.`);
     this.#received = 0;
-    this.#frame = {
-      positions: none,
-      distortion: none,
-      normals: none,
-      inputSeq: Number(header.inputSeq),
-      frameSeq: Number(header.frameSeq),
-      epoch: Number(header.epoch),
-      skippedInputs: Number(header.skippedInputs),
-      iteration: header.iteration,
-      energy: header.energy,
-      softEnergy: header.softEnergy,
-      converged: header.converged,
-      stopReason: stopReasonFromWire(header.stopReason),
-      solveSeconds: header.solveSeconds,
-      method: methodName(header.method),
-      wireBytes: 0,
-      receivedAt: 0,
-    };
-  }
-
-  #append(part: FramePart): Frame {
-    const frame = this.#frame;
-    const count = part.vertexCount;
-    if (!frame || Number(part.frameSeq) !== frame.frameSeq || part.firstVertex !== this.#received ||
-        count > this.vertexCount - this.#received) {
-      throw misfit(`The part of frame ${part.frameSeq} from vertex ${part.firstVertex} on does not follow what came before.`);
-    }
-    frame.positions = this.#join(frame.positions, part.positions, part, 3);
-    if (part.distortion.length > 0) frame.distortion = this.#join(frame.distortion, part.distortion, part, 1);
-    if (part.normals.length > 0) frame.normals = this.#join(frame.normals, part.normals, part, 3);
-    this.#received += count;
-    if (part.last && this.#received !== this.vertexCount) {
-      throw misfit(`Frame ${part.frameSeq} ends after ${this.#received} of ${this.vertexCount} vertices.`);
+    this.#isCompressed = header.encoding === Encoding.COMPRESSED;
+    const frame = new WireFrame(header);
+    if (this.#isCompressed || header.encoding === Encoding.QUANTIZED) {
+      const { origin, extent, distortionExtent = 0 } = header.quantization ?? {};
+      frame.quantized = {
+        vertices: new Uint16Array(0),
+        normals: new Int16Array(0),
+        origin: [origin?.x ?? 0, origin?.y ?? 0, origin?.z ?? 0],
+        extent: [extent?.x ?? 0, extent?.y ?? 0, extent?.z ?? 0],
+        distortionExtent,
+      };
+    } else if (header.scalar === Scalar.FLOAT64 || header.encoding > Encoding.COMPRESSED) {
+      throw misfit("A frame comes in an encoding that was not asked for.");
     }
     return frame;
   }
 
-  #join(whole: Float32Array, bytes: Uint8Array, part: FramePart, width: number): Float32Array {
-    if (bytes.byteLength !== 4 * width * part.vertexCount) {
+  #follows(frame: WireFrame, part: FramePart): boolean {
+    return (
+      Number(part.frameSeq) === frame.frameSeq &&
+      part.firstVertex === this.#received &&
+      part.vertexCount <= this.vertexCount - this.#received
+    );
+  }
+
+  #appendRaw({ raw }: WireFrame, part: FramePart): void {
+    const { positions, distortion, normals } = part;
+    raw.positions = this.#join(raw.positions, float32View(positions), 3, part);
+    if (distortion.length > 0) raw.distortion = this.#join(raw.distortion, float32View(distortion), 1, part);
+    if (normals.length > 0) raw.normals = this.#join(raw.normals, float32View(normals), 3, part);
+  }
+
+  #appendQuantized(quantized: NonNullable<WireFrame["quantized"]>, part: FramePart): void {
+    const bytesOf = (bytes: Uint8Array) => (this.#isCompressed ? decompress(bytes, part.vertexCount) : bytes);
+    quantized.vertices = this.#join(quantized.vertices, uint16View(bytesOf(part.positions)), 4, part);
+    if (part.normals.length === 0) return;
+    const { buffer, byteOffset, length } = uint16View(bytesOf(part.normals));
+    quantized.normals = this.#join(quantized.normals, new Int16Array(buffer, byteOffset, length), 4, part);
+  }
+
+  /** `values` at their place in the whole, which is made with its first part, or is them. */
+  #join<Array extends Numbers>(whole: Array, values: Array, width: number, part: FramePart): Array {
+    if (values.length !== width * part.vertexCount) {
       throw misfit(`A part of frame ${part.frameSeq} has the wrong number of bytes for ${part.vertexCount} vertices.`);
     }
-    const values = float32View(bytes);
-    if (part.firstVertex === 0 && part.vertexCount === this.vertexCount) return values;
-    const all = whole.length > 0 ? whole : new Float32Array(width * this.vertexCount);
+    if (part.vertexCount === this.vertexCount) return values;
+    const all = whole.length > 0 ? whole : (new (values.constructor as new (length: number) => Array)(width * this.vertexCount));
     all.set(values, width * part.firstVertex);
     return all;
   }
-}
-
-const none = new Float32Array(0);
-
-/** In place where the bytes lie at a multiple of four, as the server sees to; otherwise of one copy. */
-export function float32View(bytes: Uint8Array): Float32Array {
-  const aligned = bytes.byteOffset % 4 === 0 ? bytes : bytes.slice();
-  return new Float32Array(aligned.buffer, aligned.byteOffset, aligned.byteLength / 4);
 }
 
 function misfit(text: string): LpdeformError {

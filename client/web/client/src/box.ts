@@ -1,21 +1,27 @@
 import type { LpdeformError } from "./errors.js";
-import type { Frame } from "./types.js";
+import type { WireFrame } from "./frame.js";
+
+/** A frame and the stream that it came on, which wants it acknowledged. */
+export interface Taken {
+  frame: WireFrame;
+  streamId: string;
+}
 
 /** The newest frame not yet taken, and who waits for it. Frames of an older epoch or update than one before are dropped. */
 export class FrameBox {
-  #newest: Frame | undefined;
+  #newest: Taken | undefined;
   #epoch = 0;
   #inputSeq = 0;
   #end: LpdeformError | "closed" | undefined;
   #waiting = new Set<() => void>();
 
   /** False where the frame is dropped. */
-  put(frame: Frame): boolean {
+  put(frame: WireFrame, streamId: string): boolean {
     if (frame.epoch < this.#epoch || frame.inputSeq < this.#inputSeq) return false;
     this.#epoch = frame.epoch;
     this.#inputSeq = frame.inputSeq;
-    if (this.#newest) frame.skippedInputs += this.#newest.skippedInputs;
-    this.#newest = frame;
+    if (this.#newest) frame.skippedInputs += this.#newest.frame.skippedInputs;
+    this.#newest = { frame, streamId };
     this.#wake();
     return true;
   }
@@ -44,11 +50,11 @@ export class FrameBox {
   }
 
   /** What there is; throws why nothing more comes. */
-  take(): Frame | undefined {
-    const frame = this.#newest;
+  take(): Taken | undefined {
+    const taken = this.#newest;
     this.#newest = undefined;
-    if (!frame && this.#end && this.#end !== "closed") throw this.#end;
-    return frame;
+    if (!taken && this.#end && this.#end !== "closed") throw this.#end;
+    return taken;
   }
 
   get isClosed(): boolean {

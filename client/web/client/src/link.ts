@@ -1,15 +1,15 @@
 import { FrameAssembly } from "./assembly.js";
 import { FrameBox } from "./box.js";
 import { fromFault, LpdeformError } from "./errors.js";
-import { FrameFeed } from "./feed.js";
 import type { GoAway } from "./gen/lpdeform/v1/service_pb.js";
+import type { Lane, WireFrameOptions } from "./hub.js";
 import { createSession, isSessionLost, isTakenAllTheSame, isUndecided, joinSession, type Lease } from "./lease.js";
 import { Ledger, type NumberedUpdate } from "./ledger.js";
 import { Packer } from "./packer.js";
 import { Backoff, recoveryAfter } from "./recovery.js";
 import type { Rpc } from "./rpc.js";
 import { updateToWire } from "./towire.js";
-import type { Connection, Frame, FrameOptions, Mesh, OpenOptions, Update } from "./types.js";
+import type { Connection, Frame, Mesh, OpenOptions, Update } from "./types.js";
 import { newRequestId, Uploads } from "./upload.js";
 
 /** What a session that was lost can be made anew from. */
@@ -32,7 +32,7 @@ export class Link {
   readonly ledger = new Ledger();
   readonly stop = new AbortController();
   #lease: Lease;
-  #feed: FrameFeed | undefined;
+  #lane: Lane | undefined;
   #assembly = new FrameAssembly(0);
   #goAway: GoAway | undefined;
   #connection: Connection = "idle";
@@ -48,7 +48,7 @@ export class Link {
   constructor(
     readonly rpc: Rpc,
     lease: Lease,
-    readonly frameOptions: FrameOptions,
+    readonly frameOptions: WireFrameOptions,
     readonly copy: Copy | undefined,
     readonly watcher: Watcher,
   ) {
@@ -89,15 +89,15 @@ export class Link {
 
   /** The newest frame not yet taken; taking it tells the server to send on. */
   take(): Frame | undefined {
-    const frame = this.box.take();
-    if (frame) this.#feed?.acknowledge(frame.frameSeq);
-    return frame;
+    const taken = this.box.take();
+    if (taken) this.#lane?.acknowledge(taken.frame.frameSeq, taken.streamId);
+    return taken?.frame;
   }
 
   async close(): Promise<void> {
     if (this.isClosed) return;
     this.stop.abort();
-    this.#feed?.close();
+    this.#lane?.close();
     this.#setConnection("closed");
     this.box.finish("closed");
     this.#wakeQuiet();
@@ -118,7 +118,7 @@ export class Link {
 
   #subscribe(): void {
     this.#goAway = undefined;
-    const feed = new FrameFeed(this.rpc, this.#lease.session, this.frameOptions, {
+    const lane = this.rpc.hub.subscribe(this.#lease.session, this.frameOptions, {
       opened: (opened) => {
         this.#assembly = new FrameAssembly(opened.vertexCount);
         this.box.beginEpoch(Number(opened.epoch));
@@ -129,13 +129,14 @@ export class Link {
       },
       part: (part) => {
         const frame = this.#assembly.add(part);
-        if (frame && !this.box.put(frame)) feed.acknowledge(frame.frameSeq); // dropped, but its credit is owed
+        if (!frame || this.box.put(frame, lane.streamId)) return;
+        lane.acknowledge(frame.frameSeq, lane.streamId); // dropped, but its credit is owed
       },
       fault: (fault) => this.watcher.problem(fromFault(fault)),
       goAway: (goAway) => (this.#goAway = goAway),
       ended: (error) => void this.#recover(error),
     });
-    this.#feed = feed;
+    this.#lane = lane;
   }
 
   async #recover(ended: LpdeformError | undefined): Promise<void> {

@@ -46,9 +46,9 @@ function afterGoAway(goAway: GoAway, hasCopy: boolean): Recovery {
   }
 }
 
-/** Growing pauses, 100 ms to 5 s, each spread over its upper half so that clients do not come back all at once. */
+/** Growing pauses, 100 ms to 2 s, each spread over its upper half so that clients do not come back all at once. */
 export class Backoff {
-  static readonly mostMs = 5000;
+  static readonly mostMs = 2000;
   #longestMs = 100;
 
   nextMs(): number {

@@ -3,14 +3,18 @@ import { type CallOptions, type Client, createClient, type Transport } from "@co
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { fromCall } from "./errors.js";
 import { DeformService } from "./gen/lpdeform/v1/service_pb.js";
+import { StreamHub } from "./hub.js";
 import type { ConnectOptions } from "./types.js";
 
 type Methods = typeof DeformService.method;
 type Unary = { [Name in keyof Methods]: Methods[Name]["methodKind"] extends "unary" ? Name : never }[keyof Methods];
 
+const shared = new Map<string, Rpc>();
+
 /** The calls of the service. Every error that comes out is an LpdeformError. */
 export class Rpc {
   readonly client: Client<typeof DeformService>;
+  readonly hub = new StreamHub(this);
 
   constructor(
     transport: Transport,
@@ -20,11 +24,16 @@ export class Rpc {
     this.client = createClient(DeformService, transport);
   }
 
-  static connect(options: ConnectOptions): Rpc {
-    const baseUrl = options.url ?? globalThis.location?.origin;
+  /** The same for the same options, so that sessions share a stream. */
+  static connect({ url, callTimeoutMs, reconnectForMs, fetch }: ConnectOptions): Rpc {
+    const baseUrl = url ?? globalThis.location?.origin;
     if (!baseUrl) throw new TypeError("Outside of a page, `url` is needed: of the gRPC-Web proxy.");
-    const transport = createGrpcWebTransport({ baseUrl, ...(options.fetch && { fetch: options.fetch }) });
-    return new Rpc(transport, options.callTimeoutMs, options.reconnectForMs);
+    const key = `${baseUrl} ${callTimeoutMs} ${reconnectForMs}`;
+    const known = fetch ? undefined : shared.get(key);
+    if (known) return known;
+    const rpc = new Rpc(createGrpcWebTransport({ baseUrl, ...(fetch && { fetch }) }), callTimeoutMs, reconnectForMs);
+    if (!fetch) shared.set(key, rpc);
+    return rpc;
   }
 
   async call<Name extends Unary>(

@@ -1,9 +1,11 @@
+import { loadDecompressor } from "./decode.js";
 import { LpdeformError } from "./errors.js";
 import { createSession, isSessionLost, isTakenAllTheSame, isUndecided, joinSession, type Lease } from "./lease.js";
 import { type Copy, Link, sessionClosed } from "./link.js";
 import { Backoff } from "./recovery.js";
 import { Rpc } from "./rpc.js";
 import { runSolve } from "./solve.js";
+import { frameOptionsToWire } from "./towire.js";
 import type {
   Connection,
   Frame,
@@ -41,7 +43,7 @@ export class Session implements AsyncIterable<Frame> {
 
   /** @internal openSession() and joinSession() make sessions. */
   constructor(rpc: Rpc, lease: Lease, frameOptions: FrameOptions, copy: Copy | undefined) {
-    this.#link = new Link(rpc, lease, frameOptions, copy, {
+    this.#link = new Link(rpc, lease, frameOptionsToWire(frameOptions), copy, {
       problem: (error) => this.#listeners.problem.forEach((listener) => listener(error)),
       connection: (state) => this.#listeners.connection.forEach((listener) => listener(state)),
     });
@@ -216,17 +218,45 @@ export class Session implements AsyncIterable<Frame> {
 }
 
 /** Makes a session on the server. Rejects with the first element of the mesh that cannot be deformed. */
-export async function openSession(mesh: Mesh, options: OpenOptions = {}): Promise<Session> {
-  const rpc = Rpc.connect(options);
+export function openSession(mesh: Mesh, options: OpenOptions = {}): Promise<Session> {
+  return openWith(Rpc.connect(options), mesh, options);
+}
+
+/** @internal */
+export async function openWith(rpc: Rpc, mesh: Mesh, options: OpenOptions): Promise<Session> {
+  checkMesh(mesh);
+  await prepareFor(options);
   const lease = await createSession(rpc, mesh, options, newRequestId(), options.signal);
   return new Session(rpc, lease, options, { mesh, options });
 }
 
 /** Joins somebody's session by name. It is not made anew where the server loses it, and not deleted by close(). */
-export async function joinSessionByName(name: string, options: JoinOptions = {}): Promise<Session> {
-  const rpc = Rpc.connect(options);
+export function joinSessionByName(name: string, options: JoinOptions = {}): Promise<Session> {
+  return joinWith(Rpc.connect(options), name, options);
+}
+
+/** @internal */
+export async function joinWith(rpc: Rpc, name: string, options: JoinOptions): Promise<Session> {
+  await prepareFor(options);
   const lease = await joinSession(rpc, name, options.role ?? "reader", options.signal);
   return new Session(rpc, lease, options, undefined);
+}
+
+/** Loads what frames are decompressed with, where any may come. */
+async function prepareFor({ encoding, lowestEncoding }: FrameOptions): Promise<void> {
+  if (encoding === "compressed" || lowestEncoding === "compressed") await loadDecompressor();
+}
+
+/** What the contract has no room for. */
+function checkMesh({ vertices, faces }: Mesh): void {
+  for (const [what, numbers] of [["vertices", vertices], ["faces", faces]] as const) {
+    if (numbers.length % 3 === 0) continue;
+    throw new LpdeformError("invalid_argument", `The ${what} are ${numbers.length} numbers, which are not three each.`, {
+      reason: "MESH_SIZE",
+      element: what,
+      limit: "a multiple of 3",
+    });
+  }
 }
 
 function abortReason(signal: AbortSignal): LpdeformError {

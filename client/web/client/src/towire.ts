@@ -1,5 +1,6 @@
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { FieldSchema, type Field, MeshSchema, type Mesh as WireMesh, WeldSchema, type Weld as WireWeld } from "./gen/lpdeform/v1/data_pb.js";
+import { Encoding, type FrameOptionsSchema } from "./gen/lpdeform/v1/frame_pb.js";
 import {
   HandleSchema,
   type HandleUpdateSchema,
@@ -41,6 +42,25 @@ export const freeComponents: Record<api.FreeComponents, FreeComponents> = {
   stay: FreeComponents.STAY,
   follow: FreeComponents.FOLLOW,
 };
+
+const encodings: Record<api.Encoding, Encoding> = {
+  float32: Encoding.RAW,
+  quantized: Encoding.QUANTIZED,
+  compressed: Encoding.COMPRESSED,
+};
+
+export function frameOptionsToWire(options: api.FrameOptions): MessageInitShape<typeof FrameOptionsSchema> {
+  const { credit = 0, withoutDistortion = false, withNormals = false, maxFramesPerSecond = 0 } = options;
+  const { encoding = "float32", lowestEncoding = "quantized" } = options;
+  return {
+    credit,
+    withoutDistortion,
+    withNormals,
+    maxFramesPerSecond,
+    encoding: encodings[encoding],
+    lowestEncoding: encodings[lowestEncoding],
+  };
+}
 
 export function meshToWire(mesh: api.Mesh, packer: Packer): WireMesh {
   const { scalar, bytes } = bytesOfNumbers(mesh.vertices);

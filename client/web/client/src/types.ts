@@ -143,36 +143,60 @@ export type StopReason =
   | "stalled"
   | "numerical_breakdown";
 
-/** A state of the surface on its way to the optimum. */
+/**
+ * How positions, distortion and normals travel. "float32": 16 bytes a vertex with distortion, 12 without; exact to float32.
+ * "quantized": 8 bytes, off by at most half of 1/65535 of the frame's extent along each axis (distortion: of its largest).
+ * "compressed": the same numbers, by meshoptimizer's vertex codec, about 3 bytes. The last two always carry distortion.
+ */
+export type Encoding = "float32" | "quantized" | "compressed";
+
+/** 16-bit integers, to be used as they are as normalised vertex attributes of four components, at a stride of 8 bytes. */
+export interface QuantizedSurface {
+  /** x, y, z and distortion of each vertex: position = origin + q / 65535 extent, by components. */
+  vertices: Uint16Array;
+  /** x, y, z and 0 of each normal, of 32767; empty where normals were not asked for. */
+  normals: Int16Array;
+  origin: Vector3;
+  extent: Vector3;
+  /** E_i = q / 65535 distortionExtent. */
+  distortionExtent: number;
+}
+
+/**
+ * A state of the surface on its way to the optimum. The arrays are the caller's to keep, and are views of what came. Where the
+ * frame came quantized, positions, distortion and normals are made when they are first read.
+ */
 export interface Frame {
   /** x, y, z of each vertex. */
-  positions: Float32Array;
+  readonly positions: Float32Array;
   /** E_i of each vertex, in the mesh's unit of length; empty where it was not asked for. */
-  distortion: Float32Array;
+  readonly distortion: Float32Array;
   /** x, y, z of a normal of length 1 for each vertex; empty where it was not asked for. */
-  normals: Float32Array;
+  readonly normals: Float32Array;
+  /** What came, where it came "quantized" or "compressed". */
+  readonly quantized: QuantizedSurface | undefined;
   /** The newest update it answers: see Session.update; never falls. */
-  inputSeq: number;
+  readonly inputSeq: number;
   /** Rises within an epoch. */
-  frameSeq: number;
-  epoch: number;
+  readonly frameSeq: number;
+  readonly epoch: number;
   /** Updates since the frame before that no frame answers. */
-  skippedInputs: number;
-  iteration: number;
+  readonly skippedInputs: number;
+  readonly iteration: number;
   /** E of the positions, Eq. 3 of the paper, in the mesh's unit, with soft terms. */
-  energy: number;
+  readonly energy: number;
   /** The part of it that soft and orientation handles have. */
-  softEnergy: number;
+  readonly softEnergy: number;
   /** The result for inputSeq: no further frame until there is a new update. */
-  converged: boolean;
-  stopReason: StopReason;
-  solveSeconds: number;
+  readonly converged: boolean;
+  readonly stopReason: StopReason;
+  readonly solveSeconds: number;
   /** "quasi_newton" and so on; empty before the first solve. */
-  method: string;
+  readonly method: string;
   /** Of the numbers above, as they travelled. */
-  wireBytes: number;
+  readonly wireBytes: number;
   /** When its last part came, in milliseconds of performance.now(). */
-  receivedAt: number;
+  readonly receivedAt: number;
 }
 
 export interface SolveProgress {
@@ -244,6 +268,10 @@ export interface FrameOptions {
   withNormals?: boolean;
   /** Without limit where left out; the last frame of an update always comes. */
   maxFramesPerSecond?: number;
+  /** "float32" where left out. */
+  encoding?: Encoding;
+  /** What the server may go down to where its limit of bytes a second asks for it; "quantized" where left out. */
+  lowestEncoding?: Encoding;
 }
 
 export interface ConnectOptions {

@@ -1,0 +1,57 @@
+import { distortionOf, normalsOf, positionsOf } from "./decode.js";
+import { methodName, stopReasonFromWire } from "./fromwire.js";
+import type { FrameHeader } from "./gen/lpdeform/v1/frame_pb.js";
+import type { Frame, QuantizedSurface, StopReason } from "./types.js";
+
+type Surface = Record<"positions" | "distortion" | "normals", Float32Array>;
+
+const none = new Float32Array(0);
+
+/** A frame as it is put together: its numbers as they came, or decoded when they are first asked for. */
+export class WireFrame implements Frame {
+  readonly inputSeq: number;
+  readonly frameSeq: number;
+  readonly epoch: number;
+  skippedInputs: number;
+  readonly iteration: number;
+  readonly energy: number;
+  readonly softEnergy: number;
+  readonly converged: boolean;
+  readonly stopReason: StopReason;
+  readonly solveSeconds: number;
+  readonly method: string;
+  wireBytes = 0;
+  receivedAt = 0;
+  raw: Surface = { positions: none, distortion: none, normals: none };
+  quantized: QuantizedSurface | undefined;
+  readonly #decoded: Partial<Surface> = {};
+
+  constructor(header: FrameHeader) {
+    this.inputSeq = Number(header.inputSeq);
+    this.frameSeq = Number(header.frameSeq);
+    this.epoch = Number(header.epoch);
+    this.skippedInputs = Number(header.skippedInputs);
+    this.iteration = header.iteration;
+    this.energy = header.energy;
+    this.softEnergy = header.softEnergy;
+    this.converged = header.converged;
+    this.stopReason = stopReasonFromWire(header.stopReason);
+    this.solveSeconds = header.solveSeconds;
+    this.method = methodName(header.method);
+  }
+
+  get positions(): Float32Array {
+    if (!this.quantized) return this.raw.positions;
+    return (this.#decoded.positions ??= positionsOf(this.quantized));
+  }
+
+  get distortion(): Float32Array {
+    if (!this.quantized) return this.raw.distortion;
+    return (this.#decoded.distortion ??= distortionOf(this.quantized));
+  }
+
+  get normals(): Float32Array {
+    if (!this.quantized) return this.raw.normals;
+    return (this.#decoded.normals ??= normalsOf(this.quantized));
+  }
+}

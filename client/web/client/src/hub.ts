@@ -1,0 +1,197 @@
+import type { MessageInitShape } from "@bufbuild/protobuf";
+import { fromCall, fromFault, LpdeformError } from "./errors.js";
+import type { FrameOptionsSchema, FramePart } from "./gen/lpdeform/v1/frame_pb.js";
+import {
+  type Fault,
+  type GoAway,
+  GoAwayReason,
+  type StreamEvent,
+  type StreamOpened,
+  type StreamSessionsRequestSchema,
+} from "./gen/lpdeform/v1/service_pb.js";
+import { isSessionLost } from "./lease.js";
+import type { Rpc } from "./rpc.js";
+
+/** Takes what comes on a lane. `opened` comes again whenever the stream was opened anew; `ended` comes once, and last. */
+export interface LaneSink {
+  opened(opened: StreamOpened): void;
+  part(part: FramePart): void;
+  fault(fault: Fault): void;
+  goAway(goAway: GoAway): void;
+  ended(error?: LpdeformError): void;
+}
+
+export type WireFrameOptions = MessageInitShape<typeof FrameOptionsSchema>;
+
+const mostLanes = 16;
+
+/**
+ * The frames of all sessions of a page on one stream. Over plain HTTP a browser has six connections to an origin, for all its
+ * tabs together; a stream holds one of them for as long as it lives. A session that comes along makes the stream be opened
+ * anew, with the newest frame of each first; one that goes away leaves it as it is.
+ */
+export class StreamHub {
+  readonly #streams = new Set<SharedStream>();
+
+  constructor(readonly rpc: Rpc) {}
+
+  subscribe(session: string, options: WireFrameOptions, sink: LaneSink): Lane {
+    const withRoom = [...this.#streams].find((stream) => stream.lanes.size < mostLanes);
+    const stream = withRoom ?? new SharedStream(this.rpc, () => this.#streams.delete(stream));
+    this.#streams.add(stream);
+    const lane = new Lane(this.rpc, session, options, sink, () => stream.remove(lane));
+    stream.add(lane);
+    return lane;
+  }
+}
+
+/** One session's part of a stream. */
+export class Lane {
+  /** Of the stream that there is; empty until it is open. */
+  streamId = "";
+  refusal: LpdeformError | undefined;
+  readonly #abort = new AbortController();
+  #ackDue = 0;
+  #isAcking = false;
+
+  constructor(
+    readonly rpc: Rpc,
+    readonly session: string,
+    readonly options: WireFrameOptions,
+    readonly sink: LaneSink,
+    readonly close: () => void,
+  ) {}
+
+  /** This frame of that stream and all before it have been taken; gives their credit back. */
+  acknowledge(frameSeq: number, streamId: string): void {
+    if (streamId !== this.streamId) return;
+    this.#ackDue = Math.max(this.#ackDue, frameSeq);
+    if (!this.#isAcking) void this.#sendAcks();
+  }
+
+  opened(opened: StreamOpened): void {
+    this.streamId = opened.streamId;
+    this.#ackDue = 0;
+    this.sink.opened(opened);
+  }
+
+  ended(error?: LpdeformError): void {
+    this.#abort.abort();
+    this.sink.ended(error);
+  }
+
+  /** One call at a time, with what is newest. */
+  async #sendAcks(): Promise<void> {
+    this.#isAcking = true;
+    let sent = "";
+    for (;;) {
+      const { session, streamId } = this;
+      const frameSeq = BigInt(this.#ackDue);
+      if (this.#ackDue === 0 || `${streamId} ${frameSeq}` === sent || this.#abort.signal.aborted) break;
+      sent = `${streamId} ${frameSeq}`;
+      try {
+        await this.rpc.call("ackFrames", { session, streamId, frameSeq }, this.#abort.signal);
+      } catch (thrown) {
+        // Without credit the stream would stay silent. One that was replaced meanwhile needs none.
+        if (streamId === this.streamId && !this.#abort.signal.aborted) {
+          const error = thrown as LpdeformError;
+          this.close();
+          this.ended(isSessionLost(error) ? error : new LpdeformError("unavailable", error.message, {}, error));
+        }
+      }
+    }
+    this.#isAcking = false;
+  }
+}
+
+/** A StreamSessions call, made anew as lanes come. Dead after three heartbeats of silence. */
+class SharedStream {
+  readonly lanes = new Set<Lane>();
+  #call: AbortController | undefined;
+  #isOpening = false;
+  #silence: ReturnType<typeof setTimeout> | undefined;
+  #longestSilenceMs = 45_000;
+
+  constructor(
+    readonly rpc: Rpc,
+    readonly over: () => void,
+  ) {}
+
+  add(lane: Lane): void {
+    this.lanes.add(lane);
+    if (this.#isOpening) return;
+    this.#isOpening = true;
+    queueMicrotask(() => {
+      this.#isOpening = false;
+      if (this.lanes.size > 0) void this.#run();
+    });
+  }
+
+  remove(lane: Lane): void {
+    if (this.lanes.delete(lane) && this.lanes.size === 0) this.#end();
+  }
+
+  #end(): void {
+    clearTimeout(this.#silence);
+    this.#call?.abort();
+    this.#call = undefined;
+    this.over();
+  }
+
+  async #run(): Promise<void> {
+    this.#call?.abort();
+    const call = new AbortController();
+    this.#call = call;
+    const lanes = [...this.lanes];
+    for (const lane of lanes) lane.streamId = "";
+    const request: MessageInitShape<typeof StreamSessionsRequestSchema> = {
+      streams: lanes.map(({ session, options }) => ({ session, options })),
+    };
+    let error: LpdeformError | undefined;
+    try {
+      this.#heard(call);
+      for await (const { stream, event } of this.rpc.client.streamSessions(request, { signal: call.signal })) {
+        if (this.#call !== call) return;
+        const lane = lanes[stream];
+        if (lane && event && this.lanes.has(lane)) this.#take(lane, event);
+        this.#heard(call);
+      }
+    } catch (thrown) {
+      error = call.signal.reason instanceof LpdeformError ? call.signal.reason : fromCall(thrown);
+    }
+    if (this.#call !== call) return; // replaced, or given up
+    call.abort(); // where the failure was ours, the server is to know
+    const left = [...this.lanes];
+    this.lanes.clear();
+    this.#end();
+    for (const lane of left) lane.ended(error);
+  }
+
+  #take(lane: Lane, { event }: StreamEvent): void {
+    switch (event.case) {
+      case "opened":
+        if (event.value.heartbeatIntervalMs > 0) this.#longestSilenceMs = 3 * event.value.heartbeatIntervalMs;
+        lane.opened(event.value);
+        break;
+      case "frame":
+        lane.sink.part(event.value);
+        break;
+      case "fault":
+        if (lane.streamId) lane.sink.fault(event.value);
+        else lane.refusal = fromFault(event.value);
+        break;
+      case "goAway":
+        this.lanes.delete(lane);
+        if (event.value.reason !== GoAwayReason.NOT_OPENED) lane.sink.goAway(event.value);
+        lane.ended(lane.refusal);
+        break;
+    }
+  }
+
+  #heard(call: AbortController): void {
+    clearTimeout(this.#silence);
+    this.#silence = setTimeout(() => {
+      call.abort(new LpdeformError("unavailable", "The server has fallen silent.", { reason: "SILENCE" }));
+    }, this.#longestSilenceMs);
+  }
+}

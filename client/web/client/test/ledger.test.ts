@@ -1,0 +1,134 @@
+import { describe, expect, test } from "vitest";
+import { Ledger, merged } from "../src/ledger.js";
+
+const at = (x: number) => ({ translation: [x, 0, 0] as const });
+
+describe("merging", () => {
+  test("the newest motion of a handle wins, and moves one that was added before", () => {
+    const added = { handles: { tip: { set: { vertices: [1], hold: { kind: "exact" as const } } }, base: { move: at(1) } } };
+    expect(merged(added, { handles: { tip: { move: at(2) }, base: { move: at(3) } } }).handles).toEqual({
+      tip: { set: { vertices: [1], hold: { kind: "exact" }, motion: at(2) } },
+      base: { move: at(3) },
+    });
+  });
+
+  test("settings that are left out keep their value", () => {
+    expect(merged({ settings: { p: 1, stiffness: 2 } }, { settings: { p: 3 } }).settings).toEqual({ p: 3, stiffness: 2 });
+  });
+
+  test("a resizing replaces its handle and its fields, and a later handle of that name the resizing", () => {
+    const before = { handles: { resize: { set: { vertices: [1] } }, tip: { move: at(1) } }, settings: { p: 1, lengthUnit: 2 } };
+    const resized = merged(before, { resize: { scale: [2, 1, 1] } });
+    expect(resized).toEqual({ handles: { tip: { move: at(1) } }, settings: { lengthUnit: 2 }, resize: { scale: [2, 1, 1] } });
+    expect(merged(resized, { handles: { resize: { remove: true } } }).resize).toBeUndefined();
+  });
+
+  test("leaves what it is given as it was", () => {
+    const older = { handles: { tip: { move: at(1) } }, settings: { p: 1 } };
+    merged(older, { handles: { tip: { move: at(2) } }, settings: { p: 2 } });
+    expect(older).toEqual({ handles: { tip: { move: at(1) } }, settings: { p: 1 } });
+  });
+});
+
+describe("ledger", () => {
+  test("merges what waits and numbers it by the newest", () => {
+    const ledger = new Ledger();
+    expect(ledger.add({ handles: { tip: { set: { vertices: [1] } } } })).toBe(1);
+    expect(ledger.add({ handles: { tip: { move: at(1) } } })).toBe(2);
+    expect(ledger.sendNext()).toEqual({ seq: 2, update: { handles: { tip: { set: { vertices: [1], motion: at(1) } } }, settings: {} } });
+    expect(ledger.canSend).toBe(false);
+  });
+
+  test("has several on their way only where all merely move handles", () => {
+    const ledger = new Ledger();
+    ledger.add({ handles: { tip: { set: { vertices: [1] } } } });
+    ledger.sendNext();
+    ledger.add({ handles: { tip: { move: at(1) } } });
+    expect(ledger.canSend).toBe(false);
+    ledger.accept(1);
+    ledger.sendNext();
+    ledger.add({ handles: { tip: { move: at(2) } } });
+    expect(ledger.canSend).toBe(true);
+    ledger.sendNext();
+    ledger.add({ handles: { tip: { move: at(3) } } });
+    expect(ledger.canSend).toBe(false);
+    ledger.accept(2);
+    ledger.accept(3);
+    ledger.add({ settings: { p: 2 } });
+    expect(ledger.canSend).toBe(true);
+  });
+
+  test("keeps the newest motion however answers overtake each other", () => {
+    const ledger = new Ledger();
+    ledger.add({ handles: { tip: { set: { vertices: [1] } } } });
+    ledger.sendNext();
+    ledger.accept(1);
+    for (const x of [1, 2]) {
+      ledger.add({ handles: { tip: { move: at(x) } } });
+      ledger.sendNext();
+    }
+    ledger.accept(3);
+    ledger.accept(2);
+    ledger.sessionLost();
+    expect(ledger.sendNext().update.handles).toEqual({ tip: { set: { vertices: [1], motion: at(2) } } });
+  });
+
+  test("counts an answer that overtook one that is refused", () => {
+    const ledger = new Ledger();
+    for (const x of [1, 2]) {
+      ledger.add({ handles: { tip: { move: at(x) } } });
+      ledger.sendNext();
+    }
+    ledger.accept(2);
+    ledger.refuse(1);
+    expect(ledger.hasInFlight).toBe(false);
+    expect(ledger.newest).toBe(2);
+  });
+
+  test("sends again what was on its way, under what waits", () => {
+    const ledger = new Ledger();
+    ledger.add({ handles: { tip: { move: at(1) }, base: { move: at(1) } } });
+    ledger.sendNext();
+    ledger.add({ handles: { tip: { move: at(2) } } });
+    ledger.connectionLost();
+    expect(ledger.sendNext()).toEqual({
+      seq: 2,
+      update: { handles: { tip: { move: at(2) }, base: { move: at(1) } }, settings: {} },
+    });
+  });
+
+  test("restores what was accepted on its own, without what was let go of", () => {
+    const ledger = new Ledger();
+    ledger.add({ handles: { tip: { set: { vertices: [1] } }, base: { set: { vertices: [2] } } }, settings: { p: 1.5 } });
+    ledger.accept(ledger.sendNext().seq);
+    ledger.add({ handles: { base: { remove: true } } });
+    ledger.accept(ledger.sendNext().seq);
+    ledger.add({ settings: { p: 3 } });
+    ledger.sessionLost();
+    expect(ledger.hasRestore).toBe(true);
+    expect(ledger.sendNext()).toEqual({ seq: 2, update: { handles: { tip: { set: { vertices: [1] } } }, settings: { p: 1.5 } } });
+    expect(ledger.hasRestore).toBe(false);
+    ledger.connectionLost();
+    expect(ledger.hasRestore).toBe(true);
+  });
+
+  test("forgets what it refused and what another writer made void", () => {
+    const ledger = new Ledger();
+    ledger.add({ settings: { p: 1 } });
+    ledger.refuse(ledger.sendNext().seq);
+    expect(ledger.newest).toBe(0);
+    ledger.add({ settings: { p: 2 } });
+    ledger.dropUnaccepted();
+    expect(ledger.hasWaiting).toBe(false);
+  });
+
+  test("counts on from what the server knows", () => {
+    const ledger = new Ledger();
+    ledger.add({ settings: { p: 1 } });
+    ledger.countFrom(40);
+    expect(ledger.newest).toBe(41);
+    expect(ledger.add({ settings: { p: 2 } })).toBe(42);
+    ledger.countFrom(3);
+    expect(ledger.add({ settings: { p: 2 } })).toBe(43);
+  });
+});

@@ -1,0 +1,74 @@
+import { afterAll, beforeAll, expect, test } from "vitest";
+import { type Frame, openSession, type Session } from "../../src/index.js";
+import { Service } from "./service.js";
+import { grid } from "./shapes.js";
+
+let service: Service;
+beforeAll(async () => {
+  service = await Service.start({ serverFlags: ["--heartbeat", "0.5"] });
+});
+afterAll(() => service.stop());
+
+const lifted = (height: number) => ({ translation: [0, 0, height] as const });
+
+async function held(): Promise<Session> {
+  const { mesh, handles } = grid(20);
+  const session = await openSession(mesh, { url: service.url, settings: { p: 2 } });
+  session.setHandles(handles);
+  session.move("right", lifted(5));
+  return session;
+}
+
+function largestDifference(one: Frame, other: Frame): number {
+  return Math.max(...one.positions.map((value, k) => Math.abs(value - other.positions[k]!)));
+}
+
+test("after kill -9 the session is made anew and shows the same surface", async () => {
+  const session = await held();
+  const before = await session.settle({ timeoutMs: 20_000 });
+  const { name } = session;
+  await service.killServer();
+  await service.startServer();
+  const after = await session.settle({ timeoutMs: 20_000 });
+  expect(session.name).not.toBe(name);
+  expect(after.inputSeq).toBe(before.inputSeq);
+  expect(largestDifference(before, after)).toBeLessThan(1e-4 * 27);
+  session.move("right", lifted(6));
+  const moved = await session.settle({ timeoutMs: 20_000 });
+  expect(moved.positions[3 * 19 + 2]).toBeCloseTo(6, 5);
+  await session.close();
+});
+
+test("what is moved while the server is away comes when it is back", async () => {
+  const session = await held();
+  await session.settle({ timeoutMs: 20_000 });
+  await service.stopServer();
+  for (let height = 6; height <= 9; ++height) session.move("right", lifted(height));
+  await service.startServer();
+  const frame = await session.settle({ timeoutMs: 20_000 });
+  expect(frame.positions[3 * 19 + 2]).toBeCloseTo(9, 5);
+  await session.close();
+});
+
+test("a solve under way begins again", async () => {
+  const session = await held();
+  const solving = session.solve({ deadlineMs: 30_000 });
+  await service.killServer();
+  await service.startServer();
+  const result = await solving;
+  expect(result.stopReason).toBe("converged");
+  expect(result.positions[3 * 19 + 2]).toBeCloseTo(5, 5);
+  await session.close();
+});
+
+test("heartbeats keep a stream that has nothing to say", async () => {
+  const session = await held();
+  await session.settle({ timeoutMs: 20_000 });
+  const states: string[] = [];
+  session.on("connection", (state) => states.push(state));
+  await new Promise((resolve) => setTimeout(resolve, 4000)); // dead after 1.5 s without them
+  session.move("right", lifted(7));
+  await session.settle({ timeoutMs: 20_000 });
+  expect(states).toEqual([]);
+  await session.close();
+});

@@ -1,0 +1,103 @@
+import { type ChildProcess, execFileSync, spawn } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import { createInterface } from "node:readline";
+
+const root = resolve(import.meta.dirname, "../../../../..");
+const serverProgram = process.env["LPDEFORM_SERVER"] ?? join(root, "build/release/bin/lpdeform-server");
+const envoyProgram = join(root, "build/web-tools/bin/envoy");
+
+/** A server and an Envoy before it, as deploy/up runs them, on free ports. */
+export class Service {
+  readonly #work = mkdtempSync(join(tmpdir(), "lpdeform-"));
+  #server: ChildProcess | undefined;
+  #envoy: ChildProcess | undefined;
+  #address = "127.0.0.1:0";
+  /** Where browsers connect. */
+  url = "";
+  /** Envoy's own page. */
+  admin = "";
+
+  /** `files`: what Envoy serves beside; `serverFlags`: of lpdeform-server. */
+  static async start({ files = tmpdir(), serverFlags = [] as string[], origins = [] as string[] } = {}): Promise<Service> {
+    const service = new Service();
+    await service.startServer(serverFlags);
+    const config = execFileSync(
+      join(root, "deploy/envoy-config"),
+      ["--web", "127.0.0.1:0", "--server", service.#address, "--files", files, "--access-log", join(service.#work, "access.log"),
+       ...origins.flatMap((origin) => ["--origin", origin])],
+      { encoding: "utf8" },
+    );
+    writeFileSync(join(service.#work, "envoy.yaml"), config);
+    await service.#startEnvoy();
+    return service;
+  }
+
+  /** On the port that it had before, if it had one. */
+  async startServer(flags: string[] = []): Promise<void> {
+    const child = spawn(serverProgram, ["--address", this.#address, ...flags], { stdio: ["ignore", "pipe", "ignore"] });
+    this.#server = child;
+    for await (const line of createInterface({ input: child.stdout! })) {
+      this.#address = line.split(" ").at(-1)!;
+      return;
+    }
+    throw new Error(`${serverProgram} did not start`);
+  }
+
+  /** Without a word to anybody. */
+  async killServer(): Promise<void> {
+    await end(this.#server, "SIGKILL");
+  }
+
+  /** Drains it. */
+  async stopServer(): Promise<void> {
+    await end(this.#server, "SIGTERM");
+  }
+
+  async killEnvoy(): Promise<void> {
+    await end(this.#envoy, "SIGKILL");
+  }
+
+  /** Memory that the kernel keeps for Envoy, in bytes. */
+  envoyResidentBytes(): number {
+    const status = readFileSync(`/proc/${this.#envoy!.pid}/status`, "utf8");
+    return 1024 * Number(/VmRSS:\s+(\d+)/.exec(status)![1]);
+  }
+
+  /** A number of Envoy's statistics. */
+  async stat(name: string): Promise<number> {
+    const text = await (await fetch(`${this.admin}/stats?filter=^${name}$`)).text();
+    return Number(text.split(": ")[1]);
+  }
+
+  async stop(): Promise<void> {
+    await Promise.all([end(this.#envoy, "SIGTERM"), end(this.#server, "SIGTERM")]);
+    rmSync(this.#work, { recursive: true, force: true });
+  }
+
+  async #startEnvoy(): Promise<void> {
+    const adminFile = join(this.#work, "admin");
+    const flags = ["--config-path", join(this.#work, "envoy.yaml"), "--concurrency", "1", "--disable-hot-restart"];
+    this.#envoy = spawn(envoyProgram, [...flags, "--admin-address-path", adminFile, "--log-level", "error"], { stdio: "ignore" });
+    for (let tries = 0; tries < 200; ++tries) {
+      try {
+        const admin = readFileSync(adminFile, "utf8");
+        const web = execFileSync(process.execPath, [join(root, "deploy/envoy-ready.mjs"), admin], { encoding: "utf8", stdio: "pipe" });
+        this.admin = `http://${admin}`;
+        this.url = `http://${web.trim()}`;
+        return;
+      } catch {
+        await new Promise((again) => setTimeout(again, 50));
+      }
+    }
+    throw new Error(`${envoyProgram} did not start`);
+  }
+}
+
+async function end(child: ChildProcess | undefined, signal: NodeJS.Signals): Promise<void> {
+  if (!child || child.exitCode !== null || child.signalCode !== null) return;
+  const ended = new Promise((resolve) => child.once("exit", resolve));
+  child.kill(signal);
+  await ended;
+}

@@ -1,0 +1,118 @@
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "server/encode.h"
+#include "server/frame_calls.h"
+#include "server/write_pump.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr int kMostStreams = 16;
+
+absl::Status wrong_count(int count) {
+  return invalid_input({"STREAMS_COUNT", "streams", absl::StrCat("1 to ", kMostStreams)},
+                       absl::StrCat("A call asks for ", count, " streams, not for 1 to ", kMostStreams, "."));
+}
+
+/// Several sessions' streams in one call. They take turns, message by message, so that none waits for another's frames.
+class StreamSessionsCall final
+    : public WritePump<grpc::ServerWriteReactor<v1::StreamSessionsResponse>, v1::StreamSessionsResponse> {
+ public:
+  explicit StreamSessionsCall(Backend& backend) : backend_(backend) {}
+
+  void begin(const v1::StreamSessionsRequest& request) {
+    if (request.streams_size() < 1 || request.streams_size() > kMostStreams) {
+      return refuse(wrong_count(request.streams_size()));
+    }
+    auto self = std::static_pointer_cast<StreamSessionsCall>(shared_from_this());
+    if (!backend_.pool.try_post([self, request] { self->open_all(request); })) refuse(server_busy());
+  }
+
+ private:
+  struct Lane {
+    Backend::OpenStream open;  // null where it could not be opened
+    absl::Status refusal;      // why; OK once that is said
+    bool is_over = false;
+  };
+
+  void open_all(const v1::StreamSessionsRequest& request) {
+    std::vector<Lane> lanes;
+    for (const v1::StreamFramesRequest& one : request.streams()) {
+      auto open = backend_.open_stream(one.session(), "", one.options(), [weak = weak_from_this()] {
+        if (const auto self = weak.lock()) self->pump();
+      });
+      lanes.push_back({open.ok() ? *std::move(open) : Backend::OpenStream{}, open.status(), false});
+    }
+    const std::scoped_lock lock(mutex_);
+    lanes_ = std::move(lanes);
+    if (is_over_locked()) return forget_all();
+    pump_locked();
+  }
+
+  Made make(v1::StreamSessionsResponse& response) override {
+    for (std::size_t tried = 0; tried < lanes_.size(); ++tried) {
+      const std::size_t turn = next_++ % lanes_.size();
+      response.set_stream(static_cast<std::uint32_t>(turn));  // first: it moves what comes after it
+      if (!make_of(lanes_[turn], response)) continue;
+      for (const Lane& lane : lanes_) {
+        if (!lane.is_over) return Made::kMessage;
+      }
+      return Made::kLastMessage;
+    }
+    return Made::kNothing;
+  }
+
+  static bool make_of(Lane& lane, v1::StreamSessionsResponse& response) {
+    if (lane.is_over) return false;
+    if (lane.open.stream == nullptr) {
+      refuse_lane(lane, response);
+      return true;
+    }
+    const std::optional<Note> note = lane.open.stream->next();
+    if (!note) return false;
+    lane.is_over = std::holds_alternative<EndNote>(*note);
+    encode(*note, *lane.open.stream, lane.open.session->vertex_count(), response);
+    return true;
+  }
+
+  /// First the fault, then the end.
+  static void refuse_lane(Lane& lane, v1::StreamSessionsResponse& response) {
+    if (!lane.refusal.ok()) {
+      encode(FaultNote{std::exchange(lane.refusal, absl::OkStatus()), 0},
+             *response.mutable_event()->mutable_fault());
+      return;
+    }
+    v1::GoAway& go_away = *response.mutable_event()->mutable_go_away();
+    go_away.set_reason(v1::GO_AWAY_REASON_NOT_OPENED);
+    go_away.set_text("The stream could not be opened.");
+    lane.is_over = true;
+  }
+
+  void let_go() override { forget_all(); }
+
+  void forget_all() {
+    for (Lane& lane : lanes_) {
+      if (lane.open.stream) backend_.forget(lane.open);
+    }
+    lanes_.clear();
+  }
+
+  Backend& backend_;
+  std::vector<Lane> lanes_;
+  std::size_t next_ = 0;  // whose turn it is, and how often there was one
+};
+
+}  // namespace
+
+grpc::ServerWriteReactor<v1::StreamSessionsResponse>* stream_sessions(
+    Backend& backend, const v1::StreamSessionsRequest& request) {
+  return begin_call<StreamSessionsCall>(backend, request);
+}
+
+}  // namespace lpdeform
