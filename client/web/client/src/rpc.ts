@@ -1,15 +1,24 @@
 import type { MessageInitShape, MessageShape } from "@bufbuild/protobuf";
-import { type CallOptions, type Client, createClient, type Transport } from "@connectrpc/connect";
+import { type CallOptions, type Client, createClient, type Interceptor, type Transport } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { fromCall } from "./errors.js";
 import { DeformService } from "./gen/lpdeform/v1/service_pb.js";
 import { StreamHub } from "./hub.js";
 import type { ConnectOptions } from "./types.js";
+import { newRequestId } from "./upload.js";
 
 type Methods = typeof DeformService.method;
 type Unary = { [Name in keyof Methods]: Methods[Name]["methodKind"] extends "unary" ? Name : never }[keyof Methods];
 
 const shared = new Map<string, Rpc>();
+
+/** Lets a proxy before several servers send all calls of a page to one of them, as sessions that share a stream need. */
+function keepTogether(id: string): Interceptor {
+  return (next) => (request) => {
+    request.header.set("lpdeform-session", id);
+    return next(request);
+  };
+}
 
 /** The calls of the service. Every error that comes out is an LpdeformError. */
 export class Rpc {
@@ -31,7 +40,9 @@ export class Rpc {
     const key = `${baseUrl} ${callTimeoutMs} ${reconnectForMs}`;
     const known = fetch ? undefined : shared.get(key);
     if (known) return known;
-    const rpc = new Rpc(createGrpcWebTransport({ baseUrl, ...(fetch && { fetch }) }), callTimeoutMs, reconnectForMs);
+    const interceptors = [keepTogether(newRequestId())];
+    const transport = createGrpcWebTransport({ baseUrl, interceptors, ...(fetch && { fetch }) });
+    const rpc = new Rpc(transport, callTimeoutMs, reconnectForMs);
     if (!fetch) shared.set(key, rpc);
     return rpc;
   }

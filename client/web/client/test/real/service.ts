@@ -1,12 +1,15 @@
 import { type ChildProcess, execFileSync, spawn } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { createInterface } from "node:readline";
 
-const root = resolve(import.meta.dirname, "../../../../..");
+/** Of the project; compiled files lie deeper than their sources. */
+export const root = (function above(folder: string): string {
+  return existsSync(join(folder, "CMakePresets.json")) ? folder : above(resolve(folder, ".."));
+})(import.meta.dirname);
 const serverProgram = process.env["LPDEFORM_SERVER"] ?? join(root, "build/release/bin/lpdeform-server");
-const envoyProgram = join(root, "build/web-tools/bin/envoy");
+export const envoyProgram = join(root, "build/web-tools/bin/envoy");
 
 /** A server and an Envoy before it, as deploy/up runs them, on free ports. */
 export class Service {
@@ -14,19 +17,20 @@ export class Service {
   #server: ChildProcess | undefined;
   #envoy: ChildProcess | undefined;
   #address = "127.0.0.1:0";
+  readonly accessLog = join(this.#work, "access.log");
   /** Where browsers connect. */
   url = "";
   /** Envoy's own page. */
   admin = "";
 
   /** `files`: what Envoy serves beside; `serverFlags`: of lpdeform-server. */
-  static async start({ files = tmpdir(), serverFlags = [] as string[], origins = [] as string[] } = {}): Promise<Service> {
+  static async start({ files = tmpdir(), serverFlags = [] as string[], origins = [] as string[], idleSeconds = 60 } = {}): Promise<Service> {
     const service = new Service();
     await service.startServer(serverFlags);
     const config = execFileSync(
       join(root, "deploy/envoy-config"),
-      ["--web", "127.0.0.1:0", "--server", service.#address, "--files", files, "--access-log", join(service.#work, "access.log"),
-       ...origins.flatMap((origin) => ["--origin", origin])],
+      ["--web", "127.0.0.1:0", "--server", service.#address, "--files", files, "--access-log", service.accessLog,
+       "--idle", String(idleSeconds), ...origins.flatMap((origin) => ["--origin", origin])],
       { encoding: "utf8" },
     );
     writeFileSync(join(service.#work, "envoy.yaml"), config);

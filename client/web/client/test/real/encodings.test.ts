@@ -1,0 +1,104 @@
+import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { type Encoding, type Frame, type FrameOptions, joinSession, openSession, type Session } from "../../src/index.js";
+import { Service } from "./service.js";
+import { grid } from "./shapes.js";
+
+/** The finished frame as a reader with these options gets it. */
+async function read(service: Service, { name }: Session, options: FrameOptions): Promise<Frame> {
+  const reader = await joinSession(name, { url: service.url, withNormals: true, ...options });
+  for await (const frame of reader) {
+    if (!frame.converged || frame.inputSeq === 0) continue;
+    await reader.close();
+    return frame;
+  }
+  throw new Error("no frame came");
+}
+
+/** A sheet of n by n, its right edge lifted and turned. */
+async function bent(service: Service, n: number): Promise<Session> {
+  const { mesh, handles } = grid(n);
+  const session = await openSession(mesh, { url: service.url, settings: { p: 2 } });
+  session.setHandles(handles);
+  session.move("right", { axis: [0, 1, 0], angle: -1, center: [n, 0, 0], translation: [0, 0, n / 3] });
+  await session.settle({ timeoutMs: 60_000 });
+  return session;
+}
+
+describe("encodings", () => {
+  let service: Service;
+  let session: Session;
+  beforeAll(async () => {
+    service = await Service.start();
+    session = await bent(service, 50);
+  });
+  afterAll(() => service.stop());
+
+  const largest = (one: Float32Array, other: Float32Array, from = 0, stride = 1) => {
+    let most = 0;
+    for (let k = from; k < one.length; k += stride) most = Math.max(most, Math.abs(one[k]! - other[k]!));
+    return most;
+  };
+  // Half a step, and what float32 rounds away of a coordinate below 64.
+  const rounding = 64 * 2 ** -23;
+
+  test.each(["quantized", "compressed"] satisfies Encoding[])("%s is off by at most half a step", async (encoding) => {
+    const exact = await read(service, session, { encoding: "float32" });
+    const frame = await read(service, session, { encoding });
+    const { extent, distortionExtent } = frame.quantized!;
+    for (let axis = 0; axis < 3; ++axis) {
+      expect(largest(frame.positions, exact.positions, axis, 3)).toBeLessThanOrEqual(extent[axis]! / 65535 / 2 + rounding);
+    }
+    expect(distortionExtent).toBeCloseTo(Math.max(...exact.distortion), 6);
+    expect(largest(frame.distortion, exact.distortion)).toBeLessThanOrEqual(distortionExtent / 65535 / 2 + 1e-7);
+    expect(largest(frame.normals, exact.normals)).toBeLessThanOrEqual(0.5 / 32767 + 1e-7);
+  });
+
+  test("compressed is the same as quantized, and smaller", async () => {
+    const quantized = await read(service, session, { encoding: "quantized" });
+    const compressed = await read(service, session, { encoding: "compressed" });
+    expect(compressed.quantized).toEqual(quantized.quantized);
+    expect(compressed.wireBytes).toBeLessThan(quantized.wireBytes);
+    expect(quantized.wireBytes).toBe(16 * 2500);
+  });
+});
+
+describe("a server with a limit of bytes a second", () => {
+  const n = 30;
+  let service: Service;
+  beforeAll(async () => {
+    // Less than ten frames a second of float32 with distortion, more than ten quantized.
+    service = await Service.start({ serverFlags: ["--max-stream-rate", String(12 * n * n * 10)] });
+  });
+  afterAll(() => service.stop());
+
+  test("lowers the precision to what the client takes", async () => {
+    const session = await bent(service, n);
+    expect((await read(service, session, { withNormals: false })).quantized).toBeDefined();
+    expect((await read(service, session, { withNormals: false, lowestEncoding: "float32" })).quantized).toBeUndefined();
+    await session.close();
+  });
+
+  test("lowers the frame rate, and still sends the last frame", async () => {
+    const session = await bent(service, n);
+    const reader = await joinSession(session.name, { url: service.url, lowestEncoding: "float32" });
+    const start = performance.now();
+    let bytes = 0;
+    let tick = 0;
+    let last = 0;
+    const dragging = setInterval(() => {
+      last = session.move("right", { translation: [0, 0, ++tick % 20] });
+      if (tick === 150) clearInterval(dragging);
+    }, 10);
+    let first = 0;
+    for await (const frame of reader) {
+      bytes += frame.wireBytes;
+      first ||= frame.wireBytes;
+      if (tick === 150 && frame.converged && frame.inputSeq >= last) break;
+    }
+    const seconds = (performance.now() - start) / 1000;
+    expect(bytes - first).toBeLessThanOrEqual(12 * n * n * 10 * seconds * 1.1);
+    expect(bytes).toBeGreaterThan(5 * first);
+    await reader.close();
+    await session.close();
+  });
+});

@@ -1,0 +1,129 @@
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { openSession } from "../../src/index.js";
+import { envoyProgram, root, Service } from "./service.js";
+import { grid } from "./shapes.js";
+
+const configure = (...flags: string[]) => execFileSync(join(root, "deploy/envoy-config"), flags, { encoding: "utf8", stdio: "pipe" });
+
+async function waitFor(isSo: () => Promise<boolean> | boolean): Promise<void> {
+  while (!(await isSo())) await new Promise((again) => setTimeout(again, 50));
+}
+
+describe("the configuration", () => {
+  const work = mkdtempSync(join(tmpdir(), "lpdeform-config-"));
+  afterAll(() => rmSync(work, { recursive: true }));
+
+  test.each([
+    ["as it is", []],
+    ["with everything said", ["--web", "0.0.0.0:0", "--server", "server.example:1", "--files", "/tmp", "--admin-port", "9901",
+                              "--access-log", "/dev/null", "--idle", "5", "--origin", "https://a.example", "--origin", "http://localhost:*"]],
+  ])("%s is valid", (_, flags) => {
+    const file = join(work, "envoy.yaml");
+    writeFileSync(file, configure(...flags));
+    // Through a pipe, which Envoy can open as /dev/stdout; what Node gives to children is a socket.
+    const validate = `"${envoyProgram}" --mode validate -c "${file}" --log-level error 2>&1 | cat`;
+    expect(execFileSync("bash", ["-c", validate], { encoding: "utf8" })).toContain("OK");
+  });
+
+  test.each([
+    ["--web", "8080"],
+    ["--server", "localhost:70000"],
+    ["--admin-port", "x"],
+    ["--idle", "0"],
+    ["--origin", 'http://a"b'],
+    ["--nothing", "1"],
+  ])("%s '%s' is refused by name", (option, value) => {
+    expect(() => configure(option, value)).toThrow(expect.objectContaining({ status: 2, stderr: expect.stringContaining(option) }));
+  });
+
+  test("retries nothing on streams and never gives them a deadline", () => {
+    const text = configure();
+    expect(text).not.toMatch(/retry_policy|num_retries/);
+    expect(text).toMatch(/StreamSessions}\n\s+route: &streams\n\s+cluster: lpdeform\n\s+timeout: 0s/);
+  });
+});
+
+describe("the proxy", () => {
+  let service: Service;
+  beforeAll(async () => {
+    service = await Service.start({ serverFlags: ["--heartbeat", "0.3"], origins: ["https://friend.example"], idleSeconds: 1 });
+  });
+  afterAll(() => service.stop());
+
+  const call = (origin?: string, init: RequestInit = {}) =>
+    fetch(`${service.url}/lpdeform.v1.DeformService/GetSession`, {
+      method: "POST",
+      body: new Uint8Array(5),
+      ...init,
+      headers: { "content-type": "application/grpc-web+proto", "x-grpc-web": "1", ...(origin && { origin }), ...init.headers },
+    });
+
+  test("leaves a stream that has nothing to say but heartbeats", async () => {
+    const { mesh, handles } = grid(4);
+    const session = await openSession(mesh, { url: service.url });
+    session.setHandles(handles);
+    await session.settle();
+    const states: string[] = [];
+    session.on("connection", (state) => states.push(state));
+    await new Promise((resolve) => setTimeout(resolve, 17_000)); // Envoy's own default cuts at 15 s
+    session.move("right", { translation: [0, 0, 1] });
+    await session.settle({ timeoutMs: 5000 });
+    expect(states).toEqual([]);
+    await session.close();
+  });
+
+  test("lets pages of known origins call and read how calls end", async () => {
+    const preflight = await call("https://friend.example", {
+      method: "OPTIONS",
+      body: null,
+      headers: { "access-control-request-method": "POST", "access-control-request-headers": "x-grpc-web,lpdeform-session" },
+    });
+    expect(preflight.status).toBe(200);
+    expect(preflight.headers.get("access-control-allow-origin")).toBe("https://friend.example");
+    expect(preflight.headers.get("access-control-allow-headers")).toContain("lpdeform-session");
+    const answer = await call("https://friend.example");
+    expect(answer.headers.get("access-control-expose-headers")).toBe("grpc-status, grpc-message, grpc-status-details-bin");
+    expect((await call("https://stranger.example")).headers.get("access-control-allow-origin")).toBeNull();
+  });
+
+  test("says at once that the server is away, and tries nothing again", async () => {
+    await service.killServer();
+    await waitFor(async () => (await call()).headers.get("grpc-status") === "14");
+    const start = performance.now();
+    await call();
+    expect(performance.now() - start).toBeLessThan(1000);
+    expect(await service.stat("cluster.lpdeform.upstream_rq_retry")).toBe(0);
+    await service.startServer(["--heartbeat", "0.3"]);
+    await waitFor(async () => (await call()).headers.get("grpc-status") === "5");
+  });
+
+  test("serves files and nothing above them", async () => {
+    expect((await fetch(`${service.url}/healthz`)).status).toBe(200);
+    expect((await fetch(`${service.url}/nothing.js`)).status).toBe(404);
+    expect((await fetch(`${service.url}/..%2f..%2fetc/passwd`)).status).toBe(400);
+  });
+
+  test("logs each call with how it ended", async () => {
+    await call();
+    await waitFor(() => readFileSync(service.accessLog, "utf8").includes("GetSession"));
+    const lines = readFileSync(service.accessLog, "utf8").trim().split("\n").map((line) => JSON.parse(line));
+    const logged = lines.findLast(({ path }) => path === "/lpdeform.v1.DeformService/GetSession");
+    expect(logged).toMatchObject({ method: "POST", status: 200, grpc_status: expect.stringMatching(/NotFound|Unavailable/) });
+  }, 60_000);
+});
+
+test("a stream that says nothing at all is cut and taken up again", async () => {
+  const service = await Service.start({ serverFlags: ["--heartbeat", "3600"], idleSeconds: 1 });
+  const session = await openSession(grid(4).mesh, { url: service.url });
+  const states: string[] = [];
+  session.on("connection", (state) => states.push(state));
+  session.poll();
+  await waitFor(() => states.length === 3);
+  expect(states).toEqual(["connected", "reconnecting", "connected"]);
+  await session.close();
+  await service.stop();
+});
