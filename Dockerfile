@@ -1,4 +1,5 @@
-# The server and the command line in one image. The steps are those of the README, by the same scripts.
+# The server and the command line in one image, Envoy and the viewer in another (--target web). The steps are those of the
+# README, by the same scripts.
 
 FROM debian:12 AS build
 WORKDIR /src
@@ -6,6 +7,31 @@ COPY deploy deploy
 RUN deploy/install build run
 COPY . .
 RUN deploy/up --server-only --build-only
+
+FROM debian:12 AS build-web
+WORKDIR /src
+COPY deploy deploy
+COPY client/web/package.json client/web/package-lock.json client/web/
+COPY client/web/client/package.json client/web/client/
+COPY client/web/viewer/package.json client/web/viewer/
+RUN deploy/install web
+COPY proto proto
+COPY client/web client/web
+RUN PATH=/src/build/web-tools/bin:$PATH npm run build --prefix client/web
+
+FROM debian:12 AS web
+RUN groupadd --gid 10001 lpdeform && useradd --uid 10001 --gid 10001 --no-create-home --shell /usr/sbin/nologin lpdeform
+WORKDIR /opt/lpdeform
+COPY LICENSE /usr/share/doc/lpdeform/
+COPY deploy/web deploy/envoy-config deploy/envoy.yaml.in deploy/
+COPY --from=build-web /src/build/web-tools/envoy/_bin/envoy build/web-tools/bin/envoy
+COPY --from=build-web /src/client/web/viewer/dist client/web/viewer/dist
+USER 10001:10001
+EXPOSE 8080
+HEALTHCHECK --interval=15s --timeout=5s --start-period=10s \
+  CMD ["bash", "-c", "exec 3<>/dev/tcp/127.0.0.1/8080 && printf 'GET /healthz HTTP/1.0\\r\\n\\r\\n' >&3 && grep -q ^ok <&3"]
+ENTRYPOINT ["deploy/web"]
+CMD ["--web", "0.0.0.0:8080", "--server", "lpdeform:50051"]
 
 FROM debian:12
 COPY deploy/install deploy/packages.txt /opt/lpdeform/deploy/

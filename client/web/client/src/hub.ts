@@ -19,15 +19,22 @@ export interface LaneSink {
   fault(fault: Fault): void;
   goAway(goAway: GoAway): void;
   ended(error?: LpdeformError): void;
+  /** Nothing more is to come until there is a new update. */
+  isQuiet(): boolean;
+  /** The stream rests; `opened` comes when it goes on. */
+  resting(): void;
 }
 
 export type WireFrameOptions = MessageInitShape<typeof FrameOptionsSchema>;
 
 const mostLanes = 16;
+/** How often a hidden page looks whether its stream may rest. */
+const restIntervalMs = 10_000;
 
 /**
  * The frames of all sessions of a page on one stream. Over plain HTTP a browser has six connections to an origin, for all its
- * tabs together; a stream holds one of them for as long as it lives. A session that comes along makes the stream be opened
+ * tabs together; a stream holds one of them for as long as it lives. So a page that is hidden, and for which nothing is under
+ * way, lets its stream rest until it is seen again or has an update. A session that comes along makes the stream be opened
  * anew, with the newest frame of each first; one that goes away leaves it as it is.
  */
 export class StreamHub {
@@ -39,7 +46,7 @@ export class StreamHub {
     const withRoom = [...this.#streams].find((stream) => stream.lanes.size < mostLanes);
     const stream = withRoom ?? new SharedStream(this.rpc, () => this.#streams.delete(stream));
     this.#streams.add(stream);
-    const lane = new Lane(this.rpc, session, options, sink, () => stream.remove(lane));
+    const lane = new Lane(this.rpc, session, options, sink, () => stream.remove(lane), () => stream.wake());
     stream.add(lane);
     return lane;
   }
@@ -60,6 +67,8 @@ export class Lane {
     readonly options: WireFrameOptions,
     readonly sink: LaneSink,
     readonly close: () => void,
+    /** There is an update: a stream that rests has to go on. */
+    readonly wake: () => void,
   ) {}
 
   /** This frame of that stream and all before it have been taken; gives their credit back. */
@@ -111,11 +120,38 @@ class SharedStream {
   #isOpening = false;
   #silence: ReturnType<typeof setTimeout> | undefined;
   #longestSilenceMs = 45_000;
+  #isResting = false;
+  #looking: ReturnType<typeof setInterval> | undefined;
 
   constructor(
     readonly rpc: Rpc,
     readonly over: () => void,
-  ) {}
+  ) {
+    globalThis.document?.addEventListener("visibilitychange", this.#lookWhileHidden);
+    this.#lookWhileHidden();
+  }
+
+  wake(): void {
+    if (!this.#isResting) return;
+    this.#isResting = false;
+    void this.#run();
+  }
+
+  readonly #lookWhileHidden = () => {
+    clearInterval(this.#looking);
+    if (globalThis.document?.hidden) this.#looking = setInterval(() => this.#rest(), restIntervalMs);
+    else this.wake();
+  };
+
+  #rest(): void {
+    const lanes = [...this.lanes];
+    if (!this.#call || this.#isOpening || !lanes.every((lane) => lane.streamId && lane.sink.isQuiet())) return;
+    this.#isResting = true;
+    clearTimeout(this.#silence);
+    this.#call.abort();
+    this.#call = undefined;
+    for (const lane of lanes) lane.sink.resting();
+  }
 
   add(lane: Lane): void {
     this.lanes.add(lane);
@@ -123,6 +159,7 @@ class SharedStream {
     this.#isOpening = true;
     queueMicrotask(() => {
       this.#isOpening = false;
+      this.#isResting = false;
       if (this.lanes.size > 0) void this.#run();
     });
   }
@@ -133,6 +170,8 @@ class SharedStream {
 
   #end(): void {
     clearTimeout(this.#silence);
+    clearInterval(this.#looking);
+    globalThis.document?.removeEventListener("visibilitychange", this.#lookWhileHidden);
     this.#call?.abort();
     this.#call = undefined;
     this.over();

@@ -36,6 +36,8 @@ export class Link {
   #assembly = new FrameAssembly(0);
   #goAway: GoAway | undefined;
   #connection: Connection = "idle";
+  /** The newest input whose last frame has come; of none, less than any. */
+  #finished = -1;
   #isStreaming = false;
   #isSending = false;
   #solves = 0;
@@ -76,6 +78,7 @@ export class Link {
       });
     }
     const seq = this.ledger.add(update);
+    this.#lane?.wake();
     this.#send();
     return seq;
   }
@@ -129,12 +132,15 @@ export class Link {
       },
       part: (part) => {
         const frame = this.#assembly.add(part);
+        if (frame?.converged) this.#finished = frame.inputSeq;
         if (!frame || this.box.put(frame, lane.streamId)) return;
         lane.acknowledge(frame.frameSeq, lane.streamId); // dropped, but its credit is owed
       },
       fault: (fault) => this.watcher.problem(fromFault(fault)),
       goAway: (goAway) => (this.#goAway = goAway),
       ended: (error) => void this.#recover(error),
+      isQuiet: () => this.#finished >= this.ledger.newest,
+      resting: () => this.#setConnection("idle"),
     });
     this.#lane = lane;
   }

@@ -218,7 +218,7 @@ export class Session implements AsyncIterable<Frame> {
 }
 
 /** Makes a session on the server. Rejects with the first element of the mesh that cannot be deformed. */
-export function openSession(mesh: Mesh, options: OpenOptions = {}): Promise<Session> {
+export async function openSession(mesh: Mesh, options: OpenOptions = {}): Promise<Session> {
   return openWith(Rpc.connect(options), mesh, options);
 }
 
@@ -231,7 +231,7 @@ export async function openWith(rpc: Rpc, mesh: Mesh, options: OpenOptions): Prom
 }
 
 /** Joins somebody's session by name. It is not made anew where the server loses it, and not deleted by close(). */
-export function joinSessionByName(name: string, options: JoinOptions = {}): Promise<Session> {
+export async function joinSessionByName(name: string, options: JoinOptions = {}): Promise<Session> {
   return joinWith(Rpc.connect(options), name, options);
 }
 

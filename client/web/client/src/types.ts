@@ -257,7 +257,10 @@ export type WeightKind = "cotangent" | "uniform" | "intrinsicDelaunay";
 /** Vertices that are copies of one: by exactly the same position, or one number a vertex, the same for copies. */
 export type Weld = "byPosition" | Uint32Array | readonly number[];
 
-/** "idle" before the first frame is asked for; "reconnecting" while the server is away; "closed" when all is over. */
+/**
+ * "idle" before the first frame is asked for, and while the page is hidden and nothing is under way; "reconnecting" while the server is away; "closed" when
+ * all is over.
+ */
 export type Connection = "idle" | "connected" | "reconnecting" | "closed";
 
 /** How frames travel. */

@@ -1,5 +1,5 @@
 import { Code, ConnectError } from "@connectrpc/connect";
-import { afterEach, describe, expect, test } from "vitest";
+import { afterEach, describe, expect, test, vi } from "vitest";
 import type { LpdeformError } from "../src/index.js";
 import { Encoding } from "../src/gen/lpdeform/v1/frame_pb.js";
 import { GoAwayReason } from "../src/gen/lpdeform/v1/service_pb.js";
@@ -50,6 +50,8 @@ async function next(session: Session) {
 const at = (x: number) => ({ translation: [x, 0, 0] as const });
 
 afterEach(async () => {
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
   await Promise.all(opened.splice(0).map((session) => session.close().catch(() => undefined)));
 });
 
@@ -442,6 +444,54 @@ describe("a session that the server has lost", () => {
     server.stream.goAway(GoAwayReason.SESSION_EXPIRED);
     server.stream.queue.finish();
     await expect(next(session)).rejects.toMatchObject({ reason: "SESSION_EXPIRED" });
+  });
+});
+
+describe("a hidden page", () => {
+  const page = Object.assign(new EventTarget(), { hidden: false });
+  const show = (hidden: boolean) => {
+    page.hidden = hidden;
+    page.dispatchEvent(new Event("visibilitychange"));
+  };
+
+  /** A session on a page, which may be hidden; clocks stand still. */
+  async function beginOnPage() {
+    vi.stubGlobal("document", page);
+    page.hidden = false;
+    vi.useFakeTimers({ toFake: ["setInterval", "clearInterval"] });
+    return begin();
+  }
+
+  test("gives its connection back when nothing is under way, until it is seen again", async () => {
+    const { server, session } = await beginOnPage();
+    server.stream.frame({ frameSeq: 1n, converged: true });
+    await arrived(server, session);
+    show(true);
+    vi.advanceTimersByTime(60_000);
+    await server.until(() => server.stream.isAborted);
+    expect(session.connection).toBe("idle");
+    expect(server.streams.length).toBe(1);
+    show(false);
+    await server.until(() => server.streams.length === 2);
+    server.stream.open();
+    await connected(session);
+  });
+
+  test("keeps it while a frame is to come, and takes it again for an update", async () => {
+    const { server, session } = await beginOnPage();
+    session.setHandle("tip", { vertices: [1] });
+    server.stream.frame({ frameSeq: 1n, converged: true });
+    await arrived(server, session);
+    show(true);
+    vi.advanceTimersByTime(60_000);
+    expect(session.connection).toBe("connected");
+    server.stream.frame({ frameSeq: 2n, inputSeq: 1n, converged: true });
+    await arrived(server, session);
+    vi.advanceTimersByTime(60_000);
+    expect(session.connection).toBe("idle");
+    session.move("tip", at(1));
+    await server.until(() => server.streams.length === 2);
+    expect(page.hidden).toBe(true);
   });
 });
 

@@ -1,5 +1,5 @@
 import { type ChildProcess, execFileSync, spawn } from "node:child_process";
-import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { createInterface } from "node:readline";
@@ -17,6 +17,7 @@ export class Service {
   #server: ChildProcess | undefined;
   #envoy: ChildProcess | undefined;
   #address = "127.0.0.1:0";
+  #envoyFlags: string[] = [];
   readonly accessLog = join(this.#work, "access.log");
   /** Where browsers connect. */
   url = "";
@@ -27,13 +28,8 @@ export class Service {
   static async start({ files = tmpdir(), serverFlags = [] as string[], origins = [] as string[], idleSeconds = 60 } = {}): Promise<Service> {
     const service = new Service();
     await service.startServer(serverFlags);
-    const config = execFileSync(
-      join(root, "deploy/envoy-config"),
-      ["--web", "127.0.0.1:0", "--server", service.#address, "--files", files, "--access-log", service.accessLog,
-       "--idle", String(idleSeconds), ...origins.flatMap((origin) => ["--origin", origin])],
-      { encoding: "utf8" },
-    );
-    writeFileSync(join(service.#work, "envoy.yaml"), config);
+    service.#envoyFlags = ["--web", "127.0.0.1:0", "--server", service.#address, "--files", files, "--access-log", service.accessLog,
+                           "--idle", String(idleSeconds), ...origins.flatMap((origin) => ["--origin", origin])];
     await service.#startEnvoy();
     return service;
   }
@@ -82,8 +78,8 @@ export class Service {
 
   async #startEnvoy(): Promise<void> {
     const adminFile = join(this.#work, "admin");
-    const flags = ["--config-path", join(this.#work, "envoy.yaml"), "--concurrency", "1", "--disable-hot-restart"];
-    this.#envoy = spawn(envoyProgram, [...flags, "--admin-address-path", adminFile, "--log-level", "error"], { stdio: "ignore" });
+    const program = join(root, "deploy/web");
+    this.#envoy = spawn(program, ["--admin-file", adminFile, ...this.#envoyFlags], { stdio: "ignore" });
     for (let tries = 0; tries < 200; ++tries) {
       try {
         const admin = readFileSync(adminFile, "utf8");
@@ -95,7 +91,7 @@ export class Service {
         await new Promise((again) => setTimeout(again, 50));
       }
     }
-    throw new Error(`${envoyProgram} did not start`);
+    throw new Error("deploy/web did not start");
   }
 }
 
