@@ -108,7 +108,13 @@ void LiveSolver::run_steps(SolveJob* job) {
   while (has_more && Clock::now() < end) has_more = deformer_->step();
   if (!has_more) return end_solve(job);
   if (job != nullptr) report(*job);
-  if (publisher_.is_frame_wanted()) publish(false);
+  if (is_frame_due()) publish(false);
+}
+
+/// Somebody may be sent one at once, or will get what waits when they have taken what was sent to them.
+bool LiveSolver::is_frame_due() const {
+  if (publisher_.is_frame_wanted()) return true;
+  return publisher_.reader_count() > 0 && Clock::now() - last_published_ >= kOldestWaiting;
 }
 
 void LiveSolver::end_solve(SolveJob* job) {
@@ -128,6 +134,7 @@ void LiveSolver::report(const SolveJob& job) {
 }
 
 std::shared_ptr<const Frame> LiveSolver::publish(bool is_final) {
+  last_published_ = Clock::now();
   const SolveSummary& summary = deformer_->summary();
   Frame frame;
   frame.input_seq = inputs_.input_seq;

@@ -37,6 +37,8 @@ class LiveSolver {
 
   static constexpr std::chrono::milliseconds kSlice{8};
   static constexpr std::chrono::milliseconds kBetweenReports{100};
+  /// While it runs for readers, none of whom may be sent a frame just now, the one that waits for them is not older.
+  static constexpr std::chrono::milliseconds kOldestWaiting{100};
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -53,6 +55,7 @@ class LiveSolver {
   void run_steps(SolveJob* job);
   void end_solve(SolveJob* job);
   void report(const SolveJob& job);
+  bool is_frame_due() const;
   std::shared_ptr<const Frame> publish(bool is_final);
 
   const std::unique_ptr<Deformer> deformer_;
@@ -69,6 +72,7 @@ class LiveSolver {
   static constexpr std::uint64_t kNobody = 0, kReaders = 1;
   std::uint64_t running_for_ = kNobody;  // the number of a job, or kReaders
   Clock::time_point last_report_;
+  Clock::time_point last_published_;
 };
 
 }  // namespace lpdeform

@@ -92,6 +92,30 @@ TEST_F(LiveSolverTest, RestsWhileNobodyLooksOn) {
   EXPECT_TRUE(publisher_->newest()->converged);
 }
 
+TEST_F(LiveSolverTest, WhatWaitsForAReaderWithoutCreditIsRenewed) {
+  auto stream = std::make_shared<FrameStream>(StreamOptions{.credit = 1}, publisher_, timers_, seconds(15),
+                                              OpenedNote{});
+  ASSERT_TRUE(publisher_->add(stream));
+  while (stream->next()) {
+  }
+  ASSERT_FALSE(stream->wants_frame());
+  Update update = hold_ends(rest(), 1, 8);
+  update.settings.p = Field::Constant(1, 1.0);
+  update.settings.solver =
+      SolveSettings{.method = Method::kLineSearch, .tolerance = 1e-14, .max_iterations = 1 << 30};
+  ASSERT_TRUE(mailbox_.take(update).ok());
+  for (int renewed = 0; renewed < 2; ++renewed) {
+    const std::uint64_t before = publisher_->newest()->frame_seq;
+    int slices = 0;
+    while (publisher_->newest()->frame_seq == before) {
+      ASSERT_TRUE(solver_.run_slice(nullptr));
+      ASSERT_LT(++slices, kMostSlices);
+    }
+    EXPECT_EQ(publisher_->newest()->input_seq, 1u);
+    EXPECT_FALSE(publisher_->newest()->converged);
+  }
+}
+
 TEST_F(LiveSolverTest, FramesKeepComingWhileItRefines) {
   const auto stream = look_on();
   Update update = hold_ends(rest(), 1, 8);

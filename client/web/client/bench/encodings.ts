@@ -5,7 +5,11 @@ import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { FrameAssembly } from "../src/assembly.js";
 import { loadDecompressor } from "../src/decode.js";
 import { openSession } from "../src/index.js";
-import { DeformService, type StreamSessionsResponse, StreamSessionsResponseSchema } from "../src/gen/lpdeform/v1/service_pb.js";
+import {
+  DeformService,
+  type StreamSessionsResponse,
+  StreamSessionsResponseSchema,
+} from "../src/gen/lpdeform/v1/service_pb.js";
 import { frameOptionsToWire } from "../src/towire.js";
 import type { Encoding } from "../src/types.js";
 import { Service } from "../test/real/service.js";
@@ -40,7 +44,9 @@ function time(work: () => void): number {
   return all.sort((a, b) => a - b)[30]!;
 }
 
-console.log("vertices  encoding    KiB  bytes/vertex  Mbit/s at 30  to attributes, ms  to positions and distortion, ms");
+console.log(
+  "vertices  encoding    KiB  bytes/vertex  Mbit/s at 30  to attributes, ms  to positions and distortion, ms",
+);
 for (const side of [100, 316]) {
   const { mesh, handles } = grid(side);
   const session = await openSession(mesh, { url: service.url, settings: { p: 2 } });
@@ -74,7 +80,9 @@ for (const side of [100, 316]) {
       [attributes.toFixed(3), 17],
       [numbers.toFixed(3), 30],
     ] as const;
-    console.log(cells.map(([text, width]) => (text === encoding ? text.padEnd(width) : text.padStart(width))).join("  "));
+    console.log(
+      cells.map(([text, width]) => (text === encoding ? text.padEnd(width) : text.padStart(width))).join("  "),
+    );
   }
   await session.close();
 }

@@ -19,7 +19,12 @@ let last = 0;
 let pointer = 0;
 const moving = setInterval(() => {
   pointer += 1;
-  last = session.move("end", { axis: [0, 1, 0], angle: pointer / 50, center: [10, 0, 0], translation: [0, 0, pointer / 50] });
+  last = session.move("end", {
+    axis: [0, 1, 0],
+    angle: pointer / 50,
+    center: [10, 0, 0],
+    translation: [0, 0, pointer / 50],
+  });
   if (pointer === 100) clearInterval(moving);
 }, 5);
 

@@ -22,7 +22,9 @@ export class FrameAssembly {
     const frame = part.header ? this.#begin(part.header) : this.#frame;
     this.#frame = undefined;
     if (!frame || !this.#follows(frame, part)) {
-      throw misfit(`The part of frame ${part.frameSeq} from vertex ${part.firstVertex} on does not follow what came before.`);
+      throw misfit(
+        `The part of frame ${part.frameSeq} from vertex ${part.firstVertex} on does not follow what came before.`,
+      );
     }
     if (frame.quantized) this.#appendQuantized(frame.quantized, part);
     else this.#appendRaw(frame, part);
@@ -90,7 +92,8 @@ export class FrameAssembly {
       throw misfit(`A part of frame ${part.frameSeq} has the wrong number of bytes for ${part.vertexCount} vertices.`);
     }
     if (part.vertexCount === this.vertexCount) return values;
-    const all = whole.length > 0 ? whole : (new (values.constructor as new (length: number) => Array)(width * this.vertexCount));
+    const all =
+      whole.length > 0 ? whole : new (values.constructor as new (length: number) => Array)(width * this.vertexCount);
     all.set(values, width * part.firstVertex);
     return all;
   }

@@ -48,7 +48,7 @@ export function normalsOf({ normals }: QuantizedSurface): Float32Array {
   return out;
 }
 
-type Decoder = typeof import("meshoptimizer/decoder")["MeshoptDecoder"];
+type Decoder = (typeof import("meshoptimizer/decoder"))["MeshoptDecoder"];
 let decoder: Decoder | undefined;
 
 /** To be awaited before the first compressed frame; loads meshoptimizer's decoder, which nobody else pays for. */
@@ -65,7 +65,12 @@ export function decompress(block: Uint8Array, count: number): Uint8Array {
     if (!decoder) throw new Error("the decoder is not loaded");
     decoder.decodeVertexBuffer(bytes, count, 8, block);
   } catch (cause) {
-    throw new LpdeformError("data_loss", `A compressed part of ${count} vertices cannot be read.`, { reason: "FRAME_PARTS" }, cause);
+    throw new LpdeformError(
+      "data_loss",
+      `A compressed part of ${count} vertices cannot be read.`,
+      { reason: "FRAME_PARTS" },
+      cause,
+    );
   }
   return bytes;
 }

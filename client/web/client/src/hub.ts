@@ -46,7 +46,14 @@ export class StreamHub {
     const withRoom = [...this.#streams].find((stream) => stream.lanes.size < mostLanes);
     const stream = withRoom ?? new SharedStream(this.rpc, () => this.#streams.delete(stream));
     this.#streams.add(stream);
-    const lane = new Lane(this.rpc, session, options, sink, () => stream.remove(lane), () => stream.wake());
+    const lane = new Lane(
+      this.rpc,
+      session,
+      options,
+      sink,
+      () => stream.remove(lane),
+      () => stream.wake(),
+    );
     stream.add(lane);
     return lane;
   }

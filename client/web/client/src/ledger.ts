@@ -37,7 +37,9 @@ function settled(state: Update): Update {
 
 function isMovesOnly({ update }: NumberedUpdate): boolean {
   const changes = Object.values(update.handles ?? {});
-  return !update.resize && Object.keys(update.settings ?? {}).length === 0 && changes.every((change) => "move" in change);
+  return (
+    !update.resize && Object.keys(update.settings ?? {}).length === 0 && changes.every((change) => "move" in change)
+  );
 }
 
 /**
@@ -116,7 +118,8 @@ export class Ledger {
   connectionLost(): void {
     let again: NumberedUpdate | undefined;
     for (const sent of this.#inFlight) {
-      if (sent.seq === this.#accepted.seq) this.#restore = sent; // an unanswered restore stays on its own
+      if (sent.seq === this.#accepted.seq)
+        this.#restore = sent; // an unanswered restore stays on its own
       else again = { seq: sent.seq, update: merged(again?.update ?? {}, sent.update) };
     }
     this.#inFlight = [];

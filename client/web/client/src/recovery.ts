@@ -10,7 +10,11 @@ export interface Recovery {
 }
 
 /** `ended`: nothing where the server ended the stream without an error. `hasCopy`: the session can be made anew. */
-export function recoveryAfter(ended: LpdeformError | undefined, goAway: GoAway | undefined, hasCopy: boolean): Recovery {
+export function recoveryAfter(
+  ended: LpdeformError | undefined,
+  goAway: GoAway | undefined,
+  hasCopy: boolean,
+): Recovery {
   if (goAway) return afterGoAway(goAway, hasCopy);
   const why = ended ?? new LpdeformError("unavailable", "The server ended the stream.");
   const pauseMs = why.retryAfterMs;
@@ -32,7 +36,11 @@ function afterGoAway(goAway: GoAway, hasCopy: boolean): Recovery {
   const pauseMs = goAway.reconnectAfterMs;
   switch (goAway.reason) {
     case GoAwayReason.SESSION_DELETED:
-      return { next: "giveUp", why: new LpdeformError("not_found", goAway.text, { reason: "SESSION_DELETED" }), pauseMs };
+      return {
+        next: "giveUp",
+        why: new LpdeformError("not_found", goAway.text, { reason: "SESSION_DELETED" }),
+        pauseMs,
+      };
     case GoAwayReason.SESSION_EXPIRED:
       return {
         next: hasCopy ? "makeAnew" : "giveUp",

@@ -39,7 +39,10 @@ export interface SessionEvents {
  */
 export class Session implements AsyncIterable<Frame> {
   readonly #link: Link;
-  readonly #listeners = { problem: new Set<(e: LpdeformError) => void>(), connection: new Set<(c: Connection) => void>() };
+  readonly #listeners = {
+    problem: new Set<(e: LpdeformError) => void>(),
+    connection: new Set<(c: Connection) => void>(),
+  };
 
   /** @internal openSession() and joinSession() make sessions. */
   constructor(rpc: Rpc, lease: Lease, frameOptions: FrameOptions, copy: Copy | undefined) {
@@ -249,13 +252,20 @@ async function prepareFor({ encoding, lowestEncoding }: FrameOptions): Promise<v
 
 /** What the contract has no room for. */
 function checkMesh({ vertices, faces }: Mesh): void {
-  for (const [what, numbers] of [["vertices", vertices], ["faces", faces]] as const) {
+  for (const [what, numbers] of [
+    ["vertices", vertices],
+    ["faces", faces],
+  ] as const) {
     if (numbers.length % 3 === 0) continue;
-    throw new LpdeformError("invalid_argument", `The ${what} are ${numbers.length} numbers, which are not three each.`, {
-      reason: "MESH_SIZE",
-      element: what,
-      limit: "a multiple of 3",
-    });
+    throw new LpdeformError(
+      "invalid_argument",
+      `The ${what} are ${numbers.length} numbers, which are not three each.`,
+      {
+        reason: "MESH_SIZE",
+        element: what,
+        limit: "a multiple of 3",
+      },
+    );
   }
 }
 

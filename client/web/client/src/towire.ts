@@ -1,5 +1,12 @@
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
-import { FieldSchema, type Field, MeshSchema, type Mesh as WireMesh, WeldSchema, type Weld as WireWeld } from "./gen/lpdeform/v1/data_pb.js";
+import {
+  FieldSchema,
+  type Field,
+  MeshSchema,
+  type Mesh as WireMesh,
+  WeldSchema,
+  type Weld as WireWeld,
+} from "./gen/lpdeform/v1/data_pb.js";
 import { Encoding, type FrameOptionsSchema } from "./gen/lpdeform/v1/frame_pb.js";
 import {
   HandleSchema,

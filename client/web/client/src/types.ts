@@ -135,13 +135,7 @@ export interface MeshReport {
 }
 
 export type StopReason =
-  | "running"
-  | "converged"
-  | "iteration_limit"
-  | "time_limit"
-  | "cancelled"
-  | "stalled"
-  | "numerical_breakdown";
+  "running" | "converged" | "iteration_limit" | "time_limit" | "cancelled" | "stalled" | "numerical_breakdown";
 
 /**
  * How positions, distortion and normals travel. "float32": 16 bytes a vertex with distortion, 12 without; exact to float32.

@@ -113,7 +113,13 @@ describe("parts that do not fit", () => {
     ["half a number", [{ ...whole, positions: new Uint8Array(23) }]],
     ["an end too early", [{ ...whole, vertexCount: 1, positions: bytesOf(positions.subarray(3)) }]],
     ["more vertices than there are", [{ ...whole, vertexCount: 3, positions: new Uint8Array(36) }]],
-    ["a gap", [{ ...whole, vertexCount: 1, positions: bytesOf(positions.subarray(3)), last: false }, { firstVertex: 2, vertexCount: 0 }]],
+    [
+      "a gap",
+      [
+        { ...whole, vertexCount: 1, positions: bytesOf(positions.subarray(3)), last: false },
+        { firstVertex: 2, vertexCount: 0 },
+      ],
+    ],
     ["bytes that are not compressed", [{ ...whole, header: header({ encoding: Encoding.COMPRESSED, quantization }) }]],
   ];
   test.each(cases)("%s", (_, parts) => {

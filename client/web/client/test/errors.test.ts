@@ -13,7 +13,10 @@ test("a network that fails is a server that is away", () => {
 });
 
 test("codes keep their names, and errors of ours stay as they are", () => {
-  expect(fromCall(new ConnectError("x", Code.ResourceExhausted))).toMatchObject({ code: "resource_exhausted", message: "x" });
+  expect(fromCall(new ConnectError("x", Code.ResourceExhausted))).toMatchObject({
+    code: "resource_exhausted",
+    message: "x",
+  });
   const error = new LpdeformError("aborted", "y");
   expect(fromCall(error)).toBe(error);
   expect(fromCall("anything else").code).toBe("unknown");
@@ -31,7 +34,9 @@ test("outside of a page the proxy has to be named", async () => {
 
 test("what is no gRPC-Web is an error and not a hang", async () => {
   const fetch = async () => new Response("<html>", { status: 502, headers: { "content-type": "text/html" } });
-  await expect(openSession(triangle, { url: "http://a.example", fetch })).rejects.toMatchObject({ code: "unavailable" });
+  await expect(openSession(triangle, { url: "http://a.example", fetch })).rejects.toMatchObject({
+    code: "unavailable",
+  });
 });
 
 test("the checksum is CRC-32C", () => {

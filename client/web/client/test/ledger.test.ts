@@ -5,7 +5,9 @@ const at = (x: number) => ({ translation: [x, 0, 0] as const });
 
 describe("merging", () => {
   test("the newest motion of a handle wins, and moves one that was added before", () => {
-    const added = { handles: { tip: { set: { vertices: [1], hold: { kind: "exact" as const } } }, base: { move: at(1) } } };
+    const added = {
+      handles: { tip: { set: { vertices: [1], hold: { kind: "exact" as const } } }, base: { move: at(1) } },
+    };
     expect(merged(added, { handles: { tip: { move: at(2) }, base: { move: at(3) } } }).handles).toEqual({
       tip: { set: { vertices: [1], hold: { kind: "exact" }, motion: at(2) } },
       base: { move: at(3) },
@@ -13,13 +15,23 @@ describe("merging", () => {
   });
 
   test("settings that are left out keep their value", () => {
-    expect(merged({ settings: { p: 1, stiffness: 2 } }, { settings: { p: 3 } }).settings).toEqual({ p: 3, stiffness: 2 });
+    expect(merged({ settings: { p: 1, stiffness: 2 } }, { settings: { p: 3 } }).settings).toEqual({
+      p: 3,
+      stiffness: 2,
+    });
   });
 
   test("a resizing replaces its handle and its fields, and a later handle of that name the resizing", () => {
-    const before = { handles: { resize: { set: { vertices: [1] } }, tip: { move: at(1) } }, settings: { p: 1, lengthUnit: 2 } };
+    const before = {
+      handles: { resize: { set: { vertices: [1] } }, tip: { move: at(1) } },
+      settings: { p: 1, lengthUnit: 2 },
+    };
     const resized = merged(before, { resize: { scale: [2, 1, 1] } });
-    expect(resized).toEqual({ handles: { tip: { move: at(1) } }, settings: { lengthUnit: 2 }, resize: { scale: [2, 1, 1] } });
+    expect(resized).toEqual({
+      handles: { tip: { move: at(1) } },
+      settings: { lengthUnit: 2 },
+      resize: { scale: [2, 1, 1] },
+    });
     expect(merged(resized, { handles: { resize: { remove: true } } }).resize).toBeUndefined();
   });
 
@@ -35,7 +47,10 @@ describe("ledger", () => {
     const ledger = new Ledger();
     expect(ledger.add({ handles: { tip: { set: { vertices: [1] } } } })).toBe(1);
     expect(ledger.add({ handles: { tip: { move: at(1) } } })).toBe(2);
-    expect(ledger.sendNext()).toEqual({ seq: 2, update: { handles: { tip: { set: { vertices: [1], motion: at(1) } } }, settings: {} } });
+    expect(ledger.sendNext()).toEqual({
+      seq: 2,
+      update: { handles: { tip: { set: { vertices: [1], motion: at(1) } } }, settings: {} },
+    });
     expect(ledger.canSend).toBe(false);
   });
 
@@ -99,14 +114,20 @@ describe("ledger", () => {
 
   test("restores what was accepted on its own, without what was let go of", () => {
     const ledger = new Ledger();
-    ledger.add({ handles: { tip: { set: { vertices: [1] } }, base: { set: { vertices: [2] } } }, settings: { p: 1.5 } });
+    ledger.add({
+      handles: { tip: { set: { vertices: [1] } }, base: { set: { vertices: [2] } } },
+      settings: { p: 1.5 },
+    });
     ledger.accept(ledger.sendNext().seq);
     ledger.add({ handles: { base: { remove: true } } });
     ledger.accept(ledger.sendNext().seq);
     ledger.add({ settings: { p: 3 } });
     ledger.sessionLost();
     expect(ledger.hasRestore).toBe(true);
-    expect(ledger.sendNext()).toEqual({ seq: 2, update: { handles: { tip: { set: { vertices: [1] } } }, settings: { p: 1.5 } } });
+    expect(ledger.sendNext()).toEqual({
+      seq: 2,
+      update: { handles: { tip: { set: { vertices: [1] } } }, settings: { p: 1.5 } },
+    });
     expect(ledger.hasRestore).toBe(false);
     ledger.connectionLost();
     expect(ledger.hasRestore).toBe(true);

@@ -1,5 +1,12 @@
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
-import { type Encoding, type Frame, type FrameOptions, joinSession, openSession, type Session } from "../../src/index.js";
+import {
+  type Encoding,
+  type Frame,
+  type FrameOptions,
+  joinSession,
+  openSession,
+  type Session,
+} from "../../src/index.js";
 import { Service } from "./service.js";
 import { grid } from "./shapes.js";
 
@@ -46,7 +53,9 @@ describe("encodings", () => {
     const frame = await read(service, session, { encoding });
     const { extent, distortionExtent } = frame.quantized!;
     for (let axis = 0; axis < 3; ++axis) {
-      expect(largest(frame.positions, exact.positions, axis, 3)).toBeLessThanOrEqual(extent[axis]! / 65535 / 2 + rounding);
+      expect(largest(frame.positions, exact.positions, axis, 3)).toBeLessThanOrEqual(
+        extent[axis]! / 65535 / 2 + rounding,
+      );
     }
     expect(distortionExtent).toBeCloseTo(Math.max(...exact.distortion), 6);
     expect(largest(frame.distortion, exact.distortion)).toBeLessThanOrEqual(distortionExtent / 65535 / 2 + 1e-7);

@@ -45,24 +45,28 @@ async function flood(credit: number): Promise<{ lines: Line[]; madeAt: Map<numbe
   return { lines, madeAt };
 }
 
-test.each([1, 2, 8])("a reader of credit %i that pauses gets the newest frame as soon as it goes on", async (credit) => {
-  const { lines, madeAt } = await flood(credit);
-  const resumed = lines.findIndex(({ resumes }) => resumes !== undefined);
-  const resumedAt = lines[resumed]!.resumes!;
-  const after = lines.slice(resumed + 1) as Required<Line>[];
-  expect(after.length).toBe(20);
-  // Fresh is what answers an update made while the reader slept at the earliest in its last half second.
-  const isFresh = ({ inputSeq }: Required<Line>) => (madeAt.get(inputSeq) ?? 0) > resumedAt - 500;
-  const first = after.findIndex(isFresh);
-  expect(first).toBeGreaterThanOrEqual(0);
-  expect(first).toBeLessThanOrEqual(credit);
-  expect(after.slice(first).every(isFresh)).toBe(true);
-  const frameBytes = after[first]!.wireBytes;
-  const held = after[first]!.receivedBytes - lines[resumed]!.receivedBytes - frameBytes;
-  expect(held).toBeLessThanOrEqual(credit * (frameBytes + 1024) + 1024);
-  console.log(
-    `credit ${credit}: ${first} older frames, ${(held / 1024).toFixed(0)} KiB held on the way, ` +
-      `the newest ${after[first]!.at - resumedAt} ms after the pause, ` +
-      `${after[first]!.at - madeAt.get(after[first]!.inputSeq)!} ms after its update`,
-  );
-}, 60_000);
+test.each([1, 2, 8])(
+  "a reader of credit %i that pauses gets the newest frame as soon as it goes on",
+  async (credit) => {
+    const { lines, madeAt } = await flood(credit);
+    const resumed = lines.findIndex(({ resumes }) => resumes !== undefined);
+    const resumedAt = lines[resumed]!.resumes!;
+    const after = lines.slice(resumed + 1) as Required<Line>[];
+    expect(after.length).toBe(20);
+    // Fresh is what answers an update made while the reader slept at the earliest in its last half second.
+    const isFresh = ({ inputSeq }: Required<Line>) => (madeAt.get(inputSeq) ?? 0) > resumedAt - 500;
+    const first = after.findIndex(isFresh);
+    expect(first).toBeGreaterThanOrEqual(0);
+    expect(first).toBeLessThanOrEqual(credit);
+    expect(after.slice(first).every(isFresh)).toBe(true);
+    const frameBytes = after[first]!.wireBytes;
+    const held = after[first]!.receivedBytes - lines[resumed]!.receivedBytes - frameBytes;
+    expect(held).toBeLessThanOrEqual(credit * (frameBytes + 1024) + 1024);
+    console.log(
+      `credit ${credit}: ${first} older frames, ${(held / 1024).toFixed(0)} KiB held on the way, ` +
+        `the newest ${after[first]!.at - resumedAt} ms after the pause, ` +
+        `${after[first]!.at - madeAt.get(after[first]!.inputSeq)!} ms after its update`,
+    );
+  },
+  60_000,
+);

@@ -7,7 +7,8 @@ import { openSession } from "../../src/index.js";
 import { envoyProgram, root, Service } from "./service.js";
 import { grid } from "./shapes.js";
 
-const configure = (...flags: string[]) => execFileSync(join(root, "deploy/envoy-config"), flags, { encoding: "utf8", stdio: "pipe" });
+const configure = (...flags: string[]) =>
+  execFileSync(join(root, "deploy/envoy-config"), flags, { encoding: "utf8", stdio: "pipe" });
 
 async function waitFor(isSo: () => Promise<boolean> | boolean): Promise<void> {
   while (!(await isSo())) await new Promise((again) => setTimeout(again, 50));
@@ -19,8 +20,27 @@ describe("the configuration", () => {
 
   test.each([
     ["as it is", []],
-    ["with everything said", ["--web", "0.0.0.0:0", "--server", "server.example:1", "--files", "/tmp", "--admin-port", "9901",
-                              "--access-log", "/dev/null", "--idle", "5", "--origin", "https://a.example", "--origin", "http://localhost:*"]],
+    [
+      "with everything said",
+      [
+        "--web",
+        "0.0.0.0:0",
+        "--server",
+        "server.example:1",
+        "--files",
+        "/tmp",
+        "--admin-port",
+        "9901",
+        "--access-log",
+        "/dev/null",
+        "--idle",
+        "5",
+        "--origin",
+        "https://a.example",
+        "--origin",
+        "http://localhost:*",
+      ],
+    ],
   ])("%s is valid", (_, flags) => {
     const file = join(work, "envoy.yaml");
     writeFileSync(file, configure(...flags));
@@ -37,7 +57,9 @@ describe("the configuration", () => {
     ["--origin", 'http://a"b'],
     ["--nothing", "1"],
   ])("%s '%s' is refused by name", (option, value) => {
-    expect(() => configure(option, value)).toThrow(expect.objectContaining({ status: 2, stderr: expect.stringContaining(option) }));
+    expect(() => configure(option, value)).toThrow(
+      expect.objectContaining({ status: 2, stderr: expect.stringContaining(option) }),
+    );
   });
 
   test("retries nothing on streams and never gives them a deadline", () => {
@@ -50,7 +72,11 @@ describe("the configuration", () => {
 describe("the proxy", () => {
   let service: Service;
   beforeAll(async () => {
-    service = await Service.start({ serverFlags: ["--heartbeat", "0.3"], origins: ["https://friend.example"], idleSeconds: 1 });
+    service = await Service.start({
+      serverFlags: ["--heartbeat", "0.3"],
+      origins: ["https://friend.example"],
+      idleSeconds: 1,
+    });
   });
   afterAll(() => service.stop());
 
@@ -59,7 +85,12 @@ describe("the proxy", () => {
       method: "POST",
       body: new Uint8Array(5),
       ...init,
-      headers: { "content-type": "application/grpc-web+proto", "x-grpc-web": "1", ...(origin && { origin }), ...init.headers },
+      headers: {
+        "content-type": "application/grpc-web+proto",
+        "x-grpc-web": "1",
+        ...(origin && { origin }),
+        ...init.headers,
+      },
     });
 
   test("leaves a stream that has nothing to say but heartbeats", async () => {
@@ -80,13 +111,18 @@ describe("the proxy", () => {
     const preflight = await call("https://friend.example", {
       method: "OPTIONS",
       body: null,
-      headers: { "access-control-request-method": "POST", "access-control-request-headers": "x-grpc-web,lpdeform-session" },
+      headers: {
+        "access-control-request-method": "POST",
+        "access-control-request-headers": "x-grpc-web,lpdeform-session",
+      },
     });
     expect(preflight.status).toBe(200);
     expect(preflight.headers.get("access-control-allow-origin")).toBe("https://friend.example");
     expect(preflight.headers.get("access-control-allow-headers")).toContain("lpdeform-session");
     const answer = await call("https://friend.example");
-    expect(answer.headers.get("access-control-expose-headers")).toBe("grpc-status, grpc-message, grpc-status-details-bin");
+    expect(answer.headers.get("access-control-expose-headers")).toBe(
+      "grpc-status, grpc-message, grpc-status-details-bin",
+    );
     expect((await call("https://stranger.example")).headers.get("access-control-allow-origin")).toBeNull();
   });
 
@@ -110,9 +146,16 @@ describe("the proxy", () => {
   test("logs each call with how it ended", async () => {
     await call();
     await waitFor(() => readFileSync(service.accessLog, "utf8").includes("GetSession"));
-    const lines = readFileSync(service.accessLog, "utf8").trim().split("\n").map((line) => JSON.parse(line));
+    const lines = readFileSync(service.accessLog, "utf8")
+      .trim()
+      .split("\n")
+      .map((line) => JSON.parse(line));
     const logged = lines.findLast(({ path }) => path === "/lpdeform.v1.DeformService/GetSession");
-    expect(logged).toMatchObject({ method: "POST", status: 200, grpc_status: expect.stringMatching(/NotFound|Unavailable/) });
+    expect(logged).toMatchObject({
+      method: "POST",
+      status: 200,
+      grpc_status: expect.stringMatching(/NotFound|Unavailable/),
+    });
   }, 60_000);
 });
 

@@ -25,11 +25,27 @@ export class Service {
   admin = "";
 
   /** `files`: what Envoy serves beside; `serverFlags`: of lpdeform-server. */
-  static async start({ files = tmpdir(), serverFlags = [] as string[], origins = [] as string[], idleSeconds = 60 } = {}): Promise<Service> {
+  static async start({
+    files = tmpdir(),
+    serverFlags = [] as string[],
+    origins = [] as string[],
+    idleSeconds = 60,
+  } = {}): Promise<Service> {
     const service = new Service();
     await service.startServer(serverFlags);
-    service.#envoyFlags = ["--web", "127.0.0.1:0", "--server", service.#address, "--files", files, "--access-log", service.accessLog,
-                           "--idle", String(idleSeconds), ...origins.flatMap((origin) => ["--origin", origin])];
+    service.#envoyFlags = [
+      "--web",
+      "127.0.0.1:0",
+      "--server",
+      service.#address,
+      "--files",
+      files,
+      "--access-log",
+      service.accessLog,
+      "--idle",
+      String(idleSeconds),
+      ...origins.flatMap((origin) => ["--origin", origin]),
+    ];
     await service.#startEnvoy();
     return service;
   }
@@ -59,9 +75,10 @@ export class Service {
     await end(this.#envoy, "SIGKILL");
   }
 
-  /** Memory that the kernel keeps for Envoy, in bytes. */
-  envoyResidentBytes(): number {
-    const status = readFileSync(`/proc/${this.#envoy!.pid}/status`, "utf8");
+  /** What the kernel holds in memory for it. */
+  residentBytes(part: "server" | "envoy"): number {
+    const { pid } = (part === "server" ? this.#server : this.#envoy)!;
+    const status = readFileSync(`/proc/${pid}/status`, "utf8");
     return 1024 * Number(/VmRSS:\s+(\d+)/.exec(status)![1]);
   }
 
@@ -83,7 +100,10 @@ export class Service {
     for (let tries = 0; tries < 200; ++tries) {
       try {
         const admin = readFileSync(adminFile, "utf8");
-        const web = execFileSync(process.execPath, [join(root, "deploy/envoy-ready.mjs"), admin], { encoding: "utf8", stdio: "pipe" });
+        const web = execFileSync(process.execPath, [join(root, "deploy/envoy-ready.mjs"), admin], {
+          encoding: "utf8",
+          stdio: "pipe",
+        });
         this.admin = `http://${admin}`;
         this.url = `http://${web.trim()}`;
         return;

@@ -4,8 +4,10 @@ import { join } from "node:path";
 import { type Browser, chromium, type Page } from "playwright-core";
 import { build } from "vite";
 import { afterAll, beforeAll, expect, test } from "vitest";
+import { openSession } from "../../src/index.js";
+import type { Watched } from "./page/page.js";
 import { Service } from "./service.js";
-import type {} from "./page/page.js";
+import { grid } from "./shapes.js";
 
 const tabs = 4;
 let files: string;
@@ -17,7 +19,10 @@ beforeAll(async () => {
   const root = join(import.meta.dirname, "page");
   await build({ root, base: "./", logLevel: "error", configFile: false, build: { outDir: files, target: "es2022" } });
   service = await Service.start({ files });
-  browser = await chromium.launch({ executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
+  browser = await chromium.launch({
+    executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
+    args: ["--no-sandbox"],
+  });
 }, 120_000);
 
 afterAll(async () => {
@@ -56,3 +61,49 @@ test("four tabs in split view all update and acknowledge over plain HTTP", async
   expect(await service.stat("http.web.downstream_cx_active")).toBeLessThanOrEqual(6);
   await context.close();
 }, 120_000);
+
+test.each([1, 2])(
+  "a page of credit %i that is busy for five seconds then gets the newest frame",
+  async (credit) => {
+    const { mesh, handles } = grid(100);
+    const session = await openSession(mesh, { url: service.url, settings: { p: 2 } });
+    session.setHandles(handles);
+    const madeAt = new Map<number, number>();
+    let tick = 0;
+    const dragging = setInterval(() => {
+      const height = 10 * Math.sin(++tick / 50);
+      madeAt.set(session.move("right", { translation: [0, 0, height] }), Date.now());
+    }, 10);
+    const page = await browser.newPage();
+    await page.goto(service.url);
+    const { resumedAt, after } = await page.evaluate(
+      async ({ name, credit }) => {
+        const log = await window.watch(name, credit);
+        const atLeast = async (count: number) => {
+          while (log.length < count) await new Promise((again) => setTimeout(again, 5));
+        };
+        await atLeast(20);
+        const taken = log.length;
+        const until = Date.now() + 5000;
+        while (Date.now() < until); // as a page that computes
+        await atLeast(taken + 15);
+        return { resumedAt: until, after: log.slice(taken) };
+      },
+      { name: session.name, credit },
+    );
+    clearInterval(dragging);
+    const isFresh = ({ inputSeq }: Watched) => (madeAt.get(inputSeq) ?? 0) > resumedAt - 500;
+    const first = after.findIndex(isFresh);
+    expect(first).toBeGreaterThanOrEqual(0);
+    expect(first).toBeLessThanOrEqual(credit);
+    expect(after.slice(first).every(isFresh)).toBe(true);
+    const { inputSeq, at } = after[first]!;
+    console.log(
+      `credit ${credit}: ${first} older frames, the newest ${at - resumedAt} ms after the pause, ` +
+        `${at - madeAt.get(inputSeq)!} ms after its update`,
+    );
+    await page.close();
+    await session.close();
+  },
+  60_000,
+);

@@ -1,0 +1,202 @@
+import { Code, ConnectError } from "@connectrpc/connect";
+import { describe, expect, test } from "vitest";
+import { GoAwayReason } from "../src/gen/lpdeform/v1/service_pb.js";
+import { joinWith, openWith } from "../src/session.js";
+import { FakeServer, triangle } from "./fake_server.js";
+import { at, begin, next, opened, refusal } from "./harness.js";
+
+describe("a stream that ends", () => {
+  test("by a broken connection is taken up again", async () => {
+    const { server, session } = await begin();
+    const states: string[] = [];
+    session.on("connection", (state) => states.push(state));
+    server.stream.queue.finish(new ConnectError("broken", Code.Unavailable));
+    await server.until(() => server.streams.length === 2);
+    server.stream.open();
+    server.stream.frame({ frameSeq: 9n });
+    expect((await next(session)).frameSeq).toBe(9);
+    expect(states).toEqual(["reconnecting", "connected"]);
+    expect(server.creations.length).toBe(1);
+  });
+
+  test("by draining is taken up again after the pause that was asked for", async () => {
+    const { server } = await begin();
+    const start = performance.now();
+    server.stream.goAway(GoAwayReason.DRAINING, { reconnectAfterMs: 300 });
+    server.stream.queue.finish();
+    await server.until(() => server.streams.length === 2);
+    expect(performance.now() - start).toBeGreaterThan(290);
+  });
+
+  test("by a frame that does not fit is taken up again", async () => {
+    const { server, session } = await begin();
+    server.stream.frame({ frameSeq: 1n, vertexCount: 8 });
+    await server.until(() => server.streams.length === 2 && server.streams[0]!.isAborted);
+    expect(session.connection).toBe("reconnecting");
+  });
+
+  test("by silence is taken up again", async () => {
+    const server = new FakeServer();
+    const session = await openWith(server.rpc(), triangle, {});
+    opened.push(session);
+    session.poll();
+    await server.until(() => server.streams.length > 0);
+    server.stream.open(0, { heartbeatIntervalMs: 50 });
+    await server.until(() => server.streams.length === 2);
+    expect(server.streams[0]!.isAborted).toBe(true);
+  });
+
+  test("stays where heartbeats come", async () => {
+    const server = new FakeServer();
+    const session = await openWith(server.rpc(), triangle, {});
+    opened.push(session);
+    session.poll();
+    await server.until(() => server.streams.length > 0);
+    server.stream.open(0, { heartbeatIntervalMs: 100 });
+    for (let k = 0; k < 8; ++k) {
+      await new Promise((resolve) => setTimeout(resolve, 80));
+      server.stream.send({ case: "heartbeat", value: {} });
+    }
+    expect(server.streams.length).toBe(1);
+  });
+
+  test("by an acknowledgement that is refused is taken up again", async () => {
+    const { server, session } = await begin();
+    server.on.ack = () => {
+      throw refusal("STREAM_UNKNOWN", {}, Code.NotFound);
+    };
+    server.stream.frame({ frameSeq: 1n });
+    await next(session);
+    await server.until(() => server.streams.length === 2);
+  });
+
+  test("with the session deleted is the end", async () => {
+    const { server, session } = await begin();
+    server.stream.goAway(GoAwayReason.SESSION_DELETED, { text: "The session was deleted." });
+    server.stream.queue.finish();
+    await expect(next(session)).rejects.toMatchObject({
+      code: "not_found",
+      reason: "SESSION_DELETED",
+      message: "The session was deleted.",
+    });
+    expect(() => session.poll()).toThrow(expect.objectContaining({ reason: "SESSION_DELETED" }));
+    expect(session.connection).toBe("closed");
+  });
+
+  test("for a fault of ours is the end", async () => {
+    const { server, session } = await begin();
+    server.stream.goAway(GoAwayReason.PROTOCOL_ERROR);
+    server.stream.queue.finish();
+    await expect(next(session)).rejects.toMatchObject({ code: "internal", reason: "PROTOCOL_ERROR" });
+  });
+
+  test("and stays away for too long is the end, with what stood in the way", async () => {
+    const server = new FakeServer();
+    const { session } = await begin(server, server.rpc(5000, 400));
+    server.on.stream = (stream) => stream.queue.finish(new ConnectError("still away", Code.Unavailable));
+    server.stream.queue.finish(new ConnectError("away", Code.Unavailable));
+    await expect(next(session)).rejects.toMatchObject({ code: "unavailable", message: "still away" });
+  });
+});
+
+describe("a session that the server has lost", () => {
+  test("is made anew from mesh, handles and settings as they were accepted", async () => {
+    const { server, session } = await begin();
+    session.setHandles({ base: { vertices: [0] }, tip: { vertices: [1] } });
+    await server.until(() => server.updates.length === 1);
+    session.move("tip", at(3));
+    session.set({ p: 1.5 });
+    server.on.solve = async function* () {
+      throw refusal("COMPONENT_WITHOUT_HANDLE", {}, Code.FailedPrecondition);
+    };
+    await session.solve().catch(() => undefined); // then all updates are answered
+    const sent = server.updates.length;
+    server.on.stream = (stream) => {
+      if (stream.request.streams[0]!.session === "sessions/1") {
+        const fault = { code: Code.NotFound, reason: "SESSION_UNKNOWN", text: "There is no such session." };
+        stream.send({ case: "fault", value: fault });
+        stream.goAway(GoAwayReason.NOT_OPENED);
+        stream.queue.finish();
+      } else {
+        stream.open();
+      }
+    };
+    server.stream.queue.finish(new ConnectError("broken", Code.Unavailable));
+    await server.until(() => server.updates.length === sent + 1);
+    expect(server.creations.length).toBe(2);
+    expect(server.creations[1]!.mesh).toEqual(server.creations[0]!.mesh);
+    expect(server.creations[1]!.requestId).not.toBe(server.creations[0]!.requestId);
+    expect(session.name).toBe("sessions/2");
+    const { session: name, update } = server.updates.at(-1)!;
+    expect(name).toBe("sessions/2");
+    expect(update!.handles.map(({ name }) => name)).toEqual(["base", "tip"]);
+    expect(update!.handles[1]!.change.value).toMatchObject({
+      motion: { kind: { case: "rigid", value: { translation: { x: 3 } } } },
+    });
+    expect(update!.settings!.p!.value).toEqual({ case: "uniform", value: 1.5 });
+    server.stream.frame({ frameSeq: 1n, inputSeq: 3n });
+    expect((await next(session)).frameSeq).toBe(1);
+  });
+
+  test("is noticed by an update as well, which then comes after what was accepted", async () => {
+    const { server, session } = await begin();
+    session.setHandle("base", { vertices: [0] });
+    await server.until(() => server.updates.length === 1);
+    server.on.update = ({ session: name }) => {
+      if (name === "sessions/1") throw refusal("SESSION_UNKNOWN", {}, Code.NotFound);
+    };
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 4);
+    expect(server.updates.slice(2).map(({ session: name, update }) => [name, update!.handles[0]!.name])).toEqual([
+      ["sessions/2", "base"],
+      ["sessions/2", "tip"],
+    ]);
+    expect(server.creations.length).toBe(2);
+  });
+
+  test("by expiring is made anew", async () => {
+    const { server } = await begin();
+    server.stream.goAway(GoAwayReason.SESSION_EXPIRED);
+    server.stream.queue.finish();
+    await server.until(() => server.streams.length === 2);
+    expect(server.stream.request.streams[0]!.session).toBe("sessions/2");
+  });
+
+  test("is asked for with the same id until the server answers", async () => {
+    const { server } = await begin();
+    server.on.create = (_, count) => {
+      if (count <= 3) throw new ConnectError("starting", Code.Unavailable);
+    };
+    server.on.stream = (stream) => {
+      if (stream.request.streams[0]!.session !== "sessions/1") return;
+      stream.send({ case: "fault", value: { code: Code.NotFound, reason: "SESSION_UNKNOWN" } });
+      stream.goAway(GoAwayReason.NOT_OPENED);
+      stream.queue.finish();
+    };
+    server.stream.queue.finish(new ConnectError("broken", Code.Unavailable));
+    await server.until(() => server.creations.length === 4);
+    expect(new Set(server.creations.slice(1).map(({ requestId }) => requestId)).size).toBe(1);
+  });
+
+  test("and refuses the mesh now is the end", async () => {
+    const { server, session } = await begin();
+    server.on.create = () => {
+      throw refusal("MESH_TOO_LARGE", {});
+    };
+    server.stream.goAway(GoAwayReason.SESSION_EXPIRED);
+    server.stream.queue.finish();
+    await expect(next(session)).rejects.toMatchObject({ reason: "MESH_TOO_LARGE" });
+  });
+
+  test("was somebody else's is the end", async () => {
+    const server = new FakeServer();
+    const session = await joinWith(server.rpc(), "sessions/1", { role: "writer" });
+    opened.push(session);
+    expect(session.setHandle("tip", { vertices: [1] })).toBe(41);
+    session.poll();
+    await server.until(() => server.streams.length > 0);
+    server.stream.goAway(GoAwayReason.SESSION_EXPIRED);
+    server.stream.queue.finish();
+    await expect(next(session)).rejects.toMatchObject({ reason: "SESSION_EXPIRED" });
+  });
+});

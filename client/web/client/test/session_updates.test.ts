@@ -1,0 +1,242 @@
+import { Code, ConnectError } from "@connectrpc/connect";
+import { describe, expect, test } from "vitest";
+import { Encoding } from "../src/gen/lpdeform/v1/frame_pb.js";
+import { joinWith, openWith } from "../src/session.js";
+import { FakeServer, triangle } from "./fake_server.js";
+import { at, begin, opened, problems, refusal } from "./harness.js";
+
+describe("updates", () => {
+  test("made faster than they are taken are merged into one", async () => {
+    const { server, session } = await begin();
+    let answer = () => {};
+    server.on.update = (_, count) => (count === 1 ? new Promise<void>((resolve) => (answer = resolve)) : undefined);
+    session.setHandle("tip", { vertices: [1] });
+    for (let x = 1; x <= 50; ++x) session.move("tip", at(x));
+    await server.until(() => server.updates.length > 0);
+    answer();
+    await server.until(() => server.updates.length > 1);
+    expect(server.updates[1]!.update).toMatchObject({ inputSeq: 51n, handles: [{ name: "tip" }] });
+    expect(session.newestInput).toBe(51);
+  });
+
+  test("that are refused are reported once, with what is wrong", async () => {
+    const { server, session } = await begin();
+    server.on.update = () => {
+      throw refusal("HANDLE_VERTEX_OUT_OF_RANGE", { element: "vertex 9", limit: "index < 3" });
+    };
+    const reported = problems(session, 1);
+    session.setHandle("tip", { vertices: [9] });
+    expect((await reported)[0]).toMatchObject({
+      code: "invalid_argument",
+      reason: "HANDLE_VERTEX_OUT_OF_RANGE",
+      element: "vertex 9",
+      limit: "index < 3",
+      message: "No.",
+    });
+    expect(session.newestInput).toBe(0);
+    delete server.on.update;
+    session.setHandle("base", { vertices: [0] });
+    await server.until(() => server.updates.length > 1);
+    expect(server.updates[1]!.update!.handles.map(({ name }) => name)).toEqual(["base"]);
+  });
+
+  test("are sent again where the server is away, until it is back", async () => {
+    const { server, session } = await begin();
+    server.on.update = (_, count) => {
+      if (count <= 3) throw new ConnectError("away", Code.Unavailable);
+    };
+    session.setHandle("tip", { vertices: [1] });
+    session.move("tip", at(3));
+    await server.until(() => server.updates.length === 4);
+    expect(server.updates[3]!.update!.inputSeq).toBe(2n);
+  });
+
+  test("wait as long as a full server asks for", async () => {
+    const { server, session } = await begin();
+    server.on.update = (_, count) => {
+      if (count === 1) throw refusal("SERVER_BUSY", {}, Code.ResourceExhausted, 300);
+    };
+    const start = performance.now();
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 2);
+    expect(performance.now() - start).toBeGreaterThan(290);
+  });
+
+  test("of a writer that was replaced are void, and takeOver() makes it the writer again", async () => {
+    const { server, session } = await begin();
+    server.on.update = ({ writerToken }) => {
+      if (writerToken === "token") throw refusal("NOT_THE_WRITER", {}, Code.PermissionDenied);
+    };
+    const reported = problems(session, 1);
+    session.setHandle("tip", { vertices: [1] });
+    expect((await reported)[0]).toMatchObject({ code: "aborted", reason: "WRITER_REPLACED" });
+    expect(() => session.move("tip", at(1))).toThrow(expect.objectContaining({ reason: "NOT_THE_WRITER" }));
+    await session.takeOver();
+    expect(session.setHandle("tip", { vertices: [1] })).toBe(41);
+    await server.until(() => server.updates.at(-1)!.writerToken === "another");
+  });
+
+  test("are thrown back once closed", async () => {
+    const { session } = await begin();
+    await session.close();
+    expect(() => session.set({ p: 2 })).toThrow(expect.objectContaining({ reason: "SESSION_CLOSED" }));
+    await expect(session.solve()).rejects.toMatchObject({ reason: "SESSION_CLOSED" });
+    await expect(session.settle()).rejects.toMatchObject({ reason: "SESSION_CLOSED" });
+    await expect(session.takeOver()).rejects.toMatchObject({ reason: "SESSION_CLOSED" });
+  });
+
+  test("of a reader are thrown back", async () => {
+    const server = new FakeServer();
+    const session = await joinWith(server.rpc(), "sessions/1", {});
+    opened.push(session);
+    expect(() => session.set({ p: 2 })).toThrow(expect.objectContaining({ reason: "NOT_THE_WRITER" }));
+    await session.close();
+    expect(server.deleted).toEqual([]);
+  });
+
+  test("too large for one message go ahead in parts", async () => {
+    const server = new FakeServer();
+    const count = 200_000;
+    const mesh = { vertices: new Float32Array(3 * count).map((_, k) => k % 1000), faces: new Uint32Array([0, 1, 2]) };
+    opened.push(await openWith(server.rpc(), mesh, {}));
+    const { data } = server.creations[0]!.mesh!;
+    expect(data!.source.case).toBe("upload");
+    const sent = server.uploads.get(data!.source.value as string)!;
+    expect(sent.length).toBe(12 * count + 12);
+    expect(new Float32Array(sent.buffer, 0, 3 * count)).toEqual(mesh.vertices);
+    expect(new Uint32Array(sent.buffer, 12 * count)).toEqual(mesh.faces);
+  });
+});
+
+describe("settling", () => {
+  test("waits for the finished frame of the newest update", async () => {
+    const { server, session } = await begin();
+    session.setHandle("tip", { vertices: [1] });
+    const settled = session.settle();
+    server.stream.frame({ frameSeq: 1n, inputSeq: 0n, converged: true });
+    await server.until(() => server.acks.length === 1);
+    server.stream.frame({ frameSeq: 2n, inputSeq: 1n });
+    await server.until(() => server.acks.length === 2);
+    server.stream.frame({ frameSeq: 3n, inputSeq: 1n, converged: true });
+    expect((await settled).frameSeq).toBe(3);
+  });
+
+  test("ends with a problem, a deadline, or an abort", async () => {
+    const { server, session } = await begin();
+    const fault = {
+      code: Code.FailedPrecondition,
+      reason: "COMPONENT_WITHOUT_HANDLE",
+      element: "component 1",
+      inputSeq: 1n,
+    };
+    const settled = session.settle();
+    server.stream.send({ case: "fault", value: fault });
+    await expect(settled).rejects.toMatchObject({
+      reason: "COMPONENT_WITHOUT_HANDLE",
+      element: "component 1",
+      inputSeq: 1,
+    });
+    await expect(session.settle({ timeoutMs: 20 })).rejects.toMatchObject({
+      code: "deadline_exceeded",
+      reason: "NO_FRAME",
+    });
+    await expect(session.settle({ signal: AbortSignal.abort() })).rejects.toMatchObject({ code: "cancelled" });
+  });
+});
+
+describe("solving", () => {
+  const summary = {
+    case: "summary",
+    value: { energy: 3, iterations: 5, inputSeq: 2n, certificate: { relativeGap: 0.5 } },
+  } as const;
+  const frame = {
+    case: "frame",
+    value: {
+      header: { vertexCount: 3, frameSeq: 1n, encoding: Encoding.RAW },
+      frameSeq: 1n,
+      vertexCount: 3,
+      last: true,
+      positions: new Uint8Array(36),
+      distortion: new Uint8Array(12),
+    },
+  } as const;
+
+  test("takes along what waits and gives the result", async () => {
+    const { server, session } = await begin();
+    server.on.solve = async function* () {
+      yield { message: { case: "progress", value: { iteration: 1, energy: 9, seconds: 0.5 } } };
+      yield { message: summary };
+      yield { message: { case: "trace", value: { records: [{ iteration: 1, energy: 9, objective: 4 }] } } };
+      yield { message: frame };
+    };
+    const progress: number[] = [];
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 1);
+    const solving = session.solve({ certify: true, trace: true, onProgress: ({ energy }) => progress.push(energy) });
+    session.move("tip", at(1));
+    const result = await solving;
+    expect(result).toMatchObject({ energy: 3, iterations: 5, optimalityGap: 0.5, inputSeq: 2 });
+    expect(result.positions.length).toBe(9);
+    expect(result.trace).toMatchObject([{ iteration: 1, energy: 9, objective: 4 }]);
+    expect(progress).toEqual([9]);
+    expect(server.solves[0]).toMatchObject({ certify: true, trace: true, progress: true });
+  });
+
+  test("begins again where the server went away, and where it lost the session", async () => {
+    const { server, session } = await begin();
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 1);
+    server.on.solve = async function* ({ session: name }) {
+      if (server.solves.length === 1) throw new ConnectError("away", Code.Unavailable);
+      if (name === "sessions/1") throw refusal("SESSION_UNKNOWN", {}, Code.NotFound);
+      yield { message: summary };
+      yield { message: frame };
+    };
+    expect((await session.solve()).energy).toBe(3);
+    expect(session.name).toBe("sessions/2");
+    expect(server.updates.at(-1)!.session).toBe("sessions/2");
+  });
+
+  test("ends with what the server refuses, a result without positions, or an abort", async () => {
+    const { server, session } = await begin();
+    server.on.solve = async function* () {
+      throw refusal("NO_HANDLES", {}, Code.FailedPrecondition);
+    };
+    await expect(session.solve()).rejects.toMatchObject({ code: "failed_precondition", reason: "NO_HANDLES" });
+    server.on.solve = async function* () {
+      yield { message: summary };
+    };
+    await expect(session.solve()).rejects.toMatchObject({ code: "data_loss" });
+    server.on.solve = async function* (_, { signal }) {
+      await new Promise((resolve) => signal.addEventListener("abort", resolve));
+      yield { message: summary };
+    };
+    const abort = new AbortController();
+    const solving = session.solve({ signal: abort.signal });
+    await server.until(() => server.solves.length === 3);
+    abort.abort();
+    await expect(solving).rejects.toMatchObject({ code: "cancelled" });
+    await expect(session.solve({ deadlineMs: 30 })).rejects.toMatchObject({ code: "deadline_exceeded" });
+  });
+});
+
+describe("opening", () => {
+  test("says what is wrong with the mesh", async () => {
+    const server = new FakeServer();
+    const halves = { vertices: [0, 0, 0, 1], faces: [0, 0, 0] };
+    await expect(openWith(server.rpc(), halves, {})).rejects.toMatchObject({
+      reason: "MESH_SIZE",
+      element: "vertices",
+    });
+    await expect(openWith(server.rpc(), { ...triangle, faces: [0, 1] }, {})).rejects.toMatchObject({
+      element: "faces",
+    });
+    server.on.create = () => {
+      throw refusal("MESH_NOT_FINITE", { element: "vertex 1" });
+    };
+    await expect(openWith(server.rpc(), triangle, {})).rejects.toMatchObject({
+      reason: "MESH_NOT_FINITE",
+      element: "vertex 1",
+    });
+  });
+});
