@@ -34,8 +34,8 @@ const restIntervalMs = 10_000;
 /**
  * The frames of all sessions of a page on one stream. Over plain HTTP a browser has six connections to an origin, for all its
  * tabs together; a stream holds one of them for as long as it lives. So a page that is hidden, and for which nothing is under
- * way, lets its stream rest until it is seen again or has an update. A session that comes along makes the stream be opened
- * anew, with the newest frame of each first; one that goes away leaves it as it is.
+ * way, lets its stream rest until it is seen again or has an update. A session that comes along or goes away makes
+ * the stream be opened anew, with the newest frame of each first.
  */
 export class StreamHub {
   readonly #streams = new Set<SharedStream>();
@@ -162,6 +162,16 @@ class SharedStream {
 
   add(lane: Lane): void {
     this.lanes.add(lane);
+    this.#openAnew();
+  }
+
+  remove(lane: Lane): void {
+    if (!this.lanes.delete(lane)) return;
+    if (this.lanes.size === 0) this.#end();
+    else this.#openAnew();
+  }
+
+  #openAnew(): void {
     if (this.#isOpening) return;
     this.#isOpening = true;
     queueMicrotask(() => {
@@ -169,10 +179,6 @@ class SharedStream {
       this.#isResting = false;
       if (this.lanes.size > 0) void this.#run();
     });
-  }
-
-  remove(lane: Lane): void {
-    if (this.lanes.delete(lane) && this.lanes.size === 0) this.#end();
   }
 
   #end(): void {

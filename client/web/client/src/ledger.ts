@@ -10,7 +10,8 @@ const resizeHandle = "resize";
 
 /** `newer` on top of `older`: the newest value of each handle and setting wins; a motion moves a handle that `older` adds. */
 export function merged(older: Update, newer: Update): Update {
-  const handles: Record<string, HandleChange> = { ...older.handles };
+  // Without a prototype, so that a handle may have any name.
+  const handles: Record<string, HandleChange> = Object.assign(Object.create(null), older.handles);
   const settings: Settings = { ...older.settings };
   let resize = older.resize;
   if (newer.handles?.[resizeHandle]) resize = undefined;
@@ -32,7 +33,7 @@ export function merged(older: Update, newer: Update): Update {
 /** What is there once motions and removals have been carried out. */
 function settled(state: Update): Update {
   const kept = Object.entries(state.handles ?? {}).filter(([, change]) => "set" in change);
-  return { ...state, handles: Object.fromEntries(kept) };
+  return { ...state, handles: Object.assign(Object.create(null), Object.fromEntries(kept)) };
 }
 
 function isMovesOnly({ update }: NumberedUpdate): boolean {

@@ -44,6 +44,7 @@ export class Link {
   #requestId = newRequestId();
   #making: Promise<void> | undefined;
   #downSince: number | undefined;
+  #over: LpdeformError | undefined; // nothing is tried any more, for this reason
   readonly #backoff = new Backoff();
   readonly #quiet = new Set<() => void>();
 
@@ -72,6 +73,7 @@ export class Link {
 
   update(update: Update): number {
     if (this.isClosed) throw sessionClosed();
+    if (this.#over) throw this.#over;
     if (!this.#lease.writerToken) {
       throw new LpdeformError("failed_precondition", "A reader cannot change the session: takeOver() first.", {
         reason: "NOT_THE_WRITER",
@@ -113,6 +115,7 @@ export class Link {
     this.#lease = lease;
     this.ledger.countFrom(lease.inputSeq);
     this.box.beginEpoch(lease.epoch);
+    this.#over = undefined;
     this.box.resume();
     this.#send();
   }
@@ -173,6 +176,7 @@ export class Link {
   }
 
   #giveUp(why: LpdeformError): void {
+    this.#over = why;
     this.ledger.dropUnaccepted();
     this.#isStreaming = false;
     this.#setConnection("closed");

@@ -80,7 +80,7 @@ export class Session implements AsyncIterable<Frame> {
 
   /**
    * Sends a change and returns its number: a frame whose inputSeq is at least that takes it into account. What the server
-   * refuses comes as a "problem", once; the session goes on without it. Throws once closed, or for a reader.
+   * refuses comes as a "problem", once; the session goes on without it. Throws once closed or over, or for a reader.
    */
   update(update: Update): number {
     return this.#link.update(update);

@@ -35,6 +35,17 @@ describe("merging", () => {
     expect(merged(resized, { handles: { resize: { remove: true } } }).resize).toBeUndefined();
   });
 
+  test("goes by names, whatever they are", () => {
+    const ledger = new Ledger();
+    ledger.add({ handles: { ["__proto__"]: { set: { vertices: [1] } } } });
+    ledger.add({ handles: { ["__proto__"]: { move: at(1) }, constructor: { move: at(2) } } });
+    ledger.accept(ledger.sendNext().seq);
+    ledger.sessionLost();
+    expect(Object.entries(ledger.sendNext().update.handles!)).toEqual([
+      ["__proto__", { set: { vertices: [1], motion: at(1) } }],
+    ]);
+  });
+
   test("leaves what it is given as it was", () => {
     const older = { handles: { tip: { move: at(1) } }, settings: { p: 1 } };
     merged(older, { handles: { tip: { move: at(2) } }, settings: { p: 2 } });

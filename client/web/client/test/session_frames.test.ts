@@ -105,6 +105,9 @@ describe("frames", () => {
     expect((await next(session)).frameSeq).toBe(4);
     await server.until(() => server.acks.length > 0);
     expect(server.acks.every(({ streamId }) => streamId === "stream2.1")).toBe(true);
+    await other.close();
+    await server.until(() => server.streams.length === 3);
+    expect(server.stream.request.streams.map(({ session: name }) => name)).toEqual([session.name]);
   });
 });
 

@@ -81,6 +81,8 @@ describe("a stream that ends", () => {
     });
     expect(() => session.poll()).toThrow(expect.objectContaining({ reason: "SESSION_DELETED" }));
     expect(session.connection).toBe("closed");
+    expect(() => session.set({ p: 2 })).toThrow(expect.objectContaining({ reason: "SESSION_DELETED" }));
+    expect(server.updates).toEqual([]);
   });
 
   test("for a fault of ours is the end", async () => {
