@@ -1,13 +1,45 @@
-import { openSession } from "lpdeform-client";
+import "./style/base.css";
+import "./style/chrome.css";
+import "./style/panel.css";
+import { App } from "./app/app.js";
+import { startCertifier } from "./app/certifier.js";
+import { Files } from "./app/files.js";
+import { startShortcuts } from "./app/shortcuts.js";
+import { exposeForTests } from "./app/testing.js";
+import { dock } from "./ui/dock.js";
+import { helpSheet } from "./ui/help.js";
+import { legend } from "./ui/legend.js";
+import { messages } from "./ui/messages.js";
+import { sidePanel } from "./ui/sidepanel.js";
+import { startTheme } from "./ui/theme.js";
+import { toolbar } from "./ui/toolbar.js";
+import { topbar } from "./ui/topbar.js";
 
-// A square of four triangles whose middle is lifted.
-const mesh = {
-  vertices: new Float32Array([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0.5, 0.5, 0]),
-  faces: new Uint32Array([0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4]),
-};
-const app = document.querySelector<HTMLElement>("#app")!;
-const session = await openSession(mesh, { settings: { p: 1.5 } });
-session.setHandles({ rim: { vertices: [0, 1, 3] }, middle: { vertices: [4], motion: { translation: [0, 0, 0.5] } } });
-for await (const frame of session) {
-  app.textContent = `${frame.positions.length / 3} vertices, energy ${frame.energy}, converged ${frame.converged}`;
-}
+const app = new App();
+const files = new Files(app);
+const help = helpSheet();
+const dropHere = document.createElement("div");
+dropHere.className = "drop-here";
+dropHere.textContent = "Drop a mesh or a handle file";
+document.querySelector("#app")!.append(
+  topbar(app, files, () => help.showModal()),
+  app.stages,
+  toolbar(app),
+  legend(app),
+  dock(app),
+  messages(app),
+  sidePanel(app),
+  help,
+  dropHere,
+);
+startTheme(app);
+startShortcuts(app, files, help);
+startCertifier(app);
+exposeForTests(app);
+
+// ?shape=sheet&detail=fine&encoding=float32 for links to a state of the page.
+const asked = new URLSearchParams(location.search);
+const detail = asked.get("detail");
+const encoding = asked.get("encoding");
+if (encoding === "float32" || encoding === "quantized" || encoding === "compressed") app.view.set({ encoding });
+app.openShape(asked.get("shape") ?? "creature", detail === "coarse" || detail === "fine" ? detail : "medium");

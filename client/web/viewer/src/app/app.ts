@@ -1,0 +1,253 @@
+import type { LpdeformError, MeshReport } from "lpdeform-client";
+import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
+import { type Document, emptyDocument, handleOf } from "../model/document.js";
+import { History } from "../model/history.js";
+import { boundsOf, type Mesh } from "../model/mesh.js";
+import { type Detail, shapeKinds } from "../model/shapes.js";
+import { State } from "../model/state.js";
+import { firstView, type View } from "../model/view.js";
+import { say, type Status } from "../link/status.js";
+import { Editing } from "./editing.js";
+import { Pane } from "./pane.js";
+
+/** What the page shows beside the pictures. */
+export interface Facts {
+  document: Document;
+  mesh: Mesh;
+  report: MeshReport | undefined;
+  status: Status;
+  /** Why the newest change cannot be shown. */
+  problem: LpdeformError | undefined;
+  /** One line that goes by itself. */
+  notice: { text: string; isBad: boolean } | undefined;
+  /** Vertices that a brush or a warning points out. */
+  pointedOut: readonly number[];
+  canUndo: boolean;
+  canRedo: boolean;
+}
+
+const noMesh: Mesh = { name: "", positions: new Float32Array(0), faces: new Uint32Array(0) };
+
+/** The page's one object: the work, how it is looked at, the panes; and the loop that draws them. */
+export class App {
+  readonly view = new State<View>(firstView);
+  readonly facts: State<Facts>;
+  readonly history = new History<Document>(emptyDocument);
+  readonly stages = document.createElement("div");
+  panes: Pane[] = [];
+  adjacency: Adjacency = adjacencyOf(0, noMesh.faces);
+  diagonal = 1;
+  edge = 0;
+  /** Called after each picture that was drawn. */
+  readonly afterDrawing = new Set<(now: number) => void>();
+  #asked = 0;
+  #lastMove = 0;
+  #resting: ReturnType<typeof setTimeout> | undefined;
+  #needsColours = true;
+  #needsMarks = true;
+
+  constructor() {
+    this.facts = new State<Facts>({
+      document: emptyDocument,
+      mesh: noMesh,
+      report: undefined,
+      status: say("idle", ""),
+      problem: undefined,
+      notice: undefined,
+      pointedOut: [],
+      canUndo: false,
+      canRedo: false,
+    });
+    this.stages.className = "stages";
+    this.#addPane("first");
+    this.view.watch((view, before) => this.#viewChanged(view, before));
+    this.facts.watch((facts, before) => {
+      if (facts.pointedOut !== before.pointedOut) this.#needsMarks = true;
+      this.requestDraw();
+    });
+    new ResizeObserver(() => this.requestDraw()).observe(this.stages);
+  }
+
+  get document(): Document {
+    return this.history.present;
+  }
+
+  get mesh(): Mesh {
+    return this.facts.now.mesh;
+  }
+
+  // The work.
+
+  openShape(id: string, detail: Detail): void {
+    const kind = shapeKinds.find((shape) => shape.id === id) ?? shapeKinds[0]!;
+    const { mesh, document, first } = kind.make(detail);
+    const { p, secondP } = this.document;
+    this.open(mesh, { ...document, p, secondP });
+    this.view.set({ shape: kind.id, detail, selected: first, tool: "move", isYUp: false, pinned: undefined });
+  }
+
+  open(mesh: Mesh, document: Document): void {
+    this.history.reset(document);
+    this.adjacency = adjacencyOf(mesh.positions.length / 3, mesh.faces);
+    this.edge = meanEdge(this.adjacency, mesh.positions);
+    this.diagonal = boundsOf(mesh.positions).diagonal;
+    this.view.set({ selected: undefined, shape: "", pinned: undefined });
+    this.facts.set({ mesh, report: undefined, problem: undefined, pointedOut: [] });
+    for (const pane of this.panes) pane.open(mesh, document, this.view.now);
+    this.#documentChanged(performance.now());
+    this.fit();
+  }
+
+  /** A step that can be undone. */
+  change(document: Document): void {
+    this.history.push(document);
+    this.#documentChanged(performance.now());
+  }
+
+  /** Part of a gesture, made by an input at `time`; endGesture() makes a step of it. */
+  during(document: Document, time: number): void {
+    this.history.during(document);
+    this.#documentChanged(time);
+  }
+
+  endGesture(): void {
+    this.history.end();
+    this.#documentChanged(performance.now());
+  }
+
+  undo(): void {
+    if (this.history.undo()) this.#documentChanged(performance.now());
+  }
+
+  redo(): void {
+    if (this.history.redo()) this.#documentChanged(performance.now());
+  }
+
+  notify(text: string, isBad = false): void {
+    this.facts.set({ notice: { text, isBad } });
+  }
+
+  fit(): void {
+    const [first] = this.panes;
+    const shown = first?.frame?.positions ?? this.mesh.positions;
+    for (const pane of this.panes) pane.stage.fit(shown, this.view.now.isYUp);
+  }
+
+  // The panes.
+
+  /** The distortion in full red: the same in both panes, so that they can be compared. */
+  get red(): number {
+    const red = this.view.now.pinned ?? Math.max(...this.panes.map((pane) => pane.statistics.red));
+    // What rounding leaves of a surface at rest is no distortion.
+    const { p, isAutomatic } = this.document;
+    return red > (1e-8 * this.diagonal) ** (isAutomatic ? 2 : p) ? red : 0;
+  }
+
+  requestDraw(): void {
+    this.#asked ||= requestAnimationFrame((now) => this.#draw(now));
+  }
+
+  #draw(now: number): void {
+    this.#asked = 0;
+    let isNew = false;
+    for (const pane of this.panes) {
+      pane.shown(now);
+      isNew = pane.takeFrame() || isNew;
+    }
+    if (isNew) this.#moved(now);
+    if (isNew || this.#needsColours) for (const pane of this.panes) pane.colour(this.document, this.view.now, this.red);
+    this.#needsColours = false;
+    if (this.#needsMarks) this.#mark();
+    const isMoving = now - this.#lastMove < 250;
+    for (const pane of this.panes) pane.draw(isMoving);
+    for (const after of this.afterDrawing) after(now);
+    if (this.panes.some((pane) => pane.isWaitingForScreen)) this.requestDraw();
+  }
+
+  /** The picture is coarser while it moves, where drawing is slow, and fine again after. */
+  #moved(now: number): void {
+    this.#lastMove = now;
+    clearTimeout(this.#resting);
+    this.#resting = setTimeout(() => this.requestDraw(), 300);
+  }
+
+  #mark(): void {
+    this.#needsMarks = false;
+    const { pointedOut, document } = this.facts.now;
+    const { tool, isDark, selected, gizmo } = this.view.now;
+    const colour = tool === "paint" ? "#ffffff" : isDark ? "#ffe066" : "#d6006d";
+    const handle = handleOf(document, selected);
+    const pose = tool === "move" && handle && !handle.isLocked && !handle.targets ? handle.pose : undefined;
+    for (const pane of this.panes) {
+      pane.mark(document, this.view.now, pointedOut, colour);
+      pane.stage.gizmo.show(pose, gizmo);
+    }
+  }
+
+  #addPane(side: "first" | "second"): void {
+    const pane = new Pane(side, {
+      changed: () => {
+        this.#follow(pane);
+        this.requestDraw();
+      },
+      status: () => this.#statusChanged(),
+      report: (report) => this.facts.set({ report }),
+      problem: (problem) => this.facts.set({ problem }),
+    });
+    new Editing(this, pane);
+    pane.stage.startControls();
+    this.panes.push(pane);
+    this.stages.append(pane.element);
+    if (this.mesh === noMesh) return;
+    pane.open(this.mesh, this.document, this.view.now);
+    pane.stage.lookAs(this.panes[0]!.stage);
+  }
+
+  /** The other pane looks the same way. */
+  #follow(pane: Pane): void {
+    if (!this.panes.includes(pane) || !this.stages.contains(document.activeElement)) return;
+    if (document.activeElement !== pane.stage.canvas) return;
+    for (const other of this.panes) {
+      if (other === pane) continue;
+      other.stage.lookAs(pane.stage);
+      other.invalidate();
+    }
+  }
+
+  /** The worst of the panes'. */
+  #statusChanged(): void {
+    const order = ["refused", "full", "draining", "away", "opening", "idle", "live"];
+    const [worst] = this.panes.map(({ status }) => status).sort((a, b) => order.indexOf(a.kind) - order.indexOf(b.kind));
+    this.facts.set({ status: worst! });
+  }
+
+  #viewChanged(view: View, before: View): void {
+    if (view.isSplit !== before.isSplit) {
+      if (view.isSplit) this.#addPane("second");
+      else this.panes.pop()?.close();
+      this.stages.classList.toggle("split", view.isSplit);
+      this.#statusChanged();
+      this.#needsMarks = true;
+    }
+    if (view.encoding !== before.encoding) for (const pane of this.panes) pane.open(this.mesh, this.document, view);
+    if (view.isYUp !== before.isYUp) this.fit();
+    this.#needsColours = this.#needsMarks = true;
+    this.requestDraw();
+  }
+
+  #documentChanged(time: number): void {
+    const { document, history } = this;
+    const { selected } = this.view.now;
+    const before = this.facts.now.document;
+    if (document.handles !== before.handles) this.#needsMarks = true;
+    if (document !== before) this.#needsColours = true;
+    for (const pane of this.panes) {
+      pane.live?.show(document, time);
+      const p = pane.side === "first" ? document.p : document.secondP;
+      pane.element.dataset["label"] = document.isAutomatic ? "p from the shape" : `p = ${p}`;
+    }
+    this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem: undefined });
+    if (selected !== undefined && !handleOf(document, selected)) this.view.set({ selected: undefined });
+    this.requestDraw();
+  }
+}

@@ -1,0 +1,207 @@
+import { addHandle, changeHandle, extendHandle, type Handle, handleOf, ownersOf, paint, releaseVertices } from "../model/document.js";
+import type { Vector3 } from "../model/mesh.js";
+import { add, type Pose, subtract } from "../model/pose.js";
+import { boxPolygon, dab, facing, insidePolygon, project } from "../model/selection.js";
+import { vertexNormals } from "../stage/drawmesh.js";
+import { onPlane, type PointerAt, Pointing, type PointingTarget, type Stroke, viewProjection } from "../stage/pointing.js";
+import type { App } from "./app.js";
+import type { Pane } from "./pane.js";
+
+/** The tools: what pointing at a pane does to the work. */
+export class Editing implements PointingTarget {
+  readonly #pointing: Pointing;
+
+  constructor(
+    readonly app: App,
+    readonly pane: Pane,
+  ) {
+    const { gizmo } = pane.stage;
+    gizmo.onPose = (pose) => this.#pose(pose);
+    gizmo.onEnd = () => app.endGesture();
+    this.#pointing = new Pointing(pane.stage, this);
+    const setViewOnly = (event: KeyboardEvent, isDown: boolean) => {
+      if (event.code === "Space") this.#pointing.isViewOnly = isDown;
+      if (event.code === "Escape" && isDown) this.#pointing.cancel();
+    };
+    window.addEventListener("keydown", (event) => setViewOnly(event, true));
+    window.addEventListener("keyup", (event) => setViewOnly(event, false));
+  }
+
+  press(at: PointerAt): Stroke | undefined {
+    switch (this.app.view.now.tool) {
+      case "move":
+        return this.#pressHandle(at);
+      case "brush":
+      case "paint":
+        return at.hit && this.#brushStroke(at);
+      case "lasso":
+        return this.#outlineStroke(at, (outline) => outline);
+      case "box":
+        return this.#outlineStroke(at, (outline) => boxPolygon(at.x, at.y, outline.at(-2)!, outline.at(-1)!));
+    }
+  }
+
+  /** With the tool that moves: a new handle on the surface; beside it, nothing is selected any more. */
+  click(at: PointerAt): void {
+    const { app } = this;
+    if (app.view.now.tool !== "move") return;
+    if (!at.hit) return app.view.set({ selected: undefined });
+    this.#select(this.#dabAt(at), at.shift ? "add" : app.view.now.mode);
+  }
+
+  hover(at: PointerAt | undefined): void {
+    const { tool } = this.app.view.now;
+    if (tool !== "brush" && tool !== "paint") return;
+    this.app.facts.set({ pointedOut: at?.hit ? this.#dabAt(at) : [] });
+  }
+
+  #dabAt({ hit }: PointerAt): number[] {
+    const { app, pane } = this;
+    const radius = app.view.now.radius * app.diagonal;
+    return dab(pane.stage.surface!.positions, app.adjacency, hit!.vertex, hit!.point, radius);
+  }
+
+  #pressHandle(at: PointerAt): Stroke | undefined {
+    const handle = this.#handleAt(at);
+    if (!handle) return undefined;
+    this.app.view.set({ selected: handle.name });
+    if (handle.isLocked) {
+      this.app.notify(`“${handle.name}” is locked: its padlock in the list lets it move.`);
+      return undefined;
+    }
+    return this.#drag(handle, at);
+  }
+
+  /** The handle whose vertices are in the face that is pointed at, or near by on the screen, for fingers. */
+  #handleAt(at: PointerAt): Handle | undefined {
+    const { app, pane } = this;
+    const { hit } = at;
+    const owners = ownersOf(app.document);
+    if (hit) {
+      const face = app.mesh.faces.subarray(3 * hit.face, 3 * hit.face + 3);
+      const owner = owners.get(hit.vertex) ?? [...face].map((vertex) => owners.get(vertex)).find((one) => one);
+      if (owner) return owner;
+    }
+    const { surface, width, height } = pane.stage;
+    if (!surface) return undefined;
+    const screen = project(surface.positions, viewProjection(pane.stage), width, height);
+    let least = at.isTouch ? 18 : 7;
+    let nearest: Handle | undefined;
+    for (const [vertex, handle] of owners) {
+      const far = Math.hypot(screen[2 * vertex]! - at.x, screen[2 * vertex + 1]! - at.y);
+      const isHidden = hit && distanceTo(at, surface.positions, vertex) > hit.distance + 0.02 * app.diagonal;
+      if (isHidden || !(far < least)) continue;
+      least = far;
+      nearest = handle;
+    }
+    return nearest;
+  }
+
+  /** In the plane that faces the eye. */
+  #drag(handle: Handle, start: PointerAt): Stroke {
+    const { app, pane } = this;
+    const grip = start.hit?.point ?? add(handle.pose.center, handle.pose.translation);
+    const from = onPlane(pane.stage, start.ray, grip) ?? grip;
+    const { name } = handle;
+    const show = (delta: Vector3, time: number) => {
+      const change: Partial<Handle> = handle.targets
+        ? { targets: handle.targets.map((value, k) => value + delta[k % 3]!) }
+        : { pose: { ...handle.pose, translation: add(handle.pose.translation, delta) } };
+      app.during(changeHandle(app.document, name, change), time);
+    };
+    return {
+      move: (at) => {
+        const to = onPlane(pane.stage, at.ray, grip);
+        if (to) show(subtract(to, from), at.time);
+      },
+      end: () => app.endGesture(),
+      cancel: () => {
+        show([0, 0, 0], performance.now());
+        app.endGesture();
+      },
+    };
+  }
+
+  #pose(pose: Pose): void {
+    const { app } = this;
+    const { selected } = app.view.now;
+    if (selected !== undefined) app.during(changeHandle(app.document, selected, { pose }), performance.now());
+  }
+
+  #brushStroke(start: PointerAt): Stroke {
+    const { app } = this;
+    const touched = new Set<number>();
+    const touch = (at: PointerAt) => {
+      if (!at.hit) return;
+      for (const vertex of this.#dabAt(at)) touched.add(vertex);
+      app.facts.set({ pointedOut: [...touched] });
+    };
+    touch(start);
+    return {
+      move: touch,
+      end: () => {
+        app.facts.set({ pointedOut: [] });
+        if (app.view.now.tool === "paint") this.#paint([...touched]);
+        else this.#select([...touched], modeOf(start, app));
+      },
+      cancel: () => app.facts.set({ pointedOut: [] }),
+    };
+  }
+
+  #paint(vertices: number[]): void {
+    const { app } = this;
+    const { paintField, paintP, paintStiffness } = app.view.now;
+    const value = paintField === "p" ? paintP : paintStiffness;
+    app.change(paint(app.document, paintField, vertices, value, app.mesh.positions.length / 3));
+    app.view.set({ colourBy: paintField });
+  }
+
+  #outlineStroke(start: PointerAt, toPolygon: (outline: number[]) => number[]): Stroke {
+    const { pane } = this;
+    const outline = [start.x, start.y];
+    return {
+      move: (at) => {
+        outline.push(at.x, at.y);
+        pane.overlay.show(toPolygon(outline));
+      },
+      end: () => {
+        pane.overlay.show([]);
+        const vertices = this.#inside(toPolygon(outline));
+        if (vertices.length > 0) this.#select(vertices, modeOf(start, this.app));
+        else this.app.notify("No vertex lies inside: draw around a part of the surface.");
+      },
+      cancel: () => pane.overlay.show([]),
+    };
+  }
+
+  #inside(polygon: readonly number[]): number[] {
+    const { stage } = this.pane;
+    const { positions, mesh } = stage.surface!;
+    const inside = insidePolygon(project(positions, viewProjection(stage), stage.width, stage.height), polygon);
+    if (this.app.view.now.isThrough) return inside;
+    return facing(inside, positions, vertexNormals(positions, mesh.faces), stage.camera.position.toArray());
+  }
+
+  #select(vertices: readonly number[], mode: "new" | "add" | "release"): void {
+    const { app } = this;
+    const rest = app.mesh.positions;
+    const before = app.document;
+    const { selected } = app.view.now;
+    if (mode === "release") return app.change(releaseVertices(before, vertices, rest));
+    if (mode === "add" && handleOf(before, selected)) return app.change(extendHandle(before, selected!, vertices, rest));
+    const after = addHandle(before, vertices, rest, {}, this.pane.stage.surface!.positions);
+    if (after === before) return app.notify("Another handle holds these vertices already.");
+    app.change(after);
+    app.view.set({ selected: after.handles.at(-1)!.name });
+  }
+}
+
+function modeOf(at: PointerAt, app: App): "new" | "add" | "release" {
+  if (at.shift) return "add";
+  return at.alt ? "release" : app.view.now.mode;
+}
+
+function distanceTo(at: PointerAt, positions: Float32Array, vertex: number): number {
+  const { origin } = at.ray;
+  return Math.hypot(positions[3 * vertex]! - origin.x, positions[3 * vertex + 1]! - origin.y, positions[3 * vertex + 2]! - origin.z);
+}

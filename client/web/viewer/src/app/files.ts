@@ -1,0 +1,127 @@
+import { FileFault } from "../io/fault.js";
+import { readHandleFile, writeHandleFile } from "../io/handlefile.js";
+import { writeObj } from "../io/obj.js";
+import { writeOff } from "../io/off.js";
+import { writePly } from "../io/ply.js";
+import { readMesh } from "../io/read.js";
+import { writeStl } from "../io/stl.js";
+import { emptyDocument } from "../model/document.js";
+import type { Mesh } from "../model/mesh.js";
+import { legendCanvas } from "../ui/legend.js";
+import type { App } from "./app.js";
+
+export type MeshFormat = "ply" | "obj" | "off" | "stl";
+
+/** What comes from files and goes into them. */
+export class Files {
+  readonly #input = document.createElement("input");
+
+  constructor(readonly app: App) {
+    this.#input.type = "file";
+    this.#input.accept = ".off,.obj,.ply,.stl,.json";
+    this.#input.multiple = true;
+    this.#input.addEventListener("change", () => {
+      void this.open([...(this.#input.files ?? [])]);
+      this.#input.value = "";
+    });
+    this.#takeDrops();
+  }
+
+  choose(): void {
+    this.#input.click();
+  }
+
+  /** Meshes before handle files, so that both can be dropped together. */
+  async open(files: readonly File[]): Promise<void> {
+    const isHandles = (file: File) => file.name.toLowerCase().endsWith(".json");
+    const sorted = [...files].sort((a, b) => Number(isHandles(a)) - Number(isHandles(b)));
+    for (const file of sorted) {
+      try {
+        if (isHandles(file)) this.#openHandles(file.name, await file.text());
+        else this.#openMesh(file.name, new Uint8Array(await file.arrayBuffer()));
+      } catch (error) {
+        if (!(error instanceof FileFault)) throw error;
+        this.app.notify(error.message, true);
+        return;
+      }
+    }
+  }
+
+  exportMesh(format: MeshFormat): void {
+    for (const { stage, distortion, side } of this.app.panes) {
+      const { positions, mesh } = stage.surface!;
+      const deformed: Mesh = { ...mesh, positions };
+      const name = `${this.#stem}-deformed${this.app.panes.length > 1 ? `-${side}` : ""}.${format}`;
+      if (format === "ply") save(name, writePly(deformed, distortion, this.app.red));
+      if (format === "obj") save(name, writeObj(deformed));
+      if (format === "off") save(name, writeOff(deformed));
+      if (format === "stl") save(name, writeStl(deformed));
+    }
+  }
+
+  /** What the panes show, with the legend, on the page's background. */
+  exportPicture(): void {
+    const pictures = this.app.panes.map(({ stage }) => stage.picture());
+    const canvas = document.createElement("canvas");
+    canvas.width = pictures.reduce((sum, picture) => sum + picture.width, 0);
+    canvas.height = pictures[0]!.height;
+    const context = canvas.getContext("2d")!;
+    context.fillStyle = getComputedStyle(document.body).backgroundColor;
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    let left = 0;
+    for (const picture of pictures) {
+      context.drawImage(picture, left, 0);
+      left += picture.width;
+    }
+    const legend = legendCanvas(this.app, canvas.width / this.app.stages.clientWidth);
+    if (legend) context.drawImage(legend, 0, canvas.height - legend.height);
+    canvas.toBlob((blob) => blob && save(`${this.#stem}.png`, blob));
+  }
+
+  saveHandles(): void {
+    save(`${this.#stem}-handles.json`, writeHandleFile(this.app.document, this.app.mesh.name));
+  }
+
+  get #stem(): string {
+    return this.app.mesh.name.replace(/\.[^.]*$/, "") || "mesh";
+  }
+
+  #openMesh(name: string, bytes: Uint8Array): void {
+    const mesh = readMesh(name, bytes);
+    const { p, secondP } = this.app.document;
+    this.app.open(mesh, { ...emptyDocument, p, secondP });
+    this.app.view.set({ tool: "move" });
+    this.app.notify(`${name}: ${(mesh.positions.length / 3).toLocaleString("en")} vertices. Click the surface to place handles.`);
+  }
+
+  #openHandles(name: string, text: string): void {
+    const { app } = this;
+    app.change(readHandleFile(text, app.document, app.mesh));
+    app.view.set({ selected: app.document.handles.at(-1)!.name });
+    app.notify(`${name}: ${app.document.handles.length} handles.`);
+  }
+
+  #takeDrops(): void {
+    const { classList } = document.body;
+    document.addEventListener("dragover", (event) => {
+      event.preventDefault();
+      classList.add("dropping");
+    });
+    document.addEventListener("dragleave", (event) => {
+      if (event.relatedTarget === null) classList.remove("dropping");
+    });
+    document.addEventListener("drop", (event) => {
+      event.preventDefault();
+      classList.remove("dropping");
+      void this.open([...(event.dataTransfer?.files ?? [])]);
+    });
+  }
+}
+
+function save(name: string, content: Blob | string | Uint8Array<ArrayBuffer>): void {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(content instanceof Blob ? content : new Blob([content]));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}

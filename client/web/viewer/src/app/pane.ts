@@ -1,0 +1,147 @@
+import type { Frame, LpdeformError, MeshReport, SolveResult } from "lpdeform-client";
+import { Live, type LiveWatcher } from "../link/live.js";
+import { say, type Status } from "../link/status.js";
+import type { Side } from "../model/changes.js";
+import { type Document, pField } from "../model/document.js";
+import type { Mesh } from "../model/mesh.js";
+import { type EnergyStatistics, energyStatistics } from "../model/statistics.js";
+import type { View } from "../model/view.js";
+import { Overlay } from "../stage/overlay.js";
+import { Stage } from "../stage/stage.js";
+import type { Scale } from "../stage/surface.js";
+import { EnergyTrail } from "./energy_trail.js";
+
+export interface PaneWatcher {
+  changed(): void;
+  status(status: Status): void;
+  report(report: MeshReport): void;
+  problem(error: LpdeformError): void;
+}
+
+const nothing: EnergyStatistics = { max: 0, red: 0, top5Share: 0 };
+
+/** One of the pictures side by side: a stage, and the session that feeds it. */
+export class Pane {
+  readonly element = document.createElement("div");
+  readonly stage: Stage;
+  readonly overlay = new Overlay();
+  readonly trail = new EnergyTrail();
+  live: Live | undefined;
+  frame: Frame | undefined;
+  statistics = nothing;
+  result: SolveResult | undefined;
+  #isDirty = true;
+  #onScreenNext: Frame | undefined;
+
+  constructor(
+    readonly side: Side,
+    readonly watcher: PaneWatcher,
+  ) {
+    this.element.className = "pane";
+    this.stage = new Stage(() => {
+      this.#isDirty = true;
+      watcher.changed();
+    });
+    this.element.append(this.stage.canvas, this.overlay.element);
+  }
+
+  open(mesh: Mesh, document: Document, view: View): void {
+    this.live?.close();
+    this.stage.open(mesh);
+    this.frame = this.result = this.#onScreenNext = undefined;
+    this.statistics = nothing;
+    this.trail.reset();
+    const watcher: LiveWatcher = {
+      frame: () => this.watcher.changed(),
+      status: (status) => this.watcher.status(status),
+      report: (report) => this.watcher.report(report),
+      problem: (error) => this.watcher.problem(error),
+    };
+    this.live = new Live(mesh, document, this.side, view.encoding, watcher);
+    this.#isDirty = true;
+  }
+
+  get status(): Status {
+    return this.live?.status ?? say("idle", "");
+  }
+
+  get distortion(): Float32Array {
+    return this.frame?.distortion ?? new Float32Array((this.stage.surface?.mesh.positions.length ?? 0) / 3);
+  }
+
+  /** Takes the newest frame where there is one; true where the surface has changed. */
+  takeFrame(): boolean {
+    const frame = this.live?.take();
+    if (!frame || !this.stage.surface) return false;
+    if (frame.inputSeq !== this.frame?.inputSeq) this.result = undefined;
+    this.frame = this.#onScreenNext = frame;
+    this.stage.surface.move(frame.positions);
+    this.stage.marks.move(frame.positions);
+    this.statistics = energyStatistics(frame.distortion);
+    this.trail.add(frame.iteration, frame.energy);
+    this.#isDirty = true;
+    return true;
+  }
+
+  colour(document: Document, view: View, red: number): void {
+    const { surface } = this.stage;
+    if (!surface) return;
+    const p = this.side === "first" ? document.p : document.secondP;
+    const [values, scale] = coloured(document, view, p, this.distortion, red);
+    surface.colour(view.colourBy, values, scale);
+    surface.show(view);
+    this.#isDirty = true;
+  }
+
+  mark(document: Document, view: View, pointedOut: readonly number[], colour: string): void {
+    const { surface, marks } = this.stage;
+    if (!surface) return;
+    marks.show(document.handles, view.selected, pointedOut, colour);
+    marks.move(surface.positions);
+    this.#isDirty = true;
+  }
+
+  /** Draws what has changed. */
+  draw(isMoving: boolean): void {
+    const { clientWidth, clientHeight } = this.element;
+    if (this.stage.resize(clientWidth, clientHeight, isMoving)) this.#isDirty = true;
+    if (!this.#isDirty) return;
+    this.#isDirty = false;
+    this.stage.draw();
+  }
+
+  /** A frame was drawn; at the next animation frame the screen has it, as far as a page can know. */
+  get isWaitingForScreen(): boolean {
+    return this.#onScreenNext !== undefined;
+  }
+
+  shown(now: number): void {
+    const frame = this.#onScreenNext;
+    this.#onScreenNext = undefined;
+    if (frame) this.live?.drawn(frame, now);
+  }
+
+  invalidate(): void {
+    this.#isDirty = true;
+  }
+
+  close(): void {
+    this.live?.close();
+    this.stage.dispose();
+    this.element.remove();
+  }
+}
+
+function coloured(document: Document, view: View, p: number, distortion: Float32Array, red: number): [Float32Array | undefined, Scale] {
+  const count = distortion.length;
+  switch (view.colourBy) {
+    case "distortion":
+      return [distortion, { low: 0, red, isLogarithmic: false }];
+    case "p":
+      return [pField(document, p) ?? new Float32Array(count).fill(p), { low: 1, red: 10, isLogarithmic: true }];
+    case "stiffness":
+      return [document.stiffness ?? new Float32Array(count).fill(1), { low: 0.01, red: 100, isLogarithmic: true }];
+    default:
+      return [undefined, { low: 0, red: 1, isLogarithmic: false }];
+  }
+}

@@ -1,0 +1,107 @@
+import { changeHandle, handleOf, removeHandle } from "../model/document.js";
+import type { Tool } from "../model/view.js";
+import type { ColourBy } from "../stage/surface.js";
+import { togglePin } from "../ui/legend.js";
+import type { App } from "./app.js";
+import type { Files } from "./files.js";
+
+const tools: readonly Tool[] = ["move", "brush", "lasso", "box", "paint"];
+const colours: readonly ColourBy[] = ["distortion", "p", "stiffness", "normals", "plain"];
+const nudges: Record<string, readonly [number, number, number]> = {
+  ArrowLeft: [-1, 0, 0],
+  ArrowRight: [1, 0, 0],
+  ArrowUp: [0, 1, 0],
+  ArrowDown: [0, -1, 0],
+  PageUp: [0, 0, 1],
+  PageDown: [0, 0, -1],
+};
+
+/** Keys, where nothing is being written. ui/help.ts tells them. */
+export function startShortcuts(app: App, files: Files, help: HTMLDialogElement): void {
+  window.addEventListener("keydown", (event) => {
+    const target = event.target as HTMLElement;
+    if (help.open || target.matches("input:not([type=range]):not([type=checkbox]), select, textarea, [role=menuitem]")) return;
+    const isHandled = event.ctrlKey || event.metaKey ? withControl(app, event) : !event.altKey && alone(app, files, help, event, target);
+    if (isHandled) event.preventDefault();
+  });
+}
+
+function withControl(app: App, { key, shiftKey }: KeyboardEvent): boolean {
+  const letter = key.toLowerCase();
+  if (letter === "z" && !shiftKey) app.undo();
+  else if ((letter === "z" && shiftKey) || letter === "y") app.redo();
+  else return false;
+  return true;
+}
+
+function alone(app: App, files: Files, help: HTMLDialogElement, event: KeyboardEvent, target: HTMLElement): boolean {
+  const { view } = app;
+  const { now } = view;
+  const { key } = event;
+  const tool = tools[Number(key) - 1];
+  if (tool) view.set({ tool });
+  else if (key in nudges && !target.matches("input, button")) return nudge(app, nudges[key]!, event.shiftKey ? 0.1 : 1);
+  else if (key === "Tab" && target.matches("canvas.stage")) view.set({ isPanelOpen: !now.isPanelOpen });
+  else {
+    const act = actions(app, files, help)[key.length === 1 ? key.toLowerCase() : key];
+    if (!act) return false;
+    act();
+  }
+  return true;
+}
+
+function actions(app: App, files: Files, help: HTMLDialogElement): Record<string, () => void> {
+  const { view } = app;
+  const { now } = view;
+  const setP = (step: number) => app.change({ ...app.document, p: Math.round(Math.min(Math.max(app.document.p + step, 1), 10) * 100) / 100, isAutomatic: false });
+  return {
+    "?": () => help.showModal(),
+    "[": () => view.set({ radius: Math.max(now.radius - 0.01, 0) }),
+    "]": () => view.set({ radius: Math.min(now.radius + 0.01, 0.25) }),
+    ",": () => setP(-0.1),
+    ".": () => setP(0.1),
+    a: () => app.change({ ...app.document, isAutomatic: !app.document.isAutomatic }),
+    c: () => view.set({ colourBy: colours[(colours.indexOf(now.colourBy) + 1) % colours.length]! }),
+    d: () => view.set({ isDark: !now.isDark }),
+    f: () => app.fit(),
+    g: () => view.set({ ghost: !now.ghost }),
+    l: () => toggleLock(app),
+    n: () => selectNext(app),
+    o: () => files.choose(),
+    p: () => togglePin(app),
+    r: () => view.set({ gizmo: "rotate", tool: "move" }),
+    s: () => view.set({ isSplit: !now.isSplit }),
+    t: () => view.set({ gizmo: "translate", tool: "move" }),
+    w: () => view.set({ wireframe: !now.wireframe }),
+    Delete: () => removeSelected(app),
+    Backspace: () => removeSelected(app),
+    Escape: () => view.set({ selected: undefined }),
+  };
+}
+
+function removeSelected(app: App): void {
+  const { selected } = app.view.now;
+  if (handleOf(app.document, selected)) app.change(removeHandle(app.document, selected!));
+}
+
+function toggleLock(app: App): void {
+  const handle = handleOf(app.document, app.view.now.selected);
+  if (handle) app.change(changeHandle(app.document, handle.name, { isLocked: !handle.isLocked }));
+}
+
+function selectNext(app: App): void {
+  const { handles } = app.document;
+  const at = handles.findIndex(({ name }) => name === app.view.now.selected);
+  if (handles.length > 0) app.view.set({ selected: handles[(at + 1) % handles.length]!.name, tool: "move" });
+}
+
+/** By a hundredth of the mesh's diagonal, along its axes. */
+function nudge(app: App, direction: readonly [number, number, number], scale: number): boolean {
+  const handle = handleOf(app.document, app.view.now.selected);
+  if (!handle || handle.isLocked || handle.targets) return false;
+  const step = 0.01 * app.diagonal * scale;
+  const [x, y, z] = handle.pose.translation;
+  const translation = [x + step * direction[0], y + step * direction[1], z + step * direction[2]] as const;
+  app.change(changeHandle(app.document, handle.name, { pose: { ...handle.pose, translation } }));
+  return true;
+}

@@ -1,0 +1,33 @@
+import type { Mesh } from "../model/mesh.js";
+import { FileFault } from "./fault.js";
+
+/** Puts a mesh together; polygons become fans of triangles. */
+export class MeshBuilder {
+  readonly positions: number[] = [];
+  readonly faces: number[] = [];
+
+  get vertexCount(): number {
+    return this.positions.length / 3;
+  }
+
+  vertex(x: number, y: number, z: number, where: string): void {
+    if (!Number.isFinite(x + y + z)) throw new FileFault(`${where}: a vertex has no three finite coordinates.`);
+    this.positions.push(x, y, z);
+  }
+
+  polygon(corners: readonly number[], where: string): void {
+    if (corners.length < 3) throw new FileFault(`${where}: a face has ${corners.length} corners.`);
+    for (let k = 2; k < corners.length; ++k) this.faces.push(corners[0]!, corners[k - 1]!, corners[k]!);
+  }
+
+  finish(name: string): Mesh {
+    if (this.vertexCount === 0) throw new FileFault(`${name} has no vertices.`);
+    if (this.faces.length === 0) throw new FileFault(`${name} has no faces: a cloud of points cannot be deformed.`);
+    for (let k = 0; k < this.faces.length; ++k) {
+      const vertex = this.faces[k]!;
+      if (Number.isInteger(vertex) && vertex >= 0 && vertex < this.vertexCount) continue;
+      throw new FileFault(`Face ${Math.floor(k / 3)} of ${name} has vertex ${vertex}; there are ${this.vertexCount} vertices.`);
+    }
+    return { name, positions: Float32Array.from(this.positions), faces: Uint32Array.from(this.faces) };
+  }
+}

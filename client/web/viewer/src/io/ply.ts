@@ -1,0 +1,134 @@
+import { blueToRed } from "../model/colours.js";
+import type { Mesh } from "../model/mesh.js";
+import { MeshBuilder } from "./builder.js";
+import { FileFault } from "./fault.js";
+
+interface Property {
+  name: string;
+  type: string;
+  /** Of a list: the type of its length. */
+  lengthType?: string;
+}
+
+interface Element {
+  name: string;
+  count: number;
+  properties: Property[];
+}
+
+const sizes: Record<string, number> = {
+  char: 1, uchar: 1, short: 2, ushort: 2, int: 4, uint: 4, float: 4, double: 8,
+  int8: 1, uint8: 1, int16: 2, uint16: 2, int32: 4, uint32: 4, float32: 4, float64: 8,
+};
+
+/** PLY as text or binary in either byte order. */
+export function readPly(name: string, bytes: Uint8Array): Mesh {
+  const { format, elements, length } = readHeader(name, bytes);
+  const body = bytes.subarray(length);
+  const next = format === "ascii" ? textReader(name, body) : binaryReader(name, body, format === "binary_little_endian");
+  const builder = new MeshBuilder();
+  for (const element of elements) {
+    for (let k = 0; k < element.count; ++k) readRow(name, element, k, next, builder);
+  }
+  return builder.finish(name);
+}
+
+function readHeader(name: string, bytes: Uint8Array): { format: string; elements: Element[]; length: number } {
+  const head = new TextDecoder("latin1").decode(bytes.subarray(0, 65_536));
+  const end = /(^|\n)end_header\r?\n/.exec(head);
+  if (!head.startsWith("ply") || !end) throw new FileFault(`${name} has no PLY header.`);
+  let format = "";
+  const elements: Element[] = [];
+  for (const line of head.slice(0, end.index).split(/\r?\n/)) {
+    const [key, ...words] = line.trim().split(/\s+/);
+    if (key === "format") format = words[0] ?? "";
+    if (key === "element") elements.push({ name: words[0] ?? "", count: Number(words[1]), properties: [] });
+    if (key === "property") {
+      const property: Property =
+        words[0] === "list" ? { name: words[3] ?? "", type: words[2] ?? "", lengthType: words[1] ?? "" } : { name: words[1] ?? "", type: words[0] ?? "" };
+      for (const type of [property.type, property.lengthType ?? property.type]) {
+        if (!(type in sizes)) throw new FileFault(`${name} has a property of type ${type}, which PLY does not know.`);
+      }
+      elements.at(-1)?.properties.push(property);
+    }
+  }
+  if (!["ascii", "binary_little_endian", "binary_big_endian"].includes(format)) {
+    throw new FileFault(`${name} is in the format “${format}”, which PLY does not know.`);
+  }
+  return { format, elements, length: end.index + end[0].length };
+}
+
+function readRow(name: string, element: Element, row: number, next: (type: string) => number, builder: MeshBuilder): void {
+  const position = [NaN, NaN, NaN];
+  let corners: number[] | undefined;
+  for (const { name: property, type, lengthType } of element.properties) {
+    if (lengthType) {
+      const list = Array.from({ length: next(lengthType) }, () => next(type));
+      if (element.name === "face" && /^vertex_ind/.test(property)) corners = list;
+    } else {
+      const value = next(type);
+      const axis = ["x", "y", "z"].indexOf(property);
+      if (axis >= 0) position[axis] = value;
+    }
+  }
+  if (element.name === "vertex") builder.vertex(position[0]!, position[1]!, position[2]!, `${name}, vertex ${row}`);
+  if (element.name === "face") builder.polygon(corners ?? [], `${name}, face ${row}`);
+}
+
+function textReader(name: string, bytes: Uint8Array): () => number {
+  const words = new TextDecoder().decode(bytes).split(/\s+/);
+  let at = words[0] === "" ? 1 : 0;
+  return () => {
+    const word = words[at++];
+    if (word === undefined || word === "") throw new FileFault(`${name} ends too soon.`);
+    return Number(word);
+  };
+}
+
+function binaryReader(name: string, bytes: Uint8Array, littleEndian: boolean): (type: string) => number {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  let at = 0;
+  return (type) => {
+    const start = at;
+    at += sizes[type]!;
+    if (at > view.byteLength) throw new FileFault(`${name} ends too soon.`);
+    switch (type) {
+      case "char": case "int8": return view.getInt8(start);
+      case "uchar": case "uint8": return view.getUint8(start);
+      case "short": case "int16": return view.getInt16(start, littleEndian);
+      case "ushort": case "uint16": return view.getUint16(start, littleEndian);
+      case "int": case "int32": return view.getInt32(start, littleEndian);
+      case "uint": case "uint32": return view.getUint32(start, littleEndian);
+      case "float": case "float32": return view.getFloat32(start, littleEndian);
+      default: return view.getFloat64(start, littleEndian);
+    }
+  };
+}
+
+/** Binary, with the distortion and a colour of each vertex, `red` being the distortion that is drawn in full red. */
+export function writePly({ positions, faces }: Mesh, distortion: Float32Array, red: number): Uint8Array<ArrayBuffer> {
+  const vertexCount = positions.length / 3;
+  const header = new TextEncoder().encode(
+    [
+      "ply", "format binary_little_endian 1.0", `element vertex ${vertexCount}`,
+      ...["x", "y", "z", "distortion"].map((property) => `property float ${property}`),
+      ...["red", "green", "blue"].map((property) => `property uchar ${property}`),
+      `element face ${faces.length / 3}`, "property list uchar int vertex_indices", "end_header", "",
+    ].join("\n"),
+  );
+  const bytes = new Uint8Array(header.length + 19 * vertexCount + (13 * faces.length) / 3);
+  bytes.set(header);
+  const view = new DataView(bytes.buffer);
+  let at = header.length;
+  for (let v = 0; v < vertexCount; ++v, at += 19) {
+    const value = distortion[v] ?? 0;
+    for (let axis = 0; axis < 3; ++axis) view.setFloat32(at + 4 * axis, positions[3 * v + axis]!, true);
+    view.setFloat32(at + 12, value, true);
+    blueToRed(red > 0 ? value / red : 0).forEach((channel, k) => view.setUint8(at + 16 + k, channel));
+  }
+  for (let f = 0; f < faces.length; f += 3, at += 13) {
+    view.setUint8(at, 3);
+    for (let corner = 0; corner < 3; ++corner) view.setInt32(at + 1 + 4 * corner, faces[f + corner]!, true);
+  }
+  return bytes;
+}

@@ -1,0 +1,26 @@
+import type { Mesh } from "../model/mesh.js";
+import { FileFault } from "./fault.js";
+import { readObj } from "./obj.js";
+import { readOff } from "./off.js";
+import { readPly } from "./ply.js";
+import { readStl } from "./stl.js";
+
+/** A mesh file by the ending of its name. Throws a FileFault. */
+export function readMesh(name: string, bytes: Uint8Array): Mesh {
+  switch (name.toLowerCase().split(".").at(-1)) {
+    case "off":
+      return readOff(name, text(bytes));
+    case "obj":
+      return readObj(name, text(bytes));
+    case "ply":
+      return readPly(name, bytes);
+    case "stl":
+      return readStl(name, bytes);
+    default:
+      throw new FileFault(`${name} is not a mesh that can be read: OFF, OBJ, PLY and STL can.`);
+  }
+}
+
+function text(bytes: Uint8Array): string {
+  return new TextDecoder().decode(bytes);
+}

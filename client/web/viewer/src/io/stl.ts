@@ -1,0 +1,76 @@
+import type { Mesh } from "../model/mesh.js";
+import { MeshBuilder } from "./builder.js";
+import { FileFault } from "./fault.js";
+
+/** STL as text or binary. Corners at exactly the same place become one vertex. */
+export function readStl(name: string, bytes: Uint8Array): Mesh {
+  const welder = new Welder(name);
+  if (isBinary(bytes)) readBinary(name, bytes, welder);
+  else readText(bytes, welder);
+  return welder.builder.finish(name);
+}
+
+function isBinary(bytes: Uint8Array): boolean {
+  if (bytes.length < 84) return false;
+  const count = new DataView(bytes.buffer, bytes.byteOffset).getUint32(80, true);
+  if (bytes.length === 84 + 50 * count) return true;
+  return new TextDecoder("latin1").decode(bytes.subarray(0, 5)) !== "solid";
+}
+
+function readBinary(name: string, bytes: Uint8Array, welder: Welder): void {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const count = view.getUint32(80, true);
+  if (bytes.length < 84 + 50 * count) throw new FileFault(`${name} has ${count} triangles by its header and ends too soon.`);
+  for (let f = 0; f < count; ++f) {
+    for (let number = 3; number < 12; number += 3) {
+      const at = 84 + 50 * f + 4 * number;
+      welder.corner(view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true));
+    }
+  }
+}
+
+function readText(bytes: Uint8Array, welder: Welder): void {
+  const vertex = /vertex\s+(\S+)\s+(\S+)\s+(\S+)/g;
+  for (const [, x, y, z] of new TextDecoder().decode(bytes).matchAll(vertex)) welder.corner(Number(x), Number(y), Number(z));
+}
+
+class Welder {
+  readonly builder = new MeshBuilder();
+  readonly #known = new Map<string, number>();
+  #face: number[] = [];
+
+  constructor(readonly name: string) {}
+
+  corner(x: number, y: number, z: number): void {
+    const key = `${x + 0} ${y + 0} ${z + 0}`; // + 0: -0 and 0 are the same place
+    let vertex = this.#known.get(key);
+    if (vertex === undefined) {
+      vertex = this.builder.vertexCount;
+      this.#known.set(key, vertex);
+      this.builder.vertex(x, y, z, `${this.name}, triangle ${this.builder.faces.length / 3}`);
+    }
+    this.#face.push(vertex);
+    if (this.#face.length === 3) this.builder.polygon(this.#face.splice(0), this.name);
+  }
+}
+
+export function writeStl({ positions, faces }: Mesh): Uint8Array<ArrayBuffer> {
+  const bytes = new Uint8Array(84 + (50 * faces.length) / 3);
+  const view = new DataView(bytes.buffer);
+  view.setUint32(80, faces.length / 3, true);
+  for (let f = 0; f < faces.length; f += 3) {
+    const at = 84 + (50 * f) / 3;
+    const corners = [0, 1, 2].map((corner) => positions.subarray(3 * faces[f + corner]!, 3 * faces[f + corner]! + 3));
+    normalOf(corners).forEach((value, axis) => view.setFloat32(at + 4 * axis, value, true));
+    corners.forEach((corner, k) => corner.forEach((value, axis) => view.setFloat32(at + 12 + 12 * k + 4 * axis, value, true)));
+  }
+  return bytes;
+}
+
+function normalOf([a, b, c]: Float32Array[]): number[] {
+  const u = a!.map((value, axis) => b![axis]! - value);
+  const v = a!.map((value, axis) => c![axis]! - value);
+  const normal = [u[1]! * v[2]! - u[2]! * v[1]!, u[2]! * v[0]! - u[0]! * v[2]!, u[0]! * v[1]! - u[1]! * v[0]!];
+  const length = Math.hypot(...normal) || 1;
+  return normal.map((value) => value / length);
+}

@@ -1,0 +1,185 @@
+import { type Encoding, type Frame, LpdeformError, type MeshReport, openSession, type Session, type SolveResult } from "lpdeform-client";
+import { changes, newSession, type Side } from "../model/changes.js";
+import type { Document } from "../model/document.js";
+import type { Mesh } from "../model/mesh.js";
+import { Meter } from "./meter.js";
+import { isPassing, say, type Status, statusOf } from "./status.js";
+
+export interface LiveWatcher {
+  /** A frame waits to be taken. */
+  frame(): void;
+  status(status: Status): void;
+  report(report: MeshReport): void;
+  /** An update was refused, or cannot be solved for yet. */
+  problem(error: LpdeformError): void;
+}
+
+/**
+ * A document kept on the server, and its surface as it comes. The server may be away at any time: the document is told again
+ * when it is back. A frame is taken when it is drawn, which lets the server send on: a page that draws slowly gets fewer frames.
+ */
+export class Live {
+  readonly meter = new Meter();
+  status: Status = say("idle", "");
+  #session: Session | undefined;
+  #told = newSession;
+  #waiting: Frame | undefined;
+  #taken: (() => void) | undefined;
+  #inputs: { seq: number; time: number; sent: number }[] = [];
+  #newest = 0;
+  #drawn = 0;
+  readonly #over = new AbortController();
+
+  constructor(
+    readonly mesh: Mesh,
+    public document: Document,
+    readonly side: Side,
+    readonly encoding: Encoding,
+    readonly watcher: LiveWatcher,
+  ) {
+    void this.#run();
+  }
+
+  /** `time`: of the input that made this change, for the latency. */
+  show(document: Document, time = performance.now()): void {
+    this.document = document;
+    this.#tell(time);
+  }
+
+  /** The newest frame, to be drawn at once. */
+  take(): Frame | undefined {
+    const frame = this.#waiting;
+    if (!frame) return undefined;
+    this.#waiting = undefined;
+    const newer = this.#poll();
+    this.#taken?.();
+    return newer ?? frame;
+  }
+
+  /** One that has come since. */
+  #poll(): Frame | undefined {
+    try {
+      return this.#session?.poll();
+    } catch {
+      return undefined; // the session is over; reading frames finds out why
+    }
+  }
+
+  /** The frame that was taken has been drawn and is on the screen since `time`. */
+  drawn(frame: Frame, time: number): void {
+    this.meter.drawn(time, frame.wireBytes);
+    this.#drawn = frame.inputSeq;
+    let answered = 0;
+    for (const { seq, time: asked, sent } of this.#inputs) {
+      if (seq > frame.inputSeq) break;
+      this.meter.answered(time - asked, frame.receivedAt - sent);
+      ++answered;
+    }
+    this.#inputs.splice(0, answered);
+  }
+
+  /** The finished result with its gap and trace; undefined where there is no server, or nothing to solve. */
+  async certify(signal: AbortSignal): Promise<SolveResult | undefined> {
+    const session = this.#session;
+    if (!session || session.connection !== "connected" || this.document.handles.length === 0) return undefined;
+    try {
+      return await session.solve({ certify: true, trace: true, deadlineMs: 30_000, signal });
+    } catch {
+      return undefined; // it was only to tell more
+    }
+  }
+
+  /** There are changes that no picture answers yet. */
+  get isSettling(): boolean {
+    return this.#newest > this.#drawn;
+  }
+
+  close(): void {
+    this.#over.abort();
+    this.#taken?.();
+    this.#session?.close().catch(() => undefined); // it expires by itself where the server is away
+    this.#session = undefined;
+  }
+
+  async #run(): Promise<void> {
+    while (!this.#over.signal.aborted) {
+      const session = await this.#open();
+      if (!session) return;
+      this.#session = session;
+      this.#told = newSession;
+      this.#inputs = [];
+      this.#newest = this.#drawn = 0;
+      this.watcher.report(session.meshReport);
+      session.on("problem", (error) => this.watcher.problem(error));
+      session.on("connection", () => this.#connection());
+      this.#tell(performance.now());
+      await this.#readFrames(session);
+    }
+  }
+
+  /** As often as it takes; nothing where the mesh is refused or the page has done with it. */
+  async #open(): Promise<Session | undefined> {
+    const { positions, faces } = this.mesh;
+    const { signal } = this.#over;
+    for (let pauseMs = 300; ; pauseMs = Math.min(2 * pauseMs, 3000)) {
+      if (!isPassing(this.status)) this.#setStatus(say("opening", "Preparing…"));
+      try {
+        return await openSession(
+          { vertices: positions, faces },
+          { freeComponents: "follow", encoding: this.encoding, lowestEncoding: "compressed", maxFramesPerSecond: 60, signal },
+        );
+      } catch (thrown) {
+        if (signal.aborted) return undefined;
+        const error = thrown as LpdeformError;
+        this.#setStatus(statusOf(error));
+        if (!isPassing(this.status)) return undefined;
+        await new Promise((again) => setTimeout(again, Math.max(pauseMs, Math.min(error.retryAfterMs, 10_000))));
+        if (signal.aborted) return undefined;
+      }
+    }
+  }
+
+  async #readFrames(session: Session): Promise<void> {
+    try {
+      for await (const frame of session) {
+        if (this.#over.signal.aborted) return;
+        this.#waiting = frame;
+        const taken = new Promise<void>((resolve) => (this.#taken = resolve));
+        this.watcher.frame();
+        await taken;
+      }
+    } catch (thrown) {
+      if (this.#over.signal.aborted) return;
+      this.#setStatus(statusOf(thrown as LpdeformError));
+      void session.close().catch(() => undefined);
+      this.#session = undefined;
+    }
+  }
+
+  #tell(time: number): void {
+    const session = this.#session;
+    const update = session && changes(this.#told, this.document, this.side);
+    if (!session || !update) return;
+    const isInput = this.#told !== newSession;
+    this.#told = this.document;
+    try {
+      this.#newest = session.update(update);
+      if (isInput) this.#inputs.push({ seq: this.#newest, time, sent: performance.now() });
+    } catch (thrown) {
+      this.watcher.problem(thrown as LpdeformError);
+    }
+  }
+
+  #connection(): void {
+    const connection = this.#session?.connection;
+    if (connection === "connected") this.#setStatus(say("live", "Live"));
+    if (connection === "reconnecting") {
+      this.#setStatus(statusOf(new LpdeformError("unavailable", "The connection was lost.")));
+    }
+  }
+
+  #setStatus(status: Status): void {
+    this.status = status;
+    this.watcher.status(status);
+  }
+}

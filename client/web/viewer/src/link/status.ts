@@ -1,0 +1,47 @@
+import type { LpdeformError } from "lpdeform-client";
+
+/** How things stand with the server, in words for people. */
+export interface Status {
+  kind: "idle" | "opening" | "live" | "away" | "full" | "draining" | "refused";
+  title: string;
+  text: string;
+  /** What the server named: "vertex 17", "face 3". */
+  element: string;
+}
+
+const kept = "Your work is kept here";
+
+export function statusOf(error: LpdeformError): Status {
+  const { code, reason, message, element } = error;
+  if (reason === "DRAINING") {
+    return say("draining", "The server is shutting down", `${kept} and goes on as soon as a server is back.`);
+  }
+  if (code === "resource_exhausted") {
+    return say("full", "The server is full", `${sentence(message)} Trying again by itself; ${kept.toLowerCase()}.`);
+  }
+  if (["unavailable", "unknown", "deadline_exceeded", "internal", "cancelled", "data_loss"].includes(code)) {
+    return say("away", "The server is away", `${kept}. Reconnecting by itself…`);
+  }
+  return { ...say("refused", "The server refuses this mesh", sentence(message)), element };
+}
+
+export function say(kind: Status["kind"], title: string, text = ""): Status {
+  return { kind, title, text, element: "" };
+}
+
+/** Whether the same may go well later. */
+export function isPassing({ kind }: Status): boolean {
+  return kind === "away" || kind === "full" || kind === "draining";
+}
+
+export function sentence(text: string): string {
+  const trimmed = text.trim();
+  if (trimmed === "") return "";
+  return trimmed[0]!.toUpperCase() + trimmed.slice(1) + (/[.!?…]$/.test(trimmed) ? "" : ".");
+}
+
+/** The vertices or faces in what a server names: "vertex 17", "face 3", "edge 4-5", "vertices 1 and 2". */
+export function elementsIn(element: string): { vertices: number[]; faces: number[] } {
+  const numbers = (element.match(/\d+/g) ?? []).map(Number);
+  return /face|triangle/i.test(element) ? { vertices: [], faces: numbers } : { vertices: numbers, faces: [] };
+}

@@ -1,0 +1,68 @@
+import type { FieldValue, Handle as WireHandle, HandleChange, Settings, Update } from "lpdeform-client";
+import { type Document, emptyDocument, type Handle, pField } from "./document.js";
+import { toMotion } from "./pose.js";
+
+/** Which pane of the split view: each has its own p. */
+export type Side = "first" | "second";
+
+/** What a session that has `before` must be told to have `after`; nothing where they are the same to it. */
+export function changes(before: Document, after: Document, side: Side = "first"): Update | undefined {
+  const handles = handleChanges(before.handles, after.handles);
+  const settings = settingChanges(before, after, side);
+  if (Object.keys(handles).length === 0 && Object.keys(settings).length === 0) return undefined;
+  return { handles, settings };
+}
+
+/** Where every session begins. */
+export const newSession: Document = { ...emptyDocument, p: NaN, secondP: NaN };
+
+function handleChanges(before: readonly Handle[], after: readonly Handle[]): Record<string, HandleChange> {
+  const changed: Record<string, HandleChange> = {};
+  if (before === after) return changed;
+  const old = new Map(before.map((handle) => [handle.name, handle]));
+  for (const handle of after) {
+    const known = old.get(handle.name);
+    old.delete(handle.name);
+    if (known === handle) continue;
+    if (!known || !isHeldAlike(known, handle)) changed[handle.name] = { set: toWire(handle) };
+    else if (known.pose !== handle.pose || known.targets !== handle.targets) {
+      changed[handle.name] = { move: motionOf(handle) };
+    }
+  }
+  for (const name of old.keys()) changed[name] = { remove: true };
+  return changed;
+}
+
+function isHeldAlike(a: Handle, b: Handle): boolean {
+  return a.vertices === b.vertices && a.points === b.points && a.hold === b.hold && a.footprint === b.footprint;
+}
+
+function motionOf(handle: Handle) {
+  return handle.targets ? { targets: handle.targets } : toMotion(handle.pose);
+}
+
+function toWire(handle: Handle): WireHandle {
+  return {
+    ...(handle.points ? { points: handle.points } : { vertices: handle.vertices }),
+    motion: motionOf(handle),
+    hold: handle.hold,
+    footprint: handle.footprint,
+  };
+}
+
+function settingChanges(before: Document, after: Document, side: Side): Settings {
+  const settings: Settings = {};
+  const [oldP, newP] = side === "first" ? [before.p, after.p] : [before.secondP, after.secondP];
+  const isRepainted = before.paintedP !== after.paintedP || before.isAutomatic !== after.isAutomatic;
+  if (isRepainted || (oldP !== newP && !after.isAutomatic)) settings.p = pOf(after, newP);
+  if (before.stiffness !== after.stiffness || before.isAutomatic !== after.isAutomatic) {
+    settings.stiffness = after.isAutomatic ? { automatic: 1 } : (after.stiffness ?? 1);
+  }
+  if (before.region !== after.region) settings.region = after.region ?? [];
+  return settings;
+}
+
+function pOf(document: Document, p: number): FieldValue {
+  if (document.isAutomatic) return { automatic: 1 };
+  return pField(document, p) ?? p;
+}

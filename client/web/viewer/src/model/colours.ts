@@ -1,0 +1,32 @@
+export type Rgb = readonly [number, number, number];
+
+/** Blue over cyan, green and yellow to red, each 0 to 255: those of the command line's pictures. */
+export const stops: readonly Rgb[] = [
+  [38, 70, 200],
+  [60, 180, 230],
+  [90, 195, 95],
+  [250, 220, 60],
+  [215, 40, 35],
+];
+
+/** Of t in 0 to 1; what is outside is clamped. */
+export function blueToRed(t: number): Rgb {
+  const scaled = Math.min(Math.max(t, 0), 1) * (stops.length - 1);
+  const stop = Math.min(Math.floor(scaled), stops.length - 2);
+  const [low, high] = [stops[stop]!, stops[stop + 1]!];
+  return [0, 1, 2].map((k) => Math.round(low[k]! + (high[k]! - low[k]!) * (scaled - stop))) as unknown as Rgb;
+}
+
+/** Told apart by most eyes, on light and on dark; groups take them in turn. */
+export const groupColours: readonly string[] = [
+  "#ff7a1a",
+  "#2f8cff",
+  "#e0409c",
+  "#12b886",
+  "#9b5de5",
+  "#f2b705",
+  "#00b8d9",
+  "#e5484d",
+  "#7cb518",
+  "#8d6e63",
+];

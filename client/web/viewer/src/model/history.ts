@@ -1,0 +1,74 @@
+/** Undo and redo of an immutable value. A gesture is many values and one step. */
+export class History<Value> {
+  #past: Value[] = [];
+  #future: Value[] = [];
+  #present: Value;
+  #before: Value | undefined;
+
+  constructor(
+    present: Value,
+    readonly most = 200,
+  ) {
+    this.#present = present;
+  }
+
+  get present(): Value {
+    return this.#present;
+  }
+
+  get canUndo(): boolean {
+    return this.#past.length > 0 || (this.#before !== undefined && this.#before !== this.#present);
+  }
+
+  get canRedo(): boolean {
+    return this.#future.length > 0;
+  }
+
+  /** A step of its own. */
+  push(value: Value): void {
+    this.end();
+    this.during(value);
+    this.end();
+  }
+
+  /** A value on the way; end() makes a step of all since the last one. */
+  during(value: Value): void {
+    this.#before ??= this.#present;
+    this.#present = value;
+  }
+
+  end(): void {
+    const before = this.#before;
+    this.#before = undefined;
+    if (before === undefined || before === this.#present) return;
+    this.#past.push(before);
+    if (this.#past.length > this.most) this.#past.shift();
+    this.#future = [];
+  }
+
+  undo(): boolean {
+    this.end();
+    const value = this.#past.pop();
+    if (value === undefined) return false;
+    this.#future.push(this.#present);
+    this.#present = value;
+    return true;
+  }
+
+  redo(): boolean {
+    this.end();
+    const value = this.#future.pop();
+    if (value === undefined) return false;
+    this.#past.push(this.#present);
+    this.#present = value;
+    return true;
+  }
+
+  /** Begins anew. */
+  reset(value: Value): void {
+    this.#past = [];
+    this.#future = [];
+    this.#before = undefined;
+    this.#present = value;
+  }
+}

@@ -1,0 +1,47 @@
+/** A triangle mesh as flat arrays, in the order of its file; neither changes. */
+export interface Mesh {
+  name: string;
+  /** x, y, z of each vertex. */
+  positions: Float32Array;
+  /** Three vertices a triangle, counter-clockwise seen from outside. */
+  faces: Uint32Array;
+}
+
+export type Vector3 = readonly [number, number, number];
+
+export interface Bounds {
+  min: Vector3;
+  max: Vector3;
+  center: Vector3;
+  diagonal: number;
+}
+
+export function boundsOf(positions: Float32Array): Bounds {
+  const min: [number, number, number] = [Infinity, Infinity, Infinity];
+  const max: [number, number, number] = [-Infinity, -Infinity, -Infinity];
+  for (let k = 0; k < positions.length; k += 3) {
+    for (let axis = 0; axis < 3; ++axis) {
+      const value = positions[k + axis]!;
+      if (value < min[axis]!) min[axis] = value;
+      if (value > max[axis]!) max[axis] = value;
+    }
+  }
+  if (positions.length === 0) return { min: [0, 0, 0], max: [0, 0, 0], center: [0, 0, 0], diagonal: 1 };
+  const center = min.map((low, axis) => (low + max[axis]!) / 2) as unknown as Vector3;
+  return { min, max, center, diagonal: Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) || 1 };
+}
+
+/** The mean of some vertices. */
+export function centroid(positions: Float32Array, vertices: ArrayLike<number>): Vector3 {
+  let x = 0;
+  let y = 0;
+  let z = 0;
+  for (let k = 0; k < vertices.length; ++k) {
+    const at = 3 * vertices[k]!;
+    x += positions[at]!;
+    y += positions[at + 1]!;
+    z += positions[at + 2]!;
+  }
+  const count = Math.max(vertices.length, 1);
+  return [x / count, y / count, z / count];
+}

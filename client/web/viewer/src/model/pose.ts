@@ -1,0 +1,71 @@
+import type { Motion } from "lpdeform-client";
+import type { Vector3 } from "./mesh.js";
+
+/** x, y, z, w of a unit quaternion. */
+export type Quaternion = readonly [number, number, number, number];
+
+/** x = R (p - center) + center + translation, relative to the mesh at rest. */
+export interface Pose {
+  rotation: Quaternion;
+  translation: Vector3;
+  center: Vector3;
+}
+
+export const noRotation: Quaternion = [0, 0, 0, 1];
+
+export function atRest(center: Vector3): Pose {
+  return { rotation: noRotation, translation: [0, 0, 0], center };
+}
+
+export function isAtRest({ rotation, translation }: Pose): boolean {
+  return Math.abs(rotation[3]) > 1 - 1e-12 && translation.every((value) => value === 0);
+}
+
+/** Where the middle of the handle goes. */
+export function anchorOf({ center, translation }: Pose): Vector3 {
+  return add(center, translation);
+}
+
+export function axisAngle(rotation: Quaternion): { axis: Vector3; angle: number } {
+  const [x, y, z, w] = rotation;
+  const length = Math.hypot(x, y, z);
+  if (length < 1e-12) return { axis: [0, 0, 1], angle: 0 };
+  return { axis: [x / length, y / length, z / length], angle: 2 * Math.atan2(length, w) };
+}
+
+export function quaternionOf(axis: Vector3, angle: number): Quaternion {
+  const length = Math.hypot(...axis);
+  const sine = Math.sin(angle / 2) / length;
+  return [axis[0] * sine, axis[1] * sine, axis[2] * sine, Math.cos(angle / 2)];
+}
+
+export function toMotion(pose: Pose): Motion {
+  if (isAtRest(pose)) return "fixed";
+  return { ...axisAngle(pose.rotation), center: pose.center, translation: pose.translation };
+}
+
+export function apply({ rotation, translation, center }: Pose, point: Vector3): Vector3 {
+  return add(add(rotate(rotation, subtract(point, center)), center), translation);
+}
+
+/** The same pose about another center. */
+export function about(pose: Pose, center: Vector3): Pose {
+  return { ...pose, center, translation: subtract(apply(pose, center), center) };
+}
+
+export function add(a: Vector3, b: Vector3): Vector3 {
+  return [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+}
+
+export function subtract(a: Vector3, b: Vector3): Vector3 {
+  return [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+}
+
+function rotate([x, y, z, w]: Quaternion, v: Vector3): Vector3 {
+  const t = cross([x, y, z], v).map((value) => 2 * value) as unknown as Vector3;
+  return add(add(v, [w * t[0], w * t[1], w * t[2]]), cross([x, y, z], t));
+}
+
+function cross(a: Vector3, b: Vector3): Vector3 {
+  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+}

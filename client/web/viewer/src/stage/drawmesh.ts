@@ -1,0 +1,137 @@
+import type { Mesh } from "../model/mesh.js";
+
+/**
+ * What is drawn of a mesh: its vertices, split where faces meet at a sharp edge at rest, so that hard edges stay hard and smooth
+ * ones smooth. Made once a mesh; a frame is then two passes over flat arrays.
+ */
+export class DrawMesh {
+  /** The vertex of the mesh that each drawn one is. */
+  readonly source: Uint32Array;
+  readonly indices: Uint32Array;
+  readonly positions: Float32Array;
+  readonly normals: Float32Array;
+
+  constructor(
+    readonly mesh: Mesh,
+    sharpDegrees = 40,
+  ) {
+    const { source, indices } = split(mesh, Math.cos((sharpDegrees * Math.PI) / 180));
+    this.source = source;
+    this.indices = indices;
+    this.positions = new Float32Array(3 * source.length);
+    this.normals = new Float32Array(3 * source.length);
+    this.take(mesh.positions);
+  }
+
+  /** Positions of the mesh's vertices; normals are the faces', weighted by area. */
+  take(positions: Float32Array): void {
+    const { source, positions: drawn } = this;
+    for (let k = 0; k < source.length; ++k) {
+      const from = 3 * source[k]!;
+      drawn[3 * k] = positions[from]!;
+      drawn[3 * k + 1] = positions[from + 1]!;
+      drawn[3 * k + 2] = positions[from + 2]!;
+    }
+    addNormals(drawn, this.indices, this.normals);
+  }
+
+  /** One value a vertex of the mesh, spread to the drawn ones. */
+  spread(values: Float32Array, into: Float32Array): void {
+    const { source } = this;
+    for (let k = 0; k < source.length; ++k) into[k] = values[source[k]!]!;
+  }
+}
+
+/** Not of length 1: the shader sees to that. */
+function addNormals(positions: Float32Array, faces: Uint32Array, normals: Float32Array): void {
+  normals.fill(0);
+  for (let f = 0; f < faces.length; f += 3) {
+    const a = 3 * faces[f]!;
+    const b = 3 * faces[f + 1]!;
+    const c = 3 * faces[f + 2]!;
+    const ax = positions[a]!;
+    const ay = positions[a + 1]!;
+    const az = positions[a + 2]!;
+    const ux = positions[b]! - ax;
+    const uy = positions[b + 1]! - ay;
+    const uz = positions[b + 2]! - az;
+    const vx = positions[c]! - ax;
+    const vy = positions[c + 1]! - ay;
+    const vz = positions[c + 2]! - az;
+    const x = uy * vz - uz * vy;
+    const y = uz * vx - ux * vz;
+    const z = ux * vy - uy * vx;
+    normals[a]! += x;
+    normals[a + 1]! += y;
+    normals[a + 2]! += z;
+    normals[b]! += x;
+    normals[b + 1]! += y;
+    normals[b + 2]! += z;
+    normals[c]! += x;
+    normals[c + 1]! += y;
+    normals[c + 2]! += z;
+  }
+}
+
+/** Normals of the mesh's own vertices, for picking. */
+export function vertexNormals(positions: Float32Array, faces: Uint32Array): Float32Array {
+  const normals = new Float32Array(positions.length);
+  addNormals(positions, faces, normals);
+  return normals;
+}
+
+/** Corners around a vertex belong together where they are joined by edges that are not sharp. */
+function split({ positions, faces }: Mesh, leastCosine: number): { source: Uint32Array; indices: Uint32Array } {
+  const normals = faceNormals(positions, faces);
+  const parents = Uint32Array.from({ length: faces.length }, (_, corner) => corner);
+  const root = (corner: number) => {
+    while (parents[corner] !== corner) corner = parents[corner] = parents[parents[corner]!]!;
+    return corner;
+  };
+  const join = (a: number, b: number) => (parents[root(a)] = root(b));
+  const vertexCount = positions.length / 3;
+  const edges = new Map<number, number>(); // of a directed edge: the corner that it begins at
+  for (let corner = 0; corner < faces.length; ++corner) {
+    edges.set(faces[corner]! * vertexCount + faces[nextCorner(corner)]!, corner);
+  }
+  for (let corner = 0; corner < faces.length; ++corner) {
+    const next = nextCorner(corner);
+    const other = edges.get(faces[next]! * vertexCount + faces[corner]!);
+    if (other === undefined || other > corner) continue;
+    const [f, g] = [3 * Math.floor(corner / 3), 3 * Math.floor(other / 3)];
+    const cosine = normals[f]! * normals[g]! + normals[f + 1]! * normals[g + 1]! + normals[f + 2]! * normals[g + 2]!;
+    if (cosine < leastCosine) continue;
+    join(corner, nextCorner(other));
+    join(next, other);
+  }
+  const drawn = new Int32Array(faces.length).fill(-1);
+  const source: number[] = [];
+  const indices = new Uint32Array(faces.length);
+  for (let corner = 0; corner < faces.length; ++corner) {
+    const top = root(corner);
+    if (drawn[top]! < 0) {
+      drawn[top] = source.length;
+      source.push(faces[corner]!);
+    }
+    indices[corner] = drawn[top]!;
+  }
+  return { source: Uint32Array.from(source), indices };
+}
+
+function nextCorner(corner: number): number {
+  return corner % 3 === 2 ? corner - 2 : corner + 1;
+}
+
+function faceNormals(positions: Float32Array, faces: Uint32Array): Float32Array {
+  const normals = new Float32Array(faces.length);
+  const corner = new Float32Array(9);
+  const triangle = new Uint32Array([0, 1, 2]);
+  const sums = new Float32Array(9);
+  for (let f = 0; f < faces.length; f += 3) {
+    for (let k = 0; k < 3; ++k) corner.set(positions.subarray(3 * faces[f + k]!, 3 * faces[f + k]! + 3), 3 * k);
+    addNormals(corner, triangle, sums);
+    const length = Math.hypot(sums[0]!, sums[1]!, sums[2]!) || 1;
+    for (let axis = 0; axis < 3; ++axis) normals[f + axis] = sums[axis]! / length;
+  }
+  return normals;
+}

@@ -1,0 +1,81 @@
+import * as three from "three";
+import type { Handle } from "../model/document.js";
+
+const vertexShader = `
+attribute vec3 colour;
+attribute float size;
+uniform float pixelRatio;
+varying vec3 vColour;
+varying float vRing;
+void main() {
+  vColour = colour;
+  vRing = smoothstep(6.5, 8.5, size);
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  gl_Position.z -= 0.0008 * gl_Position.w;
+  gl_PointSize = size * pixelRatio;
+}`;
+
+const fragmentShader = `
+varying vec3 vColour;
+varying float vRing;
+void main() {
+  float far = 2.0 * length(gl_PointCoord - 0.5);
+  if (far > 1.0) discard;
+  gl_FragColor = vec4(mix(vColour, vec3(1.0), vRing * smoothstep(0.62, 0.72, far)), 1.0);
+}`;
+
+/** Points on vertices: handles in their colours, and whatever is being pointed out. */
+export class Marks {
+  readonly object: three.Points;
+  readonly #material = new three.ShaderMaterial({ vertexShader, fragmentShader, uniforms: { pixelRatio: { value: 1 } } });
+  #vertices: number[] = [];
+
+  constructor() {
+    this.object = new three.Points(new three.BufferGeometry(), this.#material);
+    this.object.frustumCulled = false;
+    this.object.renderOrder = 1;
+  }
+
+  /** `pointedOut`: vertices under a brush or of a warning. */
+  show(handles: readonly Handle[], selected: string | undefined, pointedOut: readonly number[], pointedColour: string): void {
+    this.#vertices = [];
+    const colours: number[] = [];
+    const sizes: number[] = [];
+    const add = (vertices: readonly number[], colour: string, size: number) => {
+      const { r, g, b } = new three.Color().setStyle(colour, three.LinearSRGBColorSpace);
+      for (const vertex of vertices) {
+        this.#vertices.push(vertex);
+        colours.push(r, g, b);
+        sizes.push(size);
+      }
+    };
+    for (const { name, vertices, colour } of handles) {
+      const small = vertices.length > 400 ? 4 : vertices.length > 60 ? 5 : vertices.length > 4 ? 8 : 11;
+      add(vertices, colour, name === selected ? small + 1.5 : small);
+    }
+    add(pointedOut, pointedColour, 9);
+    const geometry = new three.BufferGeometry();
+    geometry.setAttribute("position", new three.BufferAttribute(new Float32Array(3 * this.#vertices.length), 3));
+    geometry.setAttribute("colour", new three.BufferAttribute(new Float32Array(colours), 3));
+    geometry.setAttribute("size", new three.BufferAttribute(new Float32Array(sizes), 1));
+    this.object.geometry.dispose();
+    this.object.geometry = geometry;
+  }
+
+  /** Follows the surface. */
+  move(positions: Float32Array): void {
+    const attribute = this.object.geometry.attributes["position"] as three.BufferAttribute | undefined;
+    if (!attribute) return;
+    const array = attribute.array as Float32Array;
+    this.#vertices.forEach((vertex, k) => {
+      array[3 * k] = positions[3 * vertex]!;
+      array[3 * k + 1] = positions[3 * vertex + 1]!;
+      array[3 * k + 2] = positions[3 * vertex + 2]!;
+    });
+    attribute.needsUpdate = true;
+  }
+
+  scale(pixelRatio: number): void {
+    this.#material.uniforms["pixelRatio"]!.value = pixelRatio;
+  }
+}

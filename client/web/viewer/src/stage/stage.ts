@@ -1,0 +1,142 @@
+import * as three from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { boundsOf, type Mesh } from "../model/mesh.js";
+import { Gizmo } from "./gizmo.js";
+import { Marks } from "./marks.js";
+import { Surface } from "./surface.js";
+
+const isSoftware = (() => {
+  const context = document.createElement("canvas").getContext("webgl2");
+  if (!context) return false;
+  const info = context.getExtension("WEBGL_debug_renderer_info");
+  const name = String(context.getParameter(info?.UNMASKED_RENDERER_WEBGL ?? context.RENDERER));
+  context.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+})();
+
+/** One picture of a surface: canvas, camera, and what is drawn. Draws when it is told to, not by itself. */
+export class Stage {
+  readonly canvas = document.createElement("canvas");
+  readonly camera = new three.PerspectiveCamera(32, 1, 0.01, 1000);
+  readonly marks = new Marks();
+  readonly gizmo: Gizmo;
+  surface: Surface | undefined;
+  readonly #renderer: three.WebGLRenderer;
+  readonly #scene = new three.Scene();
+  #controls: OrbitControls | undefined;
+  #pixelRatio = 0;
+  #size = [0, 0];
+
+  constructor(readonly changed: () => void) {
+    this.canvas.className = "stage";
+    this.canvas.tabIndex = 0;
+    this.#renderer = new three.WebGLRenderer({ canvas: this.canvas, antialias: !isSoftware, alpha: true });
+    this.#renderer.setClearColor(0x000000, 0);
+    this.camera.up.set(0, 0, 1);
+    this.gizmo = new Gizmo(this.camera, this.canvas, changed);
+    this.#scene.add(this.marks.object, this.gizmo.object);
+  }
+
+  /** After whoever else listens to the canvas: what these take for themselves does not turn the view. */
+  startControls(): void {
+    const controls = new OrbitControls(this.camera, this.canvas);
+    controls.rotateSpeed = 0.9;
+    controls.zoomToCursor = true;
+    controls.addEventListener("change", this.changed);
+    this.gizmo.onDragging = (isDragging) => (controls.enabled = !isDragging);
+    this.#controls = controls;
+  }
+
+  open(mesh: Mesh): void {
+    this.surface?.group.removeFromParent();
+    this.surface?.dispose();
+    this.surface = new Surface(mesh);
+    this.#scene.add(this.surface.group);
+  }
+
+  get target(): three.Vector3 {
+    return this.#controls?.target ?? new three.Vector3();
+  }
+
+  /** Looks at all of it, from in front and a little above. */
+  fit(positions: Float32Array, isYUp: boolean): void {
+    const { center, diagonal } = boundsOf(positions);
+    const away = new three.Vector3(0.62, -1, 0.42).normalize();
+    if (isYUp) away.set(0.62, 0.42, 1).normalize();
+    this.camera.up.set(0, isYUp ? 1 : 0, isYUp ? 0 : 1);
+    // OrbitControls reads the camera's up when it is made.
+    const controls = this.#controls;
+    if (controls) {
+      controls.dispose();
+      this.startControls();
+    }
+    const narrow = Math.min(1, this.camera.aspect);
+    const far = (0.58 * diagonal) / Math.tan((this.camera.fov * Math.PI) / 360) / Math.max(narrow, 0.4);
+    this.target.set(...center);
+    this.camera.position.copy(this.target).addScaledVector(away, far);
+    this.camera.near = diagonal / 200;
+    this.camera.far = diagonal * 100;
+    this.camera.updateProjectionMatrix();
+    this.#controls?.update();
+    this.changed();
+  }
+
+  /** The same view as another stage. */
+  lookAs(other: Stage): void {
+    this.camera.position.copy(other.camera.position);
+    this.camera.quaternion.copy(other.camera.quaternion);
+    this.camera.near = other.camera.near;
+    this.camera.far = other.camera.far;
+    this.camera.zoom = other.camera.zoom;
+    this.target.copy(other.target);
+    this.camera.updateProjectionMatrix();
+  }
+
+  /** The size on the page in CSS pixels. Between moves the picture is finer than while it moves, where that costs much. */
+  resize(width: number, height: number, isMoving: boolean): boolean {
+    const ratio = isSoftware ? (isMoving ? 1 : 2) : Math.min(devicePixelRatio, 2);
+    if (ratio === this.#pixelRatio && width === this.#size[0] && height === this.#size[1]) return false;
+    this.#pixelRatio = ratio;
+    this.#size = [width, height];
+    this.#renderer.setPixelRatio(ratio);
+    this.#renderer.setSize(width, height, false);
+    this.camera.aspect = width / Math.max(height, 1);
+    this.camera.updateProjectionMatrix();
+    this.marks.scale(ratio);
+    return true;
+  }
+
+  draw(): void {
+    this.#renderer.render(this.#scene, this.camera);
+  }
+
+  /** What is drawn, without the gizmo. */
+  picture(): HTMLCanvasElement {
+    const wasVisible = this.gizmo.object.visible;
+    this.gizmo.object.visible = false;
+    this.draw();
+    const copy = document.createElement("canvas");
+    copy.width = this.canvas.width;
+    copy.height = this.canvas.height;
+    copy.getContext("2d")!.drawImage(this.canvas, 0, 0);
+    this.gizmo.object.visible = wasVisible;
+    this.changed();
+    return copy;
+  }
+
+  get width(): number {
+    return this.#size[0]!;
+  }
+
+  get height(): number {
+    return this.#size[1]!;
+  }
+
+  dispose(): void {
+    this.#controls?.dispose();
+    this.gizmo.dispose();
+    this.surface?.dispose();
+    this.#renderer.dispose();
+    this.canvas.remove();
+  }
+}

@@ -1,0 +1,114 @@
+import * as three from "three";
+import type { Mesh } from "../model/mesh.js";
+import { DrawMesh } from "./drawmesh.js";
+import { surfaceMaterial } from "./surface_material.js";
+
+/** What the colours tell. */
+export type ColourBy = "distortion" | "p" | "stiffness" | "normals" | "plain";
+
+/** Of what value each colour is. */
+export interface Scale {
+  low: number;
+  red: number;
+  isLogarithmic: boolean;
+}
+
+/** The surface of a pane: faces, wireframe, the original as a ghost. */
+export class Surface {
+  readonly group = new three.Group();
+  /** Of the mesh's vertices, as drawn. */
+  positions: Float32Array;
+  readonly #draw: DrawMesh;
+  readonly #geometry = new three.BufferGeometry();
+  readonly #values: Float32Array;
+  readonly #material = surfaceMaterial();
+  readonly #wire: three.LineSegments;
+  readonly #ghost: three.Mesh;
+
+  constructor(readonly mesh: Mesh) {
+    this.positions = mesh.positions;
+    this.#draw = new DrawMesh(mesh);
+    this.#values = new Float32Array(this.#draw.source.length);
+    const geometry = this.#geometry;
+    geometry.setIndex(new three.BufferAttribute(this.#draw.indices, 1));
+    geometry.setAttribute("position", live(this.#draw.positions, 3));
+    geometry.setAttribute("normal", live(this.#draw.normals, 3));
+    geometry.setAttribute("value", live(this.#values, 1));
+    this.#wire = this.#makeWire();
+    this.#ghost = this.#makeGhost();
+    const faces = new three.Mesh(geometry, this.#material);
+    for (const object of [faces, this.#wire, this.#ghost]) {
+      object.frustumCulled = false;
+      this.group.add(object);
+    }
+    this.#wire.visible = this.#ghost.visible = false;
+  }
+
+  /** Positions of the mesh's vertices; the array is kept. */
+  move(positions: Float32Array): void {
+    this.positions = positions;
+    this.#draw.take(positions);
+    this.#geometry.attributes["position"]!.needsUpdate = true;
+    this.#geometry.attributes["normal"]!.needsUpdate = true;
+  }
+
+  colour(by: ColourBy, values: Float32Array | undefined, { low, red, isLogarithmic }: Scale): void {
+    if (values) {
+      this.#draw.spread(values, this.#values);
+      this.#geometry.attributes["value"]!.needsUpdate = true;
+    }
+    const uniforms = this.#material.uniforms;
+    uniforms["low"]!.value = low;
+    uniforms["red"]!.value = red;
+    uniforms["logarithmic"]!.value = isLogarithmic ? 1 : 0;
+    uniforms["colourful"]!.value = values && by !== "plain" && by !== "normals" ? 1 : 0;
+    uniforms["byNormal"]!.value = by === "normals" ? 1 : 0;
+  }
+
+  show({ wireframe, ghost, isDark }: { wireframe: boolean; ghost: boolean; isDark: boolean }): void {
+    this.#wire.visible = wireframe;
+    this.#ghost.visible = ghost;
+    (this.#wire.material as three.LineBasicMaterial).color.set(isDark ? "#05070c" : "#1b2436");
+    (this.#ghost.material as three.MeshBasicMaterial).color.set(isDark ? "#b9c6dc" : "#4f5d75");
+  }
+
+  dispose(): void {
+    this.#geometry.dispose();
+    this.#wire.geometry.dispose();
+    this.#ghost.geometry.dispose();
+    for (const { material } of [this.#wire, this.#ghost]) (material as three.Material).dispose();
+    this.#material.dispose();
+  }
+
+  #makeWire(): three.LineSegments {
+    const { indices, source } = this.#draw;
+    const lines: number[] = [];
+    const known = new Set<number>();
+    for (let corner = 0; corner < indices.length; ++corner) {
+      const next = corner % 3 === 2 ? corner - 2 : corner + 1;
+      const [a, b] = [source[indices[corner]!]!, source[indices[next]!]!];
+      const edge = Math.min(a, b) * source.length + Math.max(a, b);
+      if (known.has(edge)) continue;
+      known.add(edge);
+      lines.push(indices[corner]!, indices[next]!);
+    }
+    const geometry = new three.BufferGeometry();
+    geometry.setIndex(lines);
+    geometry.setAttribute("position", this.#geometry.attributes["position"]!);
+    return new three.LineSegments(geometry, new three.LineBasicMaterial({ transparent: true, opacity: 0.35 }));
+  }
+
+  #makeGhost(): three.Mesh {
+    const geometry = new three.BufferGeometry();
+    geometry.setIndex(new three.BufferAttribute(this.mesh.faces, 1));
+    geometry.setAttribute("position", new three.BufferAttribute(this.mesh.positions, 3));
+    const material = new three.MeshBasicMaterial({ transparent: true, opacity: 0.13, depthWrite: false, side: three.DoubleSide });
+    const ghost = new three.Mesh(geometry, material);
+    ghost.renderOrder = 2;
+    return ghost;
+  }
+}
+
+function live(array: Float32Array, itemSize: number): three.BufferAttribute {
+  return new three.BufferAttribute(array, itemSize).setUsage(three.DynamicDrawUsage);
+}

@@ -1,0 +1,29 @@
+import { el } from "./dom.js";
+import { icon, type IconName } from "./icons.js";
+
+export function button(name: IconName, title: string, pressed: () => void): HTMLButtonElement {
+  const element = el("button", { type: "button", className: "icon-button", title, aria: { label: title } }, icon(name) as unknown as Node);
+  element.addEventListener("click", pressed);
+  return element;
+}
+
+export function slider(
+  label: string,
+  min: number,
+  max: number,
+  step: number,
+  changed: (value: number) => void,
+  ended: () => void = () => undefined,
+): { element: HTMLElement; show: (value: number, text: string) => void } {
+  const input = el("input", { type: "range", min: String(min), max: String(max), step: String(step), aria: { label } });
+  const shown = el("output");
+  input.addEventListener("input", () => changed(input.valueAsNumber));
+  input.addEventListener("change", ended);
+  const show = (value: number, text: string) => {
+    input.valueAsNumber = value;
+    input.style.setProperty("--share", `${((value - min) / (max - min)) * 100}%`);
+    input.setAttribute("aria-valuetext", text);
+    shown.textContent = text;
+  };
+  return { element: el("label", { className: "slider" }, el("span", {}, label), input, shown), show };
+}

@@ -1,0 +1,78 @@
+import type { App } from "../app/app.js";
+import type { Document } from "../model/document.js";
+import { el, short, toggle } from "./dom.js";
+
+/** The values of the paper's figures. */
+const stops = [1, 1.5, 2, 6] as const;
+const least = 1;
+const most = 10;
+
+/** Low values take most of the way, where they differ most: share = log(p) / log(10). */
+export function shareOf(p: number): number {
+  return Math.log(p / least) / Math.log(most / least);
+}
+
+export function pAt(share: number): number {
+  const p = least * (most / least) ** share;
+  const near = stops.find((stop) => Math.abs(shareOf(stop) - share) < 0.012);
+  return near ?? Math.round(p * 20) / 20;
+}
+
+type Field = "p" | "secondP";
+
+/** The slider of p at the lower edge, two of them in the split view, and automatic p. */
+export function dock(app: App): HTMLElement {
+  const first = pSlider(app, "p");
+  const second = pSlider(app, "secondP");
+  const automatic = toggle(
+    "Automatic",
+    false,
+    (isAutomatic) => app.change({ ...app.document, isAutomatic }),
+    "p and stiffness from the shape: joints soft, the parts between them rigid",
+  );
+  const hint = el("p", { className: "p-words" });
+  app.facts.watch(({ document }) => {
+    automatic.input.checked = document.isAutomatic;
+    hint.textContent = wordsOf(document);
+  });
+  app.view.watch(({ isSplit }) => (second.hidden = !isSplit));
+  return el("section", { className: "dock", aria: { label: "p" } }, first, second, el("div", { className: "under" }, hint, automatic.element));
+}
+
+function pSlider(app: App, field: Field): HTMLElement {
+  const input = el("input", { type: "range", min: "0", max: "1", step: "0.002", aria: { label: field === "p" ? "p" : "p of the right picture" } });
+  const shown = el("output");
+  const set = (p: number) => ({ ...app.document, [field]: p, isAutomatic: false });
+  input.addEventListener("input", (event) => app.during(set(pAt(input.valueAsNumber)), event.timeStamp));
+  input.addEventListener("change", () => app.endGesture());
+  input.addEventListener("keydown", (event) => {
+    const step = { ArrowRight: 0.1, ArrowUp: 0.1, ArrowLeft: -0.1, ArrowDown: -0.1 }[event.key];
+    if (step === undefined) return;
+    event.preventDefault();
+    app.change(set(Math.round(Math.min(Math.max(app.document[field] + step, least), most) * 100) / 100));
+  });
+  const ticks = stops.map((stop) => {
+    const tick = el("button", { type: "button", className: "stop", textContent: String(stop), title: `p = ${stop}`, style: `--share: ${shareOf(stop) * 100}%` });
+    tick.addEventListener("click", () => app.change(set(stop)));
+    return tick;
+  });
+  app.facts.watch(({ document }) => {
+    const p = document[field];
+    input.valueAsNumber = shareOf(p);
+    input.style.setProperty("--share", `${shareOf(p) * 100}%`);
+    input.setAttribute("aria-valuetext", short(p));
+    shown.textContent = document.isAutomatic ? "auto" : short(p);
+    ticks.forEach((tick, k) => tick.setAttribute("aria-pressed", String(!document.isAutomatic && stops[k] === p)));
+  });
+  const track = el("div", { className: "p-track" }, input, el("div", { className: "stops" }, ...ticks));
+  return el("div", { className: "p-row" }, el("span", { className: "p-name" }, "p"), track, shown);
+}
+
+function wordsOf({ p, isAutomatic, paintedP, stiffness }: Document): string {
+  if (isAutomatic) return "From the shape: joints soft, parts rigid";
+  const painted = paintedP || stiffness ? " · painted parts as painted" : "";
+  if (p < 1.25) return `Gathers in creases; the rest keeps its shape${painted}`;
+  if (p < 1.8) return `Between crease and even${painted}`;
+  if (p < 2.5) return `As rigid as possible: spreads evenly${painted}`;
+  return `No peaks: every place gives a little${painted}`;
+}

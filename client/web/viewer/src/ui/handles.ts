@@ -1,0 +1,164 @@
+import type { Hold } from "lpdeform-client";
+import type { App } from "../app/app.js";
+import { groupColours } from "../model/colours.js";
+import { changeHandle, type Handle, handleOf, nameFault, removeHandle } from "../model/document.js";
+import { atRest, isAtRest } from "../model/pose.js";
+import { el, short } from "./dom.js";
+import { icon } from "./icons.js";
+import { button, slider } from "./controls.js";
+
+/** The handles with their names and colours, and what the selected one can be told. */
+export function handlesPanel(app: App): HTMLElement {
+  const list = el("ul", { className: "handles" });
+  const details = el("div", { className: "details" });
+  let shown = "";
+  const show = () => {
+    const { handles } = app.document;
+    const { selected } = app.view.now;
+    const now = JSON.stringify([selected, handles.map(({ name, colour, vertices, isLocked, hold, footprint, pose }) => [name, colour, vertices.length, isLocked, hold, footprint, isAtRest(pose)])]);
+    if (now === shown || details.contains(document.activeElement)) {
+      if (now === shown || isSliding(details)) return;
+    }
+    shown = now;
+    list.replaceChildren(...handles.map((handle) => row(app, handle, handle.name === selected)));
+    if (handles.length === 0) list.append(el("li", { className: "empty" }, "None yet: click the surface."));
+    const handle = handleOf(app.document, selected);
+    details.replaceChildren(...(handle ? detailsOf(app, handle) : []));
+  };
+  app.facts.watch(show);
+  app.view.watch(show);
+  details.addEventListener("change", () => queueMicrotask(show));
+  return el("div", {}, list, details);
+}
+
+/** A slider that is being dragged must stay. */
+function isSliding(details: HTMLElement): boolean {
+  return details.querySelector("input[type=range]:active") !== null;
+}
+
+function row(app: App, handle: Handle, isSelected: boolean): HTMLElement {
+  const { name, colour, vertices, points, isLocked } = handle;
+  const change = (part: Partial<Handle>) => app.change(changeHandle(app.document, name, part));
+  const dot = el("button", { type: "button", className: "dot", style: `--colour: ${colour}`, title: "Next colour", aria: { label: `Colour of ${name}` } });
+  dot.addEventListener("click", () => change({ colour: groupColours[(groupColours.indexOf(colour) + 1) % groupColours.length]! }));
+  const field = el("input", { className: "name", value: name, spellcheck: false, aria: { label: "Name" } });
+  field.addEventListener("focus", () => app.view.set({ selected: name }));
+  field.addEventListener("change", () => rename(app, name, field));
+  const lock = button(isLocked ? "lock" : "unlock", isLocked ? "Locked: let it move" : "Lock it against dragging", () => change({ isLocked: !isLocked }));
+  const remove = button("trash", `Delete ${name} (Delete)`, () => app.change(removeHandle(app.document, name)));
+  const count = points ? `${points.length} pts` : short(vertices.length);
+  const element = el("li", { className: isSelected ? "selected" : "", data: { handle: name } }, dot, field, el("span", { className: "count", title: "Vertices" }, count), lock, remove);
+  element.addEventListener("click", (event) => {
+    if (event.target === element) app.view.set({ selected: name });
+  });
+  return element;
+}
+
+function rename(app: App, name: string, field: HTMLInputElement): void {
+  const wanted = field.value.trim();
+  const fault = nameFault(app.document, name, wanted);
+  if (fault) {
+    app.notify(fault, true);
+    field.value = name;
+  } else if (wanted !== name) {
+    app.change(changeHandle(app.document, name, { name: wanted }));
+    app.view.set({ selected: wanted });
+  }
+}
+
+const kinds: readonly (readonly [Hold["kind"], string])[] = [
+  ["exact", "Exactly"],
+  ["soft", "Softly"],
+  ["orientation", "By its direction alone"],
+  ["axisLock", "Free along an axis"],
+  ["planeLock", "Free in a plane"],
+];
+
+const axes = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] } as const;
+
+function newHold(kind: Hold["kind"]): Hold {
+  switch (kind) {
+    case "soft":
+      return { kind, weight: 1 };
+    case "orientation":
+      return { kind, weight: 100 };
+    case "axisLock":
+      return { kind, axis: axes.z };
+    case "planeLock":
+      return { kind, normal: axes.z };
+    default:
+      return { kind };
+  }
+}
+
+function detailsOf(app: App, handle: Handle): Node[] {
+  const { name, hold, pose } = handle;
+  const change = (part: Partial<Handle>) => app.change(changeHandle(app.document, name, part));
+  const kind = el("select", { aria: { label: "How it is held" } });
+  for (const [value, text] of kinds) kind.append(el("option", { value, textContent: text, selected: value === hold.kind }));
+  kind.addEventListener("change", () => change({ hold: newHold(kind.value as Hold["kind"]) }));
+  const parts: Node[] = [el("label", { className: "pair" }, el("span", {}, "Held"), kind)];
+  if (hold.kind === "soft" || hold.kind === "orientation") parts.push(weight(app, name, hold));
+  if (hold.kind === "axisLock" || hold.kind === "planeLock") parts.push(direction(app, name, hold));
+  if (handle.vertices.length <= 12) parts.push(footprint(app, handle));
+  const back = el("button", { type: "button", className: "plain", disabled: isAtRest(pose) && !handle.targets }, icon("reset"), "Back to rest");
+  back.addEventListener("click", () => {
+    const { targets: _, ...rest } = handle;
+    const handles = app.document.handles.map((one) => (one.name === name ? { ...rest, pose: atRest(pose.center) } : one));
+    app.change({ ...app.document, handles });
+  });
+  parts.push(back);
+  return parts;
+}
+
+/** On a logarithmic scale, 0.001 to 1e6. */
+function weight(app: App, name: string, hold: Extract<Hold, { weight?: number }>): HTMLElement {
+  const set = (power: number) => changeHandle(app.document, name, { hold: { ...hold, weight: Number((10 ** power).toPrecision(2)) } });
+  const { element, show } = slider(
+    "Weight",
+    -3,
+    6,
+    0.1,
+    (power) => {
+      app.during(set(power), performance.now());
+      show(power, short(Number((10 ** power).toPrecision(2))));
+    },
+    () => app.endGesture(),
+  );
+  show(Math.log10(Math.max(hold.weight ?? 1, 1e-3)), short(hold.weight ?? 1));
+  return element;
+}
+
+function direction(app: App, name: string, hold: Extract<Hold, { kind: "axisLock" | "planeLock" }>): HTMLElement {
+  const current = hold.kind === "axisLock" ? hold.axis : hold.normal;
+  const select = el("select", { aria: { label: "Direction" } });
+  const known = Object.entries(axes).find(([, axis]) => axis.every((value, k) => value === current[k]));
+  for (const axis of Object.keys(axes)) select.append(el("option", { value: axis, textContent: axis, selected: axis === known?.[0] }));
+  if (!known) select.append(el("option", { value: "", textContent: current.map(short).join(", "), selected: true }));
+  select.addEventListener("change", () => {
+    const chosen = axes[select.value as keyof typeof axes];
+    const next: Hold = hold.kind === "axisLock" ? { kind: "axisLock", axis: chosen } : { kind: "planeLock", normal: chosen };
+    app.change(changeHandle(app.document, name, { hold: next }));
+  });
+  return el("label", { className: "pair" }, el("span", {}, hold.kind === "axisLock" ? "Along" : "Across"), select);
+}
+
+/** In mean edges of the mesh. */
+function footprint(app: App, { name, footprint: radius }: Handle): HTMLElement {
+  const edges = radius / app.edge;
+  const text = (value: number) => (value === 0 ? "none" : `${short(value)} edges`);
+  const { element, show } = slider(
+    "Footprint",
+    0,
+    12,
+    0.5,
+    (value) => {
+      app.during(changeHandle(app.document, name, { footprint: value * app.edge }), performance.now());
+      show(value, text(value));
+    },
+    () => app.endGesture(),
+  );
+  show(edges, text(Number(edges.toPrecision(2))));
+  element.title = "The surroundings go along nearly rigidly: against spikes of handles of few vertices";
+  return element;
+}

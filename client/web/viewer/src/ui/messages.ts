@@ -1,0 +1,73 @@
+import type { App } from "../app/app.js";
+import { isPassing, sentence, type Status } from "../link/status.js";
+import { el } from "./dom.js";
+import { pointOutNamed } from "./report.js";
+
+/** How long a line stays. */
+const noticeMs = 6000;
+
+/** What a problem asks of the user; what only says that a newer change came asks nothing. */
+const quiet = new Set(["SUPERSEDED", "NO_HANDLES"]);
+
+/** The pill of the connection, the banner while something is wrong, and lines that come and go. */
+export function messages(app: App): HTMLElement {
+  const pill = el("div", { className: "pill", role: "status" });
+  const title = el("strong");
+  const text = el("span");
+  const show = el("button", { type: "button", className: "plain", textContent: "Show where" });
+  const banner = el("div", { className: "banner", role: "alert", hidden: true }, el("span", { className: "spinner" }), el("div", {}, title, text), show);
+  const notice = el("div", { className: "notice", role: "status", hidden: true });
+  const hint = el("div", { className: "hint" });
+  let element = "";
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  let late: ReturnType<typeof setTimeout> | undefined;
+  show.addEventListener("click", () => pointOutNamed(app, element));
+
+  const showStatus = (status: Status) => {
+    pill.textContent = pillText(status);
+    pill.dataset["kind"] = status.kind;
+    const problem = app.facts.now.problem;
+    const isProblem = problem !== undefined && !quiet.has(problem.reason) && status.kind === "live";
+    const isWrong = isPassing(status) || status.kind === "refused";
+    element = isProblem ? problem.element : status.element;
+    title.textContent = isProblem ? "The server cannot take this change" : status.title;
+    text.textContent = isProblem ? sentence(problem.message) : status.text;
+    banner.dataset["kind"] = isProblem ? "refused" : status.kind;
+    show.hidden = !/\d/.test(element);
+    banner.hidden = !isWrong && !isProblem;
+  };
+  app.facts.watch((facts, before) => {
+    // A short interruption is not worth words.
+    clearTimeout(late);
+    if (facts.status.kind === "away" && before.status.kind === "live") late = setTimeout(() => showStatus(app.facts.now.status), 400);
+    else if (facts.status.kind !== "away" || facts.status !== before.status || !banner.hidden) showStatus(facts.status);
+    else late = setTimeout(() => showStatus(app.facts.now.status), 400);
+    hint.textContent = hintOf(app);
+    hint.hidden = hint.textContent === "" || !banner.hidden;
+    if (facts.notice === before.notice || !facts.notice) return;
+    notice.textContent = facts.notice.text;
+    notice.classList.toggle("bad", facts.notice.isBad);
+    notice.hidden = false;
+    clearTimeout(timer);
+    timer = setTimeout(() => (notice.hidden = true), facts.notice.isBad ? 2 * noticeMs : noticeMs);
+  });
+  app.view.watch(() => (hint.textContent = hintOf(app)));
+  return el("div", { className: "messages" }, pill, banner, hint, notice);
+}
+
+function pillText({ kind, title }: Status): string {
+  return kind === "live" ? "Live" : kind === "idle" || kind === "opening" ? "Preparing…" : title;
+}
+
+/** The next step, until it is plain. */
+function hintOf(app: App): string {
+  const { document, status } = app.facts.now;
+  const { tool } = app.view.now;
+  if (status.kind !== "live") return "";
+  if (tool === "brush") return "Paint over the surface: what you paint becomes a handle";
+  if (tool === "lasso" || tool === "box") return "Draw around a part of the surface; hold the space bar to turn the view";
+  if (tool === "paint") return "Paint over the surface: low p gathers distortion, stiffness keeps it away";
+  if (document.handles.length === 0) return "Click the surface to place a first handle";
+  if (document.handles.length === 1) return "Place a second handle: one stays, the other is dragged";
+  return app.history.canUndo ? "" : "Drag the coloured handle and watch the surface follow";
+}

@@ -1,0 +1,62 @@
+import type { Defect, MeshReport } from "lpdeform-client";
+import type { App } from "../app/app.js";
+import { elementsIn } from "../link/status.js";
+import { el } from "./dom.js";
+import { icon } from "./icons.js";
+
+/** What a defect is of: the numbers in its list are of vertices, faces, or pairs of vertices. */
+type Element = "vertex" | "face" | "edge";
+
+function elementOf(kind: string): Element {
+  if (kind.includes("edge")) return "edge";
+  return /face|triangle/.test(kind) ? "face" : "vertex";
+}
+
+/** Counts that are no fault of the mesh. */
+const harmless = new Set(["boundary_edges"]);
+
+export function warningsOf(report: MeshReport | undefined): Defect[] {
+  return (report?.defects ?? []).filter(({ kind, count }) => count > 0 && !harmless.has(kind));
+}
+
+/** The mesh's report: each warning points out its elements. */
+export function reportPanel(app: App): HTMLElement {
+  const summary = el("p", { className: "quiet" });
+  const list = el("ul", { className: "warnings" });
+  app.facts.watch(({ report, mesh }, before) => {
+    if (report === before.report && report !== undefined && list.childElementCount > 0) return;
+    const warnings = warningsOf(report);
+    const parts = report && [
+      `${report.vertices.toLocaleString("en")} vertices, ${report.faces.toLocaleString("en")} faces`,
+      `${report.components} ${report.components === 1 ? "component" : "components"}`,
+      report.boundaryLoops > 0 ? `${report.boundaryLoops} ${report.boundaryLoops === 1 ? "hole or border" : "holes or borders"}` : "closed",
+    ];
+    summary.textContent = parts ? `${mesh.name}: ${parts.join(", ")}.` : mesh.name;
+    list.replaceChildren(...warnings.map((defect) => warning(app, defect)));
+    if (report && warnings.length === 0) list.append(el("li", { className: "good" }, "Nothing wrong with it."));
+  });
+  return el("div", {}, summary, list);
+}
+
+function warning(app: App, { kind, count, first }: Defect): HTMLElement {
+  const text = `${count.toLocaleString("en")} ${kind.replaceAll("_", " ")}`;
+  const press = el("button", { type: "button", title: "Show where", data: { warning: kind } }, icon("warning"), el("span", {}, text), el("span", { className: "quiet" }, "show"));
+  press.addEventListener("click", () => {
+    const element = elementOf(kind);
+    pointOut(app, element === "face" ? { vertices: [], faces: [...first] } : { vertices: [...first], faces: [] });
+    const shown = element === "edge" ? first.length / 2 : first.length;
+    app.notify(shown < count ? `The first ${shown} of ${text} are marked.` : `${text}: marked.`);
+  });
+  return el("li", {}, press);
+}
+
+/** Marks vertices and the corners of faces, and what is there already no more. */
+export function pointOut(app: App, { vertices, faces }: { vertices: number[]; faces: number[] }): void {
+  const count = app.mesh.positions.length / 3;
+  const corners = faces.flatMap((face) => [...app.mesh.faces.subarray(3 * face, 3 * face + 3)]);
+  app.facts.set({ pointedOut: [...new Set([...vertices, ...corners])].filter((vertex) => vertex < count) });
+}
+
+export function pointOutNamed(app: App, element: string): void {
+  pointOut(app, elementsIn(element));
+}

@@ -1,0 +1,30 @@
+import type { App } from "../app/app.js";
+import { el } from "./dom.js";
+import { handlesPanel } from "./handles.js";
+import { lookPanel } from "./look.js";
+import { measures } from "./measures.js";
+import { reportPanel, warningsOf } from "./report.js";
+
+export function sidePanel(app: App): HTMLElement {
+  const mesh = section("Mesh", reportPanel(app), false);
+  const element = el(
+    "aside",
+    { className: "panel", aria: { label: "Side panel" } },
+    section("Handles", handlesPanel(app), true),
+    section("Look", lookPanel(app), true),
+    section("Measures", measures(app), true),
+    mesh,
+  );
+  app.facts.watch(({ report }, before) => {
+    if (report === before.report) return;
+    const count = warningsOf(report).length;
+    mesh.classList.toggle("warned", count > 0);
+    if (count > 0) mesh.open = true;
+  });
+  app.view.watch(({ isPanelOpen }) => document.body.classList.toggle("panel-closed", !isPanelOpen));
+  return element;
+}
+
+function section(title: string, content: HTMLElement, isOpen: boolean): HTMLDetailsElement {
+  return el("details", { open: isOpen }, el("summary", {}, title), content);
+}

@@ -1,0 +1,17 @@
+import type { App } from "../app/app.js";
+
+const key = "lpdeform-theme";
+
+/** As the user chose last, otherwise as the system has it. */
+export function startTheme(app: App): void {
+  const isSystemDark = matchMedia("(prefers-color-scheme: dark)");
+  const chosen = localStorage.getItem(key);
+  app.view.set({ isDark: chosen ? chosen === "dark" : isSystemDark.matches, isPanelOpen: innerWidth > 900 });
+  isSystemDark.addEventListener("change", () => {
+    if (!localStorage.getItem(key)) app.view.set({ isDark: isSystemDark.matches });
+  });
+  app.view.watch(({ isDark }, before) => {
+    document.documentElement.dataset["theme"] = isDark ? "dark" : "light";
+    if (isDark !== before.isDark) localStorage.setItem(key, isDark ? "dark" : "light");
+  });
+}

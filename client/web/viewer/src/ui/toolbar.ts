@@ -1,0 +1,66 @@
+import type { App } from "../app/app.js";
+import { withoutPaint } from "../model/document.js";
+import type { StrokeMode, Tool } from "../model/view.js";
+import { choice, el, short, toggle } from "./dom.js";
+import { button, slider } from "./controls.js";
+import { type IconName, icon } from "./icons.js";
+
+
+const tools: readonly (readonly [Tool, IconName, string, string])[] = [
+  ["move", "move", "Move", "Drag a handle; click the surface for a new one; drag beside it to turn the view (1)"],
+  ["brush", "brush", "Brush", "Paint a handle onto the surface (2)"],
+  ["lasso", "lasso", "Lasso", "Draw around vertices (3)"],
+  ["box", "box", "Box", "Draw a box around vertices (4)"],
+  ["paint", "paint", "p brush", "Paint p or stiffness onto the surface (5)"],
+];
+
+/** The tools at the left edge, and beside them what the chosen one can be told. */
+export function toolbar(app: App): HTMLElement {
+  const buttons = tools.map(([tool, picture, label, title]) => {
+    const element = el("button", { type: "button", className: "tool", title, data: { tool }, aria: { label } }, icon(picture), el("span", {}, label));
+    element.addEventListener("click", () => app.view.set({ tool, isPanelOpen: app.view.now.isPanelOpen }));
+    return element;
+  });
+  app.view.watch(({ tool }) => {
+    for (const element of buttons) element.setAttribute("aria-pressed", String(element.dataset["tool"] === tool));
+    if (tool !== "brush" && tool !== "paint") app.facts.set({ pointedOut: [] });
+  });
+  const fit = button("fit", "Show all of it (F)", () => app.fit());
+  const rail = el("nav", { className: "rail", aria: { label: "Tools" } }, ...buttons, el("hr"), fit);
+  return el("div", { className: "tools" }, rail, options(app));
+}
+
+function options(app: App): HTMLElement {
+  const mode = choice<StrokeMode>("What a stroke does", [["new", "New"], ["add", "Add"], ["release", "Release"]], (chosen) => app.view.set({ mode: chosen }));
+  const gizmo = choice<"translate" | "rotate">("Arrows or rings", [["translate", "Move"], ["rotate", "Turn"]], (chosen) => app.view.set({ gizmo: chosen }));
+  const field = choice<"p" | "stiffness">("What is painted", [["p", "p"], ["stiffness", "Stiffness"]], (chosen) =>
+    app.view.set({ paintField: chosen, colourBy: chosen }),
+  );
+  const size = slider("Size", 0, 0.25, 0.005, (radius) => app.view.set({ radius }));
+  const p = slider("p", 1, 10, 0.1, (paintP) => app.view.set({ paintP }));
+  const stiffness = slider("Stiffness", -2, 2, 0.05, (power) => app.view.set({ paintStiffness: Number((10 ** power).toPrecision(2)) }));
+  const through = toggle("Back side, too", app.view.now.isThrough, (isThrough) => app.view.set({ isThrough }), "Also vertices that face away");
+  const clear = el("button", { type: "button", className: "plain", textContent: "Clear painting" });
+  clear.addEventListener("click", () => app.change(withoutPaint(app.document)));
+  const element = el("div", { className: "options" }, gizmo.element, mode.element, field.element, size.element, p.element, stiffness.element, through.element, clear);
+
+  app.facts.watch(({ document }) => (clear.disabled = !document.paintedP && !document.stiffness));
+  app.view.watch((view) => {
+    const { tool } = view;
+    mode.show(view.mode);
+    gizmo.show(view.gizmo);
+    field.show(view.paintField);
+    size.show(view.radius, view.radius === 0 ? "1 vertex" : `${short(100 * view.radius)} %`);
+    p.show(view.paintP, short(view.paintP));
+    stiffness.show(Math.log10(view.paintStiffness), short(view.paintStiffness));
+    gizmo.element.hidden = tool !== "move";
+    mode.element.hidden = tool === "paint" || tool === "move";
+    field.element.hidden = clear.hidden = tool !== "paint";
+    size.element.hidden = tool === "lasso" || tool === "box";
+    p.element.hidden = tool !== "paint" || view.paintField !== "p";
+    stiffness.element.hidden = tool !== "paint" || view.paintField !== "stiffness";
+    through.element.hidden = tool !== "lasso" && tool !== "box";
+    through.input.checked = view.isThrough;
+  });
+  return element;
+}

@@ -1,0 +1,84 @@
+import type { App } from "../app/app.js";
+import type { Files } from "../app/files.js";
+import { type Detail, shapeKinds } from "../model/shapes.js";
+import { el } from "./dom.js";
+import { icon, type IconName } from "./icons.js";
+import { menu } from "./menu.js";
+import { button } from "./controls.js";
+
+/** The name, what is opened, undo, and what is done with the whole. */
+export function topbar(app: App, files: Files, showHelp: () => void): HTMLElement {
+  const shapes = el("select", { title: "A shape to begin with", aria: { label: "Shape" } });
+  for (const { id, title } of shapeKinds) shapes.append(el("option", { value: id, textContent: title }));
+  const own = el("option", { value: "", hidden: true });
+  shapes.append(own);
+  const details = el("select", { title: "How many vertices the shape has", aria: { label: "Detail" } });
+  for (const [value, text] of [["coarse", "coarse"], ["medium", "medium"], ["fine", "fine, 10,000"]]) {
+    details.append(el("option", { value: value!, textContent: text! }));
+  }
+  const openShape = () => app.openShape(shapes.value || "bar", details.value as Detail);
+  shapes.addEventListener("change", openShape);
+  details.addEventListener("change", openShape);
+
+  const undo = button("undo", "Undo (Ctrl+Z)", () => app.undo());
+  const redo = button("redo", "Redo (Ctrl+Shift+Z)", () => app.redo());
+  const split = button("split", "Two values of p side by side (S)", () => app.view.set({ isSplit: !app.view.now.isSplit }));
+  const theme = button("moon", "Dark or light (D)", () => app.view.set({ isDark: !app.view.now.isDark }));
+  const panel = button("panel", "Side panel (Tab)", () => app.view.set({ isPanelOpen: !app.view.now.isPanelOpen }));
+  const open = labelled("open", "Open", "A mesh (OFF, OBJ, PLY, STL) or a handle file; dropping it onto the page does the same (O)", () => files.choose());
+
+  app.facts.watch(({ canUndo, canRedo, mesh }) => {
+    undo.disabled = !canUndo;
+    redo.disabled = !canRedo;
+    own.textContent = mesh.name;
+  });
+  app.view.watch((view) => {
+    own.hidden = view.shape !== "";
+    shapes.value = view.shape;
+    details.value = view.detail;
+    details.hidden = view.shape === "";
+    split.setAttribute("aria-pressed", String(view.isSplit));
+    panel.setAttribute("aria-pressed", String(view.isPanelOpen));
+    theme.replaceChildren(icon(view.isDark ? "sun" : "moon"));
+  });
+  return el(
+    "header",
+    { className: "topbar" },
+    el("h1", {}, logo(), el("span", {}, "lpdeform")),
+    el("div", { className: "cluster" }, shapes, details),
+    open,
+    el("div", { className: "cluster" }, undo, redo),
+    el("span", { className: "space" }),
+    split,
+    exportMenu(files),
+    theme,
+    button("help", "Help and shortcuts (?)", showHelp),
+    panel,
+  );
+}
+
+function exportMenu(files: Files): HTMLElement {
+  return menu(icon("save"), "Save", "Save or export", [
+    ["Mesh as PLY, with distortion", () => files.exportMesh("ply")],
+    ["Mesh as OBJ", () => files.exportMesh("obj")],
+    ["Mesh as OFF", () => files.exportMesh("off")],
+    ["Mesh as STL", () => files.exportMesh("stl")],
+    ["Picture as PNG", () => files.exportPicture()],
+    ["Handles as JSON", () => files.saveHandles()],
+  ]);
+}
+
+function labelled(name: IconName, text: string, title: string, pressed: () => void): HTMLButtonElement {
+  const element = button(name, title, pressed);
+  element.classList.add("labelled");
+  element.append(el("span", {}, text));
+  element.setAttribute("aria-label", text);
+  return element;
+}
+
+function logo(): Node {
+  const template = document.createElement("template");
+  template.innerHTML =
+    '<svg class="logo" viewBox="0 0 32 32" aria-hidden="true"><path class="rest" d="M9 27V5"/><path class="bent" d="M9 27V17c0-6 4-10 12-11"/><circle class="held" cx="9" cy="27" r="3"/><circle class="pulled" cx="22" cy="6" r="3.500"/></svg>';
+  return template.content.firstChild!;
+}

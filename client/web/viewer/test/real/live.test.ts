@@ -1,0 +1,68 @@
+import { join } from "node:path";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { Service } from "../../../client/test/real/service.js";
+import { User } from "./user.js";
+
+let service: Service;
+let user: User;
+
+beforeAll(async () => {
+  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
+  user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
+  await user.settled();
+});
+
+afterAll(async () => {
+  await user.close();
+  await service.stop();
+});
+
+/** Of some handle of the page's document. */
+const handle = (name: string) => user.ask<{ vertices: number[] }>(`document().handles.find(({ name }) => name === "${name}")`);
+
+it("follows a drag live, with colours that tell the distortion", async () => {
+  const rest = await user.positions();
+  const { cold } = await user.colours();
+  expect(cold).toBeGreaterThan(0.6);
+
+  const { vertices } = await handle("Top");
+  const from = await user.vertexOnPage(vertices[0]!);
+  await user.page.mouse.move(from.x, from.y);
+  await user.page.mouse.down();
+  await user.page.mouse.move(from.x + 60, from.y + 30);
+  await user.page.mouse.move(from.x + 130, from.y + 60);
+  // The button is still down: the surface follows before it is let go.
+  await user.until("window.__lpdeform.app.red > 0");
+  await user.page.mouse.up();
+  await user.settled();
+
+  const bent = await user.positions();
+  const moved = bent.filter((value, k) => Math.abs(value - rest[k]!) > 0.01).length;
+  expect(moved).toBeGreaterThan(rest.length / 4);
+  expect(bent.every(Number.isFinite)).toBe(true);
+  const distortion = await user.ask<number[]>("distortion()");
+  expect(Math.max(...distortion)).toBeGreaterThan(0);
+  const { warm } = await user.colours();
+  expect(warm).toBeGreaterThan(0.05);
+  await expect(user.page.locator(".legend-numbers").textContent()).resolves.toMatch(/≥/);
+});
+
+it("changes the surface with p", async () => {
+  const before = await user.positions();
+  await user.page.getByRole("button", { name: "6", exact: true }).click();
+  await user.settled();
+  const after = await user.positions();
+  expect(Math.max(...after.map((value, k) => Math.abs(value - before[k]!)))).toBeGreaterThan(0.01);
+  expect(await user.ask("document().p")).toBe(6);
+});
+
+it("places a handle where the surface is clicked, and takes it back", async () => {
+  const count = await user.ask<number>("document().handles.length");
+  const place = await user.vertexOnPage(await user.vertexNear([0.5, 0, 2.6]));
+  await user.page.mouse.click(place.x, place.y);
+  expect(await user.ask("document().handles.length")).toBe(count + 1);
+  await user.settled();
+  await user.page.keyboard.press("Control+z");
+  expect(await user.ask("document().handles.length")).toBe(count);
+  expect(user.errors).toEqual([]);
+});

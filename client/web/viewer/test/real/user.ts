@@ -1,0 +1,166 @@
+import { type Browser, chromium, type Download, type Page } from "playwright-core";
+import { readFileSync } from "node:fs";
+import { inflateSync } from "node:zlib";
+
+/** Debian's Chromium, drawing in software: the same on every machine. */
+const launch = {
+  executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
+  args: ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"],
+};
+
+export interface FrameFacts {
+  inputSeq: number;
+  converged: boolean;
+  energy: number;
+  stopReason: string;
+  epoch: number;
+  iteration: number;
+  isSettling: boolean;
+  gap: number | undefined;
+}
+
+export interface MeterFacts {
+  inputs: number;
+  p50: number;
+  p99: number;
+  service50: number;
+  service99: number;
+  framesPerSecond: number;
+  bytesPerSecond: number;
+}
+
+/** Somebody before the page. */
+export class User {
+  readonly errors: string[] = [];
+
+  private constructor(
+    readonly browser: Browser,
+    readonly page: Page,
+  ) {
+    page.on("pageerror", (error) => this.errors.push(error.message));
+  }
+
+  static async open(url: string, { width = 1280, height = 800, hasTouch = false } = {}): Promise<User> {
+    const browser = await chromium.launch(launch);
+    const context = await browser.newContext({ viewport: { width, height }, hasTouch, acceptDownloads: true });
+    const user = new User(browser, await context.newPage());
+    await user.page.goto(url);
+    return user;
+  }
+
+  close(): Promise<void> {
+    return this.browser.close();
+  }
+
+  /** Of the page's test interface. */
+  ask<Value>(what: string): Promise<Value> {
+    return this.page.evaluate(`window.__lpdeform.${what}`) as Promise<Value>;
+  }
+
+  frame(pane = 0): Promise<FrameFacts | undefined> {
+    return this.ask(`frame(${pane})`);
+  }
+
+  positions(pane = 0): Promise<number[]> {
+    return this.ask(`positions(${pane})`);
+  }
+
+  async until(what: string, timeout = 60_000): Promise<void> {
+    await this.page.waitForFunction(what, undefined, { timeout, polling: 50 });
+  }
+
+  /** Until the result of all that was done so far is on the screen. */
+  settled(pane = 0): Promise<void> {
+    return this.until(`(() => {
+      const facts = window.__lpdeform?.frame(${pane});
+      return facts && facts.converged && !facts.isSettling && window.__lpdeform.status() === "live";
+    })()`);
+  }
+
+  vertexOnPage(vertex: number, pane = 0): Promise<{ x: number; y: number }> {
+    return this.ask(`vertexOnPage(${vertex}, ${pane})`);
+  }
+
+  /** The vertex whose place at rest is nearest. */
+  async vertexNear(point: readonly [number, number, number]): Promise<number> {
+    const rest = Object.values(await this.ask<Record<string, number>>("app.mesh.positions"));
+    const far = (vertex: number) => Math.hypot(...point.map((value, axis) => rest[3 * vertex + axis]! - value));
+    return Array.from({ length: rest.length / 3 }, (_, vertex) => vertex).reduce((best, one) => (far(one) < far(best) ? one : best));
+  }
+
+  /** Drags from there by that many pixels, in steps, and lets go. */
+  async drag(from: { x: number; y: number }, dx: number, dy: number, steps = 12): Promise<void> {
+    const { mouse } = this.page;
+    await mouse.move(from.x, from.y);
+    await mouse.down();
+    for (let step = 1; step <= steps; ++step) await mouse.move(from.x + (dx * step) / steps, from.y + (dy * step) / steps);
+    await mouse.up();
+  }
+
+  async openFiles(...files: { name: string; content: string | Buffer }[]): Promise<void> {
+    const chooser = this.page.waitForEvent("filechooser");
+    await this.page.getByRole("button", { name: "Open" }).click();
+    const payload = files.map(({ name, content }) => ({ name, mimeType: "application/octet-stream", buffer: Buffer.from(content) }));
+    await (await chooser).setFiles(payload);
+  }
+
+  async save(entry: string): Promise<Buffer> {
+    await this.page.getByRole("button", { name: "Save" }).click();
+    const download = this.page.waitForEvent("download");
+    await this.page.getByRole("menuitem", { name: entry }).click();
+    return readFileSync(await ((await download) as Download).path());
+  }
+
+  /** What of the picture has colours that mean much distortion (yellow to red) and little (blue), in shares of the coloured. */
+  async colours(): Promise<{ warm: number; cold: number; coloured: number }> {
+    const box = await this.page.locator("canvas.stage").first().boundingBox();
+    const png = await this.page.screenshot({ clip: box!, scale: "css" });
+    const { pixels, channels } = decodePng(png);
+    let [warm, cold, coloured] = [0, 0, 0];
+    for (let at = 0; at < pixels.length; at += channels) {
+      const [r, g, b] = [pixels[at]!, pixels[at + 1]!, pixels[at + 2]!];
+      if (Math.max(r, g, b) - Math.min(r, g, b) < 70) continue;
+      ++coloured;
+      if (r > b + 60) ++warm;
+      if (b > r + 60) ++cold;
+    }
+    return { warm: warm / coloured, cold: cold / coloured, coloured };
+  }
+}
+
+/** Eight bits a channel, not interlaced: what a screenshot is. */
+function decodePng(png: Buffer): { pixels: Uint8Array; channels: number } {
+  const width = png.readUInt32BE(16);
+  const height = png.readUInt32BE(20);
+  const channels = png[25] === 6 ? 4 : 3;
+  const parts: Buffer[] = [];
+  for (let at = 8; at < png.length; ) {
+    const length = png.readUInt32BE(at);
+    if (png.toString("latin1", at + 4, at + 8) === "IDAT") parts.push(png.subarray(at + 8, at + 8 + length));
+    at += length + 12;
+  }
+  const raw = inflateSync(Buffer.concat(parts));
+  const stride = width * channels;
+  const pixels = new Uint8Array(stride * height);
+  for (let row = 0; row < height; ++row) {
+    const filter = raw[row * (stride + 1)]!;
+    for (let k = 0; k < stride; ++k) {
+      const at = row * stride + k;
+      const left = k >= channels ? pixels[at - channels]! : 0;
+      const up = row > 0 ? pixels[at - stride]! : 0;
+      const corner = k >= channels && row > 0 ? pixels[at - stride - channels]! : 0;
+      pixels[at] = raw[row * (stride + 1) + 1 + k]! + predicted(filter, left, up, corner);
+    }
+  }
+  return { pixels, channels };
+}
+
+function predicted(filter: number, left: number, up: number, corner: number): number {
+  if (filter === 1) return left;
+  if (filter === 2) return up;
+  if (filter === 3) return (left + up) >> 1;
+  if (filter !== 4) return 0;
+  const guess = left + up - corner;
+  const [a, b, c] = [Math.abs(guess - left), Math.abs(guess - up), Math.abs(guess - corner)];
+  return a <= b && a <= c ? left : b <= c ? up : corner;
+}
