@@ -29,7 +29,7 @@ COPY --from=build-web /src/client/web/viewer/dist client/web/viewer/dist
 USER 10001:10001
 EXPOSE 8080
 HEALTHCHECK --interval=15s --timeout=5s --start-period=10s \
-  CMD ["bash", "-c", "exec 3<>/dev/tcp/127.0.0.1/8080 && printf 'GET /healthz HTTP/1.0\\r\\n\\r\\n' >&3 && grep -q ^ok <&3"]
+  CMD ["bash", "-c", "exec 3<>/dev/tcp/127.0.0.1/8080 && printf 'GET /healthz HTTP/1.1\\r\\nHost: lpdeform\\r\\nConnection: close\\r\\n\\r\\n' >&3 && grep -q ^ok <&3"]
 ENTRYPOINT ["deploy/web"]
 CMD ["--web", "0.0.0.0:8080", "--server", "lpdeform:50051"]
 
