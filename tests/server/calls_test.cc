@@ -7,6 +7,7 @@
 #include <map>
 #include <thread>
 
+#include "core/base/fault.h"
 #include "server/health_probe.h"
 #include "service_fixture.h"
 
@@ -466,6 +467,12 @@ TEST(ServerOptionsTest, AreChecked) {
   ServerOptions options;
   options.runner_threads = 1;
   EXPECT_TRUE(absl::IsInvalidArgument(Server::start(options).status()));
+  options = {};
+  for (const double rate :
+       {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    options.max_stream_bytes_per_second = rate;
+    EXPECT_EQ(fault_of(Server::start(options).status()).reason, "OPTION_OUT_OF_RANGE");
+  }
 }
 
 TEST(ServerAddress, MayBeASocketOfTheFileSystem) {
