@@ -31,6 +31,8 @@ export class Link {
   readonly box = new FrameBox();
   readonly ledger = new Ledger();
   readonly stop = new AbortController();
+  /** What ended the stream of frames the last time that one did. */
+  interruption: LpdeformError | undefined;
   #lease: Lease;
   #lane: Lane | undefined;
   #assembly = new FrameAssembly(0);
@@ -150,8 +152,9 @@ export class Link {
 
   async #recover(ended: LpdeformError | undefined): Promise<void> {
     if (this.isClosed) return;
-    this.#setConnection("reconnecting");
     const recovery = recoveryAfter(ended, this.#goAway, this.copy !== undefined);
+    this.interruption = recovery.why;
+    this.#setConnection("reconnecting");
     if (recovery.next === "giveUp" || this.#isTooLate()) return this.#giveUp(recovery.why);
     await this.#pause(Math.max(recovery.pauseMs, this.#backoff.nextMs()));
     if (this.isClosed) return;

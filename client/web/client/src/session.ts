@@ -66,6 +66,11 @@ export class Session implements AsyncIterable<Frame> {
     return this.#link.connection;
   }
 
+  /** Why it is "reconnecting", or was the last time: DRAINING where the server shuts down. */
+  get interruption(): LpdeformError | undefined {
+    return this.#link.interruption;
+  }
+
   /** The newest update that was not refused; 0 where there is none. */
   get newestInput(): number {
     return this.#link.ledger.newest;

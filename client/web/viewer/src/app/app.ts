@@ -7,6 +7,7 @@ import { type Detail, shapeKinds } from "../model/shapes.js";
 import { State } from "../model/state.js";
 import { firstView, type View } from "../model/view.js";
 import { say, type Status } from "../link/status.js";
+import { Pace } from "./pace.js";
 import { Editing } from "./editing.js";
 import { Pane } from "./pane.js";
 
@@ -41,8 +42,7 @@ export class App {
   /** Called after each picture that was drawn. */
   readonly afterDrawing = new Set<(now: number) => void>();
   #asked = 0;
-  #lastMove = 0;
-  #resting: ReturnType<typeof setTimeout> | undefined;
+  readonly #pace = new Pace(() => this.requestDraw());
   #needsColours = true;
   #needsMarks = true;
 
@@ -128,9 +128,7 @@ export class App {
   }
 
   fit(): void {
-    const [first] = this.panes;
-    const shown = first?.frame?.positions ?? this.mesh.positions;
-    for (const pane of this.panes) pane.stage.fit(shown, this.view.now.isYUp);
+    for (const pane of this.panes) pane.fit(this.view.now.isYUp);
   }
 
   // The panes.
@@ -154,21 +152,14 @@ export class App {
       pane.shown(now);
       isNew = pane.takeFrame() || isNew;
     }
-    if (isNew) this.#moved(now);
     if (isNew || this.#needsColours) for (const pane of this.panes) pane.colour(this.document, this.view.now, this.red);
     this.#needsColours = false;
     if (this.#needsMarks) this.#mark();
-    const isMoving = now - this.#lastMove < 250;
-    for (const pane of this.panes) pane.draw(isMoving);
+    const isAtRest = this.#pace.isAtRest(now);
+    const drawn = this.panes.map((pane) => pane.draw(isAtRest, this.#pace.quality));
+    if (drawn.includes(true)) this.#pace.drew(now);
     for (const after of this.afterDrawing) after(now);
     if (this.panes.some((pane) => pane.isWaitingForScreen)) this.requestDraw();
-  }
-
-  /** The picture is coarser while it moves, where drawing is slow, and fine again after. */
-  #moved(now: number): void {
-    this.#lastMove = now;
-    clearTimeout(this.#resting);
-    this.#resting = setTimeout(() => this.requestDraw(), 300);
   }
 
   #mark(): void {
@@ -200,7 +191,6 @@ export class App {
     this.stages.append(pane.element);
     if (this.mesh === noMesh) return;
     pane.open(this.mesh, this.document, this.view.now);
-    pane.stage.lookAs(this.panes[0]!.stage);
   }
 
   /** The other pane looks the same way. */
@@ -226,6 +216,7 @@ export class App {
       if (view.isSplit) this.#addPane("second");
       else this.panes.pop()?.close();
       this.stages.classList.toggle("split", view.isSplit);
+      this.fit();
       this.#statusChanged();
       this.#needsMarks = true;
     }

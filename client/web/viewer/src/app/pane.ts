@@ -90,6 +90,7 @@ export class Pane {
     const [values, scale] = coloured(document, view, p, this.distortion, red);
     surface.colour(view.colourBy, values, scale);
     surface.show(view);
+    this.stage.darken(view.isDark);
     this.#isDirty = true;
   }
 
@@ -101,13 +102,32 @@ export class Pane {
     this.#isDirty = true;
   }
 
-  /** Draws what has changed. */
-  draw(isMoving: boolean): void {
+  fit(isYUp: boolean): void {
+    const { surface } = this.stage;
+    if (!surface) return;
+    this.#resize(true, 1);
+    this.stage.fit(surface.positions, isYUp);
+  }
+
+  #resize(isMoving: boolean, quality: number): void {
     const { clientWidth, clientHeight } = this.element;
-    if (this.stage.resize(clientWidth, clientHeight, isMoving)) this.#isDirty = true;
-    if (!this.#isDirty) return;
+    if (this.stage.resize(clientWidth, clientHeight, isMoving, quality)) this.#isDirty = true;
+  }
+
+  /** Draws what has changed, or all of it finely, for a picture at rest. True where there was something. */
+  draw(isAtRest: boolean, quality: number): boolean {
+    if (isAtRest || this.#isDirty) this.#resize(!isAtRest, quality);
+    else this.#resizeToPage();
+    if (!this.#isDirty) return false;
     this.#isDirty = false;
     this.stage.draw();
+    return !isAtRest;
+  }
+
+  /** Where the page's layout has changed and nothing else. */
+  #resizeToPage(): void {
+    const { clientWidth, clientHeight } = this.element;
+    if (clientWidth !== this.stage.width || clientHeight !== this.stage.height) this.#resize(true, 1);
   }
 
   /** A frame was drawn; at the next animation frame the screen has it, as far as a page can know. */

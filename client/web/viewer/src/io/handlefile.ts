@@ -52,7 +52,7 @@ function withHandle(document: Document, json: unknown, mesh: Mesh): Document {
     hold: holdOf(object, owner),
     footprint: weightOf(object["footprint"] ?? 0, `the footprint of ${owner}`, Infinity),
   });
-  if (added.handles.at(-1)?.vertices.length !== vertices.length) {
+  if (added === document || added.handles.at(-1)!.vertices.length !== vertices.length) {
     throw new FileFault(`${capital(owner)} has a vertex that another handle has, too.`);
   }
   return added;

@@ -174,7 +174,7 @@ export class Live {
     const connection = this.#session?.connection;
     if (connection === "connected") this.#setStatus(say("live", "Live"));
     if (connection === "reconnecting") {
-      this.#setStatus(statusOf(new LpdeformError("unavailable", "The connection was lost.")));
+      this.#setStatus(statusOf(this.#session?.interruption ?? new LpdeformError("unavailable", "")));
     }
   }
 

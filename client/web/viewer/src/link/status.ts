@@ -22,7 +22,12 @@ export function statusOf(error: LpdeformError): Status {
   if (["unavailable", "unknown", "deadline_exceeded", "internal", "cancelled", "data_loss"].includes(code)) {
     return say("away", "The server is away", `${kept}. Reconnecting by itself…`);
   }
+  if (isSessionOver(reason)) return say("away", "The server has let go of this session", `${kept}. Beginning anew…`);
   return { ...say("refused", "The server refuses this mesh", sentence(message)), element };
+}
+
+function isSessionOver(reason: string): boolean {
+  return reason.startsWith("SESSION_") && reason !== "SESSIONS_FULL";
 }
 
 export function say(kind: Status["kind"], title: string, text = ""): Status {

@@ -1,11 +1,13 @@
 import * as three from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { boundsOf, type Mesh } from "../model/mesh.js";
+import { boundsOf, type Mesh, type Vector3 } from "../model/mesh.js";
+import { Backdrop } from "./backdrop.js";
 import { Gizmo } from "./gizmo.js";
 import { Marks } from "./marks.js";
 import { Surface } from "./surface.js";
 
-const isSoftware = (() => {
+/** Drawn by the processor, where each pixel counts. */
+export const isSoftware = (() => {
   const context = document.createElement("canvas").getContext("webgl2");
   if (!context) return false;
   const info = context.getExtension("WEBGL_debug_renderer_info");
@@ -14,6 +16,9 @@ const isSoftware = (() => {
   return /swiftshader|llvmpipe|software|basic render/i.test(name);
 })();
 
+/** What lies over the picture at its edges, in pixels. */
+const covered = { left: 70, top: 50, bottom: 120 };
+
 /** One picture of a surface: canvas, camera, and what is drawn. Draws when it is told to, not by itself. */
 export class Stage {
   readonly canvas = document.createElement("canvas");
@@ -21,6 +26,7 @@ export class Stage {
   readonly marks = new Marks();
   readonly gizmo: Gizmo;
   surface: Surface | undefined;
+  readonly #backdrop = new Backdrop();
   readonly #renderer: three.WebGLRenderer;
   readonly #scene = new three.Scene();
   #controls: OrbitControls | undefined;
@@ -30,11 +36,10 @@ export class Stage {
   constructor(readonly changed: () => void) {
     this.canvas.className = "stage";
     this.canvas.tabIndex = 0;
-    this.#renderer = new three.WebGLRenderer({ canvas: this.canvas, antialias: !isSoftware, alpha: true });
-    this.#renderer.setClearColor(0x000000, 0);
+    this.#renderer = new three.WebGLRenderer({ canvas: this.canvas, antialias: !isSoftware, alpha: false });
     this.camera.up.set(0, 0, 1);
     this.gizmo = new Gizmo(this.camera, this.canvas, changed);
-    this.#scene.add(this.marks.object, this.gizmo.object);
+    this.#scene.add(this.#backdrop.object, this.marks.object, this.gizmo.object);
   }
 
   /** After whoever else listens to the canvas: what these take for themselves does not turn the view. */
@@ -60,25 +65,41 @@ export class Stage {
 
   /** Looks at all of it, from in front and a little above. */
   fit(positions: Float32Array, isYUp: boolean): void {
-    const { center, diagonal } = boundsOf(positions);
-    const away = new three.Vector3(0.62, -1, 0.42).normalize();
-    if (isYUp) away.set(0.62, 0.42, 1).normalize();
-    this.camera.up.set(0, isYUp ? 1 : 0, isYUp ? 0 : 1);
+    const { min, max, center, diagonal } = boundsOf(positions);
+    const away = isYUp ? new three.Vector3(0.62, 0.42, 1) : new three.Vector3(0.62, -1, 0.42);
+    const { camera } = this;
+    camera.up.set(0, isYUp ? 1 : 0, isYUp ? 0 : 1);
     // OrbitControls reads the camera's up when it is made.
-    const controls = this.#controls;
-    if (controls) {
-      controls.dispose();
+    if (this.#controls) {
+      this.#controls.dispose();
       this.startControls();
     }
-    const narrow = Math.min(1, this.camera.aspect);
-    const far = (0.58 * diagonal) / Math.tan((this.camera.fov * Math.PI) / 360) / Math.max(narrow, 0.4);
+    camera.position.copy(away.normalize());
+    camera.lookAt(0, 0, 0);
     this.target.set(...center);
-    this.camera.position.copy(this.target).addScaledVector(away, far);
-    this.camera.near = diagonal / 200;
-    this.camera.far = diagonal * 100;
-    this.camera.updateProjectionMatrix();
+    camera.position.copy(this.target).addScaledVector(away, this.#distanceFor(min, max));
+    camera.near = diagonal / 200;
+    camera.far = diagonal * 100;
+    camera.updateProjectionMatrix();
     this.#controls?.update();
     this.changed();
+  }
+
+  /** From which a box fits into what is free of the picture. */
+  #distanceFor(min: Vector3, max: Vector3): number {
+    const { camera } = this;
+    const [width, height] = this.#size as [number, number];
+    const tangent = Math.tan((camera.fov * Math.PI) / 360);
+    const across = (tangent * Math.max(width - covered.left - 40, 0.4 * width)) / Math.max(height, 1);
+    const up = (tangent * Math.max(height - covered.top - covered.bottom, 0.4 * height)) / Math.max(height, 1);
+    const turn = camera.quaternion.clone().invert();
+    let far = 0;
+    for (let corner = 0; corner < 8; ++corner) {
+      const half = min.map((low, axis) => ((corner >> axis) & 1 ? 0.5 : -0.5) * (max[axis]! - low)) as [number, number, number];
+      const seen = new three.Vector3(...half).applyQuaternion(turn);
+      far = Math.max(far, seen.z + Math.abs(seen.x) / across, seen.z + Math.abs(seen.y) / up);
+    }
+    return 1.08 * far;
   }
 
   /** The same view as another stage. */
@@ -92,18 +113,25 @@ export class Stage {
     this.camera.updateProjectionMatrix();
   }
 
-  /** The size on the page in CSS pixels. Between moves the picture is finer than while it moves, where that costs much. */
-  resize(width: number, height: number, isMoving: boolean): boolean {
-    const ratio = isSoftware ? (isMoving ? 1 : 2) : Math.min(devicePixelRatio, 2);
+  /**
+   * The size on the page in CSS pixels. Where drawing is slow, the picture is finer at rest than while it moves; `quality`, up
+   * to 1, makes it coarser still. True where the size has changed.
+   */
+  resize(width: number, height: number, isMoving: boolean, quality = 1): boolean {
+    const ratio = isSoftware ? (isMoving ? quality : 2) : Math.min(devicePixelRatio, 2);
     if (ratio === this.#pixelRatio && width === this.#size[0] && height === this.#size[1]) return false;
     this.#pixelRatio = ratio;
     this.#size = [width, height];
     this.#renderer.setPixelRatio(ratio);
     this.#renderer.setSize(width, height, false);
     this.camera.aspect = width / Math.max(height, 1);
-    this.camera.updateProjectionMatrix();
+    this.camera.setViewOffset(width, height, -covered.left / 2, (covered.bottom - covered.top) / 2, width, height);
     this.marks.scale(ratio);
     return true;
+  }
+
+  darken(isDark: boolean): void {
+    this.#backdrop.darken(isDark);
   }
 
   draw(): void {

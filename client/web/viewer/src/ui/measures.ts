@@ -10,16 +10,16 @@ const binCount = 48;
 const plotEveryMs = 120;
 
 const rows = [
-  ["fps", "Frames a second"],
-  ["latency", "Input to picture, p50 · p99"],
-  ["service", "…without drawing"],
-  ["bytes", "Received"],
-  ["vertices", "Vertices · faces"],
-  ["energy", "Energy"],
-  ["share", "Distortion in the top 5 %"],
-  ["method", "Method · iterations"],
-  ["stop", "Stop reason"],
-  ["gap", "Gap to the optimum, at most"],
+  ["fps", "Frames a second", "Pictures with a new surface"],
+  ["latency", "Input to picture", "From moving to seeing it: the median and 99 of 100"],
+  ["service", "…of it the service", "Server and way there and back, without drawing: the median and 99 of 100"],
+  ["bytes", "Received", "As it travels"],
+  ["vertices", "Vertices · faces", ""],
+  ["energy", "Energy", "E of Eq. 3 of the paper"],
+  ["share", "In the top 5 %", "Share of the distortion that the most distorted twentieth of the cells has"],
+  ["method", "Method · iterations", ""],
+  ["stop", "Stop reason", "Why the solve ended"],
+  ["gap", "Gap, at most", "How far the energy can be from the optimum for its rotations"],
 ] as const;
 
 type Row = (typeof rows)[number][0];
@@ -30,9 +30,9 @@ export function measures(app: App): HTMLElement {
   const bars = el("canvas", { className: "plot" });
   const values = {} as Record<Row, HTMLElement>;
   const list = el("dl", { className: "numbers" });
-  for (const [row, text] of rows) {
-    values[row] = el("dd", { data: { measure: row } });
-    list.append(el("dt", {}, text), values[row]);
+  for (const [row, text, title] of rows) {
+    values[row] = el("dd", { title, data: { measure: row } });
+    list.append(el("dt", { title }, text), values[row]);
   }
   const element = el(
     "div",
@@ -85,9 +85,9 @@ function showNumbers(app: App, values: Record<Row, HTMLElement>, now: number): v
 const second = "#ff7a1a";
 
 function showPlots(app: App, energy: HTMLCanvasElement, bars: HTMLCanvasElement): void {
-  const lines = app.panes.map(({ trail }, k) => ({ x: trail.iterations, y: trail.energies, ...(k > 0 && { colour: second }) }));
-  plotLines(energy, lines, app.panes[0]!.trail.starts, short);
   const { red } = app;
+  const lines = red === 0 ? [] : app.panes.map(({ trail }, k) => ({ x: trail.iterations, y: trail.energies, ...(k > 0 && { colour: second }) }));
+  plotLines(energy, lines, app.panes[0]!.trail.starts, short);
   const most = red > 0 ? Math.max(...app.panes.map(({ statistics }) => statistics.max)) : 0;
   const counts = new Float64Array(binCount);
   if (most > 0) for (const pane of app.panes) histogram(pane.distortion, most, binCount).forEach((count, k) => (counts[k]! += count));

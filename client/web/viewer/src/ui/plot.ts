@@ -37,7 +37,7 @@ export function plotLines(canvas: HTMLCanvasElement, lines: readonly Line[], mar
   const xs = lines.flatMap(({ x }) => [x[0] ?? 0, x.at(-1) ?? 0]);
   const ys = lines.flatMap(({ y }) => y).filter((y) => y > 0);
   const [left, right] = [Math.min(...xs), Math.max(...xs)];
-  if (ys.length < 2 || right <= left) return empty(frame, "Drag a handle");
+  if (ys.length < 2 || !(right > left)) return empty(frame, "Drag a handle");
   let [low, high] = [ys.reduce((a, b) => Math.min(a, b)), ys.reduce((a, b) => Math.max(a, b))];
   low = Math.max(low, 1e-6 * high); // what rounding leaves at rest is nothing
   const isLogarithmic = high / low > 20;

@@ -10,6 +10,9 @@ export function startTheme(app: App): void {
   isSystemDark.addEventListener("change", () => {
     if (!localStorage.getItem(key)) app.view.set({ isDark: isSystemDark.matches });
   });
+  // The picture shows that it has the focus to those who move it by keys.
+  window.addEventListener("keydown", ({ key }) => key === "Tab" && document.body.classList.add("by-keyboard"));
+  window.addEventListener("pointerdown", () => document.body.classList.remove("by-keyboard"));
   app.view.watch(({ isDark }, before) => {
     document.documentElement.dataset["theme"] = isDark ? "dark" : "light";
     if (isDark !== before.isDark) localStorage.setItem(key, isDark ? "dark" : "light");

@@ -1,0 +1,37 @@
+const restMs = 300;
+/** Slower than this, and the picture is drawn more coarsely while it moves. */
+const slowMs = 55;
+const least = 0.6;
+
+/** How finely to draw: coarsely while things move and drawing is slow, finely once they rest. */
+export class Pace {
+  quality = 1;
+  #last = -Infinity;
+  #isFine = false;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #interval = 16;
+
+  /** `rest`: called when nothing has moved for a while. */
+  constructor(readonly rest: () => void) {}
+
+  /** A picture was drawn because something had changed. */
+  drew(now: number): void {
+    const interval = now - this.#last;
+    if (interval < restMs) {
+      this.#interval += 0.15 * (interval - this.#interval);
+      if (this.#interval > slowMs) this.quality = Math.max(this.quality - 0.1, least);
+      else if (this.#interval < slowMs / 2) this.quality = Math.min(this.quality + 0.05, 1);
+    }
+    this.#last = now;
+    this.#isFine = false;
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(this.rest, restMs + 20);
+  }
+
+  /** True once, when it is time for a fine picture. */
+  isAtRest(now: number): boolean {
+    if (this.#isFine || now - this.#last < restMs) return false;
+    this.#isFine = true;
+    return true;
+  }
+}

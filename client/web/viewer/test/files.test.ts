@@ -1,0 +1,146 @@
+import { describe, expect, it } from "vitest";
+import { readHandleFile, writeHandleFile } from "../src/io/handlefile.js";
+import { writeObj } from "../src/io/obj.js";
+import { writeOff } from "../src/io/off.js";
+import { writePly } from "../src/io/ply.js";
+import { readMesh } from "../src/io/read.js";
+import { writeStl } from "../src/io/stl.js";
+import { emptyDocument } from "../src/model/document.js";
+import { shapeKinds } from "../src/model/shapes.js";
+
+const { mesh, document } = shapeKinds[3]!.make("coarse");
+const bytes = (text: string) => new TextEncoder().encode(text);
+const distortion = Float32Array.from({ length: mesh.positions.length / 3 }, (_, k) => k / 7);
+
+describe("meshes", () => {
+  it.each([
+    ["off", bytes(writeOff(mesh))],
+    ["obj", bytes(writeObj(mesh))],
+    ["ply", writePly(mesh, distortion, 3)],
+  ] as const)("come back from %s as they went, to the last bit", (ending, written) => {
+    const read = readMesh(`creature.${ending}`, written);
+    expect(read.positions).toEqual(mesh.positions);
+    expect(read.faces).toEqual(mesh.faces);
+  });
+
+  it("come back from STL with the same triangles", () => {
+    const read = readMesh("creature.stl", writeStl(mesh));
+    expect(read.positions.length).toBe(mesh.positions.length);
+    const corners = ({ positions, faces }: typeof mesh) => [...faces].flatMap((v) => [...positions.subarray(3 * v, 3 * v + 3)]);
+    expect(corners(read)).toEqual(corners(mesh));
+  });
+
+  it("are read with polygons, negative numbers, comments and texture coordinates", () => {
+    const square = readMesh("a.OBJ", bytes("# c\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1 -1/1 # quad\n"));
+    expect([...square.faces]).toEqual([0, 1, 2, 0, 2, 3]);
+    expect([...readMesh("a.off", bytes("OFF # x\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0\n")).faces]).toEqual([0, 1, 2]);
+    const ply = "ply\nformat ascii 1.0\ncomment c\nelement vertex 3\nproperty float nx\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n9 0 0 0\n9 1 0 0\n9 0 1 0\n3 0 1 2\n";
+    expect([...readMesh("a.ply", bytes(ply)).positions]).toEqual([0, 0, 0, 1, 0, 0, 0, 1, 0]);
+    const stl = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e0 0\nendloop\nendfacet\nendsolid";
+    expect([...readMesh("a.stl", bytes(stl)).faces]).toEqual([0, 1, 2]);
+  });
+
+  it("are read from PLY in the other byte order", () => {
+    const head = "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\nelement face 1\nproperty list uchar uint vertex_indices\nend_header\n";
+    const view = new DataView(new ArrayBuffer(72 + 13));
+    [0, 0, 0, 1, 0, 0, 0, 1, 0].forEach((value, k) => view.setFloat64(8 * k, value));
+    view.setUint8(72, 3);
+    [0, 1, 2].forEach((value, k) => view.setUint32(73 + 4 * k, value));
+    const read = readMesh("a.ply", Uint8Array.from([...bytes(head), ...new Uint8Array(view.buffer)]));
+    expect([...read.faces]).toEqual([0, 1, 2]);
+    expect(read.positions[3]).toBe(1);
+  });
+
+  it.each([
+    ["a.txt", "", "not a mesh that can be read"],
+    ["a.off", "COFFEE", "does not begin with OFF"],
+    ["a.off", "OFF\n3 1 0\n0 0 0\n", "ends before vertex 1"],
+    ["a.off", "OFF\n3 1 0\n0 0 0\n1 0 x\n0 1 0\n3 0 1 2\n", "vertex 1: a vertex has no three finite coordinates"],
+    ["a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "Face 0 of a.obj has vertex 8; there are 3 vertices"],
+    ["a.obj", "v 0 0 0\nf 1 1\n", "line 2: a face has 2 corners"],
+    ["a.obj", "v 0 0 0\n", "has no faces"],
+    ["a.obj", "", "has no vertices"],
+    ["a.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n", "ends too soon"],
+    ["a.ply", "ply\nformat zip 1.0\nend_header\n", "format “zip”"],
+    ["a.ply", "nothing", "no PLY header"],
+    ["a.stl", "solid\nendsolid", "has no vertices"],
+  ])("%s with a fault is refused by name: %s", (name, text, message) => {
+    expect(() => readMesh(name, bytes(text))).toThrow(message);
+  });
+
+  it("cut short is refused", () => {
+    expect(() => readMesh("a.stl", writeStl(mesh).subarray(0, 300))).toThrow("ends too soon");
+    expect(() => readMesh("a.ply", writePly(mesh, distortion, 1).subarray(0, 900))).toThrow("ends too soon");
+  });
+});
+
+describe("a handle file", () => {
+  const full = {
+    mesh: "x",
+    note: "n",
+    handles: [
+      { name: "base", vertices: [0, 1, 2] },
+      { name: "tip", vertices: [7, 8], translate: [0, 0, 1], rotate: { axis: [0, 0, 2], angle_degrees: 30, center: [0.5, 0, 0] } },
+      { name: "free", vertices: [9], positions: [[1, 2, 3]] },
+      { name: "drawn", vertices: [11, 12], translate: [1, 0, 0], soft: 0.5 },
+      { name: "pin", points: [{ face: 5, barycentric: [0.2, 0.3, 0.5] }] },
+      { name: "rail", vertices: [14], axis_lock: [1, 0, 0], footprint: 0.25 },
+      { name: "floor", vertices: [15], plane_lock: [0, 0, 1] },
+      { name: "look", vertices: [16, 17], orientation: 100, rotate: { axis: [1, 0, 0], angle_degrees: -90 } },
+    ],
+    region: [0, 1, 2, 3, 7, 8],
+    groups: [{ name: "soft", vertices: [20, 21], p: 1.2, stiffness: 0.1 }],
+  };
+
+  it("with everything that the command line knows comes back the same", () => {
+    const once = readHandleFile(JSON.stringify(full), emptyDocument, mesh);
+    expect(once.handles.map(({ name }) => name)).toEqual(full.handles.map(({ name }) => name));
+    expect(once.handles[1]!.pose.translation).toEqual([0, 0, 1]);
+    expect(once.handles[2]!.targets).toEqual([1, 2, 3]);
+    expect(once.handles.map(({ hold }) => hold.kind)).toEqual(["exact", "exact", "exact", "soft", "exact", "axisLock", "planeLock", "orientation"]);
+    expect(once.paintedP![20]).toBeCloseTo(1.2);
+    const written = writeHandleFile(once, "x");
+    const again = readHandleFile(written, emptyDocument, mesh);
+    expect(JSON.parse(writeHandleFile(again, "x"))).toEqual(JSON.parse(written));
+    const numbers = (json: unknown) => JSON.stringify(json, (_, value: unknown) => (typeof value === "number" ? Number(value.toFixed(9)) : value));
+    const { note: _, ...rest } = full;
+    const parsed = JSON.parse(written) as typeof full;
+    expect(parsed.groups).toEqual([
+      { name: "p 1.2", vertices: [20, 21], p: 1.2 },
+      { name: "stiffness 0.1", vertices: [20, 21], stiffness: 0.1 },
+    ]);
+    expect(numbers(parsed.handles[3])).toBe(numbers({ name: "drawn", vertices: [11, 12], translate: [1, 0, 0], soft: 0.5 }));
+    expect(parsed.region).toEqual(rest.region);
+    expect(numbers(parsed.handles[1]!.rotate!.angle_degrees)).toBe("30");
+  });
+
+  it("keeps what the page begins with", () => {
+    const again = readHandleFile(writeHandleFile(document, mesh.name), emptyDocument, mesh);
+    expect(again.handles.map(({ vertices }) => vertices)).toEqual(document.handles.map(({ vertices }) => vertices));
+  });
+
+  const handles = (...list: object[]) => JSON.stringify({ handles: list });
+  it.each([
+    ["{", "not JSON"],
+    ["[]", "the handle file is not an object"],
+    ['{"handles": [], "what": 1}', "“what”, which is not a key"],
+    [handles(), "has no handle"],
+    [handles({ name: "a", vertices: [0] }, { name: "a", vertices: [1] }), "two handles “a”"],
+    [handles({ name: "a", vertices: [0] }, { name: "b", vertices: [0] }), "a vertex that another handle has"],
+    [handles({ name: "a", vertices: [0, 0] }), "vertex 0 twice"],
+    [handles({ name: "a", vertices: [-1] }), "vertex -1"],
+    [handles({ name: "a", vertices: [] }), "has no vertex"],
+    [handles({ name: "", vertices: [0] }), "1 to 128 bytes"],
+    [handles({ name: "a" }), "either “vertices” or “points”"],
+    [handles({ name: "a", vertices: [0], translate: [1, 2] }), "not [x, y, z]"],
+    [handles({ name: "a", vertices: [0], rotate: { axis: [0, 0, 0], angle_degrees: 3 } }), "no direction"],
+    [handles({ name: "a", vertices: [0], positions: [[1, 2, 3]], translate: [0, 0, 1] }), "beside “translate”"],
+    [handles({ name: "a", vertices: [0], positions: [] }), "1 vertices and 0 positions"],
+    [handles({ name: "a", vertices: [0], soft: -1 }), "“soft” of handle “a” is -1"],
+    [handles({ name: "a", vertices: [0], soft: 1, axis_lock: [1, 0, 0] }), "held in two ways"],
+    [handles({ name: "a", points: [{ face: 1e9, barycentric: [1, 0, 0] }] }), "face 1000000000"],
+    ['{"handles": [{"name": "a", "vertices": [0]}], "groups": [{"name": "g", "vertices": [1], "p": 0.5}]}', "“p” of group “g”"],
+  ])("with a fault is refused by name: %s", (text, message) => {
+    expect(() => readHandleFile(text, emptyDocument, mesh)).toThrow(message);
+  });
+});

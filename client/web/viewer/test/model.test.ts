@@ -1,0 +1,172 @@
+import { describe, expect, it } from "vitest";
+import { adjacencyOf, meanEdge } from "../src/model/adjacency.js";
+import { blueToRed } from "../src/model/colours.js";
+import { fitPose } from "../src/model/fit.js";
+import { History } from "../src/model/history.js";
+import { apply, axisAngle, quaternionOf, toMotion } from "../src/model/pose.js";
+import { raycast } from "../src/model/raycast.js";
+import { boxPolygon, dab, facing, insidePolygon, project } from "../src/model/selection.js";
+import { energyStatistics, histogram, percentile } from "../src/model/statistics.js";
+
+/** 4 by 4 vertices, one apart, in the plane z = 0. */
+const grid = (() => {
+  const positions = new Float32Array(48);
+  const faces: number[] = [];
+  for (let v = 0; v < 16; ++v) {
+    positions.set([v % 4, v >> 2, 0], 3 * v);
+    if (v % 4 < 3 && v < 12) faces.push(v, v + 1, v + 4, v + 1, v + 5, v + 4);
+  }
+  return { positions, faces: Uint32Array.from(faces) };
+})();
+const adjacency = adjacencyOf(16, grid.faces);
+
+describe("selection", () => {
+  it("reaches what hangs together within the radius, and no further", () => {
+    const found = dab(grid.positions, adjacency, 5, [1, 1, 0], 1);
+    expect(found.sort((a, b) => a - b)).toEqual([1, 4, 5, 6, 9]);
+    expect(dab(grid.positions, adjacency, 5, [1, 1, 0], 0)).toEqual([5]);
+  });
+
+  it("does not reach another piece close by", () => {
+    const positions = Float32Array.from([...grid.positions, ...grid.positions.map((value, k) => (k % 3 === 2 ? 0.01 : value))]);
+    const two = adjacencyOf(32, Uint32Array.from([...grid.faces, ...grid.faces.map((vertex) => vertex + 16)]));
+    expect(dab(positions, two, 5, [1, 1, 0], 1).every((vertex) => vertex < 16)).toBe(true);
+  });
+
+  it("projects as the camera sees it, and leaves out what is behind", () => {
+    const lookAlongZ = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, -1, 0, 0, 0, 0]; // w = -z
+    const screen = project(Float32Array.of(0, 0, -1, 1, 1, -1, 0, 0, 1), lookAlongZ, 200, 100);
+    expect([...screen]).toEqual([100, 50, 200, 0, NaN, NaN]);
+  });
+
+  it("takes what lies inside of a polygon, also one with a dent", () => {
+    const screen = Float32Array.of(1, 1, 5, 1, 5, 4.5, 9, 9, NaN, NaN);
+    expect(insidePolygon(screen, boxPolygon(8, 8, 0, 0))).toEqual([0, 1, 2]);
+    expect(insidePolygon(screen, [0, 0, 10, 0, 5, 4, 0, 10])).toEqual([0, 1]);
+  });
+
+  it("tells what faces the eye", () => {
+    const normals = Float32Array.of(0, 0, 1, 0, 0, -1);
+    expect(facing([0, 1], new Float32Array(6), normals, [0, 0, 5])).toEqual([0]);
+  });
+});
+
+describe("a ray", () => {
+  it("meets the nearest face and names its nearest corner", () => {
+    const hit = raycast(grid.positions, grid.faces, [1.1, 1.2, 5], [0, 0, -1])!;
+    expect(hit.vertex).toBe(5);
+    expect(hit.distance).toBeCloseTo(5, 6);
+    expect(hit.point[2]).toBeCloseTo(0, 6);
+  });
+
+  it("passes beside the surface", () => {
+    expect(raycast(grid.positions, grid.faces, [-1, 1, 5], [0, 0, -1])).toBeUndefined();
+  });
+});
+
+describe("statistics", () => {
+  const energies = Float32Array.from({ length: 1000 }, (_, k) => (k * 37) % 1000);
+  const sorted = [...energies].sort((a, b) => b - a);
+
+  it("finds the share of the top twentieth as sorting does", () => {
+    const exact = sorted.slice(0, 50).reduce((a, b) => a + b) / sorted.reduce((a, b) => a + b);
+    expect(energyStatistics(energies).top5Share).toBeCloseTo(exact, 3);
+  });
+
+  it("draws the 95th percentile in red, and the largest where most are 0", () => {
+    const { red, max } = energyStatistics(energies);
+    expect(Math.abs(red - 950)).toBeLessThan(5); // a bin's width near there
+    expect(max).toBe(999);
+    expect(energyStatistics(Float32Array.from({ length: 100 }, (_, k) => (k === 7 ? 3 : 0)))).toEqual({ max: 3, red: 3, top5Share: 1 });
+  });
+
+  it("knows no distortion", () => {
+    expect(energyStatistics(new Float32Array(10))).toEqual({ max: 0, red: 0, top5Share: 0 });
+  });
+
+  it("counts every cell in one bin", () => {
+    const counts = histogram(energies, 999, 10);
+    expect(counts.reduce((a, b) => a + b)).toBe(1000);
+    expect(histogram(Float32Array.of(0, 5, 10, 20), 10, 2)).toEqual(Uint32Array.of(1, 3));
+  });
+
+  it("has percentiles of few numbers", () => {
+    expect(percentile([3, 1, 2], 0.5)).toBe(2);
+    expect(percentile([3, 1, 2], 0.99)).toBe(3);
+    expect(percentile([], 0.5)).toBeNaN();
+  });
+});
+
+describe("poses", () => {
+  const turn = quaternionOf([1, 2, 3], 2.5);
+  const pose = { rotation: turn, center: [1, 1, 1] as const, translation: [0.5, -1, 2] as const };
+
+  it("come back from the positions that they make", () => {
+    const rest = Float32Array.from({ length: 30 }, (_, k) => Math.sin(13 * k));
+    const current = Float32Array.from(Array.from({ length: 10 }, (_, v) => apply(pose, [rest[3 * v]!, rest[3 * v + 1]!, rest[3 * v + 2]!])).flat());
+    const found = fitPose(rest, current, [0, 2, 3, 5, 9]);
+    for (let v = 0; v < 10; ++v) {
+      const point = apply(found, [rest[3 * v]!, rest[3 * v + 1]!, rest[3 * v + 2]!]);
+      point.forEach((value, axis) => expect(value).toBeCloseTo(current[3 * v + axis]!, 5));
+    }
+  });
+
+  it("do not turn what has no direction to tell", () => {
+    const rest = Float32Array.of(0, 0, 0, 1, 0, 0);
+    const current = Float32Array.of(0, 0, 5, 0, 1, 5);
+    expect(fitPose(rest, current, [0, 1]).rotation).toEqual([0, 0, 0, 1]);
+  });
+
+  it("are axis and angle to the server, and nothing at rest", () => {
+    const { axis, angle } = axisAngle(turn);
+    expect(angle).toBeCloseTo(2.5, 12);
+    expect(axis[2] / axis[0]).toBeCloseTo(3, 12);
+    expect(toMotion({ ...pose, rotation: [0, 0, 0, 1], translation: [0, 0, 0] })).toBe("fixed");
+  });
+});
+
+describe("history", () => {
+  it("makes one step of a gesture", () => {
+    const history = new History(0);
+    for (const value of [1, 2, 3]) history.during(value);
+    history.end();
+    history.push(4);
+    expect(history.undo() && history.present).toBe(3);
+    expect(history.undo() && history.present).toBe(0);
+    expect(history.undo()).toBe(false);
+    expect(history.redo() && history.redo() && history.present).toBe(4);
+    expect(history.redo()).toBe(false);
+  });
+
+  it("forgets what was undone when something new is done", () => {
+    const history = new History(0);
+    history.push(1);
+    history.undo();
+    history.push(2);
+    expect(history.canRedo).toBe(false);
+  });
+
+  it("makes no step of a gesture that ends where it began, and keeps a bounded number", () => {
+    const history = new History(0, 3);
+    history.during(1);
+    history.during(0);
+    history.end();
+    expect(history.canUndo).toBe(false);
+    for (let k = 1; k < 10; ++k) history.push(k);
+    let steps = 0;
+    while (history.undo()) ++steps;
+    expect(steps).toBe(3);
+  });
+});
+
+it("has the colours of the command line's pictures", () => {
+  expect(blueToRed(0)).toEqual([38, 70, 200]);
+  expect(blueToRed(0.5)).toEqual([90, 195, 95]);
+  expect(blueToRed(7)).toEqual([215, 40, 35]);
+});
+
+it("knows each neighbour once", () => {
+  const { starts, neighbours } = adjacency;
+  expect([...neighbours.subarray(starts[5], starts[6])].sort((a, b) => a - b)).toEqual([1, 2, 4, 6, 8, 9]);
+  expect(meanEdge(adjacency, grid.positions)).toBeGreaterThan(1);
+});

@@ -1,0 +1,140 @@
+import { join } from "node:path";
+import { afterAll, beforeAll, describe, expect, it } from "vitest";
+import { Service } from "../../../client/test/real/service.js";
+import { readMesh } from "../../src/io/read.js";
+import { writeOff } from "../../src/io/off.js";
+import { blockSurface } from "../../src/model/block.js";
+import { User } from "./user.js";
+
+let service: Service;
+let user: User;
+
+beforeAll(async () => {
+  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
+  user = await User.open(service.url);
+  await user.settled();
+});
+
+afterAll(async () => {
+  await user.close();
+  await service.stop();
+});
+
+/** 3 x 3 x 12 cells. */
+const tower = blockSurface(3, 3, 12, () => true);
+const bottom = 0;
+/** On its upper rim, to the front. */
+const rim = tower.positions.findIndex((value, k) => k % 3 === 2 && value === 12 && tower.positions[k - 1] === 0 && tower.positions[k - 2] === 1);
+const rimVertex = Math.floor(rim / 3);
+
+const heldNames = () => user.ask<string[]>("document().handles.map(({ name }) => name)");
+const largestDifference = (a: readonly number[], b: readonly number[]) => Math.max(...a.map((value, k) => Math.abs(value - b[k]!)));
+
+async function boxAround(from: number, to: number, slack: number): Promise<void> {
+  const [a, b] = [await user.vertexOnPage(from), await user.vertexOnPage(to)];
+  const start = { x: Math.min(a.x, b.x) - 90, y: Math.min(a.y, b.y) - slack };
+  await user.drag(start, Math.abs(a.x - b.x) + 180, Math.abs(a.y - b.y) + 2 * slack);
+}
+
+describe("somebody with a mesh of their own", () => {
+  it("opens it and is told how it is", async () => {
+    await user.openFiles({ name: "tower.off", content: writeOff(tower) });
+    await user.until("window.__lpdeform.app.facts.now.report !== undefined && window.__lpdeform.app.mesh.name === 'tower.off'");
+    await user.page.locator("summary", { hasText: "Mesh" }).click();
+    expect(await user.page.locator(".panel").textContent()).toMatch(/tower\.off: 164 vertices, 324 faces, 1 component, closed/);
+    expect(await user.page.locator(".panel").textContent()).toContain("Nothing wrong with it.");
+  });
+
+  it("places handles with the box and by a click, undoes and redoes", async () => {
+    await user.page.getByRole("button", { name: "Box", exact: true }).click();
+    await boxAround(bottom, bottom, 30);
+    expect((await heldNames()).length).toBe(1);
+    await user.page.getByRole("button", { name: "Move", exact: true }).first().click();
+    const place = await user.vertexOnPage(rimVertex);
+    await user.page.mouse.click(place.x, place.y + 2);
+    expect(await heldNames()).toEqual(["Handle 1", "Handle 2"]);
+    await user.settled();
+    await user.page.keyboard.press("Control+z");
+    expect((await heldNames()).length).toBe(1);
+    await user.page.keyboard.press("Control+Shift+Z");
+    expect((await heldNames()).length).toBe(2);
+    await user.settled();
+  });
+
+  it("drags, and the server dies and comes back in the middle of it: nothing is lost", async () => {
+    const rest = await user.positions();
+    const { mouse } = user.page;
+    const from = await user.vertexOnPage(rimVertex);
+    await mouse.move(from.x, from.y);
+    await mouse.down();
+    await mouse.move(from.x + 30, from.y + 10);
+    await mouse.move(from.x + 60, from.y + 20);
+    await user.until("window.__lpdeform.app.red > 0");
+
+    await service.killServer();
+    await user.until('window.__lpdeform.status() === "away"');
+    await mouse.move(from.x + 80, from.y + 30); // the user goes on
+    await user.page.locator(".banner", { hasText: "The server is away" }).waitFor();
+    expect(await user.page.locator(".banner").textContent()).toContain("Your work is kept here");
+    await service.startServer();
+    await user.until('window.__lpdeform.status() === "live"');
+    await mouse.move(from.x + 110, from.y + 40);
+    await mouse.up();
+    await user.settled();
+    await user.page.locator(".banner").waitFor({ state: "hidden" });
+
+    const bent = await user.positions();
+    expect(largestDifference(bent, rest)).toBeGreaterThan(1);
+    // The handle is exactly where it was dragged to, by the page's own account of it.
+    const { vertices, pose } = await user.ask<{ vertices: number[]; pose: { translation: number[] } }>("document().handles[1]");
+    const [vertex] = vertices as [number];
+    pose.translation.forEach((value, axis) => expect(bent[3 * vertex + axis]! - rest[3 * vertex + axis]!).toBeCloseTo(value, 2));
+    expect(user.errors).toEqual([]);
+  });
+
+  it("changes p and sees vertices move and colours change", async () => {
+    const before = await user.positions();
+    const colours = await user.colours();
+    await user.page.getByRole("button", { name: "1", exact: true }).click();
+    await user.settled();
+    expect(largestDifference(await user.positions(), before)).toBeGreaterThan(0.05);
+    const gathered = await user.colours();
+    expect(Math.abs(gathered.warm - colours.warm) + Math.abs(gathered.cold - colours.cold)).toBeGreaterThan(0.02);
+    await user.until("window.__lpdeform.frame().gap !== undefined"); // by itself, once all rests
+  });
+
+  it.each(["PLY, with distortion", "OBJ", "OFF"])("exports the mesh as %s and reloads it equal", async (format) => {
+    const shown = await user.positions();
+    const file = await user.save(`Mesh as ${format}`);
+    const ending = format.slice(0, 3).toLowerCase();
+    const read = readMesh(`x.${ending}`, file);
+    expect([...read.positions]).toEqual(shown);
+    expect(read.faces).toEqual(tower.faces);
+  });
+
+  it("saves the handles, reloads the exported mesh, and has both again", async () => {
+    const shown = await user.positions();
+    const handles = await user.save("Handles as JSON");
+    const exported = await user.save("Mesh as PLY, with distortion");
+    const before = await user.ask<object>("document().handles.map(({ name, vertices }) => ({ name, vertices }))");
+
+    await user.openFiles({ name: "tower.off", content: writeOff(tower) }, { name: "tower-handles.json", content: handles });
+    await user.settled();
+    expect(await user.ask("document().handles.map(({ name, vertices }) => ({ name, vertices }))")).toEqual(before);
+    await user.until("window.__lpdeform.app.red > 0");
+    expect(largestDifference(await user.positions(), [...tower.positions])).toBeGreaterThan(1);
+
+    await user.openFiles({ name: "bent.ply", content: exported });
+    await user.until("window.__lpdeform.app.mesh.name === 'bent.ply'");
+    await user.settled();
+    const reloaded = await user.ask<Record<string, number>>("app.mesh.positions");
+    expect(Object.values(reloaded)).toEqual(shown);
+  });
+
+  it("saves a picture", async () => {
+    const png = await user.save("Picture as PNG");
+    expect(png.subarray(1, 4).toString()).toBe("PNG");
+    expect(png.length).toBeGreaterThan(10_000);
+    expect(user.errors).toEqual([]);
+  });
+});
