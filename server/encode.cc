@@ -191,6 +191,9 @@ void encode_header(const FramePiece& piece, v1::FrameHeader& out) {
   }
   out.set_solve_seconds(frame.solve_seconds);
   out.set_method(encode_method(frame.method));
+  if (frame.optimality_gap && piece.with_certificate) {
+    out.mutable_certificate()->set_relative_gap(*frame.optimality_gap);
+  }
 }
 
 void encode_piece(const FramePiece& piece, v1::FramePart& out) {
@@ -271,6 +274,7 @@ void encode_event(const Note& note, const FrameStream& stream, std::uint32_t ver
                     granted.set_lowest_encoding(encode_encoding(options.lowest_format));
                     granted.set_without_distortion(!options.with_distortion);
                     granted.set_with_normals(options.with_normals);
+                    granted.set_certify(options.with_certificate);
                     granted.set_max_frames_per_second(options.max_frames_per_second);
                   },
                   [&](const FramePiece& piece) { encode_piece(piece, *out.mutable_frame()); },

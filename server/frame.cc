@@ -157,19 +157,21 @@ Surface::Parts Surface::counted(Parts form) const {
 }
 
 FrameCutter::FrameCutter(std::shared_ptr<const Frame> frame, Format format, bool with_distortion,
-                         bool with_normals, std::uint64_t skipped_inputs)
+                         bool with_normals, std::uint64_t skipped_inputs, bool with_certificate)
     : frame_(std::move(frame)),
       format_(format),
       with_distortion_(with_distortion),
       with_normals_(with_normals),
+      with_certificate_(with_certificate),
       skipped_inputs_(skipped_inputs) {}
 
 FramePiece FrameCutter::next() {
   LPDEFORM_CHECK(has_more());
   const std::uint32_t most = Surface::vertices_a_part(format_, with_distortion_, with_normals_);
   const std::uint32_t left = frame_->surface->vertex_count() - at_;
-  FramePiece piece{frame_,          at_,     std::min(most, left), left <= most,
-                   skipped_inputs_, format_, with_distortion_,     with_normals_};
+  FramePiece piece{frame_,           at_,     std::min(most, left), left <= most,
+                   skipped_inputs_,  format_, with_distortion_,     with_normals_,
+                   with_certificate_};
   at_ += piece.count;
   if (piece.is_last) frame_.reset();
   return piece;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -117,6 +118,8 @@ struct Frame {
   StopReason stop_reason = StopReason::kRunning;
   double solve_seconds = 0;
   Method method = Method::kAuto;
+  std::optional<double> optimality_gap;  // of a result, once it is known
+  std::uint64_t repeats = 0;             // the frame_seq of the same state without its gap; 0: none
   std::shared_ptr<const Surface> surface;
 };
 
@@ -130,6 +133,7 @@ struct FramePiece {
   Format format = Format::kFloat32;
   bool with_distortion = true;
   bool with_normals = false;
+  bool with_certificate = false;
 
   Surface::Bytes bytes() const {
     return frame->surface->bytes(format, first, count, with_distortion, with_normals);
@@ -141,7 +145,7 @@ class FrameCutter {
  public:
   FrameCutter() = default;
   FrameCutter(std::shared_ptr<const Frame> frame, Format format, bool with_distortion, bool with_normals,
-              std::uint64_t skipped_inputs);
+              std::uint64_t skipped_inputs, bool with_certificate = false);
 
   bool has_more() const { return frame_ != nullptr; }
   /// Needs has_more(). Lets go of the frame with its last piece.
@@ -152,6 +156,7 @@ class FrameCutter {
   Format format_ = Format::kFloat32;
   bool with_distortion_ = true;
   bool with_normals_ = false;
+  bool with_certificate_ = false;
   std::uint64_t skipped_inputs_ = 0;
   std::uint32_t at_ = 0;
 };

@@ -87,6 +87,8 @@ std::optional<Note> FrameStream::next_locked(Timers::TimePoint now) {
 void FrameStream::begin_frame(Timers::TimePoint now) {
   std::shared_ptr<const Frame> newest = publisher_->newest();
   if (!newest || newest->frame_seq <= last_seq_ || in_flight_.size() >= options_.credit) return;
+  const bool was_sent = newest->repeats != 0 && newest->repeats == last_seq_;
+  if (was_sent && !options_.with_certificate) return;
   if (const Timers::TimePoint when = next_frame_at(); now < when) return arm(is_pace_armed_, when);
   const std::uint64_t answered = has_sent_frame_ ? newest->taken - last_taken_ : 0;
   last_seq_ = newest->frame_seq;
@@ -96,7 +98,7 @@ void FrameStream::begin_frame(Timers::TimePoint now) {
   in_flight_.push_back(last_seq_);
   last_bytes_ = 0;
   cutter_ = FrameCutter(newest, options_.format_for(*newest->surface), options_.with_distortion,
-                        options_.with_normals, answered > 1 ? answered - 1 : 0);
+                        options_.with_normals, answered > 1 ? answered - 1 : 0, options_.with_certificate);
 }
 
 FramePiece FrameStream::next_piece() {

@@ -26,6 +26,7 @@ struct StreamOptions {
   Format lowest_format = Format::kFloat32;
   bool with_distortion = true;
   bool with_normals = false;
+  bool with_certificate = false;
   double max_frames_per_second = 0;
   /// The server's; 0 is without limit. Lowers the frame rate first, to kLowestRate, then the precision, then the rate
   /// again.

@@ -21,11 +21,12 @@ absl::Status no_handles() {
 }  // namespace
 
 LiveSolver::LiveSolver(std::unique_ptr<Deformer> deformer, const Mailbox& mailbox, Publisher& publisher,
-                       std::shared_ptr<const DrawMesh> mesh, std::stop_token stop)
+                       std::shared_ptr<const DrawMesh> mesh, Alarm alarm, std::stop_token stop)
     : deformer_(std::move(deformer)),
       mailbox_(mailbox),
       publisher_(publisher),
       mesh_(std::move(mesh)),
+      alarm_(std::move(alarm)),
       stop_(std::move(stop)) {
   publish(mailbox_.newest().handles->handles().empty());
 }
@@ -41,6 +42,9 @@ bool LiveSolver::run_slice(SolveJob* job) {
                                                                : kNobody;
   if (phase_ == Phase::kRunning && running_for_ != wanted) pause();
   if (wanted == kNobody) return false;
+  if (wanted == kReaders && (phase_ == Phase::kAnswered || phase_ == Phase::kCertifying)) {
+    return look_for_certificate();
+  }
   if (phase_ != Phase::kRunning) {
     if (!(job != nullptr ? begin_job(*job) : begin_live())) return false;
     phase_ = Phase::kRunning;
@@ -70,6 +74,7 @@ void LiveSolver::take_over(const Inputs& inputs) {
 
 /// False where the job has ended.
 bool LiveSolver::begin_job(SolveJob& job) {
+  if (phase_ == Phase::kCertifying) phase_ = Phase::kAnswered;  // where this fails, it is looked for anew
   absl::Status status = blocked_;
   if (inputs_.handles == nullptr) status = no_handles();
   SolveSettings settings = inputs_.solver;
@@ -113,16 +118,49 @@ void LiveSolver::run_steps(SolveJob* job) {
 
 /// Somebody may be sent one at once, or will get what waits when they have taken what was sent to them.
 bool LiveSolver::is_frame_due() const {
+  if (deformer_->is_certifying()) return false;  // the positions are those of the result
   if (publisher_.is_frame_wanted()) return true;
   return publisher_.reader_count() > 0 && Clock::now() - last_published_ >= kOldestWaiting;
 }
 
 void LiveSolver::end_solve(SolveJob* job) {
   if (deformer_->summary().stop_reason == StopReason::kCancelled) return pause();
-  phase_ = Phase::kDone;
+  const bool is_certified = deformer_->summary().optimality_gap.has_value();
+  phase_ = is_certified ? Phase::kDone : Phase::kAnswered;
+  answered_at_ = alarm_.timers->now();
+  is_alarm_set_ = false;
+  if (!is_certified && publisher_.is_certificate_wanted()) set_alarm();
   running_for_ = kNobody;
   const std::shared_ptr<const Frame> frame = publish(true);
   if (job != nullptr) job->finish(SolveResult{deformer_->summary(), frame});
+}
+
+/// For the readers. True while there is more to do.
+bool LiveSolver::look_for_certificate() {
+  if (!publisher_.is_certificate_wanted()) return false;
+  if (phase_ == Phase::kAnswered && !begin_certificate()) return false;
+  const Clock::time_point end = Clock::now() + kSlice;
+  bool has_more = true;
+  while (has_more && Clock::now() < end) has_more = deformer_->step();
+  if (has_more) return true;
+  phase_ = Phase::kDone;
+  publisher_.certify_newest(deformer_->summary().optimality_gap.value());
+  return false;
+}
+
+/// False where it is too early: then the alarm is set.
+bool LiveSolver::begin_certificate() {
+  if (alarm_.timers->now() < answered_at_ + kQuiet) {
+    set_alarm();
+    return false;
+  }
+  const bool is_begun = deformer_->start_certificate(stop_).ok();
+  phase_ = is_begun ? Phase::kCertifying : Phase::kDone;
+  return is_begun;
+}
+
+void LiveSolver::set_alarm() {
+  if (!std::exchange(is_alarm_set_, true)) alarm_.timers->at(answered_at_ + kQuiet, alarm_.ring);
 }
 
 void LiveSolver::report(const SolveJob& job) {
@@ -146,6 +184,7 @@ std::shared_ptr<const Frame> LiveSolver::publish(bool is_final) {
   frame.stop_reason = is_final ? summary.stop_reason : StopReason::kRunning;
   frame.solve_seconds = summary.solve_seconds;
   frame.method = summary.method;
+  if (is_final && blocked_.ok()) frame.optimality_gap = summary.optimality_gap;
   frame.surface = std::make_shared<const Surface>(mesh_->positions(deformer_->positions()),
                                                   mesh_->distortion(deformer_->cell_energies()), mesh_);
   return publisher_.publish(std::move(frame));

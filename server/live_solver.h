@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <stop_token>
 
@@ -9,6 +10,7 @@
 #include "server/mailbox.h"
 #include "server/publisher.h"
 #include "server/solve_job.h"
+#include "server/timers.h"
 
 namespace lpdeform {
 
@@ -19,11 +21,20 @@ namespace lpdeform {
 /// Inputs with no handle at all leave the surface as it is: its present state is their result. Where a
 /// component lacks a handle, no frame answers the inputs; a standing fault says so until newer inputs are
 /// better.
+///
+/// Where a reader asked for certificates and a result has stood for kQuiet, it looks for the result's and publishes
+/// the frame again with it; a newer input or a Solve call ends the search.
 class LiveSolver {
  public:
+  /// How it asks to be run again later: `ring` is called on the timers' thread, and may outlive the solver.
+  struct Alarm {
+    std::shared_ptr<Timers> timers;
+    std::function<void()> ring;
+  };
+
   /// Publishes the present state, in the vertices of `mesh`. Ends its solves when `stop` is requested.
   LiveSolver(std::unique_ptr<Deformer> deformer, const Mailbox& mailbox, Publisher& publisher,
-             std::shared_ptr<const DrawMesh> mesh, std::stop_token stop);
+             std::shared_ptr<const DrawMesh> mesh, Alarm alarm, std::stop_token stop);
 
   /// At most about kSlice, or one step where that takes longer. `job` may be null. True where there is more
   /// to do.
@@ -39,6 +50,7 @@ class LiveSolver {
   static constexpr std::chrono::milliseconds kBetweenReports{100};
   /// While it runs for readers, none of whom may be sent a frame just now, the one that waits for them is not older.
   static constexpr std::chrono::milliseconds kOldestWaiting{100};
+  static constexpr std::chrono::milliseconds kQuiet{100};
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -46,6 +58,8 @@ class LiveSolver {
     kDone,     // the inputs are answered, or cannot be
     kWaiting,  // they are not yet, and no solve runs
     kRunning,
+    kAnswered,    // done but for a certificate
+    kCertifying,  // it is being looked for
   };
 
   void take_over(const Inputs& inputs);
@@ -54,6 +68,9 @@ class LiveSolver {
   void pause();
   void run_steps(SolveJob* job);
   void end_solve(SolveJob* job);
+  bool look_for_certificate();
+  bool begin_certificate();
+  void set_alarm();
   void report(const SolveJob& job);
   bool is_frame_due() const;
   std::shared_ptr<const Frame> publish(bool is_final);
@@ -62,6 +79,7 @@ class LiveSolver {
   const Mailbox& mailbox_;
   Publisher& publisher_;
   const std::shared_ptr<const DrawMesh> mesh_;
+  const Alarm alarm_;
   const std::stop_token stop_;
 
   Inputs inputs_;                          // taken over, or tried
@@ -73,6 +91,8 @@ class LiveSolver {
   std::uint64_t running_for_ = kNobody;  // the number of a job, or kReaders
   Clock::time_point last_report_;
   Clock::time_point last_published_;
+  Timers::TimePoint answered_at_;  // while kAnswered
+  bool is_alarm_set_ = false;      // since then
 };
 
 }  // namespace lpdeform

@@ -31,8 +31,21 @@ void Publisher::begin_epoch(std::uint64_t epoch) {
       Frame again = *newest_;
       again.frame_seq = ++frames_;
       again.epoch = epoch;
+      again.repeats = 0;
       newest_ = std::make_shared<const Frame>(std::move(again));
     }
+  }
+  wake_all();
+}
+
+void Publisher::certify_newest(double optimality_gap) {
+  {
+    const std::scoped_lock lock(mutex_);
+    Frame again = *newest_;
+    again.repeats = newest_->frame_seq;
+    again.frame_seq = ++frames_;
+    again.optimality_gap = optimality_gap;
+    newest_ = std::make_shared<const Frame>(std::move(again));
   }
   wake_all();
 }
@@ -84,6 +97,12 @@ std::size_t Publisher::reader_count() const {
 bool Publisher::is_frame_wanted() const {
   const auto all = readers();
   return std::any_of(all.begin(), all.end(), [](const auto& stream) { return stream->wants_frame(); });
+}
+
+bool Publisher::is_certificate_wanted() const {
+  const auto all = readers();
+  return std::any_of(all.begin(), all.end(),
+                     [](const auto& stream) { return stream->options().with_certificate; });
 }
 
 void Publisher::close(EndReason reason, const std::string& text) {

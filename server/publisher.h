@@ -24,6 +24,10 @@ class Publisher {
   /// Numbers the frame within its epoch, puts it into the slot and wakes the readers.
   std::shared_ptr<const Frame> publish(Frame frame);
 
+  /// Publishes the newest frame again, now with its certificate: for the readers that asked for it, and for those
+  /// that it has not been sent to. After a publish().
+  void certify_newest(double optimality_gap);
+
   /// Frames sent from now on are of this epoch, the one in the slot too.
   void begin_epoch(std::uint64_t epoch);
 
@@ -42,6 +46,8 @@ class Publisher {
   std::size_t reader_count() const;
   /// Whether any reader could be sent a frame at once.
   bool is_frame_wanted() const;
+  /// Whether any reader asked for certificates.
+  bool is_certificate_wanted() const;
 
   /// Ends every stream and takes no more.
   void close(EndReason reason, const std::string& text);

@@ -52,9 +52,12 @@ absl::StatusOr<std::shared_ptr<Session>> Session::create(SessionParts parts, Ses
   std::unique_ptr<Deformer> deformer = std::move(parts.deformer);
   const std::shared_ptr<Session> session(new Session(std::move(parts), std::move(services)));
   if (absl::Status status = session->mailbox_.begin_with(beginning); !status.ok()) return status;
+  LiveSolver::Alarm alarm{session->services_.timers, [weak = session->weak_from_this()] {
+                            if (const auto self = weak.lock()) self->services_.scheduler.wake(self);
+                          }};
   session->solver_ =
       std::make_unique<LiveSolver>(std::move(deformer), session->mailbox_, *session->publisher_,
-                                   session->mesh_, session->stop_.get_token());
+                                   session->mesh_, std::move(alarm), session->stop_.get_token());
   return session;
 }
 

@@ -96,7 +96,8 @@ absl::StatusOr<Solved> solve_on(const std::string& address, const DeformOptions&
   if (!session.ok()) return session.status();
   interrupt.set_action([&session] { session->close().IgnoreError(); });
 
-  client::SolveOptions solve{.certify = options.report.has_value(), .keep_trace = options.report.has_value()};
+  client::SolveOptions solve{.certify = options.certify || options.report.has_value(),
+                             .keep_trace = options.report.has_value()};
   solve.with_normals = options.normals;
   solve.initial_positions = std::move(inputs.initial_positions);
   solve.on_progress = [&progress](const client::SolveProgress& now) { progress.show(now); };
@@ -132,6 +133,7 @@ void print_summary(const Inputs& inputs, const client::SolveResult& result) {
               result.setup_seconds + result.solve_seconds, result.energy, result.initial_energy);
   if (const double* const p = std::get_if<double>(&inputs.p))
     std::printf("; E^(1/p) = %.6g", std::pow(result.energy, 1 / *p));
+  if (result.optimality_gap) std::printf("; gap %.2g", *result.optimality_gap);
   std::printf("\n");
 }
 

@@ -27,6 +27,7 @@ struct DeformOptions {
   int threads = 0;       // of the server in this process; 0: all cores
   bool welds = false;    // vertices at one position are one
   bool normals = false;  // in .obj and .ply
+  bool certify = false;  // print the optimality gap
   std::vector<std::filesystem::path> out;
   std::optional<std::filesystem::path> report;
   std::optional<std::string> server;  // a server in this process where there is none

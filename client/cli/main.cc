@@ -148,6 +148,12 @@ void add_solver_options(CLI::App& app, DeformOptions& options) {
       ->option_text("SECONDS");
 }
 
+void add_weld(CLI::App& app, bool& welds) {
+  app.add_flag("--weld", welds,
+               "Vertices at exactly the same position are one: for meshes split along seams of texture or "
+               "normals");
+}
+
 void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand("deform", "Deform a mesh by its handles and write the result");
   const auto options = std::make_shared<DeformOptions>();
@@ -163,13 +169,13 @@ void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
                  ".off, or a picture as .png")
       ->allow_extra_args(false)
       ->option_text("FILE");
-  app.add_flag("--weld", options->welds,
-               "Vertices at exactly the same position are one: for meshes split along seams of texture or "
-               "normals");
+  add_weld(app, options->welds);
   app.add_flag(
       "--normals", options->normals,
       "Write normals to .obj and .ply; those of an OBJ input are carried along, so that its hard edges "
       "stay hard");
+  app.add_flag("--certify", options->certify,
+               "Print how far the result can be from the best one for its rotations (a report has it, too)");
   app.add_option("--report", options->report, "Where to write what was measured, as JSON")
       ->option_text("FILE");
   CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")
@@ -220,6 +226,7 @@ void add_resize(CLI::App& program, std::function<ExitStatus()>& command) {
   add_vector(app, "--origin", options->origin, "What stays where it is (the middle of the bounding box)");
   add_vector(app, "--x-axis", options->x_axis, "The direction of the first factor (1,0,0)");
   add_vector(app, "--y-axis", options->y_axis, "The direction of the second factor (0,1,0)");
+  add_weld(app, options->welds);
   CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")
                                    ->check(CLI::Range(1, 1024))
                                    ->option_text("N");

@@ -49,7 +49,10 @@ struct OpenOptions {
   /// What the server may go down to where its limit of bytes a second asks for it; the frame rate comes first.
   Encoding lowest_encoding = Encoding::kRaw;
   bool without_distortion = false;
-  bool with_normals = false;         // fills Frame::normals
+  bool with_normals = false;  // fills Frame::normals
+  /// A result comes again with its Frame::optimality_gap, unless a new update comes first: the server looks for it
+  /// once updates have paused for a tenth of a second.
+  bool certify = false;
   double max_frames_per_second = 0;  // 0 is without limit; the last frame of an update always comes
 };
 
@@ -98,7 +101,7 @@ class Session {
   absl::StatusOr<std::optional<Frame>> poll();
 
   /// Takes frames until one is the finished result of the newest update. Waits, in vain where that one was
-  /// taken before. Errors as next_frame.
+  /// taken before; not for its optimality_gap, which the next frame has. Errors as next_frame.
   absl::StatusOr<Frame> settle(std::chrono::milliseconds timeout);
 
   /// Solves for the present handles and settings on the server and returns the finished result; waits for it.

@@ -79,6 +79,7 @@ absl::Status FrameAssembly::begin(const v1::FrameHeader& header) {
   frame.stop_reason = from_wire(header.stop_reason());
   frame.solve_seconds = header.solve_seconds();
   frame.method = method_name(header.method());
+  if (header.has_certificate()) frame.optimality_gap = header.certificate().relative_gap();
   frame.positions.reserve(std::size_t{3} * vertex_count_);
   frame.distortion.reserve(vertex_count_);
   received_ = 0;

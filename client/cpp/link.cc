@@ -22,6 +22,7 @@ v1::DeformRequest open_request(const Lease& lease, const OpenOptions& options) {
   frames.set_lowest_encoding(to_wire(std::max(options.encoding, options.lowest_encoding)));
   frames.set_without_distortion(options.without_distortion);
   frames.set_with_normals(options.with_normals);
+  frames.set_certify(options.certify);
   frames.set_max_frames_per_second(options.max_frames_per_second);
   return request;
 }

@@ -235,10 +235,14 @@ struct Frame {
   std::uint32_t iteration = 0;
   double energy = 0;       // E of the positions, Eq. 3 of the paper, in the mesh's unit, with soft terms
   double soft_energy = 0;  // the part of it that soft and orientation handles have
-  bool converged = false;  // the result for input_seq: no further frame until there is a new update
+  /// The result for input_seq: no further frame until there is a new update, but for the same one with its gap.
+  bool converged = false;
   StopReason stop_reason = StopReason::kRunning;
   double solve_seconds = 0;
   std::string method = {};
+  /// (E - lower bound) / E of the convex problem with its rotations held. In results alone, where asked for: see
+  /// OpenOptions::certify.
+  std::optional<double> optimality_gap = {};
 };
 
 struct IterationRecord {

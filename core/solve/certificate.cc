@@ -1,6 +1,7 @@
 #include "core/solve/certificate.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -139,68 +140,124 @@ double penalty(const Problem& problem, const DualBound& dual) {
   return dual.k(i) * dual.p(i) * std::pow(energy, dual.p(i) - 2);
 }
 
-/// ADMM on min sum f_i(z_i), z = A x - b, from the present residuals r and multipliers y, with the metric
-/// factored for equal cell weights. Returns the best bound seen.
-double polish(const Problem& problem, const ConvexRows& rows, DualBound& dual, EdgeVectors r, EdgeVectors y,
-              double best, double enough, const CertificateSettings& settings, Clock::time_point end) {
-  const double rho = penalty(problem, dual);
-  EdgeVectors image;
-  for (int step = 0; step < settings.max_steps && best < enough; ++step) {
-    if (problem.stop.stop_requested() || Clock::now() >= end) break;
-    const EdgeVectors v = r + y / rho;
-    EdgeVectors z = v;
-    for (std::int32_t i = 0; i < rows.count(); ++i) {
-      const double size = rows.norm(v, i);
-      const double factor = size > 0 ? shrink(size, dual.k(i), dual.p(i), rho) / size : 0;
-      rows.rows(z, i) *= factor;
-    }
-    y = rho * (v - z);
-    // x minimises |r - z + y / rho|; what remains of that vector, times rho, has A^T (.) = 0: a dual point.
-    rows.apply(least_squares(problem, rows, r - z + y / rho), image);
-    r -= image;
-    if (step % 5 == 4) best = std::max(best, dual.scaled_bound(rho * (r - z) + y));
-  }
-  return best;
-}
-
-/// The best bound from the terms' gradients, smoothed by several shares of the mean cell energy; `y` gets the
-/// gradient that gave it.
-double gradient_bound(const Problem& problem, ConvexRows& rows, DualBound& dual, const EdgeVectors& z,
-                      EdgeVectors& y) {
-  double best = -kInfinity;
-  const double mean = mean_energy(problem);
-  for (const double share : {0.0, 1e-4, 1e-3, 1e-2, 1e-1}) {
-    if (share > 0 && problem.norm.lowest_p() >= 2) break;
-    const double eps = share * mean;
-    problem.objective.reweigh(problem.norm.smoothed(eps * eps));
-    if (!rows.factor()) continue;
-    EdgeVectors gradient = term_gradients(rows, z, eps);
-    const double bound = dual.scaled_bound(project(problem, rows, gradient));
-    if (bound > best) best = bound, y = std::move(gradient);
-  }
-  return best;
-}
-
 }  // namespace
 
-double relative_gap(const Problem& problem, const Points& x, const CertificateSettings& settings) {
-  const double primal = problem.objective.sum(problem.norm);
-  if (primal <= problem.zero_objective) return 0;
-  if (!std::isfinite(primal) || problem.constraints.linear.has_tied_locks()) return 1;
-  const Clock::time_point end =
-      Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                         std::chrono::duration<double>(std::min(settings.max_seconds, kLongestSeconds)));
-
-  EdgeVectors z, y;
-  ConvexRows rows(problem);
-  rows.residuals(x, z);
-  DualBound dual(rows, z);
-  const double enough = (1 - settings.good_enough) * primal;
-  double best = gradient_bound(problem, rows, dual, z, y);
-  if (best < enough && y.size() > 0 && rows.factor_equal()) {
-    best = polish(problem, rows, dual, z, std::move(y), best, enough, settings, end);
+/// The stages of a certificate: gradients smoothed by several shares of the mean cell energy, then ADMM on
+/// min sum f_i(z_i), z = A x - b, from the residuals at x and the best of the gradients.
+class Certificate::Search {
+ public:
+  Search(Problem problem, const Points& x, const CertificateSettings& settings)
+      : problem_(std::move(problem)),
+        settings_(settings),
+        end_(Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
+                                std::min(settings.max_seconds, kLongestSeconds)))),
+        primal_(problem_.objective.sum(problem_.norm)),
+        rows_(problem_),
+        dual_(rows_, z_) {
+    is_over_ = primal_ <= problem_.zero_objective || !std::isfinite(primal_) ||
+               problem_.constraints.linear.has_tied_locks();
+    if (is_over_) return;
+    rows_.residuals(x, z_);
+    mean_energy_ = mean_energy(problem_);
   }
-  return best > -kInfinity ? std::clamp((primal - best) / primal, 0.0, 1.0) : 1;
+
+  bool step() {
+    if (is_over_ || problem_.stop.stop_requested()) return false;
+    if (share_ < kShares.size() && (share_ == 0 || problem_.norm.lowest_p() < 2)) {
+      bound_by_gradient(kShares[share_++] * mean_energy_);
+      return !is_over_;
+    }
+    if (!is_polishing_ && !begin_polishing()) return false;
+    for (int k = 0; k < kStepsAtOnce; ++k) {
+      if (polished_ == settings_.max_steps || Clock::now() >= end_) return false;
+      polish();
+    }
+    return !is_over_;
+  }
+
+  double relative_gap() const {
+    if (primal_ <= problem_.zero_objective) return 0;
+    return best_ > -kInfinity ? std::clamp((primal_ - best_) / primal_, 0.0, 1.0) : 1;
+  }
+
+ private:
+  static constexpr std::array<double, 5> kShares = {0.0, 1e-4, 1e-3, 1e-2, 1e-1};
+  static constexpr int kStepsAtOnce = 5;
+
+  bool take(double bound) {
+    const bool is_better = bound > best_;
+    if (is_better) best_ = bound;
+    is_over_ = best_ >= (1 - settings_.good_enough) * primal_;
+    return is_better;
+  }
+
+  void bound_by_gradient(double eps) {
+    problem_.objective.reweigh(problem_.norm.smoothed(eps * eps));
+    if (!rows_.factor()) return;
+    EdgeVectors gradient = term_gradients(rows_, z_, eps);
+    if (take(dual_.scaled_bound(project(problem_, rows_, gradient)))) y_ = std::move(gradient);
+  }
+
+  /// False where there is nothing to begin with.
+  bool begin_polishing() {
+    is_polishing_ = y_.size() > 0 && Clock::now() < end_ && rows_.factor_equal();
+    if (!is_polishing_) return false;
+    rho_ = penalty(problem_, dual_);
+    r_ = z_;
+    return true;
+  }
+
+  /// One step of ADMM; its present residuals are r_, its multipliers y_.
+  void polish() {
+    const EdgeVectors v = r_ + y_ / rho_;
+    EdgeVectors z = v;
+    for (std::int32_t i = 0; i < rows_.count(); ++i) {
+      const double size = rows_.norm(v, i);
+      const double factor = size > 0 ? shrink(size, dual_.k(i), dual_.p(i), rho_) / size : 0;
+      rows_.rows(z, i) *= factor;
+    }
+    y_ = rho_ * (v - z);
+    // x minimises |r - z + y / rho|; what remains of that vector, times rho, has A^T (.) = 0: a dual point.
+    rows_.apply(least_squares(problem_, rows_, r_ - z + y_ / rho_), image_);
+    r_ -= image_;
+    if (++polished_ % kStepsAtOnce == 0) take(dual_.scaled_bound(rho_ * (r_ - z) + y_));
+  }
+
+  const Problem problem_;
+  const CertificateSettings settings_;
+  const Clock::time_point end_;
+  const double primal_;
+  EdgeVectors z_;  // the residuals at x
+  ConvexRows rows_;
+  DualBound dual_;
+  double best_ = -kInfinity;
+  bool is_over_ = false;
+  std::size_t share_ = 0;  // the next of kShares
+  double mean_energy_ = 0;
+  bool is_polishing_ = false;
+  int polished_ = 0;
+  double rho_ = 0;
+  EdgeVectors y_, r_, image_;
+};
+
+Certificate::Certificate(Problem problem, const Points& x, const CertificateSettings& settings)
+    : search_(std::make_unique<Search>(std::move(problem), x, settings)) {}
+
+Certificate::~Certificate() = default;
+
+bool Certificate::step() {
+  return search_->step();
+}
+
+double Certificate::relative_gap() const {
+  return search_->relative_gap();
+}
+
+double relative_gap(const Problem& problem, const Points& x, const CertificateSettings& settings) {
+  Certificate certificate(problem, x, settings);
+  while (certificate.step()) {
+  }
+  return certificate.relative_gap();
 }
 
 }  // namespace lpdeform

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <limits>
+#include <memory>
 
 #include "core/solve/minimiser.h"
 #include "core/solve/residuals.h"
@@ -31,9 +32,28 @@ struct CertificateSettings {
   double max_seconds = std::numeric_limits<double>::infinity();
 };
 
-/// (P - D) / P at x in [0, 1], P the sum of the norm's unsmoothed terms; 0 where P is 0. `problem.objective`
-/// holds the evaluation at x; `problem.metric` is refactored. 1 where no bound was found, also because P is not
-/// finite, or where locks alone keep a component.
+/// The bound, in steps of at most one factorisation or five back-substitutions, so that a live session can leave
+/// off between them.
+class Certificate {
+ public:
+  /// `problem.objective` holds the evaluation at x, in `problem.norm`; `problem.metric` is refactored. What `problem`
+  /// refers to must not change before the last step.
+  Certificate(Problem problem, const Points& x, const CertificateSettings& settings = {});
+  ~Certificate();
+
+  /// True while there is more to do. Ends early where the problem's stop is requested.
+  bool step();
+
+  /// (P - D) / P at x in [0, 1], P the sum of the norm's unsmoothed terms and D the best bound so far; 0 where P is 0. 1
+  /// where no bound was found, also because P is not finite, or where locks alone keep a component.
+  double relative_gap() const;
+
+ private:
+  class Search;
+  std::unique_ptr<Search> search_;
+};
+
+/// All steps at once.
 double relative_gap(const Problem& problem, const Points& x, const CertificateSettings& settings = {});
 
 }  // namespace lpdeform

@@ -28,7 +28,7 @@ constexpr std::size_t kCopyChunk = 4096;     // vertices
 constexpr std::int32_t kLargeMesh = 5000;    // vertices, from which on a coarse level pays
 constexpr std::int32_t kLargeAtTwo = 60000;  // the same where every p is 2: there is less to gain
 constexpr double kFarthestGuess = 2;         // of the last move, how much more of it is guessed at most
-constexpr double kSameWay = 0.5;     // the squared cosine between two moves, from which on they are one drag
+constexpr double kSameWay = 0.5;  // the squared cosine between two moves, from which on they are one drag
 constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
@@ -70,10 +70,16 @@ struct Deformer::Impl {
   void begin(const SolveSettings& new_settings, std::stop_token new_stop);
   void iterate();
   void end(StopReason reason);
-  double gap(double max_seconds);
+  void begin_certificate(double max_seconds);
+  bool certify();
   void replace_constraints(Constraints next);
   void interrupt() {
+    certificate.reset();
     if (minimiser) end(StopReason::kCancelled);
+  }
+  void change_inputs() {
+    interrupt();
+    norm.reset();
   }
 
   std::shared_ptr<const RestShape> shape;
@@ -101,6 +107,7 @@ struct Deformer::Impl {
   std::optional<LpNorm> norm;           // true norm, and the reference of the running solve
   std::unique_ptr<CoarseLevel> coarse;  // made when first needed
   std::unique_ptr<Minimiser> minimiser;
+  std::unique_ptr<Certificate> certificate;  // under way, after the minimiser's end
   Clock::time_point started;
   double best_sum = 0, best_soft_sum = 0;
   SolveSummary summary;
@@ -350,14 +357,21 @@ void Deformer::Impl::end(StopReason reason) {
   summary.solve_seconds = seconds_since(started);
   if (!settings.certify || reason == StopReason::kCancelled) return;
   const double rest = settings.time_limit_seconds - summary.solve_seconds;
-  summary.optimality_gap = gap(std::max(kCertificateSeconds, rest));
+  begin_certificate(std::max(kCertificateSeconds, rest));
 }
 
-double Deformer::Impl::gap(double max_seconds) {
-  if (!constraints || !norm) return 1;
+void Deformer::Impl::begin_certificate(double max_seconds) {
   is_metric_live = false;  // the certificate factors for itself
   objective.evaluate(x, *norm);
-  return relative_gap(make_problem(), x, {.max_seconds = max_seconds});
+  certificate =
+      std::make_unique<Certificate>(make_problem(), x, CertificateSettings{.max_seconds = max_seconds});
+}
+
+bool Deformer::Impl::certify() {
+  if (certificate->step()) return true;
+  summary.optimality_gap = certificate->relative_gap();
+  certificate.reset();
+  return false;
 }
 
 /// Keeps what is factored where only targets changed.
@@ -410,7 +424,7 @@ absl::Status Deformer::set_handles(const HandleSet& handles) {
   }
   auto constraints = make_constraints(*self.shape, handles, self.options.free_components, outside.get());
   if (!constraints.ok()) return constraints.status();
-  self.interrupt();
+  self.change_inputs();
   positions();  // the present ones go with the constraints before
   self.handles = handles;
   self.outside = std::move(outside);
@@ -421,7 +435,7 @@ absl::Status Deformer::set_handles(const HandleSet& handles) {
 absl::Status Deformer::set_material(const Material& material) {
   if (absl::Status status = check_material(material, impl_->shape->vertex_count()); !status.ok())
     return status;
-  impl_->interrupt();
+  impl_->change_inputs();
   impl_->material = material;
   impl_->is_metric_live = false;
   return absl::OkStatus();
@@ -440,7 +454,7 @@ absl::Status Deformer::set_positions(const Points& positions) {
         {"POSITIONS_NOT_FINITE", absl::StrCat("vertex ", i), "1e9 diagonals of the mesh"},
         absl::StrCat("the position of vertex ", i, " is not finite, or over 1e9 diagonals of the mesh away"));
   }
-  impl_->interrupt();
+  impl_->change_inputs();
   impl_->x_before_move.resize(0, 3);
   impl_->x = (positions.rowwise() - impl_->shape->centre()) / impl_->unit();
   impl_->positions = positions;
@@ -464,6 +478,7 @@ absl::Status Deformer::start(const SolveSettings& settings, std::stop_token stop
 
 bool Deformer::step() {
   Impl& self = *impl_;
+  if (self.certificate) return self.certify();
   if (!self.minimiser) return false;
   if (self.stop.stop_requested())
     self.end(StopReason::kCancelled);
@@ -473,7 +488,23 @@ bool Deformer::step() {
     self.end(StopReason::kIterationLimit);
   else
     self.iterate();
-  return self.minimiser != nullptr;
+  return self.minimiser != nullptr || self.certificate != nullptr;
+}
+
+absl::Status Deformer::start_certificate(std::stop_token stop) {
+  Impl& self = *impl_;
+  self.interrupt();
+  if (!self.norm) {
+    return make_fault(absl::StatusCode::kFailedPrecondition, {"NOT_SOLVED", "", ""},
+                      "there was no solve for the present inputs; a certificate is that of a result");
+  }
+  self.stop = std::move(stop);
+  self.begin_certificate(std::numeric_limits<double>::infinity());
+  return absl::OkStatus();
+}
+
+bool Deformer::is_certifying() const {
+  return impl_->certificate != nullptr;
 }
 
 absl::StatusOr<SolveSummary> Deformer::solve(const SolveSettings& settings, std::stop_token stop) {
@@ -493,11 +524,6 @@ const Points& Deformer::positions() const {
     self.is_positions_current = true;
   }
   return self.positions;
-}
-
-double Deformer::optimality_gap() {
-  impl_->interrupt();
-  return impl_->gap(std::numeric_limits<double>::infinity());
 }
 
 std::size_t Deformer::memory_bytes() const {

@@ -55,8 +55,17 @@ class Deformer {
   /// iteration.
   absl::Status start(const SolveSettings& settings, std::stop_token stop = {});
 
-  /// One iteration. True while there is more to do; false once the summary has its stop reason.
+  /// One iteration, or one step of the certificate where one is under way. True while there is more to do; false once
+  /// the summary is whole.
   bool step();
+
+  /// Begins the certificate of positions(), the result of a solve for the present inputs: step() goes on with it, and once that
+  /// returns false summary().optimality_gap has it. Nothing else of the summary changes. Ends a running solve with
+  /// kCancelled. FAILED_PRECONDITION (NOT_SOLVED). Starting anything and changing any input ends it without a result;
+  /// where `stop` is requested, it ends with what it has.
+  absl::Status start_certificate(std::stop_token stop = {});
+  /// The steps under way are those of a certificate: positions() do not change any more.
+  bool is_certifying() const;
 
   /// start, then step until the end.
   absl::StatusOr<SolveSummary> solve(const SolveSettings& settings, std::stop_token stop = {});
@@ -69,10 +78,6 @@ class Deformer {
   const Points& positions() const;
   /// E_i at positions(), in the caller's unit of length; 0 for unreferenced vertices.
   const Field& cell_energies() const;
-
-  /// The certificate at positions() for the material of the last solve: see SolveSummary::optimality_gap. 1
-  /// before the first solve. Ends a running solve with kCancelled.
-  double optimality_gap();
 
   /// Bytes held while solving, the shared rest shape left out.
   std::size_t memory_bytes() const;

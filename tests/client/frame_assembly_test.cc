@@ -45,6 +45,14 @@ TEST(FrameAssembly, PutsPartsTogetherInOrder) {
   EXPECT_TRUE((*frame)->converged);
 }
 
+TEST(FrameAssembly, ReadsACertificateWhereThereIsOne) {
+  FrameAssembly assembly(1);
+  v1::FramePart whole = first_part(1, {1, 2, 3}, true);
+  EXPECT_EQ(assembly.add(whole).value()->optimality_gap, std::nullopt);
+  whole.mutable_header()->mutable_certificate();
+  EXPECT_EQ(assembly.add(whole).value()->optimality_gap, 0);  // a gap of 0 is one
+}
+
 TEST(FrameAssembly, ReadsDoublesBitForBit) {
   v1::FramePart whole = first_part(1, {0, 0, 0}, true);
   whole.mutable_header()->set_scalar(v1::SCALAR_FLOAT64);

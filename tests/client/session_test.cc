@@ -1,66 +1,9 @@
 // The client library against a real server in this process.
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <memory>
-#include <numbers>
-
-#include "client/cli/generated_shape.h"
-#include "client/cli/mesh_input.h"
-#include "client/cpp/client.h"
-#include "core/mesh/shapes.h"
-#include "tests/client/in_process_server.h"
-#include "tests/core/split_shapes.h"
+#include "tests/client/session_fixture.h"
 
 namespace lpdeform::client {
 namespace {
-
-constexpr std::chrono::seconds kPatience{60};
-
-/// The paper's bar, both ends held, the middle twisted by `degrees`.
-class SessionTest : public testing::Test {
- protected:
-  static Motion twist(double degrees) {
-    return RigidMotion{.angle_radians = degrees * std::numbers::pi / 180, .center = {2, 2, 10.5}};
-  }
-
-  static Update bar_handles(double degrees) {
-    Update update;
-    cli::GeneratedShape shape = cli::generate_shape("bar", 1).value();
-    for (cli::NamedHandle& handle : shape.handles) {
-      if (handle.name == "middle") handle.handle.motion = twist(degrees);
-      update.handles.emplace(std::move(handle.name), std::move(handle.handle));
-    }
-    return update;
-  }
-
-  static std::vector<std::uint32_t> vertices_of(const std::string& name) {
-    return std::get<Handle>(bar_handles(0).handles.at(name)).vertices;
-  }
-
-  static Mesh bar() { return cli::to_client(box_surface(4, 4, 21)); }
-
-  absl::StatusOr<Client> connect() { return Client::connect(server_.address()); }
-
-  /// A session of the twisted bar.
-  Session open_bar(OpenOptions options = {}) {
-    Session session = connect()->open(bar(), std::move(options)).value();
-    session.update(bar_handles(90)).value();
-    return session;
-  }
-
-  InProcessServer server_;
-};
-
-/// How far two results are apart at most, in one coordinate.
-double distance(const std::vector<double>& a, const std::vector<double>& b) {
-  double most = a.size() == b.size() ? 0 : INFINITY;
-  for (std::size_t k = 0; k < std::min(a.size(), b.size()); ++k) most = std::max(most, std::abs(a[k] - b[k]));
-  return most;
-}
 
 TEST_F(SessionTest, SettlesOnAFrameThatMeetsTheHandles) {
   Session session = open_bar();
@@ -115,6 +58,26 @@ TEST_F(SessionTest, SolveReturnsDoublesATraceAndACertificate) {
   for (const std::uint32_t vertex : vertices_of("end_a")) {
     for (int k = 0; k < 3; ++k) EXPECT_EQ(solved->positions[3 * vertex + k], rest.vertices[3 * vertex + k]);
   }
+}
+
+TEST_F(SessionTest, AResultComesAgainWithItsGapWhereItWasAskedFor) {
+  Session session = open_bar({.certify = true});
+  const Frame first = session.settle(kPatience).value();
+  const Frame again = first.optimality_gap ? first : session.next_frame(kPatience).value();
+  ASSERT_TRUE(again.optimality_gap.has_value());
+  EXPECT_LT(*again.optimality_gap, 1e-4);
+  EXPECT_TRUE(again.converged);
+  EXPECT_EQ(again.input_seq, first.input_seq);
+  EXPECT_EQ(again.positions, first.positions);
+
+  const std::uint64_t moved = session.move("middle", twist(80)).value();
+  Frame frame;
+  do {
+    frame = session.next_frame(kPatience).value();
+    const bool is_result = frame.converged && frame.input_seq == moved;
+    EXPECT_TRUE(is_result || !frame.optimality_gap.has_value());
+  } while (!frame.optimality_gap);
+  EXPECT_EQ(frame.input_seq, moved);
 }
 
 TEST_F(SessionTest, SettingsChangeInALiveSession) {
@@ -246,87 +209,6 @@ TEST_F(SessionTest, ANewWriterReplacesTheOldOneWhichCanTakeOverAgain) {
   EXPECT_GT(ours->energy, theirs.energy);
 }
 
-TEST_F(SessionTest, EveryKindOfHandleIsAddedMovedRegroupedAndRemovedLive) {
-  const RigidMotion motion{.angle_radians = 0.3, .center = {2, 2, 10.5}, .translation = {0.5, 0, 0}};
-  const std::vector<SurfacePoint> points{{100, {0.2, 0.3, 0.5}}, {300, {0.6, 0.2, 0.2}}};
-  const std::vector<std::uint32_t> middle = vertices_of("middle");
-  const std::vector<Handle> kinds{{middle, motion, Soft{5}},
-                                  {{}, motion, Exactly{}, points},
-                                  {{}, motion, Soft{50}, points},
-                                  {middle, motion, Orientation{}},
-                                  {middle, motion, AxisLock{{1, 2, 3}}},
-                                  {middle, motion, PlaneLock{{1, 2, 3}}},
-                                  {{middle[0]}, motion, Exactly{}, {}, 3.0}};
-  Session session = open_bar();
-  ASSERT_TRUE(session.remove("middle").ok());
-  ASSERT_TRUE(session.settle(kPatience).ok());
-  for (const Handle& kind : kinds) {  // each takes the place of the one before
-    session.set_handle("kind", kind).value();
-    const auto set = session.settle(kPatience);
-    ASSERT_TRUE(set.ok()) << kind.hold.index() << ": " << set.status();
-    EXPECT_GT(set->energy, 0);
-    EXPECT_EQ(set->soft_energy > 0, kind.hold.index() == 1 || kind.hold.index() == 2);
-    session.move("kind", RigidMotion{.translation = {0, 0, 0.1}}).value();
-    ASSERT_TRUE(session.settle(kPatience).ok());
-    const auto solved = session.solve();
-    ASSERT_TRUE(solved.ok()) << solved.status();
-    EXPECT_EQ(solved->stop_reason, StopReason::kConverged);
-  }
-  ASSERT_TRUE(session.remove("kind").ok());
-  const auto frame = session.settle(kPatience);
-  ASSERT_TRUE(frame.ok()) << frame.status();
-  EXPECT_LT(distance(frame->positions, bar().vertices), 1e-2);  // nothing bends it any more
-}
-
-TEST_F(SessionTest, ARefusedKindLeavesTheSessionAsItWas) {
-  Session session = open_bar();
-  const Frame before = session.settle(kPatience).value();
-  session.set_handle("bad", {{0}, Fixed{}, AxisLock{{0, 0, 0}}}).value();
-  absl::Status refused;
-  while (refused.ok()) refused = session.next_frame(kPatience).status();
-  EXPECT_EQ(fault_of(refused).reason, "HANDLE_LOCK_DIRECTION");
-  const auto solved = session.solve();
-  ASSERT_TRUE(solved.ok()) << solved.status();
-  EXPECT_NEAR(solved->energy / before.energy, 1, 1e-3);
-}
-
-TEST_F(SessionTest, ARegionOfInterestIsSetChangedAndRemovedLive) {
-  Session session = open_bar({.double_precision = true});
-  const Frame bent = session.settle(kPatience).value();
-  std::vector<std::uint32_t> upper;
-  const Mesh rest = bar();
-  for (std::uint32_t i = 0; i < rest.vertex_count(); ++i) {
-    if (rest.vertices[3 * i + 2] >= 8) upper.push_back(i);
-  }
-  session.set({.region = RegionOfInterest{upper}}).value();
-  session.move("middle", twist(60)).value();
-  const Frame upper_moved = session.settle(kPatience).value();
-  double below = 0, above = 0;
-  for (std::uint32_t k = 0; k < rest.vertices.size(); ++k) {
-    double& most = rest.vertices[k / 3 * 3 + 2] >= 8 ? above : below;
-    most = std::max(most, std::abs(upper_moved.positions[k] - bent.positions[k]));
-  }
-  EXPECT_EQ(below, 0);
-  EXPECT_GT(above, 0.5);
-  session.set({.region = RegionOfInterest{}}).value();
-  const Frame free = session.settle(kPatience).value();
-  session.move("middle", twist(0)).value();
-  const Frame still = session.settle(kPatience).value();
-  EXPECT_LT(still.energy, 1e-3 * free.energy);
-}
-
-TEST_F(SessionTest, KindsComeBackWhenTheSessionIsMadeAnew) {
-  Session session = open_bar();
-  session.set_handle("middle", {vertices_of("middle"), twist(90), Soft{0.5}}).value();
-  const double energy = session.solve().value().energy;
-  server_.stop();
-  server_.start_again();
-  const auto again = session.solve();
-  ASSERT_TRUE(again.ok()) << again.status();
-  EXPECT_NEAR(again->energy / energy, 1, 1e-3);
-  EXPECT_GT(again->soft_energy, 0);
-}
-
 TEST_F(SessionTest, ALargeMeshTravelsInParts) {
   const TriangleMesh large = grid(200, 200, 1.0);  // 40,401 vertices: 1.9 MB
   Session session = connect()->open(cli::to_client(large)).value();
@@ -351,42 +233,6 @@ TEST_F(SessionTest, NobodyAtTheAddressIsUnavailableAtOnce) {
   const auto client = Client::connect("unix:/nowhere/socket");
   EXPECT_TRUE(absl::IsUnavailable(client.status()));
   EXPECT_EQ(fault_of(client.status()).reason, "NO_SERVER");
-}
-
-TEST_F(SessionTest, ASplitMeshIsWeldedAndDrawnWithItsHardEdges) {
-  const TriangleMesh split = split_at_every_corner(box_surface(2, 2, 6));
-  Mesh mesh = cli::to_client(split);
-  mesh.normals = cli::flat(flat_normals(split));
-  Session session =
-      connect()
-          ->open(mesh, {.weld = {.by_position = true}, .double_precision = true, .with_normals = true})
-          .value();
-  EXPECT_EQ(session.mesh_report().vertices, split.vertices.rows());
-  EXPECT_GT(session.mesh_report().welded_vertices, 0);
-  Update update;
-  std::vector<std::uint32_t> low, high;
-  for (Eigen::Index v = 0; v < split.vertices.rows(); ++v) {
-    if (split.vertices(v, 2) == 0) low.push_back(static_cast<std::uint32_t>(v));
-    if (split.vertices(v, 2) == 6) high.push_back(static_cast<std::uint32_t>(v));
-  }
-  update.handles.emplace("low", Handle{.vertices = low});
-  const RigidMotion turn{.angle_radians = 0.5, .center = {1, 1, 0}};
-  update.handles.emplace("high", Handle{.vertices = high, .motion = turn});
-  session.update(update).value();
-  const Frame frame = session.settle(kPatience).value();
-  const SolveResult solved = session.solve({.with_normals = true}).value();
-  EXPECT_EQ(frame.normals.size(), mesh.normals.size());
-  EXPECT_EQ(solved.normals.size(), mesh.normals.size());
-  // The end's own faces are turned about z: their normals stay along it, and those of the sides across it.
-  for (const std::uint32_t v : high) {
-    const double was = mesh.normals[3 * v + 2], is = solved.normals[3 * v + 2];
-    if (was == 1) {
-      EXPECT_NEAR(is, 1, 1e-9);
-    } else {
-      EXPECT_LT(is, 0.5);
-    }
-  }
-  EXPECT_TRUE(session.solve().value().normals.empty());
 }
 
 /// The finished frame of a session that another reads in this encoding.

@@ -73,6 +73,30 @@ TEST_F(FrameStreamTest, SendsNoMoreThanItsCreditAndThenTheNewest) {
   EXPECT_TRUE(drain(*stream).empty());
 }
 
+TEST_F(FrameStreamTest, TheFrameWithACertificateGoesToThoseWhoAskedOrHaveNotSeenIt) {
+  const auto plain = open({.credit = 8});
+  const auto certified = open({.credit = 8, .with_certificate = true});
+  const auto slow = open({.credit = 1});
+  publish(1);
+  drain(*slow);
+  publish(2, true);
+  EXPECT_EQ(drain(*plain).size(), 1u);
+  EXPECT_EQ(drain(*certified).size(), 1u);
+  publisher_->certify_newest(0.25);
+  EXPECT_TRUE(drain(*plain).empty());
+  const auto again = drain(*certified);
+  ASSERT_EQ(again.size(), 1u);
+  EXPECT_EQ(again[0].frame->optimality_gap, 0.25);
+  EXPECT_EQ(again[0].frame->frame_seq, 3u);
+  EXPECT_EQ(again[0].skipped_inputs, 0u);
+  ASSERT_TRUE(slow->acknowledge(1).ok());
+  const auto late = drain(*slow);
+  ASSERT_EQ(late.size(), 1u);
+  EXPECT_TRUE(late[0].frame->converged);
+  publisher_->begin_epoch(2);
+  EXPECT_EQ(drain(*plain).size(), 1u);
+}
+
 TEST_F(FrameStreamTest, AcknowledgingALaterFrameAcknowledgesThoseBefore) {
   const auto stream = open({.credit = 2});
   publish(1);

@@ -1,60 +1,12 @@
 #include "server/live_solver.h"
 
-#include <gtest/gtest.h>
+#include <algorithm>
+#include <limits>
 
-#include <chrono>
-#include <optional>
-
-#include "bar.h"
-#include "core/base/fault.h"
-#include "manual_timers.h"
+#include "live_solver_fixture.h"
 
 namespace lpdeform {
 namespace {
-
-using std::chrono::seconds;
-
-constexpr int kMostSlices = 100000;
-
-class LiveSolverTest : public testing::Test {
- protected:
-  explicit LiveSolverTest(const TriangleMesh& mesh = bar_mesh())
-      : shape_(shape_of(mesh)),
-        mailbox_(shape_),
-        solver_(deformer_of(shape_), mailbox_, *publisher_, std::make_shared<DrawMesh>(shape_), {}) {}
-
-  const Points& rest() const { return shape_->positions(); }
-
-  std::shared_ptr<FrameStream> look_on() {
-    auto stream = std::make_shared<FrameStream>(StreamOptions{.credit = 8}, publisher_, timers_, seconds(15),
-                                                OpenedNote{});
-    EXPECT_TRUE(publisher_->add(stream));
-    return stream;
-  }
-
-  void settle(SolveJob* job = nullptr) {
-    int slices = 0;
-    while (solver_.run_slice(job)) ASSERT_LT(++slices, kMostSlices);
-  }
-
-  std::shared_ptr<SolveJob> job(SolveOptions options = {}) {
-    auto made = std::make_shared<SolveJob>(
-        std::move(options), [this](const SolveProgress&) { ++reports_; },
-        [this](absl::StatusOr<SolveResult> result) { result_ = std::move(result); });
-    made->version = mailbox_.newest().version;
-    return made;
-  }
-
-  std::string failure() const { return result_ ? fault_of(result_->status()).reason : "not ended"; }
-
-  std::shared_ptr<ManualTimers> timers_ = std::make_shared<ManualTimers>();
-  std::shared_ptr<Publisher> publisher_ = std::make_shared<Publisher>();
-  std::shared_ptr<const RestShape> shape_;
-  Mailbox mailbox_;
-  LiveSolver solver_;
-  std::optional<absl::StatusOr<SolveResult>> result_;
-  int reports_ = 0;
-};
 
 TEST_F(LiveSolverTest, BeginsWithTheRestMeshAsItsResult) {
   const auto frame = publisher_->newest();
@@ -213,6 +165,55 @@ TEST_F(LiveSolverTest, SettingsWithoutHandlesLeaveTheSurfaceAsItIs) {
   EXPECT_TRUE(publisher_->newest()->converged);
   EXPECT_EQ(publisher_->newest()->input_seq, 1u);
   EXPECT_FALSE(publisher_->standing());
+}
+
+/// Turns the top of the bar about its axis, and shifts it.
+Update turn_tip(std::uint64_t input_seq, double share) {
+  RigidMotion motion;
+  motion.axis = {0, 0, 1};
+  motion.angle_radians = 1.5 * share;
+  motion.center = {2, 2, 21};
+  motion.translation = {4 * share, 0, share};  // pulled: a pushed bar buckles, and then it jumps
+  Update update;
+  update.input_seq = input_seq;
+  update.handles.push_back({"tip", motion});
+  return update;
+}
+
+TEST_F(LiveSolverTest, ADragNeitherFlickersNorLeavesAnythingBehind) {
+  constexpr int kMoves = 40;
+  const auto tip = vertices_at(rest(), highest_z(rest()));
+  const auto stream = look_on();
+  std::uint64_t seq = 0;
+  for (const double p : {1.0, 1.5, 2.0, 6.0}) {
+    Update update = hold_ends(rest(), ++seq, 0);
+    update.settings.p = Field::Constant(1, p);
+    ASSERT_TRUE(mailbox_.take(update).ok());
+    settle();
+    std::shared_ptr<const Frame> before = publisher_->newest();
+    double largest = 0;
+    for (int k = 1; k <= 2 * kMoves; ++k) {
+      ASSERT_TRUE(mailbox_.take(turn_tip(++seq, double(std::min(k, 2 * kMoves - k)) / kMoves)).ok());
+      solver_.run_slice(nullptr);  // the next input comes as soon as there is a frame
+      const auto frame = publisher_->newest();
+      ASSERT_EQ(frame->input_seq, seq);
+      const Points moved = frame->surface->positions() - before->surface->positions();
+      double of_handles = 0;
+      for (const std::int32_t vertex : tip) of_handles = std::max(of_handles, moved.row(vertex).norm());
+      EXPECT_LE(moved.rowwise().norm().maxCoeff(), 4 * of_handles) << "p = " << p << ", move " << k;
+      largest = std::max(largest, frame->energy);
+      before = frame;
+      while (const auto note = stream->next()) {
+      }
+      ASSERT_TRUE(stream->acknowledge(frame->frame_seq).ok());
+    }
+    settle();
+    EXPECT_TRUE(publisher_->newest()->converged);
+    EXPECT_LE(publisher_->newest()->energy, 1e-6 * largest) << "p = " << p;
+    while (const auto note = stream->next()) {
+    }
+    ASSERT_TRUE(stream->acknowledge(publisher_->newest()->frame_seq).ok());
+  }
 }
 
 class TwoBarsTest : public LiveSolverTest {

@@ -341,6 +341,37 @@ TEST_F(ManualTimeTest, SilentStreamsSaySomethingNowAndThen) {
   }
 }
 
+TEST_F(ManualTimeTest, AResultComesAgainWithItsCertificateWhereItWasAskedFor) {
+  const auto session = create(bar_mesh());
+  v1::FrameOptions options = with_credit(8);
+  options.set_certify(true);
+  DeformClient client(*stub_, session, options);
+  DeformClient plain(*stub_, session, with_credit(8), false);
+  ASSERT_TRUE(client.send(ends_message(rest(), 1, 1)));
+  const auto first = client.settle(1);
+  ASSERT_TRUE(first);
+  EXPECT_FALSE(first->header.has_certificate());
+  ASSERT_TRUE(plain.settle(1));
+
+  timers_->advance(std::chrono::milliseconds(100));
+  const auto again = client.next_frame();
+  ASSERT_TRUE(again);
+  ASSERT_TRUE(again->header.has_certificate());
+  EXPECT_LT(again->header.certificate().relative_gap(), 1e-4);
+  EXPECT_TRUE(again->header.converged());
+  EXPECT_GT(again->header.frame_seq(), first->header.frame_seq());
+  EXPECT_EQ(again->header.input_seq(), 1u);
+  EXPECT_EQ(again->positions, first->positions);
+
+  ASSERT_TRUE(client.send(tip_message(2, 2)));
+  const auto moved = plain.next_frame();  // nothing between
+  ASSERT_TRUE(moved);
+  EXPECT_EQ(moved->header.input_seq(), 2u);
+  EXPECT_FALSE(moved->header.has_certificate());
+  ASSERT_TRUE(client.settle(2));
+  expect_invariants(client.history, 8);
+}
+
 TEST_F(ManualTimeTest, ExpiryEndsStreamsWithThatReason) {
   const auto session = create(bar_mesh());
   DeformClient client(*stub_, session);

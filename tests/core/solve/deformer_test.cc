@@ -30,7 +30,7 @@ TEST_F(DeformerTest, BeginsAtRest) {
   EXPECT_EQ(solver->positions(), bar.vertices);
   EXPECT_EQ(solver->cell_energies().maxCoeff(), 0);
   EXPECT_FALSE(solver->step());
-  EXPECT_EQ(solver->optimality_gap(), 1);
+  EXPECT_EQ(fault_of(solver->start_certificate()).reason, "NOT_SOLVED");
 }
 
 TEST_F(DeformerTest, RefusesBadSettingsAndNamesThem) {
@@ -246,6 +246,59 @@ TEST_F(DeformerTest, CountsItsMemory) {
   auto solver = deformer(shape, ends(40), Material::uniform(1.5));
   ASSERT_TRUE(solver->solve({}).ok());
   EXPECT_GT(solver->memory_bytes(), static_cast<std::size_t>(bar.vertices.rows()) * 300);
+}
+
+TEST_F(DeformerTest, ACertificateIsMadeAtRestInSteps) {
+  auto solver = deformer(shape, ends(60), Material::uniform(1));
+  ASSERT_EQ(solver->solve({}).value().optimality_gap, std::nullopt);
+  const Points result = solver->positions();
+  const SolveSummary before = solver->summary();
+  ASSERT_TRUE(solver->start_certificate().ok());
+  EXPECT_TRUE(solver->is_certifying());
+  int steps = 0;
+  while (solver->step()) ++steps;
+  EXPECT_GT(steps, 0);
+  EXPECT_FALSE(solver->is_certifying());
+  EXPECT_LT(solver->summary().optimality_gap.value(), 1e-3);
+  EXPECT_EQ(solver->summary().energy, before.energy);
+  EXPECT_EQ(solver->summary().iterations, before.iterations);
+  EXPECT_EQ(solver->positions(), result);
+
+  SolveSettings cold{.initial = InitialGuess::kLaplacian, .certify = true};
+  EXPECT_EQ(solver->solve(cold).value().optimality_gap.value(),
+            deformer(shape, ends(60), Material::uniform(1))->solve(cold).value().optimality_gap.value());
+}
+
+TEST_F(DeformerTest, NewInputsAndSolvesEndACertificate) {
+  auto solver = deformer(shape, ends(60), Material::uniform(1));
+  const auto begin = [&] {
+    ASSERT_TRUE(solver->solve({}).ok());
+    ASSERT_TRUE(solver->start_certificate().ok());
+    ASSERT_TRUE(solver->step());
+  };
+  begin();
+  ASSERT_TRUE(solver->set_handles(ends(70)).ok());
+  EXPECT_FALSE(solver->step());
+  EXPECT_FALSE(solver->summary().optimality_gap.has_value());
+  EXPECT_EQ(fault_of(solver->start_certificate()).reason, "NOT_SOLVED");
+  begin();
+  ASSERT_TRUE(solver->set_material(Material::uniform(1.5)).ok());
+  EXPECT_FALSE(solver->step());
+  ASSERT_TRUE(solver->set_material(Material::uniform(1)).ok());
+  begin();
+  ASSERT_TRUE(solver->start({}).ok());
+  EXPECT_FALSE(solver->is_certifying());
+  EXPECT_FALSE(solver->summary().optimality_gap.has_value());
+}
+
+TEST_F(DeformerTest, AStoppedCertificateEndsWithWhatItHas) {
+  auto solver = deformer(shape, ends(60), Material::uniform(1));
+  ASSERT_TRUE(solver->solve({}).ok());
+  std::stop_source stop;
+  ASSERT_TRUE(solver->start_certificate(stop.get_token()).ok());
+  stop.request_stop();
+  EXPECT_FALSE(solver->step());
+  EXPECT_EQ(solver->summary().optimality_gap.value(), 1);  // no bound was found yet
 }
 
 }  // namespace
