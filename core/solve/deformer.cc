@@ -29,6 +29,8 @@ constexpr std::int32_t kLargeMesh = 5000;    // vertices, from which on a coarse
 constexpr std::int32_t kLargeAtTwo = 60000;  // the same where every p is 2: there is less to gain
 constexpr double kFarthestGuess = 2;         // of the last move, how much more of it is guessed at most
 constexpr double kSameWay = 0.5;  // the squared cosine between two moves, from which on they are one drag
+constexpr double kSteady =
+    9;  // the square of how far the surface may have moved, in handles' moves, in such a drag
 constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
@@ -138,19 +140,21 @@ Points Deformer::Impl::current_guess() {
   Points last = std::exchange(x_before_move, x);
   last = last.rows() == x.rows() ? Points(x - last) : Points(Points::Zero(x.rows(), 3));
   Points u = Points::Zero(x.rows(), 3), forces = u;
-  double along = 0, size = 0, left = 0;
+  double along = 0, size = 0, left = 0, longest = 0;
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     if (!constraints->is_held[i]) continue;
     u.row(i) = constraints->targets.row(i) - x.row(i);
     along += u.row(i).dot(last.row(i));
     size += last.row(i).squaredNorm();
+    longest = std::max(longest, last.row(i).squaredNorm());
     left += u.row(i).squaredNorm();
   }
   const SoftTerms& before = objective.soft_terms();
   if (constraints->soft.has_rows_of(before)) constraints->soft.add_pull(before, forces);
   if (left == 0 && forces.isZero(0)) return x;
   const double share = size > 0 ? along / size : 0;
-  const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left;
+  const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left &&
+                       last.rowwise().squaredNorm().maxCoeff() < kSteady * longest;
   if (goes_on) {
     forces.setZero();  // what is soft goes along
     for (Eigen::Index i = 0; i < x.rows(); ++i) {

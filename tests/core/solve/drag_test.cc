@@ -1,0 +1,115 @@
+// Drags in a live session: each solve goes on from the state that the one before had reached.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "core/solve/paper_poses.h"
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+/// Of the farthest that a vertex goes from one frame to the first of the next move, in the handles' own moves: what
+/// the guess takes over from the move before, up to three of them, and one iteration.
+constexpr double kFarthestJump = 4;
+
+/// The pose with its rigid motions done by `share`.
+HandleSet part_way(const HandleSet& pose, double share) {
+  HandleSet handles;
+  for (const auto& [name, handle] : pose.handles()) {
+    Handle moved = handle;
+    if (auto* const motion = std::get_if<RigidMotion>(&moved.motion)) {
+      motion->angle_radians *= share;
+      motion->translation *= share;
+    }
+    EXPECT_TRUE(handles.set(name, std::move(moved)).ok());
+  }
+  return handles;
+}
+
+double farthest(const Points& from, const Points& to) {
+  return (to - from).rowwise().norm().maxCoeff();
+}
+
+double farthest_of_handles(const Points& from, const Points& to, const HandleSet& handles) {
+  double most = 0;
+  for (const auto& [name, handle] : handles.handles()) {
+    most = std::max(most, farthest(rows_of(from, handle.vertices), rows_of(to, handle.vertices)));
+  }
+  return most;
+}
+
+struct DragCase {
+  double p;
+  int iterations;  // a move, before the next one comes
+  int moves;
+};
+
+class DragTest : public testing::TestWithParam<DragCase> {
+ protected:
+  static std::vector<PaperPose> poses() { return {paper_bar(0.5), paper_block(0.5), paper_sheet(0.5)}; }
+
+  /// Moves the handles and iterates, `iterations` at most. The first state goes to `first`.
+  static void move(Deformer& live, const HandleSet& handles, int iterations, Points* first = nullptr) {
+    ASSERT_TRUE(live.set_handles(handles).ok());
+    ASSERT_TRUE(live.start({}).ok());
+    live.step();
+    if (first != nullptr) *first = live.positions();
+    for (int k = 1; k < iterations && live.step(); ++k) {
+    }
+  }
+};
+
+TEST_P(DragTest, FramesDoNotFlicker) {
+  for (const PaperPose& pose : poses()) {
+    const auto live =
+        deformer(rest_shape(pose.mesh), part_way(pose.handles, 0), Material::uniform(GetParam().p));
+    ASSERT_TRUE(live->solve({}).ok());
+    for (int k = 1; k <= GetParam().moves; ++k) {
+      const HandleSet handles = part_way(pose.handles, double(k) / GetParam().moves);
+      const Points before = live->positions();
+      Points first;
+      move(*live, handles, GetParam().iterations, &first);
+      EXPECT_LE(farthest(before, first), kFarthestJump * farthest_of_handles(before, first, handles))
+          << pose.name << ", move " << k;
+    }
+  }
+}
+
+TEST_P(DragTest, ADragBackToTheStartEndsAtRest) {
+  for (const PaperPose& pose : poses()) {
+    const auto live =
+        deformer(rest_shape(pose.mesh), part_way(pose.handles, 0), Material::uniform(GetParam().p));
+    ASSERT_TRUE(live->solve({}).ok());
+    const int moves = GetParam().moves;
+    double largest = 0;
+    for (int k = 1; k <= 2 * moves; ++k) {
+      const bool is_last = k == 2 * moves;
+      const double share = double(std::min(k, 2 * moves - k)) / moves;
+      move(*live, part_way(pose.handles, share),
+           is_last ? std::numeric_limits<int>::max() : GetParam().iterations);
+      largest = std::max(largest, live->summary().energy);
+    }
+    EXPECT_EQ(live->summary().stop_reason, StopReason::kConverged) << pose.name;
+    EXPECT_LE(live->summary().energy, 1e-6 * largest) << pose.name;
+    EXPECT_GT(largest, 0) << pose.name;
+  }
+}
+
+std::string name_of(const testing::TestParamInfo<DragCase>& info) {
+  return absl::StrCat("P", static_cast<int>(10 * info.param.p),
+                      info.param.iterations > 100 ? "Converged" : "InHaste");
+}
+
+INSTANTIATE_TEST_SUITE_P(Norms, DragTest,
+                         testing::Values(DragCase{1, 4, 30}, DragCase{1, 1000, 8}, DragCase{1.5, 4, 30},
+                                         DragCase{1.5, 1000, 8}, DragCase{2, 4, 30}, DragCase{2, 1000, 8},
+                                         DragCase{6, 4, 30}, DragCase{6, 1000, 8}),
+                         name_of);
+
+}  // namespace
+}  // namespace lpdeform
