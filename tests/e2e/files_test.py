@@ -1,0 +1,157 @@
+"""What the programs read and write: meshes in and out, info, fields and groups, resizing."""
+
+import json
+import math
+
+from programs import OnShapes, main, read_bytes, read_off, read_ply, read_text, run
+
+
+class Files(OnShapes):
+
+    def test_all_outputs_are_written_at_once(self):
+        outputs = [self.at(f"all.{ending}") for ending in ("ply", "obj", "off", "png")]
+        self.deform(*(word for output in outputs for word in ("--out", output)))
+        off = read_off(outputs[2])
+        self.assertEqual([(v["x"], v["y"], v["z"]) for v in read_ply(outputs[0])], off)
+        obj = [tuple(map(float, line.split()[1:4])) for line in read_text(outputs[1]).splitlines() if line.startswith("v ")]
+        self.assertEqual(obj, off)
+        self.assertEqual(read_bytes(outputs[3])[:8], b"\x89PNG\r\n\x1a\n")
+
+    def test_obj_output_keeps_what_an_obj_input_has_beside_coordinates(self):
+        source = self.write("square.obj", "mtllib square.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0.25 0.75\n"
+                                          "usemtl red\ng face\nf 1/1 2/1 3/1 4/1\n")
+        handles = self.write("square.json", '{"handles": [{"name": "all", "vertices": [0, 2], "translate": [0, 0, 1]}]}')
+        out = self.at("square_out.obj")
+        self.assertEqual(run("deform", source, "--handles", handles, "--out", out).returncode, 0)
+        kept, given = ([line for line in read_text(path).splitlines() if not line.startswith("v ")] for path in (out, source))
+        self.assertEqual(kept, given)
+
+    def split_bar(self):
+        """The bar with a vertex and a normal for each corner of each face, and its handles."""
+        points = read_off(self.at("bar.off"))
+        lines = [line.split() for line in read_text(self.at("bar.off")).splitlines()]
+        faces = [tuple(map(int, words[1:])) for words in lines if len(words) == 4 and words[0] == "3"]
+        text, copies = [], {}
+        for face in faces:
+            a, b, c = (points[v] for v in face)
+            u, w = [b[k] - a[k] for k in range(3)], [c[k] - a[k] for k in range(3)]
+            normal = (u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0])
+            text.append("vn {} {} {}".format(*normal))
+            for v in face:
+                copies.setdefault(v, []).append(sum(map(len, copies.values())))
+                text.append("v {} {} {}".format(*points[v]))
+            text.append("f -3//-1 -2//-1 -1//-1")
+        handles = json.loads(read_text(self.at("bar.json")))
+        for handle in handles["handles"]:
+            handle["vertices"] = [copy for v in handle["vertices"] for copy in copies[v]]
+        return self.write("split.obj", "\n".join(text) + "\n"), self.write("split.json", json.dumps(handles)), copies
+
+    def test_a_split_obj_comes_out_in_one_piece_and_ready_to_draw(self):
+        mesh, handles, copies = self.split_bar()
+        out, report = self.at("posed.obj"), self.at("posed.json")
+        apart = run("deform", mesh, "--handles", handles, "--out", out)
+        self.assertEqual(apart.returncode, 2, "each face is a component of its own")
+        done = run("deform", mesh, "--handles", handles, "--weld", "--normals", "--out", out, "--report", report)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertGreater(json.loads(read_text(report))["mesh"]["welded_vertices"], 0)
+        self.deform("--out", self.at("whole.off"))
+        whole = read_off(self.at("whole.off"))
+        lines = read_text(out).splitlines()
+        posed = [line for line in lines if line.startswith("v ")]
+        for v, same in copies.items():
+            self.assertEqual(len({posed[copy] for copy in same}), 1)
+            for axis, word in enumerate(posed[same[0]].split()[1:]):
+                self.assertAlmostEqual(float(word), whole[v][axis], delta=0.02)
+        normals = [tuple(map(float, line.split()[1:])) for line in lines if line.startswith("vn ")]
+        self.assertEqual(len(normals), len(posed))
+        for normal in normals:
+            self.assertAlmostEqual(math.hypot(*normal), 1, delta=1e-6)
+
+    def test_info_prints_the_object_that_the_report_calls_mesh(self):
+        info = run("info", self.at("creature.off"), "--json")
+        self.assertEqual(info.returncode, 0)
+        self.assertEqual(json.loads(info.stdout), self.deform("--max-iterations", 1, shape="creature")["mesh"])
+
+    def test_info_for_people_names_counts(self):
+        info = run("info", self.at("bar.off"))
+        self.assertEqual(info.returncode, 0)
+        self.assertRegex(info.stdout, r"(?m)^vertices +370$")
+        self.assertRegex(info.stdout, r"(?m)^non manifold edges +0$")
+
+    def test_info_shows_the_report_of_a_mesh_that_cannot_be_deformed_and_says_why(self):
+        bad = self.write("nan.off", "OFF\n3 1 0\n0 0 0\n1 0 nan\n0 1 0\n3 0 1 2\n")
+        info = run("info", bad, "--json")
+        self.assertEqual(info.returncode, 2)
+        self.assertEqual(json.loads(info.stdout)["not_finite"], 1)
+        self.assertIn("vertex 1", info.stderr.lower())
+
+    def test_fields_are_read_and_summed_up(self):
+        ends = self.write("p.txt", "".join(f"{1 + (k % 2)}\n" for k in range(370)))
+        stiff = self.write("s.txt", "2\n" * 370)
+        report = self.deform("--p-field", ends, "--stiffness-field", stiff, "--length-unit", 0.5)
+        self.assertEqual(report["p"], {"min": 1, "mean": 1.5, "max": 2})
+        doubled, plain = self.deform("--p", 2, "--stiffness-field", stiff), self.deform("--p", 2)
+        self.assertAlmostEqual(doubled["energy"] / plain["energy"], 2, delta=1e-3)  # twice the tolerance's worth
+
+    def test_p_from_the_geometry_is_the_same_through_a_server_and_may_be_painted_over(self):
+        alone = self.deform("--p", "auto:0.5")
+        self.assertEqual(alone["p"], {"automatic": 0.5})
+        served = self.deform("--p", "auto:0.5", "--server", self.server.address)
+        self.assertEqual(served["energy"], alone["energy"])
+        handles = json.loads(read_text(self.at("bar.json")))
+        handles["groups"] = [{"name": "low", "vertices": [0, 1, 2], "p": 1, "stiffness": 7}]
+        painted = self.write("painted.json", json.dumps(handles))
+        out = self.at("painted_report.json")
+        done = run("deform", self.at("bar.off"), "--handles", painted, "--p", "auto:0.5", "--p-group", "low=3", "--report", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = json.loads(read_text(out))
+        self.assertEqual(report["p"]["max"], 3)
+        self.assertLess(report["p"]["min"], 1.6)  # of the geometry
+
+    def test_obj_groups_are_painted_and_an_unknown_one_is_named(self):
+        lines = [f"v {x} {y} {z}" for x, y, z in read_off(self.at("bar.off"))]
+        words = [line.split() for line in read_text(self.at("bar.off")).splitlines()]
+        faces = [line[1:] for line in words if len(line) == 4 and line[0] == "3"]
+        lines += ["g front"] + ["f " + " ".join(str(int(v) + 1) for v in face) for face in faces[:10]]
+        lines += ["g rest"] + ["f " + " ".join(str(int(v) + 1) for v in face) for face in faces[10:]]
+        obj = self.write("grouped.obj", "\n".join(lines) + "\n")
+        report_path = self.at("grouped_report.json")
+        done = run("deform", obj, "--handles", self.at("bar.json"), "--p-group", "front=1.5", "--stiffness-group",
+                   "rest=2", "--report", report_path)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = json.loads(read_text(report_path))
+        self.assertEqual((report["p"]["min"], report["p"]["max"]), (1.5, 2))
+        refusal = self.refused(2, "deform", obj, "--handles", self.at("bar.json"), "--p-group", "back=1")
+        self.assertIn("front, rest", refusal)
+
+    def test_resize_meets_the_scaled_extent_through_a_server_and_alone(self):
+        for options in ([], ["--server", self.server.address]):
+            out = self.at("resized.off")
+            done = run("resize", self.at("bar.off"), out, "--scale", "1,1.5,3", "--origin", "0,0,0", *options)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(done.stdout.count("converged"), 2)  # 1.5 is shared; x and z differ from it
+            positions = read_off(out)
+            for axis, extent, places in ((0, 4, 1), (1, 6, 1), (2, 63, 3)):  # the last solve holds the ends of z alone
+                self.assertAlmostEqual(min(position[axis] for position in positions), 0, places)
+                self.assertAlmostEqual(max(position[axis] for position in positions), extent, places)
+        self.assertIn("0.01 to 100", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "1,1,0"))
+        self.assertIn("axis", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "1,1,2",
+                                           "--x-axis", "0,1,0"))
+
+    def test_a_split_mesh_is_resized_in_one_piece(self):
+        mesh, _, copies = self.split_bar()
+        out = self.at("long.obj")
+        done = run("resize", mesh, out, "--scale", "1,1,2", "--weld")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        posed = [line for line in read_text(out).splitlines() if line.startswith("v ")]
+        self.assertEqual({len({posed[copy] for copy in same}) for same in copies.values()}, {1})
+        self.assertEqual(run("resize", self.at("bar.off"), self.at("long.off"), "--scale", "1,1,2").returncode, 0)
+        whole = read_off(self.at("long.off"))
+        for v, same in copies.items():
+            for axis, word in enumerate(posed[same[0]].split()[1:]):
+                self.assertAlmostEqual(float(word), whole[v][axis], delta=0.02)
+        self.assertIn("--weld", run("resize", "--help").stdout)
+
+
+if __name__ == "__main__":
+    main()
