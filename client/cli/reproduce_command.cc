@@ -137,6 +137,18 @@ absl::StatusOr<std::vector<Figure>> make_figures(const reproduce::Settings& sett
   return figures;
 }
 
+/// Takes the pictures of an earlier page away that are not of this one.
+void remove_stale(const fs::path& folder, const std::vector<Figure>& figures) {
+  const absl::StatusOr<std::string> before = read_text(folder / kVerdicts);
+  std::set<std::string> stale;
+  if (before.ok()) stale = reproduce::pictures_named(*before);
+  for (const Figure& figure : figures) {
+    for (const reproduce::Picture& picture : figure.pictures) stale.erase(picture.file);
+  }
+  std::error_code ignored;  // what cannot be removed hurts nobody
+  for (const std::string& file : stale) fs::remove(folder / file, ignored);
+}
+
 /// The verdicts last: they say that the folder is whole.
 absl::Status write_all(const fs::path& folder, const std::vector<Figure>& figures,
                        const reproduce::Settings& settings) {
@@ -148,6 +160,7 @@ absl::Status write_all(const fs::path& folder, const std::vector<Figure>& figure
   }
   const absl::Status written = write_whole_file(folder / kPage, page_html(figures, settings));
   if (!written.ok()) return written;
+  remove_stale(folder, figures);
   return write_whole_file(folder / kVerdicts, verdicts_json(figures, settings));
 }
 

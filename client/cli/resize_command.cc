@@ -51,10 +51,11 @@ absl::StatusOr<Scaling> read_scaling(const ResizeOptions& options, const Triangl
 }
 
 /// One solve on the server: along one axis, by `factor`.
-absl::Status stretch(client::Client& server, const Scaling& scaling, int axis, double factor,
+absl::Status stretch(client::Client& server, const Scaling& scaling, bool welds, int axis, double factor,
                      Interrupt& interrupt, Resized& resized) {
   Progress progress;
-  absl::StatusOr<client::Session> session = server.open(to_client(resized.file.mesh));
+  absl::StatusOr<client::Session> session =
+      server.open(to_client(resized.file.mesh), {.weld = {.by_position = welds}});
   if (!session.ok()) return session.status();
   interrupt.set_action([&session] { session->close().IgnoreError(); });
   client::Resize resize;
@@ -83,8 +84,8 @@ absl::Status stretch(client::Client& server, const Scaling& scaling, int axis, d
   return absl::OkStatus();
 }
 
-absl::StatusOr<Resized> resize_on(const std::string& address, const Scaling& scaling, MeshFile file,
-                                  Interrupt& interrupt) {
+absl::StatusOr<Resized> resize_on(const std::string& address, const Scaling& scaling, bool welds,
+                                  MeshFile file, Interrupt& interrupt) {
   absl::StatusOr<client::Client> server = client::Client::connect(address);
   if (!server.ok()) return server.status();
   Resized resized{std::move(file), {}};
@@ -95,7 +96,7 @@ absl::StatusOr<Resized> resize_on(const std::string& address, const Scaling& sca
   for (int axis = 0; axis < 3; ++axis) {
     const double factor = scaling.scale[axis] / shared;
     if (factor == 1) continue;
-    absl::Status status = stretch(*server, scaling, axis, factor, interrupt, resized);
+    absl::Status status = stretch(*server, scaling, welds, axis, factor, interrupt, resized);
     if (!status.ok()) return status;
   }
   return resized;
@@ -117,8 +118,8 @@ ExitStatus run_resize(const ResizeOptions& options) {
     if (!started.ok()) return complain(started.status());
     local = *std::move(started);
   }
-  const absl::StatusOr<Resized> resized =
-      resize_on(local ? local->address() : *options.server, *scaling, *std::move(file), interrupt);
+  const absl::StatusOr<Resized> resized = resize_on(local ? local->address() : *options.server, *scaling,
+                                                    options.welds, *std::move(file), interrupt);
   if (interrupt.happened()) return kInterrupted;
   if (!resized.ok()) return complain(resized.status());
   const absl::Status written =

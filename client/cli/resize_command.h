@@ -15,6 +15,7 @@ struct ResizeOptions {
   std::vector<double> scale = {1, 1, 1};  // along the axes, each 0.01 to 100
   std::vector<double> origin;             // x, y, z; empty: the middle of the mesh's bounding box
   std::vector<double> x_axis, y_axis;     // directions; both or none
+  bool welds = false;                     // vertices at one position are one
   int threads = 0;                        // of the server in this process; 0: all cores
   std::optional<std::string> server;      // a server in this process where there is none
 };

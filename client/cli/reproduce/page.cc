@@ -168,4 +168,19 @@ std::string verdicts_json(const std::vector<Figure>& figures, const Settings& se
   return root.dump(2) + "\n";
 }
 
+std::set<std::string> pictures_named(const std::string& verdicts) {
+  const auto root = nlohmann::json::parse(verdicts, nullptr, false);
+  std::set<std::string> names;
+  if (!root.is_object() || !root.contains("figures") || !root["figures"].is_array()) return names;
+  for (const auto& figure : root["figures"]) {
+    if (!figure.is_object() || !figure.contains("pictures") || !figure["pictures"].is_array()) continue;
+    for (const auto& picture : figure["pictures"]) {
+      if (!picture.is_string()) continue;
+      const auto name = picture.get<std::string>();
+      if (name.ends_with(".png") && name.find('/') == std::string::npos) names.insert(name);
+    }
+  }
+  return names;
+}
+
 }  // namespace lpdeform::reproduce

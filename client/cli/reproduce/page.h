@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,9 @@ std::string page_html(const std::vector<Figure>& figures, const Settings& settin
 /// The verdicts for programs: {made_by, size, threads, claims, claims_that_hold, figures: [{id, title, claims:
 /// [{text, measured, holds, numbers}], pictures}]}.
 std::string verdicts_json(const std::vector<Figure>& figures, const Settings& settings);
+
+/// The pictures that such verdicts name, plain file names of PNG pictures alone; none where the text is something else.
+std::set<std::string> pictures_named(const std::string& verdicts);
 
 /// What `made_by` says, by which a folder is known to be ours.
 inline constexpr const char* kMadeBy = "lpdeform reproduce";

@@ -58,5 +58,15 @@ TEST(Verdicts, HoldWhatThePageSays) {
   EXPECT_EQ(first["claims"][0]["holds"], true);
 }
 
+TEST(Verdicts, NameTheirPicturesAndNothingOutsideOfTheirFolder) {
+  using testing::ElementsAre;
+  using testing::IsEmpty;
+  EXPECT_THAT(pictures_named(verdicts_json({figure(true), figure(false)}, {})), ElementsAre("x.png"));
+  EXPECT_THAT(pictures_named(R"({"figures": [{"pictures": ["../a.png", "/b.png", "c.txt", 4, "d.png"]}]})"),
+              ElementsAre("d.png"));
+  for (const char* text : {"", "{", "[]", "{\"figures\": 3}", R"({"figures": [3, {"pictures": {}}]})"})
+    EXPECT_THAT(pictures_named(text), IsEmpty()) << text;
+}
+
 }  // namespace
 }  // namespace lpdeform::reproduce
