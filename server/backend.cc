@@ -252,14 +252,14 @@ absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const v1::CreateS
   parts.free_components = *free_components;
   parts.memory = *std::move(memory);
   if (absl::Status status = make_mesh(request, decoder, parts); !status.ok()) return status;
-  parts.features = std::make_shared<const ShapeFeatures>(parts.shape);
+  const int threads = options_.threads == 0 ? available_cores() : options_.threads;
+  parts.features = std::make_shared<const ShapeFeatures>(parts.shape, Workers(threads));
   Decoder inputs(*uploads_, mesh_message.vertex_count(), parts.features.get(), parts.mesh->weld().get());
   if (absl::Status status = inputs.handles(request.handles(), parts.beginning); !status.ok()) return status;
   auto settings = inputs.settings(request.settings());
   if (!settings.ok()) return settings.status();
   parts.beginning.settings = *std::move(settings);
-  auto deformer = Deformer::create(
-      parts.shape, {*free_components, options_.threads == 0 ? available_cores() : options_.threads});
+  auto deformer = Deformer::create(parts.shape, {*free_components, threads});
   if (!deformer.ok()) return deformer.status();
   parts.deformer = *std::move(deformer);
   log().info("session_created", {{"session", abbreviated(parts.name)},

@@ -3,17 +3,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
-#include <numeric>
-#include <unsupported/Eigen/BVH>
 
 #include "core/analysis/face_geometry.h"
+#include "core/analysis/face_tree.h"
 
 namespace lpdeform {
 namespace {
 
 using Point = Eigen::Vector3d;
-using Box = Eigen::AlignedBox3d;
-using Tree = Eigen::KdBVH<double, 3, std::int32_t>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kThinnest = 0.5;        // scaled units
@@ -22,70 +19,44 @@ constexpr double kEdgeTolerance = 1e-9;  // so that no ray slips through between
 constexpr double kRounding = 1e-9;       // of the diagonal: a doubled face lies at 0, to rounding
 constexpr std::size_t kFacesAChunk = 256;
 
-Point corner(const RestShape& shape, std::int32_t face, int k) {
-  return shape.scaled_positions().row(shape.faces()(face, k)).transpose();
-}
+/// A face as rays meet it from behind.
+struct Triangle {
+  Point a, ab, ac;
+  Point normal;      // twice the area long
+  double sign = 1;   // of its component
+  double least = 0;  // of sign * <normal, direction>
 
-Tree tree_of(const RestShape& shape) {
-  std::vector<std::int32_t> faces(shape.faces().rows());
-  std::iota(faces.begin(), faces.end(), 0);
-  std::vector<Box> boxes;
-  boxes.reserve(faces.size());
-  for (const std::int32_t face : faces) {
-    Box box(corner(shape, face, 0));
-    boxes.push_back(box.extend(corner(shape, face, 1)).extend(corner(shape, face, 2)));
-  }
-  return Tree(faces.begin(), faces.end(), boxes.begin(), boxes.end());
-}
-
-/// The query of Eigen's BVMinimize: the nearest face that the ray meets from behind.
-class InwardRay {
- public:
-  using Scalar = double;
-
-  InwardRay(const RestShape& shape, const std::vector<double>& signs, Point origin, Point direction,
-            double rounding)
-      : shape_(shape), signs_(signs), origin_(origin), direction_(direction), rounding_(rounding) {}
-
-  /// Where the ray enters the box; infinite where it does not.
-  double minimumOnVolume(const Box& box) const {
-    double enter = 0, leave = kInfinity;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double low = box.min()[axis] - rounding_ - origin_[axis];
-      const double high = box.max()[axis] + rounding_ - origin_[axis];
-      if (direction_[axis] == 0) {
-        if (low > 0 || high < 0) return kInfinity;
-        continue;
-      }
-      const double a = low / direction_[axis], b = high / direction_[axis];
-      enter = std::max(enter, std::min(a, b));
-      leave = std::min(leave, std::max(a, b));
-    }
-    return enter <= leave ? enter : kInfinity;
-  }
-
-  double minimumOnObject(std::int32_t face) const {
-    const Point a = corner(shape_, face, 0);
-    const Point ab = corner(shape_, face, 1) - a, ac = corner(shape_, face, 2) - a;
-    const Point normal = ab.cross(ac);  // twice the area long
-    const double facing = normal.dot(direction_);
-    const double sign = signs_[shape_.components()[shape_.faces()(face, 0)]];
-    if (!(sign * facing > kOpposite * normal.norm())) return kInfinity;
-    const Point from_a = origin_ - a;
+  /// Where the ray meets it; infinite where it does not.
+  double distance(const Point& origin, const Point& direction, double rounding) const {
+    const double facing = normal.dot(direction);
+    if (!(sign * facing > least)) return kInfinity;
+    const Point from_a = origin - a;
     const double t = -from_a.dot(normal) / facing;
-    if (t < -rounding_) return kInfinity;
-    const Point across = from_a.cross(direction_);
+    if (t < -rounding) return kInfinity;
+    const Point across = from_a.cross(direction);
     const double v = -ac.dot(across) / facing, w = ab.dot(across) / facing;
     const bool is_inside = v >= -kEdgeTolerance && w >= -kEdgeTolerance && v + w <= 1 + kEdgeTolerance;
     return is_inside ? std::max(t, 0.0) : kInfinity;
   }
-
- private:
-  const RestShape& shape_;
-  const std::vector<double>& signs_;
-  Point origin_, direction_;
-  double rounding_;
 };
+
+/// In the tree's order.
+std::vector<Triangle> triangles_of(const RestShape& shape, const FaceTree& tree,
+                                   const std::vector<double>& signs) {
+  std::vector<Triangle> triangles;
+  triangles.reserve(tree.order().size());
+  for (const std::int32_t face : tree.order()) {
+    const auto corner = [&](int k) -> Point {
+      return shape.scaled_positions().row(shape.faces()(face, k)).transpose();
+    };
+    Triangle triangle{.a = corner(0), .ab = corner(1) - corner(0), .ac = corner(2) - corner(0), .normal = {}};
+    triangle.normal = triangle.ab.cross(triangle.ac);
+    triangle.sign = signs[shape.components()[shape.faces()(face, 0)]];
+    triangle.least = kOpposite * triangle.normal.norm();
+    triangles.push_back(triangle);
+  }
+  return triangles;
+}
 
 }  // namespace
 
@@ -111,19 +82,21 @@ std::vector<double> outward_signs(const RestShape& shape) {
 }
 
 std::vector<double> thickness_behind_faces(const RestShape& shape, const Workers& workers) {
-  const Tree tree = tree_of(shape);
+  const FaceTree tree(shape.scaled_positions(), shape.faces());
   const std::vector<double> signs = outward_signs(shape);
-  const double diagonal = shape.diagonal() / shape.mean_edge_length();
+  const std::vector<Triangle> triangles = triangles_of(shape, tree, signs);
+  const double rounding = kRounding * shape.diagonal() / shape.mean_edge_length();
   std::vector<double> thickness(shape.faces().rows(), kInfinity);
   workers.for_chunks(thickness.size(), kFacesAChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t f = begin; f < end; ++f) {
-      const FaceGeometry face = face_geometry(shape, static_cast<Eigen::Index>(f));
+    for (std::size_t k = begin; k < end; ++k) {  // in the tree's order: rays of one place go the same way
+      const Eigen::Index f = tree.order()[k];
+      const FaceGeometry face = face_geometry(shape, f);
       if (face.area == 0) continue;
-      const double sign = signs[shape.components()[shape.faces()(static_cast<Eigen::Index>(f), 0)]];
-      InwardRay ray(shape, signs, face.centre.transpose(), -sign * face.normal.transpose(),
-                    kRounding * diagonal);
-      const double length = Eigen::BVMinimize(tree, ray);
-      if (length < std::numeric_limits<double>::max()) thickness[f] = std::max(length, kThinnest);
+      const Point origin = face.centre.transpose(), inwards = -triangles[k].sign * face.normal.transpose();
+      const double length = tree.nearest(origin, inwards, rounding, [&](std::int32_t other) {
+        return triangles[other].distance(origin, inwards, rounding);
+      });
+      if (length < kInfinity) thickness[f] = std::max(length, kThinnest);
     }
   });
   return thickness;
