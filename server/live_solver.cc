@@ -154,7 +154,7 @@ bool LiveSolver::begin_certificate() {
     set_alarm();
     return false;
   }
-  const bool is_begun = deformer_->start_certificate(stop_).ok();
+  const bool is_begun = deformer_->start_certificate(stop_, kCertificateSeconds).ok();
   phase_ = is_begun ? Phase::kCertifying : Phase::kDone;
   return is_begun;
 }

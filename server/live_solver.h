@@ -23,7 +23,7 @@ namespace lpdeform {
 /// better.
 ///
 /// Where a reader asked for certificates and a result has stood for kQuiet, it looks for the result's and publishes
-/// the frame again with it; a newer input or a Solve call ends the search.
+/// the frame again with it, after kCertificateSeconds with what it has; a newer input or a Solve call ends the search.
 class LiveSolver {
  public:
   /// How it asks to be run again later: `ring` is called on the timers' thread, and may outlive the solver.
@@ -51,6 +51,7 @@ class LiveSolver {
   /// While it runs for readers, none of whom may be sent a frame just now, the one that waits for them is not older.
   static constexpr std::chrono::milliseconds kOldestWaiting{100};
   static constexpr std::chrono::milliseconds kQuiet{100};
+  static constexpr double kCertificateSeconds = 10;
 
  private:
   using Clock = std::chrono::steady_clock;

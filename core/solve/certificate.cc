@@ -47,11 +47,15 @@ class DualBound {
 
   /// max over theta >= 0 of D(theta y), for y with A^T y = 0.
   double scaled_bound(const EdgeVectors& y) {
-    norms_.resize(step_.count());
+    conjugates_.assign(step_.count(), 0);
     double longest_theta = 2;
     for (std::int32_t i = 0; i < step_.count(); ++i) {
-      norms_[i] = step_.norm(y, i);
-      if (p(i) == 1 && norms_[i] > 0) longest_theta = std::min(longest_theta, k(i) / norms_[i]);
+      const double norm = step_.norm(y, i);
+      if (norm == 0) continue;
+      if (p(i) > 1)
+        conjugates_[i] = norm * conjugate_point(norm, k(i), p(i));
+      else
+        longest_theta = std::min(longest_theta, k(i) / norm);
     }
     inner_ = y.cwiseProduct(z_).sum();
     double low = 0, high = longest_theta;
@@ -70,26 +74,28 @@ class DualBound {
   double k(std::int32_t i) const { return step_.coefficient(i); }
 
  private:
+  // f_i*(theta y_i) = (1 - 1/p_i) theta^{p_i / (p_i - 1)} |y_i| t_i, t_i the conjugate point of |y_i|.
   double slope(double theta) const {
-    double sum = inner_;
+    double sum = inner_, power = 0, of_p = 0;
     for (std::int32_t i = 0; i < step_.count(); ++i) {
-      if (p(i) > 1 && norms_[i] > 0) sum -= norms_[i] * conjugate_point(theta * norms_[i], k(i), p(i));
+      if (conjugates_[i] == 0) continue;
+      if (p(i) != of_p) of_p = p(i), power = std::pow(theta, 1 / (of_p - 1));
+      sum -= power * conjugates_[i];
     }
     return sum;
   }
   double value(double theta) const {
     double sum = theta * inner_;
     for (std::int32_t i = 0; i < step_.count(); ++i) {
-      if (p(i) == 1 || norms_[i] == 0) continue;
-      const double t = conjugate_point(theta * norms_[i], k(i), p(i));
-      sum -= (p(i) - 1) * k(i) * std::pow(t, p(i));
+      if (conjugates_[i] == 0) continue;
+      sum -= (1 - 1 / p(i)) * std::pow(theta, p(i) / (p(i) - 1)) * conjugates_[i];
     }
     return std::isfinite(sum) ? sum : -kInfinity;
   }
 
   const ConvexRows& step_;
   const EdgeVectors& z_;
-  std::vector<double> norms_;
+  std::vector<double> conjugates_;  // |y_i| t_i
   double inner_ = 0;
 };
 
@@ -168,10 +174,8 @@ class Certificate::Search {
       return !is_over_;
     }
     if (!is_polishing_ && !begin_polishing()) return false;
-    for (int k = 0; k < kStepsAtOnce; ++k) {
-      if (polished_ == settings_.max_steps || Clock::now() >= end_) return false;
-      polish();
-    }
+    if (polished_ == settings_.max_steps || Clock::now() >= end_) return false;
+    polish();
     return !is_over_;
   }
 
@@ -182,7 +186,7 @@ class Certificate::Search {
 
  private:
   static constexpr std::array<double, 5> kShares = {0.0, 1e-4, 1e-3, 1e-2, 1e-1};
-  static constexpr int kStepsAtOnce = 5;
+  static constexpr int kBetweenBounds = 5;
 
   bool take(double bound) {
     const bool is_better = bound > best_;
@@ -220,7 +224,7 @@ class Certificate::Search {
     // x minimises |r - z + y / rho|; what remains of that vector, times rho, has A^T (.) = 0: a dual point.
     rows_.apply(least_squares(problem_, rows_, r_ - z + y_ / rho_), image_);
     r_ -= image_;
-    if (++polished_ % kStepsAtOnce == 0) take(dual_.scaled_bound(rho_ * (r_ - z) + y_));
+    if (++polished_ % kBetweenBounds == 0) take(dual_.scaled_bound(rho_ * (r_ - z) + y_));
   }
 
   const Problem problem_;

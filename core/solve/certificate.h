@@ -32,7 +32,7 @@ struct CertificateSettings {
   double max_seconds = std::numeric_limits<double>::infinity();
 };
 
-/// The bound, in steps of at most one factorisation or five back-substitutions, so that a live session can leave
+/// The bound, in steps of at most one factorisation or back-substitution, so that a live session can leave
 /// off between them.
 class Certificate {
  public:

@@ -495,7 +495,7 @@ bool Deformer::step() {
   return self.minimiser != nullptr || self.certificate != nullptr;
 }
 
-absl::Status Deformer::start_certificate(std::stop_token stop) {
+absl::Status Deformer::start_certificate(std::stop_token stop, double max_seconds) {
   Impl& self = *impl_;
   self.interrupt();
   if (!self.norm) {
@@ -503,7 +503,7 @@ absl::Status Deformer::start_certificate(std::stop_token stop) {
                       "there was no solve for the present inputs; a certificate is that of a result");
   }
   self.stop = std::move(stop);
-  self.begin_certificate(std::numeric_limits<double>::infinity());
+  self.begin_certificate(max_seconds);
   return absl::OkStatus();
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <stop_token>
 
@@ -62,8 +63,9 @@ class Deformer {
   /// Begins the certificate of positions(), the result of a solve for the present inputs: step() goes on with it, and once that
   /// returns false summary().optimality_gap has it. Nothing else of the summary changes. Ends a running solve with
   /// kCancelled. FAILED_PRECONDITION (NOT_SOLVED). Starting anything and changing any input ends it without a result;
-  /// where `stop` is requested, it ends with what it has.
-  absl::Status start_certificate(std::stop_token stop = {});
+  /// where `stop` is requested, or after max_seconds, it ends with what it has.
+  absl::Status start_certificate(std::stop_token stop = {},
+                                 double max_seconds = std::numeric_limits<double>::infinity());
   /// The steps under way are those of a certificate: positions() do not change any more.
   bool is_certifying() const;
 
