@@ -45,8 +45,8 @@ TEST_F(LiveSolverTest, RestsWhileNobodyLooksOn) {
 }
 
 TEST_F(LiveSolverTest, WhatWaitsForAReaderWithoutCreditIsRenewed) {
-  auto stream = std::make_shared<FrameStream>(StreamOptions{.credit = 1}, publisher_, timers_, seconds(15),
-                                              OpenedNote{});
+  auto stream = std::make_shared<FrameStream>(StreamOptions{.credit = 1}, publisher_, timers_,
+                                              std::chrono::seconds(15), OpenedNote{});
   ASSERT_TRUE(publisher_->add(stream));
   while (stream->next()) {
   }
