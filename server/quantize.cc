@@ -13,9 +13,10 @@ static_assert(std::endian::native == std::endian::little, "numbers travel as the
 
 constexpr double kMostUnsigned = 65535, kMostSigned = 32767;
 
-/// Steps a unit of length; 0 where there is no length.
+/// Steps a unit of length; 0 where there is no length, or one that is next to nothing.
 double steps(double extent) {
-  return extent > 0 ? kMostUnsigned / extent : 0;
+  const double steps = kMostUnsigned / extent;
+  return std::isfinite(steps) ? steps : 0;
 }
 
 std::uint16_t nearest(double steps) {

@@ -140,7 +140,7 @@ export type StopReason =
 /**
  * How positions, distortion and normals travel. "float32": 16 bytes a vertex with distortion, 12 without; exact to float32.
  * "quantized": 8 bytes, off by at most half of 1/65535 of the frame's extent along each axis (distortion: of its largest).
- * "compressed": the same numbers, by meshoptimizer's vertex codec, about 3 bytes. The last two always carry distortion.
+ * "compressed": the same numbers, by meshoptimizer's vertex codec, 3 to 5 bytes on smooth surfaces. The last two always carry distortion.
  */
 export type Encoding = "float32" | "quantized" | "compressed";
 
