@@ -1,6 +1,8 @@
+import { anchorOfHandle, handleOf } from "../model/document.js";
 import { project } from "../model/selection.js";
 import { viewProjection } from "../stage/pointing.js";
 import type { App } from "./app.js";
+import type { Pane } from "./pane.js";
 
 /** What scripted users ask of the page: `window.__lpdeform`. Reads only. */
 export function exposeForTests(app: App): void {
@@ -30,13 +32,16 @@ export function exposeForTests(app: App): void {
         bytesPerSecond: meter.bytesPerSecond(now),
       };
     },
-    /** On the page, in CSS pixels. */
-    vertexOnPage: (vertex: number, pane = 0) => {
-      const { stage } = paneAt(pane);
-      const screen = project(stage.surface!.positions, viewProjection(stage), stage.width, stage.height);
-      const box = stage.canvas.getBoundingClientRect();
-      return { x: box.left + screen[2 * vertex]!, y: box.top + screen[2 * vertex + 1]! };
-    },
+    vertexOnPage: (vertex: number, pane = 0) => onPage(paneAt(pane), paneAt(pane).stage.surface!.positions.slice(3 * vertex, 3 * vertex + 3)),
+    /** Where the gizmo is. */
+    anchorOnPage: (pane = 0) => onPage(paneAt(pane), Float32Array.from(anchorOfHandle(handleOf(app.document, app.view.now.selected)!))),
   };
   Object.assign(window, { __lpdeform: inspect });
+}
+
+/** In CSS pixels. */
+function onPage({ stage }: Pane, point: Float32Array): { x: number; y: number } {
+  const [x, y] = project(point, viewProjection(stage), stage.width, stage.height);
+  const box = stage.canvas.getBoundingClientRect();
+  return { x: box.left + x!, y: box.top + y! };
 }

@@ -8,15 +8,20 @@ import { icon } from "./icons.js";
 type Element = "vertex" | "face" | "edge";
 
 function elementOf(kind: string): Element {
-  if (kind.includes("edge")) return "edge";
+  if (kind.includes("edge") || kind === "inconsistent_orientation") return "edge";
   return /face|triangle/.test(kind) ? "face" : "vertex";
 }
 
-/** Counts that are no fault of the mesh. */
-const harmless = new Set(["boundary_edges"]);
+/** What the server sees to by itself, and most meshes have some of. */
+const mild = new Set(["clamped_edges", "floored_vertices", "flipped_edges"]);
 
+function defectsOf(report: MeshReport | undefined): Defect[] {
+  return (report?.defects ?? []).filter(({ count }) => count > 0);
+}
+
+/** What somebody who cares for the mesh wants to know. */
 export function warningsOf(report: MeshReport | undefined): Defect[] {
-  return (report?.defects ?? []).filter(({ kind, count }) => count > 0 && !harmless.has(kind));
+  return defectsOf(report).filter(({ kind }) => !mild.has(kind));
 }
 
 /** The mesh's report: each warning points out its elements. */
@@ -24,16 +29,16 @@ export function reportPanel(app: App): HTMLElement {
   const summary = el("p", { className: "quiet" });
   const list = el("ul", { className: "warnings" });
   app.facts.watch(({ report, mesh }, before) => {
-    if (report === before.report && report !== undefined && list.childElementCount > 0) return;
-    const warnings = warningsOf(report);
+    if (report === before.report && mesh === before.mesh && summary.textContent !== "") return;
+    const defects = defectsOf(report);
     const parts = report && [
       `${report.vertices.toLocaleString("en")} vertices, ${report.faces.toLocaleString("en")} faces`,
       `${report.components} ${report.components === 1 ? "component" : "components"}`,
       report.boundaryLoops > 0 ? `${report.boundaryLoops} ${report.boundaryLoops === 1 ? "hole or border" : "holes or borders"}` : "closed",
     ];
     summary.textContent = parts ? `${mesh.name}: ${parts.join(", ")}.` : mesh.name;
-    list.replaceChildren(...warnings.map((defect) => warning(app, defect)));
-    if (report && warnings.length === 0) list.append(el("li", { className: "good" }, "Nothing wrong with it."));
+    list.replaceChildren(...defects.map((defect) => warning(app, defect)));
+    if (report && defects.length === 0) list.append(el("li", { className: "good" }, "Nothing wrong with it."));
   });
   return el("div", {}, summary, list);
 }
@@ -47,7 +52,7 @@ function warning(app: App, { kind, count, first }: Defect): HTMLElement {
     const shown = element === "edge" ? first.length / 2 : first.length;
     app.notify(shown < count ? `The first ${shown} of ${text} are marked.` : `${text}: marked.`);
   });
-  return el("li", {}, press);
+  return el("li", { className: mild.has(kind) ? "mild" : "" }, press);
 }
 
 /** Marks vertices and the corners of faces, and what is there already no more. */

@@ -1,0 +1,206 @@
+import { join } from "node:path";
+import { afterAll, beforeAll, beforeEach, describe, expect, it } from "vitest";
+import { Service } from "../../../client/test/real/service.js";
+import { User } from "./user.js";
+
+let service: Service;
+let user: User;
+
+beforeAll(async () => {
+  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
+  user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
+});
+
+afterAll(async () => {
+  await user.close();
+  await service.stop();
+});
+
+beforeEach(async () => {
+  await user.settled();
+});
+
+interface HandleFacts {
+  name: string;
+  colour: string;
+  vertices: number[];
+  isLocked: boolean;
+  hold: { kind: string; weight?: number };
+  pose: { translation: [number, number, number]; rotation: [number, number, number, number] };
+}
+
+const handles = () => user.ask<HandleFacts[]>("document().handles");
+const selected = () => user.ask<string | undefined>("app.view.now.selected");
+const press = (key: string) => user.page.keyboard.press(key);
+const frontAt = async (height: number) => user.vertexOnPage(await user.vertexNear([0.5, 0, height]));
+
+describe("handles", () => {
+  it("are painted with the brush", async () => {
+    await press("2");
+    const [from, to] = [await frontAt(2), await frontAt(3)];
+    await user.drag(from, to.x - from.x, to.y - from.y);
+    const [, , painted] = await handles();
+    expect(painted!.vertices.length).toBeGreaterThan(3);
+    expect(await selected()).toBe(painted!.name);
+  });
+
+  it("grow with Shift and shrink with Alt", async () => {
+    const before = (await handles())[2]!.vertices.length;
+    const [from, to] = [await frontAt(3), await frontAt(4)];
+    await user.page.keyboard.down("Shift");
+    await user.drag(from, to.x - from.x, to.y - from.y);
+    await user.page.keyboard.up("Shift");
+    const grown = (await handles())[2]!.vertices.length;
+    expect(grown).toBeGreaterThan(before);
+    await user.page.keyboard.down("Alt");
+    await user.drag(from, to.x - from.x, to.y - from.y);
+    await user.page.keyboard.up("Alt");
+    expect((await handles())[2]!.vertices.length).toBeLessThan(grown);
+  });
+
+  it("are renamed, coloured, locked, held softly and deleted in the list", async () => {
+    const row = user.page.locator(".handles li").nth(2);
+    const { colour } = (await handles())[2]!;
+    await row.getByLabel("Name").fill("Middle");
+    await row.getByLabel("Name").press("Enter");
+    await user.page.locator('.handles li[data-handle="Middle"]').waitFor();
+    await user.page.getByLabel("Colour of Middle").click();
+    await user.page.getByLabel("How it is held").selectOption("soft");
+    await user.page.locator('[data-handle="Middle"]').getByTitle("Lock it against dragging").click();
+    const [, , middle] = await handles();
+    expect(middle).toMatchObject({ name: "Middle", isLocked: true, hold: { kind: "soft", weight: 1 } });
+    expect(middle!.colour).not.toBe(colour);
+    await user.settled();
+    expect(await user.ask("status()")).toBe("live");
+    await row.getByLabel("Name").fill("Top");
+    await row.getByLabel("Name").press("Enter");
+    await user.page.locator(".notice.bad", { hasText: "There is a handle “Top” already." }).waitFor();
+    await user.page.getByLabel("Delete Middle").click();
+    expect((await handles()).length).toBe(2);
+  });
+
+  it("are drawn around with the lasso", async () => {
+    await press("3");
+    const middle = await frontAt(2.6);
+    const { mouse } = user.page;
+    await mouse.move(middle.x - 30, middle.y - 20);
+    await mouse.down();
+    for (const [x, y] of [[60, -20], [60, 30], [-30, 30], [-30, -10]]) await mouse.move(middle.x + x!, middle.y + y!);
+    await mouse.up();
+    expect((await handles()).length).toBe(3);
+    await press("Delete");
+    expect((await handles()).length).toBe(2);
+  });
+});
+
+describe("the gizmo", () => {
+  it("moves along an axis and turns about one", async () => {
+    await press("1");
+    await press("t");
+    await user.page.locator('[data-handle="Top"] .name').click();
+    await user.page.locator("canvas.stage").focus();
+    const before = (await handles())[1]!.pose.translation;
+    const top = await user.ask<{ x: number; y: number }>("anchorOnPage()");
+    await user.drag({ x: top.x, y: top.y - 55 }, 0, -40);
+    const after = (await handles())[1]!.pose.translation;
+    expect(after[2]).toBeGreaterThan(before[2] + 0.05);
+    expect(Math.abs(after[0] - before[0])).toBeLessThan(1e-6);
+    await user.settled();
+    await press("r");
+    const again = await user.ask<{ x: number; y: number }>("anchorOnPage()");
+    await user.drag({ x: again.x + 3, y: again.y - 6 }, 60, 20);
+    await user.settled();
+    const turned = (await handles())[1]!.pose.rotation;
+    expect(Math.abs(turned[3])).toBeLessThan(0.999);
+    expect(await user.ask("app.red")).toBeGreaterThan(0);
+  });
+
+  it("gives way to keys", async () => {
+    const before = (await handles())[1]!.pose.translation;
+    await user.page.locator("canvas.stage").focus();
+    await press("ArrowRight");
+    const after = (await handles())[1]!.pose.translation;
+    expect(after[0] - before[0]).toBeCloseTo(0.01 * (await user.ask<number>("app.diagonal")), 9);
+    await press("Control+z");
+    expect((await handles())[1]!.pose.translation).toEqual(before);
+  });
+});
+
+describe("p", () => {
+  it("is painted, with stiffness beside it, and taken away again", async () => {
+    await press("5");
+    const [from, to] = [await frontAt(1), await frontAt(2)];
+    await user.drag(from, to.x - from.x, to.y - from.y);
+    await user.settled();
+    const painted = await user.ask<Record<string, number>>("document().paintedP");
+    expect(Object.values(painted).filter((value) => value === 1).length).toBeGreaterThan(2);
+    expect(await user.ask("app.view.now.colourBy")).toBe("p");
+    await user.page.getByRole("group", { name: "What is painted" }).getByRole("button", { name: "Stiffness" }).click();
+    await user.drag(from, to.x - from.x, to.y - from.y);
+    await user.settled();
+    const stiffness = await user.ask<Record<string, number>>("document().stiffness");
+    expect(Math.max(...Object.values(stiffness))).toBe(10);
+    await user.page.getByRole("button", { name: "Clear painting" }).click();
+    expect(await user.ask("document().paintedP")).toBeUndefined();
+    await user.page.getByRole("button", { name: "Distortion" }).click();
+  });
+
+  it("is found from the shape", async () => {
+    const before = await user.positions();
+    await user.page.locator(".dock .toggle").click();
+    expect(await user.ask("document().isAutomatic")).toBe(true);
+    await user.settled();
+    expect(await user.positions()).not.toEqual(before);
+    await press("a");
+    expect(await user.ask("document().isAutomatic")).toBe(false);
+  });
+
+  it("has two values side by side, with the same handles", async () => {
+    await press("s");
+    await user.settled(1);
+    const [left, right] = [await user.positions(0), await user.positions(1)];
+    expect(right.length).toBe(left.length);
+    expect(Math.max(...right.map((value, k) => Math.abs(value - left[k]!)))).toBeGreaterThan(0.01);
+    const { vertices } = (await handles())[1]!;
+    for (const vertex of vertices) expect(Math.abs(right[3 * vertex]! - left[3 * vertex]!)).toBeLessThan(1e-3);
+    await press("1");
+    const from = await user.vertexOnPage(vertices[0]!, 1);
+    await user.drag(from, 40, 20);
+    await user.settled(0);
+    await user.settled(1);
+    expect(await user.positions(0)).not.toEqual(left);
+    expect(await user.positions(1)).not.toEqual(right);
+    await press("s");
+  });
+});
+
+describe("the look", () => {
+  it("has wireframe, ghost, normals and a scale that can be pinned", async () => {
+    for (const key of ["w", "g"]) {
+      const before = await user.colours();
+      await press(key);
+      await expect.poll(() => user.colours(), { timeout: 10_000 }).not.toEqual(before);
+    }
+    await press("p");
+    const pinned = await user.ask<number>("app.red");
+    await user.page.getByRole("button", { name: "6", exact: true }).click();
+    await user.settled();
+    expect(await user.ask("app.red")).toBe(pinned);
+    await press("p");
+    expect(await user.ask("app.red")).not.toBe(pinned);
+    await user.page.getByRole("button", { name: "Normals" }).click();
+    await user.page.locator(".legend").waitFor({ state: "hidden" });
+  });
+
+  it("is dark and light, and tells its keys", async () => {
+    const theme = () => user.page.evaluate("document.documentElement.dataset.theme");
+    const before = await theme();
+    await press("d");
+    expect(await theme()).not.toBe(before);
+    await press("?");
+    await user.page.getByRole("dialog", { name: "Help" }).waitFor();
+    await press("Escape");
+    await user.page.getByRole("dialog", { name: "Help" }).waitFor({ state: "hidden" });
+    expect(user.errors).toEqual([]);
+  });
+});

@@ -1,0 +1,64 @@
+import { join } from "node:path";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { Service } from "../../../client/test/real/service.js";
+import { User } from "./user.js";
+
+let service: Service;
+let user: User;
+
+beforeAll(async () => {
+  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
+  user = await User.open(`${service.url}/?shape=bar&detail=coarse`, { width: 820, height: 1180, hasTouch: true });
+  await user.settled();
+});
+
+afterAll(async () => {
+  await user.close();
+  await service.stop();
+});
+
+type Point = { x: number; y: number };
+
+/** Fingers that go down at the first points, over the next, and up. */
+async function touch(...steps: Point[][]): Promise<void> {
+  const devtools = await user.page.context().newCDPSession(user.page);
+  const send = (type: "touchStart" | "touchMove" | "touchEnd", points: Point[]) =>
+    devtools.send("Input.dispatchTouchEvent", { type, touchPoints: points.map((point, id) => ({ ...point, id })) });
+  let down = 0;
+  for (const points of steps) {
+    await send(points.length > down ? "touchStart" : "touchMove", points);
+    down = points.length;
+  }
+  await send("touchEnd", []);
+  await devtools.detach();
+}
+
+const camera = () => user.ask<number>("app.panes[0].stage.camera.position.distanceTo(window.__lpdeform.app.panes[0].stage.target)");
+
+it("a finger drags a handle, and the surface follows", async () => {
+  const rest = await user.positions();
+  const vertex = await user.ask<number>("document().handles[1].vertices[0]");
+  const { x, y } = await user.vertexOnPage(vertex);
+  await touch([{ x, y }], [{ x: x + 20, y: y + 5 }], [{ x: x + 60, y: y + 20 }], [{ x: x + 90, y: y + 30 }]);
+  await user.settled();
+  const bent = await user.positions();
+  expect(Math.max(...bent.map((value, k) => Math.abs(value - rest[k]!)))).toBeGreaterThan(0.2);
+});
+
+it("a tap on the surface places a handle", async () => {
+  const { x, y } = await user.vertexOnPage(await user.vertexNear([0.5, 0, 2]));
+  await user.page.touchscreen.tap(x, y);
+  expect(await user.ask("document().handles.length")).toBe(3);
+});
+
+it("two fingers zoom, also where the first had begun to paint", async () => {
+  await user.page.getByRole("button", { name: "Brush", exact: true }).tap();
+  const before = await camera();
+  const { x, y } = await user.vertexOnPage(await user.vertexNear([0.5, 0, 3.5]));
+  const count = await user.ask("document().handles.length");
+  const pair = (gap: number) => [{ x, y }, { x, y: y + gap }];
+  await touch([{ x, y }], pair(100), pair(140), pair(200), pair(260));
+  expect(await camera()).toBeLessThan(0.9 * before);
+  expect(await user.ask("document().handles.length")).toBe(count);
+  expect(user.errors).toEqual([]);
+});

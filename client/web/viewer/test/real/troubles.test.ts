@@ -1,0 +1,107 @@
+import { join } from "node:path";
+import { afterEach, describe, expect, it } from "vitest";
+import { Service } from "../../../client/test/real/service.js";
+import { User } from "./user.js";
+
+const files = join(import.meta.dirname, "../../dist");
+const open: { stop(): Promise<void> }[] = [];
+
+async function start(...serverFlags: string[]): Promise<Service> {
+  const service = await Service.start({ files, serverFlags });
+  open.push(service);
+  return service;
+}
+
+async function visit(service: Service): Promise<User> {
+  const user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
+  open.push({ stop: () => user.close() });
+  return user;
+}
+
+afterEach(async () => {
+  while (open.length > 0) await open.pop()!.stop();
+});
+
+const banner = (user: User, words: string) => user.page.locator(".banner", { hasText: words }).waitFor();
+
+describe("the page says plainly, and goes on by itself when", () => {
+  it("the server is full", async () => {
+    const service = await start("--max-sessions", "1");
+    const first = await visit(service);
+    await first.settled();
+    const second = await visit(service);
+    await banner(second, "The server is full");
+    await first.ask("app.panes[0].live.close()");
+    await second.settled();
+    await second.page.locator(".banner").waitFor({ state: "hidden" });
+  });
+
+  it("the server shuts down, and another comes", async () => {
+    const service = await start();
+    const user = await visit(service);
+    await user.settled();
+    const stopping = service.stopServer();
+    await banner(user, "The server is shutting down");
+    await stopping;
+    await service.startServer();
+    await user.settled();
+    expect(await user.ask("document().handles.length")).toBe(2);
+  });
+
+  it("there is no server yet", async () => {
+    const service = await start();
+    await service.killServer();
+    const user = await visit(service);
+    await banner(user, "The server is away");
+    await service.startServer();
+    await user.settled();
+    expect(user.errors).toEqual([]);
+  });
+
+  it("the server refuses a mesh, and takes the next", async () => {
+    const service = await start("--max-vertices", "500");
+    const user = await visit(service);
+    await user.settled();
+    await user.page.getByLabel("Detail").selectOption("fine");
+    await banner(user, "The server refuses this mesh");
+    expect(await user.page.locator(".banner").textContent()).toContain("500");
+    await user.page.getByLabel("Detail").selectOption("coarse");
+    await user.settled();
+    await user.page.locator(".banner").waitFor({ state: "hidden" });
+  });
+});
+
+describe("a mesh with defects", () => {
+  // A tetrahedron, a third face on one of its edges, a face without area, a vertex that nothing uses.
+  const off = "OFF\n7 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n5 5 5\n0.5 0 0\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n3 1 2 4\n3 0 6 1\n";
+
+  it("is told as warnings, and each points out its elements", async () => {
+    const service = await start();
+    const user = await visit(service);
+    await user.settled();
+    await user.openFiles({ name: "odd.off", content: off });
+    const warnings = user.page.locator(".warnings button");
+    await warnings.first().waitFor();
+    const texts = await warnings.allTextContents();
+    expect(texts.join("; ")).toMatch(/1 unreferenced vertices/);
+    await user.page.locator('[data-warning="unreferenced_vertices"]').click();
+    expect(await user.ask("app.facts.now.pointedOut")).toEqual([5]);
+    await user.page.locator('[data-warning="zero_area_faces"]').click();
+    expect((await user.ask<number[]>("app.facts.now.pointedOut")).sort()).toEqual([0, 1, 6]);
+    await user.page.locator('[data-warning="non_manifold_edges"]').click();
+    expect(await user.ask<number[]>("app.facts.now.pointedOut")).toEqual(expect.arrayContaining([1, 2]));
+  });
+
+  it("or a file that is no mesh is refused in words, and what was there stays", async () => {
+    const service = await start();
+    const user = await visit(service);
+    await user.settled();
+    await user.openFiles({ name: "bad.off", content: "OFF\n3 1 0\n0 0 0\n" });
+    await user.page.locator(".notice.bad", { hasText: "bad.off ends before vertex 1." }).waitFor();
+    await user.openFiles({ name: "bad.json", content: '{"handles": [{"name": "a", "vertices": [99999]}]}' });
+    await user.page.locator(".notice.bad", { hasText: "vertex 99999" }).waitFor();
+    expect(await user.ask("app.mesh.name")).toBe("bar");
+    expect(await user.ask("document().handles.length")).toBe(2);
+    expect(user.errors).toEqual([]);
+  });
+});
