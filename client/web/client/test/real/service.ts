@@ -26,7 +26,7 @@ export class Service {
 
   /** `files`: what Envoy serves beside; `serverFlags`: of lpdeform-server. */
   static async start({
-    files = tmpdir(),
+    files = "",
     serverFlags = [] as string[],
     origins = [] as string[],
     idleSeconds = 60,
@@ -39,7 +39,7 @@ export class Service {
       "--server",
       service.#address,
       "--files",
-      files,
+      files || service.#work,
       "--access-log",
       service.accessLog,
       "--idle",
