@@ -139,6 +139,13 @@ describe("what is drawn", () => {
     expect(smooth.source.length).toBeLessThan((1.02 * creature.positions.length) / 3);
   });
 
+  it("knows whether it has an inside that nobody sees", () => {
+    const { mesh } = shapeKinds[0]!.make("coarse");
+    expect(new DrawMesh(mesh).isClosed).toBe(true);
+    expect(new DrawMesh({ ...mesh, faces: mesh.faces.slice(3) }).isClosed).toBe(false);
+    expect(new DrawMesh({ ...mesh, faces: Uint32Array.from([...mesh.faces, 0, 1, 2]) }).isClosed).toBe(false);
+  });
+
   it("follows the mesh's vertices, with normals that look outwards", () => {
     const { mesh } = shapeKinds[0]!.make("coarse");
     const draw = new DrawMesh(mesh);

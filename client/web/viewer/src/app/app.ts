@@ -141,6 +141,10 @@ export class App {
     return red > (1e-8 * this.diagonal) ** (isAutomatic ? 2 : p) ? red : 0;
   }
 
+  togglePin(): void {
+    this.view.set({ pinned: this.view.now.pinned === undefined && this.red > 0 ? this.red : undefined });
+  }
+
   requestDraw(): void {
     this.#asked ||= requestAnimationFrame((now) => this.#draw(now));
   }

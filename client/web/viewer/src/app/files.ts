@@ -7,8 +7,8 @@ import { readMesh } from "../io/read.js";
 import { writeStl } from "../io/stl.js";
 import { emptyDocument } from "../model/document.js";
 import type { Mesh } from "../model/mesh.js";
-import { legendCanvas } from "../ui/legend.js";
 import type { App } from "./app.js";
+import { legendCanvas } from "./legend.js";
 
 export type MeshFormat = "ply" | "obj" | "off" | "stl";
 

@@ -1,7 +1,5 @@
 import { changeHandle, handleOf, removeHandle } from "../model/document.js";
-import type { Tool } from "../model/view.js";
-import type { ColourBy } from "../stage/surface.js";
-import { togglePin } from "../ui/legend.js";
+import type { ColourBy, Tool } from "../model/view.js";
 import type { App } from "./app.js";
 import type { Files } from "./files.js";
 
@@ -68,7 +66,7 @@ function actions(app: App, files: Files, help: HTMLDialogElement): Record<string
     l: () => toggleLock(app),
     n: () => selectNext(app),
     o: () => files.choose(),
-    p: () => togglePin(app),
+    p: () => app.togglePin(),
     r: () => view.set({ gizmo: "rotate", tool: "move" }),
     s: () => view.set({ isSplit: !now.isSplit }),
     t: () => view.set({ gizmo: "translate", tool: "move" }),

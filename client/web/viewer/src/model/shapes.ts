@@ -54,8 +54,8 @@ function sheet(detail: Detail): Shape {
 /** A row of three square holes, as wide as what is between them. */
 function block(detail: Detail): Shape {
   const unit = { coarse: 2, medium: 4, fine: 7 }[detail];
-  const isHole = (x: number, y: number) => Math.floor(x / unit - 1) % 4 < 2 && x >= unit && y >= unit && y < 3 * unit;
-  const mesh = scaled("block", blockSurface(12 * unit, 4 * unit, 2 * unit, (x, y) => !isHole(x, y)), 1 / (2 * unit));
+  const isHole = (x: number, z: number) => Math.floor(x / unit - 1) % 4 < 2 && x >= unit && z >= unit && z < 3 * unit;
+  const mesh = scaled("block", blockSurface(12 * unit, 2 * unit, 4 * unit, (x, _, z) => !isHole(x, z)), 1 / (2 * unit));
   const [low, high] = extent(mesh, 0);
   return withHandles(mesh, [
     ["Left", (v) => v[0]! < low + 0.01],

@@ -1,8 +1,10 @@
 import type { Encoding } from "lpdeform-client";
-import type { ColourBy } from "../stage/surface.js";
 import type { Detail } from "./shapes.js";
 
 export type Tool = "move" | "brush" | "lasso" | "box" | "paint";
+
+/** What the colours tell. */
+export type ColourBy = "distortion" | "p" | "stiffness" | "normals" | "plain";
 
 /** What a selecting stroke does: a new handle, more for the selected one, or letting go of vertices. */
 export type StrokeMode = "new" | "add" | "release";

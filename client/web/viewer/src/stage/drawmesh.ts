@@ -10,12 +10,15 @@ export class DrawMesh {
   readonly indices: Uint32Array;
   readonly positions: Float32Array;
   readonly normals: Float32Array;
+  /** Every edge has a face on either side. */
+  readonly isClosed: boolean;
 
   constructor(
     readonly mesh: Mesh,
     sharpDegrees = 40,
   ) {
-    const { source, indices } = split(mesh, Math.cos((sharpDegrees * Math.PI) / 180));
+    const { source, indices, isClosed } = split(mesh, Math.cos((sharpDegrees * Math.PI) / 180));
+    this.isClosed = isClosed;
     this.source = source;
     this.indices = indices;
     this.positions = new Float32Array(3 * source.length);
@@ -81,7 +84,7 @@ export function vertexNormals(positions: Float32Array, faces: Uint32Array): Floa
 }
 
 /** Corners around a vertex belong together where they are joined by edges that are not sharp. */
-function split({ positions, faces }: Mesh, leastCosine: number): { source: Uint32Array; indices: Uint32Array } {
+function split({ positions, faces }: Mesh, leastCosine: number): Pick<DrawMesh, "source" | "indices" | "isClosed"> {
   const normals = faceNormals(positions, faces);
   const parents = Uint32Array.from({ length: faces.length }, (_, corner) => corner);
   const root = (corner: number) => {
@@ -94,9 +97,11 @@ function split({ positions, faces }: Mesh, leastCosine: number): { source: Uint3
   for (let corner = 0; corner < faces.length; ++corner) {
     edges.set(faces[corner]! * vertexCount + faces[nextCorner(corner)]!, corner);
   }
+  let isClosed = edges.size === faces.length;
   for (let corner = 0; corner < faces.length; ++corner) {
     const next = nextCorner(corner);
     const other = edges.get(faces[next]! * vertexCount + faces[corner]!);
+    if (other === undefined) isClosed = false;
     if (other === undefined || other > corner) continue;
     const [f, g] = [3 * Math.floor(corner / 3), 3 * Math.floor(other / 3)];
     const cosine = normals[f]! * normals[g]! + normals[f + 1]! * normals[g + 1]! + normals[f + 2]! * normals[g + 2]!;
@@ -115,7 +120,7 @@ function split({ positions, faces }: Mesh, leastCosine: number): { source: Uint3
     }
     indices[corner] = drawn[top]!;
   }
-  return { source: Uint32Array.from(source), indices };
+  return { source: Uint32Array.from(source), indices, isClosed };
 }
 
 function nextCorner(corner: number): number {

@@ -4,20 +4,13 @@ import { boundsOf, type Mesh, type Vector3 } from "../model/mesh.js";
 import { Backdrop } from "./backdrop.js";
 import { Gizmo } from "./gizmo.js";
 import { Marks } from "./marks.js";
+import { isSoftware } from "./software.js";
 import { Surface } from "./surface.js";
 
-/** Drawn by the processor, where each pixel counts. */
-export const isSoftware = (() => {
-  const context = document.createElement("canvas").getContext("webgl2");
-  if (!context) return false;
-  const info = context.getExtension("WEBGL_debug_renderer_info");
-  const name = String(context.getParameter(info?.UNMASKED_RENDERER_WEBGL ?? context.RENDERER));
-  context.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|software|basic render/i.test(name);
-})();
-
-/** What lies over the picture at its edges, in pixels. */
-const covered = { left: 70, top: 50, bottom: 120 };
+/** What lies over a picture of that width at its edges, in pixels. */
+function coveredAt(width: number): { left: number; top: number; bottom: number } {
+  return width > 620 ? { left: 70, top: 50, bottom: 120 } : { left: 40, top: 110, bottom: 165 };
+}
 
 /** One picture of a surface: canvas, camera, and what is drawn. Draws when it is told to, not by itself. */
 export class Stage {
@@ -89,6 +82,7 @@ export class Stage {
   #distanceFor(min: Vector3, max: Vector3): number {
     const { camera } = this;
     const [width, height] = this.#size as [number, number];
+    const covered = coveredAt(width);
     const tangent = Math.tan((camera.fov * Math.PI) / 360);
     const across = (tangent * Math.max(width - covered.left - 40, 0.4 * width)) / Math.max(height, 1);
     const up = (tangent * Math.max(height - covered.top - covered.bottom, 0.4 * height)) / Math.max(height, 1);
@@ -125,6 +119,7 @@ export class Stage {
     this.#renderer.setPixelRatio(ratio);
     this.#renderer.setSize(width, height, false);
     this.camera.aspect = width / Math.max(height, 1);
+    const covered = coveredAt(width);
     this.camera.setViewOffset(width, height, -covered.left / 2, (covered.bottom - covered.top) / 2, width, height);
     this.marks.scale(ratio);
     return true;

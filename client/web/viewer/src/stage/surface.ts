@@ -1,10 +1,9 @@
 import * as three from "three";
 import type { Mesh } from "../model/mesh.js";
+import type { ColourBy } from "../model/view.js";
 import { DrawMesh } from "./drawmesh.js";
-import { surfaceMaterial } from "./surface_material.js";
-
-/** What the colours tell. */
-export type ColourBy = "distortion" | "p" | "stiffness" | "normals" | "plain";
+import { isSoftware } from "./software.js";
+import { colourByNormal, surfaceMaterial } from "./surface_material.js";
 
 /** Of what value each colour is. */
 export interface Scale {
@@ -12,6 +11,9 @@ export interface Scale {
   red: number;
   isLogarithmic: boolean;
 }
+
+/** From so many on, light at the vertices looks like light everywhere. */
+const denseVertices = 4000;
 
 /** The surface of a pane: faces, wireframe, the original as a ghost. */
 export class Surface {
@@ -21,7 +23,8 @@ export class Surface {
   readonly #draw: DrawMesh;
   readonly #geometry = new three.BufferGeometry();
   readonly #values: Float32Array;
-  readonly #material = surfaceMaterial();
+  readonly #isPerVertex: boolean;
+  readonly #material: three.ShaderMaterial;
   readonly #wire: three.LineSegments;
   readonly #ghost: three.Mesh;
 
@@ -29,6 +32,8 @@ export class Surface {
     this.positions = mesh.positions;
     this.#draw = new DrawMesh(mesh);
     this.#values = new Float32Array(this.#draw.source.length);
+    this.#isPerVertex = isSoftware && mesh.positions.length > 3 * denseVertices;
+    this.#material = surfaceMaterial(this.#isPerVertex, this.#draw.isClosed);
     const geometry = this.#geometry;
     geometry.setIndex(new three.BufferAttribute(this.#draw.indices, 1));
     geometry.setAttribute("position", live(this.#draw.positions, 3));
@@ -62,7 +67,7 @@ export class Surface {
     uniforms["red"]!.value = red;
     uniforms["logarithmic"]!.value = isLogarithmic ? 1 : 0;
     uniforms["colourful"]!.value = values && by !== "plain" && by !== "normals" ? 1 : 0;
-    uniforms["byNormal"]!.value = by === "normals" ? 1 : 0;
+    colourByNormal(this.#material, by === "normals", this.#isPerVertex);
   }
 
   show({ wireframe, ghost, isDark }: { wireframe: boolean; ghost: boolean; isDark: boolean }): void {

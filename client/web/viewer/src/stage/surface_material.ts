@@ -3,16 +3,36 @@ import { stops } from "../model/colours.js";
 
 // Lit from the eye and from above, in sRGB throughout: no conversions, so that the legend's colours are the surface's.
 
+const light = `
+/* How bright, and how shiny, a place is that looks along the normal, seen from toEye. */
+vec2 lit(vec3 normal, vec3 toEye) {
+  vec3 key = normalize(vec3(0.35, 0.75, 0.6));
+  float facing = max(dot(normal, toEye), 0.0);
+  float diffuse = 0.52 + 0.36 * max(dot(normal, key), 0.0) + 0.2 * facing + 0.1 * pow(1.0 - facing, 3.0);
+  return vec2(diffuse, 0.16 * pow(max(dot(normal, normalize(key + toEye)), 0.0), 40.0));
+}`;
+
 const vertexShader = `
 attribute float value;
 varying float vValue;
+#ifdef PER_VERTEX
+varying vec2 vLit;
+#else
 varying vec3 vNormal;
 varying vec3 vToEye;
+#endif
+${light}
 void main() {
   vec4 seen = modelViewMatrix * vec4(position, 1.0);
   vValue = value;
+#ifdef PER_VERTEX
+  vec3 toEye = normalize(-seen.xyz);
+  vec3 facing = normalize(normalMatrix * normal);
+  vLit = lit(dot(facing, toEye) < -0.1 ? -facing : facing, toEye);
+#else
   vNormal = normalMatrix * normal;
   vToEye = -seen.xyz;
+#endif
   gl_Position = projectionMatrix * seen;
 }`;
 
@@ -21,13 +41,16 @@ uniform float red;
 uniform float low;
 uniform float logarithmic;
 uniform float colourful;
-uniform float byNormal;
 uniform vec3 plain;
 uniform vec3 stops[5];
 varying float vValue;
+#ifdef PER_VERTEX
+varying vec2 vLit;
+#else
 varying vec3 vNormal;
 varying vec3 vToEye;
-
+#endif
+${light}
 vec3 blueToRed(float t) {
   float scaled = clamp(t, 0.0, 1.0) * 4.0;
   if (scaled < 1.0) return mix(stops[0], stops[1], scaled);
@@ -37,24 +60,30 @@ vec3 blueToRed(float t) {
 }
 
 void main() {
-  vec3 normal = normalize(vNormal);
-  if (!gl_FrontFacing) normal = -normal;
-  float value = logarithmic > 0.5 ? log(vValue / low) / log(red / low) : (vValue - low) / max(red - low, 1e-30);
-  vec3 colour = mix(plain, blueToRed(red > low ? value : 0.0), colourful);
-  colour = mix(colour, 0.5 + 0.5 * normal, byNormal);
-  vec3 toEye = normalize(vToEye);
-  vec3 key = normalize(vec3(0.35, 0.75, 0.6));
-  float diffuse = 0.52 + 0.36 * max(dot(normal, key), 0.0) + 0.2 * max(dot(normal, toEye), 0.0);
-  float shine = pow(max(dot(normal, normalize(key + toEye)), 0.0), 40.0) * 0.16;
-  float rim = pow(1.0 - max(dot(normal, toEye), 0.0), 3.0) * 0.1;
-  gl_FragColor = vec4(colour * (gl_FrontFacing ? diffuse : 0.55 * diffuse) + shine + rim * colour, 1.0);
+  float share = logarithmic > 0.5 ? log(vValue / low) / log(red / low) : (vValue - low) / max(red - low, 1e-30);
+  vec3 colour = colourful > 0.5 ? blueToRed(red > low ? share : 0.0) : plain;
+#ifdef PER_VERTEX
+  vec2 brightness = vLit;
+#else
+  vec3 normal = normalize(gl_FrontFacing ? vNormal : -vNormal);
+  vec2 brightness = lit(normal, normalize(vToEye));
+#ifdef BY_NORMAL
+  colour = 0.5 + 0.5 * normal;
+#endif
+#endif
+  gl_FragColor = vec4(colour * (gl_FrontFacing ? brightness.x : 0.55 * brightness.x) + brightness.y, 1.0);
 }`;
 
-export function surfaceMaterial(): three.ShaderMaterial {
+/**
+ * `isPerVertex`: light is found at vertices and not at pixels, which a processor that draws takes half the time for, and which
+ * shows on coarse meshes alone. `isClosed`: nobody sees the inside, which need not be drawn.
+ */
+export function surfaceMaterial(isPerVertex: boolean, isClosed: boolean): three.ShaderMaterial {
   return new three.ShaderMaterial({
     vertexShader,
     fragmentShader,
-    side: three.DoubleSide,
+    defines: isPerVertex ? { PER_VERTEX: "" } : {},
+    side: isClosed ? three.FrontSide : three.DoubleSide,
     polygonOffset: true,
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
@@ -63,9 +92,16 @@ export function surfaceMaterial(): three.ShaderMaterial {
       low: { value: 0 },
       logarithmic: { value: 0 },
       colourful: { value: 1 },
-      byNormal: { value: 0 },
       plain: { value: new three.Vector3(0.72, 0.75, 0.8) },
       stops: { value: stops.map(([r, g, b]) => new three.Vector3(r / 255, g / 255, b / 255)) },
     },
   });
+}
+
+/** Colours by normals, or by values again. */
+export function colourByNormal(material: three.ShaderMaterial, isOn: boolean, isPerVertex: boolean): void {
+  const defines = isOn ? { BY_NORMAL: "" } : isPerVertex ? { PER_VERTEX: "" } : {};
+  if (JSON.stringify(defines) === JSON.stringify(material.defines)) return;
+  material.defines = defines;
+  material.needsUpdate = true;
 }

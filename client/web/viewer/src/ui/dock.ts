@@ -1,6 +1,7 @@
 import type { App } from "../app/app.js";
 import type { Document } from "../model/document.js";
-import { el, short, toggle } from "./dom.js";
+import { short } from "../model/words.js";
+import { el, toggle } from "./dom.js";
 
 /** The values of the paper's figures. */
 const stops = [1, 1.5, 2, 6] as const;

@@ -28,24 +28,6 @@ export function setText(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** "1.2 k", "0.031": three digits, for reading at a glance. */
-export function short(value: number): string {
-  if (!Number.isFinite(value)) return "–";
-  const size = Math.abs(value);
-  if (size === 0) return "0";
-  if (size >= 1e6) return `${(value / 1e6).toPrecision(3)} M`;
-  if (size >= 1e4) return `${(value / 1e3).toPrecision(3)} k`;
-  if (size < 1e-3) return value.toExponential(1).replace("e-", "·10⁻").replace(/\d+$/, (digits) => [...digits].map((d) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(d)]).join(""));
-  return Number(value.toPrecision(3)).toString();
-}
-
-let unique = 0;
-
-/** An id for a label. */
-export function freeId(): string {
-  return `field-${++unique}`;
-}
-
 /** A switch with its label. */
 export function toggle(label: string, isOn: boolean, changed: (isOn: boolean) => void, title = ""): { element: HTMLElement; input: HTMLInputElement } {
   const input = el("input", { type: "checkbox", checked: isOn });

@@ -3,7 +3,8 @@ import type { App } from "../app/app.js";
 import { groupColours } from "../model/colours.js";
 import { changeHandle, type Handle, handleOf, nameFault, removeHandle } from "../model/document.js";
 import { atRest, isAtRest } from "../model/pose.js";
-import { el, short } from "./dom.js";
+import { short } from "../model/words.js";
+import { el } from "./dom.js";
 import { icon } from "./icons.js";
 import { button, slider } from "./controls.js";
 

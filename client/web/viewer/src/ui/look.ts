@@ -1,6 +1,6 @@
 import type { Encoding } from "lpdeform-client";
 import type { App } from "../app/app.js";
-import type { ColourBy } from "../stage/surface.js";
+import type { ColourBy } from "../model/view.js";
 import { choice, el, toggle } from "./dom.js";
 
 /** What is drawn, and how it travels. */

@@ -2,7 +2,8 @@ import type { App } from "../app/app.js";
 import type { Pane } from "../app/pane.js";
 import { blueToRed } from "../model/colours.js";
 import { histogram } from "../model/statistics.js";
-import { el, setText, short } from "./dom.js";
+import { short } from "../model/words.js";
+import { el, setText } from "./dom.js";
 import { plotBars, plotLines } from "./plot.js";
 
 const binCount = 48;
@@ -73,7 +74,8 @@ function showNumbers(app: App, values: Record<Row, HTMLElement>, now: number): v
   setText(values.fps, both(({ live }) => String(live?.meter.framesPerSecond(now) ?? 0)));
   setText(values.latency, both(({ live }) => `${milliseconds(live?.meter.latency(0.5) ?? NaN)} · ${milliseconds(live?.meter.latency(0.99) ?? NaN)} ms`));
   setText(values.service, both(({ live }) => `${milliseconds(live?.meter.service(0.5) ?? NaN)} · ${milliseconds(live?.meter.service(0.99) ?? NaN)} ms`));
-  setText(values.bytes, `${short(sum(({ live }) => live?.meter.bytesPerSecond(now) ?? 0) / 1e6)} MB/s, ${app.view.now.encoding}`);
+  const bytes = sum(({ live }) => live?.meter.bytesPerSecond(now) ?? 0);
+  setText(values.bytes, bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB/s` : `${(bytes / 1e6).toFixed(2)} MB/s`);
   setText(values.vertices, `${(mesh.positions.length / 3).toLocaleString("en")} · ${((report?.faces ?? mesh.faces.length / 3)).toLocaleString("en")}`);
   setText(values.energy, both(({ frame }) => (frame ? short(frame.energy) : "–")));
   setText(values.share, both(({ statistics }) => (app.red > 0 ? `${(100 * statistics.top5Share).toFixed(0)} %` : "–")));

@@ -44,7 +44,7 @@ export function reportPanel(app: App): HTMLElement {
 }
 
 function warning(app: App, { kind, count, first }: Defect): HTMLElement {
-  const text = `${count.toLocaleString("en")} ${kind.replaceAll("_", " ")}`;
+  const text = `${count.toLocaleString("en")} ${kind.replace("non_", "non-").replaceAll("_", " ")}`;
   const press = el("button", { type: "button", title: "Show where", data: { warning: kind } }, icon("warning"), el("span", {}, text), el("span", { className: "quiet" }, "show"));
   press.addEventListener("click", () => {
     const element = elementOf(kind);

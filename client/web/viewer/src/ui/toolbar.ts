@@ -1,7 +1,8 @@
 import type { App } from "../app/app.js";
 import { withoutPaint } from "../model/document.js";
 import type { StrokeMode, Tool } from "../model/view.js";
-import { choice, el, short, toggle } from "./dom.js";
+import { short } from "../model/words.js";
+import { choice, el, toggle } from "./dom.js";
 import { button, slider } from "./controls.js";
 import { type IconName, icon } from "./icons.js";
 

@@ -2,10 +2,10 @@ import { type Browser, chromium, type Download, type Page } from "playwright-cor
 import { readFileSync } from "node:fs";
 import { inflateSync } from "node:zlib";
 
-/** Debian's Chromium, drawing in software: the same on every machine. */
+/** Debian's Chromium, drawing in software, pages too, as it does on machines without a GPU: the same on every machine. */
 const launch = {
   executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
-  args: ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"],
+  args: ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing", "--no-sandbox"],
 };
 
 export interface FrameFacts {
@@ -40,9 +40,9 @@ export class User {
     page.on("pageerror", (error) => this.errors.push(error.message));
   }
 
-  static async open(url: string, { width = 1280, height = 800, hasTouch = false } = {}): Promise<User> {
+  static async open(url: string, { width = 1280, height = 800, hasTouch = false, colorScheme = "light" as "light" | "dark" } = {}): Promise<User> {
     const browser = await chromium.launch(launch);
-    const context = await browser.newContext({ viewport: { width, height }, hasTouch, acceptDownloads: true });
+    const context = await browser.newContext({ viewport: { width, height }, hasTouch, colorScheme, acceptDownloads: true });
     const user = new User(browser, await context.newPage());
     await user.page.goto(url);
     return user;

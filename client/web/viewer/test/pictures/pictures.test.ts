@@ -1,0 +1,149 @@
+// Pictures of every state of the page, to be looked at: npm run pictures, into build/viewer-pictures.
+import { mkdirSync } from "node:fs";
+import { join } from "node:path";
+import { afterAll, beforeAll, it } from "vitest";
+import { Service } from "../../../client/test/real/service.js";
+import { User } from "../real/user.js";
+
+const out = join(import.meta.dirname, "../../../../../build/viewer-pictures");
+const only = new RegExp(process.env["ONLY"] ?? "");
+const files = join(import.meta.dirname, "../../dist");
+const desktop = { width: 1440, height: 900 };
+const upright = { width: 820, height: 1180, hasTouch: true };
+const across = { width: 1180, height: 820, hasTouch: true };
+
+let service: Service;
+
+beforeAll(async () => {
+  mkdirSync(out, { recursive: true });
+  service = await Service.start({ files });
+});
+
+afterAll(() => service.stop());
+
+interface State {
+  name: string;
+  query?: string;
+  size?: { width: number; height: number; hasTouch?: boolean };
+  isLight?: boolean;
+  act?: (user: User) => Promise<unknown>;
+}
+
+/** Drags the k-th vertex of the handle. */
+async function pull(user: User, handle: string, dx: number, dy: number, k = 0, pane = 0): Promise<void> {
+  const vertex = await user.ask<number>(`document().handles.find(({ name }) => name === "${handle}").vertices[${k}]`);
+  await user.drag(await user.vertexOnPage(vertex, pane), dx, dy);
+  await user.settled(pane);
+}
+
+async function stroke(user: User, points: readonly (readonly [number, number])[]): Promise<void> {
+  const { mouse } = user.page;
+  await mouse.move(...points[0]!);
+  await mouse.down();
+  for (const point of points) await mouse.move(...point);
+}
+
+const raiseHead = (user: User) => pull(user, "Head", -110, -60, 40);
+const p = (user: User, value: string, row = 0) => user.page.locator(".p-row").nth(row).getByRole("button", { name: value, exact: true }).click();
+const keys = async (user: User, ...all: string[]) => {
+  for (const key of all) await user.page.keyboard.press(key);
+};
+const place = (user: User, x: number, y: number, z: number) => user.vertexNear([x, y, z]).then((vertex) => user.vertexOnPage(vertex));
+
+const states: readonly State[] = [
+  { name: "open-dark" },
+  { name: "open-light", isLight: true },
+  { name: "dragged-dark", act: raiseHead },
+  { name: "dragged-light", isLight: true, act: raiseHead },
+  {
+    name: "split",
+    query: "?shape=bar",
+    act: async (user) => {
+      await keys(user, "s");
+      await user.settled(1);
+      await p(user, "1");
+      await pull(user, "Top", 130, 40);
+      await user.settled(1);
+      await keys(user, "Escape");
+      await user.page.waitForTimeout(2500);
+    },
+  },
+  {
+    name: "sheet-ghost-wireframe",
+    query: "?shape=sheet",
+    isLight: true,
+    act: async (user) => {
+      await p(user, "1");
+      await pull(user, "Top", -90, 220);
+      await keys(user, "w", "g");
+    },
+  },
+  { name: "block", query: "?shape=block", act: (user) => pull(user, "Right", 90, -120) },
+  {
+    name: "brush",
+    act: async (user) => {
+      await keys(user, "2");
+      const { x, y } = await place(user, 0, -0.15, 0.48);
+      await stroke(user, Array.from({ length: 14 }, (_, k) => [x - 90 + 12 * k, y] as const));
+    },
+  },
+  {
+    name: "lasso",
+    isLight: true,
+    act: async (user) => {
+      await keys(user, "3");
+      const { x, y } = await place(user, -0.86, 0, 0.5);
+      await stroke(user, Array.from({ length: 40 }, (_, k) => [x + 70 * Math.cos(k / 6.3), y + 60 * Math.sin(k / 6.3)] as const));
+    },
+  },
+  {
+    name: "p-brush",
+    act: async (user) => {
+      await raiseHead(user);
+      await keys(user, "5");
+      const { x, y } = await place(user, 0.3, -0.1, 0.6);
+      await stroke(user, Array.from({ length: 14 }, (_, k) => [x - 30 + 5 * k, y + 40 - 10 * k] as const));
+      await user.page.mouse.up();
+      await user.settled();
+      await user.page.mouse.move(700, 200);
+    },
+  },
+  { name: "rings-and-soft", act: async (user) => (await keys(user, "r"), await user.page.getByLabel("How it is held").selectOption("soft")) },
+  { name: "automatic", act: async (user) => (await raiseHead(user), await keys(user, "a"), await user.settled(), await user.page.waitForTimeout(2500)) },
+  { name: "normals", act: async (user) => (await raiseHead(user), await keys(user, "c", "c", "c")) },
+  { name: "help", act: (user) => keys(user, "?") },
+  { name: "save-menu", isLight: true, act: (user) => user.page.getByRole("button", { name: "Save" }).click() },
+  { name: "upright", size: upright, act: (user) => pull(user, "Head", -90, -60, 40) },
+  { name: "upright-panel", size: upright, isLight: true, act: async (user) => (await pull(user, "Head", -90, -60, 40), await user.page.getByRole("button", { name: "Side panel" }).click()) },
+  { name: "upright-split", size: upright, act: async (user) => (await keys(user, "s"), await user.settled(1), await pull(user, "Head", -40, -50, 40)) },
+  { name: "across", size: across, query: "?shape=bar", act: (user) => pull(user, "Top", 110, 60) },
+  {
+    name: "warnings",
+    isLight: true,
+    act: async (user) => {
+      const content = "OFF\n7 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n5 5 5\n0.5 0 0\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n3 1 2 4\n3 0 6 1\n";
+      await user.openFiles({ name: "odd.off", content });
+      await user.page.locator('[data-warning="non_manifold_edges"]').click();
+    },
+  },
+  {
+    name: "away",
+    act: async (user) => {
+      await raiseHead(user);
+      await service.killServer();
+      await user.page.locator(".banner").waitFor();
+    },
+  },
+];
+
+it.each(states.filter(({ name }) => only.test(name)))("$name", async ({ name, query = "", size = desktop, isLight = false, act }) => {
+  const user = await User.open(`${service.url}/${query}`, { ...size, colorScheme: isLight ? "light" : "dark" });
+  try {
+    await user.settled();
+    await act?.(user);
+    await user.page.waitForTimeout(1200); // the picture at rest, and plots
+    await user.page.screenshot({ path: join(out, `${name}.png`) });
+  } finally {
+    await user.close();
+  }
+});
