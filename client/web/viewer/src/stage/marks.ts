@@ -10,8 +10,9 @@ varying float vRing;
 void main() {
   vColour = colour;
   vRing = smoothstep(6.5, 8.5, size);
-  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
-  gl_Position.z -= 0.0008 * gl_Position.w;
+  vec4 seen = modelViewMatrix * vec4(position, 1.0);
+  seen.xyz *= 0.996; // before the surface that it lies on, in the same place of the picture
+  gl_Position = projectionMatrix * seen;
   gl_PointSize = size * pixelRatio;
 }`;
 

@@ -12,8 +12,8 @@ const plotEveryMs = 120;
 
 const rows = [
   ["fps", "Frames a second", "Pictures with a new surface"],
-  ["latency", "Input to picture", "From moving to seeing it: the median and 99 of 100"],
-  ["service", "…of it the service", "Server and way there and back, without drawing: the median and 99 of 100"],
+  ["latency", "Input to picture, ms", "From moving to seeing it: the median and 99 of 100"],
+  ["service", "…of it the service, ms", "Server and way there and back, without drawing: the median and 99 of 100"],
   ["bytes", "Received", "As it travels"],
   ["vertices", "Vertices · faces", ""],
   ["energy", "Energy", "E of Eq. 3 of the paper"],
@@ -67,20 +67,21 @@ export function measures(app: App): HTMLElement {
 }
 
 function showNumbers(app: App, values: Record<Row, HTMLElement>, now: number): void {
-  const both = (text: (pane: Pane) => string) => [...new Set(app.panes.map(text))].join("  |  ");
+  const both = (text: (pane: Pane) => string) => [...new Set(app.panes.map(text))].join(" | ");
   const sum = (number: (pane: Pane) => number) => app.panes.reduce((total, pane) => total + number(pane), 0);
   const milliseconds = (value: number) => (Number.isNaN(value) ? "–" : `${value.toFixed(0)}`);
   const { mesh, report } = app.facts.now;
   setText(values.fps, both(({ live }) => String(live?.meter.framesPerSecond(now) ?? 0)));
-  setText(values.latency, both(({ live }) => `${milliseconds(live?.meter.latency(0.5) ?? NaN)} · ${milliseconds(live?.meter.latency(0.99) ?? NaN)} ms`));
-  setText(values.service, both(({ live }) => `${milliseconds(live?.meter.service(0.5) ?? NaN)} · ${milliseconds(live?.meter.service(0.99) ?? NaN)} ms`));
+  const pair = (shares: readonly (number | undefined)[]) => shares.map((value) => milliseconds(value ?? NaN)).join(" · ");
+  setText(values.latency, both(({ live }) => pair([live?.meter.latency(0.5), live?.meter.latency(0.99)])));
+  setText(values.service, both(({ live }) => pair([live?.meter.service(0.5), live?.meter.service(0.99)])));
   const bytes = sum(({ live }) => live?.meter.bytesPerSecond(now) ?? 0);
   setText(values.bytes, bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB/s` : `${(bytes / 1e6).toFixed(2)} MB/s`);
   setText(values.vertices, `${(mesh.positions.length / 3).toLocaleString("en")} · ${((report?.faces ?? mesh.faces.length / 3)).toLocaleString("en")}`);
   setText(values.energy, both(({ frame }) => (frame ? short(frame.energy) : "–")));
   setText(values.share, both(({ statistics }) => (app.red > 0 ? `${(100 * statistics.top5Share).toFixed(0)} %` : "–")));
   setText(values.method, both(({ frame }) => (frame?.method ? `${frame.method.replaceAll("_", " ")} · ${frame.iteration}` : "–")));
-  setText(values.stop, both(({ frame }) => (frame ? frame.stopReason.replaceAll("_", " ") : "–")));
+  setText(values.stop, both(({ frame }) => (frame?.method ? frame.stopReason.replaceAll("_", " ") : "–")));
   setText(values.gap, both(({ result }) => (result?.optimalityGap === undefined ? "–" : `${short(100 * result.optimalityGap)} %`)));
 }
 

@@ -43,8 +43,14 @@ export function reportPanel(app: App): HTMLElement {
   return el("div", {}, summary, list);
 }
 
+/** "zero_area_faces" as "zero area face" or "faces". */
+function wordsOf(kind: string, count: number): string {
+  const words = kind.replace("non_", "non-").replaceAll("_", " ");
+  return count === 1 ? words.replace(/ices$/, "ex").replace(/s$/, "") : words;
+}
+
 function warning(app: App, { kind, count, first }: Defect): HTMLElement {
-  const text = `${count.toLocaleString("en")} ${kind.replace("non_", "non-").replaceAll("_", " ")}`;
+  const text = `${count.toLocaleString("en")} ${wordsOf(kind, count)}`;
   const press = el("button", { type: "button", title: "Show where", data: { warning: kind } }, icon("warning"), el("span", {}, text), el("span", { className: "quiet" }, "show"));
   press.addEventListener("click", () => {
     const element = elementOf(kind);

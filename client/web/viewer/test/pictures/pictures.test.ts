@@ -62,7 +62,7 @@ const states: readonly State[] = [
       await keys(user, "s");
       await user.settled(1);
       await p(user, "1");
-      await pull(user, "Top", 130, 40);
+      await pull(user, "Top", 150, 130);
       await user.settled(1);
       await keys(user, "Escape");
       await user.page.waitForTimeout(2500);

@@ -83,7 +83,7 @@ describe("a mesh with defects", () => {
     const warnings = user.page.locator(".warnings button");
     await warnings.first().waitFor();
     const texts = await warnings.allTextContents();
-    expect(texts.join("; ")).toMatch(/1 unreferenced vertices/);
+    expect(texts.join("; ")).toMatch(/1 unreferenced vertex.*2 non-manifold edges/);
     await user.page.locator('[data-warning="unreferenced_vertices"]').click();
     expect(await user.ask("app.facts.now.pointedOut")).toEqual([5]);
     await user.page.locator('[data-warning="zero_area_faces"]').click();
