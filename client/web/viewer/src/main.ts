@@ -1,6 +1,4 @@
-import "./style/base.css";
-import "./style/chrome.css";
-import "./style/panel.css";
+import "./style/index.css";
 import { App } from "./app/app.js";
 import { startCertifier } from "./app/certifier.js";
 import { Files } from "./app/files.js";
@@ -36,6 +34,10 @@ startTheme(app);
 startShortcuts(app, files, help);
 startCertifier(app);
 exposeForTests(app);
+// A page that is left by mistake takes the work along.
+window.addEventListener("beforeunload", (event) => {
+  if (app.history.canUndo) event.preventDefault();
+});
 
 // ?shape=sheet&detail=fine&encoding=float32 for links to a state of the page.
 const asked = new URLSearchParams(location.search);

@@ -34,14 +34,17 @@ describe("meshes", () => {
     const square = readMesh("a.OBJ", bytes("# c\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1 -1/1 # quad\n"));
     expect([...square.faces]).toEqual([0, 1, 2, 0, 2, 3]);
     expect([...readMesh("a.off", bytes("OFF # x\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0\n")).faces]).toEqual([0, 1, 2]);
-    const ply = "ply\nformat ascii 1.0\ncomment c\nelement vertex 3\nproperty float nx\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n9 0 0 0\n9 1 0 0\n9 0 1 0\n3 0 1 2\n";
+    const ply =
+      "ply\nformat ascii 1.0\ncomment c\nelement vertex 3\nproperty float nx\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n9 0 0 0\n9 1 0 0\n9 0 1 0\n3 0 1 2\n";
     expect([...readMesh("a.ply", bytes(ply)).positions]).toEqual([0, 0, 0, 1, 0, 0, 0, 1, 0]);
-    const stl = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e0 0\nendloop\nendfacet\nendsolid";
+    const stl =
+      "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e0 0\nendloop\nendfacet\nendsolid";
     expect([...readMesh("a.stl", bytes(stl)).faces]).toEqual([0, 1, 2]);
   });
 
   it("are read from PLY in the other byte order", () => {
-    const head = "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\nelement face 1\nproperty list uchar uint vertex_indices\nend_header\n";
+    const head =
+      "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\nelement face 1\nproperty list uchar uint vertex_indices\nend_header\n";
     const view = new DataView(new ArrayBuffer(72 + 13));
     [0, 0, 0, 1, 0, 0, 0, 1, 0].forEach((value, k) => view.setFloat64(8 * k, value));
     view.setUint8(72, 3);
@@ -80,7 +83,12 @@ describe("a handle file", () => {
     note: "n",
     handles: [
       { name: "base", vertices: [0, 1, 2] },
-      { name: "tip", vertices: [7, 8], translate: [0, 0, 1], rotate: { axis: [0, 0, 2], angle_degrees: 30, center: [0.5, 0, 0] } },
+      {
+        name: "tip",
+        vertices: [7, 8],
+        translate: [0, 0, 1],
+        rotate: { axis: [0, 0, 2], angle_degrees: 30, center: [0.5, 0, 0] },
+      },
       { name: "free", vertices: [9], positions: [[1, 2, 3]] },
       { name: "drawn", vertices: [11, 12], translate: [1, 0, 0], soft: 0.5 },
       { name: "pin", points: [{ face: 5, barycentric: [0.2, 0.3, 0.5] }] },
@@ -97,12 +105,22 @@ describe("a handle file", () => {
     expect(once.handles.map(({ name }) => name)).toEqual(full.handles.map(({ name }) => name));
     expect(once.handles[1]!.pose.translation).toEqual([0, 0, 1]);
     expect(once.handles[2]!.targets).toEqual([1, 2, 3]);
-    expect(once.handles.map(({ hold }) => hold.kind)).toEqual(["exact", "exact", "exact", "soft", "exact", "axisLock", "planeLock", "orientation"]);
+    expect(once.handles.map(({ hold }) => hold.kind)).toEqual([
+      "exact",
+      "exact",
+      "exact",
+      "soft",
+      "exact",
+      "axisLock",
+      "planeLock",
+      "orientation",
+    ]);
     expect(once.paintedP![20]).toBeCloseTo(1.2);
     const written = writeHandleFile(once, "x");
     const again = readHandleFile(written, emptyDocument, mesh);
     expect(JSON.parse(writeHandleFile(again, "x"))).toEqual(JSON.parse(written));
-    const numbers = (json: unknown) => JSON.stringify(json, (_, value: unknown) => (typeof value === "number" ? Number(value.toFixed(9)) : value));
+    const numbers = (json: unknown) =>
+      JSON.stringify(json, (_, value: unknown) => (typeof value === "number" ? Number(value.toFixed(9)) : value));
     const { note: _, ...rest } = full;
     const parsed = JSON.parse(written) as typeof full;
     expect(parsed.groups).toEqual([

@@ -4,7 +4,19 @@ import { EnergyTrail } from "../src/app/energy_trail.js";
 import { Meter } from "../src/link/meter.js";
 import { elementsIn, isPassing, statusOf } from "../src/link/status.js";
 import { changes, newSession } from "../src/model/changes.js";
-import { addHandle, changeHandle, type Document, emptyDocument, extendHandle, handleOf, nameFault, paint, releaseVertices, removeHandle, withoutPaint } from "../src/model/document.js";
+import {
+  addHandle,
+  changeHandle,
+  type Document,
+  emptyDocument,
+  extendHandle,
+  handleOf,
+  nameFault,
+  paint,
+  releaseVertices,
+  removeHandle,
+  withoutPaint,
+} from "../src/model/document.js";
 import { shapeKinds } from "../src/model/shapes.js";
 import { DrawMesh } from "../src/stage/drawmesh.js";
 
@@ -95,7 +107,10 @@ describe("words for", () => {
   });
 
   it("what is wrong name the element and its place", () => {
-    expect(statusOf(new LpdeformError("invalid_argument", "a face has 2 corners", { element: "face 3" }))).toMatchObject({ text: "A face has 2 corners.", element: "face 3" });
+    expect(statusOf(new LpdeformError("invalid_argument", "a face has 2 corners", { element: "face 3" }))).toMatchObject({
+      text: "A face has 2 corners.",
+      element: "face 3",
+    });
     expect(elementsIn("face 3")).toEqual({ vertices: [], faces: [3] });
     expect(elementsIn("edge 4-5")).toEqual({ vertices: [4, 5], faces: [] });
   });
@@ -120,7 +135,14 @@ describe("the meter", () => {
 
 it("the energies of solve after solve are one line, of bounded length", () => {
   const trail = new EnergyTrail(4);
-  for (const [iteration, energy] of [[0, 9], [5, 8], [1, 7], [3, 6], [0, 5]] as const) trail.add(iteration, energy);
+  for (const [iteration, energy] of [
+    [0, 9],
+    [5, 8],
+    [1, 7],
+    [3, 6],
+    [0, 5],
+  ] as const)
+    trail.add(iteration, energy);
   expect(trail.iterations).toEqual([5, 6, 8, 8]);
   expect(trail.energies).toEqual([8, 7, 6, 5]);
   expect(trail.starts).toEqual([6, 8]);
@@ -151,12 +173,16 @@ describe("what is drawn", () => {
     const draw = new DrawMesh(mesh);
     draw.take(mesh.positions.map((value) => 2 * value));
     for (let k = 0; k < draw.source.length; ++k) {
-      for (let axis = 0; axis < 3; ++axis) expect(draw.positions[3 * k + axis]).toBe(2 * mesh.positions[3 * draw.source[k]! + axis]!);
+      for (let axis = 0; axis < 3; ++axis)
+        expect(draw.positions[3 * k + axis]).toBe(2 * mesh.positions[3 * draw.source[k]! + axis]!);
     }
     const top = draw.positions.findIndex((value, k) => k % 3 === 2 && value > 10.4 && draw.normals[k]! > 0);
     expect(top).toBeGreaterThan(0);
     const values = new Float32Array(draw.source.length);
-    draw.spread(Float32Array.from({ length: mesh.positions.length / 3 }, (_, vertex) => vertex), values);
+    draw.spread(
+      Float32Array.from({ length: mesh.positions.length / 3 }, (_, vertex) => vertex),
+      values,
+    );
     expect([...values]).toEqual([...draw.source]);
   });
 });

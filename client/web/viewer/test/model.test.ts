@@ -77,7 +77,11 @@ describe("statistics", () => {
     const { red, max } = energyStatistics(energies);
     expect(Math.abs(red - 950)).toBeLessThan(5); // a bin's width near there
     expect(max).toBe(999);
-    expect(energyStatistics(Float32Array.from({ length: 100 }, (_, k) => (k === 7 ? 3 : 0)))).toEqual({ max: 3, red: 3, top5Share: 1 });
+    expect(energyStatistics(Float32Array.from({ length: 100 }, (_, k) => (k === 7 ? 3 : 0)))).toEqual({
+      max: 3,
+      red: 3,
+      top5Share: 1,
+    });
   });
 
   it("knows no distortion", () => {
@@ -103,7 +107,9 @@ describe("poses", () => {
 
   it("come back from the positions that they make", () => {
     const rest = Float32Array.from({ length: 30 }, (_, k) => Math.sin(13 * k));
-    const current = Float32Array.from(Array.from({ length: 10 }, (_, v) => apply(pose, [rest[3 * v]!, rest[3 * v + 1]!, rest[3 * v + 2]!])).flat());
+    const current = Float32Array.from(
+      Array.from({ length: 10 }, (_, v) => apply(pose, [rest[3 * v]!, rest[3 * v + 1]!, rest[3 * v + 2]!])).flat(),
+    );
     const found = fitPose(rest, current, [0, 2, 3, 5, 9]);
     for (let v = 0; v < 10; ++v) {
       const point = apply(found, [rest[3 * v]!, rest[3 * v + 1]!, rest[3 * v + 2]!]);

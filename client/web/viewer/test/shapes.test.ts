@@ -19,7 +19,10 @@ function volume(positions: Float32Array, faces: Uint32Array): number {
   let sum = 0;
   for (let f = 0; f < faces.length; f += 3) {
     const [a, b, c] = [0, 1, 2].map((k) => positions.subarray(3 * faces[f + k]!, 3 * faces[f + k]! + 3)) as Float32Array[];
-    sum += a![0]! * (b![1]! * c![2]! - b![2]! * c![1]!) + a![1]! * (b![2]! * c![0]! - b![0]! * c![2]!) + a![2]! * (b![0]! * c![1]! - b![1]! * c![0]!);
+    sum +=
+      a![0]! * (b![1]! * c![2]! - b![2]! * c![1]!) +
+      a![1]! * (b![2]! * c![0]! - b![0]! * c![2]!) +
+      a![2]! * (b![0]! * c![1]! - b![1]! * c![0]!);
   }
   return sum / 6;
 }

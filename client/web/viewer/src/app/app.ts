@@ -41,6 +41,7 @@ export class App {
   edge = 0;
   /** Called after each picture that was drawn. */
   readonly afterDrawing = new Set<(now: number) => void>();
+  #turned: Pane | undefined;
   #asked = 0;
   readonly #pace = new Pace(() => this.requestDraw());
   #needsColours = true;
@@ -189,6 +190,9 @@ export class App {
       report: (report) => this.facts.set({ report }),
       problem: (problem) => this.facts.set({ problem }),
     });
+    for (const turning of ["pointerdown", "wheel"]) {
+      pane.element.addEventListener(turning, () => (this.#turned = pane), { capture: true, passive: true });
+    }
     new Editing(this, pane);
     pane.stage.startControls();
     this.panes.push(pane);
@@ -197,10 +201,9 @@ export class App {
     pane.open(this.mesh, this.document, this.view.now);
   }
 
-  /** The other pane looks the same way. */
+  /** The other pane looks the same way as the one that is being turned. */
   #follow(pane: Pane): void {
-    if (!this.panes.includes(pane) || !this.stages.contains(document.activeElement)) return;
-    if (document.activeElement !== pane.stage.canvas) return;
+    if (pane !== this.#turned) return;
     for (const other of this.panes) {
       if (other === pane) continue;
       other.stage.lookAs(pane.stage);

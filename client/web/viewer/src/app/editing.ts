@@ -1,4 +1,13 @@
-import { addHandle, changeHandle, extendHandle, type Handle, handleOf, ownersOf, paint, releaseVertices } from "../model/document.js";
+import {
+  addHandle,
+  changeHandle,
+  extendHandle,
+  type Handle,
+  handleOf,
+  ownersOf,
+  paint,
+  releaseVertices,
+} from "../model/document.js";
 import type { Vector3 } from "../model/mesh.js";
 import { add, type Pose, subtract } from "../model/pose.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../model/selection.js";
@@ -23,8 +32,9 @@ export class Editing implements PointingTarget {
       if (event.code === "Space") this.#pointing.isViewOnly = isDown;
       if (event.code === "Escape" && isDown) this.#pointing.cancel();
     };
-    window.addEventListener("keydown", (event) => setViewOnly(event, true));
-    window.addEventListener("keyup", (event) => setViewOnly(event, false));
+    const { signal } = pane.over;
+    window.addEventListener("keydown", (event) => setViewOnly(event, true), { signal });
+    window.addEventListener("keyup", (event) => setViewOnly(event, false), { signal });
   }
 
   press(at: PointerAt): Stroke | undefined {
@@ -203,5 +213,9 @@ function modeOf(at: PointerAt, app: App): "new" | "add" | "release" {
 
 function distanceTo(at: PointerAt, positions: Float32Array, vertex: number): number {
   const { origin } = at.ray;
-  return Math.hypot(positions[3 * vertex]! - origin.x, positions[3 * vertex + 1]! - origin.y, positions[3 * vertex + 2]! - origin.z);
+  return Math.hypot(
+    positions[3 * vertex]! - origin.x,
+    positions[3 * vertex + 1]! - origin.y,
+    positions[3 * vertex + 2]! - origin.z,
+  );
 }

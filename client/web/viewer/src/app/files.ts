@@ -91,7 +91,9 @@ export class Files {
     const { p, secondP } = this.app.document;
     this.app.open(mesh, { ...emptyDocument, p, secondP });
     this.app.view.set({ tool: "move" });
-    this.app.notify(`${name}: ${(mesh.positions.length / 3).toLocaleString("en")} vertices. Click the surface to place handles.`);
+    this.app.notify(
+      `${name}: ${(mesh.positions.length / 3).toLocaleString("en")} vertices. Click the surface to place handles.`,
+    );
   }
 
   #openHandles(name: string, text: string): void {

@@ -26,6 +26,8 @@ export class Pane {
   readonly stage: Stage;
   readonly overlay = new Overlay();
   readonly trail = new EnergyTrail();
+  /** Aborted when the pane is closed. */
+  readonly over = new AbortController();
   live: Live | undefined;
   frame: Frame | undefined;
   statistics = nothing;
@@ -146,13 +148,20 @@ export class Pane {
   }
 
   close(): void {
+    this.over.abort();
     this.live?.close();
     this.stage.dispose();
     this.element.remove();
   }
 }
 
-function coloured(document: Document, view: View, p: number, distortion: Float32Array, red: number): [Float32Array | undefined, Scale] {
+function coloured(
+  document: Document,
+  view: View,
+  p: number,
+  distortion: Float32Array,
+  red: number,
+): [Float32Array | undefined, Scale] {
   const count = distortion.length;
   switch (view.colourBy) {
     case "distortion":

@@ -19,7 +19,8 @@ export function startShortcuts(app: App, files: Files, help: HTMLDialogElement):
   window.addEventListener("keydown", (event) => {
     const target = event.target as HTMLElement;
     if (help.open || target.matches("input:not([type=range]):not([type=checkbox]), select, textarea, [role=menuitem]")) return;
-    const isHandled = event.ctrlKey || event.metaKey ? withControl(app, event) : !event.altKey && alone(app, files, help, event, target);
+    const isHandled =
+      event.ctrlKey || event.metaKey ? withControl(app, event) : !event.altKey && alone(app, files, help, event, target);
     if (isHandled) event.preventDefault();
   });
 }
@@ -51,7 +52,12 @@ function alone(app: App, files: Files, help: HTMLDialogElement, event: KeyboardE
 function actions(app: App, files: Files, help: HTMLDialogElement): Record<string, () => void> {
   const { view } = app;
   const { now } = view;
-  const setP = (step: number) => app.change({ ...app.document, p: Math.round(Math.min(Math.max(app.document.p + step, 1), 10) * 100) / 100, isAutomatic: false });
+  const setP = (step: number) =>
+    app.change({
+      ...app.document,
+      p: Math.round(Math.min(Math.max(app.document.p + step, 1), 10) * 100) / 100,
+      isAutomatic: false,
+    });
   return {
     "?": () => help.showModal(),
     "[": () => view.set({ radius: Math.max(now.radius - 0.01, 0) }),

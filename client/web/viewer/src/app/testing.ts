@@ -15,7 +15,16 @@ export function exposeForTests(app: App): void {
       const { frame, result, live } = paneAt(pane);
       if (!frame) return undefined;
       const { inputSeq, converged, energy, stopReason, epoch, iteration } = frame;
-      return { inputSeq, converged, energy, stopReason, epoch, iteration, isSettling: live!.isSettling, gap: result?.optimalityGap };
+      return {
+        inputSeq,
+        converged,
+        energy,
+        stopReason,
+        epoch,
+        iteration,
+        isSettling: live!.isSettling,
+        gap: result?.optimalityGap,
+      };
     },
     document: () => app.document,
     status: () => app.facts.now.status.kind,
@@ -32,9 +41,11 @@ export function exposeForTests(app: App): void {
         bytesPerSecond: meter.bytesPerSecond(now),
       };
     },
-    vertexOnPage: (vertex: number, pane = 0) => onPage(paneAt(pane), paneAt(pane).stage.surface!.positions.slice(3 * vertex, 3 * vertex + 3)),
+    vertexOnPage: (vertex: number, pane = 0) =>
+      onPage(paneAt(pane), paneAt(pane).stage.surface!.positions.slice(3 * vertex, 3 * vertex + 3)),
     /** Where the gizmo is. */
-    anchorOnPage: (pane = 0) => onPage(paneAt(pane), Float32Array.from(anchorOfHandle(handleOf(app.document, app.view.now.selected)!))),
+    anchorOnPage: (pane = 0) =>
+      onPage(paneAt(pane), Float32Array.from(anchorOfHandle(handleOf(app.document, app.view.now.selected)!))),
   };
   Object.assign(window, { __lpdeform: inspect });
 }

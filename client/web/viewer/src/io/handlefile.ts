@@ -48,7 +48,12 @@ function withHandle(document: Document, json: unknown, mesh: Mesh): Document {
   const added = addHandle(document, vertices, mesh.positions, {
     name,
     ...(points && { points }),
-    ...motionOf(object, owner, points ? centerOf(points, mesh) : centroid(mesh.positions, vertices), vertices.length || points!.length),
+    ...motionOf(
+      object,
+      owner,
+      points ? centerOf(points, mesh) : centroid(mesh.positions, vertices),
+      vertices.length || points!.length,
+    ),
     hold: holdOf(object, owner),
     footprint: weightOf(object["footprint"] ?? 0, `the footprint of ${owner}`, Infinity),
   });
@@ -58,14 +63,20 @@ function withHandle(document: Document, json: unknown, mesh: Mesh): Document {
   return added;
 }
 
-function motionOf(object: Record<string, unknown>, owner: string, middle: Vector3, count: number): Pick<Handle, "pose" | "targets"> {
+function motionOf(
+  object: Record<string, unknown>,
+  owner: string,
+  middle: Vector3,
+  count: number,
+): Pick<Handle, "pose" | "targets"> {
   const { translate, rotate, positions } = object;
   if (positions !== undefined) {
     if (translate !== undefined || rotate !== undefined) {
       throw new FileFault(`${capital(owner)} has “positions” beside “translate” or “rotate”.`);
     }
     const targets = arrayOf(positions, `the positions of ${owner}`).flatMap((one) => vector3(one, `a position of ${owner}`));
-    if (targets.length !== 3 * count) throw new FileFault(`${capital(owner)} has ${count} vertices and ${targets.length / 3} positions.`);
+    if (targets.length !== 3 * count)
+      throw new FileFault(`${capital(owner)} has ${count} vertices and ${targets.length / 3} positions.`);
     return { pose: { rotation: noRotation, translation: [0, 0, 0], center: middle }, targets };
   }
   const pose: Pose = { rotation: noRotation, translation: [0, 0, 0], center: middle };
@@ -116,7 +127,8 @@ function centerOf(points: readonly SurfacePoint[], mesh: Mesh): Vector3 {
   for (const { face, barycentric } of points) {
     for (let corner = 0; corner < 3; ++corner) {
       const vertex = mesh.faces[3 * face + corner]!;
-      for (let axis = 0; axis < 3; ++axis) sum[axis]! += (barycentric[corner]! * mesh.positions[3 * vertex + axis]!) / points.length;
+      for (let axis = 0; axis < 3; ++axis)
+        sum[axis]! += (barycentric[corner]! * mesh.positions[3 * vertex + axis]!) / points.length;
     }
   }
   return sum;
@@ -128,7 +140,10 @@ function withGroup(document: Document, json: unknown, vertexCount: number): Docu
   checkKeys(group, ["name", "vertices", "p", "stiffness"], owner);
   const vertices = vertexNumbers(group["vertices"], owner, vertexCount);
   let result = document;
-  for (const [field, least, most] of [["p", 1, 64], ["stiffness", 1e-6, 1e6]] as const) {
+  for (const [field, least, most] of [
+    ["p", 1, 64],
+    ["stiffness", 1e-6, 1e6],
+  ] as const) {
     if (group[field] === undefined) continue;
     const value = Number(group[field]);
     if (!(value >= least && value <= most)) throw new FileFault(`“${field}” of ${owner} is not within ${least} to ${most}.`);
@@ -188,4 +203,3 @@ function shortest(value: number): number {
 function capital(text: string): string {
   return text[0]!.toUpperCase() + text.slice(1);
 }
-

@@ -19,13 +19,16 @@ export function textOf(json: unknown, what: string): string {
 }
 
 export function vector3(json: unknown, what: string): Vector3 {
-  if (Array.isArray(json) && json.length === 3 && json.every((value) => Number.isFinite(value))) return json as unknown as Vector3;
+  if (Array.isArray(json) && json.length === 3 && json.every((value) => Number.isFinite(value)))
+    return json as unknown as Vector3;
   throw new FileFault(`In the handle file, ${what} is not [x, y, z].`);
 }
 
 export function weightOf(json: unknown, what: string, most: number): number {
   if (typeof json === "number" && json >= 0 && json <= most && Number.isFinite(json)) return json;
-  throw new FileFault(`In the handle file, ${what} is ${String(json)}, not a number from 0${most < Infinity ? ` to ${most}` : ""}.`);
+  throw new FileFault(
+    `In the handle file, ${what} is ${String(json)}, not a number from 0${most < Infinity ? ` to ${most}` : ""}.`,
+  );
 }
 
 export function checkKeys(object: Record<string, unknown>, known: readonly string[], what: string): void {
@@ -41,7 +44,9 @@ export function vertexNumbers(json: unknown, what: string, vertexCount: number):
   const seen = new Set<number>();
   for (const number of numbers) {
     if (!Number.isInteger(number) || (number as number) < 0 || (number as number) >= vertexCount) {
-      throw new FileFault(`In the handle file, ${what} has vertex ${String(number)}; the mesh has vertices 0 to ${vertexCount - 1}.`);
+      throw new FileFault(
+        `In the handle file, ${what} has vertex ${String(number)}; the mesh has vertices 0 to ${vertexCount - 1}.`,
+      );
     }
     if (seen.has(number as number)) throw new FileFault(`In the handle file, ${what} has vertex ${String(number)} twice.`);
     seen.add(number as number);

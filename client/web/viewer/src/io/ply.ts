@@ -17,8 +17,22 @@ interface Element {
 }
 
 const sizes: Record<string, number> = {
-  char: 1, uchar: 1, short: 2, ushort: 2, int: 4, uint: 4, float: 4, double: 8,
-  int8: 1, uint8: 1, int16: 2, uint16: 2, int32: 4, uint32: 4, float32: 4, float64: 8,
+  char: 1,
+  uchar: 1,
+  short: 2,
+  ushort: 2,
+  int: 4,
+  uint: 4,
+  float: 4,
+  double: 8,
+  int8: 1,
+  uint8: 1,
+  int16: 2,
+  uint16: 2,
+  int32: 4,
+  uint32: 4,
+  float32: 4,
+  float64: 8,
 };
 
 /** PLY as text or binary in either byte order. */
@@ -45,7 +59,9 @@ function readHeader(name: string, bytes: Uint8Array): { format: string; elements
     if (key === "element") elements.push({ name: words[0] ?? "", count: Number(words[1]), properties: [] });
     if (key === "property") {
       const property: Property =
-        words[0] === "list" ? { name: words[3] ?? "", type: words[2] ?? "", lengthType: words[1] ?? "" } : { name: words[1] ?? "", type: words[0] ?? "" };
+        words[0] === "list"
+          ? { name: words[3] ?? "", type: words[2] ?? "", lengthType: words[1] ?? "" }
+          : { name: words[1] ?? "", type: words[0] ?? "" };
       for (const type of [property.type, property.lengthType ?? property.type]) {
         if (!(type in sizes)) throw new FileFault(`${name} has a property of type ${type}, which PLY does not know.`);
       }
@@ -93,14 +109,29 @@ function binaryReader(name: string, bytes: Uint8Array, littleEndian: boolean): (
     at += sizes[type]!;
     if (at > view.byteLength) throw new FileFault(`${name} ends too soon.`);
     switch (type) {
-      case "char": case "int8": return view.getInt8(start);
-      case "uchar": case "uint8": return view.getUint8(start);
-      case "short": case "int16": return view.getInt16(start, littleEndian);
-      case "ushort": case "uint16": return view.getUint16(start, littleEndian);
-      case "int": case "int32": return view.getInt32(start, littleEndian);
-      case "uint": case "uint32": return view.getUint32(start, littleEndian);
-      case "float": case "float32": return view.getFloat32(start, littleEndian);
-      default: return view.getFloat64(start, littleEndian);
+      case "char":
+      case "int8":
+        return view.getInt8(start);
+      case "uchar":
+      case "uint8":
+        return view.getUint8(start);
+      case "short":
+      case "int16":
+        return view.getInt16(start, littleEndian);
+      case "ushort":
+      case "uint16":
+        return view.getUint16(start, littleEndian);
+      case "int":
+      case "int32":
+        return view.getInt32(start, littleEndian);
+      case "uint":
+      case "uint32":
+        return view.getUint32(start, littleEndian);
+      case "float":
+      case "float32":
+        return view.getFloat32(start, littleEndian);
+      default:
+        return view.getFloat64(start, littleEndian);
     }
   };
 }
@@ -110,10 +141,15 @@ export function writePly({ positions, faces }: Mesh, distortion: Float32Array, r
   const vertexCount = positions.length / 3;
   const header = new TextEncoder().encode(
     [
-      "ply", "format binary_little_endian 1.0", `element vertex ${vertexCount}`,
+      "ply",
+      "format binary_little_endian 1.0",
+      `element vertex ${vertexCount}`,
       ...["x", "y", "z", "distortion"].map((property) => `property float ${property}`),
       ...["red", "green", "blue"].map((property) => `property uchar ${property}`),
-      `element face ${faces.length / 3}`, "property list uchar int vertex_indices", "end_header", "",
+      `element face ${faces.length / 3}`,
+      "property list uchar int vertex_indices",
+      "end_header",
+      "",
     ].join("\n"),
   );
   const bytes = new Uint8Array(header.length + 19 * vertexCount + (13 * faces.length) / 3);

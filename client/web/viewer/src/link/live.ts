@@ -1,4 +1,12 @@
-import { type Encoding, type Frame, LpdeformError, type MeshReport, openSession, type Session, type SolveResult } from "lpdeform-client";
+import {
+  type Encoding,
+  type Frame,
+  LpdeformError,
+  type MeshReport,
+  openSession,
+  type Session,
+  type SolveResult,
+} from "lpdeform-client";
 import { changes, newSession, type Side } from "../model/changes.js";
 import type { Document } from "../model/document.js";
 import type { Mesh } from "../model/mesh.js";

@@ -42,7 +42,12 @@ export function blockSurface(nx: number, ny: number, nz: number, isSolid: (x: nu
 /** The corners of one side of a cell, counter-clockwise from outside. */
 function cellSide(cell: readonly number[], axis: number, isFar: boolean): number[][] {
   const [first, second] = [(axis + 1) % 3, (axis + 2) % 3];
-  const around = [[0, 0], [1, 0], [1, 1], [0, 1]];
+  const around = [
+    [0, 0],
+    [1, 0],
+    [1, 1],
+    [0, 1],
+  ];
   return around.map(([u, v]) => {
     const corner = [...cell];
     corner[axis]! += isFar ? 1 : 0;

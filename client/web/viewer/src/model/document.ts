@@ -156,7 +156,10 @@ export function pField({ paintedP }: Document, p: number): Float32Array | undefi
 export function anchorOfHandle(handle: Handle): Vector3 {
   if (handle.targets) {
     const points = Float32Array.from(handle.targets);
-    return centroid(points, Array.from({ length: points.length / 3 }, (_, k) => k));
+    return centroid(
+      points,
+      Array.from({ length: points.length / 3 }, (_, k) => k),
+    );
   }
   const { center, translation } = handle.pose;
   return [center[0] + translation[0], center[1] + translation[1], center[2] + translation[2]];

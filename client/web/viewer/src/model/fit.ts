@@ -14,7 +14,17 @@ export function fitPose(rest: Float32Array, current: Float32Array, vertices: rea
       }
     }
   }
-  const [xx, xy, xz, yx, yy, yz, zx, zy, zz] = s as unknown as [number, number, number, number, number, number, number, number, number];
+  const [xx, xy, xz, yx, yy, yz, zx, zy, zz] = s as unknown as [
+    number,
+    number,
+    number,
+    number,
+    number,
+    number,
+    number,
+    number,
+    number,
+  ];
   // Of w, x, y, z; the rotation is the eigenvector of the largest eigenvalue.
   const n = [
     [xx + yy + zz, yz - zy, zx - xz, xy - yx],
@@ -38,7 +48,12 @@ function largestEigenvector(n: number[][]): Quaternion {
     const largest = Math.max(...product.flat().map(Math.abs)) || 1;
     power = product.map((row) => row.map((value) => value / largest));
   }
-  const [w, x, y, z] = power.reduce((best, row) => (Math.hypot(...row) > Math.hypot(...best) ? row : best)) as [number, number, number, number];
+  const [w, x, y, z] = power.reduce((best, row) => (Math.hypot(...row) > Math.hypot(...best) ? row : best)) as [
+    number,
+    number,
+    number,
+    number,
+  ];
   const length = Math.hypot(w, x, y, z) * (w < 0 ? -1 : 1);
   return length === 0 ? [0, 0, 0, 1] : [x / length, y / length, z / length, w / length];
 }
@@ -46,7 +61,11 @@ function largestEigenvector(n: number[][]): Quaternion {
 /** Vertices on a line, or fewer than three, leave the turn about it open. */
 function isLine(rest: Float32Array, center: readonly number[], vertices: readonly number[]): boolean {
   const offsets = vertices.map((v) => [0, 1, 2].map((axis) => rest[3 * v + axis]! - center[axis]!));
-  const longest = offsets.reduce((best, one) => (Math.hypot(...one) > Math.hypot(...best) ? one : best), [0, 0, 0]) as [number, number, number];
+  const longest = offsets.reduce((best, one) => (Math.hypot(...one) > Math.hypot(...best) ? one : best), [0, 0, 0]) as [
+    number,
+    number,
+    number,
+  ];
   const length = Math.hypot(...longest);
   return offsets.every(([x, y, z]) => {
     const across = [y! * longest[2] - z! * longest[1], z! * longest[0] - x! * longest[2], x! * longest[1] - y! * longest[0]];

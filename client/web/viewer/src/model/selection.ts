@@ -76,7 +76,12 @@ export function boxPolygon(x0: number, y0: number, x1: number, y1: number): numb
 }
 
 /** Those whose normal looks towards the eye. */
-export function facing(vertices: readonly number[], positions: Float32Array, normals: Float32Array, eye: readonly number[]): number[] {
+export function facing(
+  vertices: readonly number[],
+  positions: Float32Array,
+  normals: Float32Array,
+  eye: readonly number[],
+): number[] {
   return vertices.filter((v) => {
     let dot = 0;
     for (let axis = 0; axis < 3; ++axis) dot += normals[3 * v + axis]! * (eye[axis]! - positions[3 * v + axis]!);

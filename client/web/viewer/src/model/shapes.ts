@@ -30,7 +30,11 @@ export const shapeKinds: readonly ShapeKind[] = [
 function bar(detail: Detail): Shape {
   const cells = { coarse: 4, medium: 10, fine: 21 }[detail];
   const height = Math.round((21 / 4) * cells);
-  const mesh = scaled("bar", blockSurface(cells, cells, height, () => true), 1 / cells);
+  const mesh = scaled(
+    "bar",
+    blockSurface(cells, cells, height, () => true),
+    1 / cells,
+  );
   const [low, high] = extent(mesh, 2);
   return withHandles(mesh, [
     ["Base", (v) => v[2]! < low + 0.01],
@@ -42,7 +46,11 @@ function bar(detail: Detail): Shape {
 function sheet(detail: Detail): Shape {
   const scale = { coarse: 0.5, medium: 1, fine: 1.6 }[detail];
   const [width, height] = [Math.round(30 * scale), Math.round(60 * scale)];
-  const mesh = scaled("sheet", blockSurface(2, width, height, () => true), 3 / width);
+  const mesh = scaled(
+    "sheet",
+    blockSurface(2, width, height, () => true),
+    3 / width,
+  );
   for (let k = 0; k < mesh.positions.length; k += 3) mesh.positions[k]! *= 2 / scale / 3;
   const [low, high] = extent(mesh, 2);
   return withHandles(mesh, [
@@ -55,7 +63,11 @@ function sheet(detail: Detail): Shape {
 function block(detail: Detail): Shape {
   const unit = { coarse: 2, medium: 4, fine: 7 }[detail];
   const isHole = (x: number, z: number) => Math.floor(x / unit - 1) % 4 < 2 && x >= unit && z >= unit && z < 3 * unit;
-  const mesh = scaled("block", blockSurface(12 * unit, 2 * unit, 4 * unit, (x, _, z) => !isHole(x, z)), 1 / (2 * unit));
+  const mesh = scaled(
+    "block",
+    blockSurface(12 * unit, 2 * unit, 4 * unit, (x, _, z) => !isHole(x, z)),
+    1 / (2 * unit),
+  );
   const [low, high] = extent(mesh, 0);
   return withHandles(mesh, [
     ["Left", (v) => v[0]! < low + 0.01],

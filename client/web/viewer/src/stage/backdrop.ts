@@ -7,8 +7,10 @@ const dark = ["#10151f", "#2a3446"] as const;
 export class Backdrop {
   readonly object: three.Mesh;
   readonly #material = new three.ShaderMaterial({
-    vertexShader: "varying float vHeight; void main() { vHeight = 0.5 + 0.5 * position.y; gl_Position = vec4(position.xy, 1.0, 1.0); }",
-    fragmentShader: "uniform vec3 low; uniform vec3 high; varying float vHeight; void main() { gl_FragColor = vec4(mix(low, high, vHeight), 1.0); }",
+    vertexShader:
+      "varying float vHeight; void main() { vHeight = 0.5 + 0.5 * position.y; gl_Position = vec4(position.xy, 1.0, 1.0); }",
+    fragmentShader:
+      "uniform vec3 low; uniform vec3 high; varying float vHeight; void main() { gl_FragColor = vec4(mix(low, high, vHeight), 1.0); }",
     depthTest: false,
     depthWrite: false,
     uniforms: { low: { value: new three.Vector3() }, high: { value: new three.Vector3() } },

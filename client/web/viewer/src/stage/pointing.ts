@@ -82,7 +82,9 @@ export class Pointing {
       alt: event.altKey,
       ray,
       get hit() {
-        found ??= { hit: surface && raycast(surface.positions, surface.mesh.faces, ray.origin.toArray(), ray.direction.toArray()) };
+        found ??= {
+          hit: surface && raycast(surface.positions, surface.mesh.faces, ray.origin.toArray(), ray.direction.toArray()),
+        };
         return found.hit;
       },
     };

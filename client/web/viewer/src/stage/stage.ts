@@ -29,6 +29,8 @@ export class Stage {
   constructor(readonly changed: () => void) {
     this.canvas.className = "stage";
     this.canvas.tabIndex = 0;
+    this.canvas.setAttribute("role", "img");
+    this.canvas.setAttribute("aria-label", "The surface; arrow keys move the selected handle, N selects the next");
     this.#renderer = new three.WebGLRenderer({ canvas: this.canvas, antialias: !isSoftware, alpha: false });
     this.camera.up.set(0, 0, 1);
     this.gizmo = new Gizmo(this.camera, this.canvas, changed);
@@ -160,6 +162,7 @@ export class Stage {
     this.gizmo.dispose();
     this.surface?.dispose();
     this.#renderer.dispose();
+    this.#renderer.forceContextLoss(); // browsers have few, and take the oldest away
     this.canvas.remove();
   }
 }

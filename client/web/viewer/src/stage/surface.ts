@@ -107,7 +107,12 @@ export class Surface {
     const geometry = new three.BufferGeometry();
     geometry.setIndex(new three.BufferAttribute(this.mesh.faces, 1));
     geometry.setAttribute("position", new three.BufferAttribute(this.mesh.positions, 3));
-    const material = new three.MeshBasicMaterial({ transparent: true, opacity: 0.13, depthWrite: false, side: three.DoubleSide });
+    const material = new three.MeshBasicMaterial({
+      transparent: true,
+      opacity: 0.13,
+      depthWrite: false,
+      side: three.DoubleSide,
+    });
     const ghost = new three.Mesh(geometry, material);
     ghost.renderOrder = 2;
     return ghost;

@@ -2,7 +2,11 @@ import { el } from "./dom.js";
 import { icon, type IconName } from "./icons.js";
 
 export function button(name: IconName, title: string, pressed: () => void): HTMLButtonElement {
-  const element = el("button", { type: "button", className: "icon-button", title, aria: { label: title } }, icon(name) as unknown as Node);
+  const element = el(
+    "button",
+    { type: "button", className: "icon-button", title, aria: { label: title } },
+    icon(name) as unknown as Node,
+  );
   element.addEventListener("click", pressed);
   return element;
 }

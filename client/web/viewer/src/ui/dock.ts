@@ -37,11 +37,23 @@ export function dock(app: App): HTMLElement {
     hint.textContent = wordsOf(document);
   });
   app.view.watch(({ isSplit }) => (second.hidden = !isSplit));
-  return el("section", { className: "dock", aria: { label: "p" } }, first, second, el("div", { className: "under" }, hint, automatic.element));
+  return el(
+    "section",
+    { className: "dock", aria: { label: "p" } },
+    first,
+    second,
+    el("div", { className: "under" }, hint, automatic.element),
+  );
 }
 
 function pSlider(app: App, field: Field): HTMLElement {
-  const input = el("input", { type: "range", min: "0", max: "1", step: "0.002", aria: { label: field === "p" ? "p" : "p of the right picture" } });
+  const input = el("input", {
+    type: "range",
+    min: "0",
+    max: "1",
+    step: "0.002",
+    aria: { label: field === "p" ? "p" : "p of the right picture" },
+  });
   const shown = el("output");
   const set = (p: number) => ({ ...app.document, [field]: p, isAutomatic: false });
   input.addEventListener("input", (event) => app.during(set(pAt(input.valueAsNumber)), event.timeStamp));
@@ -53,7 +65,13 @@ function pSlider(app: App, field: Field): HTMLElement {
     app.change(set(Math.round(Math.min(Math.max(app.document[field] + step, least), most) * 100) / 100));
   });
   const ticks = stops.map((stop) => {
-    const tick = el("button", { type: "button", className: "stop", textContent: String(stop), title: `p = ${stop}`, style: `--share: ${shareOf(stop) * 100}%` });
+    const tick = el("button", {
+      type: "button",
+      className: "stop",
+      textContent: String(stop),
+      title: `p = ${stop}`,
+      style: `--share: ${shareOf(stop) * 100}%`,
+    });
     tick.addEventListener("click", () => app.change(set(stop)));
     return tick;
   });

@@ -29,10 +29,18 @@ export function setText(element: HTMLElement, text: string): void {
 }
 
 /** A switch with its label. */
-export function toggle(label: string, isOn: boolean, changed: (isOn: boolean) => void, title = ""): { element: HTMLElement; input: HTMLInputElement } {
+export function toggle(
+  label: string,
+  isOn: boolean,
+  changed: (isOn: boolean) => void,
+  title = "",
+): { element: HTMLElement; input: HTMLInputElement } {
   const input = el("input", { type: "checkbox", checked: isOn });
   input.addEventListener("change", () => changed(input.checked));
-  return { element: el("label", { className: "toggle", title }, input, el("span", { className: "track" }), el("span", {}, label)), input };
+  return {
+    element: el("label", { className: "toggle", title }, input, el("span", { className: "track" }), el("span", {}, label)),
+    input,
+  };
 }
 
 /** One of several, as a row of buttons. */

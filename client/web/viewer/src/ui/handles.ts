@@ -16,7 +16,18 @@ export function handlesPanel(app: App): HTMLElement {
   const show = () => {
     const { handles } = app.document;
     const { selected } = app.view.now;
-    const now = JSON.stringify([selected, handles.map(({ name, colour, vertices, isLocked, hold, footprint, pose }) => [name, colour, vertices.length, isLocked, hold, footprint, isAtRest(pose)])]);
+    const now = JSON.stringify([
+      selected,
+      handles.map(({ name, colour, vertices, isLocked, hold, footprint, pose }) => [
+        name,
+        colour,
+        vertices.length,
+        isLocked,
+        hold,
+        footprint,
+        isAtRest(pose),
+      ]),
+    ]);
     if (now === shown || details.contains(document.activeElement)) {
       if (now === shown || isSliding(details)) return;
     }
@@ -40,15 +51,33 @@ function isSliding(details: HTMLElement): boolean {
 function row(app: App, handle: Handle, isSelected: boolean): HTMLElement {
   const { name, colour, vertices, points, isLocked } = handle;
   const change = (part: Partial<Handle>) => app.change(changeHandle(app.document, name, part));
-  const dot = el("button", { type: "button", className: "dot", style: `--colour: ${colour}`, title: "Next colour", aria: { label: `Colour of ${name}` } });
-  dot.addEventListener("click", () => change({ colour: groupColours[(groupColours.indexOf(colour) + 1) % groupColours.length]! }));
+  const dot = el("button", {
+    type: "button",
+    className: "dot",
+    style: `--colour: ${colour}`,
+    title: "Next colour",
+    aria: { label: `Colour of ${name}` },
+  });
+  dot.addEventListener("click", () =>
+    change({ colour: groupColours[(groupColours.indexOf(colour) + 1) % groupColours.length]! }),
+  );
   const field = el("input", { className: "name", value: name, spellcheck: false, aria: { label: "Name" } });
   field.addEventListener("focus", () => app.view.set({ selected: name }));
   field.addEventListener("change", () => rename(app, name, field));
-  const lock = button(isLocked ? "lock" : "unlock", isLocked ? "Locked: let it move" : "Lock it against dragging", () => change({ isLocked: !isLocked }));
+  const lock = button(isLocked ? "lock" : "unlock", isLocked ? "Locked: let it move" : "Lock it against dragging", () =>
+    change({ isLocked: !isLocked }),
+  );
   const remove = button("trash", `Delete ${name} (Delete)`, () => app.change(removeHandle(app.document, name)));
   const count = points ? `${points.length} pts` : short(vertices.length);
-  const element = el("li", { className: isSelected ? "selected" : "", data: { handle: name } }, dot, field, el("span", { className: "count", title: "Vertices" }, count), lock, remove);
+  const element = el(
+    "li",
+    { className: isSelected ? "selected" : "", data: { handle: name } },
+    dot,
+    field,
+    el("span", { className: "count", title: "Vertices" }, count),
+    lock,
+    remove,
+  );
   element.addEventListener("click", (event) => {
     if (event.target === element) app.view.set({ selected: name });
   });
@@ -102,7 +131,12 @@ function detailsOf(app: App, handle: Handle): Node[] {
   if (hold.kind === "soft" || hold.kind === "orientation") parts.push(weight(app, name, hold));
   if (hold.kind === "axisLock" || hold.kind === "planeLock") parts.push(direction(app, name, hold));
   if (handle.vertices.length <= 12) parts.push(footprint(app, handle));
-  const back = el("button", { type: "button", className: "plain", disabled: isAtRest(pose) && !handle.targets }, icon("reset"), "Back to rest");
+  const back = el(
+    "button",
+    { type: "button", className: "plain", disabled: isAtRest(pose) && !handle.targets },
+    icon("reset"),
+    "Back to rest",
+  );
   back.addEventListener("click", () => {
     const { targets: _, ...rest } = handle;
     const handles = app.document.handles.map((one) => (one.name === name ? { ...rest, pose: atRest(pose.center) } : one));
@@ -114,7 +148,8 @@ function detailsOf(app: App, handle: Handle): Node[] {
 
 /** On a logarithmic scale, 0.001 to 1e6. */
 function weight(app: App, name: string, hold: Extract<Hold, { weight?: number }>): HTMLElement {
-  const set = (power: number) => changeHandle(app.document, name, { hold: { ...hold, weight: Number((10 ** power).toPrecision(2)) } });
+  const set = (power: number) =>
+    changeHandle(app.document, name, { hold: { ...hold, weight: Number((10 ** power).toPrecision(2)) } });
   const { element, show } = slider(
     "Weight",
     -3,
@@ -134,7 +169,8 @@ function direction(app: App, name: string, hold: Extract<Hold, { kind: "axisLock
   const current = hold.kind === "axisLock" ? hold.axis : hold.normal;
   const select = el("select", { aria: { label: "Direction" } });
   const known = Object.entries(axes).find(([, axis]) => axis.every((value, k) => value === current[k]));
-  for (const axis of Object.keys(axes)) select.append(el("option", { value: axis, textContent: axis, selected: axis === known?.[0] }));
+  for (const axis of Object.keys(axes))
+    select.append(el("option", { value: axis, textContent: axis, selected: axis === known?.[0] }));
   if (!known) select.append(el("option", { value: "", textContent: current.map(short).join(", "), selected: true }));
   select.addEventListener("change", () => {
     const chosen = axes[select.value as keyof typeof axes];

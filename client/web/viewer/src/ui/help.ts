@@ -69,7 +69,14 @@ export function helpSheet(): HTMLDialogElement {
           "section",
           {},
           el("h3", {}, title),
-          el("dl", {}, ...rows.flatMap(([keys, text]) => [el("dt", {}, ...keys.split("  ").map((key) => el("kbd", {}, key))), el("dd", {}, text)])),
+          el(
+            "dl",
+            {},
+            ...rows.flatMap(([keys, text]) => [
+              el("dt", {}, ...keys.split("  ").map((key) => el("kbd", {}, key))),
+              el("dd", {}, text),
+            ]),
+          ),
         ),
       ),
     ),

@@ -10,10 +10,25 @@ const gradient = stops.map(([r, g, b]) => `rgb(${r}, ${g}, ${b})`).join(", ");
 export function legend(app: App): HTMLElement {
   const title = el("span", { className: "legend-title" });
   const numbers = [el("span"), el("span"), el("span")] as const;
-  const pin = el("button", { type: "button", className: "icon-button small", title: "Pin the scale, to compare (P)", aria: { label: "Pin the scale" } }, icon("pin"));
+  const pin = el(
+    "button",
+    {
+      type: "button",
+      className: "icon-button small",
+      title: "Pin the scale, to compare (P)",
+      aria: { label: "Pin the scale" },
+    },
+    icon("pin"),
+  );
   pin.addEventListener("click", () => app.togglePin());
   const bar = el("div", { className: "legend-bar", style: `background: linear-gradient(90deg, ${gradient})` });
-  const element = el("aside", { className: "legend" }, el("div", { className: "legend-head" }, title, pin), bar, el("div", { className: "legend-numbers" }, ...numbers));
+  const element = el(
+    "aside",
+    { className: "legend" },
+    el("div", { className: "legend-head" }, title, pin),
+    bar,
+    el("div", { className: "legend-numbers" }, ...numbers),
+  );
   const show = () => {
     const all = legendOf(app);
     element.hidden = all === undefined;

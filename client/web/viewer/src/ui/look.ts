@@ -7,15 +7,30 @@ import { choice, el, toggle } from "./dom.js";
 export function lookPanel(app: App): HTMLElement {
   const colour = choice<ColourBy>(
     "Colours",
-    [["distortion", "Distortion"], ["p", "p"], ["stiffness", "Stiffness"], ["normals", "Normals"], ["plain", "Plain"]],
+    [
+      ["distortion", "Distortion"],
+      ["p", "p"],
+      ["stiffness", "Stiffness"],
+      ["normals", "Normals"],
+      ["plain", "Plain"],
+    ],
     (colourBy) => app.view.set({ colourBy }),
   );
   const wireframe = toggle("Wireframe", false, (isOn) => app.view.set({ wireframe: isOn }), "The edges (W)");
   const ghost = toggle("Original", false, (isOn) => app.view.set({ ghost: isOn }), "The mesh at rest as a ghost (G)");
-  const pin = toggle("Pin scale", false, (isOn) => app.view.set({ pinned: isOn && app.red > 0 ? app.red : undefined }), "Keep the colours' scale as it is (P)");
+  const pin = toggle(
+    "Pin scale",
+    false,
+    (isOn) => app.view.set({ pinned: isOn && app.red > 0 ? app.red : undefined }),
+    "Keep the colours' scale as it is (P)",
+  );
   const up = toggle("Y is up", false, (isOn) => app.view.set({ isYUp: isOn }), "For meshes whose y axis points up");
   const encoding = el("select", { aria: { label: "How frames travel" } });
-  for (const [value, text] of [["float32", "exact, 16 bytes a vertex"], ["quantized", "16 bits, 8 bytes a vertex"], ["compressed", "compressed, some 3 bytes"]]) {
+  for (const [value, text] of [
+    ["float32", "exact, 16 bytes a vertex"],
+    ["quantized", "16 bits, 8 bytes a vertex"],
+    ["compressed", "compressed, some 3 bytes"],
+  ]) {
     encoding.append(el("option", { value: value!, textContent: text! }));
   }
   encoding.addEventListener("change", () => app.view.set({ encoding: encoding.value as Encoding }));

@@ -71,28 +71,59 @@ function showNumbers(app: App, values: Record<Row, HTMLElement>, now: number): v
   const sum = (number: (pane: Pane) => number) => app.panes.reduce((total, pane) => total + number(pane), 0);
   const milliseconds = (value: number) => (Number.isNaN(value) ? "–" : `${value.toFixed(0)}`);
   const { mesh, report } = app.facts.now;
-  setText(values.fps, both(({ live }) => String(live?.meter.framesPerSecond(now) ?? 0)));
+  setText(
+    values.fps,
+    both(({ live }) => String(live?.meter.framesPerSecond(now) ?? 0)),
+  );
   const pair = (shares: readonly (number | undefined)[]) => shares.map((value) => milliseconds(value ?? NaN)).join(" · ");
-  setText(values.latency, both(({ live }) => pair([live?.meter.latency(0.5), live?.meter.latency(0.99)])));
-  setText(values.service, both(({ live }) => pair([live?.meter.service(0.5), live?.meter.service(0.99)])));
+  setText(
+    values.latency,
+    both(({ live }) => pair([live?.meter.latency(0.5), live?.meter.latency(0.99)])),
+  );
+  setText(
+    values.service,
+    both(({ live }) => pair([live?.meter.service(0.5), live?.meter.service(0.99)])),
+  );
   const bytes = sum(({ live }) => live?.meter.bytesPerSecond(now) ?? 0);
   setText(values.bytes, bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB/s` : `${(bytes / 1e6).toFixed(2)} MB/s`);
-  setText(values.vertices, `${(mesh.positions.length / 3).toLocaleString("en")} · ${((report?.faces ?? mesh.faces.length / 3)).toLocaleString("en")}`);
-  setText(values.energy, both(({ frame }) => (frame ? short(frame.energy) : "–")));
-  setText(values.share, both(({ statistics }) => (app.red > 0 ? `${(100 * statistics.top5Share).toFixed(0)} %` : "–")));
-  setText(values.method, both(({ frame }) => (frame?.method ? `${frame.method.replaceAll("_", " ")} · ${frame.iteration}` : "–")));
-  setText(values.stop, both(({ frame }) => (frame?.method ? frame.stopReason.replaceAll("_", " ") : "–")));
-  setText(values.gap, both(({ result }) => (result?.optimalityGap === undefined ? "–" : `${short(100 * result.optimalityGap)} %`)));
+  setText(
+    values.vertices,
+    `${(mesh.positions.length / 3).toLocaleString("en")} · ${(report?.faces ?? mesh.faces.length / 3).toLocaleString("en")}`,
+  );
+  setText(
+    values.energy,
+    both(({ frame }) => (frame ? short(frame.energy) : "–")),
+  );
+  setText(
+    values.share,
+    both(({ statistics }) => (app.red > 0 ? `${(100 * statistics.top5Share).toFixed(0)} %` : "–")),
+  );
+  setText(
+    values.method,
+    both(({ frame }) => (frame?.method ? `${frame.method.replaceAll("_", " ")} · ${frame.iteration}` : "–")),
+  );
+  setText(
+    values.stop,
+    both(({ frame }) => (frame?.method ? frame.stopReason.replaceAll("_", " ") : "–")),
+  );
+  setText(
+    values.gap,
+    both(({ result }) => (result?.optimalityGap === undefined ? "–" : `${short(100 * result.optimalityGap)} %`)),
+  );
 }
 
 const second = "#ff7a1a";
 
 function showPlots(app: App, energy: HTMLCanvasElement, bars: HTMLCanvasElement): void {
   const { red } = app;
-  const lines = red === 0 ? [] : app.panes.map(({ trail }, k) => ({ x: trail.iterations, y: trail.energies, ...(k > 0 && { colour: second }) }));
+  const lines =
+    red === 0
+      ? []
+      : app.panes.map(({ trail }, k) => ({ x: trail.iterations, y: trail.energies, ...(k > 0 && { colour: second }) }));
   plotLines(energy, lines, app.panes[0]!.trail.starts, short);
   const most = red > 0 ? Math.max(...app.panes.map(({ statistics }) => statistics.max)) : 0;
   const counts = new Float64Array(binCount);
-  if (most > 0) for (const pane of app.panes) histogram(pane.distortion, most, binCount).forEach((count, k) => (counts[k]! += count));
+  if (most > 0)
+    for (const pane of app.panes) histogram(pane.distortion, most, binCount).forEach((count, k) => (counts[k]! += count));
   plotBars(bars, counts, (share) => `rgb(${blueToRed(red > 0 ? (share * most) / red : 0).join(",")})`, short(most));
 }

@@ -7,7 +7,12 @@ export function menu(
   title: string,
   actions: readonly (readonly [string, () => void])[],
 ): HTMLElement {
-  const opener = el("button", { type: "button", className: "icon-button labelled", title, aria: { haspopup: "menu", expanded: "false", label } }, picture, el("span", {}, label));
+  const opener = el(
+    "button",
+    { type: "button", className: "icon-button labelled", title, aria: { haspopup: "menu", expanded: "false", label } },
+    picture,
+    el("span", {}, label),
+  );
   const list = el("div", { className: "menu", role: "menu", hidden: true });
   const show = (isOpen: boolean) => {
     list.hidden = !isOpen;

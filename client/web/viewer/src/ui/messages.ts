@@ -15,7 +15,13 @@ export function messages(app: App): HTMLElement {
   const title = el("strong");
   const text = el("span");
   const show = el("button", { type: "button", className: "plain", textContent: "Show where" });
-  const banner = el("div", { className: "banner", role: "alert", hidden: true }, el("span", { className: "spinner" }), el("div", {}, title, text), show);
+  const banner = el(
+    "div",
+    { className: "banner", role: "alert", hidden: true },
+    el("span", { className: "spinner" }),
+    el("div", {}, title, text),
+    show,
+  );
   const notice = el("div", { className: "notice", role: "status", hidden: true });
   const hint = el("div", { className: "hint" });
   let element = "";
@@ -39,7 +45,8 @@ export function messages(app: App): HTMLElement {
   app.facts.watch((facts, before) => {
     // A short interruption is not worth words.
     clearTimeout(late);
-    if (facts.status.kind === "away" && before.status.kind === "live") late = setTimeout(() => showStatus(app.facts.now.status), 400);
+    if (facts.status.kind === "away" && before.status.kind === "live")
+      late = setTimeout(() => showStatus(app.facts.now.status), 400);
     else if (facts.status.kind !== "away" || facts.status !== before.status || !banner.hidden) showStatus(facts.status);
     else late = setTimeout(() => showStatus(app.facts.now.status), 400);
     hint.textContent = hintOf(app);

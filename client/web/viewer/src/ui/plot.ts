@@ -19,7 +19,11 @@ function begin(canvas: HTMLCanvasElement): Frame | undefined {
   context.clearRect(0, 0, width, height);
   context.font = "10px system-ui, sans-serif";
   const style = getComputedStyle(canvas);
-  const [ink, faint, accent] = ["--muted", "--line", "--accent"].map((name) => style.getPropertyValue(name)) as [string, string, string];
+  const [ink, faint, accent] = ["--muted", "--line", "--accent"].map((name) => style.getPropertyValue(name)) as [
+    string,
+    string,
+    string,
+  ];
   return { context, width, height, ink, faint, accent };
 }
 
@@ -30,7 +34,12 @@ export interface Line {
 }
 
 /** Lines over a common x; the y axis is logarithmic where the values ask for it. */
-export function plotLines(canvas: HTMLCanvasElement, lines: readonly Line[], marks: readonly number[], format: (y: number) => string): void {
+export function plotLines(
+  canvas: HTMLCanvasElement,
+  lines: readonly Line[],
+  marks: readonly number[],
+  format: (y: number) => string,
+): void {
   const frame = begin(canvas);
   if (!frame) return;
   const { context, width, height, ink, faint, accent } = frame;
@@ -69,7 +78,12 @@ export function plotLines(canvas: HTMLCanvasElement, lines: readonly Line[], mar
 }
 
 /** Bars from 0 to the largest, in the colours of their places; heights by the root, so that few are seen beside many. */
-export function plotBars(canvas: HTMLCanvasElement, counts: ArrayLike<number>, colourAt: (share: number) => string, highText: string): void {
+export function plotBars(
+  canvas: HTMLCanvasElement,
+  counts: ArrayLike<number>,
+  colourAt: (share: number) => string,
+  highText: string,
+): void {
   const frame = begin(canvas);
   if (!frame) return;
   const { context, width, height, ink, faint } = frame;

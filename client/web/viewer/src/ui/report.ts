@@ -34,7 +34,9 @@ export function reportPanel(app: App): HTMLElement {
     const parts = report && [
       `${report.vertices.toLocaleString("en")} vertices, ${report.faces.toLocaleString("en")} faces`,
       `${report.components} ${report.components === 1 ? "component" : "components"}`,
-      report.boundaryLoops > 0 ? `${report.boundaryLoops} ${report.boundaryLoops === 1 ? "hole or border" : "holes or borders"}` : "closed",
+      report.boundaryLoops > 0
+        ? `${report.boundaryLoops} ${report.boundaryLoops === 1 ? "hole or border" : "holes or borders"}`
+        : "closed",
     ];
     summary.textContent = parts ? `${mesh.name}: ${parts.join(", ")}.` : mesh.name;
     list.replaceChildren(...defects.map((defect) => warning(app, defect)));
@@ -51,7 +53,13 @@ function wordsOf(kind: string, count: number): string {
 
 function warning(app: App, { kind, count, first }: Defect): HTMLElement {
   const text = `${count.toLocaleString("en")} ${wordsOf(kind, count)}`;
-  const press = el("button", { type: "button", title: "Show where", data: { warning: kind } }, icon("warning"), el("span", {}, text), el("span", { className: "quiet" }, "show"));
+  const press = el(
+    "button",
+    { type: "button", title: "Show where", data: { warning: kind } },
+    icon("warning"),
+    el("span", {}, text),
+    el("span", { className: "quiet" }, "show"),
+  );
   press.addEventListener("click", () => {
     const element = elementOf(kind);
     pointOut(app, element === "face" ? { vertices: [], faces: [...first] } : { vertices: [...first], faces: [] });

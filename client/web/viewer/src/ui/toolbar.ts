@@ -6,7 +6,6 @@ import { choice, el, toggle } from "./dom.js";
 import { button, slider } from "./controls.js";
 import { type IconName, icon } from "./icons.js";
 
-
 const tools: readonly (readonly [Tool, IconName, string, string])[] = [
   ["move", "move", "Move", "Drag a handle; click the surface for a new one; drag beside it to turn the view (1)"],
   ["brush", "brush", "Brush", "Paint a handle onto the surface (2)"],
@@ -18,7 +17,12 @@ const tools: readonly (readonly [Tool, IconName, string, string])[] = [
 /** The tools at the left edge, and beside them what the chosen one can be told. */
 export function toolbar(app: App): HTMLElement {
   const buttons = tools.map(([tool, picture, label, title]) => {
-    const element = el("button", { type: "button", className: "tool", title, data: { tool }, aria: { label } }, icon(picture), el("span", {}, label));
+    const element = el(
+      "button",
+      { type: "button", className: "tool", title, data: { tool }, aria: { label } },
+      icon(picture),
+      el("span", {}, label),
+    );
     element.addEventListener("click", () => app.view.set({ tool, isPanelOpen: app.view.now.isPanelOpen }));
     return element;
   });
@@ -32,18 +36,56 @@ export function toolbar(app: App): HTMLElement {
 }
 
 function options(app: App): HTMLElement {
-  const mode = choice<StrokeMode>("What a stroke does", [["new", "New"], ["add", "Add"], ["release", "Release"]], (chosen) => app.view.set({ mode: chosen }));
-  const gizmo = choice<"translate" | "rotate">("Arrows or rings", [["translate", "Move"], ["rotate", "Turn"]], (chosen) => app.view.set({ gizmo: chosen }));
-  const field = choice<"p" | "stiffness">("What is painted", [["p", "p"], ["stiffness", "Stiffness"]], (chosen) =>
-    app.view.set({ paintField: chosen, colourBy: chosen }),
+  const mode = choice<StrokeMode>(
+    "What a stroke does",
+    [
+      ["new", "New"],
+      ["add", "Add"],
+      ["release", "Release"],
+    ],
+    (chosen) => app.view.set({ mode: chosen }),
+  );
+  const gizmo = choice<"translate" | "rotate">(
+    "Arrows or rings",
+    [
+      ["translate", "Move"],
+      ["rotate", "Turn"],
+    ],
+    (chosen) => app.view.set({ gizmo: chosen }),
+  );
+  const field = choice<"p" | "stiffness">(
+    "What is painted",
+    [
+      ["p", "p"],
+      ["stiffness", "Stiffness"],
+    ],
+    (chosen) => app.view.set({ paintField: chosen, colourBy: chosen }),
   );
   const size = slider("Size", 0, 0.25, 0.005, (radius) => app.view.set({ radius }));
   const p = slider("p", 1, 10, 0.1, (paintP) => app.view.set({ paintP }));
-  const stiffness = slider("Stiffness", -2, 2, 0.05, (power) => app.view.set({ paintStiffness: Number((10 ** power).toPrecision(2)) }));
-  const through = toggle("Back side, too", app.view.now.isThrough, (isThrough) => app.view.set({ isThrough }), "Also vertices that face away");
+  const stiffness = slider("Stiffness", -2, 2, 0.05, (power) =>
+    app.view.set({ paintStiffness: Number((10 ** power).toPrecision(2)) }),
+  );
+  const through = toggle(
+    "Back side, too",
+    app.view.now.isThrough,
+    (isThrough) => app.view.set({ isThrough }),
+    "Also vertices that face away",
+  );
   const clear = el("button", { type: "button", className: "plain", textContent: "Clear painting" });
   clear.addEventListener("click", () => app.change(withoutPaint(app.document)));
-  const element = el("div", { className: "options" }, gizmo.element, mode.element, field.element, size.element, p.element, stiffness.element, through.element, clear);
+  const element = el(
+    "div",
+    { className: "options" },
+    gizmo.element,
+    mode.element,
+    field.element,
+    size.element,
+    p.element,
+    stiffness.element,
+    through.element,
+    clear,
+  );
 
   app.facts.watch(({ document }) => (clear.disabled = !document.paintedP && !document.stiffness));
   app.view.watch((view) => {

@@ -13,7 +13,11 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
   const own = el("option", { value: "", hidden: true });
   shapes.append(own);
   const details = el("select", { title: "How many vertices the shape has", aria: { label: "Detail" } });
-  for (const [value, text] of [["coarse", "coarse"], ["medium", "medium"], ["fine", "fine, 10,000"]]) {
+  for (const [value, text] of [
+    ["coarse", "coarse"],
+    ["medium", "medium"],
+    ["fine", "fine, 10,000"],
+  ]) {
     details.append(el("option", { value: value!, textContent: text! }));
   }
   const openShape = () => app.openShape(shapes.value || "bar", details.value as Detail);
@@ -25,7 +29,12 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
   const split = button("split", "Two values of p side by side (S)", () => app.view.set({ isSplit: !app.view.now.isSplit }));
   const theme = button("moon", "Dark or light (D)", () => app.view.set({ isDark: !app.view.now.isDark }));
   const panel = button("panel", "Side panel (Tab)", () => app.view.set({ isPanelOpen: !app.view.now.isPanelOpen }));
-  const open = labelled("open", "Open", "A mesh (OFF, OBJ, PLY, STL) or a handle file; dropping it onto the page does the same (O)", () => files.choose());
+  const open = labelled(
+    "open",
+    "Open",
+    "A mesh (OFF, OBJ, PLY, STL) or a handle file; dropping it onto the page does the same (O)",
+    () => files.choose(),
+  );
 
   app.facts.watch(({ canUndo, canRedo, mesh }) => {
     undo.disabled = !canUndo;

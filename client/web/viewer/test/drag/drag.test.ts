@@ -15,7 +15,12 @@ beforeAll(async () => {
 
 afterAll(async () => {
   await service.stop();
-  console.log(["shape     encoding    vertices  inputs  frames/s  kB/s  input to picture p50  p99 ms  of it service p50  p99 ms", ...rows].join("\n"));
+  console.log(
+    [
+      "shape     encoding    vertices  inputs  frames/s  kB/s  input to picture p50  p99 ms  of it service p50  p99 ms",
+      ...rows,
+    ].join("\n"),
+  );
 });
 
 it.each([
@@ -43,10 +48,20 @@ it.each([
     await mouse.up();
     const vertices = await user.ask<number>("app.mesh.positions.length / 3");
     const cells = [
-      [shape, -8], [encoding, -10], [vertices, 8], [all.inputs, 6], [middle!.framesPerSecond, 8], [(middle!.bytesPerSecond / 1000).toFixed(0), 4],
-      [all.p50.toFixed(0), 20], [all.p99.toFixed(0), 6], [all.service50.toFixed(0), 17], [all.service99.toFixed(0), 6],
+      [shape, -8],
+      [encoding, -10],
+      [vertices, 8],
+      [all.inputs, 6],
+      [middle!.framesPerSecond, 8],
+      [(middle!.bytesPerSecond / 1000).toFixed(0), 4],
+      [all.p50.toFixed(0), 20],
+      [all.p99.toFixed(0), 6],
+      [all.service50.toFixed(0), 17],
+      [all.service99.toFixed(0), 6],
     ] as const;
-    rows.push(cells.map(([text, width]) => (width < 0 ? String(text).padEnd(-width) : String(text).padStart(width))).join("  "));
+    rows.push(
+      cells.map(([text, width]) => (width < 0 ? String(text).padEnd(-width) : String(text).padStart(width))).join("  "),
+    );
     rows.push(`    load of the machine: ${loadavg()[0]!.toFixed(1)}`);
   } finally {
     await user.close();

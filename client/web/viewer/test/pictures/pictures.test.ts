@@ -44,11 +44,13 @@ async function stroke(user: User, points: readonly (readonly [number, number])[]
 }
 
 const raiseHead = (user: User) => pull(user, "Head", -110, -60, 40);
-const p = (user: User, value: string, row = 0) => user.page.locator(".p-row").nth(row).getByRole("button", { name: value, exact: true }).click();
+const p = (user: User, value: string, row = 0) =>
+  user.page.locator(".p-row").nth(row).getByRole("button", { name: value, exact: true }).click();
 const keys = async (user: User, ...all: string[]) => {
   for (const key of all) await user.page.keyboard.press(key);
 };
-const place = (user: User, x: number, y: number, z: number) => user.vertexNear([x, y, z]).then((vertex) => user.vertexOnPage(vertex));
+const place = (user: User, x: number, y: number, z: number) =>
+  user.vertexNear([x, y, z]).then((vertex) => user.vertexOnPage(vertex));
 
 const states: readonly State[] = [
   { name: "open-dark" },
@@ -84,7 +86,10 @@ const states: readonly State[] = [
     act: async (user) => {
       await keys(user, "2");
       const { x, y } = await place(user, 0, -0.15, 0.48);
-      await stroke(user, Array.from({ length: 14 }, (_, k) => [x - 90 + 12 * k, y] as const));
+      await stroke(
+        user,
+        Array.from({ length: 14 }, (_, k) => [x - 90 + 12 * k, y] as const),
+      );
     },
   },
   {
@@ -93,7 +98,10 @@ const states: readonly State[] = [
     act: async (user) => {
       await keys(user, "3");
       const { x, y } = await place(user, -0.86, 0, 0.5);
-      await stroke(user, Array.from({ length: 40 }, (_, k) => [x + 70 * Math.cos(k / 6.3), y + 60 * Math.sin(k / 6.3)] as const));
+      await stroke(
+        user,
+        Array.from({ length: 40 }, (_, k) => [x + 70 * Math.cos(k / 6.3), y + 60 * Math.sin(k / 6.3)] as const),
+      );
     },
   },
   {
@@ -102,26 +110,53 @@ const states: readonly State[] = [
       await raiseHead(user);
       await keys(user, "5");
       const { x, y } = await place(user, 0.3, -0.1, 0.6);
-      await stroke(user, Array.from({ length: 14 }, (_, k) => [x - 30 + 5 * k, y + 40 - 10 * k] as const));
+      await stroke(
+        user,
+        Array.from({ length: 14 }, (_, k) => [x - 30 + 5 * k, y + 40 - 10 * k] as const),
+      );
       await user.page.mouse.up();
       await user.settled();
       await user.page.mouse.move(700, 200);
     },
   },
-  { name: "rings-and-soft", act: async (user) => (await keys(user, "r"), await user.page.getByLabel("How it is held").selectOption("soft")) },
-  { name: "automatic", act: async (user) => (await raiseHead(user), await keys(user, "a"), await user.settled(), await user.page.waitForTimeout(2500)) },
+  {
+    name: "rings-and-soft",
+    act: async (user) => (await keys(user, "r"), await user.page.getByLabel("How it is held").selectOption("soft")),
+  },
+  {
+    name: "automatic",
+    act: async (user) => (
+      await raiseHead(user),
+      await keys(user, "a"),
+      await user.settled(),
+      await user.page.waitForTimeout(2500)
+    ),
+  },
   { name: "normals", act: async (user) => (await raiseHead(user), await keys(user, "c", "c", "c")) },
   { name: "help", act: (user) => keys(user, "?") },
   { name: "save-menu", isLight: true, act: (user) => user.page.getByRole("button", { name: "Save" }).click() },
   { name: "upright", size: upright, act: (user) => pull(user, "Head", -90, -60, 40) },
-  { name: "upright-panel", size: upright, isLight: true, act: async (user) => (await pull(user, "Head", -90, -60, 40), await user.page.getByRole("button", { name: "Side panel" }).click()) },
-  { name: "upright-split", size: upright, act: async (user) => (await keys(user, "s"), await user.settled(1), await pull(user, "Head", -40, -50, 40)) },
+  {
+    name: "upright-panel",
+    size: upright,
+    isLight: true,
+    act: async (user) => (
+      await pull(user, "Head", -90, -60, 40),
+      await user.page.getByRole("button", { name: "Side panel" }).click()
+    ),
+  },
+  {
+    name: "upright-split",
+    size: upright,
+    act: async (user) => (await keys(user, "s"), await user.settled(1), await pull(user, "Head", -40, -50, 40)),
+  },
   { name: "across", size: across, query: "?shape=bar", act: (user) => pull(user, "Top", 110, 60) },
   {
     name: "warnings",
     isLight: true,
     act: async (user) => {
-      const content = "OFF\n7 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n5 5 5\n0.5 0 0\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n3 1 2 4\n3 0 6 1\n";
+      const content =
+        "OFF\n7 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n5 5 5\n0.5 0 0\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n3 1 2 4\n3 0 6 1\n";
       await user.openFiles({ name: "odd.off", content });
       await user.page.locator('[data-warning="non_manifold_edges"]').click();
     },
@@ -136,14 +171,17 @@ const states: readonly State[] = [
   },
 ];
 
-it.each(states.filter(({ name }) => only.test(name)))("$name", async ({ name, query = "", size = desktop, isLight = false, act }) => {
-  const user = await User.open(`${service.url}/${query}`, { ...size, colorScheme: isLight ? "light" : "dark" });
-  try {
-    await user.settled();
-    await act?.(user);
-    await user.page.waitForTimeout(1200); // the picture at rest, and plots
-    await user.page.screenshot({ path: join(out, `${name}.png`) });
-  } finally {
-    await user.close();
-  }
-});
+it.each(states.filter(({ name }) => only.test(name)))(
+  "$name",
+  async ({ name, query = "", size = desktop, isLight = false, act }) => {
+    const user = await User.open(`${service.url}/${query}`, { ...size, colorScheme: isLight ? "light" : "dark" });
+    try {
+      await user.settled();
+      await act?.(user);
+      await user.page.waitForTimeout(1200); // the picture at rest, and plots
+      await user.page.screenshot({ path: join(out, `${name}.png`) });
+    } finally {
+      await user.close();
+    }
+  },
+);

@@ -24,11 +24,14 @@ afterAll(async () => {
 const tower = blockSurface(3, 3, 12, () => true);
 const bottom = 0;
 /** On its upper rim, to the front. */
-const rim = tower.positions.findIndex((value, k) => k % 3 === 2 && value === 12 && tower.positions[k - 1] === 0 && tower.positions[k - 2] === 1);
+const rim = tower.positions.findIndex(
+  (value, k) => k % 3 === 2 && value === 12 && tower.positions[k - 1] === 0 && tower.positions[k - 2] === 1,
+);
 const rimVertex = Math.floor(rim / 3);
 
 const heldNames = () => user.ask<string[]>("document().handles.map(({ name }) => name)");
-const largestDifference = (a: readonly number[], b: readonly number[]) => Math.max(...a.map((value, k) => Math.abs(value - b[k]!)));
+const largestDifference = (a: readonly number[], b: readonly number[]) =>
+  Math.max(...a.map((value, k) => Math.abs(value - b[k]!)));
 
 async function boxAround(from: number, to: number, slack: number): Promise<void> {
   const [a, b] = [await user.vertexOnPage(from), await user.vertexOnPage(to)];
@@ -88,7 +91,9 @@ describe("somebody with a mesh of their own", () => {
     // The handle is exactly where it was dragged to, by the page's own account of it.
     const { vertices, pose } = await user.ask<{ vertices: number[]; pose: { translation: number[] } }>("document().handles[1]");
     const [vertex] = vertices as [number];
-    pose.translation.forEach((value, axis) => expect(bent[3 * vertex + axis]! - rest[3 * vertex + axis]!).toBeCloseTo(value, 2));
+    pose.translation.forEach((value, axis) =>
+      expect(bent[3 * vertex + axis]! - rest[3 * vertex + axis]!).toBeCloseTo(value, 2),
+    );
     expect(user.errors).toEqual([]);
   });
 

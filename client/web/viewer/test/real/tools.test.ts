@@ -85,7 +85,13 @@ describe("handles", () => {
     const { mouse } = user.page;
     await mouse.move(middle.x - 30, middle.y - 20);
     await mouse.down();
-    for (const [x, y] of [[60, -20], [60, 30], [-30, 30], [-30, -10]]) await mouse.move(middle.x + x!, middle.y + y!);
+    for (const [x, y] of [
+      [60, -20],
+      [60, 30],
+      [-30, 30],
+      [-30, -10],
+    ])
+      await mouse.move(middle.x + x!, middle.y + y!);
     await mouse.up();
     expect((await handles()).length).toBe(3);
     await press("Delete");

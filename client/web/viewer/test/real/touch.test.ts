@@ -33,7 +33,8 @@ async function touch(...steps: Point[][]): Promise<void> {
   await devtools.detach();
 }
 
-const camera = () => user.ask<number>("app.panes[0].stage.camera.position.distanceTo(window.__lpdeform.app.panes[0].stage.target)");
+const camera = () =>
+  user.ask<number>("app.panes[0].stage.camera.position.distanceTo(window.__lpdeform.app.panes[0].stage.target)");
 
 it("a finger drags a handle, and the surface follows", async () => {
   const rest = await user.positions();
@@ -56,7 +57,10 @@ it("two fingers zoom, also where the first had begun to paint", async () => {
   const before = await camera();
   const { x, y } = await user.vertexOnPage(await user.vertexNear([0.5, 0, 3.5]));
   const count = await user.ask("document().handles.length");
-  const pair = (gap: number) => [{ x, y }, { x, y: y + gap }];
+  const pair = (gap: number) => [
+    { x, y },
+    { x, y: y + gap },
+  ];
   await touch([{ x, y }], pair(100), pair(140), pair(200), pair(260));
   expect(await camera()).toBeLessThan(0.9 * before);
   expect(await user.ask("document().handles.length")).toBe(count);

@@ -73,7 +73,8 @@ describe("the page says plainly, and goes on by itself when", () => {
 
 describe("a mesh with defects", () => {
   // A tetrahedron, a third face on one of its edges, a face without area, a vertex that nothing uses.
-  const off = "OFF\n7 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n5 5 5\n0.5 0 0\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n3 1 2 4\n3 0 6 1\n";
+  const off =
+    "OFF\n7 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n5 5 5\n0.5 0 0\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n3 1 2 4\n3 0 6 1\n";
 
   it("is told as warnings, and each points out its elements", async () => {
     const service = await start();

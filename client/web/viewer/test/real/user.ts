@@ -5,7 +5,13 @@ import { inflateSync } from "node:zlib";
 /** Debian's Chromium, drawing in software, pages too, as it does on machines without a GPU: the same on every machine. */
 const launch = {
   executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
-  args: ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing", "--no-sandbox"],
+  args: [
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",
+    "--no-sandbox",
+  ],
 };
 
 export interface FrameFacts {
@@ -40,7 +46,10 @@ export class User {
     page.on("pageerror", (error) => this.errors.push(error.message));
   }
 
-  static async open(url: string, { width = 1280, height = 800, hasTouch = false, colorScheme = "light" as "light" | "dark" } = {}): Promise<User> {
+  static async open(
+    url: string,
+    { width = 1280, height = 800, hasTouch = false, colorScheme = "light" as "light" | "dark" } = {},
+  ): Promise<User> {
     const browser = await chromium.launch(launch);
     const context = await browser.newContext({ viewport: { width, height }, hasTouch, colorScheme, acceptDownloads: true });
     const user = new User(browser, await context.newPage());
@@ -85,7 +94,9 @@ export class User {
   async vertexNear(point: readonly [number, number, number]): Promise<number> {
     const rest = Object.values(await this.ask<Record<string, number>>("app.mesh.positions"));
     const far = (vertex: number) => Math.hypot(...point.map((value, axis) => rest[3 * vertex + axis]! - value));
-    return Array.from({ length: rest.length / 3 }, (_, vertex) => vertex).reduce((best, one) => (far(one) < far(best) ? one : best));
+    return Array.from({ length: rest.length / 3 }, (_, vertex) => vertex).reduce((best, one) =>
+      far(one) < far(best) ? one : best,
+    );
   }
 
   /** Drags from there by that many pixels, in steps, and lets go. */
@@ -100,7 +111,11 @@ export class User {
   async openFiles(...files: { name: string; content: string | Buffer }[]): Promise<void> {
     const chooser = this.page.waitForEvent("filechooser");
     await this.page.getByRole("button", { name: "Open" }).click();
-    const payload = files.map(({ name, content }) => ({ name, mimeType: "application/octet-stream", buffer: Buffer.from(content) }));
+    const payload = files.map(({ name, content }) => ({
+      name,
+      mimeType: "application/octet-stream",
+      buffer: Buffer.from(content),
+    }));
     await (await chooser).setFiles(payload);
   }
 
@@ -134,7 +149,7 @@ function decodePng(png: Buffer): { pixels: Uint8Array; channels: number } {
   const height = png.readUInt32BE(20);
   const channels = png[25] === 6 ? 4 : 3;
   const parts: Buffer[] = [];
-  for (let at = 8; at < png.length; ) {
+  for (let at = 8; at < png.length;) {
     const length = png.readUInt32BE(at);
     if (png.toString("latin1", at + 4, at + 8) === "IDAT") parts.push(png.subarray(at + 8, at + 8 + length));
     at += length + 12;

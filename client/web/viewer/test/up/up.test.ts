@@ -7,7 +7,9 @@ it("is useful in the first ten seconds: a drag, and the surface follows", async 
   try {
     await user.settled();
     const rest = await user.positions();
-    const { x, y } = await user.ask<{ x: number; y: number }>("vertexOnPage(window.__lpdeform.document().handles.at(-1).vertices[40])");
+    const { x, y } = await user.ask<{ x: number; y: number }>(
+      "vertexOnPage(window.__lpdeform.document().handles.at(-1).vertices[40])",
+    );
     await user.drag({ x, y }, -60, -60);
     await user.settled();
     const bent = await user.positions();
