@@ -141,17 +141,21 @@ void EvaluateBlocks(const CellBlocks& blocks, std::size_t first, std::size_t las
 void GradientOfBlocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const BlockState& state,
                       const double* c, double* gradient) {
   using Row = double __attribute__((vector_size(kRow * sizeof(double)), aligned(sizeof(double))));
-  const auto row = [](const std::vector<double>& rows, std::size_t at) -> const Row& {
-    return *reinterpret_cast<const Row*>(rows.data() + at * kRow);
+  using SingleRow = float __attribute__((vector_size(kRow * sizeof(float)), aligned(sizeof(float))));
+  const auto sum_of = [&](std::size_t at) -> const Row& {
+    return *reinterpret_cast<const Row*>(state.residual_sums.data() + at * kRow);
+  };
+  const auto residual = [&](std::size_t at) -> const SingleRow& {
+    return *reinterpret_cast<const SingleRow*>(state.residuals.data() + at * kRow);
   };
   for (std::size_t block = first; block < last; ++block) {
     const std::size_t begin = blocks.first_slot[block], end = blocks.first_slot[block + 1];
     const std::int32_t* const cells = blocks.cells.data() + block * kLanes;
     for (std::size_t lane = 0; lane < kLanes && cells[lane] >= 0; ++lane) {
       const std::int32_t i = cells[lane];
-      Row sum = c[i] * row(state.residual_sums, block * kLanes + lane);
+      Row sum = c[i] * sum_of(block * kLanes + lane);
       for (std::size_t at = begin * kLanes + lane; at < end * kLanes; at += kLanes) {
-        sum -= c[blocks.neighbour[at]] * row(state.residuals, blocks.opposite[at]);
+        sum -= c[blocks.neighbour[at]] * __builtin_convertvector(residual(blocks.opposite[at]), Row);
       }
       for (std::size_t axis = 0; axis < 3; ++axis)
         gradient[3 * static_cast<std::size_t>(i) + axis] = 2 * sum[axis];
@@ -171,8 +175,8 @@ HWY_EXPORT(GradientOfBlocks);
 BlockState::BlockState(const CellBlocks& blocks)
     : rotations(blocks.cells.size() * 9),
       squared(blocks.cells.size()),
-      residuals(blocks.slot_count() * CellBlocks::kLanes * kRow),
-      residual_sums(blocks.cells.size() * kRow) {
+      residual_sums(blocks.cells.size() * kRow),
+      residuals(blocks.slot_count() * CellBlocks::kLanes * kRow) {
   constexpr std::size_t kLanes = CellBlocks::kLanes;
   for (std::size_t block = 0; block < blocks.block_count(); ++block) {
     for (std::size_t entry = 0; entry < 9; entry += 4) {
@@ -182,8 +186,8 @@ BlockState::BlockState(const CellBlocks& blocks)
 }
 
 std::size_t BlockState::memory_bytes() const {
-  return (rotations.capacity() + squared.capacity() + residuals.capacity() + residual_sums.capacity()) *
-         sizeof(double);
+  return (rotations.capacity() + squared.capacity() + residual_sums.capacity()) * sizeof(double) +
+         residuals.capacity() * sizeof(float);
 }
 
 void evaluate_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const double* rows,

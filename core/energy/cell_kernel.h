@@ -14,10 +14,11 @@ struct BlockState {
   explicit BlockState(const CellBlocks& blocks);
   std::size_t memory_bytes() const;
 
-  std::vector<double> rotations;  // [block][entry, row-major][lane]: R_i; the identity to begin with
-  std::vector<double> squared;    // [block][lane]: E_i^2
-  std::vector<double> residuals;  // [slot][lane][axis, filler]: r_ij = w_ij ((x_i - x_j) - R_i (p_i - p_j))
+  std::vector<double> rotations;      // [block][entry, row-major][lane]: R_i; the identity to begin with
+  std::vector<double> squared;        // [block][lane]: E_i^2
   std::vector<double> residual_sums;  // [block][lane][axis, filler]: sum_j r_ij
+  std::vector<float> residuals;  // [slot][lane][axis, filler]: r_ij = w_ij ((x_i - x_j) - R_i (p_i - p_j));
+      // single: an error relative to its size does no harm, and memory is the limit
 };
 
 /// Rotation fit (Eq. 2, as fit_rotation has it), squared energies and residuals of blocks first to last - 1 at

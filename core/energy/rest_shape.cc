@@ -71,13 +71,18 @@ absl::Status check_scale(const Extent& extent) {
 }
 
 /// Of the mesh's own edges, whatever the weights' are.
-double mean_length(const TriangleMesh& mesh) {
+double mean_length(const TriangleMesh& mesh, const EdgeWeights& weights) {
   double total = 0, count = 0;
-  const EdgeTable table(mesh.vertices.rows(), mesh.faces, [](Eigen::Index) { return true; });
-  table.for_edges([&](std::int32_t low, std::int32_t high, std::span<const HalfEdge>) {
+  const auto add = [&](std::int32_t low, std::int32_t high) {
     total += (mesh.vertices.row(low) - mesh.vertices.row(high)).norm();
     ++count;
-  });
+  };
+  if (weights.flipped_edges.empty()) {
+    for (const auto& [low, high] : weights.edges) add(low, high);
+    return total / count;
+  }
+  const EdgeTable table(mesh.vertices.rows(), mesh.faces, [](Eigen::Index) { return true; });
+  table.for_edges([&](std::int32_t low, std::int32_t high, std::span<const HalfEdge>) { add(low, high); });
   return total / count;
 }
 
@@ -102,7 +107,7 @@ absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const Triangl
   shape->report_ = std::move(report);
   make_rows(shape->vertex_count(), edges, shape->offsets_, shape->neighbours_, shape->weights_);
 
-  shape->mean_edge_length_ = mean_length(mesh);
+  shape->mean_edge_length_ = mean_length(mesh, edges);
   shape->diagonal_ = (extent.high - extent.low).norm();
   shape->centre_ = extent.mean;
   LPDEFORM_CHECK(shape->mean_edge_length_ > 0 && shape->diagonal_ > 0);

@@ -83,6 +83,12 @@ HWY_INLINE void store_rows(const Vector& v, double* at) {
   hn::StoreInterleaved4(v.x, v.y, v.z, hn::Zero(d), d, at);
 }
 
+/// The same in single precision.
+HWY_INLINE void store_rows(const Vector& v, float* at) {
+  const hn::Rebind<float, D> d;
+  hn::StoreInterleaved4(hn::DemoteTo(d, v.x), hn::DemoteTo(d, v.y), hn::DemoteTo(d, v.z), hn::Zero(d), d, at);
+}
+
 HWY_INLINE Matrix rotation_of(const Quaternion& q) {
   const D d;
   const V one = hn::Set(d, 1.0), two = hn::Set(d, 2.0);

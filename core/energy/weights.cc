@@ -21,21 +21,28 @@ std::array<double, 3> half_cotangents(const Points& vertices, const Eigen::Matri
           (a - c).dot(b - c) / twice_area / 2};
 }
 
-/// For each side of each face, its edge and half the cotangent of the angle opposite it.
-std::vector<WeightedEdge> half_weights(const TriangleMesh& mesh) {
-  std::vector<WeightedEdge> all;
-  all.reserve(3 * mesh.faces.rows());
+/// Appends an edge, its weight clamped.
+void add_edge(std::array<std::int32_t, 2> edge, double weight, EdgeWeights& result) {
+  if (weight < 0) result.clamped_edges.push_back(static_cast<std::int32_t>(result.edges.size()));
+  result.edges.push_back(edge);
+  result.weights.push_back(std::max(0.0, weight));
+}
+
+/// Each edge once, by its two vertices: the sum of half the cotangents of the angles opposite it, clamped.
+EdgeWeights cotangent_weights(const TriangleMesh& mesh) {
+  std::vector<double> opposite(3 * mesh.faces.rows());  // of each half-edge
   for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
-    const Eigen::Matrix<std::int32_t, 1, 3> face = mesh.faces.row(f);
-    const std::array<double, 3> cotangents = half_cotangents(mesh.vertices, face);
-    for (int corner = 0; corner < 3; ++corner) {
-      const std::int32_t u = face[(corner + 1) % 3], v = face[(corner + 2) % 3];
-      if (u != v) all.push_back({{std::min(u, v), std::max(u, v)}, cotangents[corner]});
-    }
+    const std::array<double, 3> cotangents = half_cotangents(mesh.vertices, mesh.faces.row(f));
+    for (int side = 0; side < 3; ++side) opposite[3 * f + side] = cotangents[(side + 2) % 3];
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const WeightedEdge& l, const WeightedEdge& r) { return l.edge < r.edge; });
-  return all;
+  EdgeWeights result;
+  const EdgeTable table(mesh.vertices.rows(), mesh.faces, [](Eigen::Index) { return true; });
+  table.for_edges([&](std::int32_t low, std::int32_t high, std::span<const HalfEdge> sides) {
+    double sum = 0;
+    for (const HalfEdge& side : sides) sum += opposite[side.id];
+    add_edge({low, high}, sum, result);
+  });
+  return result;
 }
 
 /// The mean weight, slivers left out: those over 1000 times the median would decide it alone.
@@ -78,9 +85,7 @@ EdgeWeights summed(const std::vector<WeightedEdge>& all) {
   for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {
     double sum = 0;
     for (end = begin; end < all.size() && all[end].edge == all[begin].edge; ++end) sum += all[end].weight;
-    if (sum < 0) result.clamped_edges.push_back(static_cast<std::int32_t>(result.edges.size()));
-    result.edges.push_back(all[begin].edge);
-    result.weights.push_back(std::max(0.0, sum));
+    add_edge(all[begin].edge, sum, result);
   }
   return result;
 }
@@ -97,7 +102,7 @@ bool has_zero_area_face(const TriangleMesh& mesh) {
 }  // namespace
 
 EdgeWeights edge_weights(const TriangleMesh& mesh, WeightKind kind) {
-  EdgeWeights result = summed(half_weights(mesh));
+  EdgeWeights result = cotangent_weights(mesh);
   if (kind == WeightKind::kUniform) {
     std::fill(result.weights.begin(), result.weights.end(), 1.0);
     result.clamped_edges.clear();

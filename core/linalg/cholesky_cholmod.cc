@@ -11,6 +11,10 @@
 namespace lpdeform {
 namespace {
 
+// Floating-point operations per entry of the factor from which on dense kernels win over columns one by one:
+// meshes of about 40,000 vertices.
+constexpr double kSupernodalSwitch = 110;
+
 /// Dense kernels in the supernodal factorisation must not start threads of their own: the same bits on any
 /// machine load, and sessions do not compete. Only OpenBLAS has such threads among Debian's BLAS packages.
 void pin_blas_to_one_thread() {
@@ -129,7 +133,7 @@ struct SparseCholesky::Impl {
     common.nmethods = 1;  // one ordering: METIS tries cost more than they save below a million vertices
     common.method[0].ordering = CHOLMOD_AMD;
     common.postorder = 1;
-    common.supernodal_switch = 40;
+    common.supernodal_switch = kSupernodalSwitch;
   }
   ~Impl() {
     cholmod_free_dense(&x, &common);

@@ -185,11 +185,25 @@ void SingleFactor::solve_backward(std::size_t first, std::size_t last) const {
   }
 }
 
-void SingleFactor::solve(const Points& b, Points& x, const Workers& workers) const {
+double SingleFactor::largest_entry(const Points& b, const Workers& workers) const {
+  const std::size_t n = new_to_old_.size();
+  chunk_maxima_.assign((n + kChunk - 1) / kChunk, 0);
+  workers.for_chunks(n, kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    const auto rows = b.middleRows(static_cast<Eigen::Index>(begin), static_cast<Eigen::Index>(end - begin));
+    chunk_maxima_[chunk] = rows.cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
+  });
+  double largest = 0;
+  for (const double maximum : chunk_maxima_) {
+    if (!(maximum <= largest)) largest = maximum;
+  }
+  return largest;
+}
+
+void SingleFactor::solve(const Points& b, Points& x, const Workers& workers, double factor) const {
   // Over the largest entry, so that no size of b leaves the range of single precision.
-  const double largest = b.cwiseAbs().maxCoeff(), scale = 1 / largest;
+  const double largest = largest_entry(b, workers), scale = 1 / largest;
   x.resize(b.rows(), 3);
-  if (!std::isfinite(scale)) return void(x.setZero());
+  if (!std::isfinite(scale) || !std::isfinite(largest)) return void(x.setZero());
   const std::size_t n = new_to_old_.size();
   workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
@@ -213,10 +227,11 @@ void SingleFactor::solve(const Points& b, Points& x, const Workers& workers) con
     for (auto part = subtrees.rbegin(); part != subtrees.rend(); ++part)
       solve_backward(part->first, part->second);
   });
+  const double back = factor * largest;
   workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       double* const row = x.data() + 3 * static_cast<std::size_t>(new_to_old_[i]);
-      for (int c = 0; c < 3; ++c) row[c] = largest * static_cast<double>(work_[i][c]);
+      for (int c = 0; c < 3; ++c) row[c] = back * static_cast<double>(work_[i][c]);
     }
   });
 }

@@ -43,8 +43,8 @@ class SingleFactor {
   /// Memory is kept.
   void clear() { new_to_old_.clear(); }
 
-  /// x = A^-1 b. x may be b. One caller at a time.
-  void solve(const Points& b, Points& x, const Workers& workers) const;
+  /// x = factor * A^-1 b. x may be b. One caller at a time.
+  void solve(const Points& b, Points& x, const Workers& workers, double factor = 1) const;
 
   std::size_t memory_bytes() const;
 
@@ -62,6 +62,7 @@ class SingleFactor {
     std::vector<std::pair<std::int32_t, std::int32_t>> subtrees;  // first and last supernode
     std::vector<std::int32_t> owed;                               // rows of ancestors that it adds to
   };
+  double largest_entry(const Points& b, const Workers& workers) const;
   std::vector<std::int32_t> parents() const;
   void cut_branches();
   void send_elsewhere(Branch& branch);
@@ -78,7 +79,8 @@ class SingleFactor {
   std::vector<Branch> branches_;
   std::vector<std::pair<std::int32_t, std::int32_t>> trunk_;  // the supernodes that are in no branch
   std::vector<std::int32_t>
-      forward_rows_;               // rows_, but those of ancestors of a branch are its places in work_
+      forward_rows_;  // rows_, but those of ancestors of a branch are its places in work_
+  mutable std::vector<double> chunk_maxima_;
   mutable std::vector<Row> work_;  // one for each column, then one for each row owed by each branch
 };
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <optional>
 
 #include "core/mesh/half_edges.h"
 #include "core/mesh/report.h"
@@ -204,8 +205,14 @@ MeshReport check_mesh(const TriangleMesh& mesh) {
                       [&](Eigen::Index f) { return states[f] != FaceState::kOutOfRange; });
   all.for_edges([&](std::int32_t, std::int32_t, std::span<const HalfEdge>) { ++report.edges; });
 
-  const EdgeTable sound(report.vertices, mesh.faces,
-                        [&](Eigen::Index f) { return states[f] == FaceState::kSound; });
+  const bool are_sound =
+      std::all_of(states.begin(), states.end(), [](FaceState state) { return state == FaceState::kSound; });
+  std::optional<EdgeTable> without_others;
+  if (!are_sound) {
+    without_others.emplace(report.vertices, mesh.faces,
+                           [&](Eigen::Index f) { return states[f] == FaceState::kSound; });
+  }
+  const EdgeTable& sound = are_sound ? all : *without_others;
   std::vector<bool> is_not_manifold(report.vertices, false);
   DisjointSets fans = check_edges(mesh, sound, is_not_manifold, report);
   check_fans(mesh, states, fans, is_not_manifold, report);

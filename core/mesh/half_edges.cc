@@ -16,6 +16,22 @@ void for_sides(const Faces& faces, const std::function<bool(Eigen::Index)>& take
   }
 }
 
+/// By (high, id); ids ascend before.
+void sort_by_high(std::vector<HalfEdge>& half_edges, std::int32_t first, std::int32_t last) {
+  constexpr std::int32_t kFew = 32;
+  const auto begin = half_edges.begin() + first, end = half_edges.begin() + last;
+  const auto is_less = [](HalfEdge a, HalfEdge b) {
+    return a.high != b.high ? a.high < b.high : a.id < b.id;
+  };
+  if (last - first > kFew) return std::sort(begin, end, is_less);
+  for (auto at = begin; at != end; ++at) {
+    const HalfEdge moved = *at;
+    auto hole = at;
+    for (; hole != begin && (hole - 1)->high > moved.high; --hole) *hole = *(hole - 1);
+    *hole = moved;
+  }
+}
+
 }  // namespace
 
 EdgeTable::EdgeTable(std::int64_t vertices, const Faces& faces,
@@ -27,10 +43,7 @@ EdgeTable::EdgeTable(std::int64_t vertices, const Faces& faces,
   std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
   for_sides(faces, takes,
             [&](std::int32_t low, HalfEdge half_edge) { half_edges_[next[low]++] = half_edge; });
-  for (std::int64_t v = 0; v < vertices; ++v) {
-    std::sort(half_edges_.begin() + start_[v], half_edges_.begin() + start_[v + 1],
-              [](HalfEdge a, HalfEdge b) { return a.high != b.high ? a.high < b.high : a.id < b.id; });
-  }
+  for (std::int64_t v = 0; v < vertices; ++v) sort_by_high(half_edges_, start_[v], start_[v + 1]);
 }
 
 void EdgeTable::for_edges(

@@ -16,7 +16,9 @@ inline bool is_zero_area(const Eigen::RowVector3d& a, const Eigen::RowVector3d& 
   const double largest =
       std::max({a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff(), c.cwiseAbs().maxCoeff()});
   // Powers of two keep the squares below from leaving the range of a double, and are exact.
-  const double unit = std::exp2(-std::ilogb(std::max(largest, std::numeric_limits<double>::min())));
+  const bool is_in_range = largest > 1e-40 && largest < 1e40;
+  const double unit =
+      is_in_range ? 1 : std::exp2(-std::ilogb(std::max(largest, std::numeric_limits<double>::min())));
   const Eigen::RowVector3d ab = unit * b - unit * a, bc = unit * c - unit * b, ca = unit * a - unit * c;
   const double longest = std::sqrt(std::max({ab.squaredNorm(), bc.squaredNorm(), ca.squaredNorm()}));
   const double rounding = 8 * std::numeric_limits<double>::epsilon() * unit * largest;

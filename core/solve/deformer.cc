@@ -39,13 +39,17 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+int threads_for(const RestShape& shape, const DeformerOptions& options) {
+  return shape.vertex_count() < options.parallel_from ? 1 : options.threads;
+}
+
 }  // namespace
 
 struct Deformer::Impl {
   Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options)
       : shape(std::move(rest_shape)),
         options(deformer_options),
-        objective(shape, Workers(deformer_options.threads)),
+        objective(shape, Workers(threads_for(*shape, deformer_options))),
         metric(shape),
         x(shape->scaled_positions()),
         best_energies(Field::Zero(shape->vertex_count())),

@@ -19,6 +19,8 @@ namespace lpdeform {
 struct DeformerOptions {
   FreeComponents free_components = FreeComponents::kError;
   int threads = 1;
+  /// Smaller meshes are computed by the calling thread alone: threads would cost them more than they bring.
+  std::int32_t parallel_from = 8000;  // vertices
 };
 
 /// One mesh being deformed: handles, material, the present state and the factorisations that go with them.

@@ -92,10 +92,12 @@ void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& 
       if (is_held[j]) b.row(i) += edge_weight(i, k) * u.row(j);
     }
   }
-  if (single_.empty())
-    factor_.solve(b, u);
-  else
-    single_.solve(b, u, workers);
+  single().solve(b, u, workers);
+}
+
+const SingleFactor& Metric::single() const {
+  if (single_.empty()) factor_.copy_to(single_);
+  return single_;
 }
 
 void Metric::solve(const Points& b, Points& x) const {
@@ -104,9 +106,7 @@ void Metric::solve(const Points& b, Points& x) const {
 }
 
 void Metric::precondition(const Points& b, Points& x, const Workers& workers) const {
-  if (single_.empty()) factor_.copy_to(single_);
-  single_.solve(b, x, workers);
-  x /= scale_;
+  single().solve(b, x, workers, 1 / scale_);
 }
 
 std::size_t Metric::memory_bytes() const {

@@ -50,8 +50,8 @@ class Metric {
   void precondition(const Points& b, Points& x, const Workers& workers) const;
 
   /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of
-  /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2. Rows of free vertices are overwritten. To single
-  /// precision where precondition() has been asked for since the last factor(). `forces`, where not null, pull
+  /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2, to single precision. Rows of free vertices are
+  /// overwritten. `forces`, where not null, pull
   /// at the free vertices besides: the entries count as well, and <forces, u> is subtracted.
   void extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
               const Points* forces = nullptr) const;
@@ -71,6 +71,7 @@ class Metric {
     return 2 * (cell_weights_[i] + cell_weights_[shape_->neighbours()[k]]) * shape_->weights()[k];
   }
   void add_entry(const MatrixEntry& entry);
+  const SingleFactor& single() const;
 
   std::shared_ptr<const RestShape> shape_;
   std::vector<double> cell_weights_;  // clipped, over scale_

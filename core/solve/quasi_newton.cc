@@ -7,6 +7,7 @@ namespace lpdeform {
 namespace {
 
 constexpr std::size_t kMemory = 6;
+constexpr std::size_t kChunk = 4096;  // vertices
 constexpr int kWindow = 20;
 constexpr int kRefresh = 40;
 constexpr int kSoonest = 5;         // iterations between refreshes, where one is asked for
@@ -91,12 +92,23 @@ double QuasiNewton::direction() {
   return slope;
 }
 
+/// trial_ = x + t * direction.
+void QuasiNewton::go_along(double t) {
+  trial_.resize(x_.rows(), 3);
+  problem_.workers().for_chunks(
+      static_cast<std::size_t>(x_.rows()), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+        const auto first = static_cast<Eigen::Index>(begin), count = static_cast<Eigen::Index>(end - begin);
+        trial_.middleRows(first, count) =
+            x_.middleRows(first, count) + t * direction_.middleRows(first, count);
+      });
+}
+
 /// The step length along direction_, 0 where none is found. problem_.objective holds the evaluation at trial_
 /// afterwards.
 double QuasiNewton::search(double slope) {
   double t = 1;
   for (int trial = 0; trial < 40 && !problem_.stop.stop_requested(); ++trial) {
-    trial_ = x_ + t * direction_;
+    go_along(t);
     const double value = problem_.objective.evaluate(trial_, norm_);
     if (value <= objective_ + kSufficientDecrease * t * slope) {
       objective_ = value;

@@ -42,6 +42,7 @@ class QuasiNewton : public Minimiser {
   void begin_memory();
   bool refresh_metric();
   double direction();
+  void go_along(double t);
   double search(double slope);
   void accept(double length);
   StepResult give_up(double slope);

@@ -91,8 +91,8 @@ TEST_F(MultiresolutionTest, StopsWithinTheCoarseLevel) {
 }
 
 TEST_F(MultiresolutionTest, GivesTheSameBitsOnAnyNumberOfThreads) {
-  auto one = deformer(shape, bend(), Material::uniform(1.5), {.threads = 1});
-  auto two = deformer(shape, bend(), Material::uniform(1.5), {.threads = 2});
+  auto one = deformer(shape, bend(), Material::uniform(1.5), {.threads = 1, .parallel_from = 0});
+  auto two = deformer(shape, bend(), Material::uniform(1.5), {.threads = 2, .parallel_from = 0});
   (void)one->solve(settings(Method::kMultiresolution));
   (void)two->solve(settings(Method::kMultiresolution));
   EXPECT_EQ(one->positions(), two->positions());
