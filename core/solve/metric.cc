@@ -78,8 +78,8 @@ void Metric::adopt(const std::vector<double>& cell_weights) {
   if (wanted > 0 && std::isfinite(wanted)) scale_ = wanted / present;
 }
 
-void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
-                    const Points* forces) const {
+void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& workers, const Points* forces,
+                    bool is_refined) const {
   Points b = Points::Zero(u.rows(), 3);
   for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
     if (is_held[i]) {
@@ -93,6 +93,21 @@ void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& 
     }
   }
   single().solve(b, u, workers);
+  if (!is_refined) return;
+  subtract_product(u, b);
+  single().solve(b, b, workers);
+  u += b;
+}
+
+/// b -= matrix_ x.
+void Metric::subtract_product(const Points& x, Points& b) const {
+  for (std::int32_t j = 0; j < matrix_.size(); ++j) {
+    for (std::int32_t entry = matrix_.columns[j]; entry < matrix_.columns[j + 1]; ++entry) {
+      const std::int32_t i = matrix_.rows[entry];
+      b.row(i) -= matrix_.values[entry] * x.row(j);
+      if (i != j) b.row(j) -= matrix_.values[entry] * x.row(i);
+    }
+  }
 }
 
 const SingleFactor& Metric::single() const {

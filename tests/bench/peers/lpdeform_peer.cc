@@ -20,7 +20,7 @@
 #include "core/mesh/shapes.h"
 #include "core/solve/deformer.h"
 #include "core/solve/paper_poses.h"
-#include "tests/core/poses.h"
+#include "tests/bench/creature_pose.h"
 
 namespace {
 
@@ -31,20 +31,10 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// A creature of about `vertices` vertices: the feet stay, the far end of the body is turned.
 PaperPose creature_pose(const std::string& name, double vertices) {
-  const auto sample = static_cast<double>(creature(24).vertices.rows());
-  PaperPose pose{name, creature(static_cast<int>(24 * std::sqrt(vertices / sample))), {}, ""};
-  const Eigen::RowVector3d low = pose.mesh.vertices.colwise().minCoeff();
-  const Eigen::RowVector3d size = pose.mesh.vertices.colwise().maxCoeff() - low;
-  const std::vector<std::int32_t> feet = slice(pose.mesh, 2, low[2], low[2] + 0.05 * size[2]);
-  std::vector<std::int32_t> head;
-  for (const std::int32_t v : slice(pose.mesh, 0, low[0] + 0.92 * size[0], 1e9)) {
-    if (std::find(feet.begin(), feet.end(), v) == feet.end()) head.push_back(v);
-  }
-  (void)pose.handles.set("feet", {feet, Fixed{}});
-  (void)pose.handles.set("head", {head, turn(Eigen::Vector3d::UnitY(), 50, (low + 0.7 * size).transpose())});
-  return pose;
+  TriangleMesh mesh = creature_of(vertices);
+  HandleSet handles = creature_turn(mesh);
+  return {name, std::move(mesh), std::move(handles), ""};
 }
 
 /// 40,401 vertices: the middle is lifted, the rim stays.

@@ -1,0 +1,174 @@
+// What a change of the held vertices costs: one patch more is held on a mesh that is factored already. Three ways:
+//
+//   refactor     numeric factorisation on the kept pattern, as Metric does it
+//   rows         CHOLMOD's row updates of a simplicial factor, a row deleted for each vertex of the patch
+//   subtrees     numeric factorisation of the columns that the patch reaches in the elimination tree, all others kept: not
+//                built; the share of the operations that it would repeat is what the counter says
+//
+// beside the whole set-up. The patch has the same share of the body whatever the mesh's size.
+
+#include <benchmark/benchmark.h>
+#include <cholmod.h>
+
+#include <algorithm>
+#include <map>
+#include <vector>
+
+#include "tests/bench/creature_pose.h"
+
+namespace lpdeform {
+namespace {
+
+/// L of one coordinate on all vertices, lower triangle, some diagonal added so that it is positive definite.
+struct Laplacian {
+  explicit Laplacian(const RestShape& shape) {
+    const std::int32_t n = shape.vertex_count();
+    columns.push_back(0);
+    for (std::int32_t i = 0; i < n; ++i) {
+      double diagonal = 1e-3;
+      const std::size_t at = rows.size();
+      rows.push_back(i);
+      values.push_back(0);
+      for (std::int32_t k = shape.offsets()[i]; k < shape.offsets()[i + 1]; ++k) {
+        diagonal += shape.weights()[k];
+        if (shape.neighbours()[k] < i) continue;
+        rows.push_back(shape.neighbours()[k]);
+        values.push_back(-shape.weights()[k]);
+      }
+      values[at] = diagonal;
+      columns.push_back(static_cast<std::int32_t>(rows.size()));
+    }
+    view.nrow = view.ncol = static_cast<std::size_t>(n);
+    view.nzmax = rows.size();
+    view.p = columns.data(), view.i = rows.data(), view.x = values.data();
+    view.stype = -1;
+    view.itype = CHOLMOD_INT, view.xtype = CHOLMOD_REAL, view.dtype = CHOLMOD_DOUBLE;
+    view.sorted = view.packed = 1;
+  }
+  std::vector<std::int32_t> columns, rows;
+  std::vector<double> values;
+  cholmod_sparse view{};
+};
+
+/// The vertices within a twentieth of the body's length of a point on it.
+std::vector<std::int32_t> patch(const TriangleMesh& mesh) {
+  const Eigen::RowVector3d low = mesh.vertices.colwise().minCoeff();
+  const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - low;
+  Eigen::Index nearest;
+  (mesh.vertices.rowwise() - (low + Eigen::RowVector3d(0.4, 0.5, 0.75).cwiseProduct(size)))
+      .rowwise()
+      .squaredNorm()
+      .minCoeff(&nearest);
+  std::vector<std::int32_t> result;
+  for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
+    if ((mesh.vertices.row(v) - mesh.vertices.row(nearest)).norm() < 0.05 * size[0])
+      result.push_back(static_cast<std::int32_t>(v));
+  }
+  return result;
+}
+
+struct Case {
+  explicit Case(double vertices) : mesh(creature_of(vertices)), shape(rest_shape(mesh)), held(patch(mesh)) {}
+  TriangleMesh mesh;
+  std::shared_ptr<const RestShape> shape;
+  std::vector<std::int32_t> held;
+};
+
+const Case& case_of(std::int64_t vertices) {
+  static std::map<std::int64_t, Case> cases;
+  return cases.try_emplace(vertices, static_cast<double>(vertices)).first->second;
+}
+
+void set_up(benchmark::State& state) {
+  const Case& all = case_of(state.range(0));
+  const HandleSet handles = creature_turn(all.mesh);
+  for (auto _ : state) {
+    auto fresh = deformer(rest_shape(all.mesh), handles, Material::uniform(2));
+    (void)fresh->start({});
+  }
+}
+
+void refactor(benchmark::State& state) {
+  const Case& all = case_of(state.range(0));
+  const HandleSet without = creature_turn(all.mesh);
+  HandleSet with = without;
+  (void)with.set("patch", {all.held, Fixed{}});
+  auto live = deformer(all.shape, without, Material::uniform(2));
+  (void)live->start({});
+  for (bool is_there = true; auto _ : state) {
+    (void)live->set_handles(is_there ? with : without);
+    (void)live->start({});
+    is_there = !is_there;
+  }
+  state.counters["patch"] = static_cast<double>(all.held.size());
+}
+
+void rows(benchmark::State& state) {
+  const Case& all = case_of(state.range(0));
+  Laplacian laplacian(*all.shape);
+  cholmod_common common;
+  cholmod_start(&common);
+  common.nmethods = 1;
+  common.method[0].ordering = CHOLMOD_AMD;
+  common.supernodal = CHOLMOD_SIMPLICIAL;
+  cholmod_factor* factor = cholmod_analyze(&laplacian.view, &common);
+  cholmod_factorize(&laplacian.view, factor, &common);
+  for (auto _ : state) {
+    state.PauseTiming();
+    cholmod_factor* changed = cholmod_copy_factor(factor, &common);
+    std::vector<std::int32_t> place(all.mesh.vertices.rows());
+    const auto* const old = static_cast<const std::int32_t*>(factor->Perm);
+    for (std::size_t k = 0; k < factor->n; ++k) place[old[k]] = static_cast<std::int32_t>(k);
+    state.ResumeTiming();
+    for (const std::int32_t vertex : all.held)
+      cholmod_rowdel(static_cast<std::size_t>(place[vertex]), nullptr, changed, &common);
+    state.PauseTiming();
+    cholmod_free_factor(&changed, &common);
+    state.ResumeTiming();
+  }
+  cholmod_free_factor(&factor, &common);
+  cholmod_finish(&common);
+}
+
+void subtrees(benchmark::State& state) {
+  const Case& all = case_of(state.range(0));
+  Laplacian laplacian(*all.shape);
+  cholmod_common common;
+  cholmod_start(&common);
+  common.nmethods = 1;
+  common.method[0].ordering = CHOLMOD_AMD;
+  common.supernodal = CHOLMOD_SIMPLICIAL;
+  cholmod_factor* factor = cholmod_analyze(&laplacian.view, &common);
+  cholmod_factorize(&laplacian.view, factor, &common);
+  cholmod_pack_factor(factor, &common);
+  const auto* const old = static_cast<const std::int32_t*>(factor->Perm);
+  const auto* const begins = static_cast<const std::int32_t*>(factor->p);
+  const auto* const counts = static_cast<const std::int32_t*>(factor->nz);
+  const auto* const below = static_cast<const std::int32_t*>(factor->i);
+  std::vector<char> is_in_patch(factor->n, 0), is_reached(factor->n, 0);
+  for (const std::int32_t vertex : all.held) is_in_patch[vertex] = 1;
+  double again = 0, whole = 0;
+  for (auto _ : state) {
+    again = whole = 0;
+    std::fill(is_reached.begin(), is_reached.end(), 0);
+    for (std::size_t k = 0; k < factor->n; ++k) {
+      const bool is_changed = is_reached[k] || is_in_patch[old[k]];
+      const double operations = double(counts[k]) * counts[k];
+      whole += operations;
+      if (!is_changed) continue;
+      again += operations;
+      if (counts[k] > 1) is_reached[below[begins[k] + 1]] = 1;  // its parent
+    }
+  }
+  state.counters["share_repeated"] = again / whole;
+  cholmod_free_factor(&factor, &common);
+  cholmod_finish(&common);
+}
+
+BENCHMARK(set_up)->Arg(10000)->Arg(100000)->Unit(benchmark::kMillisecond);
+BENCHMARK(refactor)->Arg(10000)->Arg(100000)->Unit(benchmark::kMillisecond);
+BENCHMARK(rows)->Arg(10000)->Arg(100000)->Unit(benchmark::kMillisecond)->Iterations(2);
+BENCHMARK(subtrees)->Arg(10000)->Arg(100000)->Unit(benchmark::kMillisecond)->Iterations(1);
+
+}  // namespace
+}  // namespace lpdeform

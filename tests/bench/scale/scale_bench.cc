@@ -1,0 +1,122 @@
+// One line of the table by size; see run.
+//
+//   scale_bench make MESH.ply VERTICES                      the creature with about so many vertices
+//   scale_bench solve MESH.ply P[,P...] THREADS SECONDS     a line of JSON for each p
+//
+// Every solve is cold, from the Laplacian deformation, and goes on to its own end or to the time limit. "to" are the
+// seconds of solving until E^(1/p) is within 1 % and 0.1 % of the lowest that it found; null where the limit came
+// first, as what it would have found is not known.
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_split.h"
+#include "core/mesh/io.h"
+#include "tests/bench/creature_pose.h"
+
+namespace {
+
+using namespace lpdeform;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// Another handle: the vertices within a twentieth of the body's length of a point on it.
+Handle patch(const TriangleMesh& mesh, double share) {
+  const Eigen::RowVector3d low = mesh.vertices.colwise().minCoeff();
+  const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - low;
+  const Eigen::RowVector3d centre = low + Eigen::RowVector3d(share, 0.5, 0.75).cwiseProduct(size);
+  Eigen::Index nearest;
+  (mesh.vertices.rowwise() - centre).rowwise().squaredNorm().minCoeff(&nearest);
+  Handle handle;
+  for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
+    if ((mesh.vertices.row(v) - mesh.vertices.row(nearest)).norm() < 0.05 * size[0])
+      handle.vertices.push_back(static_cast<std::int32_t>(v));
+  }
+  handle.motion = Fixed{};
+  return handle;
+}
+
+/// Seconds from a new set of handles to the first iteration.
+double change(Deformer& deformer, const HandleSet& handles) {
+  const Clock::time_point start = Clock::now();
+  (void)deformer.set_handles(handles);
+  (void)deformer.start({.method = Method::kQuasiNewton});
+  return seconds_since(start);
+}
+
+void print_seconds(const char* name, double seconds) {
+  if (seconds < 0)
+    std::printf(", \"%s\": null", name);
+  else
+    std::printf(", \"%s\": %.6g", name, seconds);
+}
+
+void solve(const TriangleMesh& mesh, double p, int threads, double limit) {
+  const HandleSet handles = creature_turn(mesh);
+  const Clock::time_point start = Clock::now();
+  const auto shape = RestShape::create(mesh).value();
+  auto deformer = Deformer::create(shape, {.threads = threads}).value();
+  (void)deformer->set_handles(handles);
+  (void)deformer->set_material(Material::uniform(p));
+  const double before = seconds_since(start);
+  SolveSettings settings;
+  settings.initial = InitialGuess::kLaplacian;
+  settings.time_limit_seconds = limit;
+  const SolveSummary summary = deformer->solve(settings).value();
+  const bool is_whole = summary.stop_reason != StopReason::kTimeLimit;
+  const auto time_to = [&](double share) {
+    const double enough = summary.energy * std::pow(share, p);
+    for (const IterationRecord& record : summary.trace) {
+      if (record.energy <= enough) return record.seconds;
+    }
+    return summary.solve_seconds;
+  };
+
+  HandleSet more = handles;
+  (void)more.set("patch", patch(mesh, 0.4));
+  HandleSet other = handles;
+  (void)other.set("patch", patch(mesh, 0.6));
+  std::vector<double> changes{change(*deformer, more), change(*deformer, other), change(*deformer, handles)};
+  std::sort(changes.begin(), changes.end());
+
+  std::printf(
+      "{\"vertices\": %d, \"p\": %g, \"threads\": %d, \"iterations\": %d, \"energy\": %.9g, \"stop\": \"%s\"",
+      static_cast<int>(mesh.vertices.rows()), p, threads, static_cast<int>(summary.iterations),
+      summary.energy, std::string(stop_reason_name(summary.stop_reason)).c_str());
+  print_seconds("setup", before + summary.setup_seconds);
+  print_seconds("iteration", summary.solve_seconds / std::max<double>(1, summary.iterations));
+  print_seconds("to_1_percent", is_whole ? time_to(1.01) : -1);
+  print_seconds("to_01_percent", is_whole ? time_to(1.001) : -1);
+  print_seconds("handle_change", changes[1]);
+  std::printf(", \"bytes_per_vertex\": %.0f}\n",
+              static_cast<double>(deformer->memory_bytes() + shape->memory_bytes()) /
+                  static_cast<double>(mesh.vertices.rows()));
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string verb = argc > 1 ? argv[1] : "";
+  if (verb == "make" && argc == 4) {
+    MeshFile file;
+    file.mesh = creature_of(std::atof(argv[3]));
+    const absl::Status status = write_mesh(argv[2], file, file.mesh.vertices, Field());
+    return status.ok() ? 0 : (std::fprintf(stderr, "%s\n", std::string(status.message()).c_str()), 1);
+  }
+  if (verb != "solve" || argc != 6) {
+    std::fprintf(stderr, "usage: scale_bench make MESH VERTICES | solve MESH P[,P...] THREADS SECONDS\n");
+    return 2;
+  }
+  const auto file = read_mesh(argv[2]);
+  if (!file.ok()) return std::fprintf(stderr, "%s\n", std::string(file.status().message()).c_str()), 1;
+  for (const std::string& p : std::vector<std::string>(absl::StrSplit(argv[3], ',')))
+    solve(file->mesh, std::atof(p.c_str()), std::atoi(argv[4]), std::atof(argv[5]));
+}
