@@ -69,6 +69,7 @@ void solve(const TriangleMesh& mesh, double p, int threads, double limit) {
   SolveSettings settings;
   settings.initial = InitialGuess::kLaplacian;
   settings.time_limit_seconds = limit;
+  settings.keep_trace = true;
   const SolveSummary summary = deformer->solve(settings).value();
   const bool is_whole = summary.stop_reason != StopReason::kTimeLimit;
   const auto time_to = [&](double share) {
