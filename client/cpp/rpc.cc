@@ -18,6 +18,8 @@ using Stub = v1::DeformService::Stub;
 
 constexpr int kFirstReconnectMs = 50;
 constexpr int kLongestReconnectMs = 2000;
+/// What one attempt to connect may take, its first exchange included: a busy server is not an absent one.
+constexpr int kAttemptMs = 5000;
 /// A part of a frame may be under way at once. More would only hide frames from the server's credit.
 constexpr int kStreamWindowBytes = 1 << 20;
 /// Switches on the time limit for unacknowledged bytes of TCP, so that a write never waits on a dead
@@ -30,7 +32,7 @@ grpc::ChannelArguments channel_arguments() {
   arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kStreamWindowBytes);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
-  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kAttemptMs);  // despite its name, an attempt's time limit
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLongestReconnectMs);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kUnacknowledgedMs);
