@@ -1,7 +1,7 @@
 import type { App } from "../app/app.js";
 import type { Document } from "../model/document.js";
 import { short } from "../model/words.js";
-import { el, toggle } from "./dom.js";
+import { el, setText, toggle } from "./dom.js";
 
 /** The values of the paper's figures. */
 const stops = [1, 1.5, 2, 6] as const;
@@ -34,7 +34,7 @@ export function dock(app: App): HTMLElement {
   const hint = el("p", { className: "p-words" });
   app.facts.watch(({ document }) => {
     automatic.input.checked = document.isAutomatic;
-    hint.textContent = wordsOf(document);
+    setText(hint, wordsOf(document));
   });
   app.view.watch(({ isSplit }) => (second.hidden = !isSplit));
   return el(
@@ -75,8 +75,11 @@ function pSlider(app: App, field: Field): HTMLElement {
     tick.addEventListener("click", () => app.change(set(stop)));
     return tick;
   });
-  app.facts.watch(({ document }) => {
+  app.facts.watch(({ document }, before) => {
     const p = document[field];
+    const isNew =
+      document === before.document || p !== before.document[field] || document.isAutomatic !== before.document.isAutomatic;
+    if (!isNew) return;
     input.valueAsNumber = shareOf(p);
     input.style.setProperty("--share", `${shareOf(p) * 100}%`);
     input.setAttribute("aria-valuetext", short(p));

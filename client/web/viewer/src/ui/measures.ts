@@ -8,7 +8,7 @@ import { plotBars, plotLines } from "./plot.js";
 
 const binCount = 48;
 /** Plots are for eyes: some a second do. */
-const plotEveryMs = 120;
+const plotEveryMs = 200;
 
 const rows = [
   ["fps", "Frames a second", "Pictures with a new surface"],

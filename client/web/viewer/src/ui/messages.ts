@@ -1,6 +1,6 @@
 import type { App } from "../app/app.js";
 import { isPassing, sentence, type Status } from "../link/status.js";
-import { el } from "./dom.js";
+import { el, setText } from "./dom.js";
 import { pointOutNamed } from "./report.js";
 
 /** How long a line stays. */
@@ -30,14 +30,14 @@ export function messages(app: App): HTMLElement {
   show.addEventListener("click", () => pointOutNamed(app, element));
 
   const showStatus = (status: Status) => {
-    pill.textContent = pillText(status);
+    setText(pill, pillText(status));
     pill.dataset["kind"] = status.kind;
     const problem = app.facts.now.problem;
     const isProblem = problem !== undefined && !quiet.has(problem.reason) && status.kind === "live";
     const isWrong = isPassing(status) || status.kind === "refused";
     element = isProblem ? problem.element : status.element;
-    title.textContent = isProblem ? "The server cannot take this change" : status.title;
-    text.textContent = isProblem ? sentence(problem.message) : status.text;
+    setText(title, isProblem ? "The server cannot take this change" : status.title);
+    setText(text, isProblem ? sentence(problem.message) : status.text);
     banner.dataset["kind"] = isProblem ? "refused" : status.kind;
     show.hidden = !/\d/.test(element);
     banner.hidden = !isWrong && !isProblem;
@@ -49,7 +49,7 @@ export function messages(app: App): HTMLElement {
       late = setTimeout(() => showStatus(app.facts.now.status), 400);
     else if (facts.status.kind !== "away" || facts.status !== before.status || !banner.hidden) showStatus(facts.status);
     else late = setTimeout(() => showStatus(app.facts.now.status), 400);
-    hint.textContent = hintOf(app);
+    setText(hint, hintOf(app));
     hint.hidden = hint.textContent === "" || !banner.hidden;
     if (facts.notice === before.notice || !facts.notice) return;
     notice.textContent = facts.notice.text;
@@ -58,7 +58,7 @@ export function messages(app: App): HTMLElement {
     clearTimeout(timer);
     timer = setTimeout(() => (notice.hidden = true), facts.notice.isBad ? 2 * noticeMs : noticeMs);
   });
-  app.view.watch(() => (hint.textContent = hintOf(app)));
+  app.view.watch(() => setText(hint, hintOf(app)));
   return el("div", { className: "messages" }, pill, banner, hint, notice);
 }
 

@@ -1,7 +1,7 @@
 import type { App } from "../app/app.js";
 import type { Files } from "../app/files.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
-import { el } from "./dom.js";
+import { el, setText } from "./dom.js";
 import { icon, type IconName } from "./icons.js";
 import { menu } from "./menu.js";
 import { button } from "./controls.js";
@@ -39,7 +39,7 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
   app.facts.watch(({ canUndo, canRedo, mesh }) => {
     undo.disabled = !canUndo;
     redo.disabled = !canRedo;
-    own.textContent = mesh.name;
+    setText(own, mesh.name);
   });
   app.view.watch((view) => {
     own.hidden = view.shape !== "";
