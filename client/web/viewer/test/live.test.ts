@@ -1,6 +1,7 @@
 import { LpdeformError } from "lpdeform-client";
 import { describe, expect, it } from "vitest";
 import { EnergyTrail } from "../src/app/energy_trail.js";
+import { Pace } from "../src/app/pace.js";
 import { Meter } from "../src/link/meter.js";
 import { elementsIn, isPassing, statusOf } from "../src/link/status.js";
 import { changes, newSession } from "../src/model/changes.js";
@@ -184,5 +185,27 @@ describe("what is drawn", () => {
       values,
     );
     expect([...values]).toEqual([...draw.source]);
+  });
+});
+
+describe("the pace", () => {
+  const drawEvery = (pace: Pace, milliseconds: number) => {
+    for (let k = 0; k < 30; ++k) pace.drew(1000 + milliseconds * k);
+  };
+
+  it("is coarse while pictures that move are slow, and fine once they rest", () => {
+    const pace = new Pace(() => undefined);
+    drawEvery(pace, 120);
+    expect(pace.quality).toBeLessThan(1);
+    expect(pace.isAtRest(1000 + 120 * 30)).toBe(false);
+    expect(pace.isAtRest(10_000)).toBe(true);
+    expect(pace.quality).toBe(1);
+    expect(pace.isAtRest(10_500)).toBe(false); // once is enough
+  });
+
+  it("is fine throughout where drawing is quick", () => {
+    const pace = new Pace(() => undefined);
+    drawEvery(pace, 16);
+    expect(pace.quality).toBe(1);
   });
 });

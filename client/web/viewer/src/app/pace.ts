@@ -1,7 +1,7 @@
 const restMs = 300;
 /** Slower than this, and the picture is drawn more coarsely while it moves. */
 const slowMs = 55;
-const least = 0.6;
+const coarse = 0.6;
 
 /** How finely to draw: coarsely while things move and drawing is slow, finely once they rest. */
 export class Pace {
@@ -19,8 +19,7 @@ export class Pace {
     const interval = now - this.#last;
     if (interval < restMs) {
       this.#interval += 0.15 * (interval - this.#interval);
-      if (this.#interval > slowMs) this.quality = Math.max(this.quality - 0.1, least);
-      else if (this.#interval < slowMs / 2) this.quality = Math.min(this.quality + 0.05, 1);
+      if (this.#interval > slowMs) this.quality = coarse; // until all rests: changing the size costs a picture
     }
     this.#last = now;
     this.#isFine = false;
@@ -32,6 +31,7 @@ export class Pace {
   isAtRest(now: number): boolean {
     if (this.#isFine || now - this.#last < restMs) return false;
     this.#isFine = true;
+    this.quality = 1;
     return true;
   }
 }
