@@ -92,16 +92,14 @@ void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& 
       if (is_held[j]) b.row(i) += edge_weight(i, k) * u.row(j);
     }
   }
-  const Points given = u;
   single().solve(b, u, workers);
-  if (is_refined) {
-    subtract_product(u, b);
-    single().solve(b, b, workers);
-    u += b;
-  }
   for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
-    if (is_held[i]) u.row(i) = given.row(i);
+    if (is_held[i]) u.row(i) = b.row(i);
   }
+  if (!is_refined) return;
+  subtract_product(u, b);  // 0 at held vertices
+  single().solve(b, b, workers);
+  u += b;
 }
 
 /// b -= matrix_ x.

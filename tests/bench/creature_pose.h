@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "tests/core/poses.h"
 
@@ -26,6 +27,21 @@ inline HandleSet creature_turn(const TriangleMesh& mesh) {
   (void)handles.set("feet", {feet, Fixed{}});
   (void)handles.set("head", {head, turn(Eigen::Vector3d::UnitY(), 50, (low + 0.7 * size).transpose())});
   return handles;
+}
+
+/// What else may be held: the vertices within a twentieth of the body's length of a point on it.
+inline std::vector<std::int32_t> creature_patch(const TriangleMesh& mesh, double share_of_length) {
+  const Eigen::RowVector3d low = mesh.vertices.colwise().minCoeff();
+  const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - low;
+  const Eigen::RowVector3d centre = low + Eigen::RowVector3d(share_of_length, 0.5, 0.75).cwiseProduct(size);
+  Eigen::Index nearest;
+  (mesh.vertices.rowwise() - centre).rowwise().squaredNorm().minCoeff(&nearest);
+  std::vector<std::int32_t> result;
+  for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
+    if ((mesh.vertices.row(v) - mesh.vertices.row(nearest)).norm() < 0.05 * size[0])
+      result.push_back(static_cast<std::int32_t>(v));
+  }
+  return result;
 }
 
 }  // namespace lpdeform

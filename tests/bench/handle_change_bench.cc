@@ -50,25 +50,9 @@ struct Laplacian {
   cholmod_sparse view{};
 };
 
-/// The vertices within a twentieth of the body's length of a point on it.
-std::vector<std::int32_t> patch(const TriangleMesh& mesh) {
-  const Eigen::RowVector3d low = mesh.vertices.colwise().minCoeff();
-  const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - low;
-  Eigen::Index nearest;
-  (mesh.vertices.rowwise() - (low + Eigen::RowVector3d(0.4, 0.5, 0.75).cwiseProduct(size)))
-      .rowwise()
-      .squaredNorm()
-      .minCoeff(&nearest);
-  std::vector<std::int32_t> result;
-  for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
-    if ((mesh.vertices.row(v) - mesh.vertices.row(nearest)).norm() < 0.05 * size[0])
-      result.push_back(static_cast<std::int32_t>(v));
-  }
-  return result;
-}
-
 struct Case {
-  explicit Case(double vertices) : mesh(creature_of(vertices)), shape(rest_shape(mesh)), held(patch(mesh)) {}
+  explicit Case(double vertices)
+      : mesh(creature_of(vertices)), shape(rest_shape(mesh)), held(creature_patch(mesh, 0.4)) {}
   TriangleMesh mesh;
   std::shared_ptr<const RestShape> shape;
   std::vector<std::int32_t> held;
@@ -103,16 +87,33 @@ void refactor(benchmark::State& state) {
   state.counters["patch"] = static_cast<double>(all.held.size());
 }
 
+/// A simplicial factor of the Laplacian.
+struct Factored {
+  explicit Factored(const RestShape& shape) : laplacian(shape) {
+    cholmod_start(&common);
+    common.nmethods = 1;
+    common.method[0].ordering = CHOLMOD_AMD;
+    common.supernodal = CHOLMOD_SIMPLICIAL;
+    factor = cholmod_analyze(&laplacian.view, &common);
+    cholmod_factorize(&laplacian.view, factor, &common);
+  }
+  ~Factored() {
+    cholmod_free_factor(&factor, &common);
+    cholmod_finish(&common);
+  }
+  Factored(const Factored&) = delete;
+  Factored& operator=(const Factored&) = delete;
+
+  Laplacian laplacian;
+  cholmod_common common;
+  cholmod_factor* factor;
+};
+
 void rows(benchmark::State& state) {
   const Case& all = case_of(state.range(0));
-  Laplacian laplacian(*all.shape);
-  cholmod_common common;
-  cholmod_start(&common);
-  common.nmethods = 1;
-  common.method[0].ordering = CHOLMOD_AMD;
-  common.supernodal = CHOLMOD_SIMPLICIAL;
-  cholmod_factor* factor = cholmod_analyze(&laplacian.view, &common);
-  cholmod_factorize(&laplacian.view, factor, &common);
+  Factored factored(*all.shape);
+  cholmod_common& common = factored.common;
+  cholmod_factor* const factor = factored.factor;
   for (auto _ : state) {
     state.PauseTiming();
     cholmod_factor* changed = cholmod_copy_factor(factor, &common);
@@ -126,20 +127,13 @@ void rows(benchmark::State& state) {
     cholmod_free_factor(&changed, &common);
     state.ResumeTiming();
   }
-  cholmod_free_factor(&factor, &common);
-  cholmod_finish(&common);
 }
 
 void subtrees(benchmark::State& state) {
   const Case& all = case_of(state.range(0));
-  Laplacian laplacian(*all.shape);
-  cholmod_common common;
-  cholmod_start(&common);
-  common.nmethods = 1;
-  common.method[0].ordering = CHOLMOD_AMD;
-  common.supernodal = CHOLMOD_SIMPLICIAL;
-  cholmod_factor* factor = cholmod_analyze(&laplacian.view, &common);
-  cholmod_factorize(&laplacian.view, factor, &common);
+  Factored factored(*all.shape);
+  cholmod_common& common = factored.common;
+  cholmod_factor* const factor = factored.factor;
   cholmod_pack_factor(factor, &common);
   const auto* const old = static_cast<const std::int32_t*>(factor->Perm);
   const auto* const begins = static_cast<const std::int32_t*>(factor->p);
@@ -161,8 +155,6 @@ void subtrees(benchmark::State& state) {
     }
   }
   state.counters["share_repeated"] = again / whole;
-  cholmod_free_factor(&factor, &common);
-  cholmod_finish(&common);
 }
 
 BENCHMARK(set_up)->Arg(10000)->Arg(100000)->Unit(benchmark::kMillisecond);

@@ -27,22 +27,6 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Another handle: the vertices within a twentieth of the body's length of a point on it.
-Handle patch(const TriangleMesh& mesh, double share) {
-  const Eigen::RowVector3d low = mesh.vertices.colwise().minCoeff();
-  const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - low;
-  const Eigen::RowVector3d centre = low + Eigen::RowVector3d(share, 0.5, 0.75).cwiseProduct(size);
-  Eigen::Index nearest;
-  (mesh.vertices.rowwise() - centre).rowwise().squaredNorm().minCoeff(&nearest);
-  Handle handle;
-  for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v) {
-    if ((mesh.vertices.row(v) - mesh.vertices.row(nearest)).norm() < 0.05 * size[0])
-      handle.vertices.push_back(static_cast<std::int32_t>(v));
-  }
-  handle.motion = Fixed{};
-  return handle;
-}
-
 /// Seconds from a new set of handles to the first iteration.
 double change(Deformer& deformer, const HandleSet& handles) {
   const Clock::time_point start = Clock::now();
@@ -81,9 +65,9 @@ void solve(const TriangleMesh& mesh, double p, int threads, double limit) {
   };
 
   HandleSet more = handles;
-  (void)more.set("patch", patch(mesh, 0.4));
+  (void)more.set("patch", {creature_patch(mesh, 0.4), Fixed{}});
   HandleSet other = handles;
-  (void)other.set("patch", patch(mesh, 0.6));
+  (void)other.set("patch", {creature_patch(mesh, 0.6), Fixed{}});
   std::vector<double> changes{change(*deformer, more), change(*deformer, other), change(*deformer, handles)};
   std::sort(changes.begin(), changes.end());
 
