@@ -1,0 +1,80 @@
+"""L_p shape deformation on an lpdeform server: NumPy arrays in, NumPy arrays out.
+
+    import lpdeform
+
+    with lpdeform.open(vertices, faces, p=1.5) as s:
+        s.set_handle("base", vertices[:, 2] < 0.1)                     # stays where it is
+        s.set_handle("tip", vertices[:, 2] > 0.9)
+        frame = s.move("tip", translation=[0, 0, 1])                   # frame.positions, frame.distortion
+
+To drag, call `s.drag("tip", ...)` as often as the mouse moves and `s.poll()` once a picture: what is newest wins in both
+directions. `s.solve()` asks for one finished result with its trace and a bound on how far it can be from the optimum.
+"""
+
+from lpdeform.aio import AsyncSession, join_async, open_async
+from lpdeform.errors import Code, InvalidInput, LpdeformError, Timeout, Unavailable
+from lpdeform.frames import Frame, FrameAssembly, QuantizedSurface
+from lpdeform.session import Session, join, open
+from lpdeform.types import (
+    Automatic,
+    AxisLock,
+    Defect,
+    Exact,
+    Fixed,
+    Handle,
+    IterationRecord,
+    MeshReport,
+    Orientation,
+    PlaneLock,
+    Removal,
+    Resize,
+    RigidMotion,
+    Settings,
+    Soft,
+    SolveProgress,
+    SolveResult,
+    SolverSettings,
+    SurfacePoints,
+    Targets,
+    Update,
+)
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "AsyncSession",
+    "Automatic",
+    "AxisLock",
+    "Code",
+    "Defect",
+    "Exact",
+    "Fixed",
+    "Frame",
+    "FrameAssembly",
+    "Handle",
+    "InvalidInput",
+    "IterationRecord",
+    "LpdeformError",
+    "MeshReport",
+    "Orientation",
+    "PlaneLock",
+    "QuantizedSurface",
+    "Removal",
+    "Resize",
+    "RigidMotion",
+    "Session",
+    "Settings",
+    "Soft",
+    "SolveProgress",
+    "SolveResult",
+    "SolverSettings",
+    "SurfacePoints",
+    "Targets",
+    "Timeout",
+    "Unavailable",
+    "Update",
+    "join",
+    "join_async",
+    "open",
+    "open_async",
+]

@@ -1,0 +1,106 @@
+"""The newest frame not yet taken, what the server had to say, and who waits for either."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import NamedTuple
+
+from lpdeform.errors import LpdeformError, again
+from lpdeform.frames import Frame
+
+_most_problems = 64
+
+
+class Taken(NamedTuple):
+    """A frame and the stream that it came on, which wants it acknowledged."""
+
+    frame: Frame
+    stream: int
+
+
+class FrameBox:
+    """Frames of an older epoch or update than one before are dropped. May be used by any thread."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._newest: Taken | None = None
+        self._epoch = 0
+        self._input_seq = 0
+        self._problems: deque[LpdeformError] = deque(maxlen=_most_problems)
+        self._end: LpdeformError | None = None
+        self._listeners: set[Callable[[], None]] = set()
+
+    def put(self, frame: Frame, stream: int) -> bool:
+        """False where the frame is dropped."""
+        with self._changed:
+            if frame.epoch < self._epoch or frame.input_seq < self._input_seq:
+                return False
+            self._epoch, self._input_seq = frame.epoch, frame.input_seq
+            if self._newest is not None:
+                frame.skipped_inputs += self._newest.frame.skipped_inputs
+            self._newest = Taken(frame, stream)
+            self._wake()
+            return True
+
+    def put_problem(self, problem: LpdeformError) -> None:
+        with self._changed:
+            self._problems.append(problem)
+            self._wake()
+
+    def begin_epoch(self, epoch: int) -> None:
+        """Frames of an earlier epoch are void."""
+        with self._changed:
+            if epoch > self._epoch:
+                self._epoch, self._newest = epoch, None
+
+    def begin_session(self) -> None:
+        """Epochs begin anew: another session."""
+        with self._changed:
+            self._epoch, self._newest = 0, None
+
+    def finish(self, end: LpdeformError) -> None:
+        """Nothing more comes, for this reason."""
+        with self._changed:
+            self._end = self._end or end
+            self._wake()
+
+    def resume(self) -> None:
+        with self._changed:
+            self._end = None
+
+    def take(self) -> Taken | None:
+        """What there is. Raises what the server had to say, each once; then, once nothing more comes, why, each time."""
+        with self._changed:
+            if self._problems:
+                raise again(self._problems.popleft())
+            taken, self._newest = self._newest, None
+            if taken is None and self._end is not None:
+                raise again(self._end)
+            return taken
+
+    def wait(self, deadline: float) -> bool:
+        """Waits until take() has something to say; False where time.monotonic() reached the deadline first."""
+        with self._changed:
+            return self._changed.wait_for(self._has_news, max(0.0, deadline - time.monotonic()))
+
+    def _has_news(self) -> bool:
+        return bool(self._problems) or self._newest is not None or self._end is not None
+
+    def listen(self, listener: Callable[[], None]) -> None:
+        """Calls `listener` whenever take() has something new to say, and now where it has. It must not wait."""
+        with self._changed:
+            self._listeners.add(listener)
+            if self._has_news():
+                listener()
+
+    def forget(self, listener: Callable[[], None]) -> None:
+        with self._changed:
+            self._listeners.discard(listener)
+
+    def _wake(self) -> None:
+        self._changed.notify_all()
+        for listener in list(self._listeners):
+            listener()

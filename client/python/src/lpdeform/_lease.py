@@ -1,0 +1,78 @@
+"""What a client holds of a session on the server."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from lpdeform import _wire
+from lpdeform._numbers import Copied
+from lpdeform._rpc import Packer, Rpc, Stop
+from lpdeform.errors import LpdeformError, is_undecided
+from lpdeform.types import MeshReport, Settings
+from lpdeform.v1 import report_pb2, service_pb2
+
+
+@dataclass(frozen=True)
+class Lease:
+    session: str
+    writer_token: str
+    """Empty for a reader."""
+    epoch: int
+    input_seq: int
+    report: MeshReport
+
+
+@dataclass(frozen=True, eq=False)
+class Original:
+    """What a session is made from, and made anew from where the server has lost it. Everything is checked and copied."""
+
+    vertices: Copied
+    faces: Copied
+    normals: Copied | None
+    weld: Copied | bool
+    weights: report_pb2.WeightKind
+    free_components: service_pb2.FreeComponents
+    settings: Settings
+
+
+def create_session(rpc: Rpc, original: Original, request_id: str, stop: Stop) -> Lease:
+    """The same request id gives the same session, however often it is tried."""
+    packer = Packer(rpc, stop, request_id)
+    request = service_pb2.CreateSessionRequest(
+        request_id=request_id,
+        mesh=_wire.mesh_to_wire(original.vertices, original.faces, packer),
+        weights=original.weights,
+        free_components=original.free_components,
+        settings=_wire.settings_to_wire(original.settings, packer),
+    )
+    if original.weld is not False:
+        groups = None if original.weld is True else original.weld
+        request.weld.CopyFrom(_wire.weld_to_wire(groups, packer))
+    if original.normals is not None:
+        request.normals.CopyFrom(_wire.normals_to_wire(original.normals, packer))
+    try:
+        created = rpc.call("CreateSession", request, service_pb2.CreateSessionResponse, stop)
+    except LpdeformError as error:
+        if not is_undecided(error):
+            packer.discard()
+        raise
+    packer.discard()
+    return _lease_of(created.session, created.writer_token)
+
+
+def join_session(rpc: Rpc, name: str, as_writer: bool, stop: Stop) -> Lease:
+    get = service_pb2.GetSessionRequest(session=name)
+    found = rpc.call("GetSession", get, service_pb2.GetSessionResponse, stop)
+    lease = _lease_of(found.session, "")
+    if not as_writer:
+        return lease
+    acquire = service_pb2.AcquireWriterRequest(session=name)
+    acquired = rpc.call("AcquireWriter", acquire, service_pb2.AcquireWriterResponse, stop)
+    return replace(
+        lease, writer_token=acquired.writer_token, epoch=acquired.epoch, input_seq=acquired.input_seq
+    )
+
+
+def _lease_of(session: service_pb2.Session, writer_token: str) -> Lease:
+    report = _wire.report_from_wire(session.mesh)
+    return Lease(session.name, writer_token, session.epoch, session.input_seq, report)

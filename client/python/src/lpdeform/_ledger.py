@@ -1,0 +1,155 @@
+"""The writer's book of updates."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import NamedTuple
+
+from lpdeform.types import Change, Handle, Removal, Settings, Update
+
+_resize_handle = "resize"
+
+
+class NumberedUpdate(NamedTuple):
+    """An update and its number, which the server knows as input_seq."""
+
+    seq: int
+    update: Update
+
+
+def merged(older: Update, newer: Update) -> Update:
+    """`newer` on top of `older`: the newest value of each handle and each setting wins.
+
+    A motion for a handle that `older` adds moves the added one.
+    """
+    handles = dict(older.handles)
+    settings = older.settings
+    resize = older.resize
+    if _resize_handle in newer.handles:
+        resize = None
+    if newer.resize is not None:
+        resize = newer.resize
+        handles.pop(_resize_handle, None)
+        settings = replace(settings, p=None, stiffness=None)
+    for name, change in newer.handles.items():
+        handles[name] = _changed(handles.get(name), change)
+    given = {one.name: value for one in fields(Settings) if (value := getattr(newer.settings, one.name)) is not None}
+    return Update(handles, replace(settings, **given), resize)
+
+
+def _changed(before: Change | None, change: Change) -> Change:
+    if isinstance(before, Handle) and not isinstance(change, (Handle, Removal)):
+        return replace(before, motion=change)
+    return change
+
+
+def _settled(state: Update) -> Update:
+    """What is there once motions and removals have been carried out."""
+    kept = {name: change for name, change in state.handles.items() if isinstance(change, Handle)}
+    return replace(state, handles=kept)
+
+
+class Ledger:
+    """What the server has accepted, what is on its way (at most `window`), and what waits, merged into one.
+
+    Bounded by the size of the handles and settings themselves. What was accepted is all that is needed to make the session
+    anew. Not for several threads at a time.
+    """
+
+    window = 4
+
+    def __init__(self) -> None:
+        self._next_seq = 1
+        self._accepted = NumberedUpdate(0, Update())
+        self._restore: NumberedUpdate | None = None
+        self._in_flight: list[NumberedUpdate] = []
+        self._waiting: NumberedUpdate | None = None
+
+    def add(self, update: Update) -> int:
+        """Takes an update on; returns its number."""
+        seq = self._next_seq
+        self._next_seq += 1
+        self._waiting = NumberedUpdate(seq, merged(self._waiting.update if self._waiting else Update(), update))
+        return seq
+
+    @property
+    def has_waiting(self) -> bool:
+        return self._restore is not None or self._waiting is not None
+
+    @property
+    def can_send(self) -> bool:
+        return self.has_waiting and len(self._in_flight) < self.window
+
+    @property
+    def has_restore(self) -> bool:
+        """What send_next() gives is the state that a lost session had."""
+        return self._restore is not None
+
+    @property
+    def has_in_flight(self) -> bool:
+        return bool(self._in_flight)
+
+    def send_next(self) -> NumberedUpdate:
+        """What is to be sent next, now on its way."""
+        if self._restore is not None:
+            next_one, self._restore = self._restore, None
+        elif self._waiting is not None:
+            next_one, self._waiting = self._waiting, None
+        else:
+            raise AssertionError("nothing waits")
+        self._in_flight.append(next_one)
+        return next_one
+
+    def accept(self, seq: int) -> None:
+        """The server has taken the update of this number. Unknown numbers are nothing to us."""
+        for sent in [one for one in self._in_flight if one.seq == seq]:
+            state = _settled(merged(self._accepted.update, sent.update))
+            self._accepted = NumberedUpdate(max(self._accepted.seq, seq), state)
+            self._in_flight.remove(sent)
+
+    def refuse(self, seq: int) -> None:
+        """The server has refused the update of this number."""
+        self._in_flight = [one for one in self._in_flight if one.seq != seq]
+
+    def connection_lost(self) -> None:
+        """What was on its way waits again. Sending it twice does no harm, it is the same value."""
+        again: NumberedUpdate | None = None
+        for sent in self._in_flight:
+            if sent.seq == self._accepted.seq:  # an unanswered restore stays on its own
+                self._restore = sent
+            else:
+                again = NumberedUpdate(sent.seq, merged(again.update, sent.update) if again else sent.update)
+        self._in_flight = []
+        if again is None:
+            return
+        if self._waiting is not None:
+            again = NumberedUpdate(self._waiting.seq, merged(again.update, self._waiting.update))
+        self._waiting = again
+
+    def session_lost(self) -> None:
+        """The server has lost the session: what it had accepted is to be sent first, on its own."""
+        self.connection_lost()
+        if self._accepted.seq > 0:
+            self._restore = self._accepted
+
+    def drop_unaccepted(self) -> None:
+        """Another writer took over: what the server has not taken is void."""
+        self._restore = None
+        self._in_flight = []
+        self._waiting = None
+
+    def count_from(self, seq: int) -> None:
+        """Numbers that follow are higher than `seq`, the newest that the server knows."""
+        if self._next_seq > seq:
+            return
+        self._next_seq = seq + 1
+        if self._waiting is not None:
+            self._waiting = NumberedUpdate(self._next_seq, self._waiting.update)
+            self._next_seq += 1
+
+    @property
+    def newest(self) -> int:
+        """The newest update that was not refused; 0 where there is none."""
+        if self._waiting is not None:
+            return self._waiting.seq
+        return max([self._accepted.seq, *(one.seq for one in self._in_flight)])

@@ -1,0 +1,412 @@
+"""A session from within: the lease on the server's session, the ledger of updates, the box of frames, and a Deform stream that
+is kept alive between them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import grpc
+
+from lpdeform import _wire
+from lpdeform._box import FrameBox
+from lpdeform._lease import Lease, Original, create_session, join_session
+from lpdeform._ledger import Ledger, NumberedUpdate
+from lpdeform._recovery import Backoff, Next, recovery_after
+from lpdeform._rpc import Packer, Rpc, Stop, new_request_id
+from lpdeform.errors import (
+    Code,
+    LpdeformError,
+    again,
+    from_call,
+    from_fault,
+    is_session_lost,
+    is_taken_all_the_same,
+    is_undecided,
+    make,
+    session_closed,
+)
+from lpdeform.frames import Frame, FrameAssembly
+from lpdeform.types import Connection, Update
+from lpdeform.v1 import frame_pb2, service_pb2
+
+_closing_seconds = 3.0
+
+
+class _Stream:
+    """One Deform call. Its fields are guarded by the lock of the link."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        self.call: Any = None
+        self.is_open = False
+        self.is_over = False
+        self.opened_at = 0.0
+        self.heard_at = time.monotonic()
+        self.longest_silence = 45.0
+        """After so long without a word the connection is dead: three of the heartbeats that the server announces."""
+        self.ack_due = 0
+        self.go_away: service_pb2.GoAway | None = None
+        self.uploads: dict[int, Packer] = {}
+        """By the updates that name them, until these are answered."""
+        self.done: list[Packer] = []
+        self.failure: LpdeformError | None = None
+        """What kept an update from being sent."""
+
+    def cancel(self) -> None:
+        if self.call is not None:
+            self.call.cancel()
+
+
+class Link:
+    """One thread reads a stream and opens the next one; gRPC's own runs _requests(), which sends. Calls come on any thread.
+
+    `changed` guards all state; no call to the server is made under it.
+    """
+
+    def __init__(
+        self, rpc: Rpc, lease: Lease, options: frame_pb2.FrameOptions, original: Original | None
+    ) -> None:
+        self.rpc = rpc
+        self.original = original
+        self.box = FrameBox()
+        self.stop = Stop()
+        self.ledger = Ledger()
+        self.changed = threading.Condition()
+        self.is_solving = False
+        self.is_closing = False
+        self.lease = lease
+        self.interruption: LpdeformError | None = None
+        self._options = options
+        self._request_id = new_request_id()
+        self._renewing = threading.Lock()
+        self._over: LpdeformError | None = None
+        self._thread: threading.Thread | None = None
+        self._stream: _Stream | None = None
+        self._stream_count = 0
+        self._last_open = 0.0
+        self._is_to_reopen = False
+        self._is_taking_over = False
+        self.ledger.count_from(lease.input_seq)
+
+    # What callers ask, on their own threads.
+
+    def update(self, update: Update) -> int:
+        checked = _wire.checked_update(update)
+        with self.changed:
+            if self.is_closing:
+                raise session_closed()
+            if self._over is not None:
+                raise again(self._over)
+            if not self.lease.writer_token:
+                text = "A reader cannot change the session: take_over() first."
+                raise make(Code.FAILED_PRECONDITION, text, "NOT_THE_WRITER")
+            seq = self.ledger.add(checked)
+            self.changed.notify_all()
+        self.start_stream()
+        return seq
+
+    def start_stream(self) -> None:
+        with self.changed:
+            if self._thread is not None or self.is_closing or self._over is not None:
+                return
+            self._last_open = time.monotonic()
+            self._thread = threading.Thread(target=self._run, name="lpdeform session", daemon=True)
+            self._thread.start()
+
+    def take(self) -> Frame | None:
+        """The newest frame not yet taken; taking it tells the server to send on."""
+        if self.is_closing:
+            raise session_closed()
+        self.start_stream()
+        taken = self.box.take()
+        if taken is None:
+            return None
+        self._acknowledge(taken.frame.frame_seq, taken.stream)
+        return taken.frame
+
+    def is_result(self, frame: Frame) -> bool:
+        with self.changed:
+            return frame.converged and frame.input_seq >= self.ledger.newest
+
+    def no_frame(self) -> LpdeformError:
+        with self.changed:
+            is_down = self._stream is None or not self._stream.is_open
+            why = f" The connection is down: {self.interruption}" if is_down and self.interruption else ""
+        return make(Code.DEADLINE_EXCEEDED, f"No new frame came in time.{why}", "NO_FRAME")
+
+    @property
+    def connection(self) -> Connection:
+        with self.changed:
+            if self.is_closing or self._over is not None:
+                return "closed"
+            if self._stream is not None and self._stream.is_open and not self._stream.is_over:
+                return "connected"
+            if self._thread is None:
+                return "idle"
+            return "reconnecting"
+
+    def take_over(self) -> None:
+        with self.changed:
+            if self.is_closing:
+                raise session_closed()
+            self._is_taking_over = True
+            session = self.lease.session
+        try:
+            lease = join_session(self.rpc, session, True, self.stop)
+        except LpdeformError:
+            with self.changed:
+                self._is_taking_over = False
+                self.changed.notify_all()
+            raise
+        with self.changed:
+            self._is_taking_over = False
+            self.lease = lease
+            self.ledger.count_from(lease.input_seq)
+            self.box.begin_epoch(lease.epoch)
+            self._is_to_reopen = self._thread is not None and self._over is None
+            if self._over is not None:
+                self._thread, self._over = None, None
+            stream = self._stream
+            self.changed.notify_all()
+        if stream is not None:
+            stream.cancel()
+        self.box.resume()
+        self.start_stream()
+
+    def close(self) -> None:
+        """Deletes the session where we made it; where that fails, it expires by itself."""
+        with self.changed:
+            if self.is_closing:
+                return
+            self.is_closing = True
+            stream, thread = self._stream, self._thread
+            self.changed.notify_all()
+        self.stop.set()
+        self.box.finish(session_closed())
+        if stream is not None:
+            stream.cancel()
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(_closing_seconds)
+        if self.original is not None:
+            request = service_pb2.DeleteSessionRequest(session=self.lease.session)
+            try:
+                self.rpc.call("DeleteSession", request, service_pb2.DeleteSessionResponse, Stop(), _closing_seconds)
+            except LpdeformError:
+                pass
+        self.rpc.close()
+
+    def make_anew(self, lost: str) -> None:
+        """Once, however many ask."""
+        assert self.original is not None
+        with self._renewing:
+            with self.changed:
+                if self.lease.session != lost:
+                    return
+                request_id = self._request_id
+            lease = create_session(self.rpc, self.original, request_id, self.stop)
+            with self.changed:
+                self.lease = lease
+                self._request_id = new_request_id()
+                self.ledger.session_lost()
+                self.ledger.count_from(lease.input_seq)
+                self.box.begin_session()
+
+    # The stream, on its thread.
+
+    def _run(self) -> None:
+        backoff = Backoff()
+        while self._recover(self._one_stream(), backoff):
+            pass
+
+    def _one_stream(self) -> LpdeformError | None:
+        with self.changed:
+            self._stream_count += 1
+            stream = self._stream = _Stream(self._stream_count)
+            self._is_to_reopen = False
+            lease = self.lease
+        try:
+            stream.call = self.rpc.deform(self._requests(stream, lease))
+            if self.is_closing:
+                stream.cancel()
+            assembly: list[FrameAssembly] = []
+            for response in stream.call:
+                self._take(stream, assembly, response)
+            ended = None
+        except LpdeformError as error:
+            stream.cancel()
+            ended = error
+        except grpc.RpcError as error:
+            ended = from_call(error, self.rpc.address)
+        except ValueError:  # the channel was closed meanwhile
+            ended = session_closed()
+        with self.changed:
+            stream.is_over = True
+            self.changed.notify_all()
+            return stream.failure or ended
+
+    def _recover(self, ended: LpdeformError | None, backoff: Backoff) -> bool:
+        """Pauses, makes the session anew where it is lost. False where it is all over."""
+        with self.changed:
+            stream = self._stream
+            assert stream is not None
+            if stream.is_open:
+                self._last_open = time.monotonic()
+                if self._last_open - stream.opened_at >= Backoff.most:
+                    backoff.reset()  # one that breaks at once is no success
+            self.ledger.connection_lost()
+            self.changed.notify_all()
+            self.changed.wait_for(lambda: not self._is_taking_over or self.is_closing)
+            if self.is_closing:
+                return False
+            if self._is_to_reopen:
+                return True
+            recovery = recovery_after(ended, stream.go_away, self.original is not None)
+            self.interruption = recovery.why
+            is_too_late = time.monotonic() - self._last_open > self.rpc.reconnect_for
+            if recovery.next is Next.GIVE_UP or is_too_late:
+                self._give_up(recovery.why)
+                return False
+            if self.changed.wait_for(lambda: self.is_closing, max(recovery.pause, backoff.next())):
+                return False
+            lost = self.lease.session
+        self.rpc.reach(lost, self.stop, Backoff.most)
+        if recovery.next is Next.RESUME:
+            return True
+        try:
+            self.make_anew(lost)
+        except LpdeformError as error:
+            if not is_undecided(error):
+                with self.changed:
+                    self._give_up(error)
+                return False
+        return True
+
+    def _give_up(self, why: LpdeformError) -> None:
+        self.ledger.drop_unaccepted()
+        self._over = why
+        self.box.finish(why)
+        self.changed.notify_all()
+
+    # What is sent.
+
+    def _requests(self, stream: _Stream, lease: Lease) -> Iterator[service_pb2.DeformRequest]:
+        opening = service_pb2.DeformOpen(
+            session=lease.session, writer_token=lease.writer_token, options=self._options
+        )
+        yield service_pb2.DeformRequest(open=opening)
+        while True:
+            with self.changed:
+                if not self._wait_for_work(stream):
+                    return
+                ack, stream.ack_due = stream.ack_due, 0
+                done, stream.done = stream.done, []
+                update = self.ledger.send_next() if self._can_send else None
+            if ack:
+                yield service_pb2.DeformRequest(ack=service_pb2.FrameAck(frame_seq=ack))
+            for packer in done:
+                packer.discard()
+            if update is not None:
+                message = self._packed(stream, update)
+                if message is not None:
+                    yield service_pb2.DeformRequest(update=message)
+
+    @property
+    def _can_send(self) -> bool:
+        return not self.is_solving and self.ledger.can_send
+
+    def _wait_for_work(self, stream: _Stream) -> bool:
+        """False where the stream is over. Ends one that has been silent for too long."""
+
+        def has_work() -> bool:
+            is_due = bool(stream.ack_due or stream.done) or self._can_send
+            return stream.is_over or (stream.is_open and is_due)
+
+        while not stream.is_over:
+            left = stream.heard_at + stream.longest_silence - time.monotonic()
+            if left <= 0:
+                stream.cancel()
+                return False
+            if self.changed.wait_for(has_work, left):
+                break
+        return not stream.is_over
+
+    def _packed(self, stream: _Stream, update: NumberedUpdate) -> service_pb2.Update | None:
+        packer = Packer(self.rpc, self.stop)
+        try:
+            message = _wire.update_to_wire(update.update, update.seq, packer)
+        except LpdeformError as error:
+            with self.changed:
+                if not is_undecided(error):
+                    self.ledger.refuse(update.seq)
+                    self.box.put_problem(error)
+                    return None
+                stream.failure = error  # what is in flight waits again for the next stream
+            stream.cancel()
+            return None
+        if packer.uploads:
+            with self.changed:
+                stream.uploads[update.seq] = packer
+        return message
+
+    def _acknowledge(self, frame_seq: int, number: int) -> None:
+        with self.changed:
+            stream = self._stream
+            if stream is not None and stream.number == number:
+                stream.ack_due = max(frame_seq, stream.ack_due)
+                self.changed.notify_all()
+
+    # What comes.
+
+    def _take(self, stream: _Stream, assembly: list[FrameAssembly], response: service_pb2.DeformResponse) -> None:
+        stream.heard_at = time.monotonic()
+        if response.HasField("result"):
+            with self.changed:
+                self.ledger.accept(response.result.input_seq)
+                self._note_answered(stream, response.result.input_seq)
+            return
+        kind = response.event.WhichOneof("event")
+        if kind == "opened":
+            assembly[:] = [FrameAssembly(response.event.opened.vertex_count)]
+            self._take_opened(stream, response.event.opened)
+        elif kind == "frame":
+            if not assembly:
+                raise make(Code.DATA_LOSS, "A frame came before the stream was open.", "FRAME_PARTS")
+            frame = assembly[0].add(response.event.frame)
+            if frame is not None and not self.box.put(frame, stream.number):
+                self._acknowledge(frame.frame_seq, stream.number)  # dropped, but its credit is owed
+        elif kind == "fault":
+            self._take_fault(stream, response.event.fault)
+        elif kind == "go_away":
+            with self.changed:
+                stream.go_away = response.event.go_away
+
+    def _take_opened(self, stream: _Stream, opened: service_pb2.StreamOpened) -> None:
+        self.box.begin_epoch(opened.epoch)
+        with self.changed:
+            if opened.heartbeat_interval_ms > 0:
+                stream.longest_silence = 3 * opened.heartbeat_interval_ms / 1000
+            self.ledger.count_from(opened.input_seq)
+            stream.is_open = True
+            stream.opened_at = time.monotonic()
+            self.changed.notify_all()
+
+    def _take_fault(self, stream: _Stream, fault: service_pb2.Fault) -> None:
+        error = from_fault(fault)
+        with self.changed:
+            is_void = is_taken_all_the_same(error) and 0 < error.input_seq < self.ledger.newest
+            if is_taken_all_the_same(error):
+                self.ledger.accept(error.input_seq)
+            elif not is_session_lost(error):  # then it waits for the session made anew
+                self.ledger.refuse(error.input_seq)
+            self._note_answered(stream, error.input_seq)
+        if not is_void:
+            self.box.put_problem(error)
+
+    def _note_answered(self, stream: _Stream, seq: int) -> None:
+        packer = stream.uploads.pop(seq, None)
+        if packer is not None:
+            stream.done.append(packer)
+        self.changed.notify_all()

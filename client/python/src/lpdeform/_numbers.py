@@ -1,0 +1,129 @@
+"""Arrays as they are given, checked and copied; bytes as they travel. The ranges of numbers are the server's to refuse."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lpdeform.errors import invalid
+
+Copied = npt.NDArray[Any]
+_most_index = 2**32 - 1
+
+
+def _array(values: npt.ArrayLike, what: str) -> Copied:
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError) as cause:
+        raise invalid(f"The {what} are no array: {cause}.", "ARRAY", what) from cause
+
+
+def numbers(values: npt.ArrayLike, what: str, width: int = 1) -> Copied:
+    """float32 where they are, otherwise float64: a copy of shape (k,), or (k, width)."""
+    array = _array(values, what)
+    if array.dtype.kind not in "fiub":
+        raise invalid(f"The {what} are of type {array.dtype} and not numbers.", "ARRAY_TYPE", what, "float32 or float64")
+    copied = np.array(array, dtype="<f4" if array.dtype.itemsize == 4 and array.dtype.kind == "f" else "<f8", order="C")
+    return _shaped(copied, what, width)
+
+
+def indices(values: npt.ArrayLike, what: str, width: int = 1) -> Copied:
+    """uint32, a copy. Of a boolean mask, where it is true."""
+    array = _array(values, what)
+    if array.dtype.kind == "b" and width == 1 and array.ndim == 1:
+        array = np.flatnonzero(array)
+    if array.size == 0:
+        array = array.astype(np.int64)
+    if array.dtype.kind not in "iu":
+        raise invalid(f"The {what} are of type {array.dtype} and not integers.", "ARRAY_TYPE", what, "integers")
+    outside = (array < 0) | (array > _most_index)
+    if outside.any():
+        first = int(np.flatnonzero(outside.reshape(-1))[0])
+        raise invalid(
+            f"Of the {what}, number {first} is {array.reshape(-1)[first]}, which is no index.",
+            "INDEX_OUT_OF_RANGE",
+            f"{what}, number {first}",
+            f"0 <= index <= {_most_index}",
+        )
+    return _shaped(np.array(array, dtype="<u4", order="C"), what, width)
+
+
+def _shaped(array: Copied, what: str, width: int) -> Copied:
+    """Of shape (k,) or (k, width); a flat run of width times k numbers is taken, too."""
+    if width == 1 and array.ndim == 1:
+        return array
+    if width > 1 and array.ndim == 2 and array.shape[1] == width:
+        return array
+    if width > 1 and array.ndim == 1 and array.size % width == 0:
+        return array.reshape(-1, width)
+    wanted = "(k,)" if width == 1 else f"(k, {width})"
+    raise invalid(f"The {what} are of shape {array.shape} and not {wanted}.", "ARRAY_SHAPE", what, wanted)
+
+
+def is_single_precision(array: Copied) -> bool:
+    return array.dtype.itemsize == 4
+
+
+# CRC-32C over many lanes at once: the bytes are cut into runs of one length, a step of the usual table goes over all runs
+# together, and their sums are joined in pairs, each pair as sum(ab) = advance(sum(a), length of b) ^ sum(b).
+
+_polynomial = 0x82F63B78
+_lane_bytes = 2048
+
+
+def _make_table() -> npt.NDArray[np.uint32]:
+    table = np.arange(256, dtype=np.uint32)
+    for _ in range(8):
+        table = np.where(table & 1, (table >> 1) ^ np.uint32(_polynomial), table >> 1).astype(np.uint32)
+    return table
+
+
+_table = _make_table()
+
+
+def _apply(matrix: npt.NDArray[np.uint32], sums: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
+    """A linear map over bits, given by what it makes of each bit, to many sums."""
+    out = np.zeros_like(sums)
+    for bit in range(32):
+        out ^= np.where((sums >> np.uint32(bit)) & np.uint32(1), matrix[bit], np.uint32(0)).astype(np.uint32)
+    return out
+
+
+def _advance_by_lane() -> npt.NDArray[np.uint32]:
+    matrix = np.uint32(1) << np.arange(32, dtype=np.uint32)
+    for _ in range(_lane_bytes):
+        matrix = (matrix >> 8) ^ _table[matrix & 0xFF]
+    return matrix
+
+
+def crc32c(data: bytes) -> int:
+    """CRC-32C (Castagnoli).
+
+    >>> hex(crc32c(b"123456789"))
+    '0xe3069283'
+    """
+    if len(data) < 4:
+        return _crc32c_short(data)
+    lanes = 1 << (-(-len(data) // _lane_bytes) - 1).bit_length()
+    # Zeros in front change nothing where the register begins as zero; that it begins with ones goes into the first bytes.
+    runs = np.zeros(lanes * _lane_bytes, np.uint8)
+    runs[runs.size - len(data) :] = np.frombuffer(data, np.uint8)
+    runs[runs.size - len(data) :][:4] ^= np.uint8(0xFF)
+    columns = np.ascontiguousarray(runs.reshape(lanes, _lane_bytes).T)
+    sums = np.zeros(lanes, np.uint32)
+    for column in columns:
+        sums = (sums >> np.uint32(8)) ^ _table[(sums ^ column) & np.uint32(0xFF)]
+    matrix = _advance_by_lane()
+    while sums.size > 1:
+        sums = _apply(matrix, sums[0::2]) ^ sums[1::2]
+        matrix = _apply(matrix, matrix)
+    return int(sums[0]) ^ 0xFFFFFFFF
+
+
+def _crc32c_short(data: bytes) -> int:
+    rest = 0xFFFFFFFF
+    for octet in data:
+        rest = (rest >> 8) ^ int(_table[(rest ^ octet) & 0xFF])
+    return rest ^ 0xFFFFFFFF

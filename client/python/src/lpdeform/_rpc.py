@@ -1,0 +1,184 @@
+"""The calls of the service; nothing else touches gRPC. Every error that comes out is an LpdeformError."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import threading
+from collections.abc import Iterator
+from typing import Any, Protocol, TypeVar
+
+import grpc
+from google.protobuf.message import Message
+
+from lpdeform._numbers import crc32c
+from lpdeform.errors import Code, from_call, make
+from lpdeform.v1 import data_pb2, service_pb2
+
+Response = TypeVar("Response", bound=Message)
+_service = "/lpdeform.v1.DeformService/"
+_most_part_bytes = 1 << 20
+_most_inline_bytes = 1 << 20
+_channel_options = [
+    ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.min_reconnect_backoff_ms", 1000),
+    ("grpc.max_reconnect_backoff_ms", 1000),
+    ("grpc.dns_min_time_between_resolutions_ms", 1000),
+    ("grpc.keepalive_time_ms", 30_000),
+    ("grpc.keepalive_timeout_ms", 10_000),
+    ("grpc.http2.bdp_probe", 0),  # bounds what is under way: a slow reader costs little memory
+    ("grpc.http2.lookahead_bytes", 256 * 1024),
+    ("grpc.enable_retries", 0),  # sessions resume by themselves, and know what has to be sent again
+]
+
+
+def default_address() -> str:
+    return os.environ.get("LPDEFORM_ADDRESS") or "localhost:50051"
+
+
+class Ended(Protocol):
+    def cancel(self) -> Any: ...
+
+
+class Stop:
+    """Ends the calls that were made with it, from any thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._calls: set[Ended] = set()
+        self.is_set = False
+
+    def set(self) -> None:
+        with self._lock:
+            self.is_set = True
+            calls = list(self._calls)
+        for call in calls:
+            call.cancel()
+
+    def add(self, call: Ended) -> None:
+        with self._lock:
+            self._calls.add(call)
+            is_set = self.is_set
+        if is_set:
+            call.cancel()
+
+    def remove(self, call: Ended) -> None:
+        with self._lock:
+            self._calls.discard(call)
+
+
+class Rpc:
+    """A connection to a server."""
+
+    def __init__(self, address: str, call_timeout: float = 30.0, reconnect_for: float = 120.0) -> None:
+        self.address = address
+        self.call_timeout = call_timeout
+        self.reconnect_for = reconnect_for
+        self._channel = grpc.insecure_channel(address, options=_channel_options)
+
+    def call(self, name: str, request: Message, response: type[Response], stop: Stop, timeout: float | None = None) -> Response:
+        """A call with one answer; waits for it."""
+        method = self._channel.unary_unary(_service + name, _serialize, response.FromString)
+        try:
+            call = method.future(request, timeout=self.call_timeout if timeout is None else timeout)
+        except ValueError as closed:  # the channel is
+            raise make(Code.CANCELLED, "The connection is closed.") from closed
+        stop.add(call)
+        try:
+            answer: Response = call.result()
+            return answer
+        except grpc.FutureCancelledError:
+            raise make(Code.CANCELLED, "The call was ended.") from None
+        except grpc.RpcError as error:
+            raise from_call(error, self.address) from None
+        except BaseException:  # an interrupt in a notebook
+            call.cancel()
+            raise
+        finally:
+            stop.remove(call)
+
+    def deform(self, requests: Iterator[service_pb2.DeformRequest]) -> Any:
+        method = self._channel.stream_stream(_service + "Deform", _serialize, service_pb2.DeformResponse.FromString)
+        return method(requests)
+
+    def solve(self, request: service_pb2.SolveRequest, timeout: float | None) -> Any:
+        method = self._channel.unary_stream(_service + "Solve", _serialize, service_pb2.SolveResponse.FromString)
+        return method(request, timeout=timeout)
+
+    def reach(self, session: str, stop: Stop, timeout: float) -> None:
+        """Waits until the server answers, at most `timeout`. gRPC makes a connection again while a call waits for it."""
+        method = self._channel.unary_unary(_service + "GetSession", _serialize, service_pb2.GetSessionResponse.FromString)
+        try:
+            request = service_pb2.GetSessionRequest(session=session)
+            call = method.future(request, timeout=timeout, wait_for_ready=True)
+        except ValueError:  # the channel was closed
+            return
+        stop.add(call)
+        try:
+            call.exception()  # the next call says what is wrong
+        except grpc.FutureCancelledError:
+            return
+        finally:
+            stop.remove(call)
+
+    def close(self) -> None:
+        self._channel.close()
+
+
+def _serialize(message: Message) -> bytes:
+    return message.SerializeToString()
+
+
+def new_request_id() -> str:
+    """128 random bits, in hexadecimal digits."""
+    return secrets.token_hex(16)
+
+
+class Packer:
+    """Puts runs of numbers into the buffers of one message: inline up to 1 MiB together, the rest ahead as uploads.
+
+    `request_id`: the same for every try of the same call, so that it is the same request to the last bit.
+    """
+
+    def __init__(self, rpc: Rpc, stop: Stop, request_id: str | None = None) -> None:
+        self._rpc = rpc
+        self._stop = stop
+        self._id = request_id or new_request_id()
+        self._left = _most_inline_bytes
+        self._count = 0
+        self.uploads: list[str] = []
+
+    def pack(self, data: bytes) -> data_pb2.Buffer:
+        if len(data) <= self._left:
+            self._left -= len(data)
+            return data_pb2.Buffer(inline=data)
+        return data_pb2.Buffer(upload=self._upload(data))
+
+    def _upload(self, data: bytes) -> str:
+        self._count += 1
+        create = service_pb2.CreateUploadRequest(
+            request_id=f"{self._id}-{self._count}", size_bytes=len(data), crc32c=crc32c(data)
+        )
+        created = self._rpc.call("CreateUpload", create, service_pb2.CreateUploadResponse, self._stop)
+        self.uploads.append(created.upload)
+        part_bytes = min(max(created.max_part_bytes, 1), _most_part_bytes)
+        is_finished = False
+        for offset in range(0, len(data), part_bytes):
+            part = service_pb2.UploadPartRequest(
+                upload=created.upload, offset=offset, data=data[offset : offset + part_bytes]
+            )
+            is_finished = self._rpc.call("UploadPart", part, service_pb2.UploadPartResponse, self._stop).finished
+        if not is_finished:
+            text = "The server misses parts of an upload that were all sent."
+            raise make(Code.DATA_LOSS, text, "UPLOAD_INCOMPLETE", created.upload)
+        return created.upload
+
+    def discard(self) -> None:
+        """Gives the memory back before the uploads expire."""
+        names, self.uploads = self.uploads, []
+        for name in names:
+            try:
+                request = service_pb2.DeleteUploadRequest(upload=name)
+                self._rpc.call("DeleteUpload", request, service_pb2.DeleteUploadResponse, self._stop)
+            except Exception:  # it expires by itself
+                return

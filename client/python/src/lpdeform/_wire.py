@@ -1,0 +1,317 @@
+"""From what is given to messages of the contract, in two steps: checked and copied at once, packed when it is sent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from lpdeform import types
+from lpdeform._numbers import Copied, indices, is_single_precision, numbers
+from lpdeform._rpc import Packer
+from lpdeform.errors import invalid
+from lpdeform.v1 import data_pb2, frame_pb2, handle_pb2, report_pb2, service_pb2
+
+T = TypeVar("T")
+
+_methods: dict[types.Method, handle_pb2.Method] = {
+    "auto": handle_pb2.METHOD_UNSPECIFIED,
+    "quasi_newton": handle_pb2.METHOD_QUASI_NEWTON,
+    "line_search": handle_pb2.METHOD_LINE_SEARCH,
+    "local_global": handle_pb2.METHOD_LOCAL_GLOBAL,
+    "conic": handle_pb2.METHOD_CONIC,
+    "multiresolution": handle_pb2.METHOD_MULTIRESOLUTION,
+}
+_guesses: dict[types.InitialGuess, handle_pb2.InitialGuess] = {
+    "current": handle_pb2.INITIAL_GUESS_UNSPECIFIED,
+    "laplacian": handle_pb2.INITIAL_GUESS_LAPLACIAN,
+    "rest": handle_pb2.INITIAL_GUESS_REST,
+}
+_weights: dict[types.WeightKind, report_pb2.WeightKind] = {
+    "cotangent": report_pb2.WEIGHT_KIND_COTANGENT,
+    "uniform": report_pb2.WEIGHT_KIND_UNIFORM,
+    "intrinsic_delaunay": report_pb2.WEIGHT_KIND_INTRINSIC_DELAUNAY,
+}
+_free_components: dict[types.FreeComponents, service_pb2.FreeComponents] = {
+    "error": service_pb2.FREE_COMPONENTS_ERROR,
+    "stay": service_pb2.FREE_COMPONENTS_STAY,
+    "follow": service_pb2.FREE_COMPONENTS_FOLLOW,
+}
+_encodings: dict[types.Encoding, frame_pb2.Encoding] = {
+    "float64": frame_pb2.ENCODING_RAW,
+    "float32": frame_pb2.ENCODING_RAW,
+    "quantized": frame_pb2.ENCODING_QUANTIZED,
+    "compressed": frame_pb2.ENCODING_COMPRESSED,
+}
+
+
+def named(table: Mapping[Any, T], name: object, what: str) -> T:
+    if name not in table:
+        known = ", ".join(table)
+        raise invalid(f"There is no {what} {name!r}: there are {known}.", "NAME_UNKNOWN", what, known)
+    return table[name]
+
+
+# Checked and copied.
+
+
+def checked_update(update: types.Update) -> types.Update:
+    handles = {str(name): _checked_change(str(name), change) for name, change in update.handles.items()}
+    if update.resize is not None:
+        _vector(update.resize.scale, "resize.scale")
+    return types.Update(handles, checked_settings(update.settings), update.resize)
+
+
+def _checked_change(name: str, change: types.Change) -> types.Change:
+    what = f"handle {name!r}"
+    if isinstance(change, types.Handle):
+        points = change.points
+        if points is not None:
+            faces = indices(points.faces, f"faces of the points of {what}")
+            barycentric = numbers(points.barycentric, f"barycentric coordinates of {what}", 3)
+            points = types.SurfacePoints(faces, barycentric)
+        return replace(
+            change,
+            vertices=indices(change.vertices, f"vertices of {what}"),
+            points=points,
+            motion=_checked_motion(change.motion, what),
+            hold=_checked_hold(change.hold, what),
+        )
+    if isinstance(change, types.Removal):
+        return change
+    return _checked_motion(change, what)
+
+
+def _checked_motion(motion: types.Motion, what: str) -> types.Motion:
+    if isinstance(motion, types.Targets):
+        return types.Targets(numbers(motion.positions, f"targets of {what}", 3))
+    if isinstance(motion, types.RigidMotion):
+        return types.RigidMotion(
+            _vector(motion.axis, f"axis of {what}"),
+            float(motion.angle),
+            _vector(motion.center, f"center of {what}"),
+            _vector(motion.translation, f"translation of {what}"),
+        )
+    if isinstance(motion, types.Fixed):
+        return motion
+    raise invalid(f"The motion of {what} is of type {type(motion).__name__}.", "MOTION_TYPE", what)
+
+
+def _checked_hold(hold: types.Hold, what: str) -> types.Hold:
+    if isinstance(hold, types.AxisLock):
+        return types.AxisLock(_vector(hold.axis, f"axis of {what}"))
+    if isinstance(hold, types.PlaneLock):
+        return types.PlaneLock(_vector(hold.normal, f"normal of {what}"))
+    if isinstance(hold, (types.Exact, types.Soft, types.Orientation)):
+        return hold
+    raise invalid(f"The hold of {what} is of type {type(hold).__name__}.", "HOLD_TYPE", what)
+
+
+def checked_settings(settings: types.Settings) -> types.Settings:
+    if settings.solver is not None:
+        named(_methods, settings.solver.method, "method")
+        named(_guesses, settings.solver.initial, "initial guess")
+    return replace(
+        settings,
+        p=_checked_field(settings.p, "p"),
+        stiffness=_checked_field(settings.stiffness, "stiffness"),
+        region=None if settings.region is None else indices(settings.region, "region"),
+    )
+
+
+def _checked_field(value: types.Field | None, what: str) -> types.Field | None:
+    if value is None or isinstance(value, types.Automatic):
+        return value
+    if np.ndim(value) == 0 and not isinstance(value, (str, bytes)):
+        try:
+            return float(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            raise invalid(f"{what} is of type {type(value).__name__}.", "ARRAY_TYPE", what) from None
+    return numbers(value, what)
+
+
+def _vector(values: types.Vector3, what: str) -> types.Vector3:
+    array = numbers(values, what)
+    if array.shape != (3,):
+        raise invalid(f"The {what} is of shape {array.shape} and not three numbers.", "ARRAY_SHAPE", what, "(3,)")
+    x, y, z = (float(value) for value in array)
+    return (x, y, z)
+
+
+# Packed.
+
+
+def scalar_of(array: Copied) -> data_pb2.Scalar:
+    return data_pb2.SCALAR_FLOAT32 if is_single_precision(array) else data_pb2.SCALAR_FLOAT64
+
+
+def _packed(array: npt.ArrayLike, packer: Packer) -> data_pb2.Buffer:
+    return packer.pack(np.asarray(array).tobytes())
+
+
+def mesh_to_wire(vertices: Copied, faces: Copied, packer: Packer) -> data_pb2.Mesh:
+    return data_pb2.Mesh(
+        vertex_count=len(vertices),
+        face_count=len(faces),
+        scalar=scalar_of(vertices),
+        data=packer.pack(vertices.tobytes() + faces.tobytes()),
+    )
+
+
+def weld_to_wire(weld: Copied | None, packer: Packer) -> data_pb2.Weld:
+    """`weld`: one number a vertex, or None for by position."""
+    if weld is None:
+        return data_pb2.Weld(position=data_pb2.WeldByPosition())
+    return data_pb2.Weld(groups=_packed(weld, packer))
+
+
+def normals_to_wire(normals: Copied, packer: Packer) -> data_pb2.Normals:
+    return data_pb2.Normals(scalar=scalar_of(normals), data=_packed(normals, packer))
+
+
+def weights_to_wire(weights: str) -> report_pb2.WeightKind:
+    return named(_weights, weights, "weights")
+
+
+def free_components_to_wire(free_components: str) -> service_pb2.FreeComponents:
+    return named(_free_components, free_components, "free_components")
+
+
+def frame_options_to_wire(
+    encoding: str, lowest_encoding: str | None, credit: int, with_distortion: bool, with_normals: bool,
+    max_frames_per_second: float, certify: bool,
+) -> frame_pb2.FrameOptions:  # fmt: skip
+    asked = named(_encodings, encoding, "encoding")
+    lowest = asked if lowest_encoding is None else max(asked, named(_encodings, lowest_encoding, "encoding"))
+    return frame_pb2.FrameOptions(
+        credit=credit,
+        scalar=data_pb2.SCALAR_FLOAT64 if encoding == "float64" else data_pb2.SCALAR_FLOAT32,
+        without_distortion=not with_distortion,
+        max_frames_per_second=max_frames_per_second,
+        with_normals=with_normals,
+        encoding=asked,
+        lowest_encoding=lowest,
+        certify=certify,
+    )
+
+
+def update_to_wire(update: types.Update, input_seq: int, packer: Packer) -> service_pb2.Update:
+    message = service_pb2.Update(input_seq=input_seq, settings=settings_to_wire(update.settings, packer))
+    for name, change in update.handles.items():
+        message.handles.append(_change_to_wire(name, change, packer))
+    if update.resize is not None:
+        message.resize.CopyFrom(_resize_to_wire(update.resize))
+    return message
+
+
+def settings_to_wire(settings: types.Settings, packer: Packer) -> handle_pb2.SettingsUpdate:
+    message = handle_pb2.SettingsUpdate()
+    if settings.p is not None:
+        message.p.CopyFrom(_field_to_wire(settings.p, packer))
+    if settings.stiffness is not None:
+        message.stiffness.CopyFrom(_field_to_wire(settings.stiffness, packer))
+    if settings.length_unit is not None:
+        message.length_unit.length = settings.length_unit
+        message.length_unit.SetInParent()
+    if (solver := settings.solver) is not None:
+        message.solver.SetInParent()
+        message.solver.method = _methods[solver.method]
+        message.solver.tolerance = solver.tolerance
+        message.solver.max_iterations = solver.max_iterations
+        message.solver.time_limit_seconds = solver.time_limit
+        message.solver.initial = _guesses[solver.initial]
+    if settings.region is not None:
+        message.region.SetInParent()
+        if np.size(settings.region):
+            message.region.vertices.CopyFrom(_packed(settings.region, packer))
+    return message
+
+
+def _field_to_wire(value: types.Field, packer: Packer) -> data_pb2.Field:
+    if isinstance(value, types.Automatic):
+        return data_pb2.Field(automatic=data_pb2.AutomaticField(strength=value.strength))
+    if isinstance(value, float):
+        return data_pb2.Field(uniform=value)
+    array = np.asarray(value)
+    return data_pb2.Field(per_vertex=data_pb2.FieldValues(scalar=scalar_of(array), values=_packed(array, packer)))
+
+
+def _change_to_wire(name: str, change: types.Change, packer: Packer) -> handle_pb2.HandleUpdate:
+    if isinstance(change, types.Handle):
+        return handle_pb2.HandleUpdate(name=name, set=_handle_to_wire(change, packer))
+    if isinstance(change, types.Removal):
+        return handle_pb2.HandleUpdate(name=name, remove=handle_pb2.Removal())
+    return handle_pb2.HandleUpdate(name=name, move=_motion_to_wire(change, packer))
+
+
+def _handle_to_wire(handle: types.Handle, packer: Packer) -> handle_pb2.Handle:
+    message = handle_pb2.Handle(motion=_motion_to_wire(handle.motion, packer), footprint_radius=handle.footprint)
+    if handle.points is None or np.size(handle.vertices):
+        message.vertices.CopyFrom(_packed(handle.vertices, packer))
+    if handle.points is not None:
+        barycentric = np.asarray(handle.points.barycentric)
+        points = handle_pb2.SurfacePoints(
+            faces=_packed(handle.points.faces, packer),
+            scalar=scalar_of(barycentric),
+            barycentric=_packed(barycentric, packer),
+        )
+        message.points.CopyFrom(points)
+    hold = handle.hold
+    if isinstance(hold, types.Soft):
+        message.soft.weight = hold.weight
+    elif isinstance(hold, types.Orientation):
+        message.orientation.weight = hold.weight
+    elif isinstance(hold, types.AxisLock):
+        message.axis_lock.axis.CopyFrom(_vector_to_wire(hold.axis))
+    elif isinstance(hold, types.PlaneLock):
+        message.plane_lock.normal.CopyFrom(_vector_to_wire(hold.normal))
+    return message
+
+
+def _motion_to_wire(motion: types.Motion, packer: Packer) -> handle_pb2.Motion:
+    if isinstance(motion, types.Targets):
+        positions = np.asarray(motion.positions)
+        targets = handle_pb2.TargetPositions(scalar=scalar_of(positions), positions=_packed(positions, packer))
+        return handle_pb2.Motion(targets=targets)
+    if isinstance(motion, types.RigidMotion):
+        rigid = handle_pb2.RigidMotion(
+            axis=_vector_to_wire(motion.axis),
+            angle_radians=motion.angle,
+            center=_vector_to_wire(motion.center),
+            translation=_vector_to_wire(motion.translation),
+        )
+        return handle_pb2.Motion(rigid=rigid)
+    return handle_pb2.Motion(fixed=handle_pb2.Fixed())
+
+
+def _resize_to_wire(resize: types.Resize) -> data_pb2.Resize:
+    message = data_pb2.Resize(scale=_vector_to_wire(resize.scale))
+    if resize.origin is not None:
+        message.origin.CopyFrom(_vector_to_wire(resize.origin))
+    if resize.axes is not None:
+        message.x_axis.CopyFrom(_vector_to_wire(resize.axes[0]))
+        message.y_axis.CopyFrom(_vector_to_wire(resize.axes[1]))
+    return message
+
+
+def _vector_to_wire(vector: types.Vector3) -> data_pb2.Vector3:
+    x, y, z = (float(value) for value in vector)
+    return data_pb2.Vector3(x=x, y=y, z=z)
+
+
+# From the wire.
+
+
+def report_from_wire(report: report_pb2.MeshReport) -> types.MeshReport:
+    return types.MeshReport(
+        vertices=report.vertices,
+        faces=report.faces,
+        edges=report.edges,
+        components=report.components,
+        boundary_loops=report.boundary_loops,
+        defects=tuple(types.Defect(one.kind, one.count, tuple(one.first)) for one in report.defects),
+        welded_vertices=report.welded_vertices,
+    )

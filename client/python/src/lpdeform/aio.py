@@ -1,0 +1,233 @@
+"""The same sessions for asyncio: what waits is awaited. They work in any event loop, and cancelling ends what was asked for."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Callable, Generator, Mapping
+from types import TracebackType
+from typing import Any, TypeVar
+
+import numpy.typing as npt
+
+from lpdeform._link import Link
+from lpdeform._rpc import Stop
+from lpdeform._solve import solve
+from lpdeform.errors import LpdeformError
+from lpdeform.frames import Frame
+from lpdeform.session import Live, connect, frame_options, join_link, open_link
+from lpdeform.types import (
+    Encoding,
+    Field,
+    FreeComponents,
+    Handle,
+    Motion,
+    Settings,
+    SolveProgress,
+    SolveResult,
+    SolverSettings,
+    Vector3,
+    WeightKind,
+)
+
+T = TypeVar("T")
+
+
+async def _in_a_thread(work: Callable[[Stop], T]) -> T:
+    """`work` on another thread; cancelling ends its calls."""
+    stop = Stop()
+    try:
+        return await asyncio.to_thread(work, stop)
+    except asyncio.CancelledError:
+        stop.set()
+        raise
+
+
+class AsyncSession(Live):
+    """As Session. `async for frame in session` gives frames as they come, the newest first."""
+
+    async def move(
+        self,
+        name: str,
+        motion: Motion | None = None,
+        *,
+        translation: Vector3 | None = None,
+        axis: Vector3 | None = None,
+        angle: float | None = None,
+        center: Vector3 | None = None,
+        targets: npt.ArrayLike | None = None,
+        timeout: float = 60.0,
+    ) -> Frame:
+        """As Session.move()."""
+        self.drag(name, motion, translation=translation, axis=axis, angle=angle, center=center, targets=targets)
+        return await self.settle(timeout)
+
+    async def next_frame(self, timeout: float = 60.0) -> Frame:
+        """As Session.next_frame()."""
+        return await self._next(time.monotonic() + timeout)
+
+    async def settle(self, timeout: float = 60.0) -> Frame:
+        """As Session.settle()."""
+        deadline = time.monotonic() + timeout
+        while True:
+            frame = await self._next(deadline)
+            if self._link.is_result(frame):
+                return frame
+
+    async def _next(self, deadline: float) -> Frame:
+        loop, news = asyncio.get_running_loop(), asyncio.Event()
+
+        def tell() -> None:
+            loop.call_soon_threadsafe(news.set)
+
+        self._link.box.listen(tell)
+        try:
+            while True:
+                news.clear()
+                frame = self._link.take()
+                if frame is not None:
+                    return frame
+                try:
+                    await asyncio.wait_for(news.wait(), deadline - time.monotonic())
+                except asyncio.TimeoutError:
+                    raise self._link.no_frame() from None
+        finally:
+            self._link.box.forget(tell)
+
+    async def __aiter__(self) -> AsyncIterator[Frame]:
+        while not self._link.is_closing:
+            try:
+                yield await self._next(time.monotonic() + 3600)
+            except LpdeformError as error:
+                if error.reason == "SESSION_CLOSED":
+                    return
+                if error.reason != "NO_FRAME":
+                    raise
+
+    async def solve(
+        self,
+        *,
+        certify: bool = False,
+        trace: bool = False,
+        with_normals: bool = False,
+        initial_positions: npt.ArrayLike | None = None,
+        on_progress: Callable[[SolveProgress], None] | None = None,
+        timeout: float | None = None,
+    ) -> SolveResult:
+        """As Session.solve(); `on_progress` is called in the event loop."""
+        loop, report = asyncio.get_running_loop(), None
+        if on_progress is not None:
+            told = on_progress
+
+            def report(progress: SolveProgress) -> None:
+                loop.call_soon_threadsafe(told, progress)
+
+        options = self._solve_options(certify, trace, with_normals, initial_positions, report, timeout)
+        return await _in_a_thread(lambda stop: solve(self._link, options, stop))
+
+    async def take_over(self) -> None:
+        """As Session.take_over()."""
+        await asyncio.to_thread(self._link.take_over)
+
+    async def close(self) -> None:
+        """As Session.close()."""
+        await asyncio.to_thread(self._link.close)
+
+    async def __aenter__(self) -> AsyncSession:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    def __repr__(self) -> str:
+        return f"<AsyncSession at {self.address}: {self.mesh_report.vertices} vertices, {self.connection}>"
+
+
+class Opening:
+    """A session to be: `session = await opening`, or `async with opening as session`."""
+
+    def __init__(self, make: Callable[[Stop], Link]) -> None:
+        self._make = make
+        self._session: AsyncSession | None = None
+
+    async def _open(self) -> AsyncSession:
+        return AsyncSession(await _in_a_thread(self._make))
+
+    def __await__(self) -> Generator[Any, None, AsyncSession]:
+        return self._open().__await__()
+
+    async def __aenter__(self) -> AsyncSession:
+        self._session = await self._open()
+        return self._session
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if self._session is not None:
+            await self._session.close()
+
+
+def open_async(
+    vertices: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    *,
+    address: str | None = None,
+    handles: Mapping[str, Handle] | None = None,
+    p: Field | None = None,
+    stiffness: Field | None = None,
+    length_unit: float | None = None,
+    solver: SolverSettings | None = None,
+    region: npt.ArrayLike | None = None,
+    normals: npt.ArrayLike | None = None,
+    weights: WeightKind = "cotangent",
+    free_components: FreeComponents = "error",
+    weld: npt.ArrayLike | bool = False,
+    encoding: Encoding = "float32",
+    lowest_encoding: Encoding | None = None,
+    credit: int = 0,
+    with_distortion: bool = True,
+    with_normals: bool = False,
+    certify: bool = False,
+    max_frames_per_second: float = 0.0,
+    call_timeout: float = 30.0,
+    reconnect_for: float = 120.0,
+) -> Opening:
+    """As open(): `async with lpdeform.open_async(vertices, faces) as session`."""
+    options = frame_options(
+        encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
+    )
+    settings = Settings(p, stiffness, length_unit, solver, region)
+
+    def make(stop: Stop) -> Link:
+        rpc = connect(address, call_timeout, reconnect_for)
+        return open_link(
+            rpc, stop, vertices, faces, normals, handles, settings, weights, free_components, weld, options
+        )
+
+    return Opening(make)
+
+
+def join_async(
+    name: str,
+    *,
+    as_writer: bool = False,
+    address: str | None = None,
+    encoding: Encoding = "float32",
+    lowest_encoding: Encoding | None = None,
+    credit: int = 0,
+    with_distortion: bool = True,
+    with_normals: bool = False,
+    certify: bool = False,
+    max_frames_per_second: float = 0.0,
+    call_timeout: float = 30.0,
+    reconnect_for: float = 120.0,
+) -> Opening:
+    """As join()."""
+    options = frame_options(
+        encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
+    )
+    return Opening(
+        lambda stop: join_link(connect(address, call_timeout, reconnect_for), stop, name, as_writer, options)
+    )

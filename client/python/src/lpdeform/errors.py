@@ -1,0 +1,193 @@
+"""What this package raises. proto/errors.md lists the server's reasons."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from typing import Any
+
+from lpdeform.v1 import google_rpc_pb2, service_pb2
+
+
+class Code(str, Enum):
+    """The kinds of google.rpc.Code, by their names."""
+
+    CANCELLED = "cancelled"
+    UNKNOWN = "unknown"
+    INVALID_ARGUMENT = "invalid_argument"
+    DEADLINE_EXCEEDED = "deadline_exceeded"
+    NOT_FOUND = "not_found"
+    ALREADY_EXISTS = "already_exists"
+    PERMISSION_DENIED = "permission_denied"
+    RESOURCE_EXHAUSTED = "resource_exhausted"
+    FAILED_PRECONDITION = "failed_precondition"
+    ABORTED = "aborted"
+    OUT_OF_RANGE = "out_of_range"
+    UNIMPLEMENTED = "unimplemented"
+    INTERNAL = "internal"
+    UNAVAILABLE = "unavailable"
+    DATA_LOSS = "data_loss"
+    UNAUTHENTICATED = "unauthenticated"
+
+
+_by_number = dict(enumerate(Code, start=1))
+
+
+class LpdeformError(Exception):
+    """Every error of this package. `str(error)` is one sentence for people; programs read the rest.
+
+    code: the kind of error.
+    reason: stable, upper case: "HANDLE_VERTEX_TWICE"; empty where the server was not reached.
+    element: what is wrong: "vertex 17"; may be empty.
+    limit: the bound that was broken; may be empty.
+    metadata: all that the server said of it (google.rpc.ErrorInfo.metadata), `element` and `limit` included.
+    input_seq: the update that it is about; 0 where it is about none.
+    retry_after: seconds after which to try again; 0 where trying again does not help.
+    """
+
+    code: Code
+    reason: str
+    element: str
+    limit: str
+    metadata: Mapping[str, str]
+    input_seq: int
+    retry_after: float
+
+    def __init__(
+        self,
+        code: Code,
+        message: str,
+        reason: str = "",
+        element: str = "",
+        limit: str = "",
+        *,
+        metadata: Mapping[str, str] | None = None,
+        input_seq: int = 0,
+        retry_after: float = 0.0,
+    ) -> None:
+        super().__init__(message)
+        self.code = code
+        self.reason = reason
+        self.element = element
+        self.limit = limit
+        self.metadata = dict(metadata or {})
+        self.input_seq = input_seq
+        self.retry_after = retry_after
+
+    def __str__(self) -> str:
+        return f"{self.args[0]} ({self.reason})" if self.reason else str(self.args[0])
+
+
+class InvalidInput(LpdeformError, ValueError):
+    """What was given cannot be deformed: `element` and `limit` say what and why."""
+
+
+class Unavailable(LpdeformError, ConnectionError):
+    """No server answers, or it went away."""
+
+
+class Timeout(LpdeformError, TimeoutError):
+    """What was waited for did not come in time."""
+
+
+_classes: dict[Code, type[LpdeformError]] = {
+    Code.INVALID_ARGUMENT: InvalidInput,
+    Code.UNAVAILABLE: Unavailable,
+    Code.DEADLINE_EXCEEDED: Timeout,
+}
+
+
+def make(
+    code: Code,
+    message: str,
+    reason: str = "",
+    element: str = "",
+    limit: str = "",
+    *,
+    metadata: Mapping[str, str] | None = None,
+    input_seq: int = 0,
+    retry_after: float = 0.0,
+) -> LpdeformError:
+    """The error of the class that its code asks for."""
+    return _classes.get(code, LpdeformError)(
+        code, message, reason, element, limit, metadata=metadata, input_seq=input_seq, retry_after=retry_after
+    )
+
+
+def invalid(message: str, reason: str, element: str = "", limit: str = "") -> LpdeformError:
+    return make(Code.INVALID_ARGUMENT, message, reason, element, limit)
+
+
+def session_closed() -> LpdeformError:
+    return make(Code.FAILED_PRECONDITION, "The session is closed.", "SESSION_CLOSED")
+
+
+def again(error: LpdeformError) -> LpdeformError:
+    """A copy to be raised, so that tracebacks of several calls do not pile up on one error."""
+    return make(
+        error.code,
+        str(error.args[0]),
+        error.reason,
+        error.element,
+        error.limit,
+        metadata=error.metadata,
+        input_seq=error.input_seq,
+        retry_after=error.retry_after,
+    )
+
+
+def from_fault(fault: service_pb2.Fault) -> LpdeformError:
+    metadata = {name: value for name, value in (("element", fault.element), ("limit", fault.limit)) if value}
+    return make(
+        _by_number.get(fault.code, Code.UNKNOWN),
+        fault.text,
+        fault.reason,
+        fault.element,
+        fault.limit,
+        metadata=metadata,
+        input_seq=fault.input_seq,
+        retry_after=fault.retry_after_ms / 1000,
+    )
+
+
+def from_call(error: Any, address: str) -> LpdeformError:
+    """Of the grpc.RpcError that a call ended with: its google.rpc.Status, where the server sent one."""
+    code = Code[error.code().name] if error.code().name in Code.__members__ else Code.UNKNOWN
+    info, retry = google_rpc_pb2.ErrorInfo(), google_rpc_pb2.RetryInfo()
+    for key, value in error.trailing_metadata() or ():
+        if key != "grpc-status-details-bin" or not isinstance(value, bytes):
+            continue
+        for detail in google_rpc_pb2.Status.FromString(value).details:
+            if detail.type_url.endswith("/google.rpc.ErrorInfo"):
+                info.ParseFromString(detail.value)
+            elif detail.type_url.endswith("/google.rpc.RetryInfo"):
+                retry.ParseFromString(detail.value)
+    message = error.details() or "The call failed."
+    if code is Code.UNAVAILABLE and not info.reason:
+        message, info.reason = f"No lpdeform server answers at {address}: {message}", "NO_SERVER"
+    metadata = dict(info.metadata)
+    return make(
+        code,
+        message,
+        info.reason,
+        metadata.get("element", ""),
+        metadata.get("limit", ""),
+        metadata=metadata,
+        retry_after=retry.retry_delay.seconds + retry.retry_delay.nanos / 1e9,
+    )
+
+
+def is_session_lost(error: LpdeformError) -> bool:
+    """The server has the session no more."""
+    return error.code is Code.NOT_FOUND and error.reason.startswith("SESSION_")
+
+
+def is_undecided(error: LpdeformError) -> bool:
+    """Whether the server took the call is not known, or may change: it is to be tried again."""
+    passing = (Code.UNAVAILABLE, Code.CANCELLED, Code.DEADLINE_EXCEEDED, Code.RESOURCE_EXHAUSTED)
+    return error.code in passing or is_session_lost(error) or error.reason == "UPLOAD_UNKNOWN"
+
+
+def is_taken_all_the_same(error: LpdeformError) -> bool:
+    """The server took the update, and cannot solve for it yet."""
+    return error.code in (Code.FAILED_PRECONDITION, Code.ABORTED)

@@ -1,0 +1,463 @@
+"""Sessions as programs use them."""
+
+from __future__ import annotations
+
+import atexit
+import threading
+import time
+import weakref
+from collections.abc import Callable, Iterator, Mapping
+from types import TracebackType
+from typing import Any, TypeVar
+
+import numpy.typing as npt
+
+from lpdeform import _codec, _wire
+from lpdeform._lease import Original, create_session, join_session
+from lpdeform._link import Link
+from lpdeform._numbers import indices, numbers
+from lpdeform._rpc import Rpc, Stop, default_address, new_request_id
+from lpdeform._solve import SolveOptions, checked_positions, solve
+from lpdeform.errors import LpdeformError, invalid, session_closed
+from lpdeform.frames import Frame
+from lpdeform.types import (
+    Change,
+    Connection,
+    Encoding,
+    Field,
+    FreeComponents,
+    Handle,
+    Hold,
+    Exact,
+    Fixed,
+    MeshReport,
+    Motion,
+    Removal,
+    Resize,
+    RigidMotion,
+    Settings,
+    SolveProgress,
+    SolveResult,
+    SolverSettings,
+    SurfacePoints,
+    Targets,
+    Update,
+    Vector3,
+    WeightKind,
+)
+from lpdeform.v1 import frame_pb2
+
+Self = TypeVar("Self", bound="Live")
+_no_motion = Fixed()
+_links: weakref.WeakSet[Link] = weakref.WeakSet()
+
+
+@atexit.register
+def _close_all() -> None:
+    for link in list(_links):
+        link.close()
+
+
+def _abandon(link: Link) -> None:
+    """Of a session that nobody has any more. The collector may run on any thread, so it must not wait here."""
+    threading.Thread(target=link.close, daemon=True).start()
+
+
+class Live:
+    """What sessions have that does not wait. Changes made faster than the connection takes them are merged, the newest value of
+    each handle and each setting winning."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        _links.add(link)
+        finalizer: Any = weakref.finalize(self, _abandon, link)
+        finalizer.atexit = False
+
+    @property
+    def name(self) -> str:
+        """"sessions/<32 hexadecimal digits>"; another one after the session had to be made anew."""
+        return self._link.lease.session
+
+    @property
+    def address(self) -> str:
+        """Of the server."""
+        return self._link.rpc.address
+
+    @property
+    def mesh_report(self) -> MeshReport:
+        """What the server found in the mesh."""
+        return self._link.lease.report
+
+    @property
+    def connection(self) -> Connection:
+        """"idle" before the first update or frame; "reconnecting" while the server is away; "closed" when all is over."""
+        return self._link.connection
+
+    @property
+    def interruption(self) -> LpdeformError | None:
+        """Why it is "reconnecting", or was the last time: DRAINING where the server shuts down."""
+        return self._link.interruption
+
+    @property
+    def newest_input(self) -> int:
+        """The newest update that was not refused; 0 where there is none."""
+        with self._link.changed:
+            return self._link.ledger.newest
+
+    def update(
+        self,
+        handles: Mapping[str, Change] | None = None,
+        settings: Settings | None = None,
+        resize: Resize | None = None,
+    ) -> int:
+        """Sends a change, which the server takes whole or not at all, and returns its number: a frame whose input_seq is at
+        least that takes it into account.
+
+        What the server refuses is raised by the next call that takes frames, once; the session goes on without it, and
+        without what was merged into it. Raises at once where the session is closed (SESSION_CLOSED), for a reader
+        (NOT_THE_WRITER), and for arrays of the wrong type or shape.
+        """
+        return self._link.update(Update(handles or {}, settings or Settings(), resize))
+
+    def set_handles(self, handles: Mapping[str, Handle]) -> int:
+        """Adds handles or replaces those of the same names. As update()."""
+        return self.update(handles)
+
+    def set_handle(
+        self,
+        name: str,
+        vertices: npt.ArrayLike = (),
+        motion: Motion = _no_motion,
+        *,
+        hold: Hold = Exact(),
+        points: SurfacePoints | None = None,
+        footprint: float = 0.0,
+    ) -> int:
+        """Adds a handle or replaces the one of that name. As update()."""
+        return self.update({name: Handle(vertices, motion, hold, points, footprint)})
+
+    def drag(
+        self,
+        name: str,
+        motion: Motion | None = None,
+        *,
+        translation: Vector3 | None = None,
+        axis: Vector3 | None = None,
+        angle: float | None = None,
+        center: Vector3 | None = None,
+        targets: npt.ArrayLike | None = None,
+    ) -> int:
+        """Moves a handle without waiting for the surface. As update(); the motion as in move()."""
+        return self.update({name: motion_of(motion, translation, axis, angle, center, targets)})
+
+    def remove(self, name: str) -> int:
+        """Lets go of a handle. As update()."""
+        return self.update({name: Removal()})
+
+    def set(
+        self,
+        *,
+        p: Field | None = None,
+        stiffness: Field | None = None,
+        length_unit: float | None = None,
+        solver: SolverSettings | None = None,
+        region: npt.ArrayLike | None = None,
+    ) -> int:
+        """Changes what is given. As update()."""
+        return self.update(settings=Settings(p, stiffness, length_unit, solver, region))
+
+    def poll(self) -> Frame | None:
+        """The newest frame not yet taken, where there is one; does not wait.
+
+        Taking a frame tells the server to send on, so that a reader who stops asking costs a bounded number of frames. Raises
+        what the server had to say about an update, once, and once nothing more comes, why.
+        """
+        return self._link.take()
+
+    def _solve_options(
+        self,
+        certify: bool,
+        trace: bool,
+        with_normals: bool,
+        initial_positions: npt.ArrayLike | None,
+        on_progress: Callable[[SolveProgress], None] | None,
+        timeout: float | None,
+    ) -> SolveOptions:
+        if self._link.is_closing:
+            raise session_closed()
+        positions = checked_positions(initial_positions, self.mesh_report.vertices)
+        return SolveOptions(certify, trace, with_normals, positions, on_progress, timeout)
+
+
+class Session(Live):
+    """A mesh being deformed on a server; open() and join() make sessions. Every function may be called from any thread.
+
+    Frames come over a stream. While it is down, the session reconnects with growing pauses: to the same session where the
+    server still has it, otherwise to a new one that it makes from its own copy of mesh, handles and settings. Frames of an
+    older epoch or an older update than one that was shown are dropped.
+
+    Iterating gives frames as they come, the newest first.
+    """
+
+    def move(
+        self,
+        name: str,
+        motion: Motion | None = None,
+        *,
+        translation: Vector3 | None = None,
+        axis: Vector3 | None = None,
+        angle: float | None = None,
+        center: Vector3 | None = None,
+        targets: npt.ArrayLike | None = None,
+        timeout: float = 60.0,
+    ) -> Frame:
+        """Moves a handle and waits for the finished result.
+
+        By a motion; or by its parts, x = R (p - center) + center + translation with the rotation by `angle` radians about
+        `axis`; or to `targets`, one position a vertex. Always relative to the rest mesh: the same call twice moves once.
+        """
+        self.drag(name, motion, translation=translation, axis=axis, angle=angle, center=center, targets=targets)
+        return self.settle(timeout)
+
+    def next_frame(self, timeout: float = 60.0) -> Frame:
+        """The newest frame not yet taken; waits for one. Raises as poll(), and Timeout (NO_FRAME)."""
+        return self._next(time.monotonic() + timeout)
+
+    def settle(self, timeout: float = 60.0) -> Frame:
+        """Takes frames until one is the finished result of the newest update. Waits in vain where that one was taken before;
+        not for its optimality_gap, which the next frame has. Raises as next_frame()."""
+        deadline = time.monotonic() + timeout
+        while True:
+            frame = self._next(deadline)
+            if self._link.is_result(frame):
+                return frame
+
+    def _next(self, deadline: float) -> Frame:
+        while True:
+            frame = self._link.take()
+            if frame is not None:
+                return frame
+            if not self._link.box.wait(deadline):
+                raise self._link.no_frame()
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Ends when the session is closed; raises why where it is over otherwise."""
+        while not self._link.is_closing:
+            try:
+                yield self._next(time.monotonic() + 3600)
+            except LpdeformError as error:
+                if error.reason == "SESSION_CLOSED":
+                    return
+                if error.reason != "NO_FRAME":
+                    raise
+
+    def solve(
+        self,
+        *,
+        certify: bool = False,
+        trace: bool = False,
+        with_normals: bool = False,
+        initial_positions: npt.ArrayLike | None = None,
+        on_progress: Callable[[SolveProgress], None] | None = None,
+        timeout: float | None = None,
+    ) -> SolveResult:
+        """Solves for the present handles and settings and returns the finished result, in float64.
+
+        `on_progress` is called at most ten times a second. Begins again where the server went away, for as long as the
+        stream would. Raises what the server refuses, and Timeout.
+        """
+        options = self._solve_options(certify, trace, with_normals, initial_positions, on_progress, timeout)
+        return solve(self._link, options, self._link.stop)
+
+    def take_over(self) -> None:
+        """Becomes the writer in place of whoever is, as a reader or after a WRITER_REPLACED."""
+        self._link.take_over()
+
+    def close(self) -> None:
+        """Ends the stream and every waiting call. Deletes the session on the server where open() made it; where no server
+        answers, it expires there by itself."""
+        self._link.close()
+
+    def __enter__(self: Self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._link.close()
+
+    def __repr__(self) -> str:
+        return f"<Session at {self.address}: {self.mesh_report.vertices} vertices, {self.connection}>"
+
+
+def motion_of(
+    motion: Motion | None,
+    translation: Vector3 | None,
+    axis: Vector3 | None,
+    angle: float | None,
+    center: Vector3 | None,
+    targets: npt.ArrayLike | None,
+) -> Motion:
+    parts = {"translation": translation, "axis": axis, "angle": angle, "center": center}
+    given = {name: value for name, value in parts.items() if value is not None}
+    if (motion is not None) + (targets is not None) + bool(given) > 1:
+        raise invalid("A motion, its parts and targets exclude each other.", "MOTION_TWICE")
+    if motion is not None:
+        return motion
+    if targets is not None:
+        return Targets(targets)
+    if not given:
+        raise invalid("There is no motion: give translation, axis and angle, targets, or a motion.", "MOTION_MISSING")
+    return RigidMotion(**given)  # type: ignore[arg-type]
+
+
+def connect(address: str | None, call_timeout: float, reconnect_for: float) -> Rpc:
+    return Rpc(address or default_address(), call_timeout, reconnect_for)
+
+
+def open_link(
+    rpc: Rpc,
+    stop: Stop,
+    vertices: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    normals: npt.ArrayLike | None,
+    handles: Mapping[str, Handle] | None,
+    settings: Settings,
+    weights: WeightKind,
+    free_components: FreeComponents,
+    weld: npt.ArrayLike | bool,
+    frame_options: frame_pb2.FrameOptions,
+) -> Link:
+    original = Original(
+        vertices=numbers(vertices, "vertices", 3),
+        faces=indices(faces, "faces", 3),
+        normals=None if normals is None else numbers(normals, "normals", 3),
+        weld=weld if isinstance(weld, bool) else indices(weld, "weld"),
+        weights=_wire.weights_to_wire(weights),
+        free_components=_wire.free_components_to_wire(free_components),
+        settings=_wire.checked_settings(settings),
+    )
+    try:
+        lease = create_session(rpc, original, new_request_id(), stop)
+    except BaseException:
+        rpc.close()
+        raise
+    link = Link(rpc, lease, frame_options, original)
+    if handles:
+        try:
+            link.update(Update(dict(handles)))
+        except BaseException:
+            link.close()
+            raise
+    return link
+
+
+def frame_options(
+    encoding: Encoding,
+    lowest_encoding: Encoding | None,
+    credit: int,
+    with_distortion: bool,
+    with_normals: bool,
+    max_frames_per_second: float,
+    certify: bool,
+) -> frame_pb2.FrameOptions:
+    if not 0 <= credit <= 8:
+        raise invalid(f"The credit is {credit}.", "CREDIT_OUT_OF_RANGE", "credit", "0 <= credit <= 8")
+    if "compressed" in (encoding, lowest_encoding):
+        _codec.require_decoder()
+    return _wire.frame_options_to_wire(
+        encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
+    )
+
+
+def open(  # noqa: A001  (called as lpdeform.open)
+    vertices: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    *,
+    address: str | None = None,
+    handles: Mapping[str, Handle] | None = None,
+    p: Field | None = None,
+    stiffness: Field | None = None,
+    length_unit: float | None = None,
+    solver: SolverSettings | None = None,
+    region: npt.ArrayLike | None = None,
+    normals: npt.ArrayLike | None = None,
+    weights: WeightKind = "cotangent",
+    free_components: FreeComponents = "error",
+    weld: npt.ArrayLike | bool = False,
+    encoding: Encoding = "float32",
+    lowest_encoding: Encoding | None = None,
+    credit: int = 0,
+    with_distortion: bool = True,
+    with_normals: bool = False,
+    certify: bool = False,
+    max_frames_per_second: float = 0.0,
+    call_timeout: float = 30.0,
+    reconnect_for: float = 120.0,
+) -> Session:
+    """Makes a session from a triangle mesh; the order of vertices is never changed.
+
+    vertices: n x 3, in any unit. faces: m x 3, 0-based, counter-clockwise seen from outside.
+    address: "host:port" or "unix:/path"; otherwise the environment variable LPDEFORM_ADDRESS, or localhost:50051.
+    handles: to begin with. p, stiffness, length_unit, solver, region: as in Settings.
+    normals: n x 3, as drawn at rest, for frames with normals.
+    free_components: what becomes of a connected component that no handle holds: "error" is raised, "stay", "follow".
+    weld: True where vertices at the same position are copies of one, or one number a vertex, the same for copies.
+    encoding: how frames travel: "float64", "float32" (16 bytes a vertex), "quantized" (8, off by half of 1/65535 of the frame's
+        extent), "compressed" (the same, 3 to 5; needs the system's meshoptimizer).
+    lowest_encoding: what the server may go down to where its limit of bytes a second asks for it.
+    credit: frames that may be under way and not yet taken, 1 to 8; 0 takes the server's 2.
+    certify: a result that stands comes again with its optimality_gap.
+    max_frames_per_second: 0 is without limit; the last frame of an update always comes.
+    call_timeout, reconnect_for: seconds of every call but solve(), and after which a session whose server stays away gives up.
+
+    Raises InvalidInput with the first element that cannot be deformed; Unavailable (NO_SERVER) where nobody answers.
+
+    >>> import lpdeform
+    >>> with lpdeform.open([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]) as session:
+    ...     session.mesh_report.edges
+    3
+    """
+    options = frame_options(
+        encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
+    )
+    settings = Settings(p, stiffness, length_unit, solver, region)
+    rpc = connect(address, call_timeout, reconnect_for)
+    link = open_link(
+        rpc, Stop(), vertices, faces, normals, handles, settings, weights, free_components, weld, options
+    )
+    return Session(link)
+
+
+def join(
+    name: str,
+    *,
+    as_writer: bool = False,
+    address: str | None = None,
+    encoding: Encoding = "float32",
+    lowest_encoding: Encoding | None = None,
+    credit: int = 0,
+    with_distortion: bool = True,
+    with_normals: bool = False,
+    certify: bool = False,
+    max_frames_per_second: float = 0.0,
+    call_timeout: float = 30.0,
+    reconnect_for: float = 120.0,
+) -> Session:
+    """Joins somebody's session by name: as a reader of its frames, or taking over as its writer.
+
+    It is not made anew where the server loses it, and not deleted by close(). The rest as in open().
+    """
+    options = frame_options(
+        encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
+    )
+    rpc = connect(address, call_timeout, reconnect_for)
+    return Session(join_link(rpc, Stop(), name, as_writer, options))
+
+
+def join_link(rpc: Rpc, stop: Stop, name: str, as_writer: bool, options: frame_pb2.FrameOptions) -> Link:
+    try:
+        return Link(rpc, join_session(rpc, name, as_writer, stop), options, None)
+    except BaseException:
+        rpc.close()
+        raise
