@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/base/geometry.h"
@@ -19,6 +20,19 @@ struct LowerMatrix {
   std::int32_t size() const { return static_cast<std::int32_t>(columns.size()) - 1; }
 };
 
+/// Where a factor's entries lie. Supernode k is columns first_columns[k] to first_columns[k + 1] - 1: a full
+/// triangle, and below it rows[first_rows[k]] to rows[first_rows[k + 1] - 1], ascending. Counted in the new order.
+struct SupernodePattern {
+  std::vector<std::int32_t> new_to_old;
+  std::vector<std::int32_t> first_columns;
+  std::vector<std::size_t> first_rows;
+  std::vector<std::int32_t> rows;
+};
+
+/// A fill-reducing order and the factor's pattern in it, by the backend. None where it does not work with
+/// supernodes (Eigen).
+std::optional<SupernodePattern> analyse_supernodes(const LowerMatrix& pattern);
+
 /// Sparse Cholesky factorisation of symmetric positive definite matrices of one pattern. The constructor
 /// orders and analyses; factor() is the numeric phase alone and may be repeated; then solve as often as you
 /// like. Behind it stands CHOLMOD or Eigen, by the build. Fill-reducing permutations stay inside. One caller
@@ -27,6 +41,8 @@ class SparseCholesky {
  public:
   /// Values are not looked at. O(n) memory besides the analysis.
   explicit SparseCholesky(const LowerMatrix& pattern);
+  /// In an order that analyse_supernodes() found: the analysis without its longest part.
+  SparseCholesky(const LowerMatrix& pattern, const std::vector<std::int32_t>& new_to_old);
   ~SparseCholesky();
   SparseCholesky(SparseCholesky&&) noexcept;
   SparseCholesky& operator=(SparseCholesky&&) noexcept;

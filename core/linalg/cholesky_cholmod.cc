@@ -122,11 +122,9 @@ void copy_simplicial(const cholmod_factor& factor, SingleFactor& out) {
   }
 }
 
-}  // namespace
-
-struct SparseCholesky::Impl {
-  Impl() {
-    pin_blas_to_one_thread();
+/// CHOLMOD's settings and workspace, and one factor.
+struct Cholmod {
+  Cholmod() {
     cholmod_start(&common);
     common.print = 0;
     common.error_handler = nullptr;
@@ -135,13 +133,64 @@ struct SparseCholesky::Impl {
     common.postorder = 1;
     common.supernodal_switch = kSupernodalSwitch;
   }
+  ~Cholmod() {
+    cholmod_free_factor(&factor, &common);
+    cholmod_finish(&common);
+  }
+  Cholmod(const Cholmod&) = delete;
+  Cholmod& operator=(const Cholmod&) = delete;
+
+  /// In the order given, or one that it finds.
+  void analyse(const LowerMatrix& pattern, const std::int32_t* new_to_old) {
+    cholmod_sparse view = view_of(pattern);
+    view.xtype = CHOLMOD_PATTERN;
+    if (new_to_old == nullptr) {
+      factor = cholmod_analyze(&view, &common);
+    } else {
+      common.method[0].ordering = CHOLMOD_GIVEN;
+      factor = cholmod_analyze_p(&view, const_cast<std::int32_t*>(new_to_old), nullptr, 0, &common);
+    }
+    LPDEFORM_CHECK(factor != nullptr);
+  }
+
+  cholmod_common common;
+  cholmod_factor* factor = nullptr;
+};
+
+}  // namespace
+
+std::optional<SupernodePattern> analyse_supernodes(const LowerMatrix& pattern) {
+  Cholmod cholmod;
+  cholmod.common.supernodal = CHOLMOD_SUPERNODAL;
+  cholmod.analyse(pattern, nullptr);
+  const cholmod_factor& factor = *cholmod.factor;
+  const auto* const order = static_cast<const std::int32_t*>(factor.Perm);
+  const auto* const first_columns = static_cast<const std::int32_t*>(factor.super);
+  const auto* const first_rows = static_cast<const std::int32_t*>(factor.pi);
+  const auto* const rows = static_cast<const std::int32_t*>(factor.s);
+  SupernodePattern result;
+  result.new_to_old.assign(order, order + factor.n);
+  result.first_columns.assign(first_columns, first_columns + factor.nsuper + 1);
+  result.first_rows.reserve(factor.nsuper + 1);
+  result.rows.reserve(factor.ssize);
+  for (std::size_t k = 0; k < factor.nsuper; ++k) {
+    result.first_rows.push_back(result.rows.size());
+    const std::int32_t columns = first_columns[k + 1] - first_columns[k];
+    result.rows.insert(result.rows.end(), rows + first_rows[k] + columns, rows + first_rows[k + 1]);
+  }
+  result.first_rows.push_back(result.rows.size());
+  return result;
+}
+
+struct SparseCholesky::Impl : Cholmod {
+  Impl() { pin_blas_to_one_thread(); }
   ~Impl() {
     cholmod_free_dense(&x, &common);
     cholmod_free_dense(&y, &common);
     cholmod_free_dense(&e, &common);
-    cholmod_free_factor(&factor, &common);
-    cholmod_finish(&common);
   }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
 
   /// `columns` right-hand sides, column-major.
   void solve(const double* b, double* result, int columns) {
@@ -158,17 +207,17 @@ struct SparseCholesky::Impl {
     std::copy_n(static_cast<const double*>(x->x), n * columns, result);
   }
 
-  cholmod_common common;
-  cholmod_factor* factor = nullptr;
   cholmod_dense *x = nullptr, *y = nullptr, *e = nullptr;  // workspace of solve, kept between calls
   Eigen::MatrixXd columns;                                 // three right-hand sides, column-major
 };
 
 SparseCholesky::SparseCholesky(const LowerMatrix& pattern) : impl_(std::make_unique<Impl>()) {
-  cholmod_sparse view = view_of(pattern);
-  view.xtype = CHOLMOD_PATTERN;
-  impl_->factor = cholmod_analyze(&view, &impl_->common);
-  LPDEFORM_CHECK(impl_->factor != nullptr);
+  impl_->analyse(pattern, nullptr);
+}
+SparseCholesky::SparseCholesky(const LowerMatrix& pattern, const std::vector<std::int32_t>& new_to_old)
+    : impl_(std::make_unique<Impl>()) {
+  LPDEFORM_CHECK(new_to_old.size() == static_cast<std::size_t>(pattern.size()));
+  impl_->analyse(pattern, new_to_old.data());
 }
 SparseCholesky::~SparseCholesky() = default;
 SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;

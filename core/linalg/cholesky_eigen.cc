@@ -19,6 +19,10 @@ Eigen::Map<const Sparse> view_of(const LowerMatrix& matrix, const double* values
 
 }  // namespace
 
+std::optional<SupernodePattern> analyse_supernodes(const LowerMatrix&) {
+  return std::nullopt;
+}
+
 struct SparseCholesky::Impl {
   Factor factor;
   std::size_t nonzeros = 0;
@@ -28,6 +32,8 @@ SparseCholesky::SparseCholesky(const LowerMatrix& pattern) : impl_(std::make_uni
   const std::vector<double> ones(pattern.rows.size(), 1.0);
   impl_->factor.analyzePattern(view_of(pattern, ones.data()));
 }
+SparseCholesky::SparseCholesky(const LowerMatrix& pattern, const std::vector<std::int32_t>&)
+    : SparseCholesky(pattern) {}
 SparseCholesky::~SparseCholesky() = default;
 SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;
 SparseCholesky& SparseCholesky::operator=(SparseCholesky&&) noexcept = default;

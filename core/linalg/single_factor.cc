@@ -83,13 +83,19 @@ float* SingleFactor::new_supernode(std::int32_t columns, const std::int32_t* row
   return values_.data() + supernodes_.back().first_value;
 }
 
-/// The supernode that has the first row below each, which is its parent in the elimination tree; -1 for roots.
-std::vector<std::int32_t> SingleFactor::parents() const {
-  std::vector<std::int32_t> node_of(new_to_old_.size());
+/// The supernode that each column is in.
+std::vector<std::int32_t> SingleFactor::node_of_columns() const {
+  std::vector<std::int32_t> result(new_to_old_.size());
   for (std::size_t k = 0; k < supernodes_.size(); ++k) {
-    std::fill_n(node_of.begin() + supernodes_[k].first_column, supernodes_[k].columns,
+    std::fill_n(result.begin() + supernodes_[k].first_column, supernodes_[k].columns,
                 static_cast<std::int32_t>(k));
   }
+  return result;
+}
+
+/// The supernode that has the first row below each, which is its parent in the elimination tree; -1 for roots.
+std::vector<std::int32_t> SingleFactor::parents() const {
+  const std::vector<std::int32_t> node_of = node_of_columns();
   std::vector<std::int32_t> result(supernodes_.size(), -1);
   for (std::size_t k = 0; k < supernodes_.size(); ++k) {
     if (supernodes_[k].row_count > 0) result[k] = node_of[rows_[supernodes_[k].first_row]];

@@ -46,12 +46,15 @@ class SingleFactor {
   /// x = factor * A^-1 b. x may be b. One caller at a time.
   void solve(const Points& b, Points& x, const Workers& workers, double factor = 1) const;
 
+  const std::vector<std::int32_t>& new_to_old() const { return new_to_old_; }
+
   std::size_t memory_bytes() const;
 
   /// x, y, z and padding: a register of vector instructions.
   using Row = float __attribute__((vector_size(16)));
 
  private:
+  friend class SingleCholesky;  // computes the values in place
   struct Supernode {
     std::int32_t first_column, columns;
     std::size_t first_row, row_count;  // of all rows
@@ -63,6 +66,7 @@ class SingleFactor {
     std::vector<std::int32_t> owed;                               // rows of ancestors that it adds to
   };
   double largest_entry(const Points& b, const Workers& workers) const;
+  std::vector<std::int32_t> node_of_columns() const;
   std::vector<std::int32_t> parents() const;
   void cut_branches();
   void send_elsewhere(Branch& branch);

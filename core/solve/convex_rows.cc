@@ -58,7 +58,7 @@ void ConvexRows::apply_transposed(const EdgeVectors& y, Points& result) const {
 
 bool ConvexRows::factor() {
   soft_weights_ = problem_.objective.soft_weights();
-  return problem_.factor_metric();
+  return problem_.factor_metric(Metric::Precision::kSingle);
 }
 
 bool ConvexRows::factor_equal() {
@@ -66,7 +66,8 @@ bool ConvexRows::factor_equal() {
   std::vector<MatrixEntry> entries = soft_.matrix_entries(soft_weights_);
   problem_.constraints.linear.add_ties(2, entries);
   const std::vector<double> equal(shape_.vertex_count(), 1.0);
-  return problem_.metric.factor(equal, problem_.constraints.is_held, entries);
+  return problem_.metric.factor(equal, problem_.constraints.is_held, entries, problem_.workers(),
+                                Metric::Precision::kDouble);
 }
 
 }  // namespace lpdeform

@@ -182,7 +182,7 @@ Points Deformer::Impl::initial_guess(InitialGuess guess) {
   for (Eigen::Index i = 0; i < result.rows(); ++i) {
     if (constraints->is_held[i]) result.row(i) = constraints->targets.row(i);
   }
-  constraints->linear.satisfy_within(metric, result);
+  constraints->linear.satisfy_within(metric, result, workers());
   return result;
 }
 
@@ -259,7 +259,10 @@ bool Deformer::Impl::prepare_metric(bool needs_plain_weights) {
   if (metric.is_factored_for(constraints->is_held) && !needs_plain_weights) return true;
   std::vector<MatrixEntry> entries = guess_springs().matrix_entries();
   constraints->linear.add_ties(2, entries);
-  return metric.factor(std::vector<double>(shape->vertex_count(), 1.0), constraints->is_held, entries);
+  const auto precision =
+      constraints->linear.empty() ? Metric::Precision::kSingle : Metric::Precision::kDouble;
+  return metric.factor(std::vector<double>(shape->vertex_count(), 1.0), constraints->is_held, entries,
+                       workers(), precision);
 }
 
 /// With the footprints of handles.

@@ -123,22 +123,23 @@ Eigen::VectorXd LinearConstraints::residual(const Points& x) const {
   return result;
 }
 
-void LinearConstraints::satisfy_within(const Metric& metric, Points& x) const {
+void LinearConstraints::satisfy_within(const Metric& metric, Points& x, const Workers& workers) const {
   if (empty()) return;
-  prepare_schur(metric);
+  prepare_schur(metric, workers);
   Points move = transposed(metric.scale() * factors_->schur.solve(residual(x)));
-  metric.solve(move, move);
+  metric.solve(move, move, workers);
   if (move.allFinite()) x += move;
   satisfy(x);
 }
 
-Points LinearConstraints::forces_against(const Metric& metric, const Points& v) const {
-  prepare_schur(metric);
+Points LinearConstraints::forces_against(const Metric& metric, const Points& v,
+                                         const Workers& workers) const {
+  prepare_schur(metric, workers);
   return transposed(metric.scale() * factors_->schur.solve(image(v)));
 }
 
 /// C M^-1 C^T from the columns of M^-1 for the distinct points, three at a time.
-void LinearConstraints::prepare_schur(const Metric& metric) const {
+void LinearConstraints::prepare_schur(const Metric& metric, const Workers& workers) const {
   if (factors_->metric_version == metric.version()) return;
   std::vector<PointForm> points;
   std::vector<std::size_t> point_of(rows_.size());
@@ -157,7 +158,7 @@ void LinearConstraints::prepare_schur(const Metric& metric) const {
         if (!is_held_[point.vertices[j]]) columns(point.vertices[j], k) += point.coefficients[j];
       }
     }
-    metric.solve(columns, columns);
+    metric.solve(columns, columns, workers);
     for (Eigen::Index q = 0; q < count; ++q) {
       inverse.row(q).segment(first, width) = points[q].at(columns).head(width);
     }

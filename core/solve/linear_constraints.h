@@ -44,13 +44,13 @@ class LinearConstraints {
   /// Moves x, its free vertices alone, by the least that makes C x = t.
   void satisfy(Points& x) const;
   /// The same by the least in the metric: a lock's or point's move spreads over the surface.
-  void satisfy_within(const Metric& metric, Points& x) const;
+  void satisfy_within(const Metric& metric, Points& x, const Workers& workers) const;
 
   /// Makes P b of v = M^-1 b, given a function that makes M^-1 v of v.
   template <typename Solve>
-  void project(const Metric& metric, const Solve& solve, Points& v) const {
+  void project(const Metric& metric, const Solve& solve, Points& v, const Workers& workers) const {
     if (empty()) return;
-    Points forces = forces_against(metric, v);
+    Points forces = forces_against(metric, v, workers);
     solve(forces);
     v -= forces;
     restrict(v);
@@ -73,11 +73,12 @@ class LinearConstraints {
  private:
   struct Factors;
   absl::Status factor();
-  void prepare_schur(const Metric& metric) const;
-  Eigen::VectorXd image(const Points& v) const;                        // C v, v zero at held vertices
-  Eigen::VectorXd residual(const Points& x) const;                     // t - C x
-  Points transposed(const Eigen::VectorXd& multipliers) const;         // C^T lambda
-  Points forces_against(const Metric& metric, const Points& v) const;  // C^T (C M^-1 C^T)^-1 C v
+  void prepare_schur(const Metric& metric, const Workers& workers) const;
+  Eigen::VectorXd image(const Points& v) const;                 // C v, v zero at held vertices
+  Eigen::VectorXd residual(const Points& x) const;              // t - C x
+  Points transposed(const Eigen::VectorXd& multipliers) const;  // C^T lambda
+  Points forces_against(const Metric& metric, const Points& v,
+                        const Workers& workers) const;  // C^T (C M^-1 C^T)^-1 C v
 
   std::vector<LinearRow> rows_;
   std::vector<char> is_held_;

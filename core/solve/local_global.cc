@@ -6,7 +6,7 @@ namespace lpdeform {
 
 LocalGlobal::LocalGlobal(Problem problem, Points x) : problem_(std::move(problem)), x_(std::move(x)) {
   objective_ = problem_.objective.evaluate(x_, problem_.norm);
-  is_factored_ = problem_.factor_metric();
+  is_factored_ = problem_.factor_metric(Metric::Precision::kDouble);
 }
 
 StepResult LocalGlobal::step() {

@@ -7,6 +7,11 @@
 namespace lpdeform {
 namespace {
 
+constexpr std::size_t kChunk = 4096;  // vertices
+constexpr int kPasses = 12;
+constexpr double kRefined = 1e-12;  // the last correction's share of the result
+constexpr double kSlowest = 0.3;    // what a correction is of the one before, at most
+
 LowerMatrix lower_pattern(const RestShape& shape) {
   LowerMatrix matrix;
   const std::int32_t n = shape.vertex_count();
@@ -26,10 +31,12 @@ LowerMatrix lower_pattern(const RestShape& shape) {
 }  // namespace
 
 Metric::Metric(std::shared_ptr<const RestShape> shape)
-    : shape_(std::move(shape)), matrix_(lower_pattern(*shape_)), factor_(matrix_) {}
+    : shape_(std::move(shape)), matrix_(lower_pattern(*shape_)) {
+  if (const auto supernodes = analyse_supernodes(matrix_)) single_.emplace(matrix_, *supernodes);
+}
 
 bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held,
-                    const std::vector<MatrixEntry>& entries) {
+                    const std::vector<MatrixEntry>& entries, const Workers& workers, Precision precision) {
   const double largest = *std::max_element(cell_weights.begin(), cell_weights.end());
   if (!(largest > 0) || !std::isfinite(largest)) return is_good_ = false;
   std::vector<double> clipped(cell_weights.size());
@@ -38,25 +45,47 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
   std::vector<MatrixEntry> scaled = entries;
   for (MatrixEntry& entry : scaled) entry.value /= largest;
   scale_ = largest;
-  if (is_good_ && is_held == is_held_ && clipped == cell_weights_ && scaled == entries_) return true;
-  single_.clear();
-  cell_weights_ = std::move(clipped);
-  is_held_ = is_held;
-  entries_ = std::move(scaled);
-  for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
-    double diagonal = 0;
-    std::int32_t entry = matrix_.columns[i];
-    for (std::int32_t k = shape_->offsets()[i]; k < shape_->offsets()[i + 1]; ++k) {
-      const std::int32_t j = shape_->neighbours()[k];
-      const double weight = edge_weight(i, k);
-      diagonal += weight;
-      if (j > i) matrix_.values[++entry] = is_held[i] || is_held[j] ? 0.0 : -weight;
-    }
-    matrix_.values[matrix_.columns[i]] = is_held[i] ? 1.0 : diagonal;
+  const bool is_same = is_good_ && is_held == is_held_ && clipped == cell_weights_ && scaled == entries_;
+  if (is_same && precision == precision_) return true;  // not a better one: the same result as anew
+  if (!is_same) {
+    cell_weights_ = std::move(clipped);
+    is_held_ = is_held;
+    entries_ = std::move(scaled);
+    fill_matrix(workers);
   }
-  for (const MatrixEntry& entry : entries_) add_entry(entry);
+  precision_ = precision;
+  is_single_current_ = is_double_current_ = false;
   ++version_;
-  return is_good_ = factor_.factor(matrix_);
+  if (precision == Precision::kSingle && single_ && single_->factor(matrix_, workers))
+    return is_good_ = is_single_current_ = true;
+  return is_good_ = factor_double();
+}
+
+bool Metric::factor_double() const {
+  if (!double_ && single_)
+    double_.emplace(matrix_, single_->result().new_to_old());
+  else if (!double_)
+    double_.emplace(matrix_);
+  copy_.clear();
+  return is_double_current_ = double_->factor(matrix_);
+}
+
+void Metric::fill_matrix(const Workers& workers) {
+  const auto n = static_cast<std::size_t>(shape_->vertex_count());
+  workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (auto i = static_cast<std::int32_t>(begin); i < static_cast<std::int32_t>(end); ++i) {
+      double diagonal = 0;
+      std::int32_t entry = matrix_.columns[i];
+      for (std::int32_t k = shape_->offsets()[i]; k < shape_->offsets()[i + 1]; ++k) {
+        const std::int32_t j = shape_->neighbours()[k];
+        const double weight = edge_weight(i, k);
+        diagonal += weight;
+        if (j > i) matrix_.values[++entry] = is_held_[i] || is_held_[j] ? 0.0 : -weight;
+      }
+      matrix_.values[matrix_.columns[i]] = is_held_[i] ? 1.0 : diagonal;
+    }
+  });
+  for (const MatrixEntry& entry : entries_) add_entry(entry);
 }
 
 void Metric::add_entry(const MatrixEntry& entry) {
@@ -92,14 +121,41 @@ void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& 
       if (is_held[j]) b.row(i) += edge_weight(i, k) * u.row(j);
     }
   }
-  single().solve(b, u, workers);
+  if (is_refined)
+    solve_scaled(b, u, workers);
+  else
+    single().solve(b, u, workers);
   for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
     if (is_held[i]) u.row(i) = b.row(i);
   }
-  if (!is_refined) return;
-  subtract_product(u, b);  // 0 at held vertices
-  single().solve(b, b, workers);
-  u += b;
+}
+
+/// x = matrix_^-1 b, x not b, by refinement from single precision. False where that does not converge.
+bool Metric::refine(const Points& b, Points& x, const Workers& workers) const {
+  single().solve(b, x, workers);
+  Points rest, correction;
+  double before = x.norm();
+  const double enough = kRefined * before;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    rest = b;
+    subtract_product(x, rest);
+    single().solve(rest, correction, workers);
+    const double size = correction.norm();
+    if (!(size < kSlowest * before || size <= enough)) return false;
+    x += correction;
+    if (size <= enough) return true;
+    before = size;
+  }
+  return false;
+}
+
+void Metric::solve_scaled(const Points& b, Points& x, const Workers& workers) const {
+  if (!is_double_current_ && refine(b, x, workers)) return;
+  if (!is_double_current_ && !factor_double()) {
+    single().solve(b, x, workers);
+    return;
+  }
+  double_->solve(b, x);
 }
 
 /// b -= matrix_ x.
@@ -114,12 +170,14 @@ void Metric::subtract_product(const Points& x, Points& b) const {
 }
 
 const SingleFactor& Metric::single() const {
-  if (single_.empty()) factor_.copy_to(single_);
-  return single_;
+  if (is_single_current_) return single_->result();
+  if (copy_.empty()) double_->copy_to(copy_);
+  return copy_;
 }
 
-void Metric::solve(const Points& b, Points& x) const {
-  factor_.solve(b, x);
+void Metric::solve(const Points& b, Points& x, const Workers& workers) const {
+  if (&b == &x) return solve(Points(b), x, workers);
+  solve_scaled(b, x, workers);
   x /= scale_;
 }
 
@@ -128,9 +186,9 @@ void Metric::precondition(const Points& b, Points& x, const Workers& workers) co
 }
 
 std::size_t Metric::memory_bytes() const {
-  return factor_.memory_bytes() + single_.memory_bytes() + cell_weights_.capacity() * sizeof(double) +
-         is_held_.capacity() + entries_.capacity() * sizeof(MatrixEntry) +
-         matrix_.columns.capacity() * sizeof(std::int32_t) +
+  return (single_ ? single_->memory_bytes() : 0) + (double_ ? double_->memory_bytes() : 0) +
+         copy_.memory_bytes() + cell_weights_.capacity() * sizeof(double) + is_held_.capacity() +
+         entries_.capacity() * sizeof(MatrixEntry) + matrix_.columns.capacity() * sizeof(std::int32_t) +
          matrix_.rows.capacity() * (sizeof(std::int32_t) + sizeof(double));
 }
 

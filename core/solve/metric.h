@@ -1,10 +1,12 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "core/base/workers.h"
 #include "core/energy/rest_shape.h"
 #include "core/linalg/cholesky.h"
+#include "core/linalg/single_cholesky.h"
 
 namespace lpdeform {
 
@@ -27,14 +29,22 @@ class Metric {
  public:
   static constexpr double kLowestShare = 1e-8;
 
+  /// What a factorisation is for.
+  enum class Precision {
+    kSingle,  // precondition() above all: several times as fast, half the memory
+    kDouble,  // solve() above all
+  };
+
   explicit Metric(std::shared_ptr<const RestShape> shape);
 
   /// `is_held` has one entry a vertex. Cell weights are clipped from below at 1e-8 of the largest used, so
   /// that the factorisation stays healthy where cells have no weight. False where the factorisation fails. A
   /// factor for the same held vertices, cell weights and entries, up to a common factor, is kept. `entries`
-  /// form a positive semidefinite matrix; those of vertices that no edge joins go to the diagonal.
+  /// form a positive semidefinite matrix; those of vertices that no edge joins go to the diagonal. Where
+  /// single precision does not carry the matrix, double is used. The same bits on any number of threads.
   [[nodiscard]] bool factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held,
-                            const std::vector<MatrixEntry>& entries = {});
+                            const std::vector<MatrixEntry>& entries, const Workers& workers,
+                            Precision precision = Precision::kSingle);
 
   /// Keeps the last factor for these cell weights as well, scaled to them on the whole: for a metric that need
   /// not be exact. After is_factored_for().
@@ -43,15 +53,15 @@ class Metric {
   /// The last factor() was for these held vertices and succeeded.
   bool is_factored_for(const std::vector<char>& is_held) const { return is_good_ && is_held == is_held_; }
 
-  /// x = M^-1 b; b is zero at held vertices.
-  void solve(const Points& b, Points& x) const;
+  /// x = M^-1 b to about 1e-12; b is zero at held vertices. From a factor in single precision by refinement.
+  void solve(const Points& b, Points& x, const Workers& workers) const;
 
-  /// The same to single precision, several times as fast.
+  /// x = M^-1 b as well as single precision has it, always the same matrix for a version() and scale().
   void precondition(const Points& b, Points& x, const Workers& workers) const;
 
   /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of
-  /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2, to about 1e-12; to single precision, in half the
-  /// time, without `is_refined`. Rows of free vertices are overwritten. `forces`, where not null, pull
+  /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2, to about 1e-12; to single precision, in a fraction of
+  /// the time, without `is_refined`. Rows of free vertices are overwritten. `forces`, where not null, pull
   /// at the free vertices besides: the entries count as well, and <forces, u> is subtracted.
   void extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
               const Points* forces = nullptr, bool is_refined = true) const;
@@ -71,6 +81,10 @@ class Metric {
     return 2 * (cell_weights_[i] + cell_weights_[shape_->neighbours()[k]]) * shape_->weights()[k];
   }
   void add_entry(const MatrixEntry& entry);
+  void fill_matrix(const Workers& workers);
+  bool factor_double() const;
+  bool refine(const Points& b, Points& x, const Workers& workers) const;
+  void solve_scaled(const Points& b, Points& x, const Workers& workers) const;
   const SingleFactor& single() const;
   void subtract_product(const Points& x, Points& b) const;
 
@@ -82,8 +96,12 @@ class Metric {
   bool is_good_ = false;
   std::uint64_t version_ = 0;
   LowerMatrix matrix_;
-  SparseCholesky factor_;
-  mutable SingleFactor single_;  // made when first asked for, empty until then
+  std::optional<SingleCholesky> single_;      // none where the backend has no supernodes
+  Precision precision_ = Precision::kSingle;  // that was asked for
+  bool is_single_current_ = false;
+  mutable std::optional<SparseCholesky> double_;  // made when first needed
+  mutable bool is_double_current_ = false;
+  mutable SingleFactor copy_;  // of double_, made when first needed, empty until then
 };
 
 }  // namespace lpdeform

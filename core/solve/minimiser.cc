@@ -4,26 +4,27 @@
 
 namespace lpdeform {
 
-bool Problem::factor_metric() const {
+bool Problem::factor_metric(Metric::Precision precision) const {
   const std::vector<double>& cell_weights = objective.cells().cell_weights();
   std::vector<MatrixEntry> entries = objective.soft_terms().matrix_entries(objective.soft_weights());
   if (!constraints.linear.empty()) {
+    precision = Metric::Precision::kDouble;
     const double sum = std::accumulate(cell_weights.begin(), cell_weights.end(), 0.0);
     constraints.linear.add_ties(2 * sum / static_cast<double>(cell_weights.size()), entries);
   }
-  return metric.factor(cell_weights, constraints.is_held, entries);
+  return metric.factor(cell_weights, constraints.is_held, entries, workers(), precision);
 }
 
 void Problem::solve(const Points& b, Points& x) const {
-  const auto inverse = [this](Points& v) { metric.solve(v, v); };
-  metric.solve(b, x);
-  constraints.linear.project(metric, inverse, x);
+  const auto inverse = [this](Points& v) { metric.solve(v, v, workers()); };
+  metric.solve(b, x, workers());
+  constraints.linear.project(metric, inverse, x, workers());
 }
 
 void Problem::precondition(const Points& b, Points& x) const {
   const auto inverse = [this](Points& v) { metric.precondition(v, v, workers()); };
   metric.precondition(b, x, workers());
-  constraints.linear.project(metric, inverse, x);
+  constraints.linear.project(metric, inverse, x, workers());
 }
 
 void restrict_to_free(const Constraints& constraints, Points& values) {

@@ -10,7 +10,7 @@ constexpr std::size_t kMemory = 6;
 constexpr std::size_t kChunk = 4096;  // vertices
 constexpr int kWindow = 20;
 constexpr int kRefresh = 40;
-constexpr int kSoonest = 5;         // iterations between refreshes, where one is asked for
+constexpr int kSoonest = 2;         // iterations between refreshes, where one is asked for
 constexpr double kShortStep = 0.9;  // asks for one
 constexpr int kTrial = 10;          // iterations for which a live session keeps the metric that it finds
 constexpr double kSufficientDecrease = 1e-4;
@@ -78,7 +78,7 @@ void QuasiNewton::begin_memory() {
 bool QuasiNewton::refresh_metric() {
   begin_memory();
   since_refresh_ = 0;
-  return problem_.factor_metric();
+  return problem_.factor_metric(Metric::Precision::kSingle);
 }
 
 /// d = -H g, H_0 = M^-1: unscaled, since M is the Hessian with rotations and weights held. Returns <g, d>.

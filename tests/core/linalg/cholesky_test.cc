@@ -4,37 +4,11 @@
 
 #include <Eigen/Cholesky>
 #include <limits>
-#include <map>
-#include <random>
+
+#include "tests/core/linalg/matrices.h"
 
 namespace lpdeform {
 namespace {
-
-/// A dense positive definite matrix with a band of `width`, and its lower triangle.
-Eigen::MatrixXd banded(int n, int width) {
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> value(-1, 1);
-  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, n);
-  for (int i = 0; i < n; ++i) {
-    for (int j = std::max(0, i - width); j < i; ++j) a(i, j) = a(j, i) = value(random);
-    a(i, i) = 2 * width + 1;
-  }
-  return a;
-}
-
-LowerMatrix lower(const Eigen::MatrixXd& a) {
-  LowerMatrix result;
-  result.columns.push_back(0);
-  for (int column = 0; column < a.cols(); ++column) {
-    for (int row = column; row < a.rows(); ++row) {
-      if (row != column && a(row, column) == 0) continue;
-      result.rows.push_back(row);
-      result.values.push_back(a(row, column));
-    }
-    result.columns.push_back(static_cast<std::int32_t>(result.rows.size()));
-  }
-  return result;
-}
 
 TEST(Cholesky, SolvesForOneAndThreeRightHandSides) {
   const Eigen::MatrixXd a = banded(60, 4);
@@ -89,47 +63,6 @@ TEST(Cholesky, ASinglePrecisionCopyCanBeMadeAgain) {
     single.solve(Points(a * expected), x, Workers(1));
     EXPECT_LT((x - expected).cwiseAbs().maxCoeff(), 1e-5);
   }
-}
-
-LowerMatrix with_shortcuts(const LowerMatrix& matrix, int count) {
-  std::mt19937 random(9);
-  std::uniform_int_distribution<int> point(0, matrix.size() - 1);
-  std::vector<std::map<int, double>> columns(static_cast<std::size_t>(matrix.size()));
-  for (std::int32_t c = 0; c < matrix.size(); ++c) {
-    for (std::int32_t k = matrix.columns[c]; k < matrix.columns[c + 1]; ++k) {
-      columns[static_cast<std::size_t>(c)][matrix.rows[k]] = matrix.values[k];
-    }
-  }
-  for (int k = 0; k < count; ++k) {
-    const int a = point(random), b = point(random);
-    if (a == b || columns[static_cast<std::size_t>(std::min(a, b))].contains(std::max(a, b))) continue;
-    columns[static_cast<std::size_t>(std::min(a, b))][std::max(a, b)] = -1;
-    columns[static_cast<std::size_t>(a)][a] += 1;
-    columns[static_cast<std::size_t>(b)][b] += 1;
-  }
-  LowerMatrix result;
-  result.columns.push_back(0);
-  for (const auto& column : columns) {
-    for (const auto& [row, value] : column) result.rows.push_back(row), result.values.push_back(value);
-    result.columns.push_back(static_cast<std::int32_t>(result.rows.size()));
-  }
-  return result;
-}
-
-/// The five-point Laplacian of a square, plus the identity: a tree with many branches. With `shortcuts` as many
-/// pairs of points are joined besides: a tree whose subtrees do not all lie together.
-LowerMatrix square_laplacian(int side, int shortcuts = 0) {
-  if (shortcuts > 0) return with_shortcuts(square_laplacian(side), shortcuts);
-  LowerMatrix result;
-  result.columns.push_back(0);
-  const auto add = [&](int row, double value) { result.rows.push_back(row), result.values.push_back(value); };
-  for (int i = 0; i < side * side; ++i) {
-    add(i, 5);
-    if ((i + 1) % side != 0) add(i + 1, -1);
-    if (i + side < side * side) add(i + side, -1);
-    result.columns.push_back(static_cast<std::int32_t>(result.rows.size()));
-  }
-  return result;
 }
 
 TEST(SingleFactor, GivesTheSameBitsOnAnyNumberOfThreadsAndTheRightOnes) {

@@ -102,8 +102,8 @@ TEST_F(CertificateTest, NeverClaimsMoreThanTheConvexStepAllows) {
   Points gradient;
   objective.gradient(gradient);
   restrict_to_free(constraints, gradient);
-  ASSERT_TRUE(metric.factor(objective.cells().cell_weights(), constraints.is_held));
-  metric.solve(gradient, gradient);
+  ASSERT_TRUE(metric.factor(objective.cells().cell_weights(), constraints.is_held, {}, Workers(1)));
+  metric.solve(gradient, gradient, Workers(1));
   const double optimum = objective.evaluate_held(start - gradient, norm);
   EXPECT_NEAR((value - optimum) / value, gap, 1e-9);  // and for p = 2 it is that value
 }

@@ -1,0 +1,201 @@
+#include "core/linalg/single_cholesky.h"
+
+#include <algorithm>
+#include <atomic>
+
+#include "core/base/check.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr std::int32_t kWidest = 64;     // columns of a supernode: more become several, one after the other
+constexpr float kLowestPivot = 1e-6f;    // of the matrix's diagonal entry
+constexpr std::size_t kTile = 64;        // rows of a supernode that one task computes
+constexpr double kWorthTasks = 200'000;  // multiplications
+
+}  // namespace
+
+SingleCholesky::SingleCholesky(const LowerMatrix& pattern, const SupernodePattern& supernodes) {
+  const std::size_t n = supernodes.new_to_old.size();
+  LPDEFORM_CHECK(n == static_cast<std::size_t>(pattern.size()));
+  old_to_new_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) old_to_new_[supernodes.new_to_old[i]] = static_cast<std::int32_t>(i);
+  factor_.begin(supernodes.new_to_old.data(), n, 0);
+  std::vector<std::int32_t> rows;
+  for (std::size_t k = 0; k + 1 < supernodes.first_columns.size(); ++k) {
+    const std::int32_t end = supernodes.first_columns[k + 1];
+    for (std::int32_t column = supernodes.first_columns[k]; column < end;) {
+      const std::int32_t columns = std::min(kWidest, end - column);
+      rows.clear();
+      for (std::int32_t row = column + columns; row < end; ++row) rows.push_back(row);
+      rows.insert(rows.end(), supernodes.rows.begin() + static_cast<std::ptrdiff_t>(supernodes.first_rows[k]),
+                  supernodes.rows.begin() + static_cast<std::ptrdiff_t>(supernodes.first_rows[k + 1]));
+      factor_.new_supernode(columns, rows.data(), rows.size());
+      column += columns;
+    }
+  }
+  factor_.finish();
+  find_updates();
+  find_entries(pattern);
+}
+
+/// Which supernodes change which, ascending for each.
+void SingleCholesky::find_updates() {
+  const std::size_t count = factor_.supernodes_.size();
+  const std::vector<std::int32_t> node_of = factor_.node_of_columns();
+  first_update_.assign(count + 1, 0);
+  update_work_.assign(count, 0);
+  const auto for_updates = [&](const auto& body) {
+    for (std::size_t k = 0; k < count; ++k) {
+      const SingleFactor::Supernode& node = factor_.supernodes_[k];
+      const std::int32_t* const rows = factor_.rows_.data() + node.first_row;
+      for (std::size_t begin = 0, end = 0; begin < node.row_count; begin = end) {
+        const std::int32_t target = node_of[rows[begin]];
+        while (end < node.row_count && node_of[rows[end]] == target) ++end;
+        body(k, target, begin, end);
+      }
+    }
+  };
+  for_updates([&](std::size_t k, std::int32_t target, std::size_t begin, std::size_t end) {
+    ++first_update_[target + 1];
+    const SingleFactor::Supernode& node = factor_.supernodes_[k];
+    update_work_[target] += static_cast<double>(node.columns) * static_cast<double>(end - begin) *
+                            static_cast<double>(node.row_count - begin);
+  });
+  for (std::size_t k = 0; k < count; ++k) first_update_[k + 1] += first_update_[k];
+  updates_.resize(first_update_[count]);
+  std::vector<std::size_t> next(first_update_.begin(), first_update_.end() - 1);
+  for_updates([&](std::size_t k, std::int32_t target, std::size_t begin, std::size_t end) {
+    updates_[next[target]++] = {static_cast<std::int32_t>(k), static_cast<std::int32_t>(begin),
+                                static_cast<std::int32_t>(end - begin)};
+  });
+}
+
+/// Where the matrix's entries go.
+void SingleCholesky::find_entries(const LowerMatrix& pattern) {
+  const std::vector<std::int32_t> node_of = factor_.node_of_columns();
+  const auto for_entries = [&](const auto& body) {
+    for (std::int32_t j = 0; j < pattern.size(); ++j) {
+      for (std::int32_t e = pattern.columns[j]; e < pattern.columns[j + 1]; ++e) {
+        const std::int32_t a = old_to_new_[j], b = old_to_new_[pattern.rows[e]];
+        body(e, std::max(a, b), std::min(a, b));
+      }
+    }
+  };
+  first_entry_.assign(factor_.supernodes_.size() + 1, 0);
+  for_entries([&](std::int32_t, std::int32_t, std::int32_t column) { ++first_entry_[node_of[column] + 1]; });
+  for (std::size_t k = 0; k + 1 < first_entry_.size(); ++k) first_entry_[k + 1] += first_entry_[k];
+  entries_.resize(first_entry_.back());
+  std::vector<std::size_t> next(first_entry_.begin(), first_entry_.end() - 1);
+  for_entries([&](std::int32_t e, std::int32_t row, std::int32_t column) {
+    const SingleFactor::Supernode& node = factor_.supernodes_[node_of[column]];
+    std::size_t r = static_cast<std::size_t>(row - node.first_column);
+    if (row >= node.first_column + node.columns) {
+      const auto begin = factor_.rows_.begin() + static_cast<std::ptrdiff_t>(node.first_row);
+      const auto found = std::lower_bound(begin, begin + static_cast<std::ptrdiff_t>(node.row_count), row);
+      r = static_cast<std::size_t>(node.columns) + static_cast<std::size_t>(found - begin);
+    }
+    const std::size_t c = static_cast<std::size_t>(column - node.first_column);
+    entries_[next[node_of[column]]++] = {
+        e, static_cast<std::uint32_t>(r * static_cast<std::size_t>(node.columns) + c)};
+  });
+}
+
+SingleCholesky::Scratch& SingleCholesky::scratch_of_thread() {
+  static thread_local Scratch result;
+  return result;
+}
+
+/// The matrix's entries, and what finding places in the block needs.
+void SingleCholesky::load(std::size_t node, const LowerMatrix& matrix, Scratch& own) {
+  const SingleFactor::Supernode& at = factor_.supernodes_[node];
+  const auto columns = static_cast<std::size_t>(at.columns);
+  float* const block = factor_.values_.data() + at.first_value;
+  std::fill_n(block, columns * (columns + at.row_count), 0.0f);
+  for (std::size_t e = first_entry_[node]; e < first_entry_[node + 1]; ++e)
+    block[entries_[e].target] = static_cast<float>(matrix.values[entries_[e].source]);
+  if (own.lowest.size() < columns) own.lowest.resize(columns);
+  for (std::size_t c = 0; c < columns; ++c) own.lowest[c] = kLowestPivot * block[c * columns + c];
+  if (own.place.size() < old_to_new_.size()) own.place.resize(old_to_new_.size());
+  for (std::size_t c = 0; c < columns; ++c) own.place[at.first_column + c] = static_cast<std::int32_t>(c);
+  const std::int32_t* const rows = factor_.rows_.data() + at.first_row;
+  for (std::size_t r = 0; r < at.row_count; ++r) own.place[rows[r]] = static_cast<std::int32_t>(columns + r);
+}
+
+/// Takes out of rows begin to end - 1 of a supernode what those eliminated before it owe.
+void SingleCholesky::update_rows(std::size_t node, std::size_t begin, std::size_t end,
+                                 const std::vector<std::int32_t>& place) {
+  const SingleFactor::Supernode& at = factor_.supernodes_[node];
+  const bool is_whole = begin == 0 && end == static_cast<std::size_t>(at.columns) + at.row_count;
+  std::vector<float>& packed = scratch_of_thread().packed;
+  for (std::size_t u = first_update_[node]; u < first_update_[node + 1]; ++u) {
+    const Update& update = updates_[u];
+    const SingleFactor::Supernode& from = factor_.supernodes_[update.from];
+    const auto columns = static_cast<std::size_t>(from.columns);
+    const std::size_t skipped = static_cast<std::size_t>(update.begin);
+    const std::int32_t* const rows = factor_.rows_.data() + from.first_row + skipped;
+    std::size_t first = 0, last = from.row_count - skipped;
+    if (!is_whole) {
+      const auto is_before = [&](std::int32_t row, std::size_t limit) {
+        return static_cast<std::size_t>(place[row]) < limit;
+      };
+      first = static_cast<std::size_t>(std::lower_bound(rows, rows + last, begin, is_before) - rows);
+      last = static_cast<std::size_t>(std::lower_bound(rows + first, rows + last, end, is_before) - rows);
+    }
+    if (first == last) continue;
+    const EliminatedRows eliminated{factor_.values_.data() + from.first_value + (columns + skipped) * columns,
+                                    rows, columns};
+    subtract_update(eliminated, static_cast<std::size_t>(update.count), first, last, place.data(),
+                    at.first_column, factor_.values_.data() + at.first_value,
+                    static_cast<std::size_t>(at.columns), packed);
+  }
+}
+
+bool SingleCholesky::eliminate(std::size_t node, const LowerMatrix& matrix, const Workers& workers,
+                               Scratch& own) {
+  const SingleFactor::Supernode& at = factor_.supernodes_[node];
+  const auto columns = static_cast<std::size_t>(at.columns);
+  load(node, matrix, own);
+  const std::size_t rows = columns + at.row_count;
+  const double solve_work =
+      static_cast<double>(columns) * static_cast<double>(columns) * static_cast<double>(at.row_count) / 2;
+  const bool is_shared = update_work_[node] + solve_work > kWorthTasks;
+  const std::size_t tile = is_shared ? kTile : rows;
+  workers.for_chunks(rows, tile, [&](std::size_t, std::size_t begin, std::size_t end) {
+    update_rows(node, begin, end, own.place);
+  });
+  float* const block = factor_.values_.data() + at.first_value;
+  if (!own.triangle.factor(block, columns, own.lowest.data())) return false;
+  if (at.row_count == 0) return true;
+  workers.for_chunks(at.row_count, is_shared ? kTile : at.row_count,
+                     [&](std::size_t, std::size_t begin, std::size_t end) {
+                       own.triangle.solve_rows(block + (columns + begin) * columns, end - begin);
+                     });
+  return true;
+}
+
+bool SingleCholesky::factor(const LowerMatrix& matrix, const Workers& workers) {
+  std::atomic<bool> is_good = true;
+  const Workers alone(1);
+  workers.for_chunks(factor_.branches_.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+    for (const auto& [first, last] : factor_.branches_[k].subtrees) {
+      for (std::int32_t node = first; node <= last && is_good; ++node) {
+        if (!eliminate(static_cast<std::size_t>(node), matrix, alone, scratch_of_thread())) is_good = false;
+      }
+    }
+  });
+  for (const auto& [first, last] : factor_.trunk_) {
+    for (std::int32_t node = first; node <= last && is_good; ++node)
+      is_good = eliminate(static_cast<std::size_t>(node), matrix, workers, trunk_);
+  }
+  return is_good;
+}
+
+std::size_t SingleCholesky::memory_bytes() const {
+  return factor_.memory_bytes() + old_to_new_.capacity() * sizeof(std::int32_t) +
+         updates_.capacity() * sizeof(Update) + entries_.capacity() * sizeof(Entry) +
+         update_work_.capacity() * sizeof(double) +
+         (first_update_.capacity() + first_entry_.capacity()) * sizeof(std::size_t);
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,94 @@
+#include "core/linalg/single_cholesky.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <utility>
+
+#include "tests/core/linalg/matrices.h"
+
+namespace lpdeform {
+namespace {
+
+SingleCholesky analysed(const LowerMatrix& matrix) {
+  return {matrix, *analyse_supernodes(matrix)};
+}
+
+TEST(SingleCholesky, FactorsNarrowAndWideSupernodes) {
+  for (const auto& [size, width] : {std::pair{1, 1}, {60, 1}, {200, 4}, {150, 149}, {400, 100}}) {
+    const Eigen::MatrixXd a = banded(size, width);
+    SingleCholesky single = analysed(lower(a));
+    ASSERT_TRUE(single.factor(lower(a), Workers(1)));
+    const Points expected = Points::Random(size, 3);
+    Points x;
+    single.result().solve(Points(a * expected), x, Workers(1));
+    // The matrix is diagonally dominant: its condition is below 10.
+    EXPECT_LT((x - expected).cwiseAbs().maxCoeff(), 1e-5) << size << " " << width;
+  }
+}
+
+TEST(SingleCholesky, GivesTheSameBitsOnAnyNumberOfThreadsAndTheRightOnes) {
+  for (const auto& [side, shortcuts] : {std::pair{60, 0}, {150, 0}, {220, 300}, {260, 700}}) {
+    const LowerMatrix matrix = square_laplacian(side, shortcuts);
+    SparseCholesky cholesky(matrix);
+    ASSERT_TRUE(cholesky.factor(matrix));
+    const Points b = Points::Random(side * side, 3);
+    Points expected, one, several;
+    cholesky.solve(b, expected);
+    SingleCholesky single = analysed(matrix);
+    ASSERT_TRUE(single.factor(matrix, Workers(1)));
+    single.result().solve(b, one, Workers(1));
+    EXPECT_LT((one - expected).cwiseAbs().maxCoeff(), 1e-5);
+    for (const int threads : {2, 4}) {
+      ASSERT_TRUE(single.factor(matrix, Workers(threads)));
+      single.result().solve(b, several, Workers(threads));
+      EXPECT_EQ(several, one);
+    }
+  }
+}
+
+TEST(SingleCholesky, FactorsOtherValuesOfThePattern) {
+  LowerMatrix matrix = square_laplacian(40);
+  SingleCholesky single = analysed(matrix);
+  Points b = Points::Random(1600, 3), first, second;
+  ASSERT_TRUE(single.factor(matrix, Workers(2)));
+  single.result().solve(b, first, Workers(1));
+  for (double& value : matrix.values) value *= 4;
+  ASSERT_TRUE(single.factor(matrix, Workers(2)));
+  single.result().solve(b, second, Workers(1));
+  EXPECT_LT((first - 4 * second).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+TEST(SingleCholesky, RefusesWhatSinglePrecisionDoesNotCarry) {
+  for (const double wrong :
+       {-1.0, 0.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e60}) {
+    LowerMatrix matrix = square_laplacian(100);
+    SingleCholesky single = analysed(matrix);
+    for (const std::int32_t j : {0, 5050, 9999}) {
+      const double right = std::exchange(matrix.values[matrix.columns[j]], wrong);
+      EXPECT_FALSE(single.factor(matrix, Workers(2))) << wrong << " at " << j;
+      matrix.values[matrix.columns[j]] = right;
+    }
+    EXPECT_TRUE(single.factor(matrix, Workers(2)));
+  }
+  // Definite, but by less than the digits of single precision.
+  Eigen::MatrixXd a = Eigen::MatrixXd::Ones(2, 2);
+  a(0, 0) += 1e-8;
+  EXPECT_FALSE(analysed(lower(a)).factor(lower(a), Workers(1)));
+}
+
+TEST(SupernodePattern, LetsTheDoubleFactorisationUseItsOrder) {
+  const LowerMatrix matrix = square_laplacian(30);
+  const auto pattern = analyse_supernodes(matrix);
+  ASSERT_TRUE(pattern.has_value());
+  SparseCholesky own(matrix), given(matrix, pattern->new_to_old);
+  ASSERT_TRUE(own.factor(matrix));
+  ASSERT_TRUE(given.factor(matrix));
+  Points b = Points::Random(900, 3), x, y;
+  own.solve(b, x);
+  given.solve(b, y);
+  EXPECT_LT((x - y).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+}  // namespace
+}  // namespace lpdeform
