@@ -25,6 +25,11 @@ std::shared_ptr<Timers> or_system(std::shared_ptr<Timers> timers) {
   return timers ? std::move(timers) : std::make_shared<SystemTimers>();
 }
 
+std::string ended_because(EndReason reason) {
+  if (reason == EndReason::kSessionExpired) return "expired";
+  return reason == EndReason::kDraining ? "draining" : "deleted";
+}
+
 }  // namespace
 
 Backend::Backend(const ServerOptions& options)
@@ -36,14 +41,36 @@ Backend::Backend(const ServerOptions& options)
       budget_(std::make_shared<Budget>(options.max_bytes)),
       uploads_(std::make_shared<Uploads>(budget_, timers,
                                          Uploads::Limits{options.max_upload_bytes, options.upload_idle})),
-      scheduler(options.runner_threads == 0 ? Scheduler::default_threads() : options.runner_threads),
-      pool(kPoolThreads, kLongestQueue) {
-  registry->on_expired = [log = log_](const Session& session) {
-    log->info("session_expired", {{"session", abbreviated(session.name())}});
+      scheduler(options.runner_threads == 0 ? Scheduler::default_threads() : options.runner_threads,
+                observer(Span::kSchedulerQueue)),
+      pool(kPoolThreads, kLongestQueue, observer(Span::kCallQueue)) {
+  registry->on_ended = [log = log_, metrics = metrics](const Session& session, EndReason reason) {
+    const std::string why = ended_because(reason);
+    metrics->session_ended(why);
+    log->info("session_ended", {{"session", abbreviated(session.name())}, {"reason", why}});
   };
+  metrics->set(Level::kSessionsMost, static_cast<double>(options.max_sessions));
+  metrics->set(Level::kMemoryBytesMost, static_cast<double>(options.max_bytes));
 }
 
-absl::Status Backend::create_upload(const v1::CreateUploadRequest& request,
+std::function<void(double)> Backend::observer(Span span) const {
+  return [metrics = metrics, span](double seconds) { metrics->observe(span, seconds); };
+}
+
+std::string Backend::metrics_text() const {
+  metrics->set(Level::kSessions, static_cast<double>(registry->size()));
+  metrics->set(Level::kUploads, static_cast<double>(uploads_->size()));
+  metrics->set(Level::kMemoryBytes, static_cast<double>(budget_->used()));
+  metrics->set(Level::kDraining, gate.is_closed() ? 1 : 0);
+  return metrics->text();
+}
+
+std::shared_ptr<CallRecord> Backend::begin_record(std::string method, CallContext context) {
+  return std::make_shared<CallRecord>(CallRecord::Services{gate, metrics, log_}, std::move(method),
+                                      std::move(context));
+}
+
+absl::Status Backend::create_upload(const CallContext&, const v1::CreateUploadRequest& request,
                                     v1::CreateUploadResponse& response) {
   const auto upload = uploads_->create(request.request_id(), request.size_bytes(), request.crc32c());
   if (!upload.ok()) return upload.status();
@@ -52,7 +79,8 @@ absl::Status Backend::create_upload(const v1::CreateUploadRequest& request,
   return absl::OkStatus();
 }
 
-absl::Status Backend::upload_part(const v1::UploadPartRequest& request, v1::UploadPartResponse& response) {
+absl::Status Backend::upload_part(const CallContext&, const v1::UploadPartRequest& request,
+                                  v1::UploadPartResponse& response) {
   const auto upload = uploads_->find(request.upload());
   if (!upload.ok()) return upload.status();
   const auto progress = (*upload)->add(request.offset(), request.data());
@@ -62,19 +90,21 @@ absl::Status Backend::upload_part(const v1::UploadPartRequest& request, v1::Uplo
   return absl::OkStatus();
 }
 
-absl::Status Backend::delete_upload(const v1::DeleteUploadRequest& request, v1::DeleteUploadResponse&) {
+absl::Status Backend::delete_upload(const CallContext&, const v1::DeleteUploadRequest& request,
+                                    v1::DeleteUploadResponse&) {
   uploads_->remove(request.upload());
   return absl::OkStatus();
 }
 
-absl::Status Backend::get_session(const v1::GetSessionRequest& request, v1::GetSessionResponse& response) {
+absl::Status Backend::get_session(const CallContext&, const v1::GetSessionRequest& request,
+                                  v1::GetSessionResponse& response) {
   const auto session = find(request.session());
   if (!session.ok()) return session.status();
   encode((*session)->info(), registry->idle(), timers->now(), *response.mutable_session());
   return absl::OkStatus();
 }
 
-absl::Status Backend::list_sessions(const v1::ListSessionsRequest& request,
+absl::Status Backend::list_sessions(const CallContext&, const v1::ListSessionsRequest& request,
                                     v1::ListSessionsResponse& response) {
   if (request.page_size() > kLargestPage) {
     return invalid_input(
@@ -94,13 +124,15 @@ absl::Status Backend::list_sessions(const v1::ListSessionsRequest& request,
   return absl::OkStatus();
 }
 
-absl::Status Backend::delete_session(const v1::DeleteSessionRequest& request, v1::DeleteSessionResponse&) {
-  registry->remove(request.session(), EndReason::kSessionDeleted, "The session was deleted.");
-  log().info("session_deleted", {{"session", abbreviated(request.session())}});
+absl::Status Backend::delete_session(const CallContext& call, const v1::DeleteSessionRequest& request,
+                                     v1::DeleteSessionResponse&) {
+  if (registry->remove(request.session(), EndReason::kSessionDeleted, "The session was deleted.")) {
+    log().info("session_deleted", {{"session", abbreviated(request.session())}, {"trace_id", call.trace_id}});
+  }
   return absl::OkStatus();
 }
 
-absl::Status Backend::acquire_writer(const v1::AcquireWriterRequest& request,
+absl::Status Backend::acquire_writer(const CallContext& call, const v1::AcquireWriterRequest& request,
                                      v1::AcquireWriterResponse& response) {
   const auto session = find(request.session());
   if (!session.ok()) return session.status();
@@ -108,27 +140,32 @@ absl::Status Backend::acquire_writer(const v1::AcquireWriterRequest& request,
   response.set_writer_token(lease.token);
   response.set_epoch(lease.epoch);
   response.set_input_seq(lease.input_seq);
-  log().info("writer_replaced", {{"session", abbreviated(request.session())}, {"epoch", lease.epoch}});
+  log().info("writer_replaced", {{"session", abbreviated(request.session())},
+                                 {"epoch", lease.epoch},
+                                 {"input_seq", lease.input_seq},
+                                 {"trace_id", call.trace_id}});
   return absl::OkStatus();
 }
 
-absl::Status Backend::update_handles(const v1::UpdateHandlesRequest& request,
+absl::Status Backend::update_handles(const CallContext& call, const v1::UpdateHandlesRequest& request,
                                      v1::UpdateHandlesResponse& response) {
   const auto session = find(request.session());
   if (!session.ok()) return session.status();
-  const auto result = update(**session, request.writer_token(), request.update());
+  const auto result = update(call, **session, request.writer_token(), request.update());
   if (!result.ok()) return result.status();
   response.mutable_result()->set_input_seq(result->input_seq);
   response.mutable_result()->set_stale_parts(result->stale_parts);
   return absl::OkStatus();
 }
 
-absl::Status Backend::ack_frames(const v1::AckFramesRequest& request, v1::AckFramesResponse&) {
+absl::Status Backend::ack_frames(const CallContext&, const v1::AckFramesRequest& request,
+                                 v1::AckFramesResponse&) {
   const auto session = find(request.session());
   return session.ok() ? (*session)->acknowledge(request.stream_id(), request.frame_seq()) : session.status();
 }
 
-absl::StatusOr<Backend::OpenStream> Backend::open_stream(const std::string& session_name,
+absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call,
+                                                         const std::string& session_name,
                                                          const std::string& token,
                                                          const v1::FrameOptions& options,
                                                          std::function<void()> wake) {
@@ -140,20 +177,31 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const std::string& sess
   auto stream = (*session)->open_stream(token, *decoded);
   if (!stream.ok()) return stream.status();
   (*stream)->start(std::move(wake));
+  metrics->change(Level::kStreams, 1);
+  const WriterLease lease = (*session)->lease();
   log().info("stream_opened", {{"session", abbreviated(session_name)},
                                {"stream", abbreviated((*stream)->id())},
-                               {"role", std::string(token.empty() ? "reader" : "writer")}});
+                               {"role", std::string(token.empty() ? "reader" : "writer")},
+                               {"epoch", lease.epoch},
+                               {"input_seq", lease.input_seq},
+                               {"trace_id", call.trace_id}});
   return OpenStream{*std::move(session), *std::move(stream)};
 }
 
-void Backend::forget(const OpenStream& open) {
+void Backend::forget(const CallContext& call, const OpenStream& open) {
   open.session->forget_stream(*open.stream);
-  log().info("stream_ended",
-             {{"session", abbreviated(open.session->name())}, {"stream", abbreviated(open.stream->id())}});
+  metrics->change(Level::kStreams, -1);
+  const WriterLease lease = open.session->lease();
+  log().info("stream_ended", {{"session", abbreviated(open.session->name())},
+                              {"stream", abbreviated(open.stream->id())},
+                              {"epoch", lease.epoch},
+                              {"input_seq", lease.input_seq},
+                              {"frame_seq", open.stream->last_frame_seq()},
+                              {"trace_id", call.trace_id}});
 }
 
-absl::StatusOr<UpdateResult> Backend::update(Session& session, const std::string& token,
-                                             const v1::Update& update) {
+absl::StatusOr<UpdateResult> Backend::update(const CallContext& call, Session& session,
+                                             const std::string& token, const v1::Update& update) {
   if (absl::Status status = session.check_writer(token); !status.ok()) return status;
   const auto decoded =
       Decoder(*uploads_, session.vertex_count(), &session.features(), session.mesh().weld().get())
@@ -162,14 +210,17 @@ absl::StatusOr<UpdateResult> Backend::update(Session& session, const std::string
   const auto result = session.update(token, *decoded);
   if (result.ok()) {
     log().debug("update", {{"session", abbreviated(session.name())},
+                           {"epoch", session.lease().epoch},
                            {"input_seq", result->input_seq},
-                           {"stale_parts", std::uint64_t{result->stale_parts}}});
+                           {"stale_parts", std::uint64_t{result->stale_parts}},
+                           {"trace_id", call.trace_id}});
   }
   return result;
 }
 
-absl::Status Backend::solve(const v1::SolveRequest& request, SolveJob::OnProgress on_progress,
-                            SolveJob::OnDone on_done, std::shared_ptr<SolveJob>& job) {
+absl::Status Backend::solve(const CallContext& call, const v1::SolveRequest& request,
+                            SolveJob::OnProgress on_progress, SolveJob::OnDone on_done,
+                            std::shared_ptr<SolveJob>& job) {
   const auto session = find(request.session());
   if (!session.ok()) return session.status();
   if (absl::Status status = (*session)->check_writer(request.writer_token()); !status.ok()) return status;
@@ -189,12 +240,29 @@ absl::Status Backend::solve(const v1::SolveRequest& request, SolveJob::OnProgres
     if (!welded.ok()) return welded.status();
     options.initial_positions = *std::move(welded);
   }
-  job = std::make_shared<SolveJob>(std::move(options), std::move(on_progress), std::move(on_done));
+  const SolveJob::OnDone on_ended = [this, session = *session, trace_id = call.trace_id,
+                                     on_done](absl::StatusOr<SolveResult> result) {
+    if (result.ok()) log_solved(*session, *result, trace_id);
+    on_done(std::move(result));
+  };
+  job = std::make_shared<SolveJob>(std::move(options), std::move(on_progress), on_ended);
   return (*session)->solve(request.writer_token(), update, job);
 }
 
-void Backend::create_session(const v1::CreateSessionRequest& request, v1::CreateSessionResponse& response,
-                             std::function<void(absl::Status)> done) {
+void Backend::log_solved(const Session& session, const SolveResult& result,
+                         const std::string& trace_id) const {
+  log().info("solved", {{"session", abbreviated(session.name())},
+                        {"epoch", result.frame->epoch},
+                        {"input_seq", result.frame->input_seq},
+                        {"frame_seq", result.frame->frame_seq},
+                        {"iterations", static_cast<std::uint64_t>(result.summary.iterations)},
+                        {"seconds", result.summary.solve_seconds},
+                        {"stop_reason", std::string(stop_reason_name(result.summary.stop_reason))},
+                        {"trace_id", trace_id}});
+}
+
+void Backend::create_session(const CallContext& call, const v1::CreateSessionRequest& request,
+                             v1::CreateSessionResponse& response, std::function<void(absl::Status)> done) {
   const Registry::OnCreated on_created = [this, &response,
                                           done](const absl::StatusOr<CreatedSession>& created) {
     if (!created.ok()) return done(created.status());
@@ -204,9 +272,9 @@ void Backend::create_session(const v1::CreateSessionRequest& request, v1::Create
   };
   const std::size_t fingerprint = std::hash<std::string>()(request.SerializeAsString());
   if (!registry->begin_creation(request.request_id(), on_created, fingerprint)) return;
-  scheduler.run_once([this, &request, on_created] {
+  scheduler.run_once([this, call, &request, on_created] {
     const std::string request_id = request.request_id();
-    registry->finish_creation(request_id, make_session(request), on_created);
+    registry->finish_creation(request_id, make_session(call, request), on_created);
   });
 }
 
@@ -233,7 +301,8 @@ absl::Status Backend::make_mesh(const v1::CreateSessionRequest& request, Decoder
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const v1::CreateSessionRequest& request) {
+absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const CallContext& call,
+                                                               const v1::CreateSessionRequest& request) {
   const v1::Mesh& mesh_message = request.mesh();
   Decoder decoder(*uploads_, mesh_message.vertex_count());
   const std::uint32_t most_faces = kFacesPerVertex * options_.max_vertices;
@@ -262,10 +331,15 @@ absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const v1::CreateS
   auto deformer = Deformer::create(parts.shape, {*free_components, threads});
   if (!deformer.ok()) return deformer.status();
   parts.deformer = *std::move(deformer);
-  log().info("session_created", {{"session", abbreviated(parts.name)},
+  auto session = Session::create(std::move(parts), {scheduler, timers, options_.heartbeat, metrics});
+  if (!session.ok()) return session.status();
+  metrics->add(Count::kSessionsCreated);
+  log().info("session_created", {{"session", abbreviated((*session)->name())},
+                                 {"epoch", (*session)->lease().epoch},
                                  {"vertices", std::uint64_t{mesh_message.vertex_count()}},
-                                 {"faces", std::uint64_t{mesh_message.face_count()}}});
-  return Session::create(std::move(parts), {scheduler, timers, options_.heartbeat});
+                                 {"faces", std::uint64_t{mesh_message.face_count()}},
+                                 {"trace_id", call.trace_id}});
+  return session;
 }
 
 }  // namespace lpdeform

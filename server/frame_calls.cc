@@ -23,12 +23,13 @@ class FrameCall : public WritePump<Reactor, Response> {
 
   /// Opens the stream, on a thread of the pool. Ends the call where that fails.
   void open(const std::string& session_name, const std::string& token, const v1::FrameOptions& options) {
-    auto open = backend_.open_stream(session_name, token, options, [weak = this->weak_from_this()] {
-      if (const auto self = weak.lock()) self->pump();
-    });
+    auto open =
+        backend_.open_stream(this->context(), session_name, token, options, [weak = this->weak_from_this()] {
+          if (const auto self = weak.lock()) self->pump();
+        });
     const std::scoped_lock lock(this->mutex_);
     if (!open.ok()) return this->refuse_locked(open.status());
-    if (this->is_over_locked()) return backend_.forget(*open);
+    if (this->is_over_locked()) return backend_.forget(this->context(), *open);
     open_ = *std::move(open);
     token_ = token;
     this->pump_locked();
@@ -43,7 +44,7 @@ class FrameCall : public WritePump<Reactor, Response> {
   }
 
   void let_go() final {
-    if (open_.stream && !std::exchange(is_forgotten_, true)) backend_.forget(open_);
+    if (open_.stream && !std::exchange(is_forgotten_, true)) backend_.forget(this->context(), open_);
   }
 
   Backend& backend_;
@@ -79,6 +80,7 @@ class DeformCall final
       is_open_ = is_open_ || (ok && request_.has_open());
     }
     if (!ok) return end_of_input(is_open);
+    record().received(request_.ByteSizeLong());
     switch (request_.message_case()) {
       case v1::DeformRequest::kOpen:
         return is_open ? break_off("The stream was opened twice.") : post(&DeformCall::take_open);
@@ -129,10 +131,12 @@ class DeformCall final
   void take_update() {
     const v1::Update& update = request_.update();
     const auto session = backend_.find(open_.session->name());
-    const auto result = session.ok() ? backend_.update(**session, token_, update) : session.status();
+    const auto result =
+        session.ok() ? backend_.update(context(), **session, token_, update) : session.status();
     if (result.ok()) {
       open_.stream->answer(*result);
     } else {
+      record().refused(result.status());
       open_.stream->answer(FaultNote{result.status(), update.input_seq()});
     }
     read();
@@ -159,12 +163,14 @@ class DeformCall final
 }  // namespace
 
 grpc::ServerWriteReactor<v1::StreamFramesResponse>* stream_frames(Backend& backend,
+                                                                  std::shared_ptr<CallRecord> record,
                                                                   const v1::StreamFramesRequest& request) {
-  return begin_call<StreamFramesCall>(backend, request);
+  return begin_call<StreamFramesCall>(backend, std::move(record), request);
 }
 
-grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* deform(Backend& backend) {
-  return begin_call<DeformCall>(backend);
+grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* deform(Backend& backend,
+                                                                       std::shared_ptr<CallRecord> record) {
+  return begin_call<DeformCall>(backend, std::move(record));
 }
 
 }  // namespace lpdeform

@@ -8,11 +8,13 @@ namespace lpdeform {
 // The calls that carry frames. They belong to gRPC once made; `backend` outlives them.
 
 grpc::ServerWriteReactor<v1::StreamFramesResponse>* stream_frames(Backend& backend,
+                                                                  std::shared_ptr<CallRecord> record,
                                                                   const v1::StreamFramesRequest& request);
 
 grpc::ServerWriteReactor<v1::StreamSessionsResponse>* stream_sessions(
-    Backend& backend, const v1::StreamSessionsRequest& request);
+    Backend& backend, std::shared_ptr<CallRecord> record, const v1::StreamSessionsRequest& request);
 
-grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* deform(Backend& backend);
+grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* deform(Backend& backend,
+                                                                       std::shared_ptr<CallRecord> record);
 
 }  // namespace lpdeform

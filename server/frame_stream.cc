@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "server/metrics.h"
 #include "server/publisher.h"
 #include "server/random_name.h"
 
@@ -86,10 +87,20 @@ std::optional<Note> FrameStream::next_locked(Timers::TimePoint now) {
 /// Takes the publisher's newest frame on, if it is new and may be sent now.
 void FrameStream::begin_frame(Timers::TimePoint now) {
   std::shared_ptr<const Frame> newest = publisher_->newest();
-  if (!newest || newest->frame_seq <= last_seq_ || in_flight_.size() >= options_.credit) return;
+  if (!newest || newest->frame_seq <= last_seq_) return;
   const bool was_sent = newest->repeats != 0 && newest->repeats == last_seq_;
   if (was_sent && !options_.with_certificate) return;
+  if (in_flight_.size() >= options_.credit) {
+    if (!std::exchange(is_stalled_, true)) publisher_->metrics().add(Count::kCreditStalls);
+    return;
+  }
   if (const Timers::TimePoint when = next_frame_at(); now < when) return arm(is_pace_armed_, when);
+  is_stalled_ = false;
+  publisher_->metrics().add(Count::kFramesSent);
+  if (has_sent_frame_) {
+    publisher_->metrics().add(Count::kFramesSuperseded,
+                              static_cast<double>(newest->frame_seq - last_seq_ - 1));
+  }
   const std::uint64_t answered = has_sent_frame_ ? newest->taken - last_taken_ : 0;
   last_seq_ = newest->frame_seq;
   last_taken_ = newest->taken;
@@ -104,6 +115,7 @@ void FrameStream::begin_frame(Timers::TimePoint now) {
 FramePiece FrameStream::next_piece() {
   FramePiece piece = cutter_.next();
   last_bytes_ += piece.bytes().size();
+  publisher_->metrics().add(Count::kFrameBytes, static_cast<double>(piece.bytes().size()));
   return piece;
 }
 
@@ -167,6 +179,11 @@ void FrameStream::answer(FaultNote fault) {
 std::size_t FrameStream::answers_waiting() const {
   const std::scoped_lock lock(mutex_);
   return answers_.size();
+}
+
+std::uint64_t FrameStream::last_frame_seq() const {
+  const std::scoped_lock lock(mutex_);
+  return last_seq_;
 }
 
 void FrameStream::end(EndReason reason, std::string text) {

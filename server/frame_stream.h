@@ -86,6 +86,9 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
 
   std::size_t answers_waiting() const;
 
+  /// Of the last frame that was begun; 0 where there was none.
+  std::uint64_t last_frame_seq() const;
+
   /// The stream is to end; the first reason counts.
   void end(EndReason reason, std::string text);
 
@@ -121,6 +124,7 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   std::uint64_t last_seq_ = 0;           // of the last frame begun
   std::uint64_t last_taken_ = 0;
   bool has_sent_frame_ = false;
+  bool is_stalled_ = false;  // a frame waits for credit
   std::uint64_t last_fault_ = 0;
   std::size_t last_bytes_ = 0;  // of the last frame's numbers
   Timers::TimePoint last_frame_at_;

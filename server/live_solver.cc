@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "server/metrics.h"
 
 namespace lpdeform {
 namespace {
@@ -62,6 +63,9 @@ void LiveSolver::take_over(const Inputs& inputs) {
   if (status.ok() && has_handles && inputs.handles != held_) {
     status = mesh_->for_client(deformer_->set_handles(*inputs.handles));
     if (status.ok()) held_ = inputs.handles;
+  }
+  if (inputs.taken > inputs_.taken + 1) {
+    publisher_.metrics().add(Count::kUpdatesCoalesced, static_cast<double>(inputs.taken - inputs_.taken - 1));
   }
   inputs_ = inputs;
   blocked_ = has_handles ? status : no_handles();
@@ -125,6 +129,8 @@ bool LiveSolver::is_frame_due() const {
 
 void LiveSolver::end_solve(SolveJob* job) {
   if (deformer_->summary().stop_reason == StopReason::kCancelled) return pause();
+  publisher_.metrics().observe(Span::kSolve, deformer_->summary().solve_seconds);
+  publisher_.metrics().observe(Span::kSetup, deformer_->summary().setup_seconds);
   const bool is_certified = deformer_->summary().optimality_gap.has_value();
   phase_ = is_certified ? Phase::kDone : Phase::kAnswered;
   answered_at_ = alarm_.timers->now();

@@ -51,6 +51,8 @@ void Log::write(int level, std::string_view event, Fields fields) const {
   line["level"] = spdlog::level::to_string_view(at).data();
   line["event"] = event;
   for (const LogField& field : fields) {
+    const auto* const text = std::get_if<std::string>(&field.value);
+    if (text != nullptr && text->empty()) continue;
     std::visit([&](const auto& value) { line[std::string(field.name)] = value; }, field.value);
   }
   logger_->log(at, line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));

@@ -16,7 +16,7 @@ class thread_pool;
 
 namespace lpdeform {
 
-/// A fact of an event. Never a token, never coordinates.
+/// A fact of an event. Never a token, never coordinates. Left out where its text is empty.
 struct LogField {
   std::string_view name;
   std::variant<std::string, std::uint64_t, double> value;

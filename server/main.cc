@@ -31,6 +31,12 @@ void describe(CLI::App& app, Arguments& arguments) {
   app.add_option("--address", server.address, "Where to listen: HOST:PORT (port 0: a free one) or unix:/PATH")
       ->envname("LPDEFORM_ADDRESS")
       ->capture_default_str();
+  app.add_option(
+         "--admin-address", server.admin_address,
+         "Where to answer GET /metrics (Prometheus), /healthz (ready) and /livez (alive) over plain HTTP: "
+         "HOST:PORT; empty: nowhere")
+      ->envname("LPDEFORM_ADMIN_ADDRESS")
+      ->capture_default_str();
   app.add_option("--threads", server.threads, "Threads that one solve may use; 0: all cores")
       ->envname("LPDEFORM_THREADS")
       ->check(CLI::Range(0, 1024))
@@ -103,6 +109,9 @@ int serve(Arguments& arguments, const sigset_t& signals) {
     return 1;
   }
   std::printf("lpdeform-server listens on %s\n", (*server)->address().c_str());
+  if (!(*server)->admin_address().empty()) {
+    std::printf("lpdeform-server shows itself on http://%s\n", (*server)->admin_address().c_str());
+  }
   std::fflush(stdout);
   int signal = 0;
   sigwait(&signals, &signal);

@@ -5,6 +5,8 @@
 
 namespace lpdeform {
 
+Publisher::Publisher(std::shared_ptr<Metrics> metrics) : metrics_(std::move(metrics)) {}
+
 std::shared_ptr<const Frame> Publisher::publish(Frame frame) {
   // Encoded here, on the solver's thread, in every form that is asked for, so that no reader's thread has to.
   for (const auto& stream : readers()) {
@@ -18,9 +20,16 @@ std::shared_ptr<const Frame> Publisher::publish(Frame frame) {
     frame.frame_seq = ++frames_;
     frame.epoch = epoch_;
     published = newest_ = std::make_shared<const Frame>(std::move(frame));
+    measure_answer();
   }
+  metrics_->add(Count::kFramesPublished);
   wake_all();
   return published;
+}
+
+void Publisher::measure_answer() {
+  waiting_.answered(newest_->input_seq, std::chrono::steady_clock::now(),
+                    [this](double seconds) { metrics_->observe(Span::kInputToFrame, seconds); });
 }
 
 void Publisher::begin_epoch(std::uint64_t epoch) {
@@ -55,9 +64,19 @@ void Publisher::set_standing(std::optional<FaultNote> fault) {
     const std::scoped_lock lock(mutex_);
     if (!fault && !standing_) return;
     standing_.reset();
+    if (fault) waiting_.forget();  // no frame will answer
     if (fault) standing_ = Standing{++faults_, *std::move(fault)};
   }
   wake_all();
+}
+
+void Publisher::took(std::uint64_t input_seq, AnswerClock::TimePoint since) {
+  metrics_->add(Count::kUpdates);
+  const std::scoped_lock lock(mutex_);
+  if (streams_.empty()) return;
+  waiting_.took(input_seq, since);
+  if (newest_ && newest_->input_seq >= input_seq)
+    measure_answer();  // the solver was quicker than we are here
 }
 
 std::shared_ptr<const Frame> Publisher::newest() const {
@@ -80,6 +99,7 @@ bool Publisher::add(const std::shared_ptr<FrameStream>& stream) {
 void Publisher::remove(const FrameStream& stream) {
   const std::scoped_lock lock(mutex_);
   std::erase_if(streams_, [&](const auto& one) { return one.expired() || one.lock().get() == &stream; });
+  if (streams_.empty()) waiting_.forget();
 }
 
 std::shared_ptr<FrameStream> Publisher::find(const std::string& id) const {

@@ -6,7 +6,9 @@
 #include <optional>
 #include <vector>
 
+#include "server/answer_clock.h"
 #include "server/frame_stream.h"
+#include "server/metrics.h"
 
 namespace lpdeform {
 
@@ -15,6 +17,8 @@ namespace lpdeform {
 /// them. Thread-safe.
 class Publisher {
  public:
+  explicit Publisher(std::shared_ptr<Metrics> metrics = std::make_shared<Metrics>());
+
   /// A fault that concerns every reader until the cause is gone. `number` rises with each.
   struct Standing {
     std::uint64_t number = 0;
@@ -34,6 +38,9 @@ class Publisher {
   /// Puts up a fault, or takes it down.
   void set_standing(std::optional<FaultNote> fault);
 
+  /// An update was taken: measures how long readers wait for the first frame that answers it.
+  void took(std::uint64_t input_seq, AnswerClock::TimePoint since);
+
   std::shared_ptr<const Frame> newest() const;
   std::optional<Standing> standing() const;
 
@@ -52,10 +59,14 @@ class Publisher {
   /// Ends every stream and takes no more.
   void close(EndReason reason, const std::string& text);
 
+  Metrics& metrics() const { return *metrics_; }
+
  private:
   std::vector<std::shared_ptr<FrameStream>> readers() const;
   void wake_all() const;
+  void measure_answer();
 
+  const std::shared_ptr<Metrics> metrics_;
   mutable std::mutex mutex_;
   std::shared_ptr<const Frame> newest_;
   std::optional<Standing> standing_;
@@ -63,6 +74,7 @@ class Publisher {
   std::uint64_t frames_ = 0;
   std::uint64_t epoch_ = 1;
   bool is_closed_ = false;
+  AnswerClock waiting_;
   std::vector<std::weak_ptr<FrameStream>> streams_;  // weak, because a stream holds its publisher
 };
 

@@ -111,18 +111,20 @@ absl::StatusOr<Registry::Page> Registry::list(std::size_t most, const std::strin
   return page;
 }
 
-void Registry::remove(const std::string& name, EndReason reason, const std::string& text) {
+bool Registry::remove(const std::string& name, EndReason reason, const std::string& text) {
   std::shared_ptr<Session> session;
   {
     const std::scoped_lock lock(mutex_);
     const auto found = sessions_.find(name);
-    if (found == sessions_.end()) return;
+    if (found == sessions_.end()) return false;
     session = found->second.session;
     by_age_.erase(found->second.number);
     requests_.erase(found->second.request_id);
     sessions_.erase(found);
   }
   session->close(reason, text);
+  if (on_ended) on_ended(*session, reason);
+  return true;
 }
 
 void Registry::drain(const std::string& text) {
@@ -142,7 +144,10 @@ void Registry::clear(EndReason reason, const std::string& text) {
     by_age_.clear();
     std::erase_if(requests_, [](const auto& request) { return !request.second.name.empty(); });
   }
-  for (const auto& [name, entry] : all) entry.session->close(reason, text);
+  for (const auto& [name, entry] : all) {
+    entry.session->close(reason, text);
+    if (on_ended) on_ended(*entry.session, reason);
+  }
 }
 
 std::size_t Registry::size() const {
@@ -167,7 +172,6 @@ void Registry::expire(const std::string& name) {
   }
   const Timers::TimePoint due = session->last_used() + limits_.idle;
   if (timers_->now() < due) return watch(name, due);
-  if (on_expired) on_expired(*session);
   remove(name, EndReason::kSessionExpired, "The session was idle for too long.");
 }
 

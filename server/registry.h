@@ -55,8 +55,8 @@ class Registry : public std::enable_shared_from_this<Registry> {
   };
   absl::StatusOr<Page> list(std::size_t most, const std::string& page_token) const;
 
-  /// Closes and forgets the session; nothing where there is none.
-  void remove(const std::string& name, EndReason reason, const std::string& text);
+  /// Closes and forgets the session; false where there is none.
+  bool remove(const std::string& name, EndReason reason, const std::string& text);
 
   /// Ends all streams, now and from now on; Solve calls go on.
   void drain(const std::string& text);
@@ -64,8 +64,8 @@ class Registry : public std::enable_shared_from_this<Registry> {
   /// Closes and forgets all.
   void clear(EndReason reason, const std::string& text);
 
-  /// What sessions are told of when they expire, for the log. Called under no lock.
-  std::function<void(const Session&)> on_expired;
+  /// Called with each session that is closed, under no lock. To be set before anything else is called.
+  std::function<void(const Session&, EndReason)> on_ended;
 
   Timers::Duration idle() const { return limits_.idle; }
   std::size_t size() const;

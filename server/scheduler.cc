@@ -31,7 +31,7 @@ bool Scheduler::LessUsed::operator()(const std::shared_ptr<Runnable>& a,
   return a->ticket_ < b->ticket_;
 }
 
-Scheduler::Scheduler(int threads) {
+Scheduler::Scheduler(int threads, std::function<void(double)> on_waited) : on_waited_(std::move(on_waited)) {
   LPDEFORM_CHECK(threads >= 2);
   const std::scoped_lock lock(mutex_);  // the first threads ask already how many there are
   for (int k = 0; k < threads; ++k) threads_.emplace_back([this] { run(); });
@@ -67,6 +67,7 @@ void Scheduler::wake(std::shared_ptr<Runnable> runnable) {
 void Scheduler::enqueue(std::shared_ptr<Runnable> runnable) {
   runnable->state_ = Runnable::State::kWaiting;
   runnable->ticket_ = ++tickets_;
+  runnable->ready_since_ = std::chrono::steady_clock::now();
   waiting_.insert(std::move(runnable));
   changed_.notify_all();
 }
@@ -90,6 +91,7 @@ void Scheduler::run() {
 
     lock.unlock();
     const auto begin = std::chrono::steady_clock::now();
+    if (on_waited_) on_waited_(std::chrono::duration<double>(begin - runnable->ready_since_).count());
     const bool has_more = runnable->run();
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
     lock.lock();

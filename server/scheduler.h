@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -30,6 +31,7 @@ class Runnable {
   const bool is_heavy_;
   State state_ = State::kAsleep;
   double used_seconds_ = 0;
+  std::chrono::steady_clock::time_point ready_since_;
   std::uint64_t ticket_ = 0;
 };
 
@@ -39,8 +41,9 @@ class Runnable {
 /// factorisation and everybody else. Thread-safe.
 class Scheduler {
  public:
-  /// `threads` >= 2.
-  explicit Scheduler(int threads);
+  /// `threads` >= 2. `on_waited` is given the seconds that each slice waited for its thread, on that thread and under
+  /// no lock; may be empty.
+  explicit Scheduler(int threads, std::function<void(double)> on_waited = {});
   /// Waits for the slices that run; the others are dropped.
   ~Scheduler();
 
@@ -66,6 +69,7 @@ class Scheduler {
   Queue::iterator next();
   void finish_slice(std::shared_ptr<Runnable> runnable, double seconds, bool has_more);
 
+  const std::function<void(double)> on_waited_;
   std::mutex mutex_;
   std::condition_variable changed_;
   Queue waiting_;

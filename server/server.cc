@@ -13,8 +13,11 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "server/admin.h"
 #include "server/backend.h"
+#include "server/health_probe.h"
 #include "server/service.h"
+#include "server/vital_signs.h"
 
 namespace lpdeform {
 namespace {
@@ -67,15 +70,42 @@ std::string with_port(const std::string& address, int port) {
 }  // namespace
 
 struct Server::Impl {
-  explicit Impl(const ServerOptions& options) : backend(options), service(backend) {}
+  explicit Impl(const ServerOptions& options)
+      : backend(options),
+        service(backend),
+        vital_signs({[this] { return is_serving(address); }, [this] { return backend.gate.is_closed(); },
+                     backend.scheduler, backend.pool}) {}
+
+  absl::Status start_admin(const std::string& at);
 
   Backend backend;
   Service service;
+  const VitalSigns vital_signs;
   std::unique_ptr<grpc::Server> grpc_server;
   std::string address;
   std::mutex draining;
   bool is_drained = false;
+  std::unique_ptr<Admin> admin;  // last, so that its threads end first
 };
+
+absl::Status Server::Impl::start_admin(const std::string& at) {
+  const auto health = [this](bool (VitalSigns::Finding::*is_well)() const) {
+    return [this, is_well] {
+      const VitalSigns::Finding finding = vital_signs.examine();
+      return Admin::Answer{(finding.*is_well)() ? 200 : 503, "application/json", finding.json()};
+    };
+  };
+  auto started =
+      Admin::start(at, {{"/metrics",
+                         [this] {
+                           return Admin::Answer{200, "text/plain; version=0.0.4", backend.metrics_text()};
+                         }},
+                        {"/healthz", health(&VitalSigns::Finding::is_ready)},
+                        {"/livez", health(&VitalSigns::Finding::is_alive)}});
+  if (!started.ok()) return started.status();
+  admin = *std::move(started);
+  return absl::OkStatus();
+}
 
 absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& options) {
   if (absl::Status status = check(options); !status.ok()) return status;
@@ -98,6 +128,9 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& optio
   }
   impl->grpc_server->GetHealthCheckService()->SetServingStatus(v1::DeformService::service_full_name(), true);
   impl->address = with_port(options.address, port);
+  if (!options.admin_address.empty()) {
+    if (absl::Status status = impl->start_admin(options.admin_address); !status.ok()) return status;
+  }
   impl->backend.log().info("started", {{"address", impl->address}});
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
@@ -110,6 +143,10 @@ Server::~Server() {
 
 const std::string& Server::address() const {
   return impl_->address;
+}
+
+std::string Server::admin_address() const {
+  return impl_->admin ? impl_->admin->address() : "";
 }
 
 void Server::drain(std::chrono::milliseconds grace) {

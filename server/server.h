@@ -16,6 +16,9 @@ struct ServerOptions {
   /// "host:port", port 0 for a free one, or "unix:/path/of/socket".
   std::string address = "127.0.0.1:0";
 
+  /// "host:port" of the admin port, with /metrics, /healthz and /livez over plain HTTP; empty: none.
+  std::string admin_address = {};
+
   /// Threads that one solve may use; 0 takes all cores.
   int threads = 0;
   /// Threads that sessions take turns on, at least 2; 0 takes max(4, 2 * cores).
@@ -50,6 +53,8 @@ class Server {
 
   /// For clients: as in the options, with the port that was found.
   const std::string& address() const;
+  /// Of the admin port; empty where there is none.
+  std::string admin_address() const;
 
   /// Stops: health says NOT_SERVING, new calls are refused as UNAVAILABLE, streams get a go-away, Solve calls
   /// may go on until `grace` has passed and are ended then. Returns when nothing runs any more. Again: at

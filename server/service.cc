@@ -1,115 +1,146 @@
 #include "server/service.h"
 
 #include <functional>
+#include <string>
+#include <string_view>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "server/frame_calls.h"
 #include "server/grpc_status.h"
 #include "server/refusals.h"
 #include "server/solve_call.h"
+#include "server/trace_context.h"
 
 namespace lpdeform {
 namespace {
 
+constexpr std::size_t kLongestTraceParent = 256;
+
+std::string text_of(const grpc::CallbackServerContext& context, const char* header) {
+  const auto found = context.client_metadata().find(header);
+  if (found == context.client_metadata().end()) return "";
+  return {found->second.data(), found->second.size()};
+}
+
+std::shared_ptr<CallRecord> begin_record(Backend& backend, const grpc::CallbackServerContext& context,
+                                         std::string_view method) {
+  const std::string trace_parent = text_of(context, "traceparent");
+  CallContext call;
+  if (trace_parent.size() <= kLongestTraceParent) call.trace_id = trace_id_of(trace_parent);
+  return backend.begin_record(absl::StrCat(v1::DeformService::service_full_name(), "/",
+                                           absl::string_view(method.data(), method.size())),
+                              std::move(call));
+}
+
 /// Runs `task` on the pool; the call ends when `task` calls what it is given.
+using Finish = std::function<void(const absl::Status&)>;
 grpc::ServerUnaryReactor* in_pool(Backend& backend, grpc::CallbackServerContext& context,
-                                  std::function<void(std::function<void(absl::Status)>)> task) {
+                                  const std::shared_ptr<CallRecord>& record,
+                                  const google::protobuf::Message& response,
+                                  std::function<void(const Finish&)> task) {
   grpc::ServerUnaryReactor* const reactor = context.DefaultReactor();
-  CallGate::Permit permit = backend.gate.enter();
-  if (permit == nullptr) {
-    reactor->Finish(to_grpc(server_draining()));
-    return reactor;
-  }
-  const auto finish = [&backend, reactor, permit](const absl::Status& status) {
-    if (!status.ok()) {
-      backend.log().info("refused",
-                         {{"reason", fault_of(status).reason}, {"text", std::string(status.message())}});
-    }
+  const auto finish = [record, reactor, &response](const absl::Status& status) {
+    if (status.ok()) record->sent(response.ByteSizeLong());
+    record->ended(status);
     reactor->Finish(to_grpc(status));
   };
-  if (!backend.pool.try_post([task = std::move(task), finish] { task(finish); })) finish(server_busy());
+  if (!record->is_let_in()) {
+    finish(server_draining());
+  } else if (!backend.pool.try_post([task = std::move(task), finish] { task(finish); })) {
+    finish(server_busy());
+  }
   return reactor;
 }
 
 template <typename Request, typename Response>
 grpc::ServerUnaryReactor* in_pool(Backend& backend, grpc::CallbackServerContext& context,
-                                  absl::Status (Backend::*handler)(const Request&, Response&),
+                                  std::string_view method,
+                                  absl::Status (Backend::*handler)(const CallContext&, const Request&,
+                                                                   Response&),
                                   const Request& request, Response& response) {
-  return in_pool(backend, context, [&backend, handler, &request, &response](const auto& finish) {
-    finish((backend.*handler)(request, response));
-  });
+  const auto record = begin_record(backend, context, method);
+  record->received(request.ByteSizeLong());
+  return in_pool(backend, context, record, response,
+                 [&backend, record, handler, &request, &response](const Finish& finish) {
+                   finish((backend.*handler)(record->context(), request, response));
+                 });
 }
 
 }  // namespace
 
 grpc::ServerUnaryReactor* Service::CreateUpload(Context* context, const v1::CreateUploadRequest* request,
                                                 v1::CreateUploadResponse* response) {
-  return in_pool(backend_, *context, &Backend::create_upload, *request, *response);
+  return in_pool(backend_, *context, "CreateUpload", &Backend::create_upload, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::UploadPart(Context* context, const v1::UploadPartRequest* request,
                                               v1::UploadPartResponse* response) {
-  return in_pool(backend_, *context, &Backend::upload_part, *request, *response);
+  return in_pool(backend_, *context, "UploadPart", &Backend::upload_part, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::DeleteUpload(Context* context, const v1::DeleteUploadRequest* request,
                                                 v1::DeleteUploadResponse* response) {
-  return in_pool(backend_, *context, &Backend::delete_upload, *request, *response);
+  return in_pool(backend_, *context, "DeleteUpload", &Backend::delete_upload, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::CreateSession(Context* context, const v1::CreateSessionRequest* request,
                                                  v1::CreateSessionResponse* response) {
-  return in_pool(backend_, *context, [this, request, response](auto finish) {
-    backend_.create_session(*request, *response, std::move(finish));
-  });
+  const auto record = begin_record(backend_, *context, "CreateSession");
+  record->received(request->ByteSizeLong());
+  return in_pool(backend_, *context, record, *response,
+                 [this, record, request, response](const Finish& finish) {
+                   backend_.create_session(record->context(), *request, *response, finish);
+                 });
 }
 
 grpc::ServerUnaryReactor* Service::GetSession(Context* context, const v1::GetSessionRequest* request,
                                               v1::GetSessionResponse* response) {
-  return in_pool(backend_, *context, &Backend::get_session, *request, *response);
+  return in_pool(backend_, *context, "GetSession", &Backend::get_session, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::ListSessions(Context* context, const v1::ListSessionsRequest* request,
                                                 v1::ListSessionsResponse* response) {
-  return in_pool(backend_, *context, &Backend::list_sessions, *request, *response);
+  return in_pool(backend_, *context, "ListSessions", &Backend::list_sessions, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::DeleteSession(Context* context, const v1::DeleteSessionRequest* request,
                                                  v1::DeleteSessionResponse* response) {
-  return in_pool(backend_, *context, &Backend::delete_session, *request, *response);
+  return in_pool(backend_, *context, "DeleteSession", &Backend::delete_session, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::AcquireWriter(Context* context, const v1::AcquireWriterRequest* request,
                                                  v1::AcquireWriterResponse* response) {
-  return in_pool(backend_, *context, &Backend::acquire_writer, *request, *response);
+  return in_pool(backend_, *context, "AcquireWriter", &Backend::acquire_writer, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::UpdateHandles(Context* context, const v1::UpdateHandlesRequest* request,
                                                  v1::UpdateHandlesResponse* response) {
-  return in_pool(backend_, *context, &Backend::update_handles, *request, *response);
+  return in_pool(backend_, *context, "UpdateHandles", &Backend::update_handles, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::AckFrames(Context* context, const v1::AckFramesRequest* request,
                                              v1::AckFramesResponse* response) {
-  return in_pool(backend_, *context, &Backend::ack_frames, *request, *response);
+  return in_pool(backend_, *context, "AckFrames", &Backend::ack_frames, *request, *response);
 }
 
 grpc::ServerWriteReactor<v1::StreamFramesResponse>* Service::StreamFrames(
-    Context*, const v1::StreamFramesRequest* request) {
-  return stream_frames(backend_, *request);
+    Context* context, const v1::StreamFramesRequest* request) {
+  return stream_frames(backend_, begin_record(backend_, *context, "StreamFrames"), *request);
 }
 
 grpc::ServerWriteReactor<v1::StreamSessionsResponse>* Service::StreamSessions(
-    Context*, const v1::StreamSessionsRequest* request) {
-  return stream_sessions(backend_, *request);
+    Context* context, const v1::StreamSessionsRequest* request) {
+  return stream_sessions(backend_, begin_record(backend_, *context, "StreamSessions"), *request);
 }
 
-grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* Service::Deform(Context*) {
-  return deform(backend_);
+grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* Service::Deform(Context* context) {
+  return deform(backend_, begin_record(backend_, *context, "Deform"));
 }
 
-grpc::ServerWriteReactor<v1::SolveResponse>* Service::Solve(Context*, const v1::SolveRequest* request) {
-  return solve(backend_, *request);
+grpc::ServerWriteReactor<v1::SolveResponse>* Service::Solve(Context* context,
+                                                            const v1::SolveRequest* request) {
+  return solve(backend_, begin_record(backend_, *context, "Solve"), *request);
 }
 
 }  // namespace lpdeform

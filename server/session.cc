@@ -72,6 +72,7 @@ Session::Session(SessionParts parts, SessionServices services)
       created_unix_ms_(unix_ms_now()),
       last_used_(services_.timers->now()),
       mailbox_(shape_, mesh_->weld()),
+      publisher_(std::make_shared<Publisher>(services_.metrics)),
       memory_(std::move(parts.memory)),
       memory_bytes_(memory_.bytes()),
       token_(random_hex_128()) {}
@@ -133,12 +134,14 @@ WriterLease Session::acquire_writer() {
 
 absl::StatusOr<UpdateResult> Session::update(const std::string& token, const Update& update) {
   touch();
+  const auto since = std::chrono::steady_clock::now();
   absl::StatusOr<UpdateResult> result;
   {
     const std::scoped_lock lock(writing_);
     if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
     if (is_closed_) return gone(name_);
     result = mailbox_.take(update);
+    if (result.ok()) publisher_->took(update.input_seq, since);
   }
   if (result.ok()) services_.scheduler.wake(shared_from_this());
   return result;

@@ -15,6 +15,7 @@
 #include "server/budget.h"
 #include "server/live_solver.h"
 #include "server/mailbox.h"
+#include "server/metrics.h"
 #include "server/publisher.h"
 #include "server/scheduler.h"
 #include "server/solve_job.h"
@@ -39,6 +40,7 @@ struct SessionServices {
   Scheduler& scheduler;
   std::shared_ptr<Timers> timers;
   Timers::Duration heartbeat;
+  std::shared_ptr<Metrics> metrics = std::make_shared<Metrics>();
 };
 
 /// What GetSession tells.
@@ -137,7 +139,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   std::atomic<bool> is_draining_ = false;
   std::stop_source stop_;
   Mailbox mailbox_;
-  const std::shared_ptr<Publisher> publisher_ = std::make_shared<Publisher>();
+  const std::shared_ptr<Publisher> publisher_;
   Reservation memory_;  // the scheduler's threads alone
   std::atomic<std::size_t> memory_bytes_;
   std::unique_ptr<LiveSolver> solver_;  // the scheduler's threads alone

@@ -44,9 +44,11 @@ class StreamSessionsCall final
   void open_all(const v1::StreamSessionsRequest& request) {
     std::vector<Lane> lanes;
     for (const v1::StreamFramesRequest& one : request.streams()) {
-      auto open = backend_.open_stream(one.session(), "", one.options(), [weak = weak_from_this()] {
-        if (const auto self = weak.lock()) self->pump();
-      });
+      auto open =
+          backend_.open_stream(context(), one.session(), "", one.options(), [weak = weak_from_this()] {
+            if (const auto self = weak.lock()) self->pump();
+          });
+      if (!open.ok()) record().refused(open.status());
       lanes.push_back({open.ok() ? *std::move(open) : Backend::OpenStream{}, open.status(), false});
     }
     const std::scoped_lock lock(mutex_);
@@ -98,7 +100,7 @@ class StreamSessionsCall final
 
   void forget_all() {
     for (Lane& lane : lanes_) {
-      if (lane.open.stream) backend_.forget(lane.open);
+      if (lane.open.stream) backend_.forget(context(), lane.open);
     }
     lanes_.clear();
   }
@@ -111,8 +113,8 @@ class StreamSessionsCall final
 }  // namespace
 
 grpc::ServerWriteReactor<v1::StreamSessionsResponse>* stream_sessions(
-    Backend& backend, const v1::StreamSessionsRequest& request) {
-  return begin_call<StreamSessionsCall>(backend, request);
+    Backend& backend, std::shared_ptr<CallRecord> record, const v1::StreamSessionsRequest& request) {
+  return begin_call<StreamSessionsCall>(backend, std::move(record), request);
 }
 
 }  // namespace lpdeform

@@ -44,7 +44,7 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
     };
     std::shared_ptr<SolveJob> job;
     absl::Status status = decode_scalar(request.scalar()).status();
-    if (status.ok()) status = backend_.solve(request, std::move(on_progress), on_done, job);
+    if (status.ok()) status = backend_.solve(context(), request, std::move(on_progress), on_done, job);
     if (!status.ok()) return refuse(status);
     const std::scoped_lock lock(mutex_);
     job_ = std::move(job);
@@ -61,11 +61,6 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
     if (!result.ok()) return refuse(result.status());
     result->frame->surface->prepare(format_, with_normals_);
     const std::scoped_lock lock(mutex_);
-    backend_.log().info("solved",
-                        {{"input_seq", result->frame->input_seq},
-                         {"iterations", static_cast<std::uint64_t>(result->summary.iterations)},
-                         {"seconds", result->summary.solve_seconds},
-                         {"stop_reason", std::string(stop_reason_name(result->summary.stop_reason))}});
     progress_.reset();
     cutter_ = FrameCutter(result->frame, format_, true, with_normals_, 0);
     result_ = *std::move(result);
@@ -112,8 +107,9 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::SolveResponse>* solve(Backend& backend, const v1::SolveRequest& request) {
-  return begin_call<SolveCall>(backend, request);
+grpc::ServerWriteReactor<v1::SolveResponse>* solve(Backend& backend, std::shared_ptr<CallRecord> record,
+                                                   const v1::SolveRequest& request) {
+  return begin_call<SolveCall>(backend, std::move(record), request);
 }
 
 }  // namespace lpdeform

@@ -6,6 +6,7 @@
 namespace lpdeform {
 
 /// A Solve call; belongs to gRPC once made. `backend` outlives it.
-grpc::ServerWriteReactor<v1::SolveResponse>* solve(Backend& backend, const v1::SolveRequest& request);
+grpc::ServerWriteReactor<v1::SolveResponse>* solve(Backend& backend, std::shared_ptr<CallRecord> record,
+                                                   const v1::SolveRequest& request);
 
 }  // namespace lpdeform

@@ -4,7 +4,8 @@
 
 namespace lpdeform {
 
-TaskPool::TaskPool(int threads, std::size_t longest_queue) : longest_queue_(longest_queue) {
+TaskPool::TaskPool(int threads, std::size_t longest_queue, std::function<void(double)> on_waited)
+    : longest_queue_(longest_queue), on_waited_(std::move(on_waited)) {
   for (int k = 0; k < threads; ++k) threads_.emplace_back([this] { run(); });
 }
 
@@ -21,7 +22,7 @@ bool TaskPool::try_post(Task task) {
   {
     const std::scoped_lock lock(mutex_);
     if (tasks_.size() >= longest_queue_) return false;
-    tasks_.push_back(std::move(task));
+    tasks_.push_back({std::move(task), std::chrono::steady_clock::now()});
   }
   changed_.notify_one();
   return true;
@@ -32,11 +33,14 @@ void TaskPool::run() {
   for (;;) {
     changed_.wait(lock, [this] { return is_stopping_ || !tasks_.empty(); });
     if (tasks_.empty()) return;
-    Task task = std::move(tasks_.front());
+    Waiting waiting = std::move(tasks_.front());
     tasks_.pop_front();
     lock.unlock();
-    task();
-    task = nullptr;
+    if (on_waited_) {
+      on_waited_(std::chrono::duration<double>(std::chrono::steady_clock::now() - waiting.since).count());
+    }
+    waiting.task();
+    waiting.task = nullptr;
     lock.lock();
   }
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
@@ -16,8 +17,9 @@ class TaskPool {
  public:
   using Task = std::function<void()>;
 
-  /// `threads` >= 1; at most `longest_queue` tasks wait.
-  TaskPool(int threads, std::size_t longest_queue);
+  /// `threads` >= 1; at most `longest_queue` tasks wait. `on_waited` is given the seconds that each waited, on the
+  /// thread that runs it; may be empty.
+  TaskPool(int threads, std::size_t longest_queue, std::function<void(double)> on_waited = {});
   /// Finishes what was taken on.
   ~TaskPool();
 
@@ -25,12 +27,17 @@ class TaskPool {
   [[nodiscard]] bool try_post(Task task);
 
  private:
+  struct Waiting {
+    Task task;
+    std::chrono::steady_clock::time_point since;
+  };
   void run();
 
   const std::size_t longest_queue_;
+  const std::function<void(double)> on_waited_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<Task> tasks_;
+  std::deque<Waiting> tasks_;
   bool is_stopping_ = false;
   std::vector<std::thread> threads_;
 };

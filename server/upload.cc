@@ -130,6 +130,11 @@ void Uploads::remove(const std::string& name) {
   if (const auto found = uploads_.find(name); found != uploads_.end()) forget(found);
 }
 
+std::size_t Uploads::size() const {
+  const std::scoped_lock lock(mutex_);
+  return uploads_.size();
+}
+
 void Uploads::forget(std::map<std::string, Entry>::iterator entry) {
   requested_.erase(entry->second.request_id);
   uploads_.erase(entry);

@@ -77,6 +77,8 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
   /// Forgets the upload; whoever has it keeps it. Nothing where there is none.
   void remove(const std::string& name);
 
+  std::size_t size() const;
+
   static constexpr std::size_t kMostUploads = 4096;  // small ones cost more than their bytes
 
  private:
@@ -92,7 +94,7 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
   const std::shared_ptr<Budget> budget_;
   const std::shared_ptr<Timers> timers_;
   const Limits limits_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::map<std::string, Entry> uploads_;          // by name
   std::map<std::string, std::string> requested_;  // names, by request_id
 };

@@ -22,9 +22,9 @@ template <typename Reactor, typename Response>
 class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<Reactor, Response>> {
  public:
   /// To be called once, right after construction.
-  void keep(std::shared_ptr<WritePump> self, CallGate::Permit permit) {
+  void keep(std::shared_ptr<WritePump> self, std::shared_ptr<CallRecord> record) {
     self_ = std::move(self);
-    permit_ = std::move(permit);
+    record_ = std::move(record);
   }
 
   /// Writes what there is to write, unless a write is under way. On any thread.
@@ -56,8 +56,7 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
   }
 
   void OnDone() final {
-    permit_.reset();
-    self_.reset();  // may destroy this
+    self_.reset();  // may destroy this; not before tasks that still need the record are over
   }
 
  protected:
@@ -87,9 +86,13 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
     if (made == Made::kNothing) return;
     is_writing_ = true;
     is_last_written_ = made == Made::kLastMessage;
+    record_->sent(response_.ByteSizeLong());
     this->StartWrite(&response_);
     on_made();
   }
+
+  CallRecord& record() const { return *record_; }
+  const CallContext& context() const { return record_->context(); }
 
   bool is_over_locked() const { return is_finished_ || is_cancelled_; }
 
@@ -99,11 +102,12 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
   void finish_locked(const absl::Status& status) {
     if (std::exchange(is_finished_, true)) return;
     let_go();
+    record_->ended(status);
     this->Finish(to_grpc(status));
   }
 
   std::shared_ptr<WritePump> self_;
-  CallGate::Permit permit_;
+  std::shared_ptr<CallRecord> record_;
   Response response_;
   absl::Status refusal_;
   bool is_writing_ = false;
@@ -114,11 +118,11 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
 
 /// Makes a call and begins it with `arguments`, or refuses it where the server drains. It belongs to gRPC.
 template <typename Call, typename... Arguments>
-Call* begin_call(Backend& backend, const Arguments&... arguments) {
+Call* begin_call(Backend& backend, std::shared_ptr<CallRecord> record, const Arguments&... arguments) {
   const auto call = std::make_shared<Call>(backend);
-  CallGate::Permit permit = backend.gate.enter();
-  const bool is_let_in = permit != nullptr;
-  call->keep(call, std::move(permit));
+  const bool is_let_in = record->is_let_in();
+  (record->received(arguments.ByteSizeLong()), ...);
+  call->keep(call, std::move(record));
   if (is_let_in) {
     call->begin(arguments...);
   } else {

@@ -19,26 +19,37 @@ PATIENCE = 280  # seconds that anything may take; never reached where all is wel
 
 
 class RunningServer:
-    """lpdeform-server on a free port of this machine."""
+    """lpdeform-server on a free port of this machine. `admin`: the URL of its admin port, where it was asked for."""
 
-    def __init__(self):
-        self.process = subprocess.Popen([SERVER, "--address", "127.0.0.1:0"], stdout=subprocess.PIPE,
+    def __init__(self, *arguments):
+        self.process = subprocess.Popen([SERVER, "--address", "127.0.0.1:0", *arguments], stdout=subprocess.PIPE,
                                         stderr=subprocess.STDOUT, text=True)
         watchdog = threading.Timer(PATIENCE, self.process.kill)
         watchdog.start()
         self.log = []
-        self.address = None
+        self.address, self.admin = None, None
         for line in self.process.stdout:
             self.log.append(line)
             found = re.search(r"127\.0\.0\.1:([1-9]\d*)", line)
             if found:
                 self.address = found.group(0)
                 break
+        if "--admin-address" in arguments:
+            self.admin = self.find(r"http://127\.0\.0\.1:\d+")
         watchdog.cancel()
         if self.address is None:
             raise AssertionError("the server did not say where it listens:\n" + "".join(self.log))
         self.reader = threading.Thread(target=self.log.extend, args=(self.process.stdout,))
         self.reader.start()
+
+    def find(self, pattern):
+        """What the pattern finds first in the lines that come from now on."""
+        for line in self.process.stdout:
+            self.log.append(line)
+            found = re.search(pattern, line)
+            if found:
+                return found.group(0)
+        raise AssertionError(f"the server did not say {pattern}:\n" + "".join(self.log))
 
     def stop(self):
         """The exit status after SIGTERM."""
@@ -134,6 +145,11 @@ class OnShapes(unittest.TestCase):
 def cli():
     """The path of lpdeform."""
     return CLI
+
+
+def server():
+    """The path of lpdeform-server."""
+    return SERVER
 
 
 def main():

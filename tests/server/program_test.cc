@@ -1,18 +1,22 @@
 // The program lpdeform-server as an operator runs it.
 
+#include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cstdint>
 #include <cstdio>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "lpdeform/v1/service.grpc.pb.h"
 #include "server/health_probe.h"
 
 namespace lpdeform {
@@ -122,6 +126,69 @@ TEST(Program, LogsOneJsonObjectAnEvent) {
   EXPECT_EQ(events.back(), "stopped");
 }
 
+/// A tetrahedron whose first vertex cannot be mistaken for anything else in a log.
+v1::CreateSessionRequest tetrahedron() {
+  const std::vector<double> points{31415.9265, 0, 0, 31416.9265, 0, 0, 31415.9265, 1, 0, 31415.9265, 0, 1};
+  const std::vector<std::uint32_t> faces{0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2};
+  v1::CreateSessionRequest request;
+  request.mutable_mesh()->set_vertex_count(4);
+  request.mutable_mesh()->set_face_count(4);
+  request.mutable_mesh()->set_scalar(v1::SCALAR_FLOAT64);
+  std::string data(reinterpret_cast<const char*>(points.data()), points.size() * sizeof(double));
+  data.append(reinterpret_cast<const char*>(faces.data()), faces.size() * sizeof(std::uint32_t));
+  request.mutable_mesh()->mutable_data()->set_inline_(data);
+  return request;
+}
+
+TEST(Program, LogsTellOfSessionEpochSequenceAndTraceAndNothingSecret) {
+  Program program({"--address", "127.0.0.1:0", "--log-level", "debug"});
+  const auto stub =
+      v1::DeformService::NewStub(grpc::CreateChannel(program.address(), grpc::InsecureChannelCredentials()));
+  const std::string trace = "4bf92f3577b34da6a3ce929d0e0e4736";
+  const auto traced = [&](grpc::ClientContext& context) {
+    context.AddMetadata("traceparent", "00-" + trace + "-00f067aa0ba902b7-01");
+  };
+  grpc::ClientContext creating, updating, refused;
+  for (auto* context : {&creating, &updating, &refused}) traced(*context);
+  v1::CreateSessionResponse session;
+  ASSERT_TRUE(stub->CreateSession(&creating, tetrahedron(), &session).ok());
+  v1::UpdateHandlesRequest update;
+  update.set_session(session.session().name());
+  update.set_writer_token(session.writer_token());
+  update.mutable_update()->set_input_seq(17);
+  update.mutable_update()->mutable_settings()->mutable_p()->set_uniform(1.5);
+  v1::UpdateHandlesResponse taken;
+  ASSERT_TRUE(stub->UpdateHandles(&updating, update, &taken).ok());
+  update.set_writer_token("a token that is wrong");
+  ASSERT_FALSE(stub->UpdateHandles(&refused, update, &taken).ok());
+  program.signal(SIGTERM);
+  EXPECT_EQ(program.wait(), 0);
+
+  const std::string log = program.rest();
+  std::map<std::string, nlohmann::json> events;
+  std::istringstream lines(log);
+  for (std::string text; std::getline(lines, text);) {
+    const auto event = nlohmann::json::parse(text);
+    events[event.at("event")] = event;
+  }
+  const std::string digits = session.session().name().substr(9, 8);
+  EXPECT_EQ(events["session_created"]["session"], digits);
+  EXPECT_EQ(events["session_created"]["epoch"], 1);
+  EXPECT_EQ(events["update"]["session"], digits);
+  EXPECT_EQ(events["update"]["input_seq"], 17);
+  EXPECT_EQ(events["update"]["epoch"], 1);
+  EXPECT_EQ(events["refused"]["reason"], "NOT_THE_WRITER");
+  EXPECT_EQ(events["refused"]["method"], "lpdeform.v1.DeformService/UpdateHandles");
+  for (const char* const event : {"session_created", "update", "refused"})
+    EXPECT_EQ(events[event]["trace_id"], trace) << event;
+  EXPECT_EQ(events["session_ended"]["reason"], "draining");
+  for (const std::string& secret :
+       {session.session().name().substr(9), session.writer_token(), std::string("a token that is wrong"),
+        std::string("31415"), std::string("31416")}) {
+    EXPECT_EQ(log.find(secret), std::string::npos) << secret;
+  }
+}
+
 TEST(Program, TakesItsOptionsFromTheEnvironmentToo) {
   Program program({}, {"LPDEFORM_ADDRESS=127.0.0.1:0", "LPDEFORM_LOG_LEVEL=off"});
   const std::string address = program.address();
@@ -136,9 +203,9 @@ TEST(Program, HelpNamesEveryOptionsVariable) {
   Program program({"--help"});
   const std::string help = program.rest();
   EXPECT_EQ(program.wait(), 0);
-  for (const char* const name :
-       {"ADDRESS", "THREADS", "RUNNER_THREADS", "MAX_SESSIONS", "MAX_VERTICES", "MAX_BYTES",
-        "MAX_UPLOAD_BYTES", "SESSION_IDLE", "UPLOAD_IDLE", "HEARTBEAT", "GRACE", "LOG_LEVEL"}) {
+  for (const char* const name : {"ADDRESS", "THREADS", "RUNNER_THREADS", "MAX_SESSIONS", "MAX_VERTICES",
+                                 "MAX_BYTES", "MAX_UPLOAD_BYTES", "SESSION_IDLE", "UPLOAD_IDLE", "HEARTBEAT",
+                                 "GRACE", "LOG_LEVEL", "ADMIN_ADDRESS"}) {
     EXPECT_NE(help.find(std::string("LPDEFORM_") + name), std::string::npos) << name;
   }
 }

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include "absl/status/status.h"
+#include "server/call_context.h"
+#include "server/call_gate.h"
+#include "server/log.h"
+#include "server/metrics.h"
+
+namespace lpdeform {
+
+/// One call, from its arrival to its end: lets it through the gate, measures it, and says why it was refused.
+/// Thread-safe.
+class CallRecord {
+ public:
+  struct Services {
+    CallGate& gate;
+    std::shared_ptr<Metrics> metrics;
+    std::shared_ptr<const Log> log;
+  };
+
+  /// `method`: "lpdeform.v1.DeformService/Solve".
+  CallRecord(const Services& services, std::string method, CallContext context);
+  /// The call is over. Without ended() it counts as cancelled.
+  ~CallRecord();
+
+  /// False where the server drains.
+  bool is_let_in() const { return permit_ != nullptr; }
+  const CallContext& context() const { return context_; }
+
+  void received(std::size_t bytes) { received_ += bytes; }
+  void sent(std::size_t bytes) { sent_ += bytes; }
+
+  /// How it ended; once.
+  void ended(const absl::Status& status);
+  /// Something in it was refused, and it goes on.
+  void refused(const absl::Status& status) const;
+
+ private:
+  const CallGate::Permit permit_;
+  const std::shared_ptr<Metrics> metrics_;
+  const std::shared_ptr<const Log> log_;
+  const std::string method_;
+  const CallContext context_;
+  const std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
+  std::atomic<absl::StatusCode> code_ = absl::StatusCode::kCancelled;
+  std::atomic<std::size_t> received_ = 0;
+  std::atomic<std::size_t> sent_ = 0;
+};
+
+}  // namespace lpdeform
