@@ -1,0 +1,93 @@
+"""Empties that hold vertices, and what the server is told of them."""
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from . import surface
+from .client import lpdeform
+
+_rigid_tolerance = 1e-5  # of the lengths and angles of a matrix that float32 has gone through
+
+
+def of(ob) -> list:
+    """The empties of a mesh object that are in the scene, each number once."""
+    found = {}
+    for one in bpy.context.scene.objects:
+        handle = one.lpdeform_handle
+        if handle.mesh == ob and handle.number > 0:
+            found.setdefault(handle.number, one)
+    return list(found.values())
+
+
+def rest_matrix(empty) -> Matrix:
+    """Of an empty, in its mesh's own space."""
+    flat = empty.lpdeform_handle.rest
+    return Matrix([flat[4 * k : 4 * k + 4] for k in range(4)])
+
+
+def add(ob, vertices: np.ndarray, rest: np.ndarray):
+    """An empty at the middle of the vertices, which lets other handles go of them. `rest`: positions of the mesh at rest."""
+    numbers = surface.held(ob)
+    number = max([int(numbers.max(initial=0)), *(one.lpdeform_handle.number for one in of(ob))]) + 1
+    numbers[vertices] = number
+    surface.set_held(ob, numbers)
+
+    empty = bpy.data.objects.new(f"{ob.name} handle", None)
+    (ob.users_collection or (bpy.context.scene.collection,))[0].objects.link(empty)
+    empty.empty_display_type = "SPHERE"
+    empty.show_in_front = True
+    extent = float(np.ptp(rest, axis=0).max())
+    empty.empty_display_size = 0.04 * extent
+    middle = rest[vertices].mean(axis=0)
+    at_rest = Matrix.Translation(middle.tolist())
+    handle = empty.lpdeform_handle
+    handle.mesh, handle.number = ob, number
+    handle.rest = [value for row in at_rest for value in row]
+    empty.matrix_world = ob.matrix_world @ at_rest
+    return empty
+
+
+def put_back(empty) -> None:
+    """To where it holds its vertices at rest."""
+    empty.matrix_world = empty.lpdeform_handle.mesh.matrix_world @ rest_matrix(empty)
+
+
+def remove(empty) -> None:
+    """Lets go of its vertices."""
+    handle = empty.lpdeform_handle
+    if handle.mesh is not None:
+        numbers = surface.held(handle.mesh)
+        numbers[numbers == handle.number] = 0
+        surface.set_held(handle.mesh, numbers)
+    bpy.data.objects.remove(empty)
+
+
+def motion_matrix(ob, empty) -> Matrix:
+    """Where it takes points at rest, in the mesh's own space."""
+    return ob.matrix_world.inverted_safe() @ empty.matrix_world @ rest_matrix(empty).inverted_safe()
+
+
+def hold(empty):
+    handle = empty.lpdeform_handle
+    axis = rest_matrix(empty).to_3x3().col[2].normalized()
+    direction = (axis.x, axis.y, axis.z) if axis.length > 0 else (0.0, 0.0, 1.0)
+    if handle.kind == "SOFT":
+        return lpdeform.Soft(handle.weight)
+    if handle.kind == "ORIENTATION":
+        return lpdeform.Orientation(handle.weight)
+    if handle.kind == "AXIS":
+        return lpdeform.AxisLock(direction)
+    if handle.kind == "PLANE":
+        return lpdeform.PlaneLock(direction)
+    return lpdeform.Exact()
+
+
+def motion(matrix: Matrix, points: np.ndarray, is_turned_only: bool):
+    """Rigid where the matrix is; otherwise each point's own target. Orientations take the rotation alone."""
+    linear = np.array(matrix.to_3x3())
+    is_rigid = np.abs(linear.T @ linear - np.eye(3)).max() < _rigid_tolerance and np.linalg.det(linear) > 0
+    if not (is_rigid or is_turned_only):
+        return lpdeform.Targets(points @ linear.T + np.array(matrix.translation))
+    axis, angle = matrix.to_quaternion().to_axis_angle()
+    return lpdeform.RigidMotion(tuple(axis) if axis.length > 0 else (0.0, 0.0, 1.0), angle, translation=tuple(matrix.translation))

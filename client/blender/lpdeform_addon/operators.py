@@ -1,0 +1,157 @@
+"""What buttons do."""
+
+import bpy
+from bpy.props import StringProperty
+
+from . import handles, live, surface
+from .client import NotReady
+
+
+def mesh_of(context):
+    """The mesh that is meant: the active object, or the one that the active empty holds."""
+    active = context.object
+    if active is None:
+        return None
+    return active if active.type == "MESH" else active.lpdeform_handle.mesh
+
+
+def _selected_handles(context) -> list:
+    return [one for one in context.selected_objects if one.lpdeform_handle.number > 0]
+
+
+class AddHandle(bpy.types.Operator):
+    """Make an empty that holds the selected vertices; moving it moves the mesh"""
+
+    bl_idname = "lpdeform.add_handle"
+    bl_label = "Add handle"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return context.object is not None and context.object.type == "MESH"
+
+    def execute(self, context):
+        ob = context.object
+        if ob.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        vertices = surface.selected(ob)
+        if not len(vertices):
+            self.report({"ERROR"}, "Select the vertices in Edit mode that the handle is to hold.")
+            return {"CANCELLED"}
+        empty = handles.add(ob, vertices, surface.rest_positions(ob))
+        running = live.of(ob)
+        if running is not None:
+            running.vertices_changed(ob)
+        for one in context.selected_objects:
+            one.select_set(False)
+        empty.select_set(True)
+        context.view_layer.objects.active = empty
+        return {"FINISHED"}
+
+
+class RemoveHandle(bpy.types.Operator):
+    """Let go of the vertices of the selected handles and delete their empties"""
+
+    bl_idname = "lpdeform.remove_handle"
+    bl_label = "Remove handle"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return bool(_selected_handles(context))
+
+    def execute(self, context):
+        meshes = set()
+        for empty in _selected_handles(context):
+            meshes.add(empty.lpdeform_handle.mesh)
+            handles.remove(empty)
+        for ob in meshes:
+            running = live.of(ob)
+            if running is not None:
+                running.vertices_changed(ob)
+        return {"FINISHED"}
+
+
+class PutBack(bpy.types.Operator):
+    """Put the selected handles back to where they hold their vertices at rest"""
+
+    bl_idname = "lpdeform.put_back"
+    bl_label = "Put back"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return any(one.lpdeform_handle.mesh for one in _selected_handles(context))
+
+    def execute(self, context):
+        for empty in _selected_handles(context):
+            if empty.lpdeform_handle.mesh is not None:
+                handles.put_back(empty)
+        return {"FINISHED"}
+
+
+class Start(bpy.types.Operator):
+    """Connect the mesh to the lpdeform server; from now on it follows its handles"""
+
+    bl_idname = "lpdeform.start"
+    bl_label = "Go live"
+
+    @classmethod
+    def poll(cls, context):
+        ob = mesh_of(context)
+        return ob is not None and ob.mode != "EDIT" and live.of(ob) is None
+
+    def execute(self, context):
+        try:
+            live.start(mesh_of(context))
+        except NotReady as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class Stop(bpy.types.Operator):
+    """End live deformation and go back to the mesh at rest"""
+
+    bl_idname = "lpdeform.stop"
+    bl_label = "Stop"
+
+    @classmethod
+    def poll(cls, context):
+        return live.of(mesh_of(context)) is not None
+
+    def execute(self, context):
+        live.stop(mesh_of(context))
+        return {"FINISHED"}
+
+
+class Apply(bpy.types.Operator):
+    """End live deformation and keep the present pose as a shape key"""
+
+    bl_idname = "lpdeform.apply"
+    bl_label = "Apply as shape key"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(name="Name", default="Pose")
+
+    @classmethod
+    def poll(cls, context):
+        running = live.of(mesh_of(context))
+        return running is not None and running.frame is not None
+
+    def execute(self, context):
+        live.stop(mesh_of(context), keep_as=self.name or "Pose")
+        return {"FINISHED"}
+
+
+_classes = (AddHandle, RemoveHandle, PutBack, Start, Stop, Apply)
+
+
+def register() -> None:
+    for one in _classes:
+        bpy.utils.register_class(one)
+
+
+def unregister() -> None:
+    for one in reversed(_classes):
+        bpy.utils.unregister_class(one)

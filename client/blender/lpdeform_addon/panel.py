@@ -1,0 +1,110 @@
+"""The sidebar's tab lpdeform."""
+
+import bpy
+
+from . import live
+from .client import address
+from .operators import mesh_of
+
+_words = {
+    "idle": "Live at {}",
+    "connected": "Live at {}",
+    "reconnecting": "{} is away; trying again",
+    "closed": "Ended",
+}
+
+
+class MainPanel(bpy.types.Panel):
+    bl_idname = "VIEW3D_PT_lpdeform"
+    bl_label = "lpdeform"
+    bl_category = "lpdeform"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+
+    def draw(self, context) -> None:
+        layout, ob = self.layout, mesh_of(context)
+        if ob is None:
+            layout.label(text="Select a mesh.", icon="INFO")
+            return
+        running = live.of(ob)
+        if running is None:
+            layout.operator("lpdeform.start", icon="PLAY")
+        else:
+            layout.label(text=_words[running.state].format(address()), icon="LINKED")
+            column = layout.column(align=True)
+            column.operator("lpdeform.stop", icon="X")
+            column.operator("lpdeform.apply", icon="SHAPEKEY_DATA")
+        if live.message(ob):
+            layout.label(text=live.message(ob), icon="ERROR")
+        layout.operator("lpdeform.add_handle", icon="EMPTY_DATA")
+
+
+class _Below:
+    bl_category = "lpdeform"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_parent_id = "VIEW3D_PT_lpdeform"
+
+    @classmethod
+    def poll(cls, context):
+        return mesh_of(context) is not None
+
+
+class MaterialPanel(_Below, bpy.types.Panel):
+    bl_idname = "VIEW3D_PT_lpdeform_material"
+    bl_label = "p and stiffness"
+
+    def draw(self, context) -> None:
+        ob = mesh_of(context)
+        self.layout.use_property_split = True
+        for name in ("p", "stiffness"):
+            column = self.layout.column(align=True)
+            column.prop(ob.lpdeform, name)
+            column.prop_search(ob.lpdeform, f"{name}_group", ob, "vertex_groups")
+            if getattr(ob.lpdeform, f"{name}_group"):
+                column.prop(ob.lpdeform, f"{name}_painted")
+
+
+class HandlePanel(_Below, bpy.types.Panel):
+    bl_idname = "VIEW3D_PT_lpdeform_handle"
+    bl_label = "Handle"
+
+    @classmethod
+    def poll(cls, context):
+        return context.object is not None and context.object.lpdeform_handle.number > 0
+
+    def draw(self, context) -> None:
+        handle, layout = context.object.lpdeform_handle, self.layout
+        layout.use_property_split = True
+        layout.prop(handle, "kind")
+        if handle.kind in ("SOFT", "ORIENTATION"):
+            layout.prop(handle, "weight")
+        layout.prop(handle, "footprint")
+        row = layout.row(align=True)
+        row.operator("lpdeform.put_back", icon="LOOP_BACK")
+        row.operator("lpdeform.remove_handle", text="Remove", icon="TRASH")
+
+
+class DistortionPanel(_Below, bpy.types.Panel):
+    bl_idname = "VIEW3D_PT_lpdeform_distortion"
+    bl_label = "Distortion"
+
+    def draw(self, context) -> None:
+        settings = mesh_of(context).lpdeform
+        self.layout.use_property_split = True
+        self.layout.prop(settings, "show_distortion")
+        if settings.show_distortion:
+            self.layout.prop(settings, "distortion_limit")
+
+
+_classes = (MainPanel, MaterialPanel, HandlePanel, DistortionPanel)
+
+
+def register() -> None:
+    for one in _classes:
+        bpy.utils.register_class(one)
+
+
+def unregister() -> None:
+    for one in reversed(_classes):
+        bpy.utils.unregister_class(one)

@@ -1,0 +1,85 @@
+"""What is kept in the file: settings of a mesh, what an empty holds, and the server's address in the preferences."""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty
+
+KINDS = (
+    ("EXACT", "Exact", "The vertices go exactly where the empty takes them"),
+    ("SOFT", "Soft", "The vertices are drawn to where the empty takes them"),
+    ("ORIENTATION", "Orientation", "The surface is turned as the empty is; its position is free"),
+    ("AXIS", "Axis", "The vertices slide along the empty's Z axis as it was at rest"),
+    ("PLANE", "Plane", "The vertices slide across the empty's Z axis as it was at rest"),
+)
+
+
+class MeshSettings(bpy.types.PropertyGroup):
+    """Of a mesh object."""
+
+    p: FloatProperty(
+        name="p", default=2.0, min=1.0, max=64.0, soft_max=10.0,
+        description="1 gathers distortion in creases, 2 spreads it evenly, more avoids peaks",
+    )  # fmt: skip
+    p_group: StringProperty(name="Paint", description="Vertex group: weight 0 is p, weight 1 the painted p")
+    p_painted: FloatProperty(name="Painted p", default=1.0, min=1.0, max=64.0, soft_max=10.0, description="p at weight 1")
+    stiffness: FloatProperty(
+        name="Stiffness", default=1.0, min=1e-6, max=1e6, soft_min=0.01, soft_max=100.0,
+        description="What distortion costs",
+    )  # fmt: skip
+    stiffness_group: StringProperty(
+        name="Paint", description="Vertex group: weight 0 is the stiffness, weight 1 the painted one, between them by powers"
+    )
+    stiffness_painted: FloatProperty(
+        name="Painted stiffness", default=100.0, min=1e-6, max=1e6, soft_min=0.01, soft_max=100.0,
+        description="Stiffness at weight 1",
+    )  # fmt: skip
+    show_distortion: BoolProperty(
+        name="As colour", default=True, description="Fills the colour attribute lpdeform distortion"
+    )
+    distortion_limit: FloatProperty(
+        name="Red from", default=0.0, min=0.0, description="Distortion that is red, in the mesh's unit; 0: the largest"
+    )
+
+
+class HandleSettings(bpy.types.PropertyGroup):
+    """Of an empty that holds vertices of a mesh."""
+
+    mesh: PointerProperty(type=bpy.types.Object, name="Mesh")
+    number: IntProperty(name="Number", description="Of its vertices in the mesh's attribute lpdeform_handle; 0: holds none")
+    rest: FloatVectorProperty(name="Rest", size=16, description="Its matrix at rest in the mesh's own space, by rows")
+    kind: EnumProperty(name="Hold", items=KINDS, default="EXACT")
+    weight: FloatProperty(
+        name="Weight", default=1.0, min=0.0, max=1e6, soft_max=100.0, description="Of soft and orientation handles"
+    )
+    footprint: FloatProperty(
+        name="Footprint", default=0.0, min=0.0, unit="LENGTH",
+        description="Radius of the surroundings that go along nearly rigidly, against spikes of single vertices",
+    )  # fmt: skip
+
+
+class Preferences(bpy.types.AddonPreferences):
+    bl_idname = __package__
+
+    address: StringProperty(
+        name="Server", default="",
+        description="HOST:PORT of the lpdeform server. Empty: the environment variable LPDEFORM_ADDRESS, or localhost:50051",
+    )  # fmt: skip
+
+    def draw(self, context) -> None:
+        self.layout.prop(self, "address")
+
+
+_classes = (MeshSettings, HandleSettings, Preferences)
+
+
+def register() -> None:
+    for one in _classes:
+        bpy.utils.register_class(one)
+    bpy.types.Object.lpdeform = PointerProperty(type=MeshSettings)
+    bpy.types.Object.lpdeform_handle = PointerProperty(type=HandleSettings)
+
+
+def unregister() -> None:
+    del bpy.types.Object.lpdeform_handle
+    del bpy.types.Object.lpdeform
+    for one in reversed(_classes):
+        bpy.utils.unregister_class(one)

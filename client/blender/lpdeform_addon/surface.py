@@ -1,0 +1,123 @@
+"""Arrays of a Blender mesh, in and out. Nothing loops over vertices but the reading of vertex groups, for which Blender 3.4 has
+no other way."""
+
+import numpy as np
+
+HANDLE_ATTRIBUTE = "lpdeform_handle"
+COLOUR_ATTRIBUTE = "lpdeform distortion"
+LIVE_KEY = "lpdeform"
+
+# Blue, cyan, green, yellow, red at equal steps: linear RGB.
+_stops = np.linspace(0.0, 1.0, 5)
+_ramp = np.array([[0.02, 0.08, 0.55], [0.0, 0.45, 0.75], [0.1, 0.65, 0.15], [0.95, 0.75, 0.05], [0.75, 0.02, 0.02]])
+
+
+def rest_positions(ob) -> np.ndarray:
+    """n x 3, in the object's own space: of the basis, where there are shape keys."""
+    keys = ob.data.shape_keys
+    source = keys.reference_key.data if keys is not None else ob.data.vertices
+    positions = np.empty(3 * len(ob.data.vertices), np.float32)
+    source.foreach_get("co", positions)
+    return positions.reshape(-1, 3)
+
+
+def triangles(ob) -> np.ndarray:
+    """m x 3: Blender's own triangulation of the faces."""
+    ob.data.calc_loop_triangles()
+    corners = np.empty(3 * len(ob.data.loop_triangles), np.int32)
+    ob.data.loop_triangles.foreach_get("vertices", corners)
+    return corners.reshape(-1, 3)
+
+
+def selected(ob) -> np.ndarray:
+    """Indices of the vertices selected in Edit mode; to be asked for in Object mode."""
+    mask = np.empty(len(ob.data.vertices), bool)
+    ob.data.vertices.foreach_get("select", mask)
+    return np.flatnonzero(mask)
+
+
+def held(ob) -> np.ndarray:
+    """For each vertex the number of the handle that holds it; 0 where none does."""
+    attribute = ob.data.attributes.get(HANDLE_ATTRIBUTE)
+    numbers = np.zeros(len(ob.data.vertices), np.int32)
+    if attribute is not None and len(attribute.data) == len(numbers):
+        attribute.data.foreach_get("value", numbers)
+    return numbers
+
+
+def set_held(ob, numbers: np.ndarray) -> None:
+    attribute = ob.data.attributes.get(HANDLE_ATTRIBUTE)
+    if attribute is None:
+        attribute = ob.data.attributes.new(HANDLE_ATTRIBUTE, "INT", "POINT")
+    attribute.data.foreach_set("value", numbers.astype(np.int32))
+
+
+def group_weights(ob, name: str):
+    """One a vertex, 0 outside of the group; None where there is no such group."""
+    group = ob.vertex_groups.get(name) if name else None
+    if group is None:
+        return None
+    index = group.index
+    weights = np.zeros(len(ob.data.vertices))
+    for vertex in ob.data.vertices:
+        for one in vertex.groups:
+            if one.group == index:
+                weights[vertex.index] = one.weight
+    return weights
+
+
+def live_key(ob):
+    keys = ob.data.shape_keys
+    return keys.key_blocks.get(LIVE_KEY) if keys is not None else None
+
+
+def add_live_key(ob) -> list:
+    """Adds the key that frames are written to, over the basis, which stays as it is. Other keys are muted: the names of those."""
+    if ob.data.shape_keys is None:
+        ob.shape_key_add(name="Basis", from_mix=False)
+    key = live_key(ob) or ob.shape_key_add(name=LIVE_KEY, from_mix=False)
+    keys = ob.data.shape_keys
+    others = [one for one in keys.key_blocks if one not in (keys.reference_key, key) and not one.mute]
+    for one in others:
+        one.mute = True
+    key.value, key.mute = 1.0, False
+    ob.active_shape_key_index = 0  # Edit mode goes on editing the basis
+    return [one.name for one in others]
+
+
+def drop_live_key(ob, muted: list, had_keys: bool) -> None:
+    """What add_live_key() did, undone. `had_keys`: there were shape keys before it."""
+    key = live_key(ob)
+    if key is not None:
+        ob.shape_key_remove(key)
+    keys = ob.data.shape_keys
+    if keys is None:
+        return
+    for name in muted:
+        if name in keys.key_blocks:
+            keys.key_blocks[name].mute = False
+    if not had_keys and len(keys.key_blocks) == 1:
+        ob.shape_key_clear()
+
+
+def show_positions(ob, positions: np.ndarray) -> None:
+    live_key(ob).data.foreach_set("co", np.ascontiguousarray(positions, np.float32).reshape(-1))
+    ob.data.update_tag()
+
+
+def colours(distortion: np.ndarray, limit: float) -> np.ndarray:
+    """n x 4: from none, blue, to the limit, red. A limit of 0 is the largest distortion there is."""
+    most = limit if limit > 0 else float(distortion.max(initial=0.0))
+    share = np.clip(distortion / most, 0.0, 1.0) if most > 0 else np.zeros(len(distortion))
+    out = np.ones((len(distortion), 4), np.float32)
+    for channel in range(3):
+        out[:, channel] = np.interp(share, _stops, _ramp[:, channel])
+    return out
+
+
+def show_distortion(ob, distortion: np.ndarray, limit: float) -> None:
+    attribute = ob.data.color_attributes.get(COLOUR_ATTRIBUTE)
+    if attribute is None:
+        attribute = ob.data.color_attributes.new(COLOUR_ATTRIBUTE, "FLOAT_COLOR", "POINT")
+        ob.data.color_attributes.active_color = attribute
+    attribute.data.foreach_set("color", colours(distortion, limit).reshape(-1))

@@ -1,0 +1,297 @@
+"""The add-on as people use it."""
+
+import os
+import signal
+import sys
+import unittest
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+sys.path.insert(0, os.path.dirname(__file__))
+import stage  # noqa: E402
+
+PREFERENCES = stage.install()
+from lpdeform_addon import live, surface  # noqa: E402
+
+
+class AddOn(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.server = stage.RunningServer()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.server.end()
+
+    def setUp(self):
+        stage.clear()
+        bpy.context.preferences.addons["lpdeform_addon"].preferences.address = self.server.address
+        self.tube = stage.tube(at=(1, 2, 3))
+        self.tube.rotation_euler = (0.3, 0, 0)
+        self.rest = stage.at_rest(self.tube)
+        self.bottom = np.flatnonzero(self.rest[:, 2] < 0.3)
+        self.top = np.flatnonzero(self.rest[:, 2] > 3.7)
+        bpy.context.view_layer.update()
+
+    def tearDown(self):
+        for name in list(live._running):
+            live.stop(bpy.data.objects[name])
+
+    def held(self):
+        """Live, with a handle at each end."""
+        anchor = stage.add_handle(self.tube, self.bottom)
+        tip = stage.add_handle(self.tube, self.top)
+        self.assertEqual(bpy.ops.lpdeform.start(), {"FINISHED"})
+        return anchor, tip
+
+    def shift(self, empty, *by):
+        """Along the mesh's own axes."""
+        empty.matrix_world = self.tube.matrix_world @ Matrix.Translation(by) @ self.tube.matrix_world.inverted() @ empty.matrix_world
+
+    def test_a_handle_is_an_empty_in_the_middle_of_what_was_selected(self):
+        tip = stage.add_handle(self.tube, self.top)
+        self.assertEqual((tip.type, bpy.context.mode), ("EMPTY", "OBJECT"))
+        bpy.context.view_layer.update()
+        middle = self.tube.matrix_world.inverted() @ tip.matrix_world.translation
+        self.assertTrue(np.allclose(middle, self.rest[self.top].mean(axis=0), atol=1e-5))
+        self.assertEqual(np.flatnonzero(surface.held(self.tube)).tolist(), self.top.tolist())
+
+    def test_moving_the_empty_moves_the_mesh_and_leaves_the_basis(self):
+        _, tip = self.held()
+        self.assertTrue(bpy.app.timers.is_registered(live.tick))
+        for step in range(10):
+            self.shift(tip, 0.1, 0, 0)
+            bpy.context.view_layer.update()
+            live.tick()
+        stage.settle(self.tube)
+        now = stage.shown(self.tube)
+        self.assertTrue(np.allclose(now[self.top], self.rest[self.top] + [1, 0, 0], atol=1e-5))
+        self.assertTrue(np.allclose(now[self.bottom], self.rest[self.bottom], atol=1e-6))
+        self.assertTrue(np.array_equal(stage.at_rest(self.tube), self.rest))
+        middle = now[np.abs(self.rest[:, 2] - 2) < 0.05].mean(axis=0)
+        self.assertTrue(0.2 < middle[0] < 0.8, middle)
+
+    def test_the_mesh_and_its_handles_may_be_moved_together(self):
+        _, tip = self.held()
+        self.shift(tip, 0, 0.5, 0)
+        stage.settle(self.tube)
+        before = stage.shown(self.tube)
+        moved = Matrix.Translation((5, 0, 0)) @ Matrix.Rotation(1.0, 4, "Z")
+        for one in bpy.context.scene.objects:
+            one.matrix_world = moved @ one.matrix_world
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube), before, atol=1e-3))
+
+    def test_a_scaled_empty_scales_what_it_holds(self):
+        _, tip = self.held()
+        tip.scale = (2, 2, 2)
+        bpy.context.view_layer.update()
+        stage.settle(self.tube)
+        now, middle = stage.shown(self.tube)[self.top], self.rest[self.top].mean(axis=0)
+        self.assertTrue(np.allclose(now - middle, 2 * (self.rest[self.top] - middle), atol=1e-5))
+
+    def test_p_is_a_property_and_a_weight_painted_group(self):
+        _, tip = self.held()
+        self.shift(tip, 1.2, 0, -0.6)
+        stage.settle(self.tube)
+        even = stage.shown(self.tube)
+        self.tube.lpdeform.p = 1.0
+        stage.settle(self.tube)
+        creased = stage.shown(self.tube)
+        self.assertGreater(np.abs(creased - even).max(), 0.02)
+        self.tube.lpdeform.p = 2.0
+        group = self.tube.vertex_groups.new(name="soft")
+        group.add(np.flatnonzero(self.rest[:, 2] < 2).tolist(), 1.0, "REPLACE")
+        self.tube.lpdeform.p_group, self.tube.lpdeform.p_painted = "soft", 1.0
+        stage.settle(self.tube)
+        sent = live.of(self.tube)._told_settings["p"]
+        self.assertEqual(sorted(set(sent.tolist())), [1.0, 2.0])
+        painted = stage.shown(self.tube)
+        self.assertGreater(np.abs(painted - even).max(), 0.01)
+        stage.activate(self.tube)
+        bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+        group.add(np.arange(len(self.rest)).tolist(), 0.0, "REPLACE")  # painted away
+        stage.turn(lambda: not live.of(self.tube)._weights["p"].any())
+        stage.settle(self.tube)
+        self.assertEqual(set(live.of(self.tube)._told_settings["p"].tolist()), {2.0})
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+    def test_stiffness_is_a_property_and_a_group(self):
+        _, tip = self.held()
+        self.shift(tip, 1.2, 0, -0.6)
+        stage.settle(self.tube)
+        before = stage.shown(self.tube)
+        group = self.tube.vertex_groups.new(name="hard")
+        group.add(np.flatnonzero(self.rest[:, 2] < 2).tolist(), 0.5, "REPLACE")
+        self.tube.lpdeform.stiffness_group, self.tube.lpdeform.stiffness_painted = "hard", 10000.0
+        stage.settle(self.tube)
+        sent = live.of(self.tube)._told_settings["stiffness"]
+        self.assertTrue(np.allclose(np.unique(sent), [1, 100]), np.unique(sent))  # half way by powers
+        lower = np.flatnonzero((self.rest[:, 2] > 1) & (self.rest[:, 2] < 1.1))
+        lean_before, lean = before[lower, 0].mean(), stage.shown(self.tube)[lower, 0].mean()
+        self.assertLess(abs(lean), 0.5 * abs(lean_before))  # the stiff half stays straight
+
+    def test_kinds_of_handles_hold_as_they_say(self):
+        _, tip = self.held()
+        tip.lpdeform_handle.kind = "PLANE"
+        self.shift(tip, 1, 0, 0.5)
+        stage.settle(self.tube)
+        now = stage.shown(self.tube)[self.top]
+        self.assertTrue(np.allclose(now[:, 2], self.rest[self.top][:, 2] + 0.5, atol=1e-4))
+        self.assertLess(np.abs(now[:, 0].mean()), 0.5)  # free across
+        tip.lpdeform_handle.kind, tip.lpdeform_handle.weight = "SOFT", 1e-6
+        stage.settle(self.tube)
+        self.assertLess(np.abs(stage.shown(self.tube) - self.rest).max(), 0.05)
+
+    def test_distortion_is_a_colour_attribute(self):
+        _, tip = self.held()
+        self.shift(tip, 1.5, 0, -0.5)
+        stage.settle(self.tube)
+        attribute = self.tube.data.color_attributes[surface.COLOUR_ATTRIBUTE]
+        colours = np.empty(4 * len(self.rest), np.float32)
+        attribute.data.foreach_get("color", colours)
+        colours = colours.reshape(-1, 4)
+        distortion = live.of(self.tube).frame.distortion
+        worst, best = distortion.argmax(), distortion.argmin()
+        self.assertTrue(np.allclose(colours[worst], [0.75, 0.02, 0.02, 1], atol=1e-5))
+        self.assertGreater(colours[best, 2], colours[best, 0])
+        self.assertEqual((attribute.domain, attribute.data_type), ("POINT", "FLOAT_COLOR"))
+
+    def test_a_pose_is_applied_as_a_shape_key(self):
+        _, tip = self.held()
+        self.shift(tip, 1, 0, 0)
+        stage.settle(self.tube)
+        posed = stage.shown(self.tube)
+        self.assertEqual(bpy.ops.lpdeform.apply(name="Lean"), {"FINISHED"})
+        self.assertIsNone(live.of(self.tube))
+        keys = self.tube.data.shape_keys.key_blocks
+        self.assertEqual(keys.keys(), ["Basis", "Lean"])
+        self.assertTrue(np.allclose(stage.shown(self.tube), posed, atol=1e-6))
+        keys["Lean"].value = 0
+        self.assertTrue(np.allclose(stage.shown(self.tube), self.rest, atol=1e-6))
+        keys["Lean"].value = 1
+        self.assertEqual(bpy.ops.lpdeform.start(), {"FINISHED"})  # again, from the basis and not from the sum
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube)[self.top], self.rest[self.top] + [1, 0, 0], atol=1e-5))
+        self.assertEqual(bpy.ops.lpdeform.stop(), {"FINISHED"})
+        self.assertTrue(np.allclose(stage.shown(self.tube), posed, atol=1e-6))
+
+    def test_stopping_leaves_the_mesh_as_it_was(self):
+        _, tip = self.held()
+        self.shift(tip, 1, 0, 0)
+        stage.settle(self.tube)
+        stage.activate(self.tube)
+        self.assertEqual(bpy.ops.lpdeform.stop(), {"FINISHED"})
+        self.assertIsNone(self.tube.data.shape_keys)
+        self.assertTrue(np.array_equal(stage.shown(self.tube), self.rest))
+
+    def test_handles_come_and_go_while_it_is_live(self):
+        _, tip = self.held()
+        self.shift(tip, 0, 0, 0.5)
+        stage.settle(self.tube)
+        middle = np.flatnonzero(np.abs(self.rest[:, 2] - 2) < 0.05)
+        waist = stage.add_handle(self.tube, middle)
+        self.shift(waist, 0, 0.7, 0)
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube)[middle], self.rest[middle] + [0, 0.7, 0], atol=1e-5))
+        self.assertEqual(bpy.ops.lpdeform.put_back(), {"FINISHED"})
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube)[middle], self.rest[middle], atol=1e-5))
+        self.assertEqual(bpy.ops.lpdeform.remove_handle(), {"FINISHED"})
+        stage.settle(self.tube)
+        self.assertGreater(stage.shown(self.tube)[middle, 2].mean(), 2.1)  # stretched with the rest again
+        bpy.data.objects.remove(tip)  # as with X
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube), self.rest, atol=1e-3))
+
+    def test_a_vertex_goes_to_the_handle_that_was_added_last(self):
+        stage.add_handle(self.tube, self.top)
+        stage.add_handle(self.tube, self.top[:10])
+        numbers = surface.held(self.tube)
+        self.assertEqual(set(numbers[self.top[:10]]), {2})
+        self.assertEqual(set(numbers[self.top[10:]]), {1})
+
+    def test_a_mesh_changed_in_edit_mode_is_sent_anew(self):
+        _, tip = self.held()
+        self.shift(tip, 0.5, 0, 0)
+        stage.settle(self.tube)
+        stage.select(self.tube, np.flatnonzero(np.abs(self.rest[:, 2] - 2) < 0.05))
+        live.tick()  # nothing is written while it is edited
+        bpy.ops.mesh.subdivide()
+        bpy.ops.object.mode_set(mode="OBJECT")
+        self.assertGreater(len(self.tube.data.vertices), len(self.rest))
+        stage.settle(self.tube)
+        self.assertEqual(live.of(self.tube).frame.positions.shape[0], len(self.tube.data.vertices))
+        self.assertTrue(np.allclose(stage.shown(self.tube)[self.top], self.rest[self.top] + [0.5, 0, 0], atol=1e-5))
+
+    def test_no_server_is_said_clearly_and_changes_nothing(self):
+        stage.add_handle(self.tube, self.top)
+        PREFERENCES.address = "127.0.0.1:1"
+        with self.assertRaisesRegex(RuntimeError, r"No lpdeform server answers at 127\.0\.0\.1:1\. Start one with deploy/up"):
+            bpy.ops.lpdeform.start()
+        self.assertIsNone(self.tube.data.shape_keys)
+        self.assertIsNone(live.of(self.tube))
+
+    def test_a_server_that_comes_back_is_gone_on_with(self):
+        _, tip = self.held()
+        self.shift(tip, 0.3, 0, 0)
+        stage.settle(self.tube)
+        self.server.end(signal.SIGKILL)
+        stage.turn(lambda: live.of(self.tube).state == "reconnecting")
+        self.shift(tip, 0.3, 0, 0)
+        bpy.context.view_layer.update()
+        live.tick()
+        self.server.start()
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube)[self.top], self.rest[self.top] + [0.6, 0, 0], atol=1e-5))
+
+    def test_what_the_server_refuses_is_shown_and_the_mesh_goes_on(self):
+        _, tip = self.held()
+        stage.settle(self.tube)
+        live.of(self.tube).session.set_handle("wrong", [10**6])
+        stage.turn(lambda: "HANDLE_VERTEX_OUT_OF_RANGE" in live.message(self.tube))
+        self.shift(tip, 0.3, 0, 0)
+        stage.settle(self.tube)
+        self.assertEqual(live.message(self.tube), "")
+
+    def test_meshes_that_cannot_be_deformed_are_named(self):
+        flat = bpy.data.meshes.new("flat")
+        flat.from_pydata([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [], [(0, 1, 2)])
+        ob = bpy.data.objects.new("flat", flat)
+        bpy.context.scene.collection.objects.link(ob)
+        stage.activate(ob)
+        with self.assertRaisesRegex(RuntimeError, "The mesh cannot be deformed: .*MESH_NO_AREA"):
+            bpy.ops.lpdeform.start()
+        self.assertIsNone(flat.shape_keys)
+
+    def test_nothing_selected_is_said(self):
+        stage.select(self.tube, [])
+        with self.assertRaisesRegex(RuntimeError, "Select the vertices in Edit mode"):
+            bpy.ops.lpdeform.add_handle()
+
+    def test_a_file_that_is_saved_and_opened_again_goes_on(self):
+        _, tip = self.held()
+        self.shift(tip, 0.4, 0, 0)
+        stage.settle(self.tube)
+        path = os.path.join(os.environ["BLENDER_USER_CONFIG"], "saved.blend")
+        os.makedirs(os.path.dirname(path), exist_ok=True)
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        self.assertEqual(live._running, {})
+        self.tube = bpy.data.objects["tube"]
+        stage.activate(self.tube)
+        self.assertEqual(bpy.ops.lpdeform.start(), {"FINISHED"})
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube)[self.top], self.rest[self.top] + [0.4, 0, 0], atol=1e-5))
+
+    def test_what_is_deleted_while_live_ends_quietly(self):
+        self.held()
+        stage.settle(self.tube)
+        bpy.data.objects.remove(self.tube)
+        self.assertIsNone(live.tick())
+        self.assertEqual(live._running, {})
+
+
+stage.main()

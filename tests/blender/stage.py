@@ -1,0 +1,142 @@
+"""What the tests in Blender share: the add-on installed from its zip, a server, shapes, and the turning of Blender's timers, which
+do not run by themselves without a window.
+
+Run as: blender ... --python TEST.py -- ADD_ON.zip SERVER PICTURES
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+import bpy
+import numpy as np
+
+ADD_ON, SERVER, PICTURES = sys.argv[sys.argv.index("--") + 1 :]
+PATIENCE = 60.0  # seconds that anything may take; never reached where all is well
+
+
+class RunningServer:
+    """lpdeform-server on a free port of this machine, which it keeps when it is started again."""
+
+    def __init__(self):
+        self.address = "127.0.0.1:0"
+        self.start()
+
+    def start(self):
+        command = [SERVER, "--address", self.address, "--log-level", "off"]
+        self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        self.address = self._process.stdout.readline().split()[-1]
+
+    def end(self, how=signal.SIGTERM):
+        self._process.send_signal(how)
+        self._process.wait(PATIENCE)
+        self._process.stdout.close()
+
+
+def install(with_its_own_modules_first=False):
+    bpy.ops.preferences.addon_install(filepath=ADD_ON)
+    if with_its_own_modules_first:
+        sys.path.insert(0, os.path.join(bpy.utils.user_resource("SCRIPTS", path="addons"), "lpdeform_addon", "modules"))
+    bpy.ops.preferences.addon_enable(module="lpdeform_addon")
+    return bpy.context.preferences.addons["lpdeform_addon"].preferences
+
+
+def clear():
+    """An empty scene."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=False)
+
+
+def tube(name="tube", around=24, along=61, radius=0.4, length=4.0, at=(0.0, 0.0, 0.0)):
+    """A closed tube along z: quads, and a polygon of `around` corners at each end."""
+    angle = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    ring = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    height = np.linspace(0, length, along)
+    vertices = np.concatenate([np.tile(ring, (along, 1)), np.repeat(height, around)[:, None]], axis=1)
+    corner = np.arange(around)
+    quads = [(k * around + a, k * around + b, (k + 1) * around + b, (k + 1) * around + a)
+             for k in range(along - 1) for a, b in zip(corner, np.roll(corner, -1))]
+    last = (along - 1) * around
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices.tolist(), [], [*quads, corner[::-1].tolist(), (last + corner).tolist()])
+    ob = bpy.data.objects.new(name, mesh)
+    ob.location = at
+    bpy.context.scene.collection.objects.link(ob)
+    bpy.context.view_layer.update()
+    return ob
+
+
+def select(ob, vertices):
+    """As a person does in Edit mode, where it is left."""
+    activate(ob)
+    mask = np.zeros(len(ob.data.vertices), bool)
+    mask[vertices] = True
+    for elements in (ob.data.edges, ob.data.polygons):
+        elements.foreach_set("select", np.zeros(len(elements), bool))
+    ob.data.vertices.foreach_set("select", mask)
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def activate(ob):
+    for one in bpy.context.selected_objects:
+        one.select_set(False)
+    ob.select_set(True)
+    bpy.context.view_layer.objects.active = ob
+
+
+def add_handle(ob, vertices):
+    select(ob, vertices)
+    assert bpy.ops.lpdeform.add_handle() == {"FINISHED"}
+    return bpy.context.object
+
+
+def shown(ob):
+    """n x 3: what Blender draws, in the object's own space."""
+    bpy.context.view_layer.update()
+    mesh = ob.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    positions = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", positions)
+    return positions.reshape(-1, 3)
+
+
+def at_rest(ob):
+    positions = np.empty(3 * len(ob.data.vertices), np.float32)
+    ob.data.vertices.foreach_get("co", positions)
+    return positions.reshape(-1, 3)
+
+
+def turn(is_done):
+    """Turns the add-on's timer until `is_done` holds."""
+    from lpdeform_addon import live
+
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        bpy.context.view_layer.update()
+        live.tick()
+        if is_done():
+            return
+        for running in live._running.values():
+            running.session._link.box.wait(time.monotonic() + 0.05)
+            break
+    raise AssertionError("it did not happen in time")
+
+
+def settle(*obs):
+    """Until each mesh shows the result for what its handles and settings are now."""
+    from lpdeform_addon import live
+
+    def is_settled():
+        frames = [(live.of(ob), live.of(ob).frame) for ob in obs]
+        return all(frame is not None and running.session._link.is_result(frame) for running, frame in frames)
+
+    bpy.context.view_layer.update()
+    live.tick()
+    turn(is_settled)
+
+
+def main():
+    done = unittest.main(module="__main__", argv=["blender"], verbosity=2, exit=False)
+    if not done.result.wasSuccessful() or done.result.testsRun == 0:
+        raise RuntimeError("tests failed")  # Blender ends with 1
