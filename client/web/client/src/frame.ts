@@ -18,6 +18,7 @@ export class WireFrame implements Frame {
   readonly softEnergy: number;
   readonly converged: boolean;
   readonly stopReason: StopReason;
+  readonly optimalityGap: number | undefined;
   readonly solveSeconds: number;
   readonly method: string;
   wireBytes = 0;
@@ -36,6 +37,7 @@ export class WireFrame implements Frame {
     this.softEnergy = header.softEnergy;
     this.converged = header.converged;
     this.stopReason = stopReasonFromWire(header.stopReason);
+    this.optimalityGap = header.certificate?.relativeGap;
     this.solveSeconds = header.solveSeconds;
     this.method = methodName(header.method);
   }

@@ -57,12 +57,19 @@ const encodings: Record<api.Encoding, Encoding> = {
 };
 
 export function frameOptionsToWire(options: api.FrameOptions): MessageInitShape<typeof FrameOptionsSchema> {
-  const { credit = 0, withoutDistortion = false, withNormals = false, maxFramesPerSecond = 0 } = options;
+  const {
+    credit = 0,
+    withoutDistortion = false,
+    withNormals = false,
+    certify = false,
+    maxFramesPerSecond = 0,
+  } = options;
   const { encoding = "float32", lowestEncoding = "quantized" } = options;
   return {
     credit,
     withoutDistortion,
     withNormals,
+    certify,
     maxFramesPerSecond,
     encoding: encodings[encoding],
     lowestEncoding: encodings[lowestEncoding],

@@ -181,9 +181,11 @@ export interface Frame {
   readonly energy: number;
   /** The part of it that soft and orientation handles have. */
   readonly softEnergy: number;
-  /** The result for inputSeq: no further frame until there is a new update. */
+  /** The result for inputSeq: no further frame until there is a new update, but for the same one with its optimalityGap. */
   readonly converged: boolean;
   readonly stopReason: StopReason;
+  /** (energy - lower bound) / energy of the convex problem with its rotations held. In results alone, see FrameOptions.certify. */
+  readonly optimalityGap: number | undefined;
   readonly solveSeconds: number;
   /** "quasi_newton" and so on; empty before the first solve. */
   readonly method: string;
@@ -263,6 +265,11 @@ export interface FrameOptions {
   credit?: number;
   withoutDistortion?: boolean;
   withNormals?: boolean;
+  /**
+   * A result comes again, with its Frame.optimalityGap, unless a new update comes first: the server looks for it once updates
+   * have paused for a tenth of a second.
+   */
+  certify?: boolean;
   /** Without limit where left out; the last frame of an update always comes. */
   maxFramesPerSecond?: number;
   /** "float32" where left out. */

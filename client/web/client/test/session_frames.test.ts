@@ -57,6 +57,7 @@ describe("frames", () => {
       credit: 5,
       encoding: "quantized",
       withNormals: true,
+      certify: true,
       maxFramesPerSecond: 24,
     });
     opened.push(session);
@@ -67,8 +68,25 @@ describe("frames", () => {
       encoding: Encoding.QUANTIZED,
       lowestEncoding: Encoding.QUANTIZED,
       withNormals: true,
+      certify: true,
       maxFramesPerSecond: 24,
     });
+  });
+
+  test("come again with their certificate", async () => {
+    const { server, session } = await begin();
+    server.stream.frame({ frameSeq: 1n, inputSeq: 0n, converged: true });
+    const result = await next(session);
+    server.stream.frame({ frameSeq: 2n, inputSeq: 0n, converged: true, certificate: { relativeGap: 0.25 } });
+    const certified = await next(session);
+    expect([result.optimalityGap, certified.optimalityGap]).toEqual([undefined, 0.25]);
+    expect(certified.inputSeq).toBe(result.inputSeq);
+    await server.until(() => server.acks.some(({ frameSeq }) => frameSeq === 2n));
+  });
+
+  test("are asked for without a certificate where none is wanted", async () => {
+    const { server } = await begin();
+    expect(server.stream.request.streams[0]!.options!.certify).toBe(false);
   });
 
   test("of two sessions come on one stream", async () => {
