@@ -1,6 +1,5 @@
 import "./style/index.css";
 import { App } from "./app/app.js";
-import { startCertifier } from "./app/certifier.js";
 import { Files } from "./app/files.js";
 import { startShortcuts } from "./app/shortcuts.js";
 import { exposeForTests } from "./app/testing.js";
@@ -32,7 +31,6 @@ document.querySelector("#app")!.append(
 );
 startTheme(app);
 startShortcuts(app, files, help);
-startCertifier(app);
 exposeForTests(app);
 // A page that is left by mistake takes the work along.
 window.addEventListener("beforeunload", (event) => {

@@ -4,7 +4,7 @@ import { EnergyTrail } from "../src/app/energy_trail.js";
 import { Pace } from "../src/app/pace.js";
 import { Meter } from "../src/link/meter.js";
 import { elementsIn, isPassing, statusOf } from "../src/link/status.js";
-import { changes, newSession } from "../src/model/changes.js";
+import { changes, exponent, newSession } from "../src/model/changes.js";
 import {
   addHandle,
   changeHandle,
@@ -91,6 +91,12 @@ describe("what the server is told", () => {
     expect(changes(two, automatic)!.settings).toEqual({ p: { automatic: 1 }, stiffness: { automatic: 1 } });
     expect(changes(automatic, { ...automatic, isAutomatic: false, p: 3 })!.settings).toEqual({ p: 3, stiffness: 1 });
   });
+});
+
+it("the exponent of an energy is that of the side's slider, and 2 where the server finds p", () => {
+  expect([exponent(two, "first"), exponent(two, "second"), exponent({ ...two, isAutomatic: true }, "first")]).toEqual([
+    1.5, 6, 2,
+  ]);
 });
 
 describe("words for", () => {

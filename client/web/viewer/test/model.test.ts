@@ -3,6 +3,7 @@ import { adjacencyOf, meanEdge } from "../src/model/adjacency.js";
 import { blueToRed } from "../src/model/colours.js";
 import { fitPose } from "../src/model/fit.js";
 import { History } from "../src/model/history.js";
+import { follow, placesOf } from "../src/model/places.js";
 import { apply, axisAngle, quaternionOf, toMotion } from "../src/model/pose.js";
 import { raycast } from "../src/model/raycast.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../src/model/selection.js";
@@ -19,6 +20,13 @@ const grid = (() => {
   return { positions, faces: Uint32Array.from(faces) };
 })();
 const adjacency = adjacencyOf(16, grid.faces);
+
+it("places on the surface are vertices, and points inside faces by their weights", () => {
+  const places = placesOf([6], [{ face: 1, barycentric: [0.5, 0.25, 0.25] }], grid.faces);
+  const bent = grid.positions.map((value, k) => (k % 3 === 2 ? grid.positions[k - 2]! : value)); // z = x
+  // Face 1 has the vertices 1, 5 and 4.
+  expect([...follow(places, bent)]).toEqual([2, 1, 2, 0.75, 0.5, 0.75]);
+});
 
 describe("selection", () => {
   it("reaches what hangs together within the radius, and no further", () => {

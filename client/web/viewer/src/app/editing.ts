@@ -9,6 +9,7 @@ import {
   releaseVertices,
 } from "../model/document.js";
 import type { Vector3 } from "../model/mesh.js";
+import { follow, placesOf } from "../model/places.js";
 import { add, type Pose, subtract } from "../model/pose.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../model/selection.js";
 import { vertexNormals } from "../stage/drawmesh.js";
@@ -82,27 +83,35 @@ export class Editing implements PointingTarget {
     return this.#drag(handle, at);
   }
 
-  /** The handle whose vertices are in the face that is pointed at, or near by on the screen, for fingers. */
+  /** The handle that holds something of the face that is pointed at, or near by on the screen, for fingers. */
   #handleAt(at: PointerAt): Handle | undefined {
     const { app, pane } = this;
     const { hit } = at;
-    const owners = ownersOf(app.document);
+    const { handles } = app.document;
     if (hit) {
+      const owners = ownersOf(app.document);
       const face = app.mesh.faces.subarray(3 * hit.face, 3 * hit.face + 3);
-      const owner = owners.get(hit.vertex) ?? [...face].map((vertex) => owners.get(vertex)).find((one) => one);
+      const owner =
+        handles.find(({ points }) => points?.some((point) => point.face === hit.face)) ??
+        owners.get(hit.vertex) ??
+        [...face].map((vertex) => owners.get(vertex)).find((one) => one);
       if (owner) return owner;
     }
     const { surface, width, height } = pane.stage;
     if (!surface) return undefined;
-    const screen = project(surface.positions, viewProjection(pane.stage), width, height);
+    const matrix = viewProjection(pane.stage);
     let least = at.isTouch ? 18 : 7;
     let nearest: Handle | undefined;
-    for (const [vertex, handle] of owners) {
-      const far = Math.hypot(screen[2 * vertex]! - at.x, screen[2 * vertex + 1]! - at.y);
-      const isHidden = hit && distanceTo(at, surface.positions, vertex) > hit.distance + 0.02 * app.diagonal;
-      if (isHidden || !(far < least)) continue;
-      least = far;
-      nearest = handle;
+    for (const handle of handles) {
+      const places = follow(placesOf(handle.vertices, handle.points, app.mesh.faces), surface.positions);
+      const screen = project(places, matrix, width, height);
+      for (let k = 0; 2 * k < screen.length; ++k) {
+        const far = Math.hypot(screen[2 * k]! - at.x, screen[2 * k + 1]! - at.y);
+        if (!(far < least)) continue;
+        if (hit && distanceTo(at, places, k) > hit.distance + 0.02 * app.diagonal) continue; // hidden
+        least = far;
+        nearest = handle;
+      }
     }
     return nearest;
   }

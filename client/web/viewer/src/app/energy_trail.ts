@@ -1,4 +1,4 @@
-/** Energies by iteration, solve after solve in one line; the oldest are forgotten. */
+/** Energies (their p-th roots) by iteration, solve after solve in one line; the oldest are forgotten. */
 export class EnergyTrail {
   iterations: number[] = [];
   energies: number[] = [];

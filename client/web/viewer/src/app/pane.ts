@@ -1,4 +1,4 @@
-import type { Frame, LpdeformError, MeshReport, SolveResult } from "lpdeform-client";
+import type { Frame, LpdeformError, MeshReport } from "lpdeform-client";
 import { Live, type LiveWatcher } from "../link/live.js";
 import { say, type Status } from "../link/status.js";
 import type { Side } from "../model/changes.js";
@@ -31,7 +31,6 @@ export class Pane {
   live: Live | undefined;
   frame: Frame | undefined;
   statistics = nothing;
-  result: SolveResult | undefined;
   #isDirty = true;
   #onScreenNext: Frame | undefined;
 
@@ -50,7 +49,7 @@ export class Pane {
   open(mesh: Mesh, document: Document, view: View): void {
     this.live?.close();
     this.stage.open(mesh);
-    this.frame = this.result = this.#onScreenNext = undefined;
+    this.frame = this.#onScreenNext = undefined;
     this.statistics = nothing;
     this.trail.reset();
     const watcher: LiveWatcher = {
@@ -75,12 +74,16 @@ export class Pane {
   takeFrame(): boolean {
     const frame = this.live?.take();
     if (!frame || !this.stage.surface) return false;
-    if (frame.inputSeq !== this.frame?.inputSeq) this.result = undefined;
+    const before = this.frame;
+    if (frame.optimalityGap !== undefined && before?.inputSeq === frame.inputSeq && before.energy === frame.energy) {
+      this.frame = frame; // the same one again, with its certificate
+      return false;
+    }
     this.frame = this.#onScreenNext = frame;
     this.stage.surface.move(frame.positions);
     this.stage.marks.move(frame.positions);
     this.statistics = energyStatistics(frame.distortion);
-    this.trail.add(frame.iteration, frame.energy);
+    this.trail.add(frame.iteration, frame.energy ** (1 / this.live!.exponentOf(frame)));
     this.#isDirty = true;
     return true;
   }
@@ -99,7 +102,7 @@ export class Pane {
   mark(document: Document, view: View, pointedOut: readonly number[], colour: string): void {
     const { surface, marks } = this.stage;
     if (!surface) return;
-    marks.show(document.handles, view.selected, pointedOut, colour);
+    marks.show(document.handles, surface.mesh.faces, view.selected, pointedOut, colour);
     marks.move(surface.positions);
     this.#isDirty = true;
   }

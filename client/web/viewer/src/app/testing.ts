@@ -12,7 +12,7 @@ export function exposeForTests(app: App): void {
     positions: (pane = 0) => [...(paneAt(pane).frame?.positions ?? [])],
     distortion: (pane = 0) => [...(paneAt(pane).frame?.distortion ?? [])],
     frame: (pane = 0) => {
-      const { frame, result, live } = paneAt(pane);
+      const { frame, live } = paneAt(pane);
       if (!frame) return undefined;
       const { inputSeq, converged, energy, stopReason, epoch, iteration } = frame;
       return {
@@ -23,7 +23,7 @@ export function exposeForTests(app: App): void {
         epoch,
         iteration,
         isSettling: live!.isSettling,
-        gap: result?.optimalityGap,
+        gap: frame.optimalityGap,
       };
     },
     document: () => app.document,
@@ -43,6 +43,7 @@ export function exposeForTests(app: App): void {
     },
     vertexOnPage: (vertex: number, pane = 0) =>
       onPage(paneAt(pane), paneAt(pane).stage.surface!.positions.slice(3 * vertex, 3 * vertex + 3)),
+    pointOnPage: (point: readonly number[], pane = 0) => onPage(paneAt(pane), Float32Array.from(point)),
     /** Where the gizmo is. */
     anchorOnPage: (pane = 0) =>
       onPage(paneAt(pane), Float32Array.from(anchorOfHandle(handleOf(app.document, app.view.now.selected)!))),

@@ -1,13 +1,5 @@
-import {
-  type Encoding,
-  type Frame,
-  LpdeformError,
-  type MeshReport,
-  openSession,
-  type Session,
-  type SolveResult,
-} from "lpdeform-client";
-import { changes, newSession, type Side } from "../model/changes.js";
+import { type Encoding, type Frame, LpdeformError, type MeshReport, openSession, type Session } from "lpdeform-client";
+import { changes, exponent, newSession, type Side } from "../model/changes.js";
 import type { Document } from "../model/document.js";
 import type { Mesh } from "../model/mesh.js";
 import { Meter } from "./meter.js";
@@ -21,6 +13,9 @@ export interface LiveWatcher {
   /** An update was refused, or cannot be solved for yet. */
   problem(error: LpdeformError): void;
 }
+
+/** Frames answer one of the newest inputs. */
+const mostExponents = 100;
 
 /**
  * A document kept on the server, and its surface as it comes. The server may be away at any time: the document is told again
@@ -36,6 +31,8 @@ export class Live {
   #inputs: { seq: number; time: number; sent: number }[] = [];
   #newest = 0;
   #drawn = 0;
+  /** p from each input on that changed it. */
+  #exponents: { seq: number; p: number }[] = [];
   readonly #over = new AbortController();
 
   constructor(
@@ -86,15 +83,9 @@ export class Live {
     this.#inputs.splice(0, answered);
   }
 
-  /** The finished result with its gap and trace; undefined where there is no server, or nothing to solve. */
-  async certify(signal: AbortSignal): Promise<SolveResult | undefined> {
-    const session = this.#session;
-    if (!session || session.connection !== "connected" || this.document.handles.length === 0) return undefined;
-    try {
-      return await session.solve({ certify: true, trace: true, deadlineMs: 30_000, signal });
-    } catch {
-      return undefined; // it was only to tell more
-    }
+  /** p of the input that the frame answers; see exponent(). */
+  exponentOf({ inputSeq }: Frame): number {
+    return this.#exponents.findLast(({ seq }) => seq <= inputSeq)?.p ?? 2;
   }
 
   /** There are changes that no picture answers yet. */
@@ -116,6 +107,7 @@ export class Live {
       this.#session = session;
       this.#told = newSession;
       this.#inputs = [];
+      this.#exponents = [];
       this.#newest = this.#drawn = 0;
       this.watcher.report(session.meshReport);
       session.on("problem", (error) => this.watcher.problem(error));
@@ -134,7 +126,14 @@ export class Live {
       try {
         return await openSession(
           { vertices: positions, faces },
-          { freeComponents: "follow", encoding: this.encoding, lowestEncoding: "compressed", maxFramesPerSecond: 60, signal },
+          {
+            freeComponents: "follow",
+            encoding: this.encoding,
+            lowestEncoding: "compressed",
+            certify: true,
+            maxFramesPerSecond: 60,
+            signal,
+          },
         );
       } catch (thrown) {
         if (signal.aborted) return undefined;
@@ -172,10 +171,18 @@ export class Live {
     this.#told = this.document;
     try {
       this.#newest = session.update(update);
+      this.#noteExponent(this.#newest);
       if (isInput) this.#inputs.push({ seq: this.#newest, time, sent: performance.now() });
     } catch (thrown) {
       this.watcher.problem(thrown as LpdeformError);
     }
+  }
+
+  #noteExponent(seq: number): void {
+    const p = exponent(this.document, this.side);
+    if (this.#exponents.at(-1)?.p === p) return;
+    this.#exponents.push({ seq, p });
+    if (this.#exponents.length > mostExponents) this.#exponents.shift();
   }
 
   #connection(): void {

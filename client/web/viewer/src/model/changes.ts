@@ -66,3 +66,8 @@ function pOf(document: Document, p: number): FieldValue {
   if (document.isAutomatic) return { automatic: 1 };
   return pField(document, p) ?? p;
 }
+
+/** p of the energy as a whole: that of the slider, also where parts are painted; 2 where the server finds p by itself. */
+export function exponent({ isAutomatic, p, secondP }: Document, side: Side): number {
+  return isAutomatic ? 2 : side === "first" ? p : secondP;
+}

@@ -1,5 +1,6 @@
 import * as three from "three";
 import type { Handle } from "../model/document.js";
+import { follow, type Places, placesOf } from "../model/places.js";
 
 const vertexShader = `
 attribute vec3 colour;
@@ -25,11 +26,11 @@ void main() {
   gl_FragColor = vec4(mix(vColour, vec3(1.0), vRing * smoothstep(0.62, 0.72, far)), 1.0);
 }`;
 
-/** Points on vertices: handles in their colours, and whatever is being pointed out. */
+/** Points on the surface: handles in their colours, and whatever is being pointed out. */
 export class Marks {
   readonly object: three.Points;
   readonly #material = new three.ShaderMaterial({ vertexShader, fragmentShader, uniforms: { pixelRatio: { value: 1 } } });
-  #vertices: number[] = [];
+  #places: Places = { corners: [], weights: [] };
 
   constructor() {
     this.object = new three.Points(new three.BufferGeometry(), this.#material);
@@ -37,26 +38,39 @@ export class Marks {
     this.object.renderOrder = 1;
   }
 
-  /** `pointedOut`: vertices under a brush or of a warning. */
-  show(handles: readonly Handle[], selected: string | undefined, pointedOut: readonly number[], pointedColour: string): void {
-    this.#vertices = [];
+  /** `faces`: of the mesh; `pointedOut`: vertices under a brush or of a warning. */
+  show(
+    handles: readonly Handle[],
+    faces: Uint32Array,
+    selected: string | undefined,
+    pointedOut: readonly number[],
+    pointedColour: string,
+  ): void {
+    const corners: number[] = [];
+    const weights: number[] = [];
     const colours: number[] = [];
     const sizes: number[] = [];
-    const add = (vertices: readonly number[], colour: string, size: number) => {
+    const add = (places: Places, colour: string, size: number) => {
       const { r, g, b } = new three.Color().setStyle(colour, three.LinearSRGBColorSpace);
-      for (const vertex of vertices) {
-        this.#vertices.push(vertex);
+      for (let k = 0; k < places.corners.length; k += 3) {
+        for (let corner = k; corner < k + 3; ++corner) {
+          corners.push(places.corners[corner]!);
+          weights.push(places.weights[corner]!);
+        }
         colours.push(r, g, b);
         sizes.push(size);
       }
     };
-    for (const { name, vertices, colour } of handles) {
-      const small = vertices.length > 400 ? 4 : vertices.length > 60 ? 5 : vertices.length > 4 ? 8 : 11;
-      add(vertices, colour, name === selected ? small + 1.5 : small);
+    for (const { name, vertices, points, colour } of handles) {
+      const places = placesOf(vertices, points, faces);
+      const count = places.corners.length / 3;
+      const small = count > 400 ? 4 : count > 60 ? 5 : count > 4 ? 8 : 11;
+      add(places, colour, name === selected ? small + 1.5 : small);
     }
-    add(pointedOut, pointedColour, 9);
+    add(placesOf(pointedOut, [], faces), pointedColour, 9);
+    this.#places = { corners, weights };
     const geometry = new three.BufferGeometry();
-    geometry.setAttribute("position", new three.BufferAttribute(new Float32Array(3 * this.#vertices.length), 3));
+    geometry.setAttribute("position", new three.BufferAttribute(new Float32Array(corners.length), 3));
     geometry.setAttribute("colour", new three.BufferAttribute(new Float32Array(colours), 3));
     geometry.setAttribute("size", new three.BufferAttribute(new Float32Array(sizes), 1));
     this.object.geometry.dispose();
@@ -67,12 +81,7 @@ export class Marks {
   move(positions: Float32Array): void {
     const attribute = this.object.geometry.attributes["position"] as three.BufferAttribute | undefined;
     if (!attribute) return;
-    const array = attribute.array as Float32Array;
-    this.#vertices.forEach((vertex, k) => {
-      array[3 * k] = positions[3 * vertex]!;
-      array[3 * k + 1] = positions[3 * vertex + 1]!;
-      array[3 * k + 2] = positions[3 * vertex + 2]!;
-    });
+    follow(this.#places, positions, attribute.array as Float32Array);
     attribute.needsUpdate = true;
   }
 

@@ -125,7 +125,9 @@ function detailsOf(app: App, handle: Handle): Node[] {
   const { name, hold, pose } = handle;
   const change = (part: Partial<Handle>) => app.change(changeHandle(app.document, name, part));
   const kind = el("select", { aria: { label: "How it is held" } });
-  for (const [value, text] of kinds) kind.append(el("option", { value, textContent: text, selected: value === hold.kind }));
+  // Points inside faces are held as they are or softly.
+  const possible = handle.points ? kinds.slice(0, 2) : kinds;
+  for (const [value, text] of possible) kind.append(el("option", { value, textContent: text, selected: value === hold.kind }));
   kind.addEventListener("change", () => change({ hold: newHold(kind.value as Hold["kind"]) }));
   const parts: Node[] = [el("label", { className: "pair" }, el("span", {}, "Held"), kind)];
   if (hold.kind === "soft" || hold.kind === "orientation") parts.push(weight(app, name, hold));

@@ -13,7 +13,7 @@ const plotEveryMs = 200;
 const rows = [
   ["fps", "Frames a second", "Pictures with a new surface"],
   ["latency", "Input to picture, ms", "From moving to seeing it: the median and 99 of 100"],
-  ["service", "…of it the service, ms", "Server and way there and back, without drawing: the median and 99 of 100"],
+  ["service", "…of it service, ms", "Server and way there and back, without drawing: the median and 99 of 100"],
   ["bytes", "Received", "As it travels"],
   ["vertices", "Vertices · faces", ""],
   ["energy", "Energy", "E of Eq. 3 of the paper"],
@@ -38,7 +38,17 @@ export function measures(app: App): HTMLElement {
   const element = el(
     "div",
     { className: "measures" },
-    el("figure", {}, el("figcaption", {}, "Energy by iteration"), energy),
+    el(
+      "figure",
+      {},
+      el(
+        "figcaption",
+        { title: "The p-th root of the energy: a length, which can be compared between values of p" },
+        "Energy by iteration, E",
+        el("sup", {}, "1/p"),
+      ),
+      energy,
+    ),
     el("figure", {}, el("figcaption", {}, "Cells by energy"), bars),
     list,
   );
@@ -98,18 +108,21 @@ function showNumbers(app: App, values: Record<Row, HTMLElement>, now: number): v
     values.share,
     both(({ statistics }) => (app.red > 0 ? `${(100 * statistics.top5Share).toFixed(0)} %` : "–")),
   );
-  setText(
-    values.method,
-    both(({ frame }) => (frame?.method ? `${frame.method.replaceAll("_", " ")} · ${frame.iteration}` : "–")),
-  );
+  const methods = both(({ frame }) => frame?.method.replaceAll("_", " ") || "–");
+  setText(values.method, `${methods} · ${both(({ frame }) => String(frame?.iteration ?? 0))}`);
   setText(
     values.stop,
     both(({ frame }) => (frame?.method ? frame.stopReason.replaceAll("_", " ") : "–")),
   );
   setText(
     values.gap,
-    both(({ result }) => (result?.optimalityGap === undefined ? "–" : `${short(100 * result.optimalityGap)} %`)),
+    both(({ frame }) => (frame?.optimalityGap === undefined ? "–" : gapText(frame.optimalityGap))),
   );
+}
+
+/** The server says 1 where it has found no bound in its time. */
+function gapText(gap: number): string {
+  return gap < 1 ? `${short(100 * gap)} %` : "not found";
 }
 
 const second = "#ff7a1a";

@@ -48,7 +48,7 @@ export function plotLines(
   const [left, right] = [Math.min(...xs), Math.max(...xs)];
   if (ys.length < 2 || !(right > left)) return empty(frame, "Drag a handle");
   let [low, high] = [ys.reduce((a, b) => Math.min(a, b)), ys.reduce((a, b) => Math.max(a, b))];
-  low = Math.max(low, 1e-6 * high); // what rounding leaves at rest is nothing
+  low = Math.max(low, 1e-4 * high); // what rounding leaves at rest is nothing
   const isLogarithmic = high / low > 20;
   const scale = isLogarithmic ? Math.log : (y: number) => y;
   if (!isLogarithmic) [low, high] = [low - 0.05 * (high - low || high), high + 0.05 * (high - low || high)];

@@ -178,7 +178,9 @@ it.each(states.filter(({ name }) => only.test(name)))(
     try {
       await user.settled();
       await act?.(user);
-      await user.page.waitForTimeout(1200); // the picture at rest, and plots
+      // The picture at rest, and plots.
+      await user.until(`[...document.querySelectorAll("canvas.stage")].every((one) => one.width >= 2 * one.clientWidth)`);
+      await user.page.waitForTimeout(1200);
       await user.page.screenshot({ path: join(out, `${name}.png`) });
     } finally {
       await user.close();

@@ -99,6 +99,63 @@ describe("handles", () => {
   });
 });
 
+describe("points inside faces, from a file", () => {
+  const content = JSON.stringify({
+    handles: [
+      { name: "Base", vertices: [...Array(25).keys()] },
+      { name: "Pin", points: [{ face: 0, barycentric: [0.2, 0.3, 0.5] }] },
+    ],
+  });
+  const middle = "app.mesh.faces.slice(3 * POINT.face, 3 * POINT.face + 3)";
+  /** Where the point is on the surface as it is drawn. */
+  const place = async (): Promise<number[]> => {
+    const [face, weights] = await user.ask<[number, number[]]>(
+      "document().handles[1].points.map(({ face, barycentric }) => [face, barycentric])[0]",
+    );
+    const corners = Object.values(await user.ask<Record<string, number>>(middle.replaceAll("POINT.face", String(face))));
+    const positions = await user.positions();
+    return [0, 1, 2].map((axis) => corners.reduce((sum, vertex, k) => sum + weights[k]! * positions[3 * vertex + axis]!, 0));
+  };
+  const onPage = ([x, y, z]: number[]) => user.ask<{ x: number; y: number }>(`pointOnPage([${x}, ${y}, ${z}])`);
+
+  it("are drawn in their handle's colour, and dragged", async () => {
+    const mesh = await user.ask<{ faces: Record<string, number>; positions: Record<string, number> }>("app.mesh");
+    const front = await user.vertexNear([0.5, 0, 3.2]);
+    const faces = Object.values(mesh.faces);
+    const face = Math.floor(faces.findIndex((vertex, k) => vertex === front && isInFront(k)) / 3);
+    function isInFront(corner: number): boolean {
+      const first = corner - (corner % 3);
+      return faces.slice(first, first + 3).every((vertex) => mesh.positions[3 * vertex + 1] === mesh.positions[3 * front + 1]);
+    }
+    await user.openFiles({ name: "pin.json", content: content.replace('"face":0', `"face":${face}`) });
+    await user.settled();
+    await press("1");
+    await press("Escape"); // without the gizmo over it
+    const start = await onPage(await place());
+    const hex = await user.ask<string>("document().handles[1].colour");
+    const wanted = [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
+    await expect
+      .poll(async () => Math.max(...(await user.colourAt(start)).map((value, k) => Math.abs(value - wanted[k]!))))
+      .toBeLessThan(12);
+
+    const before = await place();
+    await user.drag(start, 40, -20);
+    await user.settled();
+    const { translation } = (await handles())[1]!.pose;
+    expect(Math.hypot(...translation)).toBeGreaterThan(0.1);
+    const after = await place();
+    for (const axis of [0, 1, 2]) expect(after[axis]! - before[axis]!).toBeCloseTo(translation[axis]!, 2);
+    await user.page.getByLabel("How it is held").waitFor();
+    expect(await user.page.getByLabel("How it is held").locator("option").allTextContents()).toEqual(["Exactly", "Softly"]);
+  });
+
+  it("can be undone", async () => {
+    await press("Control+z");
+    await press("Control+z");
+    expect((await handles()).map(({ name }) => name)).toEqual(["Base", "Top"]);
+  });
+});
+
 describe("the gizmo", () => {
   it("moves along an axis and turns about one", async () => {
     await press("1");
@@ -176,6 +233,14 @@ describe("p", () => {
     await user.settled(1);
     expect(await user.positions(0)).not.toEqual(left);
     expect(await user.positions(1)).not.toEqual(right);
+    // The plot compares lengths: the p-th roots of the energies.
+    for (const [pane, p] of [await user.ask<number>("document().p"), await user.ask<number>("document().secondP")].entries()) {
+      const { energy } = (await user.frame(pane))!;
+      expect(await user.ask(`app.panes[${pane}].trail.energies.at(-1)`)).toBeCloseTo(energy ** (1 / p), 9);
+    }
+    // The server looks for the gaps by itself, once all rests.
+    await user.until("[0, 1].every((pane) => window.__lpdeform.frame(pane).gap !== undefined)");
+    await expect.poll(() => user.page.locator('[data-measure="gap"]').textContent()).toMatch(/^[^–]* %/);
     await press("s");
   });
 });

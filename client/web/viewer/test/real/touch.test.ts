@@ -52,6 +52,40 @@ it("a tap on the surface places a handle", async () => {
   expect(await user.ask("document().handles.length")).toBe(3);
 });
 
+it("upright, the sliders of p stay in reach beside the open panel, for one picture and for two", async () => {
+  const { page } = user;
+  const stop = (row: number, value: string) =>
+    page.locator(".p-row").nth(row).getByRole("button", { name: value, exact: true });
+  await page.getByRole("button", { name: "Side panel" }).tap();
+  await page.locator(".panel").waitFor();
+  await stop(0, "6").tap();
+  expect(await user.ask("document().p")).toBe(6);
+  await page.getByTitle("Two values of p side by side").tap();
+  await user.settled(1);
+  await stop(1, "1").tap();
+  await stop(0, "2").tap();
+  expect([await user.ask("document().p"), await user.ask("document().secondP")]).toEqual([2, 1]);
+  // Each at the lower edge of its own picture, clear of the legend, the panel and each other.
+  const boxes = [".p-row >> nth=0", ".p-row >> nth=1", ".legend", ".dock .under", ".panel"];
+  const [first, second, ...others] = await Promise.all(boxes.map((box) => page.locator(box).boundingBox()));
+  const panes = await Promise.all([0, 1].map((k) => page.locator(".pane").nth(k).boundingBox()));
+  [first!, second!].forEach((slider, k) => {
+    expect(slider.y).toBeGreaterThan(panes[k]!.y + panes[k]!.height / 2);
+    expect(slider.y + slider.height).toBeLessThan(panes[k]!.y + panes[k]!.height);
+    for (const other of others) {
+      const isApart =
+        slider.x >= other!.x + other!.width ||
+        other!.x >= slider.x + slider.width ||
+        slider.y >= other!.y + other!.height ||
+        other!.y >= slider.y + slider.height;
+      expect(isApart).toBe(true);
+    }
+  });
+  await page.getByTitle("Two values of p side by side").tap();
+  await page.getByRole("button", { name: "Side panel" }).tap();
+  await user.settled();
+});
+
 it("two fingers zoom, also where the first had begun to paint", async () => {
   await user.page.getByRole("button", { name: "Brush", exact: true }).tap();
   const before = await camera();

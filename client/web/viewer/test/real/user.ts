@@ -126,6 +126,13 @@ export class User {
     return readFileSync(await ((await download) as Download).path());
   }
 
+  /** Red, green and blue of a place on the page. */
+  async colourAt({ x, y }: { x: number; y: number }): Promise<[number, number, number]> {
+    const png = await this.page.screenshot({ clip: { x: Math.floor(x), y: Math.floor(y), width: 1, height: 1 }, scale: "css" });
+    const [r, g, b] = decodePng(png).pixels;
+    return [r!, g!, b!];
+  }
+
   /** What of the picture has colours that mean much distortion (yellow to red) and little (blue), in shares of the coloured. */
   async colours(): Promise<{ warm: number; cold: number; coloured: number }> {
     const box = await this.page.locator("canvas.stage").first().boundingBox();
