@@ -1,6 +1,7 @@
 import "./style/index.css";
 import { App } from "./app/app.js";
 import { Files } from "./app/files.js";
+import { Keeper } from "./app/keeper.js";
 import { startShortcuts } from "./app/shortcuts.js";
 import { exposeForTests } from "./app/testing.js";
 import { dock } from "./ui/dock.js";
@@ -24,7 +25,7 @@ document.querySelector("#app")!.append(
   toolbar(app),
   legend(app),
   dock(app),
-  messages(app),
+  messages(app, () => beginAnew()),
   sidePanel(app),
   help,
   dropHere,
@@ -32,14 +33,18 @@ document.querySelector("#app")!.append(
 startTheme(app);
 startShortcuts(app, files, help);
 exposeForTests(app);
-// A page that is left by mistake takes the work along.
+const keeper = new Keeper(app);
+// Where nothing is kept, a page that is left by mistake takes the work along.
 window.addEventListener("beforeunload", (event) => {
-  if (app.history.canUndo) event.preventDefault();
+  if (app.history.canUndo && !keeper.isKeeping) event.preventDefault();
 });
 
 // ?shape=sheet&detail=fine&encoding=float32 for links to a state of the page.
 const asked = new URLSearchParams(location.search);
 const detail = asked.get("detail");
 const encoding = asked.get("encoding");
+const beginAnew = () =>
+  app.beginAnew(asked.get("shape") ?? "creature", detail === "coarse" || detail === "fine" ? detail : "medium");
 if (encoding === "float32" || encoding === "quantized" || encoding === "compressed") app.view.set({ encoding });
-app.openShape(asked.get("shape") ?? "creature", detail === "coarse" || detail === "fine" ? detail : "medium");
+if (!(await keeper.restore())) beginAnew();
+keeper.start();

@@ -6,6 +6,7 @@ import { boundsOf, type Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
 import { State } from "../model/state.js";
 import { firstView, type View } from "../model/view.js";
+import type { Look } from "../stage/stage.js";
 import { say, type Status } from "../link/status.js";
 import { Pace } from "./pace.js";
 import { Editing } from "./editing.js";
@@ -21,6 +22,8 @@ export interface Facts {
   problem: LpdeformError | undefined;
   /** One line that goes by itself. */
   notice: { text: string; isBad: boolean } | undefined;
+  /** When the work was kept that a reload has brought back, of Date.now(). */
+  restoredFrom: number | undefined;
   /** Vertices that a brush or a warning points out. */
   pointedOut: readonly number[];
   canUndo: boolean;
@@ -55,6 +58,7 @@ export class App {
       status: say("idle", ""),
       problem: undefined,
       notice: undefined,
+      restoredFrom: undefined,
       pointedOut: [],
       canUndo: false,
       canRedo: false,
@@ -87,13 +91,19 @@ export class App {
     this.view.set({ shape: kind.id, detail, selected: first, tool: "move", isYUp: false, pinned: undefined });
   }
 
+  /** Without anything of what was there before. */
+  beginAnew(id: string, detail: Detail): void {
+    this.history.reset(emptyDocument);
+    this.openShape(id, detail);
+  }
+
   open(mesh: Mesh, document: Document): void {
     this.history.reset(document);
     this.adjacency = adjacencyOf(mesh.positions.length / 3, mesh.faces);
     this.edge = meanEdge(this.adjacency, mesh.positions);
     this.diagonal = boundsOf(mesh.positions).diagonal;
     this.view.set({ selected: undefined, shape: "", pinned: undefined });
-    this.facts.set({ mesh, report: undefined, problem: undefined, pointedOut: [] });
+    this.facts.set({ mesh, report: undefined, problem: undefined, restoredFrom: undefined, pointedOut: [] });
     for (const pane of this.panes) pane.open(mesh, document, this.view.now);
     this.#documentChanged(performance.now());
     this.fit();
@@ -130,6 +140,10 @@ export class App {
 
   fit(): void {
     for (const pane of this.panes) pane.fit(this.view.now.isYUp);
+  }
+
+  lookFrom(look: Look): void {
+    for (const pane of this.panes) pane.stage.lookFrom(look);
   }
 
   // The panes.
@@ -227,7 +241,8 @@ export class App {
       this.#statusChanged();
       this.#needsMarks = true;
     }
-    if (view.encoding !== before.encoding) for (const pane of this.panes) pane.open(this.mesh, this.document, view);
+    if (view.encoding !== before.encoding && this.mesh !== noMesh)
+      for (const pane of this.panes) pane.open(this.mesh, this.document, view);
     if (view.isYUp !== before.isYUp) this.fit();
     this.#needsColours = this.#needsMarks = true;
     this.requestDraw();

@@ -7,6 +7,12 @@ import { Marks } from "./marks.js";
 import { isSoftware } from "./software.js";
 import { Surface } from "./surface.js";
 
+/** From where to where. */
+export interface Look {
+  position: Vector3;
+  target: Vector3;
+}
+
 /** What lies over a picture of that width at its edges, in pixels. */
 function coveredAt(width: number): { left: number; top: number; bottom: number } {
   return width > 620 ? { left: 70, top: 50, bottom: 120 } : { left: 40, top: 110, bottom: 165 };
@@ -96,6 +102,19 @@ export class Stage {
       far = Math.max(far, seen.z + Math.abs(seen.x) / across, seen.z + Math.abs(seen.y) / up);
     }
     return 1.08 * far;
+  }
+
+  get look(): Look {
+    return { position: this.camera.position.toArray(), target: this.target.toArray() };
+  }
+
+  /** After fit(). */
+  lookFrom({ position, target }: Look): void {
+    this.camera.position.set(...position);
+    this.target.set(...target);
+    this.camera.lookAt(this.target);
+    this.#controls?.update();
+    this.changed();
   }
 
   /** The same view as another stage. */

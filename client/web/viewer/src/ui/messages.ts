@@ -10,7 +10,7 @@ const noticeMs = 6000;
 const quiet = new Set(["SUPERSEDED", "NO_HANDLES"]);
 
 /** The pill of the connection, the banner while something is wrong, and lines that come and go. */
-export function messages(app: App): HTMLElement {
+export function messages(app: App, beginAnew: () => void): HTMLElement {
   const pill = el("div", { className: "pill", role: "status" });
   const title = el("strong");
   const text = el("span");
@@ -24,6 +24,7 @@ export function messages(app: App): HTMLElement {
   );
   const notice = el("div", { className: "notice", role: "status", hidden: true });
   const hint = el("div", { className: "hint" });
+  const restored = restoredNote(app, beginAnew);
   let element = "";
   let timer: ReturnType<typeof setTimeout> | undefined;
   let late: ReturnType<typeof setTimeout> | undefined;
@@ -50,7 +51,7 @@ export function messages(app: App): HTMLElement {
     else if (facts.status.kind !== "away" || facts.status !== before.status || !banner.hidden) showStatus(facts.status);
     else late = setTimeout(() => showStatus(app.facts.now.status), 400);
     setText(hint, hintOf(app));
-    hint.hidden = hint.textContent === "" || !banner.hidden;
+    hint.hidden = hint.textContent === "" || !banner.hidden || facts.restoredFrom !== undefined;
     if (facts.notice === before.notice || !facts.notice) return;
     notice.textContent = facts.notice.text;
     notice.classList.toggle("bad", facts.notice.isBad);
@@ -59,7 +60,31 @@ export function messages(app: App): HTMLElement {
     timer = setTimeout(() => (notice.hidden = true), facts.notice.isBad ? 2 * noticeMs : noticeMs);
   });
   app.view.watch(() => setText(hint, hintOf(app)));
-  return el("div", { className: "messages" }, pill, banner, hint, notice);
+  return el("div", { className: "messages" }, pill, banner, restored, hint, notice);
+}
+
+/** Says that the work is that of before, until it is changed, dismissed or let go. */
+function restoredNote(app: App, beginAnew: () => void): HTMLElement {
+  const text = el("span");
+  const discard = el("button", { type: "button", className: "plain", textContent: "Discard it" });
+  const keep = el("button", { type: "button", className: "plain", textContent: "Go on" });
+  discard.addEventListener("click", beginAnew);
+  keep.addEventListener("click", () => app.facts.set({ restoredFrom: undefined }));
+  const note = el("div", { className: "restored", role: "status", hidden: true }, text, keep, discard);
+  app.facts.watch(({ restoredFrom, mesh }) => {
+    note.hidden = restoredFrom === undefined;
+    if (restoredFrom !== undefined) setText(text, `“${mesh.name}” is here again as you left it ${ago(restoredFrom)}.`);
+  });
+  return note;
+}
+
+/** "just now", "5 minutes ago". */
+function ago(time: number): string {
+  const minutes = Math.round((Date.now() - time) / 60_000);
+  if (minutes < 2) return "just now";
+  const words = new Intl.RelativeTimeFormat("en");
+  if (minutes < 120) return words.format(-minutes, "minute");
+  return minutes < 48 * 60 ? words.format(-Math.round(minutes / 60), "hour") : words.format(-Math.round(minutes / 1440), "day");
 }
 
 function pillText({ kind, title }: Status): string {

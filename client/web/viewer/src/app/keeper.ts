@@ -1,0 +1,147 @@
+import { Store, type Work } from "../io/store.js";
+import type { Mesh } from "../model/mesh.js";
+import type { View } from "../model/view.js";
+import type { App } from "./app.js";
+
+const key = "lpdeform-work";
+const saveEveryMs = 500;
+/** Longer than a page that is being reloaded takes to let go of its work. */
+const patienceMs = 1000;
+const mostWorks = 8;
+const oldestMs = 30 * 24 * 3600 * 1000;
+
+/**
+ * Keeps the work of this tab in the browser, and brings it back after a reload; in a new tab, what a closed one left. Each tab
+ * holds a lock on its work, so that no two write to the same.
+ */
+export class Keeper {
+  /** The work is kept, but for what the last moment changed, which a page that is being left keeps yet. */
+  isKeeping = false;
+  #store: Store | undefined;
+  #id = "";
+  #keptMesh: Mesh | undefined;
+  /** There is more than a shape that the page can make again. */
+  #isTouched = false;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #camera = "";
+
+  constructor(readonly app: App) {}
+
+  /** True where there was work. Where the browser keeps nothing, all goes on without. */
+  async restore(): Promise<boolean> {
+    try {
+      const store = await within(Store.open(), patienceMs);
+      const work = await this.#claimWork(store);
+      const mesh = work && (await store.mesh(work.id));
+      this.#store = store;
+      if (!work || !mesh) return false;
+      this.#show(work, mesh);
+      return true;
+    } catch {
+      return false;
+    }
+  }
+
+  /** From now on every change is kept. */
+  start(): void {
+    const { app } = this;
+    if (!this.#store) return;
+    app.facts.watch((facts, before) => {
+      if (facts.mesh !== before.mesh) this.#isTouched = this.isKeeping = false;
+      if (facts.canUndo) this.#isTouched = true;
+      if (facts.document !== before.document && facts.mesh === before.mesh) app.facts.set({ restoredFrom: undefined });
+      if (facts.document !== before.document || facts.mesh !== before.mesh) this.#soon();
+    });
+    app.view.watch(() => this.#soon());
+    app.afterDrawing.add(() => {
+      const camera = JSON.stringify(app.panes[0]!.stage.look);
+      if (camera !== this.#camera) this.#soon();
+      this.#camera = camera;
+    });
+    const now = () => this.#timer !== undefined && void this.#save();
+    window.addEventListener("pagehide", now);
+    document.addEventListener("visibilitychange", now);
+  }
+
+  /** Of this tab, of what it was before the reload, or of a tab that is no more. */
+  async #claimWork(store: Store): Promise<Work | undefined> {
+    const works = await store.works();
+    const old = works.filter(({ savedAt }, k) => k >= mostWorks || savedAt < Date.now() - oldestMs);
+    const own = sessionStorage.getItem(key);
+    if (own && (await claim(own, patienceMs))) {
+      this.#id = own;
+    } else {
+      for (const { id, address } of works) {
+        if (address !== location.search || !navigator.locks || own || !(await claim(id, 0))) continue;
+        this.#id = id;
+        break;
+      }
+    }
+    if (this.#id === "") {
+      this.#id = [...crypto.getRandomValues(new Uint8Array(8))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+      await claim(this.#id, patienceMs);
+    }
+    sessionStorage.setItem(key, this.#id);
+    const gone = old.filter(({ id }) => id !== this.#id);
+    if (gone.length > 0) await store.remove(gone.map(({ id }) => id));
+    return works.find(({ id, address }) => id === this.#id && address === location.search);
+  }
+
+  #show({ document, view, camera, savedAt }: Work, mesh: Mesh): void {
+    const { app } = this;
+    const { selected, pinned, shape, ...look } = view;
+    app.view.set(look);
+    app.open(mesh, document);
+    app.view.set({ selected, pinned, shape: shape ?? "" });
+    app.lookFrom(camera);
+    app.facts.set({ restoredFrom: savedAt });
+    this.#keptMesh = mesh;
+    this.#isTouched = this.isKeeping = true;
+  }
+
+  #soon(): void {
+    this.#timer ??= setTimeout(() => void this.#save(), saveEveryMs);
+  }
+
+  async #save(): Promise<void> {
+    clearTimeout(this.#timer);
+    this.#timer = undefined;
+    const { app } = this;
+    const { mesh, document } = app.facts.now;
+    const { isDark: _, ...view }: View = app.view.now;
+    try {
+      if (this.#isTouched || view.shape === "") {
+        const camera = app.panes[0]!.stage.look;
+        const { search: address } = location;
+        const work: Work = { version: 1, id: this.#id, address, savedAt: Date.now(), document, view, camera };
+        await this.#store!.put(work, mesh === this.#keptMesh ? undefined : mesh);
+        this.#keptMesh = mesh;
+      } else {
+        await this.#store!.remove([this.#id]);
+        this.#keptMesh = undefined;
+      }
+      this.isKeeping = true;
+    } catch {
+      this.isKeeping = false;
+      this.#keptMesh = undefined; // full, or forbidden: the page asks before it is left
+    }
+  }
+}
+
+/** Whether the work is nobody else's, from now on for as long as this page lives. Where there are no locks, it is. */
+function claim(id: string, waitMs: number): Promise<boolean> {
+  if (!navigator.locks) return Promise.resolve(true);
+  return new Promise((resolve) => {
+    const options = waitMs > 0 ? { signal: AbortSignal.timeout(waitMs) } : { ifAvailable: true };
+    const held = navigator.locks.request(`${key}-${id}`, options, (lock) => {
+      resolve(lock !== null);
+      return lock === null ? undefined : new Promise(() => undefined);
+    });
+    held.catch(() => resolve(false));
+  });
+}
+
+function within<Value>(promise: Promise<Value>, milliseconds: number): Promise<Value> {
+  const late = new Promise<never>((_, reject) => setTimeout(() => reject(new Error("too late")), milliseconds));
+  return Promise.race([promise, late]);
+}

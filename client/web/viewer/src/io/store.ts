@@ -1,0 +1,76 @@
+import type { Document } from "../model/document.js";
+import type { Mesh, Vector3 } from "../model/mesh.js";
+import type { View } from "../model/view.js";
+
+/** The work of one tab, as it is kept over a reload; its mesh lies beside it, since that seldom changes. */
+export interface Work {
+  /** Raised where the shape of what is kept changes: what another version kept is left alone. */
+  version: 1;
+  id: string;
+  /** What followed the page's path: location.search. */
+  address: string;
+  /** Of Date.now(). */
+  savedAt: number;
+  document: Document;
+  view: Partial<View>;
+  /** From where to where it looks. */
+  camera: { position: Vector3; target: Vector3 };
+}
+
+/** The browser's database (IndexedDB), which everything of this page shares. Rejects with what the browser says. */
+export class Store {
+  private constructor(readonly database: IDBDatabase) {}
+
+  static async open(name = "lpdeform"): Promise<Store> {
+    const request = indexedDB.open(name, 1);
+    request.onupgradeneeded = () => {
+      request.result.createObjectStore("works", { keyPath: "id" });
+      request.result.createObjectStore("meshes");
+    };
+    return new Store(await answer(request));
+  }
+
+  /** All of it or nothing. `mesh`: where it is not the one that is kept already. */
+  put(work: Work, mesh: Mesh | undefined): Promise<void> {
+    return this.#write((works, meshes) => {
+      works.put(work);
+      if (mesh) meshes.put(mesh, work.id);
+    });
+  }
+
+  remove(ids: readonly string[]): Promise<void> {
+    return this.#write((works, meshes) => {
+      for (const id of ids) {
+        works.delete(id);
+        meshes.delete(id);
+      }
+    });
+  }
+
+  /** The newest first. */
+  async works(): Promise<Work[]> {
+    const all = await answer<Work[]>(this.database.transaction("works").objectStore("works").getAll());
+    return all.filter(({ version }) => version === 1).sort((a, b) => b.savedAt - a.savedAt);
+  }
+
+  mesh(id: string): Promise<Mesh | undefined> {
+    return answer<Mesh | undefined>(this.database.transaction("meshes").objectStore("meshes").get(id));
+  }
+
+  #write(change: (works: IDBObjectStore, meshes: IDBObjectStore) => void): Promise<void> {
+    return new Promise((resolve, reject) => {
+      const transaction = this.database.transaction(["works", "meshes"], "readwrite");
+      transaction.oncomplete = () => resolve();
+      transaction.onabort = transaction.onerror = () => reject(transaction.error ?? new Error("not kept"));
+      change(transaction.objectStore("works"), transaction.objectStore("meshes"));
+      transaction.commit();
+    });
+  }
+}
+
+function answer<Value>(request: IDBRequest<Value>): Promise<Value> {
+  return new Promise((resolve, reject) => {
+    request.onsuccess = () => resolve(request.result);
+    request.onerror = () => reject(request.error ?? new Error("no answer"));
+  });
+}

@@ -1,0 +1,160 @@
+import { join } from "node:path";
+import type { BrowserContext } from "playwright-core";
+import { afterAll, afterEach, beforeAll, beforeEach, expect, it } from "vitest";
+import { Service } from "../../../client/test/real/service.js";
+import { writeOff } from "../../src/io/off.js";
+import { blockSurface } from "../../src/model/block.js";
+import { User } from "./user.js";
+
+let service: Service;
+let user: User;
+
+beforeAll(async () => {
+  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
+});
+
+afterAll(() => service.stop());
+
+beforeEach(async () => {
+  user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
+  await user.settled();
+});
+
+afterEach(async () => {
+  expect(user.errors).toEqual([]);
+  await user.close();
+});
+
+const note = () => user.page.locator(".restored");
+const reload = async () => {
+  await user.page.reload();
+  await user.settled();
+};
+/** All that undo brings back, as text. */
+const work = () =>
+  user.page.evaluate<string>(
+    "JSON.stringify(__lpdeform.document(), (_, value) => (value instanceof Float32Array ? [...value].map(String) : value))",
+  );
+
+async function bend(): Promise<void> {
+  const vertex = await user.ask<number>("document().handles[1].vertices[0]");
+  await user.drag(await user.vertexOnPage(vertex), 110, 50);
+  await user.settled();
+}
+
+const far = (a: readonly number[], b: readonly number[]) => Math.max(...a.map((value, k) => Math.abs(value - b[k]!)));
+
+it("a reload brings handles, groups, p, painting, both panes and the view back, and says so", async () => {
+  await bend();
+  const row = user.page.locator(".handles li").nth(1);
+  await row.getByLabel("Name").fill("Pulled");
+  await row.getByLabel("Name").press("Enter");
+  await user.page.keyboard.press("5");
+  const [from, to] = [
+    await user.vertexOnPage(await user.vertexNear([0.5, 0, 1])),
+    await user.vertexOnPage(await user.vertexNear([0.5, 0, 2])),
+  ];
+  await user.drag(from, to.x - from.x, to.y - from.y);
+  await user.page.locator("canvas.stage").focus();
+  for (const key of ["1", "w", "c", "s"]) await user.page.keyboard.press(key);
+  await user.settled(1);
+  await user.page.getByRole("button", { name: "2", exact: true }).first().click();
+  await user.page.locator("canvas.stage").first().focus();
+  await user.page.mouse.move(150, 600);
+  await user.page.mouse.wheel(0, -300);
+  await user.settled(0);
+  await user.settled(1);
+  const look = () =>
+    user
+      .ask<object>(`app.panes.map(({ stage }) => stage.look)`)
+      .then((looks) =>
+        JSON.parse(JSON.stringify(looks), (_, value) => (typeof value === "number" ? Number(value.toFixed(6)) : value)),
+      );
+  const view = () => user.ask<object>("app.view.now");
+  const before = [await work(), await look(), await view()];
+  const positions = [await user.positions(0), await user.positions(1)];
+
+  await reload(); // at once: what the last moment changed is kept as well
+  await user.settled(1);
+  expect([await work(), await look(), await view()]).toEqual(before);
+  for (const pane of [0, 1]) expect(far(await user.positions(pane), positions[pane]!)).toBeLessThan(0.02);
+  expect(await note().textContent()).toContain("“bar” is here again as you left it just now.");
+
+  await user.page.getByRole("button", { name: "6", exact: true }).first().click(); // whoever goes on knows
+  expect(await note().isHidden()).toBe(true);
+});
+
+it("a mesh from a file comes back, and is let go on demand, for good", async () => {
+  const tower = blockSurface(2, 2, 6, () => true);
+  await user.openFiles({ name: "tower.off", content: writeOff(tower) });
+  await user.until("window.__lpdeform.app.facts.now.report && window.__lpdeform.app.mesh.name === 'tower.off'");
+  const place = await user.vertexOnPage(await user.vertexNear([1, 0, 5]));
+  await user.page.mouse.click(place.x, place.y);
+  await user.settled();
+  await reload();
+  expect(await user.ask("app.mesh.name")).toBe("tower.off");
+  expect(Object.values(await user.ask<object>("app.mesh.positions"))).toEqual([...tower.positions]);
+  expect(Object.values(await user.ask<object>("app.mesh.faces"))).toEqual([...tower.faces]);
+  expect(await user.ask("document().handles.length")).toBe(1);
+
+  await user.page.getByRole("button", { name: "Discard it" }).click();
+  await user.settled();
+  expect(await user.ask("app.mesh.name")).toBe("bar");
+  expect(await note().isHidden()).toBe(true);
+  await user.page.waitForTimeout(700);
+  await reload();
+  expect(await user.ask("app.mesh.name")).toBe("bar");
+  expect(await note().isHidden()).toBe(true);
+});
+
+it("what was not worked on is not kept", async () => {
+  await user.page.waitForTimeout(700);
+  await reload();
+  expect(await note().isHidden()).toBe(true);
+});
+
+it("a new tab leaves the work of an open one alone, and has that of a closed one", async () => {
+  await bend();
+  const before = await work();
+  const context: BrowserContext = user.page.context();
+  const address = user.page.url();
+  const visit = async () => {
+    const page = await context.newPage();
+    await page.goto(address);
+    await page.waitForFunction("window.__lpdeform?.status() === 'live'");
+    return page;
+  };
+  await user.page.waitForTimeout(700);
+  const second = await visit();
+  expect(await second.locator(".restored").isHidden()).toBe(true);
+  expect(await second.evaluate("window.__lpdeform.app.history.canUndo")).toBe(false);
+  await second.close();
+
+  await user.page.close();
+  const third = await visit();
+  await third.locator(".restored").waitFor();
+  expect(await third.evaluate("JSON.stringify(window.__lpdeform.document())")).toBe(before);
+});
+
+it("a browser that keeps nothing asks before the page is left", async () => {
+  const context = await user.browser.newContext({ viewport: { width: 1280, height: 800 } });
+  await context.addInitScript(() => {
+    IDBFactory.prototype.open = () => {
+      throw new DOMException("forbidden", "SecurityError");
+    };
+  });
+  const page = await context.newPage();
+  await page.goto(user.page.url());
+  await page.waitForFunction("window.__lpdeform?.frame()?.converged");
+  const asked: string[] = [];
+  page.on("dialog", (dialog) => {
+    asked.push(dialog.type());
+    void dialog.accept();
+  });
+  await page.reload();
+  await page.waitForFunction("window.__lpdeform?.frame()?.converged");
+  expect(asked).toEqual([]);
+  await page.locator(".dock").getByRole("button", { name: "6", exact: true }).click();
+  await page.reload();
+  expect(asked).toEqual(["beforeunload"]);
+});
