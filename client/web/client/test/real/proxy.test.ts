@@ -1,5 +1,5 @@
 import { execFileSync } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
@@ -28,7 +28,7 @@ describe("the configuration", () => {
         "--server",
         "server.example:1",
         "--files",
-        "/tmp",
+        "none",
         "--admin-port",
         "9901",
         "--access-log",
@@ -49,6 +49,22 @@ describe("the configuration", () => {
       stdio: "pipe",
     });
     expect(said).toContain("OK");
+  });
+
+  test("reads the viewer's files, and refuses what is none by name", () => {
+    const files = mkdtempSync(join(work, "files-"));
+    expect(() => configure("--files", files)).toThrow(
+      expect.objectContaining({ status: 2, stderr: expect.stringContaining(`${files} has no index.html`) }),
+    );
+    writeFileSync(join(files, "index.html"), "<p>");
+    expect(configure("--files", files)).toContain(`filename: "${files}/index.html"`);
+    for (const name of ["notes.doc", "a b.js"]) {
+      writeFileSync(join(files, name), "");
+      expect(() => configure("--files", files)).toThrow(
+        expect.objectContaining({ status: 2, stderr: expect.stringContaining(name) }),
+      );
+      rmSync(join(files, name));
+    }
   });
 
   test.each([
@@ -73,14 +89,23 @@ describe("the configuration", () => {
 
 describe("the proxy", () => {
   let service: Service;
+  const files = mkdtempSync(join(tmpdir(), "lpdeform-files-"));
+  const script = `export const numbers = [${Array.from({ length: 60_000 }, (_, k) => k).join()}];`;
   beforeAll(async () => {
+    mkdirSync(join(files, "assets"));
+    writeFileSync(join(files, "index.html"), "<!doctype html>");
+    writeFileSync(join(files, "assets/numbers-1a2b.js"), script);
     service = await Service.start({
+      files,
       serverFlags: ["--heartbeat", "0.3"],
       origins: ["https://friend.example"],
       idleSeconds: 1,
     });
   });
-  afterAll(() => service.stop());
+  afterAll(async () => {
+    await service.stop();
+    rmSync(files, { recursive: true });
+  });
 
   const call = (origin?: string, init: RequestInit = {}) =>
     fetch(`${service.url}/lpdeform.v1.DeformService/GetSession`, {
@@ -139,8 +164,27 @@ describe("the proxy", () => {
     await waitFor(async () => (await call()).headers.get("grpc-status") === "5");
   });
 
-  test("serves files and nothing above them", async () => {
+  test("serves the viewer's files whole, compressed, and kept where their names change with them", async () => {
+    const page = await fetch(service.url);
+    expect([page.status, page.headers.get("content-type"), page.headers.get("cache-control")]).toEqual([
+      200,
+      "text/html",
+      "no-cache",
+    ]);
+    expect(await page.text()).toBe("<!doctype html>");
+    const asset = await fetch(`${service.url}/assets/numbers-1a2b.js?again`);
+    expect(asset.headers.get("content-type")).toBe("text/javascript");
+    expect(asset.headers.get("content-encoding")).toBe("gzip");
+    expect(asset.headers.get("cache-control")).toContain("immutable");
+    expect(await asset.text()).toBe(script);
+    const plain = await fetch(`${service.url}/assets/numbers-1a2b.js`, { headers: { "accept-encoding": "identity" } });
+    expect(plain.headers.get("content-encoding")).toBeNull();
+    expect(await plain.text()).toBe(script);
+  });
+
+  test("serves nothing else", async () => {
     expect((await fetch(`${service.url}/healthz`)).status).toBe(200);
+    expect((await fetch(`${service.url}/assets/`)).status).toBe(404);
     expect((await fetch(`${service.url}/nothing.js`)).status).toBe(404);
     expect((await fetch(`${service.url}/..%2f..%2fetc/passwd`)).status).toBe(400);
   });

@@ -39,7 +39,7 @@ export class Service {
       "--server",
       service.#address,
       "--files",
-      files || service.#work,
+      files || "none",
       "--access-log",
       service.accessLog,
       "--idle",
