@@ -75,11 +75,27 @@ export class Service {
     await end(this.#envoy, "SIGKILL");
   }
 
+  /** Where the server is reached without Envoy. */
+  get serverAddress(): string {
+    return this.#address;
+  }
+
   /** What the kernel holds in memory for it. */
   residentBytes(part: "server" | "envoy"): number {
-    const { pid } = (part === "server" ? this.#server : this.#envoy)!;
-    const status = readFileSync(`/proc/${pid}/status`, "utf8");
+    const status = readFileSync(`/proc/${this.#pidOf(part)}/status`, "utf8");
     return 1024 * Number(/VmRSS:\s+(\d+)/.exec(status)![1]);
+  }
+
+  /** What it has computed so far, on all cores together. */
+  cpuSeconds(part: "server" | "envoy"): number {
+    const fields = readFileSync(`/proc/${this.#pidOf(part)}/stat`, "utf8")
+      .split(") ")[1]!
+      .split(" ");
+    return (Number(fields[11]) + Number(fields[12])) / 100; // user and system, in the kernel's hundredths of a second
+  }
+
+  #pidOf(part: "server" | "envoy"): number {
+    return (part === "server" ? this.#server : this.#envoy)!.pid!;
   }
 
   /** A number of Envoy's statistics. */
