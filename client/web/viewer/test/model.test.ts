@@ -3,6 +3,7 @@ import { adjacencyOf, meanEdge } from "../src/model/adjacency.js";
 import { blueToRed } from "../src/model/colours.js";
 import { fitPose } from "../src/model/fit.js";
 import { History } from "../src/model/history.js";
+import { boundsOf } from "../src/model/mesh.js";
 import { follow, placesOf } from "../src/model/places.js";
 import { apply, axisAngle, quaternionOf, toMotion } from "../src/model/pose.js";
 import { raycast } from "../src/model/raycast.js";
@@ -26,6 +27,12 @@ it("places on the surface are vertices, and points inside faces by their weights
   const bent = grid.positions.map((value, k) => (k % 3 === 2 ? grid.positions[k - 2]! : value)); // z = x
   // Face 1 has the vertices 1, 5 and 4.
   expect([...follow(places, bent)]).toEqual([2, 1, 2, 0.75, 0.5, 0.75]);
+});
+
+it("the bounds of a mesh leave out what no face uses", () => {
+  const positions = Float32Array.of(0, 0, 0, 2, 0, 0, 0, 1, 0, 9, 9, 9);
+  expect(boundsOf(positions, Uint32Array.of(0, 1, 2))).toMatchObject({ max: [2, 1, 0], center: [1, 0.5, 0] });
+  expect(boundsOf(positions).max).toEqual([9, 9, 9]);
 });
 
 describe("selection", () => {

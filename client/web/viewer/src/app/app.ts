@@ -101,7 +101,7 @@ export class App {
     this.history.reset(document);
     this.adjacency = adjacencyOf(mesh.positions.length / 3, mesh.faces);
     this.edge = meanEdge(this.adjacency, mesh.positions);
-    this.diagonal = boundsOf(mesh.positions).diagonal;
+    this.diagonal = boundsOf(mesh.positions, mesh.faces).diagonal;
     this.view.set({ selected: undefined, shape: "", pinned: undefined });
     this.facts.set({ mesh, report: undefined, problem: undefined, restoredFrom: undefined, pointedOut: [] });
     for (const pane of this.panes) pane.open(mesh, document, this.view.now);

@@ -111,7 +111,7 @@ export class Pane {
     const { surface } = this.stage;
     if (!surface) return;
     this.#resize(true, 1);
-    this.stage.fit(surface.positions, isYUp);
+    this.stage.fit(surface, isYUp);
   }
 
   #resize(isMoving: boolean, quality: number): void {

@@ -16,17 +16,20 @@ export interface Bounds {
   diagonal: number;
 }
 
-export function boundsOf(positions: Float32Array): Bounds {
+/** Of all positions, or of those that faces use. */
+export function boundsOf(positions: Float32Array, faces?: Uint32Array): Bounds {
   const min: [number, number, number] = [Infinity, Infinity, Infinity];
   const max: [number, number, number] = [-Infinity, -Infinity, -Infinity];
-  for (let k = 0; k < positions.length; k += 3) {
+  const count = faces?.length ?? positions.length / 3;
+  for (let k = 0; k < count; ++k) {
+    const vertex = faces ? faces[k]! : k;
     for (let axis = 0; axis < 3; ++axis) {
-      const value = positions[k + axis]!;
+      const value = positions[3 * vertex + axis]!;
       if (value < min[axis]!) min[axis] = value;
       if (value > max[axis]!) max[axis] = value;
     }
   }
-  if (positions.length === 0) return { min: [0, 0, 0], max: [0, 0, 0], center: [0, 0, 0], diagonal: 1 };
+  if (count === 0) return { min: [0, 0, 0], max: [0, 0, 0], center: [0, 0, 0], diagonal: 1 };
   const center = min.map((low, axis) => (low + max[axis]!) / 2) as unknown as Vector3;
   return { min, max, center, diagonal: Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) || 1 };
 }

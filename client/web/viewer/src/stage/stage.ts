@@ -65,8 +65,8 @@ export class Stage {
   }
 
   /** Looks at all of it, from in front and a little above. */
-  fit(positions: Float32Array, isYUp: boolean): void {
-    const { min, max, center, diagonal } = boundsOf(positions);
+  fit({ positions, mesh }: Surface, isYUp: boolean): void {
+    const { min, max, center, diagonal } = boundsOf(positions, mesh.faces);
     const away = isYUp ? new three.Vector3(0.62, 0.42, 1) : new three.Vector3(0.62, -1, 0.42);
     const { camera } = this;
     camera.up.set(0, isYUp ? 1 : 0, isYUp ? 0 : 1);

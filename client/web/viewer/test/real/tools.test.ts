@@ -263,6 +263,39 @@ describe("the look", () => {
     await user.page.locator(".legend").waitFor({ state: "hidden" });
   });
 
+  it.each(["light", "dark"])("can be read when it is %s", async (theme) => {
+    await user.ask(`app.view.set({ isDark: ${theme === "dark"} })`);
+    for (const summary of await user.page.locator(".panel details:not([open]) > summary").all()) await summary.click();
+    const faint = await user.page.evaluate(() => {
+      const parse = (colour: string) => (colour.match(/[\d.]+/g) ?? []).map(Number);
+      const light = ([r, g, b]: number[]) =>
+        [r!, g!, b!]
+          .map((value) => value / 255)
+          .map((value) => (value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4))
+          .reduce((sum, value, k) => sum + value * [0.2126, 0.7152, 0.0722][k]!, 0);
+      /** The nearest background that is not to be seen through. */
+      const behind = (element: Element | null): number[] => {
+        for (let one = element; one; one = one.parentElement) {
+          const colour = parse(getComputedStyle(one).backgroundColor);
+          if (colour.length === 3 || (colour[3] ?? 0) > 0.9) return colour;
+        }
+        return [255, 255, 255];
+      };
+      const found: string[] = [];
+      for (const element of document.querySelectorAll("#app *")) {
+        const text = [...element.childNodes]
+          .filter(({ nodeType }) => nodeType === 3)
+          .map(({ textContent }) => textContent!.trim());
+        if (text.join("") === "" || !element.checkVisibility() || element.closest(":disabled, option")) continue;
+        const [one, other] = [light(parse(getComputedStyle(element).color)), light(behind(element))];
+        const contrast = (Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05);
+        if (contrast < 4.5) found.push(`${text.join(" ")}: ${contrast.toFixed(2)}`); // WCAG 2.2, 1.4.3
+      }
+      return found;
+    });
+    expect(faint).toEqual([]);
+  });
+
   it("is dark and light, and tells its keys", async () => {
     const theme = () => user.page.evaluate("document.documentElement.dataset.theme");
     const before = await theme();
