@@ -142,6 +142,11 @@ export class App {
     for (const pane of this.panes) pane.fit(this.view.now.isYUp);
   }
 
+  /** Turns to some vertices of the mesh. */
+  lookAt(vertices: readonly number[]): void {
+    for (const pane of this.panes) pane.lookAt(vertices);
+  }
+
   lookFrom(look: Look): void {
     for (const pane of this.panes) pane.stage.lookFrom(look);
   }

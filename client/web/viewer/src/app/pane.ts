@@ -3,9 +3,10 @@ import { Live, type LiveWatcher } from "../link/live.js";
 import { say, type Status } from "../link/status.js";
 import type { Side } from "../model/changes.js";
 import { type Document, pField } from "../model/document.js";
-import type { Mesh } from "../model/mesh.js";
+import { boundsOf, centroid, type Mesh } from "../model/mesh.js";
 import { type EnergyStatistics, energyStatistics } from "../model/statistics.js";
 import type { View } from "../model/view.js";
+import { vertexNormals } from "../stage/drawmesh.js";
 import { Overlay } from "../stage/overlay.js";
 import { Stage } from "../stage/stage.js";
 import type { Scale } from "../stage/surface.js";
@@ -112,6 +113,19 @@ export class Pane {
     if (!surface) return;
     this.#resize(true, 1);
     this.stage.fit(surface, isYUp);
+  }
+
+  /** Near enough to see them, from outside. */
+  lookAt(vertices: readonly number[]): void {
+    const { surface } = this.stage;
+    if (!surface || vertices.length === 0) return;
+    const { positions, mesh } = surface;
+    const normals = vertexNormals(positions, mesh.faces);
+    const place = centroid(positions, vertices);
+    const { diagonal } = boundsOf(positions, mesh.faces);
+    const far = (vertex: number) => Math.hypot(...place.map((value, axis) => positions[3 * vertex + axis]! - value));
+    const radius = vertices.reduce((most, vertex) => Math.max(most, far(vertex)), 0);
+    this.stage.lookAt(place, centroid(normals, vertices), Math.max(6 * radius, 0.9 * diagonal));
   }
 
   #resize(isMoving: boolean, quality: number): void {

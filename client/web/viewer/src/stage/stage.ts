@@ -117,6 +117,18 @@ export class Stage {
     this.changed();
   }
 
+  /** At a place from outside, where `normal` points; from where it looks now where that is nothing. */
+  lookAt(place: Vector3, normal: Vector3, distance: number): void {
+    const towards = new three.Vector3(...normal);
+    if (towards.length() < 1e-6) towards.copy(this.camera.position).sub(this.target);
+    // Not from straight above or below, where nobody knows what is left and right.
+    const { up } = this.camera;
+    towards.normalize().addScaledVector(up, -0.2 * towards.dot(up));
+    if (towards.clone().cross(up).length() < 0.1) towards.add(new three.Vector3(0.3, up.z ? -0.3 : 0, up.y ? 0.3 : 0));
+    const position = new three.Vector3(...place).addScaledVector(towards.normalize(), distance);
+    this.lookFrom({ position: position.toArray(), target: place });
+  }
+
   /** The same view as another stage. */
   lookAs(other: Stage): void {
     this.camera.position.copy(other.camera.position);

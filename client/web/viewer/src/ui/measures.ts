@@ -108,8 +108,8 @@ function showNumbers(app: App, values: Record<Row, HTMLElement>, now: number): v
     values.share,
     both(({ statistics }) => (app.red > 0 ? `${(100 * statistics.top5Share).toFixed(0)} %` : "–")),
   );
-  const methods = both(({ frame }) => frame?.method.replaceAll("_", " ") || "–");
-  setText(values.method, `${methods} · ${both(({ frame }) => String(frame?.iteration ?? 0))}`);
+  const methods = both(({ frame }) => frame?.method.replaceAll("_", " ") ?? "");
+  setText(values.method, methods ? `${methods} · ${both(({ frame }) => String(frame?.iteration ?? 0))}` : "–");
   setText(
     values.stop,
     both(({ frame }) => (frame?.method ? frame.stopReason.replaceAll("_", " ") : "–")),

@@ -69,11 +69,13 @@ function warning(app: App, { kind, count, first }: Defect): HTMLElement {
   return el("li", { className: mild.has(kind) ? "mild" : "" }, press);
 }
 
-/** Marks vertices and the corners of faces, and what is there already no more. */
+/** Marks vertices and the corners of faces and turns to them; what was marked is no more. */
 export function pointOut(app: App, { vertices, faces }: { vertices: number[]; faces: number[] }): void {
   const count = app.mesh.positions.length / 3;
   const corners = faces.flatMap((face) => [...app.mesh.faces.subarray(3 * face, 3 * face + 3)]);
-  app.facts.set({ pointedOut: [...new Set([...vertices, ...corners])].filter((vertex) => vertex < count) });
+  const pointedOut = [...new Set([...vertices, ...corners])].filter((vertex) => vertex < count);
+  app.facts.set({ pointedOut });
+  app.lookAt(pointedOut);
 }
 
 export function pointOutNamed(app: App, element: string): void {

@@ -91,6 +91,14 @@ describe("a mesh with defects", () => {
     expect((await user.ask<number[]>("app.facts.now.pointedOut")).sort()).toEqual([0, 1, 6]);
     await user.page.locator('[data-warning="non_manifold_edges"]').click();
     expect(await user.ask<number[]>("app.facts.now.pointedOut")).toEqual(expect.arrayContaining([1, 2]));
+    // What is marked comes into view.
+    await user.page.locator("canvas.stage").hover();
+    await user.page.mouse.wheel(0, -2000);
+    await user.page.locator('[data-warning="unreferenced_vertices"]').click();
+    const box = (await user.page.locator("canvas.stage").boundingBox())!;
+    const { x, y } = await user.vertexOnPage(5);
+    expect(Math.abs(x - (box.x + box.width / 2))).toBeLessThan(box.width / 4);
+    expect(Math.abs(y - (box.y + box.height / 2))).toBeLessThan(box.height / 4);
   });
 
   it("or a file that is no mesh is refused in words, and what was there stays", async () => {
