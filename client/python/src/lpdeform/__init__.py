@@ -14,7 +14,8 @@ directions. `s.solve()` asks for one finished result with its trace and a bound 
 from lpdeform.aio import AsyncSession, join_async, open_async
 from lpdeform.errors import Code, InvalidInput, LpdeformError, Timeout, Unavailable
 from lpdeform.frames import Frame, FrameAssembly, QuantizedSurface
-from lpdeform.session import Session, join, open
+from lpdeform.opening import join, open
+from lpdeform.session import Session
 from lpdeform.types import (
     Automatic,
     AxisLock,

@@ -16,6 +16,7 @@ from lpdeform._lease import Lease, Original, create_session, join_session
 from lpdeform._ledger import Ledger, NumberedUpdate
 from lpdeform._recovery import Backoff, Next, recovery_after
 from lpdeform._rpc import Packer, Rpc, Stop, new_request_id
+from lpdeform._stream import Stream
 from lpdeform.errors import (
     Code,
     LpdeformError,
@@ -33,31 +34,6 @@ from lpdeform.types import Connection, Update
 from lpdeform.v1 import frame_pb2, service_pb2
 
 _closing_seconds = 3.0
-
-
-class _Stream:
-    """One Deform call. Its fields are guarded by the lock of the link."""
-
-    def __init__(self, number: int) -> None:
-        self.number = number
-        self.call: Any = None
-        self.is_open = False
-        self.is_over = False
-        self.opened_at = 0.0
-        self.heard_at = time.monotonic()
-        self.longest_silence = 45.0
-        """After so long without a word the connection is dead: three of the heartbeats that the server announces."""
-        self.ack_due = 0
-        self.go_away: service_pb2.GoAway | None = None
-        self.uploads: dict[int, Packer] = {}
-        """By the updates that name them, until these are answered."""
-        self.done: list[Packer] = []
-        self.failure: LpdeformError | None = None
-        """What kept an update from being sent."""
-
-    def cancel(self) -> None:
-        if self.call is not None:
-            self.call.cancel()
 
 
 class Link:
@@ -84,7 +60,7 @@ class Link:
         self._renewing = threading.Lock()
         self._over: LpdeformError | None = None
         self._thread: threading.Thread | None = None
-        self._stream: _Stream | None = None
+        self._stream: Stream | None = None
         self._stream_count = 0
         self._last_open = 0.0
         self._is_to_reopen = False
@@ -224,7 +200,7 @@ class Link:
     def _one_stream(self) -> LpdeformError | None:
         with self.changed:
             self._stream_count += 1
-            stream = self._stream = _Stream(self._stream_count)
+            stream = self._stream = Stream(self._stream_count)
             self._is_to_reopen = False
             lease = self.lease
         try:
@@ -292,7 +268,7 @@ class Link:
 
     # What is sent.
 
-    def _requests(self, stream: _Stream, lease: Lease) -> Iterator[service_pb2.DeformRequest]:
+    def _requests(self, stream: Stream, lease: Lease) -> Iterator[service_pb2.DeformRequest]:
         opening = service_pb2.DeformOpen(
             session=lease.session, writer_token=lease.writer_token, options=self._options
         )
@@ -317,7 +293,7 @@ class Link:
     def _can_send(self) -> bool:
         return not self.is_solving and self.ledger.can_send
 
-    def _wait_for_work(self, stream: _Stream) -> bool:
+    def _wait_for_work(self, stream: Stream) -> bool:
         """False where the stream is over. Ends one that has been silent for too long."""
 
         def has_work() -> bool:
@@ -333,7 +309,7 @@ class Link:
                 break
         return not stream.is_over
 
-    def _packed(self, stream: _Stream, update: NumberedUpdate) -> service_pb2.Update | None:
+    def _packed(self, stream: Stream, update: NumberedUpdate) -> service_pb2.Update | None:
         packer = Packer(self.rpc, self.stop)
         try:
             message = _wire.update_to_wire(update.update, update.seq, packer)
@@ -360,7 +336,7 @@ class Link:
 
     # What comes.
 
-    def _take(self, stream: _Stream, assembly: list[FrameAssembly], response: service_pb2.DeformResponse) -> None:
+    def _take(self, stream: Stream, assembly: list[FrameAssembly], response: service_pb2.DeformResponse) -> None:
         stream.heard_at = time.monotonic()
         if response.HasField("result"):
             with self.changed:
@@ -383,7 +359,7 @@ class Link:
             with self.changed:
                 stream.go_away = response.event.go_away
 
-    def _take_opened(self, stream: _Stream, opened: service_pb2.StreamOpened) -> None:
+    def _take_opened(self, stream: Stream, opened: service_pb2.StreamOpened) -> None:
         self.box.begin_epoch(opened.epoch)
         with self.changed:
             if opened.heartbeat_interval_ms > 0:
@@ -393,7 +369,7 @@ class Link:
             stream.opened_at = time.monotonic()
             self.changed.notify_all()
 
-    def _take_fault(self, stream: _Stream, fault: service_pb2.Fault) -> None:
+    def _take_fault(self, stream: Stream, fault: service_pb2.Fault) -> None:
         error = from_fault(fault)
         with self.changed:
             is_void = is_taken_all_the_same(error) and 0 < error.input_seq < self.ledger.newest
@@ -405,7 +381,7 @@ class Link:
         if not is_void:
             self.box.put_problem(error)
 
-    def _note_answered(self, stream: _Stream, seq: int) -> None:
+    def _note_answered(self, stream: Stream, seq: int) -> None:
         packer = stream.uploads.pop(seq, None)
         if packer is not None:
             stream.done.append(packer)

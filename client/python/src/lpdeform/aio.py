@@ -15,7 +15,8 @@ from lpdeform._rpc import Stop
 from lpdeform._solve import solve
 from lpdeform.errors import LpdeformError
 from lpdeform.frames import Frame
-from lpdeform.session import Live, connect, frame_options, join_link, open_link
+from lpdeform.opening import connect, frame_options, join_link, open_link
+from lpdeform.session import Live
 from lpdeform.types import (
     Encoding,
     Field,

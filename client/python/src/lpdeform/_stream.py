@@ -1,0 +1,35 @@
+"""One Deform call as its link sees it."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from lpdeform._rpc import Packer
+from lpdeform.errors import LpdeformError
+from lpdeform.v1 import service_pb2
+
+
+class Stream:
+    """One Deform call. Its fields are guarded by the lock of the link."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        self.call: Any = None
+        self.is_open = False
+        self.is_over = False
+        self.opened_at = 0.0
+        self.heard_at = time.monotonic()
+        self.longest_silence = 45.0
+        """After so long without a word the connection is dead: three of the heartbeats that the server announces."""
+        self.ack_due = 0
+        self.go_away: service_pb2.GoAway | None = None
+        self.uploads: dict[int, Packer] = {}
+        """By the updates that name them, until these are answered."""
+        self.done: list[Packer] = []
+        self.failure: LpdeformError | None = None
+        """What kept an update from being sent."""
+
+    def cancel(self) -> None:
+        if self.call is not None:
+            self.call.cancel()

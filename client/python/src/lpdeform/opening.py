@@ -1,0 +1,169 @@
+"""How sessions are made and joined."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy.typing as npt
+
+from lpdeform import _codec, _wire
+from lpdeform._lease import Original, create_session, join_session
+from lpdeform._link import Link
+from lpdeform._numbers import indices, numbers
+from lpdeform._rpc import Rpc, Stop, default_address, new_request_id
+from lpdeform.errors import invalid
+from lpdeform.session import Session
+from lpdeform.types import Encoding, Field, FreeComponents, Handle, Settings, SolverSettings, Update, WeightKind
+from lpdeform.v1 import frame_pb2
+
+
+def connect(address: str | None, call_timeout: float, reconnect_for: float) -> Rpc:
+    return Rpc(address or default_address(), call_timeout, reconnect_for)
+
+
+def open_link(
+    rpc: Rpc,
+    stop: Stop,
+    vertices: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    normals: npt.ArrayLike | None,
+    handles: Mapping[str, Handle] | None,
+    settings: Settings,
+    weights: WeightKind,
+    free_components: FreeComponents,
+    weld: npt.ArrayLike | bool,
+    frame_options: frame_pb2.FrameOptions,
+) -> Link:
+    original = Original(
+        vertices=numbers(vertices, "vertices", 3),
+        faces=indices(faces, "faces", 3),
+        normals=None if normals is None else numbers(normals, "normals", 3),
+        weld=weld if isinstance(weld, bool) else indices(weld, "weld"),
+        weights=_wire.weights_to_wire(weights),
+        free_components=_wire.free_components_to_wire(free_components),
+        settings=_wire.checked_settings(settings),
+    )
+    try:
+        lease = create_session(rpc, original, new_request_id(), stop)
+    except BaseException:
+        rpc.close()
+        raise
+    link = Link(rpc, lease, frame_options, original)
+    if handles:
+        try:
+            link.update(Update(dict(handles)))
+        except BaseException:
+            link.close()
+            raise
+    return link
+
+
+def frame_options(
+    encoding: Encoding,
+    lowest_encoding: Encoding | None,
+    credit: int,
+    with_distortion: bool,
+    with_normals: bool,
+    max_frames_per_second: float,
+    certify: bool,
+) -> frame_pb2.FrameOptions:
+    if not 0 <= credit <= 8:
+        raise invalid(f"The credit is {credit}.", "CREDIT_OUT_OF_RANGE", "credit", "0 <= credit <= 8")
+    if "compressed" in (encoding, lowest_encoding):
+        _codec.require_decoder()
+    return _wire.frame_options_to_wire(
+        encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
+    )
+
+
+def open(  # noqa: A001  (called as lpdeform.open)
+    vertices: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    *,
+    address: str | None = None,
+    handles: Mapping[str, Handle] | None = None,
+    p: Field | None = None,
+    stiffness: Field | None = None,
+    length_unit: float | None = None,
+    solver: SolverSettings | None = None,
+    region: npt.ArrayLike | None = None,
+    normals: npt.ArrayLike | None = None,
+    weights: WeightKind = "cotangent",
+    free_components: FreeComponents = "error",
+    weld: npt.ArrayLike | bool = False,
+    encoding: Encoding = "float32",
+    lowest_encoding: Encoding | None = None,
+    credit: int = 0,
+    with_distortion: bool = True,
+    with_normals: bool = False,
+    certify: bool = False,
+    max_frames_per_second: float = 0.0,
+    call_timeout: float = 30.0,
+    reconnect_for: float = 120.0,
+) -> Session:
+    """Makes a session from a triangle mesh; the order of vertices is never changed.
+
+    vertices: n x 3, in any unit. faces: m x 3, 0-based, counter-clockwise seen from outside.
+    address: "host:port" or "unix:/path"; otherwise the environment variable LPDEFORM_ADDRESS, or localhost:50051.
+    handles: to begin with. p, stiffness, length_unit, solver, region: as in Settings.
+    normals: n x 3, as drawn at rest, for frames with normals.
+    free_components: what becomes of a connected component that no handle holds: "error" is raised, "stay", "follow".
+    weld: True where vertices at the same position are copies of one, or one number a vertex, the same for copies.
+    encoding: how frames travel: "float64", "float32" (16 bytes a vertex), "quantized" (8, off by half of 1/65535 of the frame's
+        extent), "compressed" (the same, 3 to 5; needs the system's meshoptimizer).
+    lowest_encoding: what the server may go down to where its limit of bytes a second asks for it.
+    credit: frames that may be under way and not yet taken, 1 to 8; 0 takes the server's 2.
+    certify: a result that stands comes again with its optimality_gap.
+    max_frames_per_second: 0 is without limit; the last frame of an update always comes.
+    call_timeout, reconnect_for: seconds of every call but solve(), and after which a session whose server stays away gives up.
+
+    Raises InvalidInput with the first element that cannot be deformed; Unavailable (NO_SERVER) where nobody answers.
+
+    >>> import lpdeform
+    >>> with lpdeform.open([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]) as session:
+    ...     session.mesh_report.edges
+    3
+    """
+    options = frame_options(
+        encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
+    )
+    settings = Settings(p, stiffness, length_unit, solver, region)
+    rpc = connect(address, call_timeout, reconnect_for)
+    link = open_link(
+        rpc, Stop(), vertices, faces, normals, handles, settings, weights, free_components, weld, options
+    )
+    return Session(link)
+
+
+def join(
+    name: str,
+    *,
+    as_writer: bool = False,
+    address: str | None = None,
+    encoding: Encoding = "float32",
+    lowest_encoding: Encoding | None = None,
+    credit: int = 0,
+    with_distortion: bool = True,
+    with_normals: bool = False,
+    certify: bool = False,
+    max_frames_per_second: float = 0.0,
+    call_timeout: float = 30.0,
+    reconnect_for: float = 120.0,
+) -> Session:
+    """Joins somebody's session by name: as a reader of its frames, or taking over as its writer.
+
+    It is not made anew where the server loses it, and not deleted by close(). The rest as in open().
+    """
+    options = frame_options(
+        encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
+    )
+    rpc = connect(address, call_timeout, reconnect_for)
+    return Session(join_link(rpc, Stop(), name, as_writer, options))
+
+
+def join_link(rpc: Rpc, stop: Stop, name: str, as_writer: bool, options: frame_pb2.FrameOptions) -> Link:
+    try:
+        return Link(rpc, join_session(rpc, name, as_writer, stop), options, None)
+    except BaseException:
+        rpc.close()
+        raise
