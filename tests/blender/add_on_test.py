@@ -5,6 +5,7 @@ import signal
 import sys
 import unittest
 
+import bmesh
 import bpy
 import numpy as np
 from mathutils import Matrix
@@ -225,6 +226,20 @@ class AddOn(unittest.TestCase):
         stage.settle(self.tube)
         self.assertEqual(live.of(self.tube).frame.positions.shape[0], len(self.tube.data.vertices))
         self.assertTrue(np.allclose(stage.shown(self.tube)[self.top], self.rest[self.top] + [0.5, 0, 0], atol=1e-5))
+
+    def test_a_mesh_changed_by_a_script_is_sent_anew(self):
+        _, tip = self.held()
+        self.shift(tip, 0.5, 0, 0)
+        stage.settle(self.tube)
+        edited = bmesh.new()
+        edited.from_mesh(self.tube.data)
+        bmesh.ops.subdivide_edges(edited, edges=edited.edges[:40], cuts=1)
+        edited.to_mesh(self.tube.data)
+        edited.free()
+        stage.turn(lambda: len(live.of(self.tube)._rest) == len(self.tube.data.vertices))
+        stage.settle(self.tube)
+        self.assertGreater(len(self.tube.data.vertices), len(self.rest))
+        self.assertEqual(live.message(self.tube), "")
 
     def test_no_server_is_said_clearly_and_changes_nothing(self):
         stage.add_handle(self.tube, self.top)

@@ -56,7 +56,7 @@ class LiveMesh:
         was, self._mode = self._mode, ob.mode
         if ob.mode == "EDIT":
             return
-        if was == "EDIT":
+        if was == "EDIT" or len(ob.data.vertices) != len(self._rest):
             self._look_again(ob)
         if was != ob.mode:
             self._weights, self._weights_read = {}, 0.0  # to be read anew
@@ -74,7 +74,7 @@ class LiveMesh:
             surface.show_distortion(ob, self.frame.distortion, ob.lpdeform.distortion_limit)
 
     def _look_again(self, ob) -> None:
-        """After Edit mode, where the mesh at rest may have become another one."""
+        """Where the mesh at rest may have become another one."""
         is_same = len(ob.data.vertices) == len(self._rest) and np.array_equal(surface.rest_positions(ob), self._rest)
         if is_same and np.array_equal(surface.triangles(ob), self._faces):
             self._held = surface.held(ob)

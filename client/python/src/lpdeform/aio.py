@@ -116,14 +116,14 @@ class AsyncSession(Live):
         timeout: float | None = None,
     ) -> SolveResult:
         """As Session.solve(); `on_progress` is called in the event loop."""
-        loop, report = asyncio.get_running_loop(), None
-        if on_progress is not None:
-            told = on_progress
+        loop = asyncio.get_running_loop()
 
-            def report(progress: SolveProgress) -> None:
-                loop.call_soon_threadsafe(told, progress)
+        def report(progress: SolveProgress) -> None:
+            if on_progress is not None:
+                loop.call_soon_threadsafe(on_progress, progress)
 
-        options = self._solve_options(certify, trace, with_normals, initial_positions, report, timeout)
+        told = None if on_progress is None else report
+        options = self._solve_options(certify, trace, with_normals, initial_positions, told, timeout)
         return await _in_a_thread(lambda stop: solve(self._link, options, stop))
 
     async def take_over(self) -> None:
