@@ -18,7 +18,7 @@ const rows = [
   ["vertices", "Vertices · faces", ""],
   ["energy", "Energy", "E of Eq. 3 of the paper"],
   ["share", "In the top 5 %", "Share of the distortion that the most distorted twentieth of the cells has"],
-  ["method", "Method · iterations", ""],
+  ["method", "Method", "With the iterations of the newest solve"],
   ["stop", "Stop reason", "Why the solve ended"],
   ["gap", "Gap, at most", "How far the energy can be from the optimum for its rotations"],
 ] as const;

@@ -80,7 +80,7 @@ const states: readonly State[] = [
       await keys(user, "w", "g");
     },
   },
-  { name: "block", query: "?shape=block", act: (user) => pull(user, "Right", 90, -120) },
+  { name: "block", query: "?shape=block", act: (user) => pull(user, "Right", -60, -110) },
   {
     name: "brush",
     act: async (user) => {
@@ -159,6 +159,45 @@ const states: readonly State[] = [
         "OFF\n7 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n5 5 5\n0.5 0 0\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n3 1 2 4\n3 0 6 1\n";
       await user.openFiles({ name: "odd.off", content });
       await user.page.locator('[data-warning="non_manifold_edges"]').click();
+    },
+  },
+  {
+    name: "upright-split-panel",
+    size: upright,
+    isLight: true,
+    act: async (user) => (
+      await keys(user, "s"),
+      await user.settled(1),
+      await pull(user, "Head", -40, -50, 40),
+      await user.page.getByRole("button", { name: "Side panel" }).click()
+    ),
+  },
+  {
+    name: "restored",
+    act: async (user) => {
+      await raiseHead(user);
+      await user.page.waitForTimeout(700);
+      await user.page.reload();
+      await user.settled();
+    },
+  },
+  {
+    name: "points",
+    query: "?shape=bar",
+    act: async (user) => {
+      const points: object[] = [];
+      for (const height of [3, 3.5, 4]) {
+        const vertex = await user.vertexNear([0.5, 0, height]);
+        const face = Math.floor((await user.ask<number>(`app.mesh.faces.indexOf(${vertex})`)) / 3);
+        points.push({ face, barycentric: [0.3, 0.3, 0.4] });
+      }
+      const base = await user.ask<number[]>("document().handles[0].vertices");
+      const handles = [
+        { name: "Base", vertices: base },
+        { name: "Pins", points, translate: [0.8, 0, 0] },
+      ];
+      await user.openFiles({ name: "pins.json", content: JSON.stringify({ handles }) });
+      await user.settled();
     },
   },
   {

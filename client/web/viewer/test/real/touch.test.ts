@@ -65,6 +65,10 @@ it("upright, the sliders of p stay in reach beside the open panel, for one pictu
   await stop(1, "1").tap();
   await stop(0, "2").tap();
   expect([await user.ask("document().p"), await user.ask("document().secondP")]).toEqual([2, 1]);
+  for (const isOn of [true, false]) {
+    await page.locator(".dock .toggle").tap();
+    expect(await user.ask("document().isAutomatic")).toBe(isOn);
+  }
   // Each at the lower edge of its own picture, clear of the legend, the panel and each other.
   const boxes = [".p-row >> nth=0", ".p-row >> nth=1", ".legend", ".dock .under", ".panel"];
   const [first, second, ...others] = await Promise.all(boxes.map((box) => page.locator(box).boundingBox()));
