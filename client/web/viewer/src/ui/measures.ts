@@ -12,7 +12,7 @@ const plotEveryMs = 200;
 
 const rows = [
   ["fps", "Frames a second", "Pictures with a new surface"],
-  ["latency", "Input to picture, ms", "From moving to seeing it: the median and 99 of 100"],
+  ["latency", "Input to frame, ms", "From moving to seeing it: the median and 99 of 100"],
   ["service", "…of it service, ms", "Server and way there and back, without drawing: the median and 99 of 100"],
   ["bytes", "Received", "As it travels"],
   ["vertices", "Vertices · faces", ""],
