@@ -1,0 +1,243 @@
+#include "core/solve/deformer_impl.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/solve/conic.h"
+#include "core/solve/holds.h"
+#include "core/solve/line_search.h"
+#include "core/solve/local_global.h"
+#include "core/solve/multiresolution.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr double kCertificateSeconds = 1;    // it gets, whatever is left of the time limit
+constexpr std::size_t kCopyChunk = 4096;     // vertices
+constexpr std::int32_t kLargeMesh = 5000;    // vertices, from which on a coarse level pays
+constexpr std::int32_t kLargeAtTwo = 60000;  // the same where every p is 2: there is less to gain
+constexpr double kRounding = 1e-13;          // of the largest coordinate, in scaled units
+
+using Clock = std::chrono::steady_clock;
+
+}  // namespace
+
+double Deformer::Impl::seconds() const {
+  return std::chrono::duration<double>(Clock::now() - started).count();
+}
+
+/// The largest E_i or D_k at the guess: the reference length that keeps terms of any p in range.
+double Deformer::Impl::typical_energy(const Points& guess) {
+  objective.evaluate(guess, LpNorm(Material::uniform(2), shape->vertex_count(), unit(), 1));
+  const auto& e2 = objective.cells().squared_energies();
+  const auto& d2 = objective.soft_terms().squared_distances();
+  double largest = *std::max_element(e2.begin(), e2.end());
+  if (!d2.empty()) largest = std::max(largest, *std::max_element(d2.begin(), d2.end()));
+  largest = std::sqrt(largest);
+  return largest > 1e-12 ? largest : 1.0;
+}
+
+/// The objective where every E_i is what rounding leaves of it.
+double Deformer::Impl::zero_objective() const {
+  const double rounding = kRounding * (1 + constraints->targets.cwiseAbs().maxCoeff());
+  double sum = 0;
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) sum += norm->term(i, rounding * rounding).value;
+  return sum;
+}
+
+Problem Deformer::Impl::make_problem() {
+  return {objective,
+          metric,
+          *constraints,
+          *norm,
+          settings.tolerance,
+          length_unit() / unit(),
+          shape->diagonal() / unit(),
+          zero_objective(),
+          stop};
+}
+
+/// Makes the coarse level where there is none. False where the mesh cannot have one, or the handles are not known
+/// to it.
+bool Deformer::Impl::prepare_coarse() {
+  const bool has_footprint = constraints->footprint.size() > 0;
+  if (!holds_vertices_exactly(handles) || has_footprint) return false;  // it knows no other kind of handle
+  if (!coarse) coarse = CoarseLevel::create(*shape, workers().threads());
+  return coarse && coarse->take_over(*shape, handles, *constraints, material).ok();
+}
+
+Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {
+  if (asked == Method::kAuto) {
+    const std::int32_t large = (material.p.array() == 2).all() ? kLargeAtTwo : kLargeMesh;
+    asked = is_warm || shape->vertex_count() < large ? Method::kQuasiNewton : Method::kMultiresolution;
+  }
+  if (asked != Method::kMultiresolution || (!is_warm && prepare_coarse())) return asked;
+  return Method::kQuasiNewton;
+}
+
+std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points guess, Warmth warmth) {
+  Problem problem = make_problem();
+  switch (method) {
+    case Method::kLineSearch:
+      return std::make_unique<LineSearch>(std::move(problem), std::move(guess));
+    case Method::kLocalGlobal:
+      return std::make_unique<LocalGlobal>(std::move(problem), std::move(guess));
+    case Method::kConic:
+      return std::make_unique<Conic>(std::move(problem), std::move(guess));
+    case Method::kMultiresolution:
+      return std::make_unique<Multiresolution>(std::move(problem), std::move(guess), *coarse);
+    case Method::kAuto:
+    case Method::kQuasiNewton:
+      break;
+  }
+  return std::make_unique<QuasiNewton>(std::move(problem), std::move(guess), warmth);
+}
+
+/// Factors for the present handles with equal cell weights, unless a usable factor is there. False where that
+/// fails.
+bool Deformer::Impl::prepare_metric(bool needs_plain_weights) {
+  if (metric.is_factored_for(constraints->is_held) && !needs_plain_weights) return true;
+  std::vector<MatrixEntry> entries = guess_springs().matrix_entries();
+  constraints->linear.add_ties(2, entries);
+  const auto precision =
+      constraints->linear.empty() ? Metric::Precision::kSingle : Metric::Precision::kDouble;
+  return metric.factor(std::vector<double>(shape->vertex_count(), 1.0), constraints->is_held, entries,
+                       workers(), precision);
+}
+
+/// With the footprints of handles.
+Material Deformer::Impl::effective_material() const {
+  const Field& factors = constraints->footprint;
+  if (factors.size() == 0) return material;
+  Material result = material;
+  if (material.stiffness.size() == 1)
+    result.stiffness = material.stiffness[0] * factors;
+  else
+    result.stiffness = material.stiffness.cwiseProduct(factors);
+  return result;
+}
+
+/// Called with the evaluation of minimiser->x() in `objective`, and its true sum.
+void Deformer::Impl::keep_if_best(double sum) {
+  const bool is_first = summary.iterations == 0;
+  if (!is_first && !(sum < best_sum)) return;
+  best_sum = std::isnan(sum) ? std::numeric_limits<double>::infinity() : sum;
+  best_soft_sum = objective.soft_terms().sum(*norm);
+  is_positions_current = false;
+  const auto& e2 = objective.cells().squared_energies();
+  const Points& from = minimiser->x();
+  x.resize(from.rows(), 3);
+  workers().for_chunks(e2.size(), kCopyChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    std::copy(from.data() + 3 * begin, from.data() + 3 * end, x.data() + 3 * begin);
+    for (std::size_t i = begin; i < end; ++i) best_energies[i] = unit() * std::sqrt(e2[i]);
+  });
+}
+
+void Deformer::Impl::record(const StepResult& result, double sum) {
+  summary.energy = norm->true_energy(best_sum);
+  summary.soft_energy = norm->true_energy(best_soft_sum);
+  summary.solve_seconds = seconds();
+  if (!settings.keep_trace) return;
+  summary.trace.push_back(
+      {summary.iterations, summary.solve_seconds, norm->true_energy(sum), result.objective, result.stage});
+}
+
+void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token new_stop) {
+  started = Clock::now();
+  settings = new_settings;
+  stop = std::move(new_stop);
+  summary = {};
+  summary.threads = workers().threads();
+  const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state;
+  if (!is_warm) x_before_move.resize(0, 3);
+  settings.method = summary.method = chosen_method(settings.method, is_warm);
+  const bool keeps_metric =
+      is_warm && is_metric_live && is_metric_of_rows && metric.is_factored_for(constraints->is_held);
+  const bool is_factored = prepare_metric(!is_warm || !is_metric_of_rows);
+  is_metric_of_rows = true;
+  summary.setup_seconds = seconds();
+
+  started = Clock::now();
+  Points guess = is_factored ? initial_guess(settings.initial) : constraints->targets;
+  if (!guess.allFinite()) {
+    guess = constraints->targets;
+    constraints->linear.satisfy(guess);
+  }
+  SoftTerms soft = constraints->soft;
+  soft.set_length_unit(length_unit() / unit());
+  objective.set_soft_terms(std::move(soft));
+  const double typical = typical_energy(guess);
+  const double reference = settings.method == Method::kLineSearch ? length_unit() / unit() : typical;
+  norm.emplace(effective_material(), shape->vertex_count(), unit(), reference);
+  objective.reweigh(*norm);  // typical_energy has evaluated the guess
+  best_sum = std::numeric_limits<double>::infinity();
+  const Warmth warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
+  minimiser = make_minimiser(settings.method, std::move(guess), warmth);
+  is_metric_live = settings.method == Method::kQuasiNewton;
+  const double sum = objective.sum(*norm);
+  keep_if_best(sum);
+  summary.initial_energy = norm->true_energy(sum);
+  record({Outcome::kProgress, sum, 0}, sum);
+  if (!is_factored) end(StopReason::kNumericalBreakdown);
+}
+
+void Deformer::Impl::iterate() {
+  const StepResult result = minimiser->step();
+  ++summary.iterations;
+  const double sum = result.is_true ? result.objective : objective.sum(*norm);
+  keep_if_best(sum);
+  record(result, sum);
+  switch (result.outcome) {
+    case Outcome::kProgress:
+      return;
+    case Outcome::kConverged:
+      return end(StopReason::kConverged);
+    case Outcome::kStalled:
+      return end(StopReason::kStalled);
+    case Outcome::kBreakdown:
+      return end(StopReason::kNumericalBreakdown);
+  }
+}
+
+void Deformer::Impl::end(StopReason reason) {
+  // Before its end the metric may still be that of the guess.
+  if (settings.method == Method::kMultiresolution) is_metric_live = reason == StopReason::kConverged;
+  minimiser.reset();
+  has_state = true;
+  summary.stop_reason = reason;
+  summary.solve_seconds = seconds();
+  if (!settings.certify || reason == StopReason::kCancelled) return;
+  const double rest = settings.time_limit_seconds - summary.solve_seconds;
+  begin_certificate(std::max(kCertificateSeconds, rest));
+}
+
+void Deformer::Impl::begin_certificate(double max_seconds) {
+  is_metric_live = false;  // the certificate factors for itself
+  objective.evaluate(x, *norm);
+  certificate =
+      std::make_unique<Certificate>(make_problem(), x, CertificateSettings{.max_seconds = max_seconds});
+}
+
+bool Deformer::Impl::certify() {
+  if (certificate->step()) return true;
+  summary.optimality_gap = certificate->relative_gap();
+  certificate.reset();
+  return false;
+}
+
+/// Keeps what is factored where only targets changed.
+void Deformer::Impl::replace_constraints(Constraints next) {
+  if (constraints) {
+    const bool has_footprint_of_before =
+        next.footprint.size() == constraints->footprint.size() && next.footprint == constraints->footprint;
+    const bool has_rows_of_before =
+        next.linear.reuse(constraints->linear) && next.soft.has_rows_of(constraints->soft);
+    if (!has_footprint_of_before) is_metric_live = false;
+    is_metric_of_rows = is_metric_of_rows && has_rows_of_before;
+  }
+  constraints = std::move(next);
+}
+
+}  // namespace lpdeform

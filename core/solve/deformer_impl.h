@@ -1,0 +1,92 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "core/solve/certificate.h"
+#include "core/solve/coarse_level.h"
+#include "core/solve/deformer.h"
+#include "core/solve/minimiser.h"
+#include "core/solve/quasi_newton.h"
+
+namespace lpdeform {
+
+/// What a Deformer holds, and the loop of a solve. Its guesses are in deformer_guess.cc, the rest in deformer_impl.cc.
+struct Deformer::Impl {
+  Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options)
+      : shape(std::move(rest_shape)),
+        options(deformer_options),
+        objective(shape, Workers(shape->vertex_count() < options.parallel_from ? 1 : options.threads)),
+        metric(shape),
+        x(shape->scaled_positions()),
+        best_energies(Field::Zero(shape->vertex_count())),
+        positions(shape->positions()) {}
+
+  double unit() const { return shape->mean_edge_length(); }
+  const Workers& workers() const { return objective.cells().workers(); }
+  double length_unit() const { return material.length_unit > 0 ? material.length_unit : unit(); }
+
+  Points laplacian_guess();
+  Points current_guess();
+  SoftTerms guess_springs() const;
+  Points initial_guess(InitialGuess guess);
+  double typical_energy(const Points& guess);
+  double zero_objective() const;
+  Problem make_problem();
+  Method chosen_method(Method asked, bool is_warm);
+  bool prepare_coarse();
+  std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, Warmth warmth);
+  bool prepare_metric(bool needs_plain_weights);
+  void keep_if_best(double sum);
+  Material effective_material() const;
+  void record(const StepResult& result, double sum);
+  void begin(const SolveSettings& new_settings, std::stop_token new_stop);
+  void iterate();
+  void end(StopReason reason);
+  void begin_certificate(double max_seconds);
+  bool certify();
+  void replace_constraints(Constraints next);
+  double seconds() const;  // since `started`
+  void interrupt() {
+    certificate.reset();
+    if (minimiser) end(StopReason::kCancelled);
+  }
+  void change_inputs() {
+    interrupt();
+    norm.reset();
+  }
+
+  std::shared_ptr<const RestShape> shape;
+  DeformerOptions options;
+  Objective objective;
+  Metric metric;
+  HandleSet handles;
+  Material material;
+  std::optional<Constraints> constraints;
+  std::shared_ptr<const Points> outside;  // where the region's surroundings are held, the caller's units
+
+  // The state, in scaled units: the best of the last solve, or what was set.
+  Points x;
+  Points x_before_move;  // when the last warm solve began; empty where there was none
+  bool has_state = false;
+  bool is_metric_of_rows = true;  // the last factor knows the present soft terms and linear rows
+  bool is_metric_live = false;    // the last factor is quasi_newton's, for this material
+  Field best_energies;            // E_i at x, the caller's units
+  Points positions;               // x in the caller's units, made when asked for
+  bool is_positions_current = true;
+
+  // The running solve.
+  SolveSettings settings;
+  std::stop_token stop;
+  std::optional<LpNorm> norm;           // true norm, and the reference of the running solve
+  std::unique_ptr<CoarseLevel> coarse;  // made when first needed
+  std::unique_ptr<Minimiser> minimiser;
+  std::unique_ptr<Certificate> certificate;  // under way, after the minimiser's end
+  std::chrono::steady_clock::time_point started;
+  double best_sum = 0, best_soft_sum = 0;
+  SolveSummary summary;
+};
+
+}  // namespace lpdeform
