@@ -41,6 +41,6 @@ COPY LICENSE /usr/share/doc/lpdeform/
 COPY --from=build /src/build/release/bin/lpdeform-server /src/build/release/bin/lpdeform /usr/local/bin/
 USER 10001:10001
 EXPOSE 50051 9464
-HEALTHCHECK --interval=15s --timeout=5s --start-period=10s CMD ["lpdeform-server", "--healthcheck", "127.0.0.1:50051"]
+HEALTHCHECK --interval=15s --timeout=5s --start-period=10s CMD ["lpdeform-server", "--healthcheck", "http://127.0.0.1:9464"]
 ENTRYPOINT ["lpdeform-server"]
-CMD ["--address", "0.0.0.0:50051", "--admin-address", "0.0.0.0:9464"]
+CMD ["--address", "0.0.0.0:50051", "--admin-address", "0.0.0.0:9464", "--allow-anonymous"]

@@ -4,16 +4,17 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
 #include "core/base/fault.h"
 #include "core/base/workers.h"
 #include "server/encode.h"
+#include "server/key_watch.h"
 #include "server/random_name.h"
 
 namespace lpdeform {
 namespace {
 
 constexpr int kPoolThreads = 4;
-constexpr std::size_t kLongestQueue = 4096;
 constexpr std::uint32_t kDefaultPage = 100, kLargestPage = 1000;
 constexpr std::uint32_t kFacesPerVertex = 3;
 
@@ -32,18 +33,20 @@ std::string ended_because(EndReason reason) {
 
 }  // namespace
 
-Backend::Backend(const ServerOptions& options)
+Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
     : timers(or_system(options.timers)),
-      registry(
-          std::make_shared<Registry>(timers, Registry::Limits{options.max_sessions, options.session_idle})),
+      registry(std::make_shared<Registry>(timers, Registry::Limits{options.max_sessions, options.session_idle,
+                                                                   options.max_sessions_per_caller})),
       options_(options),
+      tokens_(std::move(tokens)),
       log_(options.log ? options.log : std::make_shared<Log>("off")),
       budget_(std::make_shared<Budget>(options.max_bytes)),
-      uploads_(std::make_shared<Uploads>(budget_, timers,
-                                         Uploads::Limits{options.max_upload_bytes, options.upload_idle})),
+      uploads_(std::make_shared<Uploads>(
+          budget_, timers,
+          Uploads::Limits{options.max_upload_bytes, options.upload_idle, options.max_uploads})),
       scheduler(options.runner_threads == 0 ? Scheduler::default_threads() : options.runner_threads,
                 observer(Span::kSchedulerQueue)),
-      pool(kPoolThreads, kLongestQueue, observer(Span::kCallQueue)) {
+      pool(kPoolThreads, options.max_calls_waiting, observer(Span::kCallQueue)) {
   registry->on_ended = [log = log_, metrics = metrics](const Session& session, EndReason reason) {
     const std::string why = ended_because(reason);
     metrics->session_ended(why);
@@ -51,6 +54,26 @@ Backend::Backend(const ServerOptions& options)
   };
   metrics->set(Level::kSessionsMost, static_cast<double>(options.max_sessions));
   metrics->set(Level::kMemoryBytesMost, static_cast<double>(options.max_bytes));
+  if (tokens_) watch_keys(timers, tokens_, log_);
+}
+
+absl::StatusOr<Caller> Backend::identify(const CallContext& call, Access access) const {
+  absl::StatusOr<Caller> caller = Caller{};
+  if (tokens_ != nullptr) {
+    caller = tokens_->check(call.authorization, absl::ToUnixSeconds(absl::Now()));
+  } else if (!call.peer_identity.empty()) {
+    caller->subject = absl::StrCat("certificate:", call.peer_identity);
+  }
+  if (!caller.ok() || access == Access::kRead || !caller->is_viewer) return caller;
+  return make_fault(absl::StatusCode::kPermissionDenied, {"READ_ONLY", "authorization", ""},
+                    "The bearer token lets its holder look on and change nothing.");
+}
+
+absl::StatusOr<std::shared_ptr<Session>> Backend::find(const CallContext& call, Access access,
+                                                       const std::string& name) const {
+  const auto caller = identify(call, access);
+  if (!caller.ok()) return caller.status();
+  return registry->find(name, caller->subject);
 }
 
 std::function<void(double)> Backend::observer(Span span) const {
@@ -70,18 +93,23 @@ std::shared_ptr<CallRecord> Backend::begin_record(std::string method, CallContex
                                       std::move(context));
 }
 
-absl::Status Backend::create_upload(const CallContext&, const v1::CreateUploadRequest& request,
+absl::Status Backend::create_upload(const CallContext& call, const v1::CreateUploadRequest& request,
                                     v1::CreateUploadResponse& response) {
-  const auto upload = uploads_->create(request.request_id(), request.size_bytes(), request.crc32c());
+  const auto caller = identify(call, Access::kChange);
+  if (!caller.ok()) return caller.status();
+  const auto upload =
+      uploads_->create(request.request_id(), request.size_bytes(), request.crc32c(), caller->subject);
   if (!upload.ok()) return upload.status();
   response.set_upload((*upload)->name());
   response.set_max_part_bytes(Upload::kMostPartBytes);
   return absl::OkStatus();
 }
 
-absl::Status Backend::upload_part(const CallContext&, const v1::UploadPartRequest& request,
+absl::Status Backend::upload_part(const CallContext& call, const v1::UploadPartRequest& request,
                                   v1::UploadPartResponse& response) {
-  const auto upload = uploads_->find(request.upload());
+  const auto caller = identify(call, Access::kChange);
+  if (!caller.ok()) return caller.status();
+  const auto upload = uploads_->find(request.upload(), caller->subject);
   if (!upload.ok()) return upload.status();
   const auto progress = (*upload)->add(request.offset(), request.data());
   if (!progress.ok()) return progress.status();
@@ -90,29 +118,33 @@ absl::Status Backend::upload_part(const CallContext&, const v1::UploadPartReques
   return absl::OkStatus();
 }
 
-absl::Status Backend::delete_upload(const CallContext&, const v1::DeleteUploadRequest& request,
+absl::Status Backend::delete_upload(const CallContext& call, const v1::DeleteUploadRequest& request,
                                     v1::DeleteUploadResponse&) {
-  uploads_->remove(request.upload());
+  const auto caller = identify(call, Access::kChange);
+  if (!caller.ok()) return caller.status();
+  uploads_->remove(request.upload(), caller->subject);
   return absl::OkStatus();
 }
 
-absl::Status Backend::get_session(const CallContext&, const v1::GetSessionRequest& request,
+absl::Status Backend::get_session(const CallContext& call, const v1::GetSessionRequest& request,
                                   v1::GetSessionResponse& response) {
-  const auto session = find(request.session());
+  const auto session = find(call, Access::kRead, request.session());
   if (!session.ok()) return session.status();
   encode((*session)->info(), registry->idle(), timers->now(), *response.mutable_session());
   return absl::OkStatus();
 }
 
-absl::Status Backend::list_sessions(const CallContext&, const v1::ListSessionsRequest& request,
+absl::Status Backend::list_sessions(const CallContext& call, const v1::ListSessionsRequest& request,
                                     v1::ListSessionsResponse& response) {
   if (request.page_size() > kLargestPage) {
     return invalid_input(
         {"PAGE_SIZE", "page_size", absl::StrCat("page_size <= ", kLargestPage)},
         absl::StrCat("A page of ", request.page_size(), " sessions is over ", kLargestPage, "."));
   }
-  const auto page =
-      registry->list(request.page_size() == 0 ? kDefaultPage : request.page_size(), request.page_token());
+  const auto caller = identify(call, Access::kRead);
+  if (!caller.ok()) return caller.status();
+  const auto page = registry->list(request.page_size() == 0 ? kDefaultPage : request.page_size(),
+                                   request.page_token(), caller->subject);
   if (!page.ok()) return page.status();
   for (const auto& session : page->sessions) {
     v1::Session& listed = *response.add_sessions();
@@ -126,6 +158,9 @@ absl::Status Backend::list_sessions(const CallContext&, const v1::ListSessionsRe
 
 absl::Status Backend::delete_session(const CallContext& call, const v1::DeleteSessionRequest& request,
                                      v1::DeleteSessionResponse&) {
+  const auto session = find(call, Access::kChange, request.session());
+  if (absl::IsNotFound(session.status())) return absl::OkStatus();
+  if (!session.ok()) return session.status();
   if (registry->remove(request.session(), EndReason::kSessionDeleted, "The session was deleted.")) {
     log().info("session_deleted", {{"session", abbreviated(request.session())}, {"trace_id", call.trace_id}});
   }
@@ -134,7 +169,7 @@ absl::Status Backend::delete_session(const CallContext& call, const v1::DeleteSe
 
 absl::Status Backend::acquire_writer(const CallContext& call, const v1::AcquireWriterRequest& request,
                                      v1::AcquireWriterResponse& response) {
-  const auto session = find(request.session());
+  const auto session = find(call, Access::kChange, request.session());
   if (!session.ok()) return session.status();
   const WriterLease lease = (*session)->acquire_writer();
   response.set_writer_token(lease.token);
@@ -149,7 +184,7 @@ absl::Status Backend::acquire_writer(const CallContext& call, const v1::AcquireW
 
 absl::Status Backend::update_handles(const CallContext& call, const v1::UpdateHandlesRequest& request,
                                      v1::UpdateHandlesResponse& response) {
-  const auto session = find(request.session());
+  const auto session = find(call, Access::kChange, request.session());
   if (!session.ok()) return session.status();
   const auto result = update(call, **session, request.writer_token(), request.update());
   if (!result.ok()) return result.status();
@@ -158,9 +193,9 @@ absl::Status Backend::update_handles(const CallContext& call, const v1::UpdateHa
   return absl::OkStatus();
 }
 
-absl::Status Backend::ack_frames(const CallContext&, const v1::AckFramesRequest& request,
+absl::Status Backend::ack_frames(const CallContext& call, const v1::AckFramesRequest& request,
                                  v1::AckFramesResponse&) {
-  const auto session = find(request.session());
+  const auto session = find(call, Access::kRead, request.session());
   return session.ok() ? (*session)->acknowledge(request.stream_id(), request.frame_seq()) : session.status();
 }
 
@@ -169,7 +204,7 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call
                                                          const std::string& token,
                                                          const v1::FrameOptions& options,
                                                          std::function<void()> wake) {
-  auto session = find(session_name);
+  auto session = find(call, token.empty() ? Access::kRead : Access::kChange, session_name);
   if (!session.ok()) return session.status();
   auto decoded = decode_frame_options(options);
   if (!decoded.ok()) return decoded.status();
@@ -203,9 +238,9 @@ void Backend::forget(const CallContext& call, const OpenStream& open) {
 absl::StatusOr<UpdateResult> Backend::update(const CallContext& call, Session& session,
                                              const std::string& token, const v1::Update& update) {
   if (absl::Status status = session.check_writer(token); !status.ok()) return status;
-  const auto decoded =
-      Decoder(*uploads_, session.vertex_count(), &session.features(), session.mesh().weld().get())
-          .update(update);
+  const auto decoded = Decoder(*uploads_, session.vertex_count(), &session.features(),
+                               session.mesh().weld().get(), session.owner())
+                           .update(update);
   if (!decoded.ok()) return decoded.status();
   const auto result = session.update(token, *decoded);
   if (result.ok()) {
@@ -221,11 +256,11 @@ absl::StatusOr<UpdateResult> Backend::update(const CallContext& call, Session& s
 absl::Status Backend::solve(const CallContext& call, const v1::SolveRequest& request,
                             SolveJob::OnProgress on_progress, SolveJob::OnDone on_done,
                             std::shared_ptr<SolveJob>& job) {
-  const auto session = find(request.session());
+  const auto session = find(call, Access::kChange, request.session());
   if (!session.ok()) return session.status();
   if (absl::Status status = (*session)->check_writer(request.writer_token()); !status.ok()) return status;
   Decoder decoder(*uploads_, (*session)->vertex_count(), &(*session)->features(),
-                  (*session)->mesh().weld().get());
+                  (*session)->mesh().weld().get(), (*session)->owner());
   std::optional<Update> update;
   if (request.has_update()) {
     auto decoded = decoder.update(request.update());
@@ -263,6 +298,8 @@ void Backend::log_solved(const Session& session, const SolveResult& result,
 
 void Backend::create_session(const CallContext& call, const v1::CreateSessionRequest& request,
                              v1::CreateSessionResponse& response, std::function<void(absl::Status)> done) {
+  const auto caller = identify(call, Access::kChange);
+  if (!caller.ok()) return done(caller.status());
   const Registry::OnCreated on_created = [this, &response,
                                           done](const absl::StatusOr<CreatedSession>& created) {
     if (!created.ok()) return done(created.status());
@@ -271,10 +308,10 @@ void Backend::create_session(const CallContext& call, const v1::CreateSessionReq
     done(absl::OkStatus());
   };
   const std::size_t fingerprint = std::hash<std::string>()(request.SerializeAsString());
-  if (!registry->begin_creation(request.request_id(), on_created, fingerprint)) return;
-  scheduler.run_once([this, call, &request, on_created] {
+  if (!registry->begin_creation(request.request_id(), on_created, fingerprint, caller->subject)) return;
+  scheduler.run_once([this, call, owner = caller->subject, &request, on_created] {
     const std::string request_id = request.request_id();
-    registry->finish_creation(request_id, make_session(call, request), on_created);
+    registry->finish_creation(request_id, make_session(call, owner, request), on_created, owner);
   });
 }
 
@@ -302,9 +339,10 @@ absl::Status Backend::make_mesh(const v1::CreateSessionRequest& request, Decoder
 }
 
 absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const CallContext& call,
+                                                               const std::string& owner,
                                                                const v1::CreateSessionRequest& request) {
   const v1::Mesh& mesh_message = request.mesh();
-  Decoder decoder(*uploads_, mesh_message.vertex_count());
+  Decoder decoder(*uploads_, mesh_message.vertex_count(), nullptr, nullptr, owner);
   const std::uint32_t most_faces = kFacesPerVertex * options_.max_vertices;
   if (absl::Status status = decoder.check_mesh_size(mesh_message, {options_.max_vertices, most_faces});
       !status.ok()) {
@@ -318,12 +356,14 @@ absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const CallContext
 
   SessionParts parts;
   parts.name = absl::StrCat("sessions/", random_hex_128());
+  parts.owner = owner;
   parts.free_components = *free_components;
   parts.memory = *std::move(memory);
   if (absl::Status status = make_mesh(request, decoder, parts); !status.ok()) return status;
   const int threads = options_.threads == 0 ? available_cores() : options_.threads;
   parts.features = std::make_shared<const ShapeFeatures>(parts.shape, Workers(threads));
-  Decoder inputs(*uploads_, mesh_message.vertex_count(), parts.features.get(), parts.mesh->weld().get());
+  Decoder inputs(*uploads_, mesh_message.vertex_count(), parts.features.get(), parts.mesh->weld().get(),
+                 owner);
   if (absl::Status status = inputs.handles(request.handles(), parts.beginning); !status.ok()) return status;
   auto settings = inputs.settings(request.settings());
   if (!settings.ok()) return settings.status();
@@ -331,7 +371,12 @@ absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const CallContext
   auto deformer = Deformer::create(parts.shape, {*free_components, threads});
   if (!deformer.ok()) return deformer.status();
   parts.deformer = *std::move(deformer);
-  auto session = Session::create(std::move(parts), {scheduler, timers, options_.heartbeat, metrics});
+  auto session =
+      Session::create(std::move(parts), {scheduler,
+                                         timers,
+                                         options_.heartbeat,
+                                         metrics,
+                                         {options_.max_streams_per_session, options_.max_handles}});
   if (!session.ok()) return session.status();
   metrics->add(Count::kSessionsCreated);
   log().info("session_created", {{"session", abbreviated((*session)->name())},

@@ -18,6 +18,7 @@
 #include "server/scheduler.h"
 #include "server/server.h"
 #include "server/task_pool.h"
+#include "server/tokens.h"
 #include "server/upload.h"
 
 namespace lpdeform {
@@ -26,7 +27,8 @@ namespace lpdeform {
 /// response. Called from the task pool and the scheduler, never from gRPC's threads. Thread-safe.
 class Backend {
  public:
-  explicit Backend(const ServerOptions& options);
+  /// `tokens`: null where callers need none.
+  explicit Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens = nullptr);
 
   absl::Status create_upload(const CallContext& call, const v1::CreateUploadRequest& request,
                              v1::CreateUploadResponse& response);
@@ -52,7 +54,13 @@ class Backend {
   void create_session(const CallContext& call, const v1::CreateSessionRequest& request,
                       v1::CreateSessionResponse& response, std::function<void(absl::Status)> done);
 
-  absl::StatusOr<std::shared_ptr<Session>> find(const std::string& name) { return registry->find(name); }
+  /// What a call is going to do.
+  enum class Access { kRead, kChange };
+  /// Who calls. UNAUTHENTICATED as Tokens::check; PERMISSION_DENIED READ_ONLY.
+  absl::StatusOr<Caller> identify(const CallContext& call, Access access) const;
+  /// A session of the caller's. Errors: as identify; NOT_FOUND SESSION_UNKNOWN.
+  absl::StatusOr<std::shared_ptr<Session>> find(const CallContext& call, Access access,
+                                                const std::string& name) const;
 
   /// A stream of a session, which is found by its name; with a token, the writer's. `wake` as FrameStream::start has it.
   struct OpenStream {
@@ -91,13 +99,14 @@ class Backend {
  private:
   std::function<void(double)> observer(Span span) const;
   void log_solved(const Session& session, const SolveResult& result, const std::string& trace_id) const;
-  absl::StatusOr<std::shared_ptr<Session>> make_session(const CallContext& call,
+  absl::StatusOr<std::shared_ptr<Session>> make_session(const CallContext& call, const std::string& owner,
                                                         const v1::CreateSessionRequest& request);
   /// Fills in the shape and the mesh that it is drawn as.
   static absl::Status make_mesh(const v1::CreateSessionRequest& request, Decoder& decoder,
                                 SessionParts& parts);
 
   const ServerOptions options_;
+  const std::shared_ptr<Tokens> tokens_;
   const std::shared_ptr<const Log> log_;
   const std::shared_ptr<Budget> budget_;
   const std::shared_ptr<Uploads> uploads_;

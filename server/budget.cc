@@ -13,7 +13,7 @@ absl::StatusOr<Reservation> Budget::reserve(std::size_t bytes) {
     return make_fault(absl::StatusCode::kResourceExhausted,
                       {"MEMORY_FULL", "memory", absl::StrCat("bytes <= ", most_)},
                       absl::StrCat("This needs about ", bytes, " bytes; the server has ", used_, " of its ",
-                                   most_, " in use."));
+                                   most_, " in use. Try again later, or with a smaller mesh."));
   }
   used_ += bytes;
   return Reservation(shared_from_this(), bytes);

@@ -7,7 +7,11 @@ namespace lpdeform {
 /// What a call brings along beside its request.
 struct CallContext {
   /// Of the caller's traceparent header; empty where there is none.
-  std::string trace_id;
+  std::string trace_id = {};
+  /// The header "authorization". Never logged.
+  std::string authorization = {};
+  /// Whom the client's certificate names; empty where none was asked for.
+  std::string peer_identity = {};
 };
 
 }  // namespace lpdeform

@@ -172,7 +172,7 @@ absl::StatusOr<Decoder::Bytes> Decoder::bytes(const v1::Buffer& buffer, std::str
     return invalid_input({"BUFFER_MISSING", std::string(what), ""},
                          absl::StrCat("The ", std::string(what), " are missing."));
   }
-  const auto upload = uploads_.find(buffer.upload());
+  const auto upload = uploads_.find(buffer.upload(), owner_);
   if (!upload.ok()) return upload.status();
   const auto whole = (*upload)->bytes();
   if (!whole.ok()) return whole.status();

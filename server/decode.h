@@ -33,14 +33,15 @@ namespace lpdeform {
 class Decoder {
  public:
   /// `vertex_count`: of the client's mesh that the message is about; `features`: its geometry, needed by
-  /// handles(), settings() and update(); `weld`: from the client's vertices to those of `features`, null where
+  /// handles(), settings() and update(); `owner`: whose uploads it may name; `weld`: from the client's vertices to those of `features`, null where
   /// they are the same.
   Decoder(Uploads& uploads, std::uint32_t vertex_count, const ShapeFeatures* features = nullptr,
-          const Weld* weld = nullptr)
+          const Weld* weld = nullptr, std::string owner = "")
       : uploads_(uploads),
         vertex_count_(vertex_count),
         features_(features),
         weld_(weld),
+        owner_(std::move(owner)),
         room_for_vertices_(vertex_count),
         room_for_targets_(vertex_count),
         room_for_region_(vertex_count) {}
@@ -93,6 +94,7 @@ class Decoder {
   const std::uint32_t vertex_count_;
   const ShapeFeatures* const features_;
   const Weld* const weld_;
+  const std::string owner_;
   std::uint64_t room_for_vertices_;
   std::uint64_t room_for_targets_;
   std::uint64_t room_for_region_;

@@ -130,7 +130,7 @@ class DeformCall final
 
   void take_update() {
     const v1::Update& update = request_.update();
-    const auto session = backend_.find(open_.session->name());
+    const auto session = backend_.registry->find(open_.session->name(), open_.session->owner());
     const auto result =
         session.ok() ? backend_.update(context(), **session, token_, update) : session.status();
     if (result.ok()) {

@@ -16,9 +16,6 @@
 namespace lpdeform {
 namespace {
 
-/// Names that ages are kept for: all handles, and as many that were let go of.
-constexpr std::size_t kMostAges = 2 * Mailbox::kMostHandles;
-
 constexpr std::size_t kLongestName = 128;
 /// Room for a new writer to count on, and for languages whose integers are signed.
 constexpr std::uint64_t kHighestInputSeq = std::numeric_limits<std::int64_t>::max();
@@ -72,8 +69,9 @@ struct Mailbox::Candidate {
   bool has_material() const { return has_p || has_stiffness || has_length_unit; }
 };
 
-Mailbox::Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld)
-    : shape_(std::move(shape)), weld_(std::move(weld)) {
+Mailbox::Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld,
+                 std::size_t most_handles)
+    : shape_(std::move(shape)), weld_(std::move(weld)), most_handles_(most_handles) {
   inputs_.handles = inputs_.given_handles = std::make_shared<const HandleSet>();
   inputs_.material = inputs_.given_material = std::make_shared<const Material>();
 }
@@ -212,7 +210,8 @@ void Mailbox::note_ages(const Candidate& next, std::uint64_t seq) {
   if (next.has_length_unit) ages_.length_unit = seq;
   if (next.has_solver) ages_.solver = seq;
   if (next.has_region) ages_.region = seq;
-  if (ages_.handles.size() > kMostAges) forget_oldest();
+  // Of all handles, and of as many that were let go of.
+  if (ages_.handles.size() > 2 * most_handles_) forget_oldest();
 }
 
 /// Gives up the ages of the older half of the handles that were let go of.
@@ -232,10 +231,10 @@ void Mailbox::forget_oldest() {
 }
 
 absl::Status Mailbox::check(const Candidate& next, const Inputs& before) const {
-  if (next.handles && next.handles->handles().size() > kMostHandles) {
-    return invalid_input({"TOO_MANY_HANDLES", "", absl::StrCat("handles <= ", kMostHandles)},
+  if (next.handles && next.handles->handles().size() > most_handles_) {
+    return invalid_input({"TOO_MANY_HANDLES", "", absl::StrCat("handles <= ", most_handles_)},
                          absl::StrCat("The session would have ", next.handles->handles().size(),
-                                      " handles; it may have ", kMostHandles, "."));
+                                      " handles; it may have ", most_handles_, ". Let go of some first."));
   }
   absl::Status status;
   if (next.is_regrouped) status = check_handles(*next.handles, vertex_count(), shape_->face_count());

@@ -34,7 +34,8 @@ struct Inputs {
 class Mailbox {
  public:
   /// `weld`: from the vertices that updates speak of to those of `shape`; null where they are the same.
-  explicit Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld = nullptr);
+  explicit Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld = nullptr,
+                   std::size_t most_handles = kMostHandles);
 
   /// A part with the input_seq of the value that is there is a repetition: dropped, but not counted as stale.
   /// Errors, INVALID_ARGUMENT: INPUT_SEQ_ZERO, HANDLE_CHANGED_TWICE (in this update), TOO_MANY_HANDLES,
@@ -47,7 +48,7 @@ class Mailbox {
 
   Inputs newest() const;
 
-  static constexpr std::size_t kMostHandles = 4096;
+  static constexpr std::size_t kMostHandles = 4096;  // where nothing else is said
 
  private:
   /// The input_seq of the newest value of each part. Handles let go of are remembered so that a late change
@@ -78,6 +79,7 @@ class Mailbox {
 
   const std::shared_ptr<const RestShape> shape_;
   const std::shared_ptr<const Weld> weld_;
+  const std::size_t most_handles_;
   std::mutex merging_;  // one update at a time; guards ages_
   Ages ages_;
   mutable std::mutex mutex_;  // guards inputs_, for moments only

@@ -37,6 +37,37 @@ void describe(CLI::App& app, Arguments& arguments) {
          "HOST:PORT; empty: nowhere")
       ->envname("LPDEFORM_ADMIN_ADDRESS")
       ->capture_default_str();
+  app.add_option("--tls-cert", server.tls.certificate_chain,
+                 "Serve with TLS: the certificate chain, in PEM; read again every minute")
+      ->envname("LPDEFORM_TLS_CERT");
+  app.add_option("--tls-key", server.tls.private_key, "The certificate's private key, in PEM")
+      ->envname("LPDEFORM_TLS_KEY");
+  app.add_option("--tls-client-ca", server.tls.client_authorities,
+                 "Let in only clients with a certificate that one of these signed, in PEM (mutual TLS)")
+      ->envname("LPDEFORM_TLS_CLIENT_CA");
+  app.add_option("--token-keys", server.token_keys_file,
+                 "Let in only callers with a bearer token (JWT) that one of these public keys signed, in "
+                 "PEM; read again "
+                 "when it changes")
+      ->envname("LPDEFORM_TOKEN_KEYS");
+  app.add_option("--token-issuer", server.token_issuer, "What the tokens' \"iss\" must be (not looked at)")
+      ->envname("LPDEFORM_TOKEN_ISSUER");
+  app.add_option("--token-audience", server.token_audience,
+                 "What the tokens' \"aud\" must have in it (not looked at)")
+      ->envname("LPDEFORM_TOKEN_AUDIENCE");
+  app.add_flag("--allow-anonymous", server.allow_anonymous,
+               "Without --token-keys and --tls-client-ca, serve other machines, too: whoever reaches the "
+               "address is let "
+               "in")
+      ->envname("LPDEFORM_ALLOW_ANONYMOUS");
+  app.add_option("--max-connections", server.max_connections,
+                 "Connections at a time, 1 to 10^6; more are closed at once")
+      ->envname("LPDEFORM_MAX_CONNECTIONS")
+      ->capture_default_str();
+  app.add_option("--max-sessions-per-caller", server.max_sessions_per_caller,
+                 "Sessions of one caller at a time, where callers are told apart; 0: without limit")
+      ->envname("LPDEFORM_MAX_SESSIONS_PER_CALLER")
+      ->capture_default_str();
   app.add_option("--threads", server.threads, "Threads that one solve may use; 0: all cores")
       ->envname("LPDEFORM_THREADS")
       ->check(CLI::Range(0, 1024))
@@ -48,6 +79,24 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->capture_default_str();
   app.add_option("--max-sessions", server.max_sessions, "Sessions at a time")
       ->envname("LPDEFORM_MAX_SESSIONS")
+      ->capture_default_str();
+  app.add_option("--max-streams-per-session", server.max_streams_per_session,
+                 "Streams of one session at a time")
+      ->envname("LPDEFORM_MAX_STREAMS_PER_SESSION")
+      ->capture_default_str();
+  app.add_option("--max-handles", server.max_handles, "Handles of one session")
+      ->envname("LPDEFORM_MAX_HANDLES")
+      ->capture_default_str();
+  app.add_option("--max-uploads", server.max_uploads, "Uploads at a time")
+      ->envname("LPDEFORM_MAX_UPLOADS")
+      ->capture_default_str();
+  app.add_option("--max-calls-waiting", server.max_calls_waiting,
+                 "Calls that wait for a thread to look at them")
+      ->envname("LPDEFORM_MAX_CALLS_WAITING")
+      ->capture_default_str();
+  app.add_option("--max-calls-per-connection", server.max_calls_per_connection,
+                 "Calls on one connection at a time, streams included; more wait in the client")
+      ->envname("LPDEFORM_MAX_CALLS_PER_CONNECTION")
       ->capture_default_str();
   app.add_option("--max-vertices", server.max_vertices, "Vertices of one mesh; of faces, three times as many")
       ->envname("LPDEFORM_MAX_VERTICES")
@@ -93,7 +142,8 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->check(CLI::IsMember({"debug", "info", "warning", "error", "off"}))
       ->capture_default_str();
   app.add_option("--healthcheck", arguments.probed,
-                 "Asks the server at this address for its health and exits: 0 where it serves, 1 where not")
+                 "Asks the server at this address for its health and exits: 0 where it serves, 1 where not; "
+                 "http://HOST:PORT asks its admin port, which needs no certificate")
       ->type_name("ADDRESS");
 }
 

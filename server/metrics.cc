@@ -36,6 +36,9 @@ constexpr std::array kCounts{
     Entry{"lpdeform_frame_bytes_total", "Bytes of positions, distortion and normals in frames sent."},
     Entry{"lpdeform_credit_stalls_total", "Times that a frame had to wait for a reader's credit."},
     Entry{"lpdeform_sessions_created_total", "Sessions made."},
+    Entry{"lpdeform_connections_total", "Connections taken."},
+    Entry{"lpdeform_connections_refused_total",
+          "Connections closed at once for want of room (--max-connections)."},
 };
 constexpr std::array kLevels{
     Entry{"lpdeform_sessions", "Sessions held."},

@@ -17,6 +17,8 @@ enum class Count {
   kFrameBytes,        // of the numbers in frames sent
   kCreditStalls,      // a reader had to give credit back before it could be sent the frame that waits
   kSessionsCreated,
+  kConnections,         // taken
+  kConnectionsRefused,  // for want of room
 };
 
 /// What has a value at each moment.

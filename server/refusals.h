@@ -12,7 +12,7 @@ inline absl::Status server_draining() {
 /// RESOURCE_EXHAUSTED SERVER_BUSY.
 inline absl::Status server_busy() {
   return make_fault(absl::StatusCode::kResourceExhausted, {"SERVER_BUSY", "calls", ""},
-                    "The server has too many calls waiting.");
+                    "The server has too many calls waiting; try again later.");
 }
 
 }  // namespace lpdeform

@@ -12,13 +12,14 @@ namespace lpdeform {
 Registry::Registry(std::shared_ptr<Timers> timers, Limits limits)
     : timers_(std::move(timers)), limits_(limits) {}
 
-bool Registry::begin_creation(const std::string& request_id, OnCreated on_created, std::size_t fingerprint) {
+bool Registry::begin_creation(const std::string& request_id, OnCreated on_created, std::size_t fingerprint,
+                              const std::string& owner) {
   if (absl::Status status = check_request_id(request_id); !status.ok()) {
     on_created(status);
     return false;
   }
   std::unique_lock lock(mutex_);
-  if (const auto known = requests_.find(request_id); known != requests_.end()) {
+  if (const auto known = requests_.find({owner, request_id}); known != requests_.end()) {
     if (known->second.fingerprint != fingerprint) {
       lock.unlock();
       on_created(request_id_reused());
@@ -34,25 +35,45 @@ bool Registry::begin_creation(const std::string& request_id, OnCreated on_create
     on_created(created);
     return false;
   }
-  if (sessions_.size() + being_made_ >= limits_.most_sessions) {
+  if (absl::Status status = check_room(owner); !status.ok()) {
     lock.unlock();
-    on_created(
-        make_fault(absl::StatusCode::kResourceExhausted,
-                   {"SESSIONS_FULL", "sessions", absl::StrCat("sessions <= ", limits_.most_sessions)},
-                   absl::StrCat("The server has all of its ", limits_.most_sessions, " sessions in use.")));
+    on_created(status);
     return false;
   }
   ++being_made_;
+  ++held_[owner];
   if (!request_id.empty()) {
-    Request& made = requests_[request_id];
+    Request& made = requests_[{owner, request_id}];
     made.fingerprint = fingerprint;
     made.waiting.push_back(std::move(on_created));
   }
   return true;
 }
 
+absl::Status Registry::check_room(const std::string& owner) const {
+  if (sessions_.size() + being_made_ >= limits_.most_sessions) {
+    return make_fault(absl::StatusCode::kResourceExhausted,
+                      {"SESSIONS_FULL", "sessions", absl::StrCat("sessions <= ", limits_.most_sessions)},
+                      absl::StrCat("The server has all of its ", limits_.most_sessions,
+                                   " sessions in use; try again later."));
+  }
+  const auto held = held_.find(owner);
+  if (owner.empty() || limits_.most_each == 0 || held == held_.end() || held->second < limits_.most_each) {
+    return absl::OkStatus();
+  }
+  return make_fault(absl::StatusCode::kResourceExhausted,
+                    {"CALLER_SESSIONS_FULL", "sessions", absl::StrCat("sessions <= ", limits_.most_each)},
+                    absl::StrCat("The caller has all of the ", limits_.most_each,
+                                 " sessions that one caller may have; delete one first."));
+}
+
+void Registry::give_up_place(const std::string& owner) {
+  const auto held = held_.find(owner);
+  if (--held->second == 0) held_.erase(held);
+}
+
 void Registry::finish_creation(const std::string& request_id, absl::StatusOr<std::shared_ptr<Session>> made,
-                               const OnCreated& on_created) {
+                               const OnCreated& on_created, const std::string& owner) {
   absl::StatusOr<CreatedSession> created =
       made.ok() ? absl::StatusOr<CreatedSession>(CreatedSession{*made, (*made)->lease().token})
                 : made.status();
@@ -61,15 +82,16 @@ void Registry::finish_creation(const std::string& request_id, absl::StatusOr<std
     const std::scoped_lock lock(mutex_);
     --being_made_;
     if (!request_id.empty()) {
-      Request& request = requests_[request_id];
+      Request& request = requests_[{owner, request_id}];
       waiting.swap(request.waiting);
       if (made.ok()) {
         request.name = (*made)->name();
         request.writer_token = created->writer_token;
       } else {
-        requests_.erase(request_id);
+        requests_.erase({owner, request_id});
       }
     }
+    if (!made.ok()) give_up_place(owner);
     if (made.ok()) {
       const std::string& name = (*made)->name();
       sessions_[name] = {*made, request_id, ++numbers_};
@@ -81,11 +103,12 @@ void Registry::finish_creation(const std::string& request_id, absl::StatusOr<std
   for (const OnCreated& one : waiting) one(created);
 }
 
-absl::StatusOr<std::shared_ptr<Session>> Registry::find(const std::string& name) const {
+absl::StatusOr<std::shared_ptr<Session>> Registry::find(const std::string& name,
+                                                        const std::string& owner) const {
   {
     const std::scoped_lock lock(mutex_);
     const auto found = sessions_.find(name);
-    if (found != sessions_.end()) {
+    if (found != sessions_.end() && found->second.session->owner() == owner) {
       found->second.session->touch();
       return found->second.session;
     }
@@ -94,7 +117,8 @@ absl::StatusOr<std::shared_ptr<Session>> Registry::find(const std::string& name)
                     "There is no such session; it may have expired or been deleted.");
 }
 
-absl::StatusOr<Registry::Page> Registry::list(std::size_t most, const std::string& page_token) const {
+absl::StatusOr<Registry::Page> Registry::list(std::size_t most, const std::string& page_token,
+                                              const std::string& owner) const {
   std::uint64_t before = 0;
   if (!page_token.empty() && !absl::SimpleAtoi(page_token, &before)) {
     return invalid_input({"PAGE_TOKEN", "page_token", ""},
@@ -103,11 +127,18 @@ absl::StatusOr<Registry::Page> Registry::list(std::size_t most, const std::strin
   const std::scoped_lock lock(mutex_);
   Page page;
   auto entry = page_token.empty() ? by_age_.end() : by_age_.lower_bound(before);
-  while (entry != by_age_.begin() && page.sessions.size() < most) {
+  std::uint64_t last = 0;  // the number of the page's last
+  while (entry != by_age_.begin()) {
     --entry;
-    page.sessions.push_back(sessions_.at(entry->second).session);
+    const std::shared_ptr<Session>& session = sessions_.at(entry->second).session;
+    if (session->owner() != owner) continue;
+    if (page.sessions.size() == most) {
+      page.next_page_token = absl::StrCat(last);
+      break;
+    }
+    last = entry->first;
+    page.sessions.push_back(session);
   }
-  if (entry != by_age_.begin() && !page.sessions.empty()) page.next_page_token = absl::StrCat(entry->first);
   return page;
 }
 
@@ -119,7 +150,8 @@ bool Registry::remove(const std::string& name, EndReason reason, const std::stri
     if (found == sessions_.end()) return false;
     session = found->second.session;
     by_age_.erase(found->second.number);
-    requests_.erase(found->second.request_id);
+    requests_.erase({session->owner(), found->second.request_id});
+    give_up_place(session->owner());
     sessions_.erase(found);
   }
   session->close(reason, text);
@@ -142,6 +174,7 @@ void Registry::clear(EndReason reason, const std::string& text) {
     const std::scoped_lock lock(mutex_);
     all.swap(sessions_);
     by_age_.clear();
+    for (const auto& [name, entry] : all) give_up_place(entry.session->owner());
     std::erase_if(requests_, [](const auto& request) { return !request.second.name.empty(); });
   }
   for (const auto& [name, entry] : all) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -29,6 +30,7 @@ class Registry : public std::enable_shared_from_this<Registry> {
   struct Limits {
     std::size_t most_sessions;
     Timers::Duration idle;
+    std::size_t most_each = 0;  // of one owner; 0: without limit. Not for the owner "", who is everybody
   };
 
   Registry(std::shared_ptr<Timers> timers, Limits limits);
@@ -36,24 +38,26 @@ class Registry : public std::enable_shared_from_this<Registry> {
   /// Claims a place for a session to be made. True where the caller is to make it and then call
   /// finish_creation() with the same request_id; `on_created` hears how that went. False where `on_created`
   /// is or will be called without the caller's doing: the session exists, another caller is making it, or an
-  /// error (INVALID_ARGUMENT REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED SESSIONS_FULL). `fingerprint`
+  /// error (INVALID_ARGUMENT REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED SESSIONS_FULL, CALLER_SESSIONS_FULL). `fingerprint`
   /// differs for requests that differ: the same request_id with another one is refused.
-  bool begin_creation(const std::string& request_id, OnCreated on_created, std::size_t fingerprint = 0);
+  bool begin_creation(const std::string& request_id, OnCreated on_created, std::size_t fingerprint = 0,
+                      const std::string& owner = "");
 
   /// Enters the session, or gives its place up. With an empty request_id, tells `on_created` alone.
   void finish_creation(const std::string& request_id, absl::StatusOr<std::shared_ptr<Session>> made,
-                       const OnCreated& on_created);
+                       const OnCreated& on_created, const std::string& owner = "");
 
-  /// NOT_FOUND SESSION_UNKNOWN. Counts as use.
-  absl::StatusOr<std::shared_ptr<Session>> find(const std::string& name) const;
+  /// NOT_FOUND SESSION_UNKNOWN, also where it is somebody else's. Counts as use.
+  absl::StatusOr<std::shared_ptr<Session>> find(const std::string& name, const std::string& owner = "") const;
 
-  /// Newest first, at most `most`, those after `page_token` (empty: from the beginning), with the token of
+  /// The owner's, newest first, at most `most`, those after `page_token` (empty: from the beginning), with the token of
   /// the next page (empty: there is none). INVALID_ARGUMENT PAGE_TOKEN.
   struct Page {
     std::vector<std::shared_ptr<Session>> sessions;
     std::string next_page_token;
   };
-  absl::StatusOr<Page> list(std::size_t most, const std::string& page_token) const;
+  absl::StatusOr<Page> list(std::size_t most, const std::string& page_token,
+                            const std::string& owner = "") const;
 
   /// Closes and forgets the session; false where there is none.
   bool remove(const std::string& name, EndReason reason, const std::string& text);
@@ -84,13 +88,16 @@ class Registry : public std::enable_shared_from_this<Registry> {
   };
   void watch(const std::string& name, Timers::TimePoint when);
   void expire(const std::string& name);
+  absl::Status check_room(const std::string& owner) const;
+  void give_up_place(const std::string& owner);
 
   const std::shared_ptr<Timers> timers_;
   const Limits limits_;
   mutable std::mutex mutex_;
   std::map<std::string, Entry> sessions_;
-  std::map<std::uint64_t, std::string> by_age_;  // names, by their numbers
-  std::map<std::string, Request> requests_;
+  std::map<std::uint64_t, std::string> by_age_;                      // names, by their numbers
+  std::map<std::pair<std::string, std::string>, Request> requests_;  // by owner and request_id
+  std::map<std::string, std::size_t> held_;  // sessions of each owner, those being made included
   std::size_t being_made_ = 0;
   std::uint64_t numbers_ = 0;
 };

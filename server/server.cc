@@ -10,20 +10,24 @@
 #include <thread>
 #include <utility>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "server/admin.h"
 #include "server/backend.h"
 #include "server/health_probe.h"
+#include "server/listener.h"
 #include "server/service.h"
+#include "server/tokens.h"
+#include "server/transport_security.h"
 #include "server/vital_signs.h"
 
 namespace lpdeform {
 namespace {
 
-constexpr int kMostCallsAConnection = 256;
 constexpr int kKeepaliveMs = 30'000;
+/// Until a new connection has to have spoken HTTP/2, TLS included.
+constexpr int kHandshakeMs = 20'000;
+constexpr std::chrono::seconds kAcceptPatience{5};
 /// Between the last answer and the end of the connections: who writes to a connection that has ended loses what he
 /// has not read of it yet, the reason for its end among that.
 constexpr std::chrono::milliseconds kLinger{100};
@@ -43,6 +47,17 @@ absl::Status check(const ServerOptions& options) {
   if (!(options.max_stream_bytes_per_second >= 0) || std::isinf(options.max_stream_bytes_per_second)) {
     return out_of_range("max_stream_bytes_per_second", "finite and >= 0");
   }
+  for (const auto& [name, value] :
+       {std::pair("max_sessions", options.max_sessions),
+        std::pair("max_streams_per_session", options.max_streams_per_session),
+        std::pair("max_handles", options.max_handles), std::pair("max_uploads", options.max_uploads),
+        std::pair("max_calls_waiting", options.max_calls_waiting),
+        std::pair("max_calls_per_connection", options.max_calls_per_connection)}) {
+    if (value == 0 || value > 1'000'000) return out_of_range(name, "1 to 10^6");
+  }
+  if (options.max_connections == 0 || options.max_connections > 1'000'000) {
+    return out_of_range("max_connections", "1 to 10^6");
+  }
   if (options.heartbeat.count() <= 0) return out_of_range("heartbeat", "more than 0");
   if (options.session_idle.count() <= 0) return out_of_range("session_idle", "more than 0");
   if (options.upload_idle.count() <= 0) return out_of_range("upload_idle", "more than 0");
@@ -61,28 +76,74 @@ void prepare_grpc() {
   });
 }
 
-/// The address with the port that was found in place of a port 0.
-std::string with_port(const std::string& address, int port) {
-  if (absl::StartsWith(address, "unix:")) return address;
-  return absl::StrCat(address.substr(0, address.rfind(':')), ":", port);
+bool tells_callers_apart(const ServerOptions& options) {
+  return !options.token_keys_file.empty() || options.tls.knows_clients();
+}
+
+absl::Status check_anonymous(const ServerOptions& options, const Listener& listener) {
+  if (tells_callers_apart(options) || options.allow_anonymous || listener.is_local()) return absl::OkStatus();
+  return invalid_input(
+      {"ANONYMOUS_ADDRESS", options.address, "loopback or unix"},
+      absl::StrCat("Without authentication the server listens for this machine alone, not on ",
+                   options.address,
+                   "; give --token-keys or --tls-client-ca, or --allow-anonymous to let everybody in."));
+}
+
+/// Empty where callers need no token.
+absl::StatusOr<std::unique_ptr<Tokens>> make_tokens(const ServerOptions& options) {
+  if (options.token_keys_file.empty()) return nullptr;
+  return Tokens::create({options.token_keys_file, options.token_issuer, options.token_audience});
+}
+
+void warn_of_what_is_open(const ServerOptions& options, const Listener& listener, const Log& log) {
+  if (!tells_callers_apart(options)) {
+    log.warning("no_authentication",
+                {{"address", listener.address()},
+                 {"text", listener.is_local() ? "Whoever is on this machine is let in."
+                                              : "Whoever reaches the address is let in."}});
+  } else if (!options.tls.is_on() && !listener.is_local()) {
+    log.warning("no_encryption", {{"address", listener.address()},
+                                  {"text", "Tokens travel in the open unless a proxy adds TLS."}});
+  }
+}
+
+/// Whether the listener takes a connection made now. That gRPC then answers is not tried: with TLS that would need
+/// certificates of a client.
+bool takes_connection(const Listener& listener) {
+  const std::uint64_t before = listener.accepted();
+  const auto channel = grpc::CreateChannel(listener.address(), grpc::InsecureChannelCredentials());
+  channel->GetState(true);
+  const auto end = std::chrono::steady_clock::now() + kAcceptPatience;
+  while (listener.accepted() == before && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return listener.accepted() != before;
 }
 
 }  // namespace
 
 struct Server::Impl {
-  explicit Impl(const ServerOptions& options)
-      : backend(options),
+  Impl(const ServerOptions& options, std::unique_ptr<Listener> to_take_from, std::unique_ptr<Tokens> tokens)
+      : listener(std::move(to_take_from)),
+        backend(options, std::move(tokens)),
         service(backend),
-        vital_signs({[this] { return is_serving(address); }, [this] { return backend.gate.is_closed(); },
-                     backend.scheduler, backend.pool}) {}
+        vital_signs({[this, is_plain = !options.tls.is_on()] {
+                       return is_plain ? is_serving(listener->address()) : takes_connection(*listener);
+                     },
+                     [this] { return backend.gate.is_closed(); }, backend.scheduler, backend.pool}) {}
+
+  absl::Status start_grpc(const ServerOptions& options,
+                          const std::shared_ptr<grpc::ServerCredentials>& credentials);
+  void start_listening(const ServerOptions& options);
 
   absl::Status start_admin(const std::string& at);
 
+  const std::unique_ptr<Listener> listener;
   Backend backend;
   Service service;
   const VitalSigns vital_signs;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
   std::unique_ptr<grpc::Server> grpc_server;
-  std::string address;
   std::mutex draining;
   bool is_drained = false;
   std::unique_ptr<Admin> admin;  // last, so that its threads end first
@@ -107,32 +168,65 @@ absl::Status Server::Impl::start_admin(const std::string& at) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& options) {
-  if (absl::Status status = check(options); !status.ok()) return status;
-  prepare_grpc();
-  auto impl = std::make_unique<Impl>(options);
-  int port = 0;
+absl::Status Server::Impl::start_grpc(const ServerOptions& options,
+                                      const std::shared_ptr<grpc::ServerCredentials>& credentials) {
   grpc::ServerBuilder builder;
-  builder.AddListeningPort(options.address, grpc::InsecureServerCredentials(), &port);
-  builder.RegisterService(&impl->service);
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // a port that is taken is an error
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMostCallsAConnection);
+  acceptor = builder.experimental().AddExternalConnectionAcceptor(
+      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, credentials);
+  builder.RegisterService(&service);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
+                             static_cast<int>(options.max_calls_per_connection));
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kKeepaliveMs / 3);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
   // Probing grows windows until seconds of frames hide in them, behind the credits' back.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
-  impl->grpc_server = builder.BuildAndStart();
-  if (impl->grpc_server == nullptr || (port == 0 && !absl::StartsWith(options.address, "unix:"))) {
-    return make_fault(absl::StatusCode::kUnavailable, {"ADDRESS_NOT_BOUND", options.address, ""},
-                      absl::StrCat("The server cannot listen on ", options.address, "; is it taken?"));
+  grpc_server = builder.BuildAndStart();
+  if (grpc_server == nullptr) return absl::InternalError("gRPC did not start.");
+  grpc_server->GetHealthCheckService()->SetServingStatus(v1::DeformService::service_full_name(), true);
+  return absl::OkStatus();
+}
+
+void Server::Impl::start_listening(const ServerOptions& options) {
+  Listener::Events events;
+  events.on_connection = [this](int listener_fd, int fd) {
+    backend.metrics->add(Count::kConnections);
+    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
+    parameters.listener_fd = listener_fd;
+    parameters.fd = fd;
+    acceptor->HandleNewConnection(&parameters);
+  };
+  events.on_refused = [this] { backend.metrics->add(Count::kConnectionsRefused); };
+  const std::size_t most = listener->start(options.max_connections, std::move(events));
+  if (most < options.max_connections) {
+    backend.log().warning("few_descriptors", {{"connections", std::uint64_t{most}},
+                                              {"text", "Raise the limit of descriptors (ulimit -n)."}});
   }
-  impl->grpc_server->GetHealthCheckService()->SetServingStatus(v1::DeformService::service_full_name(), true);
-  impl->address = with_port(options.address, port);
+}
+
+absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& options) {
+  if (absl::Status status = check(options); !status.ok()) return status;
+  const auto credentials = make_credentials(options.tls);
+  if (!credentials.ok()) return credentials.status();
+  auto tokens = make_tokens(options);
+  if (!tokens.ok()) return tokens.status();
+  auto listener = Listener::bind(options.address);
+  if (!listener.ok()) return listener.status();
+  if (absl::Status status = check_anonymous(options, **listener); !status.ok()) return status;
+  prepare_grpc();
+  auto impl = std::make_unique<Impl>(options, *std::move(listener), *std::move(tokens));
+  if (absl::Status status = impl->start_grpc(options, *credentials); !status.ok()) return status;
+  impl->start_listening(options);
+  auto server = std::unique_ptr<Server>(new Server(std::move(impl)));
+  const Log& log = server->impl_->backend.log();
   if (!options.admin_address.empty()) {
-    if (absl::Status status = impl->start_admin(options.admin_address); !status.ok()) return status;
+    if (absl::Status status = server->impl_->start_admin(options.admin_address); !status.ok()) return status;
   }
-  impl->backend.log().info("started", {{"address", impl->address}});
-  return std::unique_ptr<Server>(new Server(std::move(impl)));
+  log.info("started", {{"address", server->address()},
+                       {"tls", std::string(options.tls.is_on() ? "on" : "off")},
+                       {"tokens", std::string(options.token_keys_file.empty() ? "off" : "on")}});
+  warn_of_what_is_open(options, *server->impl_->listener, log);
+  return server;
 }
 
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -142,7 +236,7 @@ Server::~Server() {
 }
 
 const std::string& Server::address() const {
-  return impl_->address;
+  return impl_->listener->address();
 }
 
 std::string Server::admin_address() const {
@@ -161,6 +255,7 @@ void Server::drain(std::chrono::milliseconds grace) {
   backend.gate.wait_until_empty(std::chrono::steady_clock::now() + grace);
   std::this_thread::sleep_for(std::min(grace, kLinger));
   backend.registry->clear(EndReason::kDraining, text);
+  impl_->listener->stop();
   impl_->grpc_server->Shutdown(std::chrono::system_clock::now());  // cancels what is still under way
   impl_->grpc_server->Wait();
   backend.gate.wait_until_empty(std::chrono::steady_clock::time_point::max());

@@ -8,7 +8,10 @@
 
 #include "absl/status/statusor.h"
 #include "server/log.h"
+#include "server/session.h"
 #include "server/timers.h"
+#include "server/tls_files.h"
+#include "server/upload.h"
 
 namespace lpdeform {
 
@@ -19,12 +22,28 @@ struct ServerOptions {
   /// "host:port" of the admin port, with /metrics, /healthz and /livez over plain HTTP; empty: none.
   std::string admin_address = {};
 
+  TlsFiles tls = {};
+  /// Where set, calls need a bearer token: see Tokens. Read again when it changes.
+  std::string token_keys_file = {};
+  std::string token_issuer = {};
+  std::string token_audience = {};
+  /// Without tokens and client certificates, whoever reaches the server is let in. Unless this is set, it then serves
+  /// only addresses that only this machine reaches.
+  bool allow_anonymous = false;
+
   /// Threads that one solve may use; 0 takes all cores.
   int threads = 0;
   /// Threads that sessions take turns on, at least 2; 0 takes max(4, 2 * cores).
   int runner_threads = 0;
 
+  std::size_t max_connections = 4096;
   std::size_t max_sessions = 256;
+  std::size_t max_sessions_per_caller = 64;  // where callers are told apart; 0: without limit
+  std::size_t max_streams_per_session = SessionLimits().streams;
+  std::size_t max_handles = SessionLimits().handles;  // of one session
+  std::size_t max_uploads = Uploads::kMostUploads;
+  std::size_t max_calls_waiting = 4096;          // for a thread that looks at them
+  std::size_t max_calls_per_connection = 256;    // at a time; streams are calls
   std::uint32_t max_vertices = 2'000'000;        // of one mesh; of faces, three times as many
   std::size_t max_bytes = std::size_t{8} << 30;  // of all sessions and uploads together, by our own count
   std::uint64_t max_upload_bytes = std::uint64_t{256} << 20;  // of one upload
@@ -45,7 +64,8 @@ struct ServerOptions {
 /// The service, running: from start() until drain() or the destructor. Thread-safe.
 class Server {
  public:
-  /// Errors: INVALID_ARGUMENT OPTION_OUT_OF_RANGE; UNAVAILABLE ADDRESS_NOT_BOUND.
+  /// Errors: INVALID_ARGUMENT OPTION_OUT_OF_RANGE, ANONYMOUS_ADDRESS, TLS_FILES, TOKEN_KEYS; UNAVAILABLE
+  /// ADDRESS_NOT_BOUND.
   static absl::StatusOr<std::unique_ptr<Server>> start(const ServerOptions& options);
 
   /// Drains, waiting for nobody.

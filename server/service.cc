@@ -28,6 +28,13 @@ std::shared_ptr<CallRecord> begin_record(Backend& backend, const grpc::CallbackS
   const std::string trace_parent = text_of(context, "traceparent");
   CallContext call;
   if (trace_parent.size() <= kLongestTraceParent) call.trace_id = trace_id_of(trace_parent);
+  call.authorization = text_of(context, "authorization");
+  if (const auto auth = context.auth_context(); auth && auth->IsPeerAuthenticated()) {
+    for (const grpc::string_ref& name : auth->GetPeerIdentity()) {
+      call.peer_identity.assign(name.data(), name.size());
+      break;
+    }
+  }
   return backend.begin_record(absl::StrCat(v1::DeformService::service_full_name(), "/",
                                            absl::string_view(method.data(), method.size())),
                               std::move(call));

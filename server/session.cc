@@ -33,10 +33,10 @@ absl::Status gone(const std::string& name) {
                     absl::StrCat("There is no ", name, "."));
 }
 
-absl::Status too_many_streams() {
-  return make_fault(absl::StatusCode::kResourceExhausted,
-                    {"STREAMS_FULL", "streams", absl::StrCat("streams <= ", Session::kMostStreams)},
-                    absl::StrCat("The session has all of its ", Session::kMostStreams, " streams in use."));
+absl::Status too_many_streams(std::size_t most) {
+  return make_fault(
+      absl::StatusCode::kResourceExhausted, {"STREAMS_FULL", "streams", absl::StrCat("streams <= ", most)},
+      absl::StrCat("The session has all of its ", most, " streams in use; end one, or try again later."));
 }
 
 absl::Status ended_by(EndReason reason, const std::string& text) {
@@ -64,6 +64,7 @@ absl::StatusOr<std::shared_ptr<Session>> Session::create(SessionParts parts, Ses
 Session::Session(SessionParts parts, SessionServices services)
     : Runnable(parts.shape->vertex_count() > kHeavyVertices),
       name_(std::move(parts.name)),
+      owner_(std::move(parts.owner)),
       shape_(std::move(parts.shape)),
       mesh_(parts.mesh ? std::move(parts.mesh) : std::make_shared<const DrawMesh>(shape_)),
       features_(parts.features ? std::move(parts.features) : std::make_shared<ShapeFeatures>(shape_)),
@@ -71,7 +72,7 @@ Session::Session(SessionParts parts, SessionServices services)
       services_(std::move(services)),
       created_unix_ms_(unix_ms_now()),
       last_used_(services_.timers->now()),
-      mailbox_(shape_, mesh_->weld()),
+      mailbox_(shape_, mesh_->weld(), services_.limits.handles),
       publisher_(std::make_shared<Publisher>(services_.metrics)),
       memory_(std::move(parts.memory)),
       memory_bytes_(memory_.bytes()),
@@ -181,7 +182,8 @@ absl::StatusOr<std::shared_ptr<FrameStream>> Session::open_stream(const std::str
     }
     stream = std::make_shared<FrameStream>(options, publisher_, services_.timers, services_.heartbeat,
                                            OpenedNote{epoch_, mailbox_.newest().input_seq});
-    if (publisher_->reader_count() >= kMostStreams) return too_many_streams();
+    if (publisher_->reader_count() >= services_.limits.streams)
+      return too_many_streams(services_.limits.streams);
     if (!publisher_->add(stream)) return is_draining_ && !is_closed_ ? server_draining() : gone(name_);
     std::erase_if(writers_, [](const auto& weak) { return weak.expired(); });
     if (!token.empty()) writers_.push_back(stream);

@@ -26,6 +26,7 @@ namespace lpdeform {
 /// What a session is made of.
 struct SessionParts {
   std::string name;
+  std::string owner = {};  // the subject of the caller that made it
   std::shared_ptr<const RestShape> shape;
   std::shared_ptr<const ShapeFeatures> features = nullptr;  // of `shape`; made where left out
   std::unique_ptr<Deformer> deformer;
@@ -35,12 +36,19 @@ struct SessionParts {
   Reservation memory;  // the estimate that it was admitted with
 };
 
+/// What one session may have.
+struct SessionLimits {
+  std::size_t streams = 256;
+  std::size_t handles = Mailbox::kMostHandles;
+};
+
 /// What everybody's sessions share.
 struct SessionServices {
   Scheduler& scheduler;
   std::shared_ptr<Timers> timers;
   Timers::Duration heartbeat;
   std::shared_ptr<Metrics> metrics = std::make_shared<Metrics>();
+  SessionLimits limits = {};
 };
 
 /// What GetSession tells.
@@ -72,6 +80,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   static absl::StatusOr<std::shared_ptr<Session>> create(SessionParts parts, SessionServices services);
 
   const std::string& name() const { return name_; }
+  const std::string& owner() const { return owner_; }
   /// The client's.
   std::uint32_t vertex_count() const { return mesh_->vertex_count(); }
   const DrawMesh& mesh() const { return *mesh_; }
@@ -118,8 +127,6 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
 
   bool run() override;
 
-  static constexpr std::size_t kMostStreams = 256;
-
  private:
   Session(SessionParts parts, SessionServices services);
   absl::Status check_writer_locked(const std::string& token) const;
@@ -128,6 +135,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   std::shared_ptr<SolveJob> job() const;
 
   const std::string name_;
+  const std::string owner_;
   const std::shared_ptr<const RestShape> shape_;
   const std::shared_ptr<const DrawMesh> mesh_;
   const std::shared_ptr<const ShapeFeatures> features_;

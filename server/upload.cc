@@ -19,11 +19,13 @@ absl::Status check_request_id(const std::string& request_id) {
       absl::StrCat("The request_id has ", request_id.size(), " bytes; it may be empty or have 8 to 64."));
 }
 
-Upload::Upload(std::string name, std::uint64_t size_bytes, std::uint32_t crc32c, Reservation memory)
+Upload::Upload(std::string name, std::uint64_t size_bytes, std::uint32_t crc32c, Reservation memory,
+               std::string owner)
     : name_(std::move(name)),
       size_(size_bytes),
       crc32c_(crc32c),
       memory_(std::move(memory)),
+      owner_(std::move(owner)),
       data_(std::make_unique_for_overwrite<char[]>(size_bytes)) {}
 
 absl::StatusOr<UploadProgress> Upload::add(std::uint64_t offset, std::string_view data) {
@@ -86,7 +88,8 @@ Uploads::Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers,
     : budget_(std::move(budget)), timers_(std::move(timers)), limits_(limits) {}
 
 absl::StatusOr<std::shared_ptr<Upload>> Uploads::create(const std::string& request_id,
-                                                        std::uint64_t size_bytes, std::uint32_t crc32c) {
+                                                        std::uint64_t size_bytes, std::uint32_t crc32c,
+                                                        const std::string& owner) {
   if (absl::Status status = check_request_id(request_id); !status.ok()) return status;
   if (size_bytes == 0 || size_bytes > limits_.most_bytes_each) {
     return invalid_input({"UPLOAD_SIZE", "size_bytes", absl::StrCat("1 to ", limits_.most_bytes_each)},
@@ -94,30 +97,31 @@ absl::StatusOr<std::shared_ptr<Upload>> Uploads::create(const std::string& reque
                                       limits_.most_bytes_each, "."));
   }
   const std::scoped_lock lock(mutex_);
-  if (const auto known = requested_.find(request_id); known != requested_.end()) {
+  if (const auto known = requested_.find({owner, request_id}); known != requested_.end()) {
     const std::shared_ptr<Upload>& upload = uploads_[known->second].upload;
     if (upload->size() == size_bytes && upload->crc32c() == crc32c) return upload;
     return request_id_reused();
   }
-  if (uploads_.size() >= kMostUploads) {
+  if (uploads_.size() >= limits_.most_uploads) {
     return make_fault(absl::StatusCode::kResourceExhausted,
-                      {"UPLOADS_FULL", "uploads", absl::StrCat("uploads <= ", kMostUploads)},
-                      absl::StrCat("The server has all of its ", kMostUploads, " uploads in use."));
+                      {"UPLOADS_FULL", "uploads", absl::StrCat("uploads <= ", limits_.most_uploads)},
+                      absl::StrCat("The server has all of its ", limits_.most_uploads,
+                                   " uploads in use; delete those that have served, or try again later."));
   }
   absl::StatusOr<Reservation> memory = budget_->reserve(size_bytes);
   if (!memory.ok()) return memory.status();
   auto upload = std::make_shared<Upload>(absl::StrCat("uploads/", random_hex_128()), size_bytes, crc32c,
-                                         *std::move(memory));
+                                         *std::move(memory), owner);
   uploads_[upload->name()] = {upload, request_id, timers_->now()};
-  if (!request_id.empty()) requested_[request_id] = upload->name();
+  if (!request_id.empty()) requested_[{owner, request_id}] = upload->name();
   watch(upload->name(), timers_->now() + limits_.idle);
   return upload;
 }
 
-absl::StatusOr<std::shared_ptr<Upload>> Uploads::find(const std::string& name) {
+absl::StatusOr<std::shared_ptr<Upload>> Uploads::find(const std::string& name, const std::string& owner) {
   const std::scoped_lock lock(mutex_);
   const auto found = uploads_.find(name);
-  if (found != uploads_.end()) {
+  if (found != uploads_.end() && found->second.upload->owner() == owner) {
     found->second.last_used = timers_->now();
     return found->second.upload;
   }
@@ -125,9 +129,10 @@ absl::StatusOr<std::shared_ptr<Upload>> Uploads::find(const std::string& name) {
                     "There is no such upload; it may have expired.");
 }
 
-void Uploads::remove(const std::string& name) {
+void Uploads::remove(const std::string& name, const std::string& owner) {
   const std::scoped_lock lock(mutex_);
-  if (const auto found = uploads_.find(name); found != uploads_.end()) forget(found);
+  const auto found = uploads_.find(name);
+  if (found != uploads_.end() && found->second.upload->owner() == owner) forget(found);
 }
 
 std::size_t Uploads::size() const {
@@ -136,7 +141,7 @@ std::size_t Uploads::size() const {
 }
 
 void Uploads::forget(std::map<std::string, Entry>::iterator entry) {
-  requested_.erase(entry->second.request_id);
+  requested_.erase({entry->second.upload->owner(), entry->second.request_id});
   uploads_.erase(entry);
 }
 

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "absl/status/statusor.h"
 #include "server/budget.h"
@@ -23,9 +24,12 @@ struct UploadProgress {
 /// Bytes that come in parts, in any order. Thread-safe.
 class Upload {
  public:
-  Upload(std::string name, std::uint64_t size_bytes, std::uint32_t crc32c, Reservation memory);
+  Upload(std::string name, std::uint64_t size_bytes, std::uint32_t crc32c, Reservation memory,
+         std::string owner = "");
 
   const std::string& name() const { return name_; }
+  /// The subject of the caller that made it.
+  const std::string& owner() const { return owner_; }
   std::uint64_t size() const { return size_; }
   std::uint32_t crc32c() const { return crc32c_; }
 
@@ -47,6 +51,7 @@ class Upload {
   const std::uint64_t size_;
   const std::uint32_t crc32c_;
   const Reservation memory_;
+  const std::string owner_;
   mutable std::mutex mutex_;
   std::unique_ptr<char[]> data_;
   std::map<std::uint64_t, std::uint64_t>
@@ -59,9 +64,12 @@ class Upload {
 /// a shared pointer.
 class Uploads : public std::enable_shared_from_this<Uploads> {
  public:
+  static constexpr std::size_t kMostUploads = 4096;  // small ones cost more than their bytes
+
   struct Limits {
     std::uint64_t most_bytes_each;
     Timers::Duration idle;
+    std::size_t most_uploads = kMostUploads;
   };
 
   Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers, Limits limits);
@@ -69,17 +77,15 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
   /// Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED MEMORY_FULL,
   /// UPLOADS_FULL.
   absl::StatusOr<std::shared_ptr<Upload>> create(const std::string& request_id, std::uint64_t size_bytes,
-                                                 std::uint32_t crc32c);
+                                                 std::uint32_t crc32c, const std::string& owner = "");
 
-  /// NOT_FOUND UPLOAD_UNKNOWN.
-  absl::StatusOr<std::shared_ptr<Upload>> find(const std::string& name);
+  /// NOT_FOUND UPLOAD_UNKNOWN, also where it is somebody else's.
+  absl::StatusOr<std::shared_ptr<Upload>> find(const std::string& name, const std::string& owner = "");
 
-  /// Forgets the upload; whoever has it keeps it. Nothing where there is none.
-  void remove(const std::string& name);
+  /// Forgets the upload; whoever has it keeps it. Nothing where there is none, or it is somebody else's.
+  void remove(const std::string& name, const std::string& owner = "");
 
   std::size_t size() const;
-
-  static constexpr std::size_t kMostUploads = 4096;  // small ones cost more than their bytes
 
  private:
   struct Entry {
@@ -95,8 +101,8 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
   const std::shared_ptr<Timers> timers_;
   const Limits limits_;
   mutable std::mutex mutex_;
-  std::map<std::string, Entry> uploads_;          // by name
-  std::map<std::string, std::string> requested_;  // names, by request_id
+  std::map<std::string, Entry> uploads_;                                  // by name
+  std::map<std::pair<std::string, std::string>, std::string> requested_;  // names, by owner and request_id
 };
 
 /// INVALID_ARGUMENT REQUEST_ID where it is neither empty nor 8 to 64 bytes.

@@ -86,7 +86,9 @@ absl::StatusOr<Solved> solve_on(const std::string& address, const DeformOptions&
                                 Interrupt& interrupt) {
   Progress progress;
   progress.show("connecting");
-  absl::StatusOr<client::Client> server = client::Client::connect(address);
+  auto connecting = client_options(options.server);
+  if (!connecting.ok()) return connecting.status();
+  absl::StatusOr<client::Client> server = client::Client::connect(address, *std::move(connecting));
   if (!server.ok()) return server.status();
   progress.show("sending the mesh");
   absl::StatusOr<client::Session> session =
@@ -145,13 +147,13 @@ ExitStatus run_deform(const DeformOptions& options) {
   if (!inputs.ok()) return complain(inputs.status());
 
   std::unique_ptr<LocalServer> local;
-  if (!options.server) {
+  if (!options.server.address) {
     absl::StatusOr<std::unique_ptr<LocalServer>> started = LocalServer::start(options.threads);
     if (!started.ok()) return complain(started.status());
     local = *std::move(started);
   }
   const absl::StatusOr<Solved> solved =
-      solve_on(local ? local->address() : *options.server, options, *inputs, interrupt);
+      solve_on(local ? local->address() : *options.server.address, options, *inputs, interrupt);
   if (interrupt.happened()) return kInterrupted;
   if (!solved.ok()) return complain(solved.status());
 

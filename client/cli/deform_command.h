@@ -8,6 +8,7 @@
 
 #include "client/cli/exit_status.h"
 #include "client/cli/material_input.h"
+#include "client/cli/server_access.h"
 #include "client/cpp/types.h"
 
 namespace lpdeform::cli {
@@ -30,7 +31,7 @@ struct DeformOptions {
   bool certify = false;  // print the optimality gap
   std::vector<std::filesystem::path> out;
   std::optional<std::filesystem::path> report;
-  std::optional<std::string> server;  // a server in this process where there is none
+  ServerAccess server;
 };
 
 /// Deforms a mesh once and writes what was asked for. Prints one line about how the solve went and one for

@@ -16,6 +16,7 @@
 #include "client/cli/info_command.h"
 #include "client/cli/reproduce_command.h"
 #include "client/cli/resize_command.h"
+#include "client/cli/server_access.h"
 #include "client/cli/shape_command.h"
 #include "core/solve/paper_poses.h"
 
@@ -154,6 +155,33 @@ void add_weld(CLI::App& app, bool& welds) {
                "normals");
 }
 
+void add_access_options(CLI::App& app, ServerAccess& access, CLI::Option* server) {
+  app.add_flag("--tls", access.tls, "Connect with TLS, trusting whom the system trusts")->needs(server);
+  app.add_option("--tls-ca", access.tls_ca, "Connect with TLS, trusting these certificates, in PEM")
+      ->needs(server)
+      ->option_text("FILE");
+  CLI::Option* const cert = app.add_option("--tls-cert", access.tls_cert,
+                                           "Our own certificate, in PEM, where the server asks for one")
+                                ->needs(server)
+                                ->option_text("FILE");
+  CLI::Option* const key = app.add_option("--tls-key", access.tls_key, "Its private key, in PEM")
+                               ->needs(cert)
+                               ->option_text("FILE");
+  cert->needs(key);
+  app.add_option("--token-file", access.token_file,
+                 "Where the bearer token is, where the server asks for one")
+      ->envname("LPDEFORM_TOKEN_FILE")
+      ->option_text("FILE");
+}
+
+void add_server_options(CLI::App& app, ServerAccess& access, CLI::Option* excluded) {
+  CLI::Option* const server = app.add_option("--server", access.address,
+                                             "HOST:PORT or unix:PATH of a server (solves in this process)")
+                                  ->excludes(excluded)
+                                  ->option_text("ADDRESS");
+  add_access_options(app, access, server);
+}
+
 void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand("deform", "Deform a mesh by its handles and write the result");
   const auto options = std::make_shared<DeformOptions>();
@@ -181,9 +209,7 @@ void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")
                                    ->check(CLI::Range(1, 1024))
                                    ->option_text("N");
-  app.add_option("--server", options->server, "HOST:PORT or unix:PATH of a server (solves in this process)")
-      ->excludes(threads)
-      ->option_text("ADDRESS");
+  add_server_options(app, options->server, threads);
   app.callback([&command, options] { command = [options] { return run_deform(*options); }; });
   app.footer(
       "In brackets: what holds where an option is left out.\n\n"
@@ -230,9 +256,7 @@ void add_resize(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")
                                    ->check(CLI::Range(1, 1024))
                                    ->option_text("N");
-  app.add_option("--server", options->server, "HOST:PORT or unix:PATH of a server (solves in this process)")
-      ->excludes(threads)
-      ->option_text("ADDRESS");
+  add_server_options(app, options->server, threads);
   app.callback([&command, options] { command = [options] { return run_resize(*options); }; });
 }
 

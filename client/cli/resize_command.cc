@@ -84,9 +84,11 @@ absl::Status stretch(client::Client& server, const Scaling& scaling, bool welds,
   return absl::OkStatus();
 }
 
-absl::StatusOr<Resized> resize_on(const std::string& address, const Scaling& scaling, bool welds,
-                                  MeshFile file, Interrupt& interrupt) {
-  absl::StatusOr<client::Client> server = client::Client::connect(address);
+absl::StatusOr<Resized> resize_on(const std::string& address, const ServerAccess& access,
+                                  const Scaling& scaling, bool welds, MeshFile file, Interrupt& interrupt) {
+  auto connecting = client_options(access);
+  if (!connecting.ok()) return connecting.status();
+  absl::StatusOr<client::Client> server = client::Client::connect(address, *std::move(connecting));
   if (!server.ok()) return server.status();
   Resized resized{std::move(file), {}};
   const double shared = shared_factor(scaling.scale);
@@ -113,13 +115,14 @@ ExitStatus run_resize(const ResizeOptions& options) {
   if (!scaling.ok()) return complain(scaling.status());
 
   std::unique_ptr<LocalServer> local;
-  if (!options.server) {
+  if (!options.server.address) {
     absl::StatusOr<std::unique_ptr<LocalServer>> started = LocalServer::start(options.threads);
     if (!started.ok()) return complain(started.status());
     local = *std::move(started);
   }
-  const absl::StatusOr<Resized> resized = resize_on(local ? local->address() : *options.server, *scaling,
-                                                    options.welds, *std::move(file), interrupt);
+  const absl::StatusOr<Resized> resized =
+      resize_on(local ? local->address() : *options.server.address, options.server, *scaling, options.welds,
+                *std::move(file), interrupt);
   if (interrupt.happened()) return kInterrupted;
   if (!resized.ok()) return complain(resized.status());
   const absl::Status written =

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/cli/exit_status.h"
+#include "client/cli/server_access.h"
 
 namespace lpdeform::cli {
 
@@ -17,7 +18,7 @@ struct ResizeOptions {
   std::vector<double> x_axis, y_axis;     // directions; both or none
   bool welds = false;                     // vertices at one position are one
   int threads = 0;                        // of the server in this process; 0: all cores
-  std::optional<std::string> server;      // a server in this process where there is none
+  ServerAccess server;
 };
 
 /// Content-aware resizing of a mesh: as core/solve/resize.h has it, the factor that two of three axes share

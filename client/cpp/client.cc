@@ -78,12 +78,13 @@ absl::Status Session::close() {
   return link_->close();
 }
 
-Client::Client(std::shared_ptr<Rpc> rpc, ClientOptions options) : rpc_(std::move(rpc)), options_(options) {}
+Client::Client(std::shared_ptr<Rpc> rpc, ClientOptions options)
+    : rpc_(std::move(rpc)), options_(std::move(options)) {}
 
 absl::StatusOr<Client> Client::connect(std::string_view address, ClientOptions options) {
-  auto rpc = Rpc::connect(std::string(address), options.connect_timeout, options.call_timeout);
+  auto rpc = Rpc::connect(std::string(address), options);
   if (!rpc.ok()) return rpc.status();
-  return Client(*std::move(rpc), options);
+  return Client(*std::move(rpc), std::move(options));
 }
 
 absl::StatusOr<Session> Client::open(Mesh mesh, OpenOptions options) {

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,6 +28,13 @@ namespace lpdeform::client {
 class Rpc;
 class Link;
 
+/// Connecting with TLS. Texts in PEM.
+struct Tls {
+  std::string root_certificates;  // whom to trust; empty: whom the system trusts
+  std::string certificate_chain;  // our own, where the server asks for one
+  std::string private_key;
+};
+
 struct ClientOptions {
   /// Of connect(), which does not wait where the address refuses at once.
   std::chrono::milliseconds connect_timeout = std::chrono::seconds(10);
@@ -35,6 +43,9 @@ struct ClientOptions {
   /// A live session whose server stays away for longer gives up; next_frame then says UNAVAILABLE for good. A
   /// solve under way says it too, and may be asked for again.
   std::chrono::milliseconds reconnect_for = std::chrono::minutes(2);
+  std::optional<Tls> tls = {};  // empty: plain text
+  /// Gives the bearer token of each call when that begins, so that tokens may be renewed; on any thread. Empty: none.
+  std::function<std::string()> token = {};
 };
 
 struct OpenOptions {

@@ -3,7 +3,9 @@
 #include <grpc/grpc.h>
 #include <grpcpp/grpcpp.h>
 
+#include <functional>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -63,9 +65,23 @@ bool answers(grpc::Channel& channel, std::chrono::system_clock::time_point deadl
   }
 }
 
+using TokenSource = std::function<std::string()>;
+
+void add_token(const TokenSource& token, grpc::ClientContext& context) {
+  if (token) context.AddMetadata("authorization", "Bearer " + token());
+}
+
+std::shared_ptr<grpc::ChannelCredentials> credentials_of(const std::optional<Tls>& tls) {
+  if (!tls) return grpc::InsecureChannelCredentials();
+  return grpc::SslCredentials({tls->root_certificates, tls->private_key, tls->certificate_chain});
+}
+
 class GrpcDeformCall final : public DeformCall {
  public:
-  explicit GrpcDeformCall(Stub& stub) : stream_(stub.Deform(&context_)) {}
+  GrpcDeformCall(Stub& stub, const TokenSource& token) {
+    add_token(token, context_);
+    stream_ = stub.Deform(&context_);
+  }
 
   bool write(const v1::DeformRequest& request) override { return stream_->Write(request); }
   bool read(v1::DeformResponse& response) override { return stream_->Read(&response); }
@@ -79,8 +95,10 @@ class GrpcDeformCall final : public DeformCall {
 
 class GrpcRpc final : public Rpc {
  public:
-  GrpcRpc(const std::shared_ptr<grpc::Channel>& channel, std::chrono::milliseconds call_timeout)
-      : stub_(v1::DeformService::NewStub(channel)), call_timeout_(call_timeout) {}
+  GrpcRpc(const std::shared_ptr<grpc::Channel>& channel, const ClientOptions& options)
+      : stub_(v1::DeformService::NewStub(channel)),
+        call_timeout_(options.call_timeout),
+        token_(options.token) {}
 
   absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
                                                 const std::stop_token& stop) override {
@@ -118,6 +136,7 @@ class GrpcRpc final : public Rpc {
   absl::Status solve(const v1::SolveRequest& request, double deadline_seconds, const std::stop_token& stop,
                      const std::function<absl::Status(const v1::SolveResponse&)>& on_response) override {
     grpc::ClientContext context;
+    add_token(token_, context);
     if (deadline_seconds > 0) {
       const auto limit = std::chrono::duration<double>(deadline_seconds);
       context.set_deadline(std::chrono::system_clock::now() +
@@ -133,7 +152,7 @@ class GrpcRpc final : public Rpc {
     return taken.ok() ? status_of(ended) : taken;
   }
 
-  std::unique_ptr<DeformCall> deform() override { return std::make_unique<GrpcDeformCall>(*stub_); }
+  std::unique_ptr<DeformCall> deform() override { return std::make_unique<GrpcDeformCall>(*stub_, token_); }
 
  private:
   template <typename Request, typename Response>
@@ -141,6 +160,7 @@ class GrpcRpc final : public Rpc {
                                                               Response*),
                                  const Request& request, const std::stop_token& stop) {
     grpc::ClientContext context;
+    add_token(token_, context);
     context.set_deadline(std::chrono::system_clock::now() + call_timeout_);
     const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
     Response response;
@@ -150,22 +170,20 @@ class GrpcRpc final : public Rpc {
   }
 
   std::unique_ptr<Stub> stub_;
-  std::chrono::milliseconds call_timeout_;
+  const std::chrono::milliseconds call_timeout_;
+  const TokenSource token_;
 };
 
 }  // namespace
 
-absl::StatusOr<std::shared_ptr<Rpc>> Rpc::connect(const std::string& address,
-                                                  std::chrono::milliseconds connect_timeout,
-                                                  std::chrono::milliseconds call_timeout) {
+absl::StatusOr<std::shared_ptr<Rpc>> Rpc::connect(const std::string& address, const ClientOptions& options) {
   keep_grpc();
-  const auto channel =
-      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), channel_arguments());
-  if (!answers(*channel, std::chrono::system_clock::now() + connect_timeout)) {
+  const auto channel = grpc::CreateCustomChannel(address, credentials_of(options.tls), channel_arguments());
+  if (!answers(*channel, std::chrono::system_clock::now() + options.connect_timeout)) {
     return make_fault(absl::StatusCode::kUnavailable, {"NO_SERVER", address, ""},
                       absl::StrCat("No server answers at \"", address, "\"."));
   }
-  return std::make_shared<GrpcRpc>(channel, call_timeout);
+  return std::make_shared<GrpcRpc>(channel, options);
 }
 
 }  // namespace lpdeform::client

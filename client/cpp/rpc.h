@@ -8,6 +8,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/cpp/client.h"
 #include "lpdeform/v1/service.pb.h"
 
 namespace lpdeform::client {
@@ -32,8 +33,7 @@ class Rpc {
   /// `address` as in Client::connect. Waits until the server answers or the address refuses:
   /// UNAVAILABLE (NO_SERVER).
   static absl::StatusOr<std::shared_ptr<Rpc>> connect(const std::string& address,
-                                                      std::chrono::milliseconds connect_timeout,
-                                                      std::chrono::milliseconds call_timeout);
+                                                      const ClientOptions& options);
   virtual ~Rpc() = default;
 
   virtual absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,

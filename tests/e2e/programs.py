@@ -21,8 +21,8 @@ PATIENCE = 280  # seconds that anything may take; never reached where all is wel
 class RunningServer:
     """lpdeform-server on a free port of this machine. `admin`: the URL of its admin port, where it was asked for."""
 
-    def __init__(self, *arguments):
-        self.process = subprocess.Popen([SERVER, "--address", "127.0.0.1:0", *arguments], stdout=subprocess.PIPE,
+    def __init__(self, *arguments, program=None):
+        self.process = subprocess.Popen([program or SERVER, "--address", "127.0.0.1:0", *arguments], stdout=subprocess.PIPE,
                                         stderr=subprocess.STDOUT, text=True)
         watchdog = threading.Timer(PATIENCE, self.process.kill)
         watchdog.start()

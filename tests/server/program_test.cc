@@ -119,7 +119,7 @@ TEST(Program, LogsOneJsonObjectAnEvent) {
   for (std::string text; std::getline(lines, text);) {
     const auto event = nlohmann::json::parse(text);
     EXPECT_TRUE(event.contains("time"));
-    EXPECT_EQ(event.at("level"), "info");
+    EXPECT_EQ(event.at("level"), event.at("event") == "no_authentication" ? "warning" : "info");
     events.push_back(event.at("event"));
   }
   ASSERT_GE(events.size(), 2u);
@@ -203,9 +203,34 @@ TEST(Program, HelpNamesEveryOptionsVariable) {
   Program program({"--help"});
   const std::string help = program.rest();
   EXPECT_EQ(program.wait(), 0);
-  for (const char* const name : {"ADDRESS", "THREADS", "RUNNER_THREADS", "MAX_SESSIONS", "MAX_VERTICES",
-                                 "MAX_BYTES", "MAX_UPLOAD_BYTES", "SESSION_IDLE", "UPLOAD_IDLE", "HEARTBEAT",
-                                 "GRACE", "LOG_LEVEL", "ADMIN_ADDRESS"}) {
+  for (const char* const name : {"ADDRESS",
+                                 "THREADS",
+                                 "RUNNER_THREADS",
+                                 "MAX_SESSIONS",
+                                 "MAX_VERTICES",
+                                 "MAX_BYTES",
+                                 "MAX_UPLOAD_BYTES",
+                                 "SESSION_IDLE",
+                                 "UPLOAD_IDLE",
+                                 "HEARTBEAT",
+                                 "GRACE",
+                                 "LOG_LEVEL",
+                                 "ADMIN_ADDRESS",
+                                 "TLS_CERT",
+                                 "TLS_KEY",
+                                 "TLS_CLIENT_CA",
+                                 "TOKEN_KEYS",
+                                 "TOKEN_ISSUER",
+                                 "TOKEN_AUDIENCE",
+                                 "ALLOW_ANONYMOUS",
+                                 "MAX_CONNECTIONS",
+                                 "MAX_SESSIONS_PER_CALLER",
+                                 "MAX_STREAMS_PER_SESSION",
+                                 "MAX_HANDLES",
+                                 "MAX_UPLOADS",
+                                 "MAX_CALLS_WAITING",
+                                 "MAX_CALLS_PER_CONNECTION",
+                                 "MAX_STREAM_RATE"}) {
     EXPECT_NE(help.find(std::string("LPDEFORM_") + name), std::string::npos) << name;
   }
 }

@@ -219,7 +219,7 @@ TEST_F(SessionTest, AcknowledgementsNameTheirStream) {
 TEST_F(SessionTest, StreamsAreBounded) {
   const auto session = create();
   std::vector<std::shared_ptr<FrameStream>> streams;
-  for (std::size_t k = 0; k < Session::kMostStreams; ++k) streams.push_back(open(*session));
+  for (std::size_t k = 0; k < SessionLimits().streams; ++k) streams.push_back(open(*session));
   const auto refused = session->open_stream("", {});
   EXPECT_EQ(reason(refused.status()), "STREAMS_FULL");
   session->forget_stream(*streams[0]);

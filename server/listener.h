@@ -1,0 +1,76 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <unordered_map>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+struct addrinfo;
+
+namespace lpdeform {
+
+/// Takes connections for gRPC and hands them over. gRPC's own listener never takes one again after file descriptors ran
+/// out once (CVE-2023-4785, gRPC 1.51), and knows no limit; this one refuses connections before they run out, and goes
+/// on after they did.
+class Listener {
+ public:
+  /// Binds: "host:port", port 0 for a free one, on every address that the host has; or "unix:/path", in place of a socket
+  /// that was left there. Does not take connections yet. UNAVAILABLE ADDRESS_NOT_BOUND.
+  static absl::StatusOr<std::unique_ptr<Listener>> bind(const std::string& address);
+  ~Listener();
+
+  /// With the port that was found.
+  const std::string& address() const { return address_; }
+  /// Whether only this machine can reach it: loopback, or a Unix socket.
+  bool is_local() const { return is_local_; }
+
+  struct Events {
+    /// A connection, from the listener's thread. Whoever is called owns `fd`.
+    std::function<void(int listener_fd, int fd)> on_connection;
+    /// One was closed at once for want of room.
+    std::function<void()> on_refused;
+  };
+  /// Takes connections from now on, at most `most_connections` at a time. Raises the process's limit of descriptors for
+  /// that; returns how many there can be within it. Once.
+  std::size_t start(std::size_t most_connections, Events events);
+
+  /// Connections handed over so far.
+  std::uint64_t accepted() const { return accepted_; }
+
+  /// Takes no more. Again: nothing.
+  void stop();
+
+ private:
+  Listener() = default;
+  absl::Status bind_path(const std::string& path);
+  absl::Status bind_host(const std::string& host, const std::string& port);
+  absl::Status add_socket(const addrinfo& info, int port);
+  void run();
+  void accept_from(int listening);
+  bool has_room();
+
+  std::string address_;
+  std::string path_;  // of a Unix socket
+  bool is_local_ = true;
+  std::vector<int> sockets_;
+  int wake_ = -1;
+  Events events_;
+  std::size_t most_ = 0;
+  int last_descriptor_ = 0;  // from here on they are not for connections
+  // The listener's thread alone:
+  std::unordered_map<int, std::uint64_t> given_;  // connections handed over: descriptor and inode
+  std::chrono::steady_clock::time_point counted_at_;
+  std::atomic<std::uint64_t> accepted_ = 0;
+  std::atomic<bool> is_stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace lpdeform

@@ -1,0 +1,66 @@
+"""The table of limits in server/README.md is that of the server's flags."""
+
+import os
+import re
+import subprocess
+import unittest
+
+import programs
+
+ROOT = os.path.join(os.path.dirname(__file__), "..", "..")
+FLAG = re.compile(r"^  --([a-z-]+) \S.*?=(\S+) \(Env:(\w+)\)$", re.MULTILINE)
+ROW = re.compile(r"^\| `--([a-z-]+)` \| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
+UNITS = {"KiB": 2**10, "MiB": 2**20, "GiB": 2**30, "s": 1, "": 1}
+NO_REASON = "-"
+OTHER_LIMITS = {"session-idle", "upload-idle", "heartbeat", "grace"}
+
+
+def is_limit(flag):
+    return flag.startswith("max-") or flag in OTHER_LIMITS
+
+
+def value_of(text):
+    number, unit = re.fullmatch(r"([\d,]+) ?(\w*)", text).groups()
+    return int(number.replace(",", "")) * UNITS[unit]
+
+
+class Limits(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        said = subprocess.run([programs.server(), "--help"], capture_output=True, text=True, timeout=programs.PATIENCE).stdout
+        cls.flags = {name: (default, variable) for name, default, variable in FLAG.findall(said) if is_limit(name)}
+        cls.rows = {flag: (default, what, refusal) for flag, default, what, refusal in
+                    ROW.findall(programs.read_text(os.path.join(ROOT, "server", "README.md")))}
+
+    def test_every_limit_is_a_flag_and_every_such_flag_is_in_the_table(self):
+        self.assertGreater(len(self.flags), 15)
+        self.assertEqual(set(self.rows), set(self.flags))
+
+    def test_the_defaults_are_those_of_the_flags(self):
+        for flag, (default, _, _) in self.rows.items():
+            self.assertEqual(value_of(default), float(self.flags[flag][0]), flag)
+
+    def test_every_flag_has_the_variable_of_its_name(self):
+        for flag, (_, variable) in self.flags.items():
+            self.assertEqual(variable, "LPDEFORM_" + flag.upper().replace("-", "_"))
+
+    def test_every_refusal_is_one_of_the_contract(self):
+        known = programs.read_text(os.path.join(ROOT, "proto", "errors.md"))
+        refusals = [refusal for _, _, refusal in self.rows.values() if refusal != NO_REASON]
+        self.assertGreater(len(refusals), 8)
+        for refusal in refusals:
+            reason, code = re.fullmatch(r"`([A-Z_]+)` ([A-Z_]+)", refusal).groups()
+            self.assertIn(f"| `{reason}` | {code} |", known)
+
+    def test_values_out_of_range_are_refused_by_name(self):
+        for flag in ("max-sessions", "max-connections", "max-streams-per-session", "max-handles", "max-uploads",
+                     "max-calls-waiting", "max-calls-per-connection", "max-vertices"):
+            for value in ("0", "200000000"):
+                done = subprocess.run([programs.server(), "--address", "127.0.0.1:0", f"--{flag}", value],
+                                      capture_output=True, text=True, timeout=programs.PATIENCE)
+                self.assertEqual(done.returncode, 1, flag)
+                self.assertIn(f"Option {flag.replace('-', '_')} must be 1 to", done.stderr)
+
+
+if __name__ == "__main__":
+    programs.main()
