@@ -14,6 +14,7 @@
 #include "client/cli/deform_command.h"
 #include "client/cli/generated_shape.h"
 #include "client/cli/info_command.h"
+#include "client/cli/load_command.h"
 #include "client/cli/reproduce_command.h"
 #include "client/cli/resize_command.h"
 #include "client/cli/server_access.h"
@@ -260,6 +261,53 @@ void add_resize(CLI::App& program, std::function<ExitStatus()>& command) {
   app.callback([&command, options] { command = [options] { return run_resize(*options); }; });
 }
 
+void add_load(CLI::App& program, std::function<ExitStatus()>& command) {
+  CLI::App& app = *program.add_subcommand(
+      "load",
+      "Load a server: updates at fixed times, whatever it does, and the time to the frames that answer them");
+  const auto options = std::make_shared<LoadOptions>();
+  CLI::Option* const server =
+      app.add_option("--server", options->server.address, "HOST:PORT or unix:PATH of the server")
+          ->required()
+          ->option_text("ADDRESS");
+  add_access_options(app, options->server, server);
+  app.add_option("--sessions", options->sessions, "Sessions at a time (10)")
+      ->check(CLI::Range(1, 10000))
+      ->option_text("N");
+  app.add_option("--vertices", options->vertices,
+                 "Vertices of each; several sizes, with commas, are taken in turn (1000)")
+      ->delimiter(',')
+      ->check(CLI::Range(4, 2000000))
+      ->option_text("V[,V]...");
+  app.add_option("--rate", options->rate, "Updates a second of each (10)")
+      ->check(within(0.01, 1000))
+      ->option_text("R");
+  app.add_option("--seconds", options->seconds, "For so long (10)")
+      ->check(within(0.1, 1e6))
+      ->option_text("T");
+  app.add_option("--p", options->p, "p of each, 1 to 64 (2)")->check(within(1, 64))->option_text("P");
+  app.add_option("--slow-readers", options->slow_readers,
+                 "So many sessions have a second reader, a slow one (0)")
+      ->check(CLI::Range(0, 10000))
+      ->option_text("N");
+  app.add_option("--slow-pause", options->slow_pause_seconds, "Seconds between two frames that it takes (1)")
+      ->check(within(0.001, 3600))
+      ->option_text("S");
+  app.add_option("--reconnect", options->reconnect_seconds,
+                 "Each session changes its connection every S seconds (never)")
+      ->check(within(0.1, 1e6))
+      ->option_text("S");
+  app.add_option("--report", options->report, "Where to write what was measured, as JSON")
+      ->option_text("FILE");
+  app.callback([&command, options] { command = [options] { return run_load(*options); }; });
+  app.footer(
+      "Input to frame: from when an update was due to when the first frame that answers it was there. "
+      "Updates are due at\n"
+      "fixed times, so a server that falls behind shows. Exit status: 0 every update was answered and "
+      "nothing failed;\n"
+      "1 not so; 2 bad input; 3 server unreachable or refusing.");
+}
+
 void add_shape(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app =
       *program.add_subcommand("shape", "Write a generated mesh to try things on, and handles for it");
@@ -311,6 +359,7 @@ int run(int argc, char** argv) {
   add_deform(program, command);
   add_info(program, command);
   add_resize(program, command);
+  add_load(program, command);
   add_shape(program, command);
   add_reproduce(program, command);
   try {
