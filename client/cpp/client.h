@@ -30,9 +30,9 @@ class Link;
 
 /// Connecting with TLS. Texts in PEM.
 struct Tls {
-  std::string root_certificates;  // whom to trust; empty: whom the system trusts
-  std::string certificate_chain;  // our own, where the server asks for one
-  std::string private_key;
+  std::string root_certificates = {};  // whom to trust; empty: whom the system trusts
+  std::string certificate_chain = {};  // our own, where the server asks for one
+  std::string private_key = {};
 };
 
 struct ClientOptions {

@@ -42,10 +42,15 @@ class Load(programs.OnShapes):
         self.assertIn("input to frame p50", said)
 
     def test_sessions_outlive_reconnects_and_slow_readers_cost_nothing(self):
+        server = programs.RunningServer("--admin-address", "127.0.0.1:0")
+        self.addCleanup(server.stop)
         report, _ = self.load("--sessions", 2, "--vertices", 100, "--rate", 20, "--seconds", 3, "--reconnect", 1,
-                              "--slow-readers", 2, "--slow-pause", 0.5)
+                              "--slow-readers", 2, "--slow-pause", 0.5, server=server)
         self.expect_whole(report, 120)
-        self.assertGreaterEqual(report["all"]["reconnects"], 2)
+        reconnects = report["all"]["reconnects"]
+        self.assertGreaterEqual(reconnects, 2)
+        # Of each session its maker, its driver and its slow reader.
+        self.assertGreaterEqual(self.metric(server, "lpdeform_connections_total"), 6 + reconnects)
 
     def test_leaves_no_session_behind(self):
         server = programs.RunningServer("--admin-address", "127.0.0.1:0")
@@ -68,12 +73,16 @@ class Load(programs.OnShapes):
             server.reader.join()
             server.process.stdout.close()
 
+    @staticmethod
+    def metric(server, name):
+        with urllib.request.urlopen(server.admin + "/metrics", timeout=60) as answer:
+            return float(re.search(rf"^{name} (\S+)$", answer.read().decode(), re.MULTILINE).group(1))
+
     def kill_under_load(self, server):
         end = time.monotonic() + programs.PATIENCE
         taken = 0
         while taken < 10 and time.monotonic() < end:
-            with urllib.request.urlopen(server.admin + "/metrics", timeout=60) as answer:
-                taken = float(re.search(r"^lpdeform_updates_total (\S+)$", answer.read().decode(), re.MULTILINE).group(1))
+            taken = self.metric(server, "lpdeform_updates_total")
         server.process.send_signal(signal.SIGKILL)
 
     def test_bad_input_is_refused(self):
