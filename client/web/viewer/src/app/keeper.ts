@@ -2,6 +2,7 @@ import { Store, type Work } from "../io/store.js";
 import type { Mesh } from "../model/mesh.js";
 import type { View } from "../model/view.js";
 import type { App } from "./app.js";
+import { claim, whileFree } from "./claim.js";
 
 const key = "lpdeform-work";
 const saveEveryMs = 500;
@@ -65,14 +66,11 @@ export class Keeper {
 
   /** Of this tab, of what it was before the reload, or of a tab that is no more. */
   async #claimWork(store: Store): Promise<Work | undefined> {
-    const works = await store.works();
-    const old = works.filter(({ savedAt }, k) => k >= mostWorks || savedAt < Date.now() - oldestMs);
     const own = sessionStorage.getItem(key);
-    if (own && (await claim(own, patienceMs))) {
-      this.#id = own;
-    } else {
-      for (const { id, address } of works) {
-        if (address !== location.search || !navigator.locks || own || !(await claim(id, 0))) continue;
+    if (own && (await claim(own, patienceMs))) this.#id = own;
+    if (!own) {
+      for (const { id, address } of await store.works()) {
+        if (address !== location.search || !(await claim(id, 0))) continue;
         this.#id = id;
         break;
       }
@@ -82,9 +80,16 @@ export class Keeper {
       await claim(this.#id, patienceMs);
     }
     sessionStorage.setItem(key, this.#id);
-    const gone = old.filter(({ id }) => id !== this.#id);
-    if (gone.length > 0) await store.remove(gone.map(({ id }) => id));
+    // Only now does nobody else write to it.
+    const works = await store.works();
+    void this.#makeRoom(store, works).catch(() => undefined); // the next page tries again
     return works.find(({ id, address }) => id === this.#id && address === location.search);
+  }
+
+  /** Lets go of what is old or too much, but of nothing that a tab has open, this one's included. */
+  async #makeRoom(store: Store, works: readonly Work[]): Promise<void> {
+    const old = works.filter(({ savedAt }, k) => k >= mostWorks || savedAt < Date.now() - oldestMs);
+    for (const { id } of old) await whileFree(id, () => store.remove([id]));
   }
 
   #show({ document, view, camera, savedAt }: Work, mesh: Mesh): void {
@@ -126,19 +131,6 @@ export class Keeper {
       this.#keptMesh = undefined; // full, or forbidden: the page asks before it is left
     }
   }
-}
-
-/** Whether the work is nobody else's, from now on for as long as this page lives. Where there are no locks, it is. */
-function claim(id: string, waitMs: number): Promise<boolean> {
-  if (!navigator.locks) return Promise.resolve(true);
-  return new Promise((resolve) => {
-    const options = waitMs > 0 ? { signal: AbortSignal.timeout(waitMs) } : { ifAvailable: true };
-    const held = navigator.locks.request(`${key}-${id}`, options, (lock) => {
-      resolve(lock !== null);
-      return lock === null ? undefined : new Promise(() => undefined);
-    });
-    held.catch(() => resolve(false));
-  });
 }
 
 function within<Value>(promise: Promise<Value>, milliseconds: number): Promise<Value> {

@@ -27,7 +27,10 @@ export class Store {
       request.result.createObjectStore("works", { keyPath: "id" });
       request.result.createObjectStore("meshes");
     };
-    return new Store(await answer(request));
+    const database = await answer(request);
+    // A newer page must not wait for this one; from then on this one says that it keeps nothing.
+    database.onversionchange = () => database.close();
+    return new Store(database);
   }
 
   /** All of it or nothing. `mesh`: where it is not the one that is kept already. */

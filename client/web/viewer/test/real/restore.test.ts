@@ -136,6 +136,46 @@ it("a new tab leaves the work of an open one alone, and has that of a closed one
   expect(await third.evaluate("JSON.stringify(window.__lpdeform.document())")).toBe(before);
 });
 
+it("what is old is let go, but not the work of an open tab", async () => {
+  await bend();
+  await user.page.waitForTimeout(700);
+  // The open tab's and a closed one's, both of long ago.
+  const kept = (then: string) =>
+    user.page.evaluate<string[]>(`new Promise((resolve) => {
+      indexedDB.open("lpdeform").onsuccess = ({ target }) => {
+        const transaction = target.result.transaction("works", "readwrite");
+        const works = transaction.objectStore("works");
+        works.getAll().onsuccess = ({ target: { result } }) => (${then})(works, result);
+        works.getAllKeys().onsuccess = ({ target: { result } }) => resolve(result);
+      };
+    })`);
+  const [own] = await kept("() => undefined");
+  await kept(`(works, [own]) => {
+    works.put({ ...own, savedAt: 0 });
+    works.put({ ...own, savedAt: 0, id: "closed", address: "?shape=sheet" });
+  }`);
+  expect(await kept("() => undefined")).toEqual([own, "closed"].sort());
+  const second = await user.page.context().newPage();
+  await second.goto(user.page.url());
+  await second.waitForFunction("window.__lpdeform?.status() === 'live'");
+  await second.waitForTimeout(300);
+  expect(await kept("() => undefined")).toEqual([own]);
+  await second.close();
+  const before = await work();
+  await reload();
+  expect(await work()).toBe(before);
+});
+
+it("a page that holds the kept work does not keep a newer page from renewing the database", async () => {
+  expect(
+    await user.page.evaluate(`new Promise((resolve) => {
+      const request = indexedDB.deleteDatabase("lpdeform");
+      request.onsuccess = () => resolve("renewed");
+      request.onblocked = () => resolve("blocked");
+    })`),
+  ).toBe("renewed");
+});
+
 it("a browser that keeps nothing asks before the page is left", async () => {
   const context = await user.browser.newContext({ viewport: { width: 1280, height: 800 } });
   await context.addInitScript(() => {

@@ -1,0 +1,50 @@
+const prefix = "lpdeform-work-";
+const channelName = "lpdeform-claims";
+/** What a page that is awake needs to answer. */
+const answerMs = 250;
+
+interface Call {
+  kind: "whose" | "mine";
+  id: string;
+}
+
+/**
+ * Whether the work is nobody else's, from now on for as long as this page lives. By the browser's locks; where there are none,
+ * as on pages from plain HTTP, by asking the other pages.
+ */
+export function claim(id: string, waitMs: number): Promise<boolean> {
+  if (!navigator.locks) return claimByAsking(id, waitMs);
+  return new Promise((resolve) => {
+    const options = waitMs > 0 ? { signal: AbortSignal.timeout(waitMs) } : { ifAvailable: true };
+    const held = navigator.locks.request(prefix + id, options, (lock) => {
+      resolve(lock !== null);
+      return lock === null ? undefined : new Promise(() => undefined);
+    });
+    held.catch(() => resolve(false));
+  });
+}
+
+/** Does it with the work, which nobody else has or takes meanwhile; not at all where somebody has it. */
+export async function whileFree(id: string, act: () => Promise<void>): Promise<void> {
+  if (navigator.locks) await navigator.locks.request(prefix + id, { ifAvailable: true }, (lock) => lock && act());
+  else if (!(await isHeld(id))) await act();
+}
+
+async function claimByAsking(id: string, waitMs: number): Promise<boolean> {
+  const until = performance.now() + waitMs;
+  while (await isHeld(id)) if (performance.now() >= until) return false;
+  const channel = new BroadcastChannel(channelName);
+  channel.onmessage = ({ data }: MessageEvent<Call>) => {
+    if (data.kind === "whose" && data.id === id) channel.postMessage({ kind: "mine", id });
+  };
+  return true;
+}
+
+function isHeld(id: string): Promise<boolean> {
+  const channel = new BroadcastChannel(channelName);
+  return new Promise<boolean>((resolve) => {
+    channel.onmessage = ({ data }: MessageEvent<Call>) => data.kind === "mine" && data.id === id && resolve(true);
+    setTimeout(() => resolve(false), answerMs);
+    channel.postMessage({ kind: "whose", id });
+  }).finally(() => channel.close());
+}
