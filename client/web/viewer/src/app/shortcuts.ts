@@ -35,12 +35,10 @@ function withControl(app: App, { key, shiftKey }: KeyboardEvent): boolean {
 
 function alone(app: App, files: Files, help: HTMLDialogElement, event: KeyboardEvent, target: HTMLElement): boolean {
   const { view } = app;
-  const { now } = view;
   const { key } = event;
   const tool = tools[Number(key) - 1];
   if (tool) view.set({ tool });
   else if (key in nudges && !target.matches("input, button")) return nudge(app, nudges[key]!, event.shiftKey ? 0.1 : 1);
-  else if (key === "Tab" && target.matches("canvas.stage")) view.set({ isPanelOpen: !now.isPanelOpen });
   else {
     const act = actions(app, files, help)[key.length === 1 ? key.toLowerCase() : key];
     if (!act) return false;
@@ -69,6 +67,7 @@ function actions(app: App, files: Files, help: HTMLDialogElement): Record<string
     d: () => view.set({ isDark: !now.isDark }),
     f: () => app.fit(),
     g: () => view.set({ ghost: !now.ghost }),
+    i: () => view.set({ isPanelOpen: !now.isPanelOpen }),
     l: () => toggleLock(app),
     n: () => selectNext(app),
     o: () => files.choose(),

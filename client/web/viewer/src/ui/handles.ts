@@ -1,16 +1,18 @@
 import type { Hold } from "lpdeform-client";
 import type { App } from "../app/app.js";
-import { groupColours } from "../model/colours.js";
-import { changeHandle, type Handle, handleOf, nameFault, removeHandle } from "../model/document.js";
+import { changeHandle, type Handle, handleOf } from "../model/document.js";
 import { atRest, isAtRest } from "../model/pose.js";
 import { short } from "../model/words.js";
 import { el } from "./dom.js";
 import { icon } from "./icons.js";
-import { button, slider } from "./controls.js";
+import { slider } from "./controls.js";
+import { type HandleRow, handleRow } from "./handle_row.js";
 
 /** The handles with their names and colours, and what the selected one can be told. */
 export function handlesPanel(app: App): HTMLElement {
   const list = el("ul", { className: "handles" });
+  const none = el("li", { className: "empty" }, "None yet: click the surface.");
+  const rows: HandleRow[] = [];
   const details = el("div", { className: "details" });
   let shown = "";
   const show = () => {
@@ -32,10 +34,20 @@ export function handlesPanel(app: App): HTMLElement {
       if (now === shown || isSliding(details)) return;
     }
     shown = now;
-    list.replaceChildren(...handles.map((handle) => row(app, handle, handle.name === selected)));
-    if (handles.length === 0) list.append(el("li", { className: "empty" }, "None yet: click the surface."));
+    while (rows.length < handles.length) {
+      rows.push(handleRow(app));
+      list.append(rows.at(-1)!.element);
+    }
+    handles.forEach((handle, k) => rows[k]!.show(handle, handle.name === selected));
+    for (const { element } of rows.splice(handles.length)) {
+      const isFocused = element.contains(document.activeElement);
+      element.remove();
+      if (isFocused) rows.at(-1)?.element.querySelector<HTMLElement>("button:last-child")?.focus();
+    }
+    none.remove();
+    if (handles.length === 0) list.append(none);
     const handle = handleOf(app.document, selected);
-    details.replaceChildren(...(handle ? detailsOf(app, handle) : []));
+    renew(details, handle ? detailsOf(app, handle) : []);
   };
   app.facts.watch(show);
   app.view.watch(show);
@@ -43,57 +55,17 @@ export function handlesPanel(app: App): HTMLElement {
   return el("div", {}, list, details);
 }
 
+/** The focus goes to what is called as it was. */
+function renew(details: HTMLElement, parts: readonly Node[]): void {
+  const { activeElement } = document;
+  const label = details.contains(activeElement) ? activeElement!.getAttribute("aria-label") : undefined;
+  details.replaceChildren(...parts);
+  if (label) details.querySelector<HTMLElement>(`[aria-label="${label}"]`)?.focus();
+}
+
 /** A slider that is being dragged must stay. */
 function isSliding(details: HTMLElement): boolean {
   return details.querySelector("input[type=range]:active") !== null;
-}
-
-function row(app: App, handle: Handle, isSelected: boolean): HTMLElement {
-  const { name, colour, vertices, points, isLocked } = handle;
-  const change = (part: Partial<Handle>) => app.change(changeHandle(app.document, name, part));
-  const dot = el("button", {
-    type: "button",
-    className: "dot",
-    style: `--colour: ${colour}`,
-    title: "Next colour",
-    aria: { label: `Colour of ${name}` },
-  });
-  dot.addEventListener("click", () =>
-    change({ colour: groupColours[(groupColours.indexOf(colour) + 1) % groupColours.length]! }),
-  );
-  const field = el("input", { className: "name", value: name, spellcheck: false, aria: { label: "Name" } });
-  field.addEventListener("focus", () => app.view.set({ selected: name }));
-  field.addEventListener("change", () => rename(app, name, field));
-  const lock = button(isLocked ? "lock" : "unlock", isLocked ? "Locked: let it move" : "Lock it against dragging", () =>
-    change({ isLocked: !isLocked }),
-  );
-  const remove = button("trash", `Delete ${name} (Delete)`, () => app.change(removeHandle(app.document, name)));
-  const count = points ? `${points.length} pts` : short(vertices.length);
-  const element = el(
-    "li",
-    { className: isSelected ? "selected" : "", data: { handle: name } },
-    dot,
-    field,
-    el("span", { className: "count", title: "Vertices" }, count),
-    lock,
-    remove,
-  );
-  element.addEventListener("click", (event) => {
-    if (event.target === element) app.view.set({ selected: name });
-  });
-  return element;
-}
-
-function rename(app: App, name: string, field: HTMLInputElement): void {
-  const wanted = field.value.trim();
-  const fault = nameFault(app.document, name, wanted);
-  if (fault) {
-    app.notify(fault, true);
-    field.value = name;
-  } else if (wanted !== name) {
-    app.change(changeHandle(app.document, name, { name: wanted }));
-    app.view.set({ selected: wanted });
-  }
 }
 
 const kinds: readonly (readonly [Hold["kind"], string])[] = [
@@ -135,7 +107,7 @@ function detailsOf(app: App, handle: Handle): Node[] {
   if (handle.vertices.length <= 12) parts.push(footprint(app, handle));
   const back = el(
     "button",
-    { type: "button", className: "plain", disabled: isAtRest(pose) && !handle.targets },
+    { type: "button", className: "plain", disabled: isAtRest(pose) && !handle.targets, aria: { label: "Back to rest" } },
     icon("reset"),
     "Back to rest",
   );

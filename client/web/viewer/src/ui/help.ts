@@ -41,7 +41,7 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
       ["C", "Next colours"],
       ["P", "Pin the colours' scale"],
       ["D", "Dark or light"],
-      ["Tab", "in the picture: the side panel"],
+      ["I", "The side panel"],
       ["O", "Open a file"],
       ["?", "This help"],
     ],

@@ -28,7 +28,7 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
   const redo = button("redo", "Redo (Ctrl+Shift+Z)", () => app.redo());
   const split = button("split", "Two values of p side by side (S)", () => app.view.set({ isSplit: !app.view.now.isSplit }));
   const theme = button("moon", "Dark or light (D)", () => app.view.set({ isDark: !app.view.now.isDark }));
-  const panel = button("panel", "Side panel (Tab)", () => app.view.set({ isPanelOpen: !app.view.now.isPanelOpen }));
+  const panel = button("panel", "Side panel (I)", () => app.view.set({ isPanelOpen: !app.view.now.isPanelOpen }));
   const open = labelled(
     "open",
     "Open",

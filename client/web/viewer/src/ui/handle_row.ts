@@ -1,0 +1,69 @@
+import type { App } from "../app/app.js";
+import { groupColours } from "../model/colours.js";
+import { changeHandle, type Handle, nameFault, removeHandle } from "../model/document.js";
+import { short } from "../model/words.js";
+import { button } from "./controls.js";
+import { el, setText } from "./dom.js";
+import { icon } from "./icons.js";
+
+export interface HandleRow {
+  element: HTMLElement;
+  show(handle: Handle, isSelected: boolean): void;
+}
+
+/** A line of the list: colour, name, count, padlock, bin. It stays while what it shows changes, and the focus in it. */
+export function handleRow(app: App): HandleRow {
+  let shown: Handle | undefined;
+  const change = (part: (handle: Handle) => Partial<Handle>) =>
+    app.change(changeHandle(app.document, shown!.name, part(shown!)));
+  const dot = el("button", { type: "button", className: "dot", title: "Next colour" });
+  dot.addEventListener("click", () =>
+    change(({ colour }) => ({ colour: groupColours[(groupColours.indexOf(colour) + 1) % groupColours.length]! })),
+  );
+  const field = el("input", { className: "name", spellcheck: false, aria: { label: "Name" } });
+  field.addEventListener("focus", () => app.view.set({ selected: shown!.name }));
+  field.addEventListener("change", () => rename(app, shown!.name, field));
+  const lock = button("unlock", "", () => change(({ isLocked }) => ({ isLocked: !isLocked })));
+  const remove = button("trash", "", () => app.change(removeHandle(app.document, shown!.name)));
+  const count = el("span", { className: "count", title: "Vertices" });
+  const element = el("li", {}, dot, field, count, lock, remove);
+  element.addEventListener("click", (event) => {
+    if (event.target === element) app.view.set({ selected: shown!.name });
+  });
+
+  const show = (handle: Handle, isSelected: boolean) => {
+    const { name, colour, vertices, points, isLocked } = handle;
+    if (name !== shown?.name) {
+      field.value = name;
+      element.dataset["handle"] = name;
+      dot.setAttribute("aria-label", `Colour of ${name}`);
+      entitle(remove, `Delete ${name} (Delete)`);
+    }
+    if (isLocked !== shown?.isLocked) {
+      lock.replaceChildren(icon(isLocked ? "lock" : "unlock"));
+      entitle(lock, isLocked ? "Locked: let it move" : "Lock it against dragging");
+    }
+    dot.style.setProperty("--colour", colour);
+    setText(count, points ? `${points.length} pts` : short(vertices.length));
+    element.classList.toggle("selected", isSelected);
+    shown = handle;
+  };
+  return { element, show };
+}
+
+function entitle(element: HTMLElement, title: string): void {
+  element.title = title;
+  element.setAttribute("aria-label", title);
+}
+
+function rename(app: App, name: string, field: HTMLInputElement): void {
+  const wanted = field.value.trim();
+  const fault = nameFault(app.document, name, wanted);
+  if (fault) {
+    app.notify(fault, true);
+    field.value = name;
+  } else if (wanted !== name) {
+    app.change(changeHandle(app.document, name, { name: wanted }));
+    app.view.set({ selected: wanted });
+  }
+}

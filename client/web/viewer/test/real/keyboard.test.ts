@@ -1,0 +1,89 @@
+import { join } from "node:path";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { Service } from "../../../client/test/real/service.js";
+import { User } from "./user.js";
+
+let service: Service;
+let user: User;
+
+beforeAll(async () => {
+  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
+  user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
+  await user.settled();
+});
+
+afterAll(async () => {
+  expect(user.errors).toEqual([]);
+  await user.close();
+  await service.stop();
+});
+
+const press = (key: string) => user.page.keyboard.press(key);
+const focused = () =>
+  user.page.evaluate<string>(
+    "(({ activeElement: one }) => one.matches('canvas') ? 'canvas' : one.getAttribute('aria-label') ?? one.textContent)(document)",
+  );
+
+it("Tab goes round the whole page, and back", async () => {
+  const canFocus = await user.page.evaluate<number>(
+    "[...document.querySelectorAll('a[href], button, input, select, textarea, canvas[tabindex]')].filter((one) => one.checkVisibility() && !one.disabled && one.tabIndex >= 0 && one.type !== 'file').length",
+  );
+  for (const key of ["Tab", "Shift+Tab"]) {
+    await user.page.locator("canvas.stage").focus();
+    const round = [await focused()];
+    for (let k = 0; k < canFocus + 5; ++k) {
+      await press(key);
+      const name = await focused();
+      if (name === "canvas") break;
+      round.push(name);
+    }
+    expect(await focused()).toBe("canvas");
+    expect(round.length).toBeGreaterThanOrEqual(canFocus);
+    expect(round).toEqual(expect.arrayContaining(["Open", "Move", "Name", "How it is held"]));
+  }
+});
+
+it("I opens and closes the side panel", async () => {
+  await user.page.locator("canvas.stage").focus();
+  await press("i");
+  expect(await user.ask("app.view.now.isPanelOpen")).toBe(false);
+  await press("I");
+  expect(await user.ask("app.view.now.isPanelOpen")).toBe(true);
+});
+
+it("the focus stays in the list while a handle is selected, renamed, locked and set", async () => {
+  const rows = user.page.locator(".handles li");
+  await rows.nth(0).getByLabel("Name").focus();
+  expect(await focused()).toBe("Name");
+  expect(await user.ask("app.view.now.selected === window.__lpdeform.document().handles[0].name")).toBe(true);
+  await press("Control+A");
+  await user.page.keyboard.type("Foot");
+  await press("Enter");
+  expect(await user.ask("document().handles[0].name")).toBe("Foot");
+  expect(await focused()).toBe("Name");
+  await press("Tab");
+  await press("Enter");
+  expect(await user.ask("document().handles[0].isLocked")).toBe(false);
+  expect(await focused()).toBe("Lock it against dragging");
+  await press("Enter");
+  expect(await focused()).toBe("Locked: let it move");
+
+  await user.page.getByLabel("How it is held").focus();
+  await press("ArrowDown");
+  await user.until("window.__lpdeform.document().handles[0].hold.kind === 'soft'");
+  expect(await focused()).toBe("How it is held");
+  await user.page.getByLabel("Weight").focus();
+  for (const weight of [1.3, 1.6]) {
+    await press("ArrowRight");
+    await user.until(`window.__lpdeform.document().handles[0].hold.weight === ${weight}`);
+    expect(await focused()).toBe("Weight");
+  }
+});
+
+it("and goes to the handle before where the last one is deleted", async () => {
+  const bins = user.page.locator(".handles button:last-child");
+  await bins.nth(1).focus();
+  await press("Enter");
+  expect(await user.ask("document().handles.length")).toBe(1);
+  expect(await focused()).toBe("Delete Foot (Delete)");
+});
