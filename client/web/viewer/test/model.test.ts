@@ -167,6 +167,18 @@ describe("history", () => {
     expect(history.canRedo).toBe(false);
   });
 
+  it("makes no step of a gesture that is cancelled, and keeps what was undone before it", () => {
+    const history = new History({ at: 0 });
+    const begin = history.present;
+    history.push({ at: 1 });
+    history.undo();
+    history.during({ at: 2 });
+    history.cancel();
+    expect([history.present, history.canUndo, history.canRedo]).toEqual([begin, false, true]);
+    history.cancel();
+    expect(history.present).toBe(begin);
+  });
+
   it("makes no step of a gesture that ends where it began, and keeps a bounded number", () => {
     const history = new History(0, 3);
     history.during(1);

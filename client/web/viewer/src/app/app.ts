@@ -126,6 +126,12 @@ export class App {
     this.#documentChanged(performance.now());
   }
 
+  /** What the gesture has changed is as before, without a step. */
+  cancelGesture(): void {
+    this.history.cancel();
+    this.#documentChanged(performance.now());
+  }
+
   undo(): void {
     if (this.history.undo()) this.#documentChanged(performance.now());
   }

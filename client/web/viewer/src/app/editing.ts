@@ -134,10 +134,7 @@ export class Editing implements PointingTarget {
         if (to) show(subtract(to, from), at.time);
       },
       end: () => app.endGesture(),
-      cancel: () => {
-        show([0, 0, 0], performance.now());
-        app.endGesture();
-      },
+      cancel: () => app.cancelGesture(),
     };
   }
 

@@ -46,6 +46,12 @@ export class History<Value> {
     this.#future = [];
   }
 
+  /** As if the gesture had not been. */
+  cancel(): void {
+    this.#present = this.#before ?? this.#present;
+    this.#before = undefined;
+  }
+
   undo(): boolean {
     this.end();
     const value = this.#past.pop();
