@@ -71,6 +71,11 @@ describe("what the server is told", () => {
     expect([renamed["a"], "set" in renamed["c"]!]).toEqual([{ remove: true }, true]);
   });
 
+  it("is also of a handle whose name is one of the language's", () => {
+    const named = addHandle(emptyDocument, [0], rest, { name: "__proto__" });
+    expect(Object.entries(changes(newSession, named)!.handles!).map(([name]) => name)).toEqual(["__proto__"]);
+  });
+
   it("is each side's own p", () => {
     const after: Document = { ...two, p: 3 };
     expect(changes(two, after, "first")!.settings).toEqual({ p: 3 });
@@ -111,6 +116,16 @@ describe("words for", () => {
     const status = statusOf(new LpdeformError(code, "the mesh has 9 faces", { reason, element: "face 3" }));
     expect([status.kind, isPassing(status)]).toEqual([kind, passes]);
     expect(status.title).not.toBe("");
+  });
+
+  it.each([
+    ["invalid_argument", "The server refuses this mesh"],
+    ["resource_exhausted", "The server is full"],
+    ["unauthenticated", "The server does not let you in"],
+    ["permission_denied", "The server does not let you in"],
+    ["unimplemented", "The server does not know this request"],
+  ] as const)("%s are its own", (code, title) => {
+    expect(statusOf(new LpdeformError(code, "no", {})).title).toBe(title);
   });
 
   it("what is wrong name the element and its place", () => {

@@ -14,6 +14,9 @@ export interface LiveWatcher {
   problem(error: LpdeformError): void;
 }
 
+/** Between attempts: at first, and at most. */
+const [firstPauseMs, longestPauseMs] = [300, 3000];
+
 /** Frames answer one of the newest inputs. */
 const mostExponents = 100;
 
@@ -101,7 +104,7 @@ export class Live {
   }
 
   async #run(): Promise<void> {
-    while (!this.#over.signal.aborted) {
+    for (let pauseMs = firstPauseMs; !this.#over.signal.aborted;) {
       const session = await this.#open();
       if (!session) return;
       this.#session = session;
@@ -113,7 +116,11 @@ export class Live {
       session.on("problem", (error) => this.watcher.problem(error));
       session.on("connection", () => this.#connection());
       this.#tell(performance.now());
-      await this.#readFrames(session);
+      const hadFrames = await this.#readFrames(session);
+      if (this.#over.signal.aborted || !isPassing(this.status)) return;
+      // A server that opens sessions and gives no frames must not be sent the mesh over and over.
+      if (!hadFrames) await pause(pauseMs);
+      pauseMs = hadFrames ? firstPauseMs : Math.min(2 * pauseMs, longestPauseMs);
     }
   }
 
@@ -121,7 +128,7 @@ export class Live {
   async #open(): Promise<Session | undefined> {
     const { positions, faces } = this.mesh;
     const { signal } = this.#over;
-    for (let pauseMs = 300; ; pauseMs = Math.min(2 * pauseMs, 3000)) {
+    for (let pauseMs = firstPauseMs; ; pauseMs = Math.min(2 * pauseMs, longestPauseMs)) {
       if (!isPassing(this.status)) this.#setStatus(say("opening", "Preparing…"));
       try {
         return await openSession(
@@ -140,27 +147,31 @@ export class Live {
         const error = thrown as LpdeformError;
         this.#setStatus(statusOf(error));
         if (!isPassing(this.status)) return undefined;
-        await new Promise((again) => setTimeout(again, Math.max(pauseMs, Math.min(error.retryAfterMs, 10_000))));
+        await pause(Math.max(pauseMs, Math.min(error.retryAfterMs, 10_000)));
         if (signal.aborted) return undefined;
       }
     }
   }
 
-  async #readFrames(session: Session): Promise<void> {
+  /** Until the session is over; whether there was any. */
+  async #readFrames(session: Session): Promise<boolean> {
+    let hadFrames = false;
     try {
       for await (const frame of session) {
-        if (this.#over.signal.aborted) return;
+        if (this.#over.signal.aborted) break;
+        hadFrames = true;
         this.#waiting = frame;
         const taken = new Promise<void>((resolve) => (this.#taken = resolve));
         this.watcher.frame();
         await taken;
       }
     } catch (thrown) {
-      if (this.#over.signal.aborted) return;
+      if (this.#over.signal.aborted) return hadFrames;
       this.#setStatus(statusOf(thrown as LpdeformError));
       void session.close().catch(() => undefined);
       this.#session = undefined;
     }
+    return hadFrames;
   }
 
   #tell(time: number): void {
@@ -197,4 +208,8 @@ export class Live {
     this.status = status;
     this.watcher.status(status);
   }
+}
+
+function pause(milliseconds: number): Promise<void> {
+  return new Promise((done) => setTimeout(done, milliseconds));
 }

@@ -23,6 +23,12 @@ export function statusOf(error: LpdeformError): Status {
     return say("away", "The server is away", `${kept}. Reconnecting by itself…`);
   }
   if (isSessionOver(reason)) return say("away", "The server has let go of this session", `${kept}. Beginning anew…`);
+  if (code === "unauthenticated" || code === "permission_denied") {
+    return say("refused", "The server does not let you in", `${sentence(message)} ${kept}.`);
+  }
+  if (code === "unimplemented") {
+    return say("refused", "The server does not know this request", `It may be older than this page. ${kept}.`);
+  }
   return { ...say("refused", "The server refuses this mesh", sentence(message)), element };
 }
 

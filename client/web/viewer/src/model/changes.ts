@@ -17,20 +17,20 @@ export function changes(before: Document, after: Document, side: Side = "first")
 export const newSession: Document = { ...emptyDocument, p: NaN, secondP: NaN };
 
 function handleChanges(before: readonly Handle[], after: readonly Handle[]): Record<string, HandleChange> {
-  const changed: Record<string, HandleChange> = {};
-  if (before === after) return changed;
+  const changed = new Map<string, HandleChange>();
+  if (before === after) return {};
   const old = new Map(before.map((handle) => [handle.name, handle]));
   for (const handle of after) {
     const known = old.get(handle.name);
     old.delete(handle.name);
     if (known === handle) continue;
-    if (!known || !isHeldAlike(known, handle)) changed[handle.name] = { set: toWire(handle) };
+    if (!known || !isHeldAlike(known, handle)) changed.set(handle.name, { set: toWire(handle) });
     else if (known.pose !== handle.pose || known.targets !== handle.targets) {
-      changed[handle.name] = { move: motionOf(handle) };
+      changed.set(handle.name, { move: motionOf(handle) });
     }
   }
-  for (const name of old.keys()) changed[name] = { remove: true };
-  return changed;
+  for (const name of old.keys()) changed.set(name, { remove: true });
+  return Object.fromEntries(changed); // takes any name, "__proto__" too
 }
 
 function isHeldAlike(a: Handle, b: Handle): boolean {
