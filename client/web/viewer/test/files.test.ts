@@ -10,6 +10,8 @@ import { shapeKinds } from "../src/model/shapes.js";
 
 const { mesh, document } = shapeKinds[3]!.make("coarse");
 const bytes = (text: string) => new TextEncoder().encode(text);
+const ply = (...lines: string[]) =>
+  `${["ply", "format ascii 1.0", ...lines, ...(lines.includes("end_header") ? [] : ["end_header"])].join("\n")}\n`;
 const distortion = Float32Array.from({ length: mesh.positions.length / 3 }, (_, k) => k / 7);
 
 describe("meshes", () => {
@@ -56,6 +58,20 @@ describe("meshes", () => {
 
   it.each([
     ["a.txt", "", "not a mesh that can be read"],
+    ["a.ply", ply("element vertex 1e15", "element face 1"), "Element “vertex” of a.ply has no property"],
+    ["a.ply", ply("element odd 1000000000000000", "element vertex 1"), "Element “odd” of a.ply has no property"],
+    ["a.ply", ply("element vertex -1", "property float x"), "Element “vertex” of a.ply has the count “-1”"],
+    ["a.ply", ply("element vertex 1.5", "property float x"), "Element “vertex” of a.ply has the count “1.5”"],
+    ["a.ply", ply("element vertex many", "property float x"), "Element “vertex” of a.ply has the count “many”"],
+    [
+      "a.ply",
+      ply("element face 1", "property list double int vertex_indices", "end_header", "1e20 0"),
+      "A list of 100000000000000000000 in element “face” of a.ply, row 0",
+    ],
+    ["a.ply", ply("element face 1", "property list double int vertex_indices", "end_header", "-1 0"), "A list of -1"],
+    ["a.ply", ply("element face 1", "property list float int vertex_indices", "end_header", "2.5 0"), "A list of 2.5"],
+    ["a.ply", ply("element face 1", "property list float int vertex_indices", "end_header", "x 0"), "A list of NaN"],
+    ["a.ply", ply("element face 1", "property list uint int vertex_indices", "end_header", "4e9 0"), "a.ply ends too soon"],
     ["a.off", "COFFEE", "does not begin with OFF"],
     ["a.off", "OFF\n3 1 0\n0 0 0\n", "ends before vertex 1"],
     ["a.off", "OFF\n3 1 0\n0 0 0\n1 0 x\n0 1 0\n3 0 1 2\n", "vertex 1: a vertex has no three finite coordinates"],
@@ -157,6 +173,20 @@ describe("a handle file", () => {
     [handles({ name: "a", vertices: [0], soft: -1 }), "“soft” of handle “a” is -1"],
     [handles({ name: "a", vertices: [0], soft: 1, axis_lock: [1, 0, 0] }), "held in two ways"],
     [handles({ name: "a", points: [{ face: 1e9, barycentric: [1, 0, 0] }] }), "face 1000000000"],
+    ...[null, "30", [], {}].flatMap((value): [string, string][] => [
+      [
+        handles({ name: "a", vertices: [0], rotate: { axis: [0, 0, 1], angle_degrees: value } }),
+        "“angle_degrees” of handle “a”",
+      ],
+      [handles({ name: "a", points: [{ face: value, barycentric: [1, 0, 0] }] }), `a point in face ${JSON.stringify(value)}`],
+      [
+        JSON.stringify({
+          handles: [{ name: "a", vertices: [0] }],
+          groups: [{ name: "g", vertices: [1], p: Array.isArray(value) ? [2] : value }],
+        }),
+        "“p” of group “g”",
+      ],
+    ]),
     ['{"handles": [{"name": "a", "vertices": [0]}], "groups": [{"name": "g", "vertices": [1], "p": 0.5}]}', "“p” of group “g”"],
   ])("with a fault is refused by name: %s", (text, message) => {
     expect(() => readHandleFile(text, emptyDocument, mesh)).toThrow(message);

@@ -86,8 +86,10 @@ function motionOf(
   checkKeys(turn, ["axis", "angle_degrees", "center"], `“rotate” of ${owner}`);
   const axis = vector3(turn["axis"], `the axis of ${owner}`);
   if (Math.hypot(...axis) < 1e-12) throw new FileFault(`The axis of ${owner} has no direction.`);
-  const degrees = Number(turn["angle_degrees"]);
-  if (!Number.isFinite(degrees)) throw new FileFault(`“angle_degrees” of ${owner} is not a number.`);
+  const degrees = turn["angle_degrees"];
+  if (typeof degrees !== "number" || !Number.isFinite(degrees)) {
+    throw new FileFault(`“angle_degrees” of ${owner} is not a number.`);
+  }
   const center = turn["center"] === undefined ? ([0, 0, 0] as const) : vector3(turn["center"], `the center of ${owner}`);
   return { pose: { rotation: quaternionOf(axis, (degrees * Math.PI) / 180), translation, center } };
 }
@@ -113,10 +115,10 @@ function direction(json: unknown, owner: string): Vector3 {
 function surfacePoints(json: unknown, owner: string, mesh: Mesh): SurfacePoint[] {
   return arrayOf(json, `the points of ${owner}`).map((one) => {
     const point = objectOf(one, `a point of ${owner}`);
-    const face = Number(point["face"]);
+    const { face } = point;
     const faces = mesh.faces.length / 3;
-    if (!Number.isInteger(face) || face < 0 || face >= faces) {
-      throw new FileFault(`${capital(owner)} has a point in face ${String(point["face"])}; the mesh has ${faces} faces.`);
+    if (typeof face !== "number" || !Number.isInteger(face) || face < 0 || face >= faces) {
+      throw new FileFault(`${capital(owner)} has a point in face ${JSON.stringify(face)}; the mesh has ${faces} faces.`);
     }
     return { face, barycentric: vector3(point["barycentric"], `“barycentric” of ${owner}`) };
   });
@@ -145,8 +147,9 @@ function withGroup(document: Document, json: unknown, vertexCount: number): Docu
     ["stiffness", 1e-6, 1e6],
   ] as const) {
     if (group[field] === undefined) continue;
-    const value = Number(group[field]);
-    if (!(value >= least && value <= most)) throw new FileFault(`“${field}” of ${owner} is not within ${least} to ${most}.`);
+    const value = group[field];
+    if (typeof value !== "number" || !(value >= least && value <= most))
+      throw new FileFault(`“${field}” of ${owner} is not within ${least} to ${most}.`);
     result = paint(result, field, vertices, value, vertexCount);
   }
   return result;

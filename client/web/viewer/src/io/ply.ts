@@ -16,6 +16,9 @@ interface Element {
   properties: Property[];
 }
 
+/** What PLY's widest type of a whole number can say. */
+const mostInList = 2 ** 32 - 1;
+
 const sizes: Record<string, number> = {
   char: 1,
   uchar: 1,
@@ -56,7 +59,7 @@ function readHeader(name: string, bytes: Uint8Array): { format: string; elements
   for (const line of head.slice(0, end.index).split(/\r?\n/)) {
     const [key, ...words] = line.trim().split(/\s+/);
     if (key === "format") format = words[0] ?? "";
-    if (key === "element") elements.push({ name: words[0] ?? "", count: Number(words[1]), properties: [] });
+    if (key === "element") elements.push({ name: words[0] ?? "", count: countOf(name, words), properties: [] });
     if (key === "property") {
       const property: Property =
         words[0] === "list"
@@ -71,7 +74,16 @@ function readHeader(name: string, bytes: Uint8Array): { format: string; elements
   if (!["ascii", "binary_little_endian", "binary_big_endian"].includes(format)) {
     throw new FileFault(`${name} is in the format “${format}”, which PLY does not know.`);
   }
+  for (const { name: element, count, properties } of elements) {
+    // Rows of nothing would be read without end.
+    if (count > 0 && properties.length === 0) throw new FileFault(`Element “${element}” of ${name} has no property.`);
+  }
   return { format, elements, length: end.index + end[0].length };
+}
+
+function countOf(name: string, [element, count]: readonly string[]): number {
+  if (Number.isInteger(Number(count)) && Number(count) >= 0) return Number(count);
+  throw new FileFault(`Element “${element}” of ${name} has the count “${count}”.`);
 }
 
 function readRow(name: string, element: Element, row: number, next: (type: string) => number, builder: MeshBuilder): void {
@@ -79,7 +91,12 @@ function readRow(name: string, element: Element, row: number, next: (type: strin
   let corners: number[] | undefined;
   for (const { name: property, type, lengthType } of element.properties) {
     if (lengthType) {
-      const list = Array.from({ length: next(lengthType) }, () => next(type));
+      const length = next(lengthType);
+      if (!Number.isInteger(length) || length < 0 || length > mostInList) {
+        throw new FileFault(`A list of ${length} in element “${element.name}” of ${name}, row ${row}, cannot be read.`);
+      }
+      const list: number[] = [];
+      while (list.length < length) list.push(next(type));
       if (element.name === "face" && /^vertex_ind/.test(property)) corners = list;
     } else {
       const value = next(type);
