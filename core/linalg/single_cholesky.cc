@@ -13,6 +13,17 @@ constexpr float kLowestPivot = 1e-6f;    // of the matrix's diagonal entry
 constexpr std::size_t kTile = 64;        // rows of a supernode that one task computes
 constexpr double kWorthTasks = 200'000;  // multiplications
 
+/// Before wide supernodes are divided, which takes away the upper half of their triangles.
+std::size_t value_count(const SupernodePattern& supernodes) {
+  std::size_t result = 0;
+  for (std::size_t k = 0; k + 1 < supernodes.first_columns.size(); ++k) {
+    const auto columns =
+        static_cast<std::size_t>(supernodes.first_columns[k + 1] - supernodes.first_columns[k]);
+    result += columns * (columns + supernodes.first_rows[k + 1] - supernodes.first_rows[k]);
+  }
+  return result;
+}
+
 }  // namespace
 
 SingleCholesky::SingleCholesky(const LowerMatrix& pattern, const SupernodePattern& supernodes) {
@@ -20,7 +31,7 @@ SingleCholesky::SingleCholesky(const LowerMatrix& pattern, const SupernodePatter
   LPDEFORM_CHECK(n == static_cast<std::size_t>(pattern.size()));
   old_to_new_.resize(n);
   for (std::size_t i = 0; i < n; ++i) old_to_new_[supernodes.new_to_old[i]] = static_cast<std::int32_t>(i);
-  factor_.begin(supernodes.new_to_old.data(), n, 0);
+  factor_.begin(supernodes.new_to_old.data(), n, value_count(supernodes));
   std::vector<std::int32_t> rows;
   for (std::size_t k = 0; k + 1 < supernodes.first_columns.size(); ++k) {
     const std::int32_t end = supernodes.first_columns[k + 1];
@@ -93,6 +104,7 @@ void SingleCholesky::find_entries(const LowerMatrix& pattern) {
     if (row >= node.first_column + node.columns) {
       const auto begin = factor_.rows_.begin() + static_cast<std::ptrdiff_t>(node.first_row);
       const auto found = std::lower_bound(begin, begin + static_cast<std::ptrdiff_t>(node.row_count), row);
+      LPDEFORM_CHECK(found - begin < static_cast<std::ptrdiff_t>(node.row_count) && *found == row);
       r = static_cast<std::size_t>(node.columns) + static_cast<std::size_t>(found - begin);
     }
     const std::size_t c = static_cast<std::size_t>(column - node.first_column);
@@ -159,7 +171,7 @@ bool SingleCholesky::eliminate(std::size_t node, const LowerMatrix& matrix, cons
   const std::size_t rows = columns + at.row_count;
   const double solve_work =
       static_cast<double>(columns) * static_cast<double>(columns) * static_cast<double>(at.row_count) / 2;
-  const bool is_shared = update_work_[node] + solve_work > kWorthTasks;
+  const bool is_shared = workers.threads() > 1 && update_work_[node] + solve_work > kWorthTasks;
   const std::size_t tile = is_shared ? kTile : rows;
   workers.for_chunks(rows, tile, [&](std::size_t, std::size_t begin, std::size_t end) {
     update_rows(node, begin, end, own.place);

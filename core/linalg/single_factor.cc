@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace lpdeform {
 namespace {
@@ -200,7 +201,7 @@ double SingleFactor::largest_entry(const Points& b, const Workers& workers) cons
   });
   double largest = 0;
   for (const double maximum : chunk_maxima_) {
-    if (!(maximum <= largest)) largest = maximum;
+    if (!(maximum <= largest) && !std::isnan(largest)) largest = maximum;
   }
   return largest;
 }
@@ -209,7 +210,8 @@ void SingleFactor::solve(const Points& b, Points& x, const Workers& workers, dou
   // Over the largest entry, so that no size of b leaves the range of single precision.
   const double largest = largest_entry(b, workers), scale = 1 / largest;
   x.resize(b.rows(), 3);
-  if (!std::isfinite(scale) || !std::isfinite(largest)) return void(x.setZero());
+  if (!std::isfinite(largest)) return void(x.setConstant(std::numeric_limits<double>::quiet_NaN()));
+  if (!std::isfinite(scale)) return void(x.setZero());
   const std::size_t n = new_to_old_.size();
   workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {

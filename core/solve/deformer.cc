@@ -10,8 +10,8 @@
 namespace lpdeform {
 namespace {
 
-constexpr std::size_t kWorkspace =
-    24;  // positions of all vertices that a solve holds at most: the memory of L-BFGS
+// What a solve holds at most, in positions of all vertices: states, gradients and the pairs of L-BFGS.
+constexpr std::size_t kWorkspace = 24;
 
 }  // namespace
 

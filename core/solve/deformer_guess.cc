@@ -8,8 +8,8 @@ namespace {
 
 constexpr double kFarthestGuess = 2;  // of the last move, how much more of it is guessed at most
 constexpr double kSameWay = 0.5;      // the squared cosine between two moves, from which on they are one drag
-constexpr double kSteady =
-    9;  // the square of how far the surface may have moved, in handles' moves, in such a drag
+// The square of how far the surface may have moved, in handles' moves, in such a drag.
+constexpr double kSteady = 9;
 
 }  // namespace
 

@@ -186,7 +186,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
 void Deformer::Impl::iterate() {
   const StepResult result = minimiser->step();
   ++summary.iterations;
-  const double sum = result.is_true ? result.objective : objective.sum(*norm);
+  const double sum = result.true_sum ? *result.true_sum : objective.sum(*norm);
   keep_if_best(sum);
   record(result, sum);
   switch (result.outcome) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace lpdeform {
@@ -56,8 +57,11 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
   precision_ = precision;
   is_single_current_ = is_double_current_ = false;
   ++version_;
-  if (precision == Precision::kSingle && single_ && single_->factor(matrix_, workers))
+  if (precision == Precision::kSingle && single_ && single_->factor(matrix_, workers)) {
+    double_.reset();  // several times the memory
+    copy_ = {};
     return is_good_ = is_single_current_ = true;
+  }
   return is_good_ = factor_double();
 }
 
@@ -152,7 +156,7 @@ bool Metric::refine(const Points& b, Points& x, const Workers& workers) const {
 void Metric::solve_scaled(const Points& b, Points& x, const Workers& workers) const {
   if (!is_double_current_ && refine(b, x, workers)) return;
   if (!is_double_current_ && !factor_double()) {
-    single().solve(b, x, workers);
+    x.setConstant(b.rows(), 3, std::numeric_limits<double>::quiet_NaN());
     return;
   }
   double_->solve(b, x);

@@ -22,8 +22,9 @@ struct MatrixEntry {
 ///
 ///   M = 2 * Laplacian with edge weights (c_i + c_j) w_ij + entries,     held vertices are identity rows
 ///
-/// with the entries that soft terms add (SoftTerms::matrix_entries): one scalar matrix for all three coordinates. For p = 2 it is exact (the matrix of local_global); for other
-/// p it is what iteratively reweighted least squares would use. Ordering and symbolic analysis are made once,
+/// with the entries that soft terms add (SoftTerms::matrix_entries): one scalar matrix for all three coordinates.
+/// For p = 2 it is exact (the matrix of local_global); for other p it is what iteratively reweighted least squares
+/// would use. Ordering and symbolic analysis are made once,
 /// by the constructor; factor() is numeric alone.
 class Metric {
  public:
@@ -53,7 +54,8 @@ class Metric {
   /// The last factor() was for these held vertices and succeeded.
   bool is_factored_for(const std::vector<char>& is_held) const { return is_good_ && is_held == is_held_; }
 
-  /// x = M^-1 b to about 1e-12; b is zero at held vertices. From a factor in single precision by refinement.
+  /// x = M^-1 b to about 1e-12; b is zero at held vertices. From a factor in single precision by refinement. Not
+  /// a number where no factor has these digits.
   void solve(const Points& b, Points& x, const Workers& workers) const;
 
   /// x = M^-1 b as well as single precision has it, always the same matrix for a version() and scale().

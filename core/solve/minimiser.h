@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <stop_token>
 
 #include "core/energy/lp_norm.h"
@@ -45,7 +46,7 @@ struct StepResult {
   Outcome outcome = Outcome::kProgress;
   double objective = 0;  // at x(), of the method's present objective
   int stage = 0;         // counts the objectives; within a stage the objective never rises
-  bool is_true = false;  // the objective is problem.norm's, not a smoothed one
+  std::optional<double> true_sum = std::nullopt;  // problem.norm's sum at x(), where the method knows it
 };
 
 /// One algorithm: makes one iteration a call. Time, limits, cancellation, trace and the best state belong to

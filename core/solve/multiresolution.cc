@@ -41,9 +41,10 @@ StepResult Multiresolution::step() {
     ++result.stage;  // 0 is the coarse level's
     return result;
   }
-  if (level_.deformer().step()) return {Outcome::kProgress, objective_, 0, true};
+  if (level_.deformer().step()) return {Outcome::kProgress, objective_, 0, objective_};
   begin_fine();
-  return {Outcome::kProgress, problem_.objective.sum(problem_.norm), 0, true};
+  const double sum = problem_.objective.sum(problem_.norm);
+  return {Outcome::kProgress, sum, 0, sum};
 }
 
 }  // namespace lpdeform

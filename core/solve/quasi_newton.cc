@@ -35,6 +35,7 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
     if (!is_warm && p > lowest) shares_.push_back((2 - p) / (2 - lowest));
   }
   begin_stage(warmth == Warmth::kWithMetric);
+  true_sum_ = problem_.objective.sum(problem_.norm);
 }
 
 /// The objective of stage_: p first, then eps. problem_.objective holds the evaluation at x_.
@@ -127,9 +128,10 @@ bool QuasiNewton::is_stage_over() const {
   return history_.front() - history_.back() <= problem_.tolerance * norm_.highest_p() * history_.back();
 }
 
-bool QuasiNewton::is_at_zero() const {
-  const double sum = is_true_norm_ ? objective_ : problem_.objective.sum(problem_.norm);
-  return sum <= problem_.zero_objective;
+/// problem_.objective holds the evaluation at x_.
+StepResult QuasiNewton::result(Outcome outcome) {
+  true_sum_ = is_true_norm_ ? objective_ : problem_.objective.sum(problem_.norm);
+  return {outcome, objective_, stage_, true_sum_};
 }
 
 /// Where no step along d lowers the objective: another metric, the next stage, or the end.
@@ -145,7 +147,7 @@ StepResult QuasiNewton::give_up(double slope) {
     begin_stage();
     return result(Outcome::kProgress);
   }
-  const bool is_good = -0.5 * slope <= problem_.tolerance * norm_.highest_p() * objective_;
+  const bool is_good = slope <= 0 && -0.5 * slope <= problem_.tolerance * norm_.highest_p() * objective_;
   return result(is_good ? Outcome::kConverged : Outcome::kStalled);
 }
 
@@ -161,7 +163,7 @@ void QuasiNewton::accept(double length) {
 }
 
 StepResult QuasiNewton::step() {
-  if (is_at_zero()) return result(Outcome::kConverged);
+  if (true_sum_ <= problem_.zero_objective) return result(Outcome::kConverged);
   if (!is_last_stage_ && (stage_iterations_ >= kStageIterations || is_stage_over())) {
     ++stage_;
     begin_stage();

@@ -47,8 +47,7 @@ class QuasiNewton : public Minimiser {
   void accept(double length);
   StepResult give_up(double slope);
   bool is_stage_over() const;
-  bool is_at_zero() const;
-  StepResult result(Outcome outcome) const { return {outcome, objective_, stage_, is_true_norm_}; }
+  StepResult result(Outcome outcome);
 
   Problem problem_;
   std::vector<double> shares_;  // of the way from 2 to p_i, for the first stages
@@ -63,6 +62,7 @@ class QuasiNewton : public Minimiser {
   double last_length_ = 1;                         // of a step
   double step_length_ = 0;                         // of the last step along direction_, not yet remembered
   double objective_ = 0;
+  double true_sum_ = 0;  // of problem_.norm at x_
   PairMemory memory_;
   std::deque<double> history_;  // objectives of the stage's last 21 iterations
   int stage_iterations_ = 0, since_refresh_ = 0;

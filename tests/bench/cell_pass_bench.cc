@@ -59,30 +59,36 @@ struct FactoredMetric {
     is_held.assign(shape->vertex_count(), false);
     is_held[0] = true;
   }
-  bool factor(double weight) {
+  bool factor(double weight, int threads = 1, Metric::Precision precision = Metric::Precision::kSingle) {
     std::vector<double> weights(shape->vertex_count(), 1.0);
     weights[0] = weight;
-    return metric.factor(weights, is_held);
+    return metric.factor(weights, is_held, {}, Workers(threads), precision);
   }
   std::shared_ptr<const RestShape> shape;
   Metric metric;
   std::vector<char> is_held;
 };
 
+/// 0 threads stand for double precision, which has one.
 void metric_factor(benchmark::State& state) {
   FactoredMetric test(static_cast<int>(state.range(0)));
+  const int threads = static_cast<int>(state.range(1));
+  const auto precision = threads == 0 ? Metric::Precision::kDouble : Metric::Precision::kSingle;
   double weight = 1;
-  for (auto _ : state)
-    benchmark::DoNotOptimize(test.factor(weight = 3 - weight));  // never the same twice running
+  for (auto _ : state)  // never the same twice running
+    benchmark::DoNotOptimize(test.factor(weight = 3 - weight, std::max(1, threads), precision));
 }
-BENCHMARK(metric_factor)->Arg(63)->Arg(200)->Unit(benchmark::kMillisecond);
+BENCHMARK(metric_factor)
+    ->ArgsProduct({{63, 200, 316}, {0, 1, 2}})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 void metric_solve(benchmark::State& state) {
   FactoredMetric test(static_cast<int>(state.range(0)));
   if (!test.factor(1)) return state.SkipWithError("not positive definite");
   const Points b = Points::Random(test.shape->vertex_count(), 3);
   Points x;
-  for (auto _ : state) test.metric.solve(b, x);
+  for (auto _ : state) test.metric.solve(b, x, Workers(1));
 }
 BENCHMARK(metric_solve)->Arg(63)->Arg(200)->Arg(316)->Unit(benchmark::kMillisecond);
 

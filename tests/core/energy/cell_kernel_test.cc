@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "core/energy/rotation_fit.h"
+#include "tests/core/instruction_sets.h"
 #include "tests/core/poses.h"
 
 namespace lpdeform {
@@ -142,14 +143,7 @@ TEST_P(CellKernel, HoldsRotationsWhereTheyAreNotToBeFitted) {
   EXPECT_GT(sum, 1);  // the identity is not the best here
 }
 
-std::vector<std::int64_t> targets() {
-  std::vector<std::int64_t> result;
-  for (std::int64_t rest = hwy::SupportedTargets(); rest != 0; rest &= rest - 1)
-    result.push_back(rest & -rest);
-  return result;
-}
-
-INSTANTIATE_TEST_SUITE_P(Targets, CellKernel, testing::ValuesIn(targets()),
+INSTANTIATE_TEST_SUITE_P(Targets, CellKernel, testing::ValuesIn(instruction_sets()),
                          [](const auto& info) { return std::string(hwy::TargetName(info.param)); });
 
 }  // namespace

@@ -133,6 +133,26 @@ TEST_P(EveryMethod, GivesTheSameBitsOnAnyNumberOfThreads) {
   }
 }
 
+// Large enough for factorisations and back-substitutions by several threads.
+TEST(QuasiNewton, GivesTheSameBitsOnAnyNumberOfThreadsWhereItsMetricIsShared) {
+  const int side = 140;
+  const TriangleMesh mesh = grid(side, side, 2);
+  const auto shape = rest_shape(mesh);
+  HandleSet handles;
+  (void)handles.set("left", {slice(mesh, 0, 0, 0), Fixed{}});
+  (void)handles.set("right",
+                    {slice(mesh, 0, side, side), turn(Eigen::Vector3d::UnitY(), -70, {side / 2.0, 0, 0})});
+  for (const double p : {1.0, 6.0}) {
+    const SolveSettings few{
+        .method = Method::kQuasiNewton, .initial = InitialGuess::kLaplacian, .max_iterations = 15};
+    auto one = deformer(shape, handles, Material::uniform(p), {.threads = 1});
+    ASSERT_TRUE(one->solve(few).ok());
+    auto several = deformer(shape, handles, Material::uniform(p), {.threads = 3});
+    ASSERT_TRUE(several->solve(few).ok());
+    EXPECT_EQ(several->positions(), one->positions()) << "p = " << p;
+  }
+}
+
 TEST_P(EveryMethod, ChangesNothingButUnitsUnderScaleAndTranslation) {
   SolveSettings few = settings();
   few.max_iterations = 8;

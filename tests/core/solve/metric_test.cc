@@ -135,6 +135,32 @@ TEST_F(MetricTest, SolvesWhereSinglePrecisionDoesNotCarryTheMatrix) {
   EXPECT_LT((x - b).norm(), 1e-6 * b.norm());
 }
 
+TEST_F(MetricTest, GivesTheDoubleFactorBackWhenItIsNotWanted) {
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  const std::size_t before = metric.memory_bytes();
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), Metric::Precision::kDouble));
+  EXPECT_GT(metric.memory_bytes(), before);
+  Points b = Points::Random(shape->vertex_count(), 3), exact, refined, x;
+  clear_held(b);
+  metric.solve(b, exact, Workers(1));
+  metric.precondition(b, x, Workers(1));
+  EXPECT_LT((x - exact).norm(), 1e-5 * exact.norm());
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  EXPECT_EQ(metric.memory_bytes(), before);
+  metric.solve(b, refined, Workers(1));
+  EXPECT_LT((refined - exact).norm(), 1e-11 * exact.norm());
+}
+
+TEST_F(MetricTest, GivesNoNumberForWhatIsNone) {
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  for (const std::int32_t i : {1, 5, shape->vertex_count() - 1}) {
+    Points b = Points::Ones(shape->vertex_count(), 3), x;
+    b(i, 1) = std::nan("");
+    metric.precondition(b, x, Workers(1));
+    EXPECT_TRUE(x.array().isNaN().all()) << i;
+  }
+}
+
 TEST_F(MetricTest, FailsWithoutUsableWeights) {
   EXPECT_FALSE(metric.factor(std::vector<double>(shape->vertex_count(), 0.0), is_held, {}, Workers(1)));
   EXPECT_FALSE(
