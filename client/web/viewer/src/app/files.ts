@@ -8,7 +8,12 @@ import { writeStl } from "../io/stl.js";
 import { emptyDocument } from "../model/document.js";
 import type { Mesh } from "../model/mesh.js";
 import type { App } from "./app.js";
+import { sentence } from "../link/status.js";
 import { legendCanvas } from "./legend.js";
+import type { Pane } from "./pane.js";
+
+/** For the result that is exported. */
+const solveMs = 60_000;
 
 export type MeshFormat = "ply" | "obj" | "off" | "stl";
 
@@ -40,22 +45,39 @@ export class Files {
         if (isHandles(file)) this.#openHandles(file.name, await file.text());
         else this.#openMesh(file.name, new Uint8Array(await file.arrayBuffer()));
       } catch (error) {
-        if (!(error instanceof FileFault)) throw error;
-        this.app.notify(error.message, true);
+        const isFault = error instanceof FileFault;
+        this.app.notify(isFault ? error.message : `${file.name} cannot be opened: ${(error as Error).message}`, true);
         return;
       }
     }
   }
 
-  exportMesh(format: MeshFormat): void {
-    for (const { stage, distortion, side } of this.app.panes) {
-      const { positions, mesh } = stage.surface!;
+  /** In the precision of the server's result, which what is drawn may not have. */
+  async exportMesh(format: MeshFormat): Promise<void> {
+    const panes = [...this.app.panes];
+    const stem = this.#stem;
+    for (const pane of panes) {
+      const { mesh } = pane.stage.surface!;
+      const { positions, distortion } = await this.#exactly(pane);
       const deformed: Mesh = { ...mesh, positions };
-      const name = `${this.#stem}-deformed${this.app.panes.length > 1 ? `-${side}` : ""}.${format}`;
+      const name = `${stem}-deformed${panes.length > 1 ? `-${pane.side}` : ""}.${format}`;
       if (format === "ply") save(name, writePly(deformed, distortion, this.app.red));
       if (format === "obj") save(name, writeObj(deformed));
       if (format === "off") save(name, writeOff(deformed));
       if (format === "stl") save(name, writeStl(deformed));
+    }
+  }
+
+  async #exactly({ stage, frame, live, distortion }: Pane): Promise<{ positions: Float32Array; distortion: Float32Array }> {
+    const shown = { positions: stage.surface!.positions, distortion };
+    const isExact = !frame || (!frame.quantized && frame.converged && !live!.isSettling);
+    if (isExact) return shown;
+    try {
+      return await live!.solve(solveMs);
+    } catch (thrown) {
+      const why = sentence((thrown as Error).message);
+      this.app.notify(`What is shown was written as it is, rounded for the screen. ${why}`, true);
+      return shown;
     }
   }
 

@@ -1,4 +1,12 @@
-import { type Encoding, type Frame, LpdeformError, type MeshReport, openSession, type Session } from "lpdeform-client";
+import {
+  type Encoding,
+  type Frame,
+  LpdeformError,
+  type MeshReport,
+  openSession,
+  type Session,
+  type SolveResult,
+} from "lpdeform-client";
 import { changes, exponent, newSession, type Side } from "../model/changes.js";
 import type { Document } from "../model/document.js";
 import type { Mesh } from "../model/mesh.js";
@@ -94,6 +102,15 @@ export class Live {
   /** There are changes that no picture answers yet. */
   get isSettling(): boolean {
     return this.#newest > this.#drawn;
+  }
+
+  /**
+   * The result for the document in full float32 precision, which frames may not have. Rejects where the server is away, or has nothing to solve, or takes longer than `deadlineMs`.
+   */
+  async solve(deadlineMs: number): Promise<SolveResult> {
+    const session = this.#session;
+    if (!session || this.status.kind !== "live") throw new LpdeformError("unavailable", this.status.title);
+    return await session.solve({ deadlineMs, signal: AbortSignal.timeout(deadlineMs) });
   }
 
   close(): void {

@@ -68,10 +68,10 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
 
 function exportMenu(files: Files): HTMLElement {
   return menu(icon("save"), "Save", "Save or export", [
-    ["Mesh as PLY, with distortion", () => files.exportMesh("ply")],
-    ["Mesh as OBJ", () => files.exportMesh("obj")],
-    ["Mesh as OFF", () => files.exportMesh("off")],
-    ["Mesh as STL", () => files.exportMesh("stl")],
+    ["Mesh as PLY, with distortion", () => void files.exportMesh("ply")],
+    ["Mesh as OBJ", () => void files.exportMesh("obj")],
+    ["Mesh as OFF", () => void files.exportMesh("off")],
+    ["Mesh as STL", () => void files.exportMesh("stl")],
     ["Picture as PNG", () => files.exportPicture()],
     ["Handles as JSON", () => files.saveHandles()],
   ]);

@@ -4,6 +4,8 @@ import { Service } from "../../../client/test/real/service.js";
 import { readMesh } from "../../src/io/read.js";
 import { writeOff } from "../../src/io/off.js";
 import { blockSurface } from "../../src/model/block.js";
+import type { Vector3 } from "../../src/model/mesh.js";
+import { apply, type Pose } from "../../src/model/pose.js";
 import { User } from "./user.js";
 
 let service: Service;
@@ -108,17 +110,26 @@ describe("somebody with a mesh of their own", () => {
     await user.until("window.__lpdeform.frame().gap !== undefined"); // by itself, once all rests
   });
 
-  it.each(["PLY, with distortion", "OBJ", "OFF"])("exports the mesh as %s and reloads it equal", async (format) => {
+  it.each(["PLY, with distortion", "OBJ", "OFF"])("exports the mesh as %s, more exactly than it is shown", async (format) => {
     const shown = await user.positions();
     const file = await user.save(`Mesh as ${format}`);
     const ending = format.slice(0, 3).toLowerCase();
     const read = readMesh(`x.${ending}`, file);
-    expect([...read.positions]).toEqual(shown);
+    expect(largestDifference([...read.positions], shown)).toBeLessThan(0.02);
     expect(read.faces).toEqual(tower.faces);
+    expect(await user.page.locator(".notice.bad").isHidden()).toBe(true);
+    // Handles are where they were put, as exactly as the file can say.
+    const handles = await user.ask<{ vertices: number[]; pose: Pose }[]>("document().handles");
+    for (const { vertices, pose } of handles) {
+      for (const vertex of vertices) {
+        const target = apply(pose, [...tower.positions.subarray(3 * vertex, 3 * vertex + 3)] as unknown as Vector3);
+        const got = [...read.positions.subarray(3 * vertex, 3 * vertex + 3)];
+        expect(largestDifference(got, target)).toBeLessThanOrEqual(2 ** -24 * Math.max(...target.map(Math.abs)));
+      }
+    }
   });
 
   it("saves the handles, reloads the exported mesh, and has both again", async () => {
-    const shown = await user.positions();
     const handles = await user.save("Handles as JSON");
     const exported = await user.save("Mesh as PLY, with distortion");
     const before = await user.ask<object>("document().handles.map(({ name, vertices }) => ({ name, vertices }))");
@@ -133,7 +144,21 @@ describe("somebody with a mesh of their own", () => {
     await user.until("window.__lpdeform.app.mesh.name === 'bent.ply'");
     await user.settled();
     const reloaded = await user.ask<Record<string, number>>("app.mesh.positions");
-    expect(Object.values(reloaded)).toEqual(shown);
+    expect(Object.values(reloaded)).toEqual([...readMesh("bent.ply", exported).positions]);
+  });
+
+  it("exports what is shown, and says so, where the server is away", async () => {
+    const shown = await user.positions();
+    await service.killServer();
+    await user.until('window.__lpdeform.status() === "away"');
+    const file = await user.save("Mesh as OFF");
+    expect([...readMesh("x.off", file).positions]).toEqual(shown);
+    await user.page
+      .locator(".notice.bad", { hasText: "What is shown was written as it is, rounded for the screen." })
+      .waitFor();
+    await service.startServer();
+    await user.until('window.__lpdeform.status() === "live"');
+    await user.settled();
   });
 
   it("saves a picture", async () => {
