@@ -167,6 +167,20 @@ describe("history", () => {
     expect(history.canRedo).toBe(false);
   });
 
+  it("comes back whole after another one", () => {
+    const history = new History(0);
+    for (const value of [1, 2, 3]) history.push(value);
+    history.undo();
+    const { steps } = history;
+    history.reset(9);
+    history.push(10);
+    history.restore(steps);
+    expect([history.present, history.canUndo, history.canRedo]).toEqual([2, true, true]);
+    expect(history.redo() && history.present).toBe(3);
+    expect(history.undo() && history.undo() && history.undo() && history.present).toBe(0);
+    expect(steps.past).toEqual([0, 1]);
+  });
+
   it("makes no step of a gesture that is cancelled, and keeps what was undone before it", () => {
     const history = new History({ at: 0 });
     const begin = history.present;

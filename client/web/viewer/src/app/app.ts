@@ -1,7 +1,7 @@
 import type { LpdeformError, MeshReport } from "lpdeform-client";
 import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
 import { type Document, emptyDocument, handleOf } from "../model/document.js";
-import { History } from "../model/history.js";
+import { History, type Steps } from "../model/history.js";
 import { boundsOf, type Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
 import { State } from "../model/state.js";
@@ -24,10 +24,20 @@ export interface Facts {
   notice: { text: string; isBad: boolean } | undefined;
   /** When the work was kept that a reload has brought back, of Date.now(). */
   restoredFrom: number | undefined;
+  /** The name of the work whose place other work has taken; bringBack() swaps them. */
+  setAside: string | undefined;
   /** Vertices that a brush or a warning points out. */
   pointedOut: readonly number[];
   canUndo: boolean;
   canRedo: boolean;
+}
+
+/** Work that has made room for other work. */
+interface Aside {
+  mesh: Mesh;
+  steps: Steps<Document>;
+  view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned">;
+  look: Look;
 }
 
 const noMesh: Mesh = { name: "", positions: new Float32Array(0), faces: new Uint32Array(0) };
@@ -44,6 +54,8 @@ export class App {
   edge = 0;
   /** Called after each picture that was drawn. */
   readonly afterDrawing = new Set<(now: number) => void>();
+  #aside: Aside | undefined;
+  #isBroughtBack = false;
   #turned: Pane | undefined;
   #asked = 0;
   readonly #pace = new Pace(() => this.requestDraw());
@@ -59,6 +71,7 @@ export class App {
       problem: undefined,
       notice: undefined,
       restoredFrom: undefined,
+      setAside: undefined,
       pointedOut: [],
       canUndo: false,
       canRedo: false,
@@ -84,29 +97,63 @@ export class App {
   // The work.
 
   openShape(id: string, detail: Detail): void {
+    this.#openShape(id, detail, this.document);
+  }
+
+  #openShape(id: string, detail: Detail, { p, secondP }: Document): void {
     const kind = shapeKinds.find((shape) => shape.id === id) ?? shapeKinds[0]!;
     const { mesh, document, first } = kind.make(detail);
-    const { p, secondP } = this.document;
     this.open(mesh, { ...document, p, secondP });
     this.view.set({ shape: kind.id, detail, selected: first, tool: "move", isYUp: false, pinned: undefined });
   }
 
   /** Without anything of what was there before. */
   beginAnew(id: string, detail: Detail): void {
-    this.history.reset(emptyDocument);
-    this.openShape(id, detail);
+    this.#openShape(id, detail, emptyDocument);
   }
 
-  open(mesh: Mesh, document: Document): void {
+  /** There is more than what was opened. */
+  get isTouched(): boolean {
+    return this.#isBroughtBack || this.history.canUndo || this.history.canRedo;
+  }
+
+  /** `isBroughtBack`: somebody has worked on it. */
+  open(mesh: Mesh, document: Document, isBroughtBack = false): void {
+    this.#aside = this.isTouched ? this.#present() : undefined;
+    this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
     this.adjacency = adjacencyOf(mesh.positions.length / 3, mesh.faces);
     this.edge = meanEdge(this.adjacency, mesh.positions);
     this.diagonal = boundsOf(mesh.positions, mesh.faces).diagonal;
     this.view.set({ selected: undefined, shape: "", pinned: undefined });
-    this.facts.set({ mesh, report: undefined, problem: undefined, restoredFrom: undefined, pointedOut: [] });
+    this.facts.set({
+      mesh,
+      report: undefined,
+      problem: undefined,
+      restoredFrom: undefined,
+      pointedOut: [],
+      setAside: this.#aside?.mesh.name,
+    });
     for (const pane of this.panes) pane.open(mesh, document, this.view.now);
     this.#documentChanged(performance.now());
     this.fit();
+  }
+
+  #present(): Aside {
+    const { shape, detail, selected, isYUp, pinned } = this.view.now;
+    const { look } = this.panes[0]!.stage;
+    return { mesh: this.mesh, steps: this.history.steps, view: { shape, detail, selected, isYUp, pinned }, look };
+  }
+
+  /** The work that was set aside, with what can be undone; what is there now is set aside in its place. */
+  bringBack(): void {
+    const aside = this.#aside;
+    if (!aside) return;
+    this.open(aside.mesh, aside.steps.present, true);
+    this.history.restore(aside.steps);
+    this.view.set({ ...aside.view, tool: "move" });
+    this.lookFrom(aside.look);
+    this.#documentChanged(performance.now());
   }
 
   /** A step that can be undone. */

@@ -49,7 +49,7 @@ export class Keeper {
     if (!this.#store) return;
     app.facts.watch((facts, before) => {
       if (facts.mesh !== before.mesh) this.#isTouched = this.isKeeping = false;
-      if (facts.canUndo) this.#isTouched = true;
+      if (app.isTouched) this.#isTouched = true;
       if (facts.document !== before.document && facts.mesh === before.mesh) app.facts.set({ restoredFrom: undefined });
       if (facts.document !== before.document || facts.mesh !== before.mesh) this.#soon();
     });
@@ -96,7 +96,7 @@ export class Keeper {
     const { app } = this;
     const { selected, pinned, shape, ...look } = view;
     app.view.set(look);
-    app.open(mesh, document);
+    app.open(mesh, document, true);
     app.view.set({ selected, pinned, shape: shape ?? "" });
     app.lookFrom(camera);
     app.facts.set({ restoredFrom: savedAt });

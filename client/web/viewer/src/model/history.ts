@@ -1,3 +1,10 @@
+/** All of a history, to go back to it. */
+export interface Steps<Value> {
+  past: Value[];
+  present: Value;
+  future: Value[];
+}
+
 /** Undo and redo of an immutable value. A gesture is many values and one step. */
 export class History<Value> {
   #past: Value[] = [];
@@ -70,11 +77,21 @@ export class History<Value> {
     return true;
   }
 
+  /** After which another history may take the place of this one. */
+  get steps(): Steps<Value> {
+    this.end();
+    return { past: [...this.#past], present: this.#present, future: [...this.#future] };
+  }
+
+  restore({ past, present, future }: Steps<Value>): void {
+    this.#past = [...past];
+    this.#future = [...future];
+    this.#before = undefined;
+    this.#present = present;
+  }
+
   /** Begins anew. */
   reset(value: Value): void {
-    this.#past = [];
-    this.#future = [];
-    this.#before = undefined;
-    this.#present = value;
+    this.restore({ past: [], present: value, future: [] });
   }
 }

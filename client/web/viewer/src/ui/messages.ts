@@ -51,7 +51,7 @@ export function messages(app: App, beginAnew: () => void): HTMLElement {
     else if (facts.status.kind !== "away" || facts.status !== before.status || !banner.hidden) showStatus(facts.status);
     else late = setTimeout(() => showStatus(app.facts.now.status), 400);
     setText(hint, hintOf(app));
-    hint.hidden = hint.textContent === "" || !banner.hidden || facts.restoredFrom !== undefined;
+    hint.hidden = hint.textContent === "" || !banner.hidden || facts.restoredFrom !== undefined || facts.setAside !== undefined;
     if (facts.notice === before.notice || !facts.notice) return;
     notice.textContent = facts.notice.text;
     notice.classList.toggle("bad", facts.notice.isBad);
@@ -60,7 +60,7 @@ export function messages(app: App, beginAnew: () => void): HTMLElement {
     timer = setTimeout(() => (notice.hidden = true), facts.notice.isBad ? 2 * noticeMs : noticeMs);
   });
   app.view.watch(() => setText(hint, hintOf(app)));
-  return el("div", { className: "messages" }, pill, banner, restored, hint, notice);
+  return el("div", { className: "messages" }, pill, banner, restored, asideNote(app), hint, notice);
 }
 
 /** Says that the work is that of before, until it is changed, dismissed or let go. */
@@ -74,6 +74,21 @@ function restoredNote(app: App, beginAnew: () => void): HTMLElement {
   app.facts.watch(({ restoredFrom, mesh }) => {
     note.hidden = restoredFrom === undefined;
     if (restoredFrom !== undefined) setText(text, `“${mesh.name}” is here again as you left it ${ago(restoredFrom)}.`);
+  });
+  return note;
+}
+
+/** Says what other work has taken the place of, until that is worked on. */
+function asideNote(app: App): HTMLElement {
+  const text = el("span");
+  const back = el("button", { type: "button", className: "plain", textContent: "Bring it back" });
+  const dismiss = el("button", { type: "button", className: "plain", textContent: "Dismiss" });
+  back.addEventListener("click", () => app.bringBack());
+  dismiss.addEventListener("click", () => app.facts.set({ setAside: undefined }));
+  const note = el("div", { className: "aside", role: "status", hidden: true }, text, back, dismiss);
+  app.facts.watch(({ setAside }) => {
+    note.hidden = setAside === undefined;
+    if (setAside !== undefined) setText(text, `“${setAside}” has made room, with your work on it.`);
   });
   return note;
 }

@@ -107,6 +107,46 @@ it("a mesh from a file comes back, and is let go on demand, for good", async () 
   expect(await note().isHidden()).toBe(true);
 });
 
+it("work that another shape, a file or letting go takes the place of is brought back", async () => {
+  await bend();
+  const bent = await work();
+  const aside = user.page.locator(".aside");
+  const bringBack = async () => {
+    expect(await aside.textContent()).toContain("“bar” has made room");
+    await aside.getByRole("button", { name: "Bring it back" }).click();
+    await user.settled();
+    expect([await work(), await user.ask("app.mesh.name"), await user.ask("app.view.now.shape")]).toEqual([bent, "bar", "bar"]);
+    expect(await aside.isHidden()).toBe(true);
+  };
+  await user.page.getByLabel("Shape").selectOption("sheet");
+  await user.settled();
+  await bringBack();
+  expect(await user.ask("app.history.canUndo")).toBe(true);
+
+  await user.openFiles({ name: "tower.off", content: writeOff(blockSurface(2, 2, 6, () => true)) });
+  await user.until("window.__lpdeform.app.mesh.name === 'tower.off'");
+  await bringBack();
+
+  await user.page.waitForTimeout(700);
+  await reload();
+  await user.page.getByRole("button", { name: "Discard it" }).click();
+  await user.settled();
+  await bringBack();
+  await user.page.waitForTimeout(700);
+  await reload(); // kept again
+  expect(await work()).toBe(bent);
+
+  await user.page.getByRole("button", { name: "Go on" }).click();
+  await user.page.getByLabel("Shape").selectOption("sheet");
+  await user.settled();
+  await bringBack();
+  await user.page.getByLabel("Shape").selectOption("sheet");
+  await aside.getByRole("button", { name: "Dismiss" }).click();
+  await user.page.getByLabel("Shape").selectOption("bar"); // nothing was done to the sheet
+  await user.settled();
+  expect(await aside.isHidden()).toBe(true);
+});
+
 it("what was not worked on is not kept", async () => {
   await user.page.waitForTimeout(700);
   await reload();
