@@ -4,6 +4,9 @@ import { Files } from "./app/files.js";
 import { Keeper } from "./app/keeper.js";
 import { startShortcuts } from "./app/shortcuts.js";
 import { exposeForTests } from "./app/testing.js";
+import { canDraw } from "./stage/software.js";
+import { noPictures } from "./ui/no_pictures.js";
+import { wantsBack } from "./ui/wants_back.js";
 import { dock } from "./ui/dock.js";
 import { helpSheet } from "./ui/help.js";
 import { legend } from "./ui/legend.js";
@@ -13,38 +16,44 @@ import { startTheme } from "./ui/theme.js";
 import { toolbar } from "./ui/toolbar.js";
 import { topbar } from "./ui/topbar.js";
 
-const app = new App();
-const files = new Files(app);
-const help = helpSheet();
-const dropHere = document.createElement("div");
-dropHere.className = "drop-here";
-dropHere.textContent = "Drop a mesh or a handle file";
-document.querySelector("#app")!.append(
-  topbar(app, files, () => help.showModal()),
-  app.stages,
-  toolbar(app),
-  legend(app),
-  dock(app),
-  messages(app, () => beginAnew()),
-  sidePanel(app),
-  help,
-  dropHere,
-);
-startTheme(app);
-startShortcuts(app, files, help);
-exposeForTests(app);
-const keeper = new Keeper(app);
-// Where nothing is kept, a page that is left by mistake takes the work along.
-window.addEventListener("beforeunload", (event) => {
-  if (app.history.canUndo && !keeper.isKeeping) event.preventDefault();
-});
+const root = document.querySelector("#app")!;
+if (canDraw) await start();
+else root.append(noPictures());
 
-// ?shape=sheet&detail=fine&encoding=float32 for links to a state of the page.
-const asked = new URLSearchParams(location.search);
-const detail = asked.get("detail");
-const encoding = asked.get("encoding");
-const beginAnew = () =>
-  app.beginAnew(asked.get("shape") ?? "creature", detail === "coarse" || detail === "fine" ? detail : "medium");
-if (encoding === "float32" || encoding === "quantized" || encoding === "compressed") app.view.set({ encoding });
-if (!(await keeper.restore())) beginAnew();
-keeper.start();
+async function start(): Promise<void> {
+  const app = new App();
+  const files = new Files(app);
+  const help = helpSheet();
+  const dropHere = document.createElement("div");
+  dropHere.className = "drop-here";
+  dropHere.textContent = "Drop a mesh or a handle file";
+  root.append(
+    topbar(app, files, () => help.showModal()),
+    app.stages,
+    toolbar(app),
+    legend(app),
+    dock(app),
+    messages(app, () => beginAnew()),
+    sidePanel(app),
+    help,
+    dropHere,
+  );
+  startTheme(app);
+  startShortcuts(app, files, help);
+  exposeForTests(app);
+  const keeper = new Keeper(app, wantsBack);
+  // Where nothing is kept, a page that is left by mistake takes the work along.
+  window.addEventListener("beforeunload", (event) => {
+    if (app.history.canUndo && !keeper.isKeeping) event.preventDefault();
+  });
+
+  // ?shape=sheet&detail=fine&encoding=float32 for links to a state of the page.
+  const asked = new URLSearchParams(location.search);
+  const detail = asked.get("detail");
+  const encoding = asked.get("encoding");
+  const beginAnew = () =>
+    app.beginAnew(asked.get("shape") ?? "creature", detail === "coarse" || detail === "fine" ? detail : "medium");
+  if (encoding === "float32" || encoding === "quantized" || encoding === "compressed") app.view.set({ encoding });
+  if (!(await keeper.restore())) beginAnew();
+  keeper.start();
+}

@@ -5,6 +5,8 @@ import type { App } from "./app.js";
 import { claim, whileFree } from "./claim.js";
 
 const key = "lpdeform-work";
+/** There while work is being brought back: found at the beginning, it tells of a page that did not survive that. */
+const restoringKey = "lpdeform-restoring";
 const saveEveryMs = 500;
 /** Longer than a page that is being reloaded takes to let go of its work. */
 const patienceMs = 1000;
@@ -26,7 +28,11 @@ export class Keeper {
   #timer: ReturnType<typeof setTimeout> | undefined;
   #camera = "";
 
-  constructor(readonly app: App) {}
+  /** `wantsBack`: whether the user wants work again at which the page stopped last time, by the name of its mesh. */
+  constructor(
+    readonly app: App,
+    readonly wantsBack: (name: string) => Promise<boolean>,
+  ) {}
 
   /** True where there was work. Where the browser keeps nothing, all goes on without. */
   async restore(): Promise<boolean> {
@@ -36,6 +42,10 @@ export class Keeper {
       const mesh = work && (await store.mesh(work.id));
       this.#store = store;
       if (!work || !mesh) return false;
+      if (sessionStorage.getItem(restoringKey) && !(await this.wantsBack(mesh.name))) {
+        sessionStorage.removeItem(restoringKey);
+        return false;
+      }
       this.#show(work, mesh);
       return true;
     } catch {
@@ -95,6 +105,7 @@ export class Keeper {
   #show({ document, view, camera, savedAt }: Work, mesh: Mesh): void {
     const { app } = this;
     const { selected, pinned, shape, ...look } = view;
+    this.#watchOver();
     app.view.set(look);
     app.open(mesh, document, true);
     app.view.set({ selected, pinned, shape: shape ?? "" });
@@ -102,6 +113,19 @@ export class Keeper {
     app.facts.set({ restoredFrom: savedAt });
     this.#keptMesh = mesh;
     this.#isTouched = this.isKeeping = true;
+  }
+
+  /** Until the first picture, or until the page is left in good order. */
+  #watchOver(): void {
+    const { afterDrawing } = this.app;
+    sessionStorage.setItem(restoringKey, "yes");
+    const over = () => {
+      sessionStorage.removeItem(restoringKey);
+      afterDrawing.delete(over);
+      window.removeEventListener("pagehide", over);
+    };
+    afterDrawing.add(over);
+    window.addEventListener("pagehide", over);
   }
 
   #soon(): void {

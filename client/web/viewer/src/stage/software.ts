@@ -1,9 +1,14 @@
+const context = document.createElement("canvas").getContext("webgl2");
+
+/** Nothing can be drawn where there is no WebGL. */
+export const canDraw = context !== null;
+
 /** Drawn by the processor, where each pixel counts. */
-export const isSoftware = (() => {
-  const context = document.createElement("canvas").getContext("webgl2");
-  if (!context) return false;
+export const isSoftware = context !== null && isByProcessor(context);
+
+function isByProcessor(context: WebGL2RenderingContext): boolean {
   const info = context.getExtension("WEBGL_debug_renderer_info");
   const name = String(context.getParameter(info?.UNMASKED_RENDERER_WEBGL ?? context.RENDERER));
   context.getExtension("WEBGL_lose_context")?.loseContext();
   return /swiftshader|llvmpipe|software|basic render/i.test(name);
-})();
+}

@@ -38,6 +38,7 @@ export class Stage {
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", "The surface; arrow keys move the selected handle, N selects the next");
     this.#renderer = new three.WebGLRenderer({ canvas: this.canvas, antialias: !isSoftware, alpha: false });
+    this.canvas.addEventListener("webglcontextrestored", changed);
     this.camera.up.set(0, 0, 1);
     this.gizmo = new Gizmo(this.camera, this.canvas, changed);
     this.#scene.add(this.#backdrop.object, this.marks.object, this.gizmo.object);

@@ -147,6 +147,35 @@ it("work that another shape, a file or letting go takes the place of is brought 
   expect(await aside.isHidden()).toBe(true);
 });
 
+it("work at which the page stopped is shown again only where that is wanted", async () => {
+  await bend();
+  const bent = await work();
+  await reload();
+  await reload(); // a page that was left in good order
+  expect(await work()).toBe(bent);
+
+  // What a page leaves behind that does not survive its first picture.
+  const stop = () => user.page.evaluate("sessionStorage.setItem('lpdeform-restoring', 'yes')");
+  const question = user.page.getByRole("dialog", { name: "Your work" });
+  await stop();
+  await user.page.reload();
+  await question.getByText("Show “bar” again?").waitFor();
+  expect(await user.ask("app.mesh.name")).toBe("");
+  await question.getByRole("button", { name: "Show it again" }).click();
+  await user.settled();
+  expect(await work()).toBe(bent);
+  expect(await question.isVisible()).toBe(false);
+
+  await stop();
+  await user.page.reload();
+  await question.getByRole("button", { name: "Discard it" }).click();
+  await user.settled();
+  expect(await user.ask("app.history.canUndo")).toBe(false);
+  expect(await work()).not.toBe(bent);
+  await reload();
+  expect(await note().isHidden()).toBe(true);
+});
+
 it("what was not worked on is not kept", async () => {
   await user.page.waitForTimeout(700);
   await reload();

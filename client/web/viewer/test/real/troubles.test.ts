@@ -71,6 +71,47 @@ describe("the page says plainly, and goes on by itself when", () => {
   });
 });
 
+describe("where pictures", () => {
+  it("cannot be drawn, the page says so", async () => {
+    const service = await start();
+    const user = await visit(service);
+    const context = await user.browser.newContext();
+    await context.addInitScript(`{
+      const { getContext } = HTMLCanvasElement.prototype;
+      HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+        return kind.startsWith("webgl") ? null : getContext.call(this, kind, ...rest);
+      };
+    }`);
+    const page = await context.newPage();
+    const errors: string[] = [];
+    page.on("pageerror", ({ message }) => errors.push(message));
+    await page.goto(user.page.url());
+    await page.getByRole("alert").filter({ hasText: "This browser does not draw in three dimensions" }).waitFor();
+    expect(errors).toEqual([]);
+  });
+
+  it("are lost by the browser, they come again", async () => {
+    const service = await start();
+    const user = await visit(service);
+    await user.settled();
+    await user.page.keyboard.press("c"); // the colours of p: blue throughout
+    await user.page.waitForTimeout(500);
+    const { coloured } = await user.colours();
+    await user.page.evaluate(`{
+      const context = document.querySelector("canvas.stage").getContext("webgl2");
+      const extension = context.getExtension("WEBGL_lose_context");
+      window.__restore = () => extension.restoreContext();
+      extension.loseContext();
+    }`);
+    await user.page.waitForTimeout(300);
+    expect((await user.colours()).coloured).toBeLessThan(coloured / 2);
+    await user.page.evaluate("window.__restore()");
+    await user.page.waitForTimeout(800);
+    expect((await user.colours()).coloured).toBeGreaterThan(0.95 * coloured);
+    expect(user.errors).toEqual([]);
+  });
+});
+
 describe("a mesh with defects", () => {
   // A tetrahedron, a third face on one of its edges, a face without area, a vertex that nothing uses.
   const off =
