@@ -122,18 +122,20 @@ int solve(char** argv) {
 
   std::FILE* const positions = std::fopen((out + ".f64").c_str(), "wb");
   std::vector<double> seconds, kept;
+  const auto keep = [&] {
+    kept.push_back(static_cast<double>(seconds.size()));
+    const Points& x = deformer->positions();
+    std::fwrite(x.data(), sizeof(double), static_cast<std::size_t>(x.size()), positions);
+  };
   for (bool is_running = true; is_running && total < limit;) {
     seconds.push_back(total);
-    const auto iteration = static_cast<double>(seconds.size());
-    if (kept.empty() || iteration >= 1.05 * kept.back()) {
-      kept.push_back(iteration);
-      const Points& x = deformer->positions();
-      std::fwrite(x.data(), sizeof(double), static_cast<std::size_t>(x.size()), positions);
-    }
+    if (kept.empty() || static_cast<double>(seconds.size()) >= 1.05 * kept.back()) keep();
     start = Clock::now();
     is_running = deformer->step();
     total += seconds_since(start);
   }
+  seconds.push_back(total);
+  keep();  // the last in any case
   std::fclose(positions);
   std::FILE* const json = std::fopen((out + ".json").c_str(), "w");
   std::fprintf(json, "{\"setup\": %.9g, ", setup);
