@@ -16,7 +16,7 @@ export function el<Tag extends keyof HTMLElementTagNameMap>(
 ): HTMLElementTagNameMap[Tag] {
   const element = document.createElement(tag);
   Object.assign(element, properties);
-  if (style) element.setAttribute("style", style);
+  if (style) element.style.cssText = style; // the attribute is not for pages of a strict policy
   for (const [name, value] of Object.entries(data ?? {})) element.dataset[name] = value;
   for (const [name, value] of Object.entries(aria ?? {})) element.setAttribute(`aria-${name}`, value);
   element.append(...children.filter((child): child is Node | string => child !== undefined && child !== false));

@@ -246,7 +246,7 @@ it("a page that holds the kept work does not keep a newer page from renewing the
 });
 
 it("a browser that keeps nothing asks before the page is left", async () => {
-  const context = await user.browser.newContext({ viewport: { width: 1280, height: 800 } });
+  const context = await user.browser.newContext({ viewport: { width: 1280, height: 800 }, bypassCSP: true });
   await context.addInitScript(() => {
     IDBFactory.prototype.open = () => {
       throw new DOMException("forbidden", "SecurityError");

@@ -71,6 +71,33 @@ describe("the page says plainly, and goes on by itself when", () => {
   });
 });
 
+describe("the page's policy", () => {
+  it("lets it do all it does, and nobody frame it", async () => {
+    const service = await start();
+    const user = await visit(service);
+    const context = await user.browser.newContext({ viewport: { width: 1280, height: 800 } });
+    const page = await context.newPage();
+    const said: string[] = [];
+    page.on("console", (message) => message.type() === "error" && said.push(message.text()));
+    page.on("pageerror", ({ message }) => said.push(message));
+    const answer = await page.goto(`${service.url}/?shape=bar&detail=coarse&encoding=compressed`);
+    expect(answer!.headers()["content-security-policy"]).toContain("default-src 'none'");
+    await page.locator('.pill[data-kind="live"]').waitFor();
+    await page.locator('[data-measure="stop"]', { hasText: "converged" }).waitFor();
+    await page.getByRole("button", { name: "Save" }).click();
+    const download = page.waitForEvent("download");
+    await page.getByRole("menuitem", { name: "Picture as PNG" }).click();
+    await download;
+    expect(await page.locator(".stops .stop").nth(1).getAttribute("style")).toContain("--share");
+    expect(said).toEqual([]);
+
+    const framing = await context.newPage();
+    const refusal = framing.waitForEvent("console", (message) => message.text().includes("frame-ancestors"));
+    await framing.setContent(`<iframe src="${service.url}/"></iframe>`);
+    await refusal;
+  });
+});
+
 describe("where pictures", () => {
   it("cannot be drawn, the page says so", async () => {
     const service = await start();

@@ -51,7 +51,14 @@ export class User {
     { width = 1280, height = 800, hasTouch = false, colorScheme = "light" as "light" | "dark" } = {},
   ): Promise<User> {
     const browser = await chromium.launch(launch);
-    const context = await browser.newContext({ viewport: { width, height }, hasTouch, colorScheme, acceptDownloads: true });
+    // What the tests ask of the page is evaluated, which its policy forbids; troubles.test.ts keeps the policy.
+    const context = await browser.newContext({
+      viewport: { width, height },
+      hasTouch,
+      colorScheme,
+      acceptDownloads: true,
+      bypassCSP: true,
+    });
     const user = new User(browser, await context.newPage());
     await user.page.goto(url);
     return user;
