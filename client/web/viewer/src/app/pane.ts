@@ -115,7 +115,7 @@ export class Pane {
     this.stage.fit(surface, isYUp);
   }
 
-  /** Near enough to see them, from outside. */
+  /** Near enough to see them, far enough to see where they are, from outside. */
   lookAt(vertices: readonly number[]): void {
     const { surface } = this.stage;
     if (!surface || vertices.length === 0) return;
@@ -125,7 +125,7 @@ export class Pane {
     const { diagonal } = boundsOf(positions, mesh.faces);
     const far = (vertex: number) => Math.hypot(...place.map((value, axis) => positions[3 * vertex + axis]! - value));
     const radius = vertices.reduce((most, vertex) => Math.max(most, far(vertex)), 0);
-    this.stage.lookAt(place, centroid(normals, vertices), Math.max(6 * radius, 0.9 * diagonal));
+    this.stage.lookAt(place, centroid(normals, vertices), Math.max(6 * radius, 1.6 * diagonal));
   }
 
   #resize(isMoving: boolean, quality: number): void {

@@ -163,6 +163,9 @@ describe("a mesh with defects", () => {
     await user.page.locator("canvas.stage").hover();
     await user.page.mouse.wheel(0, -2000);
     await user.page.locator('[data-warning="unreferenced_vertices"]').click();
+    const { position, target } = await user.ask<{ position: number[]; target: number[] }>("app.panes[0].stage.look");
+    const distance = Math.hypot(...position.map((value, axis) => value - target[axis]!));
+    expect(distance / (await user.ask<number>("app.diagonal"))).toBeCloseTo(1.6, 1); // all of the mesh is in sight
     const box = (await user.page.locator("canvas.stage").boundingBox())!;
     const { x, y } = await user.vertexOnPage(5);
     expect(Math.abs(x - (box.x + box.width / 2))).toBeLessThan(box.width / 4);
