@@ -132,7 +132,12 @@ function showPlots(app: App, energy: HTMLCanvasElement, bars: HTMLCanvasElement)
   const lines =
     red === 0
       ? []
-      : app.panes.map(({ trail }, k) => ({ x: trail.iterations, y: trail.energies, ...(k > 0 && { colour: second }) }));
+      : app.panes.map(({ trail, side, element }, k) => ({
+          x: trail.iterations,
+          y: trail.energies,
+          ...(k > 0 && { colour: second }),
+          ...(app.panes.length > 1 && { name: `${side === "first" ? "left" : "right"}: ${element.dataset["label"]}` }),
+        }));
   plotLines(energy, lines, app.panes[0]!.trail.starts, short);
   const most = red > 0 ? Math.max(...app.panes.map(({ statistics }) => statistics.max)) : 0;
   const counts = new Float64Array(binCount);

@@ -31,6 +31,8 @@ export interface Line {
   x: readonly number[];
   y: readonly number[];
   colour?: string;
+  /** Where there are several: what it is of. */
+  name?: string;
 }
 
 /** Lines over a common x; the y axis is logarithmic where the values ask for it. */
@@ -72,8 +74,15 @@ export function plotLines(
   context.lineWidth = 1;
   context.fillStyle = ink;
   context.fillText(format(high), 2, 9);
+  context.fillText(isLogarithmic ? `${format(low)} (log)` : format(low), 2, height - 4);
   context.textAlign = "right";
-  context.fillText(isLogarithmic ? `${format(low)} (log)` : format(low), width - 2, 9);
+  let at = width - 2;
+  for (const { name, colour } of lines.toReversed()) {
+    if (!name) continue;
+    context.fillStyle = colour ?? accent;
+    context.fillText(name, at, 9);
+    at -= context.measureText(name).width + 10;
+  }
   context.textAlign = "left";
 }
 
