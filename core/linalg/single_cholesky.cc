@@ -172,17 +172,19 @@ bool SingleCholesky::eliminate(std::size_t node, const LowerMatrix& matrix, cons
   const double solve_work =
       static_cast<double>(columns) * static_cast<double>(columns) * static_cast<double>(at.row_count) / 2;
   const bool is_shared = workers.threads() > 1 && update_work_[node] + solve_work > kWorthTasks;
-  const std::size_t tile = is_shared ? kTile : rows;
-  workers.for_chunks(rows, tile, [&](std::size_t, std::size_t begin, std::size_t end) {
+  const auto for_rows = [&](std::size_t count, const auto& body) {
+    if (!is_shared) return body(0, 0, count);
+    workers.for_chunks(count, kTile, body);
+  };
+  for_rows(rows, [&](std::size_t, std::size_t begin, std::size_t end) {
     update_rows(node, begin, end, own.place);
   });
   float* const block = factor_.values_.data() + at.first_value;
   if (!own.triangle.factor(block, columns, own.lowest.data())) return false;
   if (at.row_count == 0) return true;
-  workers.for_chunks(at.row_count, is_shared ? kTile : at.row_count,
-                     [&](std::size_t, std::size_t begin, std::size_t end) {
-                       own.triangle.solve_rows(block + (columns + begin) * columns, end - begin);
-                     });
+  for_rows(at.row_count, [&](std::size_t, std::size_t begin, std::size_t end) {
+    own.triangle.solve_rows(block + (columns + begin) * columns, end - begin, scratch_of_thread().packed);
+  });
   return true;
 }
 

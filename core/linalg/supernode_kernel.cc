@@ -190,14 +190,14 @@ bool SolvingTriangle::factor(float* triangle, std::size_t columns, const float* 
   return true;
 }
 
-void SolvingTriangle::solve_rows(float* rows, std::size_t row_count) const {
+void SolvingTriangle::solve_rows(float* rows, std::size_t row_count, std::vector<float>& scratch) const {
   if (columns_ == 1) {
     for (std::size_t r = 0; r < row_count; ++r) rows[r] *= inverse_diagonal_[0];
     return;
   }
-  std::vector<float> padded(4 * stride_);
+  if (scratch.size() < 4 * stride_) scratch.resize(4 * stride_);
   HWY_DYNAMIC_DISPATCH(SubstituteRows)
-  (rows, row_count, columns_, stride_, transposed_.data(), inverse_diagonal_.data(), padded.data());
+  (rows, row_count, columns_, stride_, transposed_.data(), inverse_diagonal_.data(), scratch.data());
 }
 
 }  // namespace lpdeform

@@ -28,8 +28,9 @@ class SolvingTriangle {
   /// the diagonal inverted. False where a pivot is not above `lowest[c]`, or not a number.
   [[nodiscard]] bool factor(float* triangle, std::size_t columns, const float* lowest);
 
-  /// Replaces each of `row_count` rows b of as many columns by the x with L x = b, after factor().
-  void solve_rows(float* rows, std::size_t row_count) const;
+  /// Replaces each of `row_count` rows b of as many columns by the x with L x = b, after factor(). `scratch` is
+  /// grown as needed.
+  void solve_rows(float* rows, std::size_t row_count, std::vector<float>& scratch) const;
 
  private:
   std::size_t columns_ = 0, stride_ = 0;

@@ -48,6 +48,8 @@ void QuasiNewton::begin_stage(bool keeps_metric) {
   is_last_stage_ = !is_on_the_way && is_smooth_enough();
   history_.assign(1, objective_);
   stage_iterations_ = 0;
+  find_gradient();
+  forget();
   is_metric_good_ = keeps_metric ? adopt_metric() : refresh_metric();
 }
 
@@ -63,23 +65,32 @@ bool QuasiNewton::is_smooth_enough() const {
 /// In a live session the metric of the state before serves at first: a factorisation takes as long as several
 /// iterations.
 bool QuasiNewton::adopt_metric() {
-  begin_memory();
   since_refresh_ = kRefresh - kTrial;
   problem_.metric.adopt(problem_.objective.cells().cell_weights());
   return true;
 }
 
-void QuasiNewton::begin_memory() {
+void QuasiNewton::find_gradient() {
   problem_.objective.gradient(gradient_);
   restrict_to_free(problem_.constraints, gradient_);
+}
+
+/// No pair is left, nor will the last step make one.
+void QuasiNewton::forget() {
   memory_.clear();
   step_length_ = 0;
 }
 
+/// For the present weights. The last step's pair is kept, in the new metric; all are where the metric is the same.
 bool QuasiNewton::refresh_metric() {
-  begin_memory();
   since_refresh_ = 0;
-  return problem_.factor_metric(Metric::Precision::kSingle);
+  const auto version = problem_.metric.version();
+  const double scale = problem_.metric.scale();
+  if (!problem_.factor_metric(Metric::Precision::kSingle)) return false;
+  if (problem_.metric.version() == version && problem_.metric.scale() == scale) return true;
+  memory_.clear();
+  if (step_length_ > 0) problem_.precondition(gradient_before_, preconditioned_);
+  return true;
 }
 
 /// d = -H g, H_0 = M^-1: unscaled, since M is the Hessian with rotations and weights held. Returns <g, d>.
@@ -139,6 +150,7 @@ StepResult QuasiNewton::give_up(double slope) {
   problem_.objective.evaluate(x_, norm_);
   if (problem_.stop.stop_requested()) return result(Outcome::kProgress);
   if (since_refresh_ > 0) {
+    forget();
     is_metric_good_ = refresh_metric();
     return result(Outcome::kProgress);
   }
@@ -154,8 +166,7 @@ StepResult QuasiNewton::give_up(double slope) {
 void QuasiNewton::accept(double length) {
   x_.swap(trial_);
   gradient_.swap(gradient_before_);
-  problem_.objective.gradient(gradient_);
-  restrict_to_free(problem_.constraints, gradient_);
+  find_gradient();
   step_length_ = last_length_ = length;
   ++stage_iterations_, ++since_refresh_;
   history_.push_back(objective_);

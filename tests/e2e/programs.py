@@ -24,21 +24,19 @@ class RunningServer:
     def __init__(self, *arguments, program=None):
         self.process = subprocess.Popen([program or SERVER, "--address", "127.0.0.1:0", *arguments], stdout=subprocess.PIPE,
                                         stderr=subprocess.STDOUT, text=True)
+        self.log = []
         watchdog = threading.Timer(PATIENCE, self.process.kill)
         watchdog.start()
-        self.log = []
-        self.address, self.admin = None, None
-        for line in self.process.stdout:
-            self.log.append(line)
-            found = re.search(r"127\.0\.0\.1:([1-9]\d*)", line)
-            if found:
-                self.address = found.group(0)
-                break
-        if "--admin-address" in arguments:
-            self.admin = self.find(r"http://127\.0\.0\.1:\d+")
-        watchdog.cancel()
-        if self.address is None:
-            raise AssertionError("the server did not say where it listens:\n" + "".join(self.log))
+        try:
+            self.address = self.find(r"127\.0\.0\.1:[1-9]\d*")
+            self.admin = self.find(r"http://127\.0\.0\.1:\d+") if "--admin-address" in arguments else None
+        except AssertionError:
+            self.process.kill()
+            self.process.wait()
+            self.process.stdout.close()
+            raise
+        finally:
+            watchdog.cancel()
         self.reader = threading.Thread(target=self.log.extend, args=(self.process.stdout,))
         self.reader.start()
 

@@ -144,14 +144,4 @@ class Apply(bpy.types.Operator):
         return {"FINISHED"}
 
 
-_classes = (AddHandle, RemoveHandle, PutBack, Start, Stop, Apply)
-
-
-def register() -> None:
-    for one in _classes:
-        bpy.utils.register_class(one)
-
-
-def unregister() -> None:
-    for one in reversed(_classes):
-        bpy.utils.unregister_class(one)
+register, unregister = bpy.utils.register_classes_factory((AddHandle, RemoveHandle, PutBack, Start, Stop, Apply))

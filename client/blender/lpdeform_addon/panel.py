@@ -97,14 +97,4 @@ class DistortionPanel(_Below, bpy.types.Panel):
             self.layout.prop(settings, "distortion_limit")
 
 
-_classes = (MainPanel, MaterialPanel, HandlePanel, DistortionPanel)
-
-
-def register() -> None:
-    for one in _classes:
-        bpy.utils.register_class(one)
-
-
-def unregister() -> None:
-    for one in reversed(_classes):
-        bpy.utils.unregister_class(one)
+register, unregister = bpy.utils.register_classes_factory((MainPanel, MaterialPanel, HandlePanel, DistortionPanel))

@@ -68,12 +68,11 @@ class Preferences(bpy.types.AddonPreferences):
         self.layout.prop(self, "address")
 
 
-_classes = (MeshSettings, HandleSettings, Preferences)
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory((MeshSettings, HandleSettings, Preferences))
 
 
 def register() -> None:
-    for one in _classes:
-        bpy.utils.register_class(one)
+    _register_classes()
     bpy.types.Object.lpdeform = PointerProperty(type=MeshSettings)
     bpy.types.Object.lpdeform_handle = PointerProperty(type=HandleSettings)
 
@@ -81,5 +80,4 @@ def register() -> None:
 def unregister() -> None:
     del bpy.types.Object.lpdeform_handle
     del bpy.types.Object.lpdeform
-    for one in reversed(_classes):
-        bpy.utils.unregister_class(one)
+    _unregister_classes()

@@ -64,7 +64,8 @@ TEST_P(SupernodeKernel, FactorsTrianglesAndSolvesRowsBelow) {
     }
     const Matrix x = Matrix::Random(6, n);
     Matrix rows = (l * x.cast<double>().transpose()).transpose().cast<float>();
-    solving.solve_rows(rows.data(), 6);
+    std::vector<float> scratch;
+    solving.solve_rows(rows.data(), 6, scratch);
     EXPECT_LT((rows - x).cwiseAbs().maxCoeff(), 1e-4f) << n;
   }
 }
