@@ -66,6 +66,18 @@ std::string Session::name() const {
   return link_->name();
 }
 
+void Session::start() {
+  link_->start();
+}
+
+absl::Status Session::ended() const {
+  return link_->ended();
+}
+
+absl::Status Session::last_problem() const {
+  return link_->last_problem();
+}
+
 MeshReport Session::mesh_report() const {
   return link_->mesh_report();
 }

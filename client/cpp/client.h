@@ -44,7 +44,7 @@ struct ClientOptions {
   /// solve under way says it too, and may be asked for again.
   std::chrono::milliseconds reconnect_for = std::chrono::minutes(2);
   std::optional<Tls> tls = {};  // empty: plain text
-  /// Gives the bearer token of each call when that begins, so that tokens may be renewed; on any thread. Empty: none.
+  /// Gives the bearer token of each call when that begins, so that tokens may be renewed; on any thread. Empty, or an empty text: none.
   std::function<std::string()> token = {};
 };
 
@@ -126,6 +126,12 @@ class Session {
 
   /// "sessions/<32 hexadecimal digits>"; another one after the session had to be made anew.
   std::string name() const;
+  /// Begins the stream of frames, which the first call for one does otherwise. Does not wait.
+  void start();
+  /// Why the session is over, as next_frame says it then; OK while it is not.
+  absl::Status ended() const;
+  /// What the connection met with when it was lost last, or when reconnecting was tried last; OK while it stands.
+  absl::Status last_problem() const;
   /// What the server found in the mesh.
   MeshReport mesh_report() const;
   Connection connection() const;

@@ -41,6 +41,11 @@ void FrameBox::finish(absl::Status why) {
   changed_.notify_all();
 }
 
+absl::Status FrameBox::end() const {
+  const std::scoped_lock lock(mutex_);
+  return end_.value_or(absl::OkStatus());
+}
+
 void FrameBox::resume() {
   const std::scoped_lock lock(mutex_);
   end_.reset();

@@ -38,6 +38,8 @@ class FrameBox {
 
   /// Nothing more comes; once the box is empty, take() says why.
   void finish(absl::Status why);
+  /// Why nothing more comes; OK while something may.
+  absl::Status end() const;
   /// Undoes finish().
   void resume();
 

@@ -10,6 +10,9 @@
 namespace lpdeform::client {
 namespace {
 
+/// After which it is seen whether the server has stayed away for too long.
+constexpr std::chrono::milliseconds kLongestWait{1000};
+
 v1::DeformRequest open_request(const Lease& lease, const OpenOptions& options) {
   v1::DeformRequest request;
   v1::DeformOpen& open = *request.mutable_open();
@@ -164,8 +167,7 @@ bool Link::recover(const absl::Status& ended, Backoff& backoff) {
     give_up(recovery.why);
     return false;
   }
-  const auto pause = std::max(recovery.pause, backoff.next());
-  if (changed_.wait_for(lock, pause, [this] { return is_closing_; })) return false;
+  if (!wait_to_try_again(recovery, backoff, lock)) return false;
   if (recovery.next == NextStep::kResume) return true;
 
   const std::string lost = lease_.session;
@@ -175,6 +177,20 @@ bool Link::recover(const absl::Status& ended, Backoff& backoff) {
   if (made.ok() || is_undecided(made)) return true;
   give_up(made);
   return false;
+}
+
+/// While the server is away gRPC's own pauses count, otherwise ours. False when the session is to be closed.
+bool Link::wait_to_try_again(const Recovery& recovery, Backoff& backoff, std::unique_lock<std::mutex>& lock) {
+  const auto longest = std::min(kLongestWait, client_options_.reconnect_for);
+  lock.unlock();
+  const Rpc::Connected connected = absl::IsUnavailable(recovery.why)
+                                       ? rpc_->wait_for_connection(longest, stop_.get_token())
+                                       : Rpc::Connected::kWas;
+  lock.lock();
+  auto pause = recovery.pause;
+  if (connected == Rpc::Connected::kWas) pause = std::max(pause, backoff.next());
+  if (connected == Rpc::Connected::kCame) pause = std::max(pause, Backoff().next());
+  return !changed_.wait_for(lock, pause, [this] { return is_closing_; });
 }
 
 void Link::give_up(absl::Status why) {

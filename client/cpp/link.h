@@ -45,6 +45,9 @@ class Link {
   absl::Status take_over();
   absl::Status close();
   std::string name() const;
+  void start();
+  absl::Status ended() const;
+  absl::Status last_problem() const;
   MeshReport mesh_report() const;
   Connection connection() const;
 
@@ -59,6 +62,7 @@ class Link {
   bool send_one(DeformCall& call, std::unique_lock<std::mutex>& lock);
   void send_update(DeformCall& call, const NumberedUpdate& update, std::unique_lock<std::mutex>& lock);
   bool recover(const absl::Status& ended, Backoff& backoff);
+  bool wait_to_try_again(const Recovery& recovery, Backoff& backoff, std::unique_lock<std::mutex>& lock);
   void give_up(absl::Status why);
 
   // On the reading thread.

@@ -133,8 +133,10 @@ absl::StatusOr<SolveResult> Link::solve_patiently(const SolveOptions& options) {
           options.deadline_seconds - std::chrono::duration<double>(now + pause - start).count();
       if (left.deadline_seconds <= 0) return result;
     }
+    const bool was_there = rpc_->wait_for_connection(pause, stop_.get_token()) == Rpc::Connected::kWas;
     std::unique_lock lock(mutex_);
-    if (changed_.wait_for(lock, pause, [this] { return is_closing_; })) {
+    const auto is_closing = [this] { return is_closing_; };
+    if (was_there ? changed_.wait_for(lock, pause, is_closing) : is_closing_) {
       return absl::CancelledError("The session was closed.");
     }
   }
@@ -262,6 +264,19 @@ absl::Status Link::close() {
 std::string Link::name() const {
   const std::scoped_lock lock(mutex_);
   return lease_.session;
+}
+
+void Link::start() {
+  start_stream();
+}
+
+absl::Status Link::ended() const {
+  return box_.end();
+}
+
+absl::Status Link::last_problem() const {
+  const std::scoped_lock lock(mutex_);
+  return is_open_ ? absl::OkStatus() : last_problem_;
 }
 
 MeshReport Link::mesh_report() const {

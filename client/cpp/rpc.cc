@@ -3,6 +3,7 @@
 #include <grpc/grpc.h>
 #include <grpcpp/grpcpp.h>
 
+#include <algorithm>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -28,6 +29,8 @@ constexpr int kStreamWindowBytes = 1 << 20;
 /// connection. Pings come rarely enough for every server.
 constexpr int kKeepaliveMs = 6 * 60 * 1000;
 constexpr int kUnacknowledgedMs = 20 * 1000;
+/// So often a wait for a connection sees whether it is to stop.
+constexpr std::chrono::milliseconds kGlance{50};
 
 grpc::ChannelArguments channel_arguments() {
   grpc::ChannelArguments arguments;
@@ -69,7 +72,8 @@ bool answers(grpc::Channel& channel, std::chrono::system_clock::time_point deadl
 using TokenSource = std::function<std::string()>;
 
 void add_token(const TokenSource& token, grpc::ClientContext& context) {
-  if (token) context.AddMetadata("authorization", "Bearer " + token());
+  const std::string text = token ? token() : "";
+  if (!text.empty()) context.AddMetadata("authorization", "Bearer " + text);
 }
 
 std::shared_ptr<grpc::ChannelCredentials> credentials_of(const std::optional<Tls>& tls) {
@@ -97,7 +101,8 @@ class GrpcDeformCall final : public DeformCall {
 class GrpcRpc final : public Rpc {
  public:
   GrpcRpc(const std::shared_ptr<grpc::Channel>& channel, const ClientOptions& options)
-      : stub_(v1::DeformService::NewStub(channel)),
+      : channel_(channel),
+        stub_(v1::DeformService::NewStub(channel)),
         call_timeout_(options.call_timeout),
         token_(options.token) {}
 
@@ -155,6 +160,17 @@ class GrpcRpc final : public Rpc {
 
   std::unique_ptr<DeformCall> deform() override { return std::make_unique<GrpcDeformCall>(*stub_, token_); }
 
+  Connected wait_for_connection(std::chrono::milliseconds longest, const std::stop_token& stop) override {
+    const auto end = std::chrono::system_clock::now() + longest;
+    for (bool has_waited = false;; has_waited = true) {
+      const grpc_connectivity_state state = channel_->GetState(true);
+      if (state == GRPC_CHANNEL_READY) return has_waited ? Connected::kCame : Connected::kWas;
+      const auto now = std::chrono::system_clock::now();
+      if (now >= end || stop.stop_requested()) return Connected::kIsNot;
+      channel_->WaitForStateChange(state, std::min(end, now + kGlance));
+    }
+  }
+
  private:
   template <typename Request, typename Response>
   absl::StatusOr<Response> unary(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
@@ -170,6 +186,7 @@ class GrpcRpc final : public Rpc {
     return response;
   }
 
+  const std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<Stub> stub_;
   const std::chrono::milliseconds call_timeout_;
   const TokenSource token_;

@@ -60,6 +60,11 @@ class Rpc {
                              const std::function<absl::Status(const v1::SolveResponse&)>& on_response) = 0;
 
   virtual std::unique_ptr<DeformCall> deform() = 0;
+
+  enum class Connected { kWas, kCame, kIsNot };
+  /// Waits for a connection where there is none, `longest` at most. To be called in place of a mere pause: gRPC makes
+  /// progress with a connection only while somebody waits in a call, or every five seconds.
+  virtual Connected wait_for_connection(std::chrono::milliseconds longest, const std::stop_token& stop) = 0;
 };
 
 }  // namespace lpdeform::client

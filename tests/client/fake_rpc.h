@@ -235,6 +235,10 @@ class FakeRpc final : public Rpc {
     return taken;
   }
 
+  Connected wait_for_connection(std::chrono::milliseconds, const std::stop_token&) override {
+    return Connected::kWas;
+  }
+
   std::unique_ptr<DeformCall> deform() override {
     const std::scoped_lock lock(mutex_);
     streams_.push_back(std::make_shared<Stream>());
