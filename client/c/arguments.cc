@@ -1,0 +1,18 @@
+#include "client/c/arguments.h"
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+
+namespace lpdeform::engine {
+
+absl::Status argument_missing(const std::string& name) {
+  return invalid_input({"ARGUMENT_MISSING", name, ""}, absl::StrCat(name, " is NULL."));
+}
+
+absl::Status check_enum(const std::string& name, std::int32_t value, std::int32_t most) {
+  if (value >= 0 && value <= most) return absl::OkStatus();
+  return invalid_input({"ENUM_UNKNOWN", name, absl::StrCat("0 <= ", name, " <= ", most)},
+                       absl::StrCat(name, " is ", value, ", which this library does not know."));
+}
+
+}  // namespace lpdeform::engine

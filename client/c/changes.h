@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "client/c/lpdeform.h"
+#include "client/c/space.h"
+#include "client/cpp/types.h"
+
+namespace lpdeform::engine {
+
+// Structs of the C interface as changes in the server's coordinates. Errors: ARGUMENT_MISSING, ENUM_UNKNOWN, ROTATION_NOT_FINITE,
+// HANDLE_CHANGED_TWICE; all else is the server's to check.
+
+absl::StatusOr<client::Update> read_update(const lpdeform_update& update, const Space& space);
+absl::StatusOr<client::Handle> read_handle(const lpdeform_handle& handle, const Space& space);
+absl::StatusOr<client::Motion> read_motion(const lpdeform_motion& motion, const Space& space);
+absl::StatusOr<client::Settings> read_settings(const lpdeform_settings& settings, const Space& space);
+
+}  // namespace lpdeform::engine

@@ -1,0 +1,376 @@
+// The border: what C callers see. Each function checks its arguments, calls, and says what came of it; no exception
+// leaves it.
+
+#include "client/c/lpdeform.h"
+
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <new>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/c/arguments.h"
+#include "client/c/changes.h"
+#include "client/c/error.h"
+#include "client/c/live_session.h"
+#include "client/c/server.h"
+#include "client/c/structs.h"
+#include "client/c/vertex_source.h"
+#include "client/cpp/client.h"
+#include "core/base/fault.h"
+
+namespace engine = lpdeform::engine;
+namespace client = lpdeform::client;
+using lpdeform::invalid_input;
+using lpdeform::make_fault;
+using lpdeform::engine::argument_missing;
+using lpdeform::engine::check_enum;
+
+struct lpdeform_client {
+  std::shared_ptr<engine::Server> server;
+};
+
+struct lpdeform_session {
+  std::shared_ptr<engine::LiveSession> live;
+};
+
+namespace {
+
+/// Calls `work`, which returns a Status, and says what came of it.
+template <typename Work>
+lpdeform_code guarded(lpdeform_error* error, Work work) {
+  try {
+    return engine::tell(work(), error);
+  } catch (const std::bad_alloc&) {
+    return engine::tell(
+        make_fault(absl::StatusCode::kResourceExhausted, {"OUT_OF_MEMORY", "", ""}, "Out of memory."), error);
+  } catch (const std::exception& exception) {
+    return engine::tell(make_fault(absl::StatusCode::kInternal, {"EXCEPTION", "", ""}, exception.what()),
+                        error);
+  }
+}
+
+absl::Status check_seconds(const char* name, double seconds) {
+  if (std::isfinite(seconds) && seconds >= 0 && seconds <= 1e9) return absl::OkStatus();
+  return invalid_input({"SECONDS_OUT_OF_RANGE", name, absl::StrCat("0 <= ", name, " <= 1e9")},
+                       absl::StrCat(name, " is ", seconds, "."));
+}
+
+std::chrono::milliseconds milliseconds(double seconds, double otherwise) {
+  return std::chrono::milliseconds(std::llround(1000 * (seconds > 0 ? seconds : otherwise)));
+}
+
+std::string text(const char* from) {
+  return from == nullptr ? std::string() : std::string(from);
+}
+
+absl::StatusOr<std::shared_ptr<engine::Server>> make_server(const lpdeform_connection& given) {
+  if (given.address == nullptr) return argument_missing("connection.address");
+  absl::Status checked = check_seconds("connect_timeout_seconds", given.connect_timeout_seconds);
+  checked.Update(check_seconds("call_timeout_seconds", given.call_timeout_seconds));
+  checked.Update(check_seconds("reconnect_seconds", given.reconnect_seconds));
+  if (!checked.ok()) return checked;
+  const client::Tls tls{text(given.root_certificates), text(given.certificate_chain),
+                        text(given.private_key)};
+  const bool has_texts =
+      !tls.root_certificates.empty() || !tls.certificate_chain.empty() || !tls.private_key.empty();
+  if (given.tls == 0 && has_texts) {
+    return invalid_input({"TLS_OFF", "connection.tls", "tls = 1"}, "There are certificates, but tls is 0.");
+  }
+  client::ClientOptions options;
+  options.connect_timeout = milliseconds(given.connect_timeout_seconds, 5);
+  options.call_timeout = milliseconds(given.call_timeout_seconds, 30);
+  options.reconnect_for = milliseconds(given.reconnect_seconds, 1e9);
+  if (given.tls != 0) options.tls = tls;
+  auto server = std::make_shared<engine::Server>(given.address, std::move(options), given.reconnect_seconds);
+  server->set_token(text(given.token));
+  return server;
+}
+
+struct ReadOptions {
+  client::OpenOptions open;
+  engine::LiveSession::Facts facts;
+};
+
+absl::StatusOr<ReadOptions> read_options(const lpdeform_options* options) {
+  lpdeform_options defaults{};
+  defaults.struct_size = sizeof defaults;
+  const auto given = engine::read_struct(options == nullptr ? &defaults : options, "options");
+  if (!given.ok()) return given.status();
+  absl::Status checked = check_enum("weights", given->weights, LPDEFORM_INTRINSIC_DELAUNAY);
+  checked.Update(check_enum("free_components", given->free_components, LPDEFORM_FREE_COMPONENTS_FOLLOW));
+  checked.Update(check_enum("encoding", given->encoding, LPDEFORM_ENCODING_COMPRESSED));
+  checked.Update(check_enum("lowest_encoding", given->lowest_encoding, LPDEFORM_ENCODING_COMPRESSED));
+  if (!checked.ok()) return checked;
+  const auto space = engine::Space::of(*given);
+  if (!space.ok()) return space.status();
+  ReadOptions out;
+  out.open.weights = static_cast<client::WeightKind>(given->weights);
+  out.open.free_components = static_cast<client::FreeComponents>(given->free_components);
+  out.open.credit = given->credit;
+  out.open.double_precision = given->double_precision != 0;
+  out.open.encoding = static_cast<client::Encoding>(given->encoding);
+  out.open.lowest_encoding = static_cast<client::Encoding>(given->lowest_encoding);
+  out.open.without_distortion = given->without_distortion != 0;
+  out.open.with_normals = given->with_normals != 0;
+  out.open.certify = given->certify != 0;
+  out.open.max_frames_per_second = given->max_frames_per_second;
+  out.facts.space = *space;
+  out.facts.contents = {
+      .normals = out.open.with_normals,
+      .distortion = !out.open.without_distortion || out.open.encoding != client::Encoding::kRaw};
+  return out;
+}
+
+absl::StatusOr<std::shared_ptr<engine::LiveSession>> open(engine::Server& server, const lpdeform_mesh* mesh,
+                                                          const lpdeform_options* options) {
+  auto read = read_options(options);
+  if (!read.ok()) return read.status();
+  const auto given = engine::read_struct(mesh, "mesh");
+  if (!given.ok()) return given.status();
+  auto copy = engine::read_mesh(*given, read->facts.space);
+  if (!copy.ok()) return copy.status();
+  read->open.weld = engine::read_weld(*given);
+  read->facts.vertex_count = given->vertex_count;
+  return server.start(
+      [mesh = *std::move(copy), how = read->open](client::Client& to) { return to.open(mesh, how); },
+      read->facts);
+}
+
+absl::StatusOr<std::shared_ptr<engine::LiveSession>> join(engine::Server& server, const char* name,
+                                                          lpdeform_role role,
+                                                          const lpdeform_options* options) {
+  if (name == nullptr) return argument_missing("name");
+  const absl::Status checked = check_enum("role", role, LPDEFORM_WRITER);
+  if (!checked.ok()) return checked;
+  auto read = read_options(options);
+  if (!read.ok()) return read.status();
+  read->facts.is_reader = role == LPDEFORM_READER;
+  const auto as = role == LPDEFORM_READER ? client::Role::kReader : client::Role::kWriter;
+  return server.start(
+      [name = std::string(name), as, how = read->open](client::Client& to) { return to.join(name, as, how); },
+      read->facts);
+}
+
+absl::Status give(absl::StatusOr<std::shared_ptr<engine::LiveSession>> made, lpdeform_session** session) {
+  if (!made.ok()) return made.status();
+  *session = new lpdeform_session{*std::move(made)};
+  return absl::OkStatus();
+}
+
+/// Sends what `read` makes of the caller's structs.
+template <typename Read>
+lpdeform_code send(lpdeform_session* session, std::uint64_t* input_seq, lpdeform_error* error, Read read) {
+  return guarded(error, [&]() -> absl::Status {
+    if (session == nullptr) return argument_missing("session");
+    absl::StatusOr<client::Update> update = read(session->live->space());
+    if (!update.ok()) return update.status();
+    const absl::StatusOr<std::uint64_t> seq = session->live->send(*std::move(update));
+    if (!seq.ok()) return seq.status();
+    if (input_seq != nullptr) *input_seq = *seq;
+    return absl::OkStatus();
+  });
+}
+
+/// Calls `frame_of` with the caller's buffers, where they are right, and hands out what is to be known of the frame.
+template <typename FrameOf>
+lpdeform_code write(lpdeform_session* session, const lpdeform_buffers* buffers, lpdeform_frame* frame,
+                    lpdeform_error* error, FrameOf frame_of) {
+  bool is_there = false;
+  const lpdeform_code code = guarded(error, [&]() -> absl::Status {
+    if (session == nullptr) return argument_missing("session");
+    const auto given = engine::read_struct(buffers, "buffers");
+    if (!given.ok()) return given.status();
+    const absl::StatusOr<std::optional<lpdeform_frame>> written = frame_of(*session->live, *given);
+    if (!written.ok()) return written.status();
+    is_there = written->has_value();
+    if (is_there) engine::write_struct(**written, frame);
+    return absl::OkStatus();
+  });
+  return code == LPDEFORM_OK && !is_there ? LPDEFORM_NO_FRAME : code;
+}
+
+}  // namespace
+
+uint32_t lpdeform_abi(void) {
+  return LPDEFORM_ABI;
+}
+
+const char* lpdeform_version(void) {
+  return LPDEFORM_RELEASE;
+}
+
+lpdeform_code lpdeform_connect(const lpdeform_connection* connection, lpdeform_client** made,
+                               lpdeform_error* error) {
+  return guarded(error, [&]() -> absl::Status {
+    if (made == nullptr) return argument_missing("client");
+    const auto given = engine::read_struct(connection, "connection");
+    if (!given.ok()) return given.status();
+    auto server = make_server(*given);
+    if (!server.ok()) return server.status();
+    *made = new lpdeform_client{*std::move(server)};
+    return absl::OkStatus();
+  });
+}
+
+lpdeform_code lpdeform_set_token(lpdeform_client* to, const char* token, lpdeform_error* error) {
+  return guarded(error, [&]() -> absl::Status {
+    if (to == nullptr) return argument_missing("client");
+    to->server->set_token(text(token));
+    return absl::OkStatus();
+  });
+}
+
+void lpdeform_disconnect(lpdeform_client* from) {
+  if (from == nullptr) return;
+  guarded(nullptr, [&] {
+    from->server->close();
+    return absl::OkStatus();
+  });
+  delete from;
+}
+
+lpdeform_code lpdeform_open(lpdeform_client* with, const lpdeform_mesh* mesh, const lpdeform_options* options,
+                            lpdeform_session** session, lpdeform_error* error) {
+  return guarded(error, [&]() -> absl::Status {
+    if (with == nullptr) return argument_missing("client");
+    if (session == nullptr) return argument_missing("session");
+    return give(open(*with->server, mesh, options), session);
+  });
+}
+
+lpdeform_code lpdeform_join(lpdeform_client* with, const char* name, lpdeform_role role,
+                            const lpdeform_options* options, lpdeform_session** session,
+                            lpdeform_error* error) {
+  return guarded(error, [&]() -> absl::Status {
+    if (with == nullptr) return argument_missing("client");
+    if (session == nullptr) return argument_missing("session");
+    return give(join(*with->server, name, role, options), session);
+  });
+}
+
+void lpdeform_close(lpdeform_session* session) {
+  if (session == nullptr) return;
+  guarded(nullptr, [&] {
+    session->live->close();
+    return absl::OkStatus();
+  });
+  delete session;
+}
+
+lpdeform_state lpdeform_session_state(const lpdeform_session* session, lpdeform_error* why) {
+  lpdeform_state state = LPDEFORM_STATE_REFUSED;
+  guarded(why, [&]() -> absl::Status {
+    if (session == nullptr) return argument_missing("session");
+    absl::Status said;
+    state = session->live->state(said);
+    return said;
+  });
+  return state;
+}
+
+lpdeform_code lpdeform_session_name(const lpdeform_session* session, char* name, size_t bytes,
+                                    lpdeform_error* error) {
+  return guarded(error, [&]() -> absl::Status {
+    if (session == nullptr) return argument_missing("session");
+    if (name == nullptr) return argument_missing("name");
+    const absl::StatusOr<std::string> said = session->live->name();
+    if (!said.ok()) return said.status();
+    if (said->size() >= bytes) {
+      return invalid_input({"BUFFER_TOO_SMALL", "name", absl::StrCat("bytes >= ", said->size() + 1)},
+                           absl::StrCat("The name needs ", said->size() + 1, " bytes, not ", bytes, "."));
+    }
+    std::memcpy(name, said->c_str(), said->size() + 1);
+    return absl::OkStatus();
+  });
+}
+
+uint32_t lpdeform_vertex_count(const lpdeform_session* session) {
+  std::uint32_t count = 0;
+  guarded(nullptr, [&] {
+    if (session != nullptr) count = session->live->vertex_count();
+    return absl::OkStatus();
+  });
+  return count;
+}
+
+lpdeform_code lpdeform_send(lpdeform_session* session, const lpdeform_update* update, uint64_t* input_seq,
+                            lpdeform_error* error) {
+  return send(session, input_seq, error, [&](const engine::Space& space) -> absl::StatusOr<client::Update> {
+    const auto given = engine::read_struct(update, "update");
+    if (!given.ok()) return given.status();
+    return engine::read_update(*given, space);
+  });
+}
+
+lpdeform_code lpdeform_set_handle(lpdeform_session* session, const lpdeform_handle* handle,
+                                  uint64_t* input_seq, lpdeform_error* error) {
+  return send(session, input_seq, error, [&](const engine::Space& space) -> absl::StatusOr<client::Update> {
+    if (handle == nullptr) return argument_missing("handle");
+    lpdeform_update update{};
+    update.struct_size = sizeof update;
+    update.set_count = 1;
+    update.sets = handle;
+    return engine::read_update(update, space);
+  });
+}
+
+lpdeform_code lpdeform_move_handle(lpdeform_session* session, const char* name, const lpdeform_motion* motion,
+                                   uint64_t* input_seq, lpdeform_error* error) {
+  return send(session, input_seq, error, [&](const engine::Space& space) -> absl::StatusOr<client::Update> {
+    if (motion == nullptr) return argument_missing("motion");
+    const lpdeform_move move{name, *motion};
+    lpdeform_update update{};
+    update.struct_size = sizeof update;
+    update.moves = &move;
+    update.move_count = 1;
+    return engine::read_update(update, space);
+  });
+}
+
+lpdeform_code lpdeform_remove_handle(lpdeform_session* session, const char* name, uint64_t* input_seq,
+                                     lpdeform_error* error) {
+  return send(session, input_seq, error, [&](const engine::Space& space) -> absl::StatusOr<client::Update> {
+    lpdeform_update update{};
+    update.struct_size = sizeof update;
+    update.removals = &name;
+    update.removal_count = 1;
+    return engine::read_update(update, space);
+  });
+}
+
+lpdeform_code lpdeform_set(lpdeform_session* session, const lpdeform_settings* settings, uint64_t* input_seq,
+                           lpdeform_error* error) {
+  return send(session, input_seq, error, [&](const engine::Space& space) -> absl::StatusOr<client::Update> {
+    if (settings == nullptr) return argument_missing("settings");
+    lpdeform_update update{};
+    update.struct_size = sizeof update;
+    update.settings = settings;
+    return engine::read_update(update, space);
+  });
+}
+
+lpdeform_code lpdeform_poll(lpdeform_session* session, const lpdeform_buffers* buffers, lpdeform_frame* frame,
+                            lpdeform_error* error) {
+  return write(session, buffers, frame, error,
+               [](engine::LiveSession& live, const lpdeform_buffers& into) { return live.poll(into); });
+}
+
+lpdeform_code lpdeform_repeat(lpdeform_session* session, const lpdeform_buffers* buffers,
+                              lpdeform_frame* frame, lpdeform_error* error) {
+  return write(session, buffers, frame, error,
+               [](engine::LiveSession& live, const lpdeform_buffers& into) { return live.repeat(into); });
+}
+
+lpdeform_code lpdeform_settle(lpdeform_session* session, double timeout_seconds,
+                              const lpdeform_buffers* buffers, lpdeform_frame* frame, lpdeform_error* error) {
+  return write(session, buffers, frame, error,
+               [=](engine::LiveSession& live,
+                   const lpdeform_buffers& into) -> absl::StatusOr<std::optional<lpdeform_frame>> {
+                 const absl::Status checked = check_seconds("timeout_seconds", timeout_seconds);
+                 if (!checked.ok()) return checked;
+                 return live.settle(timeout_seconds, into);
+               });
+}

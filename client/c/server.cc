@@ -1,0 +1,59 @@
+#include "client/c/server.h"
+
+#include <utility>
+
+namespace lpdeform::engine {
+
+Server::Server(std::string address, client::ClientOptions options, double reconnect_seconds)
+    : address_(std::move(address)), options_(std::move(options)), reconnect_seconds_(reconnect_seconds) {}
+
+void Server::set_token(std::string token) {
+  const std::scoped_lock lock(token_->mutex);
+  token_->text = std::move(token);
+}
+
+absl::StatusOr<client::Client> Server::connected() {
+  const std::scoped_lock lock(connecting_);
+  if (client_) return *client_;
+  client::ClientOptions options = options_;
+  options.token = [token = token_] {
+    const std::scoped_lock lock(token->mutex);
+    return token->text;
+  };
+  absl::StatusOr<client::Client> made = client::Client::connect(address_, std::move(options));
+  if (made.ok()) client_ = *made;
+  return made;
+}
+
+std::shared_ptr<LiveSession> Server::start(Open open, LiveSession::Facts facts) {
+  facts.reconnect_seconds = reconnect_seconds_;
+  auto session = std::make_shared<LiveSession>(
+      [self = shared_from_this(), open = std::move(open)]() -> absl::StatusOr<client::Session> {
+        absl::StatusOr<client::Client> client = self->connected();
+        if (!client.ok()) return client.status();
+        return open(*client);
+      },
+      facts);
+  forget_closed();
+  const std::scoped_lock lock(mutex_);
+  sessions_.push_back(session);
+  return session;
+}
+
+/// Their threads have ended, so that nobody waits here.
+void Server::forget_closed() {
+  const std::scoped_lock lock(mutex_);
+  std::erase_if(sessions_, [](const auto& session) { return session->is_closed(); });
+}
+
+void Server::close() {
+  std::vector<std::shared_ptr<LiveSession>> sessions;
+  {
+    const std::scoped_lock lock(mutex_);
+    sessions.swap(sessions_);
+  }
+  for (const auto& session : sessions) session->close();
+  for (const auto& session : sessions) session->wait_until_closed();
+}
+
+}  // namespace lpdeform::engine

@@ -1,0 +1,74 @@
+// A program that has gRPC, Protocol Buffers and Abseil of its own, as an engine may, loads the shared library for everybody to see:
+// neither meets the other. beside_grpc_test LIBRARY
+
+#include <dlfcn.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <string>
+
+#include "client/c/lpdeform.h"
+#include "tests/client/in_process_server.h"
+
+namespace {
+
+std::string library_path;
+
+template <typename Function>
+Function* find(void* library, const char* name) {
+  void* const found = dlsym(library, name);
+  EXPECT_NE(found, nullptr) << name;
+  return reinterpret_cast<Function*>(found);
+}
+
+TEST(SharedLibrary, WorksInAProgramWithAnotherGrpc) {
+  const lpdeform::client::InProcessServer server;  // this program's gRPC, with the same messages
+  void* const library = dlopen(library_path.c_str(), RTLD_NOW | RTLD_GLOBAL);
+  ASSERT_NE(library, nullptr) << dlerror();
+  const auto connect = find<decltype(lpdeform_connect)>(library, "lpdeform_connect");
+  const auto open = find<decltype(lpdeform_open)>(library, "lpdeform_open");
+  const auto settle = find<decltype(lpdeform_settle)>(library, "lpdeform_settle");
+  const auto close = find<decltype(lpdeform_close)>(library, "lpdeform_close");
+  const auto disconnect = find<decltype(lpdeform_disconnect)>(library, "lpdeform_disconnect");
+
+  lpdeform_error error{};
+  error.struct_size = sizeof error;
+  lpdeform_connection connection{};
+  connection.struct_size = sizeof connection;
+  const std::string address = server.address();
+  connection.address = address.c_str();
+  lpdeform_client* client = nullptr;
+  ASSERT_EQ(connect(&connection, &client, &error), LPDEFORM_OK) << error.message;
+
+  const std::array<float, 9> vertices{0, 0, 0, 1, 0, 0, 0, 1, 0};
+  const std::array<std::uint32_t, 3> indices{0, 1, 2};
+  lpdeform_mesh mesh{};
+  mesh.struct_size = sizeof mesh;
+  mesh.vertex_count = 3;
+  mesh.positions = {vertices.data(), sizeof vertices, 0, 0, LPDEFORM_FLOAT32, 0};
+  mesh.indices = indices.data();
+  mesh.index_count = 3;
+  lpdeform_session* session = nullptr;
+  ASSERT_EQ(open(client, &mesh, nullptr, &session, &error), LPDEFORM_OK) << error.message;
+
+  std::array<float, 9> out{};
+  lpdeform_buffers buffers{};
+  buffers.struct_size = sizeof buffers;
+  buffers.positions = {out.data(), sizeof out, 0, 0, LPDEFORM_FLOAT32, 0};
+  EXPECT_EQ(settle(session, 60, &buffers, nullptr, &error), LPDEFORM_OK) << error.message;
+  EXPECT_EQ(out, vertices);  // nothing holds it: as at rest
+  close(session);
+  disconnect(client);
+  EXPECT_EQ(dlclose(library), 0);
+  EXPECT_NE(dlopen(library_path.c_str(), RTLD_NOW | RTLD_NOLOAD), nullptr)
+      << "it was unloaded under its threads";
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  if (argc != 2) return 2;
+  library_path = argv[1];
+  return RUN_ALL_TESTS();
+}
