@@ -15,9 +15,12 @@ constexpr double kShortStep = 0.9;  // asks for one
 constexpr int kTrial = 10;          // iterations for which a live session keeps the metric that it finds
 constexpr double kSufficientDecrease = 1e-4;
 constexpr int kStageIterations = 60;
-constexpr double kSmoothingStep = 0.1;
+constexpr double kSmoothingStep = 0.1;  // of eps^2, from stage to stage
 constexpr double kBias = 3e-4;
-constexpr double kLeastSmoothing = 1e-26;  // eps^2 over the squared diagonal: rounding
+constexpr double kLiveBias = 0.1;  // of the mean cell's E^p
+// eps^2 over the squared diagonal:
+constexpr double kColdSmoothing = 1e-8, kPreparedSmoothing = 1e-9;
+constexpr double kLeastSmoothing = 1e-26;  // rounding
 
 }  // namespace
 
@@ -26,13 +29,12 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
       norm_(problem_.norm),
       x_(std::move(x)),
       memory_(problem_.objective.cells().workers(), kMemory) {
-  const bool is_warm = warmth != Warmth::kCold;
   const double lowest = problem_.norm.lowest_p();
-  if (lowest < 2) eps2_ = (is_warm ? 1e-9 : 1e-8) * problem_.diagonal * problem_.diagonal;
+  if (lowest < 2) eps2_ = first_smoothing(warmth, lowest);
   // No way from p = 2 where all p_i > 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8 times
   // the E^(1/p)).
   for (const double p : {2.0, 1.6, 1.35, 1.2, 1.1, 1.05}) {
-    if (!is_warm && p > lowest) shares_.push_back((2 - p) / (2 - lowest));
+    if (warmth == Warmth::kCold && p > lowest) shares_.push_back((2 - p) / (2 - lowest));
   }
   begin_stage(warmth == Warmth::kWithMetric);
   true_sum_ = problem_.objective.sum(problem_.norm);
@@ -53,13 +55,25 @@ void QuasiNewton::begin_stage(bool keeps_metric) {
   is_metric_good_ = keeps_metric ? adopt_metric() : refresh_metric();
 }
 
+double QuasiNewton::mean_energy() const {
+  double sum = 0;
+  for (const double e2 : problem_.objective.cells().squared_energies()) sum += std::sqrt(e2);
+  return sum / static_cast<double>(x_.rows());
+}
+
+/// eps^2. A live session's cells have energies to go by; a cold guess's are far too large.
+double QuasiNewton::first_smoothing(Warmth warmth, double lowest_p) const {
+  const double diagonal2 = problem_.diagonal * problem_.diagonal;
+  if (warmth == Warmth::kCold) return kColdSmoothing * diagonal2;
+  if (warmth == Warmth::kPrepared) return kPreparedSmoothing * diagonal2;
+  const double eps = std::pow(kLiveBias, 1 / lowest_p) * mean_energy();
+  return std::max(eps * eps, kLeastSmoothing * diagonal2);
+}
+
 /// Smoothing adds up to eps^p to a cell's E_i^p: too little to matter beside the mean cell's.
 bool QuasiNewton::is_smooth_enough() const {
   if (eps2_ <= kLeastSmoothing * problem_.diagonal * problem_.diagonal) return true;
-  double sum = 0;
-  for (const double e2 : problem_.objective.cells().squared_energies()) sum += std::sqrt(e2);
-  const double mean = sum / static_cast<double>(x_.rows());
-  return std::pow(std::sqrt(eps2_) / mean, problem_.norm.lowest_p()) <= kBias;
+  return std::pow(std::sqrt(eps2_) / mean_energy(), problem_.norm.lowest_p()) <= kBias;
 }
 
 /// In a live session the metric of the state before serves at first: a factorisation takes as long as several

@@ -11,6 +11,7 @@ namespace lpdeform {
 /// What a solve finds at its beginning.
 enum class Warmth {
   kCold,
+  kPrepared,    // what a coarse level found
   kWarm,        // the state of the solve before, in a live session
   kWithMetric,  // and the metric that it ended with
 };
@@ -23,7 +24,8 @@ enum class Warmth {
 /// weights and an empty memory. Every 40th iteration refactors too, and one after a shortened step, which says
 /// that the weights have changed. The last step is remembered then, in the new metric: without it p > 2 and shallow
 /// valleys take two to three times the iterations. Where no weight has changed (p = 2), all are. In a live session
-/// it starts at p_i with a small eps, and for its first ten iterations keeps the metric that it finds.
+/// it starts at p_i with an eps that adds at most a tenth to the mean cell's E^p, and for its first ten iterations
+/// keeps the metric that it finds.
 ///
 /// Converged when, in the last stage, the objective f fell over 20 iterations by at most tolerance * p * f, p
 /// the largest p_i (a relative decrease of E^(1/p) of at most the tolerance); or when no step lowers f and
@@ -38,6 +40,8 @@ class QuasiNewton : public Minimiser {
 
  private:
   void begin_stage(bool keeps_metric = false);
+  double mean_energy() const;
+  double first_smoothing(Warmth warmth, double lowest_p) const;
   bool is_smooth_enough() const;
   bool adopt_metric();
   void find_gradient();
