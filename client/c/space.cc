@@ -25,10 +25,9 @@ absl::StatusOr<Space> Space::of(const lpdeform_options& options) {
   } else if (space.mirrors_) {
     space.sign_[0] = -1;
   }
-  // Mirrored, what was clockwise is counter-clockwise.
-  const bool is_clockwise =
+  // Other coordinates of the same thing: what is clockwise to see stays so.
+  space.turns_triangles_ =
       options.winding == LPDEFORM_WINDING_USUAL ? space.mirrors_ : options.winding == LPDEFORM_CLOCKWISE;
-  space.turns_triangles_ = is_clockwise != space.mirrors_;
   return space;
 }
 

@@ -53,7 +53,9 @@ void FrameBox::resume() {
 
 absl::StatusOr<std::optional<FrameBox::Taken>> FrameBox::take(Clock::time_point deadline) {
   std::unique_lock lock(mutex_);
-  changed_.wait_until(lock, deadline, [this] { return newest_ || !problems_.empty() || end_; });
+  const auto has_something = [this] { return newest_ || !problems_.empty() || end_; };
+  // To wait for a time that has passed would still take the system's shortest sleep.
+  if (Clock::now() < deadline) changed_.wait_until(lock, deadline, has_something);
   if (!problems_.empty()) {
     absl::Status problem = std::move(problems_.front());
     problems_.pop_front();

@@ -90,11 +90,13 @@ TEST(Space, ARotationOfTheEnginesIsTheSameOneOnTheServer) {
   }
 }
 
-TEST(Space, TrianglesAreTurnedWhereTheirWindingIsNotTheUsual) {
-  EXPECT_FALSE(space_of(LPDEFORM_LEFT_HANDED, LPDEFORM_Y_UP, 1, LPDEFORM_WINDING_USUAL).turns_triangles());
-  EXPECT_FALSE(space_of(LPDEFORM_LEFT_HANDED, LPDEFORM_Y_UP, 1, LPDEFORM_CLOCKWISE).turns_triangles());
-  EXPECT_TRUE(space_of(LPDEFORM_LEFT_HANDED, LPDEFORM_Y_UP, 1, LPDEFORM_COUNTER_CLOCKWISE).turns_triangles());
+TEST(Space, TrianglesAreTurnedWhereTheyAreClockwise) {
+  EXPECT_TRUE(space_of(LPDEFORM_LEFT_HANDED, LPDEFORM_Y_UP, 1, LPDEFORM_WINDING_USUAL).turns_triangles());
+  EXPECT_TRUE(space_of(LPDEFORM_LEFT_HANDED, LPDEFORM_Y_UP, 1, LPDEFORM_CLOCKWISE).turns_triangles());
+  EXPECT_FALSE(
+      space_of(LPDEFORM_LEFT_HANDED, LPDEFORM_Y_UP, 1, LPDEFORM_COUNTER_CLOCKWISE).turns_triangles());
   EXPECT_TRUE(space_of(LPDEFORM_RIGHT_HANDED, LPDEFORM_Z_UP, 1, LPDEFORM_CLOCKWISE).turns_triangles());
+  EXPECT_FALSE(space_of(LPDEFORM_RIGHT_HANDED, LPDEFORM_Z_UP, 1).turns_triangles());
 }
 
 TEST(Space, UnknownSettingsAreErrors) {

@@ -1,0 +1,101 @@
+using System;
+using System.Runtime.InteropServices;
+
+namespace Lpdeform
+{
+    /// How a server is reached.
+    public sealed class ConnectionOptions
+    {
+        public bool Tls;
+        /// PEM; null: whom the system trusts.
+        public string RootCertificates;
+        /// Bearer token of each call; see Client.SetToken.
+        public string Token;
+        /// For how long a session tries to reach a server that is away; 0 is for ever.
+        public double ReconnectSeconds;
+    }
+
+    /// A connection to an lpdeform server, shared by its sessions. Members may be used from any thread.
+    public sealed class Client : IDisposable
+    {
+        IntPtr client;
+
+        /// `address`: "host:port". Does not wait: connecting goes on by itself.
+        public Client(string address, ConnectionOptions options = null)
+        {
+            if (Native.lpdeform_abi() != 1) throw new NotSupportedException("This assembly is for another lpdeform_client.");
+            options = options ?? new ConnectionOptions();
+            var error = LpdeformException.NewError();
+            using (var pinned = new Pinned())
+            {
+                var connection = new Native.Connection
+                {
+                    StructSize = (uint)Marshal.SizeOf(typeof(Native.Connection)),
+                    Tls = options.Tls ? 1u : 0u,
+                    Address = pinned.Text(address),
+                    RootCertificates = pinned.Text(options.RootCertificates),
+                    Token = pinned.Text(options.Token),
+                    ReconnectSeconds = options.ReconnectSeconds
+                };
+                LpdeformException.Check(Native.lpdeform_connect(ref connection, out client, error), error);
+            }
+        }
+
+        /// "0.1.0"
+        public static string LibraryVersion
+        {
+            get { return Marshal.PtrToStringAnsi(Native.lpdeform_version()); }
+        }
+
+        /// The bearer token of calls from now on; null: none.
+        public void SetToken(string token)
+        {
+            var error = LpdeformException.NewError();
+            using (var pinned = new Pinned())
+                LpdeformException.Check(Native.lpdeform_set_token(client, pinned.Text(token), error), error);
+        }
+
+        /// Begins to make a session of the mesh; does not wait. Handles may be set at once.
+        public Session Open(MeshData mesh, SessionOptions options = null)
+        {
+            if (mesh == null || mesh.Positions == null || mesh.Indices == null) throw new ArgumentNullException("mesh");
+            var error = LpdeformException.NewError();
+            IntPtr session;
+            var native = (options ?? new SessionOptions()).ToNative();
+            using (var pinned = new Pinned())
+            {
+                var copy = new Native.Mesh
+                {
+                    StructSize = (uint)Marshal.SizeOf(typeof(Native.Mesh)),
+                    VertexCount = (uint)(mesh.Positions.Length / 3),
+                    Positions = pinned.Floats(mesh.Positions),
+                    Normals = pinned.Floats(mesh.Normals),
+                    Indices = pinned.Array(mesh.Indices),
+                    IndexCount = (uint)mesh.Indices.Length,
+                    WeldByPosition = mesh.WeldByPosition ? 1u : 0u
+                };
+                LpdeformException.Check(Native.lpdeform_open(client, ref copy, ref native, out session, error), error);
+            }
+            return new Session(session);
+        }
+
+        /// Joins somebody's session by its name: to look on, or as its writer in place of whoever is.
+        public Session Join(string name, bool asWriter = false, SessionOptions options = null)
+        {
+            var error = LpdeformException.NewError();
+            IntPtr session;
+            var native = (options ?? new SessionOptions()).ToNative();
+            using (var pinned = new Pinned())
+                LpdeformException.Check(
+                    Native.lpdeform_join(client, pinned.Text(name), asWriter ? 1 : 0, ref native, out session, error), error);
+            return new Session(session);
+        }
+
+        /// Waits until the sessions are closed, usually milliseconds. To be called before the process ends.
+        public void Dispose()
+        {
+            var disconnecting = System.Threading.Interlocked.Exchange(ref client, IntPtr.Zero);
+            Native.lpdeform_disconnect(disconnecting);
+        }
+    }
+}

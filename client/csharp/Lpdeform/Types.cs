@@ -1,0 +1,153 @@
+using System;
+using System.Runtime.InteropServices;
+
+namespace Lpdeform
+{
+    /// x, y, z: a place, a direction or a shift, in the engine's coordinates.
+    [StructLayout(LayoutKind.Sequential)]
+    public struct Vector3d
+    {
+        public double X, Y, Z;
+
+        public Vector3d(double x, double y, double z)
+        {
+            X = x;
+            Y = y;
+            Z = z;
+        }
+    }
+
+    /// A rotation, of any length; all 0: none.
+    [StructLayout(LayoutKind.Sequential)]
+    public struct Quaternion4
+    {
+        public double X, Y, Z, W;
+
+        public Quaternion4(double x, double y, double z, double w)
+        {
+            X = x;
+            Y = y;
+            Z = z;
+            W = w;
+        }
+    }
+
+    /// A triangle mesh as an engine has it; vertices may be split along seams.
+    public sealed class MeshData
+    {
+        /// x, y, z of each vertex.
+        public float[] Positions;
+        /// Three 0-based vertex indices a triangle.
+        public int[] Indices;
+        /// x, y, z of each vertex's normal as drawn at rest; null: smooth ones.
+        public float[] Normals;
+        /// Vertices at exactly the same position are one.
+        public bool WeldByPosition;
+    }
+
+    public enum FrameEncoding { Raw, Quantized, Compressed }
+    public enum Weights { Cotangent, Uniform, IntrinsicDelaunay }
+    public enum FreeComponents { Error, Stay, Follow }
+
+    /// How a session is opened; the engine's coordinates are Unity's unless set otherwise.
+    public sealed class SessionOptions
+    {
+        public bool LeftHanded = true;
+        public bool ZUp = false;
+        public double UnitsPerMetre = 1;
+        public Weights Weights;
+        public FreeComponents FreeComponents;
+        public FrameEncoding Encoding;
+        public bool WithNormals;
+        public bool Certify;
+        /// 0: without limit.
+        public double MaxFramesPerSecond;
+
+        internal Native.Options ToNative()
+        {
+            return new Native.Options
+            {
+                StructSize = (uint)Marshal.SizeOf(typeof(Native.Options)),
+                Handedness = LeftHanded ? 1 : 0,
+                Up = ZUp ? 1 : 0,
+                UnitsPerMetre = UnitsPerMetre,
+                Weights = (int)Weights,
+                FreeComponents = (int)FreeComponents,
+                Encoding = (int)Encoding,
+                WithNormals = WithNormals ? 1u : 0u,
+                Certify = Certify ? 1u : 0u,
+                MaxFramesPerSecond = MaxFramesPerSecond
+            };
+        }
+    }
+
+    /// Where a handle is to be; always relative to the mesh at rest.
+    public struct Motion
+    {
+        /// Turned about Center, then moved by Translation.
+        public Quaternion4 Rotation;
+        public Vector3d Center, Translation;
+
+        public static Motion Move(double x, double y, double z)
+        {
+            return new Motion { Translation = new Vector3d(x, y, z) };
+        }
+
+        internal Native.Motion ToNative()
+        {
+            return new Native.Motion { Kind = 1, Rotation = Rotation, Center = Center, Translation = Translation };
+        }
+    }
+
+    public enum Hold { Exactly, Soft, Orientation, AxisLock, PlaneLock }
+
+    /// How a handle is held.
+    public struct HoldOptions
+    {
+        public Hold Hold;
+        /// Of Soft (0: 1) and Orientation (0: 100).
+        public double Weight;
+        /// Of AxisLock and PlaneLock.
+        public Vector3d Direction;
+        /// Radius of the surroundings that go along nearly rigidly.
+        public double Footprint;
+    }
+
+    public enum SessionState { Connecting, Live, Reconnecting, Refused }
+    public enum StopReason { Running, Converged, IterationLimit, TimeLimit, Cancelled, Stalled, NumericalBreakdown }
+
+    /// What is to be known of a frame.
+    public struct Frame
+    {
+        public int VertexCount;
+        /// The newest change that it answers: see Handles.
+        public ulong InputSeq;
+        public int Iteration;
+        /// The result: no further frame until there is a new change.
+        public bool Converged;
+        public StopReason StopReason;
+        /// Lengths in metres.
+        public double Energy;
+        public double SolveSeconds;
+        /// Only where it was asked for (SessionOptions.Certify), and of results.
+        public double? OptimalityGap;
+        /// The distortion that colours show as red.
+        public double RedDistortion;
+
+        internal static Frame From(Native.Frame frame)
+        {
+            return new Frame
+            {
+                VertexCount = (int)frame.VertexCount,
+                InputSeq = frame.InputSeq,
+                Iteration = (int)frame.Iteration,
+                Converged = frame.Converged != 0,
+                StopReason = (StopReason)frame.StopReason,
+                Energy = frame.Energy,
+                SolveSeconds = frame.SolveSeconds,
+                OptimalityGap = frame.HasOptimalityGap != 0 ? frame.OptimalityGap : (double?)null,
+                RedDistortion = frame.RedDistortion
+            };
+        }
+    }
+}

@@ -1,0 +1,54 @@
+// A sample for Unreal Engine 5: a UDynamicMeshComponent that follows handles over an lpdeform server. Put it with
+// lpdeform_follower.h into a module that depends on "GeometryFramework" and "GeometryCore", add lpdeform.h's folder to its
+// PublicIncludePaths and liblpdeform_client to its PublicAdditionalLibraries.
+//
+// Not compiled and not run with the engine here; lpdeform_follower.h, which does the work, is tested against a real server.
+#pragma once
+
+#include <memory>
+
+#include "Components/DynamicMeshComponent.h"
+#include "CoreMinimal.h"
+#include "lpdeform_follower.h"
+
+#include "LpdeformComponent.generated.h"
+
+/** A scene component that moves vertices with it: those within Radius when the game begins. */
+USTRUCT(BlueprintType)
+struct FLpdeformHandle {
+  GENERATED_BODY()
+
+  UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Lpdeform")
+  FName Name;
+  UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Lpdeform")
+  FComponentReference Component;
+  UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Lpdeform", meta = (Units = "cm"))
+  float Radius = 10;
+
+  FTransform Start;
+};
+
+UCLASS(ClassGroup = "Lpdeform", meta = (BlueprintSpawnableComponent))
+class ULpdeformComponent : public UDynamicMeshComponent {
+  GENERATED_BODY()
+
+ public:
+  ULpdeformComponent();
+
+  UPROPERTY(EditAnywhere, Category = "Lpdeform")
+  FString Address = TEXT("localhost:50051");
+  UPROPERTY(EditAnywhere, Category = "Lpdeform")
+  TArray<FLpdeformHandle> Handles;
+
+  void BeginPlay() override;
+  void EndPlay(const EEndPlayReason::Type Reason) override;
+  void TickComponent(float Seconds, ELevelTick Tick, FActorComponentTickFunction* Function) override;
+
+ private:
+  void Hold(FLpdeformHandle& Handle, const std::vector<float>& Positions);
+  void Move(const FLpdeformHandle& Handle);
+  void Show();
+
+  std::unique_ptr<LpdeformFollower> Follower;
+  TArray<int32> VertexIds;  // of the follower's vertices, in the dynamic mesh
+};

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <lpdeform.h>
+
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+/// The part of the Unreal sample that knows no engine: a session whose vertices are in Unreal's coordinates (left-handed, z up,
+/// centimetres), in C++17 around lpdeform.h. Errors are std::runtime_error in the constructor alone; on the game thread they
+/// are texts.
+class LpdeformFollower {
+ public:
+  /// x, y, z of each vertex, three indices a triangle; vertices at one position are one.
+  LpdeformFollower(const std::string& address, const std::vector<float>& positions,
+                   const std::vector<std::uint32_t>& indices) {
+    lpdeform_connection connection{};
+    connection.struct_size = sizeof connection;
+    connection.address = address.c_str();
+    if (lpdeform_connect(&connection, &client_, &error_) != LPDEFORM_OK)
+      throw std::runtime_error(error_.message);
+    lpdeform_mesh mesh{};
+    mesh.struct_size = sizeof mesh;
+    mesh.vertex_count = static_cast<std::uint32_t>(positions.size() / 3);
+    mesh.positions.data = positions.data();
+    mesh.positions.bytes = positions.size() * sizeof(float);
+    mesh.indices = indices.data();
+    mesh.index_count = static_cast<std::uint32_t>(indices.size());
+    mesh.weld_by_position = 1;
+    lpdeform_options options{};
+    options.struct_size = sizeof options;
+    options.handedness = LPDEFORM_LEFT_HANDED;
+    options.up = LPDEFORM_Z_UP;
+    options.units_per_metre = 100;
+    options.free_components = LPDEFORM_FREE_COMPONENTS_FOLLOW;
+    options.with_normals = 1;
+    if (lpdeform_open(client_, &mesh, &options, &session_, &error_) != LPDEFORM_OK) {
+      const std::string why = error_.message;
+      lpdeform_disconnect(client_);
+      throw std::runtime_error(why);
+    }
+    positions_.resize(positions.size());
+    normals_.resize(positions.size());
+    colours_.resize(4 * (positions.size() / 3));
+  }
+
+  ~LpdeformFollower() {
+    lpdeform_close(session_);
+    lpdeform_disconnect(client_);
+  }
+
+  LpdeformFollower(const LpdeformFollower&) = delete;
+  LpdeformFollower& operator=(const LpdeformFollower&) = delete;
+
+  /// False: problem() says why.
+  bool hold(const std::string& name, const std::vector<std::uint32_t>& vertices) {
+    lpdeform_handle handle{};
+    handle.struct_size = sizeof handle;
+    handle.name = name.c_str();
+    handle.vertices = vertices.data();
+    handle.vertex_count = static_cast<std::uint32_t>(vertices.size());
+    return said(lpdeform_set_handle(session_, &handle, nullptr, &error_));
+  }
+
+  /// Where the handle is, relative to the mesh at rest: a rotation about the origin (x, y, z, w), then a shift. Does not wait.
+  bool move(const char* name, const double (&rotation)[4], const double (&translation)[3]) {
+    lpdeform_motion motion{};
+    motion.kind = LPDEFORM_RIGID;
+    for (int k = 0; k < 4; ++k) motion.rotation[k] = rotation[k];
+    for (int k = 0; k < 3; ++k) motion.translation[k] = translation[k];
+    return said(lpdeform_move_handle(session_, name, &motion, nullptr, &error_));
+  }
+
+  /// Once a tick: true where positions(), normals() and colours() are new. Does not wait.
+  bool tick() {
+    lpdeform_buffers buffers{};
+    buffers.struct_size = sizeof buffers;
+    buffers.positions = {positions_.data(), positions_.size() * sizeof(float), 0, 0, LPDEFORM_FLOAT32, 0};
+    buffers.normals = {normals_.data(), normals_.size() * sizeof(float), 0, 0, LPDEFORM_FLOAT32, 0};
+    buffers.colours = {colours_.data(), colours_.size(), 0, 0, LPDEFORM_BGRA8, 0};  // as FColor
+    const lpdeform_code code = lpdeform_poll(session_, &buffers, nullptr, &error_);
+    if (code != LPDEFORM_NO_FRAME) said(code);
+    return code == LPDEFORM_OK;
+  }
+
+  const std::vector<float>& positions() const { return positions_; }
+  const std::vector<float>& normals() const { return normals_; }
+  const std::vector<std::uint8_t>& colours() const { return colours_; }
+
+  lpdeform_state state() const { return lpdeform_session_state(session_, nullptr); }
+
+  /// The last thing that went wrong, once; empty where nothing did.
+  std::string problem() { return std::exchange(problem_, {}); }
+
+ private:
+  bool said(lpdeform_code code) {
+    if (code != LPDEFORM_OK) problem_ = std::string(error_.message) + " (" + error_.reason + ")";
+    return code == LPDEFORM_OK;
+  }
+
+  lpdeform_error error_ = [] {
+    lpdeform_error error{};
+    error.struct_size = sizeof error;
+    return error;
+  }();
+  lpdeform_client* client_ = nullptr;
+  lpdeform_session* session_ = nullptr;
+  std::string problem_;
+  std::vector<float> positions_, normals_;
+  std::vector<std::uint8_t> colours_;
+};

@@ -1,0 +1,237 @@
+// The C# client against a real server, which it starts, kills and starts again: SessionTest.exe SERVER. Ends with 1 where a test fails.
+
+using System;
+using System.Diagnostics;
+using System.IO;
+using System.Linq;
+using System.Threading;
+using Lpdeform;
+
+sealed class Server : IDisposable
+{
+    readonly string program, folder = Path.Combine(Path.GetTempPath(), "lpdeform-" + Guid.NewGuid().ToString("N").Substring(0, 8));
+    Process process;
+
+    public Server(string program)
+    {
+        this.program = program;
+        Directory.CreateDirectory(folder);
+        Start();
+    }
+
+    public string Address { get { return "unix:" + folder + "/socket"; } }
+
+    public void Start()
+    {
+        process = Process.Start(new ProcessStartInfo(program, "--address " + Address + " --log-level off")
+        {
+            UseShellExecute = false, RedirectStandardOutput = true, RedirectStandardError = true
+        });
+        process.ErrorDataReceived += (sender, line) => { };
+        process.BeginErrorReadLine();
+        if (process.StandardOutput.ReadLine() == null) throw new Exception("the server did not start");
+    }
+
+    public void Kill()
+    {
+        process.Kill();
+        process.WaitForExit();
+    }
+
+    public void Dispose()
+    {
+        Kill();
+        Directory.Delete(folder, true);
+    }
+}
+
+static class SessionTest
+{
+    const double Patience = 60;
+    static Server server;
+
+    static void Expect(bool holds, string claim)
+    {
+        if (!holds) throw new Exception("not so: " + claim);
+    }
+
+    static void Eventually(Func<bool> holds, string claim)
+    {
+        var clock = Stopwatch.StartNew();
+        while (!holds())
+        {
+            Expect(clock.Elapsed.TotalSeconds < Patience, claim);
+            Thread.Sleep(1);  // as a game between two frames
+        }
+    }
+
+    /// Ten squares in a row along x, 11 x 2 vertices, as Unity winds them: clockwise seen from above.
+    static MeshData Strip()
+    {
+        var mesh = new MeshData { Positions = new float[66], Indices = new int[60] };
+        for (int i = 0; i < 22; ++i)
+        {
+            mesh.Positions[3 * i] = i / 2;
+            mesh.Positions[3 * i + 2] = i % 2;
+        }
+        for (int k = 0, a = 0; k < 60; k += 6, a += 2) new[] { a, a + 1, a + 3, a, a + 3, a + 2 }.CopyTo(mesh.Indices, k);
+        return mesh;
+    }
+
+    static Session OpenStrip(Client client, SessionOptions options = null)
+    {
+        var session = client.Open(Strip(), options);
+        session.Handles.Set("base", new[] { 0, 1 });
+        session.Handles.Set("tip", new[] { 20, 21 }, Motion.Move(0, 2, 0));
+        return session;
+    }
+
+    static void FramesComeIntoTheCallersSpans()
+    {
+        using (var client = new Client(server.Address))
+        using (var session = OpenStrip(client, new SessionOptions { WithNormals = true }))
+        {
+            var positions = new float[66];
+            var first = session.Settle(positions);
+            Expect(first.Converged && first.VertexCount == 22 && first.InputSeq == 2, "the result of two changes");
+            Expect(positions[3 * 20 + 1] == 2 && positions[1] == 0, "the tip is lifted, the base is not");
+
+            ulong moved = session.Handles.Move("tip", Motion.Move(0, 3, 0));
+            var normals = new float[66];
+            var colours = new byte[88];
+            var frame = default(Frame);
+            Eventually(() => session.TryGetFrame(positions, normals, colours, out frame) && frame.InputSeq >= moved, "a frame");
+            Expect(positions[3 * 20 + 1] == 3, "it is the newest");
+            double length = Math.Sqrt(normals.Take(3).Sum(n => (double)n * n));
+            Expect(Math.Abs(length - 1) < 1e-6, "normals of length 1");
+            Expect(normals[1] > 0, "Unity's winding looks up");
+            Expect(colours.Where((c, i) => i % 4 == 3).All(alpha => alpha == 255), "colours without gaps");
+            Expect(session.TryRepeatFrame(new float[66], default(Span<float>), default(Span<byte>), out frame), "the same again");
+        }
+    }
+
+    static void ErrorsCarryTheServersReason()
+    {
+        using (var client = new Client(server.Address))
+        using (var session = OpenStrip(client))
+        {
+            session.Settle(new float[66]);
+            session.Handles.Set("beyond", new[] { 22 });
+            LpdeformException said = null;
+            Eventually(() =>
+            {
+                try { session.TryGetFrame(new float[66]); }
+                catch (LpdeformException error) { said = error; }
+                return said != null;
+            }, "the error comes");
+            Expect(said.Code == ErrorCode.InvalidArgument && said.Reason == "HANDLE_VERTEX_OUT_OF_RANGE", said.Reason);
+            Expect(said.Element == "vertex 22" && said.Limit == "0 <= vertex < 22", said.Element + said.Limit);
+            Expect(session.State == SessionState.Live, "the session goes on");
+            try
+            {
+                session.TryGetFrame(new float[65]);
+                Expect(false, "a buffer that is too small is refused");
+            }
+            catch (LpdeformException error)
+            {
+                Expect(error.Reason == "BUFFER_TOO_SMALL", error.Reason);
+            }
+        }
+    }
+
+    static void ARefusedMeshIsAState()
+    {
+        var mesh = Strip();
+        mesh.Indices[3] = 99;
+        using (var client = new Client(server.Address))
+        using (var session = client.Open(mesh))
+        {
+            Eventually(() => session.State == SessionState.Refused, "refused");
+            Expect(session.Problem.Reason == "MESH_INDEX_OUT_OF_RANGE" && session.Problem.Element == "face 1", "it says why");
+        }
+    }
+
+    static void WorkGoesOnWhenTheServerComesBack()
+    {
+        using (var client = new Client(server.Address))
+        using (var session = OpenStrip(client))
+        {
+            var positions = new float[66];
+            session.Settle(positions);
+            server.Kill();
+            Eventually(() => session.State == SessionState.Reconnecting, "reconnecting");
+            Expect(positions[3 * 20 + 1] == 2, "the last frame stays");
+            session.Handles.Move("tip", Motion.Move(0, 1, 0));
+            server.Start();
+            session.Settle(positions);
+            Expect(positions[3 * 20 + 1] == 1, "the move of meanwhile");
+        }
+    }
+
+    static void PerFrameCallsMakeNoGarbage()
+    {
+        using (var client = new Client(server.Address))
+        using (var session = OpenStrip(client))
+        {
+            var positions = new float[66];
+            session.Settle(positions);
+            session.Handles.Move("tip", Motion.Move(0, 1, 0));
+            Frame frame;
+            session.TryGetFrame(positions, out frame);
+            int before = GC.CollectionCount(0);
+            for (int k = 0; k < 100000; ++k) session.TryGetFrame(positions, out frame);
+            for (int k = 0; k < 10000; ++k) session.Handles.Move("tip", Motion.Move(0, 1, 0.001 * k));
+            Expect(GC.CollectionCount(0) == before, "no collection in 100000 polls");
+        }
+    }
+
+    static void SettingsAndReaders()
+    {
+        using (var client = new Client(server.Address))
+        using (var session = OpenStrip(client))
+        {
+            session.Set(p: 1.5, stiffness: 2);
+            var positions = new float[66];
+            session.Settle(positions);
+            using (var reader = client.Join(session.Name))
+            {
+                var seen = new float[66];
+                reader.Settle(seen);
+                Expect(seen.SequenceEqual(positions), "a reader sees the same");
+                try
+                {
+                    reader.Handles.Remove("tip");
+                    Expect(false, "a reader changes nothing");
+                }
+                catch (LpdeformException error)
+                {
+                    Expect(error.Reason == "NOT_THE_WRITER", error.Reason);
+                }
+            }
+        }
+    }
+
+    static int Main(string[] arguments)
+    {
+        var tests = new Action[] { FramesComeIntoTheCallersSpans, ErrorsCarryTheServersReason, ARefusedMeshIsAState,
+                                   WorkGoesOnWhenTheServerComesBack, PerFrameCallsMakeNoGarbage, SettingsAndReaders };
+        int failed = 0;
+        using (server = new Server(arguments[0]))
+        {
+            foreach (var test in tests)
+            {
+                try
+                {
+                    test();
+                    Console.WriteLine("passed " + test.Method.Name);
+                }
+                catch (Exception error)
+                {
+                    ++failed;
+                    Console.WriteLine("FAILED " + test.Method.Name + ": " + error);
+                }
+            }
+        }
+        return failed == 0 ? 0 : 1;
+    }
+}
