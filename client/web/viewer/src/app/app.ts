@@ -77,7 +77,7 @@ export class App {
       canRedo: false,
     });
     this.stages.className = "stages";
-    this.#addPane("first");
+    this.#addPane(this.#makePane("first"));
     this.view.watch((view, before) => this.#viewChanged(view, before));
     this.facts.watch((facts, before) => {
       if (facts.pointedOut !== before.pointedOut) this.#needsMarks = true;
@@ -252,8 +252,9 @@ export class App {
     }
   }
 
-  #addPane(side: "first" | "second"): void {
-    const pane = new Pane(side, {
+  /** Throws where the browser does not draw it. */
+  #makePane(side: "first" | "second"): Pane {
+    const pane: Pane = new Pane(side, {
       changed: () => {
         this.#follow(pane);
         this.requestDraw();
@@ -262,6 +263,10 @@ export class App {
       report: (report) => this.facts.set({ report }),
       problem: (problem) => this.facts.set({ problem }),
     });
+    return pane;
+  }
+
+  #addPane(pane: Pane): void {
     for (const turning of ["pointerdown", "wheel"]) {
       pane.element.addEventListener(turning, () => (this.#turned = pane), { capture: true, passive: true });
     }
@@ -271,6 +276,20 @@ export class App {
     this.stages.append(pane.element);
     if (this.mesh === noMesh) return;
     pane.open(this.mesh, this.document, this.view.now);
+  }
+
+  /** False, with a word about it, where the browser draws no second picture: it has only so many. */
+  #addSecondPane(): boolean {
+    let pane: Pane;
+    try {
+      pane = this.#makePane("second");
+    } catch {
+      this.notify("This browser draws no second picture. Close other pages that draw in three dimensions.", true);
+      this.view.set({ isSplit: false });
+      return false;
+    }
+    this.#addPane(pane);
+    return true;
   }
 
   /** The other pane looks the same way as the one that is being turned. */
@@ -292,8 +311,8 @@ export class App {
 
   #viewChanged(view: View, before: View): void {
     if (view.isSplit !== before.isSplit) {
-      if (view.isSplit) this.#addPane("second");
-      else this.panes.pop()?.close();
+      if (view.isSplit && !this.#addSecondPane()) return;
+      if (!view.isSplit && this.panes.length > 1) this.panes.pop()!.close();
       this.stages.classList.toggle("split", view.isSplit);
       this.fit();
       this.#statusChanged();

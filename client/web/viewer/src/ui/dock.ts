@@ -32,11 +32,15 @@ export function dock(app: App): HTMLElement {
     "p and stiffness from the shape: joints soft, the parts between them rigid",
   );
   const hint = el("p", { className: "p-words" });
+  const explain = () => setText(hint, wordsOf(app.document, app.view.now.isSplit));
   app.facts.watch(({ document }) => {
     automatic.input.checked = document.isAutomatic;
-    setText(hint, wordsOf(document));
+    explain();
   });
-  app.view.watch(({ isSplit }) => (second.hidden = !isSplit));
+  app.view.watch(({ isSplit }) => {
+    second.hidden = !isSplit;
+    explain();
+  });
   return el(
     "section",
     { className: "dock", aria: { label: "p" } },
@@ -90,11 +94,15 @@ function pSlider(app: App, field: Field): HTMLElement {
   return el("div", { className: "p-row" }, el("span", { className: "p-name" }, "p"), track, shown);
 }
 
-function wordsOf({ p, isAutomatic, paintedP, stiffness }: Document): string {
+function wordsOf({ p, secondP, isAutomatic, paintedP, stiffness }: Document, isSplit: boolean): string {
   if (isAutomatic) return "From the shape: joints soft, parts rigid";
-  const painted = paintedP || stiffness ? " · painted parts as painted" : "";
-  if (p < 1.25) return `Gathers in creases; the rest keeps its shape${painted}`;
-  if (p < 1.8) return `Between crease and even${painted}`;
-  if (p < 2.5) return `As rigid as possible: spreads evenly${painted}`;
-  return `No peaks: every place gives a little${painted}`;
+  const words = isSplit ? `Left: ${effectOf(p)}. Right: ${effectOf(secondP)}` : effectOf(p);
+  return paintedP || stiffness ? `${words} · painted parts as painted` : words;
+}
+
+function effectOf(p: number): string {
+  if (p < 1.25) return "Gathers in creases; the rest keeps its shape";
+  if (p < 1.8) return "Between crease and even";
+  if (p < 2.5) return "As rigid as possible: spreads evenly";
+  return "No peaks: every place gives a little";
 }

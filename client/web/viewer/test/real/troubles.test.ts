@@ -117,6 +117,21 @@ describe("where pictures", () => {
     expect(errors).toEqual([]);
   });
 
+  it("are refused to a second pane, the first goes on", async () => {
+    const service = await start();
+    const user = await visit(service);
+    await user.settled();
+    await user.page.evaluate("HTMLCanvasElement.prototype.getContext = () => null");
+    await user.page.keyboard.press("s");
+    await user.page.getByText("This browser draws no second picture").waitFor();
+    expect(await user.ask("app.panes.length")).toBe(1);
+    expect(await user.ask("app.view.now.isSplit")).toBe(false);
+    const before = await user.ask<number>("app.panes[0].frame.inputSeq");
+    await user.page.keyboard.press("ArrowRight");
+    await user.until(`window.__lpdeform.app.panes[0].frame.inputSeq > ${before}`);
+    expect(user.errors).toEqual([]);
+  });
+
   it("are lost by the browser, they come again", async () => {
     const service = await start();
     const user = await visit(service);
