@@ -6,22 +6,14 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "core/base/fault.h"
-#include "core/base/workers.h"
 #include "server/encode.h"
 #include "server/key_watch.h"
-#include "server/random_name.h"
 
 namespace lpdeform {
 namespace {
 
 constexpr int kPoolThreads = 4;
 constexpr std::uint32_t kDefaultPage = 100, kLargestPage = 1000;
-constexpr std::uint32_t kFacesPerVertex = 3;
-
-/// What a session is taken to need until it is known: about what a triangulated surface needs, factored by
-/// CHOLMOD.
-constexpr std::size_t kBytesPerVertex = 2600, kBytesPerFace = 100;
-
 std::shared_ptr<Timers> or_system(std::shared_ptr<Timers> timers) {
   return timers ? std::move(timers) : std::make_shared<SystemTimers>();
 }
@@ -44,13 +36,23 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
       uploads_(std::make_shared<Uploads>(
           budget_, timers,
           Uploads::Limits{options.max_upload_bytes, options.upload_idle, options.max_uploads})),
+      factory_(options, budget_, uploads_,
+               {scheduler,
+                timers,
+                options.heartbeat,
+                metrics,
+                {options.max_streams_per_session, options.max_handles}}),
       scheduler(options.runner_threads == 0 ? Scheduler::default_threads() : options.runner_threads,
                 observer(Span::kSchedulerQueue)),
       pool(kPoolThreads, options.max_calls_waiting, observer(Span::kCallQueue)) {
-  registry->on_ended = [log = log_, metrics = metrics](const Session& session, EndReason reason) {
+  if (options.store) keeper_ = Keeper::create(options.store, {timers, metrics, log_, options.session_idle});
+  registry->on_ended = [log = log_, metrics = metrics, keeper = keeper_](const Session& session,
+                                                                         EndReason reason) {
     const std::string why = ended_because(reason);
     metrics->session_ended(why);
     log->info("session_ended", {{"session", abbreviated(session.name())}, {"reason", why}});
+    if (keeper && reason == EndReason::kDraining) keeper->release(session.name());
+    if (keeper && reason != EndReason::kDraining) keeper->remove(session.name());
   };
   metrics->set(Level::kSessionsMost, static_cast<double>(options.max_sessions));
   metrics->set(Level::kMemoryBytesMost, static_cast<double>(options.max_bytes));
@@ -126,12 +128,13 @@ absl::Status Backend::delete_upload(const CallContext& call, const v1::DeleteUpl
   return absl::OkStatus();
 }
 
-absl::Status Backend::get_session(const CallContext& call, const v1::GetSessionRequest& request,
-                                  v1::GetSessionResponse& response) {
+void Backend::get_session(const CallContext& call, const v1::GetSessionRequest& request,
+                          v1::GetSessionResponse& response, Done done) {
   const auto session = find(call, Access::kRead, request.session());
-  if (!session.ok()) return session.status();
-  encode((*session)->info(), registry->idle(), timers->now(), *response.mutable_session());
-  return absl::OkStatus();
+  if (session.ok()) {
+    encode((*session)->info(), registry->idle(), timers->now(), *response.mutable_session());
+  }
+  done(session.status());
 }
 
 absl::Status Backend::list_sessions(const CallContext& call, const v1::ListSessionsRequest& request,
@@ -156,47 +159,10 @@ absl::Status Backend::list_sessions(const CallContext& call, const v1::ListSessi
   return absl::OkStatus();
 }
 
-absl::Status Backend::delete_session(const CallContext& call, const v1::DeleteSessionRequest& request,
-                                     v1::DeleteSessionResponse&) {
-  const auto session = find(call, Access::kChange, request.session());
-  if (absl::IsNotFound(session.status())) return absl::OkStatus();
-  if (!session.ok()) return session.status();
-  if (registry->remove(request.session(), EndReason::kSessionDeleted, "The session was deleted.")) {
-    log().info("session_deleted", {{"session", abbreviated(request.session())}, {"trace_id", call.trace_id}});
-  }
-  return absl::OkStatus();
-}
-
-absl::Status Backend::acquire_writer(const CallContext& call, const v1::AcquireWriterRequest& request,
-                                     v1::AcquireWriterResponse& response) {
-  const auto session = find(call, Access::kChange, request.session());
-  if (!session.ok()) return session.status();
-  const WriterLease lease = (*session)->acquire_writer();
-  response.set_writer_token(lease.token);
-  response.set_epoch(lease.epoch);
-  response.set_input_seq(lease.input_seq);
-  log().info("writer_replaced", {{"session", abbreviated(request.session())},
-                                 {"epoch", lease.epoch},
-                                 {"input_seq", lease.input_seq},
-                                 {"trace_id", call.trace_id}});
-  return absl::OkStatus();
-}
-
-absl::Status Backend::update_handles(const CallContext& call, const v1::UpdateHandlesRequest& request,
-                                     v1::UpdateHandlesResponse& response) {
-  const auto session = find(call, Access::kChange, request.session());
-  if (!session.ok()) return session.status();
-  const auto result = update(call, **session, request.writer_token(), request.update());
-  if (!result.ok()) return result.status();
-  response.mutable_result()->set_input_seq(result->input_seq);
-  response.mutable_result()->set_stale_parts(result->stale_parts);
-  return absl::OkStatus();
-}
-
-absl::Status Backend::ack_frames(const CallContext& call, const v1::AckFramesRequest& request,
-                                 v1::AckFramesResponse&) {
+void Backend::ack_frames(const CallContext& call, const v1::AckFramesRequest& request, v1::AckFramesResponse&,
+                         Done done) {
   const auto session = find(call, Access::kRead, request.session());
-  return session.ok() ? (*session)->acknowledge(request.stream_id(), request.frame_seq()) : session.status();
+  done(session.ok() ? (*session)->acknowledge(request.stream_id(), request.frame_seq()) : session.status());
 }
 
 absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call,
@@ -235,24 +201,6 @@ void Backend::forget(const CallContext& call, const OpenStream& open) {
                               {"trace_id", call.trace_id}});
 }
 
-absl::StatusOr<UpdateResult> Backend::update(const CallContext& call, Session& session,
-                                             const std::string& token, const v1::Update& update) {
-  if (absl::Status status = session.check_writer(token); !status.ok()) return status;
-  const auto decoded = Decoder(*uploads_, session.vertex_count(), &session.features(),
-                               session.mesh().weld().get(), session.owner())
-                           .update(update);
-  if (!decoded.ok()) return decoded.status();
-  const auto result = session.update(token, *decoded);
-  if (result.ok()) {
-    log().debug("update", {{"session", abbreviated(session.name())},
-                           {"epoch", session.lease().epoch},
-                           {"input_seq", result->input_seq},
-                           {"stale_parts", std::uint64_t{result->stale_parts}},
-                           {"trace_id", call.trace_id}});
-  }
-  return result;
-}
-
 absl::Status Backend::solve(const CallContext& call, const v1::SolveRequest& request,
                             SolveJob::OnProgress on_progress, SolveJob::OnDone on_done,
                             std::shared_ptr<SolveJob>& job) {
@@ -278,10 +226,13 @@ absl::Status Backend::solve(const CallContext& call, const v1::SolveRequest& req
   const SolveJob::OnDone on_ended = [this, session = *session, trace_id = call.trace_id,
                                      on_done](absl::StatusOr<SolveResult> result) {
     if (result.ok()) log_solved(*session, *result, trace_id);
-    on_done(std::move(result));
+    // The result answers the update, so it comes when that is kept: as a rule long ago.
+    when_kept(*session, session->revision(), [on_done, result](bool) { on_done(result); });
   };
   job = std::make_shared<SolveJob>(std::move(options), std::move(on_progress), on_ended);
-  return (*session)->solve(request.writer_token(), update, job);
+  const absl::Status status = (*session)->solve(request.writer_token(), update, job);
+  if (status.ok()) when_kept(**session, (*session)->revision(), [](bool) {});
+  return status;
 }
 
 void Backend::log_solved(const Session& session, const SolveResult& result,
@@ -294,97 +245,6 @@ void Backend::log_solved(const Session& session, const SolveResult& result,
                         {"seconds", result.summary.solve_seconds},
                         {"stop_reason", std::string(stop_reason_name(result.summary.stop_reason))},
                         {"trace_id", trace_id}});
-}
-
-void Backend::create_session(const CallContext& call, const v1::CreateSessionRequest& request,
-                             v1::CreateSessionResponse& response, std::function<void(absl::Status)> done) {
-  const auto caller = identify(call, Access::kChange);
-  if (!caller.ok()) return done(caller.status());
-  const Registry::OnCreated on_created = [this, &response,
-                                          done](const absl::StatusOr<CreatedSession>& created) {
-    if (!created.ok()) return done(created.status());
-    encode(created->session->info(), registry->idle(), timers->now(), *response.mutable_session());
-    response.set_writer_token(created->writer_token);
-    done(absl::OkStatus());
-  };
-  const std::size_t fingerprint = std::hash<std::string>()(request.SerializeAsString());
-  if (!registry->begin_creation(request.request_id(), on_created, fingerprint, caller->subject)) return;
-  scheduler.run_once([this, call, owner = caller->subject, &request, on_created] {
-    const std::string request_id = request.request_id();
-    registry->finish_creation(request_id, make_session(call, owner, request), on_created, owner);
-  });
-}
-
-absl::Status Backend::make_mesh(const v1::CreateSessionRequest& request, Decoder& decoder,
-                                SessionParts& parts) {
-  const auto weights = decode_weights(request.weights());
-  if (!weights.ok()) return weights.status();
-  auto mesh = decoder.mesh(request.mesh());
-  if (!mesh.ok()) return mesh.status();
-  auto normals = decoder.normals(request.normals());
-  if (!normals.ok()) return normals.status();
-  const auto weld = decoder.weld(request.weld(), mesh->vertices);
-  if (!weld.ok()) return weld.status();
-
-  auto shape = RestShape::create(*weld ? welded(*mesh, **weld) : *mesh, *weights);
-  // What is wrong is said of the client's vertices where it can be.
-  if (!shape.ok() && *weld) {
-    if (absl::Status status = deformable(check_mesh(*mesh)); !status.ok()) return status;
-  }
-  if (!shape.ok()) return shape.status();
-  parts.shape = *std::move(shape);
-  parts.mesh =
-      std::make_shared<const DrawMesh>(parts.shape, *weld, std::move(mesh->faces), *std::move(normals));
-  return absl::OkStatus();
-}
-
-absl::StatusOr<std::shared_ptr<Session>> Backend::make_session(const CallContext& call,
-                                                               const std::string& owner,
-                                                               const v1::CreateSessionRequest& request) {
-  const v1::Mesh& mesh_message = request.mesh();
-  Decoder decoder(*uploads_, mesh_message.vertex_count(), nullptr, nullptr, owner);
-  const std::uint32_t most_faces = kFacesPerVertex * options_.max_vertices;
-  if (absl::Status status = decoder.check_mesh_size(mesh_message, {options_.max_vertices, most_faces});
-      !status.ok()) {
-    return status;
-  }
-  const auto free_components = decode_free_components(request.free_components());
-  if (!free_components.ok()) return free_components.status();
-  auto memory = budget_->reserve(kBytesPerVertex * mesh_message.vertex_count() +
-                                 kBytesPerFace * mesh_message.face_count());
-  if (!memory.ok()) return memory.status();
-
-  SessionParts parts;
-  parts.name = absl::StrCat("sessions/", random_hex_128());
-  parts.owner = owner;
-  parts.free_components = *free_components;
-  parts.memory = *std::move(memory);
-  if (absl::Status status = make_mesh(request, decoder, parts); !status.ok()) return status;
-  const int threads = options_.threads == 0 ? available_cores() : options_.threads;
-  parts.features = std::make_shared<const ShapeFeatures>(parts.shape, Workers(threads));
-  Decoder inputs(*uploads_, mesh_message.vertex_count(), parts.features.get(), parts.mesh->weld().get(),
-                 owner);
-  if (absl::Status status = inputs.handles(request.handles(), parts.beginning); !status.ok()) return status;
-  auto settings = inputs.settings(request.settings());
-  if (!settings.ok()) return settings.status();
-  parts.beginning.settings = *std::move(settings);
-  auto deformer = Deformer::create(parts.shape, {*free_components, threads});
-  if (!deformer.ok()) return deformer.status();
-  parts.deformer = *std::move(deformer);
-  auto session =
-      Session::create(std::move(parts), {scheduler,
-                                         timers,
-                                         options_.heartbeat,
-                                         metrics,
-                                         {options_.max_streams_per_session, options_.max_handles}});
-  if (!session.ok()) return session.status();
-  metrics->add(Count::kSessionsCreated);
-  log().info("session_created", {{"session", abbreviated((*session)->name())},
-                                 {"epoch", (*session)->lease().epoch},
-                                 {"vertices", std::uint64_t{mesh_message.vertex_count()}},
-                                 {"faces", std::uint64_t{mesh_message.face_count()}},
-                                 {"trace_id", call.trace_id}});
-  return session;
 }
 
 }  // namespace lpdeform

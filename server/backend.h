@@ -1,9 +1,12 @@
 #pragma once
 
 #include <chrono>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "lpdeform/v1/service.pb.h"
@@ -12,11 +15,13 @@
 #include "server/call_gate.h"
 #include "server/call_record.h"
 #include "server/decode.h"
+#include "server/keeper.h"
 #include "server/log.h"
 #include "server/metrics.h"
 #include "server/registry.h"
 #include "server/scheduler.h"
 #include "server/server.h"
+#include "server/session_factory.h"
 #include "server/task_pool.h"
 #include "server/tokens.h"
 #include "server/upload.h"
@@ -36,23 +41,31 @@ class Backend {
                            v1::UploadPartResponse& response);
   absl::Status delete_upload(const CallContext& call, const v1::DeleteUploadRequest& request,
                              v1::DeleteUploadResponse& response);
-  absl::Status get_session(const CallContext& call, const v1::GetSessionRequest& request,
-                           v1::GetSessionResponse& response);
   absl::Status list_sessions(const CallContext& call, const v1::ListSessionsRequest& request,
                              v1::ListSessionsResponse& response);
-  absl::Status delete_session(const CallContext& call, const v1::DeleteSessionRequest& request,
-                              v1::DeleteSessionResponse& response);
-  absl::Status acquire_writer(const CallContext& call, const v1::AcquireWriterRequest& request,
-                              v1::AcquireWriterResponse& response);
-  absl::Status update_handles(const CallContext& call, const v1::UpdateHandlesRequest& request,
-                              v1::UpdateHandlesResponse& response);
-  absl::Status ack_frames(const CallContext& call, const v1::AckFramesRequest& request,
-                          v1::AckFramesResponse& response);
-
-  /// Does not wait for the session to be made: `done` is called when it is, on a thread of the scheduler, or
-  /// at once. `request` and `response` must live until then.
+  // These do not wait, for the session to be made or for the store: `done` is called when all is done, on another thread, or
+  // at once. `request` and `response` must live until then.
+  using Done = std::function<void(absl::Status)>;
   void create_session(const CallContext& call, const v1::CreateSessionRequest& request,
-                      v1::CreateSessionResponse& response, std::function<void(absl::Status)> done);
+                      v1::CreateSessionResponse& response, Done done);
+  void get_session(const CallContext& call, const v1::GetSessionRequest& request,
+                   v1::GetSessionResponse& response, Done done);
+  void ack_frames(const CallContext& call, const v1::AckFramesRequest& request,
+                  v1::AckFramesResponse& response, Done done);
+  void delete_session(const CallContext& call, const v1::DeleteSessionRequest& request,
+                      v1::DeleteSessionResponse& response, Done done);
+  void acquire_writer(const CallContext& call, const v1::AcquireWriterRequest& request,
+                      v1::AcquireWriterResponse& response, Done done);
+  void update_handles(const CallContext& call, const v1::UpdateHandlesRequest& request,
+                      v1::UpdateHandlesResponse& response, Done done);
+
+  /// Calls `then` with OK once find() finds the session of this name, or will not however long one waits: at once, or, where
+  /// only the store has it, on a thread of the pool when it has been made again. Errors: UNAVAILABLE STORE_FAILING;
+  /// NOT_FOUND SESSION_DAMAGED; RESOURCE_EXHAUSTED as CreateSession.
+  void when_here(const CallContext& call, const std::string& name, Done then);
+
+  /// Ends the process's part in all sessions, as it shuts down, and waits until the store has what has changed.
+  void release_sessions(const std::string& text);
 
   /// What a call is going to do.
   enum class Access { kRead, kChange };
@@ -74,9 +87,11 @@ class Backend {
   /// Lets go of a stream that is over.
   void forget(const CallContext& call, const OpenStream& open);
 
-  /// Decodes an update for a session and gives it to it.
-  absl::StatusOr<UpdateResult> update(const CallContext& call, Session& session, const std::string& token,
-                                      const v1::Update& update);
+  /// Decodes an update for a session and gives it to it. `answered` is called with an error at once, else when the update
+  /// is in the store, or when that takes too long.
+  using OnUpdated = std::function<void(absl::StatusOr<UpdateResult>)>;
+  void update(const CallContext& call, Session& session, const std::string& token, const v1::Update& update,
+              const OnUpdated& answered);
 
   /// Decodes what a Solve call asks for and begins it.
   absl::Status solve(const CallContext& call, const v1::SolveRequest& request,
@@ -99,17 +114,32 @@ class Backend {
  private:
   std::function<void(double)> observer(Span span) const;
   void log_solved(const Session& session, const SolveResult& result, const std::string& trace_id) const;
-  absl::StatusOr<std::shared_ptr<Session>> make_session(const CallContext& call, const std::string& owner,
-                                                        const v1::CreateSessionRequest& request);
-  /// Fills in the shape and the mesh that it is drawn as.
-  static absl::Status make_mesh(const v1::CreateSessionRequest& request, Decoder& decoder,
-                                SessionParts& parts);
+  absl::StatusOr<UpdateResult> take_update(const CallContext& call, Session& session,
+                                           const std::string& token, const v1::Update& update);
+  void make_session(const CallContext& call, const v1::CreateSessionRequest& request,
+                    std::uint64_t fingerprint, const std::string& owner,
+                    const Registry::OnCreated& on_created);
+  void keep_new(std::shared_ptr<Session> session, const v1::CreateSessionRequest& request,
+                std::uint64_t fingerprint, Done done);
+  void when_kept(const Session& session, std::uint64_t revision, Keeper::OnKept on_kept);
+  void make_again(const std::string& name, absl::StatusOr<Keeper::Found> found);
+  void end_restoring(const std::string& name, const absl::Status& status);
+  void log_session(std::string_view event, const Session& session, const std::string& trace_id) const;
 
   const ServerOptions options_;
   const std::shared_ptr<Tokens> tokens_;
   const std::shared_ptr<const Log> log_;
   const std::shared_ptr<Budget> budget_;
   const std::shared_ptr<Uploads> uploads_;
+  const SessionFactory factory_;
+  std::shared_ptr<Keeper> keeper_;  // null without a store
+
+  struct Restoring {
+    std::string owner;
+    std::vector<Done> waiting;
+  };
+  std::mutex restoring_mutex_;
+  std::map<std::string, Restoring> restoring_;  // by the sessions' names
 
  public:
   // Last, so that their threads end first.

@@ -161,9 +161,22 @@ absl::StatusOr<StreamOptions> decode_frame_options(const v1::FrameOptions& messa
   return options;
 }
 
+Decoder Decoder::reading_stored(const StoredBlobs& blobs) const {
+  Decoder decoder(*this);
+  decoder.stored_ = &blobs;
+  return decoder;
+}
+
+absl::StatusOr<std::string> Decoder::raw(const v1::Buffer& buffer, std::string_view what) {
+  const auto data = bytes(buffer, what);
+  if (!data.ok()) return data.status();
+  return std::string(data->view);
+}
+
 absl::StatusOr<Decoder::Bytes> Decoder::bytes(const v1::Buffer& buffer, std::string_view what) {
   if (buffer.has_inline_()) {
-    if (buffer.inline_().size() <= kMostInlineBytes) return Bytes{nullptr, buffer.inline_()};
+    if (stored_ != nullptr || buffer.inline_().size() <= kMostInlineBytes)
+      return Bytes{nullptr, buffer.inline_()};
     return invalid_input({"INLINE_TOO_LARGE", std::string(what), absl::StrCat(kMostInlineBytes, " bytes")},
                          absl::StrCat("The ", std::string(what), " have ", buffer.inline_().size(),
                                       " bytes inline, over ", kMostInlineBytes, "; upload them."));
@@ -171,6 +184,11 @@ absl::StatusOr<Decoder::Bytes> Decoder::bytes(const v1::Buffer& buffer, std::str
   if (!buffer.has_upload()) {
     return invalid_input({"BUFFER_MISSING", std::string(what), ""},
                          absl::StrCat("The ", std::string(what), " are missing."));
+  }
+  if (stored_ != nullptr) {
+    const auto blob = stored_->find(buffer.upload());
+    if (blob != stored_->end()) return Bytes{nullptr, blob->second};
+    return wrong_size(what, 0, "what was stored");
   }
   const auto upload = uploads_.find(buffer.upload(), owner_);
   if (!upload.ok()) return upload.status();

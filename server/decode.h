@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +18,9 @@
 #include "server/upload.h"
 
 namespace lpdeform {
+
+/// What buffers of a stored session name: bytes by "blobs/KEY".
+using StoredBlobs = std::map<std::string, std::string>;
 
 /// Turns messages of the contract into the values of core and session. Numbers from outside are hostile:
 /// every size is checked before memory is taken for it, every enum for values that we do not know; however
@@ -45,6 +49,12 @@ class Decoder {
         room_for_vertices_(vertex_count),
         room_for_targets_(vertex_count),
         room_for_region_(vertex_count) {}
+
+  /// The same for messages that were stored: inline bytes of any size, blobs in place of uploads. `blobs` must outlive it.
+  Decoder reading_stored(const StoredBlobs& blobs) const;
+
+  /// The bytes of a buffer.
+  absl::StatusOr<std::string> raw(const v1::Buffer& buffer, std::string_view what);
 
   /// Also MESH_TOO_LARGE. Does not look at coordinates and indices; a vertex index over 2^31 - 1 becomes
   /// that.
@@ -95,6 +105,7 @@ class Decoder {
   const ShapeFeatures* const features_;
   const Weld* const weld_;
   const std::string owner_;
+  const StoredBlobs* stored_ = nullptr;  // where the messages are stored ones
   std::uint64_t room_for_vertices_;
   std::uint64_t room_for_targets_;
   std::uint64_t room_for_region_;

@@ -142,13 +142,7 @@ void encode_settings(const Inputs& inputs, v1::SettingsUpdate& out) {
   encode_field(inputs.given_material->p, *out.mutable_p());
   encode_field(inputs.given_material->stiffness, *out.mutable_stiffness());
   out.mutable_length_unit()->set_length(inputs.given_material->length_unit);
-  v1::SolverSettings& solver = *out.mutable_solver();
-  solver.set_method(encode_method(inputs.solver.method));
-  solver.set_tolerance(inputs.solver.tolerance);
-  solver.set_max_iterations(static_cast<std::uint32_t>(inputs.solver.max_iterations));
-  const bool has_limit = inputs.solver.time_limit_seconds < std::numeric_limits<double>::infinity();
-  solver.set_time_limit_seconds(has_limit ? inputs.solver.time_limit_seconds : 0);
-  solver.set_initial(encode_initial(inputs.solver.initial));
+  encode_solver(inputs.solver, *out.mutable_solver());
 }
 
 v1::Scalar encode_scalar(Format format) {
@@ -158,12 +152,6 @@ v1::Scalar encode_scalar(Format format) {
 v1::Encoding encode_encoding(Format format) {
   if (format == Format::kCompressed) return v1::ENCODING_COMPRESSED;
   return format == Format::kQuantized ? v1::ENCODING_QUANTIZED : v1::ENCODING_RAW;
-}
-
-void encode_vector(const Eigen::Vector3d& vector, v1::Vector3& out) {
-  out.set_x(vector.x());
-  out.set_y(vector.y());
-  out.set_z(vector.z());
 }
 
 void encode_quantization(const Quantization& quantization, v1::Quantization& out) {
@@ -292,6 +280,21 @@ void encode_event(const Note& note, const FrameStream& stream, std::uint32_t ver
 
 }  // namespace
 
+void encode_vector(const Eigen::Vector3d& vector, v1::Vector3& out) {
+  out.set_x(vector.x());
+  out.set_y(vector.y());
+  out.set_z(vector.z());
+}
+
+void encode_solver(const SolveSettings& settings, v1::SolverSettings& out) {
+  out.set_method(encode_method(settings.method));
+  out.set_tolerance(settings.tolerance);
+  out.set_max_iterations(static_cast<std::uint32_t>(settings.max_iterations));
+  const bool has_limit = settings.time_limit_seconds < std::numeric_limits<double>::infinity();
+  out.set_time_limit_seconds(has_limit ? settings.time_limit_seconds : 0);
+  out.set_initial(encode_initial(settings.initial));
+}
+
 std::uint32_t retry_after_ms(const absl::Status& status) {
   if (absl::IsUnavailable(status)) return 1000;
   if (absl::IsResourceExhausted(status)) return 5000;
@@ -351,11 +354,16 @@ void encode(const SolveResult& result, v1::SolveSummary& out) {
   out.set_input_seq(result.frame->input_seq);
 }
 
+void encode(const UpdateResult& result, v1::UpdateResult& out) {
+  out.set_input_seq(result.input_seq);
+  out.set_stale_parts(result.stale_parts);
+  out.set_kept(result.is_kept);
+}
+
 void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
             v1::DeformResponse& out) {
   if (const auto* const result = std::get_if<UpdateResult>(&note)) {
-    out.mutable_result()->set_input_seq(result->input_seq);
-    out.mutable_result()->set_stale_parts(result->stale_parts);
+    encode(*result, *out.mutable_result());
     return;
   }
   encode_event(note, stream, vertex_count, *out.mutable_event());

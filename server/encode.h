@@ -15,10 +15,16 @@ namespace lpdeform {
 /// `idle`: how long a session lives without use.
 void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint now, v1::Session& out);
 
+void encode_vector(const Eigen::Vector3d& vector, v1::Vector3& out);
+/// Of settings as Decoder makes them: max_iterations is not 0.
+void encode_solver(const SolveSettings& settings, v1::SolverSettings& out);
+
 /// The error inside a stream.
 void encode(const FaultNote& fault, v1::Fault& out);
 
 void encode(const SolveResult& result, v1::SolveSummary& out);
+
+void encode(const UpdateResult& result, v1::UpdateResult& out);
 
 /// A note of a stream: an event, or the result of an update.
 void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count, v1::DeformResponse& out);

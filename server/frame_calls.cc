@@ -21,8 +21,21 @@ class FrameCall : public WritePump<Reactor, Response> {
   using Pump = WritePump<Reactor, Response>;
   using typename Pump::Made;
 
-  /// Opens the stream, on a thread of the pool. Ends the call where that fails.
-  void open(const std::string& session_name, const std::string& token, const v1::FrameOptions& options) {
+  /// Opens the stream, on a thread of the pool, once its session is there. Ends the call where that fails.
+  void open(
+      const std::string& session_name, const std::string& token, const v1::FrameOptions& options,
+      const std::function<void()>& then = [] {}) {
+    backend_.when_here(this->context(), session_name,
+                       [self = std::static_pointer_cast<FrameCall>(this->shared_from_this()), session_name,
+                        token, options, then](const absl::Status& status) {
+                         if (!status.ok()) return self->refuse(status);
+                         self->open_here(session_name, token, options);
+                         then();
+                       });
+  }
+
+ private:
+  void open_here(const std::string& session_name, const std::string& token, const v1::FrameOptions& options) {
     auto open =
         backend_.open_stream(this->context(), session_name, token, options, [weak = this->weak_from_this()] {
           if (const auto self = weak.lock()) self->pump();
@@ -35,6 +48,7 @@ class FrameCall : public WritePump<Reactor, Response> {
     this->pump_locked();
   }
 
+ protected:
   Made make(Response& response) final {
     if (!open_.stream) return Made::kNothing;
     const std::optional<Note> note = open_.stream->next();
@@ -104,7 +118,7 @@ class DeformCall final
 
   void read_locked() {
     if (is_over_locked()) return;
-    is_read_due_ = open_.stream && open_.stream->answers_waiting() >= kMostAnswers;
+    is_read_due_ = open_.stream && open_.stream->answers_waiting() + unanswered_ >= kMostAnswers;
     if (!is_read_due_) StartRead(&request_);
   }
 
@@ -124,22 +138,41 @@ class DeformCall final
 
   void take_open() {
     const v1::DeformOpen& open = request_.open();
-    this->open(open.session(), open.writer_token(), open.options());
-    read();
+    this->open(open.session(), open.writer_token(), open.options(),
+               [self = std::static_pointer_cast<DeformCall>(shared_from_this())] { self->read(); });
   }
 
   void take_update() {
     const v1::Update& update = request_.update();
     const auto session = backend_.registry->find(open_.session->name(), open_.session->owner());
-    const auto result =
-        session.ok() ? backend_.update(context(), **session, token_, update) : session.status();
+    const auto answered = [self = std::static_pointer_cast<DeformCall>(shared_from_this()),
+                           input_seq = update.input_seq()](const absl::StatusOr<UpdateResult>& result) {
+      self->answer(result, input_seq);
+    };
+    {
+      const std::scoped_lock lock(mutex_);
+      ++unanswered_;
+    }
+    if (session.ok()) {
+      backend_.update(context(), **session, token_, update, answered);
+    } else {
+      answered(session.status());
+    }
+    read();
+  }
+
+  /// On any thread.
+  void answer(const absl::StatusOr<UpdateResult>& result, std::uint64_t input_seq) {
+    if (!result.ok()) record().refused(result.status());
+    {
+      const std::scoped_lock lock(mutex_);
+      --unanswered_;
+    }
     if (result.ok()) {
       open_.stream->answer(*result);
     } else {
-      record().refused(result.status());
-      open_.stream->answer(FaultNote{result.status(), update.input_seq()});
+      open_.stream->answer(FaultNote{result.status(), input_seq});
     }
-    read();
   }
 
   void take_ack() {
@@ -158,6 +191,7 @@ class DeformCall final
   v1::DeformRequest request_;
   bool is_open_ = false;  // an open has come
   bool is_read_due_ = false;
+  std::size_t unanswered_ = 0;  // updates taken that are not in the store yet
 };
 
 }  // namespace

@@ -61,11 +61,15 @@ struct Mailbox::Candidate {
   std::shared_ptr<const Material> solver_material;
   std::vector<std::string> named;  // handles that it changes
   std::vector<std::string> moved;  // those of them that go somewhere
-  bool is_regrouped = false;       // vertices of handles, or the region, changed
+  std::vector<std::string> regrouped, removed;
+  bool is_regrouped = false;  // vertices of handles, or the region, changed
   bool has_p = false, has_stiffness = false, has_length_unit = false, has_solver = false, has_region = false;
   std::uint32_t stale_parts = 0;
 
   bool has_handles() const { return is_regrouped || !moved.empty(); }
+  bool changes_something() const {
+    return !named.empty() || has_p || has_stiffness || has_length_unit || has_solver || has_region;
+  }
   bool has_material() const { return has_p || has_stiffness || has_length_unit; }
 };
 
@@ -98,6 +102,39 @@ absl::Status Mailbox::begin_with(const Update& update) {
   return merge(update, true).status();
 }
 
+absl::Status Mailbox::begin_again(const Update& state, InputAges ages) {
+  if (absl::Status status = begin_with(state); !status.ok()) return status;
+  const std::scoped_lock merging(merging_);
+  ages_ = std::move(ages);
+  return absl::OkStatus();
+}
+
+std::uint64_t Mailbox::revision() const {
+  const std::scoped_lock merging(merging_);
+  return revisions_.newest;
+}
+
+InputChanges Mailbox::changes_since(std::uint64_t revision) const {
+  const std::scoped_lock merging(merging_);
+  InputChanges changes;
+  changes.revision = revisions_.newest;
+  changes.inputs = newest();
+  changes.ages = ages_;
+  changes.is_all = revision == 0 || revisions_.all > revision;
+  for (const auto& [name, at] : revisions_.handles) {
+    if (!changes.inputs.given_handles->handles().contains(name)) {
+      if (at.removed > revision) changes.removed.push_back(name);
+      continue;
+    }
+    if (changes.is_all || at.set > revision) changes.regrouped.push_back(name);
+    if (changes.is_all || std::max(at.set, at.moved) > revision) changes.moved.push_back(name);
+  }
+  changes.has_p = changes.is_all || revisions_.p > revision;
+  changes.has_stiffness = changes.is_all || revisions_.stiffness > revision;
+  changes.has_region = changes.is_all || revisions_.region > revision;
+  return changes;
+}
+
 absl::StatusOr<UpdateResult> Mailbox::merge(const Update& update, bool is_beginning) {
   const std::scoped_lock merging(merging_);
   const Inputs before = newest();
@@ -114,10 +151,12 @@ absl::StatusOr<UpdateResult> Mailbox::merge(const Update& update, bool is_beginn
   if (absl::Status status = weld(next); !status.ok()) return status;
   if (absl::Status status = check_welded(next); !status.ok()) return status;
 
-  const UpdateResult result{update.input_seq, next.stale_parts};
+  const bool is_newer = update.input_seq > before.input_seq;
+  const bool changes_something = is_newer || next.changes_something();
   put_in_force(update, next);
   note_ages(next, update.input_seq);
-  return result;
+  if (changes_something) note_revisions(next);
+  return UpdateResult{update.input_seq, next.stale_parts, revisions_.newest};
 }
 
 void Mailbox::put_in_force(const Update& update, Candidate& next) {
@@ -172,12 +211,14 @@ absl::Status Mailbox::change_handles(const Update& update, Candidate& next) cons
     if (const auto* const handle = std::get_if<Handle>(&change.change)) {
       status = next.handles->set(change.name, *handle);
       next.is_regrouped = true;
+      next.regrouped.push_back(change.name);
       next.moved.push_back(change.name);
     } else if (const auto* const motion = std::get_if<HandleMotion>(&change.change)) {
       status = next.handles->set_motion(change.name, *motion);
       next.moved.push_back(change.name);
     } else {
       next.is_regrouped = next.handles->remove(change.name) || next.is_regrouped;
+      next.removed.push_back(change.name);
     }
     if (!status.ok()) return status;
   }
@@ -214,6 +255,17 @@ void Mailbox::note_ages(const Candidate& next, std::uint64_t seq) {
   if (ages_.handles.size() > 2 * most_handles_) forget_oldest();
 }
 
+/// After what is in force was changed.
+void Mailbox::note_revisions(const Candidate& next) {
+  const std::uint64_t now = ++revisions_.newest;
+  for (const std::string& name : next.regrouped) revisions_.handles[name].set = now;
+  for (const std::string& name : next.moved) revisions_.handles[name].moved = now;
+  for (const std::string& name : next.removed) revisions_.handles[name].removed = now;
+  if (next.has_p) revisions_.p = now;
+  if (next.has_stiffness) revisions_.stiffness = now;
+  if (next.has_region) revisions_.region = now;
+}
+
 /// Gives up the ages of the older half of the handles that were let go of.
 void Mailbox::forget_oldest() {
   const Inputs inputs = newest();
@@ -228,6 +280,8 @@ void Mailbox::forget_oldest() {
   ages_.forgotten = std::max(ages_.forgotten, *middle);
   std::erase_if(ages_.handles,
                 [&](const auto& entry) { return entry.second <= *middle && is_gone(entry.first); });
+  std::erase_if(revisions_.handles, [&](const auto& entry) { return !ages_.handles.contains(entry.first); });
+  revisions_.all = revisions_.newest + 1;  // noted by the revision that this is a part of
 }
 
 absl::Status Mailbox::check(const Candidate& next, const Inputs& before) const {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "core/energy/material.h"
@@ -27,6 +28,27 @@ struct Inputs {
   std::shared_ptr<const Material> given_material;
 };
 
+/// The input_seq of the newest value of each part. Handles let go of are remembered so that a late change
+/// does not bring them back; the oldest such memories are given up first, and all that is as old counts as
+/// stale from then on.
+struct InputAges {
+  std::map<std::string, std::uint64_t, std::less<>> handles;
+  std::uint64_t forgotten = 0;  // the newest of those given up
+  std::uint64_t p = 0, stiffness = 0, length_unit = 0, solver = 0, region = 0;
+};
+
+/// What a mailbox holds, and what of it has changed since a revision of it.
+struct InputChanges {
+  std::uint64_t revision = 0;  // now
+  Inputs inputs;
+  InputAges ages;
+  bool is_all = false;                 // everything is to be taken as changed
+  std::vector<std::string> regrouped;  // handles set, ascending
+  std::vector<std::string> moved;      // handles that go elsewhere, those set included
+  std::vector<std::string> removed;
+  bool has_p = false, has_stiffness = false, has_region = false;
+};
+
 /// Where updates meet the solver: keeps the newest value of each handle and each setting by input_seq. Which
 /// value is newest is decided for each handle and each setting by itself, so a late update of one does not
 /// undo another. An update is checked against the values it would lead to and is taken whole or not at all.
@@ -46,18 +68,27 @@ class Mailbox {
   /// What a session begins with: the same as an update that is older than all others.
   absl::Status begin_with(const Update& update);
 
+  /// The same of a session that is made again: its whole state, and how old the parts of it are.
+  absl::Status begin_again(const Update& state, InputAges ages);
+
   Inputs newest() const;
+
+  /// Rises with each update that changes something.
+  std::uint64_t revision() const;
+  /// What has changed since `revision`; since 0, all.
+  InputChanges changes_since(std::uint64_t revision) const;
 
   static constexpr std::size_t kMostHandles = 4096;  // where nothing else is said
 
  private:
-  /// The input_seq of the newest value of each part. Handles let go of are remembered so that a late change
-  /// does not bring them back; the oldest such memories are given up first, and all that is as old counts as
-  /// stale from then on.
-  struct Ages {
-    std::map<std::string, std::uint64_t, std::less<>> handles;
-    std::uint64_t forgotten = 0;  // the newest of those given up
-    std::uint64_t p = 0, stiffness = 0, length_unit = 0, solver = 0, region = 0;
+  /// The revision at which something last changed.
+  struct Revisions {
+    struct OfHandle {
+      std::uint64_t set = 0, moved = 0, removed = 0;
+    };
+    std::uint64_t newest = 1;  // before anything has changed
+    std::map<std::string, OfHandle, std::less<>> handles;
+    std::uint64_t all = 0, p = 0, stiffness = 0, region = 0;
   };
   struct Candidate;
 
@@ -74,14 +105,16 @@ class Mailbox {
   std::int32_t vertex_count() const { return weld_ ? weld_->split_count() : shape_->vertex_count(); }
 
   void note_ages(const Candidate& next, std::uint64_t seq);
+  void note_revisions(const Candidate& next);
   void forget_oldest();
   void put_in_force(const Update& update, Candidate& next);
 
   const std::shared_ptr<const RestShape> shape_;
   const std::shared_ptr<const Weld> weld_;
   const std::size_t most_handles_;
-  std::mutex merging_;  // one update at a time; guards ages_
-  Ages ages_;
+  mutable std::mutex merging_;  // one update at a time; guards ages_ and revisions_
+  InputAges ages_;
+  Revisions revisions_;
   mutable std::mutex mutex_;  // guards inputs_, for moments only
   Inputs inputs_;
 };

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "server/health_probe.h"
+#include "server/open_store.h"
 #include "server/server.h"
 
 namespace {
@@ -15,6 +16,8 @@ struct Arguments {
   ServerOptions server;
   double session_idle_seconds = 600, upload_idle_seconds = 600, heartbeat_seconds = 15, grace_seconds = 20;
   std::string log_level = "info";
+  std::string store = "none";
+  std::uint64_t max_store_bytes = 0;
   std::string probed;
 };
 
@@ -127,6 +130,16 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->envname("LPDEFORM_UPLOAD_IDLE")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  app.add_option("--store", arguments.store,
+                 "Where sessions are kept so that they outlive the server: sqlite:DIR, a folder of its own; "
+                 "none: in memory alone")
+      ->envname("LPDEFORM_STORE")
+      ->capture_default_str();
+  app.add_option("--max-store-bytes", arguments.max_store_bytes,
+                 "What the folder of --store may hold; as 4GiB or in bytes, 0: as much as the disk has")
+      ->envname("LPDEFORM_MAX_STORE_BYTES")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
   app.add_option("--heartbeat", arguments.heartbeat_seconds,
                  "Seconds of silence after which a stream says something")
       ->envname("LPDEFORM_HEARTBEAT")
@@ -147,17 +160,22 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->type_name("ADDRESS");
 }
 
+int refuse(const absl::Status& why) {
+  std::fprintf(stderr, "lpdeform-server: %s\n", std::string(why.message()).c_str());
+  return 1;
+}
+
 int serve(Arguments& arguments, const sigset_t& signals) {
   ServerOptions& options = arguments.server;
   options.session_idle = milliseconds(arguments.session_idle_seconds);
   options.upload_idle = milliseconds(arguments.upload_idle_seconds);
   options.heartbeat = milliseconds(arguments.heartbeat_seconds);
   options.log = std::make_shared<lpdeform::Log>(arguments.log_level);
+  auto store = lpdeform::open_store(arguments.store, {arguments.max_store_bytes});
+  if (!store.ok()) return refuse(store.status());
+  options.store = *std::move(store);
   const auto server = lpdeform::Server::start(options);
-  if (!server.ok()) {
-    std::fprintf(stderr, "lpdeform-server: %s\n", std::string(server.status().message()).c_str());
-    return 1;
-  }
+  if (!server.ok()) return refuse(server.status());
   std::printf("lpdeform-server listens on %s\n", (*server)->address().c_str());
   if (!(*server)->admin_address().empty()) {
     std::printf("lpdeform-server shows itself on http://%s\n", (*server)->admin_address().c_str());

@@ -39,6 +39,10 @@ constexpr std::array kCounts{
     Entry{"lpdeform_connections_total", "Connections taken."},
     Entry{"lpdeform_connections_refused_total",
           "Connections closed at once for want of room (--max-connections)."},
+    Entry{"lpdeform_sessions_restored_total", "Sessions made again from the store."},
+    Entry{"lpdeform_updates_not_kept_total",
+          "Updates answered before they were in the store, which failed or was slow."},
+    Entry{"lpdeform_store_errors_total", "Operations of the store that failed."},
 };
 constexpr std::array kLevels{
     Entry{"lpdeform_sessions", "Sessions held."},
@@ -48,6 +52,7 @@ constexpr std::array kLevels{
     Entry{"lpdeform_memory_bytes", "Memory of sessions and uploads by the server's own count."},
     Entry{"lpdeform_memory_limit_bytes", "Memory that they may have (--max-bytes)."},
     Entry{"lpdeform_draining", "1 while the server shuts down."},
+    Entry{"lpdeform_store_failing", "1 while the store does not take what has changed."},
 };
 constexpr std::array kSpans{
     Entry{"lpdeform_input_to_frame_seconds",
@@ -56,6 +61,9 @@ constexpr std::array kSpans{
     Entry{"lpdeform_setup_seconds", "The part of finished solves that factors."},
     Entry{"lpdeform_scheduler_queue_seconds", "From a session's being ready to run to its running."},
     Entry{"lpdeform_call_queue_seconds", "From a call's arrival to its being worked on."},
+    Entry{"lpdeform_input_to_kept_seconds", "From the taking of an update to its being in the store."},
+    Entry{"lpdeform_store_write_seconds", "Of commits to the store, each of all that has changed."},
+    Entry{"lpdeform_store_read_seconds", "Of reading a session from the store."},
 };
 
 /// Those of gRFC A66.

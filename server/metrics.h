@@ -19,10 +19,22 @@ enum class Count {
   kSessionsCreated,
   kConnections,         // taken
   kConnectionsRefused,  // for want of room
+  kSessionsRestored,    // made again from the store
+  kUpdatesNotKept,      // answered before they were in the store, which failed or was slow
+  kStoreErrors,
 };
 
 /// What has a value at each moment.
-enum class Level { kSessions, kSessionsMost, kStreams, kUploads, kMemoryBytes, kMemoryBytesMost, kDraining };
+enum class Level {
+  kSessions,
+  kSessionsMost,
+  kStreams,
+  kUploads,
+  kMemoryBytes,
+  kMemoryBytesMost,
+  kDraining,
+  kStoreFailing
+};
 
 /// What takes time, in seconds.
 enum class Span {
@@ -31,6 +43,9 @@ enum class Span {
   kSetup,           // of one solve: the part that factors
   kSchedulerQueue,  // from being ready to run to running, of a session's slice
   kCallQueue,       // the same of a call's task
+  kInputToKept,     // from the taking of an update to its being in the store
+  kStoreWrite,      // of one commit to the store
+  kStoreRead,       // of one session out of the store
 };
 
 /// What the service counts and measures, for Prometheus. The calls have the names of gRFC A66 with the labels

@@ -15,4 +15,10 @@ std::string random_hex_128() {
   return absl::BytesToHexString({bytes.data(), bytes.size()});
 }
 
+bool is_session_name(std::string_view text) {
+  constexpr std::string_view kBefore = "sessions/";
+  return text.size() == kBefore.size() + 32 && text.starts_with(kBefore) &&
+         text.find_first_not_of("0123456789abcdef", kBefore.size()) == std::string_view::npos;
+}
+
 }  // namespace lpdeform

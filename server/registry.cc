@@ -92,15 +92,43 @@ void Registry::finish_creation(const std::string& request_id, absl::StatusOr<std
       }
     }
     if (!made.ok()) give_up_place(owner);
-    if (made.ok()) {
-      const std::string& name = (*made)->name();
-      sessions_[name] = {*made, request_id, ++numbers_};
-      by_age_[numbers_] = name;
-      watch(name, timers_->now() + limits_.idle);
-    }
+    if (made.ok()) enter(*made, request_id);
   }
   if (request_id.empty()) on_created(created);
   for (const OnCreated& one : waiting) one(created);
+}
+
+/// Under the lock.
+void Registry::enter(const std::shared_ptr<Session>& session, const std::string& request_id) {
+  const std::string& name = session->name();
+  sessions_[name] = {session, request_id, ++numbers_};
+  by_age_[numbers_] = name;
+  watch(name, timers_->now() + limits_.idle);
+}
+
+absl::Status Registry::begin_restoring(const std::string& owner) {
+  const std::scoped_lock lock(mutex_);
+  if (absl::Status status = check_room(owner); !status.ok()) return status;
+  ++being_made_;
+  ++held_[owner];
+  return absl::OkStatus();
+}
+
+void Registry::finish_restoring(const std::string& owner,
+                                const absl::StatusOr<std::shared_ptr<Session>>& made,
+                                const std::string& request_id, std::size_t fingerprint) {
+  const std::scoped_lock lock(mutex_);
+  --being_made_;
+  if (!made.ok()) return give_up_place(owner);
+  if (!request_id.empty()) {
+    requests_[{owner, request_id}] = {fingerprint, (*made)->name(), (*made)->lease().token, {}};
+  }
+  enter(*made, request_id);
+}
+
+bool Registry::has(const std::string& name) const {
+  const std::scoped_lock lock(mutex_);
+  return sessions_.contains(name);
 }
 
 absl::StatusOr<std::shared_ptr<Session>> Registry::find(const std::string& name,

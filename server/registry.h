@@ -47,6 +47,16 @@ class Registry : public std::enable_shared_from_this<Registry> {
   void finish_creation(const std::string& request_id, absl::StatusOr<std::shared_ptr<Session>> made,
                        const OnCreated& on_created, const std::string& owner = "");
 
+  /// Claims a place for a session that is made again from a store. RESOURCE_EXHAUSTED SESSIONS_FULL, CALLER_SESSIONS_FULL.
+  absl::Status begin_restoring(const std::string& owner);
+
+  /// Enters it, made by this request_id with this fingerprint, or gives its place up.
+  void finish_restoring(const std::string& owner, const absl::StatusOr<std::shared_ptr<Session>>& made,
+                        const std::string& request_id, std::size_t fingerprint);
+
+  /// Whether there is a session of this name, whosever it is.
+  bool has(const std::string& name) const;
+
   /// NOT_FOUND SESSION_UNKNOWN, also where it is somebody else's. Counts as use.
   absl::StatusOr<std::shared_ptr<Session>> find(const std::string& name, const std::string& owner = "") const;
 
@@ -90,6 +100,7 @@ class Registry : public std::enable_shared_from_this<Registry> {
   void expire(const std::string& name);
   absl::Status check_room(const std::string& owner) const;
   void give_up_place(const std::string& owner);
+  void enter(const std::shared_ptr<Session>& session, const std::string& request_id);
 
   const std::shared_ptr<Timers> timers_;
   const Limits limits_;

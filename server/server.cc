@@ -254,7 +254,7 @@ void Server::drain(std::chrono::milliseconds grace) {
   backend.registry->drain(text);
   backend.gate.wait_until_empty(std::chrono::steady_clock::now() + grace);
   std::this_thread::sleep_for(std::min(grace, kLinger));
-  backend.registry->clear(EndReason::kDraining, text);
+  backend.release_sessions(text);
   impl_->listener->stop();
   impl_->grpc_server->Shutdown(std::chrono::system_clock::now());  // cancels what is still under way
   impl_->grpc_server->Wait();

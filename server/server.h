@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "server/log.h"
 #include "server/session.h"
+#include "server/store.h"
 #include "server/timers.h"
 #include "server/tls_files.h"
 #include "server/upload.h"
@@ -54,6 +55,9 @@ struct ServerOptions {
   std::chrono::milliseconds session_idle = std::chrono::minutes(10);
   std::chrono::milliseconds upload_idle = std::chrono::minutes(10);
   std::chrono::milliseconds heartbeat = std::chrono::seconds(15);
+
+  /// Where sessions are kept so that they outlive this process; empty: in memory alone. See open_store.h.
+  std::shared_ptr<Store> store = {};
 
   /// The clock of the three above; empty takes the system's.
   std::shared_ptr<Timers> timers = {};

@@ -74,6 +74,26 @@ grpc::ServerUnaryReactor* in_pool(Backend& backend, grpc::CallbackServerContext&
                  });
 }
 
+/// A call about a session, which may have to be made again from the store first.
+template <typename Request, typename Response>
+grpc::ServerUnaryReactor* about_session(Backend& backend, grpc::CallbackServerContext& context,
+                                        std::string_view method,
+                                        void (Backend::*handler)(const CallContext&, const Request&,
+                                                                 Response&, Backend::Done),
+                                        const Request& request, Response& response) {
+  const auto record = begin_record(backend, context, method);
+  record->received(request.ByteSizeLong());
+  return in_pool(backend, context, record, response,
+                 [&backend, record, handler, &request, &response](const Finish& finish) {
+                   const auto then = [&backend, record, handler, &request, &response,
+                                      finish](const absl::Status& status) {
+                     if (!status.ok()) return finish(status);
+                     (backend.*handler)(record->context(), request, response, finish);
+                   };
+                   backend.when_here(record->context(), request.session(), then);
+                 });
+}
+
 }  // namespace
 
 grpc::ServerUnaryReactor* Service::CreateUpload(Context* context, const v1::CreateUploadRequest* request,
@@ -103,7 +123,7 @@ grpc::ServerUnaryReactor* Service::CreateSession(Context* context, const v1::Cre
 
 grpc::ServerUnaryReactor* Service::GetSession(Context* context, const v1::GetSessionRequest* request,
                                               v1::GetSessionResponse* response) {
-  return in_pool(backend_, *context, "GetSession", &Backend::get_session, *request, *response);
+  return about_session(backend_, *context, "GetSession", &Backend::get_session, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::ListSessions(Context* context, const v1::ListSessionsRequest* request,
@@ -113,22 +133,22 @@ grpc::ServerUnaryReactor* Service::ListSessions(Context* context, const v1::List
 
 grpc::ServerUnaryReactor* Service::DeleteSession(Context* context, const v1::DeleteSessionRequest* request,
                                                  v1::DeleteSessionResponse* response) {
-  return in_pool(backend_, *context, "DeleteSession", &Backend::delete_session, *request, *response);
+  return about_session(backend_, *context, "DeleteSession", &Backend::delete_session, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::AcquireWriter(Context* context, const v1::AcquireWriterRequest* request,
                                                  v1::AcquireWriterResponse* response) {
-  return in_pool(backend_, *context, "AcquireWriter", &Backend::acquire_writer, *request, *response);
+  return about_session(backend_, *context, "AcquireWriter", &Backend::acquire_writer, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::UpdateHandles(Context* context, const v1::UpdateHandlesRequest* request,
                                                  v1::UpdateHandlesResponse* response) {
-  return in_pool(backend_, *context, "UpdateHandles", &Backend::update_handles, *request, *response);
+  return about_session(backend_, *context, "UpdateHandles", &Backend::update_handles, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::AckFrames(Context* context, const v1::AckFramesRequest* request,
                                              v1::AckFramesResponse* response) {
-  return in_pool(backend_, *context, "AckFrames", &Backend::ack_frames, *request, *response);
+  return about_session(backend_, *context, "AckFrames", &Backend::ack_frames, *request, *response);
 }
 
 grpc::ServerWriteReactor<v1::StreamFramesResponse>* Service::StreamFrames(

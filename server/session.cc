@@ -49,9 +49,12 @@ absl::Status ended_by(EndReason reason, const std::string& text) {
 
 absl::StatusOr<std::shared_ptr<Session>> Session::create(SessionParts parts, SessionServices services) {
   const Update beginning = std::move(parts.beginning);
+  const std::optional<SessionPast> past = parts.past;
   std::unique_ptr<Deformer> deformer = std::move(parts.deformer);
   const std::shared_ptr<Session> session(new Session(std::move(parts), std::move(services)));
-  if (absl::Status status = session->mailbox_.begin_with(beginning); !status.ok()) return status;
+  const absl::Status begun =
+      past ? session->mailbox_.begin_again(beginning, past->ages) : session->mailbox_.begin_with(beginning);
+  if (!begun.ok()) return begun;
   LiveSolver::Alarm alarm{session->services_.timers, [weak = session->weak_from_this()] {
                             if (const auto self = weak.lock()) self->services_.scheduler.wake(self);
                           }};
@@ -70,13 +73,16 @@ Session::Session(SessionParts parts, SessionServices services)
       features_(parts.features ? std::move(parts.features) : std::make_shared<ShapeFeatures>(shape_)),
       free_components_(parts.free_components),
       services_(std::move(services)),
-      created_unix_ms_(unix_ms_now()),
+      created_unix_ms_(parts.past ? parts.past->created_unix_ms : unix_ms_now()),
       last_used_(services_.timers->now()),
       mailbox_(shape_, mesh_->weld(), services_.limits.handles),
       publisher_(std::make_shared<Publisher>(services_.metrics)),
       memory_(std::move(parts.memory)),
       memory_bytes_(memory_.bytes()),
-      token_(random_hex_128()) {}
+      token_(parts.past ? parts.past->token : random_hex_128()),
+      epoch_(parts.past ? parts.past->epoch : 1) {
+  publisher_->begin_epoch(epoch_);
+}
 
 SessionInfo Session::info() const {
   return {name_,
@@ -93,6 +99,12 @@ SessionInfo Session::info() const {
 WriterLease Session::lease() const {
   const std::scoped_lock lock(writing_);
   return {token_, epoch_, mailbox_.newest().input_seq};
+}
+
+SessionChanges Session::changes_since(std::uint64_t revision) const {
+  const std::scoped_lock lock(writing_);
+  InputChanges inputs = mailbox_.changes_since(revision);
+  return {{token_, epoch_, inputs.inputs.input_seq}, std::move(inputs)};
 }
 
 absl::Status Session::check_writer(const std::string& token) const {

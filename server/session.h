@@ -23,6 +23,14 @@
 
 namespace lpdeform {
 
+/// What a session that is made again, from a store or a file, goes on from.
+struct SessionPast {
+  std::string token;        // of its writer
+  std::uint64_t epoch = 1;  // above those it had
+  std::int64_t created_unix_ms = 0;
+  InputAges ages = {};
+};
+
 /// What a session is made of.
 struct SessionParts {
   std::string name;
@@ -32,8 +40,9 @@ struct SessionParts {
   std::unique_ptr<Deformer> deformer;
   std::shared_ptr<const DrawMesh> mesh = nullptr;  // null: the shape's own vertices
   FreeComponents free_components = FreeComponents::kError;
-  Update beginning;    // settings and handles to begin with
-  Reservation memory;  // the estimate that it was admitted with
+  Update beginning;                      // settings and handles to begin with
+  std::optional<SessionPast> past = {};  // of one that is made again: then `beginning` is its state
+  Reservation memory;                    // the estimate that it was admitted with
 };
 
 /// What one session may have.
@@ -71,6 +80,12 @@ struct WriterLease {
   std::uint64_t input_seq = 0;
 };
 
+/// What a store is to be told of a session.
+struct SessionChanges {
+  WriterLease lease;
+  InputChanges inputs;
+};
+
 /// A mesh being deformed for one writer and any number of readers: a mailbox that updates go into, a live
 /// solver that a scheduler's threads run, a publisher that frames come out of. Every function but run() may
 /// be called from any thread and takes no longer than looking at its arguments.
@@ -87,6 +102,11 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   const ShapeFeatures& features() const { return *features_; }
   SessionInfo info() const;
   WriterLease lease() const;
+  std::int64_t created_unix_ms() const { return created_unix_ms_; }
+  /// Of the inputs: rises with each change that is to be kept.
+  std::uint64_t revision() const { return mailbox_.revision(); }
+  /// Who writes, and what has changed since `revision`; since 0, all.
+  SessionChanges changes_since(std::uint64_t revision) const;
 
   /// UNAUTHENTICATED WRITER_TOKEN_MISSING, PERMISSION_DENIED NOT_THE_WRITER.
   absl::Status check_writer(const std::string& token) const;
@@ -154,7 +174,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
 
   mutable std::mutex writing_;  // an update of an old writer never comes after a new one's first
   std::string token_;
-  std::uint64_t epoch_ = 1;
+  std::uint64_t epoch_;
   std::vector<std::weak_ptr<FrameStream>> writers_;
 
   mutable std::mutex mutex_;

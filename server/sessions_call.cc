@@ -1,3 +1,4 @@
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -31,7 +32,7 @@ class StreamSessionsCall final
       return refuse(wrong_count(request.streams_size()));
     }
     auto self = std::static_pointer_cast<StreamSessionsCall>(shared_from_this());
-    if (!backend_.pool.try_post([self, request] { self->open_all(request); })) refuse(server_busy());
+    if (!backend_.pool.try_post([self, request] { self->fetch(request, 0); })) refuse(server_busy());
   }
 
  private:
@@ -41,13 +42,27 @@ class StreamSessionsCall final
     bool is_over = false;
   };
 
+  /// One session after the other from the store, where it is there alone. What fails shows when it is opened.
+  void fetch(const v1::StreamSessionsRequest& request, int from) {
+    if (from == request.streams_size()) return open_all(request);
+    auto self = std::static_pointer_cast<StreamSessionsCall>(shared_from_this());
+    backend_.when_here(context(), request.streams(from).session(),
+                       [self, request, from](const absl::Status& status) {
+                         if (!status.ok()) self->not_here_[from] = status;
+                         self->fetch(request, from + 1);
+                       });
+  }
+
   void open_all(const v1::StreamSessionsRequest& request) {
     std::vector<Lane> lanes;
     for (const v1::StreamFramesRequest& one : request.streams()) {
-      auto open =
-          backend_.open_stream(context(), one.session(), "", one.options(), [weak = weak_from_this()] {
-            if (const auto self = weak.lock()) self->pump();
-          });
+      const auto pump = [weak = weak_from_this()] {
+        if (const auto self = weak.lock()) self->pump();
+      };
+      const auto missing = not_here_.find(static_cast<int>(lanes.size()));
+      auto open = missing == not_here_.end()
+                      ? backend_.open_stream(context(), one.session(), "", one.options(), pump)
+                      : missing->second;
       if (!open.ok()) record().refused(open.status());
       lanes.push_back({open.ok() ? *std::move(open) : Backend::OpenStream{}, open.status(), false});
     }
@@ -106,6 +121,7 @@ class StreamSessionsCall final
   }
 
   Backend& backend_;
+  std::map<int, absl::Status> not_here_;  // why, by the number of the stream
   std::vector<Lane> lanes_;
   std::size_t next_ = 0;  // whose turn it is, and how often there was one
 };

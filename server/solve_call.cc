@@ -18,7 +18,13 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
   void begin(const v1::SolveRequest& request) {
     auto self = std::static_pointer_cast<SolveCall>(shared_from_this());
     // A copy, because gRPC's goes when the call is cancelled.
-    if (!backend_.pool.try_post([self, request] { self->start(request); })) refuse(server_busy());
+    const auto task = [self, request] {
+      self->backend_.when_here(self->context(), request.session(),
+                               [self, request](const absl::Status& status) {
+                                 status.ok() ? self->start(request) : self->refuse(status);
+                               });
+    };
+    if (!backend_.pool.try_post(task)) refuse(server_busy());
   }
 
  private:

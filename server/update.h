@@ -42,6 +42,8 @@ struct Update {
 struct UpdateResult {
   std::uint64_t input_seq = 0;
   std::uint32_t stale_parts = 0;
+  std::uint64_t revision = 0;  // of the session's inputs, from which on the update is in them
+  bool is_kept = false;        // it is in the server's store
 };
 
 }  // namespace lpdeform

@@ -1,0 +1,150 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/log.h"
+#include "server/metrics.h"
+#include "server/session.h"
+#include "server/store.h"
+#include "server/stored_state.h"
+#include "server/task_pool.h"
+#include "server/timers.h"
+
+namespace lpdeform {
+
+/// Keeps sessions in a store while they live. Nobody who calls it waits for the store: one thread writes whatever has
+/// changed since it last did, of all sessions at once, however many updates that were; so the queue is at most one entry a
+/// session. Another thread reads, and writes blobs.
+///
+/// While the store fails or is slower than kPatience, updates are answered as taken and not kept, new sessions are refused
+/// and the rest goes on; what has changed is kept as soon as the store works again. Thread-safe. Held by a shared pointer.
+class Keeper : public std::enable_shared_from_this<Keeper> {
+ public:
+  struct Services {
+    std::shared_ptr<Timers> timers;
+    std::shared_ptr<Metrics> metrics;
+    std::shared_ptr<const Log> log;
+    Timers::Duration idle;  // after which sessions that nobody uses go
+  };
+
+  static std::shared_ptr<Keeper> create(std::shared_ptr<Store> store, Services services);
+  /// Writes what is left, if it can be written at once.
+  ~Keeper();
+
+  using OnDone = std::function<void(absl::Status)>;
+  using OnKept = std::function<void(bool is_kept)>;
+
+  /// Called, on a thread of the keeper's, with a session that another server has taken over. To be set before anything
+  /// else is called.
+  std::function<void(const Session&)> on_lost;
+
+  /// A new session. `on_done`: OK once it is kept; else UNAVAILABLE STORE_FAILING, and it is not kept at all.
+  void add(std::shared_ptr<Session> session, StoredHead head, const std::string& request_id, OnDone on_done);
+
+  /// A session made again from what take_over() gave.
+  void adopt(std::shared_ptr<Session> session, const StoredSession& stored);
+
+  /// The session's inputs have come to `revision`, in `epoch`. `on_kept` is called once: true when they are kept, false
+  /// where that takes too long.
+  void changed(const Session& session, std::uint64_t revision, std::uint64_t epoch, OnKept on_kept);
+
+  /// The session goes from the store, too. From now on take_over() does not find it.
+  void remove(const std::string& name, OnDone on_done = nullptr);
+
+  /// The session leaves this process and stays in the store.
+  void release(const std::string& name);
+
+  /// What Store::take_over finds, with its blobs.
+  struct Found {
+    StoredSession session;
+    StoredBlobs blobs;
+  };
+  using OnFound = std::function<void(absl::StatusOr<Found>)>;
+  void take_over(const std::string& name, const std::string& owner, OnFound on_found);
+
+  using OnName = std::function<void(absl::StatusOr<std::string>)>;
+  void find_request(const std::string& owner, const std::string& request_id, OnName on_name);
+
+  /// Waits until all is kept, or the store has failed, or this moment.
+  void flush(std::chrono::steady_clock::time_point end);
+
+  static constexpr std::chrono::milliseconds kPatience{250};
+  static constexpr std::chrono::milliseconds kPatienceForNew{10'000};
+
+ private:
+  Keeper(std::shared_ptr<Store> store, Services services);
+  using Clock = std::chrono::steady_clock;
+  using Calls = std::vector<std::function<void()>>;
+
+  struct Waiting {
+    std::uint64_t revision = 0, epoch = 0;
+    Timers::TimePoint until;
+    Clock::time_point since;
+    OnKept on_kept;
+  };
+  struct Entry {
+    std::shared_ptr<Session> session;  // null: it goes
+    std::string head;                  // its part of that name
+    std::vector<std::string> blobs;
+    std::string request_id;
+    std::uint64_t revision = 0, epoch = 0;  // kept
+    std::vector<Waiting> waiting;
+    OnDone on_added;  // until it is kept for the first time
+    std::vector<OnDone> on_removed;
+    bool is_leaving = false;  // forgotten once it is kept
+  };
+  /// What one entry has for the store.
+  struct Work {
+    std::string name;
+    std::shared_ptr<Session> session;  // null: a removal
+    std::string head;                  // of a new one
+    std::uint64_t revision = 0;        // kept so far, then: once `change` is
+    StoredChange change;
+  };
+
+  void run();
+  std::vector<Work> take_work();
+  static void fill_in(Work& work);
+  void write(std::vector<Work> works);
+  absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const Work> works);
+  void note_kept(const Work& work, ChangeOutcome outcome, Calls& calls);
+  void note_failed(const Work& work, const absl::Status& why, Calls& calls);
+  void note_health(const absl::Status& status);
+  void answer_kept(Entry& entry, Calls& calls);
+  static void answer_all(Entry& entry, Calls& calls);
+  void due(const std::string& name);
+  void watch(const std::string& name, Timers::TimePoint when);
+  void give_up_waiting(const std::string& name);
+  void enter_new(const std::string& name, Entry entry);
+  void give_up_new(const std::string& name);
+  void watch_unused();
+  void sweep();
+  bool is_being_removed(const std::string& name) const;
+
+  const std::shared_ptr<Store> store_;
+  const Services services_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::map<std::string, Entry> entries_;
+  std::set<std::string> due_;
+  bool is_writing_ = false;
+  bool is_failing_ = false;
+  Clock::time_point retry_at_;
+  Clock::duration pause_{};
+  bool is_stopping_ = false;
+  TaskPool reader_;  // its thread ends before the writer's
+  std::thread writer_;
+};
+
+}  // namespace lpdeform

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "server/store.h"
+
+namespace lpdeform {
+
+struct StoreLimits {
+  std::uint64_t most_bytes = 0;  // 0: without limit
+};
+
+/// The store that an operator names: "none", which is null, or "sqlite:DIR". Errors: INVALID_ARGUMENT OPTION_OUT_OF_RANGE;
+/// UNAVAILABLE STORE_FAILING.
+absl::StatusOr<std::shared_ptr<Store>> open_store(const std::string& name, const StoreLimits& limits);
+
+}  // namespace lpdeform

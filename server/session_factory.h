@@ -1,0 +1,49 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "lpdeform/v1/service.pb.h"
+#include "server/budget.h"
+#include "server/decode.h"
+#include "server/server.h"
+#include "server/session.h"
+#include "server/stored_state.h"
+#include "server/upload.h"
+
+namespace lpdeform {
+
+/// Makes sessions: from a call, or again from what a store has of one. Takes as long as setting a mesh up does: for the
+/// scheduler's threads. Thread-safe.
+class SessionFactory {
+ public:
+  SessionFactory(const ServerOptions& options, std::shared_ptr<Budget> budget,
+                 std::shared_ptr<Uploads> uploads, SessionServices services);
+
+  /// Errors: what CreateSession has.
+  absl::StatusOr<std::shared_ptr<Session>> make(const std::string& owner,
+                                                const v1::CreateSessionRequest& request) const;
+
+  /// The session of this name, with all that it had, in the epoch of `stored`. `blobs`: those of `head`. Errors: NOT_FOUND
+  /// SESSION_DAMAGED, RESOURCE_EXHAUSTED MEMORY_FULL.
+  absl::StatusOr<std::shared_ptr<Session>> make_again(const std::string& name, const StoredSession& stored,
+                                                      const SessionHead& head,
+                                                      const StoredBlobs& blobs) const;
+
+  /// For one message of a caller's.
+  Decoder decoder(const v1::CreateSessionRequest& request, const std::string& owner) const;
+
+ private:
+  absl::Status make_shape(const v1::CreateSessionRequest& request, Decoder decoder,
+                          SessionParts& parts) const;
+  absl::StatusOr<std::shared_ptr<Session>> finish(SessionParts parts) const;
+  int threads() const;
+
+  const ServerOptions options_;
+  const std::shared_ptr<Budget> budget_;
+  const std::shared_ptr<Uploads> uploads_;
+  const SessionServices services_;
+};
+
+}  // namespace lpdeform

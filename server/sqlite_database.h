@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace lpdeform {
+
+/// An SQLite database file of this process's own. For one thread at a time. Errors are UNAVAILABLE STORE_FAILING with what
+/// SQLite says.
+class SqliteDatabase {
+ public:
+  /// Opens the file, or makes it. Nobody else may have it open.
+  static absl::StatusOr<std::unique_ptr<SqliteDatabase>> open(const std::string& path);
+
+  /// Runs statements that give no rows, separated by semicolons.
+  absl::Status run(const char* statements);
+
+  /// One number out of a statement that gives one.
+  absl::StatusOr<std::int64_t> number(const char* statement);
+
+  std::string path() const { return path_; }
+
+ private:
+  friend class SqliteStatement;
+  struct Close {
+    void operator()(sqlite3* database) const;
+  };
+  SqliteDatabase(std::string path, sqlite3* database);
+  absl::Status failure() const;
+
+  std::string path_;
+  std::unique_ptr<sqlite3, Close> database_;
+};
+
+/// A statement, prepared once and run often. Parameters count from 1, columns from 0.
+class SqliteStatement {
+ public:
+  static absl::StatusOr<SqliteStatement> prepare(const SqliteDatabase& database, const char* sql);
+
+  /// Values for the next run; they must live until it is over.
+  void bind(int parameter, std::string_view text);
+  void bind_blob(int parameter, std::string_view bytes);
+  void bind(int parameter, std::int64_t number);
+
+  /// The next row: false where there is none. After false or an error the statement can be run again.
+  absl::StatusOr<bool> step();
+  /// Runs a statement that gives no rows.
+  absl::Status run();
+  /// Ends a run early.
+  void reset();
+
+  std::string text(int column) const;
+  std::int64_t number(int column) const;
+  /// Rows that the last run changed.
+  int changes() const;
+
+ private:
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const;
+  };
+  SqliteStatement(const SqliteDatabase& database, sqlite3_stmt* statement);
+
+  const SqliteDatabase* database_;
+  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+};
+
+/// A transaction: undone unless it is committed.
+class SqliteTransaction {
+ public:
+  static absl::StatusOr<SqliteTransaction> begin(SqliteDatabase& database);
+  SqliteTransaction(SqliteTransaction&& other) noexcept;
+  ~SqliteTransaction();
+
+  /// Durable once it has returned OK.
+  absl::Status commit();
+
+ private:
+  explicit SqliteTransaction(SqliteDatabase& database) : database_(&database) {}
+
+  SqliteDatabase* database_;  // null once over
+};
+
+}  // namespace lpdeform

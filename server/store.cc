@@ -1,0 +1,36 @@
+#include "server/store.h"
+
+#include <openssl/sha.h>
+
+#include <array>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+
+namespace lpdeform {
+
+std::string blob_key(std::string_view bytes) {
+  std::array<unsigned char, SHA256_DIGEST_LENGTH> digest;
+  SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), digest.data());
+  return absl::BytesToHexString({reinterpret_cast<const char*>(digest.data()), digest.size()});
+}
+
+absl::Status store_failing(std::string_view why) {
+  return make_fault(
+      absl::StatusCode::kUnavailable, {"STORE_FAILING", "store", ""},
+      absl::StrCat("The server's store of sessions fails: ", absl::string_view(why.data(), why.size()), "."));
+}
+
+absl::Status session_damaged(std::string_view why) {
+  return make_fault(absl::StatusCode::kNotFound, {"SESSION_DAMAGED", "session", ""},
+                    absl::StrCat("What is stored of the session cannot be used: ",
+                                 absl::string_view(why.data(), why.size()), "."));
+}
+
+absl::Status session_unknown() {
+  return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""},
+                    "There is no such session; it may have expired or been deleted.");
+}
+
+}  // namespace lpdeform

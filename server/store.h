@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+namespace lpdeform {
+
+/// A session as a store has it: small named parts, of which a change writes those that it is about. What is in them is
+/// the business of StoredState.
+struct StoredSession {
+  std::string owner;
+  std::uint64_t epoch = 0;
+  std::map<std::string, std::string> parts;
+};
+
+/// A change of one session.
+struct StoredChange {
+  std::string session;
+  /// What the store must have; where it has another, somebody else has taken the session over, and nothing is changed.
+  /// 0: the session is new.
+  std::uint64_t epoch_before = 0;
+  std::uint64_t epoch = 0;              // from now on; not below epoch_before
+  std::string owner = {};               // of a new session
+  std::string request_id = {};          // the same; empty, or known again by Store::find_request
+  std::vector<std::string> blobs = {};  // keys of those that a new session has
+  bool replaces_all = false;            // all parts that are not named here go
+  std::map<std::string, std::optional<std::string>> parts = {};  // without a value: the part goes
+  bool is_removal = false;                                       // the session goes, whoever has it
+};
+
+/// What became of a change.
+enum class ChangeOutcome {
+  kKept,
+  kFenced,  // the store has another epoch, or no such session
+};
+
+/// Where sessions are kept so that they outlive the process: their parts, and blobs (meshes), which are stored once
+/// however many sessions have them. What a function has returned as done is durable, and survives the end of the process
+/// at any moment. Changes are whole: a reader sees all of one or nothing of it.
+///
+/// Errors of all functions: UNAVAILABLE STORE_FAILING, the text saying what fails; then nothing has changed, or, of
+/// commit(), all has: repeating it is safe. Functions may take long, as the disk or the network does: to be called by
+/// threads that may wait. Thread-safe.
+class Store {
+ public:
+  virtual ~Store() = default;
+
+  /// Makes the changes, at best all at once. One outcome for each.
+  virtual absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) = 0;
+
+  /// The session, from now on in a new epoch, so that whoever had it is fenced off: their changes are refused.
+  /// NOT_FOUND SESSION_UNKNOWN, also where it is not the owner's; SESSION_DAMAGED where it cannot be read.
+  virtual absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner) = 0;
+
+  /// The name of the owner's session made with this request_id; empty where there is none.
+  virtual absl::StatusOr<std::string> find_request(const std::string& owner,
+                                                   const std::string& request_id) = 0;
+
+  /// Keeps `bytes` under their key, blob_key(bytes), for this session. They go with the last session that has them.
+  virtual absl::Status keep_blob(const std::string& session, const std::string& key,
+                                 std::string_view bytes) = 0;
+  /// NOT_FOUND SESSION_DAMAGED where they are not there, or are not what they were.
+  virtual absl::StatusOr<std::string> blob(const std::string& key) = 0;
+
+  /// Somebody uses these sessions: they are not to be removed by remove_unused() for a while.
+  virtual absl::Status touch(std::span<const std::string> sessions) = 0;
+  /// Removes the sessions that nobody has used for so long, this process's running time alone counted where the store is
+  /// its own. How many went.
+  virtual absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) = 0;
+};
+
+/// SHA-256 of the bytes, as 64 hexadecimal digits.
+std::string blob_key(std::string_view bytes);
+
+/// UNAVAILABLE STORE_FAILING.
+absl::Status store_failing(std::string_view why);
+/// NOT_FOUND SESSION_DAMAGED: what there is of it cannot be used.
+absl::Status session_damaged(std::string_view why);
+/// NOT_FOUND SESSION_UNKNOWN.
+absl::Status session_unknown();
+
+}  // namespace lpdeform

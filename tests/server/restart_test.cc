@@ -1,0 +1,305 @@
+// A server with a store, and the one that comes after it.
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <set>
+#include <thread>
+
+#include "absl/strings/str_cat.h"
+#include "server/sqlite_store.h"
+#include "service_fixture.h"
+
+namespace lpdeform {
+namespace {
+
+class RestartTest : public ServiceTest {
+ protected:
+  RestartTest() {
+    char name[] = "/tmp/lpdeform-restart-XXXXXX";
+    folder_ = mkdtemp(name);
+  }
+  ~RestartTest() override {
+    server_.reset();
+    options_.store.reset();
+    std::filesystem::remove_all(folder_);
+  }
+  void SetUp() override { restart(); }
+
+  /// Another server with the same store.
+  void restart() {
+    server_.reset();
+    options_.store.reset();
+    auto store = open_sqlite_store({folder_});
+    ASSERT_TRUE(store.ok()) << store.status();
+    options_.store = *std::move(store);
+    start();
+  }
+
+  v1::UpdateResult take(const v1::CreateSessionResponse& session, const v1::Update& update) {
+    v1::UpdateHandlesRequest request;
+    request.set_session(session.session().name());
+    request.set_writer_token(session.writer_token());
+    *request.mutable_update() = update;
+    v1::UpdateHandlesResponse response;
+    grpc::ClientContext context;
+    const grpc::Status status = stub_->UpdateHandles(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response.result();
+  }
+
+  grpc::Status get(const std::string& name, v1::Session& session) {
+    v1::GetSessionRequest request;
+    request.set_session(name);
+    v1::GetSessionResponse response;
+    grpc::ClientContext context;
+    const grpc::Status status = stub_->GetSession(&context, request, &response);
+    session = response.session();
+    return status;
+  }
+
+  /// All of a session that clients can see but what differs from one process to the next.
+  std::string seen(const v1::CreateSessionResponse& session) {
+    v1::Session found;
+    EXPECT_TRUE(get(session.session().name(), found).ok());
+    found.clear_epoch();
+    found.clear_expires_unix_ms();
+    found.clear_memory_bytes();
+    return found.DebugString();
+  }
+
+  /// The solved positions.
+  std::string solved(const v1::CreateSessionResponse& session) {
+    v1::SolveRequest request = solve_request(session);
+    request.set_scalar(v1::SCALAR_FLOAT64);
+    const SolveOutcome outcome = solve(request);
+    EXPECT_TRUE(outcome.status.ok()) << outcome.status.error_message();
+    return outcome.frame ? outcome.frame->positions : "";
+  }
+
+  std::string folder_;
+};
+
+/// One of everything that a session can have.
+v1::Update everything(const TriangleMesh& mesh) {
+  v1::Update update = ends_message(mesh.vertices, 7, 2);
+  const auto handle = [&](const std::string& name) -> v1::Handle& {
+    v1::HandleUpdate& change = *update.add_handles();
+    change.set_name(name);
+    return *change.mutable_set();
+  };
+  v1::Handle& soft = handle("soft");
+  soft.mutable_vertices()->set_inline_(packed(vertices_at(mesh.vertices, 5)));
+  soft.mutable_soft()->set_weight(0.25);
+  soft.set_footprint_radius(1.5);
+  v1::Handle& turned = handle("turned");
+  turned.mutable_vertices()->set_inline_(packed(vertices_at(mesh.vertices, 8)));
+  turned.mutable_orientation()->set_weight(30);
+  turned.mutable_motion()->mutable_rigid()->mutable_axis()->set_z(1);
+  turned.mutable_motion()->mutable_rigid()->set_angle_radians(0.3);
+  turned.mutable_motion()->mutable_rigid()->mutable_center()->set_x(0.5);
+  v1::Handle& rail = handle("rail");
+  rail.mutable_vertices()->set_inline_(packed(std::vector<std::int32_t>{vertices_at(mesh.vertices, 11)[0]}));
+  rail.mutable_axis_lock()->mutable_axis()->set_x(1);
+  v1::Handle& plane = handle("plane");
+  plane.mutable_vertices()->set_inline_(packed(std::vector<std::int32_t>{vertices_at(mesh.vertices, 13)[0]}));
+  plane.mutable_plane_lock()->mutable_normal()->set_y(2);
+  v1::Handle& inside = handle("inside");
+  const std::int32_t last_face = static_cast<std::int32_t>(mesh.faces.rows()) / 2;
+  inside.mutable_points()->mutable_faces()->set_inline_(packed(std::vector<std::int32_t>{last_face}));
+  inside.mutable_points()->set_scalar(v1::SCALAR_FLOAT64);
+  const std::vector<double> weights{0.2, 0.3, 0.5};
+  inside.mutable_points()->mutable_barycentric()->set_inline_(weights.data(), 24);
+  inside.mutable_soft()->set_weight(2);
+  v1::Handle& free = handle("free");
+  const std::int32_t vertex = vertices_at(mesh.vertices, 15)[0];
+  free.mutable_vertices()->set_inline_(packed(std::vector<std::int32_t>{vertex}));
+  const Points target = mesh.vertices.row(vertex).array() + 0.25;
+  free.mutable_motion()->mutable_targets()->set_scalar(v1::SCALAR_FLOAT64);
+  free.mutable_motion()->mutable_targets()->mutable_positions()->set_inline_(packed(target));
+  v1::SettingsUpdate& settings = *update.mutable_settings();
+  const Field p = Field::LinSpaced(mesh.vertices.rows(), 1.25, 3);
+  settings.mutable_p()->mutable_per_vertex()->set_scalar(v1::SCALAR_FLOAT64);
+  settings.mutable_p()->mutable_per_vertex()->mutable_values()->set_inline_(
+      p.data(), static_cast<std::size_t>(p.size()) * sizeof(double));
+  settings.mutable_stiffness()->mutable_automatic()->set_strength(0.5);
+  settings.mutable_length_unit()->set_length(0.75);
+  settings.mutable_solver()->set_method(v1::METHOD_QUASI_NEWTON);
+  settings.mutable_solver()->set_tolerance(1e-7);
+  settings.mutable_solver()->set_max_iterations(500);
+  settings.mutable_solver()->set_time_limit_seconds(60);
+  settings.mutable_solver()->set_initial(v1::INITIAL_GUESS_LAPLACIAN);
+  return update;
+}
+
+TEST_F(RestartTest, ASessionHasAllThatItHadToTheLastBit) {
+  const TriangleMesh mesh = bar_mesh();
+  const auto session = create(mesh);
+  EXPECT_TRUE(take(session, everything(mesh)).kept());
+  v1::Update later = tip_message(9, 3);
+  later.add_handles()->set_name("soft");
+  later.mutable_handles(1)->mutable_remove();
+  EXPECT_TRUE(take(session, later).kept());
+  const std::string before = seen(session), positions = solved(session);
+  restart();
+  EXPECT_EQ(seen(session), before);
+  EXPECT_EQ(solved(session), positions);
+}
+
+TEST_F(RestartTest, AWeldedSessionWithNormalsAndARegionIsTheSame) {
+  TriangleMesh mesh = bar_mesh();
+  v1::CreateSessionRequest request;
+  *request.mutable_mesh() = mesh_message(mesh);
+  request.mutable_weld()->mutable_position();
+  request.set_weights(v1::WEIGHT_KIND_UNIFORM);
+  request.set_free_components(v1::FREE_COMPONENTS_STAY);
+  Points normals = Points::Zero(mesh.vertices.rows(), 3);
+  normals.col(1).setOnes();
+  request.mutable_normals()->set_scalar(v1::SCALAR_FLOAT64);
+  request.mutable_normals()->mutable_data()->set_upload(upload(packed(normals)));
+  *request.mutable_handles() = ends_message(mesh.vertices, 0, 1).handles();
+  std::vector<std::int32_t> region;
+  for (std::int32_t v = 0; v < mesh.vertices.rows(); v += 1) {
+    if (mesh.vertices(v, 2) > 4) region.push_back(v);
+  }
+  request.mutable_settings()->mutable_region()->mutable_vertices()->set_inline_(packed(region));
+  v1::CreateSessionResponse session;
+  ASSERT_TRUE(try_create(request, session).ok());
+  const std::string before = seen(session), positions = solved(session);
+  restart();
+  EXPECT_EQ(seen(session), before);
+  EXPECT_EQ(solved(session), positions);
+}
+
+TEST_F(RestartTest, WhatIsOlderThanAValueIsStaleAfterwardsToo) {
+  const TriangleMesh mesh = bar_mesh();
+  const auto session = create(mesh);
+  take(session, ends_message(mesh.vertices, 1, 1));
+  take(session, tip_message(10, 2));
+  v1::Update removal;
+  removal.set_input_seq(12);
+  set_handle(removal, "gone", vertices_at(mesh.vertices, 5), 0);
+  take(session, removal);
+  removal.set_input_seq(14);
+  removal.mutable_handles(0)->mutable_remove();
+  take(session, removal);
+  restart();
+  EXPECT_EQ(take(session, tip_message(9, 7)).stale_parts(), 1u);
+  v1::Update late;
+  late.set_input_seq(13);
+  set_handle(late, "gone", vertices_at(mesh.vertices, 5), 0);
+  EXPECT_EQ(take(session, late).stale_parts(), 1u);
+  EXPECT_EQ(take(session, tip_message(15, 7)).stale_parts(), 0u);
+}
+
+TEST_F(RestartTest, TheWriterGoesOnInANewEpochAndTheOneBeforeItDoesNot) {
+  const auto session = create(bar_mesh());
+  v1::AcquireWriterRequest request;
+  request.set_session(session.session().name());
+  v1::AcquireWriterResponse lease;
+  grpc::ClientContext context;
+  ASSERT_TRUE(stub_->AcquireWriter(&context, request, &lease).ok());
+  restart();
+  v1::CreateSessionResponse second = session;
+  second.set_writer_token(lease.writer_token());
+  const v1::Update update = ends_message(bar_mesh().vertices, 1, 1);
+  EXPECT_EQ(details_of(this->update(session, update)).info.reason(), "NOT_THE_WRITER");
+  DeformClient stream(*stub_, second);
+  const auto opened = stream.read();
+  ASSERT_TRUE(opened && opened->event().has_opened());
+  EXPECT_GT(opened->event().opened().epoch(), lease.epoch());
+  EXPECT_TRUE(stream.send(update));
+  EXPECT_TRUE(stream.settle(1).has_value());
+}
+
+TEST_F(RestartTest, TheSameRequestGivesTheSameSession) {
+  v1::CreateSessionRequest request;
+  request.set_request_id("the same request");
+  *request.mutable_mesh() = mesh_message(bar_mesh());
+  v1::CreateSessionResponse first, second;
+  ASSERT_TRUE(try_create(request, first).ok());
+  restart();
+  ASSERT_TRUE(try_create(request, second).ok());
+  EXPECT_EQ(second.session().name(), first.session().name());
+  EXPECT_EQ(second.writer_token(), first.writer_token());
+  request.set_weights(v1::WEIGHT_KIND_UNIFORM);
+  EXPECT_EQ(details_of(try_create(request, second)).info.reason(), "REQUEST_ID_REUSED");
+}
+
+TEST_F(RestartTest, ADeletedSessionAndOneThatIsNotThereAreUnknown) {
+  const auto session = create(bar_mesh());
+  v1::DeleteSessionRequest request;
+  request.set_session(session.session().name());
+  v1::DeleteSessionResponse response;
+  grpc::ClientContext context;
+  ASSERT_TRUE(stub_->DeleteSession(&context, request, &response).ok());
+  v1::Session found;
+  EXPECT_EQ(details_of(get(session.session().name(), found)).info.reason(), "SESSION_UNKNOWN");
+  restart();
+  EXPECT_EQ(details_of(get(session.session().name(), found)).info.reason(), "SESSION_UNKNOWN");
+  EXPECT_EQ(details_of(get("sessions/nonsense", found)).info.reason(), "SESSION_UNKNOWN");
+}
+
+TEST_F(RestartTest, ManyCallsAtOnceGetOneSession) {
+  const auto session = create(bar_mesh());
+  restart();
+  std::vector<std::thread> threads;
+  std::vector<std::uint64_t> epochs(8);
+  for (std::size_t k = 0; k < epochs.size(); ++k) {
+    threads.emplace_back([&, k] {
+      v1::Session found;
+      EXPECT_TRUE(get(session.session().name(), found).ok());
+      epochs[k] = found.epoch();
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(epochs, std::vector<std::uint64_t>(8, session.session().epoch() + 1));
+}
+
+TEST_F(RestartTest, AStreamOfSeveralSessionsFindsThemAll) {
+  const auto first = create(bar_mesh()), second = create(bar_mesh());
+  restart();
+  v1::StreamSessionsRequest request;
+  request.add_streams()->set_session(first.session().name());
+  request.add_streams()->set_session("sessions/00000000000000000000000000000000");
+  request.add_streams()->set_session(second.session().name());
+  grpc::ClientContext context;
+  const auto reader = stub_->StreamSessions(&context, request);
+  std::set<std::uint32_t> opened, faulty;
+  v1::StreamSessionsResponse response;
+  while (opened.size() < 2 && reader->Read(&response)) {
+    if (response.event().has_opened()) opened.insert(response.stream());
+    if (response.event().has_fault()) faulty.insert(response.stream());
+  }
+  context.TryCancel();
+  EXPECT_EQ(opened, (std::set<std::uint32_t>{0, 2}));
+  EXPECT_EQ(faulty, (std::set<std::uint32_t>{1}));
+}
+
+TEST_F(RestartTest, OneMeshOfManySessionsIsStoredOnce) {
+  for (int k = 0; k < 3; ++k) create(bar_mesh());
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_ + "/blobs"),
+                          std::filesystem::directory_iterator()),
+            1);
+}
+
+TEST_F(RestartTest, ASessionThatNobodyUsesGoesFromTheStoreToo) {
+  timers_ = std::make_shared<ManualTimers>();
+  restart();
+  const auto session = create(bar_mesh());
+  timers_->advance(options_.session_idle + std::chrono::seconds(1));
+  restart();
+  v1::Session found;
+  EXPECT_EQ(details_of(get(session.session().name(), found)).info.reason(), "SESSION_UNKNOWN");
+}
+
+TEST_F(RestartTest, WithoutAStoreNothingIsCalledKept) {
+  server_.reset();
+  options_.store.reset();
+  start();
+  const auto session = create(bar_mesh());
+  EXPECT_FALSE(take(session, ends_message(bar_mesh().vertices, 1, 1)).kept());
+}
+
+}  // namespace
+}  // namespace lpdeform

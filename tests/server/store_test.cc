@@ -1,0 +1,242 @@
+// What every store promises, and what the folder of the SQLite store does when it is damaged, full or taken.
+
+#include "server/store.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "server/sqlite_store.h"
+
+namespace lpdeform {
+namespace {
+
+std::string reason(const absl::Status& status) {
+  return fault_of(status).reason;
+}
+
+/// A folder for one test.
+class Folder {
+ public:
+  Folder() {
+    char name[] = "/tmp/lpdeform-store-XXXXXX";
+    path_ = mkdtemp(name);
+  }
+  ~Folder() { std::filesystem::remove_all(path_); }
+  const std::string& path() const { return path_; }
+  std::size_t blobs() const {
+    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_ + "/blobs"),
+                                                  std::filesystem::directory_iterator()));
+  }
+
+ private:
+  std::string path_;
+};
+
+StoredChange beginning(const std::string& name) {
+  return {.session = name,
+          .epoch = 1,
+          .owner = "anna",
+          .parts = {{"head", "h"}, {"inputs", "1"}, {"m:tip", "here"}}};
+}
+
+absl::StatusOr<ChangeOutcome> commit(Store& store, const StoredChange& change) {
+  const auto outcomes = store.commit({&change, 1});
+  if (!outcomes.ok()) return outcomes.status();
+  return outcomes->at(0);
+}
+
+class SqliteStoreTest : public testing::Test {
+ protected:
+  void SetUp() override { open(); }
+  void open(std::uint64_t most_bytes = 0) {
+    store_.reset();
+    auto opened = open_sqlite_store({folder_.path(), most_bytes});
+    ASSERT_TRUE(opened.ok()) << opened.status();
+    store_ = *std::move(opened);
+  }
+  std::string damage(const std::string& file, std::string_view what) const {
+    const std::string path = folder_.path() + "/" + file;
+    std::ifstream in(path, std::ios::binary);
+    std::string bytes((std::istreambuf_iterator<char>(in)), {});
+    const auto at = bytes.find(what);
+    if (at != std::string::npos) bytes[at] = static_cast<char>(bytes[at] ^ 1);
+    std::ofstream(path, std::ios::binary) << bytes;
+    return at == std::string::npos ? "" : path;
+  }
+
+  Folder folder_;
+  std::shared_ptr<Store> store_;
+};
+
+TEST_F(SqliteStoreTest, GivesBackWhatWasCommittedAfterItWasClosed) {
+  ASSERT_EQ(*commit(*store_, beginning("a")), ChangeOutcome::kKept);
+  const StoredChange next{.session = "a",
+                          .epoch_before = 1,
+                          .epoch = 1,
+                          .parts = {{"inputs", "2"}, {"m:tip", std::nullopt}, {"p", "x"}}};
+  ASSERT_EQ(*commit(*store_, next), ChangeOutcome::kKept);
+  open();
+  const auto found = store_->take_over("a", "anna");
+  ASSERT_TRUE(found.ok()) << found.status();
+  EXPECT_EQ(found->owner, "anna");
+  EXPECT_EQ(found->parts, (std::map<std::string, std::string>{{"head", "h"}, {"inputs", "2"}, {"p", "x"}}));
+}
+
+TEST_F(SqliteStoreTest, ReplacesAllPartsWhereItIsToldTo) {
+  ASSERT_TRUE(commit(*store_, beginning("a")).ok());
+  const StoredChange all{
+      .session = "a", .epoch_before = 1, .epoch = 1, .replaces_all = true, .parts = {{"head", "n"}}};
+  ASSERT_EQ(*commit(*store_, all), ChangeOutcome::kKept);
+  EXPECT_EQ(store_->take_over("a", "anna")->parts, (std::map<std::string, std::string>{{"head", "n"}}));
+}
+
+TEST_F(SqliteStoreTest, WhoeverTakesASessionOverFencesTheOneBeforeOff) {
+  ASSERT_TRUE(commit(*store_, beginning("a")).ok());
+  EXPECT_EQ(store_->take_over("a", "anna")->epoch, 2u);
+  const StoredChange old{.session = "a", .epoch_before = 1, .epoch = 1, .parts = {{"inputs", "old"}}};
+  EXPECT_EQ(*commit(*store_, old), ChangeOutcome::kFenced);
+  const StoredChange removed{.session = "gone", .epoch_before = 1, .epoch = 1};
+  EXPECT_EQ(*commit(*store_, removed), ChangeOutcome::kFenced);
+  const auto found = store_->take_over("a", "anna");
+  EXPECT_EQ(found->epoch, 3u);
+  EXPECT_EQ(found->parts.at("inputs"), "1");
+}
+
+TEST_F(SqliteStoreTest, FindsSessionsOfTheirOwnerOnly) {
+  ASSERT_TRUE(commit(*store_, beginning("a")).ok());
+  EXPECT_EQ(reason(store_->take_over("a", "bert").status()), "SESSION_UNKNOWN");
+  EXPECT_EQ(reason(store_->take_over("b", "anna").status()), "SESSION_UNKNOWN");
+  EXPECT_EQ(store_->take_over("a", "anna")->epoch, 2u);  // looking was no taking over
+}
+
+TEST_F(SqliteStoreTest, FindsASessionByItsRequest) {
+  StoredChange made = beginning("a");
+  made.request_id = "request 1";
+  ASSERT_TRUE(commit(*store_, made).ok());
+  ASSERT_TRUE(commit(*store_, beginning("without a request")).ok());
+  EXPECT_EQ(*store_->find_request("anna", "request 1"), "a");
+  EXPECT_EQ(*store_->find_request("anna", "request 2"), "");
+  EXPECT_EQ(*store_->find_request("bert", "request 1"), "");
+  EXPECT_EQ(*store_->find_request("anna", ""), "");
+}
+
+TEST_F(SqliteStoreTest, ARemovedSessionIsGoneAndMayBeRemovedAgain) {
+  ASSERT_TRUE(commit(*store_, beginning("a")).ok());
+  const StoredChange removal{.session = "a", .is_removal = true};
+  EXPECT_TRUE(commit(*store_, removal).ok());
+  EXPECT_TRUE(commit(*store_, removal).ok());
+  EXPECT_EQ(reason(store_->take_over("a", "anna").status()), "SESSION_UNKNOWN");
+}
+
+TEST_F(SqliteStoreTest, ABlobIsStoredOnceAndGoesWithItsLastSession) {
+  const std::string bytes(1000, 'x'), key = blob_key(bytes);
+  for (const std::string name : {"a", "b"}) {
+    ASSERT_TRUE(store_->keep_blob(name, key, bytes).ok());
+    StoredChange made = beginning(name);
+    made.blobs = {key};
+    ASSERT_TRUE(commit(*store_, made).ok());
+  }
+  EXPECT_EQ(folder_.blobs(), 1u);
+  ASSERT_TRUE(commit(*store_, {.session = "a", .is_removal = true}).ok());
+  EXPECT_EQ(*store_->blob(key), bytes);
+  ASSERT_TRUE(commit(*store_, {.session = "b", .is_removal = true}).ok());
+  EXPECT_EQ(reason(store_->blob(key).status()), "SESSION_DAMAGED");
+  EXPECT_EQ(folder_.blobs(), 0u);
+}
+
+TEST_F(SqliteStoreTest, ABlobOfASessionThatIsBeingMadeOutlivesTheOthers) {
+  const std::string bytes = "mesh", key = blob_key(bytes);
+  ASSERT_TRUE(store_->keep_blob("a", key, bytes).ok());
+  StoredChange made = beginning("a");
+  made.blobs = {key};
+  ASSERT_TRUE(commit(*store_, made).ok());
+  ASSERT_TRUE(store_->keep_blob("b", key, bytes).ok());
+  ASSERT_TRUE(commit(*store_, {.session = "a", .is_removal = true}).ok());
+  EXPECT_TRUE(store_->blob(key).ok());
+  ASSERT_TRUE(commit(*store_, {.session = "b", .is_removal = true}).ok());  // it was not made after all
+  EXPECT_EQ(folder_.blobs(), 0u);
+}
+
+TEST_F(SqliteStoreTest, ClearsAwayWhatAnEndBetweenBlobAndSessionLeft) {
+  ASSERT_TRUE(store_->keep_blob("a", blob_key("mesh"), "mesh").ok());
+  std::ofstream(folder_.path() + "/blobs/abc.unfinished7") << "half";
+  EXPECT_EQ(folder_.blobs(), 2u);
+  open();
+  EXPECT_EQ(folder_.blobs(), 0u);
+}
+
+TEST_F(SqliteStoreTest, RemovesWhatNobodyHasUsed) {
+  ASSERT_TRUE(commit(*store_, beginning("a")).ok());
+  EXPECT_EQ(*store_->remove_unused(60'000), 0u);
+  const std::vector<std::string> names{"a"};
+  EXPECT_TRUE(store_->touch(names).ok());
+  EXPECT_EQ(*store_->remove_unused(-1000), 1u);  // as a second later
+  EXPECT_FALSE(store_->take_over("a", "anna").ok());
+}
+
+TEST_F(SqliteStoreTest, ItsFolderIsForOneServer) {
+  const auto second = open_sqlite_store({folder_.path()});
+  EXPECT_TRUE(absl::IsUnavailable(second.status()));
+  EXPECT_EQ(reason(second.status()), "STORE_FAILING");
+  EXPECT_TRUE(commit(*store_, beginning("a")).ok());
+}
+
+TEST_F(SqliteStoreTest, FindsAChangedBitInAPartAndInABlob) {
+  const std::string bytes = "a mesh that the disk will change", key = blob_key(bytes);
+  ASSERT_TRUE(store_->keep_blob("a", key, bytes).ok());
+  StoredChange made = beginning("a");
+  made.blobs = {key};
+  made.parts["p"] = "a part that the disk will change";
+  ASSERT_TRUE(commit(*store_, made).ok());
+  ASSERT_TRUE(commit(*store_, beginning("b")).ok());
+  store_.reset();
+  ASSERT_NE(damage("sessions.db", "a part that"), "");
+  ASSERT_NE(damage("blobs/" + key, "a mesh that"), "");
+  open();
+  EXPECT_EQ(reason(store_->take_over("a", "anna").status()), "SESSION_DAMAGED");
+  EXPECT_EQ(reason(store_->blob(key).status()), "SESSION_DAMAGED");
+  EXPECT_TRUE(store_->take_over("b", "anna").ok());
+}
+
+TEST_F(SqliteStoreTest, RefusesADatabaseThatIsNone) {
+  store_.reset();
+  std::ofstream(folder_.path() + "/sessions.db") << std::string(8192, 'x');
+  const auto opened = open_sqlite_store({folder_.path()});
+  EXPECT_EQ(reason(opened.status()), "STORE_FAILING");
+  EXPECT_NE(opened.status().message().find(folder_.path()), std::string::npos) << opened.status();
+  EXPECT_EQ(std::filesystem::file_size(folder_.path() + "/sessions.db"), 8192u);
+}
+
+TEST_F(SqliteStoreTest, AFullStoreChangesNothingAndGoesOnWhenThereIsRoom) {
+  open(200'000);
+  ASSERT_TRUE(commit(*store_, beginning("a")).ok());
+  const StoredChange large{.session = "a",
+                           .epoch_before = 1,
+                           .epoch = 1,
+                           .parts = {{"inputs", "2"}, {"p", std::string(300'000, 'p')}}};
+  EXPECT_EQ(reason(commit(*store_, large).status()), "STORE_FAILING");
+  const std::string mesh(300'000, 'm');
+  EXPECT_EQ(reason(store_->keep_blob("b", blob_key(mesh), mesh)), "STORE_FAILING");
+  EXPECT_EQ(folder_.blobs(), 0u);
+  const StoredChange small{.session = "a", .epoch_before = 1, .epoch = 1, .parts = {{"m:tip", "there"}}};
+  EXPECT_TRUE(commit(*store_, small).ok());
+  open(2'000'000);
+  EXPECT_EQ(store_->take_over("a", "anna")->parts,
+            (std::map<std::string, std::string>{{"head", "h"}, {"inputs", "1"}, {"m:tip", "there"}}));
+}
+
+TEST(OpenSqliteStore, RefusesAFolderThatCannotBeMade) {
+  Folder folder;
+  std::ofstream(folder.path() + "/file") << "no folder";
+  const auto opened = open_sqlite_store({folder.path() + "/file/store"});
+  EXPECT_EQ(reason(opened.status()), "STORE_FAILING");
+}
+
+}  // namespace
+}  // namespace lpdeform
