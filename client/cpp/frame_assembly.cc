@@ -140,11 +140,14 @@ bool FrameAssembly::append_quantized(const v1::FramePart& part) {
   if (vertices.size() != count) return false;
   const v1::Vector3& origin = quantization_.origin();
   const v1::Vector3& extent = quantization_.extent();
+  const double dx = extent.x() / kMostUnsigned, dy = extent.y() / kMostUnsigned,
+               dz = extent.z() / kMostUnsigned;
+  const double step = quantization_.distortion_extent() / kMostUnsigned;
   for (const auto& [x, y, z, distortion] : vertices) {
-    frame_->positions.push_back(origin.x() + x / kMostUnsigned * extent.x());
-    frame_->positions.push_back(origin.y() + y / kMostUnsigned * extent.y());
-    frame_->positions.push_back(origin.z() + z / kMostUnsigned * extent.z());
-    frame_->distortion.push_back(distortion / kMostUnsigned * quantization_.distortion_extent());
+    frame_->positions.push_back(x * dx + origin.x());
+    frame_->positions.push_back(y * dy + origin.y());
+    frame_->positions.push_back(z * dz + origin.z());
+    frame_->distortion.push_back(distortion * step);
   }
   if (part.normals().empty()) return true;
   const auto normals = quantized<std::int16_t>(part.normals(), count, is_compressed);

@@ -100,13 +100,14 @@ static class SessionTest
             var normals = new float[66];
             var colours = new byte[88];
             var frame = default(Frame);
-            Eventually(() => session.TryGetFrame(positions, normals, colours, out frame) && frame.InputSeq >= moved, "a frame");
+            Eventually(() => session.TryGetFrame(
+                new FrameBuffers { Positions = positions, Normals = normals, Colours = colours }, out frame) && frame.InputSeq >= moved, "a frame");
             Expect(positions[3 * 20 + 1] == 3, "it is the newest");
             double length = Math.Sqrt(normals.Take(3).Sum(n => (double)n * n));
             Expect(Math.Abs(length - 1) < 1e-6, "normals of length 1");
             Expect(normals[1] > 0, "Unity's winding looks up");
             Expect(colours.Where((c, i) => i % 4 == 3).All(alpha => alpha == 255), "colours without gaps");
-            Expect(session.TryRepeatFrame(new float[66], default(Span<float>), default(Span<byte>), out frame), "the same again");
+            Expect(session.TryRepeatFrame(new FrameBuffers { Positions = new float[66] }, out frame), "the same again");
         }
     }
 

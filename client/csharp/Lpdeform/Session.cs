@@ -102,50 +102,53 @@ namespace Lpdeform
 
         public bool TryGetFrame(Span<float> positions, out Frame frame)
         {
-            return TryGetFrame(positions, default(Span<float>), default(Span<byte>), out frame);
+            return TryGetFrame(new FrameBuffers { Positions = positions }, out frame);
         }
 
-        /// The same with x, y, z of each vertex's normal (needs SessionOptions.WithNormals) and r, g, b, a of its distortion as a
-        /// colour; empty: not wanted.
-        public bool TryGetFrame(Span<float> positions, Span<float> normals, Span<byte> colours, out Frame frame)
+        /// The same with normals, colours and distortion.
+        public bool TryGetFrame(FrameBuffers buffers, out Frame frame)
         {
-            return Write(positions, normals, colours, out frame, Asked.New, 0);
+            return Write(buffers, out frame, Asked.New, 0);
         }
 
         /// Writes the frame taken last once more. False where none was taken.
-        public bool TryRepeatFrame(Span<float> positions, Span<float> normals, Span<byte> colours, out Frame frame)
+        public bool TryRepeatFrame(FrameBuffers buffers, out Frame frame)
         {
-            return Write(positions, normals, colours, out frame, Asked.Last, 0);
+            return Write(buffers, out frame, Asked.Last, 0);
         }
 
         /// Waits until the finished result of the newest change has come, and writes it: for tools and loading screens.
         public Frame Settle(Span<float> positions, double timeoutSeconds = 60)
         {
+            return Settle(new FrameBuffers { Positions = positions }, timeoutSeconds);
+        }
+
+        public Frame Settle(FrameBuffers buffers, double timeoutSeconds = 60)
+        {
             Frame frame;
-            Write(positions, default(Span<float>), default(Span<byte>), out frame, Asked.Result, timeoutSeconds);
+            Write(buffers, out frame, Asked.Result, timeoutSeconds);
             return frame;
         }
 
         enum Asked { New, Last, Result }
 
-        bool Write(Span<float> positions, Span<float> normals, Span<byte> colours, out Frame frame, Asked asked, double timeout)
+        bool Write(FrameBuffers into, out Frame frame, Asked asked, double timeout)
         {
             var native = new Native.Frame { StructSize = (uint)sizeof(Native.Frame) };
             int code;
             // Settle does not keep others from a frame meanwhile.
             var error = asked == Asked.Result ? LpdeformException.NewError() : frameError;
-            fixed (float* positionsAt = &MemoryMarshal.GetReference(positions))
-            fixed (float* normalsAt = &MemoryMarshal.GetReference(normals))
-            fixed (byte* coloursAt = &MemoryMarshal.GetReference(colours))
+            fixed (float* positions = &MemoryMarshal.GetReference(into.Positions))
+            fixed (float* normals = &MemoryMarshal.GetReference(into.Normals))
+            fixed (byte* colours = &MemoryMarshal.GetReference(into.Colours))
+            fixed (float* distortion = &MemoryMarshal.GetReference(into.Distortion))
             {
                 var buffers = new Native.Buffers { StructSize = (uint)sizeof(Native.Buffers) };
-                buffers.Positions.Data = (IntPtr)positionsAt;
-                buffers.Positions.Bytes = (UIntPtr)(4UL * (ulong)positions.Length);
-                buffers.Normals.Data = (IntPtr)normalsAt;
-                buffers.Normals.Bytes = (UIntPtr)(4UL * (ulong)normals.Length);
-                buffers.Colours.Data = (IntPtr)coloursAt;
-                buffers.Colours.Bytes = (UIntPtr)(ulong)colours.Length;
+                buffers.Positions = At(positions, sizeof(float), into.Positions.Length);
+                buffers.Normals = At(normals, sizeof(float), into.Normals.Length);
+                buffers.Colours = At(colours, sizeof(byte), into.Colours.Length);
                 buffers.Colours.Format = Rgba8;
+                buffers.Distortion = At(distortion, sizeof(float), into.Distortion.Length);
                 lock (error)
                 {
                     code = Call(asked, timeout, ref buffers, ref native, error);
@@ -154,6 +157,11 @@ namespace Lpdeform
             }
             frame = Frame.From(native);
             return code == Native.Ok;
+        }
+
+        static Native.Attribute At(void* data, int size, int count)
+        {
+            return new Native.Attribute { Data = (IntPtr)data, Bytes = (UIntPtr)((ulong)size * (ulong)count) };
         }
 
         const int Rgba8 = 5;

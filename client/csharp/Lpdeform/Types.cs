@@ -59,6 +59,8 @@ namespace Lpdeform
         public FreeComponents FreeComponents;
         public FrameEncoding Encoding;
         public bool WithNormals;
+        /// Raw frames travel as float64.
+        public bool DoublePrecision;
         public bool Certify;
         /// 0: without limit.
         public double MaxFramesPerSecond;
@@ -75,6 +77,7 @@ namespace Lpdeform
                 FreeComponents = (int)FreeComponents,
                 Encoding = (int)Encoding,
                 WithNormals = WithNormals ? 1u : 0u,
+                DoublePrecision = DoublePrecision ? 1u : 0u,
                 Certify = Certify ? 1u : 0u,
                 MaxFramesPerSecond = MaxFramesPerSecond
             };
@@ -111,6 +114,19 @@ namespace Lpdeform
         public Vector3d Direction;
         /// Radius of the surroundings that go along nearly rigidly.
         public double Footprint;
+    }
+
+    /// Where a frame is to be written; what is empty is not wanted.
+    public ref struct FrameBuffers
+    {
+        /// x, y, z of each vertex, in the engine's coordinates.
+        public Span<float> Positions;
+        /// x, y, z of each vertex's normal; needs SessionOptions.WithNormals.
+        public Span<float> Normals;
+        /// r, g, b, a of each vertex: its distortion, from blue (none) to red.
+        public Span<byte> Colours;
+        /// E_i of each vertex, lengths in metres.
+        public Span<float> Distortion;
     }
 
     public enum SessionState { Connecting, Live, Reconnecting, Refused }

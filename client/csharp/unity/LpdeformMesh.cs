@@ -75,7 +75,8 @@ public sealed class LpdeformMesh : MonoBehaviour
         try
         {
             Frame frame;
-            if (session.TryGetFrame(Floats(positions), Floats(normals), Bytes(colours), out frame)) Show();
+            var buffers = new FrameBuffers { Positions = Floats(positions), Normals = Floats(normals), Colours = Bytes(colours) };
+            if (session.TryGetFrame(buffers, out frame)) Show();
         }
         catch (LpdeformException error)
         {

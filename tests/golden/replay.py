@@ -1,0 +1,183 @@
+"""Replays the golden recordings to one client: replay.py PROGRAM [ARGUMENT...]
+
+Runs `PROGRAM ARGUMENT... ADDRESS NUMBER_OF_ERRORS` against a server that says what frames.json and errors.json hold, byte for byte,
+and compares what the program prints with expected.txt. The program
+
+- opens a session of the mesh of the recording for each encoding that it has, sets both handles, waits for the result, and prints it;
+- opens a mesh of 1000 + k vertices for each error k, and prints what the call ended with;
+- in one more session moves a handle named after each k, one after the other, and prints the fault that answers it.
+
+What the client sends must mean what the recording has; numbers may be of either scalar. Programs that lack float64 say so:
+`--without float64` before PROGRAM.
+"""
+
+import base64
+import json
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import grpc
+import numpy as np
+from google.protobuf.json_format import MessageToDict
+from lpdeform.v1 import data_pb2, frame_pb2, report_pb2, service_pb2
+
+HERE = Path(__file__).parent
+PATIENCE = 100.0  # seconds; never reached where all is well
+
+
+def message(kind, text):
+    return kind.FromString(base64.b64decode(text))
+
+
+def numbers(buffer, scalar, count=None):
+    """Of a Buffer, as doubles; the first `count`."""
+    kind = "<f8" if scalar == data_pb2.SCALAR_FLOAT64 else "<f4"
+    return np.frombuffer(buffer.inline, kind, -1 if count is None else count).astype(float).tolist()
+
+
+def meaning_of_mesh(mesh):
+    size = 8 if mesh.scalar == data_pb2.SCALAR_FLOAT64 else 4
+    faces = np.frombuffer(mesh.data.inline, "<u4", offset=3 * mesh.vertex_count * size)
+    return numbers(mesh.data, mesh.scalar, 3 * mesh.vertex_count), faces.tolist(), mesh.face_count
+
+
+def meaning_of_creation(request):
+    """All but the id, with what is left out said."""
+    copy = service_pb2.CreateSessionRequest.FromString(request.SerializeToString())
+    for field in ("request_id", "mesh"):
+        copy.ClearField(field)
+    if copy.weights == report_pb2.WEIGHT_KIND_COTANGENT:
+        copy.ClearField("weights")
+    if copy.free_components == service_pb2.FREE_COMPONENTS_ERROR:
+        copy.ClearField("free_components")
+    if not copy.settings.ListFields():
+        copy.ClearField("settings")
+    return meaning_of_mesh(request.mesh), MessageToDict(copy)
+
+
+def meaning_of_handle(handle):
+    motion = handle.motion
+    rigid = motion.rigid
+    where = "fixed"
+    if motion.WhichOneof("kind") == "rigid" and (rigid.angle_radians or rigid.translation.ListFields()):
+        where = (rigid.angle_radians, rigid.translation.x, rigid.translation.y, rigid.translation.z)
+    held = np.frombuffer(handle.vertices.inline, "<u4").tolist()
+    return held, where, handle.WhichOneof("hold"), handle.footprint_radius
+
+
+class Differs(Exception):
+    pass
+
+
+class Service:
+    """The recorded server."""
+
+    def __init__(self):
+        recorded = json.loads((HERE / "frames.json").read_text())
+        self.creation = message(service_pb2.CreateSessionRequest, recorded["create_request"])
+        self.streams = recorded["streams"]
+        self.errors = json.loads((HERE / "errors.json").read_text())
+        self.problems = []
+        self.opened = set()
+
+    def differs(self, context, text):
+        self.problems.append(text)
+        context.abort(grpc.StatusCode.INVALID_ARGUMENT, text)
+
+    def create_session(self, request, context):
+        error = request.mesh.vertex_count - 1000
+        if 0 <= error < len(self.errors):
+            self.fail(self.errors[error], context)
+        if meaning_of_creation(request) != meaning_of_creation(self.creation):
+            self.differs(context, f"another session is asked for: {meaning_of_creation(request)}")
+        return message(service_pb2.CreateSessionResponse, self.streams[0]["create_response"])
+
+    @staticmethod
+    def fail(error, context):
+        code = next(code for code in grpc.StatusCode if code.value[0] == error["code"])
+        context.set_trailing_metadata((("grpc-status-details-bin", base64.b64decode(error["details"])),))
+        context.abort(code, error["text"])
+
+    def stream_for(self, options):
+        for stream in self.streams:
+            asked = message(service_pb2.DeformOpen, stream["open"]).options
+            is_raw = options.encoding in (frame_pb2.ENCODING_RAW, frame_pb2.ENCODING_UNSPECIFIED)
+            if options.encoding == asked.encoding and (not is_raw or options.scalar == asked.scalar):
+                return stream
+        raise Differs(f"no stream was recorded with {options}")
+
+    def deform(self, requests, context):
+        first = next(requests)
+        stream = self.stream_for(first.open.options)
+        self.opened.add(stream["name"])
+        opened, _, result = (message(service_pb2.DeformResponse, text) for text in stream["responses"])
+        yield opened
+        wanted = {u.name: meaning_of_handle(u.set) for u in message(service_pb2.Update, stream["update"]).handles}
+        have = {}
+        for request in requests:
+            if request.WhichOneof("message") != "update":
+                continue
+            update = request.update
+            faults = [u.name for u in update.handles if u.WhichOneof("change") == "move"]
+            if faults:
+                yield self.fault(int(faults[0]), update.input_seq)
+                continue
+            have.update({u.name: meaning_of_handle(u.set) for u in update.handles})
+            yield service_pb2.DeformResponse(result=service_pb2.UpdateResult(input_seq=update.input_seq))
+            if have == wanted:
+                result.event.frame.header.input_seq = update.input_seq
+                yield result
+            elif any(have[name] != wanted.get(name) for name in have):
+                self.differs(context, f"another update is sent: {have}, not {wanted}")
+
+    def fault(self, number, input_seq):
+        fault = message(service_pb2.Fault, self.errors[number]["fault"])
+        fault.input_seq = input_seq
+        return service_pb2.DeformResponse(event=service_pb2.StreamEvent(fault=fault))
+
+    def handlers(self):
+        service, calls = service_pb2.DESCRIPTOR.services_by_name["DeformService"], {}
+        plain = {"CreateSession": self.create_session, "DeleteSession": lambda *_: service_pb2.DeleteSessionResponse()}
+        for method in service.methods:
+            kind = getattr(service_pb2, method.input_type.name)
+            if method.name in plain:
+                make, act = grpc.unary_unary_rpc_method_handler, plain[method.name]
+            elif method.name == "Deform":
+                make, act = grpc.stream_stream_rpc_method_handler, self.deform
+            else:
+                continue
+            calls[method.name] = make(act, kind.FromString, lambda response: response.SerializeToString())
+        return grpc.method_handlers_generic_handler(service.full_name, calls)
+
+
+def main():
+    arguments = sys.argv[1:]
+    without = None
+    if arguments[0] == "--without":
+        without, arguments = arguments[1], arguments[2:]
+    recorded = Service()
+    server = grpc.server(ThreadPoolExecutor(16))
+    server.add_generic_rpc_handlers((recorded.handlers(),))
+    with tempfile.TemporaryDirectory() as folder:
+        address = f"unix:{folder}/socket"
+        server.add_insecure_port(address)
+        server.start()
+        done = subprocess.run([*arguments, address, str(len(recorded.errors))], stdout=subprocess.PIPE, timeout=PATIENCE)
+        server.stop(None)
+    said = done.stdout.decode().splitlines()
+    expected = (HERE / "expected.txt").read_text().splitlines()
+    expected = [line for line in expected if without is None or not line.startswith(without)]
+    different = [(a, b) for a, b in zip(expected, said) if a != b]
+    for wanted, line in different[:5]:
+        print(f"expected {wanted}\nand not  {line}")
+    for problem in recorded.problems[:5]:
+        print(problem)
+    ok = done.returncode == 0 and len(said) == len(expected) and not different and not recorded.problems
+    print(f"{len(said)} lines of {len(expected)}, {len(different)} different, exit status {done.returncode}")
+    sys.exit(0 if ok else 1)
+
+
+main()
