@@ -331,7 +331,9 @@ constexpr double kSameResult = 1e-3 * 10;
 
 /// The same to a reader: entries of a map may come in any order.
 void check_errors(const Json& now, const Json& then) {
-  require(now.size() == then.size(), "proto/errors.md has other reasons than the recording: record again");
+  require(now.size() == then.size(),
+          "proto/errors.md has other reasons than the recording; record again: "
+          "build/release/bin/golden_record tests/golden proto/errors.md");
   for (std::size_t k = 0; k < now.size(); ++k) {
     const auto read = [k](const Json& errors) {
       std::string details;
