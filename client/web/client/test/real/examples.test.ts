@@ -1,4 +1,5 @@
 import { execFile } from "node:child_process";
+import { readFile, rm, writeFile } from "node:fs/promises";
 import { join } from "node:path";
 import { promisify } from "node:util";
 import { afterAll, beforeAll, expect, test } from "vitest";
@@ -14,6 +15,25 @@ async function run(example: string): Promise<string> {
   const program = join(import.meta.dirname, "../../examples", `${example}.ts`);
   return (await promisify(execFile)(process.execPath, [program, service.url])).stdout;
 }
+
+test("the README's quick start does what it says", async () => {
+  const readme = await readFile(join(import.meta.dirname, "../../../README.md"), "utf8");
+  const block = /^```ts\n(.*?)^```$/ms.exec(readme)![1]!;
+  const name = "quick_start.tmp";
+  const file = join(import.meta.dirname, "../../examples", `${name}.ts`);
+  const strip = `
+    const vertices = new Float32Array(Array.from({ length: 22 }, (_, i) => [Math.floor(i / 2), i % 2, 0]).flat());
+    const faces = Array.from({ length: 60 }, (_, k) => 2 * Math.floor(k / 6) + [0, 2, 3, 0, 3, 1][k % 6]!);
+    const base = [0, 1], tip = [20, 21];
+  `;
+  const end = "\nconsole.log(frame.positions[3 * 20 + 2]);\nawait session.close();\n";
+  await writeFile(file, strip + block.replace('"http://localhost:8080"', "process.argv[2]!") + end);
+  try {
+    expect(await run(name)).toBe("1\n");
+  } finally {
+    await rm(file);
+  }
+});
 
 test("first.ts lifts the middle to where it was told to", async () => {
   expect(await run("first")).toBe("5 vertices, the middle at height 1\n");
