@@ -1,40 +1,22 @@
 import { readFileSync } from "node:fs";
-import type { CDPSession, Page } from "playwright-core";
 import type { Service } from "./service.js";
 
 /** MiB: what the page's scripts hold, what the browser's processes do with pictures and buffers, the server, and Envoy. */
 export type Held = Record<"page" | "browser" | "server" | "envoy", number>;
 
 const mebibyte = 2 ** 20;
-/** Tools that drive a page have its renderer keep the last 100 MB of what came over the network, and some for each piece. */
-const keptForTools = 150;
 
 /** What is held from sample to sample while something is repeated, and whether it grows. */
 export class Memory {
   readonly samples: Held[] = [];
 
-  private constructor(
-    readonly service: Service,
-    readonly pageTools: CDPSession,
-    readonly browserTools: CDPSession,
-  ) {}
+  constructor(readonly service: Service) {}
 
-  static async of(page: Page, service: Service): Promise<Memory> {
-    const context = page.context();
-    return new Memory(service, await context.newCDPSession(page), await context.browser()!.newBrowserCDPSession());
-  }
-
-  /** After what the page has let go of has been collected. */
-  async sample(): Promise<Held> {
-    await this.pageTools.send("HeapProfiler.collectGarbage");
-    const { usedSize, backingStorageSize = 0 } = (await this.pageTools.send("Runtime.getHeapUsage")) as {
-      usedSize: number;
-      backingStorageSize?: number;
-    };
-    const { processInfo } = await this.browserTools.send("SystemInfo.getProcessInfo");
+  /** `scripts`: bytes; `processes`: of the browser, by number. */
+  add({ scripts, processes }: { scripts: number; processes: number[] }): Held {
     const held = {
-      page: (usedSize + backingStorageSize) / mebibyte,
-      browser: processInfo.reduce((sum, { id }) => sum + proportionalBytes(id), 0) / mebibyte,
+      page: scripts / mebibyte,
+      browser: processes.reduce((sum, id) => sum + proportionalBytes(id), 0) / mebibyte,
       server: this.service.residentBytes("server") / mebibyte,
       envoy: this.service.residentBytes("envoy") / mebibyte,
     };
@@ -47,18 +29,14 @@ export class Memory {
     return Object.values(held).map((value) => value.toFixed(1));
   }
 
-  /**
-   * One line for each; `isFlat`: the first quarter warms caches and pools, from then on nothing grows by a tenth and 2 MiB, but
-   * for what the browser keeps for its tools.
-   */
+  /** One line for each; `isFlat`: the first quarter warms caches and pools, from then on nothing grows by a tenth and 2 MiB. */
   verdicts(): { text: string; isFlat: boolean }[] {
     const { samples } = this;
     const quarter = Math.floor(samples.length / 4);
     return (["page", "browser", "server", "envoy"] as const).map((who) => {
       const mean = (part: Held[]) => part.reduce((sum, held) => sum + held[who], 0) / part.length;
       const [before, after] = [mean(samples.slice(quarter, 2 * quarter)), mean(samples.slice(-quarter))];
-      const isKeptForTools = who === "browser" && after <= samples[0]!.browser + keptForTools;
-      const isFlat = after <= 1.1 * before + 2 || isKeptForTools;
+      const isFlat = after <= 1.1 * before + 2;
       return {
         text: `${who}: ${before.toFixed(1)} MiB, then ${after.toFixed(1)} MiB${isFlat ? "" : ": it grows"}`,
         isFlat,

@@ -3,7 +3,7 @@ import { readFileSync } from "node:fs";
 import { inflateSync } from "node:zlib";
 
 /** Debian's Chromium, drawing in software, pages too, as it does on machines without a GPU: the same on every machine. */
-const launch = {
+export const launch = {
   executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
   args: [
     "--use-gl=angle",

@@ -4,7 +4,7 @@ import { join } from "node:path";
 import { expect, it } from "vitest";
 import { Memory } from "../../../client/test/real/memory.js";
 import { Service } from "../../../client/test/real/service.js";
-import { User } from "../real/user.js";
+import { BarePage } from "./bare_page.js";
 
 const seconds = Number(process.env["SECONDS"] ?? 600);
 const samples = 20;
@@ -13,24 +13,24 @@ it(
   `holds no more and no less after ${seconds} s of dragging`,
   async () => {
     const service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
-    const user = await User.open(service.url);
-    await user.settled();
-    const memory = await Memory.of(user.page, service);
+    const page = await BarePage.open(service.url);
+    await page.settled();
+    const memory = new Memory(service);
     console.log("seconds  drags  inputs  page MiB  browser MiB  server MiB  Envoy MiB");
     const begin = performance.now();
     let [drags, inputs] = [0, 0];
     for (let sample = 1; sample <= samples; ++sample) {
       const end = begin + (1000 * seconds * sample) / samples;
-      do inputs += await round(user, drags++);
+      do inputs += await round(page, drags++);
       while (performance.now() < end);
-      await user.settled();
+      await page.settled();
       const passed = ((performance.now() - begin) / 1000).toFixed(0);
-      const cells = [passed, drags, inputs, ...Memory.row(await memory.sample())];
+      const cells = [passed, drags, inputs, ...Memory.row(memory.add(await page.held()))];
       console.log(cells.map((cell, k) => String(cell).padStart([7, 5, 6, 8, 11, 10, 9][k]!)).join("  "));
     }
-    expect(user.errors).toEqual([]);
-    await user.close();
+    await page.close();
     await service.stop();
+    expect(page.errors).toEqual([]);
     const verdicts = memory.verdicts();
     console.log(verdicts.map(({ text }) => text).join("\n"));
     expect(verdicts.filter(({ isFlat }) => !isFlat)).toEqual([]);
@@ -39,24 +39,28 @@ it(
 );
 
 /** A drag there and back, and now and then another p, two pictures, another step back. The number of moves. */
-async function round(user: User, count: number): Promise<number> {
-  const { mouse, keyboard } = user.page;
+async function round(page: BarePage, count: number): Promise<number> {
   if (count % 4 === 1) {
-    await keyboard.press("s");
-    await user.until("window.__lpdeform.app.panes.every(({ frame }) => frame)");
+    await page.press("s");
+    await page.until("window.__lpdeform.app.panes.every(({ frame }) => frame)");
   }
-  const vertex = await user.ask<number>("document().handles.at(-1).vertices[40]");
-  const { x, y } = await user.vertexOnPage(vertex);
-  await mouse.move(x, y);
-  await mouse.down();
+  const vertex = await page.ask<number>("document().handles.at(-1).vertices[40]");
+  const { x, y } = await page.ask<{ x: number; y: number }>(`vertexOnPage(${vertex}, 0)`);
+  await page.mouse("mouseMoved", x, y, false);
+  await page.mouse("mousePressed", x, y, true);
   const moves = 40;
   for (let move = 1; move <= moves; ++move) {
     const turn = (2 * Math.PI * move) / moves;
-    await mouse.move(x - 60 * Math.sin(turn), y - 50 * (1 - Math.cos(turn)));
+    await page.mouse("mouseMoved", x - 60 * Math.sin(turn), y - 50 * (1 - Math.cos(turn)), true);
     await new Promise((again) => setTimeout(again, 16));
   }
-  await mouse.up();
-  if (count % 4 === 2) await keyboard.press("s");
-  if (count % 4 === 3) for (const key of [".", ".", "Control+z", "Control+z"]) await keyboard.press(key);
+  await page.mouse("mouseReleased", x, y, true);
+  if (count % 4 === 2) await page.press("s");
+  if (count % 4 === 3) {
+    await page.press(".");
+    await page.press(".");
+    await page.press("z", true);
+    await page.press("z", true);
+  }
   return moves;
 }
