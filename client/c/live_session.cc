@@ -40,7 +40,11 @@ void LiveSession::run() {
     session = session_;
   }
   if (session) session->close().IgnoreError();  // what could not be deleted expires
+  session.reset();
   const std::scoped_lock lock(mutex_);
+  opening_ = nullptr;
+  session_
+      .reset();  // with its threads and its copy of the mesh: this may be kept until the client is disconnected
   is_closed_ = true;
   changed_.notify_all();
 }

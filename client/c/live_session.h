@@ -70,12 +70,12 @@ class LiveSession {
   absl::StatusOr<std::shared_ptr<client::Session>> wait_for_session(Clock::time_point deadline);
   std::optional<lpdeform_frame> take(client::Frame frame, const lpdeform_buffers& buffers);
 
-  Opening opening_;  // of the thread; empty once there is a session
+  Opening opening_;  // of the thread; empty once it is of no more use
   const Facts facts_;
 
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
-  std::shared_ptr<client::Session> session_;  // once there is one, for good
+  std::shared_ptr<client::Session> session_;  // once there is one, until it is closed
   std::optional<client::Update> pending_;     // what was changed before
   std::uint64_t pending_count_ = 0;           // so many changes
   std::int64_t seq_offset_ = 0;               // of our numbers over the session's

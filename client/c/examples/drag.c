@@ -2,7 +2,7 @@
  *
  *   drag ADDRESS [CELLS [FRAMES]]     CELLS a side, 100 unless given: 10,201 vertices
  *
- * Prints each change of the session's state, then what the library's calls cost on this thread, frame by frame. Runs on
+ * Prints each change of the session's state, then how long frames took, and what of it the library's calls cost. Runs on
  * through restarts of the server. C99 and POSIX clocks. */
 #define _POSIX_C_SOURCE 200809L
 
@@ -160,7 +160,8 @@ static void drag(lpdeform_session* session, const sheet* sheet, int frames) {
   double* const moves = calloc((size_t)frames, sizeof *moves);
   double* const polls = calloc((size_t)frames, sizeof *polls);
   double* const misses = calloc((size_t)frames, sizeof *misses);
-  if (!moves || !polls || !misses) exit(1);
+  double* const pictures = calloc((size_t)frames, sizeof *pictures);
+  if (!moves || !polls || !misses || !pictures) exit(1);
   int drawn = 0, missed = 0;
   const double start = seconds();
   for (int frame = 0; frame < frames; ++frame) {
@@ -179,13 +180,16 @@ static void drag(lpdeform_session* session, const sheet* sheet, int frames) {
     }
     tell_state(session, frame);
     wait_until(start + (frame + 1) / 60.0);
+    pictures[frame] = seconds() - before;
   }
+  tell_costs("frames", pictures, frames);
   tell_costs("moves", moves, frames);
   tell_costs("polls with a frame", polls, drawn);
   tell_costs("polls without", misses, missed);
   free(moves);
   free(polls);
   free(misses);
+  free(pictures);
 }
 
 int main(int argc, char** argv) {

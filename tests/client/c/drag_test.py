@@ -49,6 +49,8 @@ class Drag(unittest.TestCase):
             self.assertEqual(status, 0, said)
             states = re.findall(r"^frame \d+: (\w+)", said, re.M)
             self.assertEqual([state for state in states if state != "connecting"], ["live", "reconnecting", "live"], said)
+            # 60 frames a second: nothing made the loop wait for a server that was away for some of them.
+            self.assertLess(float(re.search(r"^frames: 600, p50 ([\d.]+) ms", said, re.M).group(1)), 20, said)
             drawn = int(re.search(r"polls with a frame: (\d+)", said).group(1))
             self.assertGreater(drawn, 100, said)
             # pose(0) of the example: the edge is lifted by 0.7 and moved by 0.3, from z = -2.
