@@ -288,6 +288,33 @@ TEST_F(CSessionTest, AReaderLooksOnAndChangesNothing) {
   lpdeform_close(reader);
 }
 
+TEST_F(CSessionTest, AnotherWriterTakesOverAndItsChangesBeforeItIsThereCount) {
+  open(strip_.mesh());
+  hold("base", {0, 1});
+  hold("tip", {20, 21});
+  settle(22);
+  std::array<char, 64> name{};
+  ASSERT_EQ(lpdeform_session_name(session_, name.data(), name.size(), &error_), LPDEFORM_OK);
+
+  lpdeform_session* writer = nullptr;
+  ASSERT_EQ(lpdeform_join(client_, name.data(), LPDEFORM_WRITER, nullptr, &writer, &error_), LPDEFORM_OK);
+  const lpdeform_motion up = shift(0, 1, 0);
+  std::uint64_t seq = 0;
+  ASSERT_EQ(lpdeform_move_handle(writer, "tip", &up, &seq, &error_), LPDEFORM_OK) << error_.message;
+  std::vector<Point> points(22);
+  const lpdeform_buffers buffers = into(points);
+  ASSERT_EQ(lpdeform_settle(writer, kPatienceSeconds, &buffers, &frame_, &error_), LPDEFORM_OK)
+      << error_.message;
+  EXPECT_EQ(points[20][1], 1);
+  EXPECT_GE(frame_.input_seq, seq);
+
+  EXPECT_TRUE(eventually([&] { return state() == LPDEFORM_STATE_REFUSED; }));
+  EXPECT_EQ(error_.code, LPDEFORM_ABORTED);
+  EXPECT_STREQ(error_.reason, "WRITER_REPLACED");
+  EXPECT_EQ(lpdeform_move_handle(session_, "tip", &up, nullptr, &error_), LPDEFORM_ABORTED);
+  lpdeform_close(writer);
+}
+
 TEST_F(CSessionTest, EveryEncodingShowsTheSame) {
   std::map<lpdeform_encoding, std::vector<Point>> seen;
   for (const auto encoding :
