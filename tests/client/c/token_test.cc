@@ -1,0 +1,89 @@
+// Bearer tokens through the C interface, on a server that asks for them.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "client/c/lpdeform.h"
+#include "server/server.h"
+#include "tests/server/token_maker.h"
+
+namespace lpdeform {
+namespace {
+
+/// A server that takes the tokens of one pair of keys.
+class CTokenTest : public testing::Test {
+ protected:
+  CTokenTest()
+      : keys_(std::filesystem::temp_directory_path() / ("lpdeform-c-tokens-" + std::to_string(getpid()))) {
+    std::ofstream(keys_) << maker_.public_key();
+    ServerOptions options;
+    options.address = "127.0.0.1:0";
+    options.threads = 1;
+    options.token_keys_file = keys_;
+    server_ = Server::start(options).value();
+    error_.struct_size = sizeof error_;
+    lpdeform_connection connection{};
+    connection.struct_size = sizeof connection;
+    const std::string address = server_->address();
+    connection.address = address.c_str();
+    EXPECT_EQ(lpdeform_connect(&connection, &client_, &error_), LPDEFORM_OK) << error_.message;
+  }
+
+  ~CTokenTest() override {
+    lpdeform_disconnect(client_);
+    std::filesystem::remove(keys_);
+  }
+
+  /// How a session of a triangle gets on: its state once it is no longer connecting, with the reason in error_.
+  lpdeform_state open() {
+    const std::array<float, 9> vertices{0, 0, 0, 1, 0, 0, 0, 1, 0};
+    const std::array<std::uint32_t, 3> indices{0, 1, 2};
+    lpdeform_mesh mesh{};
+    mesh.struct_size = sizeof mesh;
+    mesh.vertex_count = 3;
+    mesh.positions = {vertices.data(), sizeof vertices, 0, 0, LPDEFORM_FLOAT32, 0};
+    mesh.indices = indices.data();
+    mesh.index_count = 3;
+    lpdeform_session* session = nullptr;
+    EXPECT_EQ(lpdeform_open(client_, &mesh, nullptr, &session, &error_), LPDEFORM_OK) << error_.message;
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    lpdeform_state state = LPDEFORM_STATE_CONNECTING;
+    while (state == LPDEFORM_STATE_CONNECTING && std::chrono::steady_clock::now() < deadline) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));  // as a game between two frames
+      state = lpdeform_session_state(session, &error_);
+    }
+    lpdeform_close(session);
+    return state;
+  }
+
+  const std::filesystem::path keys_;
+  TokenMaker maker_;
+  std::unique_ptr<Server> server_;
+  lpdeform_client* client_ = nullptr;
+  lpdeform_error error_{};
+};
+
+TEST_F(CTokenTest, WithoutATokenTheSessionIsRefused) {
+  EXPECT_EQ(open(), LPDEFORM_STATE_REFUSED);
+  EXPECT_EQ(error_.code, LPDEFORM_UNAUTHENTICATED);
+  EXPECT_STREQ(error_.reason, "TOKEN_MISSING");
+}
+
+TEST_F(CTokenTest, ATokenLetsInFromTheNextCallOn) {
+  ASSERT_EQ(lpdeform_set_token(client_, "nonsense", &error_), LPDEFORM_OK);
+  EXPECT_EQ(open(), LPDEFORM_STATE_REFUSED);
+  EXPECT_STREQ(error_.reason, "TOKEN_INVALID");
+  ASSERT_EQ(lpdeform_set_token(client_, maker_.token_of("a game").c_str(), &error_), LPDEFORM_OK);
+  EXPECT_EQ(open(), LPDEFORM_STATE_LIVE) << error_.message;
+}
+
+}  // namespace
+}  // namespace lpdeform
