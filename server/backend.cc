@@ -45,7 +45,13 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
       scheduler(options.runner_threads == 0 ? Scheduler::default_threads() : options.runner_threads,
                 observer(Span::kSchedulerQueue)),
       pool(kPoolThreads, options.max_calls_waiting, observer(Span::kCallQueue)) {
-  if (options.store) keeper_ = Keeper::create(options.store, {timers, metrics, log_, options.session_idle});
+  if (options.store) {
+    keeper_ = Keeper::create(options.store, {timers, metrics, log_, options.session_idle});
+    keeper_->on_lost = [registry = std::weak_ptr(registry)](const Session& session) {
+      if (const auto self = registry.lock())
+        self->remove(session.name(), EndReason::kDraining, "Another server has the session now.");
+    };
+  }
   registry->on_ended = [log = log_, metrics = metrics, keeper = keeper_](const Session& session,
                                                                          EndReason reason) {
     const std::string why = ended_because(reason);

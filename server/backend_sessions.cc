@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
 #include "server/backend.h"
 #include "server/encode.h"
 #include "server/random_name.h"
@@ -85,7 +86,10 @@ void Backend::keep_new(std::shared_ptr<Session> session, const v1::CreateSession
 void Backend::delete_session(const CallContext& call, const v1::DeleteSessionRequest& request,
                              v1::DeleteSessionResponse&, Done done) {
   const auto session = find(call, Access::kChange, request.session());
-  if (absl::IsNotFound(session.status())) return done(absl::OkStatus());
+  if (absl::IsNotFound(session.status())) {
+    const bool is_on_its_way = keeper_ != nullptr && keeper_->is_being_removed(request.session());
+    return is_on_its_way ? keeper_->remove(request.session(), std::move(done)) : done(absl::OkStatus());
+  }
   if (!session.ok()) return done(session.status());
   if (registry->remove(request.session(), EndReason::kSessionDeleted, "The session was deleted.")) {
     log().info("session_deleted", {{"session", abbreviated(request.session())}, {"trace_id", call.trace_id}});
@@ -203,7 +207,9 @@ void Backend::end_restoring(const std::string& name, const absl::Status& status)
     waiting.swap(restoring_.at(name).waiting);
     restoring_.erase(name);
   }
-  for (const Done& then : waiting) then(status);
+  // What there is not, find() does not find either.
+  const bool is_unknown = fault_of(status).reason == "SESSION_UNKNOWN";
+  for (const Done& then : waiting) then(is_unknown ? absl::OkStatus() : status);
 }
 
 void Backend::release_sessions(const std::string& text) {

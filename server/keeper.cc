@@ -13,6 +13,8 @@ namespace {
 
 constexpr std::size_t kLongestQueue = 4096;
 constexpr std::chrono::milliseconds kFirstPause{50}, kLongestPause{2000};
+/// Between looks whether another process has let go of a session.
+constexpr std::chrono::milliseconds kBetweenLooks{50};
 /// How often those are looked for that nobody uses, in their time without use.
 constexpr int kSweepsPerIdle = 8;
 
@@ -181,28 +183,42 @@ bool Keeper::is_being_removed(const std::string& name) const {
 }
 
 void Keeper::take_over(const std::string& name, const std::string& owner, OnFound on_found) {
-  const bool is_posted = reader_.try_post([this, name, owner, on_found] {
-    if (is_being_removed(name)) return on_found(session_unknown());
-    const Clock::time_point begin = Clock::now();
-    Found found;
-    auto session = store_->take_over(name, owner);
-    absl::Status status = session.status();
-    if (session.ok()) {
-      found.session = *std::move(session);
-      const auto head = decode_head(found.session.parts);
-      status = head.status();
-      for (const std::string& key : head.ok() ? blobs_of(head->request) : std::vector<std::string>()) {
-        auto bytes = store_->blob(key);
-        status.Update(bytes.status());
-        if (bytes.ok()) found.blobs["blobs/" + key] = *std::move(bytes);
-      }
-    }
-    services_.metrics->observe(Span::kStoreRead, seconds_since(begin));
-    if (absl::IsUnavailable(status)) services_.metrics->add(Count::kStoreErrors);
-    if (!status.ok()) return on_found(status);
-    on_found(std::move(found));
+  take_over_until(name, owner, services_.timers->now() + kPatienceForOthers, on_found);
+}
+
+void Keeper::take_over_until(const std::string& name, const std::string& owner, Timers::TimePoint end,
+                             const OnFound& on_found) {
+  const bool is_posted = reader_.try_post([this, name, owner, end, on_found] {
+    absl::StatusOr<Found> found = is_being_removed(name) ? session_unknown() : read(name, owner);
+    const Timers::TimePoint now = services_.timers->now();
+    if (fault_of(found.status()).reason != "SESSION_ELSEWHERE" || now >= end)
+      return on_found(std::move(found));
+    services_.timers->at(now + kBetweenLooks, [weak = weak_from_this(), name, owner, end, on_found] {
+      if (const auto self = weak.lock()) self->take_over_until(name, owner, end, on_found);
+    });
   });
   if (!is_posted) on_found(server_busy());
+}
+
+absl::StatusOr<Keeper::Found> Keeper::read(const std::string& name, const std::string& owner) {
+  const Clock::time_point begin = Clock::now();
+  auto session = store_->take_over(name, owner);
+  absl::Status status = session.status();
+  Found found;
+  if (session.ok()) {
+    found.session = *std::move(session);
+    const auto head = decode_head(found.session.parts);
+    status = head.status();
+    for (const std::string& key : head.ok() ? blobs_of(head->request) : std::vector<std::string>()) {
+      auto bytes = store_->blob(key);
+      status.Update(bytes.status());
+      if (bytes.ok()) found.blobs["blobs/" + key] = *std::move(bytes);
+    }
+  }
+  services_.metrics->observe(Span::kStoreRead, seconds_since(begin));
+  if (fault_of(status).reason == "STORE_FAILING") services_.metrics->add(Count::kStoreErrors);
+  if (!status.ok()) return status;
+  return found;
 }
 
 void Keeper::find_request(const std::string& owner, const std::string& request_id, OnName on_name) {
@@ -220,10 +236,11 @@ void Keeper::flush(Clock::time_point end) {
 
 void Keeper::run() {
   std::unique_lock lock(mutex_);
-  for (;;) {
+  for (bool is_last_try = false;;) {
     if (is_failing_) changed_.wait_until(lock, retry_at_, [this] { return is_stopping_; });
     changed_.wait(lock, [this] { return is_stopping_ || !due_.empty(); });
-    if (due_.empty() || (is_stopping_ && is_failing_)) return;
+    if (due_.empty() || is_last_try) return;
+    is_last_try = is_stopping_;
     is_writing_ = true;
     lock.unlock();
     write(take_work());
@@ -322,7 +339,10 @@ void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
   if (entry.on_added)
     calls.emplace_back([on_added = std::exchange(entry.on_added, nullptr)] { on_added(absl::OkStatus()); });
   answer_kept(entry, calls);
-  if (entry.is_leaving && !due_.contains(work.name)) entries_.erase(found);
+  if (entry.is_leaving && !due_.contains(work.name)) {
+    entries_.erase(found);
+    calls.emplace_back([this, name = work.name] { store_->let_go(name).IgnoreError(); });
+  }
 }
 
 /// Under the lock. What has changed stays due; a new session is given up.
@@ -373,24 +393,62 @@ void Keeper::note_health(const absl::Status& status) {
 // Sessions that nobody uses.
 
 void Keeper::watch_unused() {
-  services_.timers->at(services_.timers->now() + services_.idle / kSweepsPerIdle, [weak = weak_from_this()] {
+  const Timers::Duration sweep = services_.idle / kSweepsPerIdle;
+  const Timers::Duration touch = store_->touch_every();
+  const bool is_hasty = touch.count() > 0 && touch < sweep;
+  services_.timers->at(services_.timers->now() + (is_hasty ? touch : sweep), [weak = weak_from_this()] {
     if (const auto self = weak.lock()) self->sweep();
   });
 }
 
 void Keeper::sweep() {
-  (void)reader_.try_post([this] {
-    std::vector<std::string> names;
-    {
-      const std::scoped_lock lock(mutex_);
-      for (const auto& [name, entry] : entries_) names.push_back(name);
+  const auto touched = [this] {  // its thread ends before this does
+    touch_all();
+    watch_unused();
+  };
+  if (!reader_.try_post(touched)) watch_unused();
+}
+
+/// On the reader's thread.
+void Keeper::touch_all() {
+  std::vector<TouchedSession> sessions;
+  const Timers::TimePoint now = services_.timers->now();
+  bool is_sweep = false;
+  {
+    const std::scoped_lock lock(mutex_);
+    is_sweep = now >= next_sweep_;
+    for (const auto& [name, entry] : entries_) {
+      if (entry.session == nullptr || entry.epoch == 0 || entry.is_leaving) continue;
+      sessions.push_back({name, entry.epoch, now - entry.session->last_used() < kInUse});
     }
+  }
+  const auto lost = store_->touch(sessions);
+  if (lost.ok()) drop(*lost);
+  absl::Status status = lost.status();
+  if (is_sweep && status.ok()) {
     const auto idle_ms = std::chrono::duration_cast<std::chrono::milliseconds>(services_.idle).count();
-    absl::Status status = store_->touch(names);
-    if (status.ok()) status = store_->remove_unused(idle_ms).status();
-    if (!status.ok()) services_.metrics->add(Count::kStoreErrors);
-  });
-  watch_unused();
+    status = store_->remove_unused(idle_ms).status();
+    const std::scoped_lock lock(mutex_);
+    next_sweep_ = now + services_.idle / kSweepsPerIdle;
+  }
+  if (!status.ok()) services_.metrics->add(Count::kStoreErrors);
+}
+
+/// Sessions that another process has now.
+void Keeper::drop(const std::vector<std::string>& lost) {
+  Calls calls;
+  {
+    const std::scoped_lock lock(mutex_);
+    for (const std::string& name : lost) {
+      const auto found = entries_.find(name);
+      if (found == entries_.end() || found->second.session == nullptr) continue;
+      answer_all(found->second, calls);
+      if (on_lost) calls.emplace_back([this, session = found->second.session] { on_lost(*session); });
+      due_.erase(name);
+      entries_.erase(found);
+    }
+  }
+  for (const auto& call : calls) call();
 }
 
 }  // namespace lpdeform

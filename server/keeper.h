@@ -62,10 +62,14 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   /// The session goes from the store, too. From now on take_over() does not find it.
   void remove(const std::string& name, OnDone on_done = nullptr);
 
+  /// It was, and the store may not know yet.
+  bool is_being_removed(const std::string& name) const;
+
   /// The session leaves this process and stays in the store.
   void release(const std::string& name);
 
-  /// What Store::take_over finds, with its blobs.
+  /// What Store::take_over finds, with its blobs. Where another process has the session in use, waits for kPatienceForOthers
+  /// whether it lets go: as long as the lease of one that has died.
   struct Found {
     StoredSession session;
     StoredBlobs blobs;
@@ -79,8 +83,11 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   /// Waits until all is kept, or the store has failed, or this moment.
   void flush(std::chrono::steady_clock::time_point end);
 
+  /// A session that was used so long ago is still in use.
+  static constexpr std::chrono::milliseconds kInUse{1000};
   static constexpr std::chrono::milliseconds kPatience{250};
   static constexpr std::chrono::milliseconds kPatienceForNew{10'000};
+  static constexpr std::chrono::milliseconds kPatienceForOthers{2'000};
 
  private:
   Keeper(std::shared_ptr<Store> store, Services services);
@@ -128,9 +135,13 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void give_up_waiting(const std::string& name);
   void enter_new(const std::string& name, Entry entry);
   void give_up_new(const std::string& name);
+  void take_over_until(const std::string& name, const std::string& owner, Timers::TimePoint end,
+                       const OnFound& on_found);
+  absl::StatusOr<Found> read(const std::string& name, const std::string& owner);
   void watch_unused();
   void sweep();
-  bool is_being_removed(const std::string& name) const;
+  void touch_all();
+  void drop(const std::vector<std::string>& lost);
 
   const std::shared_ptr<Store> store_;
   const Services services_;
@@ -143,6 +154,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   Clock::time_point retry_at_;
   Clock::duration pause_{};
   bool is_stopping_ = false;
+  Timers::TimePoint next_sweep_;
   TaskPool reader_;  // its thread ends before the writer's
   std::thread writer_;
 };

@@ -132,7 +132,7 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->capture_default_str();
   app.add_option("--store", arguments.store,
                  "Where sessions are kept so that they outlive the server: sqlite:DIR, a folder of its own; "
-                 "none: in memory alone")
+                 "redis://HOST:PORT, shared by several servers; none: in memory alone")
       ->envname("LPDEFORM_STORE")
       ->capture_default_str();
   app.add_option("--max-store-bytes", arguments.max_store_bytes,
@@ -171,7 +171,7 @@ int serve(Arguments& arguments, const sigset_t& signals) {
   options.upload_idle = milliseconds(arguments.upload_idle_seconds);
   options.heartbeat = milliseconds(arguments.heartbeat_seconds);
   options.log = std::make_shared<lpdeform::Log>(arguments.log_level);
-  auto store = lpdeform::open_store(arguments.store, {arguments.max_store_bytes});
+  auto store = lpdeform::open_store(arguments.store, {arguments.max_store_bytes, options.session_idle});
   if (!store.ok()) return refuse(store.status());
   options.store = *std::move(store);
   const auto server = lpdeform::Server::start(options);
@@ -212,6 +212,7 @@ sigset_t signals_for_sigwait() {
 
 int main(int argc, char** argv) {
   const sigset_t signals = signals_for_sigwait();
+  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of the write to it
 
   Arguments arguments;
   CLI::App app;

@@ -1,20 +1,30 @@
 #include "server/open_store.h"
 
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "server/redis_store.h"
 #include "server/sqlite_store.h"
 
 namespace lpdeform {
 
 absl::StatusOr<std::shared_ptr<Store>> open_store(const std::string& name, const StoreLimits& limits) {
-  static const std::string kSqlite = "sqlite:";
+  static const std::string kSqlite = "sqlite:", kRedis = "redis://";
   if (name == "none") return nullptr;
   if (absl::StartsWith(name, kSqlite) && name.size() > kSqlite.size()) {
     return open_sqlite_store({name.substr(kSqlite.size()), limits.most_bytes});
   }
-  return invalid_input({"OPTION_OUT_OF_RANGE", "store", "none or sqlite:DIR"},
-                       absl::StrCat("Option --store must be none or sqlite:DIR, not '", name, "'."));
+  std::uint32_t port = 0;
+  const std::size_t colon = name.rfind(':');
+  if (absl::StartsWith(name, kRedis) && colon > kRedis.size() &&
+      absl::SimpleAtoi(name.substr(colon + 1), &port) && port >= 1 && port <= 65535) {
+    return open_redis_store(
+        {name.substr(kRedis.size(), colon - kRedis.size()), static_cast<int>(port), limits.idle});
+  }
+  const std::string known = "none, sqlite:DIR or redis://HOST:PORT";
+  return invalid_input({"OPTION_OUT_OF_RANGE", "store", known},
+                       absl::StrCat("Option --store must be ", known, ", not '", name, "'."));
 }
 
 }  // namespace lpdeform

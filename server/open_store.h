@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -10,10 +11,12 @@
 namespace lpdeform {
 
 struct StoreLimits {
-  std::uint64_t most_bytes = 0;  // 0: without limit
+  std::uint64_t most_bytes = 0;  // of sqlite; 0: without limit
+  std::chrono::milliseconds idle =
+      std::chrono::minutes(10);  // of redis: what nobody has touched for so long goes
 };
 
-/// The store that an operator names: "none", which is null, or "sqlite:DIR". Errors: INVALID_ARGUMENT OPTION_OUT_OF_RANGE;
+/// The store that an operator names: "none", which is null, "sqlite:DIR", or "redis://HOST:PORT". Errors: INVALID_ARGUMENT OPTION_OUT_OF_RANGE;
 /// UNAVAILABLE STORE_FAILING.
 absl::StatusOr<std::shared_ptr<Store>> open_store(const std::string& name, const StoreLimits& limits);
 

@@ -9,12 +9,13 @@
 #include "absl/status/statusor.h"
 #include "server/log.h"
 #include "server/session.h"
-#include "server/store.h"
 #include "server/timers.h"
 #include "server/tls_files.h"
 #include "server/upload.h"
 
 namespace lpdeform {
+
+class Store;
 
 struct ServerOptions {
   /// "host:port", port 0 for a free one, or "unix:/path/of/socket".

@@ -71,7 +71,8 @@ class SqliteStore final : public Store {
   absl::StatusOr<std::string> find_request(const std::string& owner, const std::string& request_id) override;
   absl::Status keep_blob(const std::string& session, const std::string& key, std::string_view bytes) override;
   absl::StatusOr<std::string> blob(const std::string& key) override { return blobs_.read(key); }
-  absl::Status touch(std::span<const std::string> sessions) override;
+  absl::StatusOr<std::vector<std::string>> touch(std::span<const TouchedSession> sessions) override;
+  absl::Status let_go(const std::string&) override { return absl::OkStatus(); }
   absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) override;
 
  private:
@@ -118,7 +119,7 @@ class SqliteStore final : public Store {
 absl::Status SqliteStore::prepare() {
   static constexpr std::array<const char*, kCount> kSql{
       "INSERT INTO sessions VALUES (?1, ?2, ?3, ?4, ?5)",
-      "UPDATE sessions SET epoch = ?3, used_ms = ?4 WHERE name = ?1 AND epoch = ?2",
+      "UPDATE sessions SET epoch = ?3, used_ms = ?4 WHERE name = ?1 AND epoch IN (?2, ?3)",
       "SELECT owner, epoch FROM sessions WHERE name = ?1",
       "DELETE FROM sessions WHERE name = ?1",
       "INSERT INTO parts VALUES (?1, ?2, ?3) ON CONFLICT DO UPDATE SET value = excluded.value",
@@ -354,16 +355,18 @@ absl::Status SqliteStore::limit_size() {
   return database_->run(absl::StrCat("PRAGMA max_page_count = ", pages).c_str());
 }
 
-absl::Status SqliteStore::touch(std::span<const std::string> sessions) {
+/// The folder is this process's own, so nobody else has taken any of them.
+absl::StatusOr<std::vector<std::string>> SqliteStore::touch(std::span<const TouchedSession> sessions) {
   const std::scoped_lock lock(mutex_);
   auto transaction = SqliteTransaction::begin(*database_);
   if (!transaction.ok()) return transaction.status();
-  for (const std::string& name : sessions) {
-    sql(kTouch).bind(1, name);
+  for (const TouchedSession& session : sessions) {
+    sql(kTouch).bind(1, session.name);
     sql(kTouch).bind(2, unix_ms_now());
     if (absl::Status status = sql(kTouch).run(); !status.ok()) return status;
   }
-  return transaction->commit();
+  if (absl::Status status = transaction->commit(); !status.ok()) return status;
+  return std::vector<std::string>();
 }
 
 absl::StatusOr<std::size_t> SqliteStore::remove_unused(std::int64_t idle_ms) {

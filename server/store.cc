@@ -28,6 +28,12 @@ absl::Status session_damaged(std::string_view why) {
                                  absl::string_view(why.data(), why.size()), "."));
 }
 
+absl::Status session_elsewhere() {
+  return make_fault(
+      absl::StatusCode::kUnavailable, {"SESSION_ELSEWHERE", "session", ""},
+      "Another server has the session in use; try again, it lets go as soon as nobody uses it there.");
+}
+
 absl::Status session_unknown() {
   return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""},
                     "There is no such session; it may have expired or been deleted.");

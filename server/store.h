@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -36,6 +37,13 @@ struct StoredChange {
   bool is_removal = false;                                       // the session goes, whoever has it
 };
 
+/// A session that a process has in its memory.
+struct TouchedSession {
+  std::string name;
+  std::uint64_t epoch = 0;  // that the process knows
+  bool is_in_use = false;
+};
+
 /// What became of a change.
 enum class ChangeOutcome {
   kKept,
@@ -57,7 +65,8 @@ class Store {
   virtual absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) = 0;
 
   /// The session, from now on in a new epoch, so that whoever had it is fenced off: their changes are refused.
-  /// NOT_FOUND SESSION_UNKNOWN, also where it is not the owner's; SESSION_DAMAGED where it cannot be read.
+  /// NOT_FOUND SESSION_UNKNOWN, also where it is not the owner's; SESSION_DAMAGED where it cannot be read; UNAVAILABLE
+  /// SESSION_ELSEWHERE while another process has it in use.
   virtual absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner) = 0;
 
   /// The name of the owner's session made with this request_id; empty where there is none.
@@ -70,10 +79,15 @@ class Store {
   /// NOT_FOUND SESSION_DAMAGED where they are not there, or are not what they were.
   virtual absl::StatusOr<std::string> blob(const std::string& key) = 0;
 
-  /// Somebody uses these sessions: they are not to be removed by remove_unused() for a while.
-  virtual absl::Status touch(std::span<const std::string> sessions) = 0;
-  /// Removes the sessions that nobody has used for so long, this process's running time alone counted where the store is
-  /// its own. How many went.
+  /// This process has these sessions, so they are not removed as unused; where they are in use, no other process may take
+  /// them over for a while. Those that another has taken over.
+  virtual absl::StatusOr<std::vector<std::string>> touch(std::span<const TouchedSession> sessions) = 0;
+  /// How often touch() is to be called; 0: it has no haste.
+  virtual std::chrono::milliseconds touch_every() const { return std::chrono::milliseconds(0); }
+  /// This process lets go of the session: another may take it over at once.
+  virtual absl::Status let_go(const std::string& session) = 0;
+  /// Removes the sessions that nobody has touched for so long, the time that no server ran aside where the store knows it.
+  /// How many went.
   virtual absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) = 0;
 };
 
@@ -84,6 +98,8 @@ std::string blob_key(std::string_view bytes);
 absl::Status store_failing(std::string_view why);
 /// NOT_FOUND SESSION_DAMAGED: what there is of it cannot be used.
 absl::Status session_damaged(std::string_view why);
+/// UNAVAILABLE SESSION_ELSEWHERE.
+absl::Status session_elsewhere();
 /// NOT_FOUND SESSION_UNKNOWN.
 absl::Status session_unknown();
 

@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cpp/status_details.h"
+#include "client/cpp/upload.h"
 #include "core/base/fault.h"
 #include "lpdeform/v1/service.grpc.pb.h"
 
@@ -69,11 +70,17 @@ bool answers(grpc::Channel& channel, std::chrono::system_clock::time_point deadl
   }
 }
 
-using TokenSource = std::function<std::string()>;
+/// What every call says of its caller.
+struct Caller {
+  std::function<std::string()> token;
+  std::string id = new_request_id();
+};
 
-void add_token(const TokenSource& token, grpc::ClientContext& context) {
-  const std::string text = token ? token() : "";
+/// The header lpdeform-session lets a proxy before several servers send all calls of a client to one of them.
+void introduce(const Caller& caller, grpc::ClientContext& context) {
+  const std::string text = caller.token ? caller.token() : "";
   if (!text.empty()) context.AddMetadata("authorization", "Bearer " + text);
+  context.AddMetadata("lpdeform-session", caller.id);
 }
 
 std::shared_ptr<grpc::ChannelCredentials> credentials_of(const std::optional<Tls>& tls) {
@@ -83,8 +90,8 @@ std::shared_ptr<grpc::ChannelCredentials> credentials_of(const std::optional<Tls
 
 class GrpcDeformCall final : public DeformCall {
  public:
-  GrpcDeformCall(Stub& stub, const TokenSource& token) {
-    add_token(token, context_);
+  GrpcDeformCall(Stub& stub, const Caller& caller) {
+    introduce(caller, context_);
     stream_ = stub.Deform(&context_);
   }
 
@@ -104,7 +111,7 @@ class GrpcRpc final : public Rpc {
       : channel_(channel),
         stub_(v1::DeformService::NewStub(channel)),
         call_timeout_(options.call_timeout),
-        token_(options.token) {}
+        caller_{options.token} {}
 
   absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
                                                 const std::stop_token& stop) override {
@@ -142,7 +149,7 @@ class GrpcRpc final : public Rpc {
   absl::Status solve(const v1::SolveRequest& request, double deadline_seconds, const std::stop_token& stop,
                      const std::function<absl::Status(const v1::SolveResponse&)>& on_response) override {
     grpc::ClientContext context;
-    add_token(token_, context);
+    introduce(caller_, context);
     if (deadline_seconds > 0) {
       const auto limit = std::chrono::duration<double>(deadline_seconds);
       context.set_deadline(std::chrono::system_clock::now() +
@@ -158,7 +165,7 @@ class GrpcRpc final : public Rpc {
     return taken.ok() ? status_of(ended) : taken;
   }
 
-  std::unique_ptr<DeformCall> deform() override { return std::make_unique<GrpcDeformCall>(*stub_, token_); }
+  std::unique_ptr<DeformCall> deform() override { return std::make_unique<GrpcDeformCall>(*stub_, caller_); }
 
   Connected wait_for_connection(std::chrono::milliseconds longest, const std::stop_token& stop) override {
     const auto end = std::chrono::system_clock::now() + longest;
@@ -177,7 +184,7 @@ class GrpcRpc final : public Rpc {
                                                               Response*),
                                  const Request& request, const std::stop_token& stop) {
     grpc::ClientContext context;
-    add_token(token_, context);
+    introduce(caller_, context);
     context.set_deadline(std::chrono::system_clock::now() + call_timeout_);
     const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
     Response response;
@@ -189,7 +196,7 @@ class GrpcRpc final : public Rpc {
   const std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<Stub> stub_;
   const std::chrono::milliseconds call_timeout_;
-  const TokenSource token_;
+  const Caller caller_;
 };
 
 }  // namespace

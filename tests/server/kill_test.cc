@@ -17,6 +17,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "program.h"
+#include "redis_server.h"
 #include "service_fixture.h"
 
 namespace lpdeform {
@@ -99,13 +100,18 @@ class Writer {
         grpc::CreateCustomChannel(places_.address, grpc::InsecureChannelCredentials(), arguments));
   }
 
-  /// Until the server is there.
+  /// Until the server is there, and lets go of what the one before it held.
   template <typename Call>
   static grpc::Status patiently(const Call& call) {
-    grpc::ClientContext context;
-    context.set_wait_for_ready(true);
-    context.set_deadline(std::chrono::system_clock::now() + kTestDeadline);
-    return call(context);
+    const auto end = std::chrono::system_clock::now() + kTestDeadline;
+    grpc::Status status;
+    do {
+      grpc::ClientContext context;
+      context.set_wait_for_ready(true);
+      context.set_deadline(end);
+      status = call(context);
+    } while (status.error_code() == grpc::StatusCode::UNAVAILABLE && std::chrono::system_clock::now() < end);
+    return status;
   }
 
   bool make(v1::DeformService::Stub& stub) {
@@ -212,12 +218,21 @@ class Writer {
   int lost_ = 0;
 };
 
-TEST(Kill, NoAcknowledgedUpdateIsLostAndNothingIsCorrupted) {
+class KillTest : public testing::TestWithParam<std::string> {};
+
+INSTANTIATE_TEST_SUITE_P(Stores, KillTest, testing::Values("sqlite", "redis"),
+                         [](const auto& info) { return info.param; });
+
+TEST_P(KillTest, NoAcknowledgedUpdateIsLostAndNothingIsCorrupted) {
   const int kills = number_from_environment("LPDEFORM_KILLS", 6);
   const auto seed = static_cast<unsigned>(number_from_environment("LPDEFORM_SEED", 1));
   char folder[] = "/tmp/lpdeform-kill-XXXXXX";
   ASSERT_NE(mkdtemp(folder), nullptr);
-  const Places places{absl::StrCat("unix:", folder, "/socket"), absl::StrCat("sqlite:", folder, "/store")};
+  const bool has_redis = GetParam() == "redis";
+  const std::unique_ptr<RedisServer> redis = has_redis ? std::make_unique<RedisServer>(folder) : nullptr;
+  const Places places{absl::StrCat("unix:", folder, "/socket"),
+                      has_redis ? absl::StrCat("redis://127.0.0.1:", redis->port())
+                                : absl::StrCat("sqlite:", folder, "/store")};
   const auto start = [&] {
     std::filesystem::remove(absl::StrCat(folder, "/socket"));
     return std::make_unique<Program>(std::vector<std::string>{"--address", places.address, "--store",
@@ -237,9 +252,11 @@ TEST(Kill, NoAcknowledgedUpdateIsLostAndNothingIsCorrupted) {
     const Clock::time_point at = Clock::now() + std::chrono::milliseconds(20 + chance() % 400);
     std::this_thread::sleep_until(at);  // a random moment, which no event tells of
     is_over = true;
+    if (has_redis && kill % 2 == 1) redis->stop();
     server->signal(SIGKILL);
     server->wait();
     server.reset();
+    if (has_redis && kill % 2 == 1) redis->start();
     // Those that wait for a server to be there get one.
     auto again = start();
     for (std::thread& thread : threads) thread.join();

@@ -17,7 +17,8 @@ namespace lpdeform {
 /// all but the program's own settings.
 class Program {
  public:
-  explicit Program(std::vector<std::string> arguments, std::vector<std::string> environment = {}) {
+  explicit Program(std::vector<std::string> arguments, std::vector<std::string> environment = {},
+                   const char* program = LPDEFORM_SERVER_PROGRAM) {
     for (char** entry = environ; *entry != nullptr; ++entry) {
       if (!std::string_view(*entry).starts_with("LPDEFORM_")) environment.emplace_back(*entry);
     }
@@ -28,8 +29,8 @@ class Program {
     posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
     posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
     posix_spawn_file_actions_addclose(&actions, ends[0]);
-    arguments.insert(arguments.begin(), LPDEFORM_SERVER_PROGRAM);
-    EXPECT_EQ(posix_spawn(&pid_, LPDEFORM_SERVER_PROGRAM, &actions, nullptr, pointers(arguments).data(),
+    arguments.insert(arguments.begin(), program);
+    EXPECT_EQ(posix_spawn(&pid_, program, &actions, nullptr, pointers(arguments).data(),
                           pointers(environment).data()),
               0);
     posix_spawn_file_actions_destroy(&actions);

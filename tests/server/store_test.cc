@@ -11,6 +11,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "redis_server.h"
+#include "server/redis_store.h"
 #include "server/sqlite_store.h"
 
 namespace lpdeform {
@@ -51,6 +53,30 @@ absl::StatusOr<ChangeOutcome> commit(Store& store, const StoredChange& change) {
   return outcomes->at(0);
 }
 
+/// What holds for every store: "sqlite" and "redis".
+class StoreTest : public testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    if (GetParam() == "redis") redis_ = std::make_unique<RedisServer>(folder_.path());
+    open();
+  }
+  /// As another process would, after the end of the one before.
+  void open() {
+    store_.reset();
+    auto opened = redis_ ? open_redis_store({.host = "127.0.0.1", .port = redis_->port()})
+                         : open_sqlite_store({folder_.path()});
+    ASSERT_TRUE(opened.ok()) << opened.status();
+    store_ = *std::move(opened);
+  }
+
+  Folder folder_;
+  std::unique_ptr<RedisServer> redis_;
+  std::shared_ptr<Store> store_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Kinds, StoreTest, testing::Values("sqlite", "redis"),
+                         [](const auto& info) { return info.param; });
+
 class SqliteStoreTest : public testing::Test {
  protected:
   void SetUp() override { open(); }
@@ -74,13 +100,14 @@ class SqliteStoreTest : public testing::Test {
   std::shared_ptr<Store> store_;
 };
 
-TEST_F(SqliteStoreTest, GivesBackWhatWasCommittedAfterItWasClosed) {
+TEST_P(StoreTest, GivesBackWhatWasCommittedAfterItWasClosed) {
   ASSERT_EQ(*commit(*store_, beginning("a")), ChangeOutcome::kKept);
   const StoredChange next{.session = "a",
                           .epoch_before = 1,
                           .epoch = 1,
                           .parts = {{"inputs", "2"}, {"m:tip", std::nullopt}, {"p", "x"}}};
   ASSERT_EQ(*commit(*store_, next), ChangeOutcome::kKept);
+  ASSERT_TRUE(store_->let_go("a").ok());
   open();
   const auto found = store_->take_over("a", "anna");
   ASSERT_TRUE(found.ok()) << found.status();
@@ -88,7 +115,7 @@ TEST_F(SqliteStoreTest, GivesBackWhatWasCommittedAfterItWasClosed) {
   EXPECT_EQ(found->parts, (std::map<std::string, std::string>{{"head", "h"}, {"inputs", "2"}, {"p", "x"}}));
 }
 
-TEST_F(SqliteStoreTest, ReplacesAllPartsWhereItIsToldTo) {
+TEST_P(StoreTest, ReplacesAllPartsWhereItIsToldTo) {
   ASSERT_TRUE(commit(*store_, beginning("a")).ok());
   const StoredChange all{
       .session = "a", .epoch_before = 1, .epoch = 1, .replaces_all = true, .parts = {{"head", "n"}}};
@@ -96,7 +123,7 @@ TEST_F(SqliteStoreTest, ReplacesAllPartsWhereItIsToldTo) {
   EXPECT_EQ(store_->take_over("a", "anna")->parts, (std::map<std::string, std::string>{{"head", "n"}}));
 }
 
-TEST_F(SqliteStoreTest, WhoeverTakesASessionOverFencesTheOneBeforeOff) {
+TEST_P(StoreTest, WhoeverTakesASessionOverFencesTheOneBeforeOff) {
   ASSERT_TRUE(commit(*store_, beginning("a")).ok());
   EXPECT_EQ(store_->take_over("a", "anna")->epoch, 2u);
   const StoredChange old{.session = "a", .epoch_before = 1, .epoch = 1, .parts = {{"inputs", "old"}}};
@@ -108,14 +135,14 @@ TEST_F(SqliteStoreTest, WhoeverTakesASessionOverFencesTheOneBeforeOff) {
   EXPECT_EQ(found->parts.at("inputs"), "1");
 }
 
-TEST_F(SqliteStoreTest, FindsSessionsOfTheirOwnerOnly) {
+TEST_P(StoreTest, FindsSessionsOfTheirOwnerOnly) {
   ASSERT_TRUE(commit(*store_, beginning("a")).ok());
   EXPECT_EQ(reason(store_->take_over("a", "bert").status()), "SESSION_UNKNOWN");
   EXPECT_EQ(reason(store_->take_over("b", "anna").status()), "SESSION_UNKNOWN");
   EXPECT_EQ(store_->take_over("a", "anna")->epoch, 2u);  // looking was no taking over
 }
 
-TEST_F(SqliteStoreTest, FindsASessionByItsRequest) {
+TEST_P(StoreTest, FindsASessionByItsRequest) {
   StoredChange made = beginning("a");
   made.request_id = "request 1";
   ASSERT_TRUE(commit(*store_, made).ok());
@@ -126,7 +153,7 @@ TEST_F(SqliteStoreTest, FindsASessionByItsRequest) {
   EXPECT_EQ(*store_->find_request("anna", ""), "");
 }
 
-TEST_F(SqliteStoreTest, ARemovedSessionIsGoneAndMayBeRemovedAgain) {
+TEST_P(StoreTest, ARemovedSessionIsGoneAndMayBeRemovedAgain) {
   ASSERT_TRUE(commit(*store_, beginning("a")).ok());
   const StoredChange removal{.session = "a", .is_removal = true};
   EXPECT_TRUE(commit(*store_, removal).ok());
@@ -134,7 +161,7 @@ TEST_F(SqliteStoreTest, ARemovedSessionIsGoneAndMayBeRemovedAgain) {
   EXPECT_EQ(reason(store_->take_over("a", "anna").status()), "SESSION_UNKNOWN");
 }
 
-TEST_F(SqliteStoreTest, ABlobIsStoredOnceAndGoesWithItsLastSession) {
+TEST_P(StoreTest, ABlobIsStoredOnceAndGoesWithItsLastSession) {
   const std::string bytes(1000, 'x'), key = blob_key(bytes);
   for (const std::string name : {"a", "b"}) {
     ASSERT_TRUE(store_->keep_blob(name, key, bytes).ok());
@@ -142,15 +169,16 @@ TEST_F(SqliteStoreTest, ABlobIsStoredOnceAndGoesWithItsLastSession) {
     made.blobs = {key};
     ASSERT_TRUE(commit(*store_, made).ok());
   }
-  EXPECT_EQ(folder_.blobs(), 1u);
+  if (!redis_) {
+    EXPECT_EQ(folder_.blobs(), 1u);
+  }
   ASSERT_TRUE(commit(*store_, {.session = "a", .is_removal = true}).ok());
   EXPECT_EQ(*store_->blob(key), bytes);
   ASSERT_TRUE(commit(*store_, {.session = "b", .is_removal = true}).ok());
   EXPECT_EQ(reason(store_->blob(key).status()), "SESSION_DAMAGED");
-  EXPECT_EQ(folder_.blobs(), 0u);
 }
 
-TEST_F(SqliteStoreTest, ABlobOfASessionThatIsBeingMadeOutlivesTheOthers) {
+TEST_P(StoreTest, ABlobOfASessionThatIsBeingMadeOutlivesTheOthers) {
   const std::string bytes = "mesh", key = blob_key(bytes);
   ASSERT_TRUE(store_->keep_blob("a", key, bytes).ok());
   StoredChange made = beginning("a");
@@ -160,7 +188,7 @@ TEST_F(SqliteStoreTest, ABlobOfASessionThatIsBeingMadeOutlivesTheOthers) {
   ASSERT_TRUE(commit(*store_, {.session = "a", .is_removal = true}).ok());
   EXPECT_TRUE(store_->blob(key).ok());
   ASSERT_TRUE(commit(*store_, {.session = "b", .is_removal = true}).ok());  // it was not made after all
-  EXPECT_EQ(folder_.blobs(), 0u);
+  EXPECT_FALSE(store_->blob(key).ok());
 }
 
 TEST_F(SqliteStoreTest, ClearsAwayWhatAnEndBetweenBlobAndSessionLeft) {
@@ -174,8 +202,8 @@ TEST_F(SqliteStoreTest, ClearsAwayWhatAnEndBetweenBlobAndSessionLeft) {
 TEST_F(SqliteStoreTest, RemovesWhatNobodyHasUsed) {
   ASSERT_TRUE(commit(*store_, beginning("a")).ok());
   EXPECT_EQ(*store_->remove_unused(60'000), 0u);
-  const std::vector<std::string> names{"a"};
-  EXPECT_TRUE(store_->touch(names).ok());
+  const std::vector<TouchedSession> sessions{{"a", 1, true}};
+  EXPECT_TRUE(store_->touch(sessions)->empty());
   EXPECT_EQ(*store_->remove_unused(-1000), 1u);  // as a second later
   EXPECT_FALSE(store_->take_over("a", "anna").ok());
 }
@@ -229,6 +257,80 @@ TEST_F(SqliteStoreTest, AFullStoreChangesNothingAndGoesOnWhenThereIsRoom) {
   open(2'000'000);
   EXPECT_EQ(store_->take_over("a", "anna")->parts,
             (std::map<std::string, std::string>{{"head", "h"}, {"inputs", "1"}, {"m:tip", "there"}}));
+}
+
+class RedisStoreTest : public testing::Test {
+ protected:
+  /// A store as one of several servers has it.
+  std::shared_ptr<Store> open(std::chrono::milliseconds lease = std::chrono::minutes(1)) {
+    auto opened = open_redis_store({.host = "127.0.0.1",
+                                    .port = redis_.port(),
+                                    .lease = lease,
+                                    .patience = std::chrono::milliseconds(200)});
+    EXPECT_TRUE(opened.ok()) << opened.status();
+    return *std::move(opened);
+  }
+
+  Folder folder_;
+  RedisServer redis_{folder_.path()};
+};
+
+TEST_F(RedisStoreTest, ASessionInUseIsHeldUntilItIsLetGo) {
+  const auto first = open(), second = open();
+  ASSERT_TRUE(commit(*first, beginning("a")).ok());
+  EXPECT_EQ(reason(second->take_over("a", "anna").status()), "SESSION_ELSEWHERE");
+  EXPECT_TRUE(absl::IsUnavailable(second->take_over("a", "anna").status()));
+  ASSERT_TRUE(second->let_go("a").ok());  // it is not the second's to let go
+  EXPECT_FALSE(second->take_over("a", "anna").ok());
+  ASSERT_TRUE(first->let_go("a").ok());
+  EXPECT_EQ(second->take_over("a", "anna")->epoch, 2u);
+}
+
+TEST_F(RedisStoreTest, ALeaseThatNobodyRenewsEndsAndItsHolderIsFencedOff) {
+  const auto first = open(std::chrono::milliseconds(1)), second = open();
+  ASSERT_TRUE(commit(*first, beginning("a")).ok());
+  absl::StatusOr<StoredSession> taken;
+  do {
+    taken = second->take_over("a", "anna");
+  } while (reason(taken.status()) == "SESSION_ELSEWHERE");
+  ASSERT_TRUE(taken.ok());
+  for (const std::uint64_t epoch : {1, 2}) {  // also where it makes up the same next epoch
+    const StoredChange late{.session = "a", .epoch_before = 1, .epoch = epoch, .parts = {{"inputs", "late"}}};
+    EXPECT_EQ(*commit(*first, late), ChangeOutcome::kFenced);
+  }
+  const std::vector<TouchedSession> sessions{{"a", 1, true}};
+  EXPECT_EQ(*first->touch(sessions), std::vector<std::string>{"a"});
+  const std::vector<TouchedSession> held{{"a", 2, true}};
+  EXPECT_TRUE(second->touch(held)->empty());
+  EXPECT_EQ(second->take_over("a", "anna")->parts.at("inputs"), "1");
+}
+
+TEST_F(RedisStoreTest, AChangeWhoseAnswerWasLostCanBeMadeAgain) {
+  const auto store = open();
+  ASSERT_TRUE(commit(*store, beginning("a")).ok());
+  const StoredChange writer{.session = "a", .epoch_before = 1, .epoch = 2, .parts = {{"writer", "w"}}};
+  EXPECT_EQ(*commit(*store, writer), ChangeOutcome::kKept);
+  EXPECT_EQ(*commit(*store, writer), ChangeOutcome::kKept);
+  EXPECT_EQ(*commit(*store, beginning("a")), ChangeOutcome::kKept);
+}
+
+TEST_F(RedisStoreTest, RedisAwaySlowOrRestartedIsAnErrorThatPasses) {
+  const auto store = open();
+  ASSERT_TRUE(commit(*store, beginning("a")).ok());
+  redis_.pause();
+  EXPECT_EQ(reason(store->take_over("a", "anna").status()), "STORE_FAILING");
+  redis_.resume();
+  redis_.stop();
+  EXPECT_EQ(reason(commit(*store, beginning("b")).status()), "STORE_FAILING");
+  EXPECT_EQ(reason(store->blob("key").status()), "STORE_FAILING");
+  redis_.start();
+  EXPECT_TRUE(commit(*store, beginning("b")).ok());
+  EXPECT_EQ(store->take_over("a", "anna")->parts.at("inputs"), "1");
+}
+
+TEST(OpenRedisStore, RefusesAServerThatIsNotThere) {
+  const auto opened = open_redis_store({.host = "127.0.0.1", .port = 1});
+  EXPECT_EQ(reason(opened.status()), "STORE_FAILING");
 }
 
 TEST(OpenSqliteStore, RefusesAFolderThatCannotBeMade) {

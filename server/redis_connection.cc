@@ -1,0 +1,84 @@
+#include "server/redis_connection.h"
+
+#include <hiredis.h>
+#include <sys/time.h>
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/store.h"
+
+namespace lpdeform {
+namespace {
+
+timeval time_of(std::chrono::milliseconds duration) {
+  return {duration.count() / 1000, 1000 * (duration.count() % 1000)};
+}
+
+RedisReply read(const redisReply& reply) {
+  RedisReply out;
+  out.is_nothing = reply.type == REDIS_REPLY_NIL;
+  out.number = reply.integer;
+  if (reply.str != nullptr) out.text.assign(reply.str, reply.len);
+  for (std::size_t k = 0; k < reply.elements; ++k) out.elements.push_back(read(*reply.element[k]));
+  return out;
+}
+
+}  // namespace
+
+void RedisConnection::Free::operator()(redisContext* context) const {
+  redisFree(context);
+}
+
+RedisConnection::RedisConnection(std::string host, int port, std::chrono::milliseconds patience)
+    : host_(std::move(host)), port_(port), patience_(patience) {}
+
+RedisConnection::~RedisConnection() = default;
+
+absl::Status RedisConnection::failure(const std::string& what) {
+  context_.reset();
+  return store_failing(absl::StrCat(what, " (Redis at ", host_, ":", port_, ")"));
+}
+
+absl::Status RedisConnection::connect() {
+  if (context_ != nullptr) return absl::OkStatus();
+  context_.reset(redisConnectWithTimeout(host_.c_str(), port_, time_of(patience_)));
+  if (context_ == nullptr) return failure("no memory");
+  if (context_->err != 0) return failure(context_->errstr);
+  redisSetTimeout(context_.get(), time_of(patience_));
+  redisEnableKeepAlive(context_.get());
+  return absl::OkStatus();
+}
+
+absl::StatusOr<RedisReply> RedisConnection::run(const Command& command) {
+  auto replies = run(std::vector<Command>{command});
+  if (!replies.ok()) return replies.status();
+  return std::move(replies->front());
+}
+
+absl::StatusOr<std::vector<RedisReply>> RedisConnection::run(const std::vector<Command>& commands) {
+  if (absl::Status status = connect(); !status.ok()) return status;
+  for (const Command& command : commands) {
+    std::vector<const char*> texts;
+    std::vector<std::size_t> sizes;
+    for (const std::string& word : command) {
+      texts.push_back(word.data());
+      sizes.push_back(word.size());
+    }
+    redisAppendCommandArgv(context_.get(), static_cast<int>(texts.size()), texts.data(), sizes.data());
+  }
+  std::vector<RedisReply> replies;
+  std::string refused;
+  while (replies.size() < commands.size()) {
+    void* received = nullptr;
+    if (redisGetReply(context_.get(), &received) != REDIS_OK) return failure(context_->errstr);
+    const std::unique_ptr<redisReply, void (*)(void*)> reply(static_cast<redisReply*>(received),
+                                                             freeReplyObject);
+    if (reply->type == REDIS_REPLY_ERROR && refused.empty()) refused.assign(reply->str, reply->len);
+    replies.push_back(read(*reply));
+  }
+  if (refused.empty()) return replies;
+  return failure(refused);
+}
+
+}  // namespace lpdeform

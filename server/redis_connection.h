@@ -1,0 +1,50 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+struct redisContext;
+
+namespace lpdeform {
+
+/// What Redis answers.
+struct RedisReply {
+  bool is_nothing = false;  // nil
+  std::int64_t number = 0;
+  std::string text;  // of strings and statuses
+  std::vector<RedisReply> elements;
+};
+
+/// A connection to a Redis server, made anew after a failure, when it is next needed. For one thread at a time. Errors are
+/// UNAVAILABLE STORE_FAILING; whether the commands were carried out is not known then.
+class RedisConnection {
+ public:
+  RedisConnection(std::string host, int port, std::chrono::milliseconds patience);
+  ~RedisConnection();
+
+  using Command = std::vector<std::string>;
+
+  absl::StatusOr<RedisReply> run(const Command& command);
+  /// Sends all, then reads the answers: one journey.
+  absl::StatusOr<std::vector<RedisReply>> run(const std::vector<Command>& commands);
+
+ private:
+  absl::Status connect();
+  absl::Status failure(const std::string& what);
+
+  struct Free {
+    void operator()(redisContext* context) const;
+  };
+  const std::string host_;
+  const int port_;
+  const std::chrono::milliseconds patience_;
+  std::unique_ptr<redisContext, Free> context_;
+};
+
+}  // namespace lpdeform

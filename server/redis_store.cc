@@ -1,0 +1,257 @@
+#include "server/redis_store.h"
+
+#include <map>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "server/random_name.h"
+#include "server/redis_connection.h"
+
+namespace lpdeform {
+namespace {
+
+using Command = RedisConnection::Command;
+
+const std::string kSession = "lpdeform:s:", kBlob = "lpdeform:b:", kUsers = "lpdeform:u:";
+const std::string kPart = "p:";
+
+// Of all scripts, KEYS[1] is the session's hash and ARGV[1] the holder.
+const std::string kNow = "local t = redis.call('TIME'); local now = t[1] * 1000 + math.floor(t[2] / 1000); ";
+
+/// ARGV: holder, epoch before, epoch, lease, idle, replaces all, then names and values of hash fields in turn, "=" before a
+/// value that is set and "-" for one that goes. 1: done; 0: fenced.
+const std::string kCommit =
+    kNow +
+    "if ARGV[2] ~= '0' then "
+    "  local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch'); "
+    "  if has[1] ~= ARGV[1] or (has[2] ~= ARGV[2] and has[2] ~= ARGV[3]) then return 0 end "
+    "end "
+    "if ARGV[6] == '1' then "
+    "  for _, field in ipairs(redis.call('HKEYS', KEYS[1])) do "
+    "    if string.sub(field, 1, 2) == 'p:' then redis.call('HDEL', KEYS[1], field) end "
+    "  end "
+    "end "
+    "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'epoch', ARGV[3], 'until', now + ARGV[4]); "
+    "for k = 7, #ARGV, 2 do "
+    "  if string.sub(ARGV[k + 1], 1, 1) == '=' then redis.call('HSET', KEYS[1], ARGV[k], string.sub(ARGV[k + "
+    "1], 2)) "
+    "  else redis.call('HDEL', KEYS[1], ARGV[k]) end "
+    "end "
+    "redis.call('PEXPIRE', KEYS[1], ARGV[5]); return 1";
+
+/// ARGV: holder, owner, lease, idle. -1: none, -2: held by another; else the hash, in the new epoch.
+const std::string kTakeOver =
+    kNow +
+    "local has = redis.call('HMGET', KEYS[1], 'holder', 'until', 'owner'); "
+    "if not has[3] or has[3] ~= ARGV[2] then return -1 end "
+    "if has[1] ~= ARGV[1] and has[2] and tonumber(has[2]) > now then return -2 end "
+    "redis.call('HINCRBY', KEYS[1], 'epoch', 1); "
+    "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'until', now + ARGV[3]); "
+    "redis.call('PEXPIRE', KEYS[1], ARGV[4]); return redis.call('HGETALL', KEYS[1])";
+
+/// ARGV: holder, epoch, lease, 0 where it is not in use, idle. 0: another has it. Its blobs live as long.
+const std::string kTouch =
+    kNow +
+    "local has = redis.call('HMGET', KEYS[1], 'holder', 'blobs', 'request'); "
+    "if has[1] ~= ARGV[1] then return 0 end "
+    "if ARGV[4] == '1' then redis.call('HSET', KEYS[1], 'until', now + ARGV[3]) end "
+    "redis.call('PEXPIRE', KEYS[1], ARGV[5]); "
+    "for key in string.gmatch(has[2] or '', '%x+') do "
+    "  redis.call('PEXPIRE', 'lpdeform:b:' .. key, ARGV[5]); redis.call('PEXPIRE', 'lpdeform:u:' .. key, "
+    "ARGV[5]) "
+    "end "
+    "if has[3] and has[3] ~= '' then redis.call('PEXPIRE', has[3], ARGV[5]) end return 1";
+
+/// ARGV: holder, session, then the keys of its blobs, as far as its maker knows. It goes, whoever has it.
+const std::string kRemove =
+    "local function let_go(key) "
+    "  redis.call('SREM', 'lpdeform:u:' .. key, ARGV[2]); "
+    "  if redis.call('SCARD', 'lpdeform:u:' .. key) == 0 then redis.call('DEL', 'lpdeform:b:' .. key) end "
+    "end "
+    "local has = redis.call('HMGET', KEYS[1], 'blobs', 'request'); "
+    "for key in string.gmatch(has[1] or '', '%x+') do let_go(key) end "
+    "for k = 3, #ARGV do let_go(ARGV[k]) end "
+    "if has[2] and has[2] ~= '' then redis.call('DEL', has[2]) end "
+    "redis.call('DEL', KEYS[1]); return 1";
+
+const std::string kLetGo =
+    "if redis.call('HGET', KEYS[1], 'holder') == ARGV[1] then redis.call('HSET', KEYS[1], 'until', 0) end "
+    "return 1";
+
+Command script(const std::string& text, const std::string& session) {
+  return {"EVAL", text, "1", kSession + session};
+}
+
+std::string request_key(const std::string& owner, const std::string& request_id) {
+  return absl::StrCat("lpdeform:r:", blob_key(absl::StrCat(owner.size(), ":", owner, request_id)));
+}
+
+class RedisStore final : public Store {
+ public:
+  explicit RedisStore(const RedisStoreOptions& options)
+      : options_(options),
+        writer_(options.host, options.port, options.patience),
+        reader_(options.host, options.port, options.patience) {}
+
+  absl::Status ping() {
+    const std::scoped_lock lock(reading_);
+    return reader_.run({"PING"}).status();
+  }
+
+  absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) override;
+  absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner) override;
+  absl::StatusOr<std::string> find_request(const std::string& owner, const std::string& request_id) override;
+  absl::Status keep_blob(const std::string& session, const std::string& key, std::string_view bytes) override;
+  absl::StatusOr<std::string> blob(const std::string& key) override;
+  absl::StatusOr<std::vector<std::string>> touch(std::span<const TouchedSession> sessions) override;
+  std::chrono::milliseconds touch_every() const override { return options_.lease / 3; }
+  absl::Status let_go(const std::string& session) override;
+  /// Keys expire by themselves.
+  absl::StatusOr<std::size_t> remove_unused(std::int64_t) override { return 0; }
+
+ private:
+  Command command_of(const StoredChange& change);
+  std::string lease() const { return absl::StrCat(options_.lease.count()); }
+  std::string idle() const { return absl::StrCat(options_.idle.count()); }
+
+  const RedisStoreOptions options_;
+  const std::string holder_ = random_hex_128();
+  std::mutex writing_, reading_;
+  RedisConnection writer_, reader_;
+  std::mutex pinning_;
+  std::map<std::string, std::vector<std::string>> pinned_;  // blobs of sessions that are being made
+};
+
+Command RedisStore::command_of(const StoredChange& change) {
+  if (change.is_removal) {
+    Command command = script(kRemove, change.session);
+    command.insert(command.end(), {holder_, change.session});
+    const std::scoped_lock lock(pinning_);
+    const auto pinned = pinned_.find(change.session);
+    if (pinned != pinned_.end()) command.insert(command.end(), pinned->second.begin(), pinned->second.end());
+    return command;
+  }
+  Command command = script(kCommit, change.session);
+  command.insert(command.end(), {holder_, absl::StrCat(change.epoch_before), absl::StrCat(change.epoch),
+                                 lease(), idle(), change.replaces_all ? "1" : "0"});
+  if (change.epoch_before == 0) {
+    const std::string request = change.request_id.empty() ? "" : request_key(change.owner, change.request_id);
+    command.insert(command.end(), {"owner", absl::StrCat("=", change.owner), "blobs",
+                                   absl::StrCat("=", absl::StrJoin(change.blobs, " ")), "request",
+                                   absl::StrCat("=", request)});
+  }
+  for (const auto& [name, value] : change.parts) {
+    command.push_back(kPart + name);
+    command.push_back(value ? absl::StrCat("=", *value) : std::string("-"));
+  }
+  return command;
+}
+
+absl::StatusOr<std::vector<ChangeOutcome>> RedisStore::commit(std::span<const StoredChange> changes) {
+  std::vector<Command> commands;
+  for (const StoredChange& change : changes) {
+    commands.push_back(command_of(change));
+    if (change.epoch_before == 0 && !change.is_removal && !change.request_id.empty()) {
+      commands.push_back({"SET", request_key(change.owner, change.request_id), change.session, "PX", idle()});
+    }
+  }
+  const std::scoped_lock lock(writing_);
+  const auto replies = writer_.run(commands);
+  if (!replies.ok()) return replies.status();
+  std::vector<ChangeOutcome> outcomes;
+  for (std::size_t k = 0; k < commands.size(); ++k) {
+    if (commands[k][0] != "EVAL") continue;
+    outcomes.push_back((*replies)[k].number == 1 ? ChangeOutcome::kKept : ChangeOutcome::kFenced);
+  }
+  const std::scoped_lock pinning(pinning_);
+  for (const StoredChange& change : changes) pinned_.erase(change.session);
+  return outcomes;
+}
+
+absl::StatusOr<StoredSession> RedisStore::take_over(const std::string& session, const std::string& owner) {
+  Command command = script(kTakeOver, session);
+  command.insert(command.end(), {holder_, owner, lease(), idle()});
+  const std::scoped_lock lock(reading_);
+  const auto reply = reader_.run(command);
+  if (!reply.ok()) return reply.status();
+  if (reply->elements.empty()) return reply->number == -2 ? session_elsewhere() : session_unknown();
+  StoredSession found;
+  found.owner = owner;
+  for (std::size_t k = 0; k + 1 < reply->elements.size(); k += 2) {
+    const std::string& field = reply->elements[k].text;
+    const std::string& value = reply->elements[k + 1].text;
+    if (field == "epoch" && !absl::SimpleAtoi(value, &found.epoch)) return session_damaged("it has no epoch");
+    if (field.starts_with(kPart)) found.parts[field.substr(kPart.size())] = value;
+  }
+  return found;
+}
+
+absl::StatusOr<std::string> RedisStore::find_request(const std::string& owner,
+                                                     const std::string& request_id) {
+  if (request_id.empty()) return "";
+  const std::scoped_lock lock(reading_);
+  const auto reply = reader_.run({"GET", request_key(owner, request_id)});
+  if (!reply.ok()) return reply.status();
+  return reply->text;
+}
+
+absl::Status RedisStore::keep_blob(const std::string& session, const std::string& key,
+                                   std::string_view bytes) {
+  {
+    const std::scoped_lock lock(pinning_);
+    pinned_[session].push_back(key);
+  }
+  const std::scoped_lock lock(reading_);
+  const auto known = reader_.run(std::vector<Command>{
+      {"SADD", kUsers + key, session}, {"PEXPIRE", kUsers + key, idle()}, {"PEXPIRE", kBlob + key, idle()}});
+  if (!known.ok()) return known.status();
+  if (known->at(2).number == 1) return absl::OkStatus();
+  return reader_.run({"SET", kBlob + key, std::string(bytes), "PX", idle()}).status();
+}
+
+absl::StatusOr<std::string> RedisStore::blob(const std::string& key) {
+  const std::scoped_lock lock(reading_);
+  const auto reply = reader_.run({"GET", kBlob + key});
+  if (!reply.ok()) return reply.status();
+  if (!reply->is_nothing && blob_key(reply->text) == key) return reply->text;
+  return session_damaged(reply->is_nothing ? "its mesh is missing" : "its mesh is not what was written");
+}
+
+absl::StatusOr<std::vector<std::string>> RedisStore::touch(std::span<const TouchedSession> sessions) {
+  std::vector<std::string> lost;
+  if (sessions.empty()) return lost;
+  std::vector<Command> commands;
+  for (const TouchedSession& session : sessions) {
+    commands.push_back(script(kTouch, session.name));
+    commands.back().insert(commands.back().end(), {holder_, absl::StrCat(session.epoch), lease(),
+                                                   session.is_in_use ? "1" : "0", idle()});
+  }
+  const std::scoped_lock lock(reading_);
+  const auto replies = reader_.run(commands);
+  if (!replies.ok()) return replies.status();
+  for (std::size_t k = 0; k < sessions.size(); ++k) {
+    if ((*replies)[k].number == 0) lost.push_back(sessions[k].name);
+  }
+  return lost;
+}
+
+absl::Status RedisStore::let_go(const std::string& session) {
+  Command command = script(kLetGo, session);
+  command.push_back(holder_);
+  const std::scoped_lock lock(writing_);
+  return writer_.run(command).status();
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<Store>> open_redis_store(const RedisStoreOptions& options) {
+  auto store = std::make_shared<RedisStore>(options);
+  if (absl::Status status = store->ping(); !status.ok()) return status;
+  return store;
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,145 @@
+// A server whose store fails or hangs: what goes on, what is refused, and that nothing acknowledged is lost.
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "restart_fixture.h"
+
+namespace lpdeform {
+namespace {
+
+class StoreFaultsTest : public RestartTest {
+ protected:
+  v1::CreateSessionRequest request() const {
+    v1::CreateSessionRequest request;
+    *request.mutable_mesh() = mesh_message(mesh_);
+    return request;
+  }
+
+  /// Sends updates until one is kept again; the store has recovered then.
+  std::uint64_t until_kept(const v1::CreateSessionResponse& session, std::uint64_t seq) {
+    const auto end = std::chrono::steady_clock::now() + kTestDeadline;
+    while (!take(session, tip_message(seq, 0.01 * static_cast<double>(seq))).kept()) {
+      EXPECT_LT(std::chrono::steady_clock::now(), end);
+      ++seq;
+    }
+    return seq;
+  }
+
+  /// As a client does that is told to try again: the store has to take something first to count as well again.
+  template <typename Call>
+  static grpc::Status again_and_again(const Call& call) {
+    const auto end = std::chrono::steady_clock::now() + kTestDeadline;
+    for (;;) {
+      const grpc::Status status = call();
+      if (status.error_code() != grpc::StatusCode::UNAVAILABLE || std::chrono::steady_clock::now() > end)
+        return status;
+    }
+  }
+
+  const TriangleMesh mesh_ = bar_mesh();
+};
+
+TEST_F(StoreFaultsTest, WhileItFailsADragGoesOnAndIsNotCalledKept) {
+  const auto session = create(mesh_);
+  v1::Update first = ends_message(mesh_.vertices, 1, 1);
+  first.mutable_settings()->mutable_solver()->set_initial(
+      v1::INITIAL_GUESS_LAPLACIAN);  // whatever came before
+  ASSERT_TRUE(take(session, first).kept());
+  faults_->set_failing(true);
+  DeformClient stream(*stub_, session);
+  for (std::uint64_t seq = 2; seq < 12; ++seq) {
+    ASSERT_TRUE(stream.send(tip_message(seq, 0.1 * static_cast<double>(seq))));
+    ASSERT_TRUE(stream.settle(seq).has_value());
+  }
+  ASSERT_FALSE(stream.history.results.empty());
+  for (const v1::UpdateResult& result : stream.history.results) EXPECT_FALSE(result.kept());
+
+  faults_->set_failing(false);
+  const std::uint64_t newest = until_kept(session, 12);
+  const std::string before = seen(session), positions = solved(session);
+  restart();  // with all of what the store had refused at first
+  EXPECT_EQ(seen(session), before);
+  EXPECT_TRUE(solved(session) == positions);
+  v1::Session found;
+  ASSERT_TRUE(get(session.session().name(), found).ok());
+  EXPECT_EQ(found.input_seq(), newest);
+}
+
+TEST_F(StoreFaultsTest, WhileItFailsANewSessionIsRefusedAndLeavesNothing) {
+  faults_->set_failing(true);
+  v1::CreateSessionResponse session;
+  const ErrorDetails details = details_of(try_create(request(), session));
+  EXPECT_EQ(details.info.reason(), "STORE_FAILING");
+  EXPECT_TRUE(details.retry.has_value());
+  faults_->set_failing(false);
+  EXPECT_TRUE(again_and_again([&] { return try_create(request(), session); }).ok());
+}
+
+TEST_F(StoreFaultsTest, WhileItFailsASessionThatOnlyItHasIsAskedForAgainLater) {
+  const auto session = create(mesh_);
+  restart();
+  faults_->set_failing(true);
+  v1::Session found;
+  EXPECT_EQ(details_of(get(session.session().name(), found)).info.reason(), "STORE_FAILING");
+  faults_->set_failing(false);
+  EXPECT_TRUE(get(session.session().name(), found).ok());
+}
+
+TEST_F(StoreFaultsTest, WhileItFailsANewWriterAndADeletionAreNotConfirmed) {
+  const auto session = create(mesh_);
+  faults_->set_failing(true);
+  v1::AcquireWriterRequest acquire;
+  acquire.set_session(session.session().name());
+  v1::AcquireWriterResponse lease;
+  grpc::ClientContext acquiring, deleting;
+  EXPECT_EQ(details_of(stub_->AcquireWriter(&acquiring, acquire, &lease)).info.reason(), "STORE_FAILING");
+  v1::DeleteSessionRequest remove;
+  remove.set_session(session.session().name());
+  v1::DeleteSessionResponse removed;
+  EXPECT_EQ(details_of(stub_->DeleteSession(&deleting, remove, &removed)).info.reason(), "STORE_FAILING");
+  faults_->set_failing(false);
+  const grpc::Status deleted = again_and_again([&] {
+    grpc::ClientContext again;
+    return stub_->DeleteSession(&again, remove, &removed);
+  });
+  EXPECT_TRUE(deleted.ok());
+  restart();
+  v1::Session found;
+  EXPECT_EQ(details_of(get(session.session().name(), found)).info.reason(), "SESSION_UNKNOWN");
+}
+
+TEST_F(StoreFaultsTest, WhileItHangsUpdatesAreAnsweredSoonAndKeptLater) {
+  const auto session = create(mesh_);
+  ASSERT_TRUE(take(session, ends_message(mesh_.vertices, 1, 1)).kept());
+  faults_->set_hanging(true);
+  DeformClient stream(*stub_, session);
+  ASSERT_TRUE(stream.send(tip_message(2, 2)));
+  ASSERT_TRUE(stream.settle(2).has_value());
+  EXPECT_FALSE(take(session, tip_message(3, 2.5)).kept());
+  faults_->set_hanging(false);
+  until_kept(session, 4);
+  const std::string before = seen(session);
+  restart();
+  EXPECT_EQ(seen(session), before);
+}
+
+TEST_F(StoreFaultsTest, ASessionWhoseMeshIsDamagedIsToBeMadeAnew) {
+  const auto session = create(mesh_);
+  const auto other = create(box_surface(2, 2, 4));
+  server_.reset();
+  for (const auto& file : std::filesystem::directory_iterator(folder_ + "/blobs")) {
+    if (file.file_size() == packed(mesh_.vertices).size() + packed(mesh_.faces).size())
+      std::filesystem::resize_file(file.path(), 100);
+  }
+  restart();
+  v1::Session found;
+  const grpc::Status damaged = get(session.session().name(), found);
+  EXPECT_EQ(damaged.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(details_of(damaged).info.reason(), "SESSION_DAMAGED");
+  EXPECT_TRUE(get(other.session().name(), found).ok());
+}
+
+}  // namespace
+}  // namespace lpdeform
