@@ -3,8 +3,8 @@
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { chromium } from "playwright-core";
 import { build } from "vite";
+import { BarePage } from "../test/real/bare_page.js";
 import { Memory } from "../test/real/memory.js";
 import type {} from "../test/real/page/page.js";
 import { root, Service } from "../test/real/service.js";
@@ -22,33 +22,36 @@ await build({
   build: { outDir: files, target: "es2022" },
 });
 const service = await Service.start({ files });
-const browser = await chromium.launch({
-  executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
-  args: ["--no-sandbox"],
-});
-const tab = await browser.newPage();
-await tab.goto(service.url);
-await tab.waitForFunction(() => window.views);
-const memory = await Memory.of(tab, service);
+const tab = await BarePage.open(service.url);
+await tab.until("window.views");
+const memory = new Memory(service);
+
+/** Runs in the page. */
+async function drag(milliseconds: number): Promise<{ updates: number; frames: number }> {
+  const views = window.views!;
+  let updates = 0;
+  const end = performance.now() + milliseconds;
+  while (performance.now() < end) {
+    for (const view of views) view.move(5 * Math.sin(++updates / 40));
+    await new Promise((next) => setTimeout(next, 16));
+  }
+  return { updates, frames: views.reduce((sum, view) => sum + view.frames, 0) };
+}
+
 console.log("seconds  updates  frames  page MiB  browser MiB  server MiB  Envoy MiB");
 for (let sample = 1; sample <= samples; ++sample) {
-  const { updates, frames } = await tab.evaluate(
-    async (milliseconds) => {
-      const views = window.views!;
-      let updates = 0;
-      const end = performance.now() + milliseconds;
-      while (performance.now() < end) {
-        for (const view of views) view.move(5 * Math.sin(++updates / 40));
-        await new Promise((next) => setTimeout(next, 16));
-      }
-      return { updates, frames: views.reduce((sum, view) => sum + view.frames, 0) };
-    },
-    (1000 * seconds) / samples,
+  const { updates, frames } = await tab.evaluate<Awaited<ReturnType<typeof drag>>>(
+    `(${drag})(${(1000 * seconds) / samples})`,
   );
-  const cells = [((seconds * sample) / samples).toFixed(0), updates, frames, ...Memory.row(await memory.sample())];
+  const cells = [
+    ((seconds * sample) / samples).toFixed(0),
+    updates,
+    frames,
+    ...Memory.row(memory.add(await tab.held())),
+  ];
   console.log(cells.map((cell, k) => String(cell).padStart([7, 7, 6, 8, 11, 10, 9][k]!)).join("  "));
 }
-await browser.close();
+await tab.close();
 await service.stop();
 rmSync(files, { recursive: true, force: true });
 

@@ -2,9 +2,10 @@
 // and fails where it grows.
 import { join } from "node:path";
 import { expect, it } from "vitest";
+import { BarePage } from "../../../client/test/real/bare_page.js";
 import { Memory } from "../../../client/test/real/memory.js";
 import { Service } from "../../../client/test/real/service.js";
-import { BarePage } from "./bare_page.js";
+import { launch } from "../real/user.js";
 
 const seconds = Number(process.env["SECONDS"] ?? 600);
 const samples = 20;
@@ -13,7 +14,7 @@ it(
   `holds no more and no less after ${seconds} s of dragging`,
   async () => {
     const service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
-    const page = await BarePage.open(service.url);
+    const page = await BarePage.open(service.url, launch.args);
     await page.settled();
     const memory = new Memory(service);
     console.log("seconds  drags  inputs  page MiB  browser MiB  server MiB  Envoy MiB");

@@ -3,7 +3,8 @@ import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { createInterface } from "node:readline";
-import { launch } from "../real/user.js";
+
+const chromium = process.env["CHROMIUM"] ?? "/usr/bin/chromium";
 
 /** What DevTools speak, over one socket. */
 class Tools {
@@ -57,10 +58,16 @@ export class BarePage {
     readonly folder: string,
   ) {}
 
-  static async open(url: string): Promise<BarePage> {
+  /** `browserFlags`: of Chromium, beside what a page needs that nobody sees. */
+  static async open(url: string, browserFlags: readonly string[] = ["--no-sandbox"]): Promise<BarePage> {
     const folder = mkdtempSync(join(tmpdir(), "lpdeform-browser-"));
-    const flags = ["--headless=new", "--remote-debugging-port=0", `--user-data-dir=${folder}`, "--window-size=1280,800"];
-    const child = spawn(launch.executablePath, [...launch.args, ...flags, "--no-first-run", "about:blank"], {
+    const flags = [
+      "--headless=new",
+      "--remote-debugging-port=0",
+      `--user-data-dir=${folder}`,
+      "--window-size=1280,800",
+    ];
+    const child = spawn(chromium, [...browserFlags, ...flags, "--no-first-run", "about:blank"], {
       stdio: ["ignore", "ignore", "pipe"],
     });
     const page = new BarePage(child, folder);
@@ -72,7 +79,10 @@ export class BarePage {
   }
 
   async #connect(browser: string): Promise<void> {
-    const targets = (await (await fetch(`http://${new URL(browser).host}/json/list`)).json()) as Record<string, string>[];
+    const targets = (await (await fetch(`http://${new URL(browser).host}/json/list`)).json()) as Record<
+      string,
+      string
+    >[];
     const { webSocketDebuggerUrl } = targets.find(({ type }) => type === "page")!;
     this.#browser = await Tools.connect(browser);
     this.#page = await Tools.connect(webSocketDebuggerUrl!, (method, params) => {
@@ -83,23 +93,24 @@ export class BarePage {
     });
   }
 
-  /** Of the page's test interface. */
+  /** Of the viewer's test interface. */
   async ask<Value>(what: string): Promise<Value> {
-    return this.#evaluate(`window.__lpdeform.${what}`);
+    return this.evaluate(`window.__lpdeform.${what}`);
   }
 
-  async #evaluate<Value>(expression: string): Promise<Value> {
+  /** Where it is a promise: what that gives. */
+  async evaluate<Value>(expression: string): Promise<Value> {
     const { result, exceptionDetails } = await this.#page.send<{
       result: { value: Value };
       exceptionDetails?: { text: string };
-    }>("Runtime.evaluate", { expression, returnByValue: true });
+    }>("Runtime.evaluate", { expression, returnByValue: true, awaitPromise: true });
     if (exceptionDetails) throw new Error(`${expression}: ${exceptionDetails.text}`);
     return result.value;
   }
 
   async until(condition: string, timeout = 60_000): Promise<void> {
     const end = performance.now() + timeout;
-    while (!(await this.#evaluate(`Boolean(${condition})`))) {
+    while (!(await this.evaluate(`Boolean(${condition})`))) {
       if (performance.now() > end) throw new Error(`not within ${timeout} ms: ${condition}`);
       await new Promise((again) => setTimeout(again, 50));
     }
@@ -112,7 +123,12 @@ export class BarePage {
     })()`);
   }
 
-  async mouse(type: "mouseMoved" | "mousePressed" | "mouseReleased", x: number, y: number, isDown: boolean): Promise<void> {
+  async mouse(
+    type: "mouseMoved" | "mousePressed" | "mouseReleased",
+    x: number,
+    y: number,
+    isDown: boolean,
+  ): Promise<void> {
     await this.#page.send("Input.dispatchMouseEvent", {
       type,
       x,
@@ -153,5 +169,5 @@ async function endpoint(child: ChildProcess): Promise<string> {
     child.stderr!.resume();
     return found[1]!;
   }
-  throw new Error(`${launch.executablePath} ended before it said where to reach it`);
+  throw new Error(`${chromium} ended before it said where to reach it`);
 }
