@@ -15,6 +15,8 @@ template <typename... Cases>
 struct Match : Cases... {
   using Cases::operator()...;
 };
+template <typename... Cases>
+Match(Cases...) -> Match<Cases...>;  // clang 14 does not find it by itself
 
 v1::StopReason encode_stop(StopReason reason) {
   switch (reason) {

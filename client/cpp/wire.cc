@@ -15,6 +15,8 @@ template <typename... Cases>
 struct Match : Cases... {
   using Cases::operator()...;
 };
+template <typename... Cases>
+Match(Cases...) -> Match<Cases...>;  // clang 14 does not find it by itself
 
 void put(const std::array<double, 3>& from, v1::Vector3* to) {
   to->set_x(from[0]);

@@ -1,0 +1,26 @@
+// libFuzzer: what a client makes of parts of frames, in every encoding. The input is one DeformResponse after the other, each with
+// two bytes of its length before it.
+
+#include <algorithm>
+#include <cstdint>
+
+#include "client/cpp/frame_assembly.h"
+#include "core/base/check.h"
+#include "lpdeform/v1/service.pb.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace lpdeform;
+  constexpr std::uint32_t kVertices = 22;
+  client::FrameAssembly assembly(kVertices);
+  while (size >= 2) {
+    const std::size_t length = std::min<std::size_t>(data[0] + 256u * data[1], size - 2);
+    v1::DeformResponse response;
+    if (response.ParseFromArray(data + 2, static_cast<int>(length)) && response.event().has_frame()) {
+      const auto frame = assembly.add(response.event().frame());
+      if (frame.ok() && *frame) LPDEFORM_CHECK((*frame)->positions.size() == 3 * kVertices);
+    }
+    data += 2 + length;
+    size -= 2 + length;
+  }
+  return 0;
+}
