@@ -32,7 +32,8 @@ void Multiresolution::begin_fine() {
   } else {
     problem_.objective.evaluate(x_, problem_.norm);
   }
-  fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), is_better ? Warmth::kPrepared : Warmth::kCold);
+  fine_ =
+      std::make_unique<QuasiNewton>(problem_, std::move(x_), is_better ? Warmth::kPrepared : Warmth::kCold);
 }
 
 StepResult Multiresolution::step() {

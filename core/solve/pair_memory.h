@@ -27,6 +27,7 @@ class PairMemory {
 
   /// Forgets all pairs: M has changed.
   void clear() { pairs_.clear(); }
+  bool is_empty() const { return pairs_.empty(); }
 
   /// d = -H g; returns <g, d>. `length` > 0 says that the step length * d has been made since the last call, when
   /// gradient and h were those before: the pair is taken in, unless <s, y> is not positive to rounding. 0 where

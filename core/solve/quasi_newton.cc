@@ -159,11 +159,11 @@ StepResult QuasiNewton::result(Outcome outcome) {
   return {outcome, objective_, stage_, true_sum_};
 }
 
-/// Where no step along d lowers the objective: another metric, the next stage, or the end.
+/// Where no step along d lowers the objective: a fresh metric without memory, the next stage, or the end.
 StepResult QuasiNewton::give_up(double slope) {
   problem_.objective.evaluate(x_, norm_);
   if (problem_.stop.stop_requested()) return result(Outcome::kProgress);
-  if (since_refresh_ > 0) {
+  if (since_refresh_ > 0 || !memory_.is_empty()) {
     forget();
     is_metric_good_ = refresh_metric();
     return result(Outcome::kProgress);

@@ -92,7 +92,9 @@ class Schedule {
   }
 
  private:
-  static std::string newest(const std::vector<std::string>& names) { return names.empty() ? "none" : names.back(); }
+  static std::string newest(const std::vector<std::string>& names) {
+    return names.empty() ? "none" : names.back();
+  }
 
   /// Names of few letters, which no server gives, become those of what is there.
   void name(Message& message) const {
@@ -134,7 +136,8 @@ class Schedule {
     switch (call.call_case()) {
       case fuzz::Call::kCreateUpload: {
         v1::CreateUploadResponse response;
-        if (backend().create_upload(context_, call.create_upload(), response).ok()) uploads_.push_back(response.upload());
+        if (backend().create_upload(context_, call.create_upload(), response).ok())
+          uploads_.push_back(response.upload());
         return;
       }
       case fuzz::Call::kUploadPart: {
@@ -185,7 +188,8 @@ class Schedule {
       case fuzz::Call::kOpenStream: {
         const v1::DeformOpen& open = call.open_stream();
         if (streams_.size() >= kMostStreams) return;
-        auto stream = backend().open_stream(context_, open.session(), open.writer_token(), open.options(), [] {});
+        auto stream =
+            backend().open_stream(context_, open.session(), open.writer_token(), open.options(), [] {});
         if (stream.ok()) streams_.push_back(*std::move(stream));
         return;
       }
@@ -241,7 +245,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   return 0;
 }
 
-extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size, unsigned seed) {
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
+                                               unsigned seed) {
   fuzz::Schedule schedule;
   if (!schedule.ParseFromArray(data, static_cast<int>(size))) schedule.Clear();
   std::mt19937 random(seed);
@@ -257,10 +262,13 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
 }
 
 /// The calls of two schedules, one after the other or interleaved.
-extern "C" std::size_t LLVMFuzzerCustomCrossOver(const std::uint8_t* data1, std::size_t size1, const std::uint8_t* data2,
-                                                 std::size_t size2, std::uint8_t* out, std::size_t max_size, unsigned seed) {
+extern "C" std::size_t LLVMFuzzerCustomCrossOver(const std::uint8_t* data1, std::size_t size1,
+                                                 const std::uint8_t* data2, std::size_t size2,
+                                                 std::uint8_t* out, std::size_t max_size, unsigned seed) {
   fuzz::Schedule one, two, result;
-  if (!one.ParseFromArray(data1, static_cast<int>(size1)) || !two.ParseFromArray(data2, static_cast<int>(size2))) return 0;
+  if (!one.ParseFromArray(data1, static_cast<int>(size1)) ||
+      !two.ParseFromArray(data2, static_cast<int>(size2)))
+    return 0;
   std::mt19937 random(seed);
   for (int i = 0, j = 0; i < one.calls_size() || j < two.calls_size();) {
     const bool takes_first = j == two.calls_size() || (i < one.calls_size() && (random() & 1) != 0);

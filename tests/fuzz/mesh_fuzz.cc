@@ -17,11 +17,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     LPDEFORM_CHECK(!file.status().message().empty());
     return 0;
   }
-  const auto shape = RestShape::create(file->mesh, data[0] & 4 ? WeightKind::kIntrinsicDelaunay : WeightKind::kCotangent);
+  const auto shape =
+      RestShape::create(file->mesh, data[0] & 4 ? WeightKind::kIntrinsicDelaunay : WeightKind::kCotangent);
   if (shape.ok()) LPDEFORM_CHECK((*shape)->scaled_positions().allFinite());
   if (format == MeshFormat::kObj && file->mesh.vertices.allFinite()) {
     const auto again = parse_mesh(obj_text(*file, file->mesh.vertices), format);
-    LPDEFORM_CHECK(again.ok() && again->mesh.vertices == file->mesh.vertices && again->mesh.faces == file->mesh.faces);
+    LPDEFORM_CHECK(again.ok() && again->mesh.vertices == file->mesh.vertices &&
+                   again->mesh.faces == file->mesh.faces);
   }
   return 0;
 }

@@ -22,14 +22,27 @@ std::size_t below(std::size_t count, std::mt19937& random) {
 
 double some_double(double old, std::mt19937& random) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  const std::array<double, 14> known{0,     -0.0,      1,         2,     1.5, 6, -1, 1e-300, 1e300, 1e-5, kInfinity,
-                                     -kInfinity, std::numeric_limits<double>::quiet_NaN(), 1e9};
+  const std::array<double, 14> known{0,
+                                     -0.0,
+                                     1,
+                                     2,
+                                     1.5,
+                                     6,
+                                     -1,
+                                     1e-300,
+                                     1e300,
+                                     1e-5,
+                                     kInfinity,
+                                     -kInfinity,
+                                     std::numeric_limits<double>::quiet_NaN(),
+                                     1e9};
   if (below(2, random) == 0) return old * std::uniform_real_distribution<>(-2, 2)(random) + 0.1;
   return known[below(known.size(), random)];
 }
 
 std::uint64_t some_integer(std::uint64_t old, std::mt19937& random) {
-  const std::array<std::uint64_t, 10> known{0, 1, 2, 3, 7, 64, 65536, 0x7fffffff, 0xffffffff, ~std::uint64_t{0}};
+  const std::array<std::uint64_t, 10> known{0,  1,     2,          3,          7,
+                                            64, 65536, 0x7fffffff, 0xffffffff, ~std::uint64_t{0}};
   if (below(2, random) == 0) return old + below(5, random) - 2;
   return known[below(known.size(), random)];
 }
@@ -70,7 +83,9 @@ struct Value {
   double operator()(double) const {
     const Reflection& r = *message.GetReflection();
     const bool is_double = field.cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE;
-    if (index >= 0) return is_double ? r.GetRepeatedDouble(message, &field, index) : r.GetRepeatedFloat(message, &field, index);
+    if (index >= 0)
+      return is_double ? r.GetRepeatedDouble(message, &field, index)
+                       : r.GetRepeatedFloat(message, &field, index);
     return is_double ? r.GetDouble(message, &field) : r.GetFloat(message, &field);
   }
   std::string operator()(const std::string&) const {
@@ -119,7 +134,8 @@ struct Setter {
         return put(&Reflection::SetFloat, &Reflection::SetRepeatedFloat, &Reflection::AddFloat,
                    static_cast<float>(real));
       case FieldDescriptor::CPPTYPE_BOOL:
-        return put(&Reflection::SetBool, &Reflection::SetRepeatedBool, &Reflection::AddBool, (whole & 1) != 0);
+        return put(&Reflection::SetBool, &Reflection::SetRepeatedBool, &Reflection::AddBool,
+                   (whole & 1) != 0);
       case FieldDescriptor::CPPTYPE_ENUM:
         return put(&Reflection::SetEnumValue, &Reflection::SetRepeatedEnumValue, &Reflection::AddEnumValue,
                    static_cast<int>(whole));
@@ -150,7 +166,8 @@ bool mutate_repeated(Message& message, const FieldDescriptor& field, std::mt1993
     if (is_message)
       mutate(*r.AddMessage(&message, &field), random);
     else
-      change_scalar(field, random, [](auto none) { return none; }, Setter{message, field, size});
+      change_scalar(
+          field, random, [](auto none) { return none; }, Setter{message, field, size});
     return true;
   }
   const int index = static_cast<int>(below(static_cast<std::size_t>(size), random));
@@ -185,15 +202,17 @@ void mutate(Message& message, std::mt19937& random) {
   std::vector<const FieldDescriptor*> fields;
   r.ListFields(message, &fields);
   const bool takes_present = !fields.empty() && below(3, random) != 0;
-  const FieldDescriptor& field =
-      takes_present ? *fields[below(fields.size(), random)]
-                    : *descriptor.field(static_cast<int>(below(static_cast<std::size_t>(descriptor.field_count()), random)));
+  const FieldDescriptor& field = takes_present
+                                     ? *fields[below(fields.size(), random)]
+                                     : *descriptor.field(static_cast<int>(below(
+                                           static_cast<std::size_t>(descriptor.field_count()), random)));
   if (field.is_repeated()) {
     mutate_repeated(message, field, random);
     return;
   }
   if (takes_present && below(12, random) == 0) return r.ClearField(&message, &field);
-  if (field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) return mutate(*r.MutableMessage(&message, &field), random);
+  if (field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE)
+    return mutate(*r.MutableMessage(&message, &field), random);
   change_scalar(field, random, Value{message, field, -1}, Setter{message, field, -1});
 }
 
