@@ -210,8 +210,7 @@ export class App {
   get red(): number {
     const red = this.view.now.pinned ?? Math.max(...this.panes.map((pane) => pane.statistics.red));
     // What rounding leaves of a surface at rest is no distortion.
-    const { p, isAutomatic } = this.document;
-    return red > (1e-8 * this.diagonal) ** (isAutomatic ? 2 : p) ? red : 0;
+    return red > 1e-8 * this.diagonal ? red : 0;
   }
 
   togglePin(): void {

@@ -66,3 +66,20 @@ it("places a handle where the surface is clicked, and takes it back", async () =
   expect(await user.ask("document().handles.length")).toBe(count);
   expect(user.errors).toEqual([]);
 });
+
+it.each(["1", "2", "6"])("is blue again once a change at p = %s is undone", async (p) => {
+  await user.page.locator("canvas.stage").focus();
+  while (await user.ask("app.history.canUndo")) await user.page.keyboard.press("Control+z");
+  await user.ask("app.view.set({ selected: 'Top' })");
+  await user.page.locator(".dock").getByRole("button", { name: p, exact: true }).click();
+  await user.page.locator("canvas.stage").focus();
+  for (let k = 0; k < 5; ++k) await user.page.keyboard.press("ArrowRight");
+  await user.settled();
+  expect(await user.ask("app.red")).toBeGreaterThan(0);
+  for (let k = 0; k < 5; ++k) await user.page.keyboard.press("Control+z");
+  await user.settled();
+  expect(await user.ask("document().p")).toBe(Number(p));
+  expect(await user.ask("app.red")).toBe(0);
+  expect((await user.colours()).warm).toBeLessThan(0.02); // the handles and the gizmo have colours of their own
+  expect(await user.page.locator(".legend").textContent()).toContain("none");
+});
