@@ -33,9 +33,16 @@ export interface Facts {
 }
 
 /** Work that has made room for other work. */
-interface Aside {
-  mesh: Mesh;
+interface Aside extends Kept {
   steps: Steps<Document>;
+  /** The user wants it no more: it is here until the page is left. */
+  isLetGo: boolean;
+}
+
+/** All of some work but what can be undone. */
+export interface Kept {
+  mesh: Mesh;
+  document: Document;
   view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned">;
   look: Look;
 }
@@ -110,6 +117,7 @@ export class App {
   /** Without anything of what was there before. */
   beginAnew(id: string, detail: Detail): void {
     this.#openShape(id, detail, emptyDocument);
+    if (this.#aside) this.#aside.isLetGo = true;
   }
 
   /** There is more than what was opened. */
@@ -119,7 +127,7 @@ export class App {
 
   /** `isBroughtBack`: somebody has worked on it. */
   open(mesh: Mesh, document: Document, isBroughtBack = false): void {
-    this.#aside = this.isTouched ? this.#present() : undefined;
+    if (this.isTouched) this.#aside = this.#present();
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
     this.adjacency = adjacencyOf(mesh.positions.length / 3, mesh.faces);
@@ -142,14 +150,31 @@ export class App {
   #present(): Aside {
     const { shape, detail, selected, isYUp, pinned } = this.view.now;
     const { look } = this.panes[0]!.stage;
-    return { mesh: this.mesh, steps: this.history.steps, view: { shape, detail, selected, isYUp, pinned }, look };
+    const view = { shape, detail, selected, isYUp, pinned };
+    return { mesh: this.mesh, document: this.document, steps: this.history.steps, view, look, isLetGo: false };
+  }
+
+  /**
+   * What the user would miss: the work that is here, or what has made room for it, as long as nothing was done to what is here. A
+   * mesh that only was opened is missed where no work is.
+   */
+  get worthKeeping(): Kept | undefined {
+    const aside = this.#aside?.isLetGo ? undefined : this.#aside;
+    const isShape = this.view.now.shape !== "";
+    return this.isTouched || (!aside && !isShape) ? this.#present() : aside;
+  }
+
+  dismissAside(): void {
+    this.#aside = undefined;
+    this.facts.set({ setAside: undefined });
   }
 
   /** The work that was set aside, with what can be undone; what is there now is set aside in its place. */
   bringBack(): void {
     const aside = this.#aside;
     if (!aside) return;
-    this.open(aside.mesh, aside.steps.present, true);
+    this.#aside = undefined;
+    this.open(aside.mesh, aside.document, true);
     this.history.restore(aside.steps);
     this.view.set({ ...aside.view, tool: "move" });
     this.lookFrom(aside.look);

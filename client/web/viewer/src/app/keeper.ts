@@ -23,8 +23,6 @@ export class Keeper {
   #store: Store | undefined;
   #id = "";
   #keptMesh: Mesh | undefined;
-  /** There is more than a shape that the page can make again. */
-  #isTouched = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #camera = "";
 
@@ -58,10 +56,9 @@ export class Keeper {
     const { app } = this;
     if (!this.#store) return;
     app.facts.watch((facts, before) => {
-      if (facts.mesh !== before.mesh) this.#isTouched = this.isKeeping = false;
-      if (app.isTouched) this.#isTouched = true;
+      if (facts.mesh !== before.mesh) this.isKeeping = false;
       if (facts.document !== before.document && facts.mesh === before.mesh) app.facts.set({ restoredFrom: undefined });
-      if (facts.document !== before.document || facts.mesh !== before.mesh) this.#soon();
+      if (facts.document !== before.document || facts.mesh !== before.mesh || facts.setAside !== before.setAside) this.#soon();
     });
     app.view.watch(() => this.#soon());
     app.afterDrawing.add(() => {
@@ -112,7 +109,7 @@ export class Keeper {
     app.lookFrom(camera);
     app.facts.set({ restoredFrom: savedAt });
     this.#keptMesh = mesh;
-    this.#isTouched = this.isKeeping = true;
+    this.isKeeping = true;
   }
 
   /** Until the first picture, or until the page is left in good order. */
@@ -135,15 +132,14 @@ export class Keeper {
   async #save(): Promise<void> {
     clearTimeout(this.#timer);
     this.#timer = undefined;
-    const { app } = this;
-    const { mesh, document } = app.facts.now;
-    const { isDark: _, ...view }: View = app.view.now;
+    const { isDark: _, ...view }: View = this.app.view.now;
+    const kept = this.app.worthKeeping;
     try {
-      if (this.#isTouched || view.shape === "") {
-        const camera = app.panes[0]!.stage.look;
+      if (kept) {
+        const { mesh, document, look: camera } = kept;
         const { search: address } = location;
-        const work: Work = { version: 1, id: this.#id, address, savedAt: Date.now(), document, view, camera };
-        await this.#store!.put(work, mesh === this.#keptMesh ? undefined : mesh);
+        const work = { version: 1, id: this.#id, address, savedAt: Date.now(), document, camera } as const;
+        await this.#store!.put({ ...work, view: { ...view, ...kept.view } }, mesh === this.#keptMesh ? undefined : mesh);
         this.#keptMesh = mesh;
       } else {
         await this.#store!.remove([this.#id]);

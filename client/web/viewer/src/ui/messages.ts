@@ -84,7 +84,7 @@ function asideNote(app: App): HTMLElement {
   const back = el("button", { type: "button", className: "plain", textContent: "Bring it back" });
   const dismiss = el("button", { type: "button", className: "plain", textContent: "Dismiss" });
   back.addEventListener("click", () => app.bringBack());
-  dismiss.addEventListener("click", () => app.facts.set({ setAside: undefined }));
+  dismiss.addEventListener("click", () => app.dismissAside());
   const note = el("div", { className: "aside", role: "status", hidden: true }, text, back, dismiss);
   app.facts.watch(({ setAside }) => {
     note.hidden = setAside === undefined;

@@ -147,6 +147,38 @@ it("work that another shape, a file or letting go takes the place of is brought 
   expect(await aside.isHidden()).toBe(true);
 });
 
+it("work that has made room stays, however much is opened after it and left as it was, over a reload too", async () => {
+  await bend();
+  const bent = await work();
+  const aside = user.page.locator(".aside");
+  const tower = { name: "tower.off", content: writeOff(blockSurface(2, 2, 6, () => true)) };
+  const openOthers = async () => {
+    await user.page.getByLabel("Shape").selectOption("sheet");
+    await user.openFiles(tower);
+    await user.until("window.__lpdeform.app.mesh.name === 'tower.off'");
+    await user.page.getByLabel("Shape").selectOption("block");
+    await user.settled();
+    expect(await aside.textContent()).toContain("“bar” has made room");
+  };
+  await openOthers();
+  await aside.getByRole("button", { name: "Bring it back" }).click();
+  await user.settled();
+  expect(await work()).toBe(bent);
+  expect(await aside.isHidden()).toBe(true);
+
+  await openOthers();
+  await user.page.waitForTimeout(700);
+  await reload();
+  expect([await work(), await user.ask("app.mesh.name"), await user.ask("app.view.now.shape")]).toEqual([bent, "bar", "bar"]);
+  expect(await note().textContent()).toContain("“bar” is here again");
+
+  await user.openFiles(tower); // a mesh that one has anyway is not worth more than work
+  await user.until("window.__lpdeform.app.mesh.name === 'tower.off'");
+  await user.page.waitForTimeout(700);
+  await reload();
+  expect(await work()).toBe(bent);
+});
+
 it("work at which the page stopped is shown again only where that is wanted", async () => {
   await bend();
   const bent = await work();
