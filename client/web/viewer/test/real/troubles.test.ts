@@ -98,17 +98,19 @@ describe("the page's policy", () => {
   });
 });
 
+const refuseWebGl = `{
+  const { getContext } = HTMLCanvasElement.prototype;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+    return kind.startsWith("webgl") ? null : getContext.call(this, kind, ...rest);
+  };
+}`;
+
 describe("where pictures", () => {
   it("cannot be drawn, the page says so", async () => {
     const service = await start();
     const user = await visit(service);
     const context = await user.browser.newContext();
-    await context.addInitScript(`{
-      const { getContext } = HTMLCanvasElement.prototype;
-      HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
-        return kind.startsWith("webgl") ? null : getContext.call(this, kind, ...rest);
-      };
-    }`);
+    await context.addInitScript(refuseWebGl);
     const page = await context.newPage();
     const errors: string[] = [];
     page.on("pageerror", ({ message }) => errors.push(message));
@@ -121,7 +123,7 @@ describe("where pictures", () => {
     const service = await start();
     const user = await visit(service);
     await user.settled();
-    await user.page.evaluate("HTMLCanvasElement.prototype.getContext = () => null");
+    await user.page.evaluate(refuseWebGl);
     await user.page.keyboard.press("s");
     await user.page.getByText("This browser draws no second picture").waitFor();
     expect(await user.ask("app.panes.length")).toBe(1);
