@@ -2,6 +2,7 @@ import { loadDecompressor } from "./decode.js";
 import { LpdeformError } from "./errors.js";
 import { createSession, isSessionLost, isTakenAllTheSame, isUndecided, joinSession, type Lease } from "./lease.js";
 import { type Copy, Link, sessionClosed } from "./link.js";
+import { tell } from "./listeners.js";
 import { Backoff } from "./recovery.js";
 import { Rpc } from "./rpc.js";
 import { runSolve } from "./solve.js";
@@ -47,8 +48,8 @@ export class Session implements AsyncIterable<Frame> {
   /** @internal openSession() and joinSession() make sessions. */
   constructor(rpc: Rpc, lease: Lease, frameOptions: FrameOptions, copy: Copy | undefined) {
     this.#link = new Link(rpc, lease, frameOptionsToWire(frameOptions), copy, {
-      problem: (error) => this.#listeners.problem.forEach((listener) => listener(error)),
-      connection: (state) => this.#listeners.connection.forEach((listener) => listener(state)),
+      problem: (error) => [...this.#listeners.problem].forEach((listener) => tell(listener, error)),
+      connection: (state) => [...this.#listeners.connection].forEach((listener) => tell(listener, state)),
     });
   }
 

@@ -4,6 +4,7 @@ import { methodName, stopReasonFromWire } from "./fromwire.js";
 import type { SolveResponse } from "./gen/lpdeform/v1/service_pb.js";
 import type { Lease } from "./lease.js";
 import type { NumberedUpdate } from "./ledger.js";
+import { tell } from "./listeners.js";
 import { Packer } from "./packer.js";
 import type { Rpc } from "./rpc.js";
 import { updateToWire } from "./towire.js";
@@ -61,7 +62,8 @@ class ResultBuilder {
     switch (message.case) {
       case "progress": {
         const { iteration, energy, seconds } = message.value;
-        this.options.onProgress?.({ iteration, energy, seconds });
+        const { onProgress } = this.options;
+        if (onProgress) tell(onProgress, { iteration, energy, seconds });
         break;
       }
       case "summary": {

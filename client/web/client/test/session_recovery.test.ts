@@ -1,5 +1,5 @@
 import { Code, ConnectError } from "@connectrpc/connect";
-import { describe, expect, test } from "vitest";
+import { describe, expect, test, vi } from "vitest";
 import { GoAwayReason } from "../src/gen/lpdeform/v1/service_pb.js";
 import { joinWith, openWith } from "../src/session.js";
 import { FakeServer, triangle } from "./fake_server.js";
@@ -98,6 +98,55 @@ describe("a stream that ends", () => {
     server.on.stream = (stream) => stream.queue.finish(new ConnectError("still away", Code.Unavailable));
     server.stream.queue.finish(new ConnectError("away", Code.Unavailable));
     await expect(next(session)).rejects.toMatchObject({ code: "unavailable", message: "still away" });
+  });
+});
+
+describe("a listener that throws", () => {
+  const mistake = new TypeError("of the caller's");
+
+  /** What the page is told. */
+  function faults(): unknown[] {
+    const all: unknown[] = [];
+    vi.stubGlobal("reportError", (fault: unknown) => all.push(fault));
+    return all;
+  }
+
+  test("to a change of the connection does not keep the stream from being taken up again", async () => {
+    const { server, session } = await begin();
+    const reported = faults();
+    const states: string[] = [];
+    const stop = session.on("connection", () => {
+      throw mistake;
+    });
+    session.on("connection", (state) => states.push(state));
+    server.stream.queue.finish(new ConnectError("broken", Code.Unavailable));
+    await server.until(() => server.streams.length === 2);
+    server.stream.open();
+    server.stream.frame({ frameSeq: 9n });
+    expect((await next(session)).frameSeq).toBe(9);
+    expect(states).toEqual(["reconnecting", "connected"]);
+    expect(reported).toEqual([mistake, mistake]);
+    stop();
+  });
+
+  test("to a problem does not keep updates and frames from going on", async () => {
+    const { server, session } = await begin();
+    const reported = faults();
+    session.on("problem", () => {
+      throw mistake;
+    });
+    server.on.update = (_, count) => {
+      if (count === 1) throw refusal("HANDLE_VERTEX_OUT_OF_RANGE", {});
+    };
+    session.setHandle("tip", { vertices: [9] });
+    await server.until(() => server.updates.length === 1);
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 2);
+    server.stream.send({ case: "fault", value: { reason: "NO_HANDLES" } });
+    server.stream.frame({ frameSeq: 1n });
+    expect((await next(session)).frameSeq).toBe(1);
+    expect(server.streams.length).toBe(1);
+    expect(reported).toEqual([mistake, mistake]);
   });
 });
 

@@ -1,5 +1,5 @@
 import { Code, ConnectError } from "@connectrpc/connect";
-import { describe, expect, test } from "vitest";
+import { describe, expect, test, vi } from "vitest";
 import { Encoding } from "../src/gen/lpdeform/v1/frame_pb.js";
 import { joinWith, openWith } from "../src/session.js";
 import { FakeServer, triangle } from "./fake_server.js";
@@ -180,6 +180,24 @@ describe("solving", () => {
     expect(result.trace).toMatchObject([{ iteration: 1, energy: 9, objective: 4 }]);
     expect(progress).toEqual([9]);
     expect(server.solves[0]).toMatchObject({ certify: true, trace: true, progress: true });
+  });
+
+  test("goes on where onProgress throws", async () => {
+    const { server, session } = await begin();
+    const reported: unknown[] = [];
+    vi.stubGlobal("reportError", (fault: unknown) => reported.push(fault));
+    server.on.solve = async function* () {
+      yield { message: { case: "progress", value: { iteration: 1, energy: 9, seconds: 0.5 } } };
+      yield { message: summary };
+      yield { message: frame };
+    };
+    const mistake = new TypeError("of the caller's");
+    const onProgress = () => {
+      throw mistake;
+    };
+    expect((await session.solve({ onProgress })).energy).toBe(3);
+    expect(server.solves.length).toBe(1);
+    expect(reported).toEqual([mistake]);
   });
 
   test("begins again where the server went away, and where it lost the session", async () => {
