@@ -11,6 +11,7 @@ import type { Rpc } from "./rpc.js";
 import { updateToWire } from "./towire.js";
 import type { Connection, Frame, Mesh, OpenOptions, Update } from "./types.js";
 import { newRequestId, Uploads } from "./upload.js";
+import { pause } from "./waiting.js";
 
 /** What a session that was lost can be made anew from. */
 export interface Copy {
@@ -126,7 +127,8 @@ export class Link {
 
   #subscribe(): void {
     this.#goAway = undefined;
-    const lane = this.rpc.hub.subscribe(this.#lease.session, this.frameOptions, {
+    const { session } = this.#lease;
+    const lane = this.rpc.hub.subscribe(session, this.frameOptions, {
       opened: (opened) => {
         this.#assembly = new FrameAssembly(opened.vertexCount);
         this.box.beginEpoch(Number(opened.epoch));
@@ -143,24 +145,25 @@ export class Link {
       },
       fault: (fault) => this.watcher.problem(fromFault(fault)),
       goAway: (goAway) => (this.#goAway = goAway),
-      ended: (error) => void this.#recover(error),
+      ended: (error) => void this.#recover(error, session),
       isQuiet: () => this.#finished >= this.ledger.newest,
       resting: () => this.#setConnection("idle"),
     });
     this.#lane = lane;
   }
 
-  async #recover(ended: LpdeformError | undefined): Promise<void> {
+  /** `session`: which the stream was of. */
+  async #recover(ended: LpdeformError | undefined, session: string): Promise<void> {
     if (this.isClosed) return;
     const recovery = recoveryAfter(ended, this.#goAway, this.copy !== undefined);
     this.interruption = recovery.why;
     this.#setConnection("reconnecting");
     if (recovery.next === "giveUp" || this.#isTooLate()) return this.#giveUp(recovery.why);
-    await this.#pause(Math.max(recovery.pauseMs, this.#backoff.nextMs()));
+    await pause(Math.max(recovery.pauseMs, this.#backoff.nextMs()), this.stop.signal);
     if (this.isClosed) return;
     if (recovery.next === "makeAnew") {
       try {
-        await this.makeAnew(this.#lease.session);
+        await this.makeAnew(session);
       } catch (error) {
         if (!isUndecided(error as LpdeformError)) return this.#giveUp(error as LpdeformError);
       }
@@ -187,7 +190,7 @@ export class Link {
     this.#wakeQuiet();
   }
 
-  /** Once, however many ask. */
+  /** Once for each session that is lost, however many find that out, and however late. */
   makeAnew(lost: string): Promise<void> {
     if (this.#lease.session !== lost) return Promise.resolve();
     this.#making ??= this.#make().finally(() => (this.#making = undefined));
@@ -212,39 +215,40 @@ export class Link {
   }
 
   async #sendOne(update: NumberedUpdate): Promise<void> {
+    const lease = this.#lease;
+    // What was on its way to a session that has been lost since waits again, whatever becomes of it there.
+    const isVoid = () => this.#lease.session !== lease.session;
     try {
-      await this.sendUpdate(update);
-      this.ledger.accept(update.seq);
+      await this.sendUpdate(update, lease, this.stop.signal);
+      if (!isVoid()) this.ledger.accept(update.seq);
       this.#heardFromServer();
     } catch (thrown) {
-      await this.#unsent(update, thrown as LpdeformError);
+      if (!isVoid()) await this.#unsent(update, thrown as LpdeformError, lease.session);
     }
     this.#wakeQuiet();
     this.#send();
   }
 
-  async sendUpdate(update: NumberedUpdate): Promise<void> {
+  async sendUpdate(update: NumberedUpdate, { session, writerToken }: Lease, signal: AbortSignal): Promise<void> {
     const packer = new Packer();
-    const uploads = new Uploads(this.rpc, this.stop.signal);
+    const uploads = new Uploads(this.rpc, signal);
     const message = updateToWire(update.update, update.seq, packer);
     try {
       await packer.flush((bytes) => uploads.add(bytes));
-      const { session, writerToken } = this.#lease;
-      await this.rpc.call("updateHandles", { session, writerToken, update: message }, this.stop.signal);
+      await this.rpc.call("updateHandles", { session, writerToken, update: message }, signal);
     } finally {
       uploads.discard();
     }
   }
 
-  async #unsent(update: NumberedUpdate, error: LpdeformError): Promise<void> {
+  async #unsent(update: NumberedUpdate, error: LpdeformError, session: string): Promise<void> {
     if (this.isClosed) return;
-    const session = this.#lease.session;
     if (isUndecided(error)) {
       this.#isSending = true;
       this.ledger.connectionLost();
       try {
         if (this.#isTooLate()) return this.#giveUp(error);
-        await this.#pause(Math.max(error.retryAfterMs, this.#backoff.nextMs()));
+        await pause(Math.max(error.retryAfterMs, this.#backoff.nextMs()), this.stop.signal);
         if (isSessionLost(error)) {
           if (!this.copy) return this.#giveUp(error);
           await this.makeAnew(session);
@@ -267,11 +271,13 @@ export class Link {
   }
 
   /** Waits until no update is on its way, and keeps others from being sent until the result is called. */
-  async holdUpdates(signal?: AbortSignal): Promise<() => void> {
+  async holdUpdates(signal: AbortSignal): Promise<() => void> {
     ++this.#solves;
-    while ((this.ledger.hasInFlight || this.#isSending) && !this.isClosed && !signal?.aborted) {
+    signal.addEventListener("abort", this.#wakeQuiet, { once: true });
+    while ((this.ledger.hasInFlight || this.#isSending) && !this.isClosed && !signal.aborted) {
       await new Promise<void>((resolve) => this.#quiet.add(resolve));
     }
+    signal.removeEventListener("abort", this.#wakeQuiet);
     return () => {
       --this.#solves;
       this.#wakeQuiet();
@@ -279,22 +285,10 @@ export class Link {
     };
   }
 
-  #wakeQuiet(): void {
+  readonly #wakeQuiet = () => {
     for (const resolve of this.#quiet) resolve();
     this.#quiet.clear();
-  }
-
-  #pause(milliseconds: number): Promise<void> {
-    return new Promise((resolve) => {
-      const done = () => {
-        clearTimeout(timer);
-        this.stop.signal.removeEventListener("abort", done);
-        resolve();
-      };
-      const timer = setTimeout(done, milliseconds);
-      this.stop.signal.addEventListener("abort", done);
-    });
-  }
+  };
 
   #setConnection(state: Connection): void {
     if (this.#connection === state) return;

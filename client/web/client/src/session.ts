@@ -23,6 +23,7 @@ import type {
   Update,
 } from "./types.js";
 import { newRequestId } from "./upload.js";
+import { pause, unlessAborted } from "./waiting.js";
 
 export interface SessionEvents {
   /** The server refused an update, or cannot solve for it yet; the session goes on. */
@@ -153,7 +154,7 @@ export class Session implements AsyncIterable<Frame> {
     for (;;) {
       const frame = this.#link.take();
       if (frame || this.#link.box.isClosed) return frame;
-      if (signal?.aborted) throw abortReason(signal);
+      if (signal?.aborted) throw abortReason(signal, "No new frame came in time.", "NO_FRAME");
       await this.#link.box.wait(signal);
     }
   }
@@ -165,36 +166,59 @@ export class Session implements AsyncIterable<Frame> {
   async solve(options: SolveOptions = {}): Promise<SolveResult> {
     const link = this.#link;
     if (link.isClosed) throw sessionClosed();
-    const signal = options.signal ? AbortSignal.any([options.signal, link.stop.signal]) : link.stop.signal;
+    const { deadlineMs } = options;
+    const end = deadlineMs === undefined ? undefined : performance.now() + deadlineMs;
+    const late = deadlineMs === undefined ? undefined : AbortSignal.timeout(timerMs(deadlineMs));
+    const signal = AbortSignal.any([link.stop.signal, late, options.signal].filter((one) => one !== undefined));
     const release = await link.holdUpdates(signal);
-    const backoff = new Backoff();
-    const latest = performance.now() + link.rpc.reconnectForMs;
     try {
-      for (;;) {
-        if (link.isClosed) throw sessionClosed();
-        if (signal.aborted) throw abortReason(signal);
-        try {
-          return await this.#solveOnce(options, signal);
-        } catch (thrown) {
-          const error = thrown as LpdeformError;
-          const isLost = isSessionLost(error) && link.copy !== undefined;
-          if (!isLost && error.code !== "unavailable") throw error;
-          if (performance.now() > latest) throw error;
-          if (isLost) await link.makeAnew(link.lease.session);
-          else await new Promise((resolve) => setTimeout(resolve, backoff.nextMs()));
-        }
-      }
+      return await this.#solveUntilDone(options, end, signal);
+    } catch (error) {
+      throw signal.aborted ? abortReason(signal, "The result did not come in time.") : error;
     } finally {
       release();
     }
   }
 
-  async #solveOnce(options: SolveOptions, signal: AbortSignal): Promise<SolveResult> {
-    const { ledger, lease, rpc } = this.#link;
+  /** `end`: on the clock of performance.now(). */
+  async #solveUntilDone(options: SolveOptions, end: number | undefined, signal: AbortSignal): Promise<SolveResult> {
+    const link = this.#link;
+    const backoff = new Backoff();
+    const latest = performance.now() + link.rpc.reconnectForMs;
+    let lost: string | undefined;
+    for (;;) {
+      signal.throwIfAborted();
+      let { lease } = link;
+      try {
+        if (lost !== undefined) {
+          await unlessAborted(link.makeAnew(lost), signal);
+          lost = undefined;
+          lease = link.lease;
+        }
+        return await this.#solveOnce(lease, options, end, signal);
+      } catch (thrown) {
+        signal.throwIfAborted();
+        const error = thrown as LpdeformError;
+        const isPassing = lost === undefined ? error.code === "unavailable" : isUndecided(error);
+        if (link.copy && isSessionLost(error)) lost ??= lease.session;
+        else if (!isPassing) throw error;
+        if (performance.now() > latest) throw error;
+        await pause(Math.max(error.retryAfterMs, backoff.nextMs()), signal);
+      }
+    }
+  }
+
+  async #solveOnce(
+    lease: Lease,
+    options: SolveOptions,
+    end: number | undefined,
+    signal: AbortSignal,
+  ): Promise<SolveResult> {
+    const { ledger, rpc } = this.#link;
     while (ledger.hasRestore) {
       const restore = ledger.sendNext();
       try {
-        await this.#link.sendUpdate(restore);
+        await this.#link.sendUpdate(restore, lease, signal);
         ledger.accept(restore.seq);
       } catch (error) {
         ledger.connectionLost();
@@ -203,7 +227,7 @@ export class Session implements AsyncIterable<Frame> {
     }
     const update = ledger.hasWaiting ? ledger.sendNext() : undefined;
     try {
-      const result = await runSolve(rpc, lease, update, options, signal);
+      const result = await runSolve(rpc, lease, update, options, end, signal);
       if (update) ledger.accept(update.seq);
       return result;
     } catch (thrown) {
@@ -275,11 +299,16 @@ function checkMesh({ vertices, faces }: Mesh): void {
   }
 }
 
-function abortReason(signal: AbortSignal): LpdeformError {
-  const { reason } = signal;
+/** What timers take. */
+function timerMs(milliseconds: number): number {
+  return Math.min(Math.max(Math.ceil(milliseconds), 0), 2 ** 31 - 1);
+}
+
+/** `text` and `reasonOfLate`: of running out of time. */
+function abortReason({ reason }: AbortSignal, text: string, reasonOfLate = ""): LpdeformError {
   if (reason instanceof LpdeformError) return reason;
-  const isTimeout = reason instanceof DOMException && reason.name === "TimeoutError";
-  return isTimeout
-    ? new LpdeformError("deadline_exceeded", "No new frame came in time.", { reason: "NO_FRAME" })
+  const isLate = reason instanceof DOMException && reason.name === "TimeoutError";
+  return isLate
+    ? new LpdeformError("deadline_exceeded", text, { reason: reasonOfLate })
     : new LpdeformError("cancelled", "The call was aborted.", {}, reason);
 }

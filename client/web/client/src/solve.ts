@@ -11,12 +11,13 @@ import { updateToWire } from "./towire.js";
 import type { IterationRecord, SolveOptions, SolveResult } from "./types.js";
 import { Uploads } from "./upload.js";
 
-/** One Solve call, from its request to the finished result. */
+/** One Solve call, from its request to the finished result. `end`: of the time for it, on the clock of performance.now(). */
 export async function runSolve(
   rpc: Rpc,
   lease: Lease,
   update: NumberedUpdate | undefined,
   options: SolveOptions,
+  end: number | undefined,
   signal: AbortSignal,
 ): Promise<SolveResult> {
   const uploads = new Uploads(rpc, signal);
@@ -34,7 +35,7 @@ export async function runSolve(
   };
   try {
     await packer.flush((bytes) => uploads.add(bytes));
-    const calling = { signal, timeoutMs: options.deadlineMs ?? 0 };
+    const calling = { signal, timeoutMs: end === undefined ? 0 : Math.max(Math.ceil(end - performance.now()), 1) };
     const result = new ResultBuilder(lease.report.vertices, options);
     for await (const response of rpc.client.solve(request, calling)) result.take(response);
     return result.finish();

@@ -205,6 +205,47 @@ describe("a session that the server has lost", () => {
     expect(server.creations.length).toBe(2);
   });
 
+  test("is made anew once, however many updates and streams find out, and however late", async () => {
+    const { server, session } = await begin();
+    session.setHandles({ base: { vertices: [0] }, tip: { vertices: [1] } });
+    await server.until(() => server.updates.length === 1);
+    let answer = () => {};
+    const isAnswered = new Promise<void>((resolve) => (answer = resolve));
+    server.on.update = async ({ session: name }) => {
+      if (name !== "sessions/1") return;
+      await isAnswered;
+      throw refusal("SESSION_UNKNOWN", {}, Code.NotFound);
+    };
+    server.on.stream = (stream) => stream.open();
+    session.move("tip", at(1));
+    session.move("tip", at(2));
+    await server.until(() => server.updates.length > 1);
+    // The stream finds out first, and has another session by the time that the update is answered.
+    server.stream.goAway(GoAwayReason.SESSION_EXPIRED);
+    server.stream.queue.finish();
+    await server.until(() => server.streams.length === 2);
+    answer();
+    await server.until(
+      () => server.updates.at(-1)!.update!.inputSeq >= 3n && server.updates.at(-1)!.session !== "sessions/1",
+    );
+    session.move("tip", at(3));
+    await server.until(() => server.updates.at(-1)!.update!.inputSeq === 4n);
+    expect([server.creations.length, session.name]).toEqual([2, "sessions/2"]);
+
+    // And the other way round: an update finds out first, the stream long after.
+    server.on.update = ({ session: name }) => {
+      if (name === "sessions/2") throw refusal("SESSION_UNKNOWN", {}, Code.NotFound);
+    };
+    const stream = server.stream;
+    session.move("tip", at(4));
+    await server.until(() => server.updates.at(-1)!.session === "sessions/3");
+    stream.goAway(GoAwayReason.SESSION_EXPIRED);
+    stream.queue.finish();
+    await server.until(() => server.streams.length === 3);
+    expect(server.stream.request.streams.map(({ session: name }) => name)).toEqual(["sessions/3"]);
+    expect([server.creations.length, session.name]).toEqual([3, "sessions/3"]);
+  });
+
   test("by expiring is made anew", async () => {
     const { server } = await begin();
     server.stream.goAway(GoAwayReason.SESSION_EXPIRED);

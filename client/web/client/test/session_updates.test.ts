@@ -144,23 +144,24 @@ describe("settling", () => {
   });
 });
 
-describe("solving", () => {
-  const summary = {
-    case: "summary",
-    value: { energy: 3, iterations: 5, inputSeq: 2n, certificate: { relativeGap: 0.5 } },
-  } as const;
-  const frame = {
-    case: "frame",
-    value: {
-      header: { vertexCount: 3, frameSeq: 1n, encoding: Encoding.RAW },
-      frameSeq: 1n,
-      vertexCount: 3,
-      last: true,
-      positions: new Uint8Array(36),
-      distortion: new Uint8Array(12),
-    },
-  } as const;
+const summary = {
+  case: "summary",
+  value: { energy: 3, iterations: 5, inputSeq: 2n, certificate: { relativeGap: 0.5 } },
+} as const;
+const frame = {
+  case: "frame",
+  value: {
+    header: { vertexCount: 3, frameSeq: 1n, encoding: Encoding.RAW },
+    frameSeq: 1n,
+    vertexCount: 3,
+    last: true,
+    positions: new Uint8Array(36),
+    distortion: new Uint8Array(12),
+  },
+} as const;
+const result = [{ message: summary }, { message: frame }];
 
+describe("solving", () => {
   test("takes along what waits and gives the result", async () => {
     const { server, session } = await begin();
     server.on.solve = async function* () {
@@ -235,6 +236,92 @@ describe("solving", () => {
     abort.abort();
     await expect(solving).rejects.toMatchObject({ code: "cancelled" });
     await expect(session.solve({ deadlineMs: 30 })).rejects.toMatchObject({ code: "deadline_exceeded" });
+  });
+});
+
+describe("solving, while it waits,", () => {
+  const away = () => {
+    throw new ConnectError("away", Code.Unavailable);
+  };
+
+  test("for an update that is under way ends at once with an abort, and at its deadline", async () => {
+    const { server, session } = await begin();
+    let answer = () => {};
+    const isAnswered = new Promise<void>((resolve) => (answer = resolve));
+    server.on.update = () => isAnswered;
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 1);
+    const abort = new AbortController();
+    const solving = session.solve({ signal: abort.signal });
+    abort.abort();
+    await expect(solving).rejects.toMatchObject({ code: "cancelled" });
+    await expect(session.solve({ deadlineMs: 50 })).rejects.toMatchObject({ code: "deadline_exceeded" });
+    expect(server.solves).toEqual([]);
+    session.move("tip", at(1)); // and holds nothing up any more
+    answer();
+    await server.until(() => server.updates.at(-1)!.update!.inputSeq === 2n);
+  });
+
+  test("for a server that is away ends at once with an abort, and at its deadline, however often it is tried", async () => {
+    const { server, session } = await begin();
+    server.on.solve = away;
+    const abort = new AbortController();
+    const solving = session.solve({ signal: abort.signal });
+    await server.until(() => server.solves.length === 6); // the pauses are of one second and more by now
+    const abortedAt = performance.now();
+    abort.abort();
+    await expect(solving).rejects.toMatchObject({ code: "cancelled" });
+    expect(performance.now() - abortedAt).toBeLessThan(300);
+
+    const [before, begun] = [server.solves.length, performance.now()];
+    await expect(session.solve({ deadlineMs: 700 })).rejects.toMatchObject({ code: "deadline_exceeded" });
+    expect(performance.now() - begun).toBeLessThan(1000);
+    expect(server.solves.length).toBeGreaterThan(before + 1);
+  });
+
+  test("tells each server that it tries how much of its time is left", async () => {
+    const { server, session } = await begin();
+    const left: number[] = [];
+    server.on.solve = async function* (_, { timeoutMs }) {
+      left.push(timeoutMs()!);
+      away();
+    };
+    await session.solve({ deadlineMs: 1000 }).catch(() => undefined);
+    expect(left.length).toBeGreaterThan(2);
+    expect(left).toEqual(left.toSorted((a, b) => b - a));
+    expect(left[0]).toBeLessThanOrEqual(1000);
+    expect(left.at(-1)).toBeLessThan(900);
+  });
+
+  test("for a server that starts makes the session that was lost anew", async () => {
+    const { server, session } = await begin();
+    server.on.solve = async function* ({ session: name }) {
+      if (name === "sessions/1") throw refusal("SESSION_UNKNOWN", {}, Code.NotFound);
+      yield* result;
+    };
+    server.on.create = (_, count) => {
+      if (count <= 3) away();
+    };
+    expect((await session.solve()).energy).toBe(3);
+    expect(server.creations.length).toBe(4);
+    expect(new Set(server.creations.slice(1).map(({ requestId }) => requestId)).size).toBe(1);
+  });
+
+  test("for a session to be made anew ends at once with an abort, and with what refuses the mesh now", async () => {
+    const { server, session } = await begin();
+    server.on.solve = () => {
+      throw refusal("SESSION_UNKNOWN", {}, Code.NotFound);
+    };
+    server.on.create = away;
+    const abort = new AbortController();
+    const solving = session.solve({ signal: abort.signal });
+    await server.until(() => server.creations.length === 2);
+    abort.abort();
+    await expect(solving).rejects.toMatchObject({ code: "cancelled" });
+    server.on.create = () => {
+      throw refusal("MESH_TOO_LARGE", {});
+    };
+    await expect(session.solve()).rejects.toMatchObject({ reason: "MESH_TOO_LARGE" });
   });
 });
 
