@@ -28,7 +28,7 @@ export async function runSolve(
     writerToken: lease.writerToken,
     certify: options.certify ?? false,
     trace: options.trace ?? false,
-    progress: options.onProgress !== undefined,
+    progress: true, // whether it is wanted or not: a proxy on the way takes silence for the end
     normals: options.withNormals ?? false,
     ...(update && { update: updateToWire(update.update, update.seq, packer) }),
     ...(initial && { initialPositions: { scalar: initial.scalar, data: initial.buffer } }),

@@ -183,6 +183,15 @@ describe("solving", () => {
     expect(server.solves[0]).toMatchObject({ certify: true, trace: true, progress: true });
   });
 
+  test("asks for progress where nobody listens as well: a proxy cuts what is silent", async () => {
+    const { server, session } = await begin();
+    server.on.solve = async function* () {
+      yield* result;
+    };
+    await session.solve();
+    expect(server.solves[0]!.progress).toBe(true);
+  });
+
   test("goes on where onProgress throws", async () => {
     const { server, session } = await begin();
     const reported: unknown[] = [];

@@ -134,6 +134,18 @@ describe("the proxy", () => {
     await session.close();
   });
 
+  test("leaves a solve to which nobody listens for longer than a silent stream may be", async () => {
+    const { mesh, handles } = grid(80);
+    const solver = { tolerance: 1e-14, maxIterations: 1_000_000, timeLimitSeconds: 3 };
+    const session = await openSession(mesh, { url: service.url, settings: { p: 1.1, solver } });
+    session.setHandles(handles);
+    session.move("right", { axis: [0, 1, 0], angle: -2, center: [40, 0, 0], translation: [0, 10, 30] });
+    const start = performance.now();
+    await session.solve({ deadlineMs: 20_000 });
+    expect(performance.now() - start).toBeGreaterThan(2000); // the server's own reckoning of time leaves out what it waits
+    await session.close();
+  });
+
   test("lets pages of known origins call and read how calls end", async () => {
     const preflight = await call("https://friend.example", {
       method: "OPTIONS",
