@@ -19,7 +19,7 @@ export interface LaneSink {
   fault(fault: Fault): void;
   goAway(goAway: GoAway): void;
   ended(error?: LpdeformError): void;
-  /** Nothing more is to come until there is a new update. */
+  /** Nothing is to be sent, and nobody waits but to see what comes. */
   isQuiet(): boolean;
   /** The stream rests; `opened` comes when it goes on. */
   resting(): void;
@@ -33,8 +33,9 @@ const restIntervalMs = 10_000;
 
 /**
  * The frames of all sessions of a page on one stream. Over plain HTTP a browser has six connections to an origin, for all its
- * tabs together; a stream holds one of them for as long as it lives. So a page that is hidden, and for which nothing is under
- * way, lets its stream rest until it is seen again or has an update. A session that comes along or goes away makes
+ * tabs together; a stream holds one of them for as long as it lives. So a page that is hidden, and has nothing to
+ * send, lets its stream rest until it is seen again or has an update: frames under way are for nobody, and a page that is hidden
+ * may not even take them. A session that comes along or goes away makes
  * the stream be opened anew, with the newest frame of each first.
  */
 export class StreamHub {
@@ -74,7 +75,7 @@ export class Lane {
     readonly options: WireFrameOptions,
     readonly sink: LaneSink,
     readonly close: () => void,
-    /** There is an update: a stream that rests has to go on. */
+    /** There is an update, or somebody waits for a frame: a stream that rests has to go on. */
     readonly wake: () => void,
   ) {}
 

@@ -39,8 +39,8 @@ export class Link {
   #assembly = new FrameAssembly(0);
   #goAway: GoAway | undefined;
   #connection: Connection = "idle";
-  /** The newest input whose last frame has come; of none, less than any. */
-  #finished = -1;
+  /** Who waits for frames whether they can be seen or not. */
+  #waitingForFrames = 0;
   #isStreaming = false;
   #isSending = false;
   #solves = 0;
@@ -102,6 +102,14 @@ export class Link {
     return taken?.frame;
   }
 
+  /** Frames come on a page that is hidden as well, until the result is called. */
+  holdStream(): () => void {
+    ++this.#waitingForFrames;
+    this.startStream();
+    this.#lane?.wake();
+    return () => --this.#waitingForFrames;
+  }
+
   async close(): Promise<void> {
     if (this.isClosed) return;
     this.stop.abort();
@@ -139,14 +147,13 @@ export class Link {
       },
       part: (part) => {
         const frame = this.#assembly.add(part);
-        if (frame?.converged) this.#finished = frame.inputSeq;
         if (!frame || this.box.put(frame, lane.streamId)) return;
         lane.acknowledge(frame.frameSeq, lane.streamId); // dropped, but its credit is owed
       },
       fault: (fault) => this.watcher.problem(fromFault(fault)),
       goAway: (goAway) => (this.#goAway = goAway),
       ended: (error) => void this.#recover(error, session),
-      isQuiet: () => this.#finished >= this.ledger.newest,
+      isQuiet: () => !this.ledger.hasWaiting && !this.ledger.hasInFlight && this.#waitingForFrames === 0,
       resting: () => this.#setConnection("idle"),
     });
     this.#lane = lane;

@@ -138,6 +138,7 @@ export class Session implements AsyncIterable<Frame> {
     const problem = new AbortController();
     const stopListening = this.on("problem", (error) => problem.abort(error));
     const signal = AbortSignal.any([problem.signal, ...signals.filter((one) => one instanceof AbortSignal)]);
+    const release = this.#link.holdStream();
     try {
       for (;;) {
         const frame = await this.#next(signal);
@@ -145,6 +146,7 @@ export class Session implements AsyncIterable<Frame> {
         if (frame.converged && frame.inputSeq >= this.#link.ledger.newest) return frame;
       }
     } finally {
+      release();
       stopListening();
     }
   }

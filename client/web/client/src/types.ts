@@ -254,8 +254,8 @@ export type WeightKind = "cotangent" | "uniform" | "intrinsicDelaunay";
 export type Weld = "byPosition" | Uint32Array | readonly number[];
 
 /**
- * "idle" before the first frame is asked for, and while the page is hidden and nothing is under way; "reconnecting" while the server is away; "closed" when
- * all is over.
+ * "idle" before the first frame is asked for, and while the page is hidden, has nothing to send and does not settle(); frames
+ * come again when it is seen. "reconnecting" while the server is away; "closed" when all is over.
  */
 export type Connection = "idle" | "connected" | "reconnecting" | "closed";
 

@@ -144,12 +144,15 @@ describe("a hidden page", () => {
     return begin();
   }
 
-  test("gives its connection back when nothing is under way, until it is seen again", async () => {
+  /** Time enough for whatever a hidden page does. */
+  const wait = () => vi.advanceTimersByTime(60_000);
+
+  test("gives its connection back until it is seen again", async () => {
     const { server, session } = await beginOnPage();
     server.stream.frame({ frameSeq: 1n, converged: true });
     await arrived(server, session);
     show(true);
-    vi.advanceTimersByTime(60_000);
+    wait();
     await server.until(() => server.stream.isAborted);
     expect(session.connection).toBe("idle");
     expect(server.streams.length).toBe(1);
@@ -159,20 +162,61 @@ describe("a hidden page", () => {
     await connected(session);
   });
 
-  test("keeps it while a frame is to come, and takes it again for an update", async () => {
+  test("does so in the middle of a solve as well, whose result comes when it is seen", async () => {
     const { server, session } = await beginOnPage();
     session.setHandle("tip", { vertices: [1] });
-    server.stream.frame({ frameSeq: 1n, converged: true });
+    await server.until(() => server.updates.length === 1);
+    server.stream.frame({ frameSeq: 1n, inputSeq: 1n }); // which a page that does not draw does not take
     await arrived(server, session);
     show(true);
-    vi.advanceTimersByTime(60_000);
-    expect(session.connection).toBe("connected");
-    server.stream.frame({ frameSeq: 2n, inputSeq: 1n, converged: true });
+    wait();
+    await server.until(() => server.stream.isAborted);
+    expect([session.connection, server.acks]).toEqual(["idle", []]);
+    show(false);
+    await server.until(() => server.streams.length === 2);
+    server.stream.open();
+    server.stream.frame({ frameSeq: 1n, inputSeq: 1n, converged: true });
+    await connected(session);
     await arrived(server, session);
-    vi.advanceTimersByTime(60_000);
-    expect(session.connection).toBe("idle");
+    expect(await next(session)).toMatchObject({ inputSeq: 1, converged: true });
+  });
+
+  test("keeps it while an update is to be sent, and takes it again for one", async () => {
+    const { server, session } = await beginOnPage();
+    let answer = () => {};
+    const isAnswered = new Promise<void>((resolve) => (answer = resolve));
+    server.on.update = () => isAnswered;
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 1);
+    show(true);
+    wait();
+    expect(session.connection).toBe("connected");
+    answer();
+    session.move("tip", at(2));
+    await vi.waitFor(() => {
+      wait();
+      expect(session.connection).toBe("idle");
+    });
+    expect(server.updates.length).toBe(2);
     session.move("tip", at(1));
     await server.until(() => server.streams.length === 2);
     expect(page.hidden).toBe(true);
+  });
+
+  test("keeps it while somebody settles, and takes it again for that", async () => {
+    const { server, session } = await beginOnPage();
+    show(true);
+    wait();
+    expect(session.connection).toBe("idle");
+    const settled = session.settle();
+    await server.until(() => server.streams.length === 2);
+    server.stream.open();
+    await connected(session);
+    wait();
+    expect(session.connection).toBe("connected");
+    server.stream.frame({ frameSeq: 1n, converged: true });
+    expect((await settled).frameSeq).toBe(1);
+    wait();
+    expect(session.connection).toBe("idle");
   });
 });
