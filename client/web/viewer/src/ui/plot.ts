@@ -55,12 +55,14 @@ export function plotLines(
   const scale = isLogarithmic ? Math.log : (y: number) => y;
   if (!isLogarithmic) [low, high] = [low - 0.05 * (high - low || high), high + 0.05 * (high - low || high)];
   const toX = (x: number) => 2 + ((x - left) / (right - left)) * (width - 4);
-  const toY = (y: number) => height - 4 - ((scale(Math.max(y, low)) - scale(low)) / (scale(high) - scale(low))) * (height - 20);
+  // Above and below the lines there is room for words.
+  const [roof, floor] = [16, height - 16];
+  const toY = (y: number) => floor - ((scale(Math.max(y, low)) - scale(low)) / (scale(high) - scale(low))) * (floor - roof);
   context.strokeStyle = faint;
   context.beginPath();
   for (const mark of marks) {
-    context.moveTo(toX(mark), 14);
-    context.lineTo(toX(mark), height - 2);
+    context.moveTo(toX(mark), roof - 2);
+    context.lineTo(toX(mark), floor + 2);
   }
   if (marks.length < width / 4) context.stroke();
   context.lineWidth = 1.6;
