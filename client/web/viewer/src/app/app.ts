@@ -20,8 +20,8 @@ export interface Facts {
   status: Status;
   /** Why the newest change cannot be shown. */
   problem: LpdeformError | undefined;
-  /** One line that goes by itself. */
-  notice: { text: string; isBad: boolean } | undefined;
+  /** One line that goes by itself, or stays until what it tells of is over. */
+  notice: { text: string; isBad: boolean; stays?: boolean } | undefined;
   /** When the work was kept that a reload has brought back, of Date.now(). */
   restoredFrom: number | undefined;
   /** The name of the work whose place other work has taken; bringBack() swaps them. */
@@ -214,6 +214,15 @@ export class App {
 
   notify(text: string, isBad = false): void {
     this.facts.set({ notice: { text, isBad } });
+  }
+
+  /** A line that stays until the result is called, or another one comes. */
+  notifyWhile(text: string): () => void {
+    const notice = { text, isBad: false, stays: true };
+    this.facts.set({ notice });
+    return () => {
+      if (this.facts.now.notice === notice) this.facts.set({ notice: undefined });
+    };
   }
 
   fit(): void {

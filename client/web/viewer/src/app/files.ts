@@ -72,12 +72,15 @@ export class Files {
     const shown = { positions: stage.surface!.positions, distortion };
     const isExact = !frame || (!frame.quantized && frame.converged && !live!.isSettling);
     if (isExact) return shown;
+    const done = this.app.notifyWhile("Exporting: computing the result in full precision…");
     try {
       return await live!.solve(solveMs);
     } catch (thrown) {
       const why = sentence((thrown as Error).message);
       this.app.notify(`What is shown was written as it is, rounded for the screen. ${why}`, true);
       return shown;
+    } finally {
+      done();
     }
   }
 

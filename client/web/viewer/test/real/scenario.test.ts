@@ -129,6 +129,22 @@ describe("somebody with a mesh of their own", () => {
     }
   });
 
+  it("says that an export is under way until it is done", async () => {
+    let release = () => {};
+    const isReleased = new Promise<void>((resolve) => (release = resolve));
+    await user.page.route("**/Solve", async (route) => {
+      await isReleased;
+      await route.continue();
+    });
+    const notice = user.page.locator(".notice", { hasText: "Exporting: computing the result in full precision…" });
+    const saving = user.save("Mesh as OFF");
+    await notice.waitFor();
+    release();
+    await saving;
+    await notice.waitFor({ state: "hidden", timeout: 3000 }); // sooner than lines go that nothing ends
+    await user.page.unroute("**/Solve");
+  });
+
   it("saves the handles, reloads the exported mesh, and has both again", async () => {
     const handles = await user.save("Handles as JSON");
     const exported = await user.save("Mesh as PLY, with distortion");
