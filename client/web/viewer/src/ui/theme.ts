@@ -1,20 +1,21 @@
 import type { App } from "../app/app.js";
+import { remember, remembered } from "../io/remember.js";
 
 const key = "lpdeform-theme";
 
 /** As the user chose last, otherwise as the system has it. */
 export function startTheme(app: App): void {
   const isSystemDark = matchMedia("(prefers-color-scheme: dark)");
-  const chosen = localStorage.getItem(key);
+  const chosen = remembered(key);
   app.view.set({ isDark: chosen ? chosen === "dark" : isSystemDark.matches, isPanelOpen: innerWidth > 900 });
   isSystemDark.addEventListener("change", () => {
-    if (!localStorage.getItem(key)) app.view.set({ isDark: isSystemDark.matches });
+    if (!remembered(key)) app.view.set({ isDark: isSystemDark.matches });
   });
   // The picture shows that it has the focus to those who move it by keys.
   window.addEventListener("keydown", ({ key }) => key === "Tab" && document.body.classList.add("by-keyboard"));
   window.addEventListener("pointerdown", () => document.body.classList.remove("by-keyboard"));
   app.view.watch(({ isDark }, before) => {
     document.documentElement.dataset["theme"] = isDark ? "dark" : "light";
-    if (isDark !== before.isDark) localStorage.setItem(key, isDark ? "dark" : "light");
+    if (isDark !== before.isDark) remember(key, isDark ? "dark" : "light");
   });
 }
