@@ -2,6 +2,7 @@ import { Store, type Work } from "../io/store.js";
 import type { Mesh } from "../model/mesh.js";
 import type { View } from "../model/view.js";
 import type { App } from "./app.js";
+import type { Answer } from "../ui/wants_back.js";
 import { claim, whileFree } from "./claim.js";
 
 const key = "lpdeform-work";
@@ -23,13 +24,15 @@ export class Keeper {
   #store: Store | undefined;
   #id = "";
   #keptMesh: Mesh | undefined;
+  /** The tab's work is yet that which was put off. */
+  #hasPutOff = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #camera = "";
 
-  /** `wantsBack`: whether the user wants work again at which the page stopped last time, by the name of its mesh. */
+  /** `wantsBack`: when the user wants work again at which the page stopped last time, by the name of its mesh. */
   constructor(
     readonly app: App,
-    readonly wantsBack: (name: string) => Promise<boolean>,
+    readonly wantsBack: (name: string) => Promise<Answer>,
   ) {}
 
   /** True where there was work. Where the browser keeps nothing, all goes on without. */
@@ -40,10 +43,10 @@ export class Keeper {
       const mesh = work && (await store.mesh(work.id));
       this.#store = store;
       if (!work || !mesh) return false;
-      if (sessionStorage.getItem(restoringKey) && !(await this.wantsBack(mesh.name))) {
-        sessionStorage.removeItem(restoringKey);
-        return false;
-      }
+      const when = sessionStorage.getItem(restoringKey) ? await this.wantsBack(mesh.name) : "now";
+      if (when === "never") sessionStorage.removeItem(restoringKey);
+      if (when === "later") await this.#putOff();
+      if (when !== "now") return false;
       this.#show(work, mesh);
       return true;
     } catch {
@@ -82,15 +85,23 @@ export class Keeper {
         break;
       }
     }
-    if (this.#id === "") {
-      this.#id = [...crypto.getRandomValues(new Uint8Array(8))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
-      await claim(this.#id, patienceMs);
-    }
+    if (this.#id === "") await this.#claimNew();
     sessionStorage.setItem(key, this.#id);
     // Only now does nobody else write to it.
     const works = await store.works();
     void this.#makeRoom(store, works).catch(() => undefined); // the next page tries again
     return works.find(({ id, address }) => id === this.#id && address === location.search);
+  }
+
+  async #claimNew(): Promise<void> {
+    this.#id = [...crypto.getRandomValues(new Uint8Array(8))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+    await claim(this.#id, patienceMs);
+  }
+
+  /** The work stays kept. The next reload asks again, unless there is other work of this tab by then. */
+  async #putOff(): Promise<void> {
+    await this.#claimNew();
+    this.#hasPutOff = true;
   }
 
   /** Lets go of what is old or too much, but of nothing that a tab has open, this one's included. */
@@ -141,6 +152,11 @@ export class Keeper {
         const work = { version: 1, id: this.#id, address, savedAt: Date.now(), document, camera } as const;
         await this.#store!.put({ ...work, view: { ...view, ...kept.view } }, mesh === this.#keptMesh ? undefined : mesh);
         this.#keptMesh = mesh;
+        if (this.#hasPutOff) {
+          sessionStorage.setItem(key, this.#id);
+          sessionStorage.removeItem(restoringKey);
+          this.#hasPutOff = false;
+        }
       } else {
         await this.#store!.remove([this.#id]);
         this.#keptMesh = undefined;

@@ -18,7 +18,11 @@ const nudges: Record<string, readonly [number, number, number]> = {
 export function startShortcuts(app: App, files: Files, help: HTMLDialogElement): void {
   window.addEventListener("keydown", (event) => {
     const target = event.target as HTMLElement;
-    if (help.open || target.matches("input:not([type=range]):not([type=checkbox]), select, textarea, [role=menuitem]")) return;
+    if (
+      document.querySelector("dialog:modal") ||
+      target.matches("input:not([type=range]):not([type=checkbox]), select, textarea, [role=menuitem]")
+    )
+      return;
     const isHandled =
       event.ctrlKey || event.metaKey ? withControl(app, event) : !event.altKey && alone(app, files, help, event, target);
     if (isHandled) event.preventDefault();

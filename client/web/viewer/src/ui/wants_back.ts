@@ -1,8 +1,11 @@
 import { el } from "./dom.js";
 
-/** Asks whether work is to be shown again that the page perhaps could not bear; Escape says no. */
-export function wantsBack(name: string): Promise<boolean> {
+export type Answer = "now" | "later" | "never";
+
+/** Asks when work is to be shown again that the page perhaps could not bear; Escape puts it off. */
+export function wantsBack(name: string): Promise<Answer> {
   const yes = el("button", { type: "button", className: "plain", textContent: "Show it again" });
+  const later = el("button", { type: "button", className: "plain", textContent: "Not now" });
   const no = el("button", { type: "button", className: "plain", textContent: "Discard it" });
   const sheet = el(
     "dialog",
@@ -11,13 +14,16 @@ export function wantsBack(name: string): Promise<boolean> {
     el("p", {}, "The page stopped while it was bringing this work back. It may be too large for this browser."),
     yes,
     " ",
+    later,
+    " ",
     no,
   );
   document.body.append(sheet);
   sheet.showModal();
-  return new Promise<boolean>((resolve) => {
-    yes.addEventListener("click", () => resolve(true));
-    no.addEventListener("click", () => resolve(false));
-    sheet.addEventListener("close", () => resolve(false));
+  return new Promise<Answer>((resolve) => {
+    yes.addEventListener("click", () => resolve("now"));
+    later.addEventListener("click", () => resolve("later"));
+    no.addEventListener("click", () => resolve("never"));
+    sheet.addEventListener("close", () => resolve("later"));
   }).finally(() => sheet.remove());
 }

@@ -199,6 +199,21 @@ it("work at which the page stopped is shown again only where that is wanted", as
   expect(await question.isVisible()).toBe(false);
 
   await stop();
+  for (const putOff of [() => user.page.keyboard.press("Escape"), () => question.getByText("Not now").click()]) {
+    await user.page.reload();
+    await question.waitFor();
+    await putOff();
+    await user.settled();
+    expect(await user.ask("app.history.canUndo")).toBe(false);
+    expect(await work()).not.toBe(bent);
+    await user.page.waitForTimeout(700);
+  }
+  await user.page.reload(); // it is there yet
+  await question.getByRole("button", { name: "Show it again" }).click();
+  await user.settled();
+  expect(await work()).toBe(bent);
+
+  await stop();
   await user.page.reload();
   await question.getByRole("button", { name: "Discard it" }).click();
   await user.settled();
@@ -298,4 +313,28 @@ it("a browser that keeps nothing asks before the page is left", async () => {
   await page.locator(".dock").getByRole("button", { name: "6", exact: true }).click();
   await page.reload();
   expect(asked).toEqual(["beforeunload"]);
+});
+
+it("a browser that lets the page remember nothing shows it all the same", async () => {
+  const context = await user.browser.newContext({ viewport: { width: 1280, height: 800 }, bypassCSP: true });
+  await context.addInitScript(() => {
+    for (const storage of ["localStorage", "sessionStorage"] as const) {
+      Object.defineProperty(window, storage, {
+        get() {
+          throw new DOMException("Access is denied for this document.", "SecurityError");
+        },
+      });
+    }
+  });
+  const page = await context.newPage();
+  const errors: string[] = [];
+  page.on("pageerror", ({ message }) => errors.push(message));
+  await page.goto(user.page.url());
+  await page.waitForFunction("window.__lpdeform?.frame()?.converged");
+  const theme = () => page.evaluate<string>("document.documentElement.dataset.theme");
+  const before = await theme();
+  await page.evaluate("__lpdeform.app.view.set({ isDark: !__lpdeform.app.view.now.isDark })");
+  expect([before, await theme()]).toEqual(["light", "dark"]);
+  await page.emulateMedia({ colorScheme: "dark" });
+  expect(errors).toEqual([]);
 });
