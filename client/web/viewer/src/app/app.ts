@@ -127,7 +127,7 @@ export class App {
 
   /** `isBroughtBack`: somebody has worked on it. */
   open(mesh: Mesh, document: Document, isBroughtBack = false): void {
-    if (this.isTouched) this.#aside = this.#present();
+    if (this.isTouched) this.#aside = { ...this.#present(), steps: this.history.steps, isLetGo: false };
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
     this.adjacency = adjacencyOf(mesh.positions.length / 3, mesh.faces);
@@ -147,11 +147,10 @@ export class App {
     this.fit();
   }
 
-  #present(): Aside {
+  #present(): Kept {
     const { shape, detail, selected, isYUp, pinned } = this.view.now;
     const { look } = this.panes[0]!.stage;
-    const view = { shape, detail, selected, isYUp, pinned };
-    return { mesh: this.mesh, document: this.document, steps: this.history.steps, view, look, isLetGo: false };
+    return { mesh: this.mesh, document: this.document, view: { shape, detail, selected, isYUp, pinned }, look };
   }
 
   /**
