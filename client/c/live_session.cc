@@ -86,7 +86,10 @@ void LiveSession::hand_over(client::Session opened) {
   const std::scoped_lock lock(mutex_);
   if (pending_ && !facts_.is_reader) {
     const absl::StatusOr<std::uint64_t> seq = session->update(*std::move(pending_));
-    if (seq.ok()) seq_offset_ = static_cast<std::int64_t>(pending_count_ - *seq);
+    if (seq.ok()) {
+      seq_offset_ = static_cast<std::int64_t>(pending_count_ - *seq);
+      first_seq_ = *seq;
+    }
   }
   pending_.reset();
   session->start();
@@ -116,6 +119,7 @@ absl::StatusOr<std::uint64_t> LiveSession::send(client::Update update) {
 
 /// Our number of the session's change `seq`. Callers have seen session_, and seq_offset_ does not change after.
 std::uint64_t LiveSession::ours(std::uint64_t seq) const {
+  if (seq < first_seq_) return 0;
   return static_cast<std::uint64_t>(std::max<std::int64_t>(0, static_cast<std::int64_t>(seq) + seq_offset_));
 }
 
@@ -171,7 +175,14 @@ absl::Status LiveSession::check(const lpdeform_buffers& buffers) const {
   return check_buffers(buffers, vertex_count(), facts_.contents);
 }
 
-std::optional<lpdeform_frame> LiveSession::take(client::Frame frame, const lpdeform_buffers& buffers) {
+absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::take(client::Frame frame,
+                                                                const lpdeform_buffers& buffers) {
+  // The buffers were measured for the mesh; what a server sends is not taken on trust.
+  if (frame.positions.size() != std::size_t{3} * vertex_count()) {
+    return make_fault(absl::StatusCode::kDataLoss, {"FRAME_VERTICES", "", absl::StrCat(vertex_count())},
+                      absl::StrCat("The server sent a frame of ", frame.positions.size() / 3,
+                                   " vertices for a mesh of ", vertex_count(), "."));
+  }
   was_live_ = true;
   frame.input_seq = ours(frame.input_seq);
   const std::scoped_lock lock(frame_mutex_);

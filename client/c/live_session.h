@@ -68,7 +68,8 @@ class LiveSession {
   absl::Status check(const lpdeform_buffers& buffers) const;
   absl::StatusOr<std::shared_ptr<client::Session>> session() const;
   absl::StatusOr<std::shared_ptr<client::Session>> wait_for_session(Clock::time_point deadline);
-  std::optional<lpdeform_frame> take(client::Frame frame, const lpdeform_buffers& buffers);
+  /// DATA_LOSS FRAME_VERTICES.
+  absl::StatusOr<std::optional<lpdeform_frame>> take(client::Frame frame, const lpdeform_buffers& buffers);
 
   Opening opening_;  // of the thread; empty once it is of no more use
   const Facts facts_;
@@ -79,6 +80,8 @@ class LiveSession {
   std::optional<client::Update> pending_;     // what was changed before
   std::uint64_t pending_count_ = 0;           // so many changes
   std::int64_t seq_offset_ = 0;               // of our numbers over the session's
+  std::uint64_t first_seq_ =
+      0;  // of the session's, that the changes made before it became; earlier ones are not ours
   absl::Status last_problem_;
   absl::Status refused_;
   mutable std::atomic<bool> was_live_ = false;  // seen so, or a frame came

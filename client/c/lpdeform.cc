@@ -146,8 +146,7 @@ lpdeform_code lpdeform_connect(const lpdeform_connection* connection, lpdeform_c
 lpdeform_code lpdeform_set_token(lpdeform_client* to, const char* token, lpdeform_error* error) {
   return guarded(error, [&]() -> absl::Status {
     if (to == nullptr) return argument_missing("client");
-    to->server->set_token(token == nullptr ? "" : token);
-    return absl::OkStatus();
+    return to->server->set_token(token == nullptr ? "" : token);
   });
 }
 

@@ -48,7 +48,8 @@ absl::StatusOr<std::shared_ptr<Server>> make_server(const lpdeform_connection& g
   options.reconnect_for = milliseconds(given.reconnect_seconds, 1e9);
   if (given.tls != 0) options.tls = tls;
   auto server = std::make_shared<Server>(given.address, std::move(options), given.reconnect_seconds);
-  server->set_token(text(given.token));
+  const absl::Status has_token = server->set_token(text(given.token));
+  if (!has_token.ok()) return has_token;
   return server;
 }
 

@@ -1,15 +1,25 @@
 #include "client/c/server.h"
 
+#include <algorithm>
 #include <utility>
+
+#include "core/base/fault.h"
 
 namespace lpdeform::engine {
 
 Server::Server(std::string address, client::ClientOptions options, double reconnect_seconds)
     : address_(std::move(address)), options_(std::move(options)), reconnect_seconds_(reconnect_seconds) {}
 
-void Server::set_token(std::string token) {
+absl::Status Server::set_token(std::string token) {
+  const auto is_allowed = [](char letter) { return letter >= 0x20 && letter <= 0x7e; };
+  if (!std::ranges::all_of(token, is_allowed)) {
+    return invalid_input(
+        {"TOKEN_CHARACTERS", "token", "printable ASCII"},
+        "The token has a character that a header cannot carry; a line break at its end, perhaps.");
+  }
   const std::scoped_lock lock(token_->mutex);
   token_->text = std::move(token);
+  return absl::OkStatus();
 }
 
 absl::StatusOr<client::Client> Server::connected() {

@@ -23,7 +23,8 @@ class Server : public std::enable_shared_from_this<Server> {
   /// `options.token` is not used: see set_token.
   Server(std::string address, client::ClientOptions options, double reconnect_seconds);
 
-  void set_token(std::string token);
+  /// INVALID_ARGUMENT TOKEN_CHARACTERS; the token in force stays then.
+  absl::Status set_token(std::string token);
 
   std::shared_ptr<LiveSession> start(Open open, LiveSession::Facts facts);
 

@@ -44,7 +44,8 @@ struct ClientOptions {
   /// solve under way says it too, and may be asked for again.
   std::chrono::milliseconds reconnect_for = std::chrono::minutes(2);
   std::optional<Tls> tls = {};  // empty: plain text
-  /// Gives the bearer token of each call when that begins, so that tokens may be renewed; on any thread. Empty, or an empty text: none.
+  /// Gives the bearer token of each call when that begins, so that tokens may be renewed; on any thread. Empty, or an empty text: none;
+  /// a text with anything but printable ASCII counts as none.
   std::function<std::string()> token = {};
 };
 

@@ -76,10 +76,16 @@ struct Caller {
   std::string id = new_request_id();
 };
 
-/// The header lpdeform-session lets a proxy before several servers send all calls of a client to one of them.
+/// gRPC ends the process over a header with any other.
+bool has_only_letters_of_headers(std::string_view text) {
+  return std::ranges::all_of(text, [](char letter) { return letter >= 0x20 && letter <= 0x7e; });
+}
+
+/// A token that no header can carry is left out: the server says that it has none. The header lpdeform-session lets a proxy before several servers send all calls of a client to one of them.
 void introduce(const Caller& caller, grpc::ClientContext& context) {
   const std::string text = caller.token ? caller.token() : "";
-  if (!text.empty()) context.AddMetadata("authorization", "Bearer " + text);
+  if (!text.empty() && has_only_letters_of_headers(text))
+    context.AddMetadata("authorization", "Bearer " + text);
   context.AddMetadata("lpdeform-session", caller.id);
 }
 

@@ -159,6 +159,23 @@ TEST_F(CSessionTest, WorksThoughTheServerComesLater) {
   EXPECT_EQ(frame_.converged, 1);
 }
 
+TEST_F(CSessionTest, NoFrameClaimsAChangeThatItDoesNotHave) {
+  server_.stop();
+  open(strip_.mesh());
+  hold("base", {0, 1});
+  hold("tip", {20, 21});
+  const lpdeform_motion up = shift(0, 2, 0);
+  ASSERT_EQ(lpdeform_move_handle(session_, "tip", &up, nullptr, &error_), LPDEFORM_OK);
+  server_.start_again();
+  std::vector<Point> points(22);
+  const lpdeform_buffers buffers = into(points);
+  EXPECT_TRUE(eventually([&] {
+    if (lpdeform_poll(session_, &buffers, &frame_, &error_) != LPDEFORM_OK) return false;
+    EXPECT_TRUE(frame_.input_seq == 0 || points[20][1] == 2) << frame_.input_seq;
+    return frame_.input_seq == 3 && frame_.converged == 1;
+  }));
+}
+
 TEST_F(CSessionTest, NumbersOfChangesGoOnFromThoseBeforeTheConnection) {
   server_.stop();
   open(strip_.mesh());

@@ -71,6 +71,22 @@ class CTokenTest : public testing::Test {
   lpdeform_error error_{};
 };
 
+TEST_F(CTokenTest, ATokenThatNoHeaderCanCarryIsRefusedAndNotRepeated) {
+  for (const std::string token : {"secret\n", "sec\rret", "secr\xc3\xa9t", "secret\x7f"}) {
+    EXPECT_EQ(lpdeform_set_token(client_, token.c_str(), &error_), LPDEFORM_INVALID_ARGUMENT);
+    EXPECT_STREQ(error_.reason, "TOKEN_CHARACTERS");
+    EXPECT_EQ(std::string(error_.message).find("sec"), std::string::npos) << error_.message;
+    lpdeform_connection connection{};
+    connection.struct_size = sizeof connection;
+    const std::string address = server_->address();
+    connection.address = address.c_str();
+    connection.token = token.c_str();
+    lpdeform_client* none = nullptr;
+    EXPECT_EQ(lpdeform_connect(&connection, &none, &error_), LPDEFORM_INVALID_ARGUMENT);
+    EXPECT_EQ(none, nullptr);
+  }
+}
+
 TEST_F(CTokenTest, WithoutATokenTheSessionIsRefused) {
   EXPECT_EQ(open(), LPDEFORM_STATE_REFUSED);
   EXPECT_EQ(error_.code, LPDEFORM_UNAUTHENTICATED);
