@@ -1,8 +1,8 @@
 #include "client/c/server.h"
 
-#include <algorithm>
 #include <utility>
 
+#include "client/cpp/rpc.h"
 #include "core/base/fault.h"
 
 namespace lpdeform::engine {
@@ -11,8 +11,7 @@ Server::Server(std::string address, client::ClientOptions options, double reconn
     : address_(std::move(address)), options_(std::move(options)), reconnect_seconds_(reconnect_seconds) {}
 
 absl::Status Server::set_token(std::string token) {
-  const auto is_allowed = [](char letter) { return letter >= 0x20 && letter <= 0x7e; };
-  if (!std::ranges::all_of(token, is_allowed)) {
+  if (!client::is_header_text(token)) {
     return invalid_input(
         {"TOKEN_CHARACTERS", "token", "printable ASCII"},
         "The token has a character that a header cannot carry; a line break at its end, perhaps.");

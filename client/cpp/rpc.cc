@@ -16,6 +16,10 @@
 #include "lpdeform/v1/service.grpc.pb.h"
 
 namespace lpdeform::client {
+
+bool is_header_text(std::string_view text) {
+  return std::ranges::all_of(text, [](char letter) { return letter >= 0x20 && letter <= 0x7e; });
+}
 namespace {
 
 using Stub = v1::DeformService::Stub;
@@ -76,16 +80,10 @@ struct Caller {
   std::string id = new_request_id();
 };
 
-/// gRPC ends the process over a header with any other.
-bool has_only_letters_of_headers(std::string_view text) {
-  return std::ranges::all_of(text, [](char letter) { return letter >= 0x20 && letter <= 0x7e; });
-}
-
 /// A token that no header can carry is left out: the server says that it has none. The header lpdeform-session lets a proxy before several servers send all calls of a client to one of them.
 void introduce(const Caller& caller, grpc::ClientContext& context) {
   const std::string text = caller.token ? caller.token() : "";
-  if (!text.empty() && has_only_letters_of_headers(text))
-    context.AddMetadata("authorization", "Bearer " + text);
+  if (!text.empty() && is_header_text(text)) context.AddMetadata("authorization", "Bearer " + text);
   context.AddMetadata("lpdeform-session", caller.id);
 }
 

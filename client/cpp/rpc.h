@@ -5,6 +5,7 @@
 #include <memory>
 #include <stop_token>
 #include <string>
+#include <string_view>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -12,6 +13,9 @@
 #include "lpdeform/v1/service.pb.h"
 
 namespace lpdeform::client {
+
+/// Printable ASCII: what a header may be. gRPC ends the process over any other.
+bool is_header_text(std::string_view text);
 
 /// One Deform call. read() on one thread, write() on one other; cancel() on any, as often as one likes.
 class DeformCall {

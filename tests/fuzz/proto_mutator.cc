@@ -156,8 +156,7 @@ struct Setter {
   }
 };
 
-/// True where the message was changed in this field, false where what is in it is to be changed instead.
-bool mutate_repeated(Message& message, const FieldDescriptor& field, std::mt19937& random) {
+void mutate_repeated(Message& message, const FieldDescriptor& field, std::mt19937& random) {
   const Reflection& r = *message.GetReflection();
   const int size = r.FieldSize(message, &field);
   const bool is_message = field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
@@ -168,28 +167,27 @@ bool mutate_repeated(Message& message, const FieldDescriptor& field, std::mt1993
     else
       change_scalar(
           field, random, [](auto none) { return none; }, Setter{message, field, size});
-    return true;
+    return;
   }
   const int index = static_cast<int>(below(static_cast<std::size_t>(size), random));
   if (what == 1) {
     r.SwapElements(&message, &field, index, size - 1);
     r.RemoveLast(&message, &field);
-    return true;
+    return;
   }
   if (what == 2) {
     r.SwapElements(&message, &field, index, static_cast<int>(below(static_cast<std::size_t>(size), random)));
-    return true;
+    return;
   }
   if (what == 3 && is_message) {
     r.AddMessage(&message, &field)->CopyFrom(r.GetRepeatedMessage(message, &field, index));
-    return true;
+    return;
   }
   if (!is_message) {
     change_scalar(field, random, Value{message, field, index}, Setter{message, field, index});
-    return true;
+    return;
   }
   mutate(*r.MutableRepeatedMessage(&message, &field, index), random);
-  return true;
 }
 
 }  // namespace
@@ -206,10 +204,7 @@ void mutate(Message& message, std::mt19937& random) {
                                      ? *fields[below(fields.size(), random)]
                                      : *descriptor.field(static_cast<int>(below(
                                            static_cast<std::size_t>(descriptor.field_count()), random)));
-  if (field.is_repeated()) {
-    mutate_repeated(message, field, random);
-    return;
-  }
+  if (field.is_repeated()) return mutate_repeated(message, field, random);
   if (takes_present && below(12, random) == 0) return r.ClearField(&message, &field);
   if (field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE)
     return mutate(*r.MutableMessage(&message, &field), random);
