@@ -4,8 +4,7 @@
 
 namespace lpdeform {
 
-bool Problem::factor_metric(Metric::Precision precision) const {
-  const std::vector<double>& cell_weights = objective.cells().cell_weights();
+bool Problem::factor_metric(const std::vector<double>& cell_weights, Metric::Precision precision) const {
   std::vector<MatrixEntry> entries = objective.soft_terms().matrix_entries(objective.soft_weights());
   if (!constraints.linear.empty()) {
     precision = Metric::Precision::kDouble;

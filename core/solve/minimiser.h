@@ -25,9 +25,13 @@ struct Problem {
   const RestShape& shape() const { return objective.cells().shape(); }
   const Workers& workers() const { return objective.cells().workers(); }
 
-  /// Factors the metric for the weights of the objective's last evaluation; with linear constraints always in
-  /// double precision. False where that fails.
-  [[nodiscard]] bool factor_metric(Metric::Precision precision) const;
+  /// Factors the metric for the weights of the objective's last evaluation, or for others of the cells; with linear
+  /// constraints always in double precision. False where that fails.
+  [[nodiscard]] bool factor_metric(Metric::Precision precision) const {
+    return factor_metric(objective.cells().cell_weights(), precision);
+  }
+  [[nodiscard]] bool factor_metric(const std::vector<double>& cell_weights,
+                                   Metric::Precision precision) const;
   /// x = M^-1 b within what the constraints allow: a direction that they allow, for any b. x may be b.
   void solve(const Points& b, Points& x) const;
   /// The same to single precision, several times as fast.

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kChunk = 12288;      // numbers
 constexpr double kLeastCurvature = 1e-12;  // <s, y> over |s| |y|
-constexpr double kLeastGamma = 0.05;
+constexpr double kLeastGamma = 0.05, kMostGamma = 4;
 
 }  // namespace
 
@@ -74,7 +74,7 @@ double PairMemory::direction(const Points& gradient, const Points& gradient_befo
   }
 
   const std::size_t m = pairs_.size();
-  if (m > 0) gamma_ = std::clamp(pairs_.back().sy.back() / pairs_.back().zy.back(), kLeastGamma, 1.0);
+  if (m > 0) gamma_ = std::clamp(pairs_.back().sy.back() / pairs_.back().zy.back(), kLeastGamma, kMostGamma);
   const auto sg = [&](std::size_t i) { return sums[kSumsBefore + kSumsOfPair * i]; };
   const auto zg = [&](std::size_t i) { return sums[kSumsBefore + kSumsOfPair * i + 1]; };
   std::vector<double> a(m), b(m);

@@ -15,8 +15,9 @@ namespace lpdeform {
 ///
 /// with M the metric, columns s = x' - x and z = M^-1 y = h' - h of S and Z, y = g' - g, R the upper triangle of
 /// S^T Y, D its diagonal, W = Z^T Y. H_0 = gamma M^-1 with gamma = <s, y> / <z, y> of the newest pair (Nocedal &
-/// Wright, 7.20), at most 1: for p > 2 the metric lacks the curvature along the residuals, (p - 1) times as much,
-/// and full steps would be too long. It outlives clear().
+/// Wright, 7.20), between 0.05 and 4: for p > 2 the metric lacks the curvature along the residuals, (p - 1) times as
+/// much, and full steps would be too long; where rotations follow a step, it has more than there is, and full steps
+/// would be about half as long as they should. It outlives clear().
 ///
 /// All vectors are swept over twice an iteration and no more. Pairs are kept in single precision: they only steer.
 /// Runs in parallel in fixed chunks: the same bits on any number of threads. One caller at a time.

@@ -15,6 +15,7 @@ constexpr double kShortStep = 0.9;  // asks for one
 constexpr int kTrial = 10;          // iterations for which a live session keeps the metric that it finds
 constexpr double kSufficientDecrease = 1e-4;
 constexpr int kStageIterations = 60;
+constexpr double kStageTolerance = 30;  // times the tolerance ends a stage that is not the last
 constexpr double kSmoothingStep = 0.1;  // of eps^2, from stage to stage
 constexpr double kBias = 3e-4;
 constexpr double kLiveBias = 0.1;  // of the mean cell's E^p
@@ -76,11 +77,25 @@ bool QuasiNewton::is_smooth_enough() const {
   return std::pow(std::sqrt(eps2_) / mean_energy(), problem_.norm.lowest_p()) <= kBias;
 }
 
+/// The cell weights c_i, those for p_i > 2 raised to their mean where they are below it.
+std::vector<double> QuasiNewton::metric_weights() const {
+  std::vector<double> weights = problem_.objective.cells().cell_weights();
+  if (norm_.highest_p() <= 2) return weights;
+  double sum = 0, count = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    if (norm_.p(static_cast<std::int32_t>(i)) > 2) sum += weights[i], ++count;
+  }
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    if (norm_.p(static_cast<std::int32_t>(i)) > 2) weights[i] = std::max(weights[i], sum / count);
+  }
+  return weights;
+}
+
 /// In a live session the metric of the state before serves at first: a factorisation takes as long as several
 /// iterations.
 bool QuasiNewton::adopt_metric() {
   since_refresh_ = kRefresh - kTrial;
-  problem_.metric.adopt(problem_.objective.cells().cell_weights());
+  problem_.metric.adopt(metric_weights());
   return true;
 }
 
@@ -100,7 +115,7 @@ bool QuasiNewton::refresh_metric() {
   since_refresh_ = 0;
   const auto version = problem_.metric.version();
   const double scale = problem_.metric.scale();
-  if (!problem_.factor_metric(Metric::Precision::kSingle)) return false;
+  if (!problem_.factor_metric(metric_weights(), Metric::Precision::kSingle)) return false;
   if (problem_.metric.version() == version && problem_.metric.scale() == scale) return true;
   memory_.clear();
   if (step_length_ > 0) problem_.precondition(gradient_before_, preconditioned_);
@@ -150,7 +165,8 @@ double QuasiNewton::search(double slope) {
 
 bool QuasiNewton::is_stage_over() const {
   if (history_.size() <= kWindow) return false;
-  return history_.front() - history_.back() <= problem_.tolerance * norm_.highest_p() * history_.back();
+  const double tolerance = (is_last_stage_ ? 1 : kStageTolerance) * problem_.tolerance;
+  return history_.front() - history_.back() <= tolerance * norm_.highest_p() * history_.back();
 }
 
 /// problem_.objective holds the evaluation at x_.

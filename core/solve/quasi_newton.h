@@ -17,7 +17,9 @@ enum class Warmth {
 };
 
 /// Limited-memory BFGS (Nocedal & Wright, algorithm 7.4) on E(x) with the reweighted Laplacian as its initial
-/// metric (after Liu et al. 2017), t = 1 first, backtracking by interpolation. The default for every p.
+/// metric (after Liu et al. 2017), t = 1 first, backtracking by interpolation. The default for every p. Where p_i > 2,
+/// a cell counts in the metric at least as much as such cells do on the average: with c_i ~ E_i^(p_i - 2) alone a
+/// cell that is at rest hardly counts, each step throws its energy up, and the search makes the step short.
 ///
 /// Where some p_i < 2 it runs through stages: p from 2 towards p_i, then cell energies smoothed with an eps
 /// that falls until it does not matter. Each stage begins with a metric refactored for the present cell
@@ -43,6 +45,7 @@ class QuasiNewton : public Minimiser {
   double mean_energy() const;
   double first_smoothing(Warmth warmth, double lowest_p) const;
   bool is_smooth_enough() const;
+  std::vector<double> metric_weights() const;
   bool adopt_metric();
   void find_gradient();
   void forget();

@@ -46,7 +46,7 @@ class PairMemoryTest : public testing::TestWithParam<int> {
       v -= alpha[i] * changes_[i];
     }
     const Points &s = steps_.back(), &y = changes_.back();
-    const double gamma = std::min(1.0, dot(s, y) / dot(y, y.cwiseQuotient(metric_)));
+    const double gamma = std::clamp(dot(s, y) / dot(y, y.cwiseQuotient(metric_)), 0.05, 4.0);
     v = (gamma * v).cwiseQuotient(metric_);
     for (std::size_t i = first; i < steps_.size(); ++i) {
       v += (alpha[i] - dot(changes_[i], v) / dot(steps_[i], changes_[i])) * steps_[i];
