@@ -88,10 +88,11 @@ std::function<void(double)> Backend::observer(Span span) const {
   return [metrics = metrics, span](double seconds) { metrics->observe(span, seconds); };
 }
 
-std::string Backend::metrics_text() const {
+std::string Backend::metrics_text() {
   metrics->set(Level::kSessions, static_cast<double>(registry->size()));
   metrics->set(Level::kUploads, static_cast<double>(uploads_->size()));
   metrics->set(Level::kMemoryBytes, static_cast<double>(budget_->used()));
+  metrics->set(Level::kOverloaded, scheduler.is_overloaded() ? 1 : 0);
   metrics->set(Level::kDraining, gate.is_closed() ? 1 : 0);
   return metrics->text();
 }

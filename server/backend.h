@@ -101,7 +101,7 @@ class Backend {
   const Log& log() const { return *log_; }
 
   /// All metrics in Prometheus's text format.
-  std::string metrics_text() const;
+  std::string metrics_text();
 
   /// A new record of a call, for its edge.
   std::shared_ptr<CallRecord> begin_record(std::string method, CallContext context);

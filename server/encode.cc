@@ -246,6 +246,14 @@ void align_event(const Note& note, const google::protobuf::MessageLite& message,
   }
 }
 
+void encode_notice(const LoadNote& load, v1::Notice& out) {
+  out.set_reason(load.is_overloaded ? v1::NOTICE_REASON_OVERLOADED : v1::NOTICE_REASON_RECOVERED);
+  out.set_text(
+      load.is_overloaded
+          ? "The server has more to solve than it can: frames come less often, and refined ones later."
+          : "The server keeps up with its work again.");
+}
+
 void encode_event(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
                   v1::StreamEvent& out) {
   const Match put{[&](const OpenedNote& opened) {
@@ -270,6 +278,7 @@ void encode_event(const Note& note, const FrameStream& stream, std::uint32_t ver
                   [&](const FramePiece& piece) { encode_piece(piece, *out.mutable_frame()); },
                   [&](const UpdateResult&) {},  // no event: see encode() of a DeformResponse
                   [&](const FaultNote& fault) { encode(fault, *out.mutable_fault()); },
+                  [&](const LoadNote& load) { encode_notice(load, *out.mutable_notice()); },
                   [&](const HeartbeatNote&) { out.mutable_heartbeat(); },
                   [&](const EndNote& end) {
                     out.mutable_go_away()->set_reason(encode_reason(end.reason));

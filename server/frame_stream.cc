@@ -23,13 +23,15 @@ Format StreamOptions::format_for(const Surface& surface) const {
 }
 
 FrameStream::FrameStream(StreamOptions options, std::shared_ptr<Publisher> publisher,
-                         std::shared_ptr<Timers> timers, Timers::Duration heartbeat, OpenedNote opened)
+                         std::shared_ptr<Timers> timers, Timers::Duration heartbeat, OpenedNote opened,
+                         IsOverloaded is_overloaded)
     : id_(random_hex_128()),
       options_(options),
       publisher_(std::move(publisher)),
       timers_(std::move(timers)),
       heartbeat_(heartbeat),
       opened_(opened),
+      is_overloaded_(std::move(is_overloaded)),
       last_frame_at_(timers_->now()),
       last_sent_at_(last_frame_at_) {}
 
@@ -66,6 +68,10 @@ std::optional<Note> FrameStream::next_locked(Timers::TimePoint now) {
     is_ended_ = true;
     cutter_ = {};
     return *std::move(end_);
+  }
+  if (is_overloaded_ && !cutter_.has_more() && is_overloaded_() != has_said_overloaded_) {
+    has_said_overloaded_ = !has_said_overloaded_;
+    return LoadNote{has_said_overloaded_};
   }
   if (!cutter_.has_more()) begin_frame(now);
   const bool is_answers_turn = !cutter_.has_more() || !std::exchange(was_answer_, false);

@@ -47,6 +47,10 @@ struct OpenedNote {
   std::uint64_t input_seq = 0;
 };
 struct HeartbeatNote {};
+/// The server has more to do than it can, or has no more.
+struct LoadNote {
+  bool is_overloaded = false;
+};
 struct FaultNote {
   absl::Status status;
   std::uint64_t input_seq = 0;
@@ -55,15 +59,18 @@ struct EndNote {
   EndReason reason = EndReason::kDraining;
   std::string text;
 };
-using Note = std::variant<OpenedNote, FramePiece, UpdateResult, FaultNote, HeartbeatNote, EndNote>;
+using Note = std::variant<OpenedNote, FramePiece, UpdateResult, FaultNote, LoadNote, HeartbeatNote, EndNote>;
 
 /// One reader of a session: decides what to send to it, and when. It holds at most one frame, the one that is
 /// being cut into pieces; what waits is the publisher's newest. A frame is begun only when fewer than
 /// `credit` frames are sent and not acknowledged. Thread-safe; calls no one under its lock but the publisher.
 class FrameStream : public std::enable_shared_from_this<FrameStream> {
  public:
+  /// Whether the server is overloaded now; must not wait. Empty where nobody knows.
+  using IsOverloaded = std::function<bool()>;
+
   FrameStream(StreamOptions options, std::shared_ptr<Publisher> publisher, std::shared_ptr<Timers> timers,
-              Timers::Duration heartbeat, OpenedNote opened);
+              Timers::Duration heartbeat, OpenedNote opened, IsOverloaded is_overloaded = {});
 
   const std::string& id() const { return id_; }
   const StreamOptions& options() const { return options_; }
@@ -111,6 +118,7 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   const std::shared_ptr<Timers> timers_;
   const Timers::Duration heartbeat_;
   const OpenedNote opened_;
+  const IsOverloaded is_overloaded_;
 
   mutable std::mutex mutex_;
   std::function<void()> waker_;
@@ -125,6 +133,7 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   std::uint64_t last_taken_ = 0;
   bool has_sent_frame_ = false;
   bool is_stalled_ = false;  // a frame waits for credit
+  bool has_said_overloaded_ = false;
   std::uint64_t last_fault_ = 0;
   std::size_t last_bytes_ = 0;  // of the last frame's numbers
   Timers::TimePoint last_frame_at_;

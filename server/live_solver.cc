@@ -32,7 +32,7 @@ LiveSolver::LiveSolver(std::unique_ptr<Deformer> deformer, const Mailbox& mailbo
   publish(mailbox_.newest().handles->handles().empty());
 }
 
-bool LiveSolver::run_slice(SolveJob* job) {
+bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
   const Inputs newest = mailbox_.newest();
   if (job != nullptr && newest.version > job->version) job->finish(superseded(newest.input_seq));
   if (job != nullptr && job->is_done()) job = nullptr;
@@ -52,7 +52,7 @@ bool LiveSolver::run_slice(SolveJob* job) {
     running_for_ = wanted;
     was_begun_ = true;
   }
-  run_steps(job);
+  run_steps(job, pace);
   return phase_ != Phase::kDone;  // where the solve was cancelled, somebody else may wait
 }
 
@@ -111,18 +111,20 @@ void LiveSolver::pause() {
   running_for_ = kNobody;
 }
 
-void LiveSolver::run_steps(SolveJob* job) {
-  const Clock::time_point end = Clock::now() + kSlice;
+void LiveSolver::run_steps(SolveJob* job, const Pace& pace) {
+  const Clock::time_point end = Clock::now() + pace.slice;
   bool has_more = true;
   while (has_more && Clock::now() < end) has_more = deformer_->step();
   if (!has_more) return end_solve(job);
   if (job != nullptr) report(*job);
-  if (is_frame_due()) publish(false);
+  if (is_frame_due(pace)) publish(false);
 }
 
 /// Somebody may be sent one at once, or will get what waits when they have taken what was sent to them.
-bool LiveSolver::is_frame_due() const {
+bool LiveSolver::is_frame_due(const Pace& pace) const {
   if (deformer_->is_certifying()) return false;  // the positions are those of the result
+  const bool is_refinement = shown_version_ == inputs_.version;
+  if (pace.is_sparing && is_refinement && Clock::now() - last_published_ < kBetweenRefinements) return false;
   if (publisher_.is_frame_wanted()) return true;
   return publisher_.reader_count() > 0 && Clock::now() - last_published_ >= kOldestWaiting;
 }
@@ -179,6 +181,7 @@ void LiveSolver::report(const SolveJob& job) {
 
 std::shared_ptr<const Frame> LiveSolver::publish(bool is_final) {
   last_published_ = Clock::now();
+  shown_version_ = inputs_.version;
   const SolveSummary& summary = deformer_->summary();
   Frame frame;
   frame.input_seq = inputs_.input_seq;

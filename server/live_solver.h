@@ -36,22 +36,33 @@ class LiveSolver {
   LiveSolver(std::unique_ptr<Deformer> deformer, const Mailbox& mailbox, Publisher& publisher,
              std::shared_ptr<const DrawMesh> mesh, Alarm alarm, std::stop_token stop);
 
-  /// At most about kSlice, or one step where that takes longer. `job` may be null. True where there is more
+  static constexpr std::chrono::milliseconds kSlice{8};
+  /// While others wait for an answer; under overload.
+  static constexpr std::chrono::milliseconds kShortSlice{1}, kOneStep{0};
+  static constexpr std::chrono::milliseconds kBetweenRefinements{250};
+  static constexpr std::chrono::milliseconds kBetweenReports{100};
+  /// While it runs for readers, none of whom may be sent a frame just now, the one that waits for them is not older.
+  static constexpr std::chrono::milliseconds kOldestWaiting{100};
+  static constexpr std::chrono::milliseconds kQuiet{100};
+  static constexpr double kCertificateSeconds = 10;
+
+  /// How it goes about a slice.
+  struct Pace {
+    std::chrono::milliseconds slice = kSlice;
+    /// Frames that only refine what was shown for the same inputs come every kBetweenRefinements.
+    bool is_sparing = false;
+  };
+
+  /// At most about pace.slice, or one step where that takes longer. `job` may be null. True where there is more
   /// to do.
-  bool run_slice(SolveJob* job);
+  bool run_slice(SolveJob* job, const Pace& pace);
+  bool run_slice(SolveJob* job) { return run_slice(job, Pace()); }
 
   /// Whether a solve was ever begun: from then on memory_bytes() includes the factors.
   bool has_solved() const { return deformer_->summary().method != Method::kAuto; }
 
   /// Bytes held, the shared rest shape left out.
   std::size_t memory_bytes() const;
-
-  static constexpr std::chrono::milliseconds kSlice{8};
-  static constexpr std::chrono::milliseconds kBetweenReports{100};
-  /// While it runs for readers, none of whom may be sent a frame just now, the one that waits for them is not older.
-  static constexpr std::chrono::milliseconds kOldestWaiting{100};
-  static constexpr std::chrono::milliseconds kQuiet{100};
-  static constexpr double kCertificateSeconds = 10;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -67,13 +78,13 @@ class LiveSolver {
   bool begin_job(SolveJob& job);
   bool begin_live();
   void pause();
-  void run_steps(SolveJob* job);
+  void run_steps(SolveJob* job, const Pace& pace);
   void end_solve(SolveJob* job);
   bool look_for_certificate();
   bool begin_certificate();
   void set_alarm();
   void report(const SolveJob& job);
-  bool is_frame_due() const;
+  bool is_frame_due(const Pace& pace) const;
   std::shared_ptr<const Frame> publish(bool is_final);
 
   const std::unique_ptr<Deformer> deformer_;
@@ -92,8 +103,9 @@ class LiveSolver {
   std::uint64_t running_for_ = kNobody;  // the number of a job, or kReaders
   Clock::time_point last_report_;
   Clock::time_point last_published_;
-  Timers::TimePoint answered_at_;  // while kAnswered
-  bool is_alarm_set_ = false;      // since then
+  std::uint64_t shown_version_ = 0;  // of the inputs that the last frame is for
+  Timers::TimePoint answered_at_;    // while kAnswered
+  bool is_alarm_set_ = false;        // since then
 };
 
 }  // namespace lpdeform

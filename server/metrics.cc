@@ -52,6 +52,8 @@ constexpr std::array kLevels{
     Entry{"lpdeform_memory_bytes", "Memory of sessions and uploads by the server's own count."},
     Entry{"lpdeform_memory_limit_bytes", "Memory that they may have (--max-bytes)."},
     Entry{"lpdeform_draining", "1 while the server shuts down."},
+    Entry{"lpdeform_overloaded",
+          "1 while sessions wait for a thread for too long and frames come less often."},
     Entry{"lpdeform_store_failing", "1 while the store does not take what has changed."},
 };
 constexpr std::array kSpans{

@@ -33,6 +33,7 @@ enum class Level {
   kMemoryBytes,
   kMemoryBytesMost,
   kDraining,
+  kOverloaded,
   kStoreFailing
 };
 

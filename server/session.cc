@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -14,6 +15,13 @@ namespace {
 
 /// A slice of a larger mesh may take long: see Scheduler.
 constexpr std::int32_t kHeavyVertices = 20000;
+
+/// One step of a large mesh costs more than many of a small one: with equal shares of the time it would hardly move
+/// beside a crowd of small ones.
+double weight_of(std::int32_t vertices) {
+  constexpr double kPlain = 1000;
+  return std::sqrt(std::max(1.0, vertices / kPlain));
+}
 
 std::int64_t unix_ms_now() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
@@ -65,7 +73,7 @@ absl::StatusOr<std::shared_ptr<Session>> Session::create(SessionParts parts, Ses
 }
 
 Session::Session(SessionParts parts, SessionServices services)
-    : Runnable(parts.shape->vertex_count() > kHeavyVertices),
+    : Runnable(parts.shape->vertex_count() > kHeavyVertices, weight_of(parts.shape->vertex_count())),
       name_(std::move(parts.name)),
       owner_(std::move(parts.owner)),
       shape_(std::move(parts.shape)),
@@ -156,7 +164,7 @@ absl::StatusOr<UpdateResult> Session::update(const std::string& token, const Upd
     result = mailbox_.take(update);
     if (result.ok()) publisher_->took(update.input_seq, since);
   }
-  if (result.ok()) services_.scheduler.wake(shared_from_this());
+  if (result.ok()) services_.scheduler.wake(shared_from_this(), Urgency::kAnswer);
   return result;
 }
 
@@ -192,8 +200,10 @@ absl::StatusOr<std::shared_ptr<FrameStream>> Session::open_stream(const std::str
     if (!token.empty()) {
       if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
     }
-    stream = std::make_shared<FrameStream>(options, publisher_, services_.timers, services_.heartbeat,
-                                           OpenedNote{epoch_, mailbox_.newest().input_seq});
+    stream = std::make_shared<FrameStream>(
+        options, publisher_, services_.timers, services_.heartbeat,
+        OpenedNote{epoch_, mailbox_.newest().input_seq},
+        [&scheduler = services_.scheduler] { return scheduler.is_overloaded(); });
     if (publisher_->reader_count() >= services_.limits.streams)
       return too_many_streams(services_.limits.streams);
     if (!publisher_->add(stream)) return is_draining_ && !is_closed_ ? server_draining() : gone(name_);
@@ -258,7 +268,12 @@ void Session::end_job(const absl::Status& why) {
 bool Session::run() {
   const std::shared_ptr<SolveJob> job = this->job();
   if (is_closed_) return false;
-  bool has_more = solver_->run_slice(job.get());
+  LiveSolver::Pace pace;
+  pace.is_sparing = services_.scheduler.is_overloaded();
+  if (services_.scheduler.is_answer_waiting()) {
+    pace.slice = pace.is_sparing ? LiveSolver::kOneStep : LiveSolver::kShortSlice;
+  }
+  bool has_more = solver_->run_slice(job.get(), pace);
   if (job && job->is_done()) {
     touch();
     const std::scoped_lock lock(mutex_);

@@ -159,6 +159,7 @@ void print(const std::string& name, const LoadTally& tally, double seconds) {
 struct Outcome {
   LoadTally all;
   std::map<int, LoadTally> by_vertices;
+  std::vector<std::uint64_t> frames;  // of each session
   double behind_ms = 0;
   double seconds = 0;
 };
@@ -171,6 +172,9 @@ absl::Status write_report(const LoadOptions& options, const Outcome& outcome) {
   json["seconds"] = outcome.seconds;
   json["slow_readers"] = options.slow_readers;
   json["generator_behind_ms"] = outcome.behind_ms;
+  const auto [least, most] = std::minmax_element(outcome.frames.begin(), outcome.frames.end());
+  const double mean = static_cast<double>(outcome.all.frames) / static_cast<double>(outcome.frames.size());
+  json["frames_per_session"] = {{"least", *least}, {"mean", mean}, {"most", *most}};
   json["all"] = json_of(outcome.all);
   json["all"]["input_to_frame_histogram_us"] = outcome.all.latency.buckets();
   for (const auto& [vertices, tally] : outcome.by_vertices)
@@ -194,6 +198,7 @@ Outcome run(const LoadOptions& options, Lanes& lanes, const Interrupt& interrupt
     const LoadTally tally = lane->finish();
     outcome.by_vertices[lane->vertices()].add(tally);
     outcome.all.add(tally);
+    outcome.frames.push_back(tally.frames);
   }
   progress.show("deleting the sessions");
   lanes.clear();

@@ -38,6 +38,9 @@ class Load(programs.OnShapes):
         # Positions and distortion as float32.
         frames = {name: tally["frames"]["received"] for name, tally in report["by_vertices"].items()}
         self.assertEqual(report["all"]["payload_bytes"], sum(16 * int(name) * count for name, count in frames.items()))
+        shares = report["frames_per_session"]
+        self.assertEqual(4 * shares["mean"], report["all"]["frames"]["received"])
+        self.assertTrue(0 < shares["least"] <= shares["mean"] <= shares["most"], shares)
         self.assertIn("400 vertices", said)
         self.assertIn("input to frame p50", said)
 

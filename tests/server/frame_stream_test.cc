@@ -161,6 +161,24 @@ TEST_F(FrameStreamTest, SaysSomethingAfterSilence) {
   EXPECT_FALSE(stream->next());
 }
 
+TEST_F(FrameStreamTest, SaysOnceThatTheServerIsOverloadedAndOnceThatItIsNoMore) {
+  bool is_overloaded = false;
+  const auto stream =
+      std::make_shared<FrameStream>(StreamOptions{.credit = 8}, publisher_, timers_, seconds(15),
+                                    OpenedNote{1, 0}, [&] { return is_overloaded; });
+  EXPECT_TRUE(publisher_->add(stream));
+  EXPECT_TRUE(std::holds_alternative<OpenedNote>(stream->next().value()));
+  EXPECT_FALSE(stream->next());
+  for (const bool overloaded : {true, false}) {
+    is_overloaded = overloaded;
+    publish(overloaded ? 1 : 2);
+    const auto note = stream->next();  // before the frame
+    ASSERT_TRUE(note && std::holds_alternative<LoadNote>(*note));
+    EXPECT_EQ(std::get<LoadNote>(*note).is_overloaded, overloaded);
+    EXPECT_EQ(drain(*stream).size(), 1u);
+  }
+}
+
 TEST_F(FrameStreamTest, HasFewTimersHoweverOftenItIsAsked) {
   const auto stream = open({.max_frames_per_second = 60});
   for (std::uint64_t input = 1; input <= 300; ++input) {

@@ -93,6 +93,28 @@ TEST_F(LiveSolverTest, FramesKeepComingWhileItRefines) {
   EXPECT_GE(refining, 3u);
 }
 
+TEST_F(LiveSolverTest, UnderOverloadAnswersComeAtOnceAndRefinementsSeldom) {
+  const auto stream = look_on();
+  const LiveSolver::Pace pace{.slice = LiveSolver::kShortSlice, .is_sparing = true};
+  for (std::uint64_t input = 1; input <= 3; ++input) {
+    Update update = hold_ends(rest(), input, 8 + static_cast<double>(input));
+    update.settings.p = Field::Constant(1, 1.0);
+    update.settings.solver =
+        SolveSettings{.method = Method::kLineSearch, .tolerance = 1e-14, .max_iterations = 1 << 30};
+    ASSERT_TRUE(mailbox_.take(update).ok());
+    ASSERT_TRUE(solver_.run_slice(nullptr, pace));
+    const auto answer = publisher_->newest();
+    EXPECT_EQ(answer->input_seq, input);  // in the first slice
+    const auto begin = std::chrono::steady_clock::now();
+    while (publisher_->newest() == answer) ASSERT_TRUE(solver_.run_slice(nullptr, pace));
+    EXPECT_GE(std::chrono::steady_clock::now() - begin,
+              LiveSolver::kBetweenRefinements - std::chrono::milliseconds(50));
+    while (stream->next()) {
+    }
+    ASSERT_TRUE(stream->acknowledge(publisher_->newest()->frame_seq).ok());
+  }
+}
+
 TEST_F(LiveSolverTest, ASolveCallRunsWithoutReadersAndReports) {
   ASSERT_TRUE(mailbox_.take(hold_ends(rest(), 4, 2)).ok());
   const auto solve = job({.certify = true, .keep_trace = true});

@@ -2,18 +2,21 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <functional>
 #include <future>
 #include <latch>
+#include <vector>
 
 namespace lpdeform {
 namespace {
 
 class Job final : public Runnable {
  public:
-  Job(bool is_heavy, std::function<bool()> slice) : Runnable(is_heavy), slice_(std::move(slice)) {}
+  Job(bool is_heavy, std::function<bool()> slice, double weight = 1)
+      : Runnable(is_heavy, weight), slice_(std::move(slice)) {}
   bool run() override { return slice_(); }
 
  private:
@@ -81,6 +84,125 @@ TEST(Scheduler, WhoeverUsedLessTimeGoesFirst) {
   // Equal shares of time mean a hundred small slices for each large one; with turns in order it would be one.
   EXPECT_GE(small, 200);
   EXPECT_LT(large, 40);
+}
+
+/// A scheduler of two threads, one of which is busy, so that the other has to choose.
+class OneThread {
+ public:
+  OneThread() {
+    scheduler.wake(std::make_shared<Job>(true, [this] {
+      is_busy_.set_value();
+      let_go_.wait();
+      return false;
+    }));
+    is_busy_.get_future().wait();
+  }
+  ~OneThread() { let_go_.count_down(); }
+
+ private:
+  std::latch let_go_{1};
+  std::promise<void> is_busy_;
+
+ public:
+  Scheduler scheduler{2};
+};
+
+TEST(Scheduler, AnswersGoBeforeRefinements) {
+  OneThread one;
+  std::promise<void> done;
+  std::latch all_wait(1);
+  std::vector<char> order;
+  const auto note = [&](char what) {
+    order.push_back(what);
+    if (order.size() == 6) done.set_value();
+    return false;
+  };
+  one.scheduler.wake(std::make_shared<Job>(false, [&] {
+    all_wait.wait();
+    return false;
+  }));
+  std::vector<std::shared_ptr<Job>> jobs;
+  for (int k = 0; k < 3; ++k) {
+    one.scheduler.wake(jobs.emplace_back(std::make_shared<Job>(false, [&] { return note('o'); })));
+    one.scheduler.wake(jobs.emplace_back(std::make_shared<Job>(false, [&] { return note('a'); })),
+                       Urgency::kAnswer);
+  }
+  EXPECT_TRUE(one.scheduler.is_answer_waiting());
+  one.scheduler.wake(jobs[4], Urgency::kAnswer);  // the last of the ordinary ones is to answer now
+  all_wait.count_down();
+  done.get_future().wait();
+  // An ordinary one may come in between for its share of the time, but no two.
+  const auto last_answer = std::find(order.rbegin(), order.rend(), 'a').base() - order.begin();
+  EXPECT_LE(std::count(order.begin(), order.begin() + last_answer, 'o'), 1);
+  EXPECT_FALSE(one.scheduler.is_answer_waiting());
+}
+
+TEST(Scheduler, RefinementsKeepAShareBesideEndlessAnswers) {
+  OneThread one;
+  std::promise<void> done;
+  std::atomic<int> answers = 0, refinements = 0;
+  std::vector<std::shared_ptr<Job>> answering;
+  for (int k = 0; k < 3; ++k) {
+    answering.push_back(std::make_shared<Job>(false, [&, k] {
+      spin(std::chrono::microseconds(100));
+      ++answers;
+      one.scheduler.wake(answering[static_cast<std::size_t>(k)],
+                         Urgency::kAnswer);  // the next update is there
+      return answers < 3000;
+    }));
+  }
+  const auto refining = std::make_shared<Job>(false, [&] {
+    spin(std::chrono::microseconds(100));
+    if (++refinements == 200) done.set_value();
+    return refinements < 200;
+  });
+  for (const auto& job : answering) one.scheduler.wake(job, Urgency::kAnswer);
+  one.scheduler.wake(refining);
+  done.get_future().wait();
+  EXPECT_GT(answers, 200);   // three quarters of the time are theirs
+  EXPECT_LT(answers, 3000);  // and no more
+}
+
+TEST(Scheduler, AHeavierWeightHasALargerShare) {
+  OneThread one;
+  std::promise<void> done;
+  int plain = 0, weighty = 0;
+  const auto job = [&](int& count, double weight) {
+    return std::make_shared<Job>(
+        false,
+        [&] {
+          spin(std::chrono::microseconds(200));
+          ++count;
+          if (plain + weighty == 500) done.set_value();
+          return plain + weighty < 500;
+        },
+        weight);
+  };
+  one.scheduler.wake(job(plain, 1));
+  one.scheduler.wake(job(weighty, 4));
+  done.get_future().wait();
+  EXPECT_GT(weighty, 2 * plain);
+  EXPECT_GT(plain, 20);  // and nobody starves
+}
+
+TEST(Scheduler, LongWaitsAreOverload) {
+  OneThread one;
+  EXPECT_FALSE(one.scheduler.is_overloaded());
+  std::promise<void> done;
+  std::vector<std::shared_ptr<Job>> jobs;
+  std::atomic<int> slices = 0;
+  std::atomic<bool> was_overloaded = false;
+  for (int k = 0; k < 50; ++k) {
+    jobs.push_back(std::make_shared<Job>(false, [&] {
+      spin(std::chrono::milliseconds(5));  // so that each waits for a quarter of a second
+      was_overloaded = was_overloaded || one.scheduler.is_overloaded();
+      if (++slices == 200) done.set_value();
+      return slices < 200;
+    }));
+  }
+  for (const auto& one_job : jobs) one.scheduler.wake(one_job);
+  done.get_future().wait();
+  EXPECT_TRUE(was_overloaded);
 }
 
 TEST(Scheduler, WakingOneThatRunsMakesItRunAgain) {
