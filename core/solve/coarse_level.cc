@@ -6,6 +6,7 @@
 
 #include "core/energy/cell_pass.h"
 #include "core/mesh/coarsen.h"
+#include "core/solve/coarse_handles.h"
 
 namespace lpdeform {
 namespace {
@@ -80,34 +81,6 @@ void CoarseLevel::find_guides(const RestShape& fine) {
 absl::Status CoarseLevel::take_over(const RestShape& fine, const HandleSet& handles,
                                     const Constraints& constraints, const Material& material) {
   const std::size_t n = fine_vertex_.size();
-  std::vector<char> is_held(n, 0);
-  Points targets = Points::Zero(static_cast<Eigen::Index>(n), 3);
-  for (std::size_t c = 0; c < n; ++c) {
-    if (!constraints.is_held[fine_vertex_[c]]) continue;
-    is_held[c] = 1;
-    targets.row(static_cast<Eigen::Index>(c)) = constraints.exact.row(fine_vertex_[c]);
-  }
-  for (const auto& [name, handle] : handles.handles()) {
-    const auto stays = [&](std::int32_t v) { return fine_vertex_[coarse_vertex_[v]] == v; };
-    if (std::any_of(handle.vertices.begin(), handle.vertices.end(), stays)) continue;
-    for (const std::int32_t v : handle.vertices) {
-      const std::int32_t c = coarse_vertex_[v];
-      if (std::exchange(is_held[c], 1)) continue;
-      targets.row(c) = constraints.exact.row(v) + shape_->positions().row(c) - fine.positions().row(v);
-    }
-  }
-
-  Handle held;
-  TargetPositions positions;
-  for (std::size_t c = 0; c < n; ++c) {
-    if (is_held[c]) held.vertices.push_back(static_cast<std::int32_t>(c));
-  }
-  positions.positions.resize(static_cast<Eigen::Index>(held.vertices.size()), 3);
-  for (std::size_t k = 0; k < held.vertices.size(); ++k) {
-    positions.positions.row(static_cast<Eigen::Index>(k)) = targets.row(held.vertices[k]);
-  }
-  held.motion = std::move(positions);
-
   Material coarse{restricted(material.p, fine_vertex_), restricted(material.stiffness, fine_vertex_),
                   material.length_unit > 0 ? material.length_unit : fine.mean_edge_length()};
   if (material.p.size() > 1 || material.p[0] != 2) {
@@ -120,10 +93,9 @@ absl::Status CoarseLevel::take_over(const RestShape& fine, const HandleSet& hand
     }
     coarse.stiffness = std::move(stiffness);
   }
-  HandleSet set;
-  absl::Status status = set.set("held", std::move(held));
-  status.Update(deformer_->set_material(coarse));
-  status.Update(deformer_->set_handles(set));
+  absl::Status status = deformer_->set_material(coarse);
+  status.Update(deformer_->set_handles(
+      coarse_handles({fine, *shape_, fine_vertex_, coarse_vertex_}, handles, constraints)));
   return status;
 }
 

@@ -21,9 +21,7 @@ class CoarseLevel {
   /// Null where the mesh cannot be coarsened to half its vertices.
   static std::unique_ptr<CoarseLevel> create(const RestShape& fine, int threads);
 
-  /// Gives the coarse Deformer what the fine one has: every coarse vertex that the fine level holds is held where
-  /// it is there; a handle of which no vertex is left holds the vertices that its own went into. Where p_i is not
-  /// 2, a coarse cell stands for m fine ones with E_i^2 a sum over them, so s_i is multiplied by m^(1 - p_i / 2).
+  /// Gives the coarse Deformer what the fine one has: coarse_handles, and `material`. Where p_i is not 2, a coarse cell stands for m fine ones with E_i^2 a sum over them, so s_i is multiplied by m^(1 - p_i / 2).
   absl::Status take_over(const RestShape& fine, const HandleSet& handles, const Constraints& constraints,
                          const Material& material);
 

@@ -59,13 +59,11 @@ Problem Deformer::Impl::make_problem() {
           stop};
 }
 
-/// Makes the coarse level where there is none. False where the mesh cannot have one, or the handles are not known
-/// to it.
+/// Makes the coarse level where there is none. False where the mesh cannot have one, or it has no vertices left for
+/// what the handles ask.
 bool Deformer::Impl::prepare_coarse() {
-  const bool has_footprint = constraints->footprint.size() > 0;
-  if (!holds_vertices_exactly(handles) || has_footprint) return false;  // it knows no other kind of handle
   if (!coarse) coarse = CoarseLevel::create(*shape, workers().threads());
-  return coarse && coarse->take_over(*shape, handles, *constraints, material).ok();
+  return coarse && coarse->take_over(*shape, handles, *constraints, effective_material()).ok();
 }
 
 Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {

@@ -75,12 +75,6 @@ void add_holds(const RestShape& shape, const std::string& name, const Handle& ha
   }
 }
 
-bool holds_vertices_exactly(const HandleSet& handles) {
-  return std::all_of(handles.handles().begin(), handles.handles().end(), [](const auto& entry) {
-    return entry.second.points.empty() && std::holds_alternative<Exactly>(entry.second.hold);
-  });
-}
-
 bool has_equations(const HandleSet& handles) {
   return std::any_of(handles.handles().begin(), handles.handles().end(), [](const auto& entry) {
     const Hold& hold = entry.second.hold;

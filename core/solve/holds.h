@@ -25,9 +25,6 @@ PointForm point_form(const RestShape& shape, const Handle& handle, std::size_t k
 void add_holds(const RestShape& shape, const std::string& name, const Handle& handle, const Points& targets,
                Holds& holds);
 
-/// Whether every handle holds vertices, each Exactly.
-bool holds_vertices_exactly(const HandleSet& handles);
-
 /// Whether some handle puts equations on positions: points held exactly, and locks.
 bool has_equations(const HandleSet& handles);
 

@@ -26,6 +26,8 @@ void Multiresolution::begin_fine() {
   for (Eigen::Index i = 0; i < found.rows(); ++i) {
     if (problem_.constraints.is_held[i]) found.row(i) = problem_.constraints.targets.row(i);
   }
+  if (found.allFinite())
+    problem_.constraints.linear.satisfy_within(problem_.metric, found, problem_.workers());
   const bool is_better = found.allFinite() && problem_.objective.evaluate(found, problem_.norm) < objective_;
   if (is_better) {
     x_.swap(found);

@@ -2,6 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <map>
+#include <set>
+
+#include "core/mesh/coarsen.h"
 #include "tests/core/poses.h"
 
 namespace lpdeform {
@@ -15,6 +19,24 @@ class MultiresolutionTest : public testing::Test {
     result.initial = InitialGuess::kLaplacian;
     result.keep_trace = true;
     return result;
+  }
+
+  /// How much of the guess's excess of E^(1/2) over the minimum the coarse level has left.
+  static double beginning(const SolveSummary& summary) {
+    const auto begun =
+        std::find_if(summary.trace.begin(), summary.trace.end(),
+                     [&](const IterationRecord& record) { return record.energy < summary.initial_energy; });
+    if (begun == summary.trace.end()) return 1;
+    const double guess = std::sqrt(summary.initial_energy / summary.energy);
+    return (std::sqrt(begun->energy / summary.energy) - 1) / (guess - 1);
+  }
+  /// One of the top that the coarse level has not.
+  std::int32_t lost_vertex() const {
+    const CoarseMesh coarse = coarsen(mesh, shape->vertex_count() / CoarseLevel::kRatio);
+    for (const std::int32_t v : slice(mesh, 2, 40, 40)) {
+      if (coarse.fine_vertex[coarse.coarse_vertex[v]] != v) return v;
+    }
+    return -1;
   }
 
   const TriangleMesh mesh = box_surface(6, 6, 40);
@@ -42,13 +64,47 @@ TEST_F(MultiresolutionTest, EndsWhereQuasiNewtonEndsOrLower) {
 
 TEST_F(MultiresolutionTest, BeginsTheFineLevelNearItsMinimum) {
   auto nested = deformer(shape, bend(), Material::uniform(2));
-  const SolveSummary summary = nested->solve(settings(Method::kMultiresolution)).value();
-  const auto begun =
-      std::find_if(summary.trace.begin(), summary.trace.end(),
-                   [&](const IterationRecord& record) { return record.energy < summary.initial_energy; });
-  ASSERT_NE(begun, summary.trace.end());
-  const double guess = std::sqrt(summary.initial_energy / summary.energy);
-  EXPECT_LT(std::sqrt(begun->energy / summary.energy) - 1, 0.3 * (guess - 1));
+  EXPECT_LT(beginning(nested->solve(settings(Method::kMultiresolution)).value()), 0.3);
+}
+
+TEST_F(MultiresolutionTest, KnowsEveryKindOfHandle) {
+  const auto top = slice(mesh, 2, 40, 40);
+  const RigidMotion motion = turn(Eigen::Vector3d::UnitX(), 80, {3, 3, 20});
+  std::vector<SurfacePoint> points;
+  std::set<std::int32_t> used;  // no vertex by two points: their equations would depend on each other
+  for (std::int32_t face = 0; face < shape->face_count(); ++face) {
+    const std::vector<std::int32_t> corners{mesh.faces(face, 0), mesh.faces(face, 1), mesh.faces(face, 2)};
+    const bool is_new =
+        std::none_of(corners.begin(), corners.end(), [&](auto v) { return used.contains(v); });
+    if (!is_new || rows_of(mesh.vertices, corners).col(2).minCoeff() < 40) continue;
+    used.insert(corners.begin(), corners.end());
+    points.push_back({face, {0.2, 0.3, 0.5}});
+  }
+  const std::int32_t lost = lost_vertex();
+  const std::map<std::string, Handle> kinds{
+      {"soft", {top, motion, Soft{10}}},
+      {"points", {{}, motion, Exactly{}, points}},
+      {"soft points", {{}, motion, Soft{100}, points}},
+      {"orientation", {top, motion, Orientation{}}},
+      {"axis", {top, motion, AxisLock{Eigen::Vector3d::UnitX()}}},
+      {"plane", {top, motion, PlaneLock{Eigen::Vector3d::UnitY()}}},
+      {"footprint", {{top[0]}, motion, Exactly{}, {}, 4.0}},
+      {"a soft vertex that is lost", {{lost}, motion, Soft{10}}},
+      {"a vertex that is lost", {{lost}, motion}},
+  };
+  for (const auto& [name, handle] : kinds) {
+    HandleSet handles;
+    (void)handles.set("bottom", {slice(mesh, 2, 0, 0), Fixed{}});
+    ASSERT_TRUE(handles.set("top", handle).ok()) << name;
+    auto alone = deformer(shape, handles, Material::uniform(2));
+    auto nested = deformer(shape, handles, Material::uniform(2));
+    const double expected = alone->solve(settings(Method::kQuasiNewton)).value().energy;
+    const SolveSummary summary = nested->solve(settings(Method::kMultiresolution)).value();
+    EXPECT_EQ(summary.method, Method::kMultiresolution) << name;
+    EXPECT_EQ(summary.stop_reason, StopReason::kConverged) << name;
+    EXPECT_LT(std::sqrt(summary.energy / expected), 1.005) << name;
+    EXPECT_LT(beginning(summary), 0.6) << name;
+  }
 }
 
 TEST_F(MultiresolutionTest, IsWhatAutoTakesForLargeMeshesAndColdStarts) {
