@@ -80,7 +80,8 @@ class StreamFramesCall final
 };
 
 class DeformCall final
-    : public FrameCall<grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>, v1::DeformResponse> {
+    : public FrameCall<grpc::ServerBidiReactor<Received<v1::DeformRequest>, v1::DeformResponse>,
+                       v1::DeformResponse> {
  public:
   using FrameCall::FrameCall;
 
@@ -91,9 +92,11 @@ class DeformCall final
     {
       const std::scoped_lock lock(mutex_);
       is_open = is_open_;
-      is_open_ = is_open_ || (ok && request_.has_open());
+      is_open_ = is_open_ || (ok && received_.is_whole && request_.has_open());
     }
     if (!ok) return end_of_input(is_open);
+    if (!received_.is_whole)
+      return break_off("A message cannot be parsed; a text that is not UTF-8, perhaps.");
     record().received(request_.ByteSizeLong());
     switch (request_.message_case()) {
       case v1::DeformRequest::kOpen:
@@ -119,7 +122,7 @@ class DeformCall final
   void read_locked() {
     if (is_over_locked()) return;
     is_read_due_ = open_.stream && open_.stream->answers_waiting() + unanswered_ >= kMostAnswers;
-    if (!is_read_due_) StartRead(&request_);
+    if (!is_read_due_) StartRead(&received_);
   }
 
   void on_made() override {
@@ -188,7 +191,8 @@ class DeformCall final
     refuse(invalid_input({"STREAM_PROTOCOL", "", ""}, why));
   }
 
-  v1::DeformRequest request_;
+  Received<v1::DeformRequest> received_;
+  const v1::DeformRequest& request_ = received_.message;
   bool is_open_ = false;  // an open has come
   bool is_read_due_ = false;
   std::size_t unanswered_ = 0;  // updates taken that are not in the store yet
@@ -202,8 +206,8 @@ grpc::ServerWriteReactor<v1::StreamFramesResponse>* stream_frames(Backend& backe
   return begin_call<StreamFramesCall>(backend, std::move(record), request);
 }
 
-grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* deform(Backend& backend,
-                                                                       std::shared_ptr<CallRecord> record) {
+grpc::ServerBidiReactor<Received<v1::DeformRequest>, v1::DeformResponse>* deform(
+    Backend& backend, std::shared_ptr<CallRecord> record) {
   return begin_call<DeformCall>(backend, std::move(record));
 }
 

@@ -2,6 +2,7 @@
 
 #include "lpdeform/v1/service.grpc.pb.h"
 #include "server/backend.h"
+#include "server/received.h"
 
 namespace lpdeform {
 
@@ -14,7 +15,7 @@ grpc::ServerWriteReactor<v1::StreamFramesResponse>* stream_frames(Backend& backe
 grpc::ServerWriteReactor<v1::StreamSessionsResponse>* stream_sessions(
     Backend& backend, std::shared_ptr<CallRecord> record, const v1::StreamSessionsRequest& request);
 
-grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* deform(Backend& backend,
-                                                                       std::shared_ptr<CallRecord> record);
+grpc::ServerBidiReactor<Received<v1::DeformRequest>, v1::DeformResponse>* deform(
+    Backend& backend, std::shared_ptr<CallRecord> record);
 
 }  // namespace lpdeform

@@ -96,6 +96,16 @@ grpc::ServerUnaryReactor* about_session(Backend& backend, grpc::CallbackServerCo
 
 }  // namespace
 
+/// Deform takes messages as they come, in place of the handler of generated code: see received.h.
+Service::Service(Backend& backend) : backend_(backend) {
+  const auto* const calls = v1::DeformRequest::descriptor()->file()->FindServiceByName("DeformService");
+  MarkMethodCallback(calls->FindMethodByName("Deform")->index(),
+                     new grpc::internal::CallbackBidiHandler<Received<v1::DeformRequest>, v1::DeformResponse>(
+                         [this](grpc::CallbackServerContext* context) {
+                           return deform(backend_, begin_record(backend_, *context, "Deform"));
+                         }));
+}
+
 grpc::ServerUnaryReactor* Service::CreateUpload(Context* context, const v1::CreateUploadRequest* request,
                                                 v1::CreateUploadResponse* response) {
   return in_pool(backend_, *context, "CreateUpload", &Backend::create_upload, *request, *response);
@@ -159,10 +169,6 @@ grpc::ServerWriteReactor<v1::StreamFramesResponse>* Service::StreamFrames(
 grpc::ServerWriteReactor<v1::StreamSessionsResponse>* Service::StreamSessions(
     Context* context, const v1::StreamSessionsRequest* request) {
   return stream_sessions(backend_, begin_record(backend_, *context, "StreamSessions"), *request);
-}
-
-grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* Service::Deform(Context* context) {
-  return deform(backend_, begin_record(backend_, *context, "Deform"));
 }
 
 grpc::ServerWriteReactor<v1::SolveResponse>* Service::Solve(Context* context,

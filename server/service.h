@@ -9,7 +9,7 @@ namespace lpdeform {
 /// back through to_grpc(). `backend` outlives it.
 class Service final : public v1::DeformService::CallbackService {
  public:
-  explicit Service(Backend& backend) : backend_(backend) {}
+  explicit Service(Backend& backend);
 
   using Context = grpc::CallbackServerContext;
   grpc::ServerUnaryReactor* CreateUpload(Context* context, const v1::CreateUploadRequest* request,
@@ -36,7 +36,6 @@ class Service final : public v1::DeformService::CallbackService {
       Context* context, const v1::StreamFramesRequest* request) override;
   grpc::ServerWriteReactor<v1::StreamSessionsResponse>* StreamSessions(
       Context* context, const v1::StreamSessionsRequest* request) override;
-  grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformResponse>* Deform(Context* context) override;
   grpc::ServerWriteReactor<v1::SolveResponse>* Solve(Context* context,
                                                      const v1::SolveRequest* request) override;
 

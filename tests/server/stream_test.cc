@@ -226,6 +226,12 @@ TEST_F(StreamTest, MessagesAgainstTheContractEndTheStreamWithThatReason) {
         v1::DeformRequest again;
         again.mutable_open()->set_session(session.session().name());
         client.write(again);
+      },
+      [](DeformClient& client) {  // what cannot be parsed, since texts are UTF-8
+        v1::Update update;
+        update.set_input_seq(1);
+        update.add_handles()->set_name("tip \xff");
+        client.send(update);
       }};
   for (const auto& offend : offences) {
     DeformClient client(*stub_, session);
@@ -249,6 +255,17 @@ TEST_F(StreamTest, AStreamThatIsNeverOpenedIsInvalid) {
   const grpc::Status status = stream->Finish();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(details_of(status).info.reason(), "STREAM_PROTOCOL");
+}
+
+TEST_F(StreamTest, AFirstMessageThatCannotBeParsedIsInvalid) {
+  grpc::ClientContext context;
+  const auto stream = stub_->Deform(&context);
+  v1::DeformRequest request;
+  request.mutable_open()->set_session("sessions/\xff");
+  stream->Write(request);
+  v1::DeformResponse response;
+  EXPECT_FALSE(stream->Read(&response));
+  EXPECT_EQ(details_of(stream->Finish()).info.reason(), "STREAM_PROTOCOL");
 }
 
 TEST_F(StreamTest, WrongOptionsAreInvalid) {
