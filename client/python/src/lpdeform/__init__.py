@@ -11,6 +11,7 @@ To drag, call `s.drag("tip", ...)` as often as the mouse moves and `s.poll()` on
 directions. `s.solve()` asks for one finished result with its trace and a bound on how far it can be from the optimum.
 """
 
+from lpdeform.access import Tls
 from lpdeform.aio import AsyncSession, join_async, open_async
 from lpdeform.errors import Code, InvalidInput, LpdeformError, Timeout, Unavailable
 from lpdeform.frames import Frame, FrameAssembly, QuantizedSurface
@@ -72,6 +73,7 @@ __all__ = [
     "SurfacePoints",
     "Targets",
     "Timeout",
+    "Tls",
     "Unavailable",
     "Update",
     "join",

@@ -12,7 +12,8 @@ import grpc
 from google.protobuf.message import Message
 
 from lpdeform._numbers import crc32c
-from lpdeform.errors import Code, from_call, make
+from lpdeform.access import Caller, Tls, Token, open_channel
+from lpdeform.errors import Code, LpdeformError, from_call, make
 from lpdeform.v1 import data_pb2, service_pb2
 
 Response = TypeVar("Response", bound=Message)
@@ -70,17 +71,27 @@ class Stop:
 class Rpc:
     """A connection to a server."""
 
-    def __init__(self, address: str, call_timeout: float = 30.0, reconnect_for: float = 120.0) -> None:
+    def __init__(
+        self,
+        address: str,
+        call_timeout: float = 30.0,
+        reconnect_for: float = 120.0,
+        token: Token = None,
+        tls: Tls | bool = False,
+    ) -> None:
         self.address = address
         self.call_timeout = call_timeout
         self.reconnect_for = reconnect_for
-        self._channel = grpc.insecure_channel(address, options=_channel_options)
+        self._caller = Caller(token, new_request_id())
+        self._channel = open_channel(address, tls, _channel_options)
 
     def call(self, name: str, request: Message, response: type[Response], stop: Stop, timeout: float | None = None) -> Response:
         """A call with one answer; waits for it."""
         method = self._channel.unary_unary(_service + name, _serialize, response.FromString)
+        longest = self.call_timeout if timeout is None else timeout
+        metadata = self._caller.metadata()
         try:
-            call = method.future(request, timeout=self.call_timeout if timeout is None else timeout)
+            call = method.future(request, timeout=longest, metadata=metadata)
         except ValueError as closed:  # the channel is
             raise make(Code.CANCELLED, "The connection is closed.") from closed
         stop.add(call)
@@ -99,19 +110,20 @@ class Rpc:
 
     def deform(self, requests: Iterator[service_pb2.DeformRequest]) -> Any:
         method = self._channel.stream_stream(_service + "Deform", _serialize, service_pb2.DeformResponse.FromString)
-        return method(requests)
+        return method(requests, metadata=self._caller.metadata())
 
     def solve(self, request: service_pb2.SolveRequest, timeout: float | None) -> Any:
         method = self._channel.unary_stream(_service + "Solve", _serialize, service_pb2.SolveResponse.FromString)
-        return method(request, timeout=timeout)
+        return method(request, timeout=timeout, metadata=self._caller.metadata())
 
     def reach(self, session: str, stop: Stop, timeout: float) -> None:
         """Waits until the server answers, at most `timeout`. gRPC makes a connection again while a call waits for it."""
         method = self._channel.unary_unary(_service + "GetSession", _serialize, service_pb2.GetSessionResponse.FromString)
         try:
             request = service_pb2.GetSessionRequest(session=session)
-            call = method.future(request, timeout=timeout, wait_for_ready=True)
-        except ValueError:  # the channel was closed
+            metadata = self._caller.metadata()
+            call = method.future(request, timeout=timeout, wait_for_ready=True, metadata=metadata)
+        except (LpdeformError, ValueError):  # no token, or the channel was closed
             return
         stop.add(call)
         try:

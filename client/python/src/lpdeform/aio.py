@@ -13,6 +13,7 @@ import numpy.typing as npt
 from lpdeform._link import Link
 from lpdeform._rpc import Stop
 from lpdeform._solve import solve
+from lpdeform.access import Tls, Token
 from lpdeform.errors import LpdeformError
 from lpdeform.frames import Frame
 from lpdeform.opening import connect, frame_options, join_link, open_link
@@ -175,6 +176,8 @@ def open_async(
     faces: npt.ArrayLike,
     *,
     address: str | None = None,
+    token: Token = None,
+    tls: Tls | bool = False,
     handles: Mapping[str, Handle] | None = None,
     p: Field | None = None,
     stiffness: Field | None = None,
@@ -202,7 +205,7 @@ def open_async(
     settings = Settings(p, stiffness, length_unit, solver, region)
 
     def make(stop: Stop) -> Link:
-        rpc = connect(address, call_timeout, reconnect_for)
+        rpc = connect(address, call_timeout, reconnect_for, token, tls)
         return open_link(
             rpc, stop, vertices, faces, normals, handles, settings, weights, free_components, weld, options
         )
@@ -215,6 +218,8 @@ def join_async(
     *,
     as_writer: bool = False,
     address: str | None = None,
+    token: Token = None,
+    tls: Tls | bool = False,
     encoding: Encoding = "float32",
     lowest_encoding: Encoding | None = None,
     credit: int = 0,
@@ -230,5 +235,5 @@ def join_async(
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
     )
     return Opening(
-        lambda stop: join_link(connect(address, call_timeout, reconnect_for), stop, name, as_writer, options)
+        lambda stop: join_link(connect(address, call_timeout, reconnect_for, token, tls), stop, name, as_writer, options)
     )

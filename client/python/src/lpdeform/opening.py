@@ -11,14 +11,17 @@ from lpdeform._lease import Original, create_session, join_session
 from lpdeform._link import Link
 from lpdeform._numbers import indices, numbers
 from lpdeform._rpc import Rpc, Stop, default_address, new_request_id
+from lpdeform.access import Tls, Token
 from lpdeform.errors import invalid
 from lpdeform.session import Session
 from lpdeform.types import Encoding, Field, FreeComponents, Handle, Settings, SolverSettings, Update, WeightKind
 from lpdeform.v1 import frame_pb2
 
 
-def connect(address: str | None, call_timeout: float, reconnect_for: float) -> Rpc:
-    return Rpc(address or default_address(), call_timeout, reconnect_for)
+def connect(
+    address: str | None, call_timeout: float, reconnect_for: float, token: Token, tls: Tls | bool
+) -> Rpc:
+    return Rpc(address or default_address(), call_timeout, reconnect_for, token, tls)
 
 
 def open_link(
@@ -81,6 +84,8 @@ def open(  # noqa: A001  (called as lpdeform.open)
     faces: npt.ArrayLike,
     *,
     address: str | None = None,
+    token: Token = None,
+    tls: Tls | bool = False,
     handles: Mapping[str, Handle] | None = None,
     p: Field | None = None,
     stiffness: Field | None = None,
@@ -105,6 +110,8 @@ def open(  # noqa: A001  (called as lpdeform.open)
 
     vertices: n x 3, in any unit. faces: m x 3, 0-based, counter-clockwise seen from outside.
     address: "host:port" or "unix:/path"; otherwise the environment variable LPDEFORM_ADDRESS, or localhost:50051.
+    token: a bearer token, or a function that gives the newest one when a call begins, on any thread.
+    tls: True, or a Tls with certificates.
     handles: to begin with. p, stiffness, length_unit, solver, region: as in Settings.
     normals: n x 3, as drawn at rest, for frames with normals.
     free_components: what becomes of a connected component that no handle holds: "error" is raised, "stay", "follow".
@@ -117,7 +124,8 @@ def open(  # noqa: A001  (called as lpdeform.open)
     max_frames_per_second: 0 is without limit; the last frame of an update always comes.
     call_timeout, reconnect_for: seconds of every call but solve(), and after which a session whose server stays away gives up.
 
-    Raises InvalidInput with the first element that cannot be deformed; Unavailable (NO_SERVER) where nobody answers.
+    Raises InvalidInput with the first element that cannot be deformed, or a certificate or token that cannot be used;
+    Unavailable (NO_SERVER) where nobody answers.
 
     >>> import lpdeform
     >>> with lpdeform.open([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]) as session:
@@ -128,7 +136,7 @@ def open(  # noqa: A001  (called as lpdeform.open)
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
     )
     settings = Settings(p, stiffness, length_unit, solver, region)
-    rpc = connect(address, call_timeout, reconnect_for)
+    rpc = connect(address, call_timeout, reconnect_for, token, tls)
     link = open_link(
         rpc, Stop(), vertices, faces, normals, handles, settings, weights, free_components, weld, options
     )
@@ -140,6 +148,8 @@ def join(
     *,
     as_writer: bool = False,
     address: str | None = None,
+    token: Token = None,
+    tls: Tls | bool = False,
     encoding: Encoding = "float32",
     lowest_encoding: Encoding | None = None,
     credit: int = 0,
@@ -157,7 +167,7 @@ def join(
     options = frame_options(
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
     )
-    rpc = connect(address, call_timeout, reconnect_for)
+    rpc = connect(address, call_timeout, reconnect_for, token, tls)
     return Session(join_link(rpc, Stop(), name, as_writer, options))
 
 

@@ -1,0 +1,94 @@
+"""Who calls, and over what: bearer tokens, TLS, and the header by which a proxy keeps a client's calls together."""
+
+from __future__ import annotations
+
+import ssl
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import grpc
+
+from lpdeform.errors import Code, invalid, make
+
+Token: TypeAlias = str | Callable[[], str] | None
+"""A bearer token, or what gives the newest one when a call begins, on any thread; None: none."""
+
+
+@dataclass(frozen=True)
+class Tls:
+    """Connecting with TLS. Texts or bytes in PEM."""
+
+    root_certificates: str | bytes | None = None
+    """Whom to trust; None: whom gRPC trusts by itself."""
+    certificate_chain: str | bytes | None = None
+    """Our own, where the server asks for one."""
+    private_key: str | bytes | None = None
+
+    def __repr__(self) -> str:
+        """Without the key."""
+        return f"<Tls{' with a certificate' if self.certificate_chain else ''}>"
+
+
+class Caller:
+    """What every call over one connection says of its caller."""
+
+    def __init__(self, token: Token, name: str) -> None:
+        """`name`: any, the same for all calls of one client. Raises InvalidInput TOKEN_CHARACTERS."""
+        if isinstance(token, str) and not _is_header_text(token):
+            text = "The token has a character that a header cannot carry; a line break at its end, perhaps."
+            raise invalid(text, "TOKEN_CHARACTERS", "token", "printable ASCII")
+        self._token = token
+        self._name = name
+
+    def metadata(self) -> list[tuple[str, str]]:
+        """Raises UNAUTHENTICATED TOKEN_FUNCTION where the caller's function does not give a token that a header can carry."""
+        found = [("lpdeform-session", self._name)]
+        if token := self._newest():
+            found.append(("authorization", f"Bearer {token}"))
+        return found
+
+    def _newest(self) -> str | None:
+        if not callable(self._token):
+            return self._token
+        try:
+            token = self._token()
+        except Exception as error:
+            raise make(Code.UNAUTHENTICATED, f"The function of the token failed: {error!r}", "TOKEN_FUNCTION") from error
+        if not isinstance(token, str) or not _is_header_text(token):
+            text = "The function of the token gave something that a header cannot carry."
+            raise make(Code.UNAUTHENTICATED, text, "TOKEN_FUNCTION")
+        return token
+
+
+def _is_header_text(text: str) -> bool:
+    return all(" " <= letter <= "~" for letter in text)
+
+
+def open_channel(address: str, tls: Tls | bool, options: list[tuple[str, int]]) -> Any:
+    """Raises InvalidInput where a text of `tls` cannot be used: gRPC would only find no way to the server."""
+    if tls is False:
+        return grpc.insecure_channel(address, options=options)
+    given = tls if isinstance(tls, Tls) else Tls()
+    roots, chain, key = map(_bytes, (given.root_certificates, given.certificate_chain, given.private_key))
+    for name, text in (("root_certificates", roots), ("certificate_chain", chain)):
+        if text is not None:
+            _check_certificates(name, text)
+    if (chain is None) != (key is None):
+        missing = "private_key" if key is None else "certificate_chain"
+        why = "A certificate chain and a private key belong together; one of them is missing."
+        raise invalid(why, "TLS_KEY_MISSING", missing)
+    if key is not None and b"PRIVATE KEY-----" not in key:
+        raise invalid("private_key is no private key in PEM.", "TLS_PRIVATE_KEY", "private_key", "PEM")
+    return grpc.secure_channel(address, grpc.ssl_channel_credentials(roots, key, chain), options=options)
+
+
+def _bytes(text: str | bytes | None) -> bytes | None:
+    return text.encode() if isinstance(text, str) else text
+
+
+def _check_certificates(name: str, text: bytes) -> None:
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).load_verify_locations(cadata=text.decode("ascii"))
+    except (ssl.SSLError, ValueError) as error:
+        raise invalid(f"{name} cannot be read: {error}", "TLS_CERTIFICATES", name, "PEM") from None
