@@ -107,7 +107,7 @@ class AddOn(unittest.TestCase):
         group.add(np.flatnonzero(self.rest[:, 2] < 2).tolist(), 1.0, "REPLACE")
         self.tube.lpdeform.p_group, self.tube.lpdeform.p_painted = "soft", 1.0
         stage.settle(self.tube)
-        sent = live.of(self.tube)._told_settings["p"]
+        sent = live.of(self.tube).fields["p"]
         self.assertEqual(sorted(set(sent.tolist())), [1.0, 2.0])
         painted = stage.shown(self.tube)
         self.assertGreater(np.abs(painted - even).max(), 0.01)
@@ -116,7 +116,7 @@ class AddOn(unittest.TestCase):
         group.add(np.arange(len(self.rest)).tolist(), 0.0, "REPLACE")  # painted away
         stage.turn(lambda: not live.of(self.tube)._weights["p"].any())
         stage.settle(self.tube)
-        self.assertEqual(set(live.of(self.tube)._told_settings["p"].tolist()), {2.0})
+        self.assertEqual(set(live.of(self.tube).fields["p"].tolist()), {2.0})
         bpy.ops.object.mode_set(mode="OBJECT")
 
     def test_stiffness_is_a_property_and_a_group(self):
@@ -128,7 +128,7 @@ class AddOn(unittest.TestCase):
         group.add(np.flatnonzero(self.rest[:, 2] < 2).tolist(), 0.5, "REPLACE")
         self.tube.lpdeform.stiffness_group, self.tube.lpdeform.stiffness_painted = "hard", 10000.0
         stage.settle(self.tube)
-        sent = live.of(self.tube)._told_settings["stiffness"]
+        sent = live.of(self.tube).fields["stiffness"]
         self.assertTrue(np.allclose(np.unique(sent), [1, 100]), np.unique(sent))  # half way by powers
         lower = np.flatnonzero((self.rest[:, 2] > 1) & (self.rest[:, 2] < 1.1))
         lean_before, lean = before[lower, 0].mean(), stage.shown(self.tube)[lower, 0].mean()
@@ -241,6 +241,68 @@ class AddOn(unittest.TestCase):
         self.assertGreater(len(self.tube.data.vertices), len(self.rest))
         self.assertEqual(live.message(self.tube), "")
 
+    def test_what_is_refused_is_said_and_takes_nothing_else_with_it(self):
+        _, tip = self.held()
+        self.shift(tip, 0.5, 0, 0)
+        stage.settle(self.tube)
+        even = stage.shown(self.tube)
+        home = tip.matrix_world.copy()
+        self.tube.lpdeform.p = 1.0  # in one update with what the server refuses
+        self.shift(tip, 1e12, 0, 0)
+        bpy.context.view_layer.update()
+        stage.turn(lambda: "HANDLE_TARGET_TOO_FAR" in live.message(self.tube))
+        stage.turn(lambda: live.of(self.tube)._told.last("p") is not None and not live.of(self.tube)._told._unanswered)
+        refused = live.of(self.tube)._told._refused
+        self.assertEqual(list(refused), ["handle 2"])
+        live.tick()
+        self.assertEqual(live.of(self.tube)._told._unanswered, {})  # not again and again
+        tip.matrix_world = home
+        stage.settle(self.tube)
+        now = stage.shown(self.tube)
+        self.assertTrue(np.allclose(now[self.top], even[self.top], atol=1e-5))
+        self.assertGreater(np.abs(now - even).max(), 0.005)  # p = 1 counts
+        stage.turn(lambda: live.message(self.tube) == "")
+
+    def test_p_by_shape_a_region_and_a_bound(self):
+        self.tube.lpdeform.certify = True
+        _, tip = self.held()
+        self.shift(tip, 1.2, 0, -0.6)
+        stage.settle(self.tube)
+        stage.turn(lambda: live.of(self.tube).frame.optimality_gap is not None)
+        self.assertLess(live.of(self.tube).frame.optimality_gap, 0.01)
+        before = stage.shown(self.tube)
+        group = self.tube.vertex_groups.new(name="upper")
+        upper = self.rest[:, 2] > 2
+        group.add(np.flatnonzero(upper).tolist(), 1.0, "REPLACE")
+        self.tube.lpdeform.region_group = "upper"
+        self.shift(tip, 0.5, 0, 0)
+        stage.settle(self.tube)
+        now = stage.shown(self.tube)
+        self.assertTrue(np.allclose(now[~upper], before[~upper], atol=1e-5))
+        self.tube.lpdeform.region_group = ""
+        stage.settle(self.tube)
+        freed = stage.shown(self.tube)
+        self.assertGreater(np.abs(freed - now)[~upper].max(), 0.01)
+        self.tube.lpdeform.p_automatic = 1.0
+        stage.settle(self.tube)
+        self.assertGreater(np.abs(stage.shown(self.tube) - freed).max(), 1e-4)
+
+    def test_files_of_the_preferences_that_cannot_be_used_are_named(self):
+        stage.add_handle(self.tube, self.top)
+        try:
+            PREFERENCES.use_tls, PREFERENCES.root_certificates = True, "/nowhere/ca.pem"
+            with self.assertRaisesRegex(RuntimeError, "/nowhere/ca.pem"):
+                bpy.ops.lpdeform.start()
+            PREFERENCES.root_certificates = __file__
+            with self.assertRaisesRegex(RuntimeError, "TLS_CERTIFICATES"):
+                bpy.ops.lpdeform.start()
+            PREFERENCES.use_tls, PREFERENCES.token_file = False, "/nowhere/token"
+            with self.assertRaisesRegex(RuntimeError, "/nowhere/token"):
+                bpy.ops.lpdeform.start()
+        finally:
+            PREFERENCES.use_tls, PREFERENCES.root_certificates, PREFERENCES.token_file = False, "", ""
+        self.assertIsNone(self.tube.data.shape_keys)
+
     def test_no_server_is_said_clearly_and_changes_nothing(self):
         stage.add_handle(self.tube, self.top)
         PREFERENCES.address = "127.0.0.1:1"
@@ -269,7 +331,7 @@ class AddOn(unittest.TestCase):
         stage.turn(lambda: "HANDLE_VERTEX_OUT_OF_RANGE" in live.message(self.tube))
         self.shift(tip, 0.3, 0, 0)
         stage.settle(self.tube)
-        self.assertEqual(live.message(self.tube), "")
+        stage.turn(lambda: live.message(self.tube) == "")
 
     def test_meshes_that_cannot_be_deformed_are_named(self):
         flat = bpy.data.meshes.new("flat")

@@ -23,7 +23,28 @@ def require() -> None:
         )
 
 
+def _preference(name: str):
+    addon = bpy.context.preferences.addons.get(__package__)
+    return getattr(addon.preferences, name) if addon is not None else None
+
+
 def address() -> str:
-    preferences = bpy.context.preferences.addons.get(__package__)
-    given = preferences.preferences.address if preferences is not None else ""
-    return given or os.environ.get("LPDEFORM_ADDRESS") or "localhost:50051"
+    return _preference("address") or os.environ.get("LPDEFORM_ADDRESS") or "localhost:50051"
+
+
+def access() -> dict:
+    """How lpdeform.open() is let in: the token and TLS of the preferences. Raises OSError where a file cannot be read."""
+    path = _preference("token_file")
+    token = (lambda: _text(path).strip()) if path else None  # read again for each call, so that it may be renewed
+    if token is not None:
+        token()
+    if not _preference("use_tls"):
+        return {"token": token, "tls": False}
+    files = ("root_certificates", "certificate_chain", "private_key")
+    texts = {name: _text(_preference(name)) for name in files if _preference(name)}
+    return {"token": token, "tls": lpdeform.Tls(**texts)}
+
+
+def _text(path: str) -> str:
+    with open(bpy.path.abspath(path), encoding="ascii", errors="replace") as file:
+        return file.read()

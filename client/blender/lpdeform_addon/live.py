@@ -7,7 +7,8 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from . import handles, surface
-from .client import NotReady, address, lpdeform, require
+from .client import NotReady, access, address, lpdeform, require
+from .told import Told
 
 _interval = 1 / 30  # seconds between two looks
 _paint_interval = 0.2  # weights are read by a loop, so less often
@@ -16,6 +17,21 @@ _running: dict = {}
 """By the names of mesh objects."""
 _messages: dict = {}
 """What was last to be said of a mesh object."""
+
+
+_settings = ("p", "stiffness", "region")
+_taken_all_the_same = ("FAILED_PRECONDITION", "ABORTED")
+"""Names of codes that are about solving: the server has taken the update in."""
+
+
+class Present:
+    """Something that the server is to know, the same as another of the same value."""
+
+    def __init__(self, value, empty=None, vertices=None, matrix=None, setting=None) -> None:
+        self.value, self.empty, self.vertices, self.matrix, self.setting = value, empty, vertices, matrix, setting
+
+    def __eq__(self, other) -> bool:
+        return isinstance(other, Present) and self.value == other.value
 
 
 class LiveMesh:
@@ -33,16 +49,23 @@ class LiveMesh:
         self._rest = surface.rest_positions(ob)
         self._faces = surface.triangles(ob)
         self._held = surface.held(ob)
-        self._told = {}
-        self._told_settings = {}
+        self._told = Told()
+        self.fields = {}
         self._weights = {}
         self._weights_read = 0.0
         self.frame = None
-        self.session = lpdeform.open(self._rest, self._faces, address=address(), free_components="stay")
+        self.session = lpdeform.open(
+            self._rest, self._faces, address=address(), free_components="stay", certify=ob.lpdeform.certify, **access()
+        )
 
     @property
     def state(self) -> str:
         return self.session.connection
+
+    @property
+    def has_refusals(self) -> bool:
+        """Something is as the server does not take it."""
+        return self._told.has_refusals
 
     def close(self) -> None:
         self.session.close()
@@ -60,13 +83,32 @@ class LiveMesh:
             self._look_again(ob)
         if was != ob.mode:
             self._weights, self._weights_read = {}, 0.0  # to be read anew
-        handles_new, settings_new = self._new_handles(ob), self._new_settings(ob)
-        if handles_new or settings_new:
-            self.session.update(handles_new, lpdeform.Settings(**settings_new))
-        frame = self.session.poll()
+        self._tell(ob)
+        try:
+            frame = self.session.poll()
+        except lpdeform.LpdeformError as error:
+            if error.code.name not in _taken_all_the_same:
+                self._told.refused()
+            raise
         if frame is not None:
+            self._told.answered(frame.input_seq)
             self.frame = frame
             self.show(ob)
+
+    def _tell(self, ob) -> None:
+        present = {**self._present_handles(ob), **self._present_settings(ob)}
+        news = self._told.news(present)
+        if not news:
+            return
+        changes = {key: self._change(key, present.get(key)) for key in news if key not in _settings}
+        settings = {key: present[key].setting for key in news if key in _settings}
+        values = {key: present.get(key) for key in news}
+        try:
+            self._told.tell(values, self.session.update(changes, lpdeform.Settings(**settings)))
+        except lpdeform.LpdeformError:  # it was not even sent
+            self._told.tell(values, 0)
+            self._told.refused()
+            raise
 
     def show(self, ob) -> None:
         surface.show_positions(ob, self.frame.positions)
@@ -82,45 +124,56 @@ class LiveMesh:
         self.session.close()
         self._open(ob)
 
-    def _new_handles(self, ob) -> dict:
-        changes, present = {}, set()
+    def _present_handles(self, ob) -> dict:
+        """Of each handle its empty, what it holds and how, and where it is."""
+        present = {}
         for empty in handles.of(ob):
             settings = empty.lpdeform_handle
             vertices = np.flatnonzero(self._held == settings.number)
             if not len(vertices):
                 continue
-            name = f"handle {settings.number}"
-            present.add(name)
             matrix = handles.motion_matrix(ob, empty)
             kind = (settings.kind, settings.weight, settings.footprint, vertices.tobytes())
             place = tuple(value for row in matrix for value in row)
-            if self._told.get(name) == (kind, place):
-                continue
-            motion = handles.motion(matrix, self._rest[vertices], settings.kind == "ORIENTATION")
-            is_moved_only = name in self._told and self._told[name][0] == kind
-            hold = handles.hold(empty)
-            changes[name] = motion if is_moved_only else lpdeform.Handle(vertices, motion, hold, None, settings.footprint)
-            self._told[name] = (kind, place)
-        for name in set(self._told) - present:
-            changes[name] = lpdeform.Removal()
-            del self._told[name]
-        return changes
+            present[f"handle {settings.number}"] = Present((kind, place), empty, vertices, matrix)
+        return present
 
-    def _new_settings(self, ob) -> dict:
+    def _change(self, key: str, present):
+        """Of a handle, from what the server has of it."""
+        if present is None:
+            return lpdeform.Removal()
+        settings = present.empty.lpdeform_handle
+        motion = handles.motion(present.matrix, self._rest[present.vertices], settings.kind == "ORIENTATION")
+        last = self._told.last(key)
+        if last is not None and last.value[0] == present.value[0]:
+            return motion
+        return lpdeform.Handle(present.vertices, motion, handles.hold(present.empty), None, settings.footprint)
+
+    def _present_settings(self, ob) -> dict:
         settings = ob.lpdeform
-        is_painting = ob.mode == "WEIGHT_PAINT" and time.monotonic() - self._weights_read >= _paint_interval
-        names = (settings.p_group, settings.stiffness_group)
-        if is_painting or self._weights.get("names") != names:
-            p_weights, stiffness_weights = (surface.group_weights(ob, name) for name in names)
-            self._weights = {"names": names, "p": p_weights, "stiffness": stiffness_weights}
-            self._weights_read = time.monotonic()
+        self._read_weights(ob)
         p = between(settings.p, settings.p_painted, self._weights["p"])
         powers = between(np.log(settings.stiffness), np.log(settings.stiffness_painted), self._weights["stiffness"])
-        stiffness = np.exp(powers)
-        fields = {"p": np.clip(p, 1.0, 64.0), "stiffness": np.clip(stiffness, 1e-6, 1e6)}
-        new = {name: value for name, value in fields.items() if not np.array_equal(value, self._told_settings.get(name))}
-        self._told_settings.update(new)
-        return new
+        self.fields = {"p": np.clip(p, 1.0, 64.0), "stiffness": np.clip(np.exp(powers), 1e-6, 1e6)}
+        present = {}
+        for name, field in self.fields.items():
+            strength = getattr(settings, f"{name}_automatic")
+            setting = lpdeform.Automatic(strength) if strength > 0 else field
+            present[name] = Present(("automatic", strength) if strength > 0 else field.tobytes(), setting=setting)
+        region = self._weights["region"]
+        may_move = np.flatnonzero(region > 0.5) if region is not None else np.zeros(0, int)
+        if len(may_move) or self._told.last("region") is not None:
+            present["region"] = Present(may_move.tobytes(), setting=may_move)
+        return present
+
+    def _read_weights(self, ob) -> None:
+        settings = ob.lpdeform
+        is_painting = ob.mode == "WEIGHT_PAINT" and time.monotonic() - self._weights_read >= _paint_interval
+        names = {name: getattr(settings, f"{name}_group") for name in _settings}
+        if is_painting or self._weights.get("names") != names:
+            self._weights = {name: surface.group_weights(ob, group) for name, group in names.items()}
+            self._weights["names"] = names
+            self._weights_read = time.monotonic()
 
 
 def between(plain: float, painted: float, weights):
@@ -147,12 +200,21 @@ def start(ob) -> None:
         _running[ob.name] = LiveMesh(ob)
     except lpdeform.Unavailable as error:
         raise NotReady(
-            f"No lpdeform server answers at {address()}. Start one with deploy/up, or set its address in the add-on's preferences."
+            f"No lpdeform server answers at {address()}. Start one with deploy/up, or set its address in the add-on's preferences"
+            f"{_over_tls()}."
         ) from error
     except lpdeform.LpdeformError as error:
-        raise NotReady(f"The mesh cannot be deformed: {error}") from error
+        is_about_us = error.code in (lpdeform.Code.UNAUTHENTICATED, lpdeform.Code.PERMISSION_DENIED)
+        what = "The server does not let us in" if is_about_us else "The mesh cannot be deformed"
+        raise NotReady(f"{what}: {error}") from error
+    except OSError as error:
+        raise NotReady(f"A file of the add-on's preferences cannot be read: {error}") from error
     if not bpy.app.timers.is_registered(tick):
         bpy.app.timers.register(tick)
+
+
+def _over_tls() -> str:
+    return ", or its certificates, since TLS is on" if access()["tls"] else ""
 
 
 def stop(ob, keep_as: str = "") -> None:
@@ -178,8 +240,8 @@ def tick():
             continue
         try:
             running.look(ob)
-            if _messages.get(name) and running.frame is not None and running.state == "connected":
-                _messages.pop(name)
+            if running.frame is not None and running.state == "connected" and not running.has_refusals:
+                _messages.pop(name, None)
         except lpdeform.LpdeformError as error:
             _messages[name] = str(error)
             if running.state == "closed":

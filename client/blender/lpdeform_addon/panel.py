@@ -31,6 +31,8 @@ class MainPanel(bpy.types.Panel):
             layout.operator("lpdeform.start", icon="PLAY")
         else:
             layout.label(text=_words[running.state].format(address()), icon="LINKED")
+            if running.frame is not None and running.frame.optimality_gap is not None:
+                layout.label(text=f"Within {100 * running.frame.optimality_gap:.2g} % of the optimum", icon="CHECKMARK")
             column = layout.column(align=True)
             column.operator("lpdeform.stop", icon="X")
             column.operator("lpdeform.apply", icon="SHAPEKEY_DATA")
@@ -59,10 +61,15 @@ class MaterialPanel(_Below, bpy.types.Panel):
         self.layout.use_property_split = True
         for name in ("p", "stiffness"):
             column = self.layout.column(align=True)
+            column.prop(ob.lpdeform, f"{name}_automatic")
+            if getattr(ob.lpdeform, f"{name}_automatic") > 0:
+                continue
             column.prop(ob.lpdeform, name)
             column.prop_search(ob.lpdeform, f"{name}_group", ob, "vertex_groups")
             if getattr(ob.lpdeform, f"{name}_group"):
                 column.prop(ob.lpdeform, f"{name}_painted")
+        self.layout.prop_search(ob.lpdeform, "region_group", ob, "vertex_groups")
+        self.layout.prop(ob.lpdeform, "certify")
 
 
 class HandlePanel(_Below, bpy.types.Panel):

@@ -32,6 +32,20 @@ class MeshSettings(bpy.types.PropertyGroup):
         name="Painted stiffness", default=100.0, min=1e-6, max=1e6, soft_min=0.01, soft_max=100.0,
         description="Stiffness at weight 1",
     )  # fmt: skip
+    p_automatic: FloatProperty(
+        name="p by shape", default=0.0, min=0.0, max=1.0,
+        description="Lets the geometry choose p, with this strength; 0: as above",
+    )  # fmt: skip
+    stiffness_automatic: FloatProperty(
+        name="Stiffness by shape", default=0.0, min=0.0, max=1.0,
+        description="Lets the geometry choose the stiffness, with this strength; 0: as above",
+    )  # fmt: skip
+    region_group: StringProperty(
+        name="Region", description="Vertex group: only what has a weight over 0.5 may move. Empty: everything may"
+    )
+    certify: BoolProperty(
+        name="Bound", default=False, description="Says how far a result can be from the optimum. Counts from the next start on"
+    )
     show_distortion: BoolProperty(
         name="As colour", default=True, description="Fills the colour attribute lpdeform distortion"
     )
@@ -64,8 +78,26 @@ class Preferences(bpy.types.AddonPreferences):
         description="HOST:PORT of the lpdeform server. Empty: the environment variable LPDEFORM_ADDRESS, or localhost:50051",
     )  # fmt: skip
 
+    token_file: StringProperty(
+        name="Token file", default="", subtype="FILE_PATH",
+        description="A file with the bearer token that the server asks for; read again for each call. Empty: none",
+    )  # fmt: skip
+    use_tls: BoolProperty(name="TLS", default=False, description="Connect with TLS")
+    root_certificates: StringProperty(
+        name="Trusted", default="", subtype="FILE_PATH", description="Certificates of those to trust, PEM. Empty: the usual ones"
+    )
+    certificate_chain: StringProperty(
+        name="Own certificate", default="", subtype="FILE_PATH", description="PEM, where the server asks for one"
+    )
+    private_key: StringProperty(name="Its key", default="", subtype="FILE_PATH", description="PEM, without a password")
+
     def draw(self, context) -> None:
-        self.layout.prop(self, "address")
+        self.layout.use_property_split = True
+        for name in ("address", "token_file", "use_tls"):
+            self.layout.prop(self, name)
+        if self.use_tls:
+            for name in ("root_certificates", "certificate_chain", "private_key"):
+                self.layout.prop(self, name)
 
 
 _register_classes, _unregister_classes = bpy.utils.register_classes_factory((MeshSettings, HandleSettings, Preferences))
