@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import tempfile
 import unittest
 
 import bmesh
@@ -302,6 +303,32 @@ class AddOn(unittest.TestCase):
         finally:
             PREFERENCES.use_tls, PREFERENCES.root_certificates, PREFERENCES.token_file = False, "", ""
         self.assertIsNone(self.tube.data.shape_keys)
+
+    def test_a_server_that_asks_for_a_token_over_tls_lets_in_by_the_preferences(self):
+        with tempfile.TemporaryDirectory() as folder:
+            cert, key, signer, public, token = (os.path.join(folder, name) for name in ("cert", "key", "signer", "public", "token"))
+            stage.openssl("req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=server", "-addext",
+                          "subjectAltName=IP:127.0.0.1", "-days", "2", "-keyout", key, "-out", cert)
+            stage.openssl("genrsa", "-out", signer, "2048")
+            stage.openssl("rsa", "-in", signer, "-pubout", "-out", public)
+            with open(token, "w") as file:
+                file.write(stage.token_of("an artist", signer) + "\n")
+            server = stage.RunningServer("--tls-cert", cert, "--tls-key", key, "--token-keys", public)
+            self.addCleanup(server.end)
+            preferences = bpy.context.preferences.addons["lpdeform_addon"].preferences
+            preferences.address, preferences.use_tls, preferences.root_certificates = server.address, True, cert
+            try:
+                stage.activate(self.tube)
+                with self.assertRaisesRegex(RuntimeError, "The server does not let us in.*TOKEN_MISSING"):
+                    bpy.ops.lpdeform.start()
+                preferences.token_file = token
+                _, tip = self.held()
+                self.shift(tip, 0.5, 0, 0)
+                stage.settle(self.tube)
+            finally:
+                preferences.use_tls, preferences.root_certificates, preferences.token_file = False, "", ""
+            self.assertTrue(np.allclose(stage.shown(self.tube)[self.top], self.rest[self.top] + [0.5, 0, 0], atol=1e-5))
+            live.stop(self.tube)
 
     def test_no_server_is_said_clearly_and_changes_nothing(self):
         stage.add_handle(self.tube, self.top)

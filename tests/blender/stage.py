@@ -4,6 +4,8 @@ do not run by themselves without a window.
 Run as: blender ... --python TEST.py -- ADD_ON.zip SERVER PICTURES
 """
 
+import base64
+import json
 import os
 import signal
 import subprocess
@@ -21,12 +23,13 @@ PATIENCE = 60.0  # seconds that anything may take; never reached where all is we
 class RunningServer:
     """lpdeform-server on a free port of this machine, which it keeps when it is started again."""
 
-    def __init__(self):
+    def __init__(self, *flags):
         self.address = "127.0.0.1:0"
+        self._flags = flags
         self.start()
 
     def start(self):
-        command = [SERVER, "--address", self.address, "--log-level", "off"]
+        command = [SERVER, "--address", self.address, "--log-level", "off", *self._flags]
         self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         self.address = self._process.stdout.readline().split()[-1]
 
@@ -34,6 +37,18 @@ class RunningServer:
         self._process.send_signal(how)
         self._process.wait(PATIENCE)
         self._process.stdout.close()
+
+
+def openssl(*arguments, data=b""):
+    return subprocess.run(["openssl", *arguments], input=data, capture_output=True, timeout=PATIENCE, check=True).stdout
+
+
+def token_of(subject, key):
+    """A JWT for the next hour, signed with the RSA key of this file."""
+    parts = ({"alg": "RS256", "typ": "JWT"}, {"sub": subject, "exp": int(time.time()) + 3600})
+    text = b".".join(base64.urlsafe_b64encode(json.dumps(part).encode()).rstrip(b"=") for part in parts)
+    signature = base64.urlsafe_b64encode(openssl("dgst", "-sha256", "-sign", key, data=text)).rstrip(b"=")
+    return (text + b"." + signature).decode()
 
 
 def install(with_its_own_modules_first=False):
