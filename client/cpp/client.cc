@@ -4,6 +4,7 @@
 
 #include "client/cpp/lease.h"
 #include "client/cpp/link.h"
+#include "client/cpp/names.h"
 #include "client/cpp/rpc.h"
 #include "client/cpp/upload.h"
 
@@ -62,6 +63,10 @@ absl::Status Session::take_over() {
   return link_->take_over();
 }
 
+bool Session::is_result(const Frame& frame) const {
+  return link_->is_result(frame);
+}
+
 std::string Session::name() const {
   return link_->name();
 }
@@ -93,21 +98,25 @@ absl::Status Session::close() {
 Client::Client(std::shared_ptr<Rpc> rpc, ClientOptions options)
     : rpc_(std::move(rpc)), options_(std::move(options)) {}
 
-absl::StatusOr<Client> Client::connect(std::string_view address, ClientOptions options) {
-  auto rpc = Rpc::connect(std::string(address), options);
+absl::StatusOr<Client> Client::connect(std::string_view address, ClientOptions options,
+                                       const std::stop_token& stop) {
+  auto rpc = Rpc::connect(std::string(address), options, stop);
   if (!rpc.ok()) return rpc.status();
   return Client(*std::move(rpc), std::move(options));
 }
 
-absl::StatusOr<Session> Client::open(Mesh mesh, OpenOptions options) {
-  auto lease = create_session(*rpc_, mesh, options, new_request_id(), {});
+absl::StatusOr<Session> Client::open(Mesh mesh, OpenOptions options, const std::stop_token& stop) {
+  auto lease = create_session(*rpc_, mesh, options, new_request_id(), stop);
   if (!lease.ok()) return lease.status();
   return Session(std::make_unique<Link>(rpc_, options_, std::move(options),
                                         std::make_shared<const Mesh>(std::move(mesh)), *std::move(lease)));
 }
 
-absl::StatusOr<Session> Client::join(std::string_view session, Role role, OpenOptions options) {
-  auto lease = join_session(*rpc_, std::string(session), role, {});
+absl::StatusOr<Session> Client::join(std::string_view session, Role role, OpenOptions options,
+                                     const std::stop_token& stop) {
+  const absl::Status checked = check_name("session", session);
+  if (!checked.ok()) return checked;
+  auto lease = join_session(*rpc_, std::string(session), role, stop);
   if (!lease.ok()) return lease.status();
   return Session(std::make_unique<Link>(rpc_, options_, std::move(options), nullptr, *std::move(lease)));
 }

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 
@@ -91,7 +92,8 @@ class Session {
   /// Does not wait: changes made faster than the connection takes them are merged, the newest value of each
   /// handle and each setting winning. A change that the server refuses comes out of next_frame as an error,
   /// once; the session goes on without it, and without what was merged into it. Errors: FAILED_PRECONDITION
-  /// once closed (SESSION_CLOSED) or for a reader (NOT_THE_WRITER).
+  /// once closed (SESSION_CLOSED) or for a reader (NOT_THE_WRITER); INVALID_ARGUMENT NAME_ENCODING where the name of a
+  /// handle is not UTF-8.
   absl::StatusOr<std::uint64_t> update(Update update);
 
   /// Adds the handle or replaces the one of that name. As update().
@@ -115,6 +117,9 @@ class Session {
   /// Takes frames until one is the finished result of the newest update. Waits, in vain where that one was
   /// taken before; not for its optimality_gap, which the next frame has. Errors as next_frame.
   absl::StatusOr<Frame> settle(std::chrono::milliseconds timeout);
+
+  /// Whether a frame of this session is the finished result of the newest update that was not refused.
+  bool is_result(const Frame& frame) const;
 
   /// Solves for the present handles and settings on the server and returns the finished result; waits for it.
   /// Does not need the stream of frames, but works beside it. Begins again where the server went away, within
@@ -153,18 +158,21 @@ class Session {
 class Client {
  public:
   /// Waits until the server answers or its address refuses. `address`: "host:port", or
-  /// "unix:/path/of/socket". UNAVAILABLE (NO_SERVER).
-  static absl::StatusOr<Client> connect(std::string_view address, ClientOptions options = {});
+  /// "unix:/path/of/socket". UNAVAILABLE (NO_SERVER); INVALID_ARGUMENT where the texts of `options.tls` are not certificates
+  /// and their key. Here and below, a request to stop ends the wait with CANCELLED.
+  static absl::StatusOr<Client> connect(std::string_view address, ClientOptions options = {},
+                                        const std::stop_token& stop = {});
 
   /// Makes a session on the server. Waits for the mesh to be sent: in one message where it is small,
   /// otherwise in parts with a checksum. Errors: INVALID_ARGUMENT with the first element that cannot be
   /// deformed; RESOURCE_EXHAUSTED; UNAVAILABLE. Keeps `mesh` for as long as the session lives.
-  absl::StatusOr<Session> open(Mesh mesh, OpenOptions options = {});
+  absl::StatusOr<Session> open(Mesh mesh, OpenOptions options = {}, const std::stop_token& stop = {});
 
   /// Joins somebody's session by name: as a reader of its frames, or taking over as its writer. Such a
   /// session is not made anew where the server loses it, and not deleted by close(). NOT_FOUND where there is
   /// none.
-  absl::StatusOr<Session> join(std::string_view session, Role role, OpenOptions options = {});
+  absl::StatusOr<Session> join(std::string_view session, Role role, OpenOptions options = {},
+                               const std::stop_token& stop = {});
 
  private:
   Client(std::shared_ptr<Rpc> rpc, ClientOptions options);

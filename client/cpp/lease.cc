@@ -30,6 +30,9 @@ absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptio
   if (!is_undecided(created.status())) uploads.discard();
   if (!created.ok()) return created.status();
   const v1::Session& session = created->session();
+  const absl::Status checked =
+      check_vertex_count(session.mesh().vertices(), static_cast<std::int64_t>(mesh.vertex_count()));
+  if (!checked.ok()) return checked;
   return Lease{session.name(), created->writer_token(), session.epoch(), session.input_seq(),
                from_wire(session.mesh())};
 }
@@ -52,6 +55,13 @@ absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role ro
   lease.epoch = acquired->epoch();
   lease.input_seq = acquired->input_seq();
   return lease;
+}
+
+absl::Status check_vertex_count(std::int64_t count, std::int64_t wanted) {
+  if (count == wanted) return absl::OkStatus();
+  return make_fault(
+      absl::StatusCode::kDataLoss, {"FRAME_VERTICES", "", absl::StrCat("vertices = ", wanted)},
+      absl::StrCat("The server speaks of ", count, " vertices of a mesh that has ", wanted, "."));
 }
 
 bool is_session_lost(const absl::Status& status) {

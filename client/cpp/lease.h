@@ -27,6 +27,9 @@ absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptio
 absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role role,
                                    const std::stop_token& stop);
 
+/// DATA_LOSS FRAME_VERTICES where a server speaks of `count` vertices of a mesh that has `wanted`: buffers were made for those.
+absl::Status check_vertex_count(std::int64_t count, std::int64_t wanted);
+
 /// The server no longer has the session that a call was about.
 bool is_session_lost(const absl::Status& status);
 

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
+#include "client/cpp/guarded.h"
 #include "client/cpp/upload.h"
 #include "client/cpp/wire.h"
 
@@ -50,19 +52,30 @@ Link::~Link() {
 void Link::start_stream() {
   const std::scoped_lock lock(mutex_);
   if (is_running_ || is_closing_ || thread_.joinable()) return;
-  is_running_ = true;
   last_open_ = Clock::now();
   thread_ = std::thread([this] { run(); });
+  is_running_ = true;
 }
 
 void Link::run() {
-  Backoff backoff;
-  while (recover(one_stream(), backoff)) {
-  }
+  const absl::Status failed = guarded([this] {
+    Backoff backoff;
+    while (recover(one_stream(), backoff)) {
+    }
+    return absl::OkStatus();
+  });
+  if (failed.ok()) return;
+  const std::scoped_lock lock(mutex_);
+  is_open_ = false;
+  give_up(failed);
 }
 
 absl::Status Link::one_stream() {
   const std::unique_ptr<DeformCall> call = rpc_->deform();
+  const auto forget = absl::MakeCleanup([this] {
+    const std::scoped_lock lock(mutex_);
+    call_ = nullptr;
+  });
   v1::DeformRequest open;
   {
     const std::scoped_lock lock(mutex_);
@@ -74,17 +87,21 @@ absl::Status Link::one_stream() {
     uploads_in_use_.clear();  // these will expire
     uploads_done_.clear();
     go_away_.reset();
+    broken_ = absl::OkStatus();
     last_heard_ = Clock::now();
     open = open_request(lease_, options_);
   }
   std::thread reader([this, &call] { listen(*call); });
-  if (call->write(open)) pump(*call);
+  const absl::Status pumped = guarded([&] {
+    if (call->write(open)) pump(*call);
+    return absl::OkStatus();
+  });
+  if (!pumped.ok()) call->cancel();
   reader.join();
-  {
-    const std::scoped_lock lock(mutex_);
-    call_ = nullptr;
-  }
-  return call->finish();
+  const absl::Status ended = call->finish();
+  const std::scoped_lock lock(mutex_);
+  if (!pumped.ok()) return pumped;
+  return broken_.ok() ? ended : broken_;
 }
 
 void Link::pump(DeformCall& call) {

@@ -41,6 +41,7 @@ class Link {
   absl::StatusOr<Frame> next_frame(FrameBox::Clock::time_point deadline);
   absl::StatusOr<std::optional<Frame>> poll();
   absl::StatusOr<Frame> settle(FrameBox::Clock::time_point deadline);
+  bool is_result(const Frame& frame) const;
   absl::StatusOr<SolveResult> solve(const SolveOptions& options);
   absl::Status take_over();
   absl::Status close();
@@ -70,7 +71,8 @@ class Link {
   absl::Status take(const v1::DeformResponse& response);
   absl::Status take(const v1::StreamEvent& event);
   absl::Status take(const v1::FramePart& part);
-  void take(const v1::StreamOpened& opened);
+  /// DATA_LOSS FRAME_VERTICES.
+  absl::Status take(const v1::StreamOpened& opened);
   void note_answered(std::uint64_t input_seq);
   void take(const v1::Fault& fault);
 
@@ -114,6 +116,7 @@ class Link {
   std::map<std::uint64_t, Uploads> uploads_in_use_;  // by the updates that name them
   std::vector<Uploads> uploads_done_;                // to be deleted
   std::optional<v1::GoAway> go_away_;
+  absl::Status broken_;  // why we gave the stream up
   std::optional<FrameAssembly> assembly_;
   Clock::time_point last_heard_;
   /// After so long without a word the connection is dead: three of the heartbeats that the server announces.

@@ -7,6 +7,7 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "client/cpp/link.h"
+#include "client/cpp/names.h"
 #include "client/cpp/solve_call.h"
 #include "client/cpp/upload.h"
 #include "client/cpp/wire.h"
@@ -22,6 +23,8 @@ absl::Status session_closed() {
 }  // namespace
 
 absl::StatusOr<std::uint64_t> Link::update(Update update) {
+  const absl::Status checked = check_names(update);
+  if (!checked.ok()) return checked;
   const std::scoped_lock lock(mutex_);
   if (is_closing_) return session_closed();
   if (lease_.writer_token.empty()) {
@@ -63,10 +66,13 @@ absl::StatusOr<Frame> Link::next_frame(Clock::time_point deadline) {
 absl::StatusOr<Frame> Link::settle(Clock::time_point deadline) {
   for (;;) {
     absl::StatusOr<Frame> frame = next_frame(deadline);
-    if (!frame.ok()) return frame;
-    const std::scoped_lock lock(mutex_);
-    if (frame->converged && frame->input_seq >= ledger_.newest()) return frame;
+    if (!frame.ok() || is_result(*frame)) return frame;
   }
+}
+
+bool Link::is_result(const Frame& frame) const {
+  const std::scoped_lock lock(mutex_);
+  return frame.converged && frame.input_seq >= ledger_.newest();
 }
 
 absl::Status Link::no_frame() const {

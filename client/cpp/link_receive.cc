@@ -3,18 +3,26 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/cpp/guarded.h"
 #include "client/cpp/link.h"
 #include "client/cpp/wire.h"
 
 namespace lpdeform::client {
 
 void Link::listen(DeformCall& call) {
-  v1::DeformResponse response;
-  while (call.read(response)) {
-    const absl::Status taken = take(response);
-    if (!taken.ok()) call.cancel();
-  }
+  absl::Status broken;
+  const absl::Status read = guarded([&] {
+    v1::DeformResponse response;
+    while (call.read(response)) {
+      if (broken.ok()) broken = guarded([&] { return take(response); });
+      if (!broken.ok()) call.cancel();  // what is left is read and dropped
+    }
+    return absl::OkStatus();
+  });
+  broken.Update(read);
+  if (!broken.ok()) call.cancel();
   const std::scoped_lock lock(mutex_);
+  broken_ = std::move(broken);
   is_over_ = true;
   changed_.notify_all();
 }
@@ -43,8 +51,7 @@ void Link::note_answered(std::uint64_t input_seq) {
 absl::Status Link::take(const v1::StreamEvent& event) {
   switch (event.event_case()) {
     case v1::StreamEvent::kOpened:
-      take(event.opened());
-      break;
+      return take(event.opened());
     case v1::StreamEvent::kFrame:
       return take(event.frame());
     case v1::StreamEvent::kFault:
@@ -61,7 +68,12 @@ absl::Status Link::take(const v1::StreamEvent& event) {
   return absl::OkStatus();
 }
 
-void Link::take(const v1::StreamOpened& opened) {
+absl::Status Link::take(const v1::StreamOpened& opened) {
+  {
+    const std::scoped_lock lock(mutex_);
+    absl::Status checked = check_vertex_count(opened.vertex_count(), lease_.mesh.vertices);
+    if (!checked.ok()) return checked;
+  }
   assembly_.emplace(opened.vertex_count());
   box_.begin_epoch(opened.epoch());
   const std::scoped_lock lock(mutex_);
@@ -73,6 +85,7 @@ void Link::take(const v1::StreamOpened& opened) {
   is_open_ = true;
   opened_ = Clock::now();
   changed_.notify_all();
+  return absl::OkStatus();
 }
 
 absl::Status Link::take(const v1::FramePart& part) {

@@ -52,6 +52,8 @@ bool is_passing(absl::StatusCode code) {
 
 Recovery recovery_after(const absl::Status& ended, const std::optional<v1::GoAway>& go_away, bool has_copy) {
   if (go_away) return after_go_away(*go_away, has_copy);
+  if (fault_of(ended).reason == "FRAME_VERTICES")
+    return {NextStep::kGiveUp, ended, {}};  // it is another mesh
   if (is_passing(ended.code())) return {NextStep::kResume, ended, {}};
   if (absl::IsNotFound(ended) && has_copy) return {NextStep::kMakeAnew, ended, {}};
   if (fault_of(ended).reason == "NOT_THE_WRITER") {  // it happened while we were away

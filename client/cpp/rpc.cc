@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cpp/status_details.h"
+#include "client/cpp/tls_texts.h"
 #include "client/cpp/upload.h"
 #include "core/base/fault.h"
 #include "lpdeform/v1/service.grpc.pb.h"
@@ -65,13 +66,34 @@ absl::Status status_of(const grpc::Status& status) {
 }
 
 /// False as soon as every address has refused: waiting would only hide that nobody is there.
-bool answers(grpc::Channel& channel, std::chrono::system_clock::time_point deadline) {
-  for (;;) {
+bool answers(grpc::Channel& channel, std::chrono::system_clock::time_point deadline,
+             const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
     const grpc_connectivity_state state = channel.GetState(true);
     if (state == GRPC_CHANNEL_READY) return true;
     if (state == GRPC_CHANNEL_TRANSIENT_FAILURE || state == GRPC_CHANNEL_SHUTDOWN) return false;
-    if (!channel.WaitForStateChange(state, deadline)) return false;
+    const auto now = std::chrono::system_clock::now();
+    if (now >= deadline) return false;
+    channel.WaitForStateChange(state, std::min(deadline, now + kGlance));
   }
+  return false;
+}
+
+/// Why there is no connection, which gRPC tells a call alone; empty where it does not know yet.
+std::string problem_of(const std::shared_ptr<grpc::Channel>& channel) {
+  if (channel->GetState(false) != GRPC_CHANNEL_TRANSIENT_FAILURE) return "";
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kGlance);
+  v1::GetSessionResponse none;
+  const grpc::Status status =
+      v1::DeformService::NewStub(channel)->GetSession(&context, v1::GetSessionRequest(), &none);
+  return status.error_code() == grpc::StatusCode::UNAVAILABLE ? status.error_message() : "";
+}
+
+absl::Status no_server(const std::string& address, const std::string& problem) {
+  return make_fault(
+      absl::StatusCode::kUnavailable, {"NO_SERVER", address, ""},
+      absl::StrCat("No server answers at \"", address, "\"", problem.empty() ? "." : ": ", problem));
 }
 
 /// What every call says of its caller.
@@ -205,14 +227,17 @@ class GrpcRpc final : public Rpc {
 
 }  // namespace
 
-absl::StatusOr<std::shared_ptr<Rpc>> Rpc::connect(const std::string& address, const ClientOptions& options) {
+absl::StatusOr<std::shared_ptr<Rpc>> Rpc::connect(const std::string& address, const ClientOptions& options,
+                                                  const std::stop_token& stop) {
+  const absl::Status checked = options.tls ? check_tls(*options.tls) : absl::OkStatus();
+  if (!checked.ok()) return checked;
   keep_grpc();
   const auto channel = grpc::CreateCustomChannel(address, credentials_of(options.tls), channel_arguments());
-  if (!answers(*channel, std::chrono::system_clock::now() + options.connect_timeout)) {
-    return make_fault(absl::StatusCode::kUnavailable, {"NO_SERVER", address, ""},
-                      absl::StrCat("No server answers at \"", address, "\"."));
+  if (answers(*channel, std::chrono::system_clock::now() + options.connect_timeout, stop)) {
+    return std::make_shared<GrpcRpc>(channel, options);
   }
-  return std::make_shared<GrpcRpc>(channel, options);
+  if (stop.stop_requested()) return absl::CancelledError("Connecting was stopped.");
+  return no_server(address, problem_of(channel));
 }
 
 }  // namespace lpdeform::client

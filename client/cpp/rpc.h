@@ -35,9 +35,10 @@ class DeformCall {
 class Rpc {
  public:
   /// `address` as in Client::connect. Waits until the server answers or the address refuses:
-  /// UNAVAILABLE (NO_SERVER).
+  /// UNAVAILABLE (NO_SERVER). INVALID_ARGUMENT as check_tls().
   static absl::StatusOr<std::shared_ptr<Rpc>> connect(const std::string& address,
-                                                      const ClientOptions& options);
+                                                      const ClientOptions& options,
+                                                      const std::stop_token& stop);
   virtual ~Rpc() = default;
 
   virtual absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,

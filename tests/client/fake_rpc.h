@@ -6,7 +6,9 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/cpp/rpc.h"
@@ -31,6 +33,13 @@ class Stream {
   void end(absl::Status status) {
     const std::scoped_lock lock(mutex_);
     if (!end_) end_ = std::move(status);
+    changed_.notify_all();
+  }
+
+  /// The client's read throws, once.
+  void throw_once() {
+    const std::scoped_lock lock(mutex_);
+    is_to_throw_ = true;
     changed_.notify_all();
   }
 
@@ -61,7 +70,8 @@ class Stream {
 
   bool read(v1::DeformResponse& response) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return !to_client_.empty() || end_; });
+    changed_.wait(lock, [this] { return !to_client_.empty() || end_ || is_to_throw_; });
+    if (std::exchange(is_to_throw_, false)) throw std::runtime_error("no message");
     if (to_client_.empty()) return false;
     response = std::move(to_client_.front());
     to_client_.pop_front();
@@ -79,6 +89,7 @@ class Stream {
   std::deque<v1::DeformResponse> to_client_;
   std::deque<v1::DeformRequest> to_server_;
   std::optional<absl::Status> end_;
+  bool is_to_throw_ = false;
 };
 
 class FakeCall final : public DeformCall {
@@ -136,6 +147,8 @@ class FakeRpc final : public Rpc {
   std::deque<absl::Status> create_ends;
   /// What Solve calls end with, in turn; OK once they are used up.
   std::deque<absl::Status> solve_ends;
+  /// Opening a stream throws.
+  bool deform_throws = false;
 
   absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
                                                 const std::stop_token&) override {
@@ -240,6 +253,7 @@ class FakeRpc final : public Rpc {
   }
 
   std::unique_ptr<DeformCall> deform() override {
+    if (deform_throws) throw std::runtime_error("no stream");
     const std::scoped_lock lock(mutex_);
     streams_.push_back(std::make_shared<Stream>());
     changed_.notify_all();

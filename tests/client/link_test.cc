@@ -186,6 +186,45 @@ TEST_F(LinkTest, AMisfittingFrameBreaksTheStreamAndNotTheSession) {
   EXPECT_TRUE(next_frame().ok());
 }
 
+TEST_F(LinkTest, AStreamOfAnotherMeshEndsTheSession) {
+  open();
+  ASSERT_TRUE(link_->poll().ok());
+  const auto stream = rpc_->next_stream();
+  ASSERT_NE(stream, nullptr);
+  v1::DeformResponse opened;
+  opened.mutable_event()->mutable_opened()->set_vertex_count(kVertexCount + 1);
+  stream->say(opened);
+  const absl::Status ended = next_frame().status();
+  EXPECT_TRUE(absl::IsDataLoss(ended));
+  EXPECT_EQ(fault_of(ended).reason, "FRAME_VERTICES");
+  EXPECT_EQ(link_->connection(), Connection::kClosed);
+}
+
+TEST_F(LinkTest, AnExceptionOnAThreadOfItsEndsTheSessionWithItsText) {
+  open();
+  rpc_->deform_throws = true;
+  const absl::Status ended = next_frame().status();
+  EXPECT_EQ(fault_of(ended).reason, "EXCEPTION");
+  EXPECT_EQ(ended.message(), "no stream");
+  EXPECT_EQ(link_->connection(), Connection::kClosed);
+}
+
+TEST_F(LinkTest, AnExceptionWhileReadingBreaksTheStreamAndNotTheSession) {
+  open();
+  const auto stream = opened_stream();
+  stream->throw_once();
+  const auto next = answered(rpc_->next_stream());
+  ASSERT_NE(next, nullptr);
+  next->say(frame(1, 0));
+  EXPECT_TRUE(next_frame().ok());
+}
+
+TEST_F(LinkTest, ANameThatIsNotUtf8IsRefusedAtTheCall) {
+  open();
+  EXPECT_EQ(fault_of(link_->update(adding("t\xc3")).status()).reason, "NAME_ENCODING");
+  EXPECT_TRUE(link_->update(adding("t\xc3\xa9")).ok());
+}
+
 TEST_F(LinkTest, CloseEndsAWaitingCallAndDeletesTheSession) {
   open();
   opened_stream();
