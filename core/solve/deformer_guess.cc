@@ -59,7 +59,7 @@ Points Deformer::Impl::current_guess() {
       if (constraints->is_held[i]) u.row(i) -= share * last.row(i);
     }
   }
-  metric.extend(constraints->is_held, u, workers(), &forces, false);
+  metric.extend(constraints->is_held, u, workers(), &forces);
   if (goes_on) u += share * last;
   return x + u;
 }

@@ -111,8 +111,8 @@ void Metric::adopt(const std::vector<double>& cell_weights) {
   if (wanted > 0 && std::isfinite(wanted)) scale_ = wanted / present;
 }
 
-void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& workers, const Points* forces,
-                    bool is_refined) const {
+void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
+                    const Points* forces) const {
   Points b = Points::Zero(u.rows(), 3);
   for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
     if (is_held[i]) {
@@ -125,10 +125,7 @@ void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& 
       if (is_held[j]) b.row(i) += edge_weight(i, k) * u.row(j);
     }
   }
-  if (is_refined)
-    solve_scaled(b, u, workers);
-  else
-    single().solve(b, u, workers);
+  single().solve(b, u, workers);
   for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
     if (is_held[i]) u.row(i) = b.row(i);
   }

@@ -62,11 +62,10 @@ class Metric {
   void precondition(const Points& b, Points& x, const Workers& workers) const;
 
   /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of
-  /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2, to about 1e-12; to single precision, in a fraction of
-  /// the time, without `is_refined`. Rows of free vertices are overwritten. `forces`, where not null, pull
+  /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2, as well as single precision has it. Rows of free vertices are overwritten. `forces`, where not null, pull
   /// at the free vertices besides: the entries count as well, and <forces, u> is subtracted.
   void extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
-              const Points* forces = nullptr, bool is_refined = true) const;
+              const Points* forces = nullptr) const;
 
   /// c_i as factored, clipped.
   double cell_weight(std::int32_t i) const { return scale_ * cell_weights_[i]; }

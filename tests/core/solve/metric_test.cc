@@ -106,7 +106,7 @@ TEST_F(MetricTest, ExtendsDisplacementsHarmonically) {
   EXPECT_EQ(u.row(0), Eigen::RowVector3d(1, 2, 3));
   const Points residual = apply(u);
   for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
-    EXPECT_TRUE(is_held[i] || residual.row(i).norm() < 1e-12) << i;
+    EXPECT_TRUE(is_held[i] || residual.row(i).norm() < 1e-5) << i;
   }
 }
 
