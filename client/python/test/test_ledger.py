@@ -101,3 +101,21 @@ def test_numbers_go_on_above_what_the_server_knows() -> None:
     ledger.count_from(40)
     assert ledger.send_next().seq == 41
     assert ledger.add(move(2)) == 42
+
+
+def test_what_was_taken_and_not_kept_is_sent_again_where_the_server_went_back() -> None:
+    ledger = Ledger()
+    for k, is_kept in ((1, True), (2, False), (3, False)):
+        ledger.add(Update({"tip": Handle([7])}) if k == 1 else Update({"old": Removal()}) if k == 2 else move(5))
+        ledger.send_next()
+        ledger.accept(k, is_kept)
+    ledger.resumed_at(3)
+    assert not ledger.has_waiting
+    ledger.resumed_at(1)
+    sent = ledger.send_next()
+    assert sent.seq == 3
+    assert isinstance(sent.update.handles["old"], Removal)
+    assert height(sent.update) == 5
+    ledger.accept(3, True)
+    ledger.resumed_at(1)
+    assert not ledger.has_waiting

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from lpdeform.types import Change, Handle, Removal, Settings, Update
 
 _resize_handle = "resize"
+_most_remembered = 16384
 
 
 class NumberedUpdate(NamedTuple):
@@ -49,6 +50,11 @@ def _settled(state: Update) -> Update:
     return replace(state, handles=kept)
 
 
+def _without_old_removals(update: Update) -> Update:
+    """Bounds what is remembered of handles that are there no more."""
+    return update if len(update.handles) <= _most_remembered else _settled(update)
+
+
 class Ledger:
     """What the server has accepted, what is on its way (at most `window`), and what waits, merged into one.
 
@@ -61,6 +67,7 @@ class Ledger:
     def __init__(self) -> None:
         self._next_seq = 1
         self._accepted = NumberedUpdate(0, Update())
+        self._unkept = NumberedUpdate(0, Update())  # accepted since the server last kept something, as it came
         self._restore: NumberedUpdate | None = None
         self._in_flight: list[NumberedUpdate] = []
         self._waiting: NumberedUpdate | None = None
@@ -100,12 +107,28 @@ class Ledger:
         self._in_flight.append(next_one)
         return next_one
 
-    def accept(self, seq: int) -> None:
-        """The server has taken the update of this number. Unknown numbers are nothing to us."""
+    def accept(self, seq: int, is_kept: bool = False) -> None:
+        """The server has taken the update of this number. Unknown numbers are nothing to us.
+
+        `is_kept`: it, and all taken before it, survive the end of the server.
+        """
         for sent in [one for one in self._in_flight if one.seq == seq]:
+            if not is_kept:
+                unkept = _without_old_removals(merged(self._unkept.update, sent.update))
+                self._unkept = NumberedUpdate(max(self._unkept.seq, seq), unkept)
+            elif seq >= self._unkept.seq:
+                self._unkept = NumberedUpdate(0, Update())
             state = _settled(merged(self._accepted.update, sent.update))
             self._accepted = NumberedUpdate(max(self._accepted.seq, seq), state)
             self._in_flight.remove(sent)
+
+    def resumed_at(self, seq: int) -> None:
+        """The session goes on, and the newest update that it has is `seq`.
+
+        What it took after that and did not keep is to be sent first, on its own.
+        """
+        if seq < self._unkept.seq and self._restore is None:
+            self._restore = NumberedUpdate(self._accepted.seq, self._unkept.update)
 
     def refuse(self, seq: int) -> None:
         """The server has refused the update of this number."""

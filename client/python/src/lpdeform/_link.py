@@ -339,7 +339,7 @@ class Link:
         stream.heard_at = time.monotonic()
         if response.HasField("result"):
             with self.changed:
-                self.ledger.accept(response.result.input_seq)
+                self.ledger.accept(response.result.input_seq, response.result.kept)
                 self._note_answered(stream, response.result.input_seq)
             return
         kind = response.event.WhichOneof("event")
@@ -364,6 +364,7 @@ class Link:
             if opened.heartbeat_interval_ms > 0:
                 stream.longest_silence = 3 * opened.heartbeat_interval_ms / 1000
             self.ledger.count_from(opened.input_seq)
+            self.ledger.resumed_at(opened.input_seq)
             stream.is_open = True
             stream.opened_at = time.monotonic()
             self.changed.notify_all()

@@ -36,6 +36,13 @@ function settled(state: Update): Update {
   return { ...state, handles: Object.assign(Object.create(null), Object.fromEntries(kept)) };
 }
 
+const mostRemembered = 16384;
+
+/** Bounds what is remembered of handles that are there no more. */
+function withoutOldRemovals(update: Update): Update {
+  return Object.keys(update.handles ?? {}).length <= mostRemembered ? update : settled(update);
+}
+
 function isMovesOnly({ update }: NumberedUpdate): boolean {
   const changes = Object.values(update.handles ?? {});
   return (
@@ -53,9 +60,12 @@ export class Ledger {
 
   #nextSeq = 1;
   #accepted: NumberedUpdate = { seq: 0, update: {} };
+  /** What was accepted since the server last kept something, as it came. */
+  #unkept: NumberedUpdate = { seq: 0, update: {} };
   #restore: NumberedUpdate | undefined;
   #inFlight: NumberedUpdate[] = [];
-  readonly #answered = new Set<number>();
+  /** Numbers of updates that were answered, and whether they were kept. */
+  readonly #answered = new Map<number, boolean>();
   #waiting: NumberedUpdate | undefined;
 
   /** Takes an update on; returns its number. */
@@ -95,11 +105,25 @@ export class Ledger {
     return next;
   }
 
-  /** The server has taken the update of this number. Taken on in the order of sending, however answers overtake each other. */
-  accept(seq: number): void {
-    this.#answered.add(seq);
-    while (this.#inFlight[0] && this.#answered.delete(this.#inFlight[0].seq)) {
-      const sent = this.#inFlight.shift()!;
+  /**
+   * The server has taken the update of this number. Taken on in the order of sending, however answers overtake each other.
+   * `isKept`: it, and all taken before it, survive the end of the server.
+   */
+  accept(seq: number, isKept = false): void {
+    this.#answered.set(seq, isKept);
+    this.#takeAnswered();
+  }
+
+  #takeAnswered(): void {
+    for (let sent = this.#inFlight[0]; sent && this.#answered.has(sent.seq); sent = this.#inFlight[0]) {
+      this.#inFlight.shift();
+      if (!this.#answered.get(sent.seq)) {
+        const update = withoutOldRemovals(merged(this.#unkept.update, sent.update));
+        this.#unkept = { seq: Math.max(this.#unkept.seq, sent.seq), update };
+      } else if (sent.seq >= this.#unkept.seq) {
+        this.#unkept = { seq: 0, update: {} };
+      }
+      this.#answered.delete(sent.seq);
       this.#accepted = {
         seq: Math.max(this.#accepted.seq, sent.seq),
         update: settled(merged(this.#accepted.update, sent.update)),
@@ -111,8 +135,15 @@ export class Ledger {
   /** The server has refused the update of this number. */
   refuse(seq: number): void {
     this.#inFlight = this.#inFlight.filter((one) => one.seq !== seq);
-    const first = this.#inFlight[0];
-    if (first && this.#answered.has(first.seq)) this.accept(first.seq);
+    this.#takeAnswered();
+  }
+
+  /**
+   * The session goes on, and the newest update that it has is `seq`: what it took after that and did not keep is to be sent
+   * first, on its own.
+   */
+  resumedAt(seq: number): void {
+    if (seq < this.#unkept.seq) this.#restore ??= { seq: this.#accepted.seq, update: this.#unkept.update };
   }
 
   /** What was on its way waits again. Sending it twice does no harm, it is the same value. */

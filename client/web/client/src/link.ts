@@ -141,6 +141,7 @@ export class Link {
         this.#assembly = new FrameAssembly(opened.vertexCount);
         this.box.beginEpoch(Number(opened.epoch));
         this.ledger.countFrom(Number(opened.inputSeq));
+        this.ledger.resumedAt(Number(opened.inputSeq));
         this.#heardFromServer();
         this.#setConnection("connected");
         this.#send();
@@ -226,8 +227,8 @@ export class Link {
     // What was on its way to a session that has been lost since waits again, whatever becomes of it there.
     const isVoid = () => this.#lease.session !== lease.session;
     try {
-      await this.sendUpdate(update, lease, this.stop.signal);
-      if (!isVoid()) this.ledger.accept(update.seq);
+      const isKept = await this.sendUpdate(update, lease, this.stop.signal);
+      if (!isVoid()) this.ledger.accept(update.seq, isKept);
       this.#heardFromServer();
     } catch (thrown) {
       if (!isVoid()) await this.#unsent(update, thrown as LpdeformError, lease.session);
@@ -236,13 +237,15 @@ export class Link {
     this.#send();
   }
 
-  async sendUpdate(update: NumberedUpdate, { session, writerToken }: Lease, signal: AbortSignal): Promise<void> {
+  /** Whether the update survives the end of the server. */
+  async sendUpdate(update: NumberedUpdate, { session, writerToken }: Lease, signal: AbortSignal): Promise<boolean> {
     const packer = new Packer();
     const uploads = new Uploads(this.rpc, signal);
     const message = updateToWire(update.update, update.seq, packer);
     try {
       await packer.flush((bytes) => uploads.add(bytes));
-      await this.rpc.call("updateHandles", { session, writerToken, update: message }, signal);
+      const { result } = await this.rpc.call("updateHandles", { session, writerToken, update: message }, signal);
+      return result?.kept ?? false;
     } finally {
       uploads.discard();
     }

@@ -220,8 +220,7 @@ export class Session implements AsyncIterable<Frame> {
     while (ledger.hasRestore) {
       const restore = ledger.sendNext();
       try {
-        await this.#link.sendUpdate(restore, lease, signal);
-        ledger.accept(restore.seq);
+        ledger.accept(restore.seq, await this.#link.sendUpdate(restore, lease, signal));
       } catch (error) {
         ledger.connectionLost();
         throw error;

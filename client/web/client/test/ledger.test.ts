@@ -163,4 +163,25 @@ describe("ledger", () => {
     ledger.countFrom(3);
     expect(ledger.add({ settings: { p: 2 } })).toBe(43);
   });
+
+  test("sends again what was taken and not kept, where the server went back", () => {
+    const ledger = new Ledger();
+    const take = (update: Parameters<Ledger["add"]>[0], isKept: boolean) => {
+      ledger.add(update);
+      ledger.accept(ledger.sendNext().seq, isKept);
+    };
+    take({ handles: { tip: { set: { vertices: [1] } } } }, true);
+    take({ handles: { old: { remove: true } } }, false);
+    take({ handles: { tip: { move: at(5) } } }, false);
+    ledger.resumedAt(3);
+    expect(ledger.hasWaiting).toBe(false);
+    ledger.resumedAt(1);
+    expect(ledger.hasRestore).toBe(true);
+    const sent = ledger.sendNext();
+    expect(sent.seq).toBe(3);
+    expect({ ...sent.update.handles }).toEqual({ old: { remove: true }, tip: { move: at(5) } });
+    ledger.accept(3, true);
+    ledger.resumedAt(1);
+    expect(ledger.hasWaiting).toBe(false);
+  });
 });
