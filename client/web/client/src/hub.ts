@@ -227,7 +227,7 @@ class SharedStream {
         lane.opened(event.value);
         break;
       case "frame":
-        lane.sink.part(event.value);
+        this.#part(lane, event.value);
         break;
       case "fault":
         if (lane.streamId) lane.sink.fault(event.value);
@@ -238,6 +238,17 @@ class SharedStream {
         if (event.value.reason !== GoAwayReason.NOT_OPENED) lane.sink.goAway(event.value);
         lane.ended(lane.refusal);
         break;
+    }
+  }
+
+  /** What does not fit ends its session's lane; the others' frames go on. */
+  #part(lane: Lane, part: FramePart): void {
+    try {
+      lane.sink.part(part);
+    } catch (misfit) {
+      this.lanes.delete(lane);
+      if (this.lanes.size === 0) this.#end();
+      lane.ended(misfit as LpdeformError);
     }
   }
 

@@ -64,8 +64,8 @@ export class Ledger {
   #unkept: NumberedUpdate = { seq: 0, update: {} };
   #restore: NumberedUpdate | undefined;
   #inFlight: NumberedUpdate[] = [];
-  /** Numbers of updates that were answered, and whether they were kept. */
-  readonly #answered = new Map<number, boolean>();
+  /** Updates that were answered, and whether they were kept. */
+  readonly #answered = new Map<NumberedUpdate, boolean>();
   #waiting: NumberedUpdate | undefined;
 
   /** Takes an update on; returns its number. */
@@ -101,40 +101,48 @@ export class Ledger {
     if (!next) throw new Error("nothing waits");
     if (this.#restore) this.#restore = undefined;
     else this.#waiting = undefined;
-    this.#inFlight.push(next);
-    return next;
+    const sent = { ...next }; // each sending is one of its own
+    this.#inFlight.push(sent);
+    return sent;
   }
 
   /**
-   * The server has taken the update of this number. Taken on in the order of sending, however answers overtake each other.
+   * Whether it waits for an answer yet. After connectionLost() it does not: what it held is sent again, perhaps with more, and an
+   * answer that comes late says nothing of that.
+   */
+  isInFlight(sent: NumberedUpdate): boolean {
+    return this.#inFlight.includes(sent);
+  }
+
+  /**
+   * The server has taken what sendNext() gave. Taken on in the order of sending, however answers overtake each other.
    * `isKept`: it, and all taken before it, survive the end of the server.
    */
-  accept(seq: number, isKept = false): void {
-    this.#answered.set(seq, isKept);
+  accept(sent: NumberedUpdate, isKept = false): void {
+    if (this.isInFlight(sent)) this.#answered.set(sent, isKept);
     this.#takeAnswered();
   }
 
   #takeAnswered(): void {
-    for (let sent = this.#inFlight[0]; sent && this.#answered.has(sent.seq); sent = this.#inFlight[0]) {
+    for (let sent = this.#inFlight[0]; sent && this.#answered.has(sent); sent = this.#inFlight[0]) {
       this.#inFlight.shift();
-      if (!this.#answered.get(sent.seq)) {
+      if (!this.#answered.get(sent)) {
         const update = withoutOldRemovals(merged(this.#unkept.update, sent.update));
         this.#unkept = { seq: Math.max(this.#unkept.seq, sent.seq), update };
       } else if (sent.seq >= this.#unkept.seq) {
         this.#unkept = { seq: 0, update: {} };
       }
-      this.#answered.delete(sent.seq);
+      this.#answered.delete(sent);
       this.#accepted = {
         seq: Math.max(this.#accepted.seq, sent.seq),
         update: settled(merged(this.#accepted.update, sent.update)),
       };
     }
-    if (this.#inFlight.length === 0) this.#answered.clear();
   }
 
-  /** The server has refused the update of this number. */
-  refuse(seq: number): void {
-    this.#inFlight = this.#inFlight.filter((one) => one.seq !== seq);
+  /** The server has refused what sendNext() gave. */
+  refuse(sent: NumberedUpdate): void {
+    this.#inFlight = this.#inFlight.filter((one) => one !== sent);
     this.#takeAnswered();
   }
 

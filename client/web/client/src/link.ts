@@ -19,6 +19,9 @@ export interface Copy {
   options: OpenOptions;
 }
 
+/** What did not fit so often never will: it is of another version, or something on the way breaks it. */
+const mostMisfits = 5;
+
 export interface Watcher {
   problem(error: LpdeformError): void;
   connection(state: Connection): void;
@@ -47,6 +50,8 @@ export class Link {
   #requestId = newRequestId();
   #making: Promise<void> | undefined;
   #downSince: number | undefined;
+  /** Streams in a row that ended with a frame that does not fit. */
+  #misfits = 0;
   #over: LpdeformError | undefined; // nothing is tried any more, for this reason
   readonly #backoff = new Backoff();
   readonly #quiet = new Set<() => void>();
@@ -148,6 +153,7 @@ export class Link {
       },
       part: (part) => {
         const frame = this.#assembly.add(part);
+        if (frame) this.#fitted();
         if (!frame || this.box.put(frame, lane.streamId)) return;
         lane.acknowledge(frame.frameSeq, lane.streamId); // dropped, but its credit is owed
       },
@@ -166,6 +172,7 @@ export class Link {
     const recovery = recoveryAfter(ended, this.#goAway, this.copy !== undefined);
     this.interruption = recovery.why;
     this.#setConnection("reconnecting");
+    if (recovery.why.reason === "FRAME_PARTS" && ++this.#misfits === mostMisfits) return this.#giveUp(recovery.why);
     if (recovery.next === "giveUp" || this.#isTooLate()) return this.#giveUp(recovery.why);
     await pause(Math.max(recovery.pauseMs, this.#backoff.nextMs()), this.stop.signal);
     if (this.isClosed) return;
@@ -181,6 +188,12 @@ export class Link {
 
   #heardFromServer(): void {
     this.#downSince = undefined;
+    if (this.#misfits === 0) this.#backoff.reset();
+  }
+
+  #fitted(): void {
+    if (this.#misfits === 0) return;
+    this.#misfits = 0;
     this.#backoff.reset();
   }
 
@@ -224,14 +237,12 @@ export class Link {
 
   async #sendOne(update: NumberedUpdate): Promise<void> {
     const lease = this.#lease;
-    // What was on its way to a session that has been lost since waits again, whatever becomes of it there.
-    const isVoid = () => this.#lease.session !== lease.session;
+    // What was on its way when the connection or the session was lost is sent again, whatever becomes of the first time.
     try {
-      const isKept = await this.sendUpdate(update, lease, this.stop.signal);
-      if (!isVoid()) this.ledger.accept(update.seq, isKept);
+      this.ledger.accept(update, await this.sendUpdate(update, lease, this.stop.signal));
       this.#heardFromServer();
     } catch (thrown) {
-      if (!isVoid()) await this.#unsent(update, thrown as LpdeformError, lease.session);
+      if (this.ledger.isInFlight(update)) await this.#unsent(update, thrown as LpdeformError, lease.session);
     }
     this.#wakeQuiet();
     this.#send();
@@ -270,8 +281,8 @@ export class Link {
       }
       return;
     }
-    if (isTakenAllTheSame(error)) this.ledger.accept(update.seq);
-    else this.ledger.refuse(update.seq);
+    if (isTakenAllTheSame(error)) this.ledger.accept(update);
+    else this.ledger.refuse(update);
     if (error.reason === "NOT_THE_WRITER") {
       this.ledger.dropUnaccepted();
       this.#lease = { ...this.#lease, writerToken: "" };

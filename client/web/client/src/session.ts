@@ -220,7 +220,7 @@ export class Session implements AsyncIterable<Frame> {
     while (ledger.hasRestore) {
       const restore = ledger.sendNext();
       try {
-        ledger.accept(restore.seq, await this.#link.sendUpdate(restore, lease, signal));
+        ledger.accept(restore, await this.#link.sendUpdate(restore, lease, signal));
       } catch (error) {
         ledger.connectionLost();
         throw error;
@@ -229,13 +229,13 @@ export class Session implements AsyncIterable<Frame> {
     const update = ledger.hasWaiting ? ledger.sendNext() : undefined;
     try {
       const result = await runSolve(rpc, lease, update, options, end, signal);
-      if (update) ledger.accept(update.seq);
+      if (update) ledger.accept(update);
       return result;
     } catch (thrown) {
       const error = thrown as LpdeformError;
-      if (update && isTakenAllTheSame(error)) ledger.accept(update.seq);
+      if (update && isTakenAllTheSame(error)) ledger.accept(update);
       else if (update && isUndecided(error)) ledger.connectionLost();
-      else if (update) ledger.refuse(update.seq);
+      else if (update) ledger.refuse(update);
       throw error;
     }
   }

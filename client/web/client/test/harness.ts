@@ -48,6 +48,13 @@ export async function next(session: Session) {
   return (await session[Symbol.asyncIterator]().next()).value!;
 }
 
+/** Something to wait for until it is opened. */
+export function gate(): { isOpen: Promise<void>; open: () => void } {
+  let open = () => {};
+  const isOpen = new Promise<void>((resolve) => (open = resolve));
+  return { isOpen, open };
+}
+
 export const at = (x: number) => ({ translation: [x, 0, 0] as const });
 
 afterEach(async () => {

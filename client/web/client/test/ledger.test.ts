@@ -1,5 +1,5 @@
 import { describe, expect, test } from "vitest";
-import { Ledger, merged } from "../src/ledger.js";
+import { Ledger, merged, type NumberedUpdate } from "../src/ledger.js";
 
 const at = (x: number) => ({ translation: [x, 0, 0] as const });
 
@@ -39,7 +39,7 @@ describe("merging", () => {
     const ledger = new Ledger();
     ledger.add({ handles: { ["__proto__"]: { set: { vertices: [1] } } } });
     ledger.add({ handles: { ["__proto__"]: { move: at(1) }, constructor: { move: at(2) } } });
-    ledger.accept(ledger.sendNext().seq);
+    ledger.accept(ledger.sendNext());
     ledger.sessionLost();
     expect(Object.entries(ledger.sendNext().update.handles!)).toEqual([
       ["__proto__", { set: { vertices: [1], motion: at(1) } }],
@@ -52,6 +52,15 @@ describe("merging", () => {
     expect(older).toEqual({ handles: { tip: { move: at(1) } }, settings: { p: 1 } });
   });
 });
+
+/** Both on their way. */
+function twoMoves(ledger: Ledger, names = ["tip", "tip"]): [NumberedUpdate, NumberedUpdate] {
+  const [first, second] = names.map((name, k) => {
+    ledger.add({ handles: { [name]: { move: at(k + 1) } } });
+    return ledger.sendNext();
+  });
+  return [first!, second!];
+}
 
 describe("ledger", () => {
   test("merges what waits and numbers it by the newest", () => {
@@ -68,18 +77,18 @@ describe("ledger", () => {
   test("has several on their way only where all merely move handles", () => {
     const ledger = new Ledger();
     ledger.add({ handles: { tip: { set: { vertices: [1] } } } });
-    ledger.sendNext();
+    const added = ledger.sendNext();
     ledger.add({ handles: { tip: { move: at(1) } } });
     expect(ledger.canSend).toBe(false);
-    ledger.accept(1);
-    ledger.sendNext();
+    ledger.accept(added);
+    const moved = ledger.sendNext();
     ledger.add({ handles: { tip: { move: at(2) } } });
     expect(ledger.canSend).toBe(true);
-    ledger.sendNext();
+    const movedOn = ledger.sendNext();
     ledger.add({ handles: { tip: { move: at(3) } } });
     expect(ledger.canSend).toBe(false);
-    ledger.accept(2);
-    ledger.accept(3);
+    ledger.accept(moved);
+    ledger.accept(movedOn);
     ledger.add({ settings: { p: 2 } });
     expect(ledger.canSend).toBe(true);
   });
@@ -87,26 +96,19 @@ describe("ledger", () => {
   test("keeps the newest motion however answers overtake each other", () => {
     const ledger = new Ledger();
     ledger.add({ handles: { tip: { set: { vertices: [1] } } } });
-    ledger.sendNext();
-    ledger.accept(1);
-    for (const x of [1, 2]) {
-      ledger.add({ handles: { tip: { move: at(x) } } });
-      ledger.sendNext();
-    }
-    ledger.accept(3);
-    ledger.accept(2);
+    ledger.accept(ledger.sendNext());
+    const [first, second] = twoMoves(ledger);
+    ledger.accept(second);
+    ledger.accept(first);
     ledger.sessionLost();
     expect(ledger.sendNext().update.handles).toEqual({ tip: { set: { vertices: [1], motion: at(2) } } });
   });
 
   test("counts an answer that overtook one that is refused", () => {
     const ledger = new Ledger();
-    for (const x of [1, 2]) {
-      ledger.add({ handles: { tip: { move: at(x) } } });
-      ledger.sendNext();
-    }
-    ledger.accept(2);
-    ledger.refuse(1);
+    const [first, second] = twoMoves(ledger);
+    ledger.accept(second);
+    ledger.refuse(first);
     expect(ledger.hasInFlight).toBe(false);
     expect(ledger.newest).toBe(2);
   });
@@ -123,15 +125,43 @@ describe("ledger", () => {
     });
   });
 
+  test("goes by what is sent again, whatever becomes late of what was on its way when the connection was lost", () => {
+    const ledger = new Ledger();
+    const [first, second] = twoMoves(ledger, ["tip", "base"]);
+    ledger.connectionLost();
+    const again = ledger.sendNext();
+    expect(again).toEqual({
+      seq: 2,
+      update: { handles: { tip: { move: at(1) }, base: { move: at(2) } }, settings: {} },
+    });
+    ledger.accept(second);
+    ledger.refuse(first);
+    expect([first, second, again].map((sent) => ledger.isInFlight(sent))).toEqual([false, false, true]);
+    ledger.connectionLost();
+    expect(ledger.sendNext()).toEqual(again);
+  });
+
+  test("does not take a restored session for restored by an answer of one before", () => {
+    const ledger = new Ledger();
+    ledger.add({ settings: { p: 1.5 } });
+    ledger.accept(ledger.sendNext());
+    ledger.sessionLost();
+    const first = ledger.sendNext();
+    ledger.sessionLost();
+    ledger.sendNext();
+    ledger.accept(first);
+    expect(ledger.hasInFlight).toBe(true);
+  });
+
   test("restores what was accepted on its own, without what was let go of", () => {
     const ledger = new Ledger();
     ledger.add({
       handles: { tip: { set: { vertices: [1] } }, base: { set: { vertices: [2] } } },
       settings: { p: 1.5 },
     });
-    ledger.accept(ledger.sendNext().seq);
+    ledger.accept(ledger.sendNext());
     ledger.add({ handles: { base: { remove: true } } });
-    ledger.accept(ledger.sendNext().seq);
+    ledger.accept(ledger.sendNext());
     ledger.add({ settings: { p: 3 } });
     ledger.sessionLost();
     expect(ledger.hasRestore).toBe(true);
@@ -147,7 +177,7 @@ describe("ledger", () => {
   test("forgets what it refused and what another writer made void", () => {
     const ledger = new Ledger();
     ledger.add({ settings: { p: 1 } });
-    ledger.refuse(ledger.sendNext().seq);
+    ledger.refuse(ledger.sendNext());
     expect(ledger.newest).toBe(0);
     ledger.add({ settings: { p: 2 } });
     ledger.dropUnaccepted();
@@ -168,7 +198,7 @@ describe("ledger", () => {
     const ledger = new Ledger();
     const take = (update: Parameters<Ledger["add"]>[0], isKept: boolean) => {
       ledger.add(update);
-      ledger.accept(ledger.sendNext().seq, isKept);
+      ledger.accept(ledger.sendNext(), isKept);
     };
     take({ handles: { tip: { set: { vertices: [1] } } } }, true);
     take({ handles: { old: { remove: true } } }, false);
@@ -180,7 +210,7 @@ describe("ledger", () => {
     const sent = ledger.sendNext();
     expect(sent.seq).toBe(3);
     expect({ ...sent.update.handles }).toEqual({ old: { remove: true }, tip: { move: at(5) } });
-    ledger.accept(3, true);
+    ledger.accept(sent, true);
     ledger.resumedAt(1);
     expect(ledger.hasWaiting).toBe(false);
   });

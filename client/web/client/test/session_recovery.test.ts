@@ -3,7 +3,7 @@ import { describe, expect, test, vi } from "vitest";
 import { GoAwayReason } from "../src/gen/lpdeform/v1/service_pb.js";
 import { joinWith, openWith } from "../src/session.js";
 import { FakeServer, triangle } from "./fake_server.js";
-import { at, begin, next, opened, refusal } from "./harness.js";
+import { at, begin, connected, next, opened, refusal } from "./harness.js";
 
 describe("a stream that ends", () => {
   test("by a broken connection is taken up again", async () => {
@@ -33,6 +33,55 @@ describe("a stream that ends", () => {
     server.stream.frame({ frameSeq: 1n, vertexCount: 8 });
     await server.until(() => server.streams.length === 2 && server.streams[0]!.isAborted);
     expect(session.connection).toBe("reconnecting");
+  });
+
+  test("by a frame that never fits is taken up again ever more slowly, and is the end after five", async () => {
+    const server = new FakeServer();
+    server.on.stream = (stream) => {
+      stream.open();
+      stream.frame({ frameSeq: 1n, vertexCount: 8 });
+    };
+    const session = await openWith(server.rpc(), triangle, {});
+    opened.push(session);
+    const start = performance.now();
+    await expect(next(session)).rejects.toMatchObject({ code: "data_loss", reason: "FRAME_PARTS" });
+    expect(server.streams.length).toBe(5);
+    expect(performance.now() - start).toBeGreaterThan((100 + 200 + 400 + 800) / 2);
+    expect(session.connection).toBe("closed");
+  });
+
+  test("by frames that do not fit goes on where one has fitted in between", async () => {
+    const server = new FakeServer();
+    server.on.stream = (stream, count) => {
+      stream.open();
+      if (count % 3 === 0) stream.frame({ frameSeq: BigInt(count) });
+      if (count < 8) stream.frame({ frameSeq: BigInt(count + 1), vertexCount: 8 });
+    };
+    const session = await openWith(server.rpc(), triangle, {});
+    opened.push(session);
+    session.poll();
+    await server.until(() => server.streams.length === 8);
+    await connected(session);
+  });
+
+  test("for one session by a frame that does not fit goes on for the others", async () => {
+    const { server, session, rpc } = await begin();
+    const other = await openWith(rpc, triangle, {});
+    opened.push(other);
+    other.poll();
+    await server.until(() => server.streams.length === 2);
+    server.stream.open(0);
+    server.stream.open(1);
+    await Promise.all([connected(session), connected(other)]);
+    const states: string[] = [];
+    other.on("connection", (state) => states.push(state));
+    server.stream.frame({ frameSeq: 1n, vertexCount: 8 });
+    server.stream.frame({ frameSeq: 2n }, { stream: 1 });
+    expect((await next(other)).frameSeq).toBe(2);
+    expect(session.connection).toBe("reconnecting");
+    await server.until(() => server.streams.length === 3);
+    expect(server.stream.request.streams.length).toBe(2);
+    expect(states).toEqual([]);
   });
 
   test("by silence is taken up again", async () => {
