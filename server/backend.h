@@ -106,6 +106,9 @@ class Backend {
   /// A new record of a call, for its edge.
   std::shared_ptr<CallRecord> begin_record(std::string method, CallContext context);
 
+  /// The longest silence of a stream.
+  Timers::Duration heartbeat() const { return options_.heartbeat; }
+
   const std::shared_ptr<Timers> timers;
   const std::shared_ptr<Metrics> metrics = std::make_shared<Metrics>();
   const std::shared_ptr<Registry> registry;

@@ -10,12 +10,14 @@
 namespace lpdeform {
 namespace {
 
-/// Progress while the solver runs, the newest only; then the summary, the trace, the result.
+/// Progress while the solver runs, the newest only; then the summary, the trace, the result. Heartbeats wherever there is
+/// nothing else to say, from the beginning of the call.
 class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveResponse>, v1::SolveResponse> {
  public:
-  explicit SolveCall(Backend& backend) : backend_(backend) {}
+  explicit SolveCall(Backend& backend) : backend_(backend), last_sent_at_(backend.timers->now()) {}
 
   void begin(const v1::SolveRequest& request) {
+    beat_at(last_sent_at_ + backend_.heartbeat());
     auto self = std::static_pointer_cast<SolveCall>(shared_from_this());
     // A copy, because gRPC's goes when the call is cancelled.
     const auto task = [self, request] {
@@ -31,6 +33,22 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
   static constexpr std::size_t kRecordsAMessage = 1000;  // of about 40 bytes
 
   std::weak_ptr<SolveCall> weak() { return std::static_pointer_cast<SolveCall>(shared_from_this()); }
+
+  void beat_at(Timers::TimePoint when) {
+    backend_.timers->at(when, [weak = weak()] {
+      if (const auto self = weak.lock()) self->beat();
+    });
+  }
+
+  void beat() {
+    const std::scoped_lock lock(mutex_);
+    if (is_over_locked()) return;
+    const Timers::TimePoint now = backend_.timers->now();
+    is_beat_due_ = now - last_sent_at_ >= backend_.heartbeat();
+    pump_locked();
+    // Still due where a write is under way: its reader has something to read.
+    beat_at((is_beat_due_ ? now : last_sent_at_) + backend_.heartbeat());
+  }
 
   void start(const v1::SolveRequest& request) {
     {
@@ -81,7 +99,11 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
       progress_.reset();
       return Made::kMessage;
     }
-    if (!result_) return Made::kNothing;
+    if (!result_) {
+      if (!is_beat_due_) return Made::kNothing;
+      response.mutable_heartbeat();
+      return Made::kMessage;
+    }
     const std::vector<IterationRecord>& trace = result_->summary.trace;
     if (!std::exchange(is_summary_sent_, true)) {
       encode(*result_, *response.mutable_summary());
@@ -96,11 +118,18 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
     return Made::kMessage;
   }
 
+  void on_made() override {
+    last_sent_at_ = backend_.timers->now();
+    is_beat_due_ = false;
+  }
+
   void let_go() override {
     if (job_) job_->abandon();
   }
 
   Backend& backend_;
+  Timers::TimePoint last_sent_at_;  // or begun
+  bool is_beat_due_ = false;
   Format format_ = Format::kFloat32;
   bool with_normals_ = false;
   std::shared_ptr<SolveJob> job_;

@@ -123,6 +123,28 @@ TEST_F(SolveCallTest, ABadUpdateEndsItAndChangesNothing) {
   EXPECT_EQ(details_of(solve(solve_request(session)).status).info.reason(), "NO_HANDLES");
 }
 
+TEST_F(SolveCallTest, SaysThatItIsThereWhereverItHasNothingElseToSay) {
+  const auto session = create(bar_mesh());
+  v1::SolveRequest request = slow_request(session);
+  request.set_progress(false);
+  const std::size_t waiting = timers_->waiting();
+  grpc::ClientContext context;
+  set_deadline(context);
+  const auto stream = stub_->Solve(&context, request);
+  while (timers_->waiting() == waiting) std::this_thread::yield();  // until the server has the call
+  v1::SolveResponse response;
+  for (int beat = 0; beat < 3; ++beat) {
+    timers_->advance(options_.heartbeat / 2);
+    timers_->advance(options_.heartbeat / 2);
+    ASSERT_TRUE(stream->Read(&response));
+    ASSERT_TRUE(response.has_heartbeat()) << response.ShortDebugString();
+  }
+  timers_->advance(options_.heartbeat / 2);
+  ASSERT_TRUE(update(session, tip_message(2, 1)).ok());  // ends it
+  EXPECT_FALSE(stream->Read(&response)) << response.ShortDebugString();
+  EXPECT_EQ(details_of(stream->Finish()).info.reason(), "SUPERSEDED");
+}
+
 TEST_F(SolveCallTest, CancellingLetsTheSessionGoOnWithOtherThings) {
   const auto session = create(bar_mesh());
   grpc::ClientContext context;

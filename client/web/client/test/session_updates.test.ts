@@ -3,7 +3,7 @@ import { describe, expect, test, vi } from "vitest";
 import { Encoding } from "../src/gen/lpdeform/v1/frame_pb.js";
 import { joinWith, openWith } from "../src/session.js";
 import { FakeServer, triangle } from "./fake_server.js";
-import { at, begin, opened, problems, refusal } from "./harness.js";
+import { at, begin, gate, opened, problems, refusal } from "./harness.js";
 
 describe("updates", () => {
   test("made faster than they are taken are merged into one", async () => {
@@ -49,6 +49,31 @@ describe("updates", () => {
     session.move("tip", at(3));
     await server.until(() => server.updates.length === 4);
     expect(server.updates[3]!.update!.inputSeq).toBe(2n);
+  });
+
+  test("are sent again until the server has them, also where an answer comes late of what was sent before", async () => {
+    const { server, session } = await begin();
+    session.setHandles({ base: { vertices: [0] }, tip: { vertices: [1] } });
+    server.on.solve = async function* () {
+      throw refusal("COMPONENT_WITHOUT_HANDLE", {}, Code.FailedPrecondition);
+    };
+    await session.solve().catch(() => undefined); // then all updates are answered
+    const [late, lost] = [gate(), gate()];
+    server.on.update = async (_, count) => {
+      if (count === 2) throw new ConnectError("broken", Code.Unavailable);
+      if (count === 3) await late.isOpen;
+      if (count !== 4) return;
+      await lost.isOpen;
+      throw new ConnectError("broken", Code.Unavailable);
+    };
+    session.move("base", at(1));
+    session.move("tip", at(2));
+    await server.until(() => server.updates.length === 4);
+    late.open();
+    await Promise.resolve();
+    lost.open();
+    await server.until(() => server.updates.length === 5);
+    expect(server.updates[4]!.update!.handles.map(({ name }) => name)).toEqual(["base", "tip"]);
   });
 
   test("wait as long as a full server asks for", async () => {
@@ -183,13 +208,14 @@ describe("solving", () => {
     expect(server.solves[0]).toMatchObject({ certify: true, trace: true, progress: true });
   });
 
-  test("asks for progress where nobody listens as well: a proxy cuts what is silent", async () => {
+  test("asks for progress only where somebody listens, and takes heartbeats for what they are", async () => {
     const { server, session } = await begin();
     server.on.solve = async function* () {
+      yield { message: { case: "heartbeat", value: {} } };
       yield* result;
     };
-    await session.solve();
-    expect(server.solves[0]!.progress).toBe(true);
+    expect((await session.solve()).energy).toBe(3);
+    expect(server.solves[0]!.progress).toBe(false);
   });
 
   test("goes on where onProgress throws", async () => {
