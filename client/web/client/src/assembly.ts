@@ -1,10 +1,10 @@
-import { decompress, float32View, uint16View } from "./decode.js";
+import { decompress, float32View, float64View, uint16View } from "./decode.js";
 import { LpdeformError } from "./errors.js";
 import { WireFrame } from "./frame.js";
 import { Scalar } from "./gen/lpdeform/v1/data_pb.js";
 import { Encoding, type FrameHeader, type FramePart } from "./gen/lpdeform/v1/frame_pb.js";
 
-type Numbers = Float32Array | Uint16Array | Int16Array;
+type Numbers = Float32Array | Float64Array | Uint16Array | Int16Array;
 
 /**
  * Puts the parts of frames together. A frame of one part, as up to 50,000 vertices give, becomes views of the message that
@@ -15,7 +15,11 @@ export class FrameAssembly {
   #isCompressed = false;
   #received = 0;
 
-  constructor(readonly vertexCount: number) {}
+  /** `isDouble`: what comes raw are doubles. */
+  constructor(
+    readonly vertexCount: number,
+    readonly isDouble = false,
+  ) {}
 
   /** The frame, where this part makes it whole. */
   add(part: FramePart): WireFrame | undefined {
@@ -57,7 +61,7 @@ export class FrameAssembly {
         extent: [extent?.x ?? 0, extent?.y ?? 0, extent?.z ?? 0],
         distortionExtent,
       };
-    } else if (header.scalar === Scalar.FLOAT64 || header.encoding > Encoding.COMPRESSED) {
+    } else if ((header.scalar === Scalar.FLOAT64) !== this.isDouble || header.encoding > Encoding.COMPRESSED) {
       throw misfit("A frame comes in an encoding that was not asked for.");
     }
     return frame;
@@ -73,9 +77,10 @@ export class FrameAssembly {
 
   #appendRaw({ raw }: WireFrame, part: FramePart): void {
     const { positions, distortion, normals } = part;
-    raw.positions = this.#join(raw.positions, float32View(positions), 3, part);
-    if (distortion.length > 0) raw.distortion = this.#join(raw.distortion, float32View(distortion), 1, part);
-    if (normals.length > 0) raw.normals = this.#join(raw.normals, float32View(normals), 3, part);
+    const numbers: (bytes: Uint8Array) => Float32Array | Float64Array = this.isDouble ? float64View : float32View;
+    raw.positions = this.#join(raw.positions, numbers(positions), 3, part);
+    if (distortion.length > 0) raw.distortion = this.#join(raw.distortion, numbers(distortion), 1, part);
+    if (normals.length > 0) raw.normals = this.#join(raw.normals, numbers(normals), 3, part);
   }
 
   #appendQuantized(quantized: NonNullable<WireFrame["quantized"]>, part: FramePart): void {

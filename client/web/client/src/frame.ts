@@ -3,7 +3,7 @@ import { methodName, stopReasonFromWire } from "./fromwire.js";
 import type { FrameHeader } from "./gen/lpdeform/v1/frame_pb.js";
 import type { Frame, QuantizedSurface, StopReason } from "./types.js";
 
-type Surface = Record<"positions" | "distortion" | "normals", Float32Array>;
+type Surface<Numbers> = Record<"positions" | "distortion" | "normals", Numbers>;
 
 const none = new Float32Array(0);
 
@@ -23,9 +23,10 @@ export class WireFrame implements Frame {
   readonly method: string;
   wireBytes = 0;
   receivedAt = 0;
-  raw: Surface = { positions: none, distortion: none, normals: none };
+  /** Doubles only where FrameAssembly was told to expect them. */
+  raw: Surface<Float32Array | Float64Array> = { positions: none, distortion: none, normals: none };
   quantized: QuantizedSurface | undefined;
-  readonly #decoded: Partial<Surface> = {};
+  readonly #decoded: Partial<Surface<Float32Array>> = {};
 
   constructor(header: FrameHeader) {
     this.inputSeq = Number(header.inputSeq);
@@ -43,17 +44,17 @@ export class WireFrame implements Frame {
   }
 
   get positions(): Float32Array {
-    if (!this.quantized) return this.raw.positions;
+    if (!this.quantized) return this.raw.positions as Float32Array;
     return (this.#decoded.positions ??= positionsOf(this.quantized));
   }
 
   get distortion(): Float32Array {
-    if (!this.quantized) return this.raw.distortion;
+    if (!this.quantized) return this.raw.distortion as Float32Array;
     return (this.#decoded.distortion ??= distortionOf(this.quantized));
   }
 
   get normals(): Float32Array {
-    if (!this.quantized) return this.raw.normals;
+    if (!this.quantized) return this.raw.normals as Float32Array;
     return (this.#decoded.normals ??= normalsOf(this.quantized));
   }
 }

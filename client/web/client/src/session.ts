@@ -9,6 +9,7 @@ import { runSolve } from "./solve.js";
 import { frameOptionsToWire } from "./towire.js";
 import type {
   Connection,
+  DoubleSolveOptions,
   Frame,
   FrameOptions,
   Handle,
@@ -165,7 +166,9 @@ export class Session implements AsyncIterable<Frame> {
    * Solves for the present handles and settings on the server and returns the finished result. Works beside the stream of
    * frames. Begins again where the server went away, for as long as the stream would. Rejects with what the server refuses.
    */
-  async solve(options: SolveOptions = {}): Promise<SolveResult> {
+  solve(options: DoubleSolveOptions): Promise<SolveResult<Float64Array>>;
+  solve(options?: SolveOptions): Promise<SolveResult>;
+  async solve(options: SolveOptions | DoubleSolveOptions = {}): Promise<SolveResult<Float32Array | Float64Array>> {
     const link = this.#link;
     if (link.isClosed) throw sessionClosed();
     const { deadlineMs } = options;
@@ -183,7 +186,11 @@ export class Session implements AsyncIterable<Frame> {
   }
 
   /** `end`: on the clock of performance.now(). */
-  async #solveUntilDone(options: SolveOptions, end: number | undefined, signal: AbortSignal): Promise<SolveResult> {
+  async #solveUntilDone(
+    options: SolveOptions | DoubleSolveOptions,
+    end: number | undefined,
+    signal: AbortSignal,
+  ): Promise<SolveResult<Float32Array | Float64Array>> {
     const link = this.#link;
     const backoff = new Backoff();
     const latest = performance.now() + link.rpc.reconnectForMs;
@@ -212,10 +219,10 @@ export class Session implements AsyncIterable<Frame> {
 
   async #solveOnce(
     lease: Lease,
-    options: SolveOptions,
+    options: SolveOptions | DoubleSolveOptions,
     end: number | undefined,
     signal: AbortSignal,
-  ): Promise<SolveResult> {
+  ): Promise<SolveResult<Float32Array | Float64Array>> {
     const { ledger, rpc } = this.#link;
     while (ledger.hasRestore) {
       const restore = ledger.sendNext();

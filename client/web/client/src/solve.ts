@@ -1,6 +1,7 @@
 import { FrameAssembly } from "./assembly.js";
 import { fromCall, LpdeformError } from "./errors.js";
 import { methodName, stopReasonFromWire } from "./fromwire.js";
+import { Scalar } from "./gen/lpdeform/v1/data_pb.js";
 import type { SolveResponse } from "./gen/lpdeform/v1/service_pb.js";
 import type { Lease } from "./lease.js";
 import type { NumberedUpdate } from "./ledger.js";
@@ -8,7 +9,8 @@ import { tell } from "./listeners.js";
 import { Packer } from "./packer.js";
 import type { Rpc } from "./rpc.js";
 import { updateToWire } from "./towire.js";
-import type { IterationRecord, SolveOptions, SolveResult } from "./types.js";
+import type { WireFrame } from "./frame.js";
+import type { DoubleSolveOptions, IterationRecord, SolveOptions, SolveResult } from "./types.js";
 import { Uploads } from "./upload.js";
 
 /** One Solve call, from its request to the finished result. `end`: of the time for it, on the clock of performance.now(). */
@@ -16,19 +18,20 @@ export async function runSolve(
   rpc: Rpc,
   lease: Lease,
   update: NumberedUpdate | undefined,
-  options: SolveOptions,
+  options: SolveOptions | DoubleSolveOptions,
   end: number | undefined,
   signal: AbortSignal,
-): Promise<SolveResult> {
+): Promise<SolveResult<Float32Array | Float64Array>> {
   const uploads = new Uploads(rpc, signal);
   const packer = new Packer();
   const initial = options.initialPositions && packer.numbers(options.initialPositions);
   const request = {
     session: lease.session,
+    scalar: isDouble(options) ? Scalar.FLOAT64 : Scalar.FLOAT32,
     writerToken: lease.writerToken,
     certify: options.certify ?? false,
     trace: options.trace ?? false,
-    progress: true, // whether it is wanted or not: a proxy on the way takes silence for the end
+    progress: options.onProgress !== undefined,
     normals: options.withNormals ?? false,
     ...(update && { update: updateToWire(update.update, update.seq, packer) }),
     ...(initial && { initialPositions: { scalar: initial.scalar, data: initial.buffer } }),
@@ -46,17 +49,21 @@ export async function runSolve(
   }
 }
 
+function isDouble(options: SolveOptions | DoubleSolveOptions): boolean {
+  return "scalar" in options && options.scalar === "float64";
+}
+
 class ResultBuilder {
   readonly #assembly: FrameAssembly;
   readonly #trace: IterationRecord[] = [];
   #numbers: Omit<SolveResult, "positions" | "distortion" | "normals" | "trace"> | undefined;
-  #surface: Pick<SolveResult, "positions" | "distortion" | "normals"> | undefined;
+  #surface: WireFrame["raw"] | undefined;
 
   constructor(
     vertexCount: number,
-    readonly options: SolveOptions,
+    readonly options: SolveOptions | DoubleSolveOptions,
   ) {
-    this.#assembly = new FrameAssembly(vertexCount);
+    this.#assembly = new FrameAssembly(vertexCount, isDouble(options));
   }
 
   take({ message }: SolveResponse): void {
@@ -84,12 +91,12 @@ class ResultBuilder {
         }
         break;
       case "frame":
-        this.#surface = this.#assembly.add(message.value) ?? this.#surface;
+        this.#surface = this.#assembly.add(message.value)?.raw ?? this.#surface;
         break;
     }
   }
 
-  finish(): SolveResult {
+  finish(): SolveResult<Float32Array | Float64Array> {
     if (!this.#numbers || !this.#surface) {
       throw new LpdeformError("data_loss", "The server's result came without positions.", { reason: "FRAME_PARTS" });
     }

@@ -226,10 +226,18 @@ export interface SolveOptions {
   signal?: AbortSignal;
 }
 
-export interface SolveResult {
-  positions: Float32Array;
-  distortion: Float32Array;
-  normals: Float32Array;
+/** For a result in the doubles that the server computes in: 32 bytes a vertex. */
+export interface DoubleSolveOptions extends SolveOptions {
+  scalar: "float64";
+}
+
+export interface SolveResult<Numbers = Float32Array> {
+  /** x, y, z of each vertex. */
+  positions: Numbers;
+  /** E_i of each vertex. */
+  distortion: Numbers;
+  /** x, y, z of a normal of length 1 for each vertex; empty where it was not asked for. */
+  normals: Numbers;
   method: string;
   stopReason: StopReason;
   iterations: number;

@@ -45,6 +45,22 @@ describe("raw frames", () => {
     expect(frame.positions).toEqual(positions);
   });
 
+  test("of doubles are so to the last bit, where they are expected", () => {
+    const doubles = Float64Array.of(0.1, 1 / 3, 1e-300, -2, 1e17 + 16, 5);
+    for (const offset of [8, 3]) {
+      const message = new Uint8Array(64);
+      message.set(bytesOf(doubles), offset);
+      const init = { header: header({ scalar: Scalar.FLOAT64 }), positions: message.subarray(offset, offset + 48) };
+      const frame = new FrameAssembly(2, true).add(part({ ...init, distortion: bytesOf(doubles.subarray(1, 3)) }))!;
+      expect(frame.raw.positions).toEqual(doubles);
+      expect(frame.raw.distortion).toEqual(doubles.subarray(1, 3));
+      expect(frame.raw.positions.buffer === message.buffer).toBe(offset === 8);
+    }
+    expect(() => new FrameAssembly(2, true).add(part({ header: header(), positions: bytesOf(positions) }))).toThrow(
+      expect.objectContaining({ reason: "FRAME_PARTS" }),
+    );
+  });
+
   test("of several parts are put together in order", () => {
     const assembly = new FrameAssembly(2);
     const first = positions.subarray(0, 3);

@@ -25,6 +25,22 @@ describe("meshes", () => {
     expect(read.faces).toEqual(mesh.faces);
   });
 
+  it("of doubles come back as they went, to the last bit, beside what is drawn", () => {
+    const exact = Float64Array.from(mesh.positions, (value, k) => value + 1e-9 * (k + 1));
+    const written = { positions: exact, faces: mesh.faces };
+    const doubles = Float64Array.from(distortion, (value) => value + 1e-12);
+    for (const [ending, file] of [
+      ["off", bytes(writeOff(written))],
+      ["obj", bytes(writeObj(written))],
+      ["ply", writePly(written, doubles, 3)],
+    ] as const) {
+      const read = readMesh(`creature.${ending}`, file);
+      expect(read.exact).toEqual(exact);
+      expect(read.positions).toEqual(Float32Array.from(exact));
+    }
+    expect(readMesh("a.off", bytes(writeOff(mesh))).exact).toBeUndefined();
+  });
+
   it("come back from STL with the same triangles", () => {
     const read = readMesh("creature.stl", writeStl(mesh));
     expect(read.positions.length).toBe(mesh.positions.length);
@@ -72,6 +88,7 @@ describe("meshes", () => {
     ["a.ply", ply("element face 1", "property list float int vertex_indices", "end_header", "2.5 0"), "A list of 2.5"],
     ["a.ply", ply("element face 1", "property list float int vertex_indices", "end_header", "x 0"), "A list of NaN"],
     ["a.ply", ply("element face 1", "property list uint int vertex_indices", "end_header", "4e9 0"), "a.ply ends too soon"],
+    ["a.off", "OFF\n1 1 0\n0 -2e18 0\n3 0 0 0\n", "a.off, vertex 0: a vertex lies farther out than 1000000000000000000"],
     ["a.off", "COFFEE", "does not begin with OFF"],
     ["a.off", "OFF\n3 1 0\n0 0 0\n", "ends before vertex 1"],
     ["a.off", "OFF\n3 1 0\n0 0 0\n1 0 x\n0 1 0\n3 0 1 2\n", "vertex 1: a vertex has no three finite coordinates"],

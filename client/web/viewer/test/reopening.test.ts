@@ -1,9 +1,10 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
+import type { ErrorCode } from "lpdeform-client";
 import { Live } from "../src/link/live.js";
 import { emptyDocument } from "../src/model/document.js";
 
 /** Sessions that open and whose stream then fails; `frames` before it does. */
-const server = vi.hoisted(() => ({ opened: 0, most: 10, frames: 0, code: "unavailable" as "unavailable" | "unauthenticated" }));
+const server = vi.hoisted(() => ({ opened: 0, most: 10, frames: 0, code: "unavailable" as ErrorCode, reason: "" }));
 
 vi.mock("lpdeform-client", async (original) => {
   const client = await original<typeof import("lpdeform-client")>();
@@ -20,7 +21,7 @@ vi.mock("lpdeform-client", async (original) => {
         async *[Symbol.asyncIterator]() {
           for (let k = 0; k < server.frames; ++k) yield await Promise.resolve({ inputSeq: 1 });
           if (server.opened === server.most) await new Promise(() => undefined);
-          throw new client.LpdeformError(server.code, "no stream");
+          throw new client.LpdeformError(server.code, "no stream", { reason: server.reason });
         },
       });
     },
@@ -29,8 +30,8 @@ vi.mock("lpdeform-client", async (original) => {
 
 const watcher = { frame: vi.fn(() => queueMicrotask(() => live.take())), status: vi.fn(), report: vi.fn(), problem: vi.fn() };
 let live: Live;
-const begin = (code: typeof server.code, frames: number) => {
-  Object.assign(server, { opened: 0, frames, code });
+const begin = (code: ErrorCode, frames: number, reason = "") => {
+  Object.assign(server, { opened: 0, frames, code, reason });
   live = new Live(
     { name: "a", positions: new Float32Array(9), faces: Uint32Array.of(0, 1, 2) },
     emptyDocument,
@@ -52,6 +53,14 @@ it("a stream that is refused for good ends it, in words", async () => {
   await vi.advanceTimersByTimeAsync(60_000);
   expect(server.opened).toBe(1);
   expect(live.status).toMatchObject({ kind: "refused", title: "The server does not let you in" });
+});
+
+it("frames that never fit end it, with what to do", async () => {
+  begin("data_loss", 0, "FRAME_PARTS");
+  await vi.advanceTimersByTimeAsync(60_000);
+  expect(server.opened).toBe(1);
+  expect(live.status).toMatchObject({ kind: "refused", title: "The server's frames do not fit this mesh" });
+  expect(live.status.text).toContain("reload the page");
 });
 
 it("sessions without frames are opened again after pauses that grow", async () => {

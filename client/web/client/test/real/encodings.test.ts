@@ -71,6 +71,28 @@ describe("encodings", () => {
   });
 });
 
+test("a solve in doubles brings back to the last bit what went out, what is held where it is and where it was put", async () => {
+  const service = await Service.start();
+  const { mesh, handles } = grid(20);
+  // No coordinate of them is a float32.
+  const vertices = Float64Array.from(mesh.vertices, (value, k) => value + 1e-4 * Math.PI * (k + 1));
+  expect(vertices.some((value) => Math.fround(value) === value)).toBe(false);
+  const put = Float64Array.from({ length: 3 * handles.right.vertices!.length }, (_, k) => 20 + Math.sqrt(k + 2));
+  const session = await openSession({ ...mesh, vertices }, { url: service.url, settings: { p: 2 } });
+  session.setHandles({ left: handles.left, right: { ...handles.right, motion: { targets: put } } });
+  const { positions, distortion } = await session.solve({ scalar: "float64", deadlineMs: 20_000 });
+  const at = (vertex: number) => [...positions.subarray(3 * vertex, 3 * vertex + 3)];
+  for (const vertex of handles.left.vertices!)
+    expect(at(vertex)).toEqual([...vertices.subarray(3 * vertex, 3 * vertex + 3)]);
+  [...handles.right.vertices!].forEach((vertex, k) => expect(at(vertex)).toEqual([...put.subarray(3 * k, 3 * k + 3)]));
+  expect(distortion).toBeInstanceOf(Float64Array);
+  const rounded = await session.solve({ deadlineMs: 20_000 });
+  expect(rounded.positions).toBeInstanceOf(Float32Array);
+  expect(rounded.positions[0]).toBe(Math.fround(vertices[0]!));
+  await session.close();
+  await service.stop();
+});
+
 describe("a server with a limit of bytes a second", () => {
   const n = 30;
   let service: Service;

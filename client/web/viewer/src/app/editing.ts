@@ -8,7 +8,7 @@ import {
   paint,
   releaseVertices,
 } from "../model/document.js";
-import type { Vector3 } from "../model/mesh.js";
+import { isAtRest, type Vector3 } from "../model/mesh.js";
 import { follow, placesOf } from "../model/places.js";
 import { add, type Pose, subtract } from "../model/pose.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../model/selection.js";
@@ -205,7 +205,9 @@ export class Editing implements PointingTarget {
     const { selected } = app.view.now;
     if (mode === "release") return app.change(releaseVertices(before, vertices, rest));
     if (mode === "add" && handleOf(before, selected)) return app.change(extendHandle(before, selected!, vertices, rest));
-    const after = addHandle(before, vertices, rest, {}, this.pane.stage.surface!.positions);
+    const { positions } = this.pane.stage.surface!;
+    const current = isAtRest(positions, rest, vertices) ? rest : positions; // what frames round away moves nothing
+    const after = addHandle(before, vertices, rest, {}, current);
     if (after === before) return app.notify("Another handle holds these vertices already.");
     app.change(after);
     app.view.set({ selected: after.handles.at(-1)!.name });

@@ -6,7 +6,7 @@ import { writePly } from "../io/ply.js";
 import { readMesh } from "../io/read.js";
 import { writeStl } from "../io/stl.js";
 import { emptyDocument } from "../model/document.js";
-import type { Mesh } from "../model/mesh.js";
+import { isAtRest, type WrittenMesh } from "../model/mesh.js";
 import type { App } from "./app.js";
 import { sentence } from "../link/status.js";
 import { legendCanvas } from "./legend.js";
@@ -14,6 +14,11 @@ import type { Pane } from "./pane.js";
 
 /** For the result that is exported. */
 const solveMs = 60_000;
+
+interface Exported {
+  positions: Float32Array | Float64Array;
+  distortion: Float32Array | Float64Array;
+}
 
 export type MeshFormat = "ply" | "obj" | "off" | "stl";
 
@@ -52,14 +57,14 @@ export class Files {
     }
   }
 
-  /** In the precision of the server's result, which what is drawn may not have. */
+  /** In the doubles of the server's result, which what is drawn does not have. */
   async exportMesh(format: MeshFormat): Promise<void> {
     const panes = [...this.app.panes];
     const stem = this.#stem;
     for (const pane of panes) {
-      const { mesh } = pane.stage.surface!;
+      const { faces } = pane.stage.surface!.mesh;
       const { positions, distortion } = await this.#exactly(pane);
-      const deformed: Mesh = { ...mesh, positions };
+      const deformed: WrittenMesh = { positions, faces };
       const name = `${stem}-deformed${panes.length > 1 ? `-${pane.side}` : ""}.${format}`;
       if (format === "ply") save(name, writePly(deformed, distortion, this.app.red));
       if (format === "obj") save(name, writeObj(deformed));
@@ -68,10 +73,13 @@ export class Files {
     }
   }
 
-  async #exactly({ stage, frame, live, distortion }: Pane): Promise<{ positions: Float32Array; distortion: Float32Array }> {
-    const shown = { positions: stage.surface!.positions, distortion };
-    const isExact = !frame || (!frame.quantized && frame.converged && !live!.isSettling);
-    if (isExact) return shown;
+  async #exactly({ stage, live, distortion }: Pane): Promise<Exported> {
+    const { positions, mesh } = stage.surface!;
+    const shown = { positions, distortion };
+    const isHeld = this.app.document.handles.length > 0;
+    if (!isHeld && isAtRest(positions, mesh.positions)) {
+      return { positions: mesh.exact ?? mesh.positions, distortion: distortion.slice().fill(0) };
+    }
     const done = this.app.notifyWhile("Exporting: computing the result in full precision…");
     try {
       return await live!.solve(solveMs);

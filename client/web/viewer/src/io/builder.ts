@@ -1,6 +1,9 @@
 import type { Mesh } from "../model/mesh.js";
 import { FileFault } from "./fault.js";
 
+/** Squares of distances stay within what float32 can say. */
+const mostCoordinate = 1e18;
+
 /** Puts a mesh together; polygons become fans of triangles. */
 export class MeshBuilder {
   readonly positions: number[] = [];
@@ -12,6 +15,9 @@ export class MeshBuilder {
 
   vertex(x: number, y: number, z: number, where: string): void {
     if (!Number.isFinite(x + y + z)) throw new FileFault(`${where}: a vertex has no three finite coordinates.`);
+    if (Math.max(Math.abs(x), Math.abs(y), Math.abs(z)) > mostCoordinate) {
+      throw new FileFault(`${where}: a vertex lies farther out than ${mostCoordinate}, which is not drawn.`);
+    }
     this.positions.push(x, y, z);
   }
 
@@ -28,6 +34,9 @@ export class MeshBuilder {
       if (Number.isInteger(vertex) && vertex >= 0 && vertex < this.vertexCount) continue;
       throw new FileFault(`Face ${Math.floor(k / 3)} of ${name} has vertex ${vertex}; there are ${this.vertexCount} vertices.`);
     }
-    return { name, positions: Float32Array.from(this.positions), faces: Uint32Array.from(this.faces) };
+    const faces = Uint32Array.from(this.faces);
+    const positions = Float32Array.from(this.positions);
+    const isExact = this.positions.every((value, k) => value === positions[k]);
+    return { name, positions, faces, ...(!isExact && { exact: Float64Array.from(this.positions) }) };
   }
 }

@@ -1,4 +1,4 @@
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh, WrittenMesh } from "../model/mesh.js";
 import { MeshBuilder } from "./builder.js";
 
 /** The positions and faces of an OBJ file; texture coordinates, normals, groups and materials are left aside. */
@@ -26,7 +26,7 @@ function cornerOf(word: string, vertexCount: number): number {
   return number < 0 ? vertexCount + number : number - 1;
 }
 
-export function writeObj({ positions, faces }: Mesh): string {
+export function writeObj({ positions, faces }: WrittenMesh): string {
   const lines: string[] = [];
   for (let k = 0; k < positions.length; k += 3) lines.push(`v ${positions[k]} ${positions[k + 1]} ${positions[k + 2]}`);
   for (let k = 0; k < faces.length; k += 3) lines.push(`f ${faces[k]! + 1} ${faces[k + 1]! + 1} ${faces[k + 2]! + 1}`);

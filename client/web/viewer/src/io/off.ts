@@ -1,4 +1,4 @@
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh, WrittenMesh } from "../model/mesh.js";
 import { MeshBuilder } from "./builder.js";
 import { FileFault } from "./fault.js";
 
@@ -31,7 +31,7 @@ export function readOff(name: string, text: string): Mesh {
   return builder.finish(name);
 }
 
-export function writeOff({ positions, faces }: Mesh): string {
+export function writeOff({ positions, faces }: WrittenMesh): string {
   const lines = ["OFF", `${positions.length / 3} ${faces.length / 3} 0`];
   for (let k = 0; k < positions.length; k += 3) lines.push(`${positions[k]} ${positions[k + 1]} ${positions[k + 2]}`);
   for (let k = 0; k < faces.length; k += 3) lines.push(`3 ${faces[k]} ${faces[k + 1]} ${faces[k + 2]}`);

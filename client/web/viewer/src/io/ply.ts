@@ -1,5 +1,5 @@
 import { blueToRed } from "../model/colours.js";
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh, WrittenMesh } from "../model/mesh.js";
 import { MeshBuilder } from "./builder.js";
 import { FileFault } from "./fault.js";
 
@@ -153,15 +153,25 @@ function binaryReader(name: string, bytes: Uint8Array, littleEndian: boolean): (
   };
 }
 
-/** Binary, with the distortion and a colour of each vertex, `red` being the distortion that is drawn in full red. */
-export function writePly({ positions, faces }: Mesh, distortion: Float32Array, red: number): Uint8Array<ArrayBuffer> {
+/**
+ * Binary, with the distortion and a colour of each vertex, `red` being the distortion that is drawn in full red. Numbers are
+ * float or double as they are given.
+ */
+export function writePly(
+  { positions, faces }: WrittenMesh,
+  distortion: Float32Array | Float64Array,
+  red: number,
+): Uint8Array<ArrayBuffer> {
+  const isDouble = positions instanceof Float64Array;
+  const size = isDouble ? 8 : 4;
+  const vertexBytes = 4 * size + 3;
   const vertexCount = positions.length / 3;
   const header = new TextEncoder().encode(
     [
       "ply",
       "format binary_little_endian 1.0",
       `element vertex ${vertexCount}`,
-      ...["x", "y", "z", "distortion"].map((property) => `property float ${property}`),
+      ...["x", "y", "z", "distortion"].map((property) => `property ${isDouble ? "double" : "float"} ${property}`),
       ...["red", "green", "blue"].map((property) => `property uchar ${property}`),
       `element face ${faces.length / 3}`,
       "property list uchar int vertex_indices",
@@ -169,15 +179,16 @@ export function writePly({ positions, faces }: Mesh, distortion: Float32Array, r
       "",
     ].join("\n"),
   );
-  const bytes = new Uint8Array(header.length + 19 * vertexCount + (13 * faces.length) / 3);
+  const bytes = new Uint8Array(header.length + vertexBytes * vertexCount + (13 * faces.length) / 3);
   bytes.set(header);
   const view = new DataView(bytes.buffer);
   let at = header.length;
-  for (let v = 0; v < vertexCount; ++v, at += 19) {
+  const set = (at: number, value: number) => (isDouble ? view.setFloat64(at, value, true) : view.setFloat32(at, value, true));
+  for (let v = 0; v < vertexCount; ++v, at += vertexBytes) {
     const value = distortion[v] ?? 0;
-    for (let axis = 0; axis < 3; ++axis) view.setFloat32(at + 4 * axis, positions[3 * v + axis]!, true);
-    view.setFloat32(at + 12, value, true);
-    blueToRed(red > 0 ? value / red : 0).forEach((channel, k) => view.setUint8(at + 16 + k, channel));
+    for (let axis = 0; axis < 3; ++axis) set(at + size * axis, positions[3 * v + axis]!);
+    set(at + 3 * size, value);
+    blueToRed(red > 0 ? value / red : 0).forEach((channel, k) => view.setUint8(at + 4 * size + k, channel));
   }
   for (let f = 0; f < faces.length; f += 3, at += 13) {
     view.setUint8(at, 3);

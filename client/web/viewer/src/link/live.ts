@@ -11,7 +11,7 @@ import { changes, exponent, newSession, type Side } from "../model/changes.js";
 import type { Document } from "../model/document.js";
 import type { Mesh } from "../model/mesh.js";
 import { Meter } from "./meter.js";
-import { isPassing, say, type Status, statusOf } from "./status.js";
+import { isPassing, say, type Status, statusAtEnd, statusOf } from "./status.js";
 
 export interface LiveWatcher {
   /** A frame waits to be taken. */
@@ -105,12 +105,13 @@ export class Live {
   }
 
   /**
-   * The result for the document in full float32 precision, which frames may not have. Rejects where the server is away, or has nothing to solve, or takes longer than `deadlineMs`.
+   * The result for the document in the doubles that the server computes in. Rejects where the server is away, or has nothing to
+   * solve, or takes longer than `deadlineMs`.
    */
-  async solve(deadlineMs: number): Promise<SolveResult> {
+  async solve(deadlineMs: number): Promise<SolveResult<Float64Array>> {
     const session = this.#session;
     if (!session || this.status.kind !== "live") throw new LpdeformError("unavailable", this.status.title);
-    return await session.solve({ deadlineMs, signal: AbortSignal.timeout(deadlineMs) });
+    return await session.solve({ scalar: "float64", deadlineMs, signal: AbortSignal.timeout(deadlineMs) });
   }
 
   close(): void {
@@ -143,13 +144,13 @@ export class Live {
 
   /** As often as it takes; nothing where the mesh is refused or the page has done with it. */
   async #open(): Promise<Session | undefined> {
-    const { positions, faces } = this.mesh;
+    const { positions, exact, faces } = this.mesh;
     const { signal } = this.#over;
     for (let pauseMs = firstPauseMs; ; pauseMs = Math.min(2 * pauseMs, longestPauseMs)) {
       if (!isPassing(this.status)) this.#setStatus(say("opening", "Preparing…"));
       try {
         return await openSession(
-          { vertices: positions, faces },
+          { vertices: exact ?? positions, faces },
           {
             freeComponents: "follow",
             encoding: this.encoding,
@@ -184,7 +185,7 @@ export class Live {
       }
     } catch (thrown) {
       if (this.#over.signal.aborted) return hadFrames;
-      this.#setStatus(statusOf(thrown as LpdeformError));
+      this.#setStatus(statusAtEnd(thrown as LpdeformError));
       void session.close().catch(() => undefined);
       this.#session = undefined;
     }

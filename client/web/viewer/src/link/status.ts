@@ -32,6 +32,13 @@ export function statusOf(error: LpdeformError): Status {
   return { ...say("refused", "The server refuses this mesh", sentence(message)), element };
 }
 
+/** Where nothing is tried again but by beginning anew. */
+export function statusAtEnd(error: LpdeformError): Status {
+  if (error.reason !== "FRAME_PARTS") return statusOf(error);
+  const advice = "Page and server may be of different versions: reload the page.";
+  return say("refused", "The server's frames do not fit this mesh", `${advice} ${kept}.`);
+}
+
 function isSessionOver(reason: string): boolean {
   return reason.startsWith("SESSION_") && reason !== "SESSIONS_FULL";
 }

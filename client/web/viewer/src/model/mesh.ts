@@ -1,9 +1,17 @@
 /** A triangle mesh as flat arrays, in the order of its file; neither changes. */
 export interface Mesh {
   name: string;
-  /** x, y, z of each vertex. */
+  /** x, y, z of each vertex, as they are drawn. */
   positions: Float32Array;
+  /** The same as the file has them, where float32 rounds some of them: what the server is given. */
+  exact?: Float64Array;
   /** Three vertices a triangle, counter-clockwise seen from outside. */
+  faces: Uint32Array;
+}
+
+/** A mesh to be written, in the precision of its numbers. */
+export interface WrittenMesh {
+  positions: Float32Array | Float64Array;
   faces: Uint32Array;
 }
 
@@ -32,6 +40,14 @@ export function boundsOf(positions: Float32Array, faces?: Uint32Array): Bounds {
   if (count === 0) return { min: [0, 0, 0], max: [0, 0, 0], center: [0, 0, 0], diagonal: 1 };
   const center = min.map((low, axis) => (low + max[axis]!) / 2) as unknown as Vector3;
   return { min, max, center, diagonal: Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) || 1 };
+}
+
+/** Whether vertices are where the mesh has them, as far as frames of 16 bits can tell. */
+export function isAtRest(positions: Float32Array, rest: Float32Array, vertices?: readonly number[]): boolean {
+  const step = boundsOf(rest).diagonal / 65535;
+  const isSame = (at: number) => Math.abs(positions[at]! - rest[at]!) <= step;
+  if (!vertices) return rest.every((_, at) => isSame(at));
+  return vertices.every((vertex) => [0, 1, 2].every((axis) => isSame(3 * vertex + axis)));
 }
 
 /** The mean of some vertices. */

@@ -1,10 +1,11 @@
 import { join } from "node:path";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
+import { resultIn } from "../../../client/test/real/grpc_web.js";
 import { Service } from "../../../client/test/real/service.js";
 import { readMesh } from "../../src/io/read.js";
 import { writeOff } from "../../src/io/off.js";
 import { blockSurface } from "../../src/model/block.js";
-import type { Vector3 } from "../../src/model/mesh.js";
+import type { Mesh, Vector3 } from "../../src/model/mesh.js";
 import { apply, type Pose } from "../../src/model/pose.js";
 import { User } from "./user.js";
 
@@ -23,13 +24,17 @@ afterAll(async () => {
 });
 
 /** 3 x 3 x 12 cells. */
-const tower = blockSurface(3, 3, 12, () => true);
+const block = blockSurface(3, 3, 12, () => true);
 const bottom = 0;
 /** On its upper rim, to the front. */
-const rim = tower.positions.findIndex(
-  (value, k) => k % 3 === 2 && value === 12 && tower.positions[k - 1] === 0 && tower.positions[k - 2] === 1,
+const rim = block.positions.findIndex(
+  (value, k) => k % 3 === 2 && value === 12 && block.positions[k - 1] === 0 && block.positions[k - 2] === 1,
 );
 const rimVertex = Math.floor(rim / 3);
+/** Its coordinates are doubles that no float32 is. */
+const exact = Float64Array.from(block.positions, (value) => 0.1 + 1.1 * value);
+const tower: Mesh = { ...block, positions: Float32Array.from(exact), exact };
+const towerFile = { name: "tower.off", content: writeOff({ positions: exact, faces: block.faces }) };
 
 const heldNames = () => user.ask<string[]>("document().handles.map(({ name }) => name)");
 const largestDifference = (a: readonly number[], b: readonly number[]) =>
@@ -41,9 +46,33 @@ async function boxAround(from: number, to: number, slack: number): Promise<void>
   await user.drag(start, Math.abs(a.x - b.x) + 180, Math.abs(a.y - b.y) + 2 * slack);
 }
 
+/** Of each vertex of a binary PLY as the page writes it: that many numbers from that property on. */
+function fromPly(file: Buffer, first = 0, count = 3): number[] {
+  const start = file.indexOf("end_header\n") + 11;
+  const row = 4 * 8 + 3;
+  return Array.from({ length: (count * exact.length) / 3 }, (_, k) =>
+    file.readDoubleLE(start + row * Math.floor(k / count) + 8 * (first + (k % count))),
+  );
+}
+
+/** Of each corner of each triangle. */
+function fromStl(file: Buffer): number[] {
+  return Array.from({ length: file.readUInt32LE(80) * 9 }, (_, k) =>
+    file.readFloatLE(84 + 50 * Math.floor(k / 9) + 12 + 4 * (k % 9)),
+  );
+}
+
+/** In the lines that begin like that. */
+function numbersAfter(key: string, file: Buffer): number[] {
+  const lines = file.toString().split("\n");
+  return lines.filter((line) => line.startsWith(key)).flatMap((line) => line.slice(key.length).split(" ").map(Number));
+}
+
 describe("somebody with a mesh of their own", () => {
+  let handles: Buffer;
+
   it("opens it and is told how it is", async () => {
-    await user.openFiles({ name: "tower.off", content: writeOff(tower) });
+    await user.openFiles(towerFile);
     await user.until("window.__lpdeform.app.facts.now.report !== undefined && window.__lpdeform.app.mesh.name === 'tower.off'");
     await user.page.locator("summary", { hasText: "Mesh" }).click();
     expect(await user.page.locator(".panel").textContent()).toMatch(/tower\.off: 164 vertices, 324 faces, 1 component, closed/);
@@ -110,22 +139,29 @@ describe("somebody with a mesh of their own", () => {
     await user.until("window.__lpdeform.frame().gap !== undefined"); // by itself, once all rests
   });
 
-  it.each(["PLY, with distortion", "OBJ", "OFF"])("exports the mesh as %s, more exactly than it is shown", async (format) => {
-    const shown = await user.positions();
+  it.each([
+    ["PLY, with distortion", fromPly, (value: number) => value],
+    ["OBJ", (file: Buffer) => numbersAfter("v ", file), (value: number) => value],
+    ["OFF", (file: Buffer) => numbersAfter("", file).slice(4, 4 + exact.length), (value: number) => value],
+    ["STL", fromStl, Math.fround],
+  ] as const)("exports the mesh as %s with the numbers that the server sent", async (format, numbersOf, asWritten) => {
+    const answer = user.page.waitForResponse((response) => response.url().endsWith("/Solve"));
     const file = await user.save(`Mesh as ${format}`);
-    const ending = format.slice(0, 3).toLowerCase();
-    const read = readMesh(`x.${ending}`, file);
-    expect(largestDifference([...read.positions], shown)).toBeLessThan(0.02);
-    expect(read.faces).toEqual(tower.faces);
+    const { positions, distortion } = resultIn(await (await answer).body(), exact.length / 3);
     expect(await user.page.locator(".notice.bad").isHidden()).toBe(true);
-    // Handles are where they were put, as exactly as the file can say.
-    const handles = await user.ask<{ vertices: number[]; pose: Pose }[]>("document().handles");
-    for (const { vertices, pose } of handles) {
-      for (const vertex of vertices) {
-        const target = apply(pose, [...tower.positions.subarray(3 * vertex, 3 * vertex + 3)] as unknown as Vector3);
-        const got = [...read.positions.subarray(3 * vertex, 3 * vertex + 3)];
-        expect(largestDifference(got, target)).toBeLessThanOrEqual(2 ** -24 * Math.max(...target.map(Math.abs)));
-      }
+    const at = (vertex: number) => [...positions.subarray(3 * vertex, 3 * vertex + 3)];
+    if (format === "STL") expect(numbersOf(file)).toEqual([...tower.faces].flatMap(at).map(asWritten));
+    else expect(numbersOf(file)).toEqual([...positions]);
+    if (numbersOf === fromPly) expect(fromPly(file, 3, 1)).toEqual([...distortion]);
+    expect(readMesh(`x.${format.slice(0, 3).toLowerCase()}`, file).faces.length).toBe(tower.faces.length);
+
+    // They are those of what is shown, and handles are where they were put, the one at rest to the last bit.
+    expect(largestDifference([...positions], await user.positions())).toBeLessThan(0.02);
+    const [foot, pulled] = await user.ask<{ vertices: number[]; pose: Pose }[]>("document().handles");
+    const rest = (vertex: number) => [...exact.subarray(3 * vertex, 3 * vertex + 3)];
+    for (const vertex of foot!.vertices) expect(at(vertex)).toEqual(rest(vertex));
+    for (const vertex of pulled!.vertices) {
+      expect(largestDifference(at(vertex), apply(pulled!.pose, rest(vertex) as unknown as Vector3))).toBeLessThan(1e-12);
     }
   });
 
@@ -146,27 +182,35 @@ describe("somebody with a mesh of their own", () => {
   });
 
   it("saves the handles, reloads the exported mesh, and has both again", async () => {
-    const handles = await user.save("Handles as JSON");
+    handles = await user.save("Handles as JSON");
     const exported = await user.save("Mesh as PLY, with distortion");
     const before = await user.ask<object>("document().handles.map(({ name, vertices }) => ({ name, vertices }))");
 
-    await user.openFiles({ name: "tower.off", content: writeOff(tower) }, { name: "tower-handles.json", content: handles });
+    await user.openFiles(towerFile, { name: "tower-handles.json", content: handles });
     await user.settled();
     expect(await user.ask("document().handles.map(({ name, vertices }) => ({ name, vertices }))")).toEqual(before);
     await user.until("window.__lpdeform.app.red > 0");
     expect(largestDifference(await user.positions(), [...tower.positions])).toBeGreaterThan(1);
 
+    const numbers = fromPly(exported);
+    const upload = user.page.waitForRequest((request) => request.url().endsWith("/CreateSession"));
     await user.openFiles({ name: "bent.ply", content: exported });
     await user.until("window.__lpdeform.app.mesh.name === 'bent.ply'");
+    // The numbers that the server sent go back to it to the last bit, and come back from it for what nothing holds.
+    const bytes = Buffer.from(new Uint8Array(Float64Array.from(numbers).buffer));
+    expect((await upload).postDataBuffer()!.includes(bytes)).toBe(true);
     await user.settled();
-    const reloaded = await user.ask<Record<string, number>>("app.mesh.positions");
-    expect(Object.values(reloaded)).toEqual([...readMesh("bent.ply", exported).positions]);
+    expect(largestDifference(await user.positions(), numbers)).toBeLessThan(1e-3);
+    expect(fromPly(await user.save("Mesh as PLY, with distortion"))).toEqual(numbers);
   });
 
   it("exports what is shown, and says so, where the server is away", async () => {
-    const shown = await user.positions();
+    await user.openFiles(towerFile, { name: "tower-handles.json", content: handles });
+    await user.until("window.__lpdeform.app.mesh.name === 'tower.off' && window.__lpdeform.document().handles.length === 2");
+    await user.settled();
     await service.killServer();
     await user.until('window.__lpdeform.status() === "away"');
+    const shown = await user.positions();
     const file = await user.save("Mesh as OFF");
     expect([...readMesh("x.off", file).positions]).toEqual(shown);
     await user.page
