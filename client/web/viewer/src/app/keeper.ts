@@ -1,3 +1,4 @@
+import { forget, remember, remembered } from "../io/remember.js";
 import { Store, type Work } from "../io/store.js";
 import type { Mesh } from "../model/mesh.js";
 import type { View } from "../model/view.js";
@@ -6,11 +7,13 @@ import type { Answer } from "../ui/wants_back.js";
 import { claim, whileFree } from "./claim.js";
 
 const key = "lpdeform-work";
-/** There while work is being brought back: found at the beginning, it tells of a page that did not survive that. */
-const restoringKey = "lpdeform-restoring";
+/**
+ * Remembered, for all tabs, while work is being brought back: found at the beginning, it tells of a page that did not survive that.
+ */
+const restoringKey = (id: string) => `lpdeform-restoring-${id}`;
 const saveEveryMs = 500;
 /** Longer than a page that is being reloaded takes to let go of its work. */
-const patienceMs = 1000;
+const patienceMs = 3000;
 const mostWorks = 8;
 const oldestMs = 30 * 24 * 3600 * 1000;
 
@@ -43,8 +46,8 @@ export class Keeper {
       const mesh = work && (await store.mesh(work.id));
       this.#store = store;
       if (!work || !mesh) return false;
-      const when = sessionStorage.getItem(restoringKey) ? await this.wantsBack(mesh.name) : "now";
-      if (when === "never") sessionStorage.removeItem(restoringKey);
+      const when = remembered(restoringKey(work.id)) ? await this.wantsBack(mesh.name) : "now";
+      if (when === "never") forget(restoringKey(work.id));
       if (when === "later") await this.#putOff();
       if (when !== "now") return false;
       this.#show(work, mesh);
@@ -98,7 +101,7 @@ export class Keeper {
     await claim(this.#id, patienceMs);
   }
 
-  /** The work stays kept. The next reload asks again, unless there is other work of this tab by then. */
+  /** The work stays kept. Whichever tab has it next asks again: this one, unless there is other work of it by then. */
   async #putOff(): Promise<void> {
     await this.#claimNew();
     this.#hasPutOff = true;
@@ -107,7 +110,12 @@ export class Keeper {
   /** Lets go of what is old or too much, but of nothing that a tab has open, this one's included. */
   async #makeRoom(store: Store, works: readonly Work[]): Promise<void> {
     const old = works.filter(({ savedAt }, k) => k >= mostWorks || savedAt < Date.now() - oldestMs);
-    for (const { id } of old) await whileFree(id, () => store.remove([id]));
+    for (const { id } of old) {
+      await whileFree(id, async () => {
+        await store.remove([id]);
+        forget(restoringKey(id));
+      });
+    }
   }
 
   #show({ document, view, camera, savedAt }: Work, mesh: Mesh): void {
@@ -126,9 +134,10 @@ export class Keeper {
   /** Until the first picture, or until the page is left in good order. */
   #watchOver(): void {
     const { afterDrawing } = this.app;
-    sessionStorage.setItem(restoringKey, "yes");
+    const mark = restoringKey(this.#id);
+    remember(mark, "yes");
     const over = () => {
-      sessionStorage.removeItem(restoringKey);
+      forget(mark);
       afterDrawing.delete(over);
       window.removeEventListener("pagehide", over);
     };
@@ -154,7 +163,6 @@ export class Keeper {
         this.#keptMesh = mesh;
         if (this.#hasPutOff) {
           sessionStorage.setItem(key, this.#id);
-          sessionStorage.removeItem(restoringKey);
           this.#hasPutOff = false;
         }
       } else {

@@ -7,6 +7,14 @@ export function remembered(key: string): string | undefined {
   }
 }
 
+export function forget(key: string): void {
+  try {
+    localStorage.removeItem(key);
+  } catch {
+    // nothing was remembered
+  }
+}
+
 /** For the next visit, where the browser lets a page do that. */
 export function remember(key: string, value: string): void {
   try {

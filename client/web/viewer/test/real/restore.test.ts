@@ -187,7 +187,8 @@ it("work at which the page stopped is shown again only where that is wanted", as
   expect(await work()).toBe(bent);
 
   // What a page leaves behind that does not survive its first picture.
-  const stop = () => user.page.evaluate("sessionStorage.setItem('lpdeform-restoring', 'yes')");
+  const stop = () =>
+    user.page.evaluate("localStorage.setItem('lpdeform-restoring-' + sessionStorage.getItem('lpdeform-work'), 'yes')");
   const question = user.page.getByRole("dialog", { name: "Your work" });
   await stop();
   await user.page.reload();
@@ -212,6 +213,27 @@ it("work at which the page stopped is shown again only where that is wanted", as
   await question.getByRole("button", { name: "Show it again" }).click();
   await user.settled();
   expect(await work()).toBe(bent);
+
+  // Put off, and other work in its place: then it is a new tab's to ask, and again the next one's.
+  await stop();
+  await user.page.reload();
+  await question.getByText("Not now").click();
+  await user.settled();
+  await user.page.locator(".dock").getByRole("button", { name: "6", exact: true }).click();
+  await user.page.waitForTimeout(700);
+  await reload(); // lets go of what was put off
+  expect(await note().textContent()).toContain("is here again");
+  const [asked, context, address] = [await work(), user.page.context(), user.page.url()];
+  expect(asked).not.toBe(bent);
+  for (const answer of ["Not now", "Show it again"]) {
+    const page = await context.newPage();
+    await page.goto(address);
+    await page.getByRole("dialog", { name: "Your work" }).getByRole("button", { name: answer }).click();
+    await page.waitForFunction("window.__lpdeform?.status() === 'live'");
+    const isBack = (await page.evaluate("JSON.stringify(window.__lpdeform.document())")) === bent;
+    expect(isBack).toBe(answer === "Show it again");
+    await page.close();
+  }
 
   await stop();
   await user.page.reload();
