@@ -63,6 +63,7 @@ export class App {
   readonly afterDrawing = new Set<(now: number) => void>();
   #aside: Aside | undefined;
   #isBroughtBack = false;
+  #isKeyHeld = false;
   #turned: Pane | undefined;
   #asked = 0;
   readonly #pace = new Pace(() => this.requestDraw());
@@ -91,6 +92,7 @@ export class App {
       this.requestDraw();
     });
     new ResizeObserver(() => this.requestDraw()).observe(this.stages);
+    for (const end of ["keyup", "blur"]) window.addEventListener(end, () => this.#keyUp());
   }
 
   get document(): Document {
@@ -195,6 +197,18 @@ export class App {
   endGesture(): void {
     this.history.end();
     this.#documentChanged(performance.now());
+  }
+
+  /** As during(), by a key: the gesture lasts until the key is let go, however often it repeats. */
+  byKey(document: Document, { timeStamp }: KeyboardEvent): void {
+    this.#isKeyHeld = true;
+    this.during(document, timeStamp);
+  }
+
+  #keyUp(): void {
+    if (!this.#isKeyHeld) return;
+    this.#isKeyHeld = false;
+    this.endGesture();
   }
 
   /** What the gesture has changed is as before, without a step. */

@@ -1,4 +1,5 @@
 import { changeHandle, handleOf, removeHandle } from "../model/document.js";
+import { steppedP } from "../model/exponent.js";
 import type { ColourBy, Tool } from "../model/view.js";
 import type { App } from "./app.js";
 import type { Files } from "./files.js";
@@ -42,30 +43,28 @@ function alone(app: App, files: Files, help: HTMLDialogElement, event: KeyboardE
   const { key } = event;
   const tool = tools[Number(key) - 1];
   if (tool) view.set({ tool });
-  else if (key in nudges && !target.matches("input, button")) return nudge(app, nudges[key]!, event.shiftKey ? 0.1 : 1);
+  else if (key in nudges && !target.matches("input, button")) return nudge(app, nudges[key]!, event);
   else {
-    const act = actions(app, files, help)[key.length === 1 ? key.toLowerCase() : key];
+    const act = actions(app, files, help, event)[key.length === 1 ? key.toLowerCase() : key];
     if (!act) return false;
     act();
   }
   return true;
 }
 
-function actions(app: App, files: Files, help: HTMLDialogElement): Record<string, () => void> {
+function actions(app: App, files: Files, help: HTMLDialogElement, event: KeyboardEvent): Record<string, () => void> {
   const { view } = app;
   const { now } = view;
-  const setP = (step: number) =>
-    app.change({
-      ...app.document,
-      p: Math.round(Math.min(Math.max(app.document.p + step, 1), 10) * 100) / 100,
-      isAutomatic: false,
-    });
+  const stepP = (step: number) => {
+    const p = steppedP(app.document.p, step);
+    if (p !== app.document.p || app.document.isAutomatic) app.byKey({ ...app.document, p, isAutomatic: false }, event);
+  };
   return {
     "?": () => help.showModal(),
     "[": () => view.set({ radius: Math.max(now.radius - 0.01, 0) }),
     "]": () => view.set({ radius: Math.min(now.radius + 0.01, 0.25) }),
-    ",": () => setP(-0.1),
-    ".": () => setP(0.1),
+    ",": () => stepP(-0.1),
+    ".": () => stepP(0.1),
     a: () => app.change({ ...app.document, isAutomatic: !app.document.isAutomatic }),
     c: () => view.set({ colourBy: colours[(colours.indexOf(now.colourBy) + 1) % colours.length]! }),
     d: () => view.set({ isDark: !now.isDark }),
@@ -103,12 +102,12 @@ function selectNext(app: App): void {
 }
 
 /** By a hundredth of the mesh's diagonal, along its axes. */
-function nudge(app: App, direction: readonly [number, number, number], scale: number): boolean {
+function nudge(app: App, direction: readonly [number, number, number], event: KeyboardEvent): boolean {
   const handle = handleOf(app.document, app.view.now.selected);
   if (!handle || handle.isLocked || handle.targets) return false;
-  const step = 0.01 * app.diagonal * scale;
+  const step = 0.01 * app.diagonal * (event.shiftKey ? 0.1 : 1);
   const [x, y, z] = handle.pose.translation;
   const translation = [x + step * direction[0], y + step * direction[1], z + step * direction[2]] as const;
-  app.change(changeHandle(app.document, handle.name, { pose: { ...handle.pose, translation } }));
+  app.byKey(changeHandle(app.document, handle.name, { pose: { ...handle.pose, translation } }), event);
   return true;
 }

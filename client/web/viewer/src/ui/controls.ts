@@ -22,7 +22,16 @@ export function slider(
   const input = el("input", { type: "range", min: String(min), max: String(max), step: String(step), aria: { label } });
   const shown = el("output");
   input.addEventListener("input", () => changed(input.valueAsNumber));
-  input.addEventListener("change", ended);
+  // A key that is held changes it over and over; that is one change.
+  input.addEventListener("keydown", () => input.classList.add("held"));
+  for (const end of ["keyup", "blur"]) {
+    input.addEventListener(end, () => {
+      const wasHeld = input.classList.contains("held");
+      input.classList.remove("held");
+      if (wasHeld) ended();
+    });
+  }
+  input.addEventListener("change", () => input.classList.contains("held") || ended());
   const show = (value: number, text: string) => {
     input.valueAsNumber = value;
     input.style.setProperty("--share", `${((value - min) / (max - min)) * 100}%`);

@@ -1,20 +1,18 @@
 import type { App } from "../app/app.js";
 import type { Document } from "../model/document.js";
+import { leastP, mostP, steppedP } from "../model/exponent.js";
 import { short } from "../model/words.js";
 import { el, setText, toggle } from "./dom.js";
 
 /** The values of the paper's figures. */
 const stops = [1, 1.5, 2, 6] as const;
-const least = 1;
-const most = 10;
-
 /** Low values take most of the way, where they differ most: share = log(p) / log(10). */
 export function shareOf(p: number): number {
-  return Math.log(p / least) / Math.log(most / least);
+  return Math.log(p / leastP) / Math.log(mostP / leastP);
 }
 
 export function pAt(share: number): number {
-  const p = least * (most / least) ** share;
+  const p = leastP * (mostP / leastP) ** share;
   const near = stops.find((stop) => Math.abs(shareOf(stop) - share) < 0.012);
   return near ?? Math.round(p * 20) / 20;
 }
@@ -66,7 +64,8 @@ function pSlider(app: App, field: Field): HTMLElement {
     const step = { ArrowRight: 0.1, ArrowUp: 0.1, ArrowLeft: -0.1, ArrowDown: -0.1 }[event.key];
     if (step === undefined) return;
     event.preventDefault();
-    app.change(set(Math.round(Math.min(Math.max(app.document[field] + step, least), most) * 100) / 100));
+    const p = steppedP(app.document[field], step);
+    if (p !== app.document[field] || app.document.isAutomatic) app.byKey(set(p), event);
   });
   const ticks = stops.map((stop) => {
     const tick = el("button", {

@@ -63,9 +63,9 @@ function renew(details: HTMLElement, parts: readonly Node[]): void {
   if (label) details.querySelector<HTMLElement>(`[aria-label="${label}"]`)?.focus();
 }
 
-/** A slider that is being dragged must stay. */
+/** A slider that is being dragged, or whose key is held, must stay. */
 function isSliding(details: HTMLElement): boolean {
-  return details.querySelector("input[type=range]:active") !== null;
+  return details.querySelector("input[type=range]:is(:active, .held)") !== null;
 }
 
 const kinds: readonly (readonly [Hold["kind"], string])[] = [

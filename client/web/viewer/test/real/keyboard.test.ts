@@ -87,3 +87,46 @@ it("and goes to the handle before where the last one is deleted", async () => {
   expect(await user.ask("document().handles.length")).toBe(1);
   expect(await focused()).toBe("Delete Foot (Delete)");
 });
+
+it("what a key does while it is held is undone at once, and a key that changes nothing leaves what can be redone", async () => {
+  const { keyboard } = user.page;
+  const held = async (key: string) => {
+    for (let k = 0; k < 5; ++k) await keyboard.down(key);
+    await keyboard.up(key);
+  };
+  const x = () => user.ask<number>("document().handles[0].pose.translation[0]");
+  const p = () => user.ask<number>("document().p");
+  await user.ask("app.view.set({ selected: window.__lpdeform.document().handles[0].name })");
+  if (await user.ask("document().handles[0].isLocked")) await press("l");
+  await user.page.locator("canvas.stage").focus();
+  const [before, firstP] = [await x(), await p()];
+  await held("ArrowRight");
+  expect(await x()).toBeCloseTo(before + 5 * 0.01 * (await user.ask<number>("app.diagonal")), 5);
+  await press("Control+z");
+  expect(await x()).toBe(before);
+
+  await held(".");
+  expect(await p()).toBeCloseTo(firstP + 0.5, 5);
+  await press("Control+z");
+  expect(await p()).toBe(firstP);
+  await user.page.getByRole("slider", { name: "p", exact: true }).focus();
+  await held("ArrowRight");
+  expect(await p()).toBeCloseTo(firstP + 0.5, 5);
+  await press("Control+z");
+  expect(await p()).toBe(firstP);
+
+  await user.page.getByLabel("Weight").focus();
+  const weight = () => user.ask<number>("document().handles[0].hold.weight");
+  const firstWeight = await weight();
+  await held("ArrowRight");
+  expect(await weight()).toBeGreaterThan(firstWeight);
+  await press("Control+z");
+  expect(await weight()).toBe(firstWeight);
+
+  await user.page.locator("canvas.stage").focus();
+  await user.page.locator(".dock").getByRole("button", { name: "1", exact: true }).click();
+  await press(".");
+  await press("Control+z");
+  await press(","); // 1 is the least
+  expect(await user.ask("app.history.canRedo")).toBe(true);
+});
