@@ -1,9 +1,9 @@
 import { execFileSync } from "node:child_process";
-import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { existsSync, mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { dirname, join } from "node:path";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
-import { openSession } from "../../src/index.js";
+import { openSession, type Session } from "../../src/index.js";
 import { envoyProgram, root, Service } from "./service.js";
 import { grid } from "./shapes.js";
 
@@ -33,6 +33,8 @@ describe("the configuration", () => {
         "9901",
         "--access-log",
         "/dev/null",
+        "--max-requests",
+        "7",
         "--idle",
         "5",
         "--origin",
@@ -72,6 +74,7 @@ describe("the configuration", () => {
     ["--server", "localhost:70000"],
     ["--admin-port", "x"],
     ["--idle", "0"],
+    ["--max-requests", "0"],
     ["--origin", 'http://a"b'],
     ["--nothing", "1"],
   ])("%s '%s' is refused by name", (option, value) => {
@@ -216,6 +219,44 @@ describe("the proxy", () => {
     });
   }, 60_000);
 });
+
+test("calls beyond what Envoy lets through are refused by name, and go well when there is room", async () => {
+  const service = await Service.start({ maxRequests: 2 });
+  // Streams of their own, since they are asked for in other ways.
+  const open = (callTimeoutMs: number) => openSession(grid(4).mesh, { url: service.url, callTimeoutMs });
+  const isConnected = (session: Session) => waitFor(() => session.connection === "connected");
+  const first = await open(30_001);
+  first.poll();
+  await isConnected(first);
+  const second = await open(30_002);
+  second.poll();
+  await isConnected(second);
+  await expect(open(30_003)).rejects.toMatchObject({
+    code: "unavailable",
+    message: expect.stringContaining("overflow"),
+  });
+  // An update waits until there is room, and is not lost.
+  first.setHandle("corner", { vertices: [0] });
+  await second.close().catch(() => undefined); // ends its stream, though its last call may be refused
+  expect((await first.settle({ timeoutMs: 20_000 })).inputSeq).toBe(1);
+  await (await open(30_003)).close();
+  await first.close();
+  await service.stop();
+});
+
+test("the access log is set aside when it has grown, and goes on", async () => {
+  const service = await Service.start({ accessLogBytes: 1 });
+  const call = () => fetch(`${service.url}/healthz`);
+  const old = `${service.accessLog}.1`;
+  const isLogged = (file: string) => existsSync(file) && readFileSync(file, "utf8").includes("/healthz");
+  await call();
+  await waitFor(() => isLogged(old));
+  rmSync(old);
+  await call();
+  await waitFor(() => isLogged(old)); // what was written since went through a log of its own
+  expect(readdirSync(dirname(old)).filter((name) => name.startsWith("access.log")).length).toBeLessThanOrEqual(2);
+  await service.stop();
+}, 120_000);
 
 test("a stream that says nothing at all is cut and taken up again", async () => {
   const service = await Service.start({ serverFlags: ["--heartbeat", "3600"], idleSeconds: 1 });

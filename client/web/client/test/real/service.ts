@@ -18,6 +18,7 @@ export class Service {
   #envoy: ChildProcess | undefined;
   #address = "127.0.0.1:0";
   #envoyFlags: string[] = [];
+  #envoyEnvironment: Record<string, string> = {};
   readonly accessLog = join(this.#work, "access.log");
   /** Where browsers connect. */
   url = "";
@@ -30,6 +31,8 @@ export class Service {
     serverFlags = [] as string[],
     origins = [] as string[],
     idleSeconds = 60,
+    maxRequests = 4096,
+    accessLogBytes = 1 << 26,
   } = {}): Promise<Service> {
     const service = new Service();
     await service.startServer(serverFlags);
@@ -44,8 +47,11 @@ export class Service {
       service.accessLog,
       "--idle",
       String(idleSeconds),
+      "--max-requests",
+      String(maxRequests),
       ...origins.flatMap((origin) => ["--origin", origin]),
     ];
+    service.#envoyEnvironment = { LPDEFORM_ACCESS_LOG_BYTES: String(accessLogBytes) };
     await service.#startEnvoy();
     return service;
   }
@@ -112,7 +118,10 @@ export class Service {
   async #startEnvoy(): Promise<void> {
     const adminFile = join(this.#work, "admin");
     const program = join(root, "deploy/web");
-    this.#envoy = spawn(program, ["--admin-file", adminFile, ...this.#envoyFlags], { stdio: "ignore" });
+    this.#envoy = spawn(program, ["--admin-file", adminFile, ...this.#envoyFlags], {
+      stdio: "ignore",
+      env: { ...process.env, ...this.#envoyEnvironment },
+    });
     for (let tries = 0; tries < 200; ++tries) {
       try {
         const admin = readFileSync(adminFile, "utf8");
