@@ -23,7 +23,7 @@ else root.append(noPictures());
 async function start(): Promise<void> {
   const app = new App();
   const files = new Files(app);
-  const help = helpSheet();
+  const help = helpSheet(app);
   const dropHere = document.createElement("div");
   dropHere.className = "drop-here";
   dropHere.textContent = "Drop a mesh or a handle file";

@@ -133,8 +133,8 @@ describe("words for", () => {
       text: "A face has 2 corners.",
       element: "face 3",
     });
-    expect(elementsIn("face 3")).toEqual({ vertices: [], faces: [3] });
-    expect(elementsIn("edge 4-5")).toEqual({ vertices: [4, 5], faces: [] });
+    expect(elementsIn("face 3")).toEqual({ vertices: [], edges: [], faces: [3] });
+    expect(elementsIn("edge 4-5")).toEqual({ vertices: [], edges: [4, 5], faces: [] });
   });
 });
 

@@ -1,3 +1,4 @@
+import { cornersOf, linesOf, trianglesOf, within } from "../src/model/pointed.js";
 import { describe, expect, it } from "vitest";
 import { adjacencyOf, meanEdge } from "../src/model/adjacency.js";
 import { blueToRed } from "../src/model/colours.js";
@@ -216,4 +217,23 @@ it("knows each neighbour once", () => {
   const { starts, neighbours } = adjacency;
   expect([...neighbours.subarray(starts[5], starts[6])].sort((a, b) => a - b)).toEqual([1, 2, 4, 6, 8, 9]);
   expect(meanEdge(adjacency, grid.positions)).toBeGreaterThan(1);
+});
+
+describe("what is pointed out", () => {
+  const faces = Uint32Array.of(0, 1, 2, 2, 1, 3);
+  const pointed = { vertices: [3], edges: [0, 3], faces: [1] };
+
+  it("has its edges and the sides of its faces as lines, and each corner once", () => {
+    expect(linesOf(pointed, faces)).toEqual([0, 3, 2, 1, 1, 3, 3, 2]);
+    expect(trianglesOf(pointed, faces)).toEqual([2, 1, 3]);
+    expect(cornersOf(pointed, faces)).toEqual([3, 0, 2, 1]);
+  });
+
+  it("leaves out what the mesh does not have", () => {
+    expect(within({ vertices: [3, 4], edges: [0, 4, 1, 2, 3], faces: [2, 0] }, 4, 2)).toEqual({
+      vertices: [3],
+      edges: [1, 2],
+      faces: [0],
+    });
+  });
 });

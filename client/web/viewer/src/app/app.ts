@@ -4,9 +4,10 @@ import { type Document, emptyDocument, handleOf } from "../model/document.js";
 import { History, type Steps } from "../model/history.js";
 import { boundsOf, type Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
+import { nothing, type PointedOut } from "../model/pointed.js";
 import { State } from "../model/state.js";
 import { firstView, type View } from "../model/view.js";
-import type { Look } from "../stage/stage.js";
+import type { Look, Stage } from "../stage/stage.js";
 import { say, type Status } from "../link/status.js";
 import { Pace } from "./pace.js";
 import { Editing } from "./editing.js";
@@ -26,8 +27,8 @@ export interface Facts {
   restoredFrom: number | undefined;
   /** The name of the work whose place other work has taken; bringBack() swaps them. */
   setAside: string | undefined;
-  /** Vertices that a brush or a warning points out. */
-  pointedOut: readonly number[];
+  /** What a brush or a warning points out. */
+  pointedOut: PointedOut;
   canUndo: boolean;
   canRedo: boolean;
 }
@@ -46,6 +47,15 @@ export interface Kept {
   view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned">;
   look: Look;
 }
+
+/** What keys do in a picture, for those who have it read to them. */
+const keysText = document.createElement("p");
+keysText.id = "picture-keys";
+keysText.className = "unseen";
+keysText.textContent =
+  "Enter shows a cross: arrow keys move it, Enter places a handle there or selects the one that is there, Escape hides it. " +
+  "Arrow keys move the selected handle, and turn the view where none is selected. Control and arrow keys turn the view, with " +
+  "Shift they shift it; plus and minus zoom.";
 
 const noMesh: Mesh = { name: "", positions: new Float32Array(0), faces: new Uint32Array(0) };
 
@@ -80,11 +90,12 @@ export class App {
       notice: undefined,
       restoredFrom: undefined,
       setAside: undefined,
-      pointedOut: [],
+      pointedOut: nothing,
       canUndo: false,
       canRedo: false,
     });
     this.stages.className = "stages";
+    this.stages.append(keysText);
     this.#addPane(this.#makePane("first"));
     this.view.watch((view, before) => this.#viewChanged(view, before));
     this.facts.watch((facts, before) => {
@@ -141,7 +152,7 @@ export class App {
       report: undefined,
       problem: undefined,
       restoredFrom: undefined,
-      pointedOut: [],
+      pointedOut: nothing,
       setAside: this.#aside?.mesh.name,
     });
     for (const pane of this.panes) pane.open(mesh, document, this.view.now);
@@ -245,6 +256,13 @@ export class App {
   /** Turns to some vertices of the mesh. */
   lookAt(vertices: readonly number[]): void {
     for (const pane of this.panes) pane.lookAt(vertices);
+  }
+
+  /** By keys: of the picture that has the focus, or the first; the other one follows. */
+  changeView(change: (stage: Stage) => void): void {
+    const pane = this.panes.find(({ stage }) => stage.canvas === globalThis.document.activeElement) ?? this.panes[0]!;
+    this.#turned = pane;
+    change(pane.stage);
   }
 
   lookFrom(look: Look): void {
@@ -362,6 +380,7 @@ export class App {
       this.stages.classList.toggle("split", view.isSplit);
       this.fit();
       this.#statusChanged();
+      this.#documentChanged(performance.now());
       this.#needsMarks = true;
     }
     if (view.encoding !== before.encoding && this.mesh !== noMesh)
@@ -369,6 +388,16 @@ export class App {
     if (view.isYUp !== before.isYUp) this.fit();
     this.#needsColours = this.#needsMarks = true;
     this.requestDraw();
+  }
+
+  /** For those who do not see them. */
+  #namePanes(): void {
+    const places =
+      this.panes.length > 1 ? { first: "Left picture", second: "Right picture" } : { first: "Picture", second: "" };
+    for (const { side, element, stage } of this.panes) {
+      stage.canvas.setAttribute("aria-label", `${places[side]} of the surface, ${element.dataset["label"]}`);
+      stage.canvas.setAttribute("aria-describedby", keysText.id);
+    }
   }
 
   #documentChanged(time: number): void {
@@ -382,6 +411,7 @@ export class App {
       const p = pane.side === "first" ? document.p : document.secondP;
       pane.element.dataset["label"] = document.isAutomatic ? "p from the shape" : `p = ${p}`;
     }
+    this.#namePanes();
     this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem: undefined });
     if (selected !== undefined && !handleOf(document, selected)) this.view.set({ selected: undefined });
     this.requestDraw();

@@ -9,12 +9,14 @@ import {
   releaseVertices,
 } from "../model/document.js";
 import { isAtRest, type Vector3 } from "../model/mesh.js";
+import { nothing, ofVertices, type PointedOut } from "../model/pointed.js";
 import { follow, placesOf } from "../model/places.js";
 import { add, type Pose, subtract } from "../model/pose.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../model/selection.js";
 import { vertexNormals } from "../stage/drawmesh.js";
 import { onPlane, type PointerAt, Pointing, type PointingTarget, type Stroke, viewProjection } from "../stage/pointing.js";
 import type { App } from "./app.js";
+import { KeyPointer } from "./key_pointer.js";
 import type { Pane } from "./pane.js";
 
 /** The tools: what pointing at a pane does to the work. */
@@ -29,6 +31,10 @@ export class Editing implements PointingTarget {
     gizmo.onPose = (pose) => this.#pose(pose);
     gizmo.onEnd = () => app.endGesture();
     this.#pointing = new Pointing(pane.stage, this);
+    new KeyPointer(pane, {
+      hover: (event) => this.app.facts.set({ pointedOut: this.#underCross(event) }),
+      press: (event) => this.#workAt(this.#pointing.at(event)),
+    });
     const setViewOnly = (event: KeyboardEvent, isDown: boolean) => {
       if (event.code === "Space") this.#pointing.isViewOnly = isDown;
       if (event.code === "Escape" && isDown) this.#pointing.cancel();
@@ -63,7 +69,32 @@ export class Editing implements PointingTarget {
   hover(at: PointerAt | undefined): void {
     const { tool } = this.app.view.now;
     if (tool !== "brush" && tool !== "paint") return;
-    this.app.facts.set({ pointedOut: at?.hit ? this.#dabAt(at) : [] });
+    this.app.facts.set({ pointedOut: at?.hit ? ofVertices(this.#dabAt(at)) : nothing });
+  }
+
+  #underCross(event: PointerEvent | undefined): PointedOut {
+    const at = event && this.#pointing.at(event);
+    return at?.hit ? ofVertices(this.#dabAt(at)) : nothing;
+  }
+
+  /** What a press by key does: the tool's work at one place. */
+  #workAt(at: PointerAt): boolean {
+    const { app } = this;
+    if (!at.hit) {
+      app.notify("There is no surface under the cross: arrow keys move it.");
+      return false;
+    }
+    if (app.view.now.tool === "paint") {
+      this.#paint(this.#dabAt(at));
+      return false;
+    }
+    const mode = modeOf(at, app);
+    const owner = mode === "new" ? this.#handleAt(at) : undefined;
+    if (owner) app.view.set({ selected: owner.name });
+    else this.#select(this.#dabAt(at), mode);
+    const handle = handleOf(app.document, app.view.now.selected);
+    if (handle) app.notify(`“${handle.name}” holds ${handle.vertices.length} vertices; arrow keys move it.`);
+    return handle !== undefined && mode === "new";
   }
 
   #dabAt({ hit }: PointerAt): number[] {
@@ -150,17 +181,17 @@ export class Editing implements PointingTarget {
     const touch = (at: PointerAt) => {
       if (!at.hit) return;
       for (const vertex of this.#dabAt(at)) touched.add(vertex);
-      app.facts.set({ pointedOut: [...touched] });
+      app.facts.set({ pointedOut: ofVertices([...touched]) });
     };
     touch(start);
     return {
       move: touch,
       end: () => {
-        app.facts.set({ pointedOut: [] });
+        app.facts.set({ pointedOut: nothing });
         if (app.view.now.tool === "paint") this.#paint([...touched]);
         else this.#select([...touched], modeOf(start, app));
       },
-      cancel: () => app.facts.set({ pointedOut: [] }),
+      cancel: () => app.facts.set({ pointedOut: nothing }),
     };
   }
 

@@ -152,7 +152,7 @@ export class Keeper {
   async #save(): Promise<void> {
     clearTimeout(this.#timer);
     this.#timer = undefined;
-    const { isDark: _, ...view }: View = this.app.view.now;
+    const { isDark: _, hasSingleKeys: __, ...view }: View = this.app.view.now;
     const kept = this.app.worthKeeping;
     try {
       if (kept) {

@@ -4,6 +4,7 @@ import { say, type Status } from "../link/status.js";
 import type { Side } from "../model/changes.js";
 import { type Document, pField } from "../model/document.js";
 import { boundsOf, centroid, type Mesh } from "../model/mesh.js";
+import { cornersOf, type PointedOut } from "../model/pointed.js";
 import { type EnergyStatistics, energyStatistics } from "../model/statistics.js";
 import type { View } from "../model/view.js";
 import { vertexNormals } from "../stage/drawmesh.js";
@@ -83,6 +84,7 @@ export class Pane {
     this.frame = this.#onScreenNext = frame;
     this.stage.surface.move(frame.positions);
     this.stage.marks.move(frame.positions);
+    this.stage.highlight.move(frame.positions);
     this.statistics = energyStatistics(frame.distortion);
     this.trail.add(frame.iteration, frame.energy ** (1 / this.live!.exponentOf(frame)));
     this.#isDirty = true;
@@ -100,11 +102,14 @@ export class Pane {
     this.#isDirty = true;
   }
 
-  mark(document: Document, view: View, pointedOut: readonly number[], colour: string): void {
-    const { surface, marks } = this.stage;
+  mark(document: Document, view: View, pointedOut: PointedOut, colour: string): void {
+    const { surface, marks, highlight } = this.stage;
     if (!surface) return;
-    marks.show(document.handles, surface.mesh.faces, view.selected, pointedOut, colour);
-    marks.move(surface.positions);
+    const { positions, mesh } = surface;
+    marks.show(document.handles, mesh.faces, view.selected, cornersOf(pointedOut, mesh.faces), colour);
+    marks.move(positions);
+    highlight.show(pointedOut, mesh.faces, colour);
+    highlight.move(positions);
     this.#isDirty = true;
   }
 

@@ -15,6 +15,18 @@ const nudges: Record<string, readonly [number, number, number]> = {
   PageDown: [0, 0, -1],
 };
 
+/** Right and up. */
+const arrows: Record<string, readonly [number, number]> = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, 1],
+  ArrowDown: [0, -1],
+};
+const zooms: Record<string, number> = { "+": 1 / 1.15, "=": 1 / 1.15, "-": 1.15 };
+const turnRadians = Math.PI / 24;
+/** Of the picture's height. */
+const shiftShare = 0.05;
+
 /** Keys, where nothing is being written. ui/help.ts tells them. */
 export function startShortcuts(app: App, files: Files, help: HTMLDialogElement): void {
   window.addEventListener("keydown", (event) => {
@@ -30,7 +42,9 @@ export function startShortcuts(app: App, files: Files, help: HTMLDialogElement):
   });
 }
 
-function withControl(app: App, { key, shiftKey }: KeyboardEvent): boolean {
+function withControl(app: App, event: KeyboardEvent): boolean {
+  const { key, shiftKey } = event;
+  if (key in arrows) return !(event.target as HTMLElement).matches("input") && turnOrShift(app, event);
   const letter = key.toLowerCase();
   if (letter === "z" && !shiftKey) app.undo();
   else if ((letter === "z" && shiftKey) || letter === "y") app.redo();
@@ -41,10 +55,14 @@ function withControl(app: App, { key, shiftKey }: KeyboardEvent): boolean {
 function alone(app: App, files: Files, help: HTMLDialogElement, event: KeyboardEvent, target: HTMLElement): boolean {
   const { view } = app;
   const { key } = event;
+  const isOnPicture = target.matches("canvas");
+  if (key.length === 1 && !view.now.hasSingleKeys && !(isOnPicture && key in zooms)) return false;
   const tool = tools[Number(key) - 1];
   if (tool) view.set({ tool });
-  else if (key in nudges && !target.matches("input, button")) return nudge(app, nudges[key]!, event);
-  else {
+  else if (key in zooms) app.changeView((stage) => stage.approach(zooms[key]!));
+  else if (key in nudges && !target.matches("input, button")) {
+    return nudge(app, nudges[key]!, event) || (key in arrows && view.now.selected === undefined && turnOrShift(app, event));
+  } else {
     const act = actions(app, files, help, event)[key.length === 1 ? key.toLowerCase() : key];
     if (!act) return false;
     act();
@@ -83,6 +101,14 @@ function actions(app: App, files: Files, help: HTMLDialogElement, event: Keyboar
     Backspace: () => removeSelected(app),
     Escape: () => view.set({ selected: undefined }),
   };
+}
+
+function turnOrShift(app: App, { key, shiftKey }: KeyboardEvent): boolean {
+  const [right, up] = arrows[key]!;
+  app.changeView((stage) =>
+    shiftKey ? stage.shift(shiftShare * right, shiftShare * up) : stage.turn(turnRadians * right, turnRadians * up),
+  );
+  return true;
 }
 
 function removeSelected(app: App): void {

@@ -1,4 +1,5 @@
 import type { LpdeformError } from "lpdeform-client";
+import { nothing, ofVertices, type PointedOut } from "../model/pointed.js";
 
 /** How things stand with the server, in words for people. */
 export interface Status {
@@ -58,8 +59,9 @@ export function sentence(text: string): string {
   return trimmed[0]!.toUpperCase() + trimmed.slice(1) + (/[.!?…]$/.test(trimmed) ? "" : ".");
 }
 
-/** The vertices or faces in what a server names: "vertex 17", "face 3", "edge 4-5", "vertices 1 and 2". */
-export function elementsIn(element: string): { vertices: number[]; faces: number[] } {
+/** The elements in what a server names: "vertex 17", "face 3", "edge 4-5", "vertices 1 and 2". */
+export function elementsIn(element: string): PointedOut {
   const numbers = (element.match(/\d+/g) ?? []).map(Number);
-  return /face|triangle/i.test(element) ? { vertices: [], faces: numbers } : { vertices: numbers, faces: [] };
+  if (/face|triangle/i.test(element)) return { ...nothing, faces: numbers };
+  return /edge/i.test(element) ? { ...nothing, edges: numbers } : ofVertices(numbers);
 }

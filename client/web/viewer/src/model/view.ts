@@ -31,6 +31,8 @@ export interface View {
   isYUp: boolean;
   isDark: boolean;
   isPanelOpen: boolean;
+  /** Letters, digits and signs are shortcuts. */
+  hasSingleKeys: boolean;
   detail: Detail;
   shape: string;
   encoding: Encoding;
@@ -54,6 +56,7 @@ export const firstView: View = {
   isYUp: false,
   isDark: true,
   isPanelOpen: true,
+  hasSingleKeys: true,
   detail: "medium",
   shape: "",
   encoding: "quantized",

@@ -38,7 +38,7 @@ export class Marks {
     this.object.renderOrder = 1;
   }
 
-  /** `faces`: of the mesh; `pointedOut`: vertices under a brush or of a warning. */
+  /** `faces`: of the mesh; `pointedOut`: vertices. */
   show(
     handles: readonly Handle[],
     faces: Uint32Array,

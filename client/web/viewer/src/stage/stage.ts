@@ -3,6 +3,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { boundsOf, type Mesh, type Vector3 } from "../model/mesh.js";
 import { Backdrop } from "./backdrop.js";
 import { Gizmo } from "./gizmo.js";
+import { Highlight } from "./highlight.js";
 import { Marks } from "./marks.js";
 import { isSoftware } from "./software.js";
 import { Surface } from "./surface.js";
@@ -23,6 +24,7 @@ export class Stage {
   readonly canvas = document.createElement("canvas");
   readonly camera = new three.PerspectiveCamera(32, 1, 0.01, 1000);
   readonly marks = new Marks();
+  readonly highlight = new Highlight();
   readonly gizmo: Gizmo;
   surface: Surface | undefined;
   readonly #backdrop = new Backdrop();
@@ -35,13 +37,13 @@ export class Stage {
   constructor(readonly changed: () => void) {
     this.canvas.className = "stage";
     this.canvas.tabIndex = 0;
-    this.canvas.setAttribute("role", "img");
-    this.canvas.setAttribute("aria-label", "The surface; arrow keys move the selected handle, N selects the next");
+    this.canvas.setAttribute("role", "application"); // keys are for the picture
+    this.canvas.setAttribute("aria-roledescription", "picture to work in");
     this.#renderer = new three.WebGLRenderer({ canvas: this.canvas, antialias: !isSoftware, alpha: false });
     this.canvas.addEventListener("webglcontextrestored", changed);
     this.camera.up.set(0, 0, 1);
     this.gizmo = new Gizmo(this.camera, this.canvas, changed);
-    this.#scene.add(this.#backdrop.object, this.marks.object, this.gizmo.object);
+    this.#scene.add(this.#backdrop.object, this.marks.object, this.highlight.object, this.gizmo.object);
   }
 
   /** After whoever else listens to the canvas: what these take for themselves does not turn the view. */
@@ -130,6 +132,34 @@ export class Stage {
     this.lookFrom({ position: position.toArray(), target: place });
   }
 
+  /** As dragging the surface to the right and up by so many radians does. */
+  turn(right: number, up: number): void {
+    const { camera, target } = this;
+    const toZ = new three.Quaternion().setFromUnitVectors(camera.up, new three.Vector3(0, 1, 0));
+    const away = camera.position.clone().sub(target).applyQuaternion(toZ);
+    const place = new three.Spherical().setFromVector3(away);
+    place.theta -= right;
+    place.phi += up;
+    place.makeSafe();
+    const position = away.setFromSpherical(place).applyQuaternion(toZ.invert()).add(target);
+    this.lookFrom({ position: position.toArray(), target: target.toArray() });
+  }
+
+  /** The view by so many heights of the picture to the right and up. */
+  shift(right: number, up: number): void {
+    const { camera, target } = this;
+    const height = 2 * Math.tan((camera.fov * Math.PI) / 360) * camera.position.distanceTo(target);
+    const by = new three.Vector3(right * height, up * height, 0).applyQuaternion(camera.quaternion);
+    this.lookFrom({ position: camera.position.clone().add(by).toArray(), target: target.clone().add(by).toArray() });
+  }
+
+  /** To so many times the distance. */
+  approach(factor: number): void {
+    const { camera, target } = this;
+    const position = target.clone().lerp(camera.position, factor);
+    this.lookFrom({ position: position.toArray(), target: target.toArray() });
+  }
+
   /** The same view as another stage. */
   lookAs(other: Stage): void {
     this.camera.position.copy(other.camera.position);
@@ -156,6 +186,7 @@ export class Stage {
     const covered = coveredAt(width);
     this.camera.setViewOffset(width, height, -covered.left / 2, (covered.bottom - covered.top) / 2, width, height);
     this.marks.scale(ratio);
+    this.highlight.resize(width, height);
     return true;
   }
 
@@ -192,6 +223,7 @@ export class Stage {
   dispose(): void {
     this.#controls?.dispose();
     this.gizmo.dispose();
+    this.highlight.dispose();
     this.surface?.dispose();
     this.#renderer.dispose();
     this.#renderer.forceContextLoss(); // browsers have few, and take the oldest away

@@ -1,4 +1,8 @@
-import { el } from "./dom.js";
+import type { App } from "../app/app.js";
+import { remember, remembered } from "../io/remember.js";
+import { el, toggle } from "./dom.js";
+
+const singleKeys = "lpdeform-single-keys";
 
 const sections: readonly (readonly [string, readonly (readonly [string, string])[]])[] = [
   [
@@ -17,6 +21,7 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
     "Handles",
     [
       ["T  R", "Arrows, rings on the selected handle"],
+      ["Enter", "A cross in the picture: arrows move it, Enter places a handle"],
       ["N", "Select the next handle"],
       ["← → ↑ ↓", "Nudge it; with Page Up, Page Down along z"],
       ["Delete", "Delete it"],
@@ -36,6 +41,8 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
     "View",
     [
       ["Space", "held: dragging turns the view"],
+      ["Ctrl+← →", "Turn the view; with Shift, shift it"],
+      ["+  -", "Zoom"],
       ["F", "Show all of it"],
       ["W  G", "Wireframe, the original as a ghost"],
       ["C", "Next colours"],
@@ -49,7 +56,17 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
 ];
 
 /** A sheet of what can be done; Escape closes it. */
-export function helpSheet(): HTMLDialogElement {
+export function helpSheet(app: App): HTMLDialogElement {
+  app.view.set({ hasSingleKeys: remembered(singleKeys) !== "off" });
+  const single = toggle(
+    "Shortcuts of a single key",
+    app.view.now.hasSingleKeys,
+    (isOn) => {
+      app.view.set({ hasSingleKeys: isOn });
+      remember(singleKeys, isOn ? "on" : "off");
+    },
+    "Letters, digits and signs: off for speech input and for whoever hits keys by mistake",
+  );
   const close = el("button", { type: "button", className: "plain", textContent: "Close" });
   const sheet = el(
     "dialog",
@@ -80,6 +97,7 @@ export function helpSheet(): HTMLDialogElement {
         ),
       ),
     ),
+    single.element,
     close,
   );
   close.addEventListener("click", () => sheet.close());

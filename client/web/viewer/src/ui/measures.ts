@@ -28,7 +28,7 @@ type Row = (typeof rows)[number][0];
 /** Plots and numbers of what the panes show. */
 export function measures(app: App): HTMLElement {
   const energy = el("canvas", { className: "plot" });
-  const bars = el("canvas", { className: "plot" });
+  const histograms = [histogramFigure(), histogramFigure()] as const;
   const values = {} as Record<Row, HTMLElement>;
   const list = el("dl", { className: "numbers" });
   for (const [row, text, title] of rows) {
@@ -49,7 +49,7 @@ export function measures(app: App): HTMLElement {
       ),
       energy,
     ),
-    el("figure", {}, el("figcaption", {}, "Cells by energy"), bars),
+    ...histograms.map(({ figure }) => figure),
     list,
   );
   let last = -Infinity;
@@ -59,7 +59,7 @@ export function measures(app: App): HTMLElement {
     last = performance.now();
     if (element.offsetParent === null) return;
     showNumbers(app, values, last);
-    showPlots(app, energy, bars);
+    showPlots(app, energy, histograms);
     if (app.panes.some(({ live }) => live && live.meter.framesPerSecond(last) > 0)) timer = setTimeout(show, 500);
   };
   const soon = () => {
@@ -127,7 +127,20 @@ function gapText(gap: number): string {
 
 const second = "#ff7a1a";
 
-function showPlots(app: App, energy: HTMLCanvasElement, bars: HTMLCanvasElement): void {
+interface HistogramFigure {
+  figure: HTMLElement;
+  caption: HTMLElement;
+  bars: HTMLCanvasElement;
+}
+
+/** Of one pane. */
+function histogramFigure(): HistogramFigure {
+  const caption = el("figcaption");
+  const bars = el("canvas", { className: "plot", role: "img" });
+  return { figure: el("figure", {}, caption, bars), caption, bars };
+}
+
+function showPlots(app: App, energy: HTMLCanvasElement, histograms: readonly HistogramFigure[]): void {
   const { red } = app;
   const lines =
     red === 0
@@ -140,8 +153,19 @@ function showPlots(app: App, energy: HTMLCanvasElement, bars: HTMLCanvasElement)
         }));
   plotLines(energy, lines, app.panes[0]!.trail.starts, short);
   const most = red > 0 ? Math.max(...app.panes.map(({ statistics }) => statistics.max)) : 0;
-  const counts = new Float64Array(binCount);
-  if (most > 0)
-    for (const pane of app.panes) histogram(pane.distortion, most, binCount).forEach((count, k) => (counts[k]! += count));
-  plotBars(bars, counts, (share) => `rgb(${blueToRed(red > 0 ? (share * most) / red : 0).join(",")})`, short(most));
+  const colourAt = (share: number) => `rgb(${blueToRed(red > 0 ? (share * most) / red : 0).join(",")})`;
+  const counts = app.panes.map(({ distortion }) =>
+    most > 0 ? histogram(distortion, most, binCount) : new Float64Array(binCount),
+  );
+  // One scale for all, so that they can be compared.
+  const highest = Math.max(...counts.flatMap((bins) => [...bins]));
+  histograms.forEach(({ figure, caption, bars }, k) => {
+    const pane = app.panes[k];
+    figure.hidden = pane === undefined;
+    if (!pane) return;
+    const side = pane.side === "first" ? "left" : "right";
+    setText(caption, app.panes.length > 1 ? `Cells by energy, ${side}: ${pane.element.dataset["label"]}` : "Cells by energy");
+    bars.setAttribute("aria-label", `${caption.textContent}, up to ${short(pane.statistics.max)}`);
+    plotBars(bars, counts[k]!, highest, colourAt, short(most));
+  });
 }

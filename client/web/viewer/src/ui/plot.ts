@@ -88,24 +88,26 @@ export function plotLines(
   context.textAlign = "left";
 }
 
-/** Bars from 0 to the largest, in the colours of their places; heights by the root, so that few are seen beside many. */
+/**
+ * Bars of places from 0 on, in the colours of their places, the one of `highest` as high as can be; heights by the root, so that few
+ * are seen beside many.
+ */
 export function plotBars(
   canvas: HTMLCanvasElement,
   counts: ArrayLike<number>,
+  highest: number,
   colourAt: (share: number) => string,
   highText: string,
 ): void {
   const frame = begin(canvas);
   if (!frame) return;
   const { context, width, height, ink, faint } = frame;
-  let most = 0;
-  for (let k = 0; k < counts.length; ++k) most = Math.max(most, counts[k]!);
-  if (most === 0) return empty(frame, "No distortion yet");
+  if (highest === 0) return empty(frame, "No distortion yet");
   const bar = width / counts.length;
   const floor = height - 13;
   for (let k = 0; k < counts.length; ++k) {
     if (counts[k] === 0) continue;
-    const size = Math.max(1.5, Math.sqrt(counts[k]! / most) * (floor - 2));
+    const size = Math.max(1.5, Math.sqrt(counts[k]! / highest) * (floor - 2));
     context.fillStyle = colourAt((k + 0.5) / counts.length);
     context.fillRect(k * bar + 0.5, floor - size, Math.max(bar - 1, 1), size);
   }

@@ -1,11 +1,13 @@
 import type { Defect, MeshReport } from "lpdeform-client";
 import type { App } from "../app/app.js";
 import { elementsIn } from "../link/status.js";
+import { cornersOf, nothing, type PointedOut, within } from "../model/pointed.js";
 import { el } from "./dom.js";
 import { icon } from "./icons.js";
 
 /** What a defect is of: the numbers in its list are of vertices, faces, or pairs of vertices. */
 type Element = "vertex" | "face" | "edge";
+const keys = { vertex: "vertices", face: "faces", edge: "edges" } as const;
 
 function elementOf(kind: string): Element {
   if (kind.includes("edge") || kind === "inconsistent_orientation") return "edge";
@@ -62,20 +64,19 @@ function warning(app: App, { kind, count, first }: Defect): HTMLElement {
   );
   press.addEventListener("click", () => {
     const element = elementOf(kind);
-    pointOut(app, element === "face" ? { vertices: [], faces: [...first] } : { vertices: [...first], faces: [] });
+    pointOut(app, { ...nothing, [keys[element]]: first });
     const shown = element === "edge" ? first.length / 2 : first.length;
     app.notify(shown < count ? `The first ${shown} of ${text} are marked.` : `${text}: marked.`);
   });
   return el("li", { className: mild.has(kind) ? "mild" : "" }, press);
 }
 
-/** Marks vertices and the corners of faces and turns to them; what was marked is no more. */
-export function pointOut(app: App, { vertices, faces }: { vertices: number[]; faces: number[] }): void {
-  const count = app.mesh.positions.length / 3;
-  const corners = faces.flatMap((face) => [...app.mesh.faces.subarray(3 * face, 3 * face + 3)]);
-  const pointedOut = [...new Set([...vertices, ...corners])].filter((vertex) => vertex < count);
+/** Marks elements and turns to them; what was marked is no more. */
+export function pointOut(app: App, elements: PointedOut): void {
+  const { positions, faces } = app.mesh;
+  const pointedOut = within(elements, positions.length / 3, faces.length / 3);
   app.facts.set({ pointedOut });
-  app.lookAt(pointedOut);
+  app.lookAt(cornersOf(pointedOut, faces));
 }
 
 export function pointOutNamed(app: App, element: string): void {

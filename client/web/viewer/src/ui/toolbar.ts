@@ -1,5 +1,6 @@
 import type { App } from "../app/app.js";
 import { withoutPaint } from "../model/document.js";
+import { nothing } from "../model/pointed.js";
 import type { StrokeMode, Tool } from "../model/view.js";
 import { short } from "../model/words.js";
 import { choice, el, toggle } from "./dom.js";
@@ -28,7 +29,7 @@ export function toolbar(app: App): HTMLElement {
   });
   app.view.watch(({ tool }) => {
     for (const element of buttons) element.setAttribute("aria-pressed", String(element.dataset["tool"] === tool));
-    if (tool !== "brush" && tool !== "paint") app.facts.set({ pointedOut: [] });
+    if (tool !== "brush" && tool !== "paint") app.facts.set({ pointedOut: nothing });
   });
   const fit = button("fit", "Show all of it (F)", () => app.fit());
   const rail = el("nav", { className: "rail", aria: { label: "Tools" } }, ...buttons, el("hr"), fit);

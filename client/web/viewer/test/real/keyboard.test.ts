@@ -130,3 +130,90 @@ it("what a key does while it is held is undone at once, and a key that changes n
   await press(","); // 1 is the least
   expect(await user.ask("app.history.canRedo")).toBe(true);
 });
+
+it("the view turns, shifts and zooms by keys", async () => {
+  await user.page.locator("canvas.stage").focus();
+  interface Look {
+    position: number[];
+    target: number[];
+  }
+  const look = () => user.ask<Look>("app.panes[0].stage.look");
+  const away = ({ position, target }: Look) => Math.hypot(...position.map((value, axis) => value - target[axis]!));
+  await press("f");
+  const first = await look();
+  for (const keys of ["Control+ArrowRight", "Control+ArrowUp"]) await press(keys);
+  const turned = await look();
+  expect(turned.target).toEqual(first.target);
+  expect(away(turned)).toBeCloseTo(away(first), 5);
+  expect(Math.hypot(...turned.position.map((value, axis) => value - first.position[axis]!))).toBeGreaterThan(0.1 * away(first));
+  for (const keys of ["Control+ArrowDown", "Control+ArrowLeft"]) await press(keys);
+  (await look()).position.forEach((value, axis) => expect(value).toBeCloseTo(first.position[axis]!, 4));
+
+  await press("Control+Shift+ArrowRight");
+  const shifted = await look();
+  const by = shifted.target.map((value, axis) => value - first.target[axis]!);
+  expect(Math.hypot(...by)).toBeGreaterThan(0.01 * away(first));
+  expect(away(shifted)).toBeCloseTo(away(first), 5);
+  await press("+");
+  expect(away(await look())).toBeLessThan(0.9 * away(first));
+  await press("-");
+  expect(away(await look())).toBeCloseTo(away(first), 4);
+
+  await press("Escape"); // no handle is selected: then arrows alone turn the view
+  await press("ArrowLeft");
+  expect((await look()).position).not.toEqual(shifted.position);
+  await press("f");
+});
+
+it("a handle is placed, moved and selected by keys alone", async () => {
+  await user.page.locator("canvas.stage").focus();
+  const cross = user.page.locator(".cross");
+  const count = await user.ask<number>("document().handles.length");
+  await press("Enter");
+  expect(await cross.isVisible()).toBe(true);
+  expect((await user.ask<number[]>("app.facts.now.pointedOut.vertices")).length).toBeGreaterThan(0);
+  await press("ArrowUp");
+  await press("Enter");
+  expect(await cross.isVisible()).toBe(false);
+  expect(await user.ask("document().handles.length")).toBe(count + 1);
+  const name = await user.ask<string>("document().handles.at(-1).name");
+  expect(await user.ask("app.view.now.selected")).toBe(name);
+  await user.page.locator(".notice", { hasText: `“${name}” holds` }).waitFor();
+  const x = () => user.ask<number>("document().handles.at(-1).pose.translation[0]");
+  const before = await x();
+  await press("ArrowRight");
+  expect(await x()).toBeGreaterThan(before);
+  await user.settled();
+
+  await press("Escape");
+  expect(await user.ask("app.view.now.selected")).toBe(undefined);
+  await press("Enter"); // in the middle again
+  await press("Escape");
+  expect(await cross.isVisible()).toBe(false);
+  await press("Delete");
+  expect(await user.ask("document().handles.length")).toBe(count + 1);
+});
+
+it("shortcuts of a single key can be switched off, and stay so", async () => {
+  await press("?");
+  const help = user.page.getByRole("dialog", { name: "Help" });
+  await help.getByText("Shortcuts of a single key").click();
+  await press("Escape");
+  await user.page.locator("canvas.stage").focus();
+  const before = await user.ask<object>("app.view.now");
+  for (const key of ["2", "w", "g", "s", "d", "i", "p", "[", "?"]) await press(key);
+  expect(await user.ask("app.view.now")).toEqual(before);
+  expect(await help.isVisible()).toBe(false);
+  await press("Control+z"); // is no single key
+  expect(await user.ask("app.history.canRedo")).toBe(true);
+
+  await user.page.reload();
+  await user.settled();
+  await press("w");
+  expect(await user.ask("app.view.now.wireframe")).toBe(false);
+  await user.page.getByRole("button", { name: "Help and shortcuts (?)" }).click();
+  await help.getByText("Shortcuts of a single key").click();
+  await press("Escape");
+  await press("w");
+  expect(await user.ask("app.view.now.wireframe")).toBe(true);
+});

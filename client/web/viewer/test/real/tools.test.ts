@@ -233,6 +233,19 @@ describe("p", () => {
     await user.settled(1);
     expect(await user.positions(0)).not.toEqual(left);
     expect(await user.positions(1)).not.toEqual(right);
+    // Each has a name, and a histogram of its own.
+    const label = (pane: number) => user.page.locator("canvas.stage").nth(pane).getAttribute("aria-label");
+    const { p: leftP, secondP } = await user.ask<{ p: number; secondP: number }>("document()");
+    expect(await label(0)).toBe(`Left picture of the surface, p = ${leftP}`);
+    expect(await label(1)).toBe(`Right picture of the surface, p = ${secondP}`);
+    const captions = user.page.locator(".measures figcaption", { hasText: "Cells by energy" });
+    expect(await captions.allTextContents()).toEqual([
+      `Cells by energy, left: p = ${leftP}`,
+      `Cells by energy, right: p = ${secondP}`,
+    ]);
+    const bars = (k: number) =>
+      captions.nth(k).evaluate((caption) => (caption.nextElementSibling as HTMLCanvasElement).toDataURL());
+    expect(await bars(0)).not.toBe(await bars(1));
     // The plot compares lengths: the p-th roots of the energies.
     for (const [pane, p] of [await user.ask<number>("document().p"), await user.ask<number>("document().secondP")].entries()) {
       const { energy } = (await user.frame(pane))!;
@@ -242,6 +255,8 @@ describe("p", () => {
     await user.until("[0, 1].every((pane) => window.__lpdeform.frame(pane).gap !== undefined)");
     await expect.poll(() => user.page.locator('[data-measure="gap"]').textContent()).toMatch(/^[^–]* %/);
     await press("s");
+    expect(await user.page.locator(".measures figcaption:visible").allTextContents()).toContain("Cells by energy");
+    expect(await label(0)).toBe(`Picture of the surface, p = ${leftP}`);
   });
 });
 

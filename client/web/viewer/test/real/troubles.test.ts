@@ -166,16 +166,30 @@ describe("a mesh with defects", () => {
     const user = await visit(service);
     await user.settled();
     await user.openFiles({ name: "odd.off", content: off });
+    const pointedOut = () => user.ask<{ vertices: number[]; edges: number[]; faces: number[] }>("app.facts.now.pointedOut");
+    // In the colour of marks on light pages, or nearly.
+    const expectMarked = async (place: readonly number[]) => {
+      await expect
+        .poll(async () => {
+          const [r, g, b] = await user.colourAt(await user.ask(`pointOnPage([${place.join()}])`));
+          return r > 120 && g < 90 && b > 60;
+        })
+        .toBe(true);
+    };
     const warnings = user.page.locator(".warnings button");
     await warnings.first().waitFor();
     const texts = await warnings.allTextContents();
     expect(texts.join("; ")).toMatch(/1 unreferenced vertex.*2 non-manifold edges/);
     await user.page.locator('[data-warning="unreferenced_vertices"]').click();
-    expect(await user.ask("app.facts.now.pointedOut")).toEqual([5]);
+    expect(await pointedOut()).toEqual({ vertices: [5], edges: [], faces: [] });
     await user.page.locator('[data-warning="zero_area_faces"]').click();
-    expect((await user.ask<number[]>("app.facts.now.pointedOut")).sort()).toEqual([0, 1, 6]);
+    expect(await pointedOut()).toEqual({ vertices: [], edges: [], faces: [5] });
+    await expectMarked([0.3, 0, 0]); // a side of it: it has no area
     await user.page.locator('[data-warning="non_manifold_edges"]').click();
-    expect(await user.ask<number[]>("app.facts.now.pointedOut")).toEqual(expect.arrayContaining([1, 2]));
+    expect((await pointedOut()).edges).toEqual(expect.arrayContaining([1, 2]));
+    await expectMarked([0.5, 0.5, 0]);
+    await user.ask("app.facts.set({ pointedOut: { vertices: [], edges: [], faces: [2] } })");
+    await expectMarked([1 / 3, 1 / 3, 1 / 3]);
     // What is marked comes into view.
     await user.page.locator("canvas.stage").hover();
     await user.page.mouse.wheel(0, -2000);
