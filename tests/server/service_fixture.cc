@@ -302,6 +302,7 @@ SolveOutcome ServiceTest::solve(const v1::SolveRequest& request, grpc::ClientCon
   v1::SolveResponse response;
   const auto stream = stub_->Solve(context, request);
   while (stream->Read(&response)) {
+    if (response.has_heartbeat()) continue;
     if (response.has_progress()) {
       outcome.progress.push_back(response.progress());
       outcome.order.push_back('p');
