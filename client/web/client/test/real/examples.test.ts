@@ -16,8 +16,8 @@ async function run(example: string): Promise<string> {
   return (await promisify(execFile)(process.execPath, [program, service.url])).stdout;
 }
 
-test("the README's quick start does what it says", async () => {
-  const readme = await readFile(join(import.meta.dirname, "../../../README.md"), "utf8");
+test.each(["../../../README.md", "../../README.md"])("the code in %s does what it says", async (path) => {
+  const readme = await readFile(join(import.meta.dirname, path), "utf8");
   const block = /^```ts\n(.*?)^```$/ms.exec(readme)![1]!;
   const name = "quick_start.tmp";
   const file = join(import.meta.dirname, "../../examples", `${name}.ts`);
