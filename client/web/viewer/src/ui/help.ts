@@ -67,7 +67,7 @@ export function helpSheet(app: App): HTMLDialogElement {
     },
     "Letters, digits and signs: off for speech input and for whoever hits keys by mistake",
   );
-  const close = el("button", { type: "button", className: "plain", textContent: "Close" });
+  const close = el("button", { type: "button", className: "plain", textContent: "Close", autofocus: true });
   const sheet = el(
     "dialog",
     { className: "help", aria: { label: "Help" } },

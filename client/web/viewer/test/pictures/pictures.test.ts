@@ -133,6 +133,14 @@ const states: readonly State[] = [
     ),
   },
   { name: "normals", act: async (user) => (await raiseHead(user), await keys(user, "c", "c", "c")) },
+  {
+    name: "cross",
+    isLight: true,
+    act: async (user) => {
+      await user.page.locator("canvas.stage").focus();
+      await keys(user, "Tab", "Shift+Tab", "Enter", "ArrowUp", "ArrowUp");
+    },
+  },
   { name: "help", act: (user) => keys(user, "?") },
   { name: "save-menu", isLight: true, act: (user) => user.page.getByRole("button", { name: "Save" }).click() },
   { name: "upright", size: upright, act: (user) => pull(user, "Head", -90, -60, 40) },
