@@ -15,4 +15,10 @@ absl::Status check_enum(const std::string& name, std::int32_t value, std::int32_
                        absl::StrCat(name, " is ", value, ", which this library does not know."));
 }
 
+absl::Status check_reserved(const std::string& name, std::uint32_t value) {
+  if (value == 0) return absl::OkStatus();
+  return invalid_input({"RESERVED_SET", name, "reserved = 0"},
+                       absl::StrCat("A reserved field of ", name, " is ", value, " and not 0."));
+}
+
 }  // namespace lpdeform::engine

@@ -143,8 +143,11 @@ absl::StatusOr<Handle> read_handle(const lpdeform_handle& handle, const Space& s
   if (!hold.ok()) return hold.status();
   Handle out;
   out.vertices = copied(handle.vertices, handle.vertex_count);
-  for (std::uint32_t k = 0; k < handle.point_count; ++k)
+  for (std::uint32_t k = 0; k < handle.point_count; ++k) {
+    const absl::Status reserved = check_reserved(absl::StrCat("points[", k, "]"), handle.points[k].reserved);
+    if (!reserved.ok()) return reserved;
     out.points.push_back(read_point(handle.points[k], space));
+  }
   out.motion = *std::move(motion);
   out.hold = *hold;
   out.footprint = space.length_to_server(handle.footprint);
@@ -152,6 +155,8 @@ absl::StatusOr<Handle> read_handle(const lpdeform_handle& handle, const Space& s
 }
 
 absl::StatusOr<Settings> read_settings(const lpdeform_settings& settings, const Space& space) {
+  const absl::Status reserved = check_reserved("settings", settings.reserved | settings.reserved_too);
+  if (!reserved.ok()) return reserved;
   Settings out;
   out.p = read_field(settings.p, settings.p_per_vertex, settings.p_count, settings.p_automatic);
   out.stiffness = read_field(settings.stiffness, settings.stiffness_per_vertex, settings.stiffness_count,

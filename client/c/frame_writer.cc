@@ -8,6 +8,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "client/c/arguments.h"
 #include "client/c/vertex_source.h"
 #include "core/base/fault.h"
 #include "core/mesh/colour.h"
@@ -17,7 +18,7 @@ namespace {
 
 constexpr double kMostUnsigned = 65535;
 
-std::size_t bytes_of(lpdeform_format format, std::size_t components) {
+std::uint32_t bytes_of(lpdeform_format format, std::uint32_t components) {
   switch (format) {
     case LPDEFORM_FLOAT32:
       return components * sizeof(float);
@@ -31,9 +32,11 @@ std::size_t bytes_of(lpdeform_format format, std::size_t components) {
   }
 }
 
-absl::Status check(const std::string& name, const lpdeform_target& target, std::size_t components,
+absl::Status check(const std::string& name, const lpdeform_target& target, std::uint32_t components,
                    std::initializer_list<lpdeform_format> formats, std::uint32_t vertex_count) {
   if (target.data == nullptr) return absl::OkStatus();
+  const absl::Status reserved = check_reserved(name, target.reserved);
+  if (!reserved.ok()) return reserved;
   if (std::ranges::find(formats, target.format) == formats.end()) {
     return invalid_input({"FORMAT_UNKNOWN", name, ""},
                          absl::StrCat("Format ", target.format, " is not one of ", name, "."));
@@ -221,8 +224,9 @@ absl::Status check_buffers(const lpdeform_buffers& buffers, std::uint32_t vertex
     return invalid_input({"RED_OUT_OF_RANGE", "red_distortion", "0 <= red_distortion"},
                          absl::StrCat("red_distortion is ", buffers.red_distortion, "."));
   }
-  absl::Status checked = check("positions", buffers.positions, 3,
-                               {LPDEFORM_FLOAT32, LPDEFORM_FLOAT64, LPDEFORM_UNORM16}, vertex_count);
+  absl::Status checked = check_reserved("buffers", buffers.reserved);
+  checked.Update(check("positions", buffers.positions, 3,
+                       {LPDEFORM_FLOAT32, LPDEFORM_FLOAT64, LPDEFORM_UNORM16}, vertex_count));
   checked.Update(check("normals", buffers.normals, 3,
                        {LPDEFORM_FLOAT32, LPDEFORM_FLOAT64, LPDEFORM_SNORM16, LPDEFORM_SNORM8},
                        vertex_count));

@@ -4,12 +4,18 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/cpp/guarded.h"
+#include "client/cpp/lease.h"
 #include "client/cpp/ledger.h"
+#include "client/cpp/names.h"
 #include "client/cpp/recovery.h"
 #include "core/base/fault.h"
 
 namespace lpdeform::engine {
 namespace {
+
+/// So often a wait for a result sees whether another thread has taken it.
+constexpr std::chrono::milliseconds kGlance{20};
 
 absl::Status session_closed() {
   return make_fault(absl::StatusCode::kFailedPrecondition, {"SESSION_CLOSED", "", ""},
@@ -21,25 +27,51 @@ absl::Status not_there_yet() {
                     "There is no session on the server yet.");
 }
 
+absl::Status no_result() {
+  return make_fault(absl::StatusCode::kDeadlineExceeded, {"NO_FRAME", "", ""},
+                    "Frames came, but not the finished result in time.");
+}
+
+client::Frame frame_of(client::SolveResult result) {
+  client::Frame out;
+  out.positions = std::move(result.positions);
+  out.distortion = std::move(result.distortion);
+  out.normals = std::move(result.normals);
+  out.input_seq = result.input_seq;
+  out.iteration = result.iterations;
+  out.energy = result.energy;
+  out.soft_energy = result.soft_energy;
+  out.converged = result.stop_reason == client::StopReason::kConverged;
+  out.stop_reason = result.stop_reason;
+  out.solve_seconds = result.solve_seconds;
+  out.optimality_gap = result.optimality_gap;
+  return out;
+}
+
 }  // namespace
 
 LiveSession::LiveSession(Opening opening, Facts facts)
     : opening_(std::move(opening)), facts_(facts), thread_([this] { run(); }) {}
 
 LiveSession::~LiveSession() {
-  close();
+  stop();
   wait_until_closed();
 }
 
 void LiveSession::run() {
-  open_patiently();
+  const absl::Status opened = client::guarded([this] {
+    open_patiently();
+    return absl::OkStatus();
+  });
+  if (!opened.ok()) refuse(opened);
   std::shared_ptr<client::Session> session;
   {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return is_closing_; });
     session = session_;
   }
-  if (session) session->close().IgnoreError();  // what could not be deleted expires
+  if (session)
+    client::guarded([&] { return session->close(); }).IgnoreError();  // what was not deleted expires
   session.reset();
   const std::scoped_lock lock(mutex_);
   opening_ = nullptr;
@@ -57,27 +89,29 @@ void LiveSession::open_patiently() {
       const std::scoped_lock lock(mutex_);
       if (is_closing_) return;
     }
-    absl::StatusOr<client::Session> opened = opening_();
+    absl::StatusOr<client::Session> opened = opening_(stop_.get_token());
     if (opened.ok()) {
       opening_ = nullptr;  // and with it its copy of the mesh
       return hand_over(*std::move(opened));
     }
+    if (is_final(opened.status(), start)) return refuse(opened.status());
     std::unique_lock lock(mutex_);
     last_problem_ = opened.status();
-    if (is_final(opened.status(), start)) {
-      refused_ = opened.status();
-      changed_.notify_all();
-      return;
-    }
     if (changed_.wait_for(lock, backoff.next(), [this] { return is_closing_; })) return;
   }
 }
 
 bool LiveSession::is_final(const absl::Status& failed, Clock::time_point since) const {
-  const bool may_pass =
-      absl::IsUnavailable(failed) || absl::IsDeadlineExceeded(failed) || absl::IsResourceExhausted(failed);
+  const bool may_pass = client::is_undecided(failed) && !client::is_session_lost(failed);
   const std::chrono::duration<double> tried = Clock::now() - since;
   return !may_pass || (facts_.reconnect_seconds > 0 && tried.count() > facts_.reconnect_seconds);
+}
+
+void LiveSession::refuse(absl::Status why) {
+  const std::scoped_lock lock(mutex_);
+  last_problem_ = why;
+  refused_ = std::move(why);
+  changed_.notify_all();
 }
 
 /// The changes made so far become one of the session's; the frames begin.
@@ -98,6 +132,8 @@ void LiveSession::hand_over(client::Session opened) {
 }
 
 absl::StatusOr<std::uint64_t> LiveSession::send(client::Update update) {
+  const absl::Status checked = client::check_names(update);
+  if (!checked.ok()) return checked;
   const std::scoped_lock lock(mutex_);
   if (is_closing_) return session_closed();
   if (!refused_.ok()) return refused_;
@@ -175,19 +211,19 @@ absl::Status LiveSession::check(const lpdeform_buffers& buffers) const {
   return check_buffers(buffers, vertex_count(), facts_.contents);
 }
 
+lpdeform_frame LiveSession::write(const client::Frame& frame, const lpdeform_buffers& buffers) const {
+  lpdeform_frame out = write_frame(frame, facts_.space, buffers);
+  out.input_seq = ours(out.input_seq);
+  return out;
+}
+
+/// The frame has as many vertices as the mesh that the buffers were measured for: client::Session sees to that.
 absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::take(client::Frame frame,
                                                                 const lpdeform_buffers& buffers) {
-  // The buffers were measured for the mesh; what a server sends is not taken on trust.
-  if (frame.positions.size() != std::size_t{3} * vertex_count()) {
-    return make_fault(absl::StatusCode::kDataLoss, {"FRAME_VERTICES", "", absl::StrCat(vertex_count())},
-                      absl::StrCat("The server sent a frame of ", frame.positions.size() / 3,
-                                   " vertices for a mesh of ", vertex_count(), "."));
-  }
   was_live_ = true;
-  frame.input_seq = ours(frame.input_seq);
   const std::scoped_lock lock(frame_mutex_);
   last_frame_ = std::move(frame);
-  return write_frame(*last_frame_, facts_.space, buffers);
+  return write(*last_frame_, buffers);
 }
 
 absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::poll(const lpdeform_buffers& buffers) {
@@ -207,7 +243,15 @@ absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::repeat(const lpdeform
   if (!checked.ok()) return checked;
   const std::scoped_lock lock(frame_mutex_);
   if (!last_frame_) return std::nullopt;
-  return write_frame(*last_frame_, facts_.space, buffers);
+  return write(*last_frame_, buffers);
+}
+
+/// The frame taken last, where it is the result that settle waits for. Empty otherwise.
+absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::taken_result(const client::Session& live,
+                                                                        const lpdeform_buffers& buffers) {
+  const std::scoped_lock lock(frame_mutex_);
+  if (!last_frame_ || !live.is_result(*last_frame_)) return std::nullopt;
+  return write(*last_frame_, buffers);
 }
 
 absl::StatusOr<std::shared_ptr<client::Session>> LiveSession::wait_for_session(Clock::time_point deadline) {
@@ -230,16 +274,50 @@ absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::settle(double timeout
   if (!live.ok()) return live.status();
   const absl::Status checked = check(buffers);
   if (!checked.ok()) return checked;
-  const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
-  absl::StatusOr<client::Frame> frame = (*live)->settle(left);
-  if (!frame.ok()) return frame.status();
-  return take(*std::move(frame), buffers);
+  for (std::chrono::milliseconds pause{0};; pause = kGlance) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
+    absl::StatusOr<client::Frame> frame = (*live)->next_frame(std::min(pause, left));
+    if (frame.ok()) {
+      const std::scoped_lock lock(frame_mutex_);
+      was_live_ = true;
+      last_frame_ = *std::move(frame);
+    } else if (!absl::IsDeadlineExceeded(frame.status())) {
+      return frame.status();
+    }
+    const auto result = taken_result(**live, buffers);
+    if (!result.ok() || result->has_value()) return result;
+    if (Clock::now() >= deadline) return frame.ok() ? no_result() : frame.status();
+  }
+}
+
+absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::solve(double timeout_seconds, bool certify,
+                                                                 const lpdeform_buffers& buffers) {
+  const double longest = timeout_seconds > 0 ? timeout_seconds : 1e9;
+  const Clock::time_point start = Clock::now();
+  const auto live = wait_for_session(
+      start + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(longest)));
+  if (!live.ok()) return live.status();
+  const absl::Status checked = check_buffers(buffers, vertex_count(), {.normals = true, .distortion = true});
+  if (!checked.ok()) return checked;
+  client::SolveOptions options;
+  options.certify = certify;
+  options.with_normals = buffers.normals.data != nullptr;
+  const double waited = std::chrono::duration<double>(Clock::now() - start).count();
+  if (timeout_seconds > 0) options.deadline_seconds = std::max(timeout_seconds - waited, 1e-3);
+  absl::StatusOr<client::SolveResult> result = (*live)->solve(options);
+  if (!result.ok()) return result.status();
+  return write(frame_of(*std::move(result)), buffers);
 }
 
 void LiveSession::close() {
   const std::scoped_lock lock(mutex_);
   is_closing_ = true;
   changed_.notify_all();
+}
+
+void LiveSession::stop() {
+  close();
+  stop_.request_stop();
 }
 
 bool LiveSession::is_closed() const {

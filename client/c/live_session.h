@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <thread>
 
 #include "absl/status/status.h"
@@ -19,8 +20,9 @@
 
 namespace lpdeform::engine {
 
-/// Makes a session of the C++ client; waits. Called again, on one thread, where it says that no server is there or it is full.
-using Opening = std::function<absl::StatusOr<client::Session>()>;
+/// Makes a session of the C++ client; waits, until it is asked to stop. Called again, on one thread, where it fails in a way that
+/// may pass (client::is_undecided).
+using Opening = std::function<absl::StatusOr<client::Session>(const std::stop_token&)>;
 
 /// A session of the C interface: one that may not be there yet. A thread of its own opens it, gives it what was
 /// changed meanwhile, and closes it in the end; callers never wait for that thread. Functions may be called
@@ -51,9 +53,14 @@ class LiveSession {
   absl::StatusOr<std::optional<lpdeform_frame>> repeat(const lpdeform_buffers& buffers);
   absl::StatusOr<std::optional<lpdeform_frame>> settle(double timeout_seconds,
                                                        const lpdeform_buffers& buffers);
+  /// As lpdeform_solve; `timeout_seconds` 0 is without limit.
+  absl::StatusOr<std::optional<lpdeform_frame>> solve(double timeout_seconds, bool certify,
+                                                      const lpdeform_buffers& buffers);
 
-  /// The session is over; the thread closes it.
+  /// The session is over; the thread closes it, once it is open where that was begun.
   void close();
+  /// The same, and what is being opened is given up.
+  void stop();
   bool is_closed() const;
   void wait_until_closed();
 
@@ -61,6 +68,7 @@ class LiveSession {
   using Clock = std::chrono::steady_clock;
 
   void run();
+  void refuse(absl::Status why);
   void open_patiently();
   bool is_final(const absl::Status& failed, Clock::time_point since) const;
   void hand_over(client::Session session);
@@ -68,10 +76,14 @@ class LiveSession {
   absl::Status check(const lpdeform_buffers& buffers) const;
   absl::StatusOr<std::shared_ptr<client::Session>> session() const;
   absl::StatusOr<std::shared_ptr<client::Session>> wait_for_session(Clock::time_point deadline);
-  /// DATA_LOSS FRAME_VERTICES.
   absl::StatusOr<std::optional<lpdeform_frame>> take(client::Frame frame, const lpdeform_buffers& buffers);
+  absl::StatusOr<std::optional<lpdeform_frame>> taken_result(const client::Session& live,
+                                                             const lpdeform_buffers& buffers);
+  /// Numbers of changes become the caller's.
+  lpdeform_frame write(const client::Frame& frame, const lpdeform_buffers& buffers) const;
 
   Opening opening_;  // of the thread; empty once it is of no more use
+  std::stop_source stop_;
   const Facts facts_;
 
   mutable std::mutex mutex_;
@@ -88,8 +100,8 @@ class LiveSession {
   bool is_closing_ = false;
   bool is_closed_ = false;
 
-  std::mutex frame_mutex_;  // after mutex_, where both are held
-  std::optional<client::Frame> last_frame_;
+  std::mutex frame_mutex_;                   // after mutex_, where both are held
+  std::optional<client::Frame> last_frame_;  // as the session gave it
 
   std::thread thread_;
 };

@@ -4,9 +4,7 @@
 #include "client/c/lpdeform.h"
 
 #include <cstring>
-#include <exception>
 #include <memory>
-#include <new>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -19,12 +17,13 @@
 #include "client/c/structs.h"
 #include "client/c/vertex_source.h"
 #include "client/cpp/client.h"
+#include "client/cpp/guarded.h"
+#include "client/cpp/names.h"
 #include "core/base/fault.h"
 
 namespace engine = lpdeform::engine;
 namespace client = lpdeform::client;
 using lpdeform::invalid_input;
-using lpdeform::make_fault;
 using lpdeform::engine::argument_missing;
 using lpdeform::engine::check_enum;
 
@@ -41,14 +40,11 @@ namespace {
 /// Calls `work`, which returns a Status, and says what came of it.
 template <typename Work>
 lpdeform_code guarded(lpdeform_error* error, Work work) {
+  const absl::Status done = client::guarded(work);
   try {
-    return engine::tell(work(), error);
-  } catch (const std::bad_alloc&) {
-    return engine::tell(
-        make_fault(absl::StatusCode::kResourceExhausted, {"OUT_OF_MEMORY", "", ""}, "Out of memory."), error);
-  } catch (const std::exception& exception) {
-    return engine::tell(make_fault(absl::StatusCode::kInternal, {"EXCEPTION", "", ""}, exception.what()),
-                        error);
+    return engine::tell(done, error);
+  } catch (...) {  // no memory for the text
+    return static_cast<lpdeform_code>(done.code());
   }
 }
 
@@ -63,7 +59,9 @@ absl::StatusOr<std::shared_ptr<engine::LiveSession>> open(engine::Server& server
   read->open.weld = engine::read_weld(*given);
   read->facts.vertex_count = given->vertex_count;
   return server.start(
-      [mesh = *std::move(copy), how = read->open](client::Client& to) { return to.open(mesh, how); },
+      [mesh = *std::move(copy), how = read->open](client::Client& to, const std::stop_token& stop) {
+        return to.open(mesh, how, stop);
+      },
       read->facts);
 }
 
@@ -71,14 +69,17 @@ absl::StatusOr<std::shared_ptr<engine::LiveSession>> join(engine::Server& server
                                                           lpdeform_role role,
                                                           const lpdeform_options* options) {
   if (name == nullptr) return argument_missing("name");
-  const absl::Status checked = check_enum("role", role, LPDEFORM_WRITER);
+  absl::Status checked = check_enum("role", role, LPDEFORM_WRITER);
+  checked.Update(client::check_name("session", name));
   if (!checked.ok()) return checked;
   auto read = engine::read_options(options);
   if (!read.ok()) return read.status();
   read->facts.is_reader = role == LPDEFORM_READER;
   const auto as = role == LPDEFORM_READER ? client::Role::kReader : client::Role::kWriter;
   return server.start(
-      [name = std::string(name), as, how = read->open](client::Client& to) { return to.join(name, as, how); },
+      [name = std::string(name), as, how = read->open](client::Client& to, const std::stop_token& stop) {
+        return to.join(name, as, how, stop);
+      },
       read->facts);
 }
 
@@ -300,4 +301,20 @@ lpdeform_code lpdeform_settle(lpdeform_session* session, double timeout_seconds,
                  if (!checked.ok()) return checked;
                  return live.settle(timeout_seconds, into);
                });
+}
+
+lpdeform_code lpdeform_solve(lpdeform_session* session, const lpdeform_solve_options* options,
+                             const lpdeform_buffers* buffers, lpdeform_frame* frame, lpdeform_error* error) {
+  return write(
+      session, buffers, frame, error,
+      [=](engine::LiveSession& live,
+          const lpdeform_buffers& into) -> absl::StatusOr<std::optional<lpdeform_frame>> {
+        lpdeform_solve_options defaults{};
+        defaults.struct_size = sizeof defaults;
+        const auto given = engine::read_struct(options == nullptr ? &defaults : options, "solve_options");
+        if (!given.ok()) return given.status();
+        const absl::Status checked = engine::check_seconds("timeout_seconds", given->timeout_seconds);
+        if (!checked.ok()) return checked;
+        return live.solve(given->timeout_seconds, given->certify != 0, into);
+      });
 }

@@ -25,10 +25,11 @@
  * Errors. Functions return a code (LPDEFORM_OK is 0) and fill in `error`, which may be NULL. A function that
  * returns an error has changed nothing. No exception leaves the library.
  *
- * Versions. Every struct begins with its size in bytes as the caller was compiled, so that structs may grow at
- * their ends: `lpdeform_mesh mesh = {sizeof mesh};`. Fields are zero unless set, and zero is the default
- * everywhere. A library that is older than its caller refuses fields that it does not know, if they are set
- * (STRUCT_TOO_NEW), rather than leave them out.
+ * Versions. A struct that is passed by itself begins with its size in bytes as the caller was compiled, so that it may
+ * grow at its end: `lpdeform_mesh mesh = {sizeof mesh};`. Those that lie within others have none, and stay as they are
+ * for as long as LPDEFORM_ABI does: lpdeform_source, _target, _motion, _point and _move. Fields are zero unless set, and
+ * zero is the default everywhere; reserved ones must be (RESERVED_SET). A library that is older than its caller refuses
+ * fields that it does not know, if they are set (STRUCT_TOO_NEW), rather than leave them out.
  *
  * Texts are UTF-8, ending in a zero byte. Vertex and face indices begin with 0; vertex order is never changed by
  * anybody, so what goes in from a vertex buffer comes out in its order.
@@ -113,7 +114,9 @@ typedef struct lpdeform_connection {
   double reconnect_seconds;
 } lpdeform_connection;
 
-/* Makes a client of the server at that address; connecting goes on by itself. Errors: INVALID_ARGUMENT. */
+/* Makes a client of the server at that address; connecting goes on by itself. Errors: INVALID_ARGUMENT, also where a
+ * certificate or key cannot be read, or they do not belong together (TLS_CERTIFICATES, TLS_PRIVATE_KEY, TLS_KEY_MISSING,
+ * TLS_KEY_MISMATCH). */
 LPDEFORM_API lpdeform_code lpdeform_connect(const lpdeform_connection* connection, lpdeform_client** client,
                                             lpdeform_error* error);
 
@@ -122,8 +125,8 @@ LPDEFORM_API lpdeform_code lpdeform_set_token(lpdeform_client* client, const cha
                                               lpdeform_error* error);
 
 /* WAITS until every session of the client is closed, those too that lpdeform_close was not called for (they
- * then are over, and still to be given to lpdeform_close): at most connect_timeout_seconds and twice call_timeout_seconds,
- * usually milliseconds. To be called before the process ends. NULL is fine. */
+ * then are over, and still to be given to lpdeform_close): at most call_timeout_seconds, however many there are, usually
+ * milliseconds. What is being opened is given up. To be called before the process ends. NULL is fine. */
 LPDEFORM_API void lpdeform_disconnect(lpdeform_client* client);
 
 /* ---- vertex buffers ---- */
@@ -198,12 +201,13 @@ enum {
   LPDEFORM_Y_UP = 0, /* Unity, Godot */
   LPDEFORM_Z_UP = 1  /* Unreal, Blender */
 };
-/* Of triangles seen from outside. */
+/* Of triangles seen from outside, by a person: mirrored coordinates do not change it. Unreal, which takes
+ * (C - A) x (B - A) in left-handed coordinates for the normal of A, B, C, is counter-clockwise. */
 typedef int32_t lpdeform_winding;
 enum {
-  LPDEFORM_WINDING_USUAL = 0, /* counter-clockwise where right-handed, clockwise where left-handed */
+  LPDEFORM_WINDING_USUAL = 0, /* clockwise where left-handed with y up (Unity), otherwise not (Unreal) */
   LPDEFORM_COUNTER_CLOCKWISE = 1,
-  LPDEFORM_CLOCKWISE = 2
+  LPDEFORM_CLOCKWISE = 2 /* Godot, too */
 };
 
 /* How frames travel; the C interface gives the same formats for all of them. */
@@ -390,8 +394,9 @@ typedef struct lpdeform_update {
 
 /* Sends a change. Changes made faster than the connection takes them are merged, the newest of each handle and
  * each setting winning. `input_seq`, where not NULL, becomes the change's number: a frame whose input_seq is at
- * least that takes it into account. Errors: INVALID_ARGUMENT where the change makes no sense by itself; what the
- * server says of it comes out of lpdeform_poll, once. FAILED_PRECONDITION when the session is over, and for a reader. */
+ * least that takes it into account. Errors: INVALID_ARGUMENT where the change makes no sense by itself, NAME_ENCODING where
+ * a name is not UTF-8; what the server says of it comes out of lpdeform_poll, once. For a reader FAILED_PRECONDITION
+ * NOT_THE_WRITER. Once the session is over, why: what lpdeform_session_state says. */
 LPDEFORM_API lpdeform_code lpdeform_send(lpdeform_session* session, const lpdeform_update* update,
                                          uint64_t* input_seq, lpdeform_error* error);
 
@@ -468,11 +473,25 @@ LPDEFORM_API lpdeform_code lpdeform_poll(lpdeform_session* session, const lpdefo
 LPDEFORM_API lpdeform_code lpdeform_repeat(lpdeform_session* session, const lpdeform_buffers* buffers,
                                            lpdeform_frame* frame, lpdeform_error* error);
 
-/* WAITS until the finished result of the newest change has come, and writes it; for tools and loading screens.
- * Takes frames meanwhile. DEADLINE_EXCEEDED where none came; other errors as lpdeform_poll. */
+/* WAITS until the finished result of the newest change has come, and writes it; for tools and loading screens. At once
+ * where it was taken before. Takes frames meanwhile. DEADLINE_EXCEEDED where none came; other errors as lpdeform_poll. */
 LPDEFORM_API lpdeform_code lpdeform_settle(lpdeform_session* session, double timeout_seconds,
                                            const lpdeform_buffers* buffers, lpdeform_frame* frame,
                                            lpdeform_error* error);
+
+typedef struct lpdeform_solve_options {
+  uint32_t struct_size;
+  uint32_t certify;       /* 1: find frame.optimality_gap */
+  double timeout_seconds; /* of the whole call; 0 is without limit */
+} lpdeform_solve_options;
+
+/* WAITS for a solve of its own to the end, for the present handles and settings, and writes the result in full precision; for
+ * tools. Works beside the frames, of which it takes none: frame_seq and epoch are 0. Normals need no with_normals.
+ * `options` may be NULL. Errors: what the server refuses; DEADLINE_EXCEEDED; UNAVAILABLE where it stayed away for
+ * reconnect_seconds; CANCELLED by lpdeform_disconnect. A solve that stopped short is no error: frame.stop_reason says so. */
+LPDEFORM_API lpdeform_code lpdeform_solve(lpdeform_session* session, const lpdeform_solve_options* options,
+                                          const lpdeform_buffers* buffers, lpdeform_frame* frame,
+                                          lpdeform_error* error);
 
 #ifdef __cplusplus
 }

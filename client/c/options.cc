@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/c/arguments.h"
 #include "client/c/structs.h"
+#include "client/cpp/tls_texts.h"
 #include "core/base/fault.h"
 
 namespace lpdeform::engine {
@@ -46,7 +47,11 @@ absl::StatusOr<std::shared_ptr<Server>> make_server(const lpdeform_connection& g
   options.connect_timeout = milliseconds(given.connect_timeout_seconds, 5);
   options.call_timeout = milliseconds(given.call_timeout_seconds, 30);
   options.reconnect_for = milliseconds(given.reconnect_seconds, 1e9);
-  if (given.tls != 0) options.tls = tls;
+  if (given.tls != 0) {
+    options.tls = tls;
+    checked.Update(client::check_tls(tls));
+    if (!checked.ok()) return checked;
+  }
   auto server = std::make_shared<Server>(given.address, std::move(options), given.reconnect_seconds);
   const absl::Status has_token = server->set_token(text(given.token));
   if (!has_token.ok()) return has_token;
@@ -61,6 +66,7 @@ absl::StatusOr<ReadOptions> read_options(const lpdeform_options* options) {
   absl::Status checked = check_enum("weights", given->weights, LPDEFORM_INTRINSIC_DELAUNAY);
   checked.Update(check_enum("free_components", given->free_components, LPDEFORM_FREE_COMPONENTS_FOLLOW));
   checked.Update(check_enum("encoding", given->encoding, LPDEFORM_ENCODING_COMPRESSED));
+  checked.Update(check_reserved("options", given->reserved));
   checked.Update(check_enum("lowest_encoding", given->lowest_encoding, LPDEFORM_ENCODING_COMPRESSED));
   if (!checked.ok()) return checked;
   const auto space = Space::of(*given);

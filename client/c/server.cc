@@ -21,15 +21,16 @@ absl::Status Server::set_token(std::string token) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<client::Client> Server::connected() {
+absl::StatusOr<client::Client> Server::connected(const std::stop_token& stop) {
   const std::scoped_lock lock(connecting_);
   if (client_) return *client_;
+  if (stop.stop_requested()) return absl::CancelledError("Connecting was stopped.");
   client::ClientOptions options = options_;
   options.token = [token = token_] {
     const std::scoped_lock lock(token->mutex);
     return token->text;
   };
-  absl::StatusOr<client::Client> made = client::Client::connect(address_, std::move(options));
+  absl::StatusOr<client::Client> made = client::Client::connect(address_, std::move(options), stop);
   if (made.ok()) client_ = *made;
   return made;
 }
@@ -37,10 +38,11 @@ absl::StatusOr<client::Client> Server::connected() {
 std::shared_ptr<LiveSession> Server::start(Open open, LiveSession::Facts facts) {
   facts.reconnect_seconds = reconnect_seconds_;
   auto session = std::make_shared<LiveSession>(
-      [self = shared_from_this(), open = std::move(open)]() -> absl::StatusOr<client::Session> {
-        absl::StatusOr<client::Client> client = self->connected();
+      [self = shared_from_this(),
+       open = std::move(open)](const std::stop_token& stop) -> absl::StatusOr<client::Session> {
+        absl::StatusOr<client::Client> client = self->connected(stop);
         if (!client.ok()) return client.status();
-        return open(*client);
+        return open(*client, stop);
       },
       facts);
   forget_closed();
@@ -61,7 +63,7 @@ void Server::close() {
     const std::scoped_lock lock(mutex_);
     sessions.swap(sessions_);
   }
-  for (const auto& session : sessions) session->close();
+  for (const auto& session : sessions) session->stop();
   for (const auto& session : sessions) session->wait_until_closed();
 }
 

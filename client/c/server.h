@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,7 @@ namespace lpdeform::engine {
 class Server : public std::enable_shared_from_this<Server> {
  public:
   /// Makes a session with a client that is connected; waits.
-  using Open = std::function<absl::StatusOr<client::Session>(client::Client&)>;
+  using Open = std::function<absl::StatusOr<client::Session>(client::Client&, const std::stop_token&)>;
 
   /// `options.token` is not used: see set_token.
   Server(std::string address, client::ClientOptions options, double reconnect_seconds);
@@ -28,11 +29,12 @@ class Server : public std::enable_shared_from_this<Server> {
 
   std::shared_ptr<LiveSession> start(Open open, LiveSession::Facts facts);
 
-  /// Closes every session and waits for the ends of their threads.
+  /// Closes every session, gives up those that are being opened, and waits for the ends of their threads: as long as one call
+  /// may take at most.
   void close();
 
  private:
-  absl::StatusOr<client::Client> connected();
+  absl::StatusOr<client::Client> connected(const std::stop_token& stop);
   void forget_closed();
 
   struct Token {

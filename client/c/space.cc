@@ -26,8 +26,9 @@ absl::StatusOr<Space> Space::of(const lpdeform_options& options) {
     space.sign_[0] = -1;
   }
   // Other coordinates of the same thing: what is clockwise to see stays so.
+  const bool is_unity = space.mirrors_ && options.up == LPDEFORM_Y_UP;
   space.turns_triangles_ =
-      options.winding == LPDEFORM_WINDING_USUAL ? space.mirrors_ : options.winding == LPDEFORM_CLOCKWISE;
+      options.winding == LPDEFORM_WINDING_USUAL ? is_unity : options.winding == LPDEFORM_CLOCKWISE;
   return space;
 }
 

@@ -24,7 +24,9 @@ std::vector<double> read_triples(const lpdeform_source& source, std::size_t coun
 }
 
 absl::StatusOr<std::vector<double>> read_triples(const std::string& name, const lpdeform_source& source,
-                                                 std::size_t count) {
+                                                 std::uint32_t count) {
+  const absl::Status reserved = check_reserved(name, source.reserved);
+  if (!reserved.ok()) return reserved;
   if (source.format != LPDEFORM_FLOAT32 && source.format != LPDEFORM_FLOAT64) {
     return invalid_input(
         {"FORMAT_UNKNOWN", name, "FLOAT32 or FLOAT64"},
@@ -66,14 +68,15 @@ absl::Status check_indices(const lpdeform_mesh& mesh) {
 }  // namespace
 
 absl::Status check_extent(const std::string& name, std::size_t bytes, std::uint32_t offset,
-                          std::uint32_t stride, std::size_t size, std::size_t count) {
-  const std::size_t step = stride == 0 ? size : stride;
+                          std::uint32_t stride, std::uint32_t size, std::uint32_t count) {
+  const std::uint64_t step = stride == 0 ? size : stride;
   if (step < size) {
     return invalid_input(
         {"STRIDE_TOO_SMALL", name, absl::StrCat("stride >= ", size)},
         absl::StrCat("The stride of ", name, " is ", stride, " bytes, its elements have ", size, "."));
   }
-  const std::size_t needed = count == 0 ? 0 : offset + (count - 1) * step + size;
+  // Each is below 2^32, so that this fits where a size_t may not.
+  const std::uint64_t needed = count == 0 ? 0 : offset + (count - 1) * step + size;
   if (needed <= bytes) return absl::OkStatus();
   return invalid_input({"BUFFER_TOO_SMALL", name, absl::StrCat("bytes >= ", needed)},
                        absl::StrCat("The buffer of ", name, " has ", bytes, " bytes; ", count,
@@ -82,7 +85,8 @@ absl::Status check_extent(const std::string& name, std::size_t bytes, std::uint3
 
 absl::StatusOr<client::Mesh> read_mesh(const lpdeform_mesh& mesh, const Space& space) {
   if (mesh.positions.data == nullptr && mesh.vertex_count > 0) return argument_missing("mesh.positions.data");
-  const absl::Status checked = check_indices(mesh);
+  absl::Status checked = check_indices(mesh);
+  checked.Update(check_reserved("mesh", mesh.reserved));
   if (!checked.ok()) return checked;
 
   client::Mesh out;

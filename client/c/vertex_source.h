@@ -20,6 +20,6 @@ client::Weld read_weld(const lpdeform_mesh& mesh);
 /// INVALID_ARGUMENT BUFFER_TOO_SMALL where `count` elements of `size` bytes, `stride` apart (0: without gaps) from
 /// `offset` on do not lie within `bytes`.
 absl::Status check_extent(const std::string& name, std::size_t bytes, std::uint32_t offset,
-                          std::uint32_t stride, std::size_t size, std::size_t count);
+                          std::uint32_t stride, std::uint32_t size, std::uint32_t count);
 
 }  // namespace lpdeform::engine

@@ -35,6 +35,7 @@ void ULpdeformComponent::BeginPlay() {
     return;
   }
   for (FLpdeformHandle& Handle : Handles) Hold(Handle, Positions);
+  SetComponentTickEnabled(true);
 }
 
 void ULpdeformComponent::EndPlay(const EEndPlayReason::Type Reason) {
@@ -51,7 +52,7 @@ void ULpdeformComponent::Hold(FLpdeformHandle& Handle, const std::vector<float>&
     const FVector At(Positions[3 * Vertex], Positions[3 * Vertex + 1], Positions[3 * Vertex + 2]);
     if (FVector::Dist(At, Handle.Start.GetLocation()) < Handle.Radius) Vertices.push_back(static_cast<uint32_t>(Vertex));
   }
-  if (!Vertices.empty()) Follower->hold(TCHAR_TO_UTF8(*Handle.Name.ToString()), Vertices);
+  Handle.bHolds = !Vertices.empty() && Follower->hold(TCHAR_TO_UTF8(*Handle.Name.ToString()), Vertices);
 }
 
 void ULpdeformComponent::Move(const FLpdeformHandle& Handle) {
@@ -68,10 +69,17 @@ void ULpdeformComponent::Move(const FLpdeformHandle& Handle) {
 void ULpdeformComponent::TickComponent(float Seconds, ELevelTick Tick, FActorComponentTickFunction* Function) {
   Super::TickComponent(Seconds, Tick, Function);
   if (!Follower) return;
-  for (const FLpdeformHandle& Handle : Handles) Move(Handle);
+  for (const FLpdeformHandle& Handle : Handles) {
+    if (Handle.bHolds) Move(Handle);
+  }
   if (Follower->tick()) Show();
+  const bool bIsOver = Follower->is_over();
   const std::string Problem = Follower->problem();
   if (!Problem.empty()) UE_LOG(LogTemp, Warning, TEXT("lpdeform: %s"), UTF8_TO_TCHAR(Problem.c_str()));
+  if (bIsOver) {  // said once; the mesh stays as it is
+    Follower.reset();
+    SetComponentTickEnabled(false);
+  }
 }
 
 void ULpdeformComponent::Show() {

@@ -26,6 +26,7 @@ struct FLpdeformHandle {
   float Radius = 10;
 
   FTransform Start;
+  bool bHolds = false;  // vertices, so that it can be moved
 };
 
 UCLASS(ClassGroup = "Lpdeform", meta = (BlueprintSpawnableComponent))

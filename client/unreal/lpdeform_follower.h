@@ -9,7 +9,7 @@
 #include <vector>
 
 /// The part of the Unreal sample that knows no engine: a session whose vertices are in Unreal's coordinates (left-handed, z up,
-/// centimetres), in C++17 around lpdeform.h. Errors are std::runtime_error in the constructor alone; on the game thread they
+/// centimetres; triangles counter-clockwise seen from outside), in C++17 around lpdeform.h. Errors are std::runtime_error in the constructor alone; on the game thread they
 /// are texts.
 class LpdeformFollower {
  public:
@@ -34,6 +34,7 @@ class LpdeformFollower {
     options.handedness = LPDEFORM_LEFT_HANDED;
     options.up = LPDEFORM_Z_UP;
     options.units_per_metre = 100;
+    options.winding = LPDEFORM_COUNTER_CLOCKWISE;  // Unreal's normal of A, B, C is (C - A) x (B - A)
     options.free_components = LPDEFORM_FREE_COMPONENTS_FOLLOW;
     options.with_normals = 1;
     if (lpdeform_open(client_, &mesh, &options, &session_, &error_) != LPDEFORM_OK) {
@@ -90,6 +91,13 @@ class LpdeformFollower {
   const std::vector<std::uint8_t>& colours() const { return colours_; }
 
   lpdeform_state state() const { return lpdeform_session_state(session_, nullptr); }
+
+  /// There is nothing more to come; problem() then says why.
+  bool is_over() {
+    if (lpdeform_session_state(session_, &error_) != LPDEFORM_STATE_REFUSED) return false;
+    said(error_.code);
+    return true;
+  }
 
   /// The last thing that went wrong, once; empty where nothing did.
   std::string problem() { return std::exchange(problem_, {}); }

@@ -164,6 +164,46 @@ TEST(Changes, SettingsThatAreZeroAreLeftAlone) {
   EXPECT_EQ(std::get<double>(*read.stiffness), 3);
 }
 
+TEST(MeshInput, ExtentsAreComparedBeyond32Bits) {
+  const Fault fault = fault_of(check_extent("positions", 100, 0xffffffff, 0xffffffff, 12, 0xffffffff));
+  EXPECT_EQ(fault.reason, "BUFFER_TOO_SMALL");
+  EXPECT_EQ(fault.limit, "bytes >= 18446744065119617037");  // (2^32 - 1) + (2^32 - 2)(2^32 - 1) + 12
+}
+
+TEST(Structs, ReservedFieldsAreZero) {
+  const std::array<float, 9> positions{};
+  lpdeform_mesh mesh{};
+  mesh.vertex_count = 3;
+  mesh.positions = {positions.data(), sizeof positions, 0, 0, LPDEFORM_FLOAT32, 1};
+  EXPECT_EQ(refused(mesh), "RESERVED_SET");
+  mesh.positions.reserved = 0;
+  mesh.reserved = 1;
+  EXPECT_EQ(refused(mesh), "RESERVED_SET");
+  lpdeform_settings settings{};
+  settings.reserved_too = 1;
+  EXPECT_EQ(fault_of(read_settings(settings, Space()).status()).reason, "RESERVED_SET");
+  const lpdeform_point point{0, 1, {1, 0, 0}};
+  lpdeform_handle handle{};
+  handle.name = "tip";
+  handle.points = &point;
+  handle.point_count = 1;
+  EXPECT_EQ(fault_of(read_handle(handle, Space()).status()).element, "points[0]");
+}
+
+TEST(Border, CertificatesThatAreNoneAreSaidAtOnce) {
+  lpdeform_error error{};
+  error.struct_size = sizeof error;
+  lpdeform_connection connection{};
+  connection.struct_size = sizeof connection;
+  connection.address = "localhost:1";
+  connection.tls = 1;
+  connection.root_certificates = "garbage";
+  lpdeform_client* client = nullptr;
+  EXPECT_EQ(lpdeform_connect(&connection, &client, &error), LPDEFORM_INVALID_ARGUMENT);
+  EXPECT_STREQ(error.reason, "TLS_CERTIFICATES");
+  EXPECT_EQ(client, nullptr);
+}
+
 TEST(Border, NullIsAnErrorAndNoCrash) {
   lpdeform_error error{};
   error.struct_size = sizeof error;

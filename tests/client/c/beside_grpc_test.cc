@@ -4,10 +4,11 @@
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 
-#include <array>
 #include <string>
+#include <vector>
 
 #include "client/c/lpdeform.h"
+#include "tests/client/c/shapes.h"
 #include "tests/client/in_process_server.h"
 
 namespace {
@@ -40,23 +41,15 @@ TEST(SharedLibrary, WorksInAProgramWithAnotherGrpc) {
   lpdeform_client* client = nullptr;
   ASSERT_EQ(connect(&connection, &client, &error), LPDEFORM_OK) << error.message;
 
-  const std::array<float, 9> vertices{0, 0, 0, 1, 0, 0, 0, 1, 0};
-  const std::array<std::uint32_t, 3> indices{0, 1, 2};
-  lpdeform_mesh mesh{};
-  mesh.struct_size = sizeof mesh;
-  mesh.vertex_count = 3;
-  mesh.positions = {vertices.data(), sizeof vertices, 0, 0, LPDEFORM_FLOAT32, 0};
-  mesh.indices = indices.data();
-  mesh.index_count = 3;
+  const lpdeform::engine::Triangle triangle;
+  const lpdeform_mesh mesh = triangle.mesh();
   lpdeform_session* session = nullptr;
   ASSERT_EQ(open(client, &mesh, nullptr, &session, &error), LPDEFORM_OK) << error.message;
 
-  std::array<float, 9> out{};
-  lpdeform_buffers buffers{};
-  buffers.struct_size = sizeof buffers;
-  buffers.positions = {out.data(), sizeof out, 0, 0, LPDEFORM_FLOAT32, 0};
+  std::vector<lpdeform::engine::Point> out(3);
+  const lpdeform_buffers buffers = lpdeform::engine::buffers_of(out);
   EXPECT_EQ(settle(session, 60, &buffers, nullptr, &error), LPDEFORM_OK) << error.message;
-  EXPECT_EQ(out, vertices);  // nothing holds it: as at rest
+  EXPECT_EQ(out, triangle.points);  // nothing holds it: as at rest
   close(session);
   disconnect(client);
   EXPECT_EQ(dlclose(library), 0);

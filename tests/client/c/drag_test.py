@@ -51,6 +51,11 @@ class Drag(unittest.TestCase):
             self.assertEqual([state for state in states if state != "connecting"], ["live", "reconnecting", "live"], said)
             # 60 frames a second: nothing made the loop wait for a server that was away for some of them.
             self.assertLess(float(re.search(r"^frames: 600, p50 ([\d.]+) ms", said, re.M).group(1)), 20, said)
+            # Nor any call of it, in 99 of 100 frames: a call that waits for the server waits for the time that it is away.
+            calls = dict(re.findall(r"^(moves|polls.*): \d+, p50 [\d.]+ ms, p99 ([\d.]+) ms", said, re.M))
+            self.assertEqual(list(calls), ["moves", "polls with a frame", "polls without"], said)
+            for name, p99 in calls.items():
+                self.assertLess(float(p99), 100, f"{name}: {said}")
             drawn = int(re.search(r"polls with a frame: (\d+)", said).group(1))
             self.assertGreater(drawn, 100, said)
             # pose(0) of the example: the edge is lifted by 0.7 and moved by 0.3, from z = -2.

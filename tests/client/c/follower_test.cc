@@ -12,9 +12,16 @@
 namespace lpdeform {
 namespace {
 
+/// z of the normal as Unreal's GeometryCore has it (VectorUtil::Normal): (C - A) x (B - A).
+double unreal_normal_z(const std::vector<float>& positions, std::uint32_t a, std::uint32_t b,
+                       std::uint32_t c) {
+  const auto edge = [&](std::uint32_t to, int k) { return positions[3 * to + k] - positions[3 * a + k]; };
+  return edge(c, 0) * edge(b, 1) - edge(c, 1) * edge(b, 0);
+}
+
 TEST(UnrealFollower, FollowsAHandleInCentimetres) {
   const client::InProcessServer server;
-  // A strip in the plane z = 0, clockwise seen from above, as Unreal has it.
+  // A strip in the plane z = 0 that looks up.
   std::vector<float> positions;
   std::vector<std::uint32_t> indices;
   for (int k = 0; k <= 10; ++k) {
@@ -22,8 +29,9 @@ TEST(UnrealFollower, FollowsAHandleInCentimetres) {
       positions.insert(positions.end(), {100.0F * static_cast<float>(k), y, 0});
   }
   for (std::uint32_t k = 0; k < 20; k += 2) {
-    for (const std::uint32_t corner : {0U, 2U, 3U, 0U, 3U, 1U}) indices.push_back(k + corner);
+    for (const std::uint32_t corner : {0U, 3U, 2U, 0U, 1U, 3U}) indices.push_back(k + corner);
   }
+  ASSERT_GT(unreal_normal_z(positions, indices[0], indices[1], indices[2]), 0);
   LpdeformFollower follower(server.address(), positions, indices);
   EXPECT_TRUE(follower.hold("base", {0, 1}));
   EXPECT_TRUE(follower.hold("tip", {20, 21}));
@@ -36,7 +44,7 @@ TEST(UnrealFollower, FollowsAHandleInCentimetres) {
   }
   EXPECT_TRUE(has_followed) << follower.problem();
   EXPECT_EQ(follower.state(), LPDEFORM_STATE_LIVE);
-  EXPECT_GT(follower.normals()[2], 0);  // the base looks up
+  EXPECT_GT(follower.normals()[2], 0);  // the base looks up still
   EXPECT_EQ(follower.problem(), "");
   follower.hold("nothing", {});  // refused by the server, and said by a later tick
   std::string problem;

@@ -91,7 +91,8 @@ TEST(Space, ARotationOfTheEnginesIsTheSameOneOnTheServer) {
 }
 
 TEST(Space, TrianglesAreTurnedWhereTheyAreClockwise) {
-  EXPECT_TRUE(space_of(LPDEFORM_LEFT_HANDED, LPDEFORM_Y_UP, 1, LPDEFORM_WINDING_USUAL).turns_triangles());
+  EXPECT_TRUE(space_of(LPDEFORM_LEFT_HANDED, LPDEFORM_Y_UP).turns_triangles());   // Unity
+  EXPECT_FALSE(space_of(LPDEFORM_LEFT_HANDED, LPDEFORM_Z_UP).turns_triangles());  // Unreal
   EXPECT_TRUE(space_of(LPDEFORM_LEFT_HANDED, LPDEFORM_Y_UP, 1, LPDEFORM_CLOCKWISE).turns_triangles());
   EXPECT_FALSE(
       space_of(LPDEFORM_LEFT_HANDED, LPDEFORM_Y_UP, 1, LPDEFORM_COUNTER_CLOCKWISE).turns_triangles());

@@ -3,16 +3,14 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <array>
-#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
-#include <thread>
 
 #include "client/c/lpdeform.h"
 #include "server/server.h"
+#include "tests/client/c/session_fixture.h"
 #include "tests/server/token_maker.h"
 
 namespace lpdeform {
@@ -44,22 +42,15 @@ class CTokenTest : public testing::Test {
 
   /// How a session of a triangle gets on: its state once it is no longer connecting, with the reason in error_.
   lpdeform_state open() {
-    const std::array<float, 9> vertices{0, 0, 0, 1, 0, 0, 0, 1, 0};
-    const std::array<std::uint32_t, 3> indices{0, 1, 2};
-    lpdeform_mesh mesh{};
-    mesh.struct_size = sizeof mesh;
-    mesh.vertex_count = 3;
-    mesh.positions = {vertices.data(), sizeof vertices, 0, 0, LPDEFORM_FLOAT32, 0};
-    mesh.indices = indices.data();
-    mesh.index_count = 3;
+    const engine::Triangle triangle;
+    const lpdeform_mesh mesh = triangle.mesh();
     lpdeform_session* session = nullptr;
     EXPECT_EQ(lpdeform_open(client_, &mesh, nullptr, &session, &error_), LPDEFORM_OK) << error_.message;
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     lpdeform_state state = LPDEFORM_STATE_CONNECTING;
-    while (state == LPDEFORM_STATE_CONNECTING && std::chrono::steady_clock::now() < deadline) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));  // as a game between two frames
+    engine::eventually([&] {
       state = lpdeform_session_state(session, &error_);
-    }
+      return state != LPDEFORM_STATE_CONNECTING;
+    });
     lpdeform_close(session);
     return state;
   }
