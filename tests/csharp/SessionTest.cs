@@ -2,48 +2,9 @@
 
 using System;
 using System.Diagnostics;
-using System.IO;
 using System.Linq;
 using System.Threading;
 using Lpdeform;
-
-sealed class Server : IDisposable
-{
-    readonly string program, folder = Path.Combine(Path.GetTempPath(), "lpdeform-" + Guid.NewGuid().ToString("N").Substring(0, 8));
-    Process process;
-
-    public Server(string program)
-    {
-        this.program = program;
-        Directory.CreateDirectory(folder);
-        Start();
-    }
-
-    public string Address { get { return "unix:" + folder + "/socket"; } }
-
-    public void Start()
-    {
-        process = Process.Start(new ProcessStartInfo(program, "--address " + Address + " --log-level off")
-        {
-            UseShellExecute = false, RedirectStandardOutput = true, RedirectStandardError = true
-        });
-        process.ErrorDataReceived += (sender, line) => { };
-        process.BeginErrorReadLine();
-        if (process.StandardOutput.ReadLine() == null) throw new Exception("the server did not start");
-    }
-
-    public void Kill()
-    {
-        process.Kill();
-        process.WaitForExit();
-    }
-
-    public void Dispose()
-    {
-        Kill();
-        Directory.Delete(folder, true);
-    }
-}
 
 static class SessionTest
 {
@@ -179,10 +140,118 @@ static class SessionTest
             session.Handles.Move("tip", Motion.Move(0, 1, 0));
             Frame frame;
             session.TryGetFrame(positions, out frame);
-            int before = GC.CollectionCount(0);
-            for (int k = 0; k < 100000; ++k) session.TryGetFrame(positions, out frame);
-            for (int k = 0; k < 10000; ++k) session.Handles.Move("tip", Motion.Move(0, 1, 0.001 * k));
-            Expect(GC.CollectionCount(0) == before, "no collection in 100000 polls");
+            Expect(Collections(calls, k => GC.KeepAlive(new object())) > 0, "the smallest garbage would show");
+            Expect(Collections(calls, k => session.TryGetFrame(positions, out frame)) == 0, "none of polls");
+            Expect(Collections(calls, k => session.Handles.Move("tip", Motion.Move(0, 1, 1e-5 * k))) == 0, "none of moves");
+        }
+    }
+
+    /// 16 bytes of each would fill the nursery of 512 KiB (tests/csharp/run) three times.
+    const int calls = 100000;
+
+    static int Collections(int count, Action<int> work)
+    {
+        int before = GC.CollectionCount(0);
+        for (int k = 0; k < count; ++k) work(k);
+        return GC.CollectionCount(0) - before;
+    }
+
+    static void Refused(string reason, Action change)
+    {
+        try
+        {
+            change();
+            Expect(false, reason);
+        }
+        catch (LpdeformException error)
+        {
+            Expect(error.Reason == reason, error.Reason);
+        }
+    }
+
+    static void EmptyArraysAreNothing()
+    {
+        var mesh = Strip();
+        mesh.Normals = new float[0];  // as Unity has them where there are none
+        using (var client = new Client(server.Address))
+        using (var session = client.Open(mesh))
+        {
+            session.Handles.Set("base", new[] { 0, 1 });
+            var positions = new float[66];
+            session.Settle(new FrameBuffers { Positions = positions, Normals = new float[0], Colours = new byte[0],
+                                              Distortion = new float[0] });
+            Refused("HANDLE_EMPTY", () =>
+            {
+                session.Handles.Set("none", new int[0]);
+                session.Settle(positions);
+            });
+            session.SetPerVertex(new double[0]);  // changes nothing
+            session.Settle(positions);
+        }
+        using (var client = new Client(server.Address))
+        using (var session = client.Open(new MeshData { Positions = new float[0], Indices = new int[0] }))
+        {
+            Eventually(() => session.State == SessionState.Refused, "refused");
+            Expect(session.Problem.Reason == "MESH_EMPTY", session.Problem.Reason);
+        }
+    }
+
+    static void TextsThatCannotBeSaidAreRefused()
+    {
+        using (var client = new Client(server.Address))
+        using (var session = OpenStrip(client))
+        {
+            foreach (var name in new[] { "tip\0", "\ud800" })
+            {
+                try
+                {
+                    session.Handles.Move(name, Motion.Move(0, 1, 0));
+                    Expect(false, "refused");
+                }
+                catch (ArgumentException)
+                {
+                }
+            }
+        }
+    }
+
+    static void TargetsPointsAndRegions()
+    {
+        using (var client = new Client(server.Address))
+        using (var session = OpenStrip(client))
+        {
+            var positions = new float[66];
+            session.Handles.MoveTo("tip", new double[] { 9, 1, 0, 9, 2, 1 });
+            session.Settle(positions);
+            Expect(positions[3 * 20] == 9 && positions[3 * 20 + 1] == 1 && positions[3 * 21 + 1] == 2, "each at its own place");
+            session.Handles.Remove("tip");
+            session.Handles.SetPoints("middle", new[] { new SurfacePoint(10, 0.25, 0.25, 0.5) }, Motion.Move(0, 1, 0));
+            session.Settle(positions);
+            var corners = Strip().Indices.Skip(30).Take(3).ToArray();
+            double height = 0.25 * positions[3 * corners[0] + 1] + 0.25 * positions[3 * corners[1] + 1] + 0.5 * positions[3 * corners[2] + 1];
+            Expect(Math.Abs(height - 1) < 1e-5, "the point is lifted: " + height);
+            session.Handles.Remove("middle");
+            session.SetRegion(new[] { 18, 19, 20, 21 });
+            session.Settle(positions);
+            session.Handles.Set("tip", new[] { 20, 21 }, Motion.Move(0, 3, 0));
+            var before = (float[])positions.Clone();
+            session.Settle(positions);
+            Expect(positions.Take(48).SequenceEqual(before.Take(48)), "outside of the region nothing moves");
+            session.SetRegion(null);
+            session.SetAutomatic(p: 0.5);
+            session.Settle(positions);
+        }
+    }
+
+    static void ASolveIsItsOwnResult()
+    {
+        using (var client = new Client(server.Address))
+        using (var session = OpenStrip(client))
+        {
+            var positions = new float[66];
+            var frame = session.Solve(new FrameBuffers { Positions = positions }, certify: true, timeoutSeconds: Patience);
+            Expect(frame.Converged && frame.OptimalityGap < 1e-3 && frame.InputSeq == 2, "a result with its bound");
+            Expect(positions[3 * 20 + 1] == 2, "the tip is lifted");
         }
     }
 
@@ -215,7 +284,8 @@ static class SessionTest
     static int Main(string[] arguments)
     {
         var tests = new Action[] { FramesComeIntoTheCallersSpans, ErrorsCarryTheServersReason, ARefusedMeshIsAState,
-                                   WorkGoesOnWhenTheServerComesBack, PerFrameCallsMakeNoGarbage, SettingsAndReaders };
+                                   WorkGoesOnWhenTheServerComesBack, PerFrameCallsMakeNoGarbage, EmptyArraysAreNothing,
+                                   TextsThatCannotBeSaidAreRefused, TargetsPointsAndRegions, ASolveIsItsOwnResult, SettingsAndReaders };
         int failed = 0;
         using (server = new Server(arguments[0]))
         {

@@ -9,6 +9,8 @@ namespace Lpdeform
         public bool Tls;
         /// PEM; null: whom the system trusts.
         public string RootCertificates;
+        /// PEM: our own and its key, where the server asks for one.
+        public string CertificateChain, PrivateKey;
         /// Bearer token of each call; see Client.SetToken.
         public string Token;
         /// For how long a session tries to reach a server that is away; 0 is for ever.
@@ -34,6 +36,8 @@ namespace Lpdeform
                     Tls = options.Tls ? 1u : 0u,
                     Address = pinned.Text(address),
                     RootCertificates = pinned.Text(options.RootCertificates),
+                    CertificateChain = pinned.Text(options.CertificateChain),
+                    PrivateKey = pinned.Text(options.PrivateKey),
                     Token = pinned.Text(options.Token),
                     ReconnectSeconds = options.ReconnectSeconds
                 };

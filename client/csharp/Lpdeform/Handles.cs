@@ -26,6 +26,19 @@ namespace Lpdeform
         public ulong Set(string name, int[] vertices, Motion motion, HoldOptions how = default(HoldOptions))
         {
             if (vertices == null) throw new ArgumentNullException("vertices");
+            return Set(name, vertices, null, motion, how);
+        }
+
+        /// The same with points inside faces of the mesh in place of vertices; exactly or soft.
+        public ulong SetPoints(string name, SurfacePoint[] points, Motion motion = default(Motion),
+                               HoldOptions how = default(HoldOptions))
+        {
+            if (points == null) throw new ArgumentNullException("points");
+            return Set(name, null, points, motion, how);
+        }
+
+        ulong Set(string name, int[] vertices, SurfacePoint[] points, Motion motion, HoldOptions how)
+        {
             ulong inputSeq;
             var error = LpdeformException.NewError();
             using (var pinned = new Pinned())
@@ -36,7 +49,9 @@ namespace Lpdeform
                     Hold = (int)how.Hold,
                     Name = pinned.Array(NameOf(name)),
                     Vertices = pinned.Array(vertices),
-                    VertexCount = (uint)vertices.Length,
+                    VertexCount = vertices == null ? 0u : (uint)vertices.Length,
+                    Points = pinned.Array(points),
+                    PointCount = points == null ? 0u : (uint)points.Length,
                     Motion = motion.ToNative(),
                     Weight = how.Weight,
                     Direction = how.Direction,
@@ -57,6 +72,24 @@ namespace Lpdeform
             var native = motion.ToNative();
             LpdeformException.Check(
                 Native.lpdeform_move_handle(session.Pointer, NameOf(name), ref native, out inputSeq, error), error);
+            return inputSeq;
+        }
+
+        /// Moves each vertex or point of a handle to a place of its own: x, y, z of each.
+        public ulong MoveTo(string name, double[] positions)
+        {
+            if (positions == null || positions.Length % 3 != 0) throw new ArgumentException("x, y, z of each", "positions");
+            ulong inputSeq;
+            var error = LpdeformException.NewError();
+            using (var pinned = new Pinned())
+            {
+                var native = new Native.Motion
+                {
+                    Kind = 2, PositionCount = (uint)(positions.Length / 3), Positions = pinned.Array(positions)
+                };
+                LpdeformException.Check(
+                    Native.lpdeform_move_handle(session.Pointer, NameOf(name), ref native, out inputSeq, error), error);
+            }
             return inputSeq;
         }
 

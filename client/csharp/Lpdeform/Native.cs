@@ -117,6 +117,13 @@ namespace Lpdeform
             public Vector3d Origin, Extent;
         }
 
+        [StructLayout(LayoutKind.Sequential)]
+        public struct SolveOptions
+        {
+            public uint StructSize, Certify;
+            public double TimeoutSeconds;
+        }
+
         // An error is passed as the bytes of lpdeform_error: see LpdeformException.
 
         [DllImport(Library, CallingConvention = C)]
@@ -158,5 +165,8 @@ namespace Lpdeform
         [DllImport(Library, CallingConvention = C)]
         public static extern int lpdeform_settle(IntPtr session, double timeoutSeconds, ref Buffers buffers, ref Frame frame,
                                                  byte[] error);
+        [DllImport(Library, CallingConvention = C)]
+        public static extern int lpdeform_solve(IntPtr session, ref SolveOptions options, ref Buffers buffers, ref Frame frame,
+                                                byte[] error);
     }
 }

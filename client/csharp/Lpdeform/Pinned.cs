@@ -10,10 +10,10 @@ namespace Lpdeform
     {
         readonly List<GCHandle> handles = new List<GCHandle>();
 
-        /// IntPtr.Zero for null.
+        /// IntPtr.Zero for null and for an empty array.
         public IntPtr Array(Array array)
         {
-            if (array == null) return IntPtr.Zero;
+            if (array == null || array.Length == 0) return IntPtr.Zero;
             var handle = GCHandle.Alloc(array, GCHandleType.Pinned);
             handles.Add(handle);
             return handle.AddrOfPinnedObject();
@@ -26,14 +26,17 @@ namespace Lpdeform
 
         public Native.Attribute Floats(float[] numbers)
         {
-            if (numbers == null) return default(Native.Attribute);
+            if (numbers == null || numbers.Length == 0) return default(Native.Attribute);
             return new Native.Attribute { Data = Array(numbers), Bytes = (UIntPtr)(4L * numbers.Length) };
         }
 
-        /// As C has texts, ending in a zero byte.
+        static readonly Encoding strict = new UTF8Encoding(false, true);
+
+        /// As C has texts, ending in a zero byte. Throws ArgumentException where that cannot be said.
         public static byte[] Utf8(string text)
         {
-            return Encoding.UTF8.GetBytes(text + "\0");
+            if (text.IndexOf('\0') >= 0) throw new ArgumentException("A text has a zero character.");
+            return strict.GetBytes(text + "\0");
         }
 
         public void Dispose()

@@ -3,7 +3,7 @@ using System.Runtime.InteropServices;
 
 namespace Lpdeform
 {
-    /// A mesh that deforms on a server while its handles are moved. Nothing here waits but Settle. Members may be used from
+    /// A mesh that deforms on a server while its handles are moved. Nothing here waits but Settle and Solve. Members may be used from
     /// any thread, except that Dispose must not overlap another.
     public sealed unsafe class Session : IDisposable
     {
@@ -68,6 +68,24 @@ namespace Lpdeform
             return Set(new Native.Settings { P = p, Stiffness = stiffness });
         }
 
+        /// p and stiffness from the geometry, with this strength, up to 1; 0 leaves one as it is. Returns the change's number.
+        public ulong SetAutomatic(double p = 0, double stiffness = 0)
+        {
+            return Set(new Native.Settings { PAutomatic = p, StiffnessAutomatic = stiffness });
+        }
+
+        /// Only these vertices may move from now on; null: all may. Returns the change's number.
+        public ulong SetRegion(int[] vertices)
+        {
+            using (var pinned = new Pinned())
+            {
+                return Set(new Native.Settings
+                {
+                    SetRegion = 1, Region = pinned.Array(vertices), RegionCount = vertices == null ? 0u : (uint)vertices.Length
+                });
+            }
+        }
+
         /// p and stiffness, one a vertex; null leaves one as it is. Returns the change's number.
         public ulong SetPerVertex(double[] p, double[] stiffness = null)
         {
@@ -130,14 +148,23 @@ namespace Lpdeform
             return frame;
         }
 
-        enum Asked { New, Last, Result }
+        /// Waits for a solve of its own to the end, for the present handles and settings, and writes the result; beside the frames,
+        /// of which it takes none. `timeoutSeconds` 0 is without limit.
+        public Frame Solve(FrameBuffers buffers, bool certify = false, double timeoutSeconds = 0)
+        {
+            Frame frame;
+            Write(buffers, out frame, certify ? Asked.CertifiedSolve : Asked.Solve, timeoutSeconds);
+            return frame;
+        }
+
+        enum Asked { New, Last, Result, Solve, CertifiedSolve }
 
         bool Write(FrameBuffers into, out Frame frame, Asked asked, double timeout)
         {
             var native = new Native.Frame { StructSize = (uint)sizeof(Native.Frame) };
             int code;
-            // Settle does not keep others from a frame meanwhile.
-            var error = asked == Asked.Result ? LpdeformException.NewError() : frameError;
+            // What waits does not keep others from a frame meanwhile.
+            var error = asked == Asked.New || asked == Asked.Last ? frameError : LpdeformException.NewError();
             fixed (float* positions = &MemoryMarshal.GetReference(into.Positions))
             fixed (float* normals = &MemoryMarshal.GetReference(into.Normals))
             fixed (byte* colours = &MemoryMarshal.GetReference(into.Colours))
@@ -161,6 +188,7 @@ namespace Lpdeform
 
         static Native.Attribute At(void* data, int size, int count)
         {
+            if (count == 0) return default(Native.Attribute);  // an empty array is at a place, too
             return new Native.Attribute { Data = (IntPtr)data, Bytes = (UIntPtr)((ulong)size * (ulong)count) };
         }
 
@@ -170,7 +198,13 @@ namespace Lpdeform
         {
             if (asked == Asked.New) return Native.lpdeform_poll(Pointer, ref buffers, ref frame, error);
             if (asked == Asked.Last) return Native.lpdeform_repeat(Pointer, ref buffers, ref frame, error);
-            return Native.lpdeform_settle(Pointer, timeout, ref buffers, ref frame, error);
+            if (asked == Asked.Result) return Native.lpdeform_settle(Pointer, timeout, ref buffers, ref frame, error);
+            var options = new Native.SolveOptions
+            {
+                StructSize = (uint)sizeof(Native.SolveOptions), Certify = asked == Asked.CertifiedSolve ? 1u : 0u,
+                TimeoutSeconds = timeout
+            };
+            return Native.lpdeform_solve(Pointer, ref options, ref buffers, ref frame, error);
         }
 
         /// The session is over; its end on the server goes on by itself.

@@ -102,6 +102,22 @@ namespace Lpdeform
         }
     }
 
+    /// A point inside a face: barycentric coordinates times the face's corners in their order; their sum is 1.
+    [StructLayout(LayoutKind.Sequential)]
+    public struct SurfacePoint
+    {
+        public uint Face;
+        uint reserved;
+        public Vector3d Barycentric;
+
+        public SurfacePoint(uint face, double first, double second, double third)
+        {
+            Face = face;
+            reserved = 0;
+            Barycentric = new Vector3d(first, second, third);
+        }
+    }
+
     public enum Hold { Exactly, Soft, Orientation, AxisLock, PlaneLock }
 
     /// How a handle is held.

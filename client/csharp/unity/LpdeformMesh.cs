@@ -1,5 +1,5 @@
-// A sample for Unity: fits a MeshFilter to the handles around it. Put Lpdeform.dll and liblpdeform_client.so below Assets/Plugins
-// and this file below Assets; add it to an object with a MeshFilter whose mesh is readable; give it handles.
+// A sample for Unity: fits a MeshFilter to the handles around it. Add the package (client/csharp/package.json) to the project and put
+// liblpdeform_client.so below Assets/Plugins; add this to an object with a MeshFilter whose mesh is readable; give it handles.
 //
 // Compiled here against declarations of what it uses of UnityEngine, and not run inside Unity.
 
@@ -21,6 +21,8 @@ public sealed class LpdeformMesh : MonoBehaviour
         public float radius = 0.1f;
         [NonSerialized] public Matrix4x4 start;
         [NonSerialized] public Motion sent;
+        /// It holds vertices, so that it can be moved.
+        [NonSerialized] public bool holds;
     }
 
     public string address = "localhost:50051";
@@ -33,11 +35,15 @@ public sealed class LpdeformMesh : MonoBehaviour
     UnityEngine.Mesh mesh;
     Vector3[] positions, normals;
     Color32[] colours;
-    SessionState state;
     float sentP;
+
+    /// How the session is, for the Inspector: "Live", or "Refused: " and why.
+    public string status = "";
 
     void OnEnable()
     {
+        sentP = 0;  // a new session knows nothing
+        status = "";
         mesh = GetComponent<MeshFilter>().mesh;  // this object's own copy
         mesh.MarkDynamic();
         positions = mesh.vertices;
@@ -45,7 +51,15 @@ public sealed class LpdeformMesh : MonoBehaviour
         if (normals.Length != positions.Length) normals = new Vector3[positions.Length];
         colours = new Color32[positions.Length];
 
-        client = new Client(address);
+        try
+        {
+            client = new Client(address);
+        }
+        catch (LpdeformException error)
+        {
+            Give("Refused: " + error.Message);
+            return;
+        }
         var data = new MeshData
         {
             Positions = Floats(positions).ToArray(),
@@ -62,7 +76,9 @@ public sealed class LpdeformMesh : MonoBehaviour
         handle.start = Here(handle);
         var center = handle.start.MultiplyPoint3x4(Vector3.zero);
         var held = Array.FindAll(Numbers(positions.Length), i => (positions[i] - center).magnitude < handle.radius);
-        if (held.Length == 0) Debug.LogWarning("No vertex is within the radius of the handle " + handle.name, this);
+        handle.sent = default(Motion);
+        handle.holds = held.Length > 0;
+        if (!handle.holds) Debug.LogWarning("No vertex is within the radius of the handle " + handle.name, this);
         else session.Handles.Set(handle.name, held);
     }
 
@@ -70,22 +86,40 @@ public sealed class LpdeformMesh : MonoBehaviour
     void Update()
     {
         if (session == null) return;
-        foreach (var handle in handles) Send(handle);
-        if (p != sentP) session.Set(p: sentP = p);
+        Tell();
+        if (session == null) return;
         try
         {
+            foreach (var handle in handles)
+                if (handle.holds) Send(handle);
+            if (p != sentP)
+            {
+                session.Set(p: p);
+                sentP = p;
+            }
             Frame frame;
             var buffers = new FrameBuffers { Positions = Floats(positions), Normals = Floats(normals), Colours = Bytes(colours) };
             if (session.TryGetFrame(buffers, out frame)) Show();
         }
         catch (LpdeformException error)
         {
-            Debug.LogWarning("lpdeform: " + error.Message + " (" + error.Reason + ")", this);
+            Debug.LogWarning("lpdeform: " + error.Message + " (" + error.Reason + ")", this);  // of a change; each comes once
         }
-        if (session.State == state) return;
-        state = session.State;
-        Debug.Log("lpdeform: " + state, this);
-        if (state == SessionState.Refused) enabled = false;
+    }
+
+    /// Says how the session is where that has changed, and lets go of one that is over: it would throw at every call.
+    void Tell()
+    {
+        var state = session.State;
+        if (state == SessionState.Refused) Give("Refused: " + (session.Problem == null ? "" : session.Problem.Message));
+        else if (status != state.ToString()) Debug.Log("lpdeform: " + (status = state.ToString()), this);
+    }
+
+    void Give(string why)
+    {
+        status = why;
+        Debug.LogWarning("lpdeform: " + why, this);
+        OnDisable();
     }
 
     void Send(HandleObject handle)
@@ -98,8 +132,8 @@ public sealed class LpdeformMesh : MonoBehaviour
             Rotation = new Quaternion4(turn.x, turn.y, turn.z, turn.w), Translation = new Vector3d(shift.x, shift.y, shift.z)
         };
         if (motion.Equals(handle.sent)) return;
-        handle.sent = motion;
         session.Handles.Move(handle.name, motion);
+        handle.sent = motion;
     }
 
     Matrix4x4 Here(HandleObject handle)

@@ -1,0 +1,127 @@
+// The sample for Unity against a real server, its messages called as Unity calls them: SampleTest.exe SERVER.
+
+using System;
+using System.Diagnostics;
+using System.Linq;
+using System.Reflection;
+using System.Threading;
+using UnityEngine;
+
+static class SampleTest
+{
+    static Server server;
+
+    static void Expect(bool holds, string claim)
+    {
+        if (!holds) throw new Exception("not so: " + claim + "; " + string.Join(" | ", UnityEngine.Debug.Warnings));
+    }
+
+    static void Send(LpdeformMesh sample, string message)
+    {
+        typeof(LpdeformMesh).GetMethod(message, BindingFlags.Instance | BindingFlags.NonPublic).Invoke(sample, null);
+    }
+
+    static void UpdateUntil(LpdeformMesh sample, Func<bool> holds, string claim)
+    {
+        var clock = Stopwatch.StartNew();
+        while (!holds())
+        {
+            Expect(clock.Elapsed.TotalSeconds < 60, claim);
+            Thread.Sleep(1);  // as a game between two frames
+            Send(sample, "Update");
+        }
+    }
+
+    /// Ten squares along x, clockwise seen from above, held at both ends by objects that are there.
+    static LpdeformMesh Sample(out UnityEngine.Mesh mesh)
+    {
+        UnityEngine.Debug.Logs.Clear();
+        UnityEngine.Debug.Warnings.Clear();
+        mesh = new UnityEngine.Mesh { vertices = new Vector3[22], normals = new Vector3[0], triangles = new int[60] };
+        for (int i = 0; i < 22; ++i) mesh.vertices[i] = new Vector3 { x = i / 2, z = i % 2 };
+        for (int k = 0, a = 0; k < 60; k += 6, a += 2) new[] { a, a + 1, a + 3, a, a + 3, a + 2 }.CopyTo(mesh.triangles, k);
+        var sample = new LpdeformMesh { address = server.Address, handles = new[] { Handle("base", 0), Handle("tip", 10) } };
+        sample.Attach(new MeshFilter { mesh = mesh });
+        return sample;
+    }
+
+    static LpdeformMesh.HandleObject Handle(string name, float x)
+    {
+        var transform = new Transform { position = new Vector3 { x = x, z = 0.5f } };
+        return new LpdeformMesh.HandleObject { name = name, transform = transform, radius = 0.6f };
+    }
+
+    static void TheMeshFollowsItsHandles()
+    {
+        UnityEngine.Mesh mesh;
+        var sample = Sample(out mesh);
+        Send(sample, "OnEnable");
+        sample.handles[1].transform.position.y = 2;
+        UpdateUntil(sample, () => mesh.vertices[20].y == 2, "the tip is lifted");
+        Expect(mesh.vertices[0].y == 0 && mesh.normals[0].y > 0, "the base stays and looks up");
+        UpdateUntil(sample, () => sample.status == "Live", "it says so");
+        Expect(UnityEngine.Debug.Warnings.Count == 0, "no warnings");
+        Send(sample, "OnDisable");
+    }
+
+    static void AHandleThatHoldsNothingIsSaidOnceAndNeverMoved()
+    {
+        UnityEngine.Mesh mesh;
+        var sample = Sample(out mesh);
+        sample.handles = sample.handles.Concat(new[] { Handle("far", 100) }).ToArray();
+        Send(sample, "OnEnable");
+        for (int height = 1; height <= 3; ++height)
+        {
+            foreach (var handle in sample.handles.Skip(1)) handle.transform.position.y = height;
+            UpdateUntil(sample, () => mesh.vertices[20].y == height, "the tip is lifted");
+        }
+        Expect(UnityEngine.Debug.Warnings.Count == 1 && UnityEngine.Debug.Warnings[0].Contains("far"), "one warning");
+        Send(sample, "OnDisable");
+    }
+
+    static void PIsSentAgainToANewSession()
+    {
+        UnityEngine.Mesh mesh;
+        var sample = Sample(out mesh);
+        sample.p = 1.25f;
+        Send(sample, "OnEnable");
+        sample.handles[1].transform.position.y = 2;
+        UpdateUntil(sample, () => mesh.vertices[20].y == 2, "the first session");
+        Send(sample, "OnDisable");
+        var sent = typeof(LpdeformMesh).GetField("sentP", BindingFlags.Instance | BindingFlags.NonPublic);
+        Send(sample, "OnEnable");
+        Expect((float)sent.GetValue(sample) == 0, "nothing was sent to the second");
+        int drawn = mesh.timesDrawn;
+        UpdateUntil(sample, () => mesh.timesDrawn > drawn, "the second session");
+        Expect((float)sent.GetValue(sample) == 1.25f, "p was");
+        Send(sample, "OnDisable");
+    }
+
+    static void ARefusalIsSaidOnceAndShown()
+    {
+        UnityEngine.Mesh mesh;
+        var sample = Sample(out mesh);
+        mesh.triangles[3] = 99;
+        Send(sample, "OnEnable");
+        UpdateUntil(sample, () => sample.status.StartsWith("Refused"), "refused");
+        for (int k = 0; k < 50; ++k) Send(sample, "Update");
+        Expect(UnityEngine.Debug.Warnings.Count == 1, UnityEngine.Debug.Warnings.Count + " warnings");
+        Expect(sample.status.Contains("99") || sample.status.Contains("index"), sample.status);
+        Send(sample, "OnDisable");
+    }
+
+    static int Main(string[] arguments)
+    {
+        var tests = new Action[] { TheMeshFollowsItsHandles, AHandleThatHoldsNothingIsSaidOnceAndNeverMoved, PIsSentAgainToANewSession,
+                                   ARefusalIsSaidOnceAndShown };
+        using (server = new Server(arguments[0]))
+        {
+            foreach (var test in tests)
+            {
+                test();
+                Console.WriteLine("passed " + test.Method.Name);
+            }
+        }
+        return 0;
+    }
+}
