@@ -170,10 +170,13 @@ describe("a mesh with defects", () => {
     // In the colour of marks on light pages, or nearly.
     const expectMarked = async (place: readonly number[]) => {
       await expect
-        .poll(async () => {
-          const [r, g, b] = await user.colourAt(await user.ask(`pointOnPage([${place.join()}])`));
-          return r > 120 && g < 90 && b > 60;
-        })
+        .poll(
+          async () => {
+            const [r, g, b] = await user.colourAt(await user.ask(`pointOnPage([${place.join()}])`));
+            return r > 120 && g < 90 && b > 60;
+          },
+          { timeout: 30_000 },
+        )
         .toBe(true);
     };
     const warnings = user.page.locator(".warnings button");
