@@ -200,6 +200,13 @@ def test_settings_out_of_range_are_refused(session: lpdeform.Session, settings: 
     assert refused(session).reason == reason
 
 
+def test_a_name_that_is_no_text_is_refused_at_once_and_the_session_goes_on(session: lpdeform.Session) -> None:
+    with pytest.raises(lpdeform.InvalidInput) as caught:
+        session.set_handle("tip \ud800", [0])
+    assert (caught.value.reason, caught.value.element) == ("NAME_ENCODING", "handle 'tip \\ud800'")
+    assert session.settle(PATIENCE).converged
+
+
 def test_what_cannot_be_sent_is_refused_at_once(session: lpdeform.Session) -> None:
     newest = session.newest_input
     for wrong in (

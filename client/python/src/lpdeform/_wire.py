@@ -59,10 +59,21 @@ def named(table: Mapping[Any, T], name: object, what: str) -> T:
 
 
 def checked_update(update: types.Update) -> types.Update:
-    handles = {str(name): _checked_change(str(name), change) for name, change in update.handles.items()}
+    handles = {_checked_name(name): _checked_change(str(name), change) for name, change in update.handles.items()}
     if update.resize is not None:
         _vector(update.resize.scale, "resize.scale")
     return types.Update(handles, checked_settings(update.settings), update.resize)
+
+
+def _checked_name(name: object) -> str:
+    """Half a character, "\\ud800", cannot travel: nobody could parse the message that has it."""
+    text = str(name)
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        what = f"handle {text!r}"
+        raise invalid(f"The name of {what} cannot be said in UTF-8.", "NAME_ENCODING", what, "UTF-8") from None
+    return text
 
 
 def _checked_change(name: str, change: types.Change) -> types.Change:
