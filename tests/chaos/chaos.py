@@ -16,6 +16,7 @@ import shutil
 import sys
 import tempfile
 import time
+import traceback
 
 import grpc
 import numpy as np
@@ -60,10 +61,9 @@ def results_to_check(history: History, writers: list[Writer]) -> set[float]:
     return xs | {of[frame["session"]][frame["input_seq"]] for frame in frames[-1:]}
 
 
-def run(seed: int, seconds: float, mode: str | None) -> History:
+def run(book: Book, seed: int, seconds: float, mode: str | None) -> None:
     chance = random.Random(seed)
     mode = mode or chance.choice(("sqlite", "redis"))
-    book = Book()
     book.note("run", seed=seed, mode=mode, seconds=seconds)
     book.note("diagonal", length=float(np.linalg.norm(PLACES.max(0) - PLACES.min(0))))
     folder = tempfile.mkdtemp(prefix="lpdeform-chaos-")
@@ -96,7 +96,6 @@ def run(seed: int, seconds: float, mode: str | None) -> History:
         if world:
             world.close()
         shutil.rmtree(folder, ignore_errors=True)
-    return book.history
 
 
 def report(seed: int, history: History, took: float) -> bool:
@@ -112,13 +111,13 @@ def report(seed: int, history: History, took: float) -> bool:
 
 
 def attempt(options, seed: int) -> History:
-    """The run's history; where this program itself could not do its part, one that says so."""
+    """The run's history. Where a call failed that must not, once the faults are over, the history ends there."""
+    book = Book()
     try:
-        return run(seed, options.seconds, options.mode)
-    except (grpc.RpcError, lpdeform.LpdeformError, OSError) as error:
-        print(f"seed {seed}: {type(error).__name__}: {error}", flush=True)
-        return History([{"kind": "run", "at": 0.0, "seed": seed, "mode": str(options.mode), "seconds": 0.0},
-                        {"kind": "last", "at": 0.0, "session": "unknown", "input_seq": 1, "since": 0.0}])
+        run(book, seed, options.seconds, options.mode)
+    except (grpc.RpcError, lpdeform.LpdeformError, OSError):
+        book.note("broken", text=traceback.format_exc())
+    return book.history
 
 
 def main() -> int:

@@ -16,6 +16,7 @@ A history is a list of events, one JSON object a line. Each has "kind" and "at" 
     shown     client, session, epoch, frame_seq what the client library gave to its caller
     fault     what                              "kill", "pause", "slow_store", "drop", "envoy"
     last      session, input_seq, since         nothing is sent after this; a converged frame was waited for
+    broken    text                              a call failed that must not, after the faults; nothing comes after it
     reference x, probe                          the same handles, solved on a server without faults
     diagonal  length                            of the mesh
     memory    when ("before", "after"), resident, sessions, streams, counted
@@ -90,6 +91,8 @@ def inputs_never_fall(history: History):
 
 def the_last_input_is_answered(history: History):
     frames = history.by("session", "frame")
+    for event in history.of("broken"):
+        yield f"the service did not come back: {event['text']}"
     for last in history.of("last"):
         if not any(frame["converged"] and frame["input_seq"] >= last["input_seq"] and frame["at"] >= last["since"]
                    for frame in frames[last["session"]]):

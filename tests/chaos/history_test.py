@@ -96,6 +96,9 @@ class Judge(unittest.TestCase):
     def test_3_a_last_input_without_its_result(self):
         self.broken(3, self.change("last", {}, input_seq=4))
 
+    def test_3_a_service_that_does_not_come_back(self):
+        self.broken(3, lambda events: events.append({"kind": "broken", "at": 99.0, "text": "UNAVAILABLE"}))
+
     def test_3_a_result_that_came_before_it_was_asked_for(self):
         self.broken(3, self.change("last", {}, since=1e9))
 
