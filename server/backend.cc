@@ -32,10 +32,12 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
       options_(options),
       tokens_(std::move(tokens)),
       log_(options.log ? options.log : std::make_shared<Log>("off")),
-      budget_(std::make_shared<Budget>(options.max_bytes)),
+      budget_(std::make_shared<Budget>(options.max_bytes, options.max_bytes_per_caller)),
       uploads_(std::make_shared<Uploads>(
           budget_, timers,
           Uploads::Limits{options.max_upload_bytes, options.upload_idle, options.max_uploads})),
+      caller_limits_(std::make_shared<CallerLimits>(
+          timers, CallerLimits::Limits{options.max_streams_per_caller, options.max_upload_bytes_per_second})),
       factory_(options, budget_, uploads_,
                {scheduler,
                 timers,
@@ -120,6 +122,10 @@ absl::Status Backend::upload_part(const CallContext& call, const v1::UploadPartR
   if (!caller.ok()) return caller.status();
   const auto upload = uploads_->find(request.upload(), caller->subject);
   if (!upload.ok()) return upload.status();
+  if (absl::Status status = caller_limits_->take_upload_bytes(caller->subject, request.data().size());
+      !status.ok()) {
+    return status;
+  }
   const auto progress = (*upload)->add(request.offset(), request.data());
   if (!progress.ok()) return progress.status();
   response.set_received_bytes(progress->received_bytes);
@@ -182,6 +188,8 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call
   auto decoded = decode_frame_options(options);
   if (!decoded.ok()) return decoded.status();
   decoded->max_bytes_per_second = options_.max_stream_bytes_per_second;
+  auto place = caller_limits_->enter_stream((*session)->owner());
+  if (!place.ok()) return place.status();
   auto stream = (*session)->open_stream(token, *decoded);
   if (!stream.ok()) return stream.status();
   (*stream)->start(std::move(wake));
@@ -193,7 +201,7 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call
                                {"epoch", lease.epoch},
                                {"input_seq", lease.input_seq},
                                {"trace_id", call.trace_id}});
-  return OpenStream{*std::move(session), *std::move(stream)};
+  return OpenStream{*std::move(session), *std::move(stream), *std::move(place)};
 }
 
 void Backend::forget(const CallContext& call, const OpenStream& open) {

@@ -14,6 +14,7 @@
 #include "server/call_context.h"
 #include "server/call_gate.h"
 #include "server/call_record.h"
+#include "server/caller_limits.h"
 #include "server/decode.h"
 #include "server/keeper.h"
 #include "server/log.h"
@@ -79,6 +80,7 @@ class Backend {
   struct OpenStream {
     std::shared_ptr<Session> session;
     std::shared_ptr<FrameStream> stream;
+    CallerLimits::Place place = nullptr;
   };
   absl::StatusOr<OpenStream> open_stream(const CallContext& call, const std::string& session_name,
                                          const std::string& token, const v1::FrameOptions& options,
@@ -134,6 +136,7 @@ class Backend {
   const std::shared_ptr<const Log> log_;
   const std::shared_ptr<Budget> budget_;
   const std::shared_ptr<Uploads> uploads_;
+  const std::shared_ptr<CallerLimits> caller_limits_;
   const SessionFactory factory_;
   std::shared_ptr<Keeper> keeper_;  // null without a store
 

@@ -167,7 +167,7 @@ void Backend::when_here(const CallContext& call, const std::string& name, Done t
     return then(absl::OkStatus());
   }
   const Done in_pool = [this, then = std::move(then)](const absl::Status& status) {
-    if (!pool.try_post([then, status] { then(status); })) then(server_busy());
+    if (!pool.try_post([then, status] { then(status); })) then(server_busy(pool.expected_wait()));
   };
   {
     const std::scoped_lock lock(restoring_mutex_);

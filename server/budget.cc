@@ -7,7 +7,7 @@
 
 namespace lpdeform {
 
-absl::StatusOr<Reservation> Budget::reserve(std::size_t bytes) {
+absl::StatusOr<Reservation> Budget::reserve(std::size_t bytes, const std::string& owner) {
   const std::scoped_lock lock(mutex_);
   if (bytes > most_ || used_ > most_ - bytes) {
     return make_fault(absl::StatusCode::kResourceExhausted,
@@ -15,8 +15,18 @@ absl::StatusOr<Reservation> Budget::reserve(std::size_t bytes) {
                       absl::StrCat("This needs about ", bytes, " bytes; the server has ", used_, " of its ",
                                    most_, " in use. Try again later, or with a smaller mesh."));
   }
-  used_ += bytes;
-  return Reservation(shared_from_this(), bytes);
+  const auto found = used_by_.find(owner);
+  const std::size_t theirs = found == used_by_.end() ? 0 : found->second;
+  if (!owner.empty() && most_each_ != 0 && (bytes > most_each_ || theirs > most_each_ - bytes)) {
+    return make_fault(
+        absl::StatusCode::kResourceExhausted,
+        {"CALLER_MEMORY_FULL", "memory", absl::StrCat("bytes <= ", most_each_)},
+        absl::StrCat("This needs about ", bytes, " bytes; the caller has ", theirs, " of the ", most_each_,
+                     " that one caller may have in use. Delete a session or an upload first, or take a "
+                     "smaller mesh."));
+  }
+  change_locked(owner, 0, bytes);
+  return Reservation(shared_from_this(), owner, bytes);
 }
 
 std::size_t Budget::used() const {
@@ -24,25 +34,36 @@ std::size_t Budget::used() const {
   return used_;
 }
 
-void Budget::change(std::size_t from, std::size_t to) {
+void Budget::change(const std::string& owner, std::size_t from, std::size_t to) {
   const std::scoped_lock lock(mutex_);
+  change_locked(owner, from, to);
+}
+
+void Budget::change_locked(const std::string& owner, std::size_t from, std::size_t to) {
   used_ = used_ - from + to;
+  if (owner.empty()) return;
+  std::size_t& theirs = used_by_[owner];
+  theirs = theirs - from + to;
+  if (theirs == 0) used_by_.erase(owner);
 }
 
 Reservation::Reservation(Reservation&& other) noexcept
-    : budget_(std::move(other.budget_)), bytes_(std::exchange(other.bytes_, 0)) {}
+    : budget_(std::move(other.budget_)),
+      owner_(std::move(other.owner_)),
+      bytes_(std::exchange(other.bytes_, 0)) {}
 
 Reservation& Reservation::operator=(Reservation&& other) noexcept {
   if (this == &other) return *this;
   resize(0);
   budget_ = std::move(other.budget_);
+  owner_ = std::move(other.owner_);
   bytes_ = std::exchange(other.bytes_, 0);
   return *this;
 }
 
 void Reservation::resize(std::size_t bytes) {
   if (budget_ == nullptr) return;
-  budget_->change(bytes_, bytes);
+  budget_->change(owner_, bytes_, bytes);
   bytes_ = bytes;
 }
 

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "core/base/fault.h"
+#include "server/refusals.h"
 
 namespace lpdeform {
 namespace {
@@ -304,12 +305,6 @@ void encode_solver(const SolveSettings& settings, v1::SolverSettings& out) {
   const bool has_limit = settings.time_limit_seconds < std::numeric_limits<double>::infinity();
   out.set_time_limit_seconds(has_limit ? settings.time_limit_seconds : 0);
   out.set_initial(encode_initial(settings.initial));
-}
-
-std::uint32_t retry_after_ms(const absl::Status& status) {
-  if (absl::IsUnavailable(status)) return 1000;
-  if (absl::IsResourceExhausted(status)) return 5000;
-  return 0;
 }
 
 void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint now, v1::Session& out) {

@@ -42,8 +42,4 @@ void encode(const FramePiece& piece, v1::SolveResponse& out);
 void encode_trace(const std::vector<IterationRecord>& trace, std::size_t begin, std::size_t end,
                   v1::SolveTrace& out);
 
-/// How long a caller had better wait before it tries again, in milliseconds; 0 where trying again does not
-/// help.
-std::uint32_t retry_after_ms(const absl::Status& status);
-
 }  // namespace lpdeform

@@ -75,7 +75,7 @@ class StreamFramesCall final
   void begin(const v1::StreamFramesRequest& request) {
     auto self = std::static_pointer_cast<StreamFramesCall>(shared_from_this());
     const auto task = [self, request] { self->open(request.session(), "", request.options()); };
-    if (!backend_.pool.try_post(task)) refuse(server_busy());
+    if (!backend_.pool.try_post(task)) refuse(server_busy(backend_.pool.expected_wait()));
   }
 };
 
@@ -136,7 +136,8 @@ class DeformCall final
 
   void post(void (DeformCall::*task)()) {
     auto self = std::static_pointer_cast<DeformCall>(shared_from_this());
-    if (!backend_.pool.try_post([self, task] { (*self.*task)(); })) refuse(server_busy());
+    if (!backend_.pool.try_post([self, task] { (*self.*task)(); }))
+      refuse(server_busy(backend_.pool.expected_wait()));
   }
 
   void take_open() {

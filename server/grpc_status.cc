@@ -5,7 +5,7 @@
 #include "core/base/fault.h"
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
-#include "server/encode.h"
+#include "server/refusals.h"
 
 namespace lpdeform {
 namespace {

@@ -75,7 +75,7 @@ void Keeper::add(std::shared_ptr<Session> session, StoredHead head, const std::s
         services_.metrics->add(Count::kStoreErrors);
         refused(status);
       });
-  if (!is_posted) on_done(server_busy());
+  if (!is_posted) on_done(server_busy(reader_.expected_wait()));
 }
 
 /// Its blobs are kept.
@@ -197,7 +197,7 @@ void Keeper::take_over_until(const std::string& name, const std::string& owner, 
       if (const auto self = weak.lock()) self->take_over_until(name, owner, end, on_found);
     });
   });
-  if (!is_posted) on_found(server_busy());
+  if (!is_posted) on_found(server_busy(reader_.expected_wait()));
 }
 
 absl::StatusOr<Keeper::Found> Keeper::read(const std::string& name, const std::string& owner) {
@@ -224,7 +224,7 @@ absl::StatusOr<Keeper::Found> Keeper::read(const std::string& name, const std::s
 void Keeper::find_request(const std::string& owner, const std::string& request_id, OnName on_name) {
   const bool is_posted = reader_.try_post(
       [this, owner, request_id, on_name] { on_name(store_->find_request(owner, request_id)); });
-  if (!is_posted) on_name(server_busy());
+  if (!is_posted) on_name(server_busy(reader_.expected_wait()));
 }
 
 void Keeper::flush(Clock::time_point end) {

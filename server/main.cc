@@ -71,6 +71,22 @@ void describe(CLI::App& app, Arguments& arguments) {
                  "Sessions of one caller at a time, where callers are told apart; 0: without limit")
       ->envname("LPDEFORM_MAX_SESSIONS_PER_CALLER")
       ->capture_default_str();
+  app.add_option("--max-streams-per-caller", server.max_streams_per_caller,
+                 "Streams of one caller at a time, where callers are told apart; 0: without limit")
+      ->envname("LPDEFORM_MAX_STREAMS_PER_CALLER")
+      ->capture_default_str();
+  app.add_option(
+         "--max-bytes-per-caller", server.max_bytes_per_caller,
+         "Memory of one caller's sessions and uploads, where callers are told apart; as 4GiB or in bytes, "
+         "0: without limit")
+      ->envname("LPDEFORM_MAX_BYTES_PER_CALLER")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+  app.add_option("--max-upload-rate", server.max_upload_bytes_per_second,
+                 "Bytes a second of one caller's uploads, where callers are told apart; 0: without limit")
+      ->envname("LPDEFORM_MAX_UPLOAD_RATE")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   app.add_option("--threads", server.threads, "Threads that one solve may use; 0: all cores")
       ->envname("LPDEFORM_THREADS")
       ->check(CLI::Range(0, 1024))

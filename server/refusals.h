@@ -1,18 +1,49 @@
 #pragma once
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+
+#include "absl/status/status.h"
+#include "absl/strings/cord.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 
 namespace lpdeform {
+
+inline constexpr char kRetryPayload[] = "lpdeform/retry_after_ms";
+
+/// The same error, saying when to try again: 1 ms to an hour from now.
+inline absl::Status retry_after(absl::Status error, std::chrono::duration<double> wait) {
+  const double ms = std::clamp(std::ceil(1e3 * wait.count()), 1.0, 3.6e6);
+  error.SetPayload(kRetryPayload, absl::Cord(absl::StrCat(static_cast<std::uint32_t>(ms))));
+  return error;
+}
+
+/// How long a caller had better wait before it tries again, in milliseconds; 0 where trying again does not help.
+inline std::uint32_t retry_after_ms(const absl::Status& error) {
+  std::uint32_t ms = 0;
+  if (const auto payload = error.GetPayload(kRetryPayload);
+      payload && absl::SimpleAtoi(std::string(*payload), &ms)) {
+    return ms;
+  }
+  if (absl::IsUnavailable(error)) return 1000;
+  if (absl::IsResourceExhausted(error)) return 5000;
+  return 0;
+}
 
 /// UNAVAILABLE DRAINING.
 inline absl::Status server_draining() {
   return make_fault(absl::StatusCode::kUnavailable, {"DRAINING", "", ""}, "The server is shutting down.");
 }
 
-/// RESOURCE_EXHAUSTED SERVER_BUSY.
-inline absl::Status server_busy() {
-  return make_fault(absl::StatusCode::kResourceExhausted, {"SERVER_BUSY", "calls", ""},
-                    "The server has too many calls waiting; try again later.");
+/// RESOURCE_EXHAUSTED SERVER_BUSY. `wait`: until those that wait now have had their turn.
+inline absl::Status server_busy(std::chrono::duration<double> wait) {
+  return retry_after(make_fault(absl::StatusCode::kResourceExhausted, {"SERVER_BUSY", "calls", ""},
+                                "The server has too many calls waiting; try again after the time given."),
+                     wait);
 }
 
 }  // namespace lpdeform

@@ -1,13 +1,20 @@
 #include "server/registry.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "server/refusals.h"
 #include "server/upload.h"
 
 namespace lpdeform {
+namespace {
+
+constexpr std::chrono::seconds kShortestAdvice{5}, kLongestAdvice{60};
+
+}  // namespace
 
 Registry::Registry(std::shared_ptr<Timers> timers, Limits limits)
     : timers_(std::move(timers)), limits_(limits) {}
@@ -52,10 +59,12 @@ bool Registry::begin_creation(const std::string& request_id, OnCreated on_create
 
 absl::Status Registry::check_room(const std::string& owner) const {
   if (sessions_.size() + being_made_ >= limits_.most_sessions) {
-    return make_fault(absl::StatusCode::kResourceExhausted,
-                      {"SESSIONS_FULL", "sessions", absl::StrCat("sessions <= ", limits_.most_sessions)},
-                      absl::StrCat("The server has all of its ", limits_.most_sessions,
-                                   " sessions in use; try again later."));
+    return retry_after(
+        make_fault(absl::StatusCode::kResourceExhausted,
+                   {"SESSIONS_FULL", "sessions", absl::StrCat("sessions <= ", limits_.most_sessions)},
+                   absl::StrCat("The server has all of its ", limits_.most_sessions,
+                                " sessions in use; try again after the time given.")),
+        until_one_expires());
   }
   const auto held = held_.find(owner);
   if (owner.empty() || limits_.most_each == 0 || held == held_.end() || held->second < limits_.most_each) {
@@ -65,6 +74,14 @@ absl::Status Registry::check_room(const std::string& owner) const {
                     {"CALLER_SESSIONS_FULL", "sessions", absl::StrCat("sessions <= ", limits_.most_each)},
                     absl::StrCat("The caller has all of the ", limits_.most_each,
                                  " sessions that one caller may have; delete one first."));
+}
+
+/// Until a session goes that nobody uses; somebody may delete one before: 5 s to a minute.
+std::chrono::duration<double> Registry::until_one_expires() const {
+  Timers::Duration soonest = kLongestAdvice;
+  for (const auto& [name, entry] : sessions_)
+    soonest = std::min(soonest, entry.session->last_used() + limits_.idle - timers_->now());
+  return std::max<Timers::Duration>(soonest, kShortestAdvice);
 }
 
 void Registry::give_up_place(const std::string& owner) {

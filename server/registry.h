@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <map>
@@ -99,6 +100,7 @@ class Registry : public std::enable_shared_from_this<Registry> {
   void watch(const std::string& name, Timers::TimePoint when);
   void expire(const std::string& name);
   absl::Status check_room(const std::string& owner) const;
+  std::chrono::duration<double> until_one_expires() const;
   void give_up_place(const std::string& owner);
   void enter(const std::shared_ptr<Session>& session, const std::string& request_id);
 

@@ -40,7 +40,10 @@ struct ServerOptions {
 
   std::size_t max_connections = 4096;
   std::size_t max_sessions = 256;
-  std::size_t max_sessions_per_caller = 64;  // where callers are told apart; 0: without limit
+  std::size_t max_sessions_per_caller = 64;                 // where callers are told apart; 0: without limit
+  std::size_t max_streams_per_caller = 256;                 // likewise
+  std::size_t max_bytes_per_caller = std::size_t{4} << 30;  // likewise, of sessions and uploads
+  double max_upload_bytes_per_second = 0;                   // likewise; see CallerLimits
   std::size_t max_streams_per_session = SessionLimits().streams;
   std::size_t max_handles = SessionLimits().handles;  // of one session
   std::size_t max_uploads = Uploads::kMostUploads;

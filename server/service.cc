@@ -55,7 +55,7 @@ grpc::ServerUnaryReactor* in_pool(Backend& backend, grpc::CallbackServerContext&
   if (!record->is_let_in()) {
     finish(server_draining());
   } else if (!backend.pool.try_post([task = std::move(task), finish] { task(finish); })) {
-    finish(server_busy());
+    finish(server_busy(backend.pool.expected_wait()));
   }
   return reactor;
 }

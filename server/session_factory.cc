@@ -65,7 +65,7 @@ absl::Status SessionFactory::make_shape(const v1::CreateSessionRequest& request,
                                         SessionParts& parts) const {
   const auto free_components = decode_free_components(request.free_components());
   if (!free_components.ok()) return free_components.status();
-  auto memory = budget_->reserve(estimate(request.mesh()));
+  auto memory = budget_->reserve(estimate(request.mesh()), parts.owner);
   if (!memory.ok()) return memory.status();
   parts.free_components = *free_components;
   parts.memory = *std::move(memory);

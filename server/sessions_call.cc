@@ -32,7 +32,8 @@ class StreamSessionsCall final
       return refuse(wrong_count(request.streams_size()));
     }
     auto self = std::static_pointer_cast<StreamSessionsCall>(shared_from_this());
-    if (!backend_.pool.try_post([self, request] { self->fetch(request, 0); })) refuse(server_busy());
+    if (!backend_.pool.try_post([self, request] { self->fetch(request, 0); }))
+      refuse(server_busy(backend_.pool.expected_wait()));
   }
 
  private:

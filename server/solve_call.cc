@@ -26,7 +26,7 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
                                  status.ok() ? self->start(request) : self->refuse(status);
                                });
     };
-    if (!backend_.pool.try_post(task)) refuse(server_busy());
+    if (!backend_.pool.try_post(task)) refuse(server_busy(backend_.pool.expected_wait()));
   }
 
  private:

@@ -1,8 +1,14 @@
 #include "server/task_pool.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace lpdeform {
+namespace {
+
+constexpr double kMeanTasks = 64;  // that the mean time is about
+
+}  // namespace
 
 TaskPool::TaskPool(int threads, std::size_t longest_queue, std::function<void(double)> on_waited)
     : longest_queue_(longest_queue), on_waited_(std::move(on_waited)) {
@@ -28,6 +34,13 @@ bool TaskPool::try_post(Task task) {
   return true;
 }
 
+std::chrono::duration<double> TaskPool::expected_wait() const {
+  const std::scoped_lock lock(mutex_);
+  const double wait =
+      mean_seconds_ * static_cast<double>(tasks_.size()) / static_cast<double>(threads_.size());
+  return std::chrono::duration<double>(std::max(0.05, wait));
+}
+
 void TaskPool::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
@@ -39,9 +52,12 @@ void TaskPool::run() {
     if (on_waited_) {
       on_waited_(std::chrono::duration<double>(std::chrono::steady_clock::now() - waiting.since).count());
     }
+    const auto begin = std::chrono::steady_clock::now();
     waiting.task();
     waiting.task = nullptr;
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
     lock.lock();
+    mean_seconds_ += (spent.count() - mean_seconds_) / kMeanTasks;
   }
 }
 

@@ -26,6 +26,10 @@ class TaskPool {
   /// False, and nothing happens, where too many wait already.
   [[nodiscard]] bool try_post(Task task);
 
+  /// How long a task that came now would wait, by those that wait and what tasks took of late; 50 ms at least, because
+  /// who asks was refused.
+  std::chrono::duration<double> expected_wait() const;
+
  private:
   struct Waiting {
     Task task;
@@ -35,9 +39,10 @@ class TaskPool {
 
   const std::size_t longest_queue_;
   const std::function<void(double)> on_waited_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Waiting> tasks_;
+  double mean_seconds_ = 0;  // of a task, over the last ones
   bool is_stopping_ = false;
   std::vector<std::thread> threads_;
 };

@@ -108,7 +108,7 @@ absl::StatusOr<std::shared_ptr<Upload>> Uploads::create(const std::string& reque
                       absl::StrCat("The server has all of its ", limits_.most_uploads,
                                    " uploads in use; delete those that have served, or try again later."));
   }
-  absl::StatusOr<Reservation> memory = budget_->reserve(size_bytes);
+  absl::StatusOr<Reservation> memory = budget_->reserve(size_bytes, owner);
   if (!memory.ok()) return memory.status();
   auto upload = std::make_shared<Upload>(absl::StrCat("uploads/", random_hex_128()), size_bytes, crc32c,
                                          *std::move(memory), owner);

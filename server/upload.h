@@ -75,7 +75,7 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
   Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers, Limits limits);
 
   /// Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED MEMORY_FULL,
-  /// UPLOADS_FULL.
+  /// CALLER_MEMORY_FULL, UPLOADS_FULL.
   absl::StatusOr<std::shared_ptr<Upload>> create(const std::string& request_id, std::uint64_t size_bytes,
                                                  std::uint32_t crc32c, const std::string& owner = "");
 

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "core/base/crc32c.h"
 #include "service_fixture.h"
@@ -159,6 +160,90 @@ TEST_F(CallersTest, OneCallerCannotTakeAllSessions) {
   for (int k = 0; k < 3; ++k) EXPECT_NE(call(alice_, &Stub::CreateSession, bad, none), "");
   create_as(alice_);
   EXPECT_EQ(refusal_, "");
+}
+
+class CallersWithLimitsTest : public CallersTest {
+ protected:
+  CallersWithLimitsTest() {
+    timers_ = std::make_shared<ManualTimers>();
+    options_.max_streams_per_caller = 1;
+    options_.max_bytes_per_caller = std::size_t{3} << 20;  // two small sessions by the estimate, not three
+    options_.max_upload_bytes_per_second = 1 << 20;
+    options_.max_sessions_per_caller = 0;
+  }
+
+  struct Reader {
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::ClientReader<v1::StreamFramesResponse>> stream;
+  };
+  /// A stream of frames; empty where it is refused, with the reason in refusal_.
+  std::unique_ptr<Reader> look(const std::string& token, const v1::CreateSessionResponse& session) {
+    auto reader = std::make_unique<Reader>();
+    reader->context.AddMetadata("authorization", "Bearer " + token);
+    v1::StreamFramesRequest request;
+    request.set_session(session.session().name());
+    reader->stream = stub_->StreamFrames(&reader->context, request);
+    v1::StreamFramesResponse first;
+    if (reader->stream->Read(&first)) return reader;
+    refusal_ = details_of(reader->stream->Finish()).info.reason();
+    return nullptr;
+  }
+};
+
+TEST_F(CallersWithLimitsTest, OneCallerCannotTakeAllStreams) {
+  const auto of_alice = create_as(alice_), of_bob = create_as(bob_);
+  auto first = look(alice_, of_alice);
+  ASSERT_TRUE(first);
+  EXPECT_FALSE(look(alice_, of_alice));
+  EXPECT_EQ(refusal_, "CALLER_STREAMS_FULL");
+  EXPECT_FALSE(look(viewer_, of_alice));
+  const auto other = look(bob_, of_bob);
+  EXPECT_TRUE(other);
+  first->context.TryCancel();
+  const auto end = std::chrono::steady_clock::now() + kTestDeadline;
+  std::unique_ptr<Reader> again;
+  while (!(again = look(alice_, of_alice)) && std::chrono::steady_clock::now() < end)
+    std::this_thread::yield();
+  EXPECT_TRUE(again);
+  for (auto* const reader : {again.get(), other.get()}) reader->context.TryCancel();
+}
+
+TEST_F(CallersWithLimitsTest, OneCallerCannotTakeAllMemory) {
+  const auto first = create_as(alice_), second = create_as(alice_);
+  EXPECT_EQ(refusal_, "");
+  create_as(alice_);
+  EXPECT_EQ(refusal_, "CALLER_MEMORY_FULL");
+  create_as(bob_);
+  EXPECT_EQ(refusal_, "");
+  v1::DeleteSessionRequest remove;
+  remove.set_session(second.session().name());
+  v1::DeleteSessionResponse removed;
+  EXPECT_EQ(call(alice_, &Stub::DeleteSession, remove, removed), "");
+  const auto end =
+      std::chrono::steady_clock::now() + kTestDeadline;  // it goes when the last thread lets go of it
+  do create_as(alice_);
+  while (refusal_ == "CALLER_MEMORY_FULL" && std::chrono::steady_clock::now() < end);
+  EXPECT_EQ(refusal_, "");
+}
+
+TEST_F(CallersWithLimitsTest, UploadsThatComeTooFastAreToldWhenToComeAgain) {
+  v1::CreateUploadRequest create;
+  create.set_size_bytes(2 << 20);
+  v1::CreateUploadResponse created;
+  ASSERT_EQ(call(alice_, &Stub::CreateUpload, create, created), "");
+  v1::UploadPartRequest part;
+  part.set_upload(created.upload());
+  part.set_data(std::string(1 << 20, 'x'));
+  v1::UploadPartResponse progress;
+  for (int k = 0; k < 4; ++k) ASSERT_EQ(call(alice_, &Stub::UploadPart, part, progress), "") << k;
+  grpc::ClientContext context;
+  context.AddMetadata("authorization", "Bearer " + alice_);
+  const ErrorDetails details = details_of(stub_->UploadPart(&context, part, &progress));
+  EXPECT_EQ(details.info.reason(), "UPLOAD_RATE");
+  ASSERT_TRUE(details.retry && details.quota);
+  EXPECT_EQ(details.retry->retry_delay().seconds(), 1);
+  timers_->advance(std::chrono::seconds(1));
+  EXPECT_EQ(call(alice_, &Stub::UploadPart, part, progress), "");
 }
 
 TEST_F(CallersTest, RequestIdsOfDifferentCallersAreDifferent) {

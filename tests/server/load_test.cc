@@ -130,6 +130,31 @@ TEST_F(LoadTest, ASmallMeshKeepsItsRateBesideALargeOne) {
   }
 }
 
+TEST_F(LoadTest, StreamsAreToldOfOverloadAndOfItsEnd) {
+  const auto told = [](DeformClient& client, v1::NoticeReason reason) {
+    while (const auto response = client.read()) {
+      const v1::StreamEvent& event = response->event();
+      if (event.has_notice() && event.notice().reason() == reason) return !event.notice().text().empty();
+      if (event.has_frame() && event.frame().last()) client.acknowledge(event.frame().frame_seq());
+    }
+    return false;
+  };
+  // More sessions that are never done than there are threads: each waits for all the others' slices.
+  std::vector<v1::CreateSessionResponse> sessions;
+  std::vector<std::unique_ptr<DeformClient>> clients;
+  for (int k = 0; k < 64; ++k) {
+    sessions.push_back(create(bar_mesh()));
+    clients.push_back(std::make_unique<DeformClient>(*stub_, sessions.back()));
+    v1::Update update = ends_message(bar_mesh().vertices, 1, 8);
+    solve_slowly(update);
+    ASSERT_TRUE(clients.back()->send(update));
+  }
+  EXPECT_TRUE(told(*clients.front(), v1::NOTICE_REASON_OVERLOADED));
+  EXPECT_TRUE(told(*clients.back(), v1::NOTICE_REASON_OVERLOADED));
+  clients.resize(1);  // without readers the others rest
+  EXPECT_TRUE(told(*clients.front(), v1::NOTICE_REASON_RECOVERED));
+}
+
 TEST_F(LoadTest, AClientThatReadsNothingGetsTheNewestFrameWhenItResumes) {
   const TriangleMesh mesh = grid(79, 49);
   const auto session = create(mesh);
