@@ -65,7 +65,8 @@ void Scheduler::wake(std::shared_ptr<Runnable> runnable, Urgency urgency) {
     case Runnable::State::kAsleep:
       runnable->urgency_ = urgency;
       runnable->used_seconds_ = std::max(runnable->used_seconds_, level_);
-      return enqueue(std::move(runnable));
+      enqueue(std::move(runnable));
+      return changed_.notify_one();
     case Runnable::State::kWaiting:
       if (is_answer && runnable->urgency_ != Urgency::kAnswer) hasten(runnable);
       return;
@@ -89,7 +90,6 @@ void Scheduler::enqueue(std::shared_ptr<Runnable> runnable) {
   runnable->ready_since_ = std::chrono::steady_clock::now();
   queue_of(runnable->urgency_).insert(std::move(runnable));
   answers_waiting_ = static_cast<int>(answers_.size());
-  changed_.notify_all();
 }
 
 /// One that waits in the ordinary queue is to answer now. That it was put off until then counts.
@@ -156,11 +156,8 @@ void Scheduler::finish_slice(std::shared_ptr<Runnable> runnable, double seconds,
   owed_seconds_ = std::clamp(owed_seconds_, -kMostOwed, ordinary_.empty() ? 0 : kMostOwed);
   const bool was_woken = runnable->state_ == Runnable::State::kWokenWhileRunning;
   runnable->state_ = Runnable::State::kAsleep;
-  if (has_more || was_woken) {
-    enqueue(std::move(runnable));
-  } else {
-    changed_.notify_all();  // a heavy one may run again
-  }
+  // Nobody has to be woken: this thread is free now, for this one or for a heavy one that had to wait.
+  if (has_more || was_woken) enqueue(std::move(runnable));
 }
 
 bool Scheduler::is_overloaded() {

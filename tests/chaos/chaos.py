@@ -85,7 +85,8 @@ def run(book: Book, seed: int, seconds: float, mode: str | None) -> None:
             what = chance.choice(world.faults())
             book.note("fault", what=what)
             world.strike(what, chance)
-        for one in (*writers, *onlookers):
+        # Readers first: a session stays with the server where it is used, and after a fault its users may be at two.
+        for one in (*onlookers, *writers):
             one.finish()
         reference(book, port, results_to_check(book.history, writers))
         with Wire(port, "last") as wire:

@@ -154,14 +154,18 @@ def kept_handles_come_back(history: History):
     sent = {(event["session"], event["input_seq"]): event["x"] for event in history.of("sent")}
     kept: dict[str, int] = defaultdict(int)
     known: dict[str, int] = defaultdict(int)  # what was kept when a stream was asked for
+    newest: dict[str, int] = defaultdict(int)  # epoch
     for event in history.events:
         if event["kind"] == "answered" and event["kept"]:
             kept[event["session"]] = max(kept[event["session"]], event["input_seq"])
         if event["kind"] == "opening":
             known[event["stream"]] = kept[event["session"]]
         if event["kind"] == "opened":
+            # One that has lost the session without knowing it speaks for an old epoch: its clients take nothing of it.
+            is_void = event["epoch"] < newest[event["session"]]
+            newest[event["session"]] = max(newest[event["session"]], event["epoch"])
             before = known[event["stream"]]
-            if event["input_seq"] < before:
+            if event["input_seq"] < before and not is_void:
                 yield f"session {event['session']}: it came back with input {event['input_seq']}, {before} was kept"
         if event["kind"] != "frame" or not event["converged"] or "probe" not in event:
             continue
@@ -174,6 +178,16 @@ def kept_handles_come_back(history: History):
 
 
 def no_old_epoch_is_shown(history: History):
+    if all(event["mode"] == "sqlite" for event in history.of("run")):  # one server at a time: it knows the newest
+        opened: dict[str, int] = defaultdict(int)
+        known: dict[str, int] = defaultdict(int)  # when a stream was asked for
+        for event in history.of("opening", "opened"):
+            if event["kind"] == "opening":
+                known[event["stream"]] = opened[event["session"]]
+            elif event["epoch"] < known[event["stream"]]:
+                yield f"session {event['session']}: a stream of epoch {event['epoch']} after one of {known[event['stream']]}"
+            else:
+                opened[event["session"]] = max(opened[event["session"]], event["epoch"])
     for client, frames in history.by("client", "shown").items():
         newest: dict[str, int] = defaultdict(int)
         for frame in frames:

@@ -142,6 +142,22 @@ class Judge(unittest.TestCase):
     def test_8_a_frame_of_an_old_epoch(self):
         self.broken(8, self.insert_after("shown", {"epoch": 3}, kind="shown", client="l", session="s", epoch=1, frame_seq=9))
 
+    def test_8_a_stream_of_an_old_epoch_where_there_is_one_server(self):
+        self.broken(8, self.change("opened", {"stream": "a"}, epoch=4))
+
+    def test_7_a_server_that_lost_the_session_speaks_for_its_old_epoch_alone(self):
+        def change(events):
+            events.insert(0, {"kind": "run", "at": 0.0, "seed": 1, "mode": "redis", "seconds": 1})
+            of = {"stream": "c", "session": "s"}
+            events += [{"kind": "opening", "at": 90.0, **of},
+                       {"kind": "opened", "at": 91.0, "epoch": 2, "input_seq": 1, "credit": 1, "client": "w", **of},
+                       {"kind": "end", "at": 92.0, "status": "OK", "by_client": True, **of}]
+        events = good()
+        change(events)
+        self.assertEqual(self.judged(events), [])
+        self.find(events, "opened", stream="c")["epoch"] = 3
+        self.assertEqual([violation.invariant for violation in self.judged(events)], [7])
+
     def test_9_two_writers_in_one_epoch(self):
         self.broken(9, self.insert_after("writer", {"epoch": 2}, kind="writer", session="s", epoch=2, token="three"))
 

@@ -18,9 +18,15 @@ PATIENCE = 60.0  # seconds that anything may take; never reached where all is we
 
 
 def free_port() -> int:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        return taken.getsockname()[1]
+    """Below those that the system gives to connections: one of these could take it while its server is down."""
+    while True:
+        port = random.SystemRandom().randrange(10000, 32000)
+        with socket.socket() as taken:
+            try:
+                taken.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+        return port
 
 
 def reaches(port: int) -> bool:
@@ -69,11 +75,17 @@ class Process:
 
 
 class Server(Process):
+    """Sessions go after 20 s without use: of one that another server took over, a copy that nobody asks for stays as long."""
+
     def __init__(self, store: str) -> None:
         self.admin = free_port()
         port = free_port()
         super().__init__([SERVER, "--address", f"127.0.0.1:{port}", "--admin-address", f"127.0.0.1:{self.admin}", "--store", store,
-                          "--heartbeat", "0.5", "--grace", "2", "--log-level", "off"], port)
+                          "--heartbeat", "0.5", "--grace", "2", "--log-level", "off", "--session-idle", "20"], port)
+
+    def start(self) -> None:
+        super().start()
+        wait_for(self.admin)  # begins to listen last
 
     def metrics(self) -> dict[str, float]:
         with urllib.request.urlopen(f"http://127.0.0.1:{self.admin}/metrics", timeout=PATIENCE) as answer:

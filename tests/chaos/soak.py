@@ -1,0 +1,174 @@
+"""Whether a server stays as large as it is: memory, descriptors and threads while sessions come and go.
+
+    tests/chaos/soak cycles [--count 10000] [--picture FILE.svg]   sessions created, streamed and deleted, four at a time
+    tests/chaos/soak load [--minutes 30] [--picture FILE.svg]      sessions under `lpdeform load`, with slow readers and
+                                                                   reconnects, a new set every half a minute
+
+Prints a line for each sample, and exits with 1 where what the server holds at the end is more than at the beginning: of memory,
+the median of the last quarter over that of the second quarter by 5 % and 4 MiB; of descriptors and threads, any, once idle.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+from lpdeform.v1 import service_pb2
+
+from machines import PATIENCE, ROOT, Server
+from picture import draw
+from wire import Book, Stream, Wire, create_request, held
+
+CLI = os.environ.get("LPDEFORM_CLI", str(ROOT / "build/release/bin/lpdeform"))
+COLUMNS = ("resident MiB", "descriptors", "threads", "sessions")
+
+
+def sample(server: Server) -> dict[str, float]:
+    process = pathlib.Path(f"/proc/{server.process.pid}")
+    status = dict(line.split(":", 1) for line in (process / "status").read_text().splitlines())
+    return {"resident MiB": int(status["VmRSS"].split()[0]) / 1024, "descriptors": len(os.listdir(process / "fd")),
+            "threads": int(status["Threads"]), "sessions": server.metrics()["lpdeform_sessions"]}
+
+
+def idle_sample(server: Server) -> dict[str, float]:
+    """Once connections that were let go of are gone: the smallest of a few seconds."""
+    samples = []
+    for _ in range(50):
+        samples.append(sample(server))
+        time.sleep(0.1)
+    return {column: min(one[column] for one in samples) for column in COLUMNS}
+
+
+class Cycles:
+    """Creates, streams and deletes."""
+
+    def __init__(self, server: Server, count: int) -> None:
+        self.server, self.left, self.done, self.faults = server, count, 0, []
+        self._lock = threading.Lock()
+        self.threads = [threading.Thread(target=self._work, daemon=True) for _ in range(4)]
+        for thread in self.threads:
+            thread.start()
+
+    @property
+    def is_over(self) -> bool:
+        return not any(thread.is_alive() for thread in self.threads)
+
+    def _work(self) -> None:
+        try:
+            with Wire(self.server.port, "soak") as wire:
+                while True:
+                    with self._lock:
+                        if self.left == 0 or self.faults:
+                            return
+                        self.left -= 1
+                    self._cycle(wire)
+                    with self._lock:
+                        self.done += 1
+        except BaseException as error:  # raised where the samples are judged
+            self.faults.append(error)
+
+    @staticmethod
+    def _cycle(wire: Wire) -> None:
+        made = wire.call("CreateSession", create_request(""))
+        stream = Stream(Book(), wire, made.session.name, made.writer_token, "soak", credit=2)
+        stream.send(service_pb2.Update(input_seq=1, handles=[held("base", 0), held("tip", 1.5)]))
+        end = time.monotonic() + PATIENCE
+        while not stream.settled.get(1):
+            if time.monotonic() > end or stream.is_over.is_set():
+                raise TimeoutError("no converged frame came")
+            time.sleep(0.001)
+        stream.end()
+        wire.call("DeleteSession", service_pb2.DeleteSessionRequest(session=made.session.name))
+
+
+def run_cycles(server: Server, options) -> list[dict[str, float]]:
+    cycles = Cycles(server, options.count)
+    samples, begin = [], time.monotonic()
+    step = max(1, options.count // 100)
+    while not cycles.is_over:
+        if cycles.done >= step * len(samples):
+            samples.append({"cycles": cycles.done, **sample(server)})
+            if len(samples) % 10 == 1:
+                show(samples[-1])
+        time.sleep(0.01)
+    if cycles.faults:
+        raise cycles.faults[0]
+    samples.append({"cycles": cycles.done, **sample(server)})
+    print(f"{cycles.done} cycles in {time.monotonic() - begin:.0f} s")
+    return samples
+
+
+def run_load(server: Server, options) -> list[dict[str, float]]:
+    samples, begin = [], time.monotonic()
+    end = begin + 60 * options.minutes
+    turn = min(30.0, max(2.0, 10 * options.minutes))
+    words = [CLI, "load", "--server", f"127.0.0.1:{server.port}", "--sessions", "12", "--vertices", "400,1000,10000", "--rate", "5",
+             "--seconds", f"{turn:.0f}", "--slow-readers", "3", "--reconnect", "7"]
+    while time.monotonic() < end:
+        load = subprocess.Popen(words, stdout=subprocess.DEVNULL)  # what it has to complain of, it says
+        while load.poll() is None:
+            time.sleep(min(5.0, turn / 3))
+            samples.append({"seconds": time.monotonic() - begin, **sample(server)})
+            if len(samples) % 12 == 1:
+                show(samples[-1])
+        if load.returncode == 2:
+            raise RuntimeError("lpdeform load was not given what it takes")
+        samples[-1]["short"] = load.returncode  # 1: an update was not answered, or a call failed
+    return samples
+
+
+def show(one: dict[str, float]) -> None:
+    print("  ".join(f"{name} {value:.0f}" for name, value in one.items()), flush=True)
+
+
+def growth(samples: list[dict[str, float]], before: dict[str, float], after: dict[str, float]) -> list[str]:
+    faults = [f"a load fell short at {one['seconds']:.0f} s" for one in samples if one.pop("short", 0)]
+    quarter = len(samples) // 4
+    early, late = samples[quarter:2 * quarter], samples[-quarter:]
+    median = [statistics.median(one["resident MiB"] for one in part) for part in (early, late)]
+    print(f"resident: {median[0]:.1f} MiB in the second quarter, {median[1]:.1f} in the last; idle before and after: "
+          + ", ".join(f"{column} {before[column]:.0f} and {after[column]:.0f}" for column in COLUMNS))
+    if median[1] > 1.05 * median[0] + 4:
+        faults.append(f"memory grew from {median[0]:.1f} to {median[1]:.1f} MiB")
+    for column in ("descriptors", "threads", "sessions"):
+        if after[column] > before[column]:
+            faults.append(f"{after[column] - before[column]:.0f} {column} are left")
+    return faults
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("cycles", "load"))
+    parser.add_argument("--count", type=int, default=10000)
+    parser.add_argument("--minutes", type=float, default=30)
+    parser.add_argument("--picture")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory():
+        server = Server("none")
+        try:
+            run = run_cycles if options.what == "cycles" else run_load
+            warm = argparse.Namespace(count=40, minutes=0.05)
+            run(server, warm)  # so that threads and connections that stay are there
+            before = idle_sample(server)
+            samples = run(server, options)
+            after = idle_sample(server)
+        finally:
+            server.kill()
+    if options.picture:
+        draw(options.picture, "cycles" if options.what == "cycles" else "seconds", samples, COLUMNS)
+        print(f"wrote {options.picture}")
+    faults = growth(samples, before, after)
+    for fault in faults:
+        print(f"soak: {fault}", file=sys.stderr)
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
