@@ -33,18 +33,14 @@ void Publisher::measure_answer() {
 }
 
 void Publisher::begin_epoch(std::uint64_t epoch) {
-  {
-    const std::scoped_lock lock(mutex_);
-    epoch_ = epoch;
-    if (newest_) {
-      Frame again = *newest_;
-      again.frame_seq = ++frames_;
-      again.epoch = epoch;
-      again.repeats = 0;
-      newest_ = std::make_shared<const Frame>(std::move(again));
-    }
-  }
-  wake_all();
+  const std::scoped_lock lock(mutex_);
+  epoch_ = epoch;
+  if (!newest_) return;
+  Frame again = *newest_;
+  again.frame_seq = ++frames_;
+  again.epoch = epoch;
+  again.repeats = 0;
+  newest_ = std::make_shared<const Frame>(std::move(again));
 }
 
 void Publisher::certify_newest(double optimality_gap) {

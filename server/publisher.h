@@ -32,8 +32,12 @@ class Publisher {
   /// that it has not been sent to. After a publish().
   void certify_newest(double optimality_gap);
 
-  /// Frames sent from now on are of this epoch, the one in the slot too.
+  /// Frames sent from now on are of this epoch, the one in the slot too. The readers hear of it with wake_all(), because
+  /// whoever begins an epoch holds a lock as a rule, and a reader's waker may want it.
   void begin_epoch(std::uint64_t epoch);
+
+  /// Wakes every reader. To be called under no lock.
+  void wake_all() const;
 
   /// Puts up a fault, or takes it down.
   void set_standing(std::optional<FaultNote> fault);
@@ -63,7 +67,6 @@ class Publisher {
 
  private:
   std::vector<std::shared_ptr<FrameStream>> readers() const;
-  void wake_all() const;
   void measure_answer();
 
   const std::shared_ptr<Metrics> metrics_;

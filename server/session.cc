@@ -148,6 +148,7 @@ WriterLease Session::acquire_writer() {
   for (const auto& weak : before) {
     if (const auto stream = weak.lock()) stream->end(EndReason::kWriterReplaced, text);
   }
+  publisher_->wake_all();  // the others go on in the new epoch
   if (job_before)
     job_before->finish(make_fault(absl::StatusCode::kAborted, {"WRITER_REPLACED", "", ""}, text));
   return lease;

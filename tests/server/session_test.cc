@@ -153,6 +153,16 @@ TEST_F(SessionTest, AnotherWriterEndsTheFirstOnesStreamAndTokenAndEpoch) {
       reader.wait_for_frame([](const Frame& frame) { return frame.epoch == 2 && frame.input_seq == 8; }));
 }
 
+TEST_F(SessionTest, NoLockIsHeldWhileAReaderIsToldOfANewWriter) {
+  const auto session = create();
+  const auto reader = open(*session);
+  std::atomic<std::uint64_t> epoch = 0;
+  reader->start([&] { epoch = session->lease().epoch; });  // as a call that ends does, under a lock of its own
+  session->acquire_writer();
+  EXPECT_EQ(epoch, 2u);
+  reader->start([] {});
+}
+
 TEST_F(SessionTest, AnotherSolveOrWriterEndsASolveWithATypedError) {
   const auto session = create();
   const std::string token = session->lease().token;
