@@ -157,7 +157,8 @@ TEST_F(SessionTest, NoLockIsHeldWhileAReaderIsToldOfANewWriter) {
   const auto session = create();
   const auto reader = open(*session);
   std::atomic<std::uint64_t> epoch = 0;
-  reader->start([&] { epoch = session->lease().epoch; });  // as a call that ends does, under a lock of its own
+  reader->start(
+      [&] { epoch = session->lease().epoch; });  // as a call that ends does, under a lock of its own
   session->acquire_writer();
   EXPECT_EQ(epoch, 2u);
   reader->start([] {});
