@@ -2,7 +2,7 @@ import { execFileSync } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
-import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { afterAll, beforeAll, describe, expect, test, vi } from "vitest";
 import { openSession, type Session } from "../../src/index.js";
 import { envoyProgram, root, Service } from "./service.js";
 import { grid } from "./shapes.js";
@@ -139,8 +139,8 @@ describe("the proxy", () => {
 
   test("leaves a solve to which nobody listens for longer than a silent stream may be", async () => {
     const { mesh, handles } = grid(80);
-    const solver = { tolerance: 1e-14, maxIterations: 1_000_000, timeLimitSeconds: 3 };
-    const session = await openSession(mesh, { url: service.url, settings: { p: 1.1, solver } });
+    const solver = { method: "lineSearch", tolerance: 1e-14, maxIterations: 1_000_000, timeLimitSeconds: 3 } as const;
+    const session = await openSession(mesh, { url: service.url, settings: { p: 1.5, solver } });
     session.setHandles(handles);
     session.move("right", { axis: [0, 1, 0], angle: -2, center: [40, 0, 0], translation: [0, 10, 30] });
     const start = performance.now();
@@ -206,17 +206,12 @@ describe("the proxy", () => {
 
   test("logs each call with how it ended", async () => {
     await call();
-    await waitFor(() => readFileSync(service.accessLog, "utf8").includes("GetSession"));
-    const lines = readFileSync(service.accessLog, "utf8")
-      .trim()
-      .split("\n")
-      .map((line) => JSON.parse(line));
-    const logged = lines.findLast(({ path }) => path === "/lpdeform.v1.DeformService/GetSession");
-    expect(logged).toMatchObject({
-      method: "POST",
-      status: 200,
-      grpc_status: expect.stringMatching(/NotFound|Unavailable/),
-    });
+    const ended = { method: "POST", status: 200, grpc_status: "NotFound" };
+    await vi.waitFor(() => {
+      const lines = readFileSync(service.accessLog, "utf8").split("\n").filter(Boolean);
+      const calls = lines.map((line) => JSON.parse(line)).filter(({ path }) => path.endsWith("/GetSession"));
+      expect(calls.at(-1)).toMatchObject(ended); // Envoy writes a little later
+    }, 30_000);
   }, 60_000);
 });
 
@@ -224,11 +219,13 @@ test("calls beyond what Envoy lets through are refused by name, and go well when
   const service = await Service.start({ maxRequests: 2 });
   // Streams of their own, since they are asked for in other ways.
   const open = (callTimeoutMs: number) => openSession(grid(4).mesh, { url: service.url, callTimeoutMs });
+  // The acknowledgements of one may take the place that the other needs.
+  const openInTime = (callTimeoutMs: number) => vi.waitFor(() => open(callTimeoutMs), 20_000);
   const isConnected = (session: Session) => waitFor(() => session.connection === "connected");
   const first = await open(30_001);
   first.poll();
   await isConnected(first);
-  const second = await open(30_002);
+  const second = await openInTime(30_002);
   second.poll();
   await isConnected(second);
   await expect(open(30_003)).rejects.toMatchObject({
@@ -239,7 +236,7 @@ test("calls beyond what Envoy lets through are refused by name, and go well when
   first.setHandle("corner", { vertices: [0] });
   await second.close().catch(() => undefined); // ends its stream, though its last call may be refused
   expect((await first.settle({ timeoutMs: 20_000 })).inputSeq).toBe(1);
-  await (await open(30_003)).close();
+  await (await openInTime(30_003)).close();
   await first.close();
   await service.stop();
 });
