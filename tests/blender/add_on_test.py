@@ -15,7 +15,7 @@ sys.path.insert(0, os.path.dirname(__file__))
 import stage  # noqa: E402
 
 PREFERENCES = stage.install()
-from lpdeform_addon import live, surface  # noqa: E402
+from lpdeform_addon import client, live, surface  # noqa: E402
 
 
 class AddOn(unittest.TestCase):
@@ -303,6 +303,56 @@ class AddOn(unittest.TestCase):
         finally:
             PREFERENCES.use_tls, PREFERENCES.root_certificates, PREFERENCES.token_file = False, "", ""
         self.assertIsNone(self.tube.data.shape_keys)
+
+    def test_a_token_file_that_goes_away_ends_the_edited_mesh_with_a_message_and_no_other(self):
+        other = stage.tube(name="other", at=(5, 0, 0))
+        rest = stage.at_rest(other)
+        tip = stage.add_handle(other, np.flatnonzero(rest[:, 2] > 3.7))
+        stage.activate(other)
+        self.assertEqual(bpy.ops.lpdeform.start(), {"FINISHED"})
+        stage.activate(self.tube)
+        self.held()
+        stage.settle(self.tube)
+        try:
+            PREFERENCES.token_file = "/nowhere/token"
+            stage.select(self.tube, np.flatnonzero(np.abs(self.rest[:, 2] - 2) < 0.05))
+            live.tick()
+            bpy.ops.mesh.subdivide()
+            bpy.ops.object.mode_set(mode="OBJECT")
+            self.assertIsNotNone(live.tick())
+        finally:
+            PREFERENCES.token_file = ""
+        self.assertIsNone(live.of(self.tube))
+        self.assertRegex(live.message(self.tube), "^Ended: .*/nowhere/token")
+        tip.location.x += 0.5
+        stage.settle(other)
+        self.assertGreater(np.abs(stage.shown(other) - rest).max(), 0.4)
+
+    def test_a_mesh_edited_into_one_that_cannot_be_deformed_ends_with_a_message(self):
+        self.held()
+        stage.settle(self.tube)
+        session = live.of(self.tube).session
+        stage.select(self.tube, np.arange(len(self.rest)))
+        live.tick()
+        bpy.ops.mesh.delete(type="ONLY_FACE")
+        bpy.ops.object.mode_set(mode="OBJECT")
+        self.assertIsNone(live.tick())
+        self.assertEqual(live._running, {})
+        self.assertRegex(live.message(self.tube), "^Ended: The mesh cannot be deformed")
+        self.assertEqual(session.connection, "closed")
+
+    def test_a_token_is_read_without_blender(self):
+        with tempfile.NamedTemporaryFile("w") as file:
+            file.write("secret\n")
+            file.flush()
+            PREFERENCES.token_file = file.name
+            abspath = bpy.path.abspath
+            try:
+                token = client.access()["token"]
+                bpy.path.abspath = None
+                self.assertEqual(token(), "secret")
+            finally:
+                bpy.path.abspath, PREFERENCES.token_file = abspath, ""
 
     def test_a_server_that_asks_for_a_token_over_tls_lets_in_by_the_preferences(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -34,17 +34,23 @@ def address() -> str:
 
 def access() -> dict:
     """How lpdeform.open() is let in: the token and TLS of the preferences. Raises OSError where a file cannot be read."""
-    path = _preference("token_file")
+    path = _path("token_file")  # here: bpy is for this thread alone
     token = (lambda: _text(path).strip()) if path else None  # read again for each call, so that it may be renewed
     if token is not None:
         token()
     if not _preference("use_tls"):
         return {"token": token, "tls": False}
     files = ("root_certificates", "certificate_chain", "private_key")
-    texts = {name: _text(_preference(name)) for name in files if _preference(name)}
+    texts = {name: _text(_path(name)) for name in files if _path(name)}
     return {"token": token, "tls": lpdeform.Tls(**texts)}
 
 
+def _path(name: str) -> str:
+    """Of a file in the preferences; empty where none is given."""
+    given = _preference(name)
+    return bpy.path.abspath(given) if given else ""
+
+
 def _text(path: str) -> str:
-    with open(bpy.path.abspath(path), encoding="ascii", errors="replace") as file:
+    with open(path, encoding="ascii", errors="replace") as file:
         return file.read()

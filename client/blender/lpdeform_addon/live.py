@@ -46,17 +46,16 @@ class LiveMesh:
         self.muted = surface.add_live_key(ob)
 
     def _open(self, ob) -> None:
-        self._rest = surface.rest_positions(ob)
-        self._faces = surface.triangles(ob)
+        """Raises NotReady, and then everything is as it was."""
+        rest, faces = surface.rest_positions(ob), surface.triangles(ob)
+        self.session = _open_session(ob, rest, faces)
+        self._rest, self._faces = rest, faces
         self._held = surface.held(ob)
         self._told = Told()
         self.fields = {}
         self._weights = {}
         self._weights_read = 0.0
         self.frame = None
-        self.session = lpdeform.open(
-            self._rest, self._faces, address=address(), free_components="stay", certify=ob.lpdeform.certify, **access()
-        )
 
     @property
     def state(self) -> str:
@@ -121,8 +120,9 @@ class LiveMesh:
         if is_same and np.array_equal(surface.triangles(ob), self._faces):
             self._held = surface.held(ob)
             return
-        self.session.close()
+        before = self.session
         self._open(ob)
+        before.close()
 
     def _present_handles(self, ob) -> dict:
         """Of each handle its empty, what it holds and how, and where it is."""
@@ -196,25 +196,29 @@ def start(ob) -> None:
         return
     _messages.pop(ob.name, None)
     require()
+    _running[ob.name] = LiveMesh(ob)
+    if not bpy.app.timers.is_registered(tick):
+        bpy.app.timers.register(tick)
+
+
+def _open_session(ob, rest, faces):
+    """Raises NotReady."""
     try:
-        _running[ob.name] = LiveMesh(ob)
+        how = access()
+    except OSError as error:
+        raise NotReady(f"A file of the add-on's preferences cannot be read: {error}") from error
+    try:
+        return lpdeform.open(rest, faces, address=address(), free_components="stay", certify=ob.lpdeform.certify, **how)
     except lpdeform.Unavailable as error:
+        over_tls = ", or its certificates, since TLS is on" if how["tls"] else ""
         raise NotReady(
             f"No lpdeform server answers at {address()}. Start one with deploy/up, or set its address in the add-on's preferences"
-            f"{_over_tls()}."
+            f"{over_tls}."
         ) from error
     except lpdeform.LpdeformError as error:
         is_about_us = error.code in (lpdeform.Code.UNAUTHENTICATED, lpdeform.Code.PERMISSION_DENIED)
         what = "The server does not let us in" if is_about_us else "The mesh cannot be deformed"
         raise NotReady(f"{what}: {error}") from error
-    except OSError as error:
-        raise NotReady(f"A file of the add-on's preferences cannot be read: {error}") from error
-    if not bpy.app.timers.is_registered(tick):
-        bpy.app.timers.register(tick)
-
-
-def _over_tls() -> str:
-    return ", or its certificates, since TLS is on" if access()["tls"] else ""
 
 
 def stop(ob, keep_as: str = "") -> None:
@@ -242,6 +246,8 @@ def tick():
             running.look(ob)
             if running.frame is not None and running.state == "connected" and not running.has_refusals:
                 _messages.pop(name, None)
+        except NotReady as error:  # the mesh was edited, and there is no session for what it has become
+            _forget(name, f"Ended: {error}")
         except lpdeform.LpdeformError as error:
             _messages[name] = str(error)
             if running.state == "closed":
