@@ -100,6 +100,13 @@ def test_a_certificate_and_a_token_let_in(
     assert len(asked) > 3  # of each call
 
 
+def test_remarks_beside_certificates_may_be_in_any_language(keys: Keys) -> None:
+    own = keys.text("alice.pem")
+    tls = lpdeform.Tls("# Müllers\n" + keys.text("authority.pem"), "# für Alice\n" + own, keys.text("alice.key"))
+    with pytest.raises(lpdeform.Unavailable):
+        lpdeform.join("sessions/0", address="localhost:1", tls=tls, call_timeout=20.0)
+
+
 def test_asyncio_too(locked: Server, keys: Keys, tls: lpdeform.Tls, make_grid: Callable[[int], Grid]) -> None:
     shape = make_grid(4)
 
@@ -141,6 +148,12 @@ def test_what_cannot_be_used_is_named(keys: Keys) -> None:
     assert fault(tls=lpdeform.Tls(None, "garbage", key)) == ("TLS_CERTIFICATES", "certificate_chain")
     assert fault(tls=lpdeform.Tls(None, own)) == ("TLS_KEY_MISSING", "private_key")
     assert fault(tls=lpdeform.Tls(None, own, own)) == ("TLS_PRIVATE_KEY", "private_key")
+    locked = _openssl("pkcs8", "-topk8", "-in", keys.at("alice.key"), "-passout", "pass:secret")
+    assert fault(tls=lpdeform.Tls(None, own, locked)) == ("TLS_PRIVATE_KEY", "private_key")
+    broken = "-----BEGIN PRIVATE KEY-----\nMIG\n-----END PRIVATE KEY-----\n"
+    assert fault(tls=lpdeform.Tls(None, own, broken)) == ("TLS_PRIVATE_KEY", "private_key")
+    for other in ("server.key", "token.key"):  # of the same kind, and of another
+        assert fault(tls=lpdeform.Tls(None, own, keys.text(other))) == ("TLS_KEY_MISMATCH", "private_key")
     assert key not in repr(lpdeform.Tls(None, own, key))
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import ssl
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -78,8 +80,8 @@ def open_channel(address: str, tls: Tls | bool, options: list[tuple[str, int]]) 
         missing = "private_key" if key is None else "certificate_chain"
         why = "A certificate chain and a private key belong together; one of them is missing."
         raise invalid(why, "TLS_KEY_MISSING", missing)
-    if key is not None and b"PRIVATE KEY-----" not in key:
-        raise invalid("private_key is no private key in PEM.", "TLS_PRIVATE_KEY", "private_key", "PEM")
+    if chain is not None and key is not None:
+        _check_own(chain, key)
     return grpc.secure_channel(address, grpc.ssl_channel_credentials(roots, key, chain), options=options)
 
 
@@ -89,6 +91,30 @@ def _bytes(text: str | bytes | None) -> bytes | None:
 
 def _check_certificates(name: str, text: bytes) -> None:
     try:
-        ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).load_verify_locations(cadata=text.decode("ascii"))
+        ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).load_verify_locations(cadata=text.decode("ascii", errors="ignore"))
     except (ssl.SSLError, ValueError) as error:
         raise invalid(f"{name} cannot be read: {error}", "TLS_CERTIFICATES", name, "PEM") from None
+
+
+def _check_own(chain: bytes, key: bytes) -> None:
+    if b"PRIVATE KEY-----" not in key:
+        raise invalid("private_key is no private key in PEM.", "TLS_PRIVATE_KEY", "private_key", "PEM, without a password")
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.set_ciphers("DEFAULT:@SECLEVEL=0")  # the server says which keys are strong enough
+    with tempfile.TemporaryDirectory() as folder:  # of this user alone, as its files: Python's ssl reads no key from memory
+        try:
+            own, secret = _kept(folder, "certificate_chain", chain), _kept(folder, "private_key", key)
+            context.load_cert_chain(own, secret, password=lambda: "")  # in place of asking on the terminal
+        except ssl.SSLError as error:
+            if error.reason in ("KEY_VALUES_MISMATCH", "KEY_TYPE_MISMATCH", "NO_CERTIFICATE_ASSIGNED"):
+                text = "private_key is not that of the first certificate of certificate_chain."
+                raise invalid(text, "TLS_KEY_MISMATCH", "private_key") from None
+            text = "private_key cannot be read: it is no private key in PEM, or one with a password."
+            raise invalid(text, "TLS_PRIVATE_KEY", "private_key", "PEM, without a password") from None
+
+
+def _kept(folder: str, name: str, text: bytes) -> str:
+    path = os.path.join(folder, name)
+    with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        file.write(text)
+    return path
