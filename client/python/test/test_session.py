@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import gc
 import threading
 import time
@@ -355,6 +356,39 @@ def test_a_session_that_nobody_has_any_more_is_closed(server: Server, shape: Gri
             break
         assert time.monotonic() < deadline
     assert link.is_closing
+
+
+@pytest.mark.parametrize("raised", [MemoryError("no room"), ValueError("no number")])
+def test_an_exception_on_a_thread_of_ours_ends_the_session_with_its_text(
+    session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch, raised: Exception
+) -> None:
+    def fails(*_: object) -> None:
+        raise raised
+
+    monkeypatch.setattr("lpdeform.frames.FrameAssembly.add", fails)
+    with pytest.raises(lpdeform.LpdeformError, match=str(raised)) as caught:
+        session.settle(PATIENCE)
+    assert (caught.value.code, caught.value.reason) == (lpdeform.Code.INTERNAL, "EXCEPTION")
+    assert session.connection == "closed"
+
+
+def test_a_stream_of_another_mesh_ends_the_session(session: lpdeform.Session, shape: Grid) -> None:
+    link = session._link
+    report = dataclasses.replace(link.lease.report, vertices=len(shape.vertices) - 1)
+    link.lease = dataclasses.replace(link.lease, report=report)
+    with pytest.raises(lpdeform.LpdeformError, match=f"{len(shape.vertices)} vertices") as caught:
+        session.settle(PATIENCE)
+    assert (caught.value.code, caught.value.reason) == (lpdeform.Code.DATA_LOSS, "FRAME_VERTICES")
+    assert session.connection == "closed"
+
+
+def test_the_timeout_of_a_solve_counts_while_another_runs(session: lpdeform.Session) -> None:
+    session._link.is_solving = True
+    with pytest.raises(lpdeform.Timeout) as caught:
+        session.solve(timeout=0.05)
+    assert caught.value.reason == "SOLVE_UNDER_WAY"
+    session._link.is_solving = False
+    session.solve(timeout=PATIENCE)
 
 
 def test_progress_is_told_and_a_deadline_kept(server: Server, make_grid: MakeGrid) -> None:

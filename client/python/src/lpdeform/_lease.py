@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from lpdeform import _wire
 from lpdeform._numbers import Copied
 from lpdeform._rpc import Packer, Rpc, Stop
-from lpdeform.errors import LpdeformError, is_undecided
+from lpdeform.errors import Code, LpdeformError, is_undecided, make
 from lpdeform.types import MeshReport, Settings
 from lpdeform.v1 import report_pb2, service_pb2
 
@@ -57,6 +57,7 @@ def create_session(rpc: Rpc, original: Original, request_id: str, stop: Stop) ->
             packer.discard()
         raise
     packer.discard()
+    check_vertex_count(created.session.mesh.vertices, len(original.vertices))
     return _lease_of(created.session, created.writer_token)
 
 
@@ -71,6 +72,13 @@ def join_session(rpc: Rpc, name: str, as_writer: bool, stop: Stop) -> Lease:
     return replace(
         lease, writer_token=acquired.writer_token, epoch=acquired.epoch, input_seq=acquired.input_seq
     )
+
+
+def check_vertex_count(count: int, wanted: int) -> None:
+    """Raises DATA_LOSS FRAME_VERTICES where a server speaks of `count` vertices of a mesh that has `wanted`."""
+    if count != wanted:
+        text = f"The server speaks of {count} vertices of a mesh that has {wanted}."
+        raise make(Code.DATA_LOSS, text, "FRAME_VERTICES", "", f"vertices = {wanted}")
 
 
 def _lease_of(session: service_pb2.Session, writer_token: str) -> Lease:

@@ -6,12 +6,13 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import grpc
 
 from lpdeform import _wire
 from lpdeform._box import FrameBox
-from lpdeform._lease import Lease, Original, create_session, join_session
+from lpdeform._lease import Lease, Original, check_vertex_count, create_session, join_session
 from lpdeform._ledger import Ledger, NumberedUpdate
 from lpdeform._recovery import Backoff, Next, recovery_after
 from lpdeform._rpc import Packer, Rpc, Stop, new_request_id
@@ -193,8 +194,17 @@ class Link:
 
     def _run(self) -> None:
         backoff = Backoff()
-        while self._recover(self._one_stream(), backoff):
-            pass
+        try:
+            while self._recover(self._one_stream(), backoff):
+                pass
+        except Exception as error:  # no memory for a frame: whoever waits is told
+            with self.changed:
+                stream = self._stream
+                if stream is not None:
+                    stream.is_over = True
+                self._give_up(make(Code.INTERNAL, f"{type(error).__name__}: {error}", "EXCEPTION"))
+            if stream is not None:
+                stream.cancel()
 
     def _one_stream(self) -> LpdeformError | None:
         with self.changed:
@@ -203,7 +213,7 @@ class Link:
             self._is_to_reopen = False
             lease = self.lease
         try:
-            stream.call = self.rpc.deform(self._requests(stream, lease))
+            stream.call = self._deform(stream, lease)
             if self.is_closing:
                 stream.cancel()
             assembly: list[FrameAssembly] = []
@@ -215,12 +225,18 @@ class Link:
             ended = error
         except grpc.RpcError as error:
             ended = from_call(error, self.rpc.address)
-        except ValueError:  # the channel was closed meanwhile
-            ended = session_closed()
         with self.changed:
             stream.is_over = True
             self.changed.notify_all()
             return stream.failure or ended
+
+    def _deform(self, stream: Stream, lease: Lease) -> Any:
+        try:
+            return self.rpc.deform(self._requests(stream, lease))
+        except LpdeformError:
+            raise
+        except ValueError:  # the channel was closed meanwhile
+            raise session_closed() from None
 
     def _recover(self, ended: LpdeformError | None, backoff: Backoff) -> bool:
         """Pauses, makes the session anew where it is lost. False where it is all over."""
@@ -344,6 +360,7 @@ class Link:
             return
         kind = response.event.WhichOneof("event")
         if kind == "opened":
+            check_vertex_count(response.event.opened.vertex_count, self.lease.report.vertices)
             assembly[:] = [FrameAssembly(response.event.opened.vertex_count)]
             self._take_opened(stream, response.event.opened)
         elif kind == "frame":

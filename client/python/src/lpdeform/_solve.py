@@ -61,28 +61,30 @@ def checked_positions(values: npt.ArrayLike | None, vertex_count: int) -> Copied
 
 def solve(link: Link, options: SolveOptions, stop: Stop) -> SolveResult:
     """Begins again where the server went away, within the timeout and for as long as the stream would."""
+    deadline = None if options.timeout is None else time.monotonic() + options.timeout
+    longest = link.rpc.call_timeout if options.timeout is None else min(options.timeout, link.rpc.call_timeout)
     with link.changed:
         is_quiet = link.changed.wait_for(
-            lambda: link.is_closing or stop.is_set or (not link.is_solving and not link.ledger.has_in_flight),
-            link.rpc.call_timeout,
+            lambda: link.is_closing or stop.is_set or (not link.is_solving and not link.ledger.has_in_flight), longest
         )
         if link.is_closing:
             raise session_closed()
+        if stop.is_set:
+            raise make(Code.CANCELLED, "The call was ended.")
         if not is_quiet:
             text = "Another solve, or an update that the server has not answered, is under way."
             raise make(Code.DEADLINE_EXCEEDED, text, "SOLVE_UNDER_WAY")
         link.is_solving = True
     try:
-        return _solve_patiently(link, options, stop)
+        return _solve_patiently(link, options, deadline, stop)
     finally:
         with link.changed:
             link.is_solving = False
             link.changed.notify_all()
 
 
-def _solve_patiently(link: Link, options: SolveOptions, stop: Stop) -> SolveResult:
+def _solve_patiently(link: Link, options: SolveOptions, deadline: float | None, stop: Stop) -> SolveResult:
     backoff = Backoff()
-    deadline = None if options.timeout is None else time.monotonic() + options.timeout
     latest = None
     while True:
         session = link.lease.session

@@ -256,7 +256,9 @@ class Session(Live):
         """Solves for the present handles and settings and returns the finished result, in float64.
 
         `on_progress` is called at most ten times a second. Begins again where the server went away, for as long as the
-        stream would. Raises what the server refuses, and Timeout.
+        stream would. `timeout`: seconds for all of it, waiting for another solve included; None is without limit. While it
+        runs, changes wait and are sent after it. Raises what the server refuses, and Timeout; SESSION_CLOSED (of
+        FAILED_PRECONDITION) where close() is called meanwhile.
         """
         options = self._solve_options(certify, trace, with_normals, initial_positions, on_progress, timeout)
         return solve(self._link, options, self._link.stop)
