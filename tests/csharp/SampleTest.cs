@@ -97,6 +97,46 @@ static class SampleTest
         Send(sample, "OnDisable");
     }
 
+    static void DisablingPutsTheMeshBackAndEnablingGoesOnFromThere()
+    {
+        UnityEngine.Mesh mesh;
+        var sample = Sample(out mesh);
+        var rest = (Vector3[])mesh.vertices.Clone();
+        Send(sample, "OnEnable");
+        sample.handles[1].transform.position.y = 2;
+        UpdateUntil(sample, () => mesh.vertices[20].y == 2, "the first session");
+        for (int round = 0; round < 2; ++round)
+        {
+            Send(sample, "OnDisable");
+            Expect(mesh.vertices.SequenceEqual(rest) && mesh.normals.Length == 0 && mesh.colors32 == null, "as it was");
+            Send(sample, "OnEnable");
+            UpdateUntil(sample, () => mesh.vertices[20].y == 2, "the pose is back, and no more than it");
+        }
+        Expect(UnityEngine.Debug.Warnings.Count == 0, "no warnings");
+        Send(sample, "OnDisable");
+    }
+
+    static void AnUpdateWithoutNewsMakesNoGarbage()
+    {
+        UnityEngine.Mesh mesh;
+        var sample = Sample(out mesh);
+        Send(sample, "OnEnable");
+        sample.handles[1].transform.position.y = 2;
+        UpdateUntil(sample, () => mesh.vertices[20].y == 2, "the tip is lifted");
+        UpdateUntil(sample, () => sample.status == "Live", "it says so");
+        var update = (Action)Delegate.CreateDelegate(typeof(Action), sample, "Update");
+        int drawn;
+        do  // until nothing more comes
+        {
+            drawn = mesh.timesDrawn;
+            for (int k = 0; k < 100; ++k, Thread.Sleep(1)) update();
+        } while (mesh.timesDrawn > drawn);
+        int before = GC.CollectionCount(0);
+        for (int k = 0; k < 100000; ++k) update();
+        Expect(GC.CollectionCount(0) == before, "no garbage");  // 16 bytes of each would fill the nursery three times
+        Send(sample, "OnDisable");
+    }
+
     static void ARefusalIsSaidOnceAndShown()
     {
         UnityEngine.Mesh mesh;
@@ -113,6 +153,7 @@ static class SampleTest
     static int Main(string[] arguments)
     {
         var tests = new Action[] { TheMeshFollowsItsHandles, AHandleThatHoldsNothingIsSaidOnceAndNeverMoved, PIsSentAgainToANewSession,
+                                   DisablingPutsTheMeshBackAndEnablingGoesOnFromThere, AnUpdateWithoutNewsMakesNoGarbage,
                                    ARefusalIsSaidOnceAndShown };
         using (server = new Server(arguments[0]))
         {

@@ -20,6 +20,7 @@ public sealed class LpdeformMesh : MonoBehaviour
         /// Vertices closer than this are held, in the object's own unit.
         public float radius = 0.1f;
         [NonSerialized] public Matrix4x4 start;
+        [NonSerialized] public bool hasStart;
         [NonSerialized] public Motion sent;
         /// It holds vertices, so that it can be moved.
         [NonSerialized] public bool holds;
@@ -33,23 +34,27 @@ public sealed class LpdeformMesh : MonoBehaviour
     Client client;
     Session session;
     UnityEngine.Mesh mesh;
+    /// As the mesh was when the object was first enabled, and is again when it is disabled.
+    Vector3[] rest, restNormals;
+    Color32[] restColours;
     Vector3[] positions, normals;
     Color32[] colours;
     float sentP;
 
     /// How the session is, for the Inspector: "Live", or "Refused: " and why.
     public string status = "";
+    SessionState? said;
 
     void OnEnable()
     {
         sentP = 0;  // a new session knows nothing
         status = "";
-        mesh = GetComponent<MeshFilter>().mesh;  // this object's own copy
-        mesh.MarkDynamic();
-        positions = mesh.vertices;
-        normals = mesh.normals;
-        if (normals.Length != positions.Length) normals = new Vector3[positions.Length];
-        colours = new Color32[positions.Length];
+        said = null;
+        var present = GetComponent<MeshFilter>().mesh;  // this object's own copy
+        if (present != mesh) Remember(present);
+        positions = (Vector3[])rest.Clone();
+        normals = restNormals.Length == rest.Length ? (Vector3[])restNormals.Clone() : new Vector3[rest.Length];
+        colours = new Color32[rest.Length];
 
         try
         {
@@ -71,9 +76,20 @@ public sealed class LpdeformMesh : MonoBehaviour
         foreach (var handle in handles) Hold(handle);
     }
 
+    void Remember(UnityEngine.Mesh present)
+    {
+        mesh = present;
+        mesh.MarkDynamic();
+        rest = mesh.vertices;
+        restNormals = mesh.normals;
+        restColours = mesh.colors32;
+        foreach (var handle in handles) handle.hasStart = false;
+    }
+
     void Hold(HandleObject handle)
     {
-        handle.start = Here(handle);
+        if (!handle.hasStart) handle.start = Here(handle);
+        handle.hasStart = true;
         var center = handle.start.MultiplyPoint3x4(Vector3.zero);
         var held = Array.FindAll(Numbers(positions.Length), i => (positions[i] - center).magnitude < handle.radius);
         handle.sent = default(Motion);
@@ -112,14 +128,20 @@ public sealed class LpdeformMesh : MonoBehaviour
     {
         var state = session.State;
         if (state == SessionState.Refused) Give("Refused: " + (session.Problem == null ? "" : session.Problem.Message));
-        else if (status != state.ToString()) Debug.Log("lpdeform: " + (status = state.ToString()), this);
+        else if (said != state)
+        {
+            said = state;
+            status = state.ToString();
+            Debug.Log("lpdeform: " + status, this);
+        }
     }
 
+    /// The mesh stays as it is.
     void Give(string why)
     {
         status = why;
         Debug.LogWarning("lpdeform: " + why, this);
-        OnDisable();
+        Release();
     }
 
     void Send(HandleObject handle)
@@ -131,9 +153,17 @@ public sealed class LpdeformMesh : MonoBehaviour
         {
             Rotation = new Quaternion4(turn.x, turn.y, turn.z, turn.w), Translation = new Vector3d(shift.x, shift.y, shift.z)
         };
-        if (motion.Equals(handle.sent)) return;
+        if (Same(motion, handle.sent)) return;
         session.Handles.Move(handle.name, motion);
         handle.sent = motion;
+    }
+
+    /// Without the garbage of Equals(object).
+    static bool Same(Motion a, Motion b)
+    {
+        return a.Rotation.X == b.Rotation.X && a.Rotation.Y == b.Rotation.Y && a.Rotation.Z == b.Rotation.Z &&
+               a.Rotation.W == b.Rotation.W && a.Translation.X == b.Translation.X && a.Translation.Y == b.Translation.Y &&
+               a.Translation.Z == b.Translation.Z;
     }
 
     Matrix4x4 Here(HandleObject handle)
@@ -150,6 +180,16 @@ public sealed class LpdeformMesh : MonoBehaviour
     }
 
     void OnDisable()
+    {
+        Release();
+        if (mesh == null) return;
+        mesh.vertices = rest;
+        mesh.normals = restNormals;
+        mesh.colors32 = restColours;
+        mesh.RecalculateBounds();
+    }
+
+    void Release()
     {
         if (session != null) session.Dispose();
         if (client != null) client.Dispose();
