@@ -13,6 +13,7 @@ ULpdeformComponent::ULpdeformComponent() {
 
 void ULpdeformComponent::BeginPlay() {
   Super::BeginPlay();
+  VertexIds.Reset();  // of a play before
   std::vector<float> Positions;
   std::vector<uint32_t> Indices;
   GetDynamicMesh()->ProcessMesh([&](const FDynamicMesh3& Mesh) {
@@ -47,6 +48,7 @@ void ULpdeformComponent::Hold(FLpdeformHandle& Handle, const std::vector<float>&
   const USceneComponent* const Component = Cast<USceneComponent>(Handle.Component.GetComponent(GetOwner()));
   if (Component == nullptr) return;
   Handle.Start = Component->GetComponentTransform().GetRelativeTransform(GetComponentTransform());
+  Handle.Sent = Handle.Start;
   std::vector<uint32_t> Vertices;
   for (size_t Vertex = 0; 3 * Vertex < Positions.size(); ++Vertex) {
     const FVector At(Positions[3 * Vertex], Positions[3 * Vertex + 1], Positions[3 * Vertex + 2]);
@@ -55,21 +57,24 @@ void ULpdeformComponent::Hold(FLpdeformHandle& Handle, const std::vector<float>&
   Handle.bHolds = !Vertices.empty() && Follower->hold(TCHAR_TO_UTF8(*Handle.Name.ToString()), Vertices);
 }
 
-void ULpdeformComponent::Move(const FLpdeformHandle& Handle) {
+void ULpdeformComponent::Move(FLpdeformHandle& Handle) {
   const USceneComponent* const Component = Cast<USceneComponent>(Handle.Component.GetComponent(GetOwner()));
   if (Component == nullptr) return;
   const FTransform Here = Component->GetComponentTransform().GetRelativeTransform(GetComponentTransform());
+  if (Here.Equals(Handle.Sent, 0)) return;
   // What takes Start to Here: x -> R x + (here - R start).
   const FQuat Turn = Here.GetRotation() * Handle.Start.GetRotation().Inverse();
   const FVector Shift = Here.GetLocation() - Turn.RotateVector(Handle.Start.GetLocation());
-  Follower->move(TCHAR_TO_UTF8(*Handle.Name.ToString()), {Turn.X, Turn.Y, Turn.Z, Turn.W}, {Shift.X, Shift.Y, Shift.Z});
+  const bool bTaken = Follower->move(TCHAR_TO_UTF8(*Handle.Name.ToString()), {Turn.X, Turn.Y, Turn.Z, Turn.W},
+                                     {Shift.X, Shift.Y, Shift.Z});
+  if (bTaken) Handle.Sent = Here;
 }
 
 /** Once a picture. Nothing here waits for the network. */
 void ULpdeformComponent::TickComponent(float Seconds, ELevelTick Tick, FActorComponentTickFunction* Function) {
   Super::TickComponent(Seconds, Tick, Function);
   if (!Follower) return;
-  for (const FLpdeformHandle& Handle : Handles) {
+  for (FLpdeformHandle& Handle : Handles) {
     if (Handle.bHolds) Move(Handle);
   }
   if (Follower->tick()) Show();

@@ -25,7 +25,7 @@ struct FLpdeformHandle {
   UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Lpdeform", meta = (Units = "cm"))
   float Radius = 10;
 
-  FTransform Start;
+  FTransform Start, Sent;
   bool bHolds = false;  // vertices, so that it can be moved
 };
 
@@ -47,7 +47,7 @@ class ULpdeformComponent : public UDynamicMeshComponent {
 
  private:
   void Hold(FLpdeformHandle& Handle, const std::vector<float>& Positions);
-  void Move(const FLpdeformHandle& Handle);
+  void Move(FLpdeformHandle& Handle);
   void Show();
 
   std::unique_ptr<LpdeformFollower> Follower;
