@@ -7,15 +7,32 @@
 #include "absl/time/clock.h"
 #include "core/base/fault.h"
 #include "server/encode.h"
+#include "server/heap_trim.h"
 #include "server/key_watch.h"
 
 namespace lpdeform {
 namespace {
 
 constexpr int kPoolThreads = 4;
-constexpr std::uint32_t kDefaultPage = 100, kLargestPage = 1000;
+constexpr std::chrono::seconds kTrimPause{10};
+
 std::shared_ptr<Timers> or_system(std::shared_ptr<Timers> timers) {
   return timers ? std::move(timers) : std::make_shared<SystemTimers>();
+}
+
+/// Between looks whether a stream whose token will expire is still there.
+constexpr std::chrono::minutes kBetweenLooks{1};
+
+void end_at(const std::shared_ptr<Timers>& timers, const std::weak_ptr<FrameStream>& weak,
+            Timers::TimePoint when) {
+  const auto look = [weak_timers = std::weak_ptr(timers), weak, when] {
+    const auto stream = weak.lock();
+    const auto again = weak_timers.lock();
+    if (!stream || !again) return;
+    if (again->now() < when) return end_at(again, weak, when);
+    stream->end(EndReason::kTokenExpired, "The bearer token that the call came with has expired.");
+  };
+  timers->at(std::min(when, timers->now() + kBetweenLooks), look);
 }
 
 std::string ended_because(EndReason reason) {
@@ -43,7 +60,7 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
                 timers,
                 options.heartbeat,
                 metrics,
-                {options.max_streams_per_session, options.max_handles}}),
+                {options.max_streams_per_session, {options.max_handles, options.max_undo}}}),
       scheduler(options.runner_threads == 0 ? Scheduler::default_threads() : options.runner_threads,
                 observer(Span::kSchedulerQueue)),
       pool(kPoolThreads, options.max_calls_waiting, observer(Span::kCallQueue)) {
@@ -54,8 +71,10 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
         self->remove(session.name(), EndReason::kDraining, "Another server has the session now.");
     };
   }
-  registry->on_ended = [log = log_, metrics = metrics, keeper = keeper_](const Session& session,
-                                                                         EndReason reason) {
+  registry->on_ended = [log = log_, metrics = metrics, keeper = keeper_,
+                        heap = std::make_shared<HeapTrim>(kTrimPause)](const Session& session,
+                                                                       EndReason reason) {
+    heap->after_release();
     const std::string why = ended_because(reason);
     metrics->session_ended(why);
     log->info("session_ended", {{"session", abbreviated(session.name())}, {"reason", why}});
@@ -150,28 +169,6 @@ void Backend::get_session(const CallContext& call, const v1::GetSessionRequest& 
   done(session.status());
 }
 
-absl::Status Backend::list_sessions(const CallContext& call, const v1::ListSessionsRequest& request,
-                                    v1::ListSessionsResponse& response) {
-  if (request.page_size() > kLargestPage) {
-    return invalid_input(
-        {"PAGE_SIZE", "page_size", absl::StrCat("page_size <= ", kLargestPage)},
-        absl::StrCat("A page of ", request.page_size(), " sessions is over ", kLargestPage, "."));
-  }
-  const auto caller = identify(call, Access::kRead);
-  if (!caller.ok()) return caller.status();
-  const auto page = registry->list(request.page_size() == 0 ? kDefaultPage : request.page_size(),
-                                   request.page_token(), caller->subject);
-  if (!page.ok()) return page.status();
-  for (const auto& session : page->sessions) {
-    v1::Session& listed = *response.add_sessions();
-    encode(session->info(), registry->idle(), timers->now(), listed);
-    listed.clear_handles();
-    listed.mutable_mesh()->clear_defects();
-  }
-  response.set_next_page_token(page->next_page_token);
-  return absl::OkStatus();
-}
-
 void Backend::ack_frames(const CallContext& call, const v1::AckFramesRequest& request, v1::AckFramesResponse&,
                          Done done) {
   const auto session = find(call, Access::kRead, request.session());
@@ -183,7 +180,9 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call
                                                          const std::string& token,
                                                          const v1::FrameOptions& options,
                                                          std::function<void()> wake) {
-  auto session = find(call, token.empty() ? Access::kRead : Access::kChange, session_name);
+  const auto caller = identify(call, token.empty() ? Access::kRead : Access::kChange);
+  if (!caller.ok()) return caller.status();
+  auto session = registry->find(session_name, caller->subject);
   if (!session.ok()) return session.status();
   auto decoded = decode_frame_options(options);
   if (!decoded.ok()) return decoded.status();
@@ -194,6 +193,10 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call
   if (!stream.ok()) return stream.status();
   (*stream)->start(std::move(wake));
   metrics->change(Level::kStreams, 1);
+  if (caller->until != 0) {
+    const std::chrono::seconds left(caller->until + 1 - absl::ToUnixSeconds(absl::Now()));
+    end_at(timers, *stream, timers->now() + left);
+  }
   const WriterLease lease = (*session)->lease();
   log().info("stream_opened", {{"session", abbreviated(session_name)},
                                {"stream", abbreviated((*stream)->id())},

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -29,6 +30,12 @@
 
 namespace lpdeform {
 
+/// A session that was just made, and what a store is to keep of it from the beginning.
+struct NewSession {
+  std::shared_ptr<Session> session;
+  StoredHead head;  // empty without a store
+};
+
 /// All that the calls of a server share, and what they do, without gRPC: each function takes a request to its
 /// response. Called from the task pool and the scheduler, never from gRPC's threads. Thread-safe.
 class Backend {
@@ -42,13 +49,15 @@ class Backend {
                            v1::UploadPartResponse& response);
   absl::Status delete_upload(const CallContext& call, const v1::DeleteUploadRequest& request,
                              v1::DeleteUploadResponse& response);
-  absl::Status list_sessions(const CallContext& call, const v1::ListSessionsRequest& request,
-                             v1::ListSessionsResponse& response);
   // These do not wait, for the session to be made or for the store: `done` is called when all is done, on another thread, or
   // at once. `request` and `response` must live until then.
   using Done = std::function<void(absl::Status)>;
   void create_session(const CallContext& call, const v1::CreateSessionRequest& request,
                       v1::CreateSessionResponse& response, Done done);
+  void restore_session(const CallContext& call, const v1::RestoreSessionRequest& request,
+                       v1::RestoreSessionResponse& response, Done done);
+  void list_sessions(const CallContext& call, const v1::ListSessionsRequest& request,
+                     v1::ListSessionsResponse& response, Done done);
   void get_session(const CallContext& call, const v1::GetSessionRequest& request,
                    v1::GetSessionResponse& response, Done done);
   void ack_frames(const CallContext& call, const v1::AckFramesRequest& request,
@@ -59,6 +68,8 @@ class Backend {
                       v1::AcquireWriterResponse& response, Done done);
   void update_handles(const CallContext& call, const v1::UpdateHandlesRequest& request,
                       v1::UpdateHandlesResponse& response, Done done);
+  void undo_update(const CallContext& call, const v1::UndoUpdateRequest& request,
+                   v1::UndoUpdateResponse& response, Done done);
 
   /// Calls `then` with OK once find() finds the session of this name, or will not however long one waits: at once, or, where
   /// only the store has it, on a thread of the pool when it has been made again. Errors: UNAVAILABLE STORE_FAILING;
@@ -75,6 +86,14 @@ class Backend {
   /// A session of the caller's. Errors: as identify; NOT_FOUND SESSION_UNKNOWN.
   absl::StatusOr<std::shared_ptr<Session>> find(const CallContext& call, Access access,
                                                 const std::string& name) const;
+
+  /// A session's file, and the memory that it has been promised. For those who may change the session: it gives its mesh away.
+  struct SnapshotFile {
+    std::string bytes;
+    Reservation memory;
+  };
+  /// Errors: as find; RESOURCE_EXHAUSTED MEMORY_FULL.
+  absl::StatusOr<SnapshotFile> snapshot(const CallContext& call, const std::string& session_name) const;
 
   /// A stream of a session, which is found by its name; with a token, the writer's. `wake` as FrameStream::start has it.
   struct OpenStream {
@@ -121,12 +140,26 @@ class Backend {
   void log_solved(const Session& session, const SolveResult& result, const std::string& trace_id) const;
   absl::StatusOr<UpdateResult> take_update(const CallContext& call, Session& session,
                                            const std::string& token, const v1::Update& update);
-  void make_session(const CallContext& call, const v1::CreateSessionRequest& request,
-                    std::uint64_t fingerprint, const std::string& owner,
-                    const Registry::OnCreated& on_created);
-  void keep_new(std::shared_ptr<Session> session, const v1::CreateSessionRequest& request,
-                std::uint64_t fingerprint, Done done);
+  /// A call that makes a session: the same request_id and fingerprint give the same one.
+  struct Creation {
+    CallContext call;
+    std::string request_id, owner;
+    std::uint64_t fingerprint = 0;
+    std::string_view event;                            // in the log
+    std::function<absl::StatusOr<NewSession>()> make;  // on a thread of the scheduler
+    Registry::OnCreated on_created;
+  };
+  template <typename Response>
+  Registry::OnCreated answering(Response& response, Done done) const;
+  void create_once(const Creation& creation);
+  void make_session(const Creation& creation);
+  absl::StatusOr<NewSession> make_new(const std::string& owner, const v1::CreateSessionRequest& request,
+                                      std::uint64_t fingerprint) const;
+  absl::StatusOr<NewSession> make_restored(const std::string& owner, const v1::RestoreSessionRequest& request,
+                                           std::uint64_t fingerprint) const;
   void when_kept(const Session& session, std::uint64_t revision, Keeper::OnKept on_kept);
+  void list_kept(const std::string& owner, const std::string& after, std::size_t most,
+                 v1::ListSessionsResponse& response, Done done);
   void make_again(const std::string& name, absl::StatusOr<Keeper::Found> found);
   void end_restoring(const std::string& name, const absl::Status& status);
   void log_session(std::string_view event, const Session& session, const std::string& trace_id) const;

@@ -1,5 +1,6 @@
 // Backend: sessions begin, change and end, and what the store has to do with that.
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -7,12 +8,18 @@
 #include "core/base/fault.h"
 #include "server/backend.h"
 #include "server/encode.h"
+#include "server/encode_stored.h"
 #include "server/random_name.h"
 #include "server/refusals.h"
+#include "server/snapshot.h"
 #include "server/stored_state.h"
 
 namespace lpdeform {
 namespace {
+
+constexpr std::uint32_t kDefaultPage = 100, kLargestPage = 1000;
+/// Of page tokens that go on with what only the store has.
+constexpr std::string_view kKeptOnly = "kept:";
 
 /// That a server which shuts down gives its store.
 constexpr std::chrono::seconds kFlushPatience{5};
@@ -26,61 +33,167 @@ void Backend::log_session(std::string_view event, const Session& session, const 
                      {"trace_id", trace_id}});
 }
 
-void Backend::create_session(const CallContext& call, const v1::CreateSessionRequest& request,
-                             v1::CreateSessionResponse& response, Done done) {
-  const auto caller = identify(call, Access::kChange);
-  if (!caller.ok()) return done(caller.status());
-  const Registry::OnCreated on_created = [this, &response,
-                                          done](const absl::StatusOr<CreatedSession>& created) {
+template <typename Response>
+Registry::OnCreated Backend::answering(Response& response, Done done) const {
+  return [this, &response, done = std::move(done)](const absl::StatusOr<CreatedSession>& created) {
     if (!created.ok()) return done(created.status());
     encode(created->session->info(), registry->idle(), timers->now(), *response.mutable_session());
     response.set_writer_token(created->writer_token);
     done(absl::OkStatus());
   };
+}
+
+void Backend::create_session(const CallContext& call, const v1::CreateSessionRequest& request,
+                             v1::CreateSessionResponse& response, Done done) {
+  const auto caller = identify(call, Access::kChange);
+  if (!caller.ok()) return done(caller.status());
   const std::uint64_t fingerprint = fingerprint_of(request);
-  const auto make = [this, call, &request, fingerprint, owner = caller->subject, on_created] {
-    make_session(call, request, fingerprint, owner, on_created);
+  const auto make = [this, &request, owner = caller->subject, fingerprint] {
+    return make_new(owner, request, fingerprint);
   };
-  if (keeper_ == nullptr || request.request_id().empty()) return make();
+  create_once({call, request.request_id(), caller->subject, fingerprint, "session_created", make,
+               answering(response, std::move(done))});
+}
+
+void Backend::restore_session(const CallContext& call, const v1::RestoreSessionRequest& request,
+                              v1::RestoreSessionResponse& response, Done done) {
+  const auto caller = identify(call, Access::kChange);
+  if (!caller.ok()) return done(caller.status());
+  const std::uint64_t fingerprint = fingerprint_of(request);
+  const auto make = [this, &request, owner = caller->subject, fingerprint] {
+    return make_restored(owner, request, fingerprint);
+  };
+  create_once({call, request.request_id(), caller->subject, fingerprint, "session_from_snapshot", make,
+               answering(response, std::move(done))});
+}
+
+void Backend::create_once(const Creation& creation) {
+  if (keeper_ == nullptr || creation.request_id.empty()) return make_session(creation);
   // A server that was restarted may have made it before.
-  keeper_->find_request(caller->subject, request.request_id(),
-                        [this, call, make, on_created](absl::StatusOr<std::string> name) {
-                          if (!name.ok()) return on_created(name.status());
-                          if (name->empty()) return make();
-                          when_here(call, *name, [make, on_created](const absl::Status& status) {
-                            if (status.ok() || absl::IsNotFound(status)) return make();
-                            on_created(status);
+  keeper_->find_request(creation.owner, creation.request_id,
+                        [this, creation](const absl::StatusOr<std::string>& name) {
+                          if (!name.ok()) return creation.on_created(name.status());
+                          if (name->empty()) return make_session(creation);
+                          when_here(creation.call, *name, [this, creation](const absl::Status& status) {
+                            if (status.ok() || absl::IsNotFound(status)) return make_session(creation);
+                            creation.on_created(status);
                           });
                         });
 }
 
-void Backend::make_session(const CallContext& call, const v1::CreateSessionRequest& request,
-                           std::uint64_t fingerprint, const std::string& owner,
-                           const Registry::OnCreated& on_created) {
-  if (!registry->begin_creation(request.request_id(), on_created, fingerprint, owner)) return;
-  scheduler.run_once([this, call, owner, &request, fingerprint, on_created] {
-    const auto finish = [this, call, owner, request_id = request.request_id(),
-                         on_created](absl::StatusOr<std::shared_ptr<Session>> made) {
+void Backend::make_session(const Creation& creation) {
+  if (!registry->begin_creation(creation.request_id, creation.on_created, creation.fingerprint,
+                                creation.owner))
+    return;
+  scheduler.run_once([this, creation] {
+    const auto finish = [this, creation](absl::StatusOr<std::shared_ptr<Session>> made) {
       if (made.ok()) {
         metrics->add(Count::kSessionsCreated);
-        log_session("session_created", **made, call.trace_id);
+        log_session(creation.event, **made, creation.call.trace_id);
       }
-      registry->finish_creation(request_id, std::move(made), on_created, owner);
+      registry->finish_creation(creation.request_id, std::move(made), creation.on_created, creation.owner);
     };
-    const auto session = factory_.make(owner, request);
-    if (!session.ok() || keeper_ == nullptr) return finish(session);
-    keep_new(*session, request, fingerprint, [finish, session = *session](const absl::Status& status) {
-      finish(status.ok() ? absl::StatusOr<std::shared_ptr<Session>>(session) : status);
-    });
+    auto made = creation.make();
+    if (!made.ok()) return finish(made.status());
+    if (keeper_ == nullptr) return finish(made->session);
+    const std::shared_ptr<Session> session = made->session;
+    keeper_->add(session, std::move(made->head), creation.request_id,
+                 [finish, session](const absl::Status& status) {
+                   finish(status.ok() ? absl::StatusOr<std::shared_ptr<Session>>(session) : status);
+                 });
   });
 }
 
-void Backend::keep_new(std::shared_ptr<Session> session, const v1::CreateSessionRequest& request,
-                       std::uint64_t fingerprint, Done done) {
-  Decoder decoder = factory_.decoder(request, session->owner());
-  auto head = encode_head(request, decoder, fingerprint, session->created_unix_ms());
-  if (!head.ok()) return done(head.status());
-  keeper_->add(std::move(session), *std::move(head), request.request_id(), std::move(done));
+absl::StatusOr<NewSession> Backend::make_new(const std::string& owner,
+                                             const v1::CreateSessionRequest& request,
+                                             std::uint64_t fingerprint) const {
+  auto session = factory_.make(owner, request);
+  if (!session.ok()) return session.status();
+  NewSession made{*std::move(session), {}};
+  if (keeper_ == nullptr) return made;
+  Decoder decoder = factory_.decoder(request, owner);
+  auto head = encode_head(request, decoder, fingerprint, made.session->created_unix_ms());
+  if (!head.ok()) return head.status();
+  made.head = *std::move(head);
+  return made;
+}
+
+absl::StatusOr<NewSession> Backend::make_restored(const std::string& owner,
+                                                  const v1::RestoreSessionRequest& request,
+                                                  std::uint64_t fingerprint) const {
+  const auto file = Decoder(*uploads_, 0, nullptr, nullptr, owner).raw(request.snapshot(), "snapshot");
+  if (!file.ok()) return file.status();
+  const auto memory = budget_->reserve(2 * file->size());  // the file, and what is read out of it
+  if (!memory.ok()) return memory.status();
+  const auto snapshot = decode_snapshot(*file);
+  if (!snapshot.ok()) return snapshot.status();
+  auto session = factory_.make_from(owner, *snapshot);
+  if (!session.ok()) return session.status();
+  NewSession made{*std::move(session), {}};
+  if (keeper_ == nullptr) return made;
+  static const StoredBlobs no_blobs;
+  Decoder decoder = factory_.decoder(snapshot->request, owner).reading_stored(no_blobs);
+  auto head = encode_head(snapshot->request, decoder, fingerprint, made.session->created_unix_ms());
+  if (!head.ok()) return head.status();
+  made.head = *std::move(head);
+  return made;
+}
+
+absl::StatusOr<Backend::SnapshotFile> Backend::snapshot(const CallContext& call,
+                                                        const std::string& session_name) const {
+  const auto session = find(call, Access::kChange, session_name);
+  if (!session.ok()) return session.status();
+  auto memory = budget_->reserve(snapshot_bytes(**session));
+  if (!memory.ok()) return memory.status();
+  SnapshotFile file{encode_snapshot(**session), *std::move(memory)};
+  file.memory.resize(file.bytes.size());
+  log_session("snapshot_made", **session, call.trace_id);
+  return file;
+}
+
+void Backend::list_sessions(const CallContext& call, const v1::ListSessionsRequest& request,
+                            v1::ListSessionsResponse& response, Done done) {
+  if (request.page_size() > kLargestPage) {
+    return done(invalid_input(
+        {"PAGE_SIZE", "page_size", absl::StrCat("page_size <= ", kLargestPage)},
+        absl::StrCat("A page of ", request.page_size(), " sessions is over ", kLargestPage, ".")));
+  }
+  const auto caller = identify(call, Access::kRead);
+  if (!caller.ok()) return done(caller.status());
+  const std::size_t most = request.page_size() == 0 ? kDefaultPage : request.page_size();
+  const std::string& token = request.page_token();
+  if (keeper_ && token.starts_with(kKeptOnly))
+    return list_kept(caller->subject, token.substr(kKeptOnly.size()), most, response, std::move(done));
+  const auto page = registry->list(most, token, caller->subject);
+  if (!page.ok()) return done(page.status());
+  for (const auto& session : page->sessions) {
+    v1::Session& listed = *response.add_sessions();
+    encode(session->info(), registry->idle(), timers->now(), listed);
+    listed.clear_handles();
+    listed.mutable_mesh()->clear_defects();
+  }
+  response.set_next_page_token(page->next_page_token);
+  if (keeper_ == nullptr || !page->next_page_token.empty()) return done(absl::OkStatus());
+  list_kept(caller->subject, "", most - page->sessions.size(), response, std::move(done));
+}
+
+/// Adds those that only the store has. Without room for any it says that there may be some.
+void Backend::list_kept(const std::string& owner, const std::string& after, std::size_t most,
+                        v1::ListSessionsResponse& response, Done done) {
+  const auto is_elsewhere = [this](const std::string& name) { return !registry->has(name); };
+  keeper_->list(owner, after, most + 1, is_elsewhere,
+                [after, most, &response, done](const absl::StatusOr<std::vector<std::string>>& names) {
+                  if (!names.ok()) return done(names.status());
+                  for (std::size_t k = 0; k < std::min(most, names->size()); ++k) {
+                    v1::Session& listed = *response.add_sessions();
+                    listed.set_name(names->at(k));
+                    listed.set_is_kept_only(true);
+                  }
+                  if (names->size() > most)
+                    response.set_next_page_token(
+                        absl::StrCat(std::string(kKeptOnly), most == 0 ? after : names->at(most - 1)));
+                  done(absl::OkStatus());
+                });
 }
 
 void Backend::delete_session(const CallContext& call, const v1::DeleteSessionRequest& request,
@@ -125,6 +238,22 @@ void Backend::update_handles(const CallContext& call, const v1::UpdateHandlesReq
            if (result.ok()) encode(*result, *response.mutable_result());
            done(result.status());
          });
+}
+
+void Backend::undo_update(const CallContext& call, const v1::UndoUpdateRequest& request,
+                          v1::UndoUpdateResponse& response, Done done) {
+  const auto session = find(call, Access::kChange, request.session());
+  if (!session.ok()) return done(session.status());
+  const auto result = (*session)->undo(request.writer_token(), request.input_seq(), request.redo());
+  if (!result.ok()) return done(result.status());
+  encode(result->update, *response.mutable_result());
+  for (const HandleChange& change : result->changes) encode_change(change, *response.add_changes());
+  response.set_undo_steps(static_cast<std::uint32_t>(result->undo_steps));
+  response.set_redo_steps(static_cast<std::uint32_t>(result->redo_steps));
+  when_kept(**session, result->update.revision, [&response, done = std::move(done)](bool is_kept) {
+    response.mutable_result()->set_kept(is_kept);
+    done(absl::OkStatus());
+  });
 }
 
 void Backend::update(const CallContext& call, Session& session, const std::string& token,

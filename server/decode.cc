@@ -226,6 +226,7 @@ absl::StatusOr<SettingsChange> Decoder::settings(const v1::SettingsUpdate& messa
 absl::StatusOr<Update> Decoder::update(const v1::Update& message) {
   Update update;
   update.input_seq = message.input_seq();
+  update.begins_step = message.begins_step();
   if (absl::Status status = handles(message.handles(), update); !status.ok()) return status;
   auto change = settings(message.settings());
   if (!change.ok()) return change.status();

@@ -22,7 +22,10 @@ absl::StatusOr<Field> Decoder::field(const v1::Field& message, std::string_view 
   if (message.value_case() == v1::Field::kAutomatic) {
     const double strength = message.automatic().strength();
     if (absl::Status status = check_strength(strength); !status.ok()) return status;
-    LPDEFORM_CHECK(features_ != nullptr);
+    if (features_ == nullptr) {
+      return invalid_input({"FIELD_MISSING", std::string(what), ""},
+                           absl::StrCat("The stored ", std::string(what), " has no values."));
+    }
     const auto material = automatic_material(features_->joint(), strength);
     return for_client(*material.*part);
   }

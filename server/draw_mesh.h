@@ -27,6 +27,10 @@ class DrawMesh {
   std::uint32_t vertex_count() const;
   /// Null where nothing is welded.
   const std::shared_ptr<const Weld>& weld() const { return weld_; }
+  /// The client's.
+  const Faces& faces() const { return weld_ ? faces_ : shape_->faces(); }
+  /// As they were given: one a vertex of the client, or no rows.
+  const Points& rest_normals() const { return rest_normals_; }
   /// How many vertices are copies of one before them.
   std::uint32_t copy_count() const {
     return vertex_count() - static_cast<std::uint32_t>(shape_->vertex_count());

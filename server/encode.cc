@@ -69,18 +69,6 @@ v1::InitialGuess encode_initial(InitialGuess guess) {
   return v1::INITIAL_GUESS_UNSPECIFIED;
 }
 
-v1::FreeComponents encode_free_components(FreeComponents free_components) {
-  switch (free_components) {
-    case FreeComponents::kError:
-      return v1::FREE_COMPONENTS_ERROR;
-    case FreeComponents::kStay:
-      return v1::FREE_COMPONENTS_STAY;
-    case FreeComponents::kFollow:
-      return v1::FREE_COMPONENTS_FOLLOW;
-  }
-  return v1::FREE_COMPONENTS_UNSPECIFIED;
-}
-
 v1::HandleKind encode_kind(const Hold& hold) {
   const Match kind{[](const Exactly&) { return v1::HANDLE_KIND_EXACT; },
                    [](const Soft&) { return v1::HANDLE_KIND_SOFT; },
@@ -88,18 +76,6 @@ v1::HandleKind encode_kind(const Hold& hold) {
                    [](const AxisLock&) { return v1::HANDLE_KIND_AXIS_LOCK; },
                    [](const PlaneLock&) { return v1::HANDLE_KIND_PLANE_LOCK; }};
   return std::visit(kind, hold);
-}
-
-v1::WeightKind encode_weights(WeightKind weights) {
-  switch (weights) {
-    case WeightKind::kCotangent:
-      return v1::WEIGHT_KIND_COTANGENT;
-    case WeightKind::kUniform:
-      return v1::WEIGHT_KIND_UNIFORM;
-    case WeightKind::kIntrinsicDelaunay:
-      return v1::WEIGHT_KIND_INTRINSIC_DELAUNAY;
-  }
-  return v1::WEIGHT_KIND_UNSPECIFIED;
 }
 
 v1::GoAwayReason encode_reason(EndReason reason) {
@@ -114,6 +90,8 @@ v1::GoAwayReason encode_reason(EndReason reason) {
       return v1::GO_AWAY_REASON_WRITER_REPLACED;
     case EndReason::kProtocolError:
       return v1::GO_AWAY_REASON_PROTOCOL_ERROR;
+    case EndReason::kTokenExpired:
+      return v1::GO_AWAY_REASON_TOKEN_EXPIRED;
   }
   return v1::GO_AWAY_REASON_UNSPECIFIED;
 }
@@ -292,6 +270,30 @@ void encode_event(const Note& note, const FrameStream& stream, std::uint32_t ver
 
 }  // namespace
 
+v1::FreeComponents encode_free_components(FreeComponents free_components) {
+  switch (free_components) {
+    case FreeComponents::kError:
+      return v1::FREE_COMPONENTS_ERROR;
+    case FreeComponents::kStay:
+      return v1::FREE_COMPONENTS_STAY;
+    case FreeComponents::kFollow:
+      return v1::FREE_COMPONENTS_FOLLOW;
+  }
+  return v1::FREE_COMPONENTS_UNSPECIFIED;
+}
+
+v1::WeightKind encode_weights(WeightKind weights) {
+  switch (weights) {
+    case WeightKind::kCotangent:
+      return v1::WEIGHT_KIND_COTANGENT;
+    case WeightKind::kUniform:
+      return v1::WEIGHT_KIND_UNIFORM;
+    case WeightKind::kIntrinsicDelaunay:
+      return v1::WEIGHT_KIND_INTRINSIC_DELAUNAY;
+  }
+  return v1::WEIGHT_KIND_UNSPECIFIED;
+}
+
 void encode_vector(const Eigen::Vector3d& vector, v1::Vector3& out) {
   out.set_x(vector.x());
   out.set_y(vector.y());
@@ -330,6 +332,8 @@ void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint no
   const auto unix_now = std::chrono::system_clock::now().time_since_epoch();
   out.set_expires_unix_ms(duration_cast<milliseconds>(unix_now + (info.last_used - now) + idle).count());
   out.set_memory_bytes(info.memory_bytes);
+  out.set_undo_steps(static_cast<std::uint32_t>(info.undo_steps));
+  out.set_redo_steps(static_cast<std::uint32_t>(info.redo_steps));
   out.set_weights(encode_weights(info.shape->weight_kind()));
   out.set_free_components(encode_free_components(info.free_components));
 }

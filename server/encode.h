@@ -15,6 +15,8 @@ namespace lpdeform {
 /// `idle`: how long a session lives without use.
 void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint now, v1::Session& out);
 
+v1::WeightKind encode_weights(WeightKind weights);
+v1::FreeComponents encode_free_components(FreeComponents free_components);
 void encode_vector(const Eigen::Vector3d& vector, v1::Vector3& out);
 /// Of settings as Decoder makes them: max_iterations is not 0.
 void encode_solver(const SolveSettings& settings, v1::SolverSettings& out);

@@ -57,7 +57,43 @@ struct MotionEncoder {
   }
 };
 
+void append(const void* numbers, std::size_t bytes, std::string& out) {
+  out.append(static_cast<const char*>(numbers), bytes);
+}
+
+/// Each vertex by its lowest copy.
+void encode_weld(const Weld& weld, v1::Weld& out) {
+  std::vector<std::int32_t> lowest;
+  for (const std::int32_t welded : weld.to_welded) lowest.push_back(weld.first_copy[welded]);
+  pack(lowest.data(), lowest.size(), *out.mutable_groups());
+}
+
 }  // namespace
+
+void encode_mesh(const SessionInfo& session, v1::CreateSessionRequest& out) {
+  const Points vertices = session.mesh->positions(session.shape->positions());
+  const Faces& faces = session.mesh->faces();
+  v1::Mesh& mesh = *out.mutable_mesh();
+  mesh.set_vertex_count(session.mesh->vertex_count());
+  mesh.set_face_count(static_cast<std::uint32_t>(faces.rows()));
+  mesh.set_scalar(v1::SCALAR_FLOAT64);
+  std::string& data = *mesh.mutable_data()->mutable_inline_();
+  data.reserve(vertices.size() * sizeof(double) + faces.size() * sizeof(std::int32_t));
+  append(vertices.data(), vertices.size() * sizeof(double), data);
+  append(faces.data(), faces.size() * sizeof(std::int32_t), data);
+  out.set_weights(encode_weights(session.shape->weight_kind()));
+  out.set_free_components(encode_free_components(session.free_components));
+  if (session.mesh->weld()) encode_weld(*session.mesh->weld(), *out.mutable_weld());
+  const Points& normals = session.mesh->rest_normals();
+  if (normals.rows() == 0) return;
+  out.mutable_normals()->set_scalar(v1::SCALAR_FLOAT64);
+  pack(normals.data(), static_cast<std::size_t>(normals.size()), *out.mutable_normals()->mutable_data());
+}
+
+void encode_positions(const Points& positions, v1::Positions& out) {
+  out.set_scalar(v1::SCALAR_FLOAT64);
+  pack(positions.data(), static_cast<std::size_t>(positions.size()), *out.mutable_data());
+}
 
 v1::Field encode_whole_field(const Field& field) {
   v1::Field out;
@@ -88,6 +124,18 @@ void encode_group(const Handle& handle, v1::Handle& out) {
 
 void encode_motion(const HandleMotion& motion, v1::Motion& out) {
   std::visit(MotionEncoder{out}, motion);
+}
+
+void encode_change(const HandleChange& change, v1::HandleUpdate& out) {
+  out.set_name(change.name);
+  if (const auto* const handle = std::get_if<Handle>(&change.change)) {
+    encode_group(*handle, *out.mutable_set());
+    encode_motion(handle->motion, *out.mutable_set()->mutable_motion());
+  } else if (const auto* const motion = std::get_if<HandleMotion>(&change.change)) {
+    encode_motion(*motion, *out.mutable_move());
+  } else {
+    out.mutable_remove();
+  }
 }
 
 }  // namespace lpdeform

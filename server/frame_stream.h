@@ -39,7 +39,14 @@ struct StreamOptions {
   Format format_for(const Surface& surface) const;
 };
 
-enum class EndReason { kSessionDeleted, kSessionExpired, kDraining, kWriterReplaced, kProtocolError };
+enum class EndReason {
+  kSessionDeleted,
+  kSessionExpired,
+  kDraining,
+  kWriterReplaced,
+  kProtocolError,
+  kTokenExpired
+};
 
 // What a stream may have to send.
 struct OpenedNote {

@@ -227,6 +227,25 @@ void Keeper::find_request(const std::string& owner, const std::string& request_i
   if (!is_posted) on_name(server_busy(reader_.expected_wait()));
 }
 
+void Keeper::list(const std::string& owner, const std::string& after, std::size_t most,
+                  std::function<bool(const std::string&)> is_wanted, OnNames on_names) {
+  const auto read = [this, owner, after, most, is_wanted = std::move(is_wanted), on_names] {
+    std::vector<std::string> wanted;
+    std::string last = after;
+    for (bool has_more = true; has_more && wanted.size() < most;) {
+      const auto names = store_->list(owner, last, most);
+      if (!names.ok()) return on_names(names.status());
+      has_more = names->size() == most;
+      for (const std::string& name : *names) {
+        if (wanted.size() < most && is_wanted(name) && !is_being_removed(name)) wanted.push_back(name);
+      }
+      if (!names->empty()) last = names->back();
+    }
+    on_names(std::move(wanted));
+  };
+  if (!reader_.try_post(read)) on_names(server_busy(reader_.expected_wait()));
+}
+
 void Keeper::flush(Clock::time_point end) {
   std::unique_lock lock(mutex_);
   changed_.wait_until(lock, end, [this] { return is_failing_ || (due_.empty() && !is_writing_); });
@@ -259,7 +278,7 @@ std::vector<Keeper::Work> Keeper::take_work() {
       const auto found = entries_.find(name);
       if (found == entries_.end()) continue;
       const Entry& entry = found->second;
-      Work work{name, entry.session, entry.epoch == 0 ? entry.head : "", entry.revision, {}};
+      Work work{name, entry.session, entry.head, entry.revision, {}};
       work.change.session = name;
       work.change.epoch_before = entry.epoch;
       if (entry.epoch == 0) {
@@ -282,7 +301,8 @@ void Keeper::fill_in(Work& work) {
   change.epoch = changes.lease.epoch;
   change.owner = work.session->owner();
   change.parts = encode_changes(changes);
-  if (change.epoch_before == 0) change.parts["head"] = work.head;
+  change.replaces_all = changes.inputs.is_all;
+  if (change.replaces_all) change.parts["head"] = work.head;
 }
 
 /// All at once; where that fails, each by itself, so that one that cannot be kept does not hold up the others.

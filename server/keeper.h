@@ -80,6 +80,11 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   using OnName = std::function<void(absl::StatusOr<std::string>)>;
   void find_request(const std::string& owner, const std::string& request_id, OnName on_name);
 
+  /// Names of the owner's sessions that only the store has, by name after `after`: as far as `is_wanted`, at most `most`.
+  using OnNames = std::function<void(absl::StatusOr<std::vector<std::string>>)>;
+  void list(const std::string& owner, const std::string& after, std::size_t most,
+            std::function<bool(const std::string&)> is_wanted, OnNames on_names);
+
   /// Waits until all is kept, or the store has failed, or this moment.
   void flush(std::chrono::steady_clock::time_point end);
 
@@ -115,8 +120,8 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   struct Work {
     std::string name;
     std::shared_ptr<Session> session;  // null: a removal
-    std::string head;                  // of a new one
-    std::uint64_t revision = 0;        // kept so far, then: once `change` is
+    std::string head;
+    std::uint64_t revision = 0;  // kept so far, then: once `change` is
     StoredChange change;
   };
 

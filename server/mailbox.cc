@@ -24,6 +24,31 @@ std::string element_of(std::string_view name) {
   return absl::StrCat("handle \"", absl::string_view(name.data(), std::min(name.size(), kLongestName)), "\"");
 }
 
+absl::Status too_high(std::uint64_t input_seq) {
+  return invalid_input({"INPUT_SEQ_TOO_HIGH", "input_seq", "input_seq < 2^63"},
+                       absl::StrCat("The update's input_seq is ", input_seq, "; it must be below 2^63."));
+}
+
+absl::Status passed(std::uint64_t input_seq, std::uint64_t newest) {
+  return make_fault(absl::StatusCode::kAborted,
+                    {"INPUT_SEQ_PASSED", "input_seq", absl::StrCat("input_seq > ", newest)},
+                    absl::StrCat("The session has taken update ", newest, ", so ", input_seq,
+                                 " cannot take a step back; look at what there is and ask again."));
+}
+
+absl::Status nothing_to(bool redo) {
+  return redo ? make_fault(absl::StatusCode::kFailedPrecondition, {"NOTHING_TO_REDO", "", ""},
+                           "No step of the handles was taken back since they were changed last.")
+              : make_fault(absl::StatusCode::kFailedPrecondition, {"NOTHING_TO_UNDO", "", ""},
+                           "The session remembers no step of its handles that could be taken back.");
+}
+
+absl::Status too_many_handles(std::size_t handles, std::size_t most) {
+  return invalid_input({"TOO_MANY_HANDLES", "", absl::StrCat("handles <= ", most)},
+                       absl::StrCat("The session would have ", handles, " handles; it may have ", most,
+                                    ". Let go of some first."));
+}
+
 }  // namespace
 
 absl::Status check_solver(const SolveSettings& settings, const Material& material, const HandleSet& handles) {
@@ -73,9 +98,13 @@ struct Mailbox::Candidate {
   bool has_material() const { return has_p || has_stiffness || has_length_unit; }
 };
 
-Mailbox::Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld,
-                 std::size_t most_handles)
-    : shape_(std::move(shape)), weld_(std::move(weld)), most_handles_(most_handles) {
+Mailbox::Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld, InputLimits limits,
+                 std::shared_ptr<Timers> timers)
+    : shape_(std::move(shape)),
+      weld_(std::move(weld)),
+      limits_(limits),
+      timers_(std::move(timers)),
+      history_(limits.undo_steps) {
   inputs_.handles = inputs_.given_handles = std::make_shared<const HandleSet>();
   inputs_.material = inputs_.given_material = std::make_shared<const Material>();
 }
@@ -86,27 +115,57 @@ Inputs Mailbox::newest() const {
 }
 
 absl::StatusOr<UpdateResult> Mailbox::take(const Update& update) {
-  if (update.input_seq > kHighestInputSeq) {
-    return invalid_input(
-        {"INPUT_SEQ_TOO_HIGH", "input_seq", "input_seq < 2^63"},
-        absl::StrCat("The update's input_seq is ", update.input_seq, "; it must be below 2^63."));
-  }
+  if (update.input_seq > kHighestInputSeq) return too_high(update.input_seq);
   if (update.input_seq == 0) {
     return invalid_input({"INPUT_SEQ_ZERO", "input_seq", "input_seq >= 1"},
                          "The update's input_seq is 0; numbers rise from 1.");
   }
-  return merge(update, false);
+  const std::scoped_lock merging(merging_);
+  return merge(update, Origin::kWriter);
 }
 
 absl::Status Mailbox::begin_with(const Update& update) {
-  return merge(update, true).status();
+  const std::scoped_lock merging(merging_);
+  return merge(update, Origin::kBeginning).status();
 }
 
-absl::Status Mailbox::begin_again(const Update& state, InputAges ages) {
+absl::Status Mailbox::begin_again(const Update& state, InputAges ages, InputHistory history) {
+  if (state.input_seq > kHighestInputSeq) return too_high(state.input_seq);
+  if (ages.handles.size() > 2 * limits_.handles)
+    return too_many_handles(ages.handles.size(), 2 * limits_.handles);
   if (absl::Status status = begin_with(state); !status.ok()) return status;
   const std::scoped_lock merging(merging_);
   ages_ = std::move(ages);
+  history_.begin_again(history.first, history.undo_steps, std::move(history.steps));
   return absl::OkStatus();
+}
+
+absl::StatusOr<UndoResult> Mailbox::undo(std::uint64_t input_seq, bool redo) {
+  const std::scoped_lock merging(merging_);
+  if (last_undo_ && last_undo_->input_seq == input_seq && last_undo_->redo == redo) return last_undo_->result;
+  if (input_seq > kHighestInputSeq) return too_high(input_seq);
+  const Inputs before = newest();
+  if (input_seq <= before.input_seq) return passed(input_seq, before.input_seq);
+  const std::vector<HandleChange>* const changes = history_.next(redo);
+  if (changes == nullptr) return nothing_to(redo);
+  Update update{input_seq, *changes, {}, false};
+  HandleEffects effects;
+  for (const HandleChange& change : *changes) {
+    const bool is_motion = std::holds_alternative<HandleMotion>(change.change);
+    (is_motion ? effects.moved : effects.regrouped).push_back(change.name);
+  }
+  std::vector<HandleChange> inverse = changes_back(*before.given_handles, effects);
+  const auto merged = merge(update, Origin::kHistory);
+  if (!merged.ok()) return merged.status();
+  history_.moved(redo, std::move(inverse), revisions_.newest);
+  last_undo_ = {
+      input_seq, redo, {*merged, std::move(update.handles), history_.undo_steps(), history_.redo_steps()}};
+  return last_undo_->result;
+}
+
+Mailbox::HistorySize Mailbox::history_size() const {
+  const std::scoped_lock merging(merging_);
+  return {history_.undo_steps(), history_.redo_steps(), history_.bytes()};
 }
 
 std::uint64_t Mailbox::revision() const {
@@ -132,14 +191,16 @@ InputChanges Mailbox::changes_since(std::uint64_t revision) const {
   changes.has_p = changes.is_all || revisions_.p > revision;
   changes.has_stiffness = changes.is_all || revisions_.stiffness > revision;
   changes.has_region = changes.is_all || revisions_.region > revision;
+  changes.history = history_.extent();
+  changes.steps = history_.changes_since(changes.is_all ? 0 : revision);
   return changes;
 }
 
-absl::StatusOr<UpdateResult> Mailbox::merge(const Update& update, bool is_beginning) {
-  const std::scoped_lock merging(merging_);
+/// Under the lock.
+absl::StatusOr<UpdateResult> Mailbox::merge(const Update& update, Origin origin) {
   const Inputs before = newest();
   Candidate next;
-  next.is_beginning = is_beginning;
+  next.is_beginning = origin == Origin::kBeginning;
   next.material = *before.given_material;
   next.solver = before.solver;
   if (!update.handles.empty() || update.settings.region) {
@@ -156,6 +217,7 @@ absl::StatusOr<UpdateResult> Mailbox::merge(const Update& update, bool is_beginn
   put_in_force(update, next);
   note_ages(next, update.input_seq);
   if (changes_something) note_revisions(next);
+  if (origin == Origin::kWriter) note_step(update, next, before);
   return UpdateResult{update.input_seq, next.stale_parts, revisions_.newest};
 }
 
@@ -252,7 +314,7 @@ void Mailbox::note_ages(const Candidate& next, std::uint64_t seq) {
   if (next.has_solver) ages_.solver = seq;
   if (next.has_region) ages_.region = seq;
   // Of all handles, and of as many that were let go of.
-  if (ages_.handles.size() > 2 * most_handles_) forget_oldest();
+  if (ages_.handles.size() > 2 * limits_.handles) forget_oldest();
 }
 
 /// After what is in force was changed.
@@ -264,6 +326,13 @@ void Mailbox::note_revisions(const Candidate& next) {
   if (next.has_p) revisions_.p = now;
   if (next.has_stiffness) revisions_.stiffness = now;
   if (next.has_region) revisions_.region = now;
+}
+
+void Mailbox::note_step(const Update& update, const Candidate& next, const Inputs& before) {
+  const Timers::TimePoint now = timers_ ? timers_->now() : Timers::TimePoint();
+  history_.note(*before.given_handles, {next.regrouped, next.moved, next.removed, update.begins_step}, now,
+                revisions_.newest);
+  if (history_.forget_dropped()) revisions_.all = revisions_.newest;
 }
 
 /// Gives up the ages of the older half of the handles that were let go of.
@@ -285,10 +354,8 @@ void Mailbox::forget_oldest() {
 }
 
 absl::Status Mailbox::check(const Candidate& next, const Inputs& before) const {
-  if (next.handles && next.handles->handles().size() > most_handles_) {
-    return invalid_input({"TOO_MANY_HANDLES", "", absl::StrCat("handles <= ", most_handles_)},
-                         absl::StrCat("The session would have ", next.handles->handles().size(),
-                                      " handles; it may have ", most_handles_, ". Let go of some first."));
+  if (next.handles && next.handles->handles().size() > limits_.handles) {
+    return too_many_handles(next.handles->handles().size(), limits_.handles);
   }
   absl::Status status;
   if (next.is_regrouped) status = check_handles(*next.handles, vertex_count(), shape_->face_count());

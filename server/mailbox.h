@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,8 @@
 #include "core/energy/material.h"
 #include "core/energy/rest_shape.h"
 #include "core/mesh/weld.h"
+#include "server/history.h"
+#include "server/timers.h"
 #include "server/update.h"
 
 namespace lpdeform {
@@ -47,6 +50,22 @@ struct InputChanges {
   std::vector<std::string> moved;      // handles that go elsewhere, those set included
   std::vector<std::string> removed;
   bool has_p = false, has_stiffness = false, has_region = false;
+  HandleHistory::Extent history;
+  HandleHistory::Changes steps;  // of it
+};
+
+/// Of a session that is made again: what could be taken back, and done again.
+struct InputHistory {
+  std::uint64_t first = 0;
+  std::size_t undo_steps = 0;
+  std::vector<std::vector<HandleChange>> steps;
+};
+
+/// What one session may have of handles.
+struct InputLimits {
+  static constexpr std::size_t kMostHandles = 4096, kMostUndo = 100;  // where nothing else is said
+  std::size_t handles = kMostHandles;
+  std::size_t undo_steps = kMostUndo;
 };
 
 /// Where updates meet the solver: keeps the newest value of each handle and each setting by input_seq. Which
@@ -56,8 +75,9 @@ struct InputChanges {
 class Mailbox {
  public:
   /// `weld`: from the vertices that updates speak of to those of `shape`; null where they are the same.
+  /// `timers`: tells pauses between gestures; null: there are none.
   explicit Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld = nullptr,
-                   std::size_t most_handles = kMostHandles);
+                   InputLimits limits = {}, std::shared_ptr<Timers> timers = nullptr);
 
   /// A part with the input_seq of the value that is there is a repetition: dropped, but not counted as stale.
   /// Errors, INVALID_ARGUMENT: INPUT_SEQ_ZERO, HANDLE_CHANGED_TWICE (in this update), TOO_MANY_HANDLES,
@@ -68,8 +88,20 @@ class Mailbox {
   /// What a session begins with: the same as an update that is older than all others.
   absl::Status begin_with(const Update& update);
 
-  /// The same of a session that is made again: its whole state, and how old the parts of it are.
-  absl::Status begin_again(const Update& state, InputAges ages);
+  /// The same of a session that is made again: its whole state, and how old the parts of it are. Also INPUT_SEQ_TOO_HIGH, and
+  /// TOO_MANY_HANDLES where more are remembered than there can be.
+  absl::Status begin_again(const Update& state, InputAges ages, InputHistory history = {});
+
+  /// Takes the newest step of the handles back (see HandleHistory), or does again what was taken back last, as an update of this
+  /// input_seq, which must be higher than all before: ABORTED INPUT_SEQ_PASSED. The same as last time gives the same
+  /// answer. FAILED_PRECONDITION NOTHING_TO_UNDO, NOTHING_TO_REDO; otherwise as take().
+  absl::StatusOr<UndoResult> undo(std::uint64_t input_seq, bool redo);
+
+  /// How many steps can be taken back, and done again; what they take.
+  struct HistorySize {
+    std::size_t undo_steps = 0, redo_steps = 0, bytes = 0;
+  };
+  HistorySize history_size() const;
 
   Inputs newest() const;
 
@@ -77,8 +109,6 @@ class Mailbox {
   std::uint64_t revision() const;
   /// What has changed since `revision`; since 0, all.
   InputChanges changes_since(std::uint64_t revision) const;
-
-  static constexpr std::size_t kMostHandles = 4096;  // where nothing else is said
 
  private:
   /// The revision at which something last changed.
@@ -92,7 +122,8 @@ class Mailbox {
   };
   struct Candidate;
 
-  absl::StatusOr<UpdateResult> merge(const Update& update, bool is_beginning);
+  enum class Origin { kBeginning, kWriter, kHistory };
+  absl::StatusOr<UpdateResult> merge(const Update& update, Origin origin);
   bool replaces(std::uint64_t age, const Update& update, Candidate& next) const;
   bool replaces_handle(const std::string& name, const Update& update, Candidate& next) const;
   absl::Status change_handles(const Update& update, Candidate& next) const;
@@ -106,15 +137,24 @@ class Mailbox {
 
   void note_ages(const Candidate& next, std::uint64_t seq);
   void note_revisions(const Candidate& next);
+  void note_step(const Update& update, const Candidate& next, const Inputs& before);
   void forget_oldest();
   void put_in_force(const Update& update, Candidate& next);
 
   const std::shared_ptr<const RestShape> shape_;
   const std::shared_ptr<const Weld> weld_;
-  const std::size_t most_handles_;
-  mutable std::mutex merging_;  // one update at a time; guards ages_ and revisions_
+  const InputLimits limits_;
+  const std::shared_ptr<Timers> timers_;
+  mutable std::mutex merging_;  // one update at a time; guards what follows
   InputAges ages_;
   Revisions revisions_;
+  HandleHistory history_;
+  struct LastUndo {
+    std::uint64_t input_seq = 0;
+    bool redo = false;
+    UndoResult result;
+  };
+  std::optional<LastUndo> last_undo_;
   mutable std::mutex mutex_;  // guards inputs_, for moments only
   Inputs inputs_;
 };

@@ -106,6 +106,9 @@ void describe(CLI::App& app, Arguments& arguments) {
   app.add_option("--max-handles", server.max_handles, "Handles of one session")
       ->envname("LPDEFORM_MAX_HANDLES")
       ->capture_default_str();
+  app.add_option("--max-undo", server.max_undo, "Steps of its handles that a session can take back; 0: none")
+      ->envname("LPDEFORM_MAX_UNDO")
+      ->capture_default_str();
   app.add_option("--max-uploads", server.max_uploads, "Uploads at a time")
       ->envname("LPDEFORM_MAX_UPLOADS")
       ->capture_default_str();

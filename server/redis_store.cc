@@ -22,6 +22,28 @@ const std::string kPart = "p:";
 // Of all scripts, KEYS[1] is the session's hash and ARGV[1] the holder.
 const std::string kNow = "local t = redis.call('TIME'); local now = t[1] * 1000 + math.floor(t[2] / 1000); ";
 
+/// A function: the session is one of its owner's, a sorted set that lives as long as the youngest of them.
+const std::string kEnter =
+    "local function enter(owner, idle) "
+    "  local all = 'lpdeform:o:' .. redis.sha1hex(owner or ''); "
+    "  redis.call('ZADD', all, 0, KEYS[1]); redis.call('PEXPIRE', all, idle) "
+    "end ";
+
+/// No keys. ARGV: owner, the key of the session before the first, how many. Those that have expired go from the set.
+const std::string kList =
+    "local all, from, most = 'lpdeform:o:' .. redis.sha1hex(ARGV[1]), '(' .. ARGV[2], tonumber(ARGV[3]); "
+    "local found = {}; "
+    "while #found < most do "
+    "  local some = redis.call('ZRANGEBYLEX', all, from, '+', 'LIMIT', 0, 100); "
+    "  if #some == 0 then break end "
+    "  for _, key in ipairs(some) do "
+    "    from = '(' .. key; "
+    "    if redis.call('HGET', key, 'owner') ~= ARGV[1] then redis.call('ZREM', all, key) "
+    "    elseif #found < most then table.insert(found, key) end "
+    "  end "
+    "end "
+    "return found";
+
 /// ARGV: holder, epoch before, epoch, lease, idle, replaces all, then names and values of hash fields in turn, "=" before a
 /// value that is set and "-" for one that goes. 1: done; 0: fenced.
 const std::string kCommit =
@@ -41,7 +63,8 @@ const std::string kCommit =
     "1], 2)) "
     "  else redis.call('HDEL', KEYS[1], ARGV[k]) end "
     "end "
-    "redis.call('PEXPIRE', KEYS[1], ARGV[5]); return 1";
+    "redis.call('PEXPIRE', KEYS[1], ARGV[5]); " +
+    kEnter + "enter(redis.call('HGET', KEYS[1], 'owner'), ARGV[5]); return 1";
 
 /// ARGV: holder, owner, lease, idle. -1: none, -2: held by another; else the hash, in the new epoch.
 const std::string kTakeOver =
@@ -56,8 +79,10 @@ const std::string kTakeOver =
 /// ARGV: holder, epoch, lease, 0 where it is not in use, idle. 0: another has it. Its blobs live as long.
 const std::string kTouch =
     kNow +
-    "local has = redis.call('HMGET', KEYS[1], 'holder', 'blobs', 'request'); "
-    "if has[1] ~= ARGV[1] then return 0 end "
+    "local has = redis.call('HMGET', KEYS[1], 'holder', 'blobs', 'request', 'owner'); "
+    "if has[1] ~= ARGV[1] then return 0 end " +
+    kEnter +
+    "enter(has[4], ARGV[5]); "
     "if ARGV[4] == '1' then redis.call('HSET', KEYS[1], 'until', now + ARGV[3]) end "
     "redis.call('PEXPIRE', KEYS[1], ARGV[5]); "
     "for key in string.gmatch(has[2] or '', '%x+') do "
@@ -105,6 +130,8 @@ class RedisStore final : public Store {
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) override;
   absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner) override;
   absl::StatusOr<std::string> find_request(const std::string& owner, const std::string& request_id) override;
+  absl::StatusOr<std::vector<std::string>> list(const std::string& owner, const std::string& after,
+                                                std::size_t most) override;
   absl::Status keep_blob(const std::string& session, const std::string& key, std::string_view bytes) override;
   absl::StatusOr<std::string> blob(const std::string& key) override;
   absl::StatusOr<std::vector<std::string>> touch(std::span<const TouchedSession> sessions) override;
@@ -197,6 +224,16 @@ absl::StatusOr<std::string> RedisStore::find_request(const std::string& owner,
   const auto reply = reader_.run({"GET", request_key(owner, request_id)});
   if (!reply.ok()) return reply.status();
   return reply->text;
+}
+
+absl::StatusOr<std::vector<std::string>> RedisStore::list(const std::string& owner, const std::string& after,
+                                                          std::size_t most) {
+  const std::scoped_lock lock(reading_);
+  const auto reply = reader_.run({"EVAL", kList, "0", owner, kSession + after, absl::StrCat(most)});
+  if (!reply.ok()) return reply.status();
+  std::vector<std::string> names;
+  for (const auto& key : reply->elements) names.push_back(key.text.substr(kSession.size()));
+  return names;
 }
 
 absl::Status RedisStore::keep_blob(const std::string& session, const std::string& key,

@@ -58,6 +58,7 @@ absl::Status check(const ServerOptions& options) {
         std::pair("max_calls_per_connection", options.max_calls_per_connection)}) {
     if (value == 0 || value > 1'000'000) return out_of_range(name, "1 to 10^6");
   }
+  if (options.max_undo > 10'000) return out_of_range("max_undo", "0 to 10^4");
   if (options.max_connections == 0 || options.max_connections > 1'000'000) {
     return out_of_range("max_connections", "1 to 10^6");
   }

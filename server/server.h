@@ -45,7 +45,8 @@ struct ServerOptions {
   std::size_t max_bytes_per_caller = std::size_t{4} << 30;  // likewise, of sessions and uploads
   double max_upload_bytes_per_second = 0;                   // likewise; see CallerLimits
   std::size_t max_streams_per_session = SessionLimits().streams;
-  std::size_t max_handles = SessionLimits().handles;  // of one session
+  std::size_t max_handles = InputLimits::kMostHandles;  // of one session
+  std::size_t max_undo = InputLimits::kMostUndo;        // steps of handles that one session can take back
   std::size_t max_uploads = Uploads::kMostUploads;
   std::size_t max_calls_waiting = 4096;          // for a thread that looks at them
   std::size_t max_calls_per_connection = 256;    // at a time; streams are calls

@@ -9,6 +9,7 @@
 #include "server/frame_calls.h"
 #include "server/grpc_status.h"
 #include "server/refusals.h"
+#include "server/snapshot_call.h"
 #include "server/solve_call.h"
 #include "server/trace_context.h"
 
@@ -94,6 +95,21 @@ grpc::ServerUnaryReactor* about_session(Backend& backend, grpc::CallbackServerCo
                  });
 }
 
+/// A call that is answered later, when the store has answered.
+template <typename Request, typename Response>
+grpc::ServerUnaryReactor* answered_later(Backend& backend, grpc::CallbackServerContext& context,
+                                         std::string_view method,
+                                         void (Backend::*handler)(const CallContext&, const Request&,
+                                                                  Response&, Backend::Done),
+                                         const Request& request, Response& response) {
+  const auto record = begin_record(backend, context, method);
+  record->received(request.ByteSizeLong());
+  return in_pool(backend, context, record, response,
+                 [&backend, record, handler, &request, &response](const Finish& finish) {
+                   (backend.*handler)(record->context(), request, response, finish);
+                 });
+}
+
 }  // namespace
 
 /// Deform takes messages as they come, in place of the handler of generated code: see received.h.
@@ -123,12 +139,17 @@ grpc::ServerUnaryReactor* Service::DeleteUpload(Context* context, const v1::Dele
 
 grpc::ServerUnaryReactor* Service::CreateSession(Context* context, const v1::CreateSessionRequest* request,
                                                  v1::CreateSessionResponse* response) {
-  const auto record = begin_record(backend_, *context, "CreateSession");
-  record->received(request->ByteSizeLong());
-  return in_pool(backend_, *context, record, *response,
-                 [this, record, request, response](const Finish& finish) {
-                   backend_.create_session(record->context(), *request, *response, finish);
-                 });
+  return answered_later(backend_, *context, "CreateSession", &Backend::create_session, *request, *response);
+}
+
+grpc::ServerUnaryReactor* Service::RestoreSession(Context* context, const v1::RestoreSessionRequest* request,
+                                                  v1::RestoreSessionResponse* response) {
+  return answered_later(backend_, *context, "RestoreSession", &Backend::restore_session, *request, *response);
+}
+
+grpc::ServerWriteReactor<v1::SnapshotSessionResponse>* Service::SnapshotSession(
+    Context* context, const v1::SnapshotSessionRequest* request) {
+  return snapshot_session(backend_, begin_record(backend_, *context, "SnapshotSession"), *request);
 }
 
 grpc::ServerUnaryReactor* Service::GetSession(Context* context, const v1::GetSessionRequest* request,
@@ -138,7 +159,7 @@ grpc::ServerUnaryReactor* Service::GetSession(Context* context, const v1::GetSes
 
 grpc::ServerUnaryReactor* Service::ListSessions(Context* context, const v1::ListSessionsRequest* request,
                                                 v1::ListSessionsResponse* response) {
-  return in_pool(backend_, *context, "ListSessions", &Backend::list_sessions, *request, *response);
+  return answered_later(backend_, *context, "ListSessions", &Backend::list_sessions, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::DeleteSession(Context* context, const v1::DeleteSessionRequest* request,
@@ -154,6 +175,11 @@ grpc::ServerUnaryReactor* Service::AcquireWriter(Context* context, const v1::Acq
 grpc::ServerUnaryReactor* Service::UpdateHandles(Context* context, const v1::UpdateHandlesRequest* request,
                                                  v1::UpdateHandlesResponse* response) {
   return about_session(backend_, *context, "UpdateHandles", &Backend::update_handles, *request, *response);
+}
+
+grpc::ServerUnaryReactor* Service::UndoUpdate(Context* context, const v1::UndoUpdateRequest* request,
+                                              v1::UndoUpdateResponse* response) {
+  return about_session(backend_, *context, "UndoUpdate", &Backend::undo_update, *request, *response);
 }
 
 grpc::ServerUnaryReactor* Service::AckFrames(Context* context, const v1::AckFramesRequest* request,

@@ -26,10 +26,16 @@ class Service final : public v1::DeformService::CallbackService {
                                          v1::ListSessionsResponse* response) override;
   grpc::ServerUnaryReactor* DeleteSession(Context* context, const v1::DeleteSessionRequest* request,
                                           v1::DeleteSessionResponse* response) override;
+  grpc::ServerWriteReactor<v1::SnapshotSessionResponse>* SnapshotSession(
+      Context* context, const v1::SnapshotSessionRequest* request) override;
+  grpc::ServerUnaryReactor* RestoreSession(Context* context, const v1::RestoreSessionRequest* request,
+                                           v1::RestoreSessionResponse* response) override;
   grpc::ServerUnaryReactor* AcquireWriter(Context* context, const v1::AcquireWriterRequest* request,
                                           v1::AcquireWriterResponse* response) override;
   grpc::ServerUnaryReactor* UpdateHandles(Context* context, const v1::UpdateHandlesRequest* request,
                                           v1::UpdateHandlesResponse* response) override;
+  grpc::ServerUnaryReactor* UndoUpdate(Context* context, const v1::UndoUpdateRequest* request,
+                                       v1::UndoUpdateResponse* response) override;
   grpc::ServerUnaryReactor* AckFrames(Context* context, const v1::AckFramesRequest* request,
                                       v1::AckFramesResponse* response) override;
   grpc::ServerWriteReactor<v1::StreamFramesResponse>* StreamFrames(

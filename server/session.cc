@@ -60,8 +60,8 @@ absl::StatusOr<std::shared_ptr<Session>> Session::create(SessionParts parts, Ses
   const std::optional<SessionPast> past = parts.past;
   std::unique_ptr<Deformer> deformer = std::move(parts.deformer);
   const std::shared_ptr<Session> session(new Session(std::move(parts), std::move(services)));
-  const absl::Status begun =
-      past ? session->mailbox_.begin_again(beginning, past->ages) : session->mailbox_.begin_with(beginning);
+  const absl::Status begun = past ? session->mailbox_.begin_again(beginning, past->ages, past->history)
+                                  : session->mailbox_.begin_with(beginning);
   if (!begun.ok()) return begun;
   LiveSolver::Alarm alarm{session->services_.timers, [weak = session->weak_from_this()] {
                             if (const auto self = weak.lock()) self->services_.scheduler.wake(self);
@@ -81,9 +81,11 @@ Session::Session(SessionParts parts, SessionServices services)
       features_(parts.features ? std::move(parts.features) : std::make_shared<ShapeFeatures>(shape_)),
       free_components_(parts.free_components),
       services_(std::move(services)),
-      created_unix_ms_(parts.past ? parts.past->created_unix_ms : unix_ms_now()),
+      created_unix_ms_(parts.past && parts.past->created_unix_ms != 0 ? parts.past->created_unix_ms
+                                                                      : unix_ms_now()),
+      has_surface_(parts.has_surface),
       last_used_(services_.timers->now()),
-      mailbox_(shape_, mesh_->weld(), services_.limits.handles),
+      mailbox_(shape_, mesh_->weld(), services_.limits.inputs, services_.timers),
       publisher_(std::make_shared<Publisher>(services_.metrics)),
       memory_(std::move(parts.memory)),
       memory_bytes_(memory_.bytes()),
@@ -93,6 +95,7 @@ Session::Session(SessionParts parts, SessionServices services)
 }
 
 SessionInfo Session::info() const {
+  const Mailbox::HistorySize history = mailbox_.history_size();
   return {name_,
           lease().epoch,
           shape_,
@@ -101,7 +104,9 @@ SessionInfo Session::info() const {
           mailbox_.newest(),
           created_unix_ms_,
           last_used_.load(),
-          memory_bytes_.load()};
+          memory_bytes_.load(),
+          history.undo_steps,
+          history.redo_steps};
 }
 
 WriterLease Session::lease() const {
@@ -166,6 +171,21 @@ absl::StatusOr<UpdateResult> Session::update(const std::string& token, const Upd
     if (result.ok()) publisher_->took(update.input_seq, since);
   }
   if (result.ok()) services_.scheduler.wake(shared_from_this(), Urgency::kAnswer);
+  return result;
+}
+
+absl::StatusOr<UndoResult> Session::undo(const std::string& token, std::uint64_t input_seq, bool redo) {
+  touch();
+  const auto since = std::chrono::steady_clock::now();
+  absl::StatusOr<UndoResult> result;
+  {
+    const std::scoped_lock lock(writing_);
+    if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
+    if (is_closed_) return gone(name_);
+    result = mailbox_.undo(input_seq, redo);
+    if (result.ok()) publisher_->took(input_seq, since);
+  }
+  if (result.ok()) services_.scheduler.wake(shared_from_this());
   return result;
 }
 
@@ -282,7 +302,8 @@ bool Session::run() {
     has_more = true;  // the readers' solve may have to go on
   }
   if (solver_->has_solved()) {  // until then the estimate stands
-    memory_bytes_ = shape_->memory_bytes() + mesh_->memory_bytes() + solver_->memory_bytes();
+    memory_bytes_ = shape_->memory_bytes() + mesh_->memory_bytes() + solver_->memory_bytes() +
+                    mailbox_.history_size().bytes;
     memory_.resize(memory_bytes_);
   }
   return has_more;

@@ -25,10 +25,11 @@ namespace lpdeform {
 
 /// What a session that is made again, from a store or a file, goes on from.
 struct SessionPast {
-  std::string token;        // of its writer
-  std::uint64_t epoch = 1;  // above those it had
-  std::int64_t created_unix_ms = 0;
+  std::string token;                 // of its writer
+  std::uint64_t epoch = 1;           // above those it had
+  std::int64_t created_unix_ms = 0;  // 0: now
   InputAges ages = {};
+  InputHistory history = {};
 };
 
 /// What a session is made of.
@@ -42,13 +43,14 @@ struct SessionParts {
   FreeComponents free_components = FreeComponents::kError;
   Update beginning;                      // settings and handles to begin with
   std::optional<SessionPast> past = {};  // of one that is made again: then `beginning` is its state
+  bool has_surface = false;              // `deformer` begins with the state of another session
   Reservation memory;                    // the estimate that it was admitted with
 };
 
 /// What one session may have.
 struct SessionLimits {
   std::size_t streams = 256;
-  std::size_t handles = Mailbox::kMostHandles;
+  InputLimits inputs = {};
 };
 
 /// What everybody's sessions share.
@@ -71,6 +73,7 @@ struct SessionInfo {
   std::int64_t created_unix_ms = 0;
   Timers::TimePoint last_used;
   std::size_t memory_bytes = 0;
+  std::size_t undo_steps = 0, redo_steps = 0;
 };
 
 /// Who may change a session, and since when.
@@ -101,6 +104,10 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   const DrawMesh& mesh() const { return *mesh_; }
   const ShapeFeatures& features() const { return *features_; }
   SessionInfo info() const;
+  /// The newest frame, of this epoch or of one before; and whether its surface comes from a solve, here or in the session that
+  /// this one was made from.
+  std::shared_ptr<const Frame> newest_frame() const { return publisher_->newest(); }
+  bool has_surface() const { return has_surface_ || newest_frame()->method != Method::kAuto; }
   WriterLease lease() const;
   std::int64_t created_unix_ms() const { return created_unix_ms_; }
   /// Of the inputs: rises with each change that is to be kept.
@@ -116,6 +123,10 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
 
   /// Errors: as check_writer and Mailbox::take; NOT_FOUND SESSION_UNKNOWN once closed.
   absl::StatusOr<UpdateResult> update(const std::string& token, const Update& update);
+
+  /// Takes the newest step of the handles back, or does again what was taken back last. Errors: as check_writer and
+  /// Mailbox::undo; NOT_FOUND SESSION_UNKNOWN once closed.
+  absl::StatusOr<UndoResult> undo(const std::string& token, std::uint64_t input_seq, bool redo);
 
   /// Takes `update` in, if there is one, and runs `job`; an earlier job ends with ABORTED SUPERSEDED. Errors
   /// as update(); then the job does not begin.
@@ -162,6 +173,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   const FreeComponents free_components_;
   const SessionServices services_;
   const std::int64_t created_unix_ms_;
+  const bool has_surface_;
   std::atomic<Timers::TimePoint> last_used_;
   std::atomic<bool> is_closed_ = false;
   std::atomic<bool> is_draining_ = false;

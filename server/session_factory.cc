@@ -74,9 +74,17 @@ absl::Status SessionFactory::make_shape(const v1::CreateSessionRequest& request,
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::shared_ptr<Session>> SessionFactory::finish(SessionParts parts) const {
+/// `surface`: the present state, of the client's vertices.
+absl::StatusOr<std::shared_ptr<Session>> SessionFactory::finish(SessionParts parts,
+                                                                const std::optional<Points>& surface) const {
   auto deformer = Deformer::create(parts.shape, {parts.free_components, threads()});
   if (!deformer.ok()) return deformer.status();
+  if (surface) {
+    const auto positions = parts.mesh->solver_positions(*surface);
+    if (!positions.ok()) return positions.status();
+    if (absl::Status status = (*deformer)->set_positions(*positions); !status.ok()) return status;
+    parts.has_surface = true;
+  }
   parts.deformer = *std::move(deformer);
   return Session::create(std::move(parts), services_);
 }
@@ -100,6 +108,40 @@ absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make(const std::string&
   if (!settings.ok()) return settings.status();
   parts.beginning.settings = *std::move(settings);
   return finish(std::move(parts));
+}
+
+absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_from(const std::string& owner,
+                                                                   const Snapshot& snapshot) const {
+  static const StoredBlobs no_blobs;
+  const v1::CreateSessionRequest& request = snapshot.request;
+  Decoder decoder = this->decoder(request, owner).reading_stored(no_blobs);
+  const std::uint32_t most_faces = kFacesPerVertex * options_.max_vertices;
+  absl::Status status = decoder.check_mesh_size(request.mesh(), {options_.max_vertices, most_faces});
+  if (!status.ok()) return status;
+  std::optional<Points> surface;
+  if (snapshot.surface) {
+    auto positions = decoder.positions(*snapshot.surface);
+    if (!positions.ok()) return positions.status();
+    surface = *std::move(positions);
+  }
+  SessionParts parts;
+  parts.name = absl::StrCat("sessions/", random_hex_128());
+  parts.owner = owner;
+  status = take_state(owner, snapshot, parts);
+  if (status.ok()) status = make_shape(request, decoder, parts);
+  return status.ok() ? finish(std::move(parts), surface) : status;
+}
+
+/// Its handles and settings, for a writer of its own.
+absl::Status SessionFactory::take_state(const std::string& owner, const Snapshot& snapshot,
+                                        SessionParts& parts) const {
+  StoredSession stored{owner, 1, snapshot.parts};
+  stored.parts["writer"] = encode_writer(random_hex_128());
+  auto state = decode_state(stored, {snapshot.request, 0, 0}, *uploads_);
+  if (!state.ok()) return snapshot_damaged(std::string(state.status().message()));
+  parts.beginning = std::move(state->state);
+  parts.past = std::move(state->past);
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_again(const std::string& name,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -9,6 +10,7 @@
 #include "server/decode.h"
 #include "server/server.h"
 #include "server/session.h"
+#include "server/snapshot.h"
 #include "server/stored_state.h"
 #include "server/upload.h"
 
@@ -31,13 +33,20 @@ class SessionFactory {
                                                       const SessionHead& head,
                                                       const StoredBlobs& blobs) const;
 
+  /// A new session of the owner's, as the snapshot has it; for the same server the same to the last bit. Errors: INVALID_ARGUMENT
+  /// SNAPSHOT_DAMAGED; what CreateSession has.
+  absl::StatusOr<std::shared_ptr<Session>> make_from(const std::string& owner,
+                                                     const Snapshot& snapshot) const;
+
   /// For one message of a caller's.
   Decoder decoder(const v1::CreateSessionRequest& request, const std::string& owner) const;
 
  private:
   absl::Status make_shape(const v1::CreateSessionRequest& request, Decoder decoder,
                           SessionParts& parts) const;
-  absl::StatusOr<std::shared_ptr<Session>> finish(SessionParts parts) const;
+  absl::Status take_state(const std::string& owner, const Snapshot& snapshot, SessionParts& parts) const;
+  absl::StatusOr<std::shared_ptr<Session>> finish(SessionParts parts,
+                                                  const std::optional<Points>& surface = {}) const;
   int threads() const;
 
   const ServerOptions options_;

@@ -69,6 +69,8 @@ class SqliteStore final : public Store {
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) override;
   absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner) override;
   absl::StatusOr<std::string> find_request(const std::string& owner, const std::string& request_id) override;
+  absl::StatusOr<std::vector<std::string>> list(const std::string& owner, const std::string& after,
+                                                std::size_t most) override;
   absl::Status keep_blob(const std::string& session, const std::string& key, std::string_view bytes) override;
   absl::StatusOr<std::string> blob(const std::string& key) override { return blobs_.read(key); }
   absl::StatusOr<std::vector<std::string>> touch(std::span<const TouchedSession> sessions) override;
@@ -90,6 +92,7 @@ class SqliteStore final : public Store {
     kRemoveBlobs,
     kHasBlob,
     kFindRequest,
+    kList,
     kTouch,
     kUnused,
     kCount
@@ -132,6 +135,7 @@ absl::Status SqliteStore::prepare() {
       "SELECT 1 FROM blobs WHERE key = ?1",
       "SELECT name FROM sessions WHERE owner = ?1 AND request_id = ?2 AND request_id <> '' ORDER BY used_ms "
       "DESC",
+      "SELECT name FROM sessions WHERE owner = ?1 AND name > ?2 ORDER BY name LIMIT ?3",
       "UPDATE sessions SET used_ms = ?2 WHERE name = ?1",
       "SELECT name FROM sessions WHERE max(used_ms, ?1) < ?2"};
   for (std::size_t k = 0; k < kCount; ++k) {
@@ -319,6 +323,22 @@ absl::StatusOr<std::string> SqliteStore::find_request(const std::string& owner,
   std::string name = *row ? find.text(0) : "";
   find.reset();
   return name;
+}
+
+absl::StatusOr<std::vector<std::string>> SqliteStore::list(const std::string& owner, const std::string& after,
+                                                           std::size_t most) {
+  const std::scoped_lock lock(mutex_);
+  SqliteStatement& select = sql(kList);
+  select.bind(1, owner);
+  select.bind(2, after);
+  select.bind(3, static_cast<std::int64_t>(most));
+  std::vector<std::string> names;
+  for (;;) {
+    const auto row = select.step();
+    if (!row.ok()) return row.status();
+    if (!*row) return names;
+    names.push_back(select.text(0));
+  }
 }
 
 absl::Status SqliteStore::keep_blob(const std::string& session, const std::string& key,

@@ -73,6 +73,10 @@ class Store {
   virtual absl::StatusOr<std::string> find_request(const std::string& owner,
                                                    const std::string& request_id) = 0;
 
+  /// Names of the owner's sessions that come after `after`, ascending; at most `most`.
+  virtual absl::StatusOr<std::vector<std::string>> list(const std::string& owner, const std::string& after,
+                                                        std::size_t most) = 0;
+
   /// Keeps `bytes` under their key, blob_key(bytes), for this session. They go with the last session that has them.
   virtual absl::Status keep_blob(const std::string& session, const std::string& key,
                                  std::string_view bytes) = 0;

@@ -17,6 +17,8 @@ namespace {
 
 constexpr const char* kGroup = "g:";
 constexpr const char* kMovement = "m:";
+constexpr const char* kStep = "s:";
+constexpr std::uint64_t kMostSteps = 10'000;  // more than a flag allows
 constexpr std::string_view kBlob = "blobs/";
 
 /// The same bytes for the same message.
@@ -56,6 +58,9 @@ std::string encode_inputs(const SessionChanges& changes) {
   message.set_solver_seq(ages.solver);
   message.set_region_seq(ages.region);
   message.set_forgotten_seq(ages.forgotten);
+  message.set_history_first(changes.inputs.history.first);
+  message.set_history_undo_steps(changes.inputs.history.undo_steps);
+  message.set_history_steps(changes.inputs.history.steps);
   message.mutable_length_unit()->set_length(changes.inputs.inputs.given_material->length_unit);
   encode_solver(changes.inputs.inputs.solver, *message.mutable_solver());
   return bytes_of(message);
@@ -110,6 +115,23 @@ InputAges read_ages(const stored::Inputs& inputs) {
   return ages;
 }
 
+/// What could be taken back, and done again.
+absl::Status read_history(const std::map<std::string, std::string>& parts, const stored::Inputs& inputs,
+                          const Decoder& decoder, InputHistory& out) {
+  if (inputs.history_steps() > kMostSteps) return session_damaged("its history is too long");
+  out.first = inputs.history_first();
+  out.undo_steps = inputs.history_undo_steps();
+  for (std::uint64_t k = 0; k < inputs.history_steps(); ++k) {
+    const auto step = read_part<stored::Step>(parts, absl::StrCat(kStep, out.first + k));
+    if (!step.ok()) return step.status();
+    Update update;
+    absl::Status status = Decoder(decoder).handles(step->changes(), update);
+    if (!status.ok()) return session_damaged(std::string(status.message()));
+    out.steps.push_back(std::move(update.handles));
+  }
+  return absl::OkStatus();
+}
+
 /// One handle, and how old it is.
 absl::Status read_handle(const std::map<std::string, std::string>& parts, const std::string& name,
                          Decoder decoder, SessionState& out) {
@@ -145,13 +167,17 @@ absl::StatusOr<StoredHead> encode_head(const v1::CreateSessionRequest& request, 
   return out;
 }
 
+std::string encode_writer(const std::string& token) {
+  stored::Writer writer;
+  writer.set_token(token);
+  return bytes_of(writer);
+}
+
 StoredParts encode_changes(const SessionChanges& changes) {
   const InputChanges& inputs = changes.inputs;
   const Material& material = *inputs.inputs.given_material;
   StoredParts parts;
-  stored::Writer writer;
-  writer.set_token(changes.lease.token);
-  parts["writer"] = bytes_of(writer);
+  parts["writer"] = encode_writer(changes.lease.token);
   parts["inputs"] = encode_inputs(changes);
   if (inputs.has_p) parts["p"] = bytes_of(encode_whole_field(material.p));
   if (inputs.has_stiffness) parts["stiffness"] = bytes_of(encode_whole_field(material.stiffness));
@@ -174,6 +200,12 @@ StoredParts encode_changes(const SessionChanges& changes) {
   for (const std::string& name : inputs.removed) {
     parts[kGroup + name] = std::nullopt;
     parts[kMovement + name] = std::nullopt;
+  }
+  for (const std::uint64_t number : inputs.steps.dropped) parts[absl::StrCat(kStep, number)] = std::nullopt;
+  for (const auto& [number, step] : inputs.steps.steps) {
+    stored::Step message;
+    for (const HandleChange& change : step) encode_change(change, *message.add_changes());
+    parts[absl::StrCat(kStep, number)] = bytes_of(message);
   }
   // A handle that is set may have been let go of before.
   if (inputs.is_all || !inputs.removed.empty() || !inputs.regrouped.empty())
@@ -223,10 +255,12 @@ absl::StatusOr<SessionState> decode_state(const StoredSession& stored, const Ses
     status = read_handle(stored.parts, part.substr(2), decoder, out);
     if (!status.ok()) return session_damaged(std::string(status.message()));
   }
+  status = read_history(stored.parts, *inputs, decoder, out.past.history);
+  if (!status.ok()) return status;
   return out;
 }
 
-std::uint64_t fingerprint_of(const v1::CreateSessionRequest& request) {
+std::uint64_t fingerprint_of(const google::protobuf::Message& request) {
   const std::string digest = blob_key(bytes_of(request));
   return std::stoull(digest.substr(0, 16), nullptr, 16);
 }

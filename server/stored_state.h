@@ -16,7 +16,7 @@ namespace lpdeform {
 
 // From a session to the parts that a store has of it (server/stored.proto), and back. The parts: "head", what never
 // changes; "writer"; "inputs", what is small; "p", "stiffness", "region"; "removed", handles let go of; for each handle
-// "g:NAME", what it holds, and "m:NAME", where it goes. So a drag writes "inputs" and one "m:".
+// "g:NAME", what it holds, and "m:NAME", where it goes; "s:NUMBER", a step of its history. So a drag writes "inputs" and one "m:".
 
 using StoredParts = std::map<std::string, std::optional<std::string>>;
 
@@ -32,6 +32,9 @@ absl::StatusOr<StoredHead> encode_head(const v1::CreateSessionRequest& request, 
 
 /// What to write for these changes.
 StoredParts encode_changes(const SessionChanges& changes);
+
+/// The part "writer".
+std::string encode_writer(const std::string& token);
 
 /// The head, read.
 struct SessionHead {
@@ -55,6 +58,6 @@ absl::StatusOr<SessionState> decode_state(const StoredSession& stored, const Ses
                                           Uploads& uploads);
 
 /// A number for a request, the same for the same one in every process.
-std::uint64_t fingerprint_of(const v1::CreateSessionRequest& request);
+std::uint64_t fingerprint_of(const google::protobuf::Message& request);
 
 }  // namespace lpdeform

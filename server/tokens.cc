@@ -222,7 +222,8 @@ absl::StatusOr<Tokens::Known> Tokens::verify(const TokenKeys& keys, const std::s
   if (role != "editor" && role != "viewer") return invalid_token();
   if (!rules_.issuer.empty() && text_of(claims, "iss") != rules_.issuer) return invalid_token();
   if (!rules_.audience.empty() && !is_for(claims, rules_.audience)) return invalid_token();
-  return Known{{subject, role == "viewer"}, static_cast<std::int64_t>(std::floor(expires))};
+  const auto last = static_cast<std::int64_t>(std::floor(expires));
+  return Known{{subject, role == "viewer", last + kLeewaySeconds}, last};
 }
 
 }  // namespace lpdeform

@@ -18,6 +18,8 @@ struct Caller {
   std::string subject;
   /// May look at the subject's sessions and change nothing.
   bool is_viewer = false;
+  /// Until when the caller is let in, in seconds since 1970; 0: for as long as there is a call.
+  std::int64_t until = 0;
 };
 
 /// Public keys and the algorithms that each is for.

@@ -36,6 +36,7 @@ struct Update {
   std::uint64_t input_seq = 0;
   std::vector<HandleChange> handles;
   SettingsChange settings;
+  bool begins_step = false;  // of the history of handles
 };
 
 /// How an update was taken.
@@ -44,6 +45,13 @@ struct UpdateResult {
   std::uint32_t stale_parts = 0;
   std::uint64_t revision = 0;  // of the session's inputs, from which on the update is in them
   bool is_kept = false;        // it is in the server's store
+};
+
+/// How a step was taken back, or done again.
+struct UndoResult {
+  UpdateResult update;
+  std::vector<HandleChange> changes;           // that were made
+  std::size_t undo_steps = 0, redo_steps = 0;  // that there are now
 };
 
 }  // namespace lpdeform

@@ -19,6 +19,7 @@
 #include "client/cli/resize_command.h"
 #include "client/cli/server_access.h"
 #include "client/cli/shape_command.h"
+#include "client/cli/snapshot_command.h"
 #include "core/solve/paper_poses.h"
 
 namespace lpdeform::cli {
@@ -183,6 +184,15 @@ void add_server_options(CLI::App& app, ServerAccess& access, CLI::Option* exclud
   add_access_options(app, access, server);
 }
 
+/// Of commands that need a server.
+void add_needed_server(CLI::App& app, ServerAccess& access) {
+  CLI::Option* const server =
+      app.add_option("--server", access.address, "HOST:PORT or unix:PATH of the server")
+          ->required()
+          ->option_text("ADDRESS");
+  add_access_options(app, access, server);
+}
+
 void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand("deform", "Deform a mesh by its handles and write the result");
   const auto options = std::make_shared<DeformOptions>();
@@ -266,11 +276,7 @@ void add_load(CLI::App& program, std::function<ExitStatus()>& command) {
       "load",
       "Load a server: updates at fixed times, whatever it does, and the time to the frames that answer them");
   const auto options = std::make_shared<LoadOptions>();
-  CLI::Option* const server =
-      app.add_option("--server", options->server.address, "HOST:PORT or unix:PATH of the server")
-          ->required()
-          ->option_text("ADDRESS");
-  add_access_options(app, options->server, server);
+  add_needed_server(app, options->server);
   app.add_option("--sessions", options->sessions, "Sessions at a time (10)")
       ->check(CLI::Range(1, 10000))
       ->option_text("N");
@@ -326,6 +332,26 @@ void add_shape(CLI::App& program, std::function<ExitStatus()>& command) {
   app.callback([&command, options] { command = [options] { return run_shape(*options); }; });
 }
 
+void add_snapshot(CLI::App& program, std::function<ExitStatus()>& command) {
+  CLI::App& app = *program.add_subcommand("snapshot", "Write a session of a server into a file");
+  const auto options = std::make_shared<SnapshotOptions>();
+  app.add_option("SESSION", options->session, "Its name: sessions/ and 32 digits")
+      ->required()
+      ->option_text(" ");
+  app.add_option("FILE", options->file, "Where it goes")->required()->option_text(" ");
+  add_needed_server(app, options->server);
+  app.callback([&command, options] { command = [options] { return run_snapshot(*options); }; });
+}
+
+void add_restore(CLI::App& program, std::function<ExitStatus()>& command) {
+  CLI::App& app =
+      *program.add_subcommand("restore", "Make a session on a server from such a file and print its name");
+  const auto options = std::make_shared<RestoreOptions>();
+  app.add_option("FILE", options->file, "What snapshot has written")->required()->option_text(" ");
+  add_needed_server(app, options->server);
+  app.callback([&command, options] { command = [options] { return run_restore(*options); }; });
+}
+
 void add_reproduce(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand(
       "reproduce", "Make the paper's table and figures again, as a page with a verdict on each claim");
@@ -361,6 +387,8 @@ int run(int argc, char** argv) {
   add_resize(program, command);
   add_load(program, command);
   add_shape(program, command);
+  add_snapshot(program, command);
+  add_restore(program, command);
   add_reproduce(program, command);
   try {
     program.parse(argc, argv);

@@ -6,6 +6,7 @@
 #include "client/cpp/link.h"
 #include "client/cpp/names.h"
 #include "client/cpp/rpc.h"
+#include "client/cpp/snapshot.h"
 #include "client/cpp/upload.h"
 
 namespace lpdeform::client {
@@ -53,6 +54,14 @@ absl::StatusOr<std::optional<Frame>> Session::poll() {
 
 absl::StatusOr<Frame> Session::settle(std::chrono::milliseconds timeout) {
   return link_->settle(std::chrono::steady_clock::now() + timeout);
+}
+
+absl::StatusOr<std::uint64_t> Session::undo() {
+  return link_->undo(false);
+}
+
+absl::StatusOr<std::uint64_t> Session::redo() {
+  return link_->undo(true);
 }
 
 absl::StatusOr<SolveResult> Session::solve(const SolveOptions& options) {
@@ -119,6 +128,20 @@ absl::StatusOr<Session> Client::join(std::string_view session, Role role, OpenOp
   auto lease = join_session(*rpc_, std::string(session), role, stop);
   if (!lease.ok()) return lease.status();
   return Session(std::make_unique<Link>(rpc_, options_, std::move(options), nullptr, *std::move(lease)));
+}
+
+absl::StatusOr<std::string> Client::snapshot(std::string_view session) {
+  return take_snapshot(*rpc_, std::string(session), {});
+}
+
+absl::StatusOr<std::string> Client::restore(std::string_view snapshot) {
+  return restore_snapshot(*rpc_, snapshot, {});
+}
+
+absl::Status Client::remove(std::string_view session) {
+  v1::DeleteSessionRequest request;
+  request.set_session(std::string(session));
+  return rpc_->call(request, {}).status();
 }
 
 }  // namespace lpdeform::client

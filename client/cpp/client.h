@@ -121,6 +121,12 @@ class Session {
   /// Whether a frame of this session is the finished result of the newest update that was not refused.
   bool is_result(const Frame& frame) const;
 
+  /// Takes the newest step of the handles back on the server, or does again what was taken back last: see types.h. Sent after all
+  /// updates before it; waits for the answer, not for the frame. The number of the update that this is. FAILED_PRECONDITION
+  /// (NOTHING_TO_UNDO, NOTHING_TO_REDO; SESSION_CLOSED), ABORTED (INPUT_SEQ_PASSED) where another update came before it; DEADLINE_EXCEEDED.
+  absl::StatusOr<std::uint64_t> undo();
+  absl::StatusOr<std::uint64_t> redo();
+
   /// Solves for the present handles and settings on the server and returns the finished result; waits for it.
   /// Does not need the stream of frames, but works beside it. Begins again where the server went away, within
   /// the deadline and for as long as the stream would try. Ends early with CANCELLED when close() is called
@@ -173,6 +179,18 @@ class Client {
   /// none.
   absl::StatusOr<Session> join(std::string_view session, Role role, OpenOptions options = {},
                                const std::stop_token& stop = {});
+
+  /// A session as a file: mesh, handles, settings, what can be undone and the surface as it is, but not who writes. Waits for it
+  /// to come in parts; the session goes on meanwhile. NOT_FOUND where there is none.
+  absl::StatusOr<std::string> snapshot(std::string_view session);
+
+  /// Makes a session from such a file, on any server of the same version or a later one; its name, to join(). It shows the same
+  /// surface to the last bit, and goes when nobody has used it for a while, or by remove(). Waits. INVALID_ARGUMENT
+  /// (SNAPSHOT_FOREIGN, SNAPSHOT_NEWER, SNAPSHOT_TRUNCATED, SNAPSHOT_DAMAGED); otherwise as open().
+  absl::StatusOr<std::string> restore(std::string_view snapshot);
+
+  /// Deletes a session by name. OK where there is none.
+  absl::Status remove(std::string_view session);
 
  private:
   Client(std::shared_ptr<Rpc> rpc, ClientOptions options);

@@ -52,6 +52,7 @@ void merge(Update& older, Update newer) {
   replace_where_given(older.settings.length_unit, newer.settings.length_unit);
   replace_where_given(older.settings.solver, newer.settings.solver);
   replace_where_given(older.settings.region, newer.settings.region);
+  older.begins_step = older.begins_step || newer.begins_step;
 }
 
 std::uint64_t Ledger::add(Update update) {
@@ -69,13 +70,36 @@ NumberedUpdate Ledger::send_next() {
   return in_flight_.back();
 }
 
-void Ledger::accept(std::uint64_t seq) {
+void Ledger::accept(std::uint64_t seq, bool is_kept) {
   const auto sent = std::ranges::find(in_flight_, seq, &NumberedUpdate::seq);
   if (sent == in_flight_.end()) return;
-  merge(accepted_.update, std::move(sent->update));
-  settle_changes(accepted_.update);
-  accepted_.seq = std::max(accepted_.seq, seq);
+  NumberedUpdate update = std::move(*sent);
   in_flight_.erase(sent);
+  merge_accepted(std::move(update), is_kept);
+}
+
+void Ledger::accept_change(NumberedUpdate change, bool is_kept) {
+  merge_accepted(std::move(change), is_kept);
+}
+
+void Ledger::merge_accepted(NumberedUpdate update, bool is_kept) {
+  if (!is_kept) {
+    merge(unkept_.update, update.update);
+    unkept_.seq = std::max(unkept_.seq, update.seq);
+  } else if (update.seq >= unkept_.seq) {
+    unkept_ = {};
+  }
+  if (unkept_.update.handles.size() > accepted_.update.handles.size() + kMostRemembered) {
+    std::erase_if(unkept_.update.handles,
+                  [](const auto& entry) { return std::holds_alternative<Update::Removal>(entry.second); });
+  }
+  accepted_.seq = std::max(accepted_.seq, update.seq);
+  merge(accepted_.update, std::move(update.update));
+  settle_changes(accepted_.update);
+}
+
+void Ledger::resumed_at(std::uint64_t seq) {
+  if (seq < unkept_.seq && !restore_) restore_ = NumberedUpdate{accepted_.seq, unkept_.update};
 }
 
 void Ledger::refuse(std::uint64_t seq) {

@@ -37,9 +37,18 @@ class Ledger {
   /// What is to be sent next, now on its way. Needs has_waiting().
   NumberedUpdate send_next();
 
-  /// The server has taken the update of this number, or refused it. Unknown numbers are nothing to us.
-  void accept(std::uint64_t seq);
+  /// The server has taken the update of this number, or refused it. Unknown numbers are nothing to us. `is_kept`: it, and
+  /// all taken before it, survive the end of the server.
+  void accept(std::uint64_t seq, bool is_kept = false);
   void refuse(std::uint64_t seq);
+
+  /// A number for a change that the server makes by itself, and the change that it made.
+  std::uint64_t take_number() { return next_seq_++; }
+  void accept_change(NumberedUpdate change, bool is_kept);
+
+  /// The session goes on, and the newest update that it has is `seq`: what it took after that and did not keep is to be sent
+  /// first, on its own.
+  void resumed_at(std::uint64_t seq);
 
   /// The connection is gone: what was on its way waits again. Sending it twice does no harm, it is the same
   /// value.
@@ -52,12 +61,19 @@ class Ledger {
   /// Numbers that follow are higher than `seq`, the newest that the server knows.
   void count_from(std::uint64_t seq);
 
+  std::uint64_t newest_accepted() const { return accepted_.seq; }
+
   /// The newest update that was not refused; 0 where there is none.
   std::uint64_t newest() const;
 
  private:
+  /// Handles that were let go of, and of which that is remembered in unkept_, beside those that there are.
+  static constexpr std::size_t kMostRemembered = 8192;
+  void merge_accepted(NumberedUpdate update, bool is_kept);
+
   std::uint64_t next_seq_ = 1;
   NumberedUpdate accepted_;  // handles only as Handle, never as Motion or Removal
+  NumberedUpdate unkept_;    // what was accepted since the server last kept something, as it came
   std::optional<NumberedUpdate> restore_;
   std::deque<NumberedUpdate> in_flight_;
   std::optional<NumberedUpdate> waiting_;

@@ -42,6 +42,7 @@ class Link {
   absl::StatusOr<std::optional<Frame>> poll();
   absl::StatusOr<Frame> settle(FrameBox::Clock::time_point deadline);
   bool is_result(const Frame& frame) const;
+  absl::StatusOr<std::uint64_t> undo(bool redo);
   absl::StatusOr<SolveResult> solve(const SolveOptions& options);
   absl::Status take_over();
   absl::Status close();
@@ -84,6 +85,9 @@ class Link {
   absl::StatusOr<SolveResult> solve_or_make_anew(const SolveOptions& options);
   absl::StatusOr<SolveResult> solve_once(const SolveOptions& options);
   absl::Status send_restore(std::unique_lock<std::mutex>& lock);
+  absl::Status send_by_call(std::unique_lock<std::mutex>& lock);
+  absl::Status begin_alone(std::unique_lock<std::mutex>& lock);
+  absl::StatusOr<v1::UndoUpdateResponse> undo_patiently(const v1::UndoUpdateRequest& request);
   absl::Status make_anew(const std::string& lost);
   absl::Status no_frame() const;
 

@@ -101,10 +101,8 @@ absl::Status Link::check_initial_positions(const SolveOptions& options) const {
                        absl::StrCat("The initial position of ", vertex, " is not finite."));
 }
 
-absl::StatusOr<SolveResult> Link::solve(const SolveOptions& options) {
-  const absl::Status checked = check_initial_positions(options);
-  if (!checked.ok()) return checked;
-  std::unique_lock lock(mutex_);
+/// Waits until nothing is under way, and lets nothing begin until is_solving_ is false again.
+absl::Status Link::begin_alone(std::unique_lock<std::mutex>& lock) {
   const auto is_quiet = [this] { return is_closing_ || (!is_solving_ && !ledger_.has_in_flight()); };
   if (!changed_.wait_for(lock, client_options_.call_timeout, is_quiet)) {
     return absl::DeadlineExceededError(
@@ -112,6 +110,54 @@ absl::StatusOr<SolveResult> Link::solve(const SolveOptions& options) {
   }
   if (is_closing_) return session_closed();
   is_solving_ = true;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::uint64_t> Link::undo(bool redo) {
+  std::unique_lock lock(mutex_);
+  if (absl::Status alone = begin_alone(lock); !alone.ok()) return alone;
+  const auto done = absl::MakeCleanup([this, &lock] {
+    if (!lock.owns_lock()) lock.lock();
+    is_solving_ = false;
+    changed_.notify_all();
+  });
+  while (ledger_.has_waiting()) {
+    if (absl::Status sent = send_by_call(lock); !sent.ok()) return sent;
+  }
+  const std::uint64_t seq = ledger_.take_number();
+  v1::UndoUpdateRequest request;
+  request.set_session(lease_.session);
+  request.set_writer_token(lease_.writer_token);
+  request.set_input_seq(seq);
+  request.set_redo(redo);
+  lock.unlock();
+  const auto undone = undo_patiently(request);
+  if (!undone.ok()) return undone.status();
+  auto change = from_wire(undone->changes());
+  if (!change.ok()) return change.status();
+  lock.lock();
+  ledger_.accept_change({seq, *std::move(change)}, undone->result().kept());
+  return seq;
+}
+
+/// The same call again does no harm, so a server that went away may be asked again.
+absl::StatusOr<v1::UndoUpdateResponse> Link::undo_patiently(const v1::UndoUpdateRequest& request) {
+  const Clock::time_point end = Clock::now() + client_options_.call_timeout;
+  Backoff backoff;
+  for (;;) {
+    auto undone = rpc_->call(request, stop_.get_token());
+    const auto pause = backoff.next();
+    if (!absl::IsUnavailable(undone.status()) || Clock::now() + pause > end) return undone;
+    std::unique_lock lock(mutex_);
+    if (changed_.wait_for(lock, pause, [this] { return is_closing_; })) return session_closed();
+  }
+}
+
+absl::StatusOr<SolveResult> Link::solve(const SolveOptions& options) {
+  const absl::Status checked = check_initial_positions(options);
+  if (!checked.ok()) return checked;
+  std::unique_lock lock(mutex_);
+  if (absl::Status alone = begin_alone(lock); !alone.ok()) return alone;
   const auto solved = absl::MakeCleanup([this] {
     const std::scoped_lock relock(mutex_);
     is_solving_ = false;
@@ -182,24 +228,37 @@ absl::StatusOr<SolveResult> Link::solve_once(const SolveOptions& options) {
 /// an update that is not.
 absl::Status Link::send_restore(std::unique_lock<std::mutex>& lock) {
   while (ledger_.has_restore()) {
-    const NumberedUpdate restore = ledger_.send_next();
-    v1::UpdateHandlesRequest request;
-    request.set_session(lease_.session);
-    request.set_writer_token(lease_.writer_token);
-    lock.unlock();
-    Uploads uploads(*rpc_, stop_.get_token());
-    Packer packer([&](std::string_view bytes) { return uploads.add(bytes); });
-    absl::Status sent = to_wire(restore.update, restore.seq, packer, *request.mutable_update());
-    if (sent.ok()) sent = rpc_->call(request, stop_.get_token()).status();
-    uploads.discard();
-    lock.lock();
-    if (!sent.ok()) {
-      ledger_.connection_lost();
-      return sent;
-    }
-    ledger_.accept(restore.seq);
+    if (absl::Status sent = send_by_call(lock); !sent.ok()) return sent;
   }
   return absl::OkStatus();
+}
+
+/// The next update, by a call of its own and not on the stream.
+absl::Status Link::send_by_call(std::unique_lock<std::mutex>& lock) {
+  const NumberedUpdate next = ledger_.send_next();
+  v1::UpdateHandlesRequest request;
+  request.set_session(lease_.session);
+  request.set_writer_token(lease_.writer_token);
+  lock.unlock();
+  Uploads uploads(*rpc_, stop_.get_token());
+  Packer packer([&](std::string_view bytes) { return uploads.add(bytes); });
+  absl::Status sent = to_wire(next.update, next.seq, packer, *request.mutable_update());
+  bool is_kept = false;
+  if (sent.ok()) {
+    const auto taken = rpc_->call(request, stop_.get_token());
+    sent = taken.status();
+    is_kept = taken.ok() && taken->result().kept();
+  }
+  uploads.discard();
+  lock.lock();
+  if (sent.ok()) {
+    ledger_.accept(next.seq, is_kept);
+  } else if (is_undecided(sent) || next.seq == ledger_.newest_accepted()) {
+    ledger_.connection_lost();
+  } else {
+    ledger_.refuse(next.seq);
+  }
+  return sent;
 }
 
 absl::Status Link::make_anew(const std::string& lost) {

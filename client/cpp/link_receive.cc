@@ -32,7 +32,7 @@ absl::Status Link::take(const v1::DeformResponse& response) {
     const std::scoped_lock lock(mutex_);
     last_heard_ = Clock::now();
     if (response.has_result()) {
-      ledger_.accept(response.result().input_seq());
+      ledger_.accept(response.result().input_seq(), response.result().kept());
       note_answered(response.result().input_seq());
       changed_.notify_all();
     }
@@ -55,6 +55,8 @@ absl::Status Link::take(const v1::StreamEvent& event) {
     case v1::StreamEvent::kFrame:
       return take(event.frame());
     case v1::StreamEvent::kFault:
+      // Its uploads went with a server that has ended, or to another one: the next stream sends it again, with new ones.
+      if (event.fault().reason() == "UPLOAD_UNKNOWN") return from_wire(event.fault());
       take(event.fault());
       break;
     case v1::StreamEvent::kGoAway: {
@@ -82,6 +84,7 @@ absl::Status Link::take(const v1::StreamOpened& opened) {
     longest_silence_ = 3 * std::chrono::milliseconds(opened.heartbeat_interval_ms());
   }
   ledger_.count_from(opened.input_seq());
+  ledger_.resumed_at(opened.input_seq());
   is_open_ = true;
   opened_ = Clock::now();
   changed_.notify_all();

@@ -172,23 +172,26 @@ class GrpcRpc final : public Rpc {
     return unary(&Stub::UpdateHandles, request, stop);
   }
 
+  absl::StatusOr<v1::RestoreSessionResponse> call(const v1::RestoreSessionRequest& request,
+                                                  const std::stop_token& stop) override {
+    return unary(&Stub::RestoreSession, request, stop);
+  }
+  absl::StatusOr<v1::UndoUpdateResponse> call(const v1::UndoUpdateRequest& request,
+                                              const std::stop_token& stop) override {
+    return unary(&Stub::UndoUpdate, request, stop);
+  }
+
+  absl::Status snapshot(
+      const v1::SnapshotSessionRequest& request, const std::stop_token& stop,
+      const std::function<absl::Status(const v1::SnapshotSessionResponse&)>& on_response) override {
+    return streaming<v1::SnapshotSessionResponse>(&Stub::SnapshotSession, request,
+                                                  std::chrono::duration<double>(call_timeout_).count(), stop,
+                                                  on_response);
+  }
+
   absl::Status solve(const v1::SolveRequest& request, double deadline_seconds, const std::stop_token& stop,
                      const std::function<absl::Status(const v1::SolveResponse&)>& on_response) override {
-    grpc::ClientContext context;
-    introduce(caller_, context);
-    if (deadline_seconds > 0) {
-      const auto limit = std::chrono::duration<double>(deadline_seconds);
-      context.set_deadline(std::chrono::system_clock::now() +
-                           std::chrono::duration_cast<std::chrono::system_clock::duration>(limit));
-    }
-    const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
-    const auto reader = stub_->Solve(&context, request);
-    absl::Status taken;
-    v1::SolveResponse response;
-    while (taken.ok() && reader->Read(&response)) taken = on_response(response);
-    if (!taken.ok()) context.TryCancel();
-    const grpc::Status ended = reader->Finish();
-    return taken.ok() ? status_of(ended) : taken;
+    return streaming<v1::SolveResponse>(&Stub::Solve, request, deadline_seconds, stop, on_response);
   }
 
   std::unique_ptr<DeformCall> deform() override { return std::make_unique<GrpcDeformCall>(*stub_, caller_); }
@@ -217,6 +220,29 @@ class GrpcRpc final : public Rpc {
     const grpc::Status status = ((*stub_).*method)(&context, request, &response);
     if (!status.ok()) return status_of(status);
     return response;
+  }
+
+  /// `deadline_seconds` 0 is without limit.
+  template <typename Response, typename Request>
+  absl::Status streaming(std::unique_ptr<grpc::ClientReader<Response>> (Stub::*method)(grpc::ClientContext*,
+                                                                                       const Request&),
+                         const Request& request, double deadline_seconds, const std::stop_token& stop,
+                         const std::function<absl::Status(const Response&)>& on_response) {
+    grpc::ClientContext context;
+    introduce(caller_, context);
+    if (deadline_seconds > 0) {
+      const auto limit = std::chrono::duration<double>(deadline_seconds);
+      context.set_deadline(std::chrono::system_clock::now() +
+                           std::chrono::duration_cast<std::chrono::system_clock::duration>(limit));
+    }
+    const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
+    const auto reader = ((*stub_).*method)(&context, request);
+    absl::Status taken;
+    Response response;
+    while (taken.ok() && reader->Read(&response)) taken = on_response(response);
+    if (!taken.ok()) context.TryCancel();
+    const grpc::Status ended = reader->Finish();
+    return taken.ok() ? status_of(ended) : taken;
   }
 
   const std::shared_ptr<grpc::Channel> channel_;

@@ -58,6 +58,16 @@ class Rpc {
   virtual absl::StatusOr<v1::UpdateHandlesResponse> call(const v1::UpdateHandlesRequest& request,
                                                          const std::stop_token& stop) = 0;
 
+  virtual absl::StatusOr<v1::RestoreSessionResponse> call(const v1::RestoreSessionRequest& request,
+                                                          const std::stop_token& stop) = 0;
+  virtual absl::StatusOr<v1::UndoUpdateResponse> call(const v1::UndoUpdateRequest& request,
+                                                      const std::stop_token& stop) = 0;
+
+  /// Calls `on_response` for each message, on this thread; an error of it ends the call and is returned.
+  virtual absl::Status snapshot(
+      const v1::SnapshotSessionRequest& request, const std::stop_token& stop,
+      const std::function<absl::Status(const v1::SnapshotSessionResponse&)>& on_response) = 0;
+
   /// Calls `on_response` for each message, on this thread; an error of it ends the call and is returned.
   /// `deadline_seconds` 0 is without limit.
   virtual absl::Status solve(const v1::SolveRequest& request, double deadline_seconds,

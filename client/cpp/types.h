@@ -201,6 +201,10 @@ struct Update {
   std::map<std::string, Change> handles = {};
   Settings settings = {};
   std::optional<Resize> resize = {};
+  /// What it does to handles is a step of its own, which Session::undo takes back: to be set when a drag begins. Otherwise updates
+  /// that move the same handles, none of them over a second after the one before, are one step, and each other update
+  /// that changes handles is one. Settings are no part of steps.
+  bool begins_step = false;
 };
 
 /// One kind of defect of a mesh.

@@ -180,6 +180,7 @@ absl::Status to_wire(const Settings& settings, Packer& packer, v1::SettingsUpdat
 
 absl::Status to_wire(const Update& update, std::uint64_t seq, Packer& packer, v1::Update& out) {
   out.set_input_seq(seq);
+  out.set_begins_step(update.begins_step);
   for (const auto& [name, change] : update.handles) {
     v1::HandleUpdate& message = *out.add_handles();
     message.set_name(name);

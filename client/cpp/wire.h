@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "client/cpp/packer.h"
 #include "client/cpp/types.h"
 #include "lpdeform/v1/service.pb.h"
@@ -25,6 +26,8 @@ v1::FreeComponents to_wire(FreeComponents free_components);
 
 MeshReport from_wire(const v1::MeshReport& report);
 StopReason from_wire(v1::StopReason reason);
+/// The same of changes of handles that the server made, with inline buffers. INTERNAL where a buffer is not as long as it has to be.
+absl::StatusOr<Update> from_wire(const google::protobuf::RepeatedPtrField<v1::HandleUpdate>& changes);
 /// "quasi_newton"; empty for none.
 std::string method_name(v1::Method method);
 IterationRecord from_wire(const v1::IterationRecord& record);

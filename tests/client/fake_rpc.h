@@ -225,6 +225,32 @@ class FakeRpc final : public Rpc {
     return v1::UpdateHandlesResponse();
   }
 
+  absl::StatusOr<v1::RestoreSessionResponse> call(const v1::RestoreSessionRequest&,
+                                                  const std::stop_token&) override {
+    return absl::UnimplementedError("restore");
+  }
+
+  /// Answers with what the test put into undo_changes.
+  absl::StatusOr<v1::UndoUpdateResponse> call(const v1::UndoUpdateRequest& request,
+                                              const std::stop_token&) override {
+    const std::scoped_lock lock(mutex_);
+    undone_.push_back(request);
+    v1::UndoUpdateResponse response;
+    response.mutable_result()->set_input_seq(request.input_seq());
+    for (const v1::HandleUpdate& change : undo_changes) *response.add_changes() = change;
+    return response;
+  }
+  std::vector<v1::HandleUpdate> undo_changes;
+  std::vector<v1::UndoUpdateRequest> undone() {
+    const std::scoped_lock lock(mutex_);
+    return undone_;
+  }
+
+  absl::Status snapshot(const v1::SnapshotSessionRequest&, const std::stop_token&,
+                        const std::function<absl::Status(const v1::SnapshotSessionResponse&)>&) override {
+    return absl::UnimplementedError("snapshot");
+  }
+
   absl::Status solve(const v1::SolveRequest& request, double, const std::stop_token&,
                      const std::function<absl::Status(const v1::SolveResponse&)>& on_response) override {
     {
@@ -270,6 +296,7 @@ class FakeRpc final : public Rpc {
   std::vector<std::string> uploads_deleted_;
   std::vector<v1::SolveRequest> solved_;
   std::vector<v1::UpdateHandlesRequest> restored_;
+  std::vector<v1::UndoUpdateRequest> undone_;
   std::size_t upload_bytes_left_ = 0;
 };
 

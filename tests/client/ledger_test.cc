@@ -195,5 +195,55 @@ TEST(Ledger, CountsOnFromWhatTheServerKnows) {
   EXPECT_EQ(ledger.add(with_p(3)), 44u);
 }
 
+/// Taken by the server at once.
+void take(Ledger& ledger, Update update, bool is_kept) {
+  ledger.add(std::move(update));
+  ledger.accept(ledger.send_next().seq, is_kept);
+}
+
+TEST(Ledger, SendsAgainWhatWasTakenAndNotKeptWhereTheServerWentBack) {
+  Ledger ledger;
+  take(ledger, adding("tip", {7}), true);
+  take(ledger, removing("old"), false);
+  take(ledger, moving("tip", 5), false);
+  ledger.resumed_at(3);
+  EXPECT_FALSE(ledger.has_waiting());
+  ledger.resumed_at(1);
+  ASSERT_TRUE(ledger.has_restore());
+  const NumberedUpdate sent = ledger.send_next();
+  EXPECT_EQ(sent.seq, 3u);
+  EXPECT_TRUE(std::holds_alternative<Update::Removal>(sent.update.handles.at("old")));
+  EXPECT_EQ(translation_x(std::get<Motion>(sent.update.handles.at("tip"))), 5);
+  ledger.connection_lost();  // before it was answered: it stays on its own
+  ASSERT_TRUE(ledger.has_restore());
+  ledger.accept(ledger.send_next().seq, true);
+  ledger.resumed_at(1);
+  EXPECT_FALSE(ledger.has_waiting());
+}
+
+TEST(Ledger, AKeptUpdateKeepsAllThatWereTakenBeforeItAndNotThoseAfter) {
+  Ledger ledger;
+  take(ledger, adding("tip", {7}), false);
+  ledger.add(moving("tip", 1));
+  const std::uint64_t first = ledger.send_next().seq;
+  ledger.add(moving("tip", 2));
+  const std::uint64_t second = ledger.send_next().seq;
+  ledger.accept(second, false);
+  ledger.accept(first, true);
+  ledger.resumed_at(first);
+  EXPECT_TRUE(ledger.has_restore());
+}
+
+TEST(Ledger, AChangeThatTheServerMadeIsPartOfWhatItHasAccepted) {
+  Ledger ledger;
+  take(ledger, adding("tip", {7}), true);
+  const std::uint64_t seq = ledger.take_number();
+  ledger.accept_change({seq, removing("tip")}, true);
+  EXPECT_EQ(ledger.newest(), seq);
+  EXPECT_EQ(ledger.add(moving("base", 1)), seq + 1);
+  ledger.session_lost();
+  EXPECT_TRUE(ledger.send_next().update.handles.empty());
+}
+
 }  // namespace
 }  // namespace lpdeform::client

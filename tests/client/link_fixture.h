@@ -33,7 +33,9 @@ class LinkTest : public testing::Test {
     return answered(rpc_->next_stream(), epoch);
   }
 
-  std::shared_ptr<Stream> answered(std::shared_ptr<Stream> stream, std::uint64_t epoch = 1) {
+  /// `input_seq`: the newest update that the server has.
+  std::shared_ptr<Stream> answered(std::shared_ptr<Stream> stream, std::uint64_t epoch = 1,
+                                   std::uint64_t input_seq = 0) {
     if (stream == nullptr) return nullptr;
     const auto open = stream->hear();
     EXPECT_TRUE(open && open->has_open());
@@ -41,6 +43,7 @@ class LinkTest : public testing::Test {
     v1::DeformResponse response;
     response.mutable_event()->mutable_opened()->set_epoch(epoch);
     response.mutable_event()->mutable_opened()->set_vertex_count(kVertexCount);
+    response.mutable_event()->mutable_opened()->set_input_seq(input_seq);
     stream->say(response);
     return stream;
   }
@@ -74,9 +77,10 @@ inline v1::DeformResponse frame(std::uint64_t frame_seq, std::uint64_t input_seq
   return response;
 }
 
-inline v1::DeformResponse result(std::uint64_t input_seq) {
+inline v1::DeformResponse result(std::uint64_t input_seq, bool is_kept = false) {
   v1::DeformResponse response;
   response.mutable_result()->set_input_seq(input_seq);
+  response.mutable_result()->set_kept(is_kept);
   return response;
 }
 

@@ -259,5 +259,67 @@ TEST_F(LinkTest, DeletesItsUploadsOnceTheyHaveServed) {
   EXPECT_EQ(deleted[1], sent->update().settings().p().per_vertex().values().upload());
 }
 
+TEST_F(LinkTest, SendsAgainWhatWasAnsweredAndLostWithTheServer) {
+  open();
+  const auto first = opened_stream();
+  link_->update(adding("tip")).value();
+  first->hear();
+  first->say(result(1, true));
+  link_->update(adding("ear")).value();
+  first->hear();
+  first->say(result(2, false));
+  first->say(frame(1, 2));
+  EXPECT_TRUE(next_frame().ok());  // so it was read
+  first->end(absl::UnavailableError("killed"));
+  const auto second = answered(rpc_->next_stream(), 2, 1);
+  std::optional<v1::DeformRequest> again = second->hear();
+  while (again && again->has_ack()) again = second->hear();
+  ASSERT_TRUE(again && again->has_update());
+  EXPECT_EQ(again->update().input_seq(), 2u);
+  ASSERT_EQ(again->update().handles_size(), 1);
+  EXPECT_EQ(again->update().handles(0).name(), "ear");
+}
+
+TEST_F(LinkTest, SendsAgainAnUpdateWhoseUploadsTheServerDoesNotKnow) {
+  open();
+  const auto first = opened_stream();
+  link_->update(adding("tip")).value();
+  first->hear();
+  v1::DeformResponse fault = refusal(1);
+  fault.mutable_event()->mutable_fault()->set_code(5);
+  fault.mutable_event()->mutable_fault()->set_reason("UPLOAD_UNKNOWN");
+  first->say(fault);
+  const auto second = answered(rpc_->next_stream());
+  const auto again = second->hear();
+  ASSERT_TRUE(again && again->has_update());
+  EXPECT_EQ(again->update().input_seq(), 1u);
+}
+
+TEST_F(LinkTest, AnUndoGoesAfterAllUpdatesAndIsPartOfWhatASessionMadeAnewGets) {
+  open();
+  link_->update(adding("tip")).value();
+  link_->update(adding("ear")).value();
+  v1::HandleUpdate removal;
+  removal.set_name("ear");
+  removal.mutable_remove();
+  rpc_->undo_changes = {removal};
+  const auto undone = link_->undo(false);
+  ASSERT_TRUE(undone.ok()) << undone.status();
+  ASSERT_EQ(rpc_->restored().size(), 1u);  // both updates, before it
+  EXPECT_EQ(rpc_->restored()[0].update().handles_size(), 2);
+  ASSERT_EQ(rpc_->undone().size(), 1u);
+  EXPECT_EQ(rpc_->undone()[0].input_seq(), *undone);
+  EXPECT_GT(*undone, rpc_->restored()[0].update().input_seq());
+  EXPECT_FALSE(rpc_->undone()[0].redo());
+  const auto stream = opened_stream();
+  stream->say(go_away(v1::GO_AWAY_REASON_SESSION_EXPIRED));
+  stream->end(absl::OkStatus());
+  const auto anew = answered(rpc_->next_stream());
+  const auto all = anew->hear();
+  ASSERT_TRUE(all && all->has_update());
+  ASSERT_EQ(all->update().handles_size(), 1);
+  EXPECT_EQ(all->update().handles(0).name(), "tip");
+}
+
 }  // namespace
 }  // namespace lpdeform::client

@@ -30,7 +30,7 @@ TEST_F(SessionTest, EveryKindOfHandleIsAddedMovedRegroupedAndRemovedLive) {
     ASSERT_TRUE(session.settle(kPatience).ok());
     const auto solved = session.solve();
     ASSERT_TRUE(solved.ok()) << solved.status();
-    EXPECT_EQ(solved->stop_reason, StopReason::kConverged);
+    EXPECT_EQ(solved->stop_reason, StopReason::kConverged) << kind.hold.index();
   }
   ASSERT_TRUE(session.remove("kind").ok());
   const auto frame = session.settle(kPatience);

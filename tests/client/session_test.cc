@@ -283,5 +283,50 @@ TEST_F(SessionTest, AFlatMeshIsExactWhenQuantized) {
   EXPECT_EQ(frame->positions, flat.vertices);
 }
 
+TEST_F(SessionTest, UndoTakesADragBackAndRedoDoesItAgain) {
+  Session session = open_bar();
+  const auto first = session.settle(kPatience);
+  ASSERT_TRUE(first.ok()) << first.status();
+  session.update({.handles = {{"middle", twist(60)}}, .begins_step = true}).value();
+  session.move("middle", twist(30)).value();
+  const auto dragged = session.settle(kPatience);
+  ASSERT_TRUE(dragged.ok()) << dragged.status();
+  ASSERT_TRUE(session.undo().ok());
+  const auto back = session.settle(kPatience);
+  ASSERT_TRUE(back.ok()) << back.status();
+  EXPECT_LT(distance(back->positions, first->positions), 1e-2);
+  EXPECT_GT(distance(dragged->positions, first->positions), 1);
+  ASSERT_TRUE(session.redo().ok());
+  const auto again = session.settle(kPatience);
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_LT(distance(again->positions, dragged->positions), 1e-2);
+  EXPECT_EQ(fault_of(session.redo().status()).reason, "NOTHING_TO_REDO");
+  EXPECT_TRUE(session.move("middle", twist(10)).ok());
+  EXPECT_TRUE(session.settle(kPatience).ok());
+}
+
+TEST_F(SessionTest, ASnapshotMakesTheSameSessionOnAnotherServer) {
+  Session session = open_bar({.double_precision = true});
+  const auto frame = session.settle(kPatience);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  const auto file = connect()->snapshot(session.name());
+  ASSERT_TRUE(file.ok()) << file.status();
+  InProcessServer elsewhere;
+  const auto other = Client::connect(elsewhere.address());
+  auto client = *other;
+  const auto name = client.restore(*file);
+  ASSERT_TRUE(name.ok()) << name.status();
+  Session copy = client.join(*name, Role::kWriter, {.double_precision = true}).value();
+  const auto first = copy.next_frame(kPatience);
+  ASSERT_TRUE(first.ok()) << first.status();
+  EXPECT_LT(distance(first->positions, frame->positions), 1e-3);  // or already a step further
+  EXPECT_TRUE(copy.move("middle", twist(20)).ok());
+  EXPECT_TRUE(copy.settle(kPatience).ok());
+  EXPECT_EQ(fault_of(client.restore("nothing of the kind").status()).reason, "SNAPSHOT_FOREIGN");
+  EXPECT_EQ(fault_of(client.snapshot("sessions/none").status()).reason, "SESSION_UNKNOWN");
+  EXPECT_TRUE(client.remove(*name).ok());
+  EXPECT_EQ(fault_of(client.snapshot(*name).status()).reason, "SESSION_UNKNOWN");
+}
+
 }  // namespace
 }  // namespace lpdeform::client

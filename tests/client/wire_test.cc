@@ -122,5 +122,31 @@ TEST(Crc32c, AgreesWithPublishedValuesAndContinuesOverParts) {
   EXPECT_EQ(crc32c(""), 0u);
 }
 
+TEST(Wire, ChangesOfHandlesComeBackAsTheyWereSent) {
+  Update update;
+  update.handles.emplace("gone", Update::Removal{});
+  update.handles.emplace("moved", Motion(TargetPositions{{1, 2, 3, 4, 5, 6}}));
+  update.handles.emplace(
+      "turned", Motion(RigidMotion{
+                    .axis = {1, 0, 0}, .angle_radians = 0.5, .center = {1, 2, 3}, .translation = {4, 5, 6}}));
+  update.handles.emplace("held", Handle{.vertices = {7, 9}, .hold = Soft{0.25}, .footprint = 2});
+  update.handles.emplace("rail", Handle{.vertices = {1}, .hold = AxisLock{{0, 1, 0}}});
+  update.handles.emplace("plane", Handle{.vertices = {2}, .hold = PlaneLock{{0, 0, 1}}});
+  update.handles.emplace("free", Handle{.vertices = {3}, .hold = Orientation{5}});
+  update.handles.emplace("points", Handle{.hold = Soft{0}, .points = {{5, {0.5, 0.25, 0.25}}}});
+  const auto packer = [] {
+    return Packer([](std::string_view) { return absl::InternalError("not needed"); });
+  };
+  v1::Update first, second;
+  Packer one = packer(), other = packer();
+  ASSERT_TRUE(to_wire(update, 1, one, first).ok());
+  const auto back = from_wire(first.handles());
+  ASSERT_TRUE(back.ok()) << back.status();
+  ASSERT_TRUE(to_wire(*back, 1, other, second).ok());
+  EXPECT_EQ(first.DebugString(), second.DebugString());
+  first.mutable_handles(3)->mutable_move()->mutable_targets()->mutable_positions()->set_inline_("odd");
+  EXPECT_TRUE(absl::IsInternal(from_wire(first.handles()).status()));
+}
+
 }  // namespace
 }  // namespace lpdeform::client

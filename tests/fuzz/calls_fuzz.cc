@@ -14,6 +14,7 @@
 #include "core/base/check.h"
 #include "server/backend.h"
 #include "server/encode.h"
+#include "server/snapshot.h"
 #include "tests/fuzz/proto_mutator.h"
 #include "tests/fuzz/schedule.pb.h"
 
@@ -164,8 +165,7 @@ class Schedule {
       }
       case fuzz::Call::kListSessions: {
         v1::ListSessionsResponse response;
-        (void)backend().list_sessions(context_, call.list_sessions(), response);
-        return;
+        return later(&Backend::list_sessions, call.list_sessions(), response);
       }
       case fuzz::Call::kDeleteSession: {
         v1::DeleteSessionResponse response;
@@ -193,11 +193,47 @@ class Schedule {
         if (stream.ok()) streams_.push_back(*std::move(stream));
         return;
       }
+      case fuzz::Call::kUndoUpdate: {
+        v1::UndoUpdateResponse response;
+        return later(&Backend::undo_update, call.undo_update(), response);
+      }
+      case fuzz::Call::kRestore:
+        return restore(call.restore());
+      case fuzz::Call::kSnapshot: {
+        const auto file = backend().snapshot(context_, call.snapshot().session());
+        if (!file.ok() || file->bytes.size() > (1u << 20)) return;
+        LPDEFORM_CHECK(restore_file(file->bytes).ok());  // what the server wrote it reads
+        return;
+      }
       case fuzz::Call::kSolve:
         return solve(call.solve());
       case fuzz::Call::CALL_NOT_SET:
         return;
     }
+  }
+
+  /// A file that somebody made up, sealed as the server does it.
+  void restore(const stored::Snapshot& snapshot) {
+    const std::string content = snapshot.SerializePartialAsString();
+    (void)restore_file(snapshot_header(content) + content);
+  }
+
+  absl::Status restore_file(const std::string& file) {
+    v1::RestoreSessionRequest request;
+    request.mutable_snapshot()->set_inline_(file);
+    v1::RestoreSessionResponse response;
+    const auto done = std::make_shared<std::promise<absl::Status>>();
+    backend().restore_session(context_, request, response,
+                              [done](const absl::Status& status) { done->set_value(status); });
+    auto ended = done->get_future();
+    LPDEFORM_CHECK(ended.wait_for(kPatience) == std::future_status::ready);
+    const absl::Status status = ended.get();
+    if (status.ok()) {
+      sessions_.push_back(response.session().name());
+      token_ = response.writer_token();
+    }
+    // There may be no room; otherwise it is what is wrong with the file.
+    return absl::IsResourceExhausted(status) ? absl::OkStatus() : status;
   }
 
   /// With a bound on its iterations, which is no bound of the service's.

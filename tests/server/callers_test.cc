@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <thread>
@@ -92,6 +93,21 @@ class CallersTest : public ServiceTest {
     if (has_frames) streaming.TryCancel();
     const grpc::Status ended = reader->Finish();
     all["frames"] = has_frames ? "" : details_of(ended).info.reason();
+    v1::SnapshotSessionRequest snapshot;
+    snapshot.set_session(name);
+    grpc::ClientContext saving;
+    if (!token.empty()) saving.AddMetadata("authorization", "Bearer " + token);
+    const auto parts = stub_->SnapshotSession(&saving, snapshot);
+    v1::SnapshotSessionResponse part;
+    while (parts->Read(&part)) file_of_it_ += part.data();
+    const grpc::Status saved = parts->Finish();
+    all["snapshot"] = saved.ok() ? "" : details_of(saved).info.reason();
+    v1::UndoUpdateRequest undo;
+    undo.set_session(name);
+    undo.set_writer_token(session.writer_token());
+    undo.set_input_seq(100);
+    v1::UndoUpdateResponse undone;
+    all["undo"] = call(token, &Stub::UndoUpdate, undo, undone);
     return all;
   }
 
@@ -100,7 +116,7 @@ class CallersTest : public ServiceTest {
   const TokenMaker maker_;
   const std::string alice_ = maker_.token_of("alice"), bob_ = maker_.token_of("bob"),
                     viewer_ = maker_.token_of("alice", "viewer");
-  std::string refusal_;
+  std::string refusal_, file_of_it_;
 };
 
 TEST_F(CallersTest, WithoutATokenNothingIsAnswered) {
@@ -130,7 +146,7 @@ TEST_F(CallersTest, SomebodyElsesSessionIsNotThere) {
 TEST_F(CallersTest, AViewerSeesTheSubjectsSessionsAndChangesNothing) {
   const auto session = create_as(alice_);
   const auto reasons = refusals(viewer_, session);
-  for (const char* const change : {"acquire", "update", "solve"})
+  for (const char* const change : {"acquire", "update", "solve", "snapshot", "undo"})
     EXPECT_EQ(reasons.at(change), "READ_ONLY") << change;
   for (const char* const look : {"get", "frames"}) EXPECT_EQ(reasons.at(look), "") << look;
   EXPECT_EQ(reasons.at("ack"), "STREAM_UNKNOWN");
@@ -142,6 +158,21 @@ TEST_F(CallersTest, AViewerSeesTheSubjectsSessionsAndChangesNothing) {
   v1::DeleteSessionResponse removed;
   EXPECT_EQ(call(viewer_, &Stub::DeleteSession, remove, removed), "READ_ONLY");
   EXPECT_EQ(sessions_of(alice_), 1u);
+}
+
+TEST_F(CallersTest, ARestoredSessionIsItsCallersAndCountsAsOne) {
+  const auto session = create_as(alice_);
+  refusals(alice_, session);
+  v1::RestoreSessionRequest restore;
+  restore.mutable_snapshot()->set_inline_(file_of_it_);
+  v1::RestoreSessionResponse restored;
+  EXPECT_EQ(call(viewer_, &Stub::RestoreSession, restore, restored), "READ_ONLY");
+  EXPECT_EQ(call("", &Stub::RestoreSession, restore, restored), "TOKEN_MISSING");
+  EXPECT_EQ(call(alice_, &Stub::RestoreSession, restore, restored), "");
+  EXPECT_EQ(call(alice_, &Stub::RestoreSession, restore, restored), "CALLER_SESSIONS_FULL");
+  EXPECT_EQ(call(bob_, &Stub::RestoreSession, restore, restored), "");
+  EXPECT_EQ(sessions_of(alice_), 2u);
+  EXPECT_EQ(sessions_of(bob_), 1u);
 }
 
 TEST_F(CallersTest, OneCallerCannotTakeAllSessions) {
@@ -276,6 +307,37 @@ TEST_F(CallersTest, SomebodyElsesUploadIsNotThere) {
   v1::CreateSessionResponse session;
   EXPECT_EQ(call(bob_, &Stub::CreateSession, use, session), "UPLOAD_UNKNOWN");
   EXPECT_EQ(call(alice_, &Stub::CreateSession, use, session), "");
+}
+
+TEST_F(CallersTest, AStreamEndsWhenItsTokenHasExpired) {
+  server_.reset();
+  timers_ = std::make_shared<ManualTimers>();
+  start();
+  const auto session = create_as(alice_);
+  const std::string soon =
+      maker_.sign("{\"sub\": \"alice\", \"exp\": " + std::to_string(std::time(nullptr) + 300) + "}");
+  const auto open = [&](grpc::ClientContext& context, const std::string& token) {
+    context.set_deadline(std::chrono::system_clock::now() + kTestDeadline);
+    context.AddMetadata("authorization", "Bearer " + token);
+    v1::StreamFramesRequest request;
+    request.set_session(session.session().name());
+    auto reader = stub_->StreamFrames(&context, request);
+    v1::StreamFramesResponse response;
+    EXPECT_TRUE(reader->Read(&response) && response.event().has_opened());
+    return reader;
+  };
+  grpc::ClientContext short_context, long_context;
+  const auto short_stream = open(short_context, soon), long_stream = open(long_context, alice_);
+  timers_->advance(std::chrono::seconds(250));
+  timers_->advance(std::chrono::seconds(100));  // with the difference between clocks that is forgiven
+  v1::StreamFramesResponse response;
+  while (short_stream->Read(&response) && !response.event().has_go_away()) {
+  }
+  EXPECT_EQ(response.event().go_away().reason(), v1::GO_AWAY_REASON_TOKEN_EXPIRED);
+  EXPECT_TRUE(short_stream->Finish().ok());
+  EXPECT_TRUE(long_stream->Read(&response));
+  EXPECT_FALSE(response.event().has_go_away());
+  long_context.TryCancel();
 }
 
 TEST_F(CallersTest, AStreamThatWasLetInGoesOn) {

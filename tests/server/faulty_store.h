@@ -39,6 +39,11 @@ class FaultyStore final : public Store {
     if (absl::Status status = pass(); !status.ok()) return status;
     return store_->find_request(owner, request_id);
   }
+  absl::StatusOr<std::vector<std::string>> list(const std::string& owner, const std::string& after,
+                                                std::size_t most) override {
+    if (absl::Status status = pass(); !status.ok()) return status;
+    return store_->list(owner, after, most);
+  }
   absl::Status keep_blob(const std::string& session, const std::string& key,
                          std::string_view bytes) override {
     if (absl::Status status = pass(); !status.ok()) return status;

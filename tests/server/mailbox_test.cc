@@ -111,7 +111,7 @@ TEST_F(MailboxTest, ALateMotionDoesNotBringBackAHandleThatWasLetGoOf) {
 }
 
 TEST_F(MailboxTest, ForgottenNamesStayStale) {
-  for (std::uint64_t k = 0; k < 3 * Mailbox::kMostHandles; ++k) {
+  for (std::uint64_t k = 0; k < 3 * InputLimits::kMostHandles; ++k) {
     Update update;
     update.input_seq = 10 + k;
     update.handles.push_back({absl::StrCat("h", k), Removal{}});
@@ -248,7 +248,7 @@ INSTANTIATE_TEST_SUITE_P(
               [](Update& u) { u.settings.solver = SolveSettings{.time_limit_seconds = -1}; }},
         Wrong{"TOO_MANY_HANDLES",
               [](Update& u) {
-                for (std::size_t k = 0; k < Mailbox::kMostHandles; ++k) {
+                for (std::size_t k = 0; k < InputLimits::kMostHandles; ++k) {
                   u.handles.push_back({absl::StrCat("h", k), Handle{{5}, Fixed{}}});
                 }
               }}),

@@ -1,11 +1,12 @@
 // Several servers that share a store in Redis, behind Envoy: one that dies or drains hands over, and the C++ client goes on
-// by itself. LPDEFORM_BAR_LENGTH makes the mesh larger: the time of a failover is printed.
+// by itself. LPDEFORM_VERTICES makes a mesh of about so many vertices: the time of a failover is printed.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -76,8 +77,12 @@ class ReplicasTest : public testing::Test {
     }
   }
 
-  static client::Mesh bar(double length) {
-    const TriangleMesh box = box_surface(4, 4, static_cast<int>(length));
+  static client::Mesh bar(int length) { return mesh_of(box_surface(4, 4, length)); }
+  static client::Mesh cube(double vertices) {
+    const int cells = std::max(1, static_cast<int>(std::lround(std::sqrt(vertices / 6))));
+    return mesh_of(box_surface(cells, cells, cells));
+  }
+  static client::Mesh mesh_of(const TriangleMesh& box) {
     return {{box.vertices.data(), box.vertices.data() + box.vertices.size()},
             {box.faces.data(), box.faces.data() + box.faces.size()}};
   }
@@ -110,8 +115,8 @@ class ReplicasTest : public testing::Test {
 };
 
 TEST_F(ReplicasTest, ASessionOutlivesEveryServerThatDies) {
-  const char* const length = std::getenv("LPDEFORM_BAR_LENGTH");
-  const client::Mesh mesh = bar(length == nullptr ? 21 : std::atof(length));
+  const char* const vertices = std::getenv("LPDEFORM_VERTICES");
+  const client::Mesh mesh = vertices == nullptr ? bar(21) : cube(std::atof(vertices));
   const Clock::time_point making = Clock::now();
   client::Session session = open(mesh);
   hold(session, mesh);

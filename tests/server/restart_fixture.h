@@ -12,6 +12,58 @@
 
 namespace lpdeform {
 
+/// One of everything that a session can have.
+inline v1::Update everything(const TriangleMesh& mesh) {
+  v1::Update update = ends_message(mesh.vertices, 7, 2);
+  const auto handle = [&](const std::string& name) -> v1::Handle& {
+    v1::HandleUpdate& change = *update.add_handles();
+    change.set_name(name);
+    return *change.mutable_set();
+  };
+  v1::Handle& soft = handle("soft");
+  soft.mutable_vertices()->set_inline_(packed(vertices_at(mesh.vertices, 5)));
+  soft.mutable_soft()->set_weight(0.25);
+  soft.set_footprint_radius(1.5);
+  v1::Handle& turned = handle("turned");
+  turned.mutable_vertices()->set_inline_(packed(vertices_at(mesh.vertices, 8)));
+  turned.mutable_orientation()->set_weight(30);
+  turned.mutable_motion()->mutable_rigid()->mutable_axis()->set_z(1);
+  turned.mutable_motion()->mutable_rigid()->set_angle_radians(0.3);
+  turned.mutable_motion()->mutable_rigid()->mutable_center()->set_x(0.5);
+  v1::Handle& rail = handle("rail");
+  rail.mutable_vertices()->set_inline_(packed(std::vector<std::int32_t>{vertices_at(mesh.vertices, 11)[0]}));
+  rail.mutable_axis_lock()->mutable_axis()->set_x(1);
+  v1::Handle& plane = handle("plane");
+  plane.mutable_vertices()->set_inline_(packed(std::vector<std::int32_t>{vertices_at(mesh.vertices, 13)[0]}));
+  plane.mutable_plane_lock()->mutable_normal()->set_y(2);
+  v1::Handle& inside = handle("inside");
+  const std::int32_t last_face = static_cast<std::int32_t>(mesh.faces.rows()) / 2;
+  inside.mutable_points()->mutable_faces()->set_inline_(packed(std::vector<std::int32_t>{last_face}));
+  inside.mutable_points()->set_scalar(v1::SCALAR_FLOAT64);
+  const std::vector<double> weights{0.2, 0.3, 0.5};
+  inside.mutable_points()->mutable_barycentric()->set_inline_(weights.data(), 24);
+  inside.mutable_soft()->set_weight(2);
+  v1::Handle& free = handle("free");
+  const std::int32_t vertex = vertices_at(mesh.vertices, 15)[0];
+  free.mutable_vertices()->set_inline_(packed(std::vector<std::int32_t>{vertex}));
+  const Points target = mesh.vertices.row(vertex).array() + 0.25;
+  free.mutable_motion()->mutable_targets()->set_scalar(v1::SCALAR_FLOAT64);
+  free.mutable_motion()->mutable_targets()->mutable_positions()->set_inline_(packed(target));
+  v1::SettingsUpdate& settings = *update.mutable_settings();
+  const Field p = Field::LinSpaced(mesh.vertices.rows(), 1.25, 3);
+  settings.mutable_p()->mutable_per_vertex()->set_scalar(v1::SCALAR_FLOAT64);
+  settings.mutable_p()->mutable_per_vertex()->mutable_values()->set_inline_(
+      p.data(), static_cast<std::size_t>(p.size()) * sizeof(double));
+  settings.mutable_stiffness()->mutable_automatic()->set_strength(0.5);
+  settings.mutable_length_unit()->set_length(0.75);
+  settings.mutable_solver()->set_method(v1::METHOD_QUASI_NEWTON);
+  settings.mutable_solver()->set_tolerance(1e-7);
+  settings.mutable_solver()->set_max_iterations(500);
+  settings.mutable_solver()->set_time_limit_seconds(60);
+  settings.mutable_solver()->set_initial(v1::INITIAL_GUESS_LAPLACIAN);
+  return update;
+}
+
 /// A server with a store in a folder, and those that come after it.
 class RestartTest : public ServiceTest {
  protected:

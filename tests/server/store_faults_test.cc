@@ -67,6 +67,31 @@ TEST_F(StoreFaultsTest, WhileItFailsADragGoesOnAndIsNotCalledKept) {
   EXPECT_EQ(found.input_seq(), newest);
 }
 
+TEST_F(StoreFaultsTest, HandlesThatWereForgottenWhileItFailedDoNotComeBack) {
+  options_.max_handles = 4;
+  restart();
+  const auto session = create(mesh_);
+  ASSERT_TRUE(take(session, ends_message(mesh_.vertices, 1, 1)).kept());
+  v1::Update added;
+  added.set_input_seq(2);
+  set_handle(added, "old", vertices_at(mesh_.vertices, 5), 0);
+  ASSERT_TRUE(take(session, added).kept());
+  faults_->set_failing(true);
+  for (std::uint64_t seq = 3; seq < 40; ++seq) {  // so many that the oldest are not remembered any more
+    v1::Update removal;
+    removal.set_input_seq(seq);
+    removal.add_handles()->set_name(seq == 3 ? "old" : "none" + std::to_string(seq));
+    removal.mutable_handles(0)->mutable_remove();
+    take(session, removal);
+  }
+  faults_->set_failing(false);
+  until_kept(session, 40);
+  const std::string before = seen(session);
+  EXPECT_EQ(before.find("\"old\""), std::string::npos);
+  restart();
+  EXPECT_EQ(seen(session), before);
+}
+
 TEST_F(StoreFaultsTest, WhileItFailsANewSessionIsRefusedAndLeavesNothing) {
   faults_->set_failing(true);
   v1::CreateSessionResponse session;

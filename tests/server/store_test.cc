@@ -142,6 +142,20 @@ TEST_P(StoreTest, FindsSessionsOfTheirOwnerOnly) {
   EXPECT_EQ(store_->take_over("a", "anna")->epoch, 2u);  // looking was no taking over
 }
 
+TEST_P(StoreTest, ListsTheOwnersSessionsByName) {
+  for (const char* name : {"c", "a", "d", "b"}) ASSERT_TRUE(commit(*store_, beginning(name)).ok());
+  StoredChange other = beginning("ab");
+  other.owner = "bert";
+  ASSERT_TRUE(commit(*store_, other).ok());
+  ASSERT_TRUE(commit(*store_, {.session = "c", .is_removal = true}).ok());
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(*store_->list("anna", "", 10), (Names{"a", "b", "d"}));
+  EXPECT_EQ(*store_->list("anna", "", 2), (Names{"a", "b"}));
+  EXPECT_EQ(*store_->list("anna", "b", 2), Names{"d"});
+  EXPECT_EQ(*store_->list("bert", "", 10), Names{"ab"});
+  EXPECT_EQ(*store_->list("", "", 10), Names{});
+}
+
 TEST_P(StoreTest, FindsASessionByItsRequest) {
   StoredChange made = beginning("a");
   made.request_id = "request 1";
