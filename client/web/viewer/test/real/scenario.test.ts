@@ -184,11 +184,12 @@ describe("somebody with a mesh of their own", () => {
   it("saves the handles, reloads the exported mesh, and has both again", async () => {
     handles = await user.save("Handles as JSON");
     const exported = await user.save("Mesh as PLY, with distortion");
-    const before = await user.ask<object>("document().handles.map(({ name, vertices }) => ({ name, vertices }))");
+    const named = () => user.ask<object>("document().handles.map(({ name, vertices }) => ({ name, vertices }))");
+    const before = await named();
 
     await user.openFiles(towerFile, { name: "tower-handles.json", content: handles });
+    await expect.poll(named, { timeout: 10_000 }).toEqual(before);
     await user.settled();
-    expect(await user.ask("document().handles.map(({ name, vertices }) => ({ name, vertices }))")).toEqual(before);
     await user.until("window.__lpdeform.app.red > 0");
     expect(largestDifference(await user.positions(), [...tower.positions])).toBeGreaterThan(1);
 
