@@ -73,6 +73,11 @@ export function fromFault(fault: Fault): LpdeformError {
   });
 }
 
+/** Not even heartbeats came. */
+export function serverSilent(): LpdeformError {
+  return new LpdeformError("unavailable", "The server has fallen silent.", { reason: "SILENCE" });
+}
+
 /** Whatever a call has thrown. */
 export function fromCall(thrown: unknown): LpdeformError {
   if (thrown instanceof LpdeformError) return thrown;

@@ -1,5 +1,5 @@
 import type { MessageInitShape } from "@bufbuild/protobuf";
-import { fromCall, fromFault, LpdeformError } from "./errors.js";
+import { fromCall, fromFault, LpdeformError, serverSilent } from "./errors.js";
 import type { FrameOptionsSchema, FramePart } from "./gen/lpdeform/v1/frame_pb.js";
 import {
   type Fault,
@@ -127,7 +127,6 @@ class SharedStream {
   #call: AbortController | undefined;
   #isOpening = false;
   #silence: ReturnType<typeof setTimeout> | undefined;
-  #longestSilenceMs = 45_000;
   #isResting = false;
   #looking: ReturnType<typeof setInterval> | undefined;
 
@@ -207,7 +206,7 @@ class SharedStream {
         if (this.#call !== call) return;
         const lane = lanes[stream];
         if (lane && event && this.lanes.has(lane)) this.#take(lane, event);
-        this.#heard(call);
+        if (this.#call === call) this.#heard(call);
       }
     } catch (thrown) {
       error = call.signal.reason instanceof LpdeformError ? call.signal.reason : fromCall(thrown);
@@ -223,7 +222,7 @@ class SharedStream {
   #take(lane: Lane, { event }: StreamEvent): void {
     switch (event.case) {
       case "opened":
-        if (event.value.heartbeatIntervalMs > 0) this.#longestSilenceMs = 3 * event.value.heartbeatIntervalMs;
+        if (event.value.heartbeatIntervalMs > 0) this.rpc.longestSilenceMs = 3 * event.value.heartbeatIntervalMs;
         lane.opened(event.value);
         break;
       case "frame":
@@ -254,8 +253,6 @@ class SharedStream {
 
   #heard(call: AbortController): void {
     clearTimeout(this.#silence);
-    this.#silence = setTimeout(() => {
-      call.abort(new LpdeformError("unavailable", "The server has fallen silent.", { reason: "SILENCE" }));
-    }, this.#longestSilenceMs);
+    this.#silence = setTimeout(() => call.abort(serverSilent()), this.rpc.longestSilenceMs);
   }
 }

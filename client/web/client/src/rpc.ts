@@ -24,6 +24,8 @@ function keepTogether(id: string): Interceptor {
 export class Rpc {
   readonly client: Client<typeof DeformService>;
   readonly hub = new StreamHub(this);
+  /** Three heartbeats: what is silent for longer is dead. Of 15 s until a stream says otherwise. */
+  longestSilenceMs = 45_000;
 
   constructor(
     transport: Transport,

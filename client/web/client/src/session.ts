@@ -193,7 +193,7 @@ export class Session implements AsyncIterable<Frame> {
   ): Promise<SolveResult<Float32Array | Float64Array>> {
     const link = this.#link;
     const backoff = new Backoff();
-    const latest = performance.now() + link.rpc.reconnectForMs;
+    let latest: number | undefined;
     let lost: string | undefined;
     for (;;) {
       signal.throwIfAborted();
@@ -211,6 +211,8 @@ export class Session implements AsyncIterable<Frame> {
         const isPassing = lost === undefined ? error.code === "unavailable" : isUndecided(error);
         if (link.copy && isSessionLost(error)) lost ??= lease.session;
         else if (!isPassing) throw error;
+        else if (lost === undefined) link.ledger.resumedAt(0); // it may have gone back: once more does no harm
+        latest ??= performance.now() + link.rpc.reconnectForMs;
         if (performance.now() > latest) throw error;
         await pause(Math.max(error.retryAfterMs, backoff.nextMs()), signal);
       }
@@ -234,10 +236,12 @@ export class Session implements AsyncIterable<Frame> {
       }
     }
     const update = ledger.hasWaiting ? ledger.sendNext() : undefined;
+    const { newest } = ledger;
     try {
       const result = await runSolve(rpc, lease, update, options, end, signal);
       if (update) ledger.accept(update);
-      return result;
+      if (result.inputSeq < newest) ledger.resumedAt(result.inputSeq);
+      if (result.inputSeq >= newest || !ledger.hasRestore) return result;
     } catch (thrown) {
       const error = thrown as LpdeformError;
       if (update && isTakenAllTheSame(error)) ledger.accept(update);
@@ -245,6 +249,7 @@ export class Session implements AsyncIterable<Frame> {
       else if (update) ledger.refuse(update);
       throw error;
     }
+    throw new LpdeformError("unavailable", "The server went back to an earlier state.");
   }
 
   /** Becomes the writer in place of whoever is, as a reader or after a WRITER_REPLACED. */

@@ -1,5 +1,5 @@
 import { FrameAssembly } from "./assembly.js";
-import { fromCall, LpdeformError } from "./errors.js";
+import { fromCall, LpdeformError, serverSilent } from "./errors.js";
 import { methodName, stopReasonFromWire } from "./fromwire.js";
 import { Scalar } from "./gen/lpdeform/v1/data_pb.js";
 import type { SolveResponse } from "./gen/lpdeform/v1/service_pb.js";
@@ -13,7 +13,10 @@ import type { WireFrame } from "./frame.js";
 import type { DoubleSolveOptions, IterationRecord, SolveOptions, SolveResult } from "./types.js";
 import { Uploads } from "./upload.js";
 
-/** One Solve call, from its request to the finished result. `end`: of the time for it, on the clock of performance.now(). */
+/**
+ * One Solve call, from its request to the finished result. `end`: of the time for it, on the clock of performance.now().
+ * Dead after three heartbeats of silence.
+ */
 export async function runSolve(
   rpc: Rpc,
   lease: Lease,
@@ -24,6 +27,12 @@ export async function runSolve(
 ): Promise<SolveResult<Float32Array | Float64Array>> {
   const uploads = new Uploads(rpc, signal);
   const packer = new Packer();
+  const dead = new AbortController();
+  let silence: ReturnType<typeof setTimeout> | undefined;
+  const heard = () => {
+    clearTimeout(silence);
+    silence = setTimeout(() => dead.abort(serverSilent()), rpc.longestSilenceMs);
+  };
   const initial = options.initialPositions && packer.numbers(options.initialPositions);
   const request = {
     session: lease.session,
@@ -38,13 +47,21 @@ export async function runSolve(
   };
   try {
     await packer.flush((bytes) => uploads.add(bytes));
-    const calling = { signal, timeoutMs: end === undefined ? 0 : Math.max(Math.ceil(end - performance.now()), 1) };
+    const calling = {
+      signal: AbortSignal.any([signal, dead.signal]),
+      timeoutMs: end === undefined ? 0 : Math.max(Math.ceil(end - performance.now()), 1),
+    };
     const result = new ResultBuilder(lease.report.vertices, options);
-    for await (const response of rpc.client.solve(request, calling)) result.take(response);
+    heard();
+    for await (const response of rpc.client.solve(request, calling)) {
+      heard();
+      result.take(response);
+    }
     return result.finish();
   } catch (thrown) {
-    throw fromCall(thrown);
+    throw dead.signal.aborted ? dead.signal.reason : fromCall(thrown);
   } finally {
+    clearTimeout(silence);
     uploads.discard();
   }
 }

@@ -251,6 +251,82 @@ describe("solving", () => {
     expect(server.updates.at(-1)!.session).toBe("sessions/2");
   });
 
+  test("begins again where the server falls silent, and holds no update back for good", async () => {
+    const server = new FakeServer();
+    const rpc = server.rpc();
+    rpc.longestSilenceMs = 300;
+    const session = await openWith(rpc, triangle, {});
+    opened.push(session);
+    server.on.solve = async function* (_, { signal }) {
+      if (server.solves.length === 1) await new Promise((resolve) => signal.addEventListener("abort", resolve));
+      yield* result;
+    };
+    const solving = session.solve();
+    await server.until(() => server.solves.length === 1);
+    session.setHandle("tip", { vertices: [1] });
+    expect((await solving).energy).toBe(3);
+    expect(server.solves.map(({ update }) => update?.inputSeq)).toEqual([undefined, 1n]);
+  });
+
+  test("goes on for as long as heartbeats come", async () => {
+    const server = new FakeServer();
+    const rpc = server.rpc();
+    rpc.longestSilenceMs = 400;
+    const session = await openWith(rpc, triangle, {});
+    opened.push(session);
+    server.on.solve = async function* () {
+      for (let k = 0; k < 8; ++k) {
+        await new Promise((resolve) => setTimeout(resolve, 80));
+        yield { message: { case: "heartbeat", value: {} } };
+      }
+      yield* result;
+    };
+    expect((await session.solve()).energy).toBe(3);
+    expect(server.solves.length).toBe(1);
+  });
+
+  test("counts the time that it tries again from when the server went away", async () => {
+    const server = new FakeServer();
+    const { session } = await begin(server, server.rpc(5000, 300));
+    server.on.solve = async function* () {
+      if (server.solves.length === 1) {
+        await new Promise((resolve) => setTimeout(resolve, 400));
+        throw new ConnectError("away", Code.Unavailable);
+      }
+      yield* result;
+    };
+    expect((await session.solve()).energy).toBe(3);
+  });
+
+  test("gives the result of the newest update where the server went back to an older state", async () => {
+    const { server, session } = await begin();
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 1);
+    server.on.solve = async function* () {
+      const inputSeq = server.updates.length === 1 ? 0n : 1n;
+      yield { message: { case: "summary", value: { ...summary.value, inputSeq } } };
+      yield { message: frame };
+    };
+    expect((await session.solve()).inputSeq).toBe(1);
+    expect(server.solves.length).toBe(2);
+    expect(server.updates[1]!.update).toMatchObject({ inputSeq: 1n, handles: [{ name: "tip" }] });
+  });
+
+  test("sends what the server did not keep before what waits, where the server went away", async () => {
+    const { server, session } = await begin();
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 1);
+    server.on.solve = async function* () {
+      if (server.solves.length === 1) throw new ConnectError("killed", Code.Unavailable);
+      yield* result;
+    };
+    const solving = session.solve();
+    session.setHandle("base", { vertices: [0] });
+    expect((await solving).inputSeq).toBe(2);
+    expect(server.solves.map(({ update }) => update?.inputSeq)).toEqual([2n, 2n]);
+    expect(server.updates[1]!.update).toMatchObject({ inputSeq: 1n, handles: [{ name: "tip" }] });
+  });
+
   test("ends with what the server refuses, a result without positions, or an abort", async () => {
     const { server, session } = await begin();
     server.on.solve = async function* () {
