@@ -21,6 +21,8 @@ export interface Copy {
 
 /** What did not fit so often never will: it is of another version, or something on the way breaks it. */
 const mostMisfits = 5;
+/** Whatever a server asks for. */
+const longestRetryMs = 10_000;
 
 export interface Watcher {
   problem(error: LpdeformError): void;
@@ -75,6 +77,11 @@ export class Link {
     return this.#connection;
   }
 
+  /** Nothing is tried, for now or for good. */
+  get #isOver(): boolean {
+    return this.isClosed || this.#over !== undefined;
+  }
+
   get isClosed(): boolean {
     return this.stop.signal.aborted;
   }
@@ -95,7 +102,7 @@ export class Link {
 
   /** Frames come from now on. */
   startStream(): void {
-    if (this.#isStreaming || this.isClosed) return;
+    if (this.#isStreaming || this.#isOver) return;
     this.#isStreaming = true;
     this.#subscribe();
   }
@@ -132,6 +139,8 @@ export class Link {
     this.ledger.countFrom(lease.inputSeq);
     this.box.beginEpoch(lease.epoch);
     this.#over = undefined;
+    this.#misfits = 0;
+    this.#backoff.reset();
     this.box.resume();
     this.#send();
   }
@@ -172,18 +181,18 @@ export class Link {
     const recovery = recoveryAfter(ended, this.#goAway, this.copy !== undefined);
     this.interruption = recovery.why;
     this.#setConnection("reconnecting");
-    if (recovery.why.reason === "FRAME_PARTS" && ++this.#misfits === mostMisfits) return this.#giveUp(recovery.why);
+    if (recovery.why.reason === "FRAME_PARTS" && ++this.#misfits >= mostMisfits) return this.#giveUp(recovery.why);
     if (recovery.next === "giveUp" || this.#isTooLate()) return this.#giveUp(recovery.why);
     await pause(Math.max(recovery.pauseMs, this.#backoff.nextMs()), this.stop.signal);
-    if (this.isClosed) return;
+    if (this.#isOver) return;
     if (recovery.next === "makeAnew") {
       try {
         await this.makeAnew(session);
       } catch (error) {
-        if (!isUndecided(error as LpdeformError)) return this.#giveUp(error as LpdeformError);
+        if (!(await this.#mayMakeAgain(error as LpdeformError))) return;
       }
     }
-    if (!this.isClosed) this.#subscribe();
+    if (!this.#isOver) this.#subscribe();
   }
 
   #heardFromServer(): void {
@@ -206,6 +215,7 @@ export class Link {
     this.#over = why;
     this.ledger.dropUnaccepted();
     this.#isStreaming = false;
+    this.#lane?.close();
     this.#setConnection("closed");
     this.box.finish(why);
     this.#wakeQuiet();
@@ -216,6 +226,13 @@ export class Link {
     if (this.#lease.session !== lost) return Promise.resolve();
     this.#making ??= this.#make().finally(() => (this.#making = undefined));
     return this.#making;
+  }
+
+  /** After makeAnew() has failed, and the pause that the server asks for. False where it is the end. */
+  async #mayMakeAgain(failure: LpdeformError): Promise<boolean> {
+    if (isUndecided(failure)) await pause(Math.min(failure.retryAfterMs, longestRetryMs), this.stop.signal);
+    else this.#giveUp(failure);
+    return isUndecided(failure);
   }
 
   async #make(): Promise<void> {
@@ -275,7 +292,7 @@ export class Link {
           await this.makeAnew(session);
         }
       } catch (again) {
-        if (!isUndecided(again as LpdeformError)) this.#giveUp(again as LpdeformError);
+        await this.#mayMakeAgain(again as LpdeformError);
       } finally {
         this.#isSending = false;
       }

@@ -3,7 +3,7 @@ import { describe, expect, test, vi } from "vitest";
 import { GoAwayReason } from "../src/gen/lpdeform/v1/service_pb.js";
 import { joinWith, openWith } from "../src/session.js";
 import { FakeServer, triangle } from "./fake_server.js";
-import { at, begin, connected, next, opened, refusal } from "./harness.js";
+import { arrived, at, begin, connected, next, opened, refusal } from "./harness.js";
 
 describe("a stream that ends", () => {
   test("by a broken connection is taken up again", async () => {
@@ -48,6 +48,9 @@ describe("a stream that ends", () => {
     expect(server.streams.length).toBe(5);
     expect(performance.now() - start).toBeGreaterThan((100 + 200 + 400 + 800) / 2);
     expect(session.connection).toBe("closed");
+    await session.takeOver();
+    await expect(next(session)).rejects.toMatchObject({ reason: "FRAME_PARTS" });
+    expect(server.streams.length).toBe(10);
   });
 
   test("by frames that do not fit goes on where one has fitted in between", async () => {
@@ -84,15 +87,47 @@ describe("a stream that ends", () => {
     expect(states).toEqual([]);
   });
 
+  test("by a frame that does not fit leaves no timer behind", async () => {
+    const { server, session } = await begin();
+    const [begun, ended] = [vi.spyOn(globalThis, "setTimeout"), vi.spyOn(globalThis, "clearTimeout")];
+    server.stream.open(0, { heartbeatIntervalMs: 12_345 });
+    await arrived(server, session);
+    server.stream.frame({ frameSeq: 1n, vertexCount: 8 });
+    await server.until(() => server.streams[0]!.isAborted);
+    const ofSilence = begun.mock.calls.flatMap(([, ms], k) =>
+      ms === 3 * 12_345 ? [begun.mock.results[k]!.value] : [],
+    );
+    const cleared = ended.mock.calls.map(([timer]) => timer);
+    vi.restoreAllMocks();
+    expect(ofSilence.length).toBeGreaterThan(0);
+    expect(ofSilence.filter((timer) => !cleared.includes(timer))).toEqual([]);
+  });
+
+  test("for good is not opened again, however often it is asked for", async () => {
+    const { server, session, rpc } = await begin();
+    server.stream.goAway(GoAwayReason.PROTOCOL_ERROR);
+    server.stream.queue.finish();
+    await expect(next(session)).rejects.toMatchObject({ reason: "PROTOCOL_ERROR" });
+    for (let k = 0; k < 3; ++k)
+      expect(() => session.poll()).toThrow(expect.objectContaining({ reason: "PROTOCOL_ERROR" }));
+    const other = await openWith(rpc, triangle, {});
+    opened.push(other);
+    other.poll();
+    await server.until(() => server.streams.length === 2);
+    expect(server.stream.request.streams.map(({ session: name }) => name)).toEqual(["sessions/2"]);
+  });
+
   test("by silence is taken up again", async () => {
     const server = new FakeServer();
-    const session = await openWith(server.rpc(), triangle, {});
+    const rpc = server.rpc();
+    const session = await openWith(rpc, triangle, {});
     opened.push(session);
     session.poll();
     await server.until(() => server.streams.length > 0);
     server.stream.open(0, { heartbeatIntervalMs: 50 });
     await server.until(() => server.streams.length === 2);
     expect(server.streams[0]!.isAborted).toBe(true);
+    expect(rpc.longestSilenceMs).toBe(150); // what a solve may be silent for as well
   });
 
   test("stays where heartbeats come", async () => {
@@ -317,6 +352,30 @@ describe("a session that the server has lost", () => {
     server.stream.queue.finish(new ConnectError("broken", Code.Unavailable));
     await server.until(() => server.creations.length === 4);
     expect(new Set(server.creations.slice(1).map(({ requestId }) => requestId)).size).toBe(1);
+  });
+
+  test("is asked for again no sooner than a full server says", async () => {
+    const full = refusal("SESSIONS_FULL", {}, Code.ResourceExhausted, 900);
+    for (const isFoundByUpdate of [false, true]) {
+      const { server, session } = await begin();
+      const asked: number[] = [];
+      server.on.create = (_, count) => {
+        asked.push(performance.now());
+        if (count === 2) throw full;
+      };
+      server.on.update = ({ session: name }) => {
+        if (name === "sessions/1") throw refusal("SESSION_UNKNOWN", {}, Code.NotFound);
+      };
+      server.on.stream = (stream) => {
+        if (stream.request.streams[0]!.session !== "sessions/1") return stream.open();
+        stream.goAway(GoAwayReason.SESSION_EXPIRED);
+        stream.queue.finish();
+      };
+      if (isFoundByUpdate) session.setHandle("tip", { vertices: [1] });
+      else server.stream.queue.finish(new ConnectError("broken", Code.Unavailable));
+      await server.until(() => server.creations.length === 3);
+      expect(asked[1]! - asked[0]!).toBeGreaterThan(890);
+    }
   });
 
   test("and refuses the mesh now is the end", async () => {
