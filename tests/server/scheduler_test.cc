@@ -123,7 +123,10 @@ TEST(Scheduler, AnswersGoBeforeRefinements) {
   }));
   std::vector<std::shared_ptr<Job>> jobs;
   for (int k = 0; k < 3; ++k) {
-    one.scheduler.wake(jobs.emplace_back(std::make_shared<Job>(false, [&] { return note('o'); })));
+    one.scheduler.wake(jobs.emplace_back(std::make_shared<Job>(false, [&] {
+      spin(std::chrono::milliseconds(100));  // far more than their share, beside answers that take no time
+      return note('o');
+    })));
     one.scheduler.wake(jobs.emplace_back(std::make_shared<Job>(false, [&] { return note('a'); })),
                        Urgency::kAnswer);
   }
