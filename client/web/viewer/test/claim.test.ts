@@ -35,6 +35,13 @@ describe.each([
     expect(await claim(crypto.randomUUID(), 0)).toBe(true);
   });
 
+  it("is had by one alone of several that want it at once", async () => {
+    const id = begin();
+    const claims = await Promise.all([claim(id, 0), claim(id, 0), claim(id, 0)]);
+    expect(claims.filter((isMine) => isMine).length).toBe(1);
+    expect(await claim(id, 0)).toBe(false);
+  });
+
   it("is touched by others only where nobody has it, and is free afterwards", async () => {
     const id = begin();
     const act = vi.fn(() => Promise.resolve());

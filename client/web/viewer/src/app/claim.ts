@@ -4,8 +4,9 @@ const channelName = "lpdeform-claims";
 const answerMs = 250;
 
 interface Call {
-  kind: "whose" | "mine";
+  kind: "whose" | "want" | "mine";
   id: string;
+  lot: number;
 }
 
 /**
@@ -32,12 +33,32 @@ export async function whileFree(id: string, act: () => Promise<void>): Promise<v
 
 async function claimByAsking(id: string, waitMs: number): Promise<boolean> {
   const until = performance.now() + waitMs;
-  while (await isHeld(id)) if (performance.now() >= until) return false;
-  const channel = new BroadcastChannel(channelName);
-  channel.onmessage = ({ data }: MessageEvent<Call>) => {
-    if (data.kind === "whose" && data.id === id) channel.postMessage({ kind: "mine", id });
-  };
+  while (!(await contend(id))) if (performance.now() >= until) return false;
   return true;
+}
+
+/** Of pages that want the same at once, the one with the smallest lot has it. Who has it goes on saying so. */
+function contend(id: string): Promise<boolean> {
+  const channel = new BroadcastChannel(channelName);
+  const lot = Math.random();
+  let isMine = false;
+  return new Promise((resolve) => {
+    const say = (kind: Call["kind"]) => channel.postMessage({ kind, id, lot });
+    const timer = setTimeout(() => resolve((isMine = true)), answerMs);
+    const giveWay = () => {
+      clearTimeout(timer);
+      channel.close();
+      resolve(false);
+    };
+    channel.onmessage = ({ data }: MessageEvent<Call>) => {
+      if (data.id !== id) return;
+      if (data.kind === "whose" || (data.kind === "want" && isMine)) say("mine");
+      else if (isMine) return;
+      else if (data.kind === "mine" || data.lot <= lot) giveWay();
+      else say("want"); // whoever came later has not heard it
+    };
+    say("want");
+  });
 }
 
 function isHeld(id: string): Promise<boolean> {
@@ -45,6 +66,6 @@ function isHeld(id: string): Promise<boolean> {
   return new Promise<boolean>((resolve) => {
     channel.onmessage = ({ data }: MessageEvent<Call>) => data.kind === "mine" && data.id === id && resolve(true);
     setTimeout(() => resolve(false), answerMs);
-    channel.postMessage({ kind: "whose", id });
+    channel.postMessage({ kind: "whose", id, lot: 1 });
   }).finally(() => channel.close());
 }
