@@ -135,6 +135,10 @@ describe("words for", () => {
     });
     expect(elementsIn("face 3")).toEqual({ vertices: [], edges: [], faces: [3] });
     expect(elementsIn("edge 4-5")).toEqual({ vertices: [], edges: [4, 5], faces: [] });
+    const handles = [{ name: "Handle 2", vertices: [7, 9] }];
+    expect(elementsIn('handle "Handle 2"', handles)).toEqual({ vertices: [7, 9], edges: [], faces: [] });
+    expect(elementsIn('handle "face 3"', handles)).toEqual({ vertices: [], edges: [], faces: [] });
+    expect(elementsIn("component 2", handles)).toEqual({ vertices: [], edges: [], faces: [] });
   });
 });
 

@@ -1,4 +1,5 @@
 import type { LpdeformError } from "lpdeform-client";
+import type { Handle } from "../model/document.js";
 import { nothing, ofVertices, type PointedOut } from "../model/pointed.js";
 
 /** How things stand with the server, in words for people. */
@@ -59,8 +60,14 @@ export function sentence(text: string): string {
   return trimmed[0]!.toUpperCase() + trimmed.slice(1) + (/[.!?…]$/.test(trimmed) ? "" : ".");
 }
 
-/** The elements in what a server names: "vertex 17", "face 3", "edge 4-5", "vertices 1 and 2". */
-export function elementsIn(element: string): PointedOut {
+/**
+ * The elements in what a server names: "vertex 17", "face 3", "edge 4-5", "vertices 1 and 2", "handle \"tip\"" of `handles`.
+ * Nothing where it names none: "component 2".
+ */
+export function elementsIn(element: string, handles: readonly Pick<Handle, "name" | "vertices">[] = []): PointedOut {
+  const [, name] = /^handle "(.*)"/.exec(element) ?? [];
+  if (name !== undefined) return ofVertices(handles.find((handle) => handle.name === name)?.vertices ?? []);
+  if (/^component/i.test(element)) return nothing;
   const numbers = (element.match(/\d+/g) ?? []).map(Number);
   if (/face|triangle/i.test(element)) return { ...nothing, faces: numbers };
   return /edge/i.test(element) ? { ...nothing, edges: numbers } : ofVertices(numbers);

@@ -1,5 +1,5 @@
 import type { App } from "../app/app.js";
-import { isPassing, sentence, type Status } from "../link/status.js";
+import { elementsIn, isPassing, sentence, type Status } from "../link/status.js";
 import { el, setText } from "./dom.js";
 import { pointOutNamed } from "./report.js";
 
@@ -40,7 +40,8 @@ export function messages(app: App, beginAnew: () => void): HTMLElement {
     setText(title, isProblem ? "The server cannot take this change" : status.title);
     setText(text, isProblem ? sentence(problem.message) : status.text);
     banner.dataset["kind"] = isProblem ? "refused" : status.kind;
-    show.hidden = !/\d/.test(element);
+    const { vertices, edges, faces } = elementsIn(element, app.document.handles);
+    show.hidden = vertices.length + edges.length + faces.length === 0;
     banner.hidden = !isWrong && !isProblem;
   };
   app.facts.watch((facts, before) => {

@@ -80,5 +80,5 @@ export function pointOut(app: App, elements: PointedOut): void {
 }
 
 export function pointOutNamed(app: App, element: string): void {
-  pointOut(app, elementsIn(element));
+  pointOut(app, elementsIn(element, app.document.handles));
 }
