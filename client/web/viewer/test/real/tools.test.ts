@@ -255,9 +255,7 @@ describe("p", () => {
     await user.until("[0, 1].every((pane) => window.__lpdeform.frame(pane).gap !== undefined)");
     await expect.poll(() => user.page.locator('[data-measure="gap"]').textContent()).toMatch(/^[^–]* %/);
     await press("s");
-    await expect
-      .poll(() => user.page.locator(".measures figcaption:visible").allTextContents())
-      .toContain("Cells by energy");
+    await expect.poll(() => user.page.locator(".measures figcaption:visible").allTextContents()).toContain("Cells by energy");
     expect(await label(0)).toBe(`Picture of the surface, p = ${leftP}`);
   });
 });
