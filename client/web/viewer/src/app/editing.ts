@@ -93,7 +93,10 @@ export class Editing implements PointingTarget {
     if (owner) app.view.set({ selected: owner.name });
     else this.#select(this.#dabAt(at), mode);
     const handle = handleOf(app.document, app.view.now.selected);
-    if (handle) app.notify(`“${handle.name}” holds ${handle.vertices.length} vertices; arrow keys move it.`);
+    if (handle) {
+      const canMove = !handle.isLocked && !handle.targets;
+      app.notify(`“${handle.name}” holds ${handle.vertices.length} vertices${canMove ? "; arrow keys move it" : ""}.`);
+    }
     return handle !== undefined && mode === "new";
   }
 

@@ -52,7 +52,9 @@ export class KeyPointer {
     return true;
   }
 
+  /** Once, however long it is held; there is nothing to press on until there is a surface. */
   #enter(event: KeyboardEvent): void {
+    if (event.repeat || !this.pane.stage.surface) return;
     if (!this.#at) this.#show(this.#middle(), event);
     else if (this.target.press(this.#asPointer(this.#at, event))) this.#show(undefined);
   }

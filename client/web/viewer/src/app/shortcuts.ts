@@ -23,6 +23,8 @@ const arrows: Record<string, readonly [number, number]> = {
   ArrowDown: [0, -1],
 };
 const zooms: Record<string, number> = { "+": 1 / 1.15, "=": 1 / 1.15, "-": 1.15 };
+/** What goes on while the key is held; what turns something on or off does not. */
+const steps = new Set(["[", "]", ",", "."]);
 const turnRadians = Math.PI / 24;
 /** Of the picture's height. */
 const shiftShare = 0.05;
@@ -65,7 +67,7 @@ function alone(app: App, files: Files, help: HTMLDialogElement, event: KeyboardE
   } else {
     const act = actions(app, files, help, event)[key.length === 1 ? key.toLowerCase() : key];
     if (!act) return false;
-    act();
+    if (!event.repeat || steps.has(key)) act();
   }
   return true;
 }

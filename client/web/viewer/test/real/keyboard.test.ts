@@ -131,6 +131,34 @@ it("what a key does while it is held is undone at once, and a key that changes n
   expect(await user.ask("app.history.canRedo")).toBe(true);
 });
 
+it("a key that turns something on or off does so once, however long it is held", async () => {
+  const { keyboard } = user.page;
+  const held = async (key: string) => {
+    for (let k = 0; k < 4; ++k) await keyboard.down(key);
+    await keyboard.up(key);
+  };
+  await user.page.locator("canvas.stage").focus();
+  const switches = { w: "view.now.wireframe", g: "view.now.ghost", i: "view.now.isPanelOpen" };
+  for (const [key, what] of Object.entries(switches)) {
+    const before = await user.ask<boolean>(`app.${what}`);
+    await held(key);
+    expect(await user.ask(`app.${what}`)).toBe(!before);
+    await press(key);
+    expect(await user.ask(`app.${what}`)).toBe(before);
+  }
+  await user.ask("app.view.set({ selected: window.__lpdeform.document().handles[0].name })");
+  const isLocked = await user.ask<boolean>("document().handles[0].isLocked");
+  await held("l");
+  expect(await user.ask("document().handles[0].isLocked")).toBe(!isLocked);
+  await press("l");
+
+  const count = await user.ask<number>("document().handles.length");
+  await held("Enter"); // shows the cross, and does not press as well
+  expect(await user.page.locator(".cross").isVisible()).toBe(true);
+  expect(await user.ask("document().handles.length")).toBe(count);
+  await press("Escape");
+});
+
 it("the view turns, shifts and zooms by keys", async () => {
   await user.page.locator("canvas.stage").focus();
   interface Look {
