@@ -13,6 +13,7 @@ export class Tally {
   frames = 0;
   skipped = 0;
   stale = 0;
+  reconnects = 0;
   payloadBytes = 0;
   readonly errors = new Map<string, number>();
 
@@ -24,6 +25,7 @@ export class Tally {
     this.frames += other.frames;
     this.skipped += other.skipped;
     this.stale += other.stale;
+    this.reconnects += other.reconnects;
     this.payloadBytes += other.payloadBytes;
     for (const [reason, count] of other.errors) this.errors.set(reason, (this.errors.get(reason) ?? 0) + count);
   }
@@ -42,6 +44,9 @@ export class Lane {
   ) {
     this.vertices = side * side;
     session.on("problem", (error) => this.#note(error));
+    session.on("connection", (state) => {
+      if (state === "reconnecting") ++this.tally.reconnects;
+    });
   }
 
   /** Opens the session and waits for its first result. */

@@ -39,7 +39,7 @@ function ofTally(tally: Tally) {
     setup_ms: ofHistogram(tally.setup),
     frames: { received: tally.frames, skipped_inputs: tally.skipped, stale: tally.stale },
     payload_bytes: tally.payloadBytes,
-    reconnects: 0,
+    reconnects: tally.reconnects,
     errors: Object.fromEntries([...tally.errors].sort()),
   };
 }
