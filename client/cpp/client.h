@@ -129,8 +129,10 @@ class Session {
 
   /// Solves for the present handles and settings on the server and returns the finished result; waits for it.
   /// Does not need the stream of frames, but works beside it. Begins again where the server went away, within
-  /// the deadline and for as long as the stream would try. Ends early with CANCELLED when close() is called
-  /// from another thread. Errors: what the server refuses; DEADLINE_EXCEEDED; UNAVAILABLE.
+  /// the deadline and for as long as the stream would try. One at a time; while one runs, updates wait and are
+  /// sent after it. When close() is called from another thread it ends early: with CANCELLED, or where it still
+  /// waited for another, with FAILED_PRECONDITION SESSION_CLOSED. Errors: what the server refuses;
+  /// DEADLINE_EXCEEDED (SOLVE_UNDER_WAY where it was spent waiting for another solve or update); UNAVAILABLE.
   absl::StatusOr<SolveResult> solve(const SolveOptions& options = {});
 
   /// Becomes the writer in place of whoever is, after WRITER_REPLACED or as a reader. Waits for the server.
@@ -150,7 +152,7 @@ class Session {
 
   /// Ends the stream and every waiting call. Deletes the session on the server where open() made it; a
   /// failure to do so is returned, and the session expires by itself. Waits for the server at most
-  /// call_timeout. Again: OK at once.
+  /// two seconds. Again: OK at once.
   absl::Status close();
 
  private:

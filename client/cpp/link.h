@@ -81,12 +81,12 @@ class Link {
   void acknowledge(std::uint64_t frame_seq, std::uint64_t stream);
   absl::Status check_initial_positions(const SolveOptions& options) const;
   absl::StatusOr<std::optional<Frame>> take_frame(Clock::time_point deadline);
-  absl::StatusOr<SolveResult> solve_patiently(const SolveOptions& options);
+  absl::StatusOr<SolveResult> solve_patiently(const SolveOptions& options, Clock::time_point start);
   absl::StatusOr<SolveResult> solve_or_make_anew(const SolveOptions& options);
   absl::StatusOr<SolveResult> solve_once(const SolveOptions& options);
   absl::Status send_restore(std::unique_lock<std::mutex>& lock);
   absl::Status send_by_call(std::unique_lock<std::mutex>& lock);
-  absl::Status begin_alone(std::unique_lock<std::mutex>& lock);
+  absl::Status begin_alone(std::unique_lock<std::mutex>& lock, Clock::time_point deadline);
   absl::StatusOr<v1::UndoUpdateResponse> undo_patiently(const v1::UndoUpdateRequest& request);
   absl::Status make_anew(const std::string& lost);
   absl::Status no_frame() const;

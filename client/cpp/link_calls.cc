@@ -102,11 +102,11 @@ absl::Status Link::check_initial_positions(const SolveOptions& options) const {
 }
 
 /// Waits until nothing is under way, and lets nothing begin until is_solving_ is false again.
-absl::Status Link::begin_alone(std::unique_lock<std::mutex>& lock) {
+absl::Status Link::begin_alone(std::unique_lock<std::mutex>& lock, Clock::time_point deadline) {
   const auto is_quiet = [this] { return is_closing_ || (!is_solving_ && !ledger_.has_in_flight()); };
-  if (!changed_.wait_for(lock, client_options_.call_timeout, is_quiet)) {
-    return absl::DeadlineExceededError(
-        "Another solve, or an update that the server has not answered, is under way.");
+  if (!changed_.wait_until(lock, deadline, is_quiet)) {
+    return make_fault(absl::StatusCode::kDeadlineExceeded, {"SOLVE_UNDER_WAY", "", ""},
+                      "Another solve, or an update that the server has not answered, is under way.");
   }
   if (is_closing_) return session_closed();
   is_solving_ = true;
@@ -114,8 +114,9 @@ absl::Status Link::begin_alone(std::unique_lock<std::mutex>& lock) {
 }
 
 absl::StatusOr<std::uint64_t> Link::undo(bool redo) {
+  const Clock::time_point deadline = Clock::now() + client_options_.call_timeout;
   std::unique_lock lock(mutex_);
-  if (absl::Status alone = begin_alone(lock); !alone.ok()) return alone;
+  if (absl::Status alone = begin_alone(lock, deadline); !alone.ok()) return alone;
   const auto done = absl::MakeCleanup([this, &lock] {
     if (!lock.owns_lock()) lock.lock();
     is_solving_ = false;
@@ -156,22 +157,31 @@ absl::StatusOr<v1::UndoUpdateResponse> Link::undo_patiently(const v1::UndoUpdate
 absl::StatusOr<SolveResult> Link::solve(const SolveOptions& options) {
   const absl::Status checked = check_initial_positions(options);
   if (!checked.ok()) return checked;
+  const Clock::time_point start = Clock::now();
+  std::chrono::duration<double> longest = client_options_.call_timeout;
+  if (options.deadline_seconds > 0)
+    longest = std::min(longest, std::chrono::duration<double>(options.deadline_seconds));
+  const Clock::time_point deadline = start + std::chrono::duration_cast<Clock::duration>(longest);
   std::unique_lock lock(mutex_);
-  if (absl::Status alone = begin_alone(lock); !alone.ok()) return alone;
+  if (absl::Status alone = begin_alone(lock, deadline); !alone.ok()) return alone;
   const auto solved = absl::MakeCleanup([this] {
     const std::scoped_lock relock(mutex_);
     is_solving_ = false;
     changed_.notify_all();
   });
   lock.unlock();
-  return solve_patiently(options);
+  return solve_patiently(options, start);
 }
 
-/// Tries again while the server is away, for as long as the stream would.
-absl::StatusOr<SolveResult> Link::solve_patiently(const SolveOptions& options) {
-  const Clock::time_point start = Clock::now();
+/// Tries again while the server is away, for as long as the stream would. The deadline of `options` counts from `start`.
+absl::StatusOr<SolveResult> Link::solve_patiently(const SolveOptions& options, Clock::time_point start) {
   std::optional<Clock::time_point> latest;
   SolveOptions left = options;
+  if (options.deadline_seconds > 0) {
+    left.deadline_seconds -= std::chrono::duration<double>(Clock::now() - start).count();
+    if (left.deadline_seconds <= 0)
+      return absl::DeadlineExceededError("The time for the solve passed before it began.");
+  }
   Backoff backoff;
   for (;;) {
     absl::StatusOr<SolveResult> result = solve_or_make_anew(left);

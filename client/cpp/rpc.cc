@@ -37,6 +37,8 @@ constexpr int kKeepaliveMs = 6 * 60 * 1000;
 constexpr int kUnacknowledgedMs = 20 * 1000;
 /// So often a wait for a connection sees whether it is to stop.
 constexpr std::chrono::milliseconds kGlance{50};
+/// For DeleteSession, as somebody waits for a window to close; a session that is not deleted expires.
+constexpr std::chrono::milliseconds kLongestClosing{2000};
 
 grpc::ChannelArguments channel_arguments() {
   grpc::ChannelArguments arguments;
@@ -161,7 +163,7 @@ class GrpcRpc final : public Rpc {
   }
   absl::StatusOr<v1::DeleteSessionResponse> call(const v1::DeleteSessionRequest& request,
                                                  const std::stop_token& stop) override {
-    return unary(&Stub::DeleteSession, request, stop);
+    return unary(&Stub::DeleteSession, request, stop, std::min(call_timeout_, kLongestClosing));
   }
   absl::StatusOr<v1::AcquireWriterResponse> call(const v1::AcquireWriterRequest& request,
                                                  const std::stop_token& stop) override {
@@ -211,10 +213,11 @@ class GrpcRpc final : public Rpc {
   template <typename Request, typename Response>
   absl::StatusOr<Response> unary(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
                                                               Response*),
-                                 const Request& request, const std::stop_token& stop) {
+                                 const Request& request, const std::stop_token& stop,
+                                 std::optional<std::chrono::milliseconds> longest = {}) {
     grpc::ClientContext context;
     introduce(caller_, context);
-    context.set_deadline(std::chrono::system_clock::now() + call_timeout_);
+    context.set_deadline(std::chrono::system_clock::now() + longest.value_or(call_timeout_));
     const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
     Response response;
     const grpc::Status status = ((*stub_).*method)(&context, request, &response);

@@ -31,7 +31,7 @@ class DeformCall {
 };
 
 /// The server's calls over one channel, gRPC hidden behind it. Thread-safe. Each waits, for at most the call
-/// timeout where nothing else is said, and ends with CANCELLED when `stop` is requested.
+/// timeout (and DeleteSession two seconds) where nothing else is said, and ends with CANCELLED when `stop` is requested.
 class Rpc {
  public:
   /// `address` as in Client::connect. Waits until the server answers or the address refuses:

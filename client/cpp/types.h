@@ -272,7 +272,7 @@ struct SolveOptions {
   std::optional<std::vector<double>> initial_positions = {};
   /// Called at most ten times a second, on the thread that called solve(). May be empty.
   std::function<void(const SolveProgress&)> on_progress = {};
-  /// Of the whole call; 0 is without limit. When it has passed, the server stops as well.
+  /// Of the whole call, waiting for another one included; 0 is without limit. When it has passed, the server stops as well.
   double deadline_seconds = 0;
 };
 

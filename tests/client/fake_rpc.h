@@ -131,6 +131,11 @@ class FakeRpc final : public Rpc {
     const std::scoped_lock lock(mutex_);
     return solved_;
   }
+  /// In seconds, of each Solve call.
+  std::vector<double> solve_deadlines() {
+    const std::scoped_lock lock(mutex_);
+    return solve_deadlines_;
+  }
   std::vector<v1::UpdateHandlesRequest> restored() {
     const std::scoped_lock lock(mutex_);
     return restored_;
@@ -251,11 +256,12 @@ class FakeRpc final : public Rpc {
     return absl::UnimplementedError("snapshot");
   }
 
-  absl::Status solve(const v1::SolveRequest& request, double, const std::stop_token&,
+  absl::Status solve(const v1::SolveRequest& request, double deadline_seconds, const std::stop_token&,
                      const std::function<absl::Status(const v1::SolveResponse&)>& on_response) override {
     {
       const std::scoped_lock lock(mutex_);
       solved_.push_back(request);
+      solve_deadlines_.push_back(deadline_seconds);
       if (!solve_ends.empty()) {
         absl::Status end = std::move(solve_ends.front());
         solve_ends.pop_front();
@@ -295,6 +301,7 @@ class FakeRpc final : public Rpc {
   std::vector<std::string> deleted_;
   std::vector<std::string> uploads_deleted_;
   std::vector<v1::SolveRequest> solved_;
+  std::vector<double> solve_deadlines_;
   std::vector<v1::UpdateHandlesRequest> restored_;
   std::vector<v1::UndoUpdateRequest> undone_;
   std::size_t upload_bytes_left_ = 0;

@@ -62,6 +62,24 @@ TEST_F(LinkTest, SolveGivesUpAtItsDeadlineWhileTheServerIsAway) {
   EXPECT_LT(rpc_->solved().size(), 12u);  // pauses of at least 25 ms
 }
 
+TEST_F(LinkTest, TheDeadlineOfASolveCountsWhileAnUpdateIsUnderWay) {
+  open();
+  const auto stream = opened_stream();
+  const std::uint64_t seq = link_->update(adding("tip")).value();
+  ASSERT_TRUE(stream->hear());
+  const auto begin = std::chrono::steady_clock::now();
+  const absl::Status late = link_->solve({.deadline_seconds = 0.05}).status();
+  EXPECT_TRUE(absl::IsDeadlineExceeded(late));
+  EXPECT_EQ(fault_of(late).reason, "SOLVE_UNDER_WAY");
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, kPatience);
+  stream->say(result(seq));
+  ASSERT_TRUE(link_->solve({.deadline_seconds = 20}).ok());
+  ASSERT_TRUE(link_->solve({}).ok());
+  EXPECT_LT(rpc_->solve_deadlines()[0], 20);  // less what it waited
+  EXPECT_GT(rpc_->solve_deadlines()[0], 0);
+  EXPECT_EQ(rpc_->solve_deadlines()[1], 0);
+}
+
 TEST_F(LinkTest, CloseEndsASolveThatWaitsForTheServer) {
   open();
   rpc_->solve_ends.assign(1000, absl::UnavailableError("refused"));

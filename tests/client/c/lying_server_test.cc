@@ -10,6 +10,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "lpdeform/v1/service.grpc.pb.h"
@@ -29,6 +30,14 @@ class LyingServer final : public v1::DeformService::Service {
     response->mutable_session()->set_name("sessions/1");
     response->mutable_session()->mutable_mesh()->set_vertices(created);
     response->set_writer_token("token");
+    return grpc::Status::OK;
+  }
+
+  grpc::Status DeleteSession(grpc::ServerContext* context, const v1::DeleteSessionRequest*,
+                             v1::DeleteSessionResponse*) override {
+    ++deletions;
+    while (deletion_hangs && !context->IsCancelled())
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     return grpc::Status::OK;
   }
 
@@ -55,9 +64,9 @@ class LyingServer final : public v1::DeformService::Service {
   }
 
   std::uint32_t created = 3, opened = 3, framed = 3;
-  std::atomic<int> calls = 0;
+  std::atomic<int> calls = 0, deletions = 0;
   int failures = 0;
-  bool hangs = false;
+  bool hangs = false, deletion_hangs = false;
 };
 
 class LyingServerTest : public testing::Test {
@@ -113,6 +122,16 @@ TEST_F(LyingServerTest, TheTruthIsTaken) {
   const lpdeform_buffers buffers = buffers_of(points);
   EXPECT_EQ(lpdeform_settle(session_, kPatienceSeconds, &buffers, nullptr, &error_), LPDEFORM_OK)
       << error_.message;
+}
+
+TEST_F(LyingServerTest, ClosingDoesNotWaitForAServerThatHangs) {
+  service_.deletion_hangs = true;
+  start();
+  EXPECT_TRUE(eventually([&] { return state() == LPDEFORM_STATE_LIVE; }));
+  lpdeform_close(std::exchange(session_, nullptr));
+  lpdeform_disconnect(
+      std::exchange(client_, nullptr));  // the timeout of calls is longer than this test may take
+  EXPECT_EQ(service_.deletions, 1);
 }
 
 TEST_F(LyingServerTest, ASessionOfAnotherMeshIsRefused) {
