@@ -125,8 +125,8 @@ LPDEFORM_API lpdeform_code lpdeform_set_token(lpdeform_client* client, const cha
                                               lpdeform_error* error);
 
 /* WAITS until every session of the client is closed, those too that lpdeform_close was not called for (they
- * then are over, and still to be given to lpdeform_close): at most call_timeout_seconds, however many there are, usually
- * milliseconds. What is being opened is given up. To be called before the process ends. NULL is fine. */
+ * then are over, and still to be given to lpdeform_close): usually milliseconds, at most about two seconds where the server
+ * hangs, however many there are. What is being opened is given up. To be called before the process ends. NULL is fine. */
 LPDEFORM_API void lpdeform_disconnect(lpdeform_client* client);
 
 /* ---- vertex buffers ---- */
@@ -482,13 +482,14 @@ LPDEFORM_API lpdeform_code lpdeform_settle(lpdeform_session* session, double tim
 typedef struct lpdeform_solve_options {
   uint32_t struct_size;
   uint32_t certify;       /* 1: find frame.optimality_gap */
-  double timeout_seconds; /* of the whole call; 0 is without limit */
+  double timeout_seconds; /* of the whole call, waiting for another included; 0 is without limit */
 } lpdeform_solve_options;
 
 /* WAITS for a solve of its own to the end, for the present handles and settings, and writes the result in full precision; for
  * tools. Works beside the frames, of which it takes none: frame_seq and epoch are 0. Normals need no with_normals.
- * `options` may be NULL. Errors: what the server refuses; DEADLINE_EXCEEDED; UNAVAILABLE where it stayed away for
- * reconnect_seconds; CANCELLED by lpdeform_disconnect. A solve that stopped short is no error: frame.stop_reason says so. */
+ * `options` may be NULL. One at a time; while one runs no change is sent: those made meanwhile are sent after it, and frames do
+ * not follow them until then. Errors: what the server refuses; DEADLINE_EXCEEDED; UNAVAILABLE where it stayed away for
+ * reconnect_seconds; by lpdeform_disconnect CANCELLED, or FAILED_PRECONDITION SESSION_CLOSED where it had not begun. A solve that stopped short is no error: frame.stop_reason says so. */
 LPDEFORM_API lpdeform_code lpdeform_solve(lpdeform_session* session, const lpdeform_solve_options* options,
                                           const lpdeform_buffers* buffers, lpdeform_frame* frame,
                                           lpdeform_error* error);

@@ -149,7 +149,9 @@ namespace Lpdeform
         }
 
         /// Waits for a solve of its own to the end, for the present handles and settings, and writes the result; beside the frames,
-        /// of which it takes none. `timeoutSeconds` 0 is without limit.
+        /// of which it takes none. One at a time; while one runs no change is sent: those made meanwhile are sent after it.
+        /// `timeoutSeconds` is of all of it, waiting for another included; 0 is without limit. By Client.Dispose it ends with
+        /// Cancelled, or with FailedPrecondition SESSION_CLOSED where it had not begun.
         public Frame Solve(FrameBuffers buffers, bool certify = false, double timeoutSeconds = 0)
         {
             Frame frame;
