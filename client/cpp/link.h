@@ -126,6 +126,7 @@ class Link {
   /// After so long without a word the connection is dead: three of the heartbeats that the server announces.
   std::chrono::milliseconds longest_silence_ = std::chrono::seconds(45);
   Clock::time_point opened_;
+  std::uint64_t sent_again_ = 0;  // the last update whose uploads the server knew no more
   Clock::time_point last_open_;
   absl::Status last_problem_;
 };

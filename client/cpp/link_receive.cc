@@ -55,8 +55,11 @@ absl::Status Link::take(const v1::StreamEvent& event) {
     case v1::StreamEvent::kFrame:
       return take(event.frame());
     case v1::StreamEvent::kFault:
-      // Its uploads went with a server that has ended, or to another one: the next stream sends it again, with new ones.
-      if (event.fault().reason() == "UPLOAD_UNKNOWN") return from_wire(event.fault());
+      // Its uploads went with a server that has ended, or to another one: the next stream sends it again, with new ones. Once:
+      // a server that loses those as well will not do better.
+      if (event.fault().reason() == "UPLOAD_UNKNOWN" &&
+          std::exchange(sent_again_, event.fault().input_seq()) != event.fault().input_seq())
+        return from_wire(event.fault());
       take(event.fault());
       break;
     case v1::StreamEvent::kGoAway: {

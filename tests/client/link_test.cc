@@ -293,6 +293,8 @@ TEST_F(LinkTest, SendsAgainAnUpdateWhoseUploadsTheServerDoesNotKnow) {
   const auto again = second->hear();
   ASSERT_TRUE(again && again->has_update());
   EXPECT_EQ(again->update().input_seq(), 1u);
+  second->say(fault);  // once is enough
+  EXPECT_EQ(fault_of(next_frame().status()).reason, "UPLOAD_UNKNOWN");
 }
 
 TEST_F(LinkTest, AnUndoGoesAfterAllUpdatesAndIsPartOfWhatASessionMadeAnewGets) {
