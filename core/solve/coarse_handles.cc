@@ -51,6 +51,10 @@ class Coarsener {
   }
 
   bool stays(std::int32_t v) const { return levels_.fine_vertex[levels_.coarse_vertex[v]] == v; }
+  bool some_stay(const Handle& handle) const {
+    return std::any_of(handle.vertices.begin(), handle.vertices.end(),
+                       [&](std::int32_t v) { return stays(v); });
+  }
   bool take(std::int32_t c) { return std::exchange(is_taken_[c], 1) == 0; }
   /// How far the coarse vertex of v is from it, at rest.
   Eigen::RowVector3d offset(std::int32_t v) const {
@@ -66,10 +70,7 @@ class Coarsener {
         targets.emplace_back(static_cast<std::int32_t>(c), constraints_.exact.row(v));
     }
     for (const auto& [name, handle] : fine.handles()) {
-      if (!std::holds_alternative<Exactly>(handle.hold) ||
-          std::any_of(handle.vertices.begin(), handle.vertices.end(),
-                      [&](std::int32_t v) { return stays(v); }))
-        continue;
+      if (!std::holds_alternative<Exactly>(handle.hold) || some_stay(handle)) continue;
       for (const std::int32_t v : handle.vertices) {
         const std::int32_t c = levels_.coarse_vertex[v];
         if (take(c)) targets.emplace_back(c, constraints_.exact.row(v) + offset(v));
@@ -80,12 +81,11 @@ class Coarsener {
 
   Handle on_vertices(const Handle& handle) {
     const Points fine_targets = target_positions(handle, levels_.fine.positions());
-    const bool some_stay =
-        std::any_of(handle.vertices.begin(), handle.vertices.end(), [&](std::int32_t v) { return stays(v); });
+    const bool has_coarse = some_stay(handle);
     std::vector<std::pair<std::int32_t, Eigen::RowVector3d>> targets;
     for (std::size_t k = 0; k < handle.vertices.size(); ++k) {
       const std::int32_t v = handle.vertices[k], c = levels_.coarse_vertex[v];
-      if ((some_stay && !stays(v)) || !take(c)) continue;
+      if ((has_coarse && !stays(v)) || !take(c)) continue;
       targets.emplace_back(c, fine_targets.row(static_cast<Eigen::Index>(k)) + offset(v));
     }
     Handle result = with_targets(handle.hold, targets);
@@ -103,16 +103,10 @@ class Coarsener {
     const Points fine_targets = target_positions(handle, levels_.fine.positions(), levels_.fine.faces());
     Handle result;
     result.hold = handle.hold;
-    TargetPositions targets{Points(rest.rows(), 3)};
-    for (Eigen::Index k = 0; k < rest.rows(); ++k) {
-      const SurfacePoint foot = nearest(handle.points[k], rest.row(k));
-      Eigen::RowVector3d at = Eigen::RowVector3d::Zero();
-      for (int c = 0; c < 3; ++c)
-        at += foot.barycentric[c] * levels_.coarse.positions().row(levels_.coarse.faces()(foot.face, c));
-      targets.positions.row(k) = fine_targets.row(k) + at - rest.row(k);
-      result.points.push_back(foot);
-    }
-    result.motion = std::move(targets);
+    for (Eigen::Index k = 0; k < rest.rows(); ++k)
+      result.points.push_back(nearest(handle.points[k], rest.row(k)));
+    const Points feet = rest_positions(result, levels_.coarse.positions(), levels_.coarse.faces());
+    result.motion = TargetPositions{fine_targets + feet - rest};
     return result;
   }
 
