@@ -27,13 +27,15 @@ export function merged(older: Update, newer: Update): Update {
     handles[name] = moved ? { set: { ...before.set, motion: change.move } } : change;
   }
   Object.assign(settings, newer.settings);
-  return { handles, settings, ...(resize && { resize }) };
+  const beginsStep = older.beginsStep || newer.beginsStep;
+  return { handles, settings, ...(resize && { resize }), ...(beginsStep && { beginsStep }) };
 }
 
 /** What is there once motions and removals have been carried out. */
 function settled(state: Update): Update {
   const kept = Object.entries(state.handles ?? {}).filter(([, change]) => "set" in change);
-  return { ...state, handles: Object.assign(Object.create(null), Object.fromEntries(kept)) };
+  const { beginsStep: _, ...rest } = state;
+  return { ...rest, handles: Object.assign(Object.create(null), Object.fromEntries(kept)) };
 }
 
 const mostRemembered = 16384;
@@ -104,6 +106,13 @@ export class Ledger {
     const sent = { ...next }; // each sending is one of its own
     this.#inFlight.push(sent);
     return sent;
+  }
+
+  /** A change that the server makes by itself, now on its way: to be accepted, with what it was, or refused. */
+  beginChange(): NumberedUpdate {
+    const change: NumberedUpdate = { seq: this.#nextSeq++, update: {} };
+    this.#inFlight.push(change);
+    return change;
   }
 
   /**
@@ -189,6 +198,10 @@ export class Ledger {
     if (this.#nextSeq > seq) return;
     this.#nextSeq = seq + 1;
     if (this.#waiting) this.#waiting = { ...this.#waiting, seq: this.#nextSeq++ };
+  }
+
+  get newestAccepted(): number {
+    return this.#accepted.seq;
   }
 
   /** The newest update that was not refused; 0 where there is none. */

@@ -89,15 +89,18 @@ export class Link {
   update(update: Update): number {
     if (this.isClosed) throw sessionClosed();
     if (this.#over) throw this.#over;
-    if (!this.#lease.writerToken) {
-      throw new LpdeformError("failed_precondition", "A reader cannot change the session: takeOver() first.", {
-        reason: "NOT_THE_WRITER",
-      });
-    }
+    this.requireWriter();
     const seq = this.ledger.add(update);
     this.#lane?.wake();
     this.#send();
     return seq;
+  }
+
+  requireWriter(): void {
+    if (this.#lease.writerToken) return;
+    throw new LpdeformError("failed_precondition", "A reader cannot change the session: takeOver() first.", {
+      reason: "NOT_THE_WRITER",
+    });
   }
 
   /** Frames come from now on. */
@@ -321,6 +324,12 @@ export class Link {
       this.#wakeQuiet();
       this.#send();
     };
+  }
+
+  /** The same, and until no solve is under way, and nobody else who is alone. */
+  async holdAlone(signal: AbortSignal): Promise<() => void> {
+    while (this.#solves > 0 && !this.isClosed) await new Promise<void>((resolve) => this.#quiet.add(resolve));
+    return this.holdUpdates(signal);
   }
 
   readonly #wakeQuiet = () => {

@@ -23,6 +23,7 @@ import type {
   SolveResult,
   Update,
 } from "./types.js";
+import { takeBack } from "./undo.js";
 import { newRequestId } from "./upload.js";
 import { pause, unlessAborted } from "./waiting.js";
 
@@ -250,6 +251,22 @@ export class Session implements AsyncIterable<Frame> {
       throw error;
     }
     throw new LpdeformError("unavailable", "The server went back to an earlier state.");
+  }
+
+  /**
+   * Takes the newest step of the handles back on the server; the number of the update that this is. A step is what a person sees
+   * as one change: updates that move the same handles, none of them over a second after the one before, or each other update
+   * that changes handles; `beginsStep` begins one in any case. Settings are no part of it. Sent after all updates before it;
+   * resolves with the answer, and settle() with the frame. Rejects with NOTHING_TO_UNDO, NOT_THE_WRITER for a reader, and with
+   * what the server refuses of an update before it.
+   */
+  undo(): Promise<number> {
+    return takeBack(this.#link, false);
+  }
+
+  /** Does again what was taken back last. As undo(); NOTHING_TO_REDO. */
+  redo(): Promise<number> {
+    return takeBack(this.#link, true);
   }
 
   /** Becomes the writer in place of whoever is, as a reader or after a WRITER_REPLACED. */

@@ -101,6 +101,7 @@ export function updateToWire(update: api.Update, inputSeq: number, packer: Packe
     handles: Object.entries(update.handles ?? {}).map(([name, change]) => changeToWire(name, change, packer)),
     ...(update.settings && { settings: settingsToWire(update.settings, packer) }),
     ...(update.resize && { resize: resizeToWire(update.resize) }),
+    ...(update.beginsStep && { beginsStep: true }),
   });
 }
 

@@ -109,6 +109,8 @@ export interface Update {
   handles?: Readonly<Record<string, HandleChange>>;
   settings?: Settings;
   resize?: Resize;
+  /** What it does to handles is a step of its own, which undo() takes back: to be set when a drag begins. */
+  beginsStep?: boolean;
 }
 
 export type HandleChange = { set: Handle } | { move: Motion } | { remove: true };

@@ -10,6 +10,8 @@ import {
   type StreamEventSchema,
   type StreamSessionsRequest,
   StreamSessionsResponseSchema,
+  type UndoUpdateRequest,
+  type UndoUpdateResponseSchema,
   type UpdateHandlesRequest,
 } from "../src/gen/lpdeform/v1/service_pb.js";
 import { Rpc } from "../src/rpc.js";
@@ -95,6 +97,7 @@ export class FakeServer {
   readonly creations: CreateSessionRequest[] = [];
   readonly updates: UpdateHandlesRequest[] = [];
   readonly acks: AckFramesRequest[] = [];
+  readonly undos: UndoUpdateRequest[] = [];
   readonly solves: SolveRequest[] = [];
   readonly deleted: string[] = [];
   readonly streams: FakeStream[] = [];
@@ -103,6 +106,7 @@ export class FakeServer {
     create?: (request: CreateSessionRequest, count: number) => void;
     update?: (request: UpdateHandlesRequest, count: number) => void | Promise<void>;
     ack?: (request: AckFramesRequest) => void;
+    undo?: (request: UndoUpdateRequest, count: number) => MessageInitShape<typeof UndoUpdateResponseSchema>;
     stream?: (stream: FakeStream, count: number) => void;
     solve?: ServiceImpl<typeof DeformService>["solve"];
   } = {};
@@ -152,6 +156,11 @@ export class FakeServer {
           this.#note();
           await this.on.update?.(request, this.updates.length);
           return { result: { inputSeq: request.update?.inputSeq ?? 0n } };
+        },
+        undoUpdate: async (request) => {
+          this.undos.push(request);
+          this.#note();
+          return await this.on.undo!(request, this.undos.length);
         },
         ackFrames: (request) => {
           this.acks.push(request);

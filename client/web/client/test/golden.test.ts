@@ -12,6 +12,7 @@ import {
   CreateSessionRequestSchema,
   DeformResponseSchema,
   FaultSchema,
+  UndoUpdateResponseSchema,
   UpdateSchema,
 } from "../src/gen/lpdeform/v1/service_pb.js";
 import type { Frame } from "../src/index.js";
@@ -31,7 +32,11 @@ interface Stream {
   update: string;
   responses: string[];
 }
-const frames = JSON.parse(read("frames.json")) as { create_request: string; streams: Stream[] };
+const frames = JSON.parse(read("frames.json")) as {
+  create_request: string;
+  streams: Stream[];
+  undo: { response: string; result: string };
+};
 const errors = JSON.parse(read("errors.json")) as { code: number; text: string; details: string; fault: string }[];
 const expected = read("expected.txt").trimEnd().split("\n");
 
@@ -109,6 +114,27 @@ test.each(frames.streams.filter(({ name }) => name !== "float64"))("the recorded
   }
   const frame = await session.settle();
   expect(linesOf(stream.name, frame)).toEqual(expected.filter((line) => line.startsWith(stream.name)));
+});
+
+test("the recorded undo", async () => {
+  const server = new FakeServer();
+  const session = await openWith(server.rpc(), strip, { withNormals: true });
+  opened.push(session);
+  session.poll();
+  await server.until(() => server.streams.length > 0);
+  session.setHandles({ base, tip: { vertices: tip.vertices, motion: { translation: tip.translation } } });
+  session.move("tip", { translation: [0, 0, 1] });
+  server.on.undo = () => message(UndoUpdateResponseSchema, frames.undo.response);
+  const number = await session.undo();
+  expect(server.undos[0]).toMatchObject({ inputSeq: BigInt(number), redo: false });
+  expect(number).toBe(3);
+  const opening = frames.streams.find(({ name }) => name === "float32")!.responses[0]!;
+  for (const text of [opening, frames.undo.result]) {
+    const response = message(DeformResponseSchema, text).message;
+    if (response.case === "event")
+      server.stream.queue.push({ stream: 0, event: { event: response.value.event as never } });
+  }
+  expect(linesOf("undo", await session.settle())).toEqual(expected.filter((line) => line.startsWith("undo")));
 });
 
 test("every recorded error of a call", async () => {
