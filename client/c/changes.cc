@@ -180,6 +180,21 @@ absl::StatusOr<Settings> read_settings(const lpdeform_settings& settings, const 
   return out;
 }
 
+/// The engine's first axis becomes the server's first, by its direction there.
+absl::StatusOr<Update> read_resizing(const lpdeform_resizing& resizing, const Space& space) {
+  Resize resize;
+  for (int k = 0; k < 3; ++k) resize.scale[k] = resizing.scale[k] == 0 ? 1 : resizing.scale[k];
+  const bool has_axes = resizing.set_axes != 0;
+  resize.axes = {space.direction_to_server(has_axes ? vector_of(resizing.x_axis) : Vector{1, 0, 0}),
+                 space.direction_to_server(has_axes ? vector_of(resizing.y_axis) : Vector{0, 1, 0})};
+  if (resizing.set_origin != 0) resize.origin = space.point_to_server(vector_of(resizing.origin));
+  const absl::Status reserved = check_reserved("resizing", resizing.reserved);
+  if (!reserved.ok()) return reserved;
+  Update out;
+  out.resize = resize;
+  return out;
+}
+
 absl::StatusOr<Update> read_update(const lpdeform_update& update, const Space& space) {
   if (update.sets == nullptr && update.set_count > 0) return argument_missing("update.sets");
   if (update.moves == nullptr && update.move_count > 0) return argument_missing("update.moves");
@@ -187,7 +202,9 @@ absl::StatusOr<Update> read_update(const lpdeform_update& update, const Space& s
   Update out;
   absl::Status read = read_sets(update, space, out);
   if (read.ok()) read = read_moves(update, space, out);
+  read.Update(check_reserved("update", update.reserved));
   if (!read.ok()) return read;
+  out.begins_step = update.begins_step != 0;
   for (std::uint32_t k = 0; k < update.removal_count; ++k) {
     const char* const name = update.removals[k];
     if (name == nullptr) return argument_missing("update.removals[k]");

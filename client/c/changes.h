@@ -13,6 +13,7 @@ namespace lpdeform::engine {
 // HANDLE_CHANGED_TWICE; all else is the server's to check.
 
 absl::StatusOr<client::Update> read_update(const lpdeform_update& update, const Space& space);
+absl::StatusOr<client::Update> read_resizing(const lpdeform_resizing& resizing, const Space& space);
 absl::StatusOr<client::Handle> read_handle(const lpdeform_handle& handle, const Space& space);
 absl::StatusOr<client::Motion> read_motion(const lpdeform_motion& motion, const Space& space);
 absl::StatusOr<client::Settings> read_settings(const lpdeform_settings& settings, const Space& space);

@@ -14,7 +14,7 @@
 namespace lpdeform::engine {
 namespace {
 
-/// So often a wait for a result sees whether another thread has taken it.
+/// So often a wait for a result looks whether another thread has taken it.
 constexpr std::chrono::milliseconds kGlance{20};
 
 absl::Status session_closed() {
@@ -27,9 +27,15 @@ absl::Status not_there_yet() {
                     "There is no session on the server yet.");
 }
 
-absl::Status no_result() {
+absl::Status no_result(const absl::Status& problem) {
+  const std::string why = problem.ok() ? "" : absl::StrCat(" The connection is down: ", problem.message());
   return make_fault(absl::StatusCode::kDeadlineExceeded, {"NO_FRAME", "", ""},
-                    "Frames came, but not the finished result in time.");
+                    absl::StrCat("The finished result did not come in time.", why));
+}
+
+absl::Status not_the_writer() {
+  return make_fault(absl::StatusCode::kFailedPrecondition, {"NOT_THE_WRITER", "", ""},
+                    "A reader cannot change the session.");
 }
 
 client::Frame frame_of(client::SolveResult result) {
@@ -137,10 +143,7 @@ absl::StatusOr<std::uint64_t> LiveSession::send(client::Update update) {
   const std::scoped_lock lock(mutex_);
   if (is_closing_) return session_closed();
   if (!refused_.ok()) return refused_;
-  if (facts_.is_reader) {
-    return make_fault(absl::StatusCode::kFailedPrecondition, {"NOT_THE_WRITER", "", ""},
-                      "A reader cannot change the session.");
-  }
+  if (facts_.is_reader) return not_the_writer();
   if (!session_) {
     if (!pending_) pending_.emplace();
     client::merge(*pending_, std::move(update));
@@ -149,6 +152,16 @@ absl::StatusOr<std::uint64_t> LiveSession::send(client::Update update) {
   const absl::Status over = session_->ended();
   if (!over.ok()) return over;
   const absl::StatusOr<std::uint64_t> seq = session_->update(std::move(update));
+  if (!seq.ok()) return seq;
+  return ours(*seq);
+}
+
+absl::StatusOr<std::uint64_t> LiveSession::undo(bool redo) {
+  const auto live = session();
+  if (!live.ok()) return live.status();
+  if (facts_.is_reader) return not_the_writer();
+  if (*live == nullptr) return not_there_yet();
+  const absl::StatusOr<std::uint64_t> seq = redo ? (*live)->redo() : (*live)->undo();
   if (!seq.ok()) return seq;
   return ours(*seq);
 }
@@ -218,12 +231,13 @@ lpdeform_frame LiveSession::write(const client::Frame& frame, const lpdeform_buf
 }
 
 /// The frame has as many vertices as the mesh that the buffers were measured for: client::Session sees to that.
-absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::take(client::Frame frame,
-                                                                const lpdeform_buffers& buffers) {
+absl::StatusOr<bool> LiveSession::take_newest(client::Session& live) {
+  absl::StatusOr<std::optional<client::Frame>> frame = live.poll();
+  if (!frame.ok()) return frame.status();
+  if (!frame->has_value()) return false;
   was_live_ = true;
-  const std::scoped_lock lock(frame_mutex_);
-  last_frame_ = std::move(frame);
-  return write(*last_frame_, buffers);
+  last_frame_ = **std::move(frame);
+  return true;
 }
 
 absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::poll(const lpdeform_buffers& buffers) {
@@ -232,10 +246,11 @@ absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::poll(const lpdeform_b
   if (*live == nullptr) return std::nullopt;
   const absl::Status checked = check(buffers);
   if (!checked.ok()) return checked;
-  absl::StatusOr<std::optional<client::Frame>> frame = (*live)->poll();
-  if (!frame.ok()) return frame.status();
-  if (!frame->has_value()) return std::nullopt;
-  return take(**std::move(frame), buffers);
+  const std::scoped_lock lock(frame_mutex_);
+  const absl::StatusOr<bool> taken = take_newest(**live);
+  if (!taken.ok()) return taken.status();
+  if (!*taken) return std::nullopt;
+  return write(*last_frame_, buffers);
 }
 
 absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::repeat(const lpdeform_buffers& buffers) {
@@ -243,14 +258,6 @@ absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::repeat(const lpdeform
   if (!checked.ok()) return checked;
   const std::scoped_lock lock(frame_mutex_);
   if (!last_frame_) return std::nullopt;
-  return write(*last_frame_, buffers);
-}
-
-/// The frame taken last, where it is the result that settle waits for. Empty otherwise.
-absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::taken_result(const client::Session& live,
-                                                                        const lpdeform_buffers& buffers) {
-  const std::scoped_lock lock(frame_mutex_);
-  if (!last_frame_ || !live.is_result(*last_frame_)) return std::nullopt;
   return write(*last_frame_, buffers);
 }
 
@@ -274,19 +281,16 @@ absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::settle(double timeout
   if (!live.ok()) return live.status();
   const absl::Status checked = check(buffers);
   if (!checked.ok()) return checked;
-  for (std::chrono::milliseconds pause{0};; pause = kGlance) {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
-    absl::StatusOr<client::Frame> frame = (*live)->next_frame(std::min(pause, left));
-    if (frame.ok()) {
+  for (;;) {
+    {
       const std::scoped_lock lock(frame_mutex_);
-      was_live_ = true;
-      last_frame_ = *std::move(frame);
-    } else if (!absl::IsDeadlineExceeded(frame.status())) {
-      return frame.status();
+      const absl::StatusOr<bool> taken = take_newest(**live);
+      if (!taken.ok()) return taken.status();
+      if (last_frame_ && (*live)->is_result(*last_frame_)) return write(*last_frame_, buffers);
     }
-    const auto result = taken_result(**live, buffers);
-    if (!result.ok() || result->has_value()) return result;
-    if (Clock::now() >= deadline) return frame.ok() ? no_result() : frame.status();
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
+    if (left.count() <= 0) return no_result((*live)->last_problem());
+    (*live)->wait(std::min(kGlance, left));
   }
 }
 

@@ -44,6 +44,8 @@ class LiveSession {
   const Space& space() const { return facts_.space; }
 
   absl::StatusOr<std::uint64_t> send(client::Update update);
+  /// As lpdeform_undo and lpdeform_redo. Waits.
+  absl::StatusOr<std::uint64_t> undo(bool redo);
   lpdeform_state state(absl::Status& why) const;
   absl::StatusOr<std::string> name() const;
   std::uint32_t vertex_count() const;
@@ -76,9 +78,8 @@ class LiveSession {
   absl::Status check(const lpdeform_buffers& buffers) const;
   absl::StatusOr<std::shared_ptr<client::Session>> session() const;
   absl::StatusOr<std::shared_ptr<client::Session>> wait_for_session(Clock::time_point deadline);
-  absl::StatusOr<std::optional<lpdeform_frame>> take(client::Frame frame, const lpdeform_buffers& buffers);
-  absl::StatusOr<std::optional<lpdeform_frame>> taken_result(const client::Session& live,
-                                                             const lpdeform_buffers& buffers);
+  /// False where there is none. Under frame_mutex_, so that of several threads none puts an older frame over a newer one.
+  absl::StatusOr<bool> take_newest(client::Session& live);
   /// Numbers of changes become the caller's.
   lpdeform_frame write(const client::Frame& frame, const lpdeform_buffers& buffers) const;
 

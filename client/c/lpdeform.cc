@@ -103,6 +103,17 @@ lpdeform_code send(lpdeform_session* session, std::uint64_t* input_seq, lpdeform
   });
 }
 
+lpdeform_code take_back(lpdeform_session* session, bool redo, std::uint64_t* input_seq,
+                        lpdeform_error* error) {
+  return guarded(error, [&]() -> absl::Status {
+    if (session == nullptr) return argument_missing("session");
+    const absl::StatusOr<std::uint64_t> seq = session->live->undo(redo);
+    if (!seq.ok()) return seq.status();
+    if (input_seq != nullptr) *input_seq = *seq;
+    return absl::OkStatus();
+  });
+}
+
 /// Calls `frame_of` with the caller's buffers, where they are right, and hands out what is to be known of the frame.
 template <typename FrameOf>
 lpdeform_code write(lpdeform_session* session, const lpdeform_buffers* buffers, lpdeform_frame* frame,
@@ -278,6 +289,23 @@ lpdeform_code lpdeform_set(lpdeform_session* session, const lpdeform_settings* s
     update.settings = settings;
     return engine::read_update(update, space);
   });
+}
+
+lpdeform_code lpdeform_resize(lpdeform_session* session, const lpdeform_resizing* resizing,
+                              uint64_t* input_seq, lpdeform_error* error) {
+  return send(session, input_seq, error, [&](const engine::Space& space) -> absl::StatusOr<client::Update> {
+    const auto given = engine::read_struct(resizing, "resizing");
+    if (!given.ok()) return given.status();
+    return engine::read_resizing(*given, space);
+  });
+}
+
+lpdeform_code lpdeform_undo(lpdeform_session* session, uint64_t* input_seq, lpdeform_error* error) {
+  return take_back(session, false, input_seq, error);
+}
+
+lpdeform_code lpdeform_redo(lpdeform_session* session, uint64_t* input_seq, lpdeform_error* error) {
+  return take_back(session, true, input_seq, error);
 }
 
 lpdeform_code lpdeform_poll(lpdeform_session* session, const lpdeform_buffers* buffers, lpdeform_frame* frame,

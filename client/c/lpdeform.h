@@ -390,6 +390,9 @@ typedef struct lpdeform_update {
   uint32_t move_count;
   uint32_t removal_count;
   const lpdeform_settings* settings; /* may be NULL */
+  /* 1: what it does to handles is a step of its own for lpdeform_undo; to be set when a drag begins. */
+  uint32_t begins_step;
+  uint32_t reserved; /* 0 */
 } lpdeform_update;
 
 /* Sends a change. Changes made faster than the connection takes them are merged, the newest of each handle and
@@ -413,6 +416,34 @@ LPDEFORM_API lpdeform_code lpdeform_remove_handle(lpdeform_session* session, con
 /* Changes p, stiffness and so on. As lpdeform_send. */
 LPDEFORM_API lpdeform_code lpdeform_set(lpdeform_session* session, const lpdeform_settings* settings,
                                         uint64_t* input_seq, lpdeform_error* error);
+
+/* A scaling by different factors along three axes, in which what is salient keeps its shape and size. */
+typedef struct lpdeform_resizing {
+  uint32_t struct_size;
+  uint32_t set_origin; /* 1: `origin` stays where it is; 0: the middle of the mesh's bounding box does */
+  uint32_t set_axes;   /* 1: the axes below; 0: the engine's x, y and z */
+  uint32_t reserved;   /* 0 */
+  double scale[3];     /* along the axes, relative to the mesh at rest: 0.01 to 100; 0 takes 1 */
+  double origin[3];
+  double x_axis[3]; /* of any length but 0 */
+  double y_axis[3]; /* what of it is across x_axis counts; the third axis is across both */
+} lpdeform_resizing;
+
+/* Scales the mesh: sets the handle "resize", which holds the ends of each component along the scaled axes, and p and
+ * stiffness. To end it, remove that handle and set p and stiffness. As lpdeform_send. */
+LPDEFORM_API lpdeform_code lpdeform_resize(lpdeform_session* session, const lpdeform_resizing* resizing,
+                                           uint64_t* input_seq, lpdeform_error* error);
+
+/* WAITS until the server has taken the newest step of the handles back, as lpdeform_send sends a change: frames follow.
+ * A step is what a person sees as one change: changes that move the same handles, none of them over a second after the one
+ * before, or each other change of handles; lpdeform_update.begins_step begins one in any case. Settings are no part of it.
+ * Errors: FAILED_PRECONDITION (NOTHING_TO_UNDO; NOT_CONNECTED while there is no session on the server yet; NOT_THE_WRITER),
+ * DEADLINE_EXCEEDED after call_timeout_seconds, what the server says of a change before it. */
+LPDEFORM_API lpdeform_code lpdeform_undo(lpdeform_session* session, uint64_t* input_seq,
+                                         lpdeform_error* error);
+/* Does again what was taken back last. As lpdeform_undo; NOTHING_TO_REDO. */
+LPDEFORM_API lpdeform_code lpdeform_redo(lpdeform_session* session, uint64_t* input_seq,
+                                         lpdeform_error* error);
 
 /* ---- frames ---- */
 
@@ -468,7 +499,7 @@ typedef struct lpdeform_frame {
 LPDEFORM_API lpdeform_code lpdeform_poll(lpdeform_session* session, const lpdeform_buffers* buffers,
                                          lpdeform_frame* frame, lpdeform_error* error);
 
-/* Writes the frame taken last once more, for engines whose buffers do not keep what was written. It can be had
+/* Writes the frame taken last, by whichever thread, once more, for engines whose buffers do not keep what was written. It can be had
  * also while the server is away and after the session is over. LPDEFORM_NO_FRAME where none was taken. */
 LPDEFORM_API lpdeform_code lpdeform_repeat(lpdeform_session* session, const lpdeform_buffers* buffers,
                                            lpdeform_frame* frame, lpdeform_error* error);

@@ -9,14 +9,21 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "client/c/arguments.h"
+#include "client/c/lpdeform.h"
 #include "core/base/fault.h"
 
 /// Structs that carry their size in their first field, `struct_size`: see "Versions" in lpdeform.h.
 namespace lpdeform::engine {
 
+/// What a struct had in the first version: only what grew since is not sizeof(Struct).
+template <typename Struct>
+inline constexpr std::size_t kFirstSize = sizeof(Struct);
+template <>
+inline constexpr std::size_t kFirstSize<lpdeform_update> = offsetof(lpdeform_update, begins_step);
+
 /// What `given` says, in a struct of this library's own size. `name` is for errors: INVALID_ARGUMENT
 /// ARGUMENT_MISSING where it is NULL, STRUCT_SIZE where it is smaller than in the first version, STRUCT_TOO_NEW where bytes
-/// that we do not know are not 0. No version but the first has been yet, so that its size is sizeof(Struct).
+/// that we do not know are not 0. What its caller does not know yet is 0.
 template <typename Struct>
 absl::StatusOr<Struct> read_struct(const Struct* given, const std::string& name) {
   if (given == nullptr) {
@@ -24,19 +31,21 @@ absl::StatusOr<Struct> read_struct(const Struct* given, const std::string& name)
   }
   std::uint32_t size = 0;
   std::memcpy(&size, given, sizeof size);
-  if (size < sizeof(Struct)) {
+  constexpr std::size_t least = kFirstSize<Struct>;
+  if (size < least) {
     return invalid_input(
-        {"STRUCT_SIZE", name, absl::StrCat("struct_size >= ", sizeof(Struct))},
-        absl::StrCat("struct_size of ", name, " is ", size, " and not at least ", sizeof(Struct), "."));
+        {"STRUCT_SIZE", name, absl::StrCat("struct_size >= ", least)},
+        absl::StrCat("struct_size of ", name, " is ", size, " and not at least ", least, "."));
   }
+  const std::size_t known = std::min<std::size_t>(size, sizeof(Struct));
   const auto* const bytes = reinterpret_cast<const unsigned char*>(given);
-  if (std::any_of(bytes + sizeof(Struct), bytes + size, [](unsigned char byte) { return byte != 0; })) {
+  if (std::any_of(bytes + known, bytes + size, [](unsigned char byte) { return byte != 0; })) {
     return invalid_input(
         {"STRUCT_TOO_NEW", name, absl::StrCat("struct_size = ", sizeof(Struct))},
         absl::StrCat("A field of ", name, " is set that this library, which is older, does not know."));
   }
-  Struct out;
-  std::memcpy(&out, given, sizeof out);
+  Struct out{};
+  std::memcpy(&out, given, known);
   return out;
 }
 

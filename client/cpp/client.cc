@@ -52,6 +52,10 @@ absl::StatusOr<std::optional<Frame>> Session::poll() {
   return link_->poll();
 }
 
+bool Session::wait(std::chrono::milliseconds timeout) {
+  return link_->wait(std::chrono::steady_clock::now() + timeout);
+}
+
 absl::StatusOr<Frame> Session::settle(std::chrono::milliseconds timeout) {
   return link_->settle(std::chrono::steady_clock::now() + timeout);
 }

@@ -114,6 +114,9 @@ class Session {
   /// The same without waiting: empty where there is no new frame.
   absl::StatusOr<std::optional<Frame>> poll();
 
+  /// Waits until next_frame has something to say, a frame or an error, and takes nothing. False where the time passed first.
+  bool wait(std::chrono::milliseconds timeout);
+
   /// Takes frames until one is the finished result of the newest update. Waits, in vain where that one was
   /// taken before; not for its optimality_gap, which the next frame has. Errors as next_frame.
   absl::StatusOr<Frame> settle(std::chrono::milliseconds timeout);

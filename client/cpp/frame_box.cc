@@ -53,9 +53,8 @@ void FrameBox::resume() {
 
 absl::StatusOr<std::optional<FrameBox::Taken>> FrameBox::take(Clock::time_point deadline) {
   std::unique_lock lock(mutex_);
-  const auto has_something = [this] { return newest_ || !problems_.empty() || end_; };
   // To wait for a time that has passed would still take the system's shortest sleep.
-  if (Clock::now() < deadline) changed_.wait_until(lock, deadline, has_something);
+  if (Clock::now() < deadline) changed_.wait_until(lock, deadline, [this] { return has_something(); });
   if (!problems_.empty()) {
     absl::Status problem = std::move(problems_.front());
     problems_.pop_front();
@@ -64,6 +63,11 @@ absl::StatusOr<std::optional<FrameBox::Taken>> FrameBox::take(Clock::time_point 
   if (newest_) return std::exchange(newest_, std::nullopt);
   if (end_) return *end_;
   return std::nullopt;
+}
+
+bool FrameBox::wait(Clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  return changed_.wait_until(lock, deadline, [this] { return has_something(); });
 }
 
 }  // namespace lpdeform::client

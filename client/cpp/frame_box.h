@@ -45,8 +45,12 @@ class FrameBox {
 
   /// Waits until `deadline` for an error, a frame or the end. Empty where none came.
   absl::StatusOr<std::optional<Taken>> take(Clock::time_point deadline);
+  /// The same without taking anything. False where there was nothing.
+  bool wait(Clock::time_point deadline);
 
  private:
+  bool has_something() const { return newest_ || !problems_.empty() || end_; }
+
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::uint64_t epoch_ = 0;

@@ -40,6 +40,7 @@ class Link {
   absl::StatusOr<std::uint64_t> update(Update update);
   absl::StatusOr<Frame> next_frame(FrameBox::Clock::time_point deadline);
   absl::StatusOr<std::optional<Frame>> poll();
+  bool wait(FrameBox::Clock::time_point deadline);
   absl::StatusOr<Frame> settle(FrameBox::Clock::time_point deadline);
   bool is_result(const Frame& frame) const;
   absl::StatusOr<std::uint64_t> undo(bool redo);

@@ -56,6 +56,11 @@ absl::StatusOr<std::optional<Frame>> Link::poll() {
   return take_frame(Clock::now());
 }
 
+bool Link::wait(Clock::time_point deadline) {
+  start_stream();
+  return box_.wait(deadline);
+}
+
 absl::StatusOr<Frame> Link::next_frame(Clock::time_point deadline) {
   absl::StatusOr<std::optional<Frame>> frame = take_frame(deadline);
   if (!frame.ok()) return frame.status();
@@ -180,7 +185,8 @@ absl::StatusOr<SolveResult> Link::solve_patiently(const SolveOptions& options, C
   if (options.deadline_seconds > 0) {
     left.deadline_seconds -= std::chrono::duration<double>(Clock::now() - start).count();
     if (left.deadline_seconds <= 0)
-      return absl::DeadlineExceededError("The time for the solve passed before it began.");
+      return make_fault(absl::StatusCode::kDeadlineExceeded, {"SOLVE_TIME_PASSED", "", ""},
+                        "The time for the solve has passed.");
   }
   Backoff backoff;
   for (;;) {

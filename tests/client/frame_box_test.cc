@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "absl/status/status.h"
 
 namespace lpdeform::client {
@@ -29,6 +32,23 @@ TEST(FrameBox, KeepsTheNewestFrameAlone) {
   ASSERT_TRUE(taken.ok() && taken->has_value());
   EXPECT_EQ((*taken)->frame.frame_seq, 2u);
   EXPECT_FALSE(take_now(box)->has_value());
+}
+
+TEST(FrameBox, WaitsForNewsAndTakesNothing) {
+  FrameBox box;
+  const auto far = FrameBox::Clock::now() + std::chrono::minutes(10);
+  EXPECT_FALSE(box.wait(FrameBox::Clock::now()));
+  std::thread later([&] { box.put(frame(1, 1, 1), 1); });
+  EXPECT_TRUE(box.wait(far));
+  later.join();
+  EXPECT_TRUE(box.wait(far));
+  EXPECT_TRUE(take_now(box)->has_value());
+  EXPECT_FALSE(box.wait(FrameBox::Clock::now()));
+  box.put_problem(absl::InternalError("something"));
+  EXPECT_TRUE(box.wait(far));
+  EXPECT_FALSE(take_now(box).ok());
+  box.finish(absl::CancelledError("over"));
+  EXPECT_TRUE(box.wait(far));
 }
 
 TEST(FrameBox, AddsUpTheInputsThatReplacedFramesSkipped) {

@@ -37,6 +37,7 @@ static class Layout
         Tell("Buffers", typeof(Native.Buffers));
         Tell("Frame", typeof(Native.Frame));
         Tell("SolveOptions", typeof(Native.SolveOptions));
+        Tell("Resizing", typeof(Native.Resizing));
         Console.WriteLine("Error {0} {1}", LpdeformException.Size, LpdeformException.Size - 512);
     }
 }

@@ -255,6 +255,40 @@ static class SessionTest
         }
     }
 
+    static void StepsAreTakenBackAndDoneAgain()
+    {
+        using (var client = new Client(server.Address))
+        using (var session = OpenStrip(client))
+        {
+            var positions = new float[66];
+            session.Settle(positions);
+            ulong moved = session.Handles.Move("tip", Motion.Move(0, 3, 0));
+            session.Settle(positions);
+            Expect(session.Undo() == moved + 1, "it has a number");
+            session.Settle(positions);
+            Expect(positions[3 * 20 + 1] == 2, "as it was before the move");
+            session.Redo();
+            session.Settle(positions);
+            Expect(positions[3 * 20 + 1] == 3, "and as it was after");
+            Refused("NOTHING_TO_REDO", () => session.Redo());
+        }
+    }
+
+    static void ResizingScalesAlongUnitysAxes()
+    {
+        using (var client = new Client(server.Address))
+        using (var session = client.Open(Strip()))
+        {
+            var positions = new float[66];
+            session.Resize(2, 1, 1.5);
+            session.Settle(positions);
+            var along = positions.Where((c, i) => i % 3 == 0);
+            var across = positions.Where((c, i) => i % 3 == 2);
+            Expect(Math.Abs(along.Max() - along.Min() - 20) < 1e-3, "twice as long");
+            Expect(Math.Abs(across.Max() - across.Min() - 1.5) < 1e-3, "and half as wide again");
+        }
+    }
+
     static void SettingsAndReaders()
     {
         using (var client = new Client(server.Address))
@@ -285,7 +319,8 @@ static class SessionTest
     {
         var tests = new Action[] { FramesComeIntoTheCallersSpans, ErrorsCarryTheServersReason, ARefusedMeshIsAState,
                                    WorkGoesOnWhenTheServerComesBack, PerFrameCallsMakeNoGarbage, EmptyArraysAreNothing,
-                                   TextsThatCannotBeSaidAreRefused, TargetsPointsAndRegions, ASolveIsItsOwnResult, SettingsAndReaders };
+                                   TextsThatCannotBeSaidAreRefused, TargetsPointsAndRegions, ASolveIsItsOwnResult, StepsAreTakenBackAndDoneAgain,
+                                   ResizingScalesAlongUnitysAxes, SettingsAndReaders };
         int failed = 0;
         using (server = new Server(arguments[0]))
         {

@@ -133,6 +133,15 @@ int main(void) {
   FIELD(lpdeform_solve_options, struct_size);
   FIELD(lpdeform_solve_options, certify);
   FIELD(lpdeform_solve_options, timeout_seconds);
+  STRUCT("Resizing", lpdeform_resizing);
+  FIELD(lpdeform_resizing, struct_size);
+  FIELD(lpdeform_resizing, set_origin);
+  FIELD(lpdeform_resizing, set_axes);
+  FIELD(lpdeform_resizing, reserved);
+  FIELD(lpdeform_resizing, scale);
+  FIELD(lpdeform_resizing, origin);
+  FIELD(lpdeform_resizing, x_axis);
+  FIELD(lpdeform_resizing, y_axis);
   printf("Error %zu %zu\n", sizeof(lpdeform_error), offsetof(lpdeform_error, message));
   return 0;
 }

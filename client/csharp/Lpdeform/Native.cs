@@ -124,6 +124,13 @@ namespace Lpdeform
             public double TimeoutSeconds;
         }
 
+        [StructLayout(LayoutKind.Sequential)]
+        public struct Resizing
+        {
+            public uint StructSize, SetOrigin, SetAxes, Reserved;
+            public Vector3d Scale, Origin, XAxis, YAxis;
+        }
+
         // An error is passed as the bytes of lpdeform_error: see LpdeformException.
 
         [DllImport(Library, CallingConvention = C)]
@@ -158,6 +165,12 @@ namespace Lpdeform
         public static extern int lpdeform_remove_handle(IntPtr session, byte[] name, out ulong inputSeq, byte[] error);
         [DllImport(Library, CallingConvention = C)]
         public static extern int lpdeform_set(IntPtr session, ref Settings settings, out ulong inputSeq, byte[] error);
+        [DllImport(Library, CallingConvention = C)]
+        public static extern int lpdeform_resize(IntPtr session, ref Resizing resizing, out ulong inputSeq, byte[] error);
+        [DllImport(Library, CallingConvention = C)]
+        public static extern int lpdeform_undo(IntPtr session, out ulong inputSeq, byte[] error);
+        [DllImport(Library, CallingConvention = C)]
+        public static extern int lpdeform_redo(IntPtr session, out ulong inputSeq, byte[] error);
         [DllImport(Library, CallingConvention = C)]
         public static extern int lpdeform_poll(IntPtr session, ref Buffers buffers, ref Frame frame, byte[] error);
         [DllImport(Library, CallingConvention = C)]

@@ -3,7 +3,7 @@ using System.Runtime.InteropServices;
 
 namespace Lpdeform
 {
-    /// A mesh that deforms on a server while its handles are moved. Nothing here waits but Settle and Solve. Members may be used from
+    /// A mesh that deforms on a server while its handles are moved. Nothing here waits but Settle, Solve, Undo and Redo. Members may be used from
     /// any thread, except that Dispose must not overlap another.
     public sealed unsafe class Session : IDisposable
     {
@@ -99,6 +99,39 @@ namespace Lpdeform
                     StiffnessCount = stiffness == null ? 0u : (uint)stiffness.Length
                 });
             }
+        }
+
+        /// Scales the mesh along the engine's axes, each by 0.01 to 100, in such a way that what is salient keeps its shape and
+        /// size. Sets the handle "resize", p and stiffness: to end it, remove that handle and set these. Returns the change's number.
+        public ulong Resize(double x, double y, double z)
+        {
+            ulong inputSeq;
+            var error = LpdeformException.NewError();
+            var resizing = new Native.Resizing
+            {
+                StructSize = (uint)sizeof(Native.Resizing), Scale = new Vector3d(x, y, z)
+            };
+            LpdeformException.Check(Native.lpdeform_resize(Pointer, ref resizing, out inputSeq, error), error);
+            return inputSeq;
+        }
+
+        /// Waits until the server has taken the newest step of the handles back; frames follow. Moves of the same handles, none over
+        /// a second after the one before, are one step. Returns the change's number. FailedPrecondition NOTHING_TO_UNDO.
+        public ulong Undo()
+        {
+            ulong inputSeq;
+            var error = LpdeformException.NewError();
+            LpdeformException.Check(Native.lpdeform_undo(Pointer, out inputSeq, error), error);
+            return inputSeq;
+        }
+
+        /// Does again what was taken back last. As Undo; NOTHING_TO_REDO.
+        public ulong Redo()
+        {
+            ulong inputSeq;
+            var error = LpdeformException.NewError();
+            LpdeformException.Check(Native.lpdeform_redo(Pointer, out inputSeq, error), error);
+            return inputSeq;
         }
 
         ulong Set(Native.Settings settings)

@@ -35,6 +35,20 @@ TEST(Structs, ALaterCallersStructIsTakenUnlessItSetsWhatIsUnknown) {
   EXPECT_EQ(fault_of(read_struct(&later.known, "options").status()).reason, "STRUCT_TOO_NEW");
 }
 
+TEST(Structs, AnEarlierCallersStructIsTakenWithZeroForWhatItDoesNotHave) {
+  lpdeform_update earlier{};
+  earlier.struct_size = offsetof(lpdeform_update, begins_step);
+  earlier.move_count = 2;
+  earlier.begins_step = earlier.reserved = 77;  // somebody else's memory
+  const auto read = read_struct(&earlier, "update");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->move_count, 2);
+  EXPECT_EQ(read->begins_step, 0);
+  EXPECT_EQ(read->reserved, 0);
+  earlier.struct_size -= 8;
+  EXPECT_EQ(fault_of(read_struct(&earlier, "update").status()).limit, "struct_size >= 48");
+}
+
 TEST(Structs, AStructWithoutItsSizeIsRefused) {
   const lpdeform_options none{};
   EXPECT_EQ(fault_of(read_struct(&none, "options").status()).reason, "STRUCT_SIZE");
