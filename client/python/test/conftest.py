@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+import lpdeform
+
 ROOT = Path(__file__).resolve().parents[3]
 PROGRAM = os.environ.get("LPDEFORM_SERVER", str(ROOT / "build/release/bin/lpdeform-server"))
 PATIENCE = 60.0  # seconds that anything may take; never reached where all is well
@@ -77,3 +79,16 @@ def grid(side: int) -> Grid:
 @pytest.fixture
 def make_grid() -> Callable[[int], Grid]:
     return grid
+
+
+@pytest.fixture
+def shape(make_grid: Callable[[int], Grid]) -> Grid:
+    return make_grid(12)
+
+
+@pytest.fixture
+def session(server: Server, shape: Grid) -> Iterator[lpdeform.Session]:
+    with lpdeform.open(shape.vertices, shape.faces, address=server.address) as made:
+        made.set_handle("left", shape.left)
+        made.set_handle("right", shape.right)
+        yield made

@@ -1,5 +1,5 @@
 from lpdeform import Fixed, Handle, Removal, Resize, RigidMotion, Settings, Update
-from lpdeform._ledger import Ledger, merged
+from lpdeform._ledger import Ledger, NumberedUpdate, merged
 
 
 def move(height: float) -> Update:
@@ -119,3 +119,25 @@ def test_what_was_taken_and_not_kept_is_sent_again_where_the_server_went_back() 
     ledger.accept(3, True)
     ledger.resumed_at(1)
     assert not ledger.has_waiting
+
+
+def test_a_change_that_the_server_made_counts_as_accepted() -> None:
+    ledger = Ledger()
+    ledger.add(Update({"tip": Handle([7])}, begins_step=True))
+    sent = ledger.send_next()
+    assert sent.update.begins_step
+    ledger.accept(sent.seq)
+    number = ledger.take_number()
+    ledger.accept_change(NumberedUpdate(number, move(2)), False)
+    assert ledger.newest == number == 2
+    ledger.session_lost()
+    restored = ledger.send_next()
+    assert (restored.seq, height(restored.update), restored.update.begins_step) == (2, 2, False)
+    assert ledger.add(move(3)) == 3
+
+
+def test_a_step_that_begins_is_not_lost_among_what_waits() -> None:
+    ledger = Ledger()
+    ledger.add(Update({"tip": Fixed()}, begins_step=True))
+    ledger.add(move(1))
+    assert ledger.send_next().update.begins_step

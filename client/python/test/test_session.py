@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-import gc
-import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -15,19 +11,6 @@ import lpdeform
 from conftest import PATIENCE, Grid, Server
 
 MakeGrid = Callable[[int], Grid]
-
-
-@pytest.fixture
-def shape(make_grid: MakeGrid) -> Grid:
-    return make_grid(12)
-
-
-@pytest.fixture
-def session(server: Server, shape: Grid) -> Iterator[lpdeform.Session]:
-    with lpdeform.open(shape.vertices, shape.faces, address=server.address) as made:
-        made.set_handle("left", shape.left)
-        made.set_handle("right", shape.right)
-        yield made
 
 
 def refused(session: lpdeform.Session) -> lpdeform.LpdeformError:
@@ -307,98 +290,3 @@ def test_readers_watch_and_may_take_over(session: lpdeform.Session, server: Serv
     with pytest.raises(lpdeform.LpdeformError) as caught:
         lpdeform.join("sessions/" + 32 * "0", address=server.address)
     assert caught.value.reason == "SESSION_UNKNOWN"
-
-
-def test_frames_come_to_who_iterates_until_it_is_closed(session: lpdeform.Session) -> None:
-    session.drag("right", translation=[0, 0, 1])
-    seen = []
-    for frame in session:
-        seen.append(frame)
-        if frame.converged and frame.input_seq == session.newest_input:
-            threading.Timer(0.05, session.close).start()
-    assert seen
-    assert session.connection == "closed"
-
-
-def test_waiting_ends_at_its_time(session: lpdeform.Session) -> None:
-    session.settle(PATIENCE)
-    with pytest.raises(TimeoutError) as caught:
-        session.next_frame(0.05)
-    assert isinstance(caught.value, lpdeform.Timeout)
-    assert caught.value.reason == "NO_FRAME"
-
-
-def test_a_closed_session_says_so_and_is_gone_from_the_server(session: lpdeform.Session, server: Server) -> None:
-    session.close()
-    session.close()
-    for call in (session.poll, session.settle, session.solve, session.take_over, lambda: session.remove("left")):
-        with pytest.raises(lpdeform.LpdeformError) as caught:
-            call()
-        assert caught.value.reason == "SESSION_CLOSED"
-    with pytest.raises(lpdeform.LpdeformError) as caught:
-        lpdeform.join(session.name, address=server.address)
-    assert caught.value.reason == "SESSION_UNKNOWN"
-
-
-def test_a_session_that_nobody_has_any_more_is_closed(server: Server, shape: Grid) -> None:
-    session = lpdeform.open(shape.vertices, shape.faces, address=server.address)
-    session.set_handle("left", shape.left)
-    session.settle(PATIENCE)
-    link, name = session._link, session.name
-    del session
-    gc.collect()
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        try:
-            lpdeform.join(name, address=server.address).close()
-        except lpdeform.LpdeformError as error:
-            assert error.reason == "SESSION_UNKNOWN"
-            break
-        assert time.monotonic() < deadline
-    assert link.is_closing
-
-
-@pytest.mark.parametrize("raised", [MemoryError("no room"), ValueError("no number")])
-def test_an_exception_on_a_thread_of_ours_ends_the_session_with_its_text(
-    session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch, raised: Exception
-) -> None:
-    def fails(*_: object) -> None:
-        raise raised
-
-    monkeypatch.setattr("lpdeform.frames.FrameAssembly.add", fails)
-    with pytest.raises(lpdeform.LpdeformError, match=str(raised)) as caught:
-        session.settle(PATIENCE)
-    assert (caught.value.code, caught.value.reason) == (lpdeform.Code.INTERNAL, "EXCEPTION")
-    assert session.connection == "closed"
-
-
-def test_a_stream_of_another_mesh_ends_the_session(session: lpdeform.Session, shape: Grid) -> None:
-    link = session._link
-    report = dataclasses.replace(link.lease.report, vertices=len(shape.vertices) - 1)
-    link.lease = dataclasses.replace(link.lease, report=report)
-    with pytest.raises(lpdeform.LpdeformError, match=f"{len(shape.vertices)} vertices") as caught:
-        session.settle(PATIENCE)
-    assert (caught.value.code, caught.value.reason) == (lpdeform.Code.DATA_LOSS, "FRAME_VERTICES")
-    assert session.connection == "closed"
-
-
-def test_the_timeout_of_a_solve_counts_while_another_runs(session: lpdeform.Session) -> None:
-    session._link.is_solving = True
-    with pytest.raises(lpdeform.Timeout) as caught:
-        session.solve(timeout=0.05)
-    assert caught.value.reason == "SOLVE_UNDER_WAY"
-    session._link.is_solving = False
-    session.solve(timeout=PATIENCE)
-
-
-def test_progress_is_told_and_a_deadline_kept(server: Server, make_grid: MakeGrid) -> None:
-    shape = make_grid(100)
-    handles = {"left": lpdeform.Handle(shape.left), "right": lpdeform.Handle(shape.right)}
-    with lpdeform.open(shape.vertices, shape.faces, address=server.address, handles=handles, p=1.0) as session:
-        session.drag("right", axis=[1, 0, 0], angle=2.5, translation=[-40, 0, 20])
-        told: list[lpdeform.SolveProgress] = []
-        result = session.solve(on_progress=told.append)
-        assert all(one.iteration <= result.iterations for one in told)
-        session.set(solver=lpdeform.SolverSettings(initial="rest", tolerance=1e-14, max_iterations=10**6), p=1.01)
-        with pytest.raises(lpdeform.Timeout):
-            session.solve(timeout=0.02)

@@ -12,10 +12,10 @@ directions. `s.solve()` asks for one finished result with its trace and a bound 
 """
 
 from lpdeform.access import Tls
-from lpdeform.aio import AsyncSession, join_async, open_async
+from lpdeform.aio import AsyncSession, join_async, open_async, restore_async
 from lpdeform.errors import Code, InvalidInput, LpdeformError, Timeout, Unavailable
 from lpdeform.frames import Frame, FrameAssembly, QuantizedSurface
-from lpdeform.opening import join, open
+from lpdeform.opening import join, open, restore
 from lpdeform.session import Session
 from lpdeform.types import (
     Automatic,
@@ -80,4 +80,6 @@ __all__ = [
     "join_async",
     "open",
     "open_async",
+    "restore",
+    "restore_async",
 ]

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from google.protobuf.message import Message
+
 from lpdeform import _wire
 from lpdeform._numbers import Copied
-from lpdeform._rpc import Packer, Rpc, Stop
+from lpdeform._rpc import Packer, Response, Rpc, Stop
 from lpdeform.errors import Code, LpdeformError, is_undecided, make
 from lpdeform.types import MeshReport, Settings
 from lpdeform.v1 import report_pb2, service_pb2
@@ -35,6 +37,13 @@ class Original:
     settings: Settings
 
 
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """A file that a session is made from, and made anew from."""
+
+    file: bytes
+
+
 def create_session(rpc: Rpc, original: Original, request_id: str, stop: Stop) -> Lease:
     """The same request id gives the same session, however often it is tried."""
     packer = Packer(rpc, stop, request_id)
@@ -50,15 +59,30 @@ def create_session(rpc: Rpc, original: Original, request_id: str, stop: Stop) ->
         request.weld.CopyFrom(_wire.weld_to_wire(groups, packer))
     if original.normals is not None:
         request.normals.CopyFrom(_wire.normals_to_wire(original.normals, packer))
+    created = _call_with(packer, rpc, "CreateSession", request, service_pb2.CreateSessionResponse, stop)
+    check_vertex_count(created.session.mesh.vertices, len(original.vertices))
+    return _lease_of(created.session, created.writer_token)
+
+
+def restore_session(rpc: Rpc, snapshot: Snapshot, request_id: str, stop: Stop) -> Lease:
+    packer = Packer(rpc, stop, request_id)
+    request = service_pb2.RestoreSessionRequest(request_id=request_id, snapshot=packer.pack(snapshot.file))
+    restored = _call_with(packer, rpc, "RestoreSession", request, service_pb2.RestoreSessionResponse, stop)
+    return _lease_of(restored.session, restored.writer_token)
+
+
+def _call_with(
+    packer: Packer, rpc: Rpc, name: str, request: Message, response: type[Response], stop: Stop
+) -> Response:
+    """The uploads stay while it is not known whether the server has taken the call: it is tried again with them."""
     try:
-        created = rpc.call("CreateSession", request, service_pb2.CreateSessionResponse, stop)
+        answer = rpc.call(name, request, response, stop)
     except LpdeformError as error:
         if not is_undecided(error):
             packer.discard()
         raise
     packer.discard()
-    check_vertex_count(created.session.mesh.vertices, len(original.vertices))
-    return _lease_of(created.session, created.writer_token)
+    return answer
 
 
 def join_session(rpc: Rpc, name: str, as_writer: bool, stop: Stop) -> Lease:

@@ -35,7 +35,7 @@ def merged(older: Update, newer: Update) -> Update:
     for name, change in newer.handles.items():
         handles[name] = _changed(handles.get(name), change)
     given = {one.name: value for one in fields(Settings) if (value := getattr(newer.settings, one.name)) is not None}
-    return Update(handles, replace(settings, **given), resize)
+    return Update(handles, replace(settings, **given), resize, older.begins_step or newer.begins_step)
 
 
 def _changed(before: Change | None, change: Change) -> Change:
@@ -47,7 +47,7 @@ def _changed(before: Change | None, change: Change) -> Change:
 def _settled(state: Update) -> Update:
     """What is there once motions and removals have been carried out."""
     kept = {name: change for name, change in state.handles.items() if isinstance(change, Handle)}
-    return replace(state, handles=kept)
+    return replace(state, handles=kept, begins_step=False)
 
 
 def _without_old_removals(update: Update) -> Update:
@@ -113,14 +113,23 @@ class Ledger:
         `is_kept`: it, and all taken before it, survive the end of the server.
         """
         for sent in [one for one in self._in_flight if one.seq == seq]:
-            if not is_kept:
-                unkept = _without_old_removals(merged(self._unkept.update, sent.update))
-                self._unkept = NumberedUpdate(max(self._unkept.seq, seq), unkept)
-            elif seq >= self._unkept.seq:
-                self._unkept = NumberedUpdate(0, Update())
-            state = _settled(merged(self._accepted.update, sent.update))
-            self._accepted = NumberedUpdate(max(self._accepted.seq, seq), state)
+            self.accept_change(sent, is_kept)
             self._in_flight.remove(sent)
+
+    def take_number(self) -> int:
+        """For a change that the server makes by itself, and accept_change() is then told of."""
+        self._next_seq += 1
+        return self._next_seq - 1
+
+    def accept_change(self, change: NumberedUpdate, is_kept: bool) -> None:
+        """What the server has now."""
+        if not is_kept:
+            unkept = _without_old_removals(merged(self._unkept.update, change.update))
+            self._unkept = NumberedUpdate(max(self._unkept.seq, change.seq), unkept)
+        elif change.seq >= self._unkept.seq:
+            self._unkept = NumberedUpdate(0, Update())
+        state = _settled(merged(self._accepted.update, change.update))
+        self._accepted = NumberedUpdate(max(self._accepted.seq, change.seq), state)
 
     def resumed_at(self, seq: int) -> None:
         """The session goes on, and the newest update that it has is `seq`.
@@ -129,6 +138,10 @@ class Ledger:
         """
         if seq < self._unkept.seq and self._restore is None:
             self._restore = NumberedUpdate(self._accepted.seq, self._unkept.update)
+
+    @property
+    def newest_accepted(self) -> int:
+        return self._accepted.seq
 
     def refuse(self, seq: int) -> None:
         """The server has refused the update of this number."""

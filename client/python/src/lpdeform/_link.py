@@ -5,22 +5,23 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import grpc
 
 from lpdeform import _wire
 from lpdeform._box import FrameBox
-from lpdeform._lease import Lease, Original, check_vertex_count, create_session, join_session
-from lpdeform._ledger import Ledger, NumberedUpdate
+from lpdeform._lease import Lease, Original, Snapshot, check_vertex_count, create_session, join_session, restore_session
+from lpdeform._ledger import Ledger
 from lpdeform._recovery import Backoff, Next, recovery_after
-from lpdeform._rpc import Packer, Rpc, Stop, new_request_id
+from lpdeform._rpc import Rpc, Stop, new_request_id
+from lpdeform._sending import requests
 from lpdeform._stream import Stream
 from lpdeform.errors import (
     Code,
     LpdeformError,
     again,
+    exception,
     from_call,
     from_fault,
     is_session_lost,
@@ -37,13 +38,13 @@ _closing_seconds = 3.0
 
 
 class Link:
-    """One thread reads a stream and opens the next one; gRPC's own runs _requests(), which sends. Calls come on any thread.
+    """One thread reads a stream and opens the next one; gRPC's own runs requests(), which sends. Calls come on any thread.
 
     `changed` guards all state; no call to the server is made under it.
     """
 
     def __init__(
-        self, rpc: Rpc, lease: Lease, options: frame_pb2.FrameOptions, original: Original | None
+        self, rpc: Rpc, lease: Lease, options: frame_pb2.FrameOptions, original: Original | Snapshot | None
     ) -> None:
         self.rpc = rpc
         self.original = original
@@ -55,7 +56,7 @@ class Link:
         self.is_closing = False
         self.lease = lease
         self.interruption: LpdeformError | None = None
-        self._options = options
+        self.options = options
         self._request_id = new_request_id()
         self._renewing = threading.Lock()
         self._over: LpdeformError | None = None
@@ -76,13 +77,16 @@ class Link:
                 raise session_closed()
             if self._over is not None:
                 raise again(self._over)
-            if not self.lease.writer_token:
-                text = "A reader cannot change the session: take_over() first."
-                raise make(Code.FAILED_PRECONDITION, text, "NOT_THE_WRITER")
+            self.require_writer()
             seq = self.ledger.add(checked)
             self.changed.notify_all()
         self.start_stream()
         return seq
+
+    def require_writer(self) -> None:
+        if not self.lease.writer_token:
+            text = "A reader cannot change the session: take_over() first."
+            raise make(Code.FAILED_PRECONDITION, text, "NOT_THE_WRITER")
 
     def start_stream(self) -> None:
         with self.changed:
@@ -182,7 +186,10 @@ class Link:
                 if self.lease.session != lost:
                     return
                 request_id = self._request_id
-            lease = create_session(self.rpc, self.original, request_id, self.stop)
+            if isinstance(self.original, Snapshot):
+                lease = restore_session(self.rpc, self.original, request_id, self.stop)
+            else:
+                lease = create_session(self.rpc, self.original, request_id, self.stop)
             with self.changed:
                 self.lease = lease
                 self._request_id = new_request_id()
@@ -202,7 +209,7 @@ class Link:
                 stream = self._stream
                 if stream is not None:
                     stream.is_over = True
-                self._give_up(make(Code.INTERNAL, f"{type(error).__name__}: {error}", "EXCEPTION"))
+                self._give_up(exception(error))
             if stream is not None:
                 stream.cancel()
 
@@ -232,7 +239,7 @@ class Link:
 
     def _deform(self, stream: Stream, lease: Lease) -> Any:
         try:
-            return self.rpc.deform(self._requests(stream, lease))
+            return self.rpc.deform(requests(self, stream, lease))
         except LpdeformError:
             raise
         except ValueError:  # the channel was closed meanwhile
@@ -281,66 +288,7 @@ class Link:
         self.box.finish(why)
         self.changed.notify_all()
 
-    # What is sent.
-
-    def _requests(self, stream: Stream, lease: Lease) -> Iterator[service_pb2.DeformRequest]:
-        opening = service_pb2.DeformOpen(
-            session=lease.session, writer_token=lease.writer_token, options=self._options
-        )
-        yield service_pb2.DeformRequest(open=opening)
-        while True:
-            with self.changed:
-                if not self._wait_for_work(stream):
-                    return
-                ack, stream.ack_due = stream.ack_due, 0
-                done, stream.done = stream.done, []
-                update = self.ledger.send_next() if self._can_send else None
-            if ack:
-                yield service_pb2.DeformRequest(ack=service_pb2.FrameAck(frame_seq=ack))
-            for packer in done:
-                packer.discard()
-            if update is not None:
-                message = self._packed(stream, update)
-                if message is not None:
-                    yield service_pb2.DeformRequest(update=message)
-
-    @property
-    def _can_send(self) -> bool:
-        return not self.is_solving and self.ledger.can_send
-
-    def _wait_for_work(self, stream: Stream) -> bool:
-        """False where the stream is over. Ends one that has been silent for too long."""
-
-        def has_work() -> bool:
-            is_due = bool(stream.ack_due or stream.done) or self._can_send
-            return stream.is_over or (stream.is_open and is_due)
-
-        while not stream.is_over:
-            left = stream.heard_at + stream.longest_silence - time.monotonic()
-            if left <= 0:
-                stream.cancel()
-                return False
-            if self.changed.wait_for(has_work, left):
-                break
-        return not stream.is_over
-
-    def _packed(self, stream: Stream, update: NumberedUpdate) -> service_pb2.Update | None:
-        packer = Packer(self.rpc, self.stop)
-        try:
-            message = _wire.update_to_wire(update.update, update.seq, packer)
-        except LpdeformError as error:
-            with self.changed:
-                if not is_undecided(error):
-                    self.ledger.refuse(update.seq)
-                    self.box.put_problem(error)
-                    return None
-                stream.failure = error  # what is in flight waits again for the next stream
-            stream.cancel()
-            return None
-        if packer.uploads:
-            with self.changed:
-                stream.uploads[update.seq] = packer
-        return message
+    # What comes.
 
     def _acknowledge(self, frame_seq: int, number: int) -> None:
         with self.changed:
@@ -348,8 +296,6 @@ class Link:
             if stream is not None and stream.number == number:
                 stream.ack_due = max(frame_seq, stream.ack_due)
                 self.changed.notify_all()
-
-    # What comes.
 
     def _take(self, stream: Stream, assembly: list[FrameAssembly], response: service_pb2.DeformResponse) -> None:
         stream.heard_at = time.monotonic()

@@ -42,7 +42,7 @@ def recovery_after(ended: LpdeformError | None, go_away: service_pb2.GoAway | No
     if go_away is not None:
         return _after_go_away(go_away, has_copy)
     why = ended or make(Code.UNAVAILABLE, "The server ended the stream.")
-    if why.reason == "FRAME_VERTICES":  # it is another mesh
+    if why.reason in ("FRAME_VERTICES", "EXCEPTION"):  # it is another mesh; it would happen again
         return Recovery(Next.GIVE_UP, why, 0.0)
     if why.code in _passing:
         return Recovery(Next.RESUME, why, why.retry_after)

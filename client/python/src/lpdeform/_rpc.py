@@ -108,13 +108,31 @@ class Rpc:
         finally:
             stop.remove(call)
 
-    def deform(self, requests: Iterator[service_pb2.DeformRequest]) -> Any:
-        method = self._channel.stream_stream(_service + "Deform", _serialize, service_pb2.DeformResponse.FromString)
+    def deform(self, requests: Iterator[bytes]) -> Any:
+        """`requests`: messages as they travel, so that whoever makes them hears of one that cannot be."""
+        method = self._channel.stream_stream(_service + "Deform", None, service_pb2.DeformResponse.FromString)
         return method(requests, metadata=self._caller.metadata())
 
     def solve(self, request: service_pb2.SolveRequest, timeout: float | None) -> Any:
         method = self._channel.unary_stream(_service + "Solve", _serialize, service_pb2.SolveResponse.FromString)
         return method(request, timeout=timeout, metadata=self._caller.metadata())
+
+    def snapshot(
+        self, request: service_pb2.SnapshotSessionRequest, stop: Stop
+    ) -> Iterator[service_pb2.SnapshotSessionResponse]:
+        """Its parts as they come."""
+        method = self._channel.unary_stream(
+            _service + "SnapshotSession", _serialize, service_pb2.SnapshotSessionResponse.FromString
+        )
+        call = method(request, timeout=self.call_timeout, metadata=self._caller.metadata())
+        stop.add(call)
+        try:
+            yield from call
+        except grpc.RpcError as error:
+            raise from_call(error, self.address) from None
+        finally:
+            call.cancel()
+            stop.remove(call)
 
     def reach(self, session: str, stop: Stop, timeout: float) -> None:
         """Waits until the server answers, at most `timeout`. gRPC makes a connection again while a call waits for it."""

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lpdeform import _wire
+from lpdeform._alone import alone, send_restore
 from lpdeform._lease import Lease
 from lpdeform._ledger import NumberedUpdate
 from lpdeform._link import Link
@@ -27,7 +28,6 @@ from lpdeform.errors import (
     is_taken_all_the_same,
     is_undecided,
     make,
-    session_closed,
 )
 from lpdeform.frames import Frame, FrameAssembly, method_name, stop_reason_name
 from lpdeform.types import IterationRecord, SolveProgress, SolveResult
@@ -63,24 +63,8 @@ def solve(link: Link, options: SolveOptions, stop: Stop) -> SolveResult:
     """Begins again where the server went away, within the timeout and for as long as the stream would."""
     deadline = None if options.timeout is None else time.monotonic() + options.timeout
     longest = link.rpc.call_timeout if options.timeout is None else min(options.timeout, link.rpc.call_timeout)
-    with link.changed:
-        is_quiet = link.changed.wait_for(
-            lambda: link.is_closing or stop.is_set or (not link.is_solving and not link.ledger.has_in_flight), longest
-        )
-        if link.is_closing:
-            raise session_closed()
-        if stop.is_set:
-            raise make(Code.CANCELLED, "The call was ended.")
-        if not is_quiet:
-            text = "Another solve, or an update that the server has not answered, is under way."
-            raise make(Code.DEADLINE_EXCEEDED, text, "SOLVE_UNDER_WAY")
-        link.is_solving = True
-    try:
+    with alone(link, longest, stop):
         return _solve_patiently(link, options, deadline, stop)
-    finally:
-        with link.changed:
-            link.is_solving = False
-            link.changed.notify_all()
 
 
 def _solve_patiently(link: Link, options: SolveOptions, deadline: float | None, stop: Stop) -> SolveResult:
@@ -89,13 +73,10 @@ def _solve_patiently(link: Link, options: SolveOptions, deadline: float | None, 
     while True:
         session = link.lease.session
         try:
-            left = None if deadline is None else max(deadline - time.monotonic(), 0.0)
-            return _solve_once(link, options, left, stop)
+            return _solve_once(link, options, _left(deadline), stop)
         except LpdeformError as error:
-            if link.is_closing:
-                raise session_closed() from None
             is_lost = is_session_lost(error) and link.original is not None
-            if stop.is_set or not (is_lost or error.code is Code.UNAVAILABLE):
+            if stop.is_set or link.is_closing or not (is_lost or error.code is Code.UNAVAILABLE):
                 raise
             pause = backoff.next()
             now = time.monotonic()
@@ -114,19 +95,28 @@ def _solve_patiently(link: Link, options: SolveOptions, deadline: float | None, 
                     raise
 
 
+def _left(deadline: float | None) -> float | None:
+    if deadline is None:
+        return None
+    left = deadline - time.monotonic()
+    if left <= 0:
+        raise make(Code.DEADLINE_EXCEEDED, "The time for the solve has passed.", "SOLVE_TIME_PASSED")
+    return left
+
+
 def _solve_once(link: Link, options: SolveOptions, timeout: float | None, stop: Stop) -> SolveResult:
-    _send_restore(link, stop)
+    send_restore(link, stop)
     with link.changed:
         update = link.ledger.send_next() if link.ledger.has_waiting else None
         lease = link.lease
     try:
         result = _run(link, lease, update, options, timeout, stop)
-    except LpdeformError as error:
+    except BaseException as error:  # an interrupt in a notebook, too
         if update is not None:
             with link.changed:
-                if is_taken_all_the_same(error):
+                if isinstance(error, LpdeformError) and is_taken_all_the_same(error):
                     link.ledger.accept(update.seq)
-                elif is_undecided(error):
+                elif not isinstance(error, LpdeformError) or is_undecided(error):
                     link.ledger.connection_lost()
                 else:
                     link.ledger.refuse(update.seq)
@@ -135,32 +125,6 @@ def _solve_once(link: Link, options: SolveOptions, timeout: float | None, stop: 
         with link.changed:
             link.ledger.accept(update.seq)
     return result
-
-
-def _send_restore(link: Link, stop: Stop) -> None:
-    """Gives a session made anew what the lost one had, on its own: it must not fall with an update that is refused."""
-    while True:
-        with link.changed:
-            if not link.ledger.has_restore:
-                return
-            restore = link.ledger.send_next()
-            lease = link.lease
-        packer = Packer(link.rpc, stop)
-        try:
-            request = service_pb2.UpdateHandlesRequest(
-                session=lease.session,
-                writer_token=lease.writer_token,
-                update=_wire.update_to_wire(restore.update, restore.seq, packer),
-            )
-            link.rpc.call("UpdateHandles", request, service_pb2.UpdateHandlesResponse, stop)
-        except LpdeformError:
-            with link.changed:
-                link.ledger.connection_lost()
-            raise
-        finally:
-            packer.discard()
-        with link.changed:
-            link.ledger.accept(restore.seq)
 
 
 def _run(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -62,7 +62,7 @@ def checked_update(update: types.Update) -> types.Update:
     handles = {_checked_name(name): _checked_change(str(name), change) for name, change in update.handles.items()}
     if update.resize is not None:
         _vector(update.resize.scale, "resize.scale")
-    return types.Update(handles, checked_settings(update.settings), update.resize)
+    return types.Update(handles, checked_settings(update.settings), update.resize, bool(update.begins_step))
 
 
 def _checked_name(name: object) -> str:
@@ -210,7 +210,9 @@ def frame_options_to_wire(
 
 
 def update_to_wire(update: types.Update, input_seq: int, packer: Packer) -> service_pb2.Update:
-    message = service_pb2.Update(input_seq=input_seq, settings=settings_to_wire(update.settings, packer))
+    message = service_pb2.Update(
+        input_seq=input_seq, settings=settings_to_wire(update.settings, packer), begins_step=update.begins_step
+    )
     for name, change in update.handles.items():
         message.handles.append(_change_to_wire(name, change, packer))
     if update.resize is not None:
@@ -326,3 +328,67 @@ def report_from_wire(report: report_pb2.MeshReport) -> types.MeshReport:
         defects=tuple(types.Defect(one.kind, one.count, tuple(one.first)) for one in report.defects),
         welded_vertices=report.welded_vertices,
     )
+
+
+def changes_from_wire(changes: Iterable[handle_pb2.HandleUpdate]) -> types.Update:
+    """Of handles, as the server made them."""
+    handles: dict[str, types.Change] = {}
+    for message in changes:
+        kind = message.WhichOneof("change")
+        if kind == "set":
+            handles[message.name] = _handle_from_wire(message.set)
+        elif kind == "move":
+            handles[message.name] = _motion_from_wire(message.move)
+        else:
+            handles[message.name] = types.Removal()
+    return types.Update(handles)
+
+
+def _handle_from_wire(handle: handle_pb2.Handle) -> types.Handle:
+    points = None
+    if handle.HasField("points"):
+        faces = np.frombuffer(handle.points.faces.inline, "<u4")
+        points = types.SurfacePoints(faces, _unpacked(handle.points.barycentric, handle.points.scalar))
+    return types.Handle(
+        vertices=np.frombuffer(handle.vertices.inline, "<u4"),
+        motion=_motion_from_wire(handle.motion),
+        hold=_hold_from_wire(handle),
+        points=points,
+        footprint=handle.footprint_radius,
+    )
+
+
+def _hold_from_wire(handle: handle_pb2.Handle) -> types.Hold:
+    kind = handle.WhichOneof("hold")
+    if kind == "soft":
+        return types.Soft(handle.soft.weight)
+    if kind == "orientation":
+        return types.Orientation(handle.orientation.weight)
+    if kind == "axis_lock":
+        return types.AxisLock(_vector_from_wire(handle.axis_lock.axis))
+    if kind == "plane_lock":
+        return types.PlaneLock(_vector_from_wire(handle.plane_lock.normal))
+    return types.Exact()
+
+
+def _motion_from_wire(motion: handle_pb2.Motion) -> types.Motion:
+    if motion.HasField("rigid"):
+        rigid = motion.rigid
+        return types.RigidMotion(
+            _vector_from_wire(rigid.axis),
+            rigid.angle_radians,
+            _vector_from_wire(rigid.center),
+            _vector_from_wire(rigid.translation),
+        )
+    if motion.HasField("targets"):
+        return types.Targets(_unpacked(motion.targets.positions, motion.targets.scalar))
+    return types.Fixed()
+
+
+def _unpacked(buffer: data_pb2.Buffer, scalar: data_pb2.Scalar) -> Copied:
+    """k x 3."""
+    return np.frombuffer(buffer.inline, "<f8" if scalar == data_pb2.SCALAR_FLOAT64 else "<f4").reshape(-1, 3)
+
+
+def _vector_from_wire(vector: data_pb2.Vector3) -> types.Vector3:
+    return (vector.x, vector.y, vector.z)

@@ -12,12 +12,14 @@ import numpy.typing as npt
 
 from lpdeform._link import Link
 from lpdeform._rpc import Stop
+from lpdeform._snapshot import snapshot
 from lpdeform._solve import solve
+from lpdeform._undo import undo
 from lpdeform.access import Tls, Token
 from lpdeform.errors import LpdeformError
 from lpdeform.frames import Frame
-from lpdeform.opening import connect, frame_options, join_link, open_link
-from lpdeform.session import Live
+from lpdeform.opening import connect, frame_options, join_link, open_link, restore_link
+from lpdeform.session import Live, deadline_after
 from lpdeform.types import (
     Encoding,
     Field,
@@ -61,16 +63,17 @@ class AsyncSession(Live):
         timeout: float = 60.0,
     ) -> Frame:
         """As Session.move()."""
+        deadline_after(timeout)
         self.drag(name, motion, translation=translation, axis=axis, angle=angle, center=center, targets=targets)
         return await self.settle(timeout)
 
     async def next_frame(self, timeout: float = 60.0) -> Frame:
         """As Session.next_frame()."""
-        return await self._next(time.monotonic() + timeout)
+        return await self._next(deadline_after(timeout))
 
     async def settle(self, timeout: float = 60.0) -> Frame:
         """As Session.settle()."""
-        deadline = time.monotonic() + timeout
+        deadline = deadline_after(timeout)
         while True:
             frame = await self._next(deadline)
             if self._link.is_result(frame):
@@ -126,6 +129,18 @@ class AsyncSession(Live):
         told = None if on_progress is None else report
         options = self._solve_options(certify, trace, with_normals, initial_positions, told, timeout)
         return await _in_a_thread(lambda stop: solve(self._link, options, stop))
+
+    async def undo(self) -> int:
+        """As Session.undo()."""
+        return await _in_a_thread(lambda stop: undo(self._link, False, stop))
+
+    async def redo(self) -> int:
+        """As Session.redo()."""
+        return await _in_a_thread(lambda stop: undo(self._link, True, stop))
+
+    async def snapshot(self) -> bytes:
+        """As Session.snapshot()."""
+        return await _in_a_thread(lambda stop: snapshot(self._link, stop))
 
     async def take_over(self) -> None:
         """As Session.take_over()."""
@@ -236,4 +251,29 @@ def join_async(
     )
     return Opening(
         lambda stop: join_link(connect(address, call_timeout, reconnect_for, token, tls), stop, name, as_writer, options)
+    )
+
+
+def restore_async(
+    snapshot: bytes,
+    *,
+    address: str | None = None,
+    token: Token = None,
+    tls: Tls | bool = False,
+    encoding: Encoding = "float32",
+    lowest_encoding: Encoding | None = None,
+    credit: int = 0,
+    with_distortion: bool = True,
+    with_normals: bool = False,
+    certify: bool = False,
+    max_frames_per_second: float = 0.0,
+    call_timeout: float = 30.0,
+    reconnect_for: float = 120.0,
+) -> Opening:
+    """As restore()."""
+    options = frame_options(
+        encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
+    )
+    return Opening(
+        lambda stop: restore_link(connect(address, call_timeout, reconnect_for, token, tls), stop, snapshot, options)
     )

@@ -122,6 +122,11 @@ def session_closed() -> LpdeformError:
     return make(Code.FAILED_PRECONDITION, "The session is closed.", "SESSION_CLOSED")
 
 
+def exception(error: Exception) -> LpdeformError:
+    """Of something unforeseen on a thread of ours."""
+    return make(Code.INTERNAL, f"{type(error).__name__}: {error}", "EXCEPTION")
+
+
 def again(error: LpdeformError) -> LpdeformError:
     """A copy to be raised, so that tracebacks of several calls do not pile up on one error."""
     return make(

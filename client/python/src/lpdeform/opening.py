@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy.typing as npt
 
 from lpdeform import _codec, _wire
-from lpdeform._lease import Original, create_session, join_session
+from lpdeform._lease import Original, Snapshot, create_session, join_session, restore_session
 from lpdeform._link import Link
 from lpdeform._numbers import indices, numbers
 from lpdeform._rpc import Rpc, Stop, default_address, new_request_id
@@ -174,6 +174,43 @@ def join(
 def join_link(rpc: Rpc, stop: Stop, name: str, as_writer: bool, options: frame_pb2.FrameOptions) -> Link:
     try:
         return Link(rpc, join_session(rpc, name, as_writer, stop), options, None)
+    except BaseException:
+        rpc.close()
+        raise
+
+
+def restore(
+    snapshot: bytes,
+    *,
+    address: str | None = None,
+    token: Token = None,
+    tls: Tls | bool = False,
+    encoding: Encoding = "float32",
+    lowest_encoding: Encoding | None = None,
+    credit: int = 0,
+    with_distortion: bool = True,
+    with_normals: bool = False,
+    certify: bool = False,
+    max_frames_per_second: float = 0.0,
+    call_timeout: float = 30.0,
+    reconnect_for: float = 120.0,
+) -> Session:
+    """Makes a session from what Session.snapshot() gave, on any server of the same version or a later one.
+
+    It shows the same surface to the last bit, has the same handles, settings and steps to undo, and is as one of open() from
+    then on. Raises InvalidInput (SNAPSHOT_FOREIGN, SNAPSHOT_NEWER, SNAPSHOT_TRUNCATED, SNAPSHOT_DAMAGED); otherwise as open().
+    """
+    options = frame_options(
+        encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
+    )
+    rpc = connect(address, call_timeout, reconnect_for, token, tls)
+    return Session(restore_link(rpc, Stop(), snapshot, options))
+
+
+def restore_link(rpc: Rpc, stop: Stop, snapshot: bytes, options: frame_pb2.FrameOptions) -> Link:
+    original = Snapshot(bytes(snapshot))
+    try:
+        return Link(rpc, restore_session(rpc, original, new_request_id(), stop), options, original)
     except BaseException:
         rpc.close()
         raise

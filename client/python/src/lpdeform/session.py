@@ -13,7 +13,9 @@ from typing import Any, TypeVar
 import numpy.typing as npt
 
 from lpdeform._link import Link
+from lpdeform._snapshot import snapshot
 from lpdeform._solve import SolveOptions, checked_positions, solve
+from lpdeform._undo import undo
 from lpdeform.errors import LpdeformError, invalid, session_closed
 from lpdeform.frames import Frame
 from lpdeform.types import (
@@ -101,15 +103,16 @@ class Live:
         handles: Mapping[str, Change] | None = None,
         settings: Settings | None = None,
         resize: Resize | None = None,
+        begins_step: bool = False,
     ) -> int:
         """Sends a change, which the server takes whole or not at all, and returns its number: a frame whose input_seq is at
-        least that takes it into account.
+        least that takes it into account. `begins_step`: what it does to handles is undone by itself, see Update.
 
         What the server refuses is raised by the next call that takes frames, once; the session goes on without it, and
         without what was merged into it. Raises at once where the session is closed (SESSION_CLOSED), for a reader
         (NOT_THE_WRITER), and for arrays of the wrong type or shape.
         """
-        return self._link.update(Update(handles or {}, settings or Settings(), resize))
+        return self._link.update(Update(handles or {}, settings or Settings(), resize, begins_step))
 
     def set_handles(self, handles: Mapping[str, Handle]) -> int:
         """Adds handles or replaces those of the same names. As update()."""
@@ -177,6 +180,8 @@ class Live:
     ) -> SolveOptions:
         if self._link.is_closing:
             raise session_closed()
+        if timeout is not None:
+            deadline_after(timeout)
         positions = checked_positions(initial_positions, self.mesh_report.vertices)
         return SolveOptions(certify, trace, with_normals, positions, on_progress, timeout)
 
@@ -208,17 +213,18 @@ class Session(Live):
         By a motion; or by its parts, x = R (p - center) + center + translation with the rotation by `angle` radians about
         `axis`; or to `targets`, one position a vertex. Always relative to the rest mesh: the same call twice moves once.
         """
+        deadline_after(timeout)
         self.drag(name, motion, translation=translation, axis=axis, angle=angle, center=center, targets=targets)
         return self.settle(timeout)
 
     def next_frame(self, timeout: float = 60.0) -> Frame:
-        """The newest frame not yet taken; waits for one. Raises as poll(), and Timeout (NO_FRAME)."""
-        return self._next(time.monotonic() + timeout)
+        """The newest frame not yet taken; waits for one. Raises as poll(), and Timeout (NO_FRAME); at once where the timeout is 0."""
+        return self._next(deadline_after(timeout))
 
     def settle(self, timeout: float = 60.0) -> Frame:
         """Takes frames until one is the finished result of the newest update. Waits in vain where that one was taken before;
         not for its optimality_gap, which the next frame has. Raises as next_frame()."""
-        deadline = time.monotonic() + timeout
+        deadline = deadline_after(timeout)
         while True:
             frame = self._next(deadline)
             if self._link.is_result(frame):
@@ -256,12 +262,35 @@ class Session(Live):
         """Solves for the present handles and settings and returns the finished result, in float64.
 
         `on_progress` is called at most ten times a second. Begins again where the server went away, for as long as the
-        stream would. `timeout`: seconds for all of it, waiting for another solve included; None is without limit. While it
-        runs, changes wait and are sent after it. Raises what the server refuses, and Timeout; SESSION_CLOSED (of
+        stream would. `timeout`: seconds for all of it, waiting for another solve included; None is without limit, and with 0
+        nothing is sent. While it runs, changes wait and are sent after it. Raises what the server refuses, and Timeout
+        (SOLVE_UNDER_WAY where it was spent waiting, SOLVE_TIME_PASSED where none was left to begin); SESSION_CLOSED (of
         FAILED_PRECONDITION) where close() is called meanwhile.
         """
         options = self._solve_options(certify, trace, with_normals, initial_positions, on_progress, timeout)
         return solve(self._link, options, self._link.stop)
+
+    def undo(self) -> int:
+        """Takes the newest step of the handles back on the server, and returns the number of the update that this is.
+
+        A step is what a person sees as one change: updates that move the same handles, none of them over a second after the
+        one before, or each other update that changes handles; `begins_step` of update() begins one in any case. Settings are
+        no part of it. Sent after all changes before it; waits for the answer, and settle() for the frame. Raises
+        FAILED_PRECONDITION NOTHING_TO_UNDO, NOT_THE_WRITER for a reader, what the server says of a change before it, Timeout.
+        """
+        return undo(self._link, False, self._link.stop)
+
+    def redo(self) -> int:
+        """Does again what was taken back last. As undo(); NOTHING_TO_REDO."""
+        return undo(self._link, True, self._link.stop)
+
+    def snapshot(self) -> bytes:
+        """The session as a file, for restore(): mesh, handles, settings, what can be undone and the surface as it is.
+
+        With all changes before it. Waits for it to come in parts, and changes made meanwhile are sent after it. Raises what the
+        server says of a change before it, RESOURCE_EXHAUSTED, Timeout.
+        """
+        return snapshot(self._link, self._link.stop)
 
     def take_over(self) -> None:
         """Becomes the writer in place of whoever is, as a reader or after a WRITER_REPLACED."""
@@ -282,6 +311,13 @@ class Session(Live):
 
     def __repr__(self) -> str:
         return f"<Session at {self.address}: {self.mesh_report.vertices} vertices, {self.connection}>"
+
+
+def deadline_after(timeout: float) -> float:
+    """On the clock of time.monotonic()."""
+    if not timeout >= 0:
+        raise invalid(f"The timeout is {timeout} seconds.", "SECONDS_OUT_OF_RANGE", "timeout", "0 <= timeout")
+    return time.monotonic() + timeout
 
 
 def motion_of(

@@ -178,6 +178,8 @@ class Update:
     handles: Mapping[str, Change] = field(default_factory=dict)
     settings: Settings = Settings()
     resize: Resize | None = None
+    begins_step: bool = False
+    """What it does to handles is a step of its own, which undo() takes back: to be set when a drag begins."""
 
 
 @dataclass(frozen=True)

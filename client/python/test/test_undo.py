@@ -1,0 +1,132 @@
+"""Steps taken back on the server, and sessions as files."""
+
+from __future__ import annotations
+
+import asyncio
+
+import numpy as np
+import pytest
+
+import lpdeform
+from conftest import PATIENCE, Grid, Server
+from lpdeform.v1 import service_pb2
+
+
+def refused(call: object) -> str:
+    with pytest.raises(lpdeform.LpdeformError) as caught:
+        call()  # type: ignore[operator]
+    return caught.value.reason
+
+
+def test_a_step_is_taken_back_and_done_again(session: lpdeform.Session, shape: Grid) -> None:
+    session.settle(PATIENCE)
+    number = session.update({"right": lpdeform.RigidMotion(translation=(0, 0, 2))}, begins_step=True)
+    assert session.undo() == number + 1
+    back = session.settle(PATIENCE).positions[:, 2]
+    assert back[11] == 0
+    assert np.abs(back).max() < 1e-6
+    assert session.redo() == number + 2
+    assert session.settle(PATIENCE).positions[11, 2] == 2
+    assert refused(session.redo) == "NOTHING_TO_REDO"
+    assert session.move("right", translation=[0, 0, 3]).positions[11, 2] == 3  # numbers go on
+
+
+def test_a_drag_is_one_step_and_begins_step_begins_another(session: lpdeform.Session) -> None:
+    session.settle(PATIENCE)
+    session.drag("right", translation=[0, 0, 1])
+    session.move("right", translation=[0, 0, 2])
+    session.update({"right": lpdeform.RigidMotion(translation=(0, 0, 3))}, begins_step=True)
+    session.drag("right", translation=[0, 0, 4])
+    assert session.settle(PATIENCE).positions[11, 2] == 4
+    session.undo()
+    assert session.settle(PATIENCE).positions[11, 2] == 2
+
+
+def test_every_kind_of_handle_comes_back_and_is_there_after_kill_9(session: lpdeform.Session, server: Server) -> None:
+    lift = lpdeform.RigidMotion(axis=(0, 0, 1), angle=0.25, center=(1, 2, 0), translation=(0, 0, 2))
+    kept = {
+        "soft": lpdeform.Handle([50], lift, lpdeform.Soft(0.5), footprint=1.5),
+        "turned": lpdeform.Handle([52], lpdeform.RigidMotion(axis=(0, 1, 0), angle=0.5), lpdeform.Orientation(50)),
+        "axis": lpdeform.Handle([54], lift, lpdeform.AxisLock((1, 0, 0))),
+        "plane": lpdeform.Handle([90], lift, lpdeform.PlaneLock((0, 1, 0))),
+        "targets": lpdeform.Handle([92, 93], lpdeform.Targets([[8, 7, 1], [9, 7, 1]])),
+        "points": lpdeform.Handle(points=lpdeform.SurfacePoints([60], [[0.25, 0.25, 0.5]]), motion=lift),
+    }
+    session.set_handles(kept)
+    before = session.settle(PATIENCE).positions
+    session.update({name: lpdeform.Removal() for name in kept}, begins_step=True)
+    session.undo()
+    assert np.abs(session.settle(PATIENCE).positions - before).max() < 1e-2
+    server.kill()
+    server.start()
+    after = session.settle(PATIENCE).positions  # made anew from this side's book
+    assert np.abs(after - before).max() < 1e-2
+    assert np.abs(after[[92, 93]] - [[8, 7, 1], [9, 7, 1]]).max() == 0
+
+
+def test_nothing_to_undo_readers_and_closed_sessions_are_said(server: Server, shape: Grid) -> None:
+    with lpdeform.open(shape.vertices, shape.faces, address=server.address) as session:
+        assert refused(session.undo) == "NOTHING_TO_UNDO"
+        session.set_handle("left", shape.left)
+        assert session.settle(PATIENCE).converged  # the session goes on
+        with lpdeform.join(session.name, address=server.address) as reader:
+            assert refused(reader.undo) == "NOT_THE_WRITER"
+    for call in (session.undo, session.redo, session.snapshot):
+        assert refused(call) == "SESSION_CLOSED"
+
+
+def test_a_change_that_is_refused_before_an_undo_is_said_by_it(session: lpdeform.Session) -> None:
+    session.settle(PATIENCE)
+    session._link.is_solving = True  # so that the change waits
+    session.set_handle("beyond", [5000])
+    session._link.is_solving = False
+    assert refused(session.undo) == "HANDLE_VERTEX_OUT_OF_RANGE"
+    assert session.move("right", translation=[0, 0, 1]).positions[11, 2] == 1
+
+
+def test_a_session_leaves_as_a_file_and_comes_back_the_same(session: lpdeform.Session, server: Server) -> None:
+    before = session.move("right", translation=[0, 0, 2])
+    session.set(p=1.5)
+    file = session.snapshot()
+    session.close()
+    with lpdeform.restore(file, address=server.address) as restored:
+        assert restored.mesh_report.vertices == 144
+        assert np.array_equal(restored.next_frame(PATIENCE).positions[11], before.positions[11])
+        assert restored.move("right", translation=[0, 0, 3]).positions[11, 2] == 3
+        restored.undo()
+        assert restored.settle(PATIENCE).positions[11, 2] == 2
+        server.kill()
+        server.start()
+        assert restored.settle(PATIENCE).positions[11, 2] == 2  # made anew from the file, and what came after it
+
+
+def test_files_that_are_no_snapshots_are_refused_by_name(session: lpdeform.Session, server: Server) -> None:
+    file = session.snapshot()
+    damaged = bytearray(file)
+    damaged[len(file) // 2] ^= 1
+    for wrong, reason in ((b"a poem", "SNAPSHOT_FOREIGN"), (file[:-9], "SNAPSHOT_TRUNCATED"), (damaged, "SNAPSHOT_DAMAGED")):
+        assert refused(lambda wrong=wrong: lpdeform.restore(bytes(wrong), address=server.address)) == reason
+
+
+def test_snapshots_with_parts_that_are_missing_are_no_files(
+    session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part = service_pb2.SnapshotSessionResponse(size_bytes=10, offset=0, data=b"12345")
+    for parts in ([], [part], [part, part]):
+        monkeypatch.setattr("lpdeform._rpc.Rpc.snapshot", lambda *_, parts=parts: iter(parts))
+        assert refused(session.snapshot) == "SNAPSHOT_INCOMPLETE"
+
+
+def test_the_same_is_awaited(server: Server, shape: Grid) -> None:
+    async def work() -> float:
+        async with lpdeform.open_async(shape.vertices, shape.faces, address=server.address) as session:
+            session.set_handle("left", shape.left)
+            session.set_handle("right", shape.right)
+            await session.move("right", translation=[0, 0, 2])
+            file = await session.snapshot()
+            await session.undo()
+            await session.redo()
+        async with lpdeform.restore_async(file, address=server.address) as restored:
+            return float((await restored.next_frame(PATIENCE)).positions[11, 2])
+
+    assert asyncio.run(work()) == 2
