@@ -75,6 +75,53 @@ class AddOn(unittest.TestCase):
         middle = now[np.abs(self.rest[:, 2] - 2) < 0.05].mean(axis=0)
         self.assertTrue(0.2 < middle[0] < 0.8, middle)
 
+    def test_a_handle_in_faces_holds_their_middles(self):
+        self.held()
+        sides = [face.index for face in self.tube.data.polygons if abs(face.center[2] - 2) < 0.1 and face.center[0] > 0.35]
+        self.assertGreater(len(sides), 1)
+        tip = stage.add_handle(self.tube, [], faces=sides)
+        self.assertEqual(surface.held(self.tube).max(), 2)
+        corners = [list(self.tube.data.polygons[k].vertices) for k in sides]
+        middles = np.array([self.rest[one].mean(axis=0) for one in corners])
+        bpy.context.view_layer.update()
+        at = self.tube.matrix_world.inverted() @ tip.matrix_world.translation
+        self.assertTrue(np.allclose(at, middles.mean(axis=0), atol=1e-5))
+        self.shift(tip, 0.5, 0, 0.2)
+        stage.settle(self.tube)
+        faces, barycentric, places = surface.middles(self.tube, sides, self.rest)
+        self.assertTrue(np.allclose(places, middles, atol=1e-5))
+        now = stage.shown(self.tube)[surface.triangles(self.tube)[faces]]
+        self.assertTrue(np.allclose(np.einsum("kc,kcx->kx", barycentric, now), middles + [0.5, 0, 0.2], atol=1e-4))
+        self.assertEqual(bpy.ops.lpdeform.remove_handle(), {"FINISHED"})
+        self.assertEqual(surface.held_faces(self.tube).max(), 0)
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube), self.rest, atol=1e-3))
+
+    def test_no_face_selected_is_said(self):
+        stage.select(self.tube, [])
+        with self.assertRaisesRegex(RuntimeError, "Select the faces in Edit mode"):
+            bpy.ops.lpdeform.add_handle(in_faces=True)
+
+    def test_solve_waits_for_the_result_and_says_its_bound(self):
+        _, tip = self.held()
+        self.shift(tip, 1.2, 0, -0.6)
+        bpy.context.view_layer.update()
+        stage.activate(self.tube)
+        self.assertEqual(bpy.ops.lpdeform.solve(), {"FINISHED"})
+        running = live.of(self.tube)
+        self.assertEqual(running.result.stop_reason, "converged")
+        self.assertLess(running.shown.optimality_gap, 1e-3)
+        solved = stage.shown(self.tube)
+        self.assertTrue(np.allclose(solved[self.top], self.rest[self.top] + [1.2, 0, -0.6], atol=1e-5))
+        stage.settle(self.tube)  # the frames that come after do not take its place
+        self.assertTrue(np.array_equal(stage.shown(self.tube), solved))
+        self.shift(tip, 0.1, 0, 0)
+        stage.settle(self.tube)
+        self.assertIsNone(running.result)
+        with self.assertRaisesRegex(RuntimeError, "SOLVE_"):
+            bpy.ops.lpdeform.solve(timeout=0)
+        self.assertEqual(bpy.ops.lpdeform.apply(name="Solved"), {"FINISHED"})
+
     def test_the_mesh_and_its_handles_may_be_moved_together(self):
         _, tip = self.held()
         self.shift(tip, 0, 0.5, 0)

@@ -14,7 +14,8 @@ import stage  # noqa: E402
 PREFERENCES = stage.install()
 from lpdeform_addon import live, surface  # noqa: E402
 
-SIZE = (800, 400)
+SIZE = (1000, 480)
+PLACES = 2.9  # from tube to tube
 
 
 def bend(ob):
@@ -27,41 +28,96 @@ def bend(ob):
     tip.matrix_world = around @ Matrix.Rotation(np.pi / 2, 4, "Y") @ around.inverted() @ tip.matrix_world
 
 
-def material():
-    made = bpy.data.materials.new("distortion")
+def material(name, colour=(0.8, 0.8, 0.8), roughness=0.5, attribute="", glow=0.0):
+    """Of one colour, or of a colour attribute; with a glow of 1 it is seen as it is, whatever the light."""
+    made = bpy.data.materials.new(name)
     made.use_nodes = True
     nodes, links = made.node_tree.nodes, made.node_tree.links
-    colour = nodes.new("ShaderNodeVertexColor")
-    colour.layer_name = surface.COLOUR_ATTRIBUTE
-    links.new(colour.outputs["Color"], nodes["Principled BSDF"].inputs["Base Color"])
-    nodes["Principled BSDF"].inputs["Roughness"].default_value = 0.6
+    surface_of = nodes["Principled BSDF"].inputs
+    surface_of["Base Color"].default_value = (*colour, 1)
+    surface_of["Roughness"].default_value = roughness
+    surface_of["Specular"].default_value = 0.3 if glow == 0 else 0.0
+    if attribute:
+        source = nodes.new("ShaderNodeVertexColor")
+        source.layer_name = attribute
+        links.new(source.outputs["Color"], surface_of["Base Color" if glow == 0 else "Emission"])
+    if glow > 0:
+        surface_of["Base Color"].default_value = (0, 0, 0, 1)
+        surface_of["Emission Strength"].default_value = glow
     return made
+
+
+def add_mesh(name, vertices, faces, made_of):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata([tuple(map(float, one)) for one in vertices], [], faces)
+    mesh.materials.append(made_of)
+    ob = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(ob)
+    return ob
+
+
+def strip(name, profile, across, made_of):
+    """A profile in the plane of y and z, drawn along x."""
+    vertices = [(x, y, z) for y, z in profile for x in across]
+    faces = [(2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2) for k in range(len(profile) - 1)]
+    ob = add_mesh(name, vertices, faces, made_of)
+    ob.data.polygons.foreach_set("use_smooth", np.ones(len(ob.data.polygons), bool))
+    return ob
+
+
+def backdrop():
+    """A floor that turns up into a wall without an edge."""
+    bend = [(8 + 4 * np.sin(a), 4 - 4 * np.cos(a)) for a in np.linspace(0, np.pi / 2, 24)]
+    strip("backdrop", [(-25, 0), *bend, (12, 25)], (-40, 48), material("paper", (0.83, 0.81, 0.78), 0.9))
+
+
+def write(text, at, size, align, made_of):
+    curve = bpy.data.curves.new(text, "FONT")
+    curve.body, curve.size, curve.align_x = text, size, align
+    curve.materials.append(made_of)
+    ob = bpy.data.objects.new(text, curve)
+    ob.location, ob.rotation_euler = at, (np.pi / 2, 0, 0)
+    bpy.context.scene.collection.objects.link(ob)
+
+
+def legend(ink, at=(6.7, -2.2, 0.12), width=2.5, height=0.16):
+    """The colours of the add-on, from none to the most of p = 2."""
+    share = np.linspace(0, 1, 65)
+    vertices = [(at[0] + width * s, at[1], at[2] + up) for s in share for up in (0, height)]
+    bar = add_mesh("legend", vertices, [(2 * k, 2 * k + 2, 2 * k + 3, 2 * k + 1) for k in range(64)],
+                   material("colours", attribute="colours", glow=1.0))
+    colours = bar.data.color_attributes.new("colours", "FLOAT_COLOR", "POINT")
+    colours.data.foreach_set("color", surface.colours(np.repeat(share, 2), 1.0).reshape(-1))
+    above = at[2] + height + 0.12
+    write("no distortion", (at[0], at[1], above), 0.26, "LEFT", ink)
+    write("most", (at[0] + width, at[1], above), 0.26, "RIGHT", ink)
 
 
 def light_and_camera():
     scene = bpy.context.scene
-    for name, energy, at, size in (("key", 500, (-4, -6, 8), 3), ("fill", 120, (8, -5, 3), 5)):
+    middle = Vector((PLACES + 1.1, 0, 1.4))
+    for name, energy, at, size, colour in (
+        ("key", 900, (-3, -7, 8), 4, (1.0, 0.95, 0.88)),
+        ("fill", 250, (12, -8, 4), 7, (0.86, 0.92, 1.0)),
+        ("rim", 500, (7, 5.5, 7), 3, (1.0, 1.0, 1.0)),
+    ):
         lamp = bpy.data.objects.new(name, bpy.data.lights.new(name, "AREA"))
-        lamp.data.energy, lamp.data.size, lamp.location = energy, size, at
-        lamp.rotation_euler = (Vector((2.6, 0, 1.5)) - lamp.location).to_track_quat("-Z", "Y").to_euler()
+        lamp.data.energy, lamp.data.size, lamp.data.color, lamp.location = energy, size, colour, at
+        lamp.rotation_euler = (middle - lamp.location).to_track_quat("-Z", "Y").to_euler()
         scene.collection.objects.link(lamp)
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-    camera.data.lens, camera.location = 50, (4.1, -15.2, 3.9)
-    camera.rotation_euler = (Vector((4.1, 0, 1.7)) - camera.location).to_track_quat("-Z", "Y").to_euler()
+    camera.data.lens, camera.location = 50, (middle.x + 0.45, -16.5, 4.2)
+    camera.rotation_euler = (middle + Vector((0.45, 0, 0)) - camera.location).to_track_quat("-Z", "Y").to_euler()
     scene.collection.objects.link(camera)
     scene.camera = camera
-    bpy.ops.mesh.primitive_plane_add(size=60, location=(0, 0, 0))
-    floor = bpy.data.materials.new("floor")
-    floor.diffuse_color = (0.8, 0.8, 0.8, 1)
-    bpy.context.object.data.materials.append(floor)
     scene.world = bpy.data.worlds.new("world")
-    scene.world.color = (0.35, 0.38, 0.45)
+    scene.world.color = (0.30, 0.31, 0.33)
 
 
 def render(path):
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
-    scene.cycles.device, scene.cycles.samples, scene.cycles.use_denoising = "CPU", 24, False
+    scene.cycles.device, scene.cycles.samples, scene.cycles.use_denoising = "CPU", 64, False
     scene.render.threads_mode, scene.render.threads = "FIXED", 1
     scene.view_settings.view_transform = "Standard"
     scene.render.resolution_x, scene.render.resolution_y = SIZE
@@ -76,8 +132,8 @@ class Picture(unittest.TestCase):
         self.addCleanup(server.end)
         stage.clear()
         PREFERENCES.address = server.address
-        tubes = [stage.tube(f"p = {p}", at=(2.9 * k, 0, 0)) for k, p in enumerate((1, 2, 6))]
-        coloured = material()
+        tubes = [stage.tube(f"p = {p}", at=(PLACES * k, 0, 0)) for k, p in enumerate((1, 2, 6))]
+        coloured = material("distortion", attribute=surface.COLOUR_ATTRIBUTE)
         for ob, p in zip(tubes, (1.0, 2.0, 6.0)):
             ob.lpdeform.p = p
             ob.data.materials.append(coloured)
@@ -90,6 +146,11 @@ class Picture(unittest.TestCase):
         for ob in tubes:
             ob.lpdeform.distortion_limit = most[1]
             live.of(ob).show(ob)
+        backdrop()
+        ink = material("ink", (0.02, 0.02, 0.025), 0.8)
+        for ob, p in zip(tubes, (1, 2, 6)):
+            write(f"p = {p}", ob.location + Vector((0, -1.0, 0.05)), 0.5, "CENTER", ink)
+        legend(ink)
         light_and_camera()
         path = os.path.join(stage.PICTURES, "bent.png")
         if os.path.exists(path):

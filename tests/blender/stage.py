@@ -83,13 +83,16 @@ def tube(name="tube", around=24, along=61, radius=0.4, length=4.0, at=(0.0, 0.0,
     return ob
 
 
-def select(ob, vertices):
+def select(ob, vertices, faces=()):
     """As a person does in Edit mode, where it is left."""
     activate(ob)
     mask = np.zeros(len(ob.data.vertices), bool)
     mask[vertices] = True
     for elements in (ob.data.edges, ob.data.polygons):
         elements.foreach_set("select", np.zeros(len(elements), bool))
+    for face in faces:
+        ob.data.polygons[face].select = True
+        mask[list(ob.data.polygons[face].vertices)] = True
     ob.data.vertices.foreach_set("select", mask)
     bpy.ops.object.mode_set(mode="EDIT")
 
@@ -101,9 +104,9 @@ def activate(ob):
     bpy.context.view_layer.objects.active = ob
 
 
-def add_handle(ob, vertices):
-    select(ob, vertices)
-    assert bpy.ops.lpdeform.add_handle() == {"FINISHED"}
+def add_handle(ob, vertices, faces=()):
+    select(ob, vertices, faces)
+    assert bpy.ops.lpdeform.add_handle(in_faces=len(faces) > 0) == {"FINISHED"}
     return bpy.context.object
 
 

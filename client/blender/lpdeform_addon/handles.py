@@ -28,18 +28,32 @@ def rest_matrix(empty) -> Matrix:
 
 def add(ob, vertices: np.ndarray, rest: np.ndarray):
     """An empty at the middle of the vertices, which lets other handles go of them. `rest`: positions of the mesh at rest."""
-    numbers = surface.held(ob)
-    number = max([int(numbers.max(initial=0)), *(one.lpdeform_handle.number for one in of(ob))]) + 1
+    number, numbers = _next_number(ob), surface.held(ob)
     numbers[vertices] = number
     surface.set_held(ob, numbers)
+    return _add_empty(ob, number, rest[vertices].mean(axis=0), rest)
 
+
+def add_in_faces(ob, faces: np.ndarray, rest: np.ndarray):
+    """The same with the middles of faces, which other handles let go of."""
+    number, numbers = _next_number(ob), surface.held_faces(ob)
+    numbers[faces] = number
+    surface.set_held_faces(ob, numbers)
+    return _add_empty(ob, number, surface.middles(ob, faces, rest)[2].mean(axis=0), rest)
+
+
+def _next_number(ob) -> int:
+    used = (surface.held(ob).max(initial=0), surface.held_faces(ob).max(initial=0))
+    return max([*map(int, used), *(one.lpdeform_handle.number for one in of(ob))]) + 1
+
+
+def _add_empty(ob, number: int, middle: np.ndarray, rest: np.ndarray):
     empty = bpy.data.objects.new(f"{ob.name} handle", None)
     (ob.users_collection or (bpy.context.scene.collection,))[0].objects.link(empty)
     empty.empty_display_type = "SPHERE"
     empty.show_in_front = True
     extent = float(np.ptp(rest, axis=0).max())
     empty.empty_display_size = 0.04 * extent
-    middle = rest[vertices].mean(axis=0)
     at_rest = Matrix.Translation(middle.tolist())
     handle = empty.lpdeform_handle
     handle.mesh, handle.number = ob, number
@@ -57,9 +71,10 @@ def remove(empty) -> None:
     """Lets go of its vertices."""
     handle = empty.lpdeform_handle
     if handle.mesh is not None:
-        numbers = surface.held(handle.mesh)
-        numbers[numbers == handle.number] = 0
-        surface.set_held(handle.mesh, numbers)
+        for read, write in ((surface.held, surface.set_held), (surface.held_faces, surface.set_held_faces)):
+            numbers = read(handle.mesh)
+            if (numbers == handle.number).any():
+                write(handle.mesh, np.where(numbers == handle.number, 0, numbers))
     bpy.data.objects.remove(empty)
 
 

@@ -1,6 +1,7 @@
 """Meshes that follow their handles: one session each, and the timer that keeps them going."""
 
 import time
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -27,11 +28,24 @@ _taken_all_the_same = ("FAILED_PRECONDITION", "ABORTED")
 class Present:
     """Something that the server is to know, the same as another of the same value."""
 
-    def __init__(self, value, empty=None, vertices=None, matrix=None, setting=None) -> None:
-        self.value, self.empty, self.vertices, self.matrix, self.setting = value, empty, vertices, matrix, setting
+    def __init__(self, value, empty=None, held=None, matrix=None, setting=None) -> None:
+        self.value, self.empty, self.held, self.matrix, self.setting = value, empty, held, matrix, setting
 
     def __eq__(self, other) -> bool:
         return isinstance(other, Present) and self.value == other.value
+
+
+class Held(NamedTuple):
+    """What a handle holds: vertices, or points inside faces; and where these are at rest."""
+
+    vertices: np.ndarray
+    points: object
+    places: np.ndarray
+
+    @property
+    def value(self) -> tuple:
+        points = self.points and (self.points.faces.tobytes(), self.points.barycentric.tobytes())
+        return self.vertices.tobytes(), points
 
 
 class LiveMesh:
@@ -39,7 +53,6 @@ class LiveMesh:
 
     def __init__(self, ob) -> None:
         self.name = ob.name
-        self.frame = None
         self._mode = ob.mode
         self._open(ob)
         self.had_keys = ob.data.shape_keys is not None
@@ -50,12 +63,12 @@ class LiveMesh:
         rest, faces = surface.rest_positions(ob), surface.triangles(ob)
         self.session = _open_session(ob, rest, faces)
         self._rest, self._faces = rest, faces
-        self._held = surface.held(ob)
+        self.vertices_changed(ob)
         self._told = Told()
         self.fields = {}
         self._weights = {}
         self._weights_read = 0.0
-        self.frame = None
+        self.frame = self.result = None
 
     @property
     def state(self) -> str:
@@ -71,7 +84,14 @@ class LiveMesh:
 
     def vertices_changed(self, ob) -> None:
         """Of handles."""
-        self._held = surface.held(ob)
+        self._held = {}
+        by_vertex, by_face = surface.held(ob), surface.held_faces(ob)
+        for number in np.unique(by_face[by_face > 0]):
+            faces, barycentric, places = surface.middles(ob, np.flatnonzero(by_face == number), self._rest)
+            self._held[int(number)] = Held(np.zeros(0, np.int64), lpdeform.SurfacePoints(faces, barycentric), places)
+        for number in np.unique(by_vertex[by_vertex > 0]):
+            vertices = np.flatnonzero(by_vertex == number)
+            self._held[int(number)] = Held(vertices, None, self._rest[vertices])
 
     def look(self, ob) -> None:
         """Tells the server what is new, and shows what has come."""
@@ -92,7 +112,25 @@ class LiveMesh:
         if frame is not None:
             self._told.answered(frame.input_seq)
             self.frame = frame
-            self.show(ob)
+            if self.result is None or frame.input_seq > self.result.input_seq:
+                self.result = None
+                self.show(ob)
+
+    def solve(self, ob, on_progress, timeout: float) -> None:
+        """Waits for a result of its own, with its bound, and shows it. Raises what the server has to say, Timeout, and NotReady."""
+        self.look(ob)
+        try:
+            self.result = self.session.solve(certify=True, on_progress=on_progress, timeout=timeout)
+        except lpdeform.InvalidInput:
+            self._told.refused()
+            raise
+        self._told.answered(self.result.input_seq)
+        self.show(ob)
+
+    @property
+    def shown(self):
+        """A frame, or the result of a solve; None where nothing came yet."""
+        return self.result or self.frame
 
     def _tell(self, ob) -> None:
         present = {**self._present_handles(ob), **self._present_settings(ob)}
@@ -110,15 +148,15 @@ class LiveMesh:
             raise
 
     def show(self, ob) -> None:
-        surface.show_positions(ob, self.frame.positions)
+        surface.show_positions(ob, self.shown.positions)
         if ob.lpdeform.show_distortion:
-            surface.show_distortion(ob, self.frame.distortion, ob.lpdeform.distortion_limit)
+            surface.show_distortion(ob, self.shown.distortion, ob.lpdeform.distortion_limit)
 
     def _look_again(self, ob) -> None:
         """Where the mesh at rest may have become another one."""
         is_same = len(ob.data.vertices) == len(self._rest) and np.array_equal(surface.rest_positions(ob), self._rest)
         if is_same and np.array_equal(surface.triangles(ob), self._faces):
-            self._held = surface.held(ob)
+            self.vertices_changed(ob)
             return
         before = self.session
         self._open(ob)
@@ -129,13 +167,13 @@ class LiveMesh:
         present = {}
         for empty in handles.of(ob):
             settings = empty.lpdeform_handle
-            vertices = np.flatnonzero(self._held == settings.number)
-            if not len(vertices):
+            held = self._held.get(settings.number)
+            if held is None:
                 continue
             matrix = handles.motion_matrix(ob, empty)
-            kind = (settings.kind, settings.weight, settings.footprint, vertices.tobytes())
+            kind = (settings.kind, settings.weight, settings.footprint, held.value)
             place = tuple(value for row in matrix for value in row)
-            present[f"handle {settings.number}"] = Present((kind, place), empty, vertices, matrix)
+            present[f"handle {settings.number}"] = Present((kind, place), empty, held, matrix)
         return present
 
     def _change(self, key: str, present):
@@ -143,11 +181,12 @@ class LiveMesh:
         if present is None:
             return lpdeform.Removal()
         settings = present.empty.lpdeform_handle
-        motion = handles.motion(present.matrix, self._rest[present.vertices], settings.kind == "ORIENTATION")
+        held = present.held
+        motion = handles.motion(present.matrix, held.places, settings.kind == "ORIENTATION")
         last = self._told.last(key)
         if last is not None and last.value[0] == present.value[0]:
             return motion
-        return lpdeform.Handle(present.vertices, motion, handles.hold(present.empty), None, settings.footprint)
+        return lpdeform.Handle(held.vertices, motion, handles.hold(present.empty), held.points, settings.footprint)
 
     def _present_settings(self, ob) -> dict:
         settings = ob.lpdeform

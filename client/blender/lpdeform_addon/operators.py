@@ -1,10 +1,10 @@
 """What buttons do."""
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from . import handles, live, surface
-from .client import NotReady
+from .client import NotReady, lpdeform
 
 
 def mesh_of(context):
@@ -26,6 +26,8 @@ class AddHandle(bpy.types.Operator):
     bl_label = "Add handle"
     bl_options = {"REGISTER", "UNDO"}
 
+    in_faces: BoolProperty(name="In faces", default=False, description="Hold the middles of the selected faces in place of vertices")
+
     @classmethod
     def poll(cls, context):
         return context.object is not None and context.object.type == "MESH"
@@ -34,11 +36,13 @@ class AddHandle(bpy.types.Operator):
         ob = context.object
         if ob.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
-        vertices = surface.selected(ob)
-        if not len(vertices):
-            self.report({"ERROR"}, "Select the vertices in Edit mode that the handle is to hold.")
+        rest = surface.rest_positions(ob)
+        chosen = surface.selected_faces(ob) if self.in_faces else surface.selected(ob)
+        if not len(chosen):
+            what = "faces in Edit mode whose middles" if self.in_faces else "vertices in Edit mode that"
+            self.report({"ERROR"}, f"Select the {what} the handle is to hold.")
             return {"CANCELLED"}
-        empty = handles.add(ob, vertices, surface.rest_positions(ob))
+        empty = handles.add_in_faces(ob, chosen, rest) if self.in_faces else handles.add(ob, chosen, rest)
         running = live.of(ob)
         if running is not None:
             running.vertices_changed(ob)
@@ -125,6 +129,35 @@ class Stop(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class Solve(bpy.types.Operator):
+    """Wait for the finished result, with a bound on how far it can be from the optimum"""
+
+    bl_idname = "lpdeform.solve"
+    bl_label = "Solve"
+
+    timeout: FloatProperty(name="Seconds", default=60.0, min=0.0, description="To wait at most")
+
+    @classmethod
+    def poll(cls, context):
+        ob = mesh_of(context)
+        return live.of(ob) is not None and ob.mode != "EDIT"
+
+    def execute(self, context):
+        ob, manager = mesh_of(context), context.window_manager
+        running = live.of(ob)
+        manager.progress_begin(0, 10_000)
+        try:
+            running.solve(ob, lambda told: manager.progress_update(min(told.iteration, 9999)), self.timeout)
+        except (NotReady, lpdeform.LpdeformError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        finally:
+            manager.progress_end()
+        result = running.result
+        self.report({"INFO"}, f"{result.stop_reason} after {result.iterations} iterations")
+        return {"FINISHED"}
+
+
 class Apply(bpy.types.Operator):
     """End live deformation and keep the present pose as a shape key"""
 
@@ -137,11 +170,11 @@ class Apply(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         running = live.of(mesh_of(context))
-        return running is not None and running.frame is not None
+        return running is not None and running.shown is not None
 
     def execute(self, context):
         live.stop(mesh_of(context), keep_as=self.name or "Pose")
         return {"FINISHED"}
 
 
-register, unregister = bpy.utils.register_classes_factory((AddHandle, RemoveHandle, PutBack, Start, Stop, Apply))
+register, unregister = bpy.utils.register_classes_factory((AddHandle, RemoveHandle, PutBack, Start, Stop, Solve, Apply))

@@ -31,14 +31,17 @@ class MainPanel(bpy.types.Panel):
             layout.operator("lpdeform.start", icon="PLAY")
         else:
             layout.label(text=_words[running.state].format(address()), icon="LINKED")
-            if running.frame is not None and running.frame.optimality_gap is not None:
-                layout.label(text=f"Within {100 * running.frame.optimality_gap:.2g} % of the optimum", icon="CHECKMARK")
+            if running.shown is not None and running.shown.optimality_gap is not None:
+                layout.label(text=f"Within {100 * running.shown.optimality_gap:.2g} % of the optimum", icon="CHECKMARK")
             column = layout.column(align=True)
+            column.operator("lpdeform.solve", icon="SHADERFX")
             column.operator("lpdeform.stop", icon="X")
             column.operator("lpdeform.apply", icon="SHAPEKEY_DATA")
         if live.message(ob):
             layout.label(text=live.message(ob), icon="ERROR")
-        layout.operator("lpdeform.add_handle", icon="EMPTY_DATA")
+        column = layout.column(align=True)
+        column.operator("lpdeform.add_handle", icon="EMPTY_DATA")
+        column.operator("lpdeform.add_handle", text="Add handle in faces", icon="SNAP_FACE_CENTER").in_faces = True
 
 
 class _Below:

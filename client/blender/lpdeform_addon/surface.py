@@ -4,6 +4,7 @@ no other way."""
 import numpy as np
 
 HANDLE_ATTRIBUTE = "lpdeform_handle"
+FACE_ATTRIBUTE = "lpdeform_handle_face"
 COLOUR_ATTRIBUTE = "lpdeform distortion"
 LIVE_KEY = "lpdeform"
 
@@ -36,20 +37,69 @@ def selected(ob) -> np.ndarray:
     return np.flatnonzero(mask)
 
 
+def selected_faces(ob) -> np.ndarray:
+    """Indices of the faces selected in Edit mode; to be asked for in Object mode."""
+    mask = np.empty(len(ob.data.polygons), bool)
+    ob.data.polygons.foreach_get("select", mask)
+    return np.flatnonzero(mask)
+
+
 def held(ob) -> np.ndarray:
     """For each vertex the number of the handle that holds it; 0 where none does."""
-    attribute = ob.data.attributes.get(HANDLE_ATTRIBUTE)
-    numbers = np.zeros(len(ob.data.vertices), np.int32)
-    if attribute is not None and len(attribute.data) == len(numbers):
+    return _numbers(ob, HANDLE_ATTRIBUTE, len(ob.data.vertices))
+
+
+def set_held(ob, numbers: np.ndarray) -> None:
+    _set_numbers(ob, HANDLE_ATTRIBUTE, "POINT", numbers)
+
+
+def held_faces(ob) -> np.ndarray:
+    """For each face the number of the handle that holds its middle; 0 where none does."""
+    return _numbers(ob, FACE_ATTRIBUTE, len(ob.data.polygons))
+
+
+def set_held_faces(ob, numbers: np.ndarray) -> None:
+    _set_numbers(ob, FACE_ATTRIBUTE, "FACE", numbers)
+
+
+def _numbers(ob, name: str, count: int) -> np.ndarray:
+    attribute = ob.data.attributes.get(name)
+    numbers = np.zeros(count, np.int32)
+    if attribute is not None and len(attribute.data) == count:
         attribute.data.foreach_get("value", numbers)
     return numbers
 
 
-def set_held(ob, numbers: np.ndarray) -> None:
-    attribute = ob.data.attributes.get(HANDLE_ATTRIBUTE)
+def _set_numbers(ob, name: str, domain: str, numbers: np.ndarray) -> None:
+    attribute = ob.data.attributes.get(name)
     if attribute is None:
-        attribute = ob.data.attributes.new(HANDLE_ATTRIBUTE, "INT", "POINT")
+        attribute = ob.data.attributes.new(name, "INT", domain)
     attribute.data.foreach_set("value", numbers.astype(np.int32))
+
+
+def middles(ob, faces, rest: np.ndarray):
+    """Of faces: k indices into triangles(), k x 3 barycentric coordinates in them, and k x 3 positions at rest."""
+    corners = triangles(ob)
+    face_of = np.empty(len(corners), np.int32)
+    ob.data.loop_triangles.foreach_get("polygon_index", face_of)
+    found, coordinates = [], []
+    for face in faces:
+        middle = rest[list(ob.data.polygons[face].vertices)].mean(axis=0)
+        inside = np.flatnonzero(face_of == face)
+        inner = [_barycentric(rest[corners[one]], middle) for one in inside]
+        best = int(np.argmax([one.min() for one in inner]))
+        within = np.maximum(inner[best], 0.0)  # of a bent face the middle lies off its triangles
+        found.append(inside[best])
+        coordinates.append(within / within.sum())
+    found, coordinates = np.array(found, np.int64), np.array(coordinates).reshape(-1, 3)
+    return found, coordinates, np.einsum("kc,kcx->kx", coordinates, rest[corners[found]])
+
+
+def _barycentric(triangle: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Of the point of the triangle's plane that is nearest to `point`."""
+    sides = (triangle[1:] - triangle[0]).astype(float)
+    b, c = np.linalg.lstsq(sides.T, point - triangle[0], rcond=None)[0]
+    return np.array([1 - b - c, b, c])
 
 
 def group_weights(ob, name: str):
