@@ -37,24 +37,43 @@ static class Replay
                      error.Message);
     }
 
-    static void TellFrame(Client client, string name, FrameEncoding encoding, bool doublePrecision)
+    static Session OpenStrip(Client client, FrameEncoding encoding, bool doublePrecision)
     {
         var options = new SessionOptions
         {
             LeftHanded = false, Encoding = encoding, DoublePrecision = doublePrecision, WithNormals = true
         };
-        using (var session = client.Open(Strip(), options))
+        var session = client.Open(Strip(), options);
+        session.Handles.Set("base", new[] { 0, 1 });
+        session.Handles.Set("tip", new[] { 20, 21 }, Motion.Move(-4, 0, 3));
+        return session;
+    }
+
+    static void TellResult(string name, Session session)
+    {
+        var buffers = new FrameBuffers { Positions = new float[66], Normals = new float[66], Distortion = new float[22] };
+        var frame = session.Settle(buffers, 30);
+        output.Write("{0}: result {1}, {2}, iteration {3}, energy {4:x16}\n", name, frame.Converged ? 1 : 0,
+                     frame.StopReason.ToString().ToLowerInvariant(), frame.Iteration,
+                     BitConverter.DoubleToInt64Bits(frame.Energy));
+        Tell(name, "positions", buffers.Positions.ToArray());
+        Tell(name, "distortion", buffers.Distortion.ToArray());
+        Tell(name, "normals", buffers.Normals.ToArray());
+    }
+
+    static void TellFrame(Client client, string name, FrameEncoding encoding, bool doublePrecision)
+    {
+        using (var session = OpenStrip(client, encoding, doublePrecision)) TellResult(name, session);
+    }
+
+    static void TellUndo(Client client)
+    {
+        using (var session = OpenStrip(client, FrameEncoding.Raw, false))
         {
-            session.Handles.Set("base", new[] { 0, 1 });
-            session.Handles.Set("tip", new[] { 20, 21 }, Motion.Move(-4, 0, 3));
-            var buffers = new FrameBuffers { Positions = new float[66], Normals = new float[66], Distortion = new float[22] };
-            var frame = session.Settle(buffers, 30);
-            output.Write("{0}: result {1}, {2}, iteration {3}, energy {4:x16}\n", name, frame.Converged ? 1 : 0,
-                         frame.StopReason.ToString().ToLowerInvariant(), frame.Iteration,
-                         BitConverter.DoubleToInt64Bits(frame.Energy));
-            Tell(name, "positions", buffers.Positions.ToArray());
-            Tell(name, "distortion", buffers.Distortion.ToArray());
-            Tell(name, "normals", buffers.Normals.ToArray());
+            session.Settle(new float[66], 30);
+            session.Handles.Move("tip", Motion.Move(0, 0, 1));
+            session.Undo();
+            TellResult("undo", session);
         }
     }
 
@@ -78,6 +97,7 @@ static class Replay
             TellFrame(client, "float32", FrameEncoding.Raw, false);
             TellFrame(client, "quantized", FrameEncoding.Quantized, false);
             TellFrame(client, "compressed", FrameEncoding.Compressed, false);
+            TellUndo(client);
             for (int k = 0; k < errors; ++k) TellCall(client, k);
             using (var session = client.Open(Strip(), own))
             {

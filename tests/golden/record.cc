@@ -2,8 +2,9 @@
 //   record FOLDER ERRORS_MD            writes them
 //   record --check FOLDER ERRORS_MD    1 where the server, asked the same, no longer answers so
 //
-// frames.json: a session and, for each encoding, what is sent and what comes on a Deform stream until the result of one update;
-// messages serialised, in base64. errors.json: each reason of proto/errors.md as the details of a call's status and as the fault
+// frames.json: a session and, for each encoding, what is sent and what comes on a Deform stream until the result of one update,
+// with the word of a server that is overloaded; a step that is undone; a session as a file, and made from it; messages
+// serialised, in base64. errors.json: each reason of proto/errors.md as the details of a call's status and as the fault
 // of a stream. expected.txt: what every client has to make of them, one thing a line; numbers by their bits.
 
 #include <grpcpp/grpcpp.h>
@@ -94,7 +95,7 @@ constexpr Way kWays[] = {
 struct Stream {
   v1::DeformOpen open;
   v1::Update update;
-  std::vector<v1::DeformResponse> responses;  // the opening, the answer to the update, its result
+  std::vector<v1::DeformResponse> responses;  // the opening, a notice, the answer to the update, its result
 
   const v1::FramePart& frame() const { return responses.back().event().frame(); }
 };
@@ -105,6 +106,14 @@ v1::CreateSessionResponse create(v1::DeformService::Stub& stub) {
   const grpc::Status status = stub.CreateSession(&context, creation(), &response);
   require(status.ok(), status.error_message());
   return response;
+}
+
+/// What a server says that has more to do than it can.
+v1::DeformResponse notice() {
+  v1::DeformResponse out;
+  out.mutable_event()->mutable_notice()->set_reason(v1::NOTICE_REASON_OVERLOADED);
+  out.mutable_event()->mutable_notice()->set_text("The server has more to solve than it can.");
+  return out;
 }
 
 Stream record_stream(v1::DeformService::Stub& stub, const v1::CreateSessionResponse& session,
@@ -141,7 +150,87 @@ Stream record_stream(v1::DeformService::Stub& stub, const v1::CreateSessionRespo
   context.TryCancel();
   call->Finish();
   require(out.responses[0].event().has_opened() && out.responses[1].has_result(), "something else came");
+  out.responses.insert(out.responses.begin() + 1, notice());
   return out;
+}
+
+// Calls about a session.
+
+template <typename Request, typename Response>
+Response ask(grpc::Status (v1::DeformService::Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+             v1::DeformService::Stub& stub, const Request& request) {
+  grpc::ClientContext context;
+  Response response;
+  const grpc::Status status = (stub.*method)(&context, request, &response);
+  require(status.ok(), status.error_message());
+  return response;
+}
+
+struct Undo {
+  v1::UndoUpdateResponse response;
+  v1::DeformResponse result;
+};
+
+/// Update 1 is the lift, update 2 takes the tip elsewhere, update 3 takes that back.
+Undo record_undo(v1::DeformService::Stub& stub) {
+  const v1::CreateSessionResponse session = create(stub);
+  v1::UpdateHandlesRequest change;
+  change.set_session(session.session().name());
+  change.set_writer_token(session.writer_token());
+  *change.mutable_update() = lift();
+  ask(&v1::DeformService::Stub::UpdateHandles, stub, change);
+  client::Update elsewhere;
+  elsewhere.handles["tip"] = client::Motion(client::RigidMotion{.translation = {0, 0, 1}});
+  elsewhere.begins_step = true;
+  client::Packer packer = inline_packer();
+  v1::Update second;
+  require(client::to_wire(elsewhere, 2, packer, second).ok(), "the update cannot be packed");
+  *change.mutable_update() = second;
+  ask(&v1::DeformService::Stub::UpdateHandles, stub, change);
+
+  Undo out;
+  v1::UndoUpdateRequest back;
+  back.set_session(session.session().name());
+  back.set_writer_token(session.writer_token());
+  back.set_input_seq(3);
+  out.response = ask(&v1::DeformService::Stub::UndoUpdate, stub, back);
+  require(out.response.changes_size() == 1 && out.response.changes(0).has_move(), "another step is undone");
+
+  grpc::ClientContext context;
+  const auto stream = stub.Deform(&context);
+  v1::DeformRequest request;
+  request.mutable_open()->set_session(session.session().name());
+  request.mutable_open()->mutable_options()->set_with_normals(true);
+  stream->Write(request);
+  const auto is_result = [&] {
+    const v1::FrameHeader& header = out.result.event().frame().header();
+    return header.converged() && header.input_seq() == 3;
+  };
+  while (!is_result()) {
+    require(stream->Read(&out.result), "the stream ended");
+    request.mutable_ack()->set_frame_seq(out.result.event().frame().frame_seq());
+    if (out.result.event().has_frame()) stream->Write(request);
+  }
+  context.TryCancel();
+  stream->Finish();
+  return out;
+}
+
+std::string take_snapshot(v1::DeformService::Stub& stub, const std::string& session) {
+  grpc::ClientContext context;
+  v1::SnapshotSessionRequest request;
+  request.set_session(session);
+  const auto parts = stub.SnapshotSession(&context, request);
+  std::string file;
+  for (v1::SnapshotSessionResponse part; parts->Read(&part);) file += part.data();
+  require(parts->Finish().ok() && !file.empty(), "there is no snapshot");
+  return file;
+}
+
+v1::RestoreSessionResponse restore(v1::DeformService::Stub& stub, const std::string& file) {
+  v1::RestoreSessionRequest request;
+  request.mutable_snapshot()->set_inline_(file);
+  return ask(&v1::DeformService::Stub::RestoreSession, stub, request);
 }
 
 // What clients make of a frame.
@@ -269,7 +358,7 @@ Json errors_json(const std::vector<Row>& rows) {
 struct Recording {
   Json frames, errors;
   std::string expected;
-  std::vector<Numbers> numbers;  // of each way
+  std::vector<Numbers> numbers;  // of each way, then of the undo
 };
 
 Recording record(v1::DeformService::Stub& stub, const std::string& errors_md) {
@@ -296,6 +385,15 @@ Recording record(v1::DeformService::Stub& stub, const std::string& errors_md) {
     }
     out.expected += lines_of(way.name, stream.frame().header(), out.numbers.back());
   }
+  const Undo undone = record_undo(stub);
+  out.frames["undo"] = {{"response", encoded(undone.response)}, {"result", encoded(undone.result)}};
+  out.numbers.push_back(raw_numbers(undone.result.event().frame()));
+  out.expected += lines_of("undo", undone.result.event().frame().header(), out.numbers.back());
+  const std::string file = take_snapshot(stub, create(stub).session().name());
+  const v1::RestoreSessionResponse restored = restore(stub, file);
+  out.frames["snapshot"] = {{"file", absl::Base64Escape(file)}, {"restore_response", encoded(restored)}};
+  out.expected +=
+      absl::StrFormat("snapshot: %d bytes\nrestored: %s\n", file.size(), restored.session().name());
   const std::vector<Row> rows = rows_of(errors_md);
   out.errors = errors_json(rows);
   for (const Row& row : rows) out.expected += tell("call", row);
@@ -361,6 +459,17 @@ void check(const Recording& now, const std::string& folder) {
   }
 }
 
+void check_calls(v1::DeformService::Stub& stub, const Recording& now, const std::string& expected,
+                 const Json& frames) {
+  require(frames["undo"]["response"] == now.frames["undo"]["response"], "an undo is answered otherwise");
+  require(furthest(now.numbers.back().positions, expected_numbers(expected, "undo positions")) < kSameResult,
+          "frames after an undo have other positions");
+  std::string file;
+  require(absl::Base64Unescape(frames["snapshot"]["file"].get<std::string>(), &file), "not base64");
+  const v1::Session session = restore(stub, file).session();  // recorded by a release before, perhaps
+  require(session.mesh().vertices() == 22, "the recorded snapshot is another session");
+}
+
 int run(bool is_check, const std::string& folder, const std::string& errors_md) {
   ServerOptions options;
   options.address = "127.0.0.1:0";
@@ -377,6 +486,8 @@ int run(bool is_check, const std::string& folder, const std::string& errors_md) 
           "quantized is not near");
   if (is_check) {
     check(now, folder);
+    check_calls(*stub, now, read_file(folder + "/expected.txt"),
+                Json::parse(read_file(folder + "/frames.json")));
   } else {
     write_file(folder + "/frames.json", now.frames.dump(1) + "\n");
     write_file(folder + "/errors.json", now.errors.dump(1) + "\n");

@@ -4,18 +4,23 @@ Runs `PROGRAM ARGUMENT... ADDRESS NUMBER_OF_ERRORS` against a server that says w
 and compares what the program prints with expected.txt. The program
 
 - opens a session of the mesh of the recording for each encoding that it has, sets both handles, waits for the result, and prints it;
+- does so once more in float32, moves the tip elsewhere, takes that back, waits for the result, and prints it ("undo"); prints how
+  long the snapshot of the session is, and the name of the session restored from it;
 - opens a mesh of 1000 + k vertices for each error k, and prints what the call ended with;
 - in one more session moves a handle named after each k, one after the other, and prints the fault that answers it.
 
-What the client sends must mean what the recording has; numbers may be of either scalar. Programs that lack float64 say so:
-`--without float64` before PROGRAM.
+What the client sends must mean what the recording has; numbers may be of either scalar. What a client has not: `--without snapshot`,
+`--without restored` before PROGRAM.
 """
 
 import base64
+import itertools
 import json
+import queue
 import subprocess
 import sys
 import tempfile
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -80,8 +85,11 @@ class Service:
         self.creation = message(service_pb2.CreateSessionRequest, recorded["create_request"])
         self.streams = recorded["streams"]
         self.errors = json.loads((HERE / "errors.json").read_text())
+        self.undo, self.snapshot = recorded["undo"], recorded["snapshot"]
         self.problems = []
-        self.opened = set()
+        self.newest = queue.Queue()
+        """What the newest stream is asked for, and None where that ends."""
+        self.newest_input = 0
 
     def differs(self, context, text):
         self.problems.append(text)
@@ -112,18 +120,30 @@ class Service:
     def deform(self, requests, context):
         first = next(requests)
         stream = self.stream_for(first.open.options)
-        self.opened.add(stream["name"])
-        opened, _, result = (message(service_pb2.DeformResponse, text) for text in stream["responses"])
+        opened, notice, _, result = (message(service_pb2.DeformResponse, text) for text in stream["responses"])
         yield opened
+        yield notice
+        asked = self.newest = queue.Queue()
+        threading.Thread(target=self.hand_over, args=(requests, asked), daemon=True).start()
         wanted = {u.name: meaning_of_handle(u.set) for u in message(service_pb2.Update, stream["update"]).handles}
         have = {}
-        for request in requests:
+        for request in iter(asked.get, None):
+            if isinstance(request, service_pb2.UndoUpdateRequest):
+                undone = message(service_pb2.DeformResponse, self.undo["result"])
+                undone.event.frame.header.input_seq = request.input_seq
+                yield undone
+                continue
             if request.WhichOneof("message") != "update":
                 continue
             update = request.update
-            faults = [u.name for u in update.handles if u.WhichOneof("change") == "move"]
-            if faults:
-                yield self.fault(int(faults[0]), update.input_seq)
+            self.newest_input = update.input_seq
+            moved = [u for u in update.handles if u.WhichOneof("change") == "move"]
+            if moved and moved[0].name == "tip":
+                self.check_move(moved[0].move, context)
+                yield service_pb2.DeformResponse(result=service_pb2.UpdateResult(input_seq=update.input_seq))
+                continue
+            if moved:
+                yield self.fault(int(moved[0].name), update.input_seq)
                 continue
             have.update({u.name: meaning_of_handle(u.set) for u in update.handles})
             yield service_pb2.DeformResponse(result=service_pb2.UpdateResult(input_seq=update.input_seq))
@@ -133,6 +153,50 @@ class Service:
             elif any(have[name] != wanted.get(name) for name in have):
                 self.differs(context, f"another update is sent: {have}, not {wanted}")
 
+    @staticmethod
+    def hand_over(requests, asked):
+        try:
+            for request in requests:
+                asked.put(request)
+        except Exception:  # the call was cancelled
+            pass
+        asked.put(None)
+
+    def check_move(self, motion, context):
+        at = motion.rigid.translation
+        if (at.x, at.y, at.z) != (0, 0, 1):
+            self.differs(context, f"the tip is moved elsewhere: {motion}")
+
+    def update_handles(self, request, context):
+        self.newest_input = request.update.input_seq
+        for change in request.update.handles:
+            self.check_move(change.move, context)
+        return service_pb2.UpdateHandlesResponse(result=service_pb2.UpdateResult(input_seq=request.update.input_seq))
+
+    def undo_update(self, request, context):
+        token = message(service_pb2.CreateSessionResponse, self.streams[0]["create_response"]).writer_token
+        if (request.redo, request.writer_token, request.input_seq) != (False, token, self.newest_input + 1):
+            self.differs(context, f"another step is undone: {request}, after update {self.newest_input}")
+        self.newest.put(request)
+        response = message(service_pb2.UndoUpdateResponse, self.undo["response"])
+        response.result.input_seq = request.input_seq
+        return response
+
+    def snapshot_session(self, request, context):
+        if request.session != message(service_pb2.CreateSessionResponse, self.streams[0]["create_response"]).session.name:
+            self.differs(context, f"another session is asked for: {request}")
+        file = base64.b64decode(self.snapshot["file"])
+        for offset in itertools.count(0, 1000):
+            if offset >= len(file):
+                return
+            part = file[offset : offset + 1000]
+            yield service_pb2.SnapshotSessionResponse(size_bytes=len(file), offset=offset, data=part)
+
+    def restore_session(self, request, context):
+        if request.snapshot.inline != base64.b64decode(self.snapshot["file"]):
+            self.differs(context, "another snapshot comes back")
+        return message(service_pb2.RestoreSessionResponse, self.snapshot["restore_response"])
+
     def fault(self, number, input_seq):
         fault = message(service_pb2.Fault, self.errors[number]["fault"])
         fault.input_seq = input_seq
@@ -140,11 +204,19 @@ class Service:
 
     def handlers(self):
         service, calls = service_pb2.DESCRIPTOR.services_by_name["DeformService"], {}
-        plain = {"CreateSession": self.create_session, "DeleteSession": lambda *_: service_pb2.DeleteSessionResponse()}
+        plain = {
+            "CreateSession": self.create_session,
+            "DeleteSession": lambda *_: service_pb2.DeleteSessionResponse(),
+            "UpdateHandles": self.update_handles,
+            "UndoUpdate": self.undo_update,
+            "RestoreSession": self.restore_session,
+        }
         for method in service.methods:
             kind = getattr(service_pb2, method.input_type.name)
             if method.name in plain:
                 make, act = grpc.unary_unary_rpc_method_handler, plain[method.name]
+            elif method.name == "SnapshotSession":
+                make, act = grpc.unary_stream_rpc_method_handler, self.snapshot_session
             elif method.name == "Deform":
                 make, act = grpc.stream_stream_rpc_method_handler, self.deform
             else:
@@ -155,11 +227,11 @@ class Service:
 
 def main():
     arguments = sys.argv[1:]
-    without = None
-    if arguments[0] == "--without":
-        without, arguments = arguments[1], arguments[2:]
+    without = ()
+    while arguments[0] == "--without":
+        without, arguments = (*without, arguments[1]), arguments[2:]
     recorded = Service()
-    server = grpc.server(ThreadPoolExecutor(16))
+    server = grpc.server(ThreadPoolExecutor(16))  # streams that are open at once, and a call
     server.add_generic_rpc_handlers((recorded.handlers(),))
     with tempfile.TemporaryDirectory() as folder:
         address = f"unix:{folder}/socket"
@@ -169,7 +241,7 @@ def main():
         server.stop(None)
     said = done.stdout.decode().splitlines()
     expected = (HERE / "expected.txt").read_text().splitlines()
-    expected = [line for line in expected if without is None or not line.startswith(without)]
+    expected = [line for line in expected if not line.startswith(without)]
     different = [(a, b) for a, b in zip(expected, said) if a != b]
     for wanted, line in different[:5]:
         print(f"expected {wanted}\nand not  {line}")

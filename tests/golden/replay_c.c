@@ -79,17 +79,14 @@ static void tell_error(const char* where) {
          error.message);
 }
 
-static void tell_frame(lpdeform_client* client, const char* name, lpdeform_encoding encoding,
-                       uint32_t double_precision) {
+static void tell_result(const char* name, lpdeform_session* session) {
   float positions[VERTICES][3], normals[VERTICES][3], distortion[VERTICES];
-  lpdeform_session* const session = open_strip(client, encoding, double_precision);
   lpdeform_buffers into = {sizeof into};
   lpdeform_frame frame = {sizeof frame};
   uint64_t energy;
   into.positions = (lpdeform_target){positions, sizeof positions, 0, 0, LPDEFORM_FLOAT32, 0};
   into.normals = (lpdeform_target){normals, sizeof normals, 0, 0, LPDEFORM_FLOAT32, 0};
   into.distortion = (lpdeform_target){distortion, sizeof distortion, 0, 0, LPDEFORM_FLOAT32, 0};
-  hold(session);
   check(lpdeform_settle(session, patience_seconds, &into, &frame, &error));
   memcpy(&energy, &frame.energy, sizeof energy);
   printf("%s: result %u, %s, iteration %u, energy %016" PRIx64 "\n", name, (unsigned)frame.converged,
@@ -98,6 +95,25 @@ static void tell_frame(lpdeform_client* client, const char* name, lpdeform_encod
   tell(name, "positions", &positions[0][0], 3 * VERTICES);
   tell(name, "distortion", distortion, VERTICES);
   tell(name, "normals", &normals[0][0], 3 * VERTICES);
+}
+
+static void tell_frame(lpdeform_client* client, const char* name, lpdeform_encoding encoding,
+                       uint32_t double_precision) {
+  lpdeform_session* const session = open_strip(client, encoding, double_precision);
+  hold(session);
+  tell_result(name, session);
+  lpdeform_close(session);
+}
+
+static void tell_undo(lpdeform_client* client) {
+  const lpdeform_motion elsewhere = {LPDEFORM_RIGID, 0, {0}, {0}, {0, 0, 1}, NULL};
+  const lpdeform_buffers none = {.struct_size = sizeof none};
+  lpdeform_session* const session = open_strip(client, LPDEFORM_ENCODING_RAW, 0);
+  hold(session);
+  check(lpdeform_settle(session, patience_seconds, &none, NULL, &error));
+  check(lpdeform_move_handle(session, "tip", &elsewhere, NULL, &error));
+  check(lpdeform_undo(session, NULL, &error));
+  tell_result("undo", session);
   lpdeform_close(session);
 }
 
@@ -135,6 +151,7 @@ int main(int argc, char** argv) {
   tell_frame(client, "float32", LPDEFORM_ENCODING_RAW, 0);
   tell_frame(client, "quantized", LPDEFORM_ENCODING_QUANTIZED, 0);
   tell_frame(client, "compressed", LPDEFORM_ENCODING_COMPRESSED, 0);
+  tell_undo(client);
   for (int k = 0; k < errors; ++k) tell_call(client, (uint32_t)k);
   session = open_strip(client, LPDEFORM_ENCODING_RAW, 0);
   for (int k = 0; k < errors; ++k) {

@@ -36,7 +36,17 @@ void tell(const char* where, const absl::Status& status) {
               fault.element.c_str(), fault.limit.c_str(), std::string(status.message()).c_str());
 }
 
-void tell_frame(Client& client, const char* name, Encoding encoding, bool double_precision) {
+void tell_frame(const char* name, const Frame& frame) {
+  std::printf("%s: result %d, %s, iteration %u, energy %016lx\n", name, frame.converged,
+              stop_reason_name(frame.stop_reason).c_str(), frame.iteration,
+              std::bit_cast<std::uint64_t>(frame.energy));
+  tell(name, "positions", frame.positions);
+  tell(name, "distortion", frame.distortion);
+  tell(name, "normals", frame.normals);
+}
+
+/// With both handles.
+Session open(Client& client, Encoding encoding, bool double_precision) {
   OpenOptions options;
   options.encoding = encoding;
   options.double_precision = double_precision;
@@ -46,13 +56,23 @@ void tell_frame(Client& client, const char* name, Encoding encoding, bool double
   update.handles["base"] = Handle{.vertices = {0, 1}};
   update.handles["tip"] = Handle{.vertices = {20, 21}, .motion = RigidMotion{.translation = {-4, 0, 3}}};
   session.update(update).value();
-  const Frame frame = session.settle(kPatience).value();
-  std::printf("%s: result %d, %s, iteration %u, energy %016lx\n", name, frame.converged,
-              stop_reason_name(frame.stop_reason).c_str(), frame.iteration,
-              std::bit_cast<std::uint64_t>(frame.energy));
-  tell(name, "positions", frame.positions);
-  tell(name, "distortion", frame.distortion);
-  tell(name, "normals", frame.normals);
+  return session;
+}
+
+void tell_frame(Client& client, const char* name, Encoding encoding, bool double_precision) {
+  Session session = open(client, encoding, double_precision);
+  tell_frame(name, session.settle(kPatience).value());
+}
+
+void tell_calls(Client& client) {
+  Session session = open(client, Encoding::kRaw, false);
+  session.settle(kPatience).value();
+  session.move("tip", RigidMotion{.translation = {0, 0, 1}}).value();
+  session.undo().value();
+  tell_frame("undo", session.settle(kPatience).value());
+  const std::string file = client.snapshot(session.name()).value();
+  std::printf("snapshot: %zu bytes\n", file.size());
+  std::printf("restored: %s\n", client.restore(file).value().c_str());
 }
 
 }  // namespace
@@ -65,6 +85,7 @@ int main(int argc, char** argv) {
   tell_frame(client, "float32", Encoding::kRaw, false);
   tell_frame(client, "quantized", Encoding::kQuantized, false);
   tell_frame(client, "compressed", Encoding::kCompressed, false);
+  tell_calls(client);
   for (int k = 0; k < errors; ++k) {
     Mesh mesh{.vertices = std::vector<double>(3 * (1000 + k)), .faces = {0, 1, 2}};
     tell("call", client.open(std::move(mesh)).status());

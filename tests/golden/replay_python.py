@@ -23,26 +23,41 @@ def tell_error(where, error):
     print(f"{where} {numbers[error.code]} {error.reason} | {error.element} | {error.limit} | {error.args[0]}")
 
 
-def tell_frame(address, encoding):
-    with lpdeform.open(strip, faces, address=address, encoding=encoding, with_normals=True) as session:
-        session.set_handles(
-            {
-                "base": lpdeform.Handle([0, 1]),
-                "tip": lpdeform.Handle([20, 21], lpdeform.RigidMotion(translation=(-4, 0, 3))),
-            }
-        )
-        frame = session.settle(30)
-        energy = struct.pack(">d", frame.energy).hex()
-        print(f"{encoding}: result {frame.converged:d}, {frame.stop_reason}, iteration {frame.iteration}, energy {energy}")
-        tell(encoding, "positions", frame.positions)
-        tell(encoding, "distortion", frame.distortion)
-        tell(encoding, "normals", frame.normals)
+def open_strip(address, encoding):
+    """With both handles."""
+    handles = {
+        "base": lpdeform.Handle([0, 1]),
+        "tip": lpdeform.Handle([20, 21], lpdeform.RigidMotion(translation=(-4, 0, 3))),
+    }
+    return lpdeform.open(strip, faces, address=address, encoding=encoding, with_normals=True, handles=handles)
+
+
+def tell_frame(name, frame):
+    energy = struct.pack(">d", frame.energy).hex()
+    print(f"{name}: result {frame.converged:d}, {frame.stop_reason}, iteration {frame.iteration}, energy {energy}")
+    tell(name, "positions", frame.positions)
+    tell(name, "distortion", frame.distortion)
+    tell(name, "normals", frame.normals)
+
+
+def tell_calls(address):
+    with open_strip(address, "float32") as session:
+        session.settle(30)
+        session.drag("tip", translation=[0, 0, 1])
+        session.undo()
+        tell_frame("undo", session.settle(30))
+        file = session.snapshot()
+        print(f"snapshot: {len(file)} bytes")
+    with lpdeform.restore(file, address=address) as restored:
+        print(f"restored: {restored.name}")
 
 
 def main(address, errors):
     sys.stdout.reconfigure(encoding="utf-8")
     for encoding in ("float64", "float32", "quantized", "compressed"):
-        tell_frame(address, encoding)
+        with open_strip(address, encoding) as session:
+            tell_frame(encoding, session.settle(30))
+    tell_calls(address)
     for k in range(errors):
         try:
             lpdeform.open(np.zeros((1000 + k, 3)), [[0, 1, 2]], address=address)
