@@ -4,7 +4,7 @@ using System.Globalization;
 using System.Threading;
 using Lpdeform;
 
-static class QuickStart
+static class Game
 {
     static readonly float[] positions = new float[66];
     static readonly int[] indices = new int[60], feet = { 0, 1 }, head = { 20, 21 };
