@@ -1,6 +1,7 @@
 // Solve calls of the running service.
 
 #include <algorithm>
+#include <array>
 #include <thread>
 
 #include "service_fixture.h"
@@ -151,6 +152,43 @@ TEST_F(SolveByManualTimeTest, SaysThatItIsThereWhereverItHasNothingElseToSay) {
   ASSERT_TRUE(update(session, tip_message(2, 1)).ok());  // ends it
   EXPECT_FALSE(stream->Read(&response)) << response.ShortDebugString();
   EXPECT_EQ(details_of(stream->Finish()).info.reason(), "SUPERSEDED");
+}
+
+/// Two threads for all sessions.
+class CrowdedSolveTest : public SolveByManualTimeTest {
+ protected:
+  void SetUp() override {
+    options_.runner_threads = 2;
+    options_.session_idle = std::chrono::hours(24 * 365);
+    SolveByManualTimeTest::SetUp();
+  }
+};
+
+TEST_F(CrowdedSolveTest, SaysThatItIsThereWhileItWaitsForAThreadAndIsSetUp) {
+  const TriangleMesh large = box_surface(20, 20, 80);
+  std::vector<v1::SolveRequest> requests;
+  for (int k = 0; k < 3; ++k) {
+    requests.push_back(solve_request(create(large)));
+    *requests.back().mutable_update() = ends_message(large.vertices, 1, 8);
+    requests.back().set_progress(
+        true);  // comes with the first iteration: what comes before it comes before the solver
+  }
+  const std::jthread clock([this](const std::stop_token& stop) {
+    for (; !stop.stop_requested(); std::this_thread::sleep_for(std::chrono::milliseconds(1)))
+      timers_->advance(options_.heartbeat);
+  });
+  std::array<grpc::ClientContext, 3> contexts;
+  std::vector<std::unique_ptr<grpc::ClientReader<v1::SolveResponse>>> streams;
+  for (std::size_t k = 0; k < contexts.size(); ++k) {
+    contexts[k].set_deadline(std::chrono::system_clock::now() + kTestDeadline);
+    streams.push_back(stub_->Solve(&contexts[k], requests[k]));
+  }
+  for (const auto& stream : streams) {
+    v1::SolveResponse response;
+    ASSERT_TRUE(stream->Read(&response)) << stream->Finish().error_message();
+    EXPECT_TRUE(response.has_heartbeat()) << response.ShortDebugString();
+  }
+  for (grpc::ClientContext& context : contexts) context.TryCancel();
 }
 
 TEST_F(SolveCallTest, CancellingLetsTheSessionGoOnWithOtherThings) {
