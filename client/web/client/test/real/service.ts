@@ -1,5 +1,5 @@
 import { type ChildProcess, execFileSync, spawn } from "node:child_process";
-import { existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { createInterface } from "node:readline";
@@ -10,6 +10,12 @@ export const root = (function above(folder: string): string {
 })(import.meta.dirname);
 const serverProgram = process.env["LPDEFORM_SERVER"] ?? join(root, "build/release/bin/lpdeform-server");
 export const envoyProgram = join(root, "build/web-tools/bin/envoy");
+
+/** What a process has computed so far, on all cores together. */
+export function cpuSecondsOf(pid: number): number {
+  const fields = readFileSync(`/proc/${pid}/stat`, "utf8").split(") ")[1]!.split(" ");
+  return (Number(fields[11]) + Number(fields[12])) / 100; // user and system, in the kernel's hundredths of a second
+}
 
 /** A server and an Envoy before it, as deploy/up runs them, on free ports. */
 export class Service {
@@ -25,7 +31,7 @@ export class Service {
   /** Envoy's own page. */
   admin = "";
 
-  /** `files`: what Envoy serves beside; `serverFlags`: of lpdeform-server. */
+  /** `files`: what Envoy serves beside; `serverFlags`: of lpdeform-server; `loggedBefore`: what the access log begins with. */
   static async start({
     files = "",
     serverFlags = [] as string[],
@@ -33,8 +39,10 @@ export class Service {
     idleSeconds = 60,
     maxRequests = 4096,
     accessLogBytes = 1 << 26,
+    loggedBefore = "",
   } = {}): Promise<Service> {
     const service = new Service();
+    if (loggedBefore) writeFileSync(service.accessLog, loggedBefore);
     await service.startServer(serverFlags);
     service.#envoyFlags = [
       "--web",
@@ -94,10 +102,7 @@ export class Service {
 
   /** What it has computed so far, on all cores together. */
   cpuSeconds(part: "server" | "envoy"): number {
-    const fields = readFileSync(`/proc/${this.#pidOf(part)}/stat`, "utf8")
-      .split(") ")[1]!
-      .split(" ");
-    return (Number(fields[11]) + Number(fields[12])) / 100; // user and system, in the kernel's hundredths of a second
+    return cpuSecondsOf(this.#pidOf(part));
   }
 
   #pidOf(part: "server" | "envoy"): number {

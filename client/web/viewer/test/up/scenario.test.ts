@@ -1,26 +1,25 @@
-import { join } from "node:path";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import { resultIn } from "../../../client/test/real/grpc_web.js";
-import { Service } from "../../../client/test/real/service.js";
 import { readMesh } from "../../src/io/read.js";
 import { writeOff } from "../../src/io/off.js";
 import { blockSurface } from "../../src/model/block.js";
 import type { Mesh, Vector3 } from "../../src/model/mesh.js";
 import { apply, type Pose } from "../../src/model/pose.js";
-import { User } from "./user.js";
+import { User } from "../real/user.js";
+import { Up } from "./up.js";
 
-let service: Service;
+let up: Up;
 let user: User;
 
 beforeAll(async () => {
-  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
-  user = await User.open(service.url);
+  up = await Up.start();
+  user = await User.open(up.url);
   await user.settled();
 });
 
 afterAll(async () => {
-  await user.close();
-  await service.stop();
+  await user?.close();
+  await up?.stop();
 });
 
 /** 3 x 3 x 12 cells. */
@@ -105,12 +104,12 @@ describe("somebody with a mesh of their own", () => {
     await mouse.move(from.x + 60, from.y + 20);
     await user.until("window.__lpdeform.app.red > 0");
 
-    await service.killServer();
+    await up.killServer();
     await user.until('window.__lpdeform.status() === "away"');
     await mouse.move(from.x + 80, from.y + 30); // the user goes on
     await user.page.locator(".banner", { hasText: "The server is away" }).waitFor();
     expect(await user.page.locator(".banner").textContent()).toContain("Your work is kept here");
-    await service.startServer();
+    await up.startServer();
     await user.until('window.__lpdeform.status() === "live"');
     await mouse.move(from.x + 110, from.y + 40);
     await mouse.up();
@@ -209,7 +208,7 @@ describe("somebody with a mesh of their own", () => {
     await user.openFiles(towerFile, { name: "tower-handles.json", content: handles });
     await user.until("window.__lpdeform.app.mesh.name === 'tower.off' && window.__lpdeform.document().handles.length === 2");
     await user.settled();
-    await service.killServer();
+    await up.killServer();
     await user.until('window.__lpdeform.status() === "away"');
     const shown = await user.positions();
     const file = await user.save("Mesh as OFF");
@@ -217,7 +216,7 @@ describe("somebody with a mesh of their own", () => {
     await user.page
       .locator(".notice.bad", { hasText: "What is shown was written as it is, rounded for the screen." })
       .waitFor();
-    await service.startServer();
+    await up.startServer();
     await user.until('window.__lpdeform.status() === "live"');
     await user.settled();
   });
