@@ -82,6 +82,7 @@ export function serverSilent(): LpdeformError {
 export function fromCall(thrown: unknown): LpdeformError {
   if (thrown instanceof LpdeformError) return thrown;
   const error = ConnectError.from(thrown);
+  if (error.cause instanceof LpdeformError) return error.cause;
   const details: ErrorDetails = {};
   for (const detail of error.details) {
     if (!("type" in detail)) continue;

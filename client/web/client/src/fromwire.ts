@@ -1,6 +1,13 @@
-import { type Buffer, Scalar, type Vector3 } from "./gen/lpdeform/v1/data_pb.js";
+import { LpdeformError } from "./errors.js";
+import { type Buffer, Scalar, type Vector3 as WireVector } from "./gen/lpdeform/v1/data_pb.js";
 import { StopReason } from "./gen/lpdeform/v1/frame_pb.js";
-import { type Handle, type HandleUpdate, Method, type Motion } from "./gen/lpdeform/v1/handle_pb.js";
+import {
+  type Handle as WireHandle,
+  type HandleUpdate as WireHandleUpdate,
+  Method,
+  type Motion as WireMotion,
+  type SurfacePoints,
+} from "./gen/lpdeform/v1/handle_pb.js";
 import type { MeshReport as WireMeshReport } from "./gen/lpdeform/v1/report_pb.js";
 import type * as api from "./types.js";
 
@@ -38,66 +45,78 @@ export function reportFromWire(report: WireMeshReport): api.MeshReport {
 }
 
 /** Changes of handles that the server made. */
-export function changesFromWire(changes: readonly HandleUpdate[]): Record<string, api.HandleChange> {
+export function changesFromWire(changes: readonly WireHandleUpdate[]): api.Update {
   // Without a prototype, so that a handle may have any name.
-  const out: Record<string, api.HandleChange> = Object.create(null);
+  const handles: Record<string, api.HandleChange> = Object.create(null);
   for (const { name, change } of changes) {
-    if (change.case === "set") out[name] = { set: handleFromWire(change.value) };
-    else if (change.case === "move") out[name] = { move: motionFromWire(change.value) };
-    else out[name] = { remove: true };
+    if (change.case === "set") handles[name] = { set: handleFromWire(change.value) };
+    else if (change.case === "move") handles[name] = { move: motionFromWire(change.value) };
+    else handles[name] = { remove: true };
   }
-  return out;
+  return { handles };
 }
 
-function handleFromWire(handle: Handle): api.Handle {
-  const motion = handle.motion ? motionFromWire(handle.motion) : "fixed";
-  const common = { motion, hold: holdFromWire(handle), footprint: handle.footprintRadius };
-  if (!handle.points) return { ...common, vertices: new Uint32Array(bytesOf(handle.vertices)) };
-  const faces = new Uint32Array(bytesOf(handle.points.faces));
-  const [...barycentric] = numbersOf(handle.points.barycentric, handle.points.scalar);
-  const points = [...faces].map((face, k) => {
-    const [a = 0, b = 0, c = 0] = barycentric.slice(3 * k, 3 * k + 3);
-    return { face, barycentric: [a, b, c] as const };
-  });
-  return { ...common, points };
+function handleFromWire({ vertices, points, motion, hold, footprintRadius }: WireHandle): api.Handle {
+  return {
+    ...(vertices && { vertices: indicesOf(vertices) }),
+    ...(points && { points: pointsFromWire(points) }),
+    ...(motion && { motion: motionFromWire(motion) }),
+    hold: holdFromWire(hold),
+    footprint: footprintRadius,
+  };
 }
 
-function holdFromWire({ hold }: Handle): api.Hold {
+function holdFromWire(hold: WireHandle["hold"]): api.Hold {
   switch (hold.case) {
     case "soft":
     case "orientation":
       return { kind: hold.case, ...(hold.value.weight !== undefined && { weight: hold.value.weight }) };
     case "axisLock":
-      return { kind: "axisLock", axis: vectorFromWire(hold.value.axis) };
+      return { kind: "axisLock", axis: vectorOf(hold.value.axis) };
     case "planeLock":
-      return { kind: "planeLock", normal: vectorFromWire(hold.value.normal) };
+      return { kind: "planeLock", normal: vectorOf(hold.value.normal) };
     default:
       return { kind: "exact" };
   }
 }
 
-function motionFromWire({ kind }: Motion): api.Motion {
+function motionFromWire({ kind }: WireMotion): api.Motion {
+  if (kind.case === "rigid") {
+    const { axis, angleRadians, center, translation } = kind.value;
+    return {
+      axis: vectorOf(axis),
+      angle: angleRadians,
+      center: vectorOf(center),
+      translation: vectorOf(translation),
+    };
+  }
   if (kind.case === "targets") return { targets: numbersOf(kind.value.positions, kind.value.scalar) };
-  if (kind.case !== "rigid") return "fixed";
-  const { axis, angleRadians, center, translation } = kind.value;
-  return {
-    axis: vectorFromWire(axis, [0, 0, 1]),
-    angle: angleRadians,
-    center: vectorFromWire(center),
-    translation: vectorFromWire(translation),
-  };
+  return "fixed";
 }
 
-function vectorFromWire(vector: Vector3 | undefined, otherwise: api.Vector3 = [0, 0, 0]): api.Vector3 {
-  return vector ? [vector.x, vector.y, vector.z] : otherwise;
+function pointsFromWire({ faces, scalar, barycentric }: SurfacePoints): api.SurfacePoint[] {
+  const numbers = numbersOf(barycentric, scalar);
+  return Array.from(indicesOf(faces), (face, k) => ({
+    face,
+    barycentric: [numbers[3 * k]!, numbers[3 * k + 1]!, numbers[3 * k + 2]!],
+  }));
 }
 
-/** A copy, which begins where numbers of any size may. */
-function bytesOf(buffer: Buffer | undefined): ArrayBuffer {
+function vectorOf(vector: WireVector | undefined): api.Vector3 {
+  return [vector?.x ?? 0, vector?.y ?? 0, vector?.z ?? 0];
+}
+
+/** Of their own: messages are views of what came. */
+function bytesOf(buffer: Buffer | undefined, width: number): ArrayBuffer {
   const bytes = buffer?.source.case === "inline" ? buffer.source.value : new Uint8Array();
-  return bytes.slice().buffer as ArrayBuffer;
+  if (bytes.byteLength % width === 0) return bytes.slice().buffer as ArrayBuffer;
+  throw new LpdeformError("internal", `The server sent ${bytes.byteLength} bytes for numbers of ${width} each.`);
+}
+
+function indicesOf(buffer: Buffer | undefined): Uint32Array {
+  return new Uint32Array(bytesOf(buffer, 4));
 }
 
 function numbersOf(buffer: Buffer | undefined, scalar: Scalar): Float32Array | Float64Array {
-  return scalar === Scalar.FLOAT64 ? new Float64Array(bytesOf(buffer)) : new Float32Array(bytesOf(buffer));
+  return scalar === Scalar.FLOAT32 ? new Float32Array(bytesOf(buffer, 4)) : new Float64Array(bytesOf(buffer, 8));
 }

@@ -86,9 +86,15 @@ export class Lane {
     if (!this.#isAcking) void this.#sendAcks();
   }
 
-  opened(opened: StreamOpened): void {
-    this.streamId = opened.streamId;
+  /** There is no stream, until another one is open. */
+  beginsAnew(): void {
+    this.streamId = "";
     this.#ackDue = 0;
+  }
+
+  opened(opened: StreamOpened): void {
+    this.beginsAnew();
+    this.streamId = opened.streamId;
     this.sink.opened(opened);
   }
 
@@ -195,7 +201,7 @@ class SharedStream {
     const call = new AbortController();
     this.#call = call;
     const lanes = [...this.lanes];
-    for (const lane of lanes) lane.streamId = "";
+    for (const lane of lanes) lane.beginsAnew();
     const request: MessageInitShape<typeof StreamSessionsRequestSchema> = {
       streams: lanes.map(({ session, options }) => ({ session, options })),
     };
@@ -223,10 +229,10 @@ class SharedStream {
     switch (event.case) {
       case "opened":
         if (event.value.heartbeatIntervalMs > 0) this.rpc.longestSilenceMs = 3 * event.value.heartbeatIntervalMs;
-        lane.opened(event.value);
+        this.#fit(lane, () => lane.opened(event.value));
         break;
       case "frame":
-        this.#part(lane, event.value);
+        this.#fit(lane, () => lane.sink.part(event.value));
         break;
       case "fault":
         if (lane.streamId) lane.sink.fault(event.value);
@@ -241,9 +247,9 @@ class SharedStream {
   }
 
   /** What does not fit ends its session's lane; the others' frames go on. */
-  #part(lane: Lane, part: FramePart): void {
+  #fit(lane: Lane, take: () => void): void {
     try {
-      lane.sink.part(part);
+      take();
     } catch (misfit) {
       this.lanes.delete(lane);
       if (this.lanes.size === 0) this.#end();

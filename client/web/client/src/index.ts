@@ -1,3 +1,9 @@
 export { type ErrorCode, type ErrorDetails, LpdeformError } from "./errors.js";
-export { joinSessionByName as joinSession, openSession, Session, type SessionEvents } from "./session.js";
+export {
+  joinSessionByName as joinSession,
+  openSession,
+  restoreSession,
+  Session,
+  type SessionEvents,
+} from "./session.js";
 export type * from "./types.js";

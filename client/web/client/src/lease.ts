@@ -1,5 +1,6 @@
 import { LpdeformError } from "./errors.js";
 import { reportFromWire } from "./fromwire.js";
+import type { Session as WireSession } from "./gen/lpdeform/v1/service_pb.js";
 import { Packer } from "./packer.js";
 import type { Rpc } from "./rpc.js";
 import { freeComponents, meshToWire, settingsToWire, weights, weldToWire } from "./towire.js";
@@ -40,18 +41,34 @@ export async function createSession(
   try {
     const { session, writerToken } = await rpc.call("createSession", request, signal);
     uploads.discard();
-    if (!session?.mesh) throw new LpdeformError("internal", "The server made a session and did not say which.");
-    return {
-      session: session.name,
-      writerToken,
-      epoch: Number(session.epoch),
-      inputSeq: Number(session.inputSeq),
-      report: reportFromWire(session.mesh),
-    };
+    const lease = leaseOf(session, writerToken);
+    checkVertexCount(lease.report.vertices, mesh.vertices.length / 3);
+    return lease;
   } catch (error) {
     if (!isUndecided(error as LpdeformError)) uploads.discard();
     throw error;
   }
+}
+
+/** What a server says that made a session. */
+export function leaseOf(session: WireSession | undefined, writerToken: string): Lease {
+  if (!session?.mesh) throw new LpdeformError("internal", "The server made a session and did not say which.");
+  return {
+    session: session.name,
+    writerToken,
+    epoch: Number(session.epoch),
+    inputSeq: Number(session.inputSeq),
+    report: reportFromWire(session.mesh),
+  };
+}
+
+/** Throws where a server speaks of `count` vertices of a mesh that has `wanted`: arrays are made for those. */
+export function checkVertexCount(count: number, wanted: number): void {
+  if (count === wanted) return;
+  throw new LpdeformError("data_loss", `The server speaks of ${count} vertices of a mesh that has ${wanted}.`, {
+    reason: "FRAME_VERTICES",
+    limit: `vertices = ${wanted}`,
+  });
 }
 
 /** Joins a session by name. */

@@ -34,8 +34,8 @@ export function merged(older: Update, newer: Update): Update {
 /** What is there once motions and removals have been carried out. */
 function settled(state: Update): Update {
   const kept = Object.entries(state.handles ?? {}).filter(([, change]) => "set" in change);
-  const { beginsStep: _, ...rest } = state;
-  return { ...rest, handles: Object.assign(Object.create(null), Object.fromEntries(kept)) };
+  const { beginsStep: _, ...lasting } = state;
+  return { ...lasting, handles: Object.assign(Object.create(null), Object.fromEntries(kept)) };
 }
 
 const mostRemembered = 16384;
@@ -48,7 +48,10 @@ function withoutOldRemovals(update: Update): Update {
 function isMovesOnly({ update }: NumberedUpdate): boolean {
   const changes = Object.values(update.handles ?? {});
   return (
-    !update.resize && Object.keys(update.settings ?? {}).length === 0 && changes.every((change) => "move" in change)
+    !update.resize &&
+    !update.beginsStep &&
+    Object.keys(update.settings ?? {}).length === 0 &&
+    changes.every((change) => "move" in change)
   );
 }
 
@@ -69,6 +72,9 @@ export class Ledger {
   /** Updates that were answered, and whether they were kept. */
   readonly #answered = new Map<NumberedUpdate, boolean>();
   #waiting: NumberedUpdate | undefined;
+
+  /** `beginsBare`: a session made anew has no handles but those of this book, else also those that it is made with. */
+  constructor(readonly beginsBare = true) {}
 
   /** Takes an update on; returns its number. */
   add(update: Update): number {
@@ -108,13 +114,6 @@ export class Ledger {
     return sent;
   }
 
-  /** A change that the server makes by itself, now on its way: to be accepted, with what it was, or refused. */
-  beginChange(): NumberedUpdate {
-    const change: NumberedUpdate = { seq: this.#nextSeq++, update: {} };
-    this.#inFlight.push(change);
-    return change;
-  }
-
   /**
    * Whether it waits for an answer yet. After connectionLost() it does not: what it held is sent again, perhaps with more, and an
    * answer that comes late says nothing of that.
@@ -135,18 +134,34 @@ export class Ledger {
   #takeAnswered(): void {
     for (let sent = this.#inFlight[0]; sent && this.#answered.has(sent); sent = this.#inFlight[0]) {
       this.#inFlight.shift();
-      if (!this.#answered.get(sent)) {
-        const update = withoutOldRemovals(merged(this.#unkept.update, sent.update));
-        this.#unkept = { seq: Math.max(this.#unkept.seq, sent.seq), update };
-      } else if (sent.seq >= this.#unkept.seq) {
-        this.#unkept = { seq: 0, update: {} };
-      }
+      const isKept = this.#answered.get(sent)!;
       this.#answered.delete(sent);
-      this.#accepted = {
-        seq: Math.max(this.#accepted.seq, sent.seq),
-        update: settled(merged(this.#accepted.update, sent.update)),
-      };
+      this.#takeOn(sent, isKept);
     }
+  }
+
+  #takeOn({ seq, update }: NumberedUpdate, isKept: boolean): void {
+    if (!isKept) {
+      const unkept = withoutOldRemovals(merged(this.#unkept.update, update));
+      this.#unkept = { seq: Math.max(this.#unkept.seq, seq), update: unkept };
+    } else if (seq >= this.#unkept.seq) {
+      this.#unkept = { seq: 0, update: {} };
+    }
+    const accepted = merged(this.#accepted.update, update);
+    this.#accepted = {
+      seq: Math.max(this.#accepted.seq, seq),
+      update: this.beginsBare ? settled(accepted) : withoutOldRemovals(accepted),
+    };
+  }
+
+  /** A number for a change that the server makes by itself. */
+  takeNumber(): number {
+    return this.#nextSeq++;
+  }
+
+  /** The change of that number. */
+  acceptChange(change: NumberedUpdate, isKept: boolean): void {
+    this.#takeOn(change, isKept);
   }
 
   /** The server has refused what sendNext() gave. */
@@ -198,10 +213,6 @@ export class Ledger {
     if (this.#nextSeq > seq) return;
     this.#nextSeq = seq + 1;
     if (this.#waiting) this.#waiting = { ...this.#waiting, seq: this.#nextSeq++ };
-  }
-
-  get newestAccepted(): number {
-    return this.#accepted.seq;
   }
 
   /** The newest update that was not refused; 0 where there is none. */

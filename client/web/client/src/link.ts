@@ -3,20 +3,22 @@ import { FrameBox } from "./box.js";
 import { fromFault, LpdeformError } from "./errors.js";
 import type { GoAway } from "./gen/lpdeform/v1/service_pb.js";
 import type { Lane, WireFrameOptions } from "./hub.js";
-import { createSession, isSessionLost, isTakenAllTheSame, isUndecided, joinSession, type Lease } from "./lease.js";
+import { checkVertexCount, isSessionLost, isTakenAllTheSame, isUndecided, joinSession, type Lease } from "./lease.js";
 import { Ledger, type NumberedUpdate } from "./ledger.js";
 import { Packer } from "./packer.js";
 import { Backoff, recoveryAfter } from "./recovery.js";
 import type { Rpc } from "./rpc.js";
 import { updateToWire } from "./towire.js";
-import type { Connection, Frame, Mesh, OpenOptions, Update } from "./types.js";
+import type { Connection, Frame, Update } from "./types.js";
 import { newRequestId, Uploads } from "./upload.js";
 import { pause } from "./waiting.js";
 
 /** What a session that was lost can be made anew from. */
 export interface Copy {
-  mesh: Mesh;
-  options: OpenOptions;
+  /** The same session for the same request id. */
+  make(requestId: string, signal: AbortSignal): Promise<Lease>;
+  /** Without handles. */
+  isBare: boolean;
 }
 
 /** What did not fit so often never will: it is of another version, or something on the way breaks it. */
@@ -35,20 +37,26 @@ export interface Watcher {
  */
 export class Link {
   readonly box = new FrameBox();
-  readonly ledger = new Ledger();
+  readonly ledger: Ledger;
   readonly stop = new AbortController();
+  /** Its handles were sent in one update, after it was lost. */
+  isMadeAnew = false;
   /** What ended the stream of frames the last time that one did. */
   interruption: LpdeformError | undefined;
   #lease: Lease;
   #lane: Lane | undefined;
   #assembly = new FrameAssembly(0);
   #goAway: GoAway | undefined;
+  /** The stream ended or rests: a server may go on meanwhile from an older state. Updates wait until it says from which. */
+  #mayHaveGoneBack = false;
   #connection: Connection = "idle";
   /** Who waits for frames whether they can be seen or not. */
   #waitingForFrames = 0;
   #isStreaming = false;
   #isSending = false;
-  #solves = 0;
+  /** Calls that no update may overtake. */
+  #holds = 0;
+  #isUndoing = false;
   #requestId = newRequestId();
   #making: Promise<void> | undefined;
   #downSince: number | undefined;
@@ -66,6 +74,7 @@ export class Link {
     readonly watcher: Watcher,
   ) {
     this.#lease = lease;
+    this.ledger = new Ledger(copy?.isBare);
     this.ledger.countFrom(lease.inputSeq);
   }
 
@@ -86,21 +95,23 @@ export class Link {
     return this.stop.signal.aborted;
   }
 
-  update(update: Update): number {
+  /** Throws where the session takes no updates of ours. */
+  checkWriter(): void {
     if (this.isClosed) throw sessionClosed();
     if (this.#over) throw this.#over;
-    this.requireWriter();
+    if (!this.#lease.writerToken) {
+      throw new LpdeformError("failed_precondition", "A reader cannot change the session: takeOver() first.", {
+        reason: "NOT_THE_WRITER",
+      });
+    }
+  }
+
+  update(update: Update): number {
+    this.checkWriter();
     const seq = this.ledger.add(update);
     this.#lane?.wake();
     this.#send();
     return seq;
-  }
-
-  requireWriter(): void {
-    if (this.#lease.writerToken) return;
-    throw new LpdeformError("failed_precondition", "A reader cannot change the session: takeOver() first.", {
-      reason: "NOT_THE_WRITER",
-    });
   }
 
   /** Frames come from now on. */
@@ -155,10 +166,9 @@ export class Link {
     const { session } = this.#lease;
     const lane = this.rpc.hub.subscribe(session, this.frameOptions, {
       opened: (opened) => {
+        checkVertexCount(opened.vertexCount, this.#lease.report.vertices);
         this.#assembly = new FrameAssembly(opened.vertexCount);
-        this.box.beginEpoch(Number(opened.epoch));
-        this.ledger.countFrom(Number(opened.inputSeq));
-        this.ledger.resumedAt(Number(opened.inputSeq));
+        this.#resumed(Number(opened.epoch), Number(opened.inputSeq));
         this.#heardFromServer();
         this.#setConnection("connected");
         this.#send();
@@ -173,9 +183,22 @@ export class Link {
       goAway: (goAway) => (this.#goAway = goAway),
       ended: (error) => void this.#recover(error, session),
       isQuiet: () => !this.ledger.hasWaiting && !this.ledger.hasInFlight && this.#waitingForFrames === 0,
-      resting: () => this.#setConnection("idle"),
+      resting: () => {
+        this.#mayHaveGoneBack = true;
+        this.#setConnection("idle");
+      },
     });
     this.#lane = lane;
+  }
+
+  /** The newest update that the server has is `inputSeq`. In a new epoch that says nothing of those before it. */
+  #resumed(epoch: number, inputSeq: number): void {
+    const isAnotherServer = epoch > this.#lease.epoch;
+    if (isAnotherServer) this.#lease = { ...this.#lease, epoch };
+    this.#mayHaveGoneBack = false;
+    this.box.beginEpoch(epoch);
+    this.ledger.countFrom(inputSeq);
+    this.ledger.resumedAt(isAnotherServer ? 0 : inputSeq);
   }
 
   /** `session`: which the stream was of. */
@@ -183,6 +206,7 @@ export class Link {
     if (this.isClosed) return;
     const recovery = recoveryAfter(ended, this.#goAway, this.copy !== undefined);
     this.interruption = recovery.why;
+    this.#mayHaveGoneBack = true;
     this.#setConnection("reconnecting");
     if (recovery.why.reason === "FRAME_PARTS" && ++this.#misfits >= mostMisfits) return this.#giveUp(recovery.why);
     if (recovery.next === "giveUp" || this.#isTooLate()) return this.#giveUp(recovery.why);
@@ -216,6 +240,7 @@ export class Link {
 
   #giveUp(why: LpdeformError): void {
     this.#over = why;
+    this.#mayHaveGoneBack = false;
     this.ledger.dropUnaccepted();
     this.#isStreaming = false;
     this.#lane?.close();
@@ -239,10 +264,10 @@ export class Link {
   }
 
   async #make(): Promise<void> {
-    const { mesh, options } = this.copy!;
-    this.#lease = await createSession(this.rpc, mesh, options, this.#requestId, this.stop.signal);
+    this.#lease = await this.copy!.make(this.#requestId, this.stop.signal);
     this.#requestId = newRequestId();
     this.ledger.sessionLost();
+    this.isMadeAnew = this.copy!.isBare && this.ledger.hasRestore;
     this.ledger.countFrom(this.#lease.inputSeq);
     this.box.beginSession();
   }
@@ -250,16 +275,18 @@ export class Link {
   // Updates.
 
   #send(): void {
-    while (!this.isClosed && !this.#isSending && this.#solves === 0 && this.ledger.canSend) {
-      void this.#sendOne(this.ledger.sendNext());
-    }
+    while (this.#maySend && this.ledger.canSend) void this.#sendOne(this.ledger.sendNext());
+  }
+
+  get #maySend(): boolean {
+    return !this.isClosed && !this.#isSending && !this.#mayHaveGoneBack && this.#holds === 0;
   }
 
   async #sendOne(update: NumberedUpdate): Promise<void> {
     const lease = this.#lease;
     // What was on its way when the connection or the session was lost is sent again, whatever becomes of the first time.
     try {
-      this.ledger.accept(update, await this.sendUpdate(update, lease, this.stop.signal));
+      this.ledger.accept(update, await this.#sendUpdate(update, lease, this.stop.signal));
       this.#heardFromServer();
     } catch (thrown) {
       if (this.ledger.isInFlight(update)) await this.#unsent(update, thrown as LpdeformError, lease.session);
@@ -269,7 +296,7 @@ export class Link {
   }
 
   /** Whether the update survives the end of the server. */
-  async sendUpdate(update: NumberedUpdate, { session, writerToken }: Lease, signal: AbortSignal): Promise<boolean> {
+  async #sendUpdate(update: NumberedUpdate, { session, writerToken }: Lease, signal: AbortSignal): Promise<boolean> {
     const packer = new Packer();
     const uploads = new Uploads(this.rpc, signal);
     const message = updateToWire(update.update, update.seq, packer);
@@ -287,6 +314,8 @@ export class Link {
     if (isUndecided(error)) {
       this.#isSending = true;
       this.ledger.connectionLost();
+      // Where no stream says what the server has, once more does no harm.
+      if (!this.#isStreaming && error.code !== "resource_exhausted") this.ledger.resumedAt(0);
       try {
         if (this.#isTooLate()) return this.#giveUp(error);
         await pause(Math.max(error.retryAfterMs, this.#backoff.nextMs()), this.stop.signal);
@@ -301,35 +330,86 @@ export class Link {
       }
       return;
     }
+    this.watcher.problem(this.#judged(update, error));
+  }
+
+  /** The server refuses the update, or cannot solve for it yet: what the caller is told. */
+  #judged(update: NumberedUpdate, error: LpdeformError): LpdeformError {
     if (isTakenAllTheSame(error)) this.ledger.accept(update);
     else this.ledger.refuse(update);
-    if (error.reason === "NOT_THE_WRITER") {
-      this.ledger.dropUnaccepted();
-      this.#lease = { ...this.#lease, writerToken: "" };
-      error = new LpdeformError("aborted", "Another writer took the session over.", { reason: "WRITER_REPLACED" });
-    }
-    this.watcher.problem(error);
+    if (error.reason !== "NOT_THE_WRITER") return error;
+    this.ledger.dropUnaccepted();
+    this.#lease = { ...this.#lease, writerToken: "" };
+    return new LpdeformError("aborted", "Another writer took the session over.", { reason: "WRITER_REPLACED" });
   }
 
   /** Waits until no update is on its way, and keeps others from being sent until the result is called. */
   async holdUpdates(signal: AbortSignal): Promise<() => void> {
-    ++this.#solves;
-    signal.addEventListener("abort", this.#wakeQuiet, { once: true });
-    while ((this.ledger.hasInFlight || this.#isSending) && !this.isClosed && !signal.aborted) {
-      await new Promise<void>((resolve) => this.#quiet.add(resolve));
-    }
-    signal.removeEventListener("abort", this.#wakeQuiet);
+    ++this.#holds;
+    await this.#until(() => this.#isQuiet && !this.#isUndoing, signal);
+    return () => this.#letGo();
+  }
+
+  /** As holdUpdates(), and keeps solves from beginning, too; waits for those that there are. Rejects where the signal ends it. */
+  async holdAll(signal: AbortSignal): Promise<() => void> {
+    const isFree = () => this.#holds === 0;
+    while (!isFree() && !signal.aborted) await this.#until(isFree, signal);
+    signal.throwIfAborted();
+    ++this.#holds;
+    this.#isUndoing = true;
+    await this.#until(() => this.#isQuiet, signal);
     return () => {
-      --this.#solves;
-      this.#wakeQuiet();
-      this.#send();
+      this.#isUndoing = false;
+      this.#letGo();
     };
   }
 
-  /** The same, and until no solve is under way, and nobody else who is alone. */
-  async holdAlone(signal: AbortSignal): Promise<() => void> {
-    while (this.#solves > 0 && !this.isClosed) await new Promise<void>((resolve) => this.#quiet.add(resolve));
-    return this.holdUpdates(signal);
+  /** No update is on its way. */
+  get #isQuiet(): boolean {
+    return !this.ledger.hasInFlight && !this.#isSending;
+  }
+
+  #letGo(): void {
+    --this.#holds;
+    this.#wakeQuiet();
+    this.#send();
+  }
+
+  async #until(isSo: () => boolean, signal: AbortSignal): Promise<void> {
+    signal.addEventListener("abort", this.#wakeQuiet, { once: true });
+    while (!isSo() && !this.isClosed && !signal.aborted) {
+      await new Promise<void>((resolve) => this.#quiet.add(resolve));
+    }
+    signal.removeEventListener("abort", this.#wakeQuiet);
+  }
+
+  /** Sends what a server that went away may have lost, while updates are held. */
+  async sendRestore(signal: AbortSignal): Promise<void> {
+    if (this.#mayHaveGoneBack) this.ledger.resumedAt(0);
+    while (this.ledger.hasRestore) await this.#sendHeld(signal);
+  }
+
+  /** Sends all that waits, while updates are held. Rejects where the server is away, and with what it refuses. */
+  async sendWaiting(signal: AbortSignal): Promise<void> {
+    await this.sendRestore(signal);
+    while (this.ledger.hasWaiting) await this.#sendHeld(signal);
+  }
+
+  async #sendHeld(signal: AbortSignal): Promise<void> {
+    const update = this.ledger.sendNext();
+    try {
+      this.ledger.accept(update, await this.#sendUpdate(update, this.#lease, signal));
+    } catch (thrown) {
+      const error = thrown as LpdeformError;
+      if (isUndecided(error)) {
+        this.ledger.connectionLost();
+        throw error;
+      }
+      if (!this.ledger.isInFlight(update)) return; // of a session that was lost meanwhile
+      const why = this.#judged(update, error);
+      if (!isTakenAllTheSame(error)) throw why;
+      this.watcher.problem(why);
+    }
   }
 
   readonly #wakeQuiet = () => {

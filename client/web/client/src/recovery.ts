@@ -18,6 +18,7 @@ export function recoveryAfter(
   if (goAway) return afterGoAway(goAway, hasCopy);
   const why = ended ?? new LpdeformError("unavailable", "The server ended the stream.");
   const pauseMs = why.retryAfterMs;
+  if (why.reason === "FRAME_VERTICES") return { next: "giveUp", why, pauseMs }; // it is another mesh
   if (isSessionLost(why)) return { next: hasCopy ? "makeAnew" : "giveUp", why, pauseMs };
   return { next: passing.has(why.code) ? "resume" : "giveUp", why, pauseMs };
 }
@@ -49,6 +50,12 @@ function afterGoAway(goAway: GoAway, hasCopy: boolean): Recovery {
       };
     case GoAwayReason.PROTOCOL_ERROR:
       return { next: "giveUp", why: new LpdeformError("internal", goAway.text, { reason: "PROTOCOL_ERROR" }), pauseMs };
+    case GoAwayReason.TOKEN_EXPIRED:
+      return {
+        next: "resume",
+        why: new LpdeformError("unauthenticated", goAway.text, { reason: "TOKEN_EXPIRED" }),
+        pauseMs,
+      };
     default:
       return { next: "resume", why: new LpdeformError("unavailable", goAway.text, { reason: "DRAINING" }), pauseMs };
   }

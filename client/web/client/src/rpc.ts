@@ -4,13 +4,24 @@ import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { fromCall } from "./errors.js";
 import { DeformService } from "./gen/lpdeform/v1/service_pb.js";
 import { StreamHub } from "./hub.js";
+import { bearing } from "./token.js";
 import type { ConnectOptions } from "./types.js";
 import { newRequestId } from "./upload.js";
 
 type Methods = typeof DeformService.method;
 type Unary = { [Name in keyof Methods]: Methods[Name]["methodKind"] extends "unary" ? Name : never }[keyof Methods];
 
-const shared = new Map<string, Rpc>();
+type Shared = Map<string, Rpc>;
+const withoutToken: Shared = new Map();
+const byToken = new WeakMap<object, Shared>();
+
+/** Those who call with the same token. */
+function sharedBy(token: ConnectOptions["token"]): Shared {
+  if (!token) return withoutToken;
+  const known = byToken.get(token) ?? new Map();
+  byToken.set(token, known);
+  return known;
+}
 
 /** Lets a proxy before several servers send all calls of a page to one of them, as sessions that share a stream need. */
 function keepTogether(id: string): Interceptor {
@@ -36,16 +47,17 @@ export class Rpc {
   }
 
   /** The same for the same options, so that sessions share a stream. */
-  static connect({ url, callTimeoutMs, reconnectForMs, fetch }: ConnectOptions): Rpc {
+  static connect({ url, callTimeoutMs, reconnectForMs, token, fetch }: ConnectOptions): Rpc {
     const baseUrl = url ?? globalThis.location?.origin;
     if (!baseUrl) throw new TypeError("Outside of a page, `url` is needed: of the gRPC-Web proxy.");
     const key = `${baseUrl} ${callTimeoutMs} ${reconnectForMs}`;
-    const known = fetch ? undefined : shared.get(key);
+    const shared = fetch ? undefined : sharedBy(token);
+    const known = shared?.get(key);
     if (known) return known;
-    const interceptors = [keepTogether(newRequestId())];
+    const interceptors = [keepTogether(newRequestId()), ...(token ? [bearing(token)] : [])];
     const transport = createGrpcWebTransport({ baseUrl, interceptors, ...(fetch && { fetch }) });
     const rpc = new Rpc(transport, callTimeoutMs, reconnectForMs);
-    if (!fetch) shared.set(key, rpc);
+    shared?.set(key, rpc);
     return rpc;
   }
 

@@ -1,10 +1,19 @@
 import { loadDecompressor } from "./decode.js";
 import { LpdeformError } from "./errors.js";
-import { createSession, isSessionLost, isTakenAllTheSame, isUndecided, joinSession, type Lease } from "./lease.js";
+import {
+  checkVertexCount,
+  createSession,
+  isSessionLost,
+  isTakenAllTheSame,
+  isUndecided,
+  joinSession,
+  type Lease,
+} from "./lease.js";
 import { type Copy, Link, sessionClosed } from "./link.js";
 import { tell } from "./listeners.js";
 import { Backoff } from "./recovery.js";
 import { Rpc } from "./rpc.js";
+import { restoreSnapshot, takeSnapshot } from "./snapshot.js";
 import { runSolve } from "./solve.js";
 import { frameOptionsToWire } from "./towire.js";
 import type {
@@ -18,12 +27,13 @@ import type {
   MeshReport,
   Motion,
   OpenOptions,
+  RestoreOptions,
   Settings,
   SolveOptions,
   SolveResult,
   Update,
 } from "./types.js";
-import { takeBack } from "./undo.js";
+import { takeStep } from "./undo.js";
 import { newRequestId } from "./upload.js";
 import { pause, unlessAborted } from "./waiting.js";
 
@@ -227,15 +237,7 @@ export class Session implements AsyncIterable<Frame> {
     signal: AbortSignal,
   ): Promise<SolveResult<Float32Array | Float64Array>> {
     const { ledger, rpc } = this.#link;
-    while (ledger.hasRestore) {
-      const restore = ledger.sendNext();
-      try {
-        ledger.accept(restore, await this.#link.sendUpdate(restore, lease, signal));
-      } catch (error) {
-        ledger.connectionLost();
-        throw error;
-      }
-    }
+    await this.#link.sendRestore(signal);
     const update = ledger.hasWaiting ? ledger.sendNext() : undefined;
     const { newest } = ledger;
     try {
@@ -254,19 +256,42 @@ export class Session implements AsyncIterable<Frame> {
   }
 
   /**
-   * Takes the newest step of the handles back on the server; the number of the update that this is. A step is what a person sees
-   * as one change: updates that move the same handles, none of them over a second after the one before, or each other update
-   * that changes handles; `beginsStep` begins one in any case. Settings are no part of it. Sent after all updates before it;
-   * resolves with the answer, and settle() with the frame. Rejects with NOTHING_TO_UNDO, NOT_THE_WRITER for a reader, and with
-   * what the server refuses of an update before it.
+   * Takes the newest step of the handles back on the server, or does again what was taken back last: see
+   * Update.beginsStep. After all updates before it, and after solves that are under way. Resolves with the number of the
+   * update that this is, when the server has it; frames show what comes of it. Rejects with FAILED_PRECONDITION
+   * (NOTHING_TO_UNDO, NOTHING_TO_REDO), ABORTED (INPUT_SEQ_PASSED) where another update came before it, DEADLINE_EXCEEDED
+   * where the server stays away. A session that had to be made anew knows no steps from before: NOT_FOUND where that
+   * happens meanwhile, NOTHING_TO_UNDO afterwards.
    */
-  undo(): Promise<number> {
-    return takeBack(this.#link, false);
+  undo(options: { signal?: AbortSignal } = {}): Promise<number> {
+    return this.#step(false, options.signal);
   }
 
-  /** Does again what was taken back last. As undo(); NOTHING_TO_REDO. */
-  redo(): Promise<number> {
-    return takeBack(this.#link, true);
+  redo(options: { signal?: AbortSignal } = {}): Promise<number> {
+    return this.#step(true, options.signal);
+  }
+
+  async #step(redo: boolean, given?: AbortSignal): Promise<number> {
+    const link = this.#link;
+    link.checkWriter();
+    const late = AbortSignal.timeout(link.rpc.callTimeoutMs);
+    const signal = AbortSignal.any([link.stop.signal, late, given].filter((one) => one !== undefined));
+    try {
+      return await takeStep(link, redo, signal);
+    } catch (error) {
+      throw signal.aborted ? abortReason(signal, "The server did not answer in time.") : error;
+    }
+  }
+
+  /**
+   * The session as a file: mesh, handles, settings, what can be undone and the surface as it is, but not who writes. The session
+   * goes on meanwhile. For restoreSession(), on any server of the same version or a later one.
+   */
+  async snapshot(options: { signal?: AbortSignal } = {}): Promise<Uint8Array<ArrayBuffer>> {
+    const { isClosed, rpc, lease, stop } = this.#link;
+    if (isClosed) throw sessionClosed();
+    const signal = AbortSignal.any([stop.signal, options.signal].filter((one) => one !== undefined));
+    return takeSnapshot(rpc, lease.session, signal);
   }
 
   /** Becomes the writer in place of whoever is, as a reader or after a WRITER_REPLACED. */
@@ -290,7 +315,29 @@ export async function openWith(rpc: Rpc, mesh: Mesh, options: OpenOptions): Prom
   checkMesh(mesh);
   await prepareFor(options);
   const lease = await createSession(rpc, mesh, options, newRequestId(), options.signal);
-  return new Session(rpc, lease, options, { mesh, options });
+  const make: Copy["make"] = (requestId, signal) => createSession(rpc, mesh, options, requestId, signal);
+  return new Session(rpc, lease, options, { make, isBare: true });
+}
+
+/**
+ * Makes a session from a file of Session.snapshot(): the same surface to the last bit, under a new name, with the caller as its
+ * writer. Where the server loses it, it is made anew from the file, which must not change, and from what came after.
+ * Rejects with INVALID_ARGUMENT (SNAPSHOT_FOREIGN, SNAPSHOT_NEWER, SNAPSHOT_TRUNCATED, SNAPSHOT_DAMAGED).
+ */
+export async function restoreSession(snapshot: Uint8Array, options: RestoreOptions = {}): Promise<Session> {
+  return restoreWith(Rpc.connect(options), snapshot, options);
+}
+
+/** @internal */
+export async function restoreWith(rpc: Rpc, snapshot: Uint8Array, options: RestoreOptions): Promise<Session> {
+  await prepareFor(options);
+  const lease = await restoreSnapshot(rpc, snapshot, newRequestId(), options.signal);
+  const make: Copy["make"] = async (requestId, signal) => {
+    const renewed = await restoreSnapshot(rpc, snapshot, requestId, signal);
+    checkVertexCount(renewed.report.vertices, lease.report.vertices);
+    return renewed;
+  };
+  return new Session(rpc, lease, options, { make, isBare: false });
 }
 
 /** Joins somebody's session by name. It is not made anew where the server loses it, and not deleted by close(). */

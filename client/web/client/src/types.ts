@@ -109,7 +109,11 @@ export interface Update {
   handles?: Readonly<Record<string, HandleChange>>;
   settings?: Settings;
   resize?: Resize;
-  /** What it does to handles is a step of its own, which undo() takes back: to be set when a drag begins. */
+  /**
+   * What it does to handles is a step of its own, which Session.undo() takes back: to be set when a drag begins. Otherwise
+   * updates that move the same handles, none of them over a second after the one before, are one step, and each other
+   * update that changes handles is one. Settings are no part of steps.
+   */
   beginsStep?: boolean;
 }
 
@@ -295,6 +299,12 @@ export interface ConnectOptions {
   callTimeoutMs?: number;
   /** A session whose server stays away for longer gives up; 2 minutes where left out. */
   reconnectForMs?: number;
+  /**
+   * Gives the bearer token of each call when that begins, so that tokens may be renewed; an empty one counts as none. Sessions
+   * share a connection where they are given the same function. Where it fails, so does what it was asked for (TOKEN_FUNCTION): an
+   * update is refused, a session whose stream has to be opened is over.
+   */
+  token?: () => string | Promise<string>;
   /** In place of the platform's, for tests and for programs outside a browser. */
   fetch?: typeof globalThis.fetch;
 }
@@ -305,6 +315,11 @@ export interface OpenOptions extends ConnectOptions, FrameOptions {
   weld?: Weld;
   settings?: Settings;
   /** Of opening; an open session is ended by close(). */
+  signal?: AbortSignal;
+}
+
+export interface RestoreOptions extends ConnectOptions, FrameOptions {
+  /** Of restoring; an open session is ended by close(). */
   signal?: AbortSignal;
 }
 

@@ -1,77 +1,60 @@
-import type { LpdeformError } from "./errors.js";
-import type { UndoUpdateResponse } from "./gen/lpdeform/v1/service_pb.js";
+import { type ErrorCode, LpdeformError } from "./errors.js";
 import { changesFromWire } from "./fromwire.js";
-import { isUndecided } from "./lease.js";
-import { type Link, sessionClosed } from "./link.js";
+import type { UndoUpdateResponse } from "./gen/lpdeform/v1/service_pb.js";
+import type { Link } from "./link.js";
 import { Backoff } from "./recovery.js";
 import { pause } from "./waiting.js";
 
-/** Takes the newest step of the handles back on the server, or does it again; the number of the update that this is. */
-export async function takeBack(link: Link, redo: boolean): Promise<number> {
-  if (link.isClosed) throw sessionClosed();
-  link.requireWriter();
-  const { signal } = link.stop;
-  const release = await link.holdAlone(signal);
+/**
+ * Takes the newest step of the handles back on the server, or does again what was taken back last; after all updates before it.
+ * The number of the update that this is.
+ */
+export async function takeStep(link: Link, redo: boolean, signal: AbortSignal): Promise<number> {
+  const release = await link.holdAll(signal);
   try {
-    await sendWaiting(link, signal);
-    if (link.isClosed) throw sessionClosed();
-    return await takeBackAlone(link, redo, signal);
-  } catch (error) {
-    throw link.isClosed ? sessionClosed() : error;
+    signal.throwIfAborted();
+    const { seq, response } = await askPatiently(link, redo, signal);
+    link.ledger.acceptChange({ seq, update: changesFromWire(response.changes) }, response.result?.kept ?? false);
+    return seq;
   } finally {
     release();
   }
 }
 
-/** So that what was changed before is a step of its own. */
-async function sendWaiting(link: Link, signal: AbortSignal): Promise<void> {
-  const { ledger } = link;
-  while (ledger.hasWaiting && !signal.aborted) {
-    const update = ledger.sendNext();
-    try {
-      ledger.accept(update, await link.sendUpdate(update, link.lease, signal));
-    } catch (thrown) {
-      if (isUndecided(thrown as LpdeformError) || update.seq === ledger.newestAccepted) ledger.connectionLost();
-      else ledger.refuse(update);
-      throw thrown;
-    }
-  }
-}
-
-async function takeBackAlone(link: Link, redo: boolean, signal: AbortSignal): Promise<number> {
-  const { ledger, lease } = link;
-  const change = ledger.beginChange();
-  try {
-    const request = { session: lease.session, writerToken: lease.writerToken, inputSeq: BigInt(change.seq), redo };
-    const undone = await askPatiently(
-      () => link.rpc.call("undoUpdate", request, signal),
-      link.rpc.callTimeoutMs,
-      signal,
-    );
-    change.update = { handles: changesFromWire(undone.changes) };
-    ledger.accept(change, undone.result?.kept ?? false);
-  } catch (error) {
-    ledger.refuse(change);
-    throw error;
-  }
-  return change.seq;
-}
-
-/** The same call again does no harm, so a server that went away may be asked again. */
+/** The same call again gives the same answer, so a server that went away may be asked again. */
 async function askPatiently(
-  ask: () => Promise<UndoUpdateResponse>,
-  longestMs: number,
+  link: Link,
+  redo: boolean,
   signal: AbortSignal,
-): Promise<UndoUpdateResponse> {
-  const end = performance.now() + longestMs;
+): Promise<{ seq: number; response: UndoUpdateResponse }> {
   const backoff = new Backoff();
+  const { session } = link.lease;
+  let seq: number | undefined;
   for (;;) {
     try {
-      return await ask();
-    } catch (error) {
-      const pauseMs = backoff.nextMs();
-      if ((error as LpdeformError).code !== "unavailable" || performance.now() + pauseMs > end) throw error;
-      await pause(pauseMs, signal);
+      await link.sendWaiting(signal);
+      const { writerToken } = link.lease;
+      if (link.lease.session !== session) throw forgotten("not_found", "SESSION_UNKNOWN");
+      if (!redo && link.isMadeAnew) await checkSteps(link, signal);
+      seq ??= link.ledger.takeNumber();
+      const request = { session, writerToken, inputSeq: BigInt(seq), redo };
+      return { seq, response: await link.rpc.call("undoUpdate", request, signal) };
+    } catch (thrown) {
+      signal.throwIfAborted();
+      const error = thrown as LpdeformError;
+      if (error.code !== "unavailable") throw error;
+      link.ledger.resumedAt(0); // it may have gone back: once more does no harm
+      await pause(Math.max(error.retryAfterMs, backoff.nextMs()), signal);
     }
   }
+}
+
+/** All the handles of a session that was made anew are a step to the server, and none to anybody else. */
+async function checkSteps({ rpc, lease }: Link, signal: AbortSignal): Promise<void> {
+  const { session } = await rpc.call("getSession", { session: lease.session }, signal);
+  if ((session?.undoSteps ?? 0) <= 1) throw forgotten("failed_precondition", "NOTHING_TO_UNDO");
+}
+
+function forgotten(code: ErrorCode, reason: string): LpdeformError {
+  return new LpdeformError(code, "The session was made anew, and knows no step from before.", { reason });
 }

@@ -6,6 +6,8 @@ import {
   type CreateSessionRequest,
   DeformService,
   type GoAwayReason,
+  type RestoreSessionRequest,
+  type RestoreSessionResponseSchema,
   type SolveRequest,
   type StreamEventSchema,
   type StreamSessionsRequest,
@@ -96,17 +98,25 @@ export class FakeStream {
 export class FakeServer {
   readonly creations: CreateSessionRequest[] = [];
   readonly updates: UpdateHandlesRequest[] = [];
-  readonly acks: AckFramesRequest[] = [];
   readonly undos: UndoUpdateRequest[] = [];
+  readonly acks: AckFramesRequest[] = [];
   readonly solves: SolveRequest[] = [];
   readonly deleted: string[] = [];
   readonly streams: FakeStream[] = [];
   readonly uploads = new Map<string, Uint8Array>();
+  readonly restored: RestoreSessionRequest[] = [];
+  undoSteps = 0;
+  /** What updates are answered with. */
+  isKeeping = false;
+  /** What it says of meshes in place of the truth. */
+  vertexCount: number | undefined;
   on: {
     create?: (request: CreateSessionRequest, count: number) => void;
     update?: (request: UpdateHandlesRequest, count: number) => void | Promise<void>;
-    ack?: (request: AckFramesRequest) => void;
     undo?: (request: UndoUpdateRequest, count: number) => MessageInitShape<typeof UndoUpdateResponseSchema>;
+    restore?: (request: RestoreSessionRequest) => MessageInitShape<typeof RestoreSessionResponseSchema>;
+    snapshot?: ServiceImpl<typeof DeformService>["snapshotSession"];
+    ack?: (request: AckFramesRequest) => void | Promise<void>;
     stream?: (stream: FakeStream, count: number) => void;
     solve?: ServiceImpl<typeof DeformService>["solve"];
   } = {};
@@ -136,16 +146,31 @@ export class FakeServer {
 
   #transport(): Transport {
     const report = { vertices: 3, faces: 1, edges: 3, components: 1, boundaryLoops: 1, defects: [], weldedVertices: 0 };
-    const session = (name: string) => ({ session: { name, epoch: 1n, mesh: report } });
+    const session = (name: string, vertices = 3) => ({
+      session: { name, epoch: 1n, mesh: { ...report, vertices: this.vertexCount ?? vertices } },
+    });
     return createRouterTransport(({ service }) => {
       service(DeformService, {
         createSession: (request) => {
           this.creations.push(request);
           this.#note();
           this.on.create?.(request, this.creations.length);
-          return { ...session(`sessions/${this.creations.length}`), writerToken: "token" };
+          const vertices = request.mesh?.vertexCount ?? 0;
+          return { ...session(`sessions/${this.creations.length}`, vertices), writerToken: "token" };
         },
-        getSession: ({ session: name }) => session(name),
+        restoreSession: (request) => {
+          this.restored.push(request);
+          this.#note();
+          const restored = { ...session(`sessions/restored${this.restored.length}`), writerToken: "token" };
+          return this.on.restore?.(request) ?? restored;
+        },
+        snapshotSession: (request, context) => this.on.snapshot!(request, context),
+        undoUpdate: (request) => {
+          this.undos.push(request);
+          this.#note();
+          return this.on.undo?.(request, this.undos.length) ?? { result: { inputSeq: request.inputSeq } };
+        },
+        getSession: ({ session: name }) => ({ session: { ...session(name).session, undoSteps: this.undoSteps } }),
         acquireWriter: () => ({ writerToken: "another", epoch: 7n, inputSeq: 40n }),
         deleteSession: ({ session: name }) => {
           this.deleted.push(name);
@@ -155,17 +180,12 @@ export class FakeServer {
           this.updates.push(request);
           this.#note();
           await this.on.update?.(request, this.updates.length);
-          return { result: { inputSeq: request.update?.inputSeq ?? 0n } };
+          return { result: { inputSeq: request.update?.inputSeq ?? 0n, kept: this.isKeeping } };
         },
-        undoUpdate: async (request) => {
-          this.undos.push(request);
-          this.#note();
-          return await this.on.undo!(request, this.undos.length);
-        },
-        ackFrames: (request) => {
+        ackFrames: async (request) => {
           this.acks.push(request);
           this.#note();
-          this.on.ack?.(request);
+          await this.on.ack?.(request);
           return {};
         },
         createUpload: ({ sizeBytes }) => {

@@ -12,11 +12,12 @@ import {
   CreateSessionRequestSchema,
   DeformResponseSchema,
   FaultSchema,
+  RestoreSessionResponseSchema,
   UndoUpdateResponseSchema,
   UpdateSchema,
 } from "../src/gen/lpdeform/v1/service_pb.js";
 import type { Frame } from "../src/index.js";
-import { openWith } from "../src/session.js";
+import { openWith, restoreWith } from "../src/session.js";
 import { FakeServer } from "./fake_server.js";
 import { opened, problems } from "./harness.js";
 
@@ -36,6 +37,7 @@ const frames = JSON.parse(read("frames.json")) as {
   create_request: string;
   streams: Stream[];
   undo: { response: string; result: string };
+  snapshot: { file: string; restore_response: string };
 };
 const errors = JSON.parse(read("errors.json")) as { code: number; text: string; details: string; fault: string }[];
 const expected = read("expected.txt").trimEnd().split("\n");
@@ -137,6 +139,26 @@ test("the recorded undo", async () => {
   expect(linesOf("undo", await session.settle())).toEqual(expected.filter((line) => line.startsWith("undo")));
 });
 
+test("the recorded snapshot, in parts, and what is restored from it", async () => {
+  const server = new FakeServer();
+  const session = await openWith(server.rpc(), strip, {});
+  opened.push(session);
+  const file = Buffer.from(frames.snapshot.file, "base64");
+  server.on.snapshot = async function* () {
+    const sizeBytes = BigInt(file.length);
+    for (let at = 0; at < file.length; at += 500)
+      yield { offset: BigInt(at), sizeBytes, data: file.subarray(at, at + 500) };
+  };
+  const taken = await session.snapshot();
+  server.on.restore = () => message(RestoreSessionResponseSchema, frames.snapshot.restore_response);
+  const restored = await restoreWith(server.rpc(), taken, {});
+  opened.push(restored);
+  expect(Buffer.from(server.restored[0]!.snapshot!.source.value as Uint8Array).equals(file)).toBe(true);
+  expect([`snapshot: ${taken.length} bytes`, `restored: ${restored.name}`]).toEqual(
+    expected.filter((line) => /^(snapshot|restored):/.test(line)),
+  );
+});
+
 test("every recorded error of a call", async () => {
   const said: string[] = [];
   for (const { code, text, details } of errors) {
@@ -160,7 +182,7 @@ test("every recorded fault of a stream", async () => {
   opened.push(session);
   session.poll();
   await server.until(() => server.streams.length > 0);
-  server.stream.open();
+  server.stream.open(0, { vertexCount: strip.vertices.length / 3 });
   const all = problems(session, errors.length);
   for (const { fault } of errors) server.stream.send({ case: "fault", value: message(FaultSchema, fault) });
   expect((await all).map((error) => tell("fault", error))).toEqual(

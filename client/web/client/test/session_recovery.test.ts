@@ -3,7 +3,7 @@ import { describe, expect, test, vi } from "vitest";
 import { GoAwayReason } from "../src/gen/lpdeform/v1/service_pb.js";
 import { joinWith, openWith } from "../src/session.js";
 import { FakeServer, triangle } from "./fake_server.js";
-import { arrived, at, begin, connected, next, opened, refusal } from "./harness.js";
+import { arrived, at, begin, connected, gate, next, opened, refusal } from "./harness.js";
 
 describe("a stream that ends", () => {
   test("by a broken connection is taken up again", async () => {
@@ -154,6 +154,31 @@ describe("a stream that ends", () => {
     await server.until(() => server.streams.length === 2);
   });
 
+  test("for another session to come along is not taken for a broken one, though an acknowledgement is on its way", async () => {
+    const { server, session, rpc } = await begin();
+    const answer = gate();
+    server.on.ack = async () => {
+      await answer.isOpen;
+      throw refusal("STREAM_UNKNOWN", {}, Code.NotFound);
+    };
+    server.stream.frame({ frameSeq: 1n });
+    await next(session);
+    await server.until(() => server.acks.length === 1);
+    const other = await openWith(rpc, triangle, {});
+    opened.push(other);
+    other.poll();
+    await server.until(() => server.streams.length === 2); // and is not open yet
+    answer.open();
+    const states: string[] = [];
+    session.on("connection", (state) => states.push(state));
+    await new Promise((resolve) => setTimeout(resolve, 50));
+    server.stream.open(0);
+    server.stream.open(1);
+    await connected(other);
+    expect(server.acks.map(({ streamId }) => streamId)).toEqual(["stream1.0"]);
+    expect([states, server.streams.length]).toEqual([[], 2]);
+  });
+
   test("with the session deleted is the end", async () => {
     const { server, session } = await begin();
     server.stream.goAway(GoAwayReason.SESSION_DELETED, { text: "The session was deleted." });
@@ -182,6 +207,110 @@ describe("a stream that ends", () => {
     server.on.stream = (stream) => stream.queue.finish(new ConnectError("still away", Code.Unavailable));
     server.stream.queue.finish(new ConnectError("away", Code.Unavailable));
     await expect(next(session)).rejects.toMatchObject({ code: "unavailable", message: "still away" });
+  });
+});
+
+describe("a server that speaks of another mesh", () => {
+  const another = { code: "data_loss", reason: "FRAME_VERTICES", limit: "vertices = 3" };
+
+  test("when the session is made is refused", async () => {
+    const server = new FakeServer();
+    server.vertexCount = 4;
+    await expect(openWith(server.rpc(), triangle, {})).rejects.toMatchObject({
+      ...another,
+      message: "The server speaks of 4 vertices of a mesh that has 3.",
+    });
+  });
+
+  test("when a stream opens ends the session, and no other of the page", async () => {
+    const { server, session, rpc } = await begin();
+    const other = await openWith(rpc, triangle, {});
+    opened.push(other);
+    other.poll();
+    await server.until(() => server.streams.length === 2);
+    server.stream.open(0, { vertexCount: 4_000_000_000 });
+    server.stream.open(1);
+    await expect(next(session)).rejects.toMatchObject(another);
+    expect(() => session.set({ p: 2 })).toThrow(expect.objectContaining(another));
+    server.stream.frame({ frameSeq: 1n }, { stream: 1 });
+    expect((await next(other)).frameSeq).toBe(1);
+    expect(server.streams.length).toBe(2);
+  });
+
+  test("when the session is made anew ends it", async () => {
+    const { server, session } = await begin();
+    server.vertexCount = 2;
+    server.stream.goAway(GoAwayReason.SESSION_EXPIRED);
+    server.stream.queue.finish();
+    await expect(next(session)).rejects.toMatchObject(another);
+    expect(server.creations.length).toBe(2);
+    expect(server.streams.length).toBe(1);
+  });
+});
+
+describe("a server that went back to an older state", () => {
+  const namesIn = (server: FakeServer, k: number) => server.updates[k]!.update!.handles.map(({ name }) => name);
+
+  /** Has an update that the server took and did not keep. */
+  async function beginUnkept() {
+    const begun = await begin();
+    begun.session.setHandles({ base: { vertices: [0] }, tip: { vertices: [1] } });
+    await begun.server.until(() => begun.server.updates.length === 1);
+    begun.server.isKeeping = true;
+    return begun;
+  }
+
+  test("is told what it lost before what comes after, which waits for that", async () => {
+    const { server, session } = await beginUnkept();
+    server.stream.queue.finish(new ConnectError("killed", Code.Unavailable));
+    await server.until(() => server.streams.length === 2);
+    session.move("tip", at(1)); // the server is back, the stream is not
+    await new Promise((resolve) => setTimeout(resolve, 50));
+    expect(server.updates.length).toBe(1);
+    server.stream.open(0, { inputSeq: 0n });
+    await server.until(() => server.updates.length === 3);
+    expect([namesIn(server, 1), namesIn(server, 2)]).toEqual([["base", "tip"], ["tip"]]);
+    expect(server.updates.map(({ update }) => update!.inputSeq)).toEqual([1n, 1n, 2n]);
+  });
+
+  test("is told what it lost where only its epoch tells, for an update was there before the stream", async () => {
+    const { server } = await beginUnkept();
+    server.stream.queue.finish(new ConnectError("killed", Code.Unavailable));
+    await server.until(() => server.streams.length === 2);
+    server.stream.open(0, { epoch: 2n, inputSeq: 1n });
+    await server.until(() => server.updates.length === 2);
+    expect(namesIn(server, 1)).toEqual(["base", "tip"]);
+    server.stream.queue.finish(new ConnectError("broken", Code.Unavailable)); // the same server: nothing is to be told
+    await server.until(() => server.streams.length === 3);
+    server.stream.open(0, { epoch: 2n, inputSeq: 1n });
+    await connected(opened.at(-1)!);
+    expect(server.updates.length).toBe(2);
+  });
+
+  test("is told what it lost where there is no stream", async () => {
+    const server = new FakeServer();
+    const session = await openWith(server.rpc(), triangle, {});
+    opened.push(session);
+    session.setHandles({ base: { vertices: [0] }, tip: { vertices: [1] } });
+    await server.until(() => server.updates.length === 1);
+    server.on.update = (_, count) => {
+      if (count === 2) throw new ConnectError("killed", Code.Unavailable);
+    };
+    session.move("tip", at(1));
+    await server.until(() => server.updates.length === 4);
+    expect([namesIn(server, 2), namesIn(server, 3)]).toEqual([["base", "tip"], ["tip"]]);
+  });
+});
+
+describe("a stream whose token has expired", () => {
+  test("is opened again at once, and says why", async () => {
+    const { server, session } = await begin();
+    server.stream.goAway(GoAwayReason.TOKEN_EXPIRED, { text: "Come back with a new token." });
+    server.stream.queue.finish();
+    await server.until(() => server.streams.length === 2);
+    expect(session.interruption).toMatchObject({ code: "unauthenticated", reason: "TOKEN_EXPIRED" });
+    server.stream.open();
+    await connected(session);
   });
 });
 

@@ -49,6 +49,10 @@ test("solve.ts comes with its proof", async () => {
   expect(Number(/within (\S+) %/.exec(gap!)![1])).toBeLessThan(1);
 });
 
+test("steps.ts takes a step back and does it again in the session that is restored", async () => {
+  expect(await run("steps")).toBe("the middle is at height 1\nand at height 2 again\n");
+});
+
 test("errors.ts names what is wrong", async () => {
   expect((await run("errors")).split("\n")).toEqual([
     "MESH_INDEX_OUT_OF_RANGE face 0: 0 <= index < 3",

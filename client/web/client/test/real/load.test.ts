@@ -25,7 +25,7 @@ function keysOf(value: unknown, path = ""): string[] {
 test("every update is answered through Envoy, and the report is that of lpdeform load", async () => {
   const report = await runLoad({ url: service.url, sessions: 4, vertices: [100, 400], rate: 10, seconds: 2, p: 2 });
   expect(report.all.updates).toEqual({ due: 80, answered: 80, unanswered: 0 });
-  expect(report.all.errors).toEqual({});
+  expect([report.all.errors, report.all.reconnects]).toEqual([{}, 0]);
   expect(report.all.input_to_frame_histogram_us.reduce((sum, [, count]) => sum + count, 0)).toBe(80);
   const frames = Object.entries(report.by_vertices).map(
     ([vertices, tally]) => 16 * Number(vertices) * tally.frames.received,
@@ -36,4 +36,17 @@ test("every update is answered through Envoy, and the report is that of lpdeform
   const flags = ["--sessions", "4", "--vertices", "100,400", "--rate", "10", "--seconds", "1", "--report", file];
   execFileSync(join(root, "build/release/bin/lpdeform"), ["load", "--server", service.serverAddress, ...flags]);
   expect(keysOf(report).sort()).toEqual(keysOf(JSON.parse(readFileSync(file, "utf8"))).sort());
+}, 60_000);
+
+test("a server that dies under load and comes back is counted, and no update stays without an answer", async () => {
+  const calls = () => service.stat("cluster.lpdeform.upstream_rq_total");
+  const before = await calls();
+  const running = runLoad({ url: service.url, sessions: 4, vertices: [100], rate: 10, seconds: 4, p: 2 });
+  while ((await calls()) < before + 100) await new Promise((again) => setTimeout(again, 20)); // half of it, or less
+  await service.killServer();
+  await service.startServer();
+  const { all } = await running;
+  expect(all.reconnects).toBeGreaterThanOrEqual(4);
+  expect(all.updates).toEqual({ due: 160, answered: 160, unanswered: 0 });
+  expect(all.errors).toEqual({});
 }, 60_000);

@@ -87,6 +87,9 @@ describe("the configuration", () => {
     const text = configure();
     expect(text).not.toMatch(/retry_policy|num_retries/);
     expect(text).toMatch(/StreamSessions}\n\s+route: &streams\n\s+cluster: lpdeform\n\s+timeout: 0s/);
+    for (const name of ["StreamFrames", "Solve", "SnapshotSession"]) {
+      expect(text).toMatch(new RegExp(`/${name}}\\n\\s+route: \\*streams`));
+    }
   });
 });
 
@@ -155,12 +158,13 @@ describe("the proxy", () => {
       body: null,
       headers: {
         "access-control-request-method": "POST",
-        "access-control-request-headers": "x-grpc-web,lpdeform-session",
+        "access-control-request-headers": "x-grpc-web,lpdeform-session,authorization",
       },
     });
     expect(preflight.status).toBe(200);
     expect(preflight.headers.get("access-control-allow-origin")).toBe("https://friend.example");
-    expect(preflight.headers.get("access-control-allow-headers")).toContain("lpdeform-session");
+    const allowed = preflight.headers.get("access-control-allow-headers")!.split(", ");
+    expect(allowed).toEqual(expect.arrayContaining(["lpdeform-session", "authorization"]));
     const answer = await call("https://friend.example");
     expect(answer.headers.get("access-control-expose-headers")).toBe(
       "grpc-status, grpc-message, grpc-status-details-bin",
@@ -253,6 +257,22 @@ test("the access log is set aside when it has grown, and goes on", async () => {
   await waitFor(() => isLogged(old)); // what was written since went through a log of its own
   expect(readdirSync(dirname(old)).filter((name) => name.startsWith("access.log")).length).toBeLessThanOrEqual(2);
   await service.stop();
+}, 120_000);
+
+test("an access log that is full already is set aside before Envoy starts, and a smaller one goes on", async () => {
+  const [full, small] = ["of yesterday\n".repeat(1000), "of today\n"];
+  for (const [loggedBefore, isAside] of [
+    [full, true],
+    [small, false],
+  ] as const) {
+    const service = await Service.start({ accessLogBytes: 10_000, loggedBefore });
+    const read = (file: string) => (existsSync(file) ? readFileSync(file, "utf8") : undefined);
+    await fetch(`${service.url}/healthz`);
+    await waitFor(() => read(service.accessLog)?.includes("/healthz") ?? false);
+    expect(read(`${service.accessLog}.1`)).toBe(isAside ? full : undefined);
+    expect(read(service.accessLog)!.startsWith(small)).toBe(!isAside);
+    await service.stop();
+  }
 }, 120_000);
 
 test("a stream that says nothing at all is cut and taken up again", async () => {

@@ -1,0 +1,279 @@
+import { create } from "@bufbuild/protobuf";
+import { Code, ConnectError } from "@connectrpc/connect";
+import { describe, expect, test } from "vitest";
+import { changesFromWire } from "../src/fromwire.js";
+import { GoAwayReason, UndoUpdateResponseSchema } from "../src/gen/lpdeform/v1/service_pb.js";
+import { Packer } from "../src/packer.js";
+import { joinWith, restoreWith } from "../src/session.js";
+import { updateToWire } from "../src/towire.js";
+import type { HandleChange } from "../src/types.js";
+import { FakeServer } from "./fake_server.js";
+import { at, begin, gate, opened, refusal } from "./harness.js";
+
+const backTo = (x: number) => ({
+  changes: [
+    {
+      name: "tip",
+      change: {
+        case: "move" as const,
+        value: { kind: { case: "rigid" as const, value: { translation: { x, y: 0, z: 0 } } } },
+      },
+    },
+  ],
+  undoSteps: 1,
+  redoSteps: 1,
+});
+
+describe("undo", () => {
+  test("goes after all updates before it, and is part of what a session made anew gets", async () => {
+    const { server, session } = await begin();
+    const answer = gate();
+    server.on.update = (_, count) => (count === 1 ? answer.isOpen : undefined);
+    server.on.undo = () => backTo(5);
+    session.setHandles({ base: { vertices: [0] }, tip: { vertices: [1] } });
+    session.move("tip", at(9));
+    const undone = session.undo();
+    await server.until(() => server.updates.length === 1);
+    expect(server.undos).toEqual([]);
+    answer.open();
+    expect(await undone).toBe(3);
+    expect(server.updates.map(({ update }) => update!.inputSeq)).toEqual([1n, 2n]);
+    expect(server.undos).toMatchObject([{ session: "sessions/1", writerToken: "token", inputSeq: 3n, redo: false }]);
+    expect(session.newestInput).toBe(3);
+
+    server.on.stream = (stream) => stream.open();
+    server.stream.goAway(GoAwayReason.SESSION_EXPIRED);
+    server.stream.queue.finish();
+    await server.until(() => server.updates.length === 3);
+    const [, tip] = server.updates[2]!.update!.handles;
+    expect(tip!.change.value).toMatchObject({ motion: { kind: { value: { translation: { x: 5 } } } } });
+    expect(server.updates[2]!.update!.inputSeq).toBe(3n);
+  });
+
+  test("is asked for again where the server went away, as the same call, after what that may have lost", async () => {
+    const { server, session } = await begin();
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 1);
+    server.on.undo = (_, count) => {
+      if (count <= 2) throw new ConnectError("away", Code.Unavailable);
+      return backTo(0);
+    };
+    expect(await session.redo()).toBe(2);
+    expect(server.undos.map(({ inputSeq, redo }) => [inputSeq, redo])).toEqual(Array(3).fill([2n, true]));
+    expect(server.updates.length).toBe(3);
+    expect(server.updates[1]!.update).toMatchObject({ inputSeq: 1n, handles: [{ name: "tip" }] });
+  });
+
+  test("in a session that was made anew takes back what came after that, and not all its handles", async () => {
+    const { server, session } = await begin();
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 1);
+    server.on.stream = (stream) => stream.open();
+    server.stream.goAway(GoAwayReason.SESSION_EXPIRED);
+    server.stream.queue.finish();
+    await server.until(() => server.updates.length === 2);
+    server.undoSteps = 1;
+    await expect(session.undo()).rejects.toMatchObject({ code: "failed_precondition", reason: "NOTHING_TO_UNDO" });
+    expect(server.undos).toEqual([]);
+    server.undoSteps = 2;
+    await session.undo();
+    server.undoSteps = 1;
+    await session.redo();
+    expect(server.undos.map(({ redo }) => redo)).toEqual([false, true]);
+  });
+
+  test("is not done to a session that was made anew while the server was away", async () => {
+    const { server, session } = await begin();
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 1);
+    server.on.stream = (stream) => stream.open();
+    server.on.undo = () => {
+      server.streams[0]!.goAway(GoAwayReason.SESSION_EXPIRED);
+      server.streams[0]!.queue.finish();
+      throw new ConnectError("away", Code.Unavailable);
+    };
+    server.on.update = async () => server.until(() => server.streams.length === 2); // it is anew by then
+    await expect(session.undo()).rejects.toMatchObject({ code: "not_found", reason: "SESSION_UNKNOWN" });
+    expect(server.undos.length).toBe(1);
+  });
+
+  test("holds updates and solves back until it is answered, and comes after solves before it", async () => {
+    const { server, session } = await begin();
+    const solved = gate();
+    server.on.solve = async function* () {
+      await solved.isOpen;
+      throw refusal("NO_HANDLES", {}, Code.FailedPrecondition);
+    };
+    const first = session.solve().catch(() => "first");
+    await server.until(() => server.solves.length === 1);
+    const undone = session.undo();
+    const redone = session.redo();
+    session.move("tip", at(1));
+    const second = session.solve().catch(() => "second");
+    await new Promise((resolve) => setTimeout(resolve, 20));
+    expect(server.undos).toEqual([]);
+    solved.open();
+    expect(await Promise.all([first, undone, redone, second])).toEqual([
+      "first",
+      expect.any(Number),
+      expect.any(Number),
+      "second",
+    ]);
+    expect(server.undos.map(({ redo }) => redo)).toEqual([false, true]);
+  });
+
+  test("ends with what the server says, and the session goes on", async () => {
+    const { server, session } = await begin();
+    server.on.undo = () => {
+      throw refusal("NOTHING_TO_UNDO", {}, Code.FailedPrecondition);
+    };
+    await expect(session.undo()).rejects.toMatchObject({ code: "failed_precondition", reason: "NOTHING_TO_UNDO" });
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 1);
+    expect(server.updates[0]!.update!.inputSeq).toBe(2n); // the number of the step was used
+  });
+
+  test("of a reader, of a closed session, or with an abort is refused here", async () => {
+    const { server, session } = await begin();
+    server.on.undo = () => {
+      throw new ConnectError("away", Code.Unavailable);
+    };
+    const abort = new AbortController();
+    const undone = session.undo({ signal: abort.signal });
+    await server.until(() => server.undos.length === 2);
+    abort.abort();
+    await expect(undone).rejects.toMatchObject({ code: "cancelled" });
+    await session.close();
+    await expect(session.undo()).rejects.toMatchObject({ reason: "SESSION_CLOSED" });
+    const reader = await joinWith(server.rpc(), "sessions/1", {});
+    opened.push(reader);
+    await expect(reader.redo()).rejects.toMatchObject({ reason: "NOT_THE_WRITER" });
+  });
+
+  test("gives up once the time of calls is over", async () => {
+    const { server, session } = await begin();
+    const brief = await joinWith(server.rpc(300), session.name, { role: "writer" });
+    opened.push(brief);
+    server.on.undo = () => {
+      throw new ConnectError("away", Code.Unavailable);
+    };
+    await expect(brief.undo()).rejects.toMatchObject({ code: "deadline_exceeded" });
+  });
+});
+
+test("a step that is to be one of its own is, and is not sent beside another", async () => {
+  const { server, session } = await begin();
+  const answer = gate();
+  server.on.update = (_, count) => (count === 1 ? answer.isOpen : undefined);
+  session.update({ handles: { tip: { move: at(1) } }, beginsStep: true });
+  session.move("tip", at(2));
+  await server.until(() => server.updates.length === 1);
+  await new Promise((resolve) => setTimeout(resolve, 20));
+  expect(server.updates.length).toBe(1);
+  answer.open();
+  await server.until(() => server.updates.length === 2);
+  expect(server.updates.map(({ update }) => update!.beginsStep)).toEqual([true, false]);
+});
+
+test("changes of every kind come back from the wire as they went out", () => {
+  const handles: Record<string, HandleChange> = {
+    moved: { move: { axis: [0, 0, 2], angle: 0.5, center: [1, 2, 3], translation: [4, 5, 6] } },
+    freed: { move: "fixed" },
+    gone: { remove: true },
+    ...Object.fromEntries(
+      (
+        [
+          { kind: "exact" },
+          { kind: "soft", weight: 3 },
+          { kind: "orientation" },
+          { kind: "axisLock", axis: [1, 0, 0] },
+          { kind: "planeLock", normal: [0, 1, 0] },
+        ] as const
+      ).map((hold) => [
+        hold.kind,
+        { set: { vertices: new Uint32Array([2, 1]), motion: "fixed" as const, hold, footprint: 0.25 } },
+      ]),
+    ),
+    placed: {
+      set: {
+        vertices: new Uint32Array([0]),
+        motion: { targets: new Float64Array([0.1, 0.2, 0.3]) },
+        hold: { kind: "exact" },
+        footprint: 0,
+      },
+    },
+    rounded: { move: { targets: new Float32Array([1, 2, 3]) } },
+    pinned: {
+      set: {
+        points: [{ face: 7, barycentric: [0.2, 0.3, 0.5] }],
+        motion: "fixed",
+        hold: { kind: "soft", weight: 1 },
+        footprint: 0,
+      },
+    },
+  };
+  const { handles: changes } = updateToWire({ handles }, 1, new Packer());
+  expect({ ...changesFromWire(create(UndoUpdateResponseSchema, { changes }).changes).handles }).toEqual(handles);
+});
+
+describe("a snapshot", () => {
+  const part = (offset: number, data: number[], sizeBytes = 5n) => ({
+    offset: BigInt(offset),
+    sizeBytes,
+    data: new Uint8Array(data),
+  });
+
+  test("is put together of its parts", async () => {
+    const { server, session } = await begin();
+    server.on.snapshot = async function* () {
+      yield part(0, [1, 2, 3]);
+      yield part(3, [4, 5]);
+    };
+    expect([...(await session.snapshot())]).toEqual([1, 2, 3, 4, 5]);
+  });
+
+  test.each([
+    ["without its end", [part(0, [1, 2, 3])]],
+    ["without a part in between", [part(0, [1]), part(3, [4, 5])]],
+    ["with more than it has", [part(0, [1, 2, 3]), part(3, [4, 5, 6])]],
+    ["of nothing", []],
+  ])("%s is refused", async (_, parts) => {
+    const { server, session } = await begin();
+    server.on.snapshot = async function* () {
+      yield* parts;
+    };
+    await expect(session.snapshot()).rejects.toMatchObject({ code: "data_loss", reason: "SNAPSHOT_INCOMPLETE" });
+  });
+
+  test("of a session that there is not says so, and of a closed one", async () => {
+    const { server, session } = await begin();
+    server.on.snapshot = async function* () {
+      throw refusal("SESSION_UNKNOWN", {}, Code.NotFound);
+    };
+    await expect(session.snapshot()).rejects.toMatchObject({ code: "not_found", reason: "SESSION_UNKNOWN" });
+    await session.close();
+    await expect(session.snapshot()).rejects.toMatchObject({ reason: "SESSION_CLOSED" });
+  });
+
+  test("makes a session, again where the server loses that, with what came after", async () => {
+    const server = new FakeServer();
+    const session = await restoreWith(server.rpc(), new Uint8Array([1, 2, 3]), {});
+    opened.push(session);
+    expect(session.name).toBe("sessions/restored1");
+    session.move("tip", at(4));
+    await server.until(() => server.updates.length === 1);
+    server.on.stream = (stream) => stream.open(0, { inputSeq: 1n });
+    session.poll();
+    await server.until(() => server.streams.length === 1);
+    server.stream.goAway(GoAwayReason.SESSION_EXPIRED);
+    server.stream.queue.finish();
+    await server.until(() => server.updates.length === 2);
+    expect(server.restored.map(({ snapshot }) => snapshot?.source.value)).toEqual(
+      Array(2).fill(new Uint8Array([1, 2, 3])),
+    );
+    expect(server.restored[1]!.requestId).not.toBe(server.restored[0]!.requestId);
+    expect(server.updates[1]!).toMatchObject({ session: "sessions/restored2", update: { handles: [{ name: "tip" }] } });
+    await session.close();
+    expect(server.deleted).toEqual(["sessions/restored2"]);
+  });
+});
