@@ -3,7 +3,7 @@ import { describe, expect, it } from "vitest";
 import { EnergyTrail } from "../src/app/energy_trail.js";
 import { Pace } from "../src/app/pace.js";
 import { Meter } from "../src/link/meter.js";
-import { elementsIn, isPassing, statusOf } from "../src/link/status.js";
+import { elementsIn, isPassing, statusAtEnd, statusOf } from "../src/link/status.js";
 import { changes, exponent, newSession } from "../src/model/changes.js";
 import {
   addHandle,
@@ -139,6 +139,15 @@ describe("words for", () => {
     expect(elementsIn('handle "Handle 2"', handles)).toEqual({ vertices: [7, 9], edges: [], faces: [] });
     expect(elementsIn('handle "face 3"', handles)).toEqual({ vertices: [], edges: [], faces: [] });
     expect(elementsIn("component 2", handles)).toEqual({ vertices: [], edges: [], faces: [] });
+  });
+});
+
+describe("words at the end", () => {
+  it.each(["FRAME_PARTS", "FRAME_VERTICES"])("of a session by %s tell what to do, and try nothing again", (reason) => {
+    const status = statusAtEnd(new LpdeformError("data_loss", "4 of 3", { reason }));
+    expect(isPassing(status)).toBe(false);
+    expect(status.text).toMatch(/reload the page\. Your work is kept here/);
+    expect(isPassing(statusAtEnd(new LpdeformError("data_loss", "cut off", {})))).toBe(true);
   });
 });
 

@@ -36,7 +36,7 @@ export function statusOf(error: LpdeformError): Status {
 
 /** Where nothing is tried again but by beginning anew. */
 export function statusAtEnd(error: LpdeformError): Status {
-  if (error.reason !== "FRAME_PARTS") return statusOf(error);
+  if (error.reason !== "FRAME_PARTS" && error.reason !== "FRAME_VERTICES") return statusOf(error);
   const advice = "Page and server may be of different versions: reload the page.";
   return say("refused", "The server's frames do not fit this mesh", `${advice} ${kept}.`);
 }

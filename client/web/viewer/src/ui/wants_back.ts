@@ -4,19 +4,15 @@ export type Answer = "now" | "later" | "never";
 
 /** Asks when work is to be shown again that the page perhaps could not bear; Escape puts it off. */
 export function wantsBack(name: string): Promise<Answer> {
-  const yes = el("button", { type: "button", className: "plain", textContent: "Show it again" });
+  const yes = el("button", { type: "button", className: "plain", textContent: "Show it again", autofocus: true });
   const later = el("button", { type: "button", className: "plain", textContent: "Not now" });
   const no = el("button", { type: "button", className: "plain", textContent: "Discard it" });
   const sheet = el(
     "dialog",
-    { className: "help", aria: { label: "Your work" } },
+    { className: "help question", aria: { label: "Your work" } },
     el("h2", {}, `Show “${name}” again?`),
     el("p", {}, "The page stopped while it was bringing this work back. It may be too large for this browser."),
-    yes,
-    " ",
-    later,
-    " ",
-    no,
+    el("div", { className: "answers" }, no, later, yes),
   );
   document.body.append(sheet);
   sheet.showModal();

@@ -222,6 +222,58 @@ it("a handle is placed, moved and selected by keys alone", async () => {
   expect(await user.ask("document().handles.length")).toBe(count + 1);
 });
 
+it("the cross goes by steps and by pixels, stays on the picture, and goes away with the focus, a press elsewhere and Escape", async () => {
+  const canvas = user.page.locator("canvas.stage");
+  const cross = user.page.locator(".cross");
+  const { width, height } = (await canvas.boundingBox())!;
+  // The browser leaves a second length out where it is 0.
+  const at = () =>
+    cross.evaluate((one) => {
+      const [x, y = 0] = one.style.translate.split(" ").map(parseFloat);
+      return [x!, y] as const;
+    });
+  const count = await user.ask<number>("document().handles.length");
+  await canvas.focus();
+  await press("ArrowLeft"); // without a cross, keys are the view's
+  expect(await cross.isVisible()).toBe(false);
+  await press("Enter");
+  const [x, y] = await at();
+  await press("ArrowRight");
+  await press("ArrowDown");
+  const [stepped, down] = await at();
+  expect(stepped - x).toBeCloseTo(0.02 * height, 1);
+  expect(down - y).toBeCloseTo(0.02 * height, 1);
+  await press("Shift+ArrowLeft");
+  await press("Shift+ArrowUp");
+  expect(await at()).toEqual([expect.closeTo(stepped - 1, 3), expect.closeTo(down - 1, 3)]);
+
+  const step = Math.ceil(1 / 0.02) + 1; // as many as the picture is high
+  for (let k = 0; k < step; ++k) await press("ArrowUp");
+  expect((await at())[1]).toBe(0);
+  expect(await user.ask("app.facts.now.pointedOut.vertices")).toEqual([]); // nothing lies under it there
+  await press("Enter");
+  expect([await cross.isVisible(), await user.ask("document().handles.length")]).toEqual([true, count]);
+  for (let k = 0; k < 2 * step * Math.ceil(width / height); ++k) await press("ArrowLeft");
+  expect(await at()).toEqual([0, 0]);
+
+  await press("Tab");
+  expect(await cross.isVisible()).toBe(false);
+  await canvas.focus();
+  expect(await cross.isVisible()).toBe(false); // it has to be asked for again
+  await press("Enter");
+  const box = (await canvas.boundingBox())!;
+  await user.page.mouse.click(box.x + 5, box.y + height - 5);
+  expect(await cross.isVisible()).toBe(false);
+  await press("Enter");
+  const before = await at();
+  await press("Control+ArrowRight"); // turns the view
+  expect(await at()).toEqual(before);
+  await press("Escape");
+  expect(await cross.isVisible()).toBe(false);
+  expect(await user.ask("document().handles.length")).toBe(count);
+  await press("f");
+});
+
 it("shortcuts of a single key can be switched off, and stay so", async () => {
   await press("?");
   const help = user.page.getByRole("dialog", { name: "Help" });

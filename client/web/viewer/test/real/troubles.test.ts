@@ -206,6 +206,27 @@ describe("a mesh with defects", () => {
     expect(Math.abs(y - (box.y + box.height / 2))).toBeLessThan(box.height / 4);
   });
 
+  it("or a change that is refused shows where, if what is named can be shown", async () => {
+    const service = await start();
+    const user = await visit(service);
+    await user.settled();
+    const refuse = (element: string) =>
+      user.ask(`app.facts.set({ problem: { reason: "COMPONENT_WITHOUT_HANDLE", message: "no", element: '${element}' } })`);
+    const show = user.page.locator(".banner").getByRole("button", { name: "Show where" });
+    await refuse("component 2"); // the number is not a vertex's
+    await banner(user, "The server cannot take this change");
+    expect(await show.isVisible()).toBe(false);
+    await refuse("vertex 17");
+    await show.click();
+    expect(await user.ask("app.facts.now.pointedOut.vertices")).toEqual([17]);
+    await refuse('handle "gone"');
+    expect(await show.isVisible()).toBe(false);
+    await refuse('handle "Top"');
+    await show.click();
+    const held = await user.ask<number[]>("document().handles.find(({ name }) => name === 'Top').vertices");
+    expect(await user.ask("app.facts.now.pointedOut.vertices")).toEqual(held);
+  });
+
   it("or a file that is no mesh is refused in words, and what was there stays", async () => {
     const service = await start();
     const user = await visit(service);
