@@ -132,35 +132,50 @@ TEST_F(CStepsTest, AResizingThatCannotBeIsRefused) {
   EXPECT_STREQ(error_.reason, "RESIZE_SCALE_OUT_OF_RANGE");
 }
 
-TEST_F(CStepsTest, OfSeveralThreadsThatPollNoneKeepsAnOlderFrameForTheRepeat) {
-  open(strip_.mesh());
-  hold("base", {0, 1});
-  hold("tip", {20, 21});
-  settle(22);
-  for (int round = 0; round < 25; ++round) {
-    const std::uint64_t seq = lift(0.01 * round);
-    std::array<std::uint64_t, 3> newest{};
-    std::atomic<bool> is_there = false;
-    std::vector<std::thread> threads;
-    for (std::uint64_t& taken : newest) {
-      threads.emplace_back([&, seq] {
-        std::vector<Point> points(22);
-        const lpdeform_buffers buffers = buffers_of(points);
-        lpdeform_frame frame{};
-        frame.struct_size = sizeof frame;
-        while (!is_there) {
-          if (lpdeform_poll(session_, &buffers, &frame, nullptr) != LPDEFORM_OK) continue;
-          taken = frame.frame_seq;
-          if (frame.converged == 1 && frame.input_seq == seq) is_there = true;
-        }
-      });
+/// Of cells x cells squares, so that to write a frame takes a while.
+struct Sheet {
+  explicit Sheet(std::uint32_t cells) {
+    const std::uint32_t side = cells + 1;
+    for (std::uint32_t i = 0; i < side * side; ++i) points.push_back({float(i % side), 0, -float(i / side)});
+    for (std::uint32_t k = 0; k < cells * cells; ++k) {
+      const std::uint32_t a = k / cells * side + k % cells;
+      for (const std::uint32_t corner : {a, a + 1, a + side + 1, a, a + side + 1, a + side})
+        indices.push_back(corner);
     }
-    for (std::thread& thread : threads) thread.join();
-    std::vector<Point> points(22);
-    const lpdeform_buffers buffers = buffers_of(points);
-    ASSERT_EQ(lpdeform_repeat(session_, &buffers, &frame_, &error_), LPDEFORM_OK);
-    ASSERT_EQ(frame_.frame_seq, std::ranges::max(newest));
   }
+
+  std::vector<Point> points;
+  std::vector<std::uint32_t> indices;
+};
+
+TEST_F(CStepsTest, OfSeveralThreadsThatPollNonePutsAnOlderFrameOverANewerOne) {
+  const Sheet sheet(60);
+  open(mesh_of(sheet.points, sheet.indices));
+  hold("base", {0, 1, 2});
+  hold("tip", {3718, 3719, 3720});
+  settle(sheet.points.size());
+  std::atomic<bool> is_over = false;
+  std::vector<std::thread> pollers;
+  for (int k = 0; k < 3; ++k) {
+    pollers.emplace_back([&] {
+      std::vector<Point> points(sheet.points.size());
+      const lpdeform_buffers buffers = buffers_of(points);
+      while (!is_over) lpdeform_poll(session_, &buffers, nullptr, nullptr);
+    });
+  }
+  std::vector<Point> points(sheet.points.size());
+  const lpdeform_buffers buffers = buffers_of(points);
+  std::uint64_t newest = frame_.frame_seq;
+  for (int seen = 0, k = 0; seen < 100; ++k) {
+    if (k % 50 == 0) lift(1 + 1e-3 * k);
+    EXPECT_EQ(lpdeform_repeat(session_, &buffers, &frame_, &error_), LPDEFORM_OK);
+    EXPECT_GE(frame_.frame_seq, newest);
+    if (HasFailure()) break;  // the threads are to be joined
+    seen += frame_.frame_seq > newest;
+    newest = frame_.frame_seq;
+  }
+  is_over = true;
+  for (std::thread& poller : pollers) poller.join();
 }
 
 }  // namespace
