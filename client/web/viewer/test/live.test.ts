@@ -128,6 +128,18 @@ describe("words for", () => {
     expect(statusOf(new LpdeformError(code, "no", {})).title).toBe(title);
   });
 
+  it("a full server leave its advice out, which the page follows by itself", () => {
+    const full = "The server has all of its 8 sessions in use; try again after the time given.";
+    expect(statusOf(new LpdeformError("resource_exhausted", full, {})).text).toBe(
+      "The server has all of its 8 sessions in use. Trying again by itself; your work is kept here.",
+    );
+  });
+
+  it("limits are set as people write them", () => {
+    const text = statusOf(new LpdeformError("invalid_argument", "allowed are vertices <= 500, faces <= 1500", {})).text;
+    expect(text.replaceAll("\u00a0", " ")).toBe("Allowed are vertices ≤ 500, faces ≤ 1500.");
+  });
+
   it("what is wrong name the element and its place", () => {
     expect(statusOf(new LpdeformError("invalid_argument", "a face has 2 corners", { element: "face 3" }))).toMatchObject({
       text: "A face has 2 corners.",

@@ -19,7 +19,8 @@ export function statusOf(error: LpdeformError): Status {
     return say("draining", "The server is shutting down", `${kept} and goes on as soon as a server is back.`);
   }
   if (code === "resource_exhausted") {
-    return say("full", "The server is full", `${sentence(message)} Trying again by itself; ${kept.toLowerCase()}.`);
+    const what = message.replace(/; try again after the time given\.?$/, "");
+    return say("full", "The server is full", `${sentence(what)} Trying again by itself; ${kept.toLowerCase()}.`);
   }
   if (["unavailable", "unknown", "deadline_exceeded", "internal", "cancelled", "data_loss"].includes(code)) {
     return say("away", "The server is away", `${kept}. Reconnecting by itself…`);
@@ -57,7 +58,8 @@ export function isPassing({ kind }: Status): boolean {
 export function sentence(text: string): string {
   const trimmed = text.trim();
   if (trimmed === "") return "";
-  return trimmed[0]!.toUpperCase() + trimmed.slice(1) + (/[.!?…]$/.test(trimmed) ? "" : ".");
+  const plain = trimmed.replaceAll(" <= ", "\u00a0≤\u00a0");
+  return plain[0]!.toUpperCase() + plain.slice(1) + (/[.!?…]$/.test(plain) ? "" : ".");
 }
 
 /**

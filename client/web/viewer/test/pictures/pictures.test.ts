@@ -2,6 +2,7 @@
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { afterAll, beforeAll, it } from "vitest";
+import { openSession } from "../../../client/src/index.js";
 import { Service } from "../../../client/test/real/service.js";
 import { User } from "../real/user.js";
 
@@ -26,7 +27,13 @@ interface State {
   query?: string;
   size?: { width: number; height: number; hasTouch?: boolean };
   isLight?: boolean;
-  act?: (user: User) => Promise<unknown>;
+  /** Of a server of its own. */
+  serverFlags?: string[];
+  /** Before the page is opened. */
+  prepare?: (service: Service) => Promise<unknown>;
+  /** What the page comes to by itself; a shape that can be dragged where left out. */
+  shows?: string;
+  act?: (user: User, service: Service) => Promise<unknown>;
 }
 
 /** Drags the k-th vertex of the handle. */
@@ -51,6 +58,18 @@ const keys = async (user: User, ...all: string[]) => {
 };
 const place = (user: User, x: number, y: number, z: number) =>
   user.vertexNear([x, y, z]).then((vertex) => user.vertexOnPage(vertex));
+
+const banner = (user: User, words: string) => user.page.locator(".banner", { hasText: words }).waitFor();
+
+async function openWithDefects(user: User): Promise<void> {
+  const content =
+    "OFF\n7 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n5 5 5\n0.5 0 0\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n3 1 2 4\n3 0 6 1\n";
+  await user.openFiles({ name: "odd.off", content });
+  const warning = user.page.locator('[data-warning="non_manifold_edges"]');
+  await warning.waitFor({ state: "attached" });
+  if (!(await warning.isVisible())) await user.page.getByRole("button", { name: "Side panel" }).click();
+  await warning.click();
+}
 
 const states: readonly State[] = [
   { name: "open-dark" },
@@ -141,7 +160,6 @@ const states: readonly State[] = [
       await keys(user, "Tab", "Shift+Tab", "Enter", "ArrowUp", "ArrowUp");
     },
   },
-  { name: "help", act: (user) => keys(user, "?") },
   { name: "save-menu", isLight: true, act: (user) => user.page.getByRole("button", { name: "Save" }).click() },
   { name: "upright", size: upright, act: (user) => pull(user, "Head", -90, -60, 40) },
   {
@@ -159,16 +177,6 @@ const states: readonly State[] = [
     act: async (user) => (await keys(user, "s"), await user.settled(1), await pull(user, "Head", -40, -50, 40)),
   },
   { name: "across", size: across, query: "?shape=bar", act: (user) => pull(user, "Top", 110, 60) },
-  {
-    name: "warnings",
-    isLight: true,
-    act: async (user) => {
-      const content =
-        "OFF\n7 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n5 5 5\n0.5 0 0\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n3 1 2 4\n3 0 6 1\n";
-      await user.openFiles({ name: "odd.off", content });
-      await user.page.locator('[data-warning="non_manifold_edges"]').click();
-    },
-  },
   {
     name: "upright-split-panel",
     size: upright,
@@ -208,29 +216,107 @@ const states: readonly State[] = [
       await user.settled();
     },
   },
-  {
-    name: "away",
-    act: async (user) => {
-      await raiseHead(user);
-      await service.killServer();
-      await user.page.locator(".banner").waitFor();
-    },
-  },
 ];
 
-it.each(states.filter(({ name }) => only.test(name)))(
-  "$name",
-  async ({ name, query = "", size = desktop, isLight = false, act }) => {
-    const user = await User.open(`${service.url}/${query}`, { ...size, colorScheme: isLight ? "light" : "dark" });
-    try {
+/** What stands between somebody and their work. */
+const troubles: readonly State[] = [
+  {
+    name: "away",
+    serverFlags: [],
+    act: async (user, own) => {
+      await raiseHead(user);
+      await own.killServer();
+      await banner(user, "The server is away");
+    },
+  },
+  {
+    name: "draining",
+    serverFlags: [],
+    act: async (user, own) => {
+      await raiseHead(user);
+      await user.page.route("**/StreamSessions", () => undefined); // no other answer comes: it stays as it is then
+      await own.stopServer();
+      await banner(user, "The server is shutting down");
+    },
+  },
+  {
+    name: "full",
+    serverFlags: ["--max-sessions", "1"],
+    prepare: ({ url }) => openSession({ vertices: [0, 0, 0, 1, 0, 0, 0, 1, 0], faces: [0, 1, 2] }, { url }),
+    shows: ".banner:has-text('The server is full')",
+  },
+  {
+    name: "refused",
+    serverFlags: ["--max-vertices", "500"],
+    shows: ".banner:has-text('The server refuses this mesh')",
+  },
+  {
+    name: "change-refused",
+    serverFlags: ["--max-handles", "3"],
+    act: async (user) => {
+      const { x, y } = await place(user, 0, -0.15, 0.48);
+      await user.page.mouse.click(x, y);
+      await banner(user, "The server cannot take this change");
+    },
+  },
+  {
+    name: "export-without-server",
+    serverFlags: [],
+    act: async (user, own) => {
+      await raiseHead(user);
+      await own.killServer();
+      await banner(user, "The server is away");
+      await user.save("Mesh as OFF");
+      await user.page.locator(".notice.bad").waitFor();
+    },
+  },
+  {
+    name: "show-again",
+    act: async (user) => {
+      await raiseHead(user);
+      await user.page.waitForTimeout(700);
+      await user.page.reload();
       await user.settled();
-      await act?.(user);
-      // The picture at rest, and plots.
-      await user.until(`[...document.querySelectorAll("canvas.stage")].every((one) => one.width >= 2 * one.clientWidth)`);
+      await user.page.evaluate("localStorage.setItem('lpdeform-restoring-' + sessionStorage.getItem('lpdeform-work'), 'yes')");
+      await user.page.reload();
+      await user.page.getByRole("dialog", { name: "Your work" }).waitFor();
+    },
+  },
+  {
+    name: "made-room",
+    act: async (user) => {
+      await raiseHead(user);
+      await user.page.getByLabel("Shape").selectOption("sheet");
+      await user.settled();
+    },
+  },
+  { name: "help", act: (user) => user.page.getByRole("button", { name: "Help and shortcuts (?)" }).click() },
+  { name: "warnings", act: openWithDefects },
+];
+const atBothSizes = troubles.flatMap((state) => [
+  { ...state, isLight: state.name.length % 2 === 0 },
+  { ...state, name: `upright-${state.name}`, size: upright, isLight: state.name.length % 2 === 1 },
+]);
+
+it.each([...states, ...atBothSizes].filter(({ name }) => only.test(name)))(
+  "$name",
+  async ({ name, query = "", size = desktop, isLight = false, serverFlags, prepare, shows, act }: State) => {
+    const served = serverFlags ? await Service.start({ files, serverFlags }) : service;
+    await prepare?.(served);
+    const user = await User.open(`${served.url}/${query}`, { ...size, colorScheme: isLight ? "light" : "dark" });
+    try {
+      if (shows) await user.page.locator(shows).waitFor();
+      else await user.settled();
+      await act?.(user, served);
+      // The picture at rest, and plots; there is none before there is a surface.
+      await user.until(
+        `window.__lpdeform.app.panes.every(({ stage }) => !stage.surface || stage.canvas.width >= 2 * stage.canvas.clientWidth)`,
+      );
       await user.page.waitForTimeout(1200);
       await user.page.screenshot({ path: join(out, `${name}.png`) });
     } finally {
       await user.close();
+      if (served !== service) await served.stop();
     }
   },
 );
