@@ -75,7 +75,7 @@ export function helpSheet(app: App): HTMLDialogElement {
     el(
       "p",
       {},
-      "Handles hold parts of the surface. Drag one and everything between them follows, with the least L_p distortion: low p gathers it in creases, high p spreads it. " +
+      "Handles hold parts of the surface. Drag one and everything between them follows, with the least Lₚ distortion: low p gathers it in creases, high p spreads it. " +
         "Blue is undistorted, red most distorted. Drag beside the shape to turn it, scroll or pinch to zoom, right-drag or two fingers to shift. On a touch screen one finger works the tool, two the view.",
     ),
     el(

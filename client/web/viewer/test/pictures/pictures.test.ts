@@ -293,12 +293,18 @@ const troubles: readonly State[] = [
   { name: "help", act: (user) => user.page.getByRole("button", { name: "Help and shortcuts (?)" }).click() },
   { name: "warnings", act: openWithDefects },
 ];
+const narrow = { width: 420, height: 860, hasTouch: true };
 const atBothSizes = troubles.flatMap((state) => [
   { ...state, isLight: state.name.length % 2 === 0 },
   { ...state, name: `upright-${state.name}`, size: upright, isLight: state.name.length % 2 === 1 },
 ]);
 
-it.each([...states, ...atBothSizes].filter(({ name }) => only.test(name)))(
+/** A window or a telephone that is narrower still. */
+const inLittleRoom = troubles
+  .filter(({ name }) => ["away", "made-room", "help"].includes(name))
+  .map((state) => ({ ...state, name: `narrow-${state.name}`, size: narrow }));
+
+it.each([...states, ...atBothSizes, ...inLittleRoom].filter(({ name }) => only.test(name)))(
   "$name",
   async ({ name, query = "", size = desktop, isLight = false, serverFlags, prepare, shows, act }: State) => {
     const served = serverFlags ? await Service.start({ files, serverFlags }) : service;
