@@ -165,64 +165,13 @@ void encode_header(const FramePiece& piece, v1::FrameHeader& out) {
   }
 }
 
+/// All but the numbers: see Outgoing.
 void encode_piece(const FramePiece& piece, v1::FramePart& out) {
   if (piece.first == 0) encode_header(piece, *out.mutable_header());
   out.set_frame_seq(piece.frame->frame_seq);
   out.set_first_vertex(piece.first);
   out.set_vertex_count(piece.count);
   out.set_last(piece.is_last);
-  const Surface::Bytes bytes = piece.bytes();
-  out.set_positions(std::string(bytes.positions));
-  out.set_distortion(std::string(bytes.distortion));
-  out.set_normals(std::string(bytes.normals));
-}
-
-/// Bytes that a field of this many takes, its tag and length included; 0 where it is empty.
-std::size_t field_bytes(std::size_t size, std::size_t tag_bytes) {
-  if (size == 0) return 0;
-  std::size_t length_bytes = 1;
-  for (std::size_t rest = size >> 7; rest != 0; rest >>= 7) ++length_bytes;
-  return tag_bytes + length_bytes + size;
-}
-
-/// The padding that lets a buffer of `size` bytes begin at a multiple of `unit` when the field before its
-/// padding ends `before` bytes past one; with what stands between that end and the buffer's. 0 of both where
-/// the buffer is empty.
-struct Gap {
-  std::size_t padding = 0, bytes = 0;
-};
-Gap gap_before(std::size_t size, std::size_t before, std::size_t tag_bytes, std::size_t unit) {
-  if (size == 0) return {};
-  const std::size_t head = field_bytes(size, tag_bytes) - size;
-  std::size_t padding = 0;
-  while ((before + field_bytes(padding, tag_bytes) + head) % unit != 0) ++padding;
-  return {padding, field_bytes(padding, tag_bytes) + head + size};
-}
-
-/// Fills the paddings of `part` so that positions, distortion and normals begin at multiples of `unit` bytes
-/// in `message`, which holds the part as its last field; these are the part's last fields, written in order.
-void align_buffers(const google::protobuf::MessageLite& message, v1::FramePart& part, std::size_t unit) {
-  const std::size_t positions = part.positions().size();
-  const Gap distortion = gap_before(part.distortion().size(), positions, 1, unit);
-  part.set_distortion_padding(std::string(distortion.padding, '\0'));
-  const Gap normals = gap_before(part.normals().size(), positions + distortion.bytes, 2, unit);
-  part.set_normals_padding(std::string(normals.padding, '\0'));
-  const std::size_t after = positions + distortion.bytes + normals.bytes;
-  for (std::size_t padding = 0; padding < 16; ++padding) {
-    part.set_positions_padding(std::string(padding, '\0'));
-    if ((message.ByteSizeLong() - after) % unit == 0) return;
-  }
-}
-
-std::size_t unit_of(const FramePiece& piece) {
-  return piece.format == Format::kFloat64 ? 8 : 4;
-}
-
-/// Aligns the frame, if there is one, of an event in `message`.
-void align_event(const Note& note, const google::protobuf::MessageLite& message, v1::StreamEvent& event) {
-  if (const auto* const piece = std::get_if<FramePiece>(&note)) {
-    align_buffers(message, *event.mutable_frame(), unit_of(*piece));
-  }
 }
 
 void encode_notice(const LoadNote& load, v1::Notice& out) {
@@ -266,6 +215,13 @@ void encode_event(const Note& note, const FrameStream& stream, std::uint32_t ver
                       out.mutable_go_away()->set_reconnect_after_ms(1000);
                   }};
   std::visit(put, note);
+}
+
+template <typename Message>
+void encode_to(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
+               Outgoing<Message>& out) {
+  encode_event(note, stream, vertex_count, *out.message.mutable_event());
+  if (const auto* const piece = std::get_if<FramePiece>(&note)) out.piece = *piece;
 }
 
 }  // namespace
@@ -313,6 +269,7 @@ void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint no
   using std::chrono::duration_cast;
   using std::chrono::milliseconds;
   out.set_name(info.name);
+  out.set_route(info.route);
   out.set_epoch(info.epoch);
   encode_report(info.mesh->report(), *out.mutable_mesh());
   out.mutable_mesh()->set_welded_vertices(info.mesh->copy_count());
@@ -371,30 +328,25 @@ void encode(const UpdateResult& result, v1::UpdateResult& out) {
 }
 
 void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
-            v1::DeformResponse& out) {
-  if (const auto* const result = std::get_if<UpdateResult>(&note)) {
-    encode(*result, *out.mutable_result());
-    return;
-  }
-  encode_event(note, stream, vertex_count, *out.mutable_event());
-  align_event(note, out, *out.mutable_event());
+            Outgoing<v1::DeformResponse>& out) {
+  if (const auto* const result = std::get_if<UpdateResult>(&note))
+    return encode(*result, *out.message.mutable_result());
+  encode_to(note, stream, vertex_count, out);
 }
 
 void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
-            v1::StreamFramesResponse& out) {
-  encode_event(note, stream, vertex_count, *out.mutable_event());
-  align_event(note, out, *out.mutable_event());
+            Outgoing<v1::StreamFramesResponse>& out) {
+  encode_to(note, stream, vertex_count, out);
 }
 
 void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
-            v1::StreamSessionsResponse& out) {
-  encode_event(note, stream, vertex_count, *out.mutable_event());
-  align_event(note, out, *out.mutable_event());
+            Outgoing<v1::StreamSessionsResponse>& out) {
+  encode_to(note, stream, vertex_count, out);
 }
 
-void encode(const FramePiece& piece, v1::SolveResponse& out) {
-  encode_piece(piece, *out.mutable_frame());
-  align_buffers(out, *out.mutable_frame(), unit_of(piece));
+void encode(const FramePiece& piece, Outgoing<v1::SolveResponse>& out) {
+  encode_piece(piece, *out.message.mutable_frame());
+  out.piece = piece;
 }
 
 void encode_trace(const std::vector<IterationRecord>& trace, std::size_t begin, std::size_t end,

@@ -5,6 +5,7 @@
 #include "absl/status/status.h"
 #include "lpdeform/v1/service.pb.h"
 #include "server/frame_stream.h"
+#include "server/outgoing.h"
 #include "server/session.h"
 #include "server/solve_job.h"
 
@@ -29,16 +30,17 @@ void encode(const SolveResult& result, v1::SolveSummary& out);
 void encode(const UpdateResult& result, v1::UpdateResult& out);
 
 /// A note of a stream: an event, or the result of an update.
-void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count, v1::DeformResponse& out);
+void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
+            Outgoing<v1::DeformResponse>& out);
 /// The same for a stream that takes no updates.
 void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
-            v1::StreamFramesResponse& out);
-/// The same for one of several on a stream, whose number is set already.
+            Outgoing<v1::StreamFramesResponse>& out);
+/// The same for one of several on a stream; its number is the caller's to set.
 void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
-            v1::StreamSessionsResponse& out);
+            Outgoing<v1::StreamSessionsResponse>& out);
 
 /// A piece of a solve's result.
-void encode(const FramePiece& piece, v1::SolveResponse& out);
+void encode(const FramePiece& piece, Outgoing<v1::SolveResponse>& out);
 
 /// Records [begin, end) of a trace.
 void encode_trace(const std::vector<IterationRecord>& trace, std::size_t begin, std::size_t end,

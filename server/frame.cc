@@ -9,17 +9,15 @@ namespace lpdeform {
 namespace {
 
 template <typename Matrix>
-std::string float32_bytes(const Matrix& values) {
-  std::string bytes(static_cast<std::size_t>(values.size()) * sizeof(float), '\0');
-  Eigen::Map<Eigen::VectorXf>(reinterpret_cast<float*>(bytes.data()), values.size()) =
-      Eigen::Map<const Eigen::VectorXd>(values.data(), values.size()).template cast<float>();
-  return bytes;
+Eigen::VectorXf float32_of(const Matrix& values) {
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), values.size()).template cast<float>();
 }
 
+/// In the order that they lie in memory.
 template <typename Matrix>
-std::string_view float64_bytes(const Matrix& values) {
+std::string_view bytes_of_all(const Matrix& values) {
   return {reinterpret_cast<const char*>(values.data()),
-          static_cast<std::size_t>(values.size()) * sizeof(double)};
+          static_cast<std::size_t>(values.size()) * sizeof(*values.data())};
 }
 
 constexpr std::size_t kMostBytes = (1u << 20) - 1024;  // of a message's numbers; the rest is for headers
@@ -65,14 +63,14 @@ Surface::Bytes Surface::bytes(Format format, std::uint32_t first, std::uint32_t 
   };
   switch (format) {
     case Format::kFloat64:
-      out.positions = cut(float64_bytes(positions_), 3 * sizeof(double));
-      if (with_distortion) out.distortion = cut(float64_bytes(cell_energies_), sizeof(double));
-      if (with_normals) out.normals = cut(float64_bytes(normals()), 3 * sizeof(double));
+      out.positions = cut(bytes_of_all(positions_), 3 * sizeof(double));
+      if (with_distortion) out.distortion = cut(bytes_of_all(cell_energies_), sizeof(double));
+      if (with_normals) out.normals = cut(bytes_of_all(normals()), 3 * sizeof(double));
       break;
     case Format::kFloat32:
-      out.positions = cut(float32().positions, 3 * sizeof(float));
-      if (with_distortion) out.distortion = cut(float32().distortion, sizeof(float));
-      if (with_normals) out.normals = cut(float32_normals(), 3 * sizeof(float));
+      out.positions = cut(bytes_of_all(float32().positions), 3 * sizeof(float));
+      if (with_distortion) out.distortion = cut(bytes_of_all(float32().distortion), sizeof(float));
+      if (with_normals) out.normals = cut(bytes_of_all(float32_normals()), 3 * sizeof(float));
       break;
     case Format::kQuantized:
       out.positions = cut(quantized().vertices, kQuantizedBytes);
@@ -105,12 +103,12 @@ void Surface::prepare(Format format, bool with_normals) const {
 }
 
 std::size_t Surface::memory_bytes() const {
-  return float64_bytes(positions_).size() + float64_bytes(cell_energies_).size() + form_bytes_;
+  return bytes_of_all(positions_).size() + bytes_of_all(cell_energies_).size() + form_bytes_;
 }
 
 const Surface::Float32& Surface::float32() const {
   return float32_.get([this] {
-    return Float32{counted(float32_bytes(positions_)), counted(float32_bytes(cell_energies_))};
+    return Float32{counted(float32_of(positions_)), counted(float32_of(cell_energies_))};
   });
 }
 
@@ -129,13 +127,13 @@ const Points& Surface::normals() const {
   LPDEFORM_CHECK(mesh_ != nullptr);
   return normals_.get([this] {
     Points made = mesh_->normals(positions_);
-    form_bytes_ += float64_bytes(made).size();
+    form_bytes_ += bytes_of_all(made).size();
     return made;
   });
 }
 
-const std::string& Surface::float32_normals() const {
-  return float32_normals_.get([this] { return counted(float32_bytes(normals())); });
+const Eigen::VectorXf& Surface::float32_normals() const {
+  return float32_normals_.get([this] { return counted(float32_of(normals())); });
 }
 
 const std::string& Surface::quantized_normals() const {
@@ -148,6 +146,11 @@ const Surface::Parts& Surface::compressed_normals() const {
 
 std::string Surface::counted(std::string form) const {
   form_bytes_ += form.size();
+  return form;
+}
+
+Eigen::VectorXf Surface::counted(Eigen::VectorXf form) const {
+  form_bytes_ += bytes_of_all(form).size();
   return form;
 }
 

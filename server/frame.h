@@ -58,7 +58,7 @@ class Surface {
 
  private:
   struct Float32 {
-    std::string positions, distortion;
+    Eigen::VectorXf positions, distortion;
   };
   struct Quantized {
     Quantization quantization;
@@ -87,10 +87,11 @@ class Surface {
   const Quantized& quantized() const;
   const Parts& compressed() const;
   const Points& normals() const;
-  const std::string& float32_normals() const;
+  const Eigen::VectorXf& float32_normals() const;
   const std::string& quantized_normals() const;
   const Parts& compressed_normals() const;
   std::string counted(std::string form) const;
+  Eigen::VectorXf counted(Eigen::VectorXf form) const;
   Parts counted(Parts form) const;
 
   const Points positions_;
@@ -101,7 +102,8 @@ class Surface {
   Form<Quantized> quantized_;
   Form<Parts> compressed_;
   Form<Points> normals_;
-  Form<std::string> float32_normals_, quantized_normals_;
+  Form<Eigen::VectorXf> float32_normals_;
+  Form<std::string> quantized_normals_;
   Form<Parts> compressed_normals_;
 };
 

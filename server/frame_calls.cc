@@ -67,8 +67,7 @@ class FrameCall : public WritePump<Reactor, Response> {
   bool is_forgotten_ = false;
 };
 
-class StreamFramesCall final
-    : public FrameCall<grpc::ServerWriteReactor<v1::StreamFramesResponse>, v1::StreamFramesResponse> {
+class StreamFramesCall final : public FrameCall<StreamFramesReactor, Outgoing<v1::StreamFramesResponse>> {
  public:
   using FrameCall::FrameCall;
 
@@ -79,9 +78,7 @@ class StreamFramesCall final
   }
 };
 
-class DeformCall final
-    : public FrameCall<grpc::ServerBidiReactor<Received<v1::DeformRequest>, v1::DeformResponse>,
-                       v1::DeformResponse> {
+class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResponse>> {
  public:
   using FrameCall::FrameCall;
 
@@ -201,14 +198,12 @@ class DeformCall final
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::StreamFramesResponse>* stream_frames(Backend& backend,
-                                                                  std::shared_ptr<CallRecord> record,
-                                                                  const v1::StreamFramesRequest& request) {
+StreamFramesReactor* stream_frames(Backend& backend, std::shared_ptr<CallRecord> record,
+                                   const v1::StreamFramesRequest& request) {
   return begin_call<StreamFramesCall>(backend, std::move(record), request);
 }
 
-grpc::ServerBidiReactor<Received<v1::DeformRequest>, v1::DeformResponse>* deform(
-    Backend& backend, std::shared_ptr<CallRecord> record) {
+DeformReactor* deform(Backend& backend, std::shared_ptr<CallRecord> record) {
   return begin_call<DeformCall>(backend, std::move(record));
 }
 

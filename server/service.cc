@@ -17,6 +17,7 @@ namespace lpdeform {
 namespace {
 
 constexpr std::size_t kLongestTraceParent = 256;
+constexpr std::size_t kLongestRoute = 128;
 
 std::string text_of(const grpc::CallbackServerContext& context, const char* header) {
   const auto found = context.client_metadata().find(header);
@@ -30,6 +31,8 @@ std::shared_ptr<CallRecord> begin_record(Backend& backend, const grpc::CallbackS
   CallContext call;
   if (trace_parent.size() <= kLongestTraceParent) call.trace_id = trace_id_of(trace_parent);
   call.authorization = text_of(context, "authorization");
+  const std::string route = text_of(context, "lpdeform-session");
+  if (route.size() <= kLongestRoute) call.route = route;
   if (const auto auth = context.auth_context(); auth && auth->IsPeerAuthenticated()) {
     for (const grpc::string_ref& name : auth->GetPeerIdentity()) {
       call.peer_identity.assign(name.data(), name.size());
@@ -95,6 +98,11 @@ grpc::ServerUnaryReactor* about_session(Backend& backend, grpc::CallbackServerCo
                  });
 }
 
+int index_of(const char* method) {
+  const auto* const calls = v1::DeformRequest::descriptor()->file()->FindServiceByName("DeformService");
+  return calls->FindMethodByName(method)->index();
+}
+
 /// A call that is answered later, when the store has answered.
 template <typename Request, typename Response>
 grpc::ServerUnaryReactor* answered_later(Backend& backend, grpc::CallbackServerContext& context,
@@ -112,13 +120,26 @@ grpc::ServerUnaryReactor* answered_later(Backend& backend, grpc::CallbackServerC
 
 }  // namespace
 
-/// Deform takes messages as they come, in place of the handler of generated code: see received.h.
+/// In place of the handlers of generated code: Deform takes messages as they come (received.h), and frames are sent from where
+/// they are (outgoing.h).
 Service::Service(Backend& backend) : backend_(backend) {
-  const auto* const calls = v1::DeformRequest::descriptor()->file()->FindServiceByName("DeformService");
-  MarkMethodCallback(calls->FindMethodByName("Deform")->index(),
-                     new grpc::internal::CallbackBidiHandler<Received<v1::DeformRequest>, v1::DeformResponse>(
-                         [this](grpc::CallbackServerContext* context) {
-                           return deform(backend_, begin_record(backend_, *context, "Deform"));
+  MarkMethodCallback(
+      index_of("Deform"),
+      new grpc::internal::CallbackBidiHandler<Received<v1::DeformRequest>, Outgoing<v1::DeformResponse>>(
+          [this](grpc::CallbackServerContext* context) {
+            return deform(backend_, begin_record(backend_, *context, "Deform"));
+          }));
+  stream_with<v1::StreamFramesRequest, v1::StreamFramesResponse>("StreamFrames", stream_frames);
+  stream_with<v1::StreamSessionsRequest, v1::StreamSessionsResponse>("StreamSessions", stream_sessions);
+  stream_with<v1::SolveRequest, v1::SolveResponse>("Solve", solve);
+}
+
+template <typename Request, typename Response, typename Begin>
+void Service::stream_with(const char* method, Begin begin) {
+  MarkMethodCallback(index_of(method),
+                     new grpc::internal::CallbackServerStreamingHandler<Request, Outgoing<Response>>(
+                         [this, method, begin](grpc::CallbackServerContext* context, const Request* request) {
+                           return begin(backend_, begin_record(backend_, *context, method), *request);
                          }));
 }
 
@@ -185,21 +206,6 @@ grpc::ServerUnaryReactor* Service::UndoUpdate(Context* context, const v1::UndoUp
 grpc::ServerUnaryReactor* Service::AckFrames(Context* context, const v1::AckFramesRequest* request,
                                              v1::AckFramesResponse* response) {
   return about_session(backend_, *context, "AckFrames", &Backend::ack_frames, *request, *response);
-}
-
-grpc::ServerWriteReactor<v1::StreamFramesResponse>* Service::StreamFrames(
-    Context* context, const v1::StreamFramesRequest* request) {
-  return stream_frames(backend_, begin_record(backend_, *context, "StreamFrames"), *request);
-}
-
-grpc::ServerWriteReactor<v1::StreamSessionsResponse>* Service::StreamSessions(
-    Context* context, const v1::StreamSessionsRequest* request) {
-  return stream_sessions(backend_, begin_record(backend_, *context, "StreamSessions"), *request);
-}
-
-grpc::ServerWriteReactor<v1::SolveResponse>* Service::Solve(Context* context,
-                                                            const v1::SolveRequest* request) {
-  return solve(backend_, begin_record(backend_, *context, "Solve"), *request);
 }
 
 }  // namespace lpdeform

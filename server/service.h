@@ -38,14 +38,11 @@ class Service final : public v1::DeformService::CallbackService {
                                        v1::UndoUpdateResponse* response) override;
   grpc::ServerUnaryReactor* AckFrames(Context* context, const v1::AckFramesRequest* request,
                                       v1::AckFramesResponse* response) override;
-  grpc::ServerWriteReactor<v1::StreamFramesResponse>* StreamFrames(
-      Context* context, const v1::StreamFramesRequest* request) override;
-  grpc::ServerWriteReactor<v1::StreamSessionsResponse>* StreamSessions(
-      Context* context, const v1::StreamSessionsRequest* request) override;
-  grpc::ServerWriteReactor<v1::SolveResponse>* Solve(Context* context,
-                                                     const v1::SolveRequest* request) override;
 
  private:
+  template <typename Request, typename Response, typename Begin>
+  void stream_with(const char* method, Begin begin);
+
   Backend& backend_;
 };
 

@@ -23,7 +23,7 @@ absl::Status wrong_count(int count) {
 
 /// Several sessions' streams in one call. They take turns, message by message, so that none waits for another's frames.
 class StreamSessionsCall final
-    : public WritePump<grpc::ServerWriteReactor<v1::StreamSessionsResponse>, v1::StreamSessionsResponse> {
+    : public WritePump<StreamSessionsReactor, Outgoing<v1::StreamSessionsResponse>> {
  public:
   explicit StreamSessionsCall(Backend& backend) : backend_(backend) {}
 
@@ -73,10 +73,10 @@ class StreamSessionsCall final
     pump_locked();
   }
 
-  Made make(v1::StreamSessionsResponse& response) override {
+  Made make(Outgoing<v1::StreamSessionsResponse>& response) override {
     for (std::size_t tried = 0; tried < lanes_.size(); ++tried) {
       const std::size_t turn = next_++ % lanes_.size();
-      response.set_stream(static_cast<std::uint32_t>(turn));  // first: it moves what comes after it
+      response.message.set_stream(static_cast<std::uint32_t>(turn));
       if (!make_of(lanes_[turn], response)) continue;
       for (const Lane& lane : lanes_) {
         if (!lane.is_over) return Made::kMessage;
@@ -86,10 +86,10 @@ class StreamSessionsCall final
     return Made::kNothing;
   }
 
-  static bool make_of(Lane& lane, v1::StreamSessionsResponse& response) {
+  static bool make_of(Lane& lane, Outgoing<v1::StreamSessionsResponse>& response) {
     if (lane.is_over) return false;
     if (lane.open.stream == nullptr) {
-      refuse_lane(lane, response);
+      refuse_lane(lane, response.message);
       return true;
     }
     const std::optional<Note> note = lane.open.stream->next();
@@ -129,8 +129,8 @@ class StreamSessionsCall final
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::StreamSessionsResponse>* stream_sessions(
-    Backend& backend, std::shared_ptr<CallRecord> record, const v1::StreamSessionsRequest& request) {
+StreamSessionsReactor* stream_sessions(Backend& backend, std::shared_ptr<CallRecord> record,
+                                       const v1::StreamSessionsRequest& request) {
   return begin_call<StreamSessionsCall>(backend, std::move(record), request);
 }
 

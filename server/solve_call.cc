@@ -12,7 +12,7 @@ namespace {
 
 /// Progress while the solver runs, the newest only; then the summary, the trace, the result. Heartbeats wherever there is
 /// nothing else to say, from the beginning of the call.
-class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveResponse>, v1::SolveResponse> {
+class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveResponse>> {
  public:
   explicit SolveCall(Backend& backend) : backend_(backend), last_sent_at_(backend.timers->now()) {}
 
@@ -91,25 +91,25 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
     pump_locked();
   }
 
-  Made make(v1::SolveResponse& response) override {
+  Made make(Outgoing<v1::SolveResponse>& response) override {
     if (progress_) {
-      response.mutable_progress()->set_iteration(progress_->iteration);
-      response.mutable_progress()->set_energy(progress_->energy);
-      response.mutable_progress()->set_seconds(progress_->seconds);
+      response.message.mutable_progress()->set_iteration(progress_->iteration);
+      response.message.mutable_progress()->set_energy(progress_->energy);
+      response.message.mutable_progress()->set_seconds(progress_->seconds);
       progress_.reset();
       return Made::kMessage;
     }
     if (!result_) {
       if (!is_beat_due_) return Made::kNothing;
-      response.mutable_heartbeat();
+      response.message.mutable_heartbeat();
       return Made::kMessage;
     }
     const std::vector<IterationRecord>& trace = result_->summary.trace;
     if (!std::exchange(is_summary_sent_, true)) {
-      encode(*result_, *response.mutable_summary());
+      encode(*result_, *response.message.mutable_summary());
     } else if (records_sent_ < trace.size()) {
       const std::size_t end = std::min(trace.size(), records_sent_ + kRecordsAMessage);
-      encode_trace(trace, records_sent_, end, *response.mutable_trace());
+      encode_trace(trace, records_sent_, end, *response.message.mutable_trace());
       records_sent_ = end;
     } else {
       encode(cutter_.next(), response);
@@ -142,8 +142,7 @@ class SolveCall final : public WritePump<grpc::ServerWriteReactor<v1::SolveRespo
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::SolveResponse>* solve(Backend& backend, std::shared_ptr<CallRecord> record,
-                                                   const v1::SolveRequest& request) {
+SolveReactor* solve(Backend& backend, std::shared_ptr<CallRecord> record, const v1::SolveRequest& request) {
   return begin_call<SolveCall>(backend, std::move(record), request);
 }
 

@@ -2,11 +2,12 @@
 
 #include "lpdeform/v1/service.grpc.pb.h"
 #include "server/backend.h"
+#include "server/frame_slices.h"
 
 namespace lpdeform {
 
 /// A Solve call; belongs to gRPC once made. `backend` outlives it.
-grpc::ServerWriteReactor<v1::SolveResponse>* solve(Backend& backend, std::shared_ptr<CallRecord> record,
-                                                   const v1::SolveRequest& request);
+using SolveReactor = grpc::ServerWriteReactor<Outgoing<v1::SolveResponse>>;
+SolveReactor* solve(Backend& backend, std::shared_ptr<CallRecord> record, const v1::SolveRequest& request);
 
 }  // namespace lpdeform

@@ -14,6 +14,7 @@
 #include "core/base/check.h"
 #include "server/backend.h"
 #include "server/encode.h"
+#include "server/frame_slices.h"
 #include "server/snapshot.h"
 #include "tests/fuzz/proto_mutator.h"
 #include "tests/fuzz/schedule.pb.h"
@@ -258,7 +259,7 @@ class Schedule {
       for (std::size_t k = 0; k < kMostNotes; ++k) {
         const auto note = open.stream->next();
         if (!note) break;
-        v1::DeformResponse response;
+        Outgoing<v1::DeformResponse> response;
         encode(*note, *open.stream, open.session->vertex_count(), response);
         LPDEFORM_CHECK(response.ByteSizeLong() < (1u << 22));
         (void)open.stream->acknowledge(open.stream->last_frame_seq());

@@ -10,6 +10,7 @@
 #include "manual_timers.h"
 #include "server/decode.h"
 #include "server/encode.h"
+#include "server/frame_slices.h"
 #include "server/publisher.h"
 
 namespace lpdeform {
@@ -140,9 +141,16 @@ TEST_F(WireTest, EncodingsAreAsAskedForAndTheLowestIsNeverAboveThem) {
   EXPECT_EQ(reason(decode_frame_options(message).status()), "ENUM_UNKNOWN");
 }
 
-/// Where `part` begins within `message` when it is written.
-std::size_t offset_of(const google::protobuf::MessageLite& message, const std::string& part) {
-  return message.SerializeAsString().find(part);
+/// As gRPC sends it.
+template <typename Message>
+std::string written(const Outgoing<Message>& out) {
+  grpc::ByteBuffer buffer;
+  bool is_ours = false;
+  EXPECT_TRUE(grpc::SerializationTraits<Outgoing<Message>>::Serialize(out, &buffer, &is_ours).ok());
+  grpc::Slice slice;
+  EXPECT_TRUE(buffer.DumpToSingleSlice(&slice).ok());
+  EXPECT_EQ(slice.size(), out.ByteSizeLong());
+  return {reinterpret_cast<const char*>(slice.begin()), slice.size()};
 }
 
 /// Triangles around vertex 0, no two numbers of a vertex alike.
@@ -166,14 +174,22 @@ TEST_P(AlignmentTest, BuffersCanBeUsedInPlaceInEveryMessage) {
   const auto mesh = std::make_shared<const DrawMesh>(fan(n));
   frame.surface =
       std::make_shared<Surface>(mesh->positions(fan(n)->positions()), Field::Constant(n, 9.25), mesh);
-  const auto expect_aligned = [&](const google::protobuf::MessageLite& message, const v1::FramePart& part) {
-    EXPECT_EQ(offset_of(message, part.positions()) % unit, 0u);
-    if (!part.distortion().empty()) {
-      EXPECT_EQ(offset_of(message, part.distortion()) % unit, 0u);
-    }
-    if (!part.normals().empty()) {
-      EXPECT_EQ(offset_of(message, part.normals()) % unit, 0u);
-    }
+  const auto expect_aligned = [&](const auto& out, auto message, const FramePiece& piece, auto part_of) {
+    const std::string bytes = written(out);
+    ASSERT_TRUE(message.ParseFromString(bytes));
+    EXPECT_TRUE(message.SerializeAsString() == bytes);  // as protobuf would have written it
+    const v1::FramePart& part = part_of(message);
+    EXPECT_EQ(part.frame_seq(), piece.frame->frame_seq);
+    EXPECT_EQ(part.vertex_count(), piece.count);
+    EXPECT_TRUE(part.positions() == piece.bytes().positions);
+    EXPECT_TRUE(part.distortion() == piece.bytes().distortion);
+    EXPECT_TRUE(part.normals() == piece.bytes().normals);
+    for (const std::string& numbers : {part.positions(), part.distortion(), part.normals()})
+      EXPECT_TRUE(numbers.empty() || bytes.find(numbers) % unit == 0) << numbers.size();
+  };
+  const auto in_event = [](const auto& message) -> const v1::FramePart& { return message.event().frame(); };
+  const auto in_answer = [](const v1::SolveResponse& message) -> const v1::FramePart& {
+    return message.frame();
   };
   for (const std::uint64_t seq : {1u, 127u, 128u, 20000u}) {
     for (const int extras : {0, 1, 2, 3}) {
@@ -189,22 +205,45 @@ TEST_P(AlignmentTest, BuffersCanBeUsedInPlaceInEveryMessage) {
                                with_distortion,
                                with_normals};
         const FrameStream stream({}, publisher, timers, std::chrono::seconds(15), {});
-        v1::DeformResponse deform;
+        Outgoing<v1::DeformResponse> deform;
         encode(piece, stream, n, deform);
-        expect_aligned(deform, deform.event().frame());
-        v1::StreamFramesResponse frames;
+        expect_aligned(deform, v1::DeformResponse(), piece, in_event);
+        Outgoing<v1::StreamFramesResponse> frames;
         encode(piece, stream, n, frames);
-        expect_aligned(frames, frames.event().frame());
-        v1::StreamSessionsResponse sessions;
-        sessions.set_stream(extras);
+        expect_aligned(frames, v1::StreamFramesResponse(), piece, in_event);
+        Outgoing<v1::StreamSessionsResponse> sessions;
+        sessions.message.set_stream(extras);
         encode(piece, stream, n, sessions);
-        expect_aligned(sessions, sessions.event().frame());
-        v1::SolveResponse solve;
+        expect_aligned(sessions, v1::StreamSessionsResponse(), piece, in_event);
+        EXPECT_EQ(sessions.message.stream(), static_cast<std::uint32_t>(extras));
+        Outgoing<v1::SolveResponse> solve;
         encode(piece, solve);
-        expect_aligned(solve, solve.frame());
+        expect_aligned(solve, v1::SolveResponse(), piece, in_answer);
       }
     }
   }
+}
+
+TEST(Outgoing, NumbersOutliveTheFrameUntilTheyAreSent) {
+  const auto shape = fan(5);
+  auto surface = std::make_shared<const Surface>(shape->positions(), Field::Constant(5, 9.25));
+  const std::weak_ptr<const Surface> watched = surface;
+  Outgoing<v1::SolveResponse> out;
+  {
+    auto frame = std::make_shared<Frame>();
+    frame->surface = std::move(surface);
+    encode(FramePiece{std::move(frame), 0, 5, true, 0, Format::kFloat64, true, false}, out);
+  }
+  grpc::ByteBuffer buffer;
+  bool is_ours = false;
+  ASSERT_TRUE(grpc::SerializationTraits<Outgoing<v1::SolveResponse>>::Serialize(out, &buffer, &is_ours).ok());
+  out.Clear();
+  EXPECT_FALSE(watched.expired());
+  v1::SolveResponse message;
+  ASSERT_TRUE(grpc::SerializationTraits<v1::SolveResponse>::Deserialize(&buffer, &message).ok());
+  EXPECT_EQ(message.frame().distortion().size(), 5 * sizeof(double));
+  buffer.Clear();
+  EXPECT_TRUE(watched.expired());
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, AlignmentTest,
