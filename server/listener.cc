@@ -211,6 +211,7 @@ void Listener::accept_from(int listening) {
     return;
   }
   if (fd >= last_descriptor_ || !has_room()) {
+    ++refused_;
     close(fd);
     events_.on_refused();
     return;

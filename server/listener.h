@@ -44,6 +44,8 @@ class Listener {
 
   /// Connections handed over so far.
   std::uint64_t accepted() const { return accepted_; }
+  /// And closed at once for want of room.
+  std::uint64_t refused() const { return refused_; }
 
   /// Takes no more. Again: nothing.
   void stop();
@@ -68,7 +70,7 @@ class Listener {
   // The listener's thread alone:
   std::unordered_map<int, std::uint64_t> given_;  // connections handed over: descriptor and inode
   std::chrono::steady_clock::time_point counted_at_;
-  std::atomic<std::uint64_t> accepted_ = 0;
+  std::atomic<std::uint64_t> accepted_ = 0, refused_ = 0;
   std::atomic<bool> is_stopping_ = false;
   std::thread thread_;
 };

@@ -134,7 +134,8 @@ struct Server::Impl {
         vital_signs({[this, is_plain = !options.tls.is_on()] {
                        return is_plain ? is_serving(listener->address()) : takes_connection(*listener);
                      },
-                     [this] { return backend.gate.is_closed(); }, backend.scheduler, backend.pool}) {}
+                     [this] { return listener->refused(); }, [this] { return backend.gate.is_closed(); },
+                     backend.scheduler, backend.pool}) {}
 
   absl::Status start_grpc(const ServerOptions& options,
                           const std::shared_ptr<grpc::ServerCredentials>& credentials);

@@ -35,7 +35,9 @@ class Probe final : public Runnable {
 VitalSigns::Finding VitalSigns::examine() const {
   Finding finding;
   finding.is_draining = parts_.is_draining();
+  const std::uint64_t refused = parts_.refused();
   if (!finding.is_draining) finding.takes_connections = parts_.accepts();
+  finding.is_full = !finding.takes_connections && parts_.refused() != refused;
   finding.takes_calls = runs_task();
   finding.runs_sessions = runs_slice();
   return finding;
@@ -53,7 +55,10 @@ bool VitalSigns::runs_slice() const {
 }
 
 std::string VitalSigns::Finding::json() const {
-  const char* const status = !is_alive() ? "failing" : is_draining ? "draining" : "serving";
+  const char* const status = !is_alive()   ? "failing"
+                             : is_draining ? "draining"
+                             : is_full     ? "full"
+                                           : "serving";
   return nlohmann::ordered_json{{"status", status},
                                 {"checks",
                                  {{"takes_connections", takes_connections},

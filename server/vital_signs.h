@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -14,6 +15,7 @@ class VitalSigns {
  public:
   struct Parts {
     std::function<bool()> accepts;
+    std::function<std::uint64_t()> refused;  // connections closed for want of room so far
     std::function<bool()> is_draining;
     Scheduler& scheduler;
     TaskPool& pool;
@@ -23,12 +25,16 @@ class VitalSigns {
   struct Finding {
     bool is_draining = false;
     bool takes_connections = false;  // not tried while draining
+    bool is_full = false;            // the connection was refused for want of room: there are too many
     bool takes_calls = false;        // the task pool ran a task within kPatienceSeconds
     bool runs_sessions = false;      // the scheduler ran a slice within kPatienceSeconds
 
-    bool is_alive() const { return (is_draining || takes_connections) && takes_calls && runs_sessions; }
-    bool is_ready() const { return !is_draining && is_alive(); }
-    /// {"status": "serving", "draining" or "failing", "checks": {...}}
+    /// Also where it is full: to start it again would end what fills it, and what was there before.
+    bool is_alive() const {
+      return (is_draining || takes_connections || is_full) && takes_calls && runs_sessions;
+    }
+    bool is_ready() const { return !is_draining && takes_connections && is_alive(); }
+    /// {"status": "serving", "draining", "full" or "failing", "checks": {...}}
     std::string json() const;
   };
 

@@ -6,6 +6,8 @@ import os
 import socket
 import subprocess
 import time
+import urllib.error
+import urllib.request
 
 import programs
 
@@ -165,6 +167,15 @@ class Exposure(OnFiles):
         self.assertIn("Whoever reaches the address is let in", said)
 
 
+def status_of(url):
+    """The status of the answer and the one in it."""
+    try:
+        with urllib.request.urlopen(url, timeout=programs.PATIENCE) as answer:
+            return answer.status, json.load(answer)["status"]
+    except urllib.error.HTTPError as error:
+        return error.code, json.load(error)["status"]
+
+
 class Descriptors(OnFiles):
     """gRPC's own listener would never take a connection again (CVE-2023-4785)."""
 
@@ -197,11 +208,13 @@ class Descriptors(OnFiles):
         # As much as the shell allows: too few for 400 connections.
         wrapper = self.write("few", f'#!/bin/sh\nulimit -n 160\nexec {programs.server()} "$@"\n')
         os.chmod(wrapper, 0o755)
-        server = programs.RunningServer(program=wrapper)
+        server = programs.RunningServer("--admin-address", "127.0.0.1:0", program=wrapper)
         self.addCleanup(server.stop)
         for _ in range(3):
             sockets = self.open_many(server, 400)
             self.assertFalse(self.healthy(server))
+            self.assertEqual(status_of(server.admin + "/livez"), (200, "full"))  # nobody is to start it again
+            self.assertEqual(status_of(server.admin + "/healthz"), (503, "full"))
             self.serves_again_after(server, sockets)
 
 
