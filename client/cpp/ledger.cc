@@ -133,6 +133,7 @@ void Ledger::session_lost() {
 
 void Ledger::drop_unaccepted() {
   restore_.reset();
+  unkept_ = {};
   in_flight_.clear();
   waiting_.reset();
 }

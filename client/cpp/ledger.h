@@ -55,7 +55,7 @@ class Ledger {
   void connection_lost();
   /// The server has lost the session: what it had accepted is to be sent first, on its own.
   void session_lost();
-  /// Another writer took over: what it has not taken is void.
+  /// Another writer took over: what it has not taken is void, and so is what it took and may have lost.
   void drop_unaccepted();
 
   /// Numbers that follow are higher than `seq`, the newest that the server knows.

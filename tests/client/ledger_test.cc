@@ -221,6 +221,16 @@ TEST(Ledger, SendsAgainWhatWasTakenAndNotKeptWhereTheServerWentBack) {
   EXPECT_FALSE(ledger.has_waiting());
 }
 
+TEST(Ledger, WhatWasNotKeptIsVoidOnceAnotherWriterTookOver) {
+  Ledger ledger;
+  take(ledger, adding("tip", {7}), true);
+  take(ledger, moving("tip", 5), false);
+  ledger.drop_unaccepted();
+  ledger.count_from(1);  // the server lost it, and the other writer changed nothing
+  ledger.resumed_at(1);
+  EXPECT_FALSE(ledger.has_waiting());
+}
+
 TEST(Ledger, AKeptUpdateKeepsAllThatWereTakenBeforeItAndNotThoseAfter) {
   Ledger ledger;
   take(ledger, adding("tip", {7}), false);

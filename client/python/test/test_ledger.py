@@ -141,3 +141,14 @@ def test_a_step_that_begins_is_not_lost_among_what_waits() -> None:
     ledger.add(Update({"tip": Fixed()}, begins_step=True))
     ledger.add(move(1))
     assert ledger.send_next().update.begins_step
+
+
+def test_what_was_not_kept_is_void_once_another_writer_took_over() -> None:
+    ledger = Ledger()
+    for k, is_kept in ((1, True), (2, False)):
+        ledger.add(Update({"tip": Handle([7])}) if k == 1 else move(5))
+        ledger.send_next()
+        ledger.accept(k, is_kept)
+    ledger.drop_unaccepted()
+    ledger.resumed_at(1)
+    assert not ledger.has_waiting

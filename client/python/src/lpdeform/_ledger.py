@@ -169,8 +169,9 @@ class Ledger:
             self._restore = self._accepted
 
     def drop_unaccepted(self) -> None:
-        """Another writer took over: what the server has not taken is void."""
+        """Another writer took over: what the server has not taken is void, and so is what it took and may have lost."""
         self._restore = None
+        self._unkept = NumberedUpdate(0, Update())
         self._in_flight = []
         self._waiting = None
 

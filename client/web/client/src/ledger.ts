@@ -200,9 +200,10 @@ export class Ledger {
     if (this.#accepted.seq > 0) this.#restore = this.#accepted;
   }
 
-  /** Another writer took over: what the server has not taken is void. */
+  /** Another writer took over: what the server has not taken is void, and so is what it took and may have lost. */
   dropUnaccepted(): void {
     this.#restore = undefined;
+    this.#unkept = { seq: 0, update: {} };
     this.#inFlight = [];
     this.#answered.clear();
     this.#waiting = undefined;

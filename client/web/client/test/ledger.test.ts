@@ -214,4 +214,15 @@ describe("ledger", () => {
     ledger.resumedAt(1);
     expect(ledger.hasWaiting).toBe(false);
   });
+
+  test("does not send again what was not kept, once another writer took over", () => {
+    const ledger = new Ledger();
+    ledger.add({ handles: { tip: { set: { vertices: [1] } } } });
+    ledger.accept(ledger.sendNext(), true);
+    ledger.add({ handles: { tip: { move: at(5) } } });
+    ledger.accept(ledger.sendNext(), false);
+    ledger.dropUnaccepted();
+    ledger.resumedAt(1);
+    expect(ledger.hasWaiting).toBe(false);
+  });
 });
