@@ -20,6 +20,9 @@ std::shared_ptr<Timers> or_system(std::shared_ptr<Timers> timers) {
   return timers ? std::move(timers) : std::make_shared<SystemTimers>();
 }
 
+/// Of a token that is good for longer, as one whose date is in milliseconds by mistake. A clock does not count much further.
+constexpr std::chrono::seconds kLongestStream = std::chrono::hours(24 * 365);
+
 /// Between looks whether a stream whose token will expire is still there.
 constexpr std::chrono::minutes kBetweenLooks{1};
 
@@ -195,7 +198,7 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call
   metrics->change(Level::kStreams, 1);
   if (caller->until != 0) {
     const std::chrono::seconds left(caller->until + 1 - absl::ToUnixSeconds(absl::Now()));
-    end_at(timers, *stream, timers->now() + left);
+    end_at(timers, *stream, timers->now() + std::min(left, kLongestStream));
   }
   const WriterLease lease = (*session)->lease();
   log().info("stream_opened", {{"session", abbreviated(session_name)},

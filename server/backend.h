@@ -92,7 +92,7 @@ class Backend {
     std::string bytes;
     Reservation memory;
   };
-  /// Errors: as find; RESOURCE_EXHAUSTED MEMORY_FULL.
+  /// Errors: as find and encode_snapshot; RESOURCE_EXHAUSTED MEMORY_FULL, CALLER_MEMORY_FULL.
   absl::StatusOr<SnapshotFile> snapshot(const CallContext& call, const std::string& session_name) const;
 
   /// A stream of a session, which is found by its name; with a token, the writer's. `wake` as FrameStream::start has it.
@@ -153,9 +153,10 @@ class Backend {
   Registry::OnCreated answering(Response& response, Done done) const;
   void create_once(const Creation& creation);
   void make_session(const Creation& creation);
-  absl::StatusOr<NewSession> make_new(const std::string& owner, const v1::CreateSessionRequest& request,
+  absl::StatusOr<NewSession> make_new(const SessionMaker& maker, const v1::CreateSessionRequest& request,
                                       std::uint64_t fingerprint) const;
-  absl::StatusOr<NewSession> make_restored(const std::string& owner, const v1::RestoreSessionRequest& request,
+  absl::StatusOr<NewSession> make_restored(const SessionMaker& maker,
+                                           const v1::RestoreSessionRequest& request,
                                            std::uint64_t fingerprint) const;
   void when_kept(const Session& session, std::uint64_t revision, Keeper::OnKept on_kept);
   void list_kept(const std::string& owner, const std::string& after, std::size_t most,

@@ -48,8 +48,8 @@ void Backend::create_session(const CallContext& call, const v1::CreateSessionReq
   const auto caller = identify(call, Access::kChange);
   if (!caller.ok()) return done(caller.status());
   const std::uint64_t fingerprint = fingerprint_of(request);
-  const auto make = [this, &request, owner = caller->subject, fingerprint] {
-    return make_new(owner, request, fingerprint);
+  const auto make = [this, call, &request, owner = caller->subject, fingerprint] {
+    return make_new({owner, call.route}, request, fingerprint);
   };
   create_once({call, request.request_id(), caller->subject, fingerprint, "session_created", make,
                answering(response, std::move(done))});
@@ -60,8 +60,8 @@ void Backend::restore_session(const CallContext& call, const v1::RestoreSessionR
   const auto caller = identify(call, Access::kChange);
   if (!caller.ok()) return done(caller.status());
   const std::uint64_t fingerprint = fingerprint_of(request);
-  const auto make = [this, &request, owner = caller->subject, fingerprint] {
-    return make_restored(owner, request, fingerprint);
+  const auto make = [this, call, &request, owner = caller->subject, fingerprint] {
+    return make_restored({owner, call.route}, request, fingerprint);
   };
   create_once({call, request.request_id(), caller->subject, fingerprint, "session_from_snapshot", make,
                answering(response, std::move(done))});
@@ -104,35 +104,34 @@ void Backend::make_session(const Creation& creation) {
   });
 }
 
-absl::StatusOr<NewSession> Backend::make_new(const std::string& owner,
+absl::StatusOr<NewSession> Backend::make_new(const SessionMaker& maker,
                                              const v1::CreateSessionRequest& request,
                                              std::uint64_t fingerprint) const {
-  auto session = factory_.make(owner, request);
+  auto session = factory_.make(maker, request);
   if (!session.ok()) return session.status();
   NewSession made{*std::move(session), {}};
   if (keeper_ == nullptr) return made;
-  Decoder decoder = factory_.decoder(request, owner);
+  Decoder decoder = factory_.decoder(request, maker.owner);
   auto head = encode_head(request, decoder, fingerprint, made.session->created_unix_ms());
   if (!head.ok()) return head.status();
   made.head = *std::move(head);
   return made;
 }
 
-absl::StatusOr<NewSession> Backend::make_restored(const std::string& owner,
+absl::StatusOr<NewSession> Backend::make_restored(const SessionMaker& maker,
                                                   const v1::RestoreSessionRequest& request,
                                                   std::uint64_t fingerprint) const {
-  const auto file = Decoder(*uploads_, 0, nullptr, nullptr, owner).raw(request.snapshot(), "snapshot");
+  const auto file =
+      Decoder(*uploads_, 0, nullptr, nullptr, maker.owner).bytes(request.snapshot(), "snapshot");
   if (!file.ok()) return file.status();
-  const auto memory = budget_->reserve(2 * file->size());  // the file, and what is read out of it
-  if (!memory.ok()) return memory.status();
-  const auto snapshot = decode_snapshot(*file);
+  const auto snapshot = decode_snapshot(file->view, *budget_, maker.owner);
   if (!snapshot.ok()) return snapshot.status();
-  auto session = factory_.make_from(owner, *snapshot);
+  auto session = factory_.make_from(maker, *snapshot);
   if (!session.ok()) return session.status();
   NewSession made{*std::move(session), {}};
   if (keeper_ == nullptr) return made;
   static const StoredBlobs no_blobs;
-  Decoder decoder = factory_.decoder(snapshot->request, owner).reading_stored(no_blobs);
+  Decoder decoder = factory_.decoder(snapshot->request, maker.owner).reading_stored(no_blobs);
   auto head = encode_head(snapshot->request, decoder, fingerprint, made.session->created_unix_ms());
   if (!head.ok()) return head.status();
   made.head = *std::move(head);
@@ -143,9 +142,11 @@ absl::StatusOr<Backend::SnapshotFile> Backend::snapshot(const CallContext& call,
                                                         const std::string& session_name) const {
   const auto session = find(call, Access::kChange, session_name);
   if (!session.ok()) return session.status();
-  auto memory = budget_->reserve(snapshot_bytes(**session));
+  auto memory = budget_->reserve(snapshot_bytes(**session), (*session)->owner());
   if (!memory.ok()) return memory.status();
-  SnapshotFile file{encode_snapshot(**session), *std::move(memory)};
+  auto bytes = encode_snapshot(**session);
+  if (!bytes.ok()) return bytes.status();
+  SnapshotFile file{*std::move(bytes), *std::move(memory)};
   file.memory.resize(file.bytes.size());
   log_session("snapshot_made", **session, call.trace_id);
   return file;
@@ -306,7 +307,7 @@ void Backend::when_here(const CallContext& call, const std::string& name, Done t
     restoring->second.waiting.push_back(in_pool);
     if (!is_new) return;
   }
-  keeper_->take_over(name, caller->subject, [this, name](absl::StatusOr<Keeper::Found> found) {
+  keeper_->take_over(name, {caller->subject, call.route}, [this, name](absl::StatusOr<Keeper::Found> found) {
     if (!found.ok()) return end_restoring(name, found.status());
     scheduler.run_once([this, name, found = std::move(found)] { make_again(name, found); });
   });

@@ -53,7 +53,13 @@ class Decoder {
   /// The same for messages that were stored: inline bytes of any size, blobs in place of uploads. `blobs` must outlive it.
   Decoder reading_stored(const StoredBlobs& blobs) const;
 
-  /// The bytes of a buffer.
+  /// The bytes of a buffer, where they are: as long as the message, what is returned, and what is stored live.
+  struct Bytes {
+    std::shared_ptr<const Upload> owner;  // of an upload, so that it does not expire meanwhile
+    std::string_view view;
+  };
+  absl::StatusOr<Bytes> bytes(const v1::Buffer& buffer, std::string_view what);
+  /// A copy of them.
   absl::StatusOr<std::string> raw(const v1::Buffer& buffer, std::string_view what);
 
   /// Also MESH_TOO_LARGE. Does not look at coordinates and indices; a vertex index over 2^31 - 1 becomes
@@ -75,11 +81,6 @@ class Decoder {
   absl::StatusOr<std::shared_ptr<const Weld>> weld(const v1::Weld& message, const Points& positions);
 
  private:
-  struct Bytes {
-    std::shared_ptr<const Upload> owner;  // of an upload, so that it does not expire meanwhile
-    std::string_view view;
-  };
-  absl::StatusOr<Bytes> bytes(const v1::Buffer& buffer, std::string_view what);
   absl::StatusOr<HandleChange> handle(const v1::HandleUpdate& message);
   absl::StatusOr<Handle> group(const v1::Handle& message);
   absl::StatusOr<std::vector<std::int32_t>> indices(const v1::Buffer& buffer, std::string_view what,

@@ -22,6 +22,11 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
+/// By another way they come to where it is: here they would wait in vain.
+bool leads_elsewhere(const Fault& fault, const std::string& route) {
+  return !route.empty() && !fault.limit.empty() && fault.limit != route_header(route);
+}
+
 }  // namespace
 
 Keeper::Keeper(std::shared_ptr<Store> store, Services services)
@@ -103,7 +108,8 @@ void Keeper::give_up_new(const std::string& name) {
 
 void Keeper::adopt(std::shared_ptr<Session> session, const StoredSession& stored) {
   const std::scoped_lock lock(mutex_);
-  Entry& entry = entries_[session->name()];
+  Entry& entry = entries_[session->name()];  // perhaps of one that is leaving: it comes back
+  entry.is_leaving = false;
   entry.head = stored.parts.at("head");
   entry.epoch = stored.epoch;
   entry.revision = session->changes_since(std::numeric_limits<std::uint64_t>::max()).inputs.revision;
@@ -182,27 +188,28 @@ bool Keeper::is_being_removed(const std::string& name) const {
   return found != entries_.end() && found->second.session == nullptr;
 }
 
-void Keeper::take_over(const std::string& name, const std::string& owner, OnFound on_found) {
-  take_over_until(name, owner, services_.timers->now() + kPatienceForOthers, on_found);
+void Keeper::take_over(const std::string& name, const Asker& asker, OnFound on_found) {
+  take_over_until(name, asker, services_.timers->now() + kPatienceForOthers, on_found);
 }
 
-void Keeper::take_over_until(const std::string& name, const std::string& owner, Timers::TimePoint end,
+void Keeper::take_over_until(const std::string& name, const Asker& asker, Timers::TimePoint end,
                              const OnFound& on_found) {
-  const bool is_posted = reader_.try_post([this, name, owner, end, on_found] {
-    absl::StatusOr<Found> found = is_being_removed(name) ? session_unknown() : read(name, owner);
+  const bool is_posted = reader_.try_post([this, name, asker, end, on_found] {
+    absl::StatusOr<Found> found = is_being_removed(name) ? session_unknown() : read(name, asker);
     const Timers::TimePoint now = services_.timers->now();
-    if (fault_of(found.status()).reason != "SESSION_ELSEWHERE" || now >= end)
+    const Fault fault = fault_of(found.status());
+    if (fault.reason != "SESSION_ELSEWHERE" || now >= end || leads_elsewhere(fault, asker.route))
       return on_found(std::move(found));
-    services_.timers->at(now + kBetweenLooks, [weak = weak_from_this(), name, owner, end, on_found] {
-      if (const auto self = weak.lock()) self->take_over_until(name, owner, end, on_found);
+    services_.timers->at(now + kBetweenLooks, [weak = weak_from_this(), name, asker, end, on_found] {
+      if (const auto self = weak.lock()) self->take_over_until(name, asker, end, on_found);
     });
   });
   if (!is_posted) on_found(server_busy(reader_.expected_wait()));
 }
 
-absl::StatusOr<Keeper::Found> Keeper::read(const std::string& name, const std::string& owner) {
+absl::StatusOr<Keeper::Found> Keeper::read(const std::string& name, const Asker& asker) {
   const Clock::time_point begin = Clock::now();
-  auto session = store_->take_over(name, owner);
+  auto session = store_->take_over(name, asker.owner, asker.route);
   absl::Status status = session.status();
   Found found;
   if (session.ok()) {
@@ -297,9 +304,11 @@ void Keeper::fill_in(Work& work) {
   change.is_removal = work.session == nullptr;
   if (change.is_removal) return;
   const SessionChanges changes = work.session->changes_since(change.epoch_before == 0 ? 0 : work.revision);
-  work.revision = changes.inputs.revision;
+  change.revision_before = work.revision;
+  change.revision = work.revision = changes.inputs.revision;
   change.epoch = changes.lease.epoch;
   change.owner = work.session->owner();
+  change.route = work.session->route();
   change.parts = encode_changes(changes);
   change.replaces_all = changes.inputs.is_all;
   if (change.replaces_all) change.parts["head"] = work.head;
@@ -344,6 +353,8 @@ void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
   const auto found = entries_.find(work.name);
   if (found == entries_.end()) return;
   Entry& entry = found->second;
+  if (entry.session != nullptr && work.session != nullptr && entry.session != work.session)
+    return;  // it left and came back meanwhile: what was written is of an epoch before
   if (work.change.is_removal || outcome == ChangeOutcome::kFenced) {
     for (OnDone& on_removed : entry.on_removed)
       calls.emplace_back([on_removed = std::move(on_removed)] { on_removed(absl::OkStatus()); });
@@ -354,6 +365,7 @@ void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
     entries_.erase(found);
     return;
   }
+  if (outcome == ChangeOutcome::kBehind) return write_all(entry, work.name);
   entry.revision = work.revision;
   entry.epoch = work.change.epoch;
   if (entry.on_added)
@@ -363,6 +375,14 @@ void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
     entries_.erase(found);
     calls.emplace_back([this, name = work.name] { store_->let_go(name).IgnoreError(); });
   }
+}
+
+/// Under the lock. The store lost what it had called kept, and this process has it yet.
+void Keeper::write_all(Entry& entry, const std::string& name) {
+  entry.revision = 0;
+  due(name);
+  services_.log->warning("store_went_back", {{"session", abbreviated(name)},
+                                             {"text", "The session is written again, in whole."}});
 }
 
 /// Under the lock. What has changed stays due; a new session is given up.
@@ -439,12 +459,14 @@ void Keeper::touch_all() {
     is_sweep = now >= next_sweep_;
     for (const auto& [name, entry] : entries_) {
       if (entry.session == nullptr || entry.epoch == 0 || entry.is_leaving) continue;
-      sessions.push_back({name, entry.epoch, now - entry.session->last_used() < kInUse});
+      sessions.push_back({name, entry.epoch, now - entry.session->last_used() < kInUse, entry.revision});
     }
   }
-  const auto lost = store_->touch(sessions);
-  if (lost.ok()) drop(*lost);
-  absl::Status status = lost.status();
+  const auto touched = store_->touch(sessions);
+  if (touched.ok()) drop(touched->lost);
+  if (touched.ok()) write_again(touched->behind);
+  if (touched.ok()) hand_over(touched->wanted);
+  absl::Status status = touched.status();
   if (is_sweep && status.ok()) {
     const auto idle_ms = std::chrono::duration_cast<std::chrono::milliseconds>(services_.idle).count();
     status = store_->remove_unused(idle_ms).status();
@@ -452,6 +474,28 @@ void Keeper::touch_all() {
     next_sweep_ = now + services_.idle / kSweepsPerIdle;
   }
   if (!status.ok()) services_.metrics->add(Count::kStoreErrors);
+}
+
+void Keeper::write_again(const std::vector<std::string>& names) {
+  const std::scoped_lock lock(mutex_);
+  for (const std::string& name : names) {
+    const auto found = entries_.find(name);
+    if (found != entries_.end() && found->second.session != nullptr) write_all(found->second, name);
+  }
+}
+
+/// Their callers come by another process now, where one of them waits already.
+void Keeper::hand_over(const std::vector<std::string>& names) {
+  Calls calls;
+  {
+    const std::scoped_lock lock(mutex_);
+    for (const std::string& name : names) {
+      const auto found = entries_.find(name);
+      if (found == entries_.end() || found->second.session == nullptr || !on_lost) continue;
+      calls.emplace_back([this, session = found->second.session] { on_lost(*session); });
+    }
+  }
+  for (const auto& call : calls) call();  // whoever has them releases them
 }
 
 /// Sessions that another process has now.

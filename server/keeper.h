@@ -45,7 +45,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   using OnDone = std::function<void(absl::Status)>;
   using OnKept = std::function<void(bool is_kept)>;
 
-  /// Called, on a thread of the keeper's, with a session that another server has taken over. To be set before anything
+  /// Called, on a thread of the keeper's, with a session that another server has taken over, or wants. To be set before anything
   /// else is called.
   std::function<void(const Session&)> on_lost;
 
@@ -69,13 +69,17 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void release(const std::string& name);
 
   /// What Store::take_over finds, with its blobs. Where another process has the session in use, waits for kPatienceForOthers
-  /// whether it lets go: as long as the lease of one that has died.
+  /// whether it lets go: as long as the lease of one that has died. Not where the asker should come by another way.
   struct Found {
     StoredSession session;
     StoredBlobs blobs;
   };
   using OnFound = std::function<void(absl::StatusOr<Found>)>;
-  void take_over(const std::string& name, const std::string& owner, OnFound on_found);
+  /// Who asks, and the way by which they came.
+  struct Asker {
+    std::string owner, route;
+  };
+  void take_over(const std::string& name, const Asker& asker, OnFound on_found);
 
   using OnName = std::function<void(absl::StatusOr<std::string>)>;
   void find_request(const std::string& owner, const std::string& request_id, OnName on_name);
@@ -130,6 +134,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   static void fill_in(Work& work);
   void write(std::vector<Work> works);
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const Work> works);
+  void write_all(Entry& entry, const std::string& name);
   void note_kept(const Work& work, ChangeOutcome outcome, Calls& calls);
   void note_failed(const Work& work, const absl::Status& why, Calls& calls);
   void note_health(const absl::Status& status);
@@ -140,13 +145,15 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void give_up_waiting(const std::string& name);
   void enter_new(const std::string& name, Entry entry);
   void give_up_new(const std::string& name);
-  void take_over_until(const std::string& name, const std::string& owner, Timers::TimePoint end,
+  void take_over_until(const std::string& name, const Asker& asker, Timers::TimePoint end,
                        const OnFound& on_found);
-  absl::StatusOr<Found> read(const std::string& name, const std::string& owner);
+  absl::StatusOr<Found> read(const std::string& name, const Asker& asker);
   void watch_unused();
   void sweep();
   void touch_all();
   void drop(const std::vector<std::string>& lost);
+  void write_again(const std::vector<std::string>& names);
+  void hand_over(const std::vector<std::string>& names);
 
   const std::shared_ptr<Store> store_;
   const Services services_;

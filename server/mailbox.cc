@@ -43,6 +43,16 @@ absl::Status nothing_to(bool redo) {
                            "The session remembers no step of its handles that could be taken back.");
 }
 
+/// Those of changes that are all made.
+HandleEffects effects_of(const std::vector<HandleChange>& changes) {
+  HandleEffects effects;
+  for (const HandleChange& change : changes) {
+    const bool is_motion = std::holds_alternative<HandleMotion>(change.change);
+    (is_motion ? effects.moved : effects.regrouped).push_back(change.name);
+  }
+  return effects;
+}
+
 absl::Status too_many_handles(std::size_t handles, std::size_t most) {
   return invalid_input({"TOO_MANY_HANDLES", "", absl::StrCat("handles <= ", most)},
                        absl::StrCat("The session would have ", handles, " handles; it may have ", most,
@@ -137,7 +147,21 @@ absl::Status Mailbox::begin_again(const Update& state, InputAges ages, InputHist
   const std::scoped_lock merging(merging_);
   ages_ = std::move(ages);
   history_.begin_again(history.first, history.undo_steps, std::move(history.steps));
+  if (history.is_undo || history.is_redo) remember_undo(history.is_redo);
   return absl::OkStatus();
+}
+
+/// The answer to the newest input, for a caller whom it did not reach before the session was made again: what it changed is
+/// what there is now of all that leads back.
+void Mailbox::remember_undo(bool redo) {
+  const std::vector<HandleChange>* const back = history_.next(!redo);
+  if (back == nullptr) return;  // too large to be remembered
+  const Inputs now = newest();
+  const UpdateResult result{now.input_seq, 0, revisions_.newest};
+  last_undo_ = {now.input_seq,
+                redo,
+                {result, changes_back(*now.given_handles, effects_of(*back)), history_.undo_steps(),
+                 history_.redo_steps()}};
 }
 
 absl::StatusOr<UndoResult> Mailbox::undo(std::uint64_t input_seq, bool redo) {
@@ -149,12 +173,7 @@ absl::StatusOr<UndoResult> Mailbox::undo(std::uint64_t input_seq, bool redo) {
   const std::vector<HandleChange>* const changes = history_.next(redo);
   if (changes == nullptr) return nothing_to(redo);
   Update update{input_seq, *changes, {}, false};
-  HandleEffects effects;
-  for (const HandleChange& change : *changes) {
-    const bool is_motion = std::holds_alternative<HandleMotion>(change.change);
-    (is_motion ? effects.moved : effects.regrouped).push_back(change.name);
-  }
-  std::vector<HandleChange> inverse = changes_back(*before.given_handles, effects);
+  std::vector<HandleChange> inverse = changes_back(*before.given_handles, effects_of(*changes));
   const auto merged = merge(update, Origin::kHistory);
   if (!merged.ok()) return merged.status();
   history_.moved(redo, std::move(inverse), revisions_.newest);
@@ -193,6 +212,9 @@ InputChanges Mailbox::changes_since(std::uint64_t revision) const {
   changes.has_region = changes.is_all || revisions_.region > revision;
   changes.history = history_.extent();
   changes.steps = history_.changes_since(changes.is_all ? 0 : revision);
+  const bool is_newest = last_undo_ && last_undo_->input_seq == changes.inputs.input_seq;
+  changes.is_undo = is_newest && !last_undo_->redo;
+  changes.is_redo = is_newest && last_undo_->redo;
   return changes;
 }
 

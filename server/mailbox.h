@@ -51,7 +51,8 @@ struct InputChanges {
   std::vector<std::string> removed;
   bool has_p = false, has_stiffness = false, has_region = false;
   HandleHistory::Extent history;
-  HandleHistory::Changes steps;  // of it
+  HandleHistory::Changes steps;           // of it
+  bool is_undo = false, is_redo = false;  // what the newest input is
 };
 
 /// Of a session that is made again: what could be taken back, and done again.
@@ -59,6 +60,7 @@ struct InputHistory {
   std::uint64_t first = 0;
   std::size_t undo_steps = 0;
   std::vector<std::vector<HandleChange>> steps;
+  bool is_undo = false, is_redo = false;  // what the newest input is
 };
 
 /// What one session may have of handles.
@@ -139,6 +141,7 @@ class Mailbox {
   void note_revisions(const Candidate& next);
   void note_step(const Update& update, const Candidate& next, const Inputs& before);
   void forget_oldest();
+  void remember_undo(bool redo);
   void put_in_force(const Update& update, Candidate& next);
 
   const std::shared_ptr<const RestShape> shape_;

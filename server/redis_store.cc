@@ -22,11 +22,15 @@ const std::string kPart = "p:";
 // Of all scripts, KEYS[1] is the session's hash and ARGV[1] the holder.
 const std::string kNow = "local t = redis.call('TIME'); local now = t[1] * 1000 + math.floor(t[2] / 1000); ";
 
-/// A function: the session is one of its owner's, a sorted set that lives as long as the youngest of them.
+/// A function: the session is one of its owner's, a sorted set that lives as long as the youngest of them. Each time two of it
+/// are looked at, so that few are in it that have expired.
 const std::string kEnter =
     "local function enter(owner, idle) "
     "  local all = 'lpdeform:o:' .. redis.sha1hex(owner or ''); "
-    "  redis.call('ZADD', all, 0, KEYS[1]); redis.call('PEXPIRE', all, idle) "
+    "  redis.call('ZADD', all, 0, KEYS[1]); redis.call('PEXPIRE', all, idle); "
+    "  for _, key in ipairs(redis.call('ZRANDMEMBER', all, 2)) do "
+    "    if redis.call('EXISTS', key) == 0 then redis.call('ZREM', all, key) end "
+    "  end "
     "end ";
 
 /// No keys. ARGV: owner, the key of the session before the first, how many. Those that have expired go from the set.
@@ -44,21 +48,24 @@ const std::string kList =
     "end "
     "return found";
 
-/// ARGV: holder, epoch before, epoch, lease, idle, replaces all, then names and values of hash fields in turn, "=" before a
-/// value that is set and "-" for one that goes. 1: done; 0: fenced.
+/// ARGV: holder, epoch before, epoch, lease, idle, replaces all, revision before, revision, then names and values of hash fields
+/// in turn, "=" before a value that is set and "-" for one that goes. 1: done; 0: fenced; 2: behind, which it is not where
+/// it has more than that (the answer to the change before was lost), nor where nothing was changed since it was taken over.
 const std::string kCommit =
     kNow +
     "if ARGV[2] ~= '0' then "
-    "  local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch'); "
+    "  local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch', 'revision'); "
     "  if has[1] ~= ARGV[1] or (has[2] ~= ARGV[2] and has[2] ~= ARGV[3]) then return 0 end "
+    "  if ARGV[6] ~= '1' and has[3] and tonumber(has[3]) < tonumber(ARGV[7]) then return 2 end "
     "end "
     "if ARGV[6] == '1' then "
     "  for _, field in ipairs(redis.call('HKEYS', KEYS[1])) do "
     "    if string.sub(field, 1, 2) == 'p:' then redis.call('HDEL', KEYS[1], field) end "
     "  end "
     "end "
-    "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'epoch', ARGV[3], 'until', now + ARGV[4]); "
-    "for k = 7, #ARGV, 2 do "
+    "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'epoch', ARGV[3], 'until', now + ARGV[4], 'revision', "
+    "ARGV[8]); "
+    "for k = 9, #ARGV, 2 do "
     "  if string.sub(ARGV[k + 1], 1, 1) == '=' then redis.call('HSET', KEYS[1], ARGV[k], string.sub(ARGV[k + "
     "1], 2)) "
     "  else redis.call('HDEL', KEYS[1], ARGV[k]) end "
@@ -66,20 +73,32 @@ const std::string kCommit =
     "redis.call('PEXPIRE', KEYS[1], ARGV[5]); " +
     kEnter + "enter(redis.call('HGET', KEYS[1], 'owner'), ARGV[5]); return 1";
 
-/// ARGV: holder, owner, lease, idle. -1: none, -2: held by another; else the hash, in the new epoch.
+/// For so many milliseconds a session stays where it has just come to, whoever wants it.
+const std::string kStays = "1000";
+/// And that somebody wants it is remembered for so many.
+const std::string kWanted = "1000";
+
+/// ARGV: holder, owner, lease, idle, route. -1: none; -2 and its route: held by another; else the hash, in the new epoch.
 const std::string kTakeOver =
     kNow +
-    "local has = redis.call('HMGET', KEYS[1], 'holder', 'until', 'owner'); "
+    "local has = redis.call('HMGET', KEYS[1], 'holder', 'until', 'owner', 'route', 'since'); "
     "if not has[3] or has[3] ~= ARGV[2] then return -1 end "
-    "if has[1] ~= ARGV[1] and has[2] and tonumber(has[2]) > now then return -2 end "
+    "if has[1] ~= ARGV[1] and has[2] and tonumber(has[2]) > now then "
+    "  if has[4] and has[4] ~= '' and has[4] == ARGV[5] and now - tonumber(has[5] or '0') > " +
+    kStays +
+    " then redis.call('HSET', KEYS[1], 'wanted', now) end "
+    "  return {-2, has[4] or ''} "
+    "end "
     "redis.call('HINCRBY', KEYS[1], 'epoch', 1); "
-    "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'until', now + ARGV[3]); "
+    "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'until', now + ARGV[3], 'since', now); "
+    "redis.call('HDEL', KEYS[1], 'revision', 'wanted'); "
     "redis.call('PEXPIRE', KEYS[1], ARGV[4]); return redis.call('HGETALL', KEYS[1])";
 
-/// ARGV: holder, epoch, lease, 0 where it is not in use, idle. 0: another has it. Its blobs live as long.
+/// ARGV: holder, epoch, lease, 0 where it is not in use, idle, revision. 0: another has it, or it is gone; 2: it is behind;
+/// 3: another wants it. Its blobs live as long.
 const std::string kTouch =
     kNow +
-    "local has = redis.call('HMGET', KEYS[1], 'holder', 'blobs', 'request', 'owner'); "
+    "local has = redis.call('HMGET', KEYS[1], 'holder', 'blobs', 'request', 'owner', 'revision', 'wanted'); "
     "if has[1] ~= ARGV[1] then return 0 end " +
     kEnter +
     "enter(has[4], ARGV[5]); "
@@ -89,7 +108,10 @@ const std::string kTouch =
     "  redis.call('PEXPIRE', 'lpdeform:b:' .. key, ARGV[5]); redis.call('PEXPIRE', 'lpdeform:u:' .. key, "
     "ARGV[5]) "
     "end "
-    "if has[3] and has[3] ~= '' then redis.call('PEXPIRE', has[3], ARGV[5]) end return 1";
+    "if has[3] and has[3] ~= '' then redis.call('PEXPIRE', has[3], ARGV[5]) end "
+    "if has[5] and tonumber(has[5]) < tonumber(ARGV[6]) then return 2 end "
+    "if has[6] and now - tonumber(has[6]) < " +
+    kWanted + " then return 3 end return 1";
 
 /// ARGV: holder, session, then the keys of its blobs, as far as its maker knows. It goes, whoever has it.
 const std::string kRemove =
@@ -97,15 +119,23 @@ const std::string kRemove =
     "  redis.call('SREM', 'lpdeform:u:' .. key, ARGV[2]); "
     "  if redis.call('SCARD', 'lpdeform:u:' .. key) == 0 then redis.call('DEL', 'lpdeform:b:' .. key) end "
     "end "
-    "local has = redis.call('HMGET', KEYS[1], 'blobs', 'request'); "
+    "local has = redis.call('HMGET', KEYS[1], 'blobs', 'request', 'owner'); "
     "for key in string.gmatch(has[1] or '', '%x+') do let_go(key) end "
     "for k = 3, #ARGV do let_go(ARGV[k]) end "
     "if has[2] and has[2] ~= '' then redis.call('DEL', has[2]) end "
+    "if has[3] then redis.call('ZREM', 'lpdeform:o:' .. redis.sha1hex(has[3]), KEYS[1]) end "
     "redis.call('DEL', KEYS[1]); return 1";
 
 const std::string kLetGo =
     "if redis.call('HGET', KEYS[1], 'holder') == ARGV[1] then redis.call('HSET', KEYS[1], 'until', 0) end "
     "return 1";
+
+constexpr std::int64_t kDone = 1, kIsBehind = 2, kIsWanted = 3, kIsHeld = -2;  // as scripts answer
+
+ChangeOutcome outcome_of(std::int64_t answer) {
+  if (answer == kIsBehind) return ChangeOutcome::kBehind;
+  return answer == kDone ? ChangeOutcome::kKept : ChangeOutcome::kFenced;
+}
 
 Command script(const std::string& text, const std::string& session) {
   return {"EVAL", text, "1", kSession + session};
@@ -128,13 +158,14 @@ class RedisStore final : public Store {
   }
 
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) override;
-  absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner) override;
+  absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner,
+                                          const std::string& route) override;
   absl::StatusOr<std::string> find_request(const std::string& owner, const std::string& request_id) override;
   absl::StatusOr<std::vector<std::string>> list(const std::string& owner, const std::string& after,
                                                 std::size_t most) override;
   absl::Status keep_blob(const std::string& session, const std::string& key, std::string_view bytes) override;
   absl::StatusOr<std::string> blob(const std::string& key) override;
-  absl::StatusOr<std::vector<std::string>> touch(std::span<const TouchedSession> sessions) override;
+  absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) override;
   std::chrono::milliseconds touch_every() const override { return options_.lease / 3; }
   absl::Status let_go(const std::string& session) override;
   /// Keys expire by themselves.
@@ -164,12 +195,14 @@ Command RedisStore::command_of(const StoredChange& change) {
   }
   Command command = script(kCommit, change.session);
   command.insert(command.end(), {holder_, absl::StrCat(change.epoch_before), absl::StrCat(change.epoch),
-                                 lease(), idle(), change.replaces_all ? "1" : "0"});
+                                 lease(), idle(), change.replaces_all ? "1" : "0",
+                                 absl::StrCat(change.revision_before), absl::StrCat(change.revision)});
   if (change.epoch_before == 0) {
     const std::string request = change.request_id.empty() ? "" : request_key(change.owner, change.request_id);
-    command.insert(command.end(), {"owner", absl::StrCat("=", change.owner), "blobs",
-                                   absl::StrCat("=", absl::StrJoin(change.blobs, " ")), "request",
-                                   absl::StrCat("=", request)});
+    command.insert(
+        command.end(),
+        {"owner", absl::StrCat("=", change.owner), "route", absl::StrCat("=", change.route), "blobs",
+         absl::StrCat("=", absl::StrJoin(change.blobs, " ")), "request", absl::StrCat("=", request)});
   }
   for (const auto& [name, value] : change.parts) {
     command.push_back(kPart + name);
@@ -192,25 +225,28 @@ absl::StatusOr<std::vector<ChangeOutcome>> RedisStore::commit(std::span<const St
   std::vector<ChangeOutcome> outcomes;
   for (std::size_t k = 0; k < commands.size(); ++k) {
     if (commands[k][0] != "EVAL") continue;
-    outcomes.push_back((*replies)[k].number == 1 ? ChangeOutcome::kKept : ChangeOutcome::kFenced);
+    outcomes.push_back(outcome_of((*replies)[k].number));
   }
   const std::scoped_lock pinning(pinning_);
   for (const StoredChange& change : changes) pinned_.erase(change.session);
   return outcomes;
 }
 
-absl::StatusOr<StoredSession> RedisStore::take_over(const std::string& session, const std::string& owner) {
+absl::StatusOr<StoredSession> RedisStore::take_over(const std::string& session, const std::string& owner,
+                                                    const std::string& route) {
   Command command = script(kTakeOver, session);
-  command.insert(command.end(), {holder_, owner, lease(), idle()});
+  command.insert(command.end(), {holder_, owner, lease(), idle(), route});
   const std::scoped_lock lock(reading_);
   const auto reply = reader_.run(command);
   if (!reply.ok()) return reply.status();
-  if (reply->elements.empty()) return reply->number == -2 ? session_elsewhere() : session_unknown();
+  if (reply->elements.empty()) return session_unknown();
+  if (reply->elements[0].number == kIsHeld) return session_elsewhere(reply->elements[1].text);
   StoredSession found;
   found.owner = owner;
   for (std::size_t k = 0; k + 1 < reply->elements.size(); k += 2) {
     const std::string& field = reply->elements[k].text;
     const std::string& value = reply->elements[k + 1].text;
+    if (field == "route") found.route = value;
     if (field == "epoch" && !absl::SimpleAtoi(value, &found.epoch)) return session_damaged("it has no epoch");
     if (field.starts_with(kPart)) found.parts[field.substr(kPart.size())] = value;
   }
@@ -258,22 +294,27 @@ absl::StatusOr<std::string> RedisStore::blob(const std::string& key) {
   return session_damaged(reply->is_nothing ? "its mesh is missing" : "its mesh is not what was written");
 }
 
-absl::StatusOr<std::vector<std::string>> RedisStore::touch(std::span<const TouchedSession> sessions) {
-  std::vector<std::string> lost;
-  if (sessions.empty()) return lost;
+absl::StatusOr<TouchResult> RedisStore::touch(std::span<const TouchedSession> sessions) {
+  TouchResult result;
+  if (sessions.empty()) return result;
   std::vector<Command> commands;
   for (const TouchedSession& session : sessions) {
     commands.push_back(script(kTouch, session.name));
-    commands.back().insert(commands.back().end(), {holder_, absl::StrCat(session.epoch), lease(),
-                                                   session.is_in_use ? "1" : "0", idle()});
+    commands.back().insert(commands.back().end(),
+                           {holder_, absl::StrCat(session.epoch), lease(), session.is_in_use ? "1" : "0",
+                            idle(), absl::StrCat(session.revision)});
   }
   const std::scoped_lock lock(reading_);
   const auto replies = reader_.run(commands);
   if (!replies.ok()) return replies.status();
   for (std::size_t k = 0; k < sessions.size(); ++k) {
-    if ((*replies)[k].number == 0) lost.push_back(sessions[k].name);
+    const std::int64_t answer = (*replies)[k].number;
+    if (answer == kIsBehind) result.behind.push_back(sessions[k].name);
+    if (answer == kIsWanted) result.wanted.push_back(sessions[k].name);
+    if (outcome_of(answer) == ChangeOutcome::kFenced && answer != kIsWanted)
+      result.lost.push_back(sessions[k].name);
   }
-  return lost;
+  return result;
 }
 
 absl::Status RedisStore::let_go(const std::string& session) {

@@ -76,6 +76,7 @@ Session::Session(SessionParts parts, SessionServices services)
     : Runnable(parts.shape->vertex_count() > kHeavyVertices, weight_of(parts.shape->vertex_count())),
       name_(std::move(parts.name)),
       owner_(std::move(parts.owner)),
+      route_(std::move(parts.route)),
       shape_(std::move(parts.shape)),
       mesh_(parts.mesh ? std::move(parts.mesh) : std::make_shared<const DrawMesh>(shape_)),
       features_(parts.features ? std::move(parts.features) : std::make_shared<ShapeFeatures>(shape_)),
@@ -97,6 +98,7 @@ Session::Session(SessionParts parts, SessionServices services)
 SessionInfo Session::info() const {
   const Mailbox::HistorySize history = mailbox_.history_size();
   return {name_,
+          route_,
           lease().epoch,
           shape_,
           mesh_,
@@ -185,7 +187,7 @@ absl::StatusOr<UndoResult> Session::undo(const std::string& token, std::uint64_t
     result = mailbox_.undo(input_seq, redo);
     if (result.ok()) publisher_->took(input_seq, since);
   }
-  if (result.ok()) services_.scheduler.wake(shared_from_this());
+  if (result.ok()) services_.scheduler.wake(shared_from_this(), Urgency::kAnswer);
   return result;
 }
 

@@ -36,6 +36,7 @@ struct SessionPast {
 struct SessionParts {
   std::string name;
   std::string owner = {};  // the subject of the caller that made it
+  std::string route = {};  // see Session::route
   std::shared_ptr<const RestShape> shape;
   std::shared_ptr<const ShapeFeatures> features = nullptr;  // of `shape`; made where left out
   std::unique_ptr<Deformer> deformer;
@@ -64,7 +65,7 @@ struct SessionServices {
 
 /// What GetSession tells.
 struct SessionInfo {
-  std::string name;
+  std::string name, route;
   std::uint64_t epoch = 0;
   std::shared_ptr<const RestShape> shape;
   std::shared_ptr<const DrawMesh> mesh;
@@ -99,6 +100,9 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
 
   const std::string& name() const { return name_; }
   const std::string& owner() const { return owner_; }
+  /// What the header lpdeform-session of the call that made it said: a proxy that chooses a server by it sends all calls that say
+  /// the same to one. Empty where there was none.
+  const std::string& route() const { return route_; }
   /// The client's.
   std::uint32_t vertex_count() const { return mesh_->vertex_count(); }
   const DrawMesh& mesh() const { return *mesh_; }
@@ -167,6 +171,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
 
   const std::string name_;
   const std::string owner_;
+  const std::string route_;
   const std::shared_ptr<const RestShape> shape_;
   const std::shared_ptr<const DrawMesh> mesh_;
   const std::shared_ptr<const ShapeFeatures> features_;

@@ -89,19 +89,20 @@ absl::StatusOr<std::shared_ptr<Session>> SessionFactory::finish(SessionParts par
   return Session::create(std::move(parts), services_);
 }
 
-absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make(const std::string& owner,
+absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make(const SessionMaker& maker,
                                                               const v1::CreateSessionRequest& request) const {
-  Decoder mesh_decoder = decoder(request, owner);
+  Decoder mesh_decoder = decoder(request, maker.owner);
   const std::uint32_t most_faces = kFacesPerVertex * options_.max_vertices;
   absl::Status status = mesh_decoder.check_mesh_size(request.mesh(), {options_.max_vertices, most_faces});
   if (!status.ok()) return status;
   SessionParts parts;
   parts.name = absl::StrCat("sessions/", random_hex_128());
-  parts.owner = owner;
+  parts.owner = maker.owner;
+  parts.route = maker.route;
   status = make_shape(request, mesh_decoder, parts);
   if (!status.ok()) return status;
   Decoder inputs(*uploads_, request.mesh().vertex_count(), parts.features.get(), parts.mesh->weld().get(),
-                 owner);
+                 maker.owner);
   status = inputs.handles(request.handles(), parts.beginning);
   if (!status.ok()) return status;
   auto settings = inputs.settings(request.settings());
@@ -110,11 +111,11 @@ absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make(const std::string&
   return finish(std::move(parts));
 }
 
-absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_from(const std::string& owner,
+absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_from(const SessionMaker& maker,
                                                                    const Snapshot& snapshot) const {
   static const StoredBlobs no_blobs;
   const v1::CreateSessionRequest& request = snapshot.request;
-  Decoder decoder = this->decoder(request, owner).reading_stored(no_blobs);
+  Decoder decoder = this->decoder(request, maker.owner).reading_stored(no_blobs);
   const std::uint32_t most_faces = kFacesPerVertex * options_.max_vertices;
   absl::Status status = decoder.check_mesh_size(request.mesh(), {options_.max_vertices, most_faces});
   if (!status.ok()) return status;
@@ -126,8 +127,9 @@ absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_from(const std::st
   }
   SessionParts parts;
   parts.name = absl::StrCat("sessions/", random_hex_128());
-  parts.owner = owner;
-  status = take_state(owner, snapshot, parts);
+  parts.owner = maker.owner;
+  parts.route = maker.route;
+  status = take_state(maker.owner, snapshot, parts);
   if (status.ok()) status = make_shape(request, decoder, parts);
   return status.ok() ? finish(std::move(parts), surface) : status;
 }
@@ -135,7 +137,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_from(const std::st
 /// Its handles and settings, for a writer of its own.
 absl::Status SessionFactory::take_state(const std::string& owner, const Snapshot& snapshot,
                                         SessionParts& parts) const {
-  StoredSession stored{owner, 1, snapshot.parts};
+  StoredSession stored{.owner = owner, .epoch = 1, .parts = snapshot.parts};
   stored.parts["writer"] = encode_writer(random_hex_128());
   auto state = decode_state(stored, {snapshot.request, 0, 0}, *uploads_);
   if (!state.ok()) return snapshot_damaged(std::string(state.status().message()));
@@ -153,6 +155,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_again(const std::s
   SessionParts parts;
   parts.name = name;
   parts.owner = stored.owner;
+  parts.route = stored.route;
   parts.beginning = std::move(state->state);
   parts.past = std::move(state->past);
   const Decoder mesh_decoder = decoder(head.request, stored.owner).reading_stored(blobs);

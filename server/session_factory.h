@@ -16,6 +16,11 @@
 
 namespace lpdeform {
 
+/// Whose session it is to be, and the way by which they came: see Session::route.
+struct SessionMaker {
+  std::string owner, route = {};
+};
+
 /// Makes sessions: from a call, or again from what a store has of one. Takes as long as setting a mesh up does: for the
 /// scheduler's threads. Thread-safe.
 class SessionFactory {
@@ -24,7 +29,7 @@ class SessionFactory {
                  std::shared_ptr<Uploads> uploads, SessionServices services);
 
   /// Errors: what CreateSession has.
-  absl::StatusOr<std::shared_ptr<Session>> make(const std::string& owner,
+  absl::StatusOr<std::shared_ptr<Session>> make(const SessionMaker& maker,
                                                 const v1::CreateSessionRequest& request) const;
 
   /// The session of this name, with all that it had, in the epoch of `stored`. `blobs`: those of `head`. Errors: NOT_FOUND
@@ -33,9 +38,9 @@ class SessionFactory {
                                                       const SessionHead& head,
                                                       const StoredBlobs& blobs) const;
 
-  /// A new session of the owner's, as the snapshot has it; for the same server the same to the last bit. Errors: INVALID_ARGUMENT
+  /// A new session of the maker's, as the snapshot has it; for the same server the same to the last bit. Errors: INVALID_ARGUMENT
   /// SNAPSHOT_DAMAGED; what CreateSession has.
-  absl::StatusOr<std::shared_ptr<Session>> make_from(const std::string& owner,
+  absl::StatusOr<std::shared_ptr<Session>> make_from(const SessionMaker& maker,
                                                      const Snapshot& snapshot) const;
 
   /// For one message of a caller's.

@@ -12,6 +12,7 @@
 #include "core/base/crc32c.h"
 #include "core/base/fault.h"
 #include "server/encode_stored.h"
+#include "server/parsed_size.h"
 #include "server/stored.pb.h"
 
 namespace lpdeform {
@@ -60,7 +61,31 @@ absl::StatusOr<std::string_view> content_of(std::string_view file) {
   }
   if (content.size() > header.bytes) return snapshot_damaged("something follows its end");
   if (crc32c(content) != header.crc32c) return snapshot_damaged("its checksum differs");
+  if (content.size() > kMostSnapshotBytes) return snapshot_damaged("it is longer than any");
   return content;
+}
+
+/// Of the parts of a snapshot, which are bytes in it: what each is, by its name.
+const google::protobuf::Descriptor* part_in(const google::protobuf::Descriptor& type,
+                                            std::string_view entry) {
+  static const auto* const parts = stored::Snapshot::descriptor()->FindFieldByName("parts")->message_type();
+  if (&type != parts) return nullptr;
+  constexpr std::uint32_t kName = 1 << 3 | 2;
+  google::protobuf::io::CodedInputStream in(reinterpret_cast<const std::uint8_t*>(entry.data()),
+                                            static_cast<int>(entry.size()));
+  std::string_view name;
+  while (const std::uint32_t tag = in.ReadTag()) {
+    int size = 0;
+    if ((tag & 7) != 2 || !in.ReadVarintSizeAsInt(&size)) break;
+    if (tag == kName) name = entry.substr(static_cast<std::size_t>(in.CurrentPosition()), size);
+    if (!in.Skip(size)) break;
+  }
+  return part_type(name);
+}
+
+/// Parsed, its parts copied and parsed in turn, and their values.
+std::size_t memory_for(std::string_view content) {
+  return 2 * parsed_size(*stored::Snapshot::descriptor(), content, part_in);
 }
 
 }  // namespace
@@ -83,7 +108,7 @@ std::size_t snapshot_bytes(const Session& session) {
               12 * static_cast<std::size_t>(session.mesh().faces().rows()));
 }
 
-std::string encode_snapshot(const Session& session) {
+absl::StatusOr<std::string> encode_snapshot(const Session& session, std::size_t most_bytes) {
   stored::Snapshot snapshot;
   encode_mesh(session.info(), *snapshot.mutable_head()->mutable_request());
   for (auto& [name, part] : encode_changes(session.changes_since(0))) {
@@ -91,6 +116,12 @@ std::string encode_snapshot(const Session& session) {
   }
   if (session.has_surface())
     encode_positions(session.newest_frame()->surface->positions(), *snapshot.mutable_surface());
+  if (const std::size_t bytes = snapshot.ByteSizeLong(); bytes > most_bytes) {
+    return make_fault(
+        absl::StatusCode::kFailedPrecondition,
+        {"SNAPSHOT_TOO_LARGE", "snapshot", absl::StrCat("bytes <= ", most_bytes)},
+        absl::StrCat("The session's file would have ", bytes, " bytes; it can have ", most_bytes, "."));
+  }
   std::string file(sizeof(Header), '\0');
   {
     google::protobuf::io::StringOutputStream stream(&file);  // appends
@@ -103,14 +134,16 @@ std::string encode_snapshot(const Session& session) {
   return file;
 }
 
-absl::StatusOr<Snapshot> decode_snapshot(std::string_view file) {
+absl::StatusOr<Snapshot> decode_snapshot(std::string_view file, Budget& budget, const std::string& owner) {
   const auto content = content_of(file);
   if (!content.ok()) return content.status();
+  auto memory = budget.reserve(memory_for(*content), owner);
+  if (!memory.ok()) return memory.status();
   stored::Snapshot message;
-  if (content->size() > std::numeric_limits<int>::max() ||
-      !message.ParseFromArray(content->data(), static_cast<int>(content->size())))
+  if (!message.ParseFromArray(content->data(), static_cast<int>(content->size())))
     return snapshot_damaged("it cannot be read");
   Snapshot snapshot;
+  snapshot.memory = *std::move(memory);
   snapshot.request = std::move(*message.mutable_head()->mutable_request());
   for (auto& [name, part] : *message.mutable_parts()) snapshot.parts[name] = std::move(part);
   if (message.has_surface()) snapshot.surface = std::move(*message.mutable_surface());

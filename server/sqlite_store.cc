@@ -67,13 +67,14 @@ class SqliteStore final : public Store {
   absl::Status prepare();
 
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) override;
-  absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner) override;
+  absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner,
+                                          const std::string& route) override;
   absl::StatusOr<std::string> find_request(const std::string& owner, const std::string& request_id) override;
   absl::StatusOr<std::vector<std::string>> list(const std::string& owner, const std::string& after,
                                                 std::size_t most) override;
   absl::Status keep_blob(const std::string& session, const std::string& key, std::string_view bytes) override;
   absl::StatusOr<std::string> blob(const std::string& key) override { return blobs_.read(key); }
-  absl::StatusOr<std::vector<std::string>> touch(std::span<const TouchedSession> sessions) override;
+  absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) override;
   absl::Status let_go(const std::string&) override { return absl::OkStatus(); }
   absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) override;
 
@@ -288,7 +289,9 @@ absl::StatusOr<std::map<std::string, std::string>> SqliteStore::parts(const std:
   }
 }
 
-absl::StatusOr<StoredSession> SqliteStore::take_over(const std::string& session, const std::string& owner) {
+/// There is no other process, and so no route.
+absl::StatusOr<StoredSession> SqliteStore::take_over(const std::string& session, const std::string& owner,
+                                                     const std::string&) {
   const std::scoped_lock lock(mutex_);
   auto transaction = SqliteTransaction::begin(*database_);
   if (!transaction.ok()) return transaction.status();
@@ -376,7 +379,7 @@ absl::Status SqliteStore::limit_size() {
 }
 
 /// The folder is this process's own, so nobody else has taken any of them.
-absl::StatusOr<std::vector<std::string>> SqliteStore::touch(std::span<const TouchedSession> sessions) {
+absl::StatusOr<TouchResult> SqliteStore::touch(std::span<const TouchedSession> sessions) {
   const std::scoped_lock lock(mutex_);
   auto transaction = SqliteTransaction::begin(*database_);
   if (!transaction.ok()) return transaction.status();
@@ -386,7 +389,7 @@ absl::StatusOr<std::vector<std::string>> SqliteStore::touch(std::span<const Touc
     if (absl::Status status = sql(kTouch).run(); !status.ok()) return status;
   }
   if (absl::Status status = transaction->commit(); !status.ok()) return status;
-  return std::vector<std::string>();
+  return TouchResult();
 }
 
 absl::StatusOr<std::size_t> SqliteStore::remove_unused(std::int64_t idle_ms) {

@@ -28,9 +28,14 @@ absl::Status session_damaged(std::string_view why) {
                                  absl::string_view(why.data(), why.size()), "."));
 }
 
-absl::Status session_elsewhere() {
+std::string route_header(const std::string& route) {
+  return absl::StrCat("lpdeform-session: ", route);
+}
+
+absl::Status session_elsewhere(const std::string& route) {
   return make_fault(
-      absl::StatusCode::kUnavailable, {"SESSION_ELSEWHERE", "session", ""},
+      absl::StatusCode::kUnavailable,
+      {"SESSION_ELSEWHERE", "session", route.empty() ? "" : route_header(route)},
       "Another server has the session in use; try again, it lets go as soon as nobody uses it there.");
 }
 

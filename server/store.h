@@ -18,6 +18,7 @@ namespace lpdeform {
 /// the business of StoredState.
 struct StoredSession {
   std::string owner;
+  std::string route = {};  // as StoredChange has it
   std::uint64_t epoch = 0;
   std::map<std::string, std::string> parts;
 };
@@ -28,8 +29,12 @@ struct StoredChange {
   /// What the store must have; where it has another, somebody else has taken the session over, and nothing is changed.
   /// 0: the session is new.
   std::uint64_t epoch_before = 0;
-  std::uint64_t epoch = 0;              // from now on; not below epoch_before
+  std::uint64_t epoch = 0;  // from now on; not below epoch_before
+  /// Of the session's inputs, as its process counts them: what the store has to have for this change to make sense, unless
+  /// it replaces all, and what it has then.
+  std::uint64_t revision_before = 0, revision = 0;
   std::string owner = {};               // of a new session
+  std::string route = {};               // the same: the way by which its callers come
   std::string request_id = {};          // the same; empty, or known again by Store::find_request
   std::vector<std::string> blobs = {};  // keys of those that a new session has
   bool replaces_all = false;            // all parts that are not named here go
@@ -42,12 +47,21 @@ struct TouchedSession {
   std::string name;
   std::uint64_t epoch = 0;  // that the process knows
   bool is_in_use = false;
+  std::uint64_t revision = 0;  // that the store called kept
 };
 
 /// What became of a change.
 enum class ChangeOutcome {
   kKept,
   kFenced,  // the store has another epoch, or no such session
+  kBehind,  // not made: the store lost changes that it had called kept, and wants all
+};
+
+/// Sessions that touch() found to be otherwise than their process takes them to be, by name.
+struct TouchResult {
+  std::vector<std::string> lost;    // another process has taken them over, or the store has them no more
+  std::vector<std::string> behind;  // the store lost changes that it had called kept
+  std::vector<std::string> wanted;  // another process is asked for them by callers who come their way
 };
 
 /// Where sessions are kept so that they outlive the process: their parts, and blobs (meshes), which are stored once
@@ -55,7 +69,8 @@ enum class ChangeOutcome {
 /// at any moment. Changes are whole: a reader sees all of one or nothing of it.
 ///
 /// Errors of all functions: UNAVAILABLE STORE_FAILING, the text saying what fails; then nothing has changed, or, of
-/// commit(), all has: repeating it is safe. Functions may take long, as the disk or the network does: to be called by
+/// commit(), all has: repeating it is safe. A store whose own disk went back to an earlier moment (Redis, which may be set to keep
+/// no more) is told from one that has all, as far as sessions live that know better. Functions may take long, as the disk or the network does: to be called by
 /// threads that may wait. Thread-safe.
 class Store {
  public:
@@ -66,8 +81,10 @@ class Store {
 
   /// The session, from now on in a new epoch, so that whoever had it is fenced off: their changes are refused.
   /// NOT_FOUND SESSION_UNKNOWN, also where it is not the owner's; SESSION_DAMAGED where it cannot be read; UNAVAILABLE
-  /// SESSION_ELSEWHERE while another process has it in use.
-  virtual absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner) = 0;
+  /// SESSION_ELSEWHERE while another process has it in use. `route`: the way by which the caller came; where it is the session's
+  /// own, the process that has it learns from touch() that it is wanted here.
+  virtual absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner,
+                                                  const std::string& route = "") = 0;
 
   /// The name of the owner's session made with this request_id; empty where there is none.
   virtual absl::StatusOr<std::string> find_request(const std::string& owner,
@@ -84,8 +101,8 @@ class Store {
   virtual absl::StatusOr<std::string> blob(const std::string& key) = 0;
 
   /// This process has these sessions, so they are not removed as unused; where they are in use, no other process may take
-  /// them over for a while. Those that another has taken over.
-  virtual absl::StatusOr<std::vector<std::string>> touch(std::span<const TouchedSession> sessions) = 0;
+  /// them over for a while.
+  virtual absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) = 0;
   /// How often touch() is to be called; 0: it has no haste.
   virtual std::chrono::milliseconds touch_every() const { return std::chrono::milliseconds(0); }
   /// This process lets go of the session: another may take it over at once.
@@ -102,8 +119,10 @@ std::string blob_key(std::string_view bytes);
 absl::Status store_failing(std::string_view why);
 /// NOT_FOUND SESSION_DAMAGED: what there is of it cannot be used.
 absl::Status session_damaged(std::string_view why);
-/// UNAVAILABLE SESSION_ELSEWHERE.
-absl::Status session_elsewhere();
+/// What a call's header has to say that is to come this way.
+std::string route_header(const std::string& route);
+/// UNAVAILABLE SESSION_ELSEWHERE, its limit route_header(). `route`: of the session; may be empty.
+absl::Status session_elsewhere(const std::string& route = "");
 /// NOT_FOUND SESSION_UNKNOWN.
 absl::Status session_unknown();
 

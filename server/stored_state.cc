@@ -61,6 +61,8 @@ std::string encode_inputs(const SessionChanges& changes) {
   message.set_history_first(changes.inputs.history.first);
   message.set_history_undo_steps(changes.inputs.history.undo_steps);
   message.set_history_steps(changes.inputs.history.steps);
+  message.set_is_undo(changes.inputs.is_undo);
+  message.set_is_redo(changes.inputs.is_redo);
   message.mutable_length_unit()->set_length(changes.inputs.inputs.given_material->length_unit);
   encode_solver(changes.inputs.inputs.solver, *message.mutable_solver());
   return bytes_of(message);
@@ -84,7 +86,8 @@ absl::StatusOr<Message> read_part(const std::map<std::string, std::string>& part
   Message message;
   const auto part = parts.find(name);
   if (part != parts.end() && message.ParseFromString(part->second)) return message;
-  return session_damaged(absl::StrCat("its part ", name.substr(0, 2) == kGroup ? "g" : name.substr(0, 8),
+  const bool is_of_handle = absl::StartsWith(name, kGroup) || absl::StartsWith(name, kMovement);
+  return session_damaged(absl::StrCat("its part ", is_of_handle ? name.substr(0, 1) : name,
                                       part == parts.end() ? " is missing" : " cannot be read"));
 }
 
@@ -121,6 +124,8 @@ absl::Status read_history(const std::map<std::string, std::string>& parts, const
   if (inputs.history_steps() > kMostSteps) return session_damaged("its history is too long");
   out.first = inputs.history_first();
   out.undo_steps = inputs.history_undo_steps();
+  out.is_undo = inputs.is_undo();
+  out.is_redo = inputs.is_redo();
   for (std::uint64_t k = 0; k < inputs.history_steps(); ++k) {
     const auto step = read_part<stored::Step>(parts, absl::StrCat(kStep, out.first + k));
     if (!step.ok()) return step.status();
@@ -217,6 +222,16 @@ absl::StatusOr<SessionHead> decode_head(const std::map<std::string, std::string>
   auto head = read_part<stored::Head>(parts, "head");
   if (!head.ok()) return head.status();
   return SessionHead{std::move(*head->mutable_request()), head->fingerprint(), head->created_unix_ms()};
+}
+
+const google::protobuf::Descriptor* part_type(std::string_view name) {
+  if (name.starts_with(kGroup)) return stored::Group::descriptor();
+  if (name.starts_with(kMovement)) return stored::Movement::descriptor();
+  if (name.starts_with(kStep)) return stored::Step::descriptor();
+  if (name == "inputs") return stored::Inputs::descriptor();
+  if (name == "removed") return stored::Removals::descriptor();
+  if (name == "p" || name == "stiffness") return v1::Field::descriptor();
+  return name == "region" ? v1::RegionOfInterest::descriptor() : nullptr;
 }
 
 std::vector<std::string> blobs_of(const v1::CreateSessionRequest& head) {

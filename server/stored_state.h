@@ -45,6 +45,9 @@ struct SessionHead {
 /// NOT_FOUND SESSION_DAMAGED.
 absl::StatusOr<SessionHead> decode_head(const std::map<std::string, std::string>& parts);
 
+/// What the bytes of a part are; null where there is no part of this name, or nobody reads it.
+const google::protobuf::Descriptor* part_type(std::string_view name);
+
 /// The names of the blobs of a head's request.
 std::vector<std::string> blobs_of(const v1::CreateSessionRequest& head);
 

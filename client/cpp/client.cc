@@ -129,9 +129,16 @@ absl::StatusOr<Session> Client::join(std::string_view session, Role role, OpenOp
                                      const std::stop_token& stop) {
   const absl::Status checked = check_name("session", session);
   if (!checked.ok()) return checked;
-  auto lease = join_session(*rpc_, std::string(session), role, stop);
+  std::shared_ptr<Rpc> rpc = rpc_;
+  auto lease = join_session(*rpc, std::string(session), role, stop);
+  const std::string route = lease.ok() ? lease->route : route_of(lease.status());
+  if (!route.empty() && route != rpc->route()) {  // come as those do who have it
+    rpc = rpc->going_by(route);
+    if (!lease.ok()) lease = join_session(*rpc, std::string(session), role, stop);
+  }
   if (!lease.ok()) return lease.status();
-  return Session(std::make_unique<Link>(rpc_, options_, std::move(options), nullptr, *std::move(lease)));
+  return Session(
+      std::make_unique<Link>(std::move(rpc), options_, std::move(options), nullptr, *std::move(lease)));
 }
 
 absl::StatusOr<std::string> Client::snapshot(std::string_view session) {

@@ -4,6 +4,7 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
 #include "client/cpp/upload.h"
 #include "client/cpp/wire.h"
 
@@ -33,8 +34,16 @@ absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptio
   const absl::Status checked =
       check_vertex_count(session.mesh().vertices(), static_cast<std::int64_t>(mesh.vertex_count()));
   if (!checked.ok()) return checked;
-  return Lease{session.name(), created->writer_token(), session.epoch(), session.input_seq(),
-               from_wire(session.mesh())};
+  return Lease{session.name(),      created->writer_token(),   session.epoch(),
+               session.input_seq(), from_wire(session.mesh()), session.route()};
+}
+
+std::string route_of(const absl::Status& status) {
+  const Fault fault = fault_of(status);
+  absl::string_view route(fault.limit);
+  return fault.reason == "SESSION_ELSEWHERE" && absl::ConsumePrefix(&route, "lpdeform-session: ")
+             ? std::string(route)
+             : "";
 }
 
 absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role role,
@@ -43,8 +52,12 @@ absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role ro
   get.set_session(session);
   const auto found = rpc.call(get, stop);
   if (!found.ok()) return found.status();
-  Lease lease{session, "", found->session().epoch(), found->session().input_seq(),
-              from_wire(found->session().mesh())};
+  Lease lease{session,
+              "",
+              found->session().epoch(),
+              found->session().input_seq(),
+              from_wire(found->session().mesh()),
+              found->session().route()};
   if (role == Role::kReader) return lease;
 
   v1::AcquireWriterRequest acquire;

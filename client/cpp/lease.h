@@ -17,11 +17,16 @@ struct Lease {
   std::uint64_t epoch = 0;
   std::uint64_t input_seq = 0;  // the newest update that the server had taken
   MeshReport mesh;
+  std::string route;  // the header that leads to it, see Rpc::going_by; may be empty
 };
 
 /// Makes a session. The same `request_id` gives the same one. Waits.
 absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptions& options,
                                      const std::string& request_id, const std::stop_token& stop);
+
+/// What a status says of the header that leads to a session which is at another of several servers; empty where it says
+/// nothing of that.
+std::string route_of(const absl::Status& status);
 
 /// Looks up a session; as its writer, takes it over. Waits.
 absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role role,

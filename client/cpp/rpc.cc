@@ -101,14 +101,14 @@ absl::Status no_server(const std::string& address, const std::string& problem) {
 /// What every call says of its caller.
 struct Caller {
   std::function<std::string()> token;
-  std::string id = new_request_id();
+  std::string route = new_request_id();
 };
 
-/// A token that no header can carry is left out: the server says that it has none. The header lpdeform-session lets a proxy before several servers send all calls of a client to one of them.
+/// A token that no header can carry is left out: the server says that it has none.
 void introduce(const Caller& caller, grpc::ClientContext& context) {
   const std::string text = caller.token ? caller.token() : "";
   if (!text.empty() && is_header_text(text)) context.AddMetadata("authorization", "Bearer " + text);
-  context.AddMetadata("lpdeform-session", caller.id);
+  context.AddMetadata("lpdeform-session", caller.route);
 }
 
 std::shared_ptr<grpc::ChannelCredentials> credentials_of(const std::optional<Tls>& tls) {
@@ -140,6 +140,16 @@ class GrpcRpc final : public Rpc {
         stub_(v1::DeformService::NewStub(channel)),
         call_timeout_(options.call_timeout),
         caller_{options.token} {}
+  GrpcRpc(const GrpcRpc& other, const std::string& route)
+      : channel_(other.channel_),
+        stub_(v1::DeformService::NewStub(other.channel_)),
+        call_timeout_(other.call_timeout_),
+        caller_{other.caller_.token, route} {}
+
+  std::string route() const override { return caller_.route; }
+  std::shared_ptr<Rpc> going_by(const std::string& route) const override {
+    return std::make_shared<GrpcRpc>(*this, is_header_text(route) ? route : caller_.route);
+  }
 
   absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
                                                 const std::stop_token& stop) override {

@@ -41,6 +41,12 @@ class Rpc {
                                                       const std::stop_token& stop);
   virtual ~Rpc() = default;
 
+  /// The value of the header lpdeform-session, which every call has: where a proxy stands before several servers, all calls
+  /// with the same one come to the same server.
+  virtual std::string route() const = 0;
+  /// The same channel by another way.
+  virtual std::shared_ptr<Rpc> going_by(const std::string& route) const = 0;
+
   virtual absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
                                                         const std::stop_token& stop) = 0;
   virtual absl::StatusOr<v1::UploadPartResponse> call(const v1::UploadPartRequest& request,

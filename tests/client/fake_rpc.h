@@ -110,6 +110,9 @@ class FakeRpc final : public Rpc {
  public:
   explicit FakeRpc(std::uint32_t vertex_count) : vertex_count_(vertex_count) {}
 
+  std::string route() const override { return "a way of its own"; }
+  std::shared_ptr<Rpc> going_by(const std::string&) const override { return nullptr; }  // there is one server
+
   /// The next stream that the client opens; null where it opens none.
   std::shared_ptr<Stream> next_stream() {
     std::unique_lock lock(mutex_);

@@ -8,6 +8,8 @@
 #include <thread>
 
 #include "core/base/crc32c.h"
+#include "server/snapshot.h"
+#include "server/stored.pb.h"
 #include "service_fixture.h"
 #include "token_maker.h"
 
@@ -257,6 +259,23 @@ TEST_F(CallersWithLimitsTest, OneCallerCannotTakeAllMemory) {
   EXPECT_EQ(refusal_, "");
 }
 
+TEST_F(CallersWithLimitsTest, SnapshotsCountAsMemoryOfTheirCaller) {
+  const auto session = create_as(alice_);
+  refusals(alice_, session);
+  const std::string file = file_of_it_;
+  create_as(alice_);  // now there is no room for more
+  ASSERT_EQ(refusal_, "");
+  stored::Snapshot snapshot;
+  ASSERT_TRUE(snapshot.ParseFromString(file.substr(kSnapshotHeaderBytes)));
+  (*snapshot.mutable_parts())["unread"] = std::string(700'000, 'x');
+  const std::string content = snapshot.SerializeAsString();
+  v1::RestoreSessionRequest restore;
+  restore.mutable_snapshot()->set_inline_(snapshot_header(content) + content);
+  v1::RestoreSessionResponse restored;
+  EXPECT_EQ(call(alice_, &Stub::RestoreSession, restore, restored), "CALLER_MEMORY_FULL");
+  EXPECT_EQ(call(bob_, &Stub::RestoreSession, restore, restored), "");
+}
+
 TEST_F(CallersWithLimitsTest, UploadsThatComeTooFastAreToldWhenToComeAgain) {
   v1::CreateUploadRequest create;
   create.set_size_bytes(2 << 20);
@@ -338,6 +357,26 @@ TEST_F(CallersTest, AStreamEndsWhenItsTokenHasExpired) {
   EXPECT_TRUE(long_stream->Read(&response));
   EXPECT_FALSE(response.event().has_go_away());
   long_context.TryCancel();
+}
+
+TEST_F(CallersTest, AStreamWhoseTokenIsGoodForAgesGoesOn) {
+  const auto session = create_as(alice_);
+  for (const char* const expires :
+       {"1795000000000", "900000000000000"}) {  // the first is a date in milliseconds
+    const std::string token = maker_.sign(std::string("{\"sub\": \"alice\", \"exp\": ") + expires + "}");
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kTestDeadline);
+    context.AddMetadata("authorization", "Bearer " + token);
+    v1::StreamFramesRequest request;
+    request.set_session(session.session().name());
+    const auto reader = stub_->StreamFrames(&context, request);
+    v1::StreamFramesResponse response;
+    ASSERT_TRUE(reader->Read(&response) && response.event().has_opened());
+    ASSERT_TRUE(reader->Read(&response));
+    EXPECT_TRUE(response.event().has_frame()) << response.ShortDebugString();
+    context.TryCancel();
+    (void)reader->Finish();
+  }
 }
 
 TEST_F(CallersTest, AStreamThatWasLetInGoesOn) {

@@ -31,9 +31,10 @@ class FaultyStore final : public Store {
     if (absl::Status status = pass(); !status.ok()) return status;
     return store_->commit(changes);
   }
-  absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner) override {
+  absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner,
+                                          const std::string& route) override {
     if (absl::Status status = pass(); !status.ok()) return status;
-    return store_->take_over(session, owner);
+    return store_->take_over(session, owner, route);
   }
   absl::StatusOr<std::string> find_request(const std::string& owner, const std::string& request_id) override {
     if (absl::Status status = pass(); !status.ok()) return status;
@@ -53,7 +54,7 @@ class FaultyStore final : public Store {
     if (absl::Status status = pass(); !status.ok()) return status;
     return store_->blob(key);
   }
-  absl::StatusOr<std::vector<std::string>> touch(std::span<const TouchedSession> sessions) override {
+  absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) override {
     if (absl::Status status = pass(); !status.ok()) return status;
     return store_->touch(sessions);
   }

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <filesystem>
 #include <string>
 #include <thread>
 #include <vector>
@@ -63,6 +64,17 @@ class RedisServer {
     waitpid(pid_, nullptr, 0);
     pid_ = 0;
   }
+
+  /// What it has on the disk, to go back to.
+  void save_as(const std::string& folder) const {
+    std::filesystem::copy(folder_ + "/appendonlydir", folder, std::filesystem::copy_options::recursive);
+  }
+  /// While it is stopped.
+  void go_back_to(const std::string& folder) const {
+    lose_all();
+    std::filesystem::copy(folder, folder_ + "/appendonlydir", std::filesystem::copy_options::recursive);
+  }
+  void lose_all() const { std::filesystem::remove_all(folder_ + "/appendonlydir"); }
 
   void pause() const { kill(pid_, SIGSTOP); }
   void resume() const { kill(pid_, SIGCONT); }

@@ -178,5 +178,44 @@ TEST_F(ReplicasTest, ARollingRestartUnderLoadLosesNoSession) {
               servers_.size(), sessions.size(), *std::max_element(longest.begin(), longest.end()));
 }
 
+/// Who looks on, by a client of their own.
+absl::StatusOr<client::Session> join(const std::string& address, const std::string& name) {
+  auto client = client::Client::connect(address);
+  return client.ok() ? client->join(name, client::Role::kReader) : client.status();
+}
+
+TEST_F(ReplicasTest, UsersOfOneSessionMeetAtOneServer) {
+  const client::Mesh mesh = bar(21);
+  client::Session session = open(mesh);
+  hold(session, mesh);
+  const std::string name = session.name();
+  std::atomic<bool> is_over = false;
+  absl::Status moved;
+  std::thread dragging([&] {
+    for (int step = 1; !is_over && moved.ok(); ++step) moved = move(session, 0.01 * (step % 100));
+  });
+  const auto others_see_it = [&] {
+    for (int k = 0; k < 6; ++k) {  // each by a way of its own, of which two thirds lead elsewhere
+      auto other = join(web_, name);
+      ASSERT_TRUE(other.ok()) << other.status();
+      absl::StatusOr<client::Frame> frame;
+      do frame = other->next_frame(kPatience);
+      while (frame.ok() && frame->input_seq == 0);  // of a session that was just made again
+      EXPECT_TRUE(frame.ok()) << frame.status();
+    }
+  };
+  others_see_it();
+  for (std::size_t k = 0; k < servers_.size(); ++k) {  // and where it is after servers have come and gone
+    servers_[k]->signal(SIGTERM);
+    EXPECT_EQ(servers_[k]->wait(), 0);
+    begin(k);
+    others_see_it();
+  }
+  is_over = true;
+  dragging.join();
+  EXPECT_TRUE(moved.ok()) << moved;
+  EXPECT_EQ(session.name(), name);
+}
+
 }  // namespace
 }  // namespace lpdeform

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <condition_variable>
+#include <functional>
 #include <future>
+#include <latch>
 #include <mutex>
 
 #include "absl/strings/str_cat.h"
@@ -81,6 +83,19 @@ class Reader {
   std::shared_ptr<State> state_;
 };
 
+/// Takes a thread of the scheduler.
+class Blocker final : public Runnable {
+ public:
+  explicit Blocker(std::function<void()> block) : Runnable(false), block_(std::move(block)) {}
+  bool run() override {
+    block_();
+    return false;
+  }
+
+ private:
+  const std::function<void()> block_;
+};
+
 class SessionTest : public testing::Test {
  protected:
   ~SessionTest() override { registry_->clear(EndReason::kDraining, ""); }
@@ -125,6 +140,26 @@ TEST_F(SessionTest, AnswersUpdatesOnEveryStream) {
   const auto is_answer = [](const Frame& frame) { return frame.input_seq == 2 && frame.converged; };
   EXPECT_TRUE(writer.wait_for_frame(is_answer));
   EXPECT_TRUE(reader.wait_for_frame(is_answer));
+}
+
+TEST_F(SessionTest, AnUpdateAndAStepTakenBackAreAnsweredBeforeRefinements) {
+  const auto session = create();
+  const std::string token = session->lease().token;
+  ASSERT_TRUE(session->update(token, hold_ends(rest_, 1, 1)).ok());
+  const auto are_busy = std::make_shared<std::latch>(scheduler_.threads());
+  const auto let_go =
+      std::make_shared<std::latch>(1);  // whoever waits may do so for longer than this test lasts
+  for (int k = 0; k < scheduler_.threads(); ++k) {
+    scheduler_.wake(std::make_shared<Blocker>([are_busy, let_go] {
+      are_busy->count_down();
+      let_go->wait();
+    }));
+  }
+  are_busy->wait();
+  EXPECT_FALSE(scheduler_.is_answer_waiting());
+  EXPECT_TRUE(session->undo(token, 2, false).ok());
+  EXPECT_TRUE(scheduler_.is_answer_waiting());
+  let_go->count_down();
 }
 
 TEST_F(SessionTest, OnlyTheWriterChangesIt) {

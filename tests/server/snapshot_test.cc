@@ -8,8 +8,12 @@
 #include <random>
 
 #include "absl/strings/match.h"
+#include "core/base/fault.h"
 #include "restart_fixture.h"
+#include "server/parsed_size.h"
+#include "server/session.h"
 #include "server/stored.pb.h"
+#include "tests/core/split_shapes.h"
 
 namespace lpdeform {
 namespace {
@@ -175,6 +179,42 @@ TEST_F(SnapshotTest, AWeldedSessionWithNormalsIsTheSame) {
   EXPECT_TRUE(snapshot(copy) == snapshot(restored(snapshot(copy))));
 }
 
+TEST_F(SnapshotTest, CopiesOfVerticesAndARegionAreTheSame) {
+  const TriangleMesh whole = bar_mesh(), mesh = split_at_every_corner(whole);
+  v1::CreateSessionRequest request;
+  *request.mutable_mesh() = mesh_message(mesh);
+  std::vector<std::int32_t> groups;
+  for (Eigen::Index corner = 0; corner < 3 * whole.faces.rows(); ++corner)
+    groups.push_back(whole.faces(corner / 3, corner % 3));
+  request.mutable_weld()->mutable_groups()->set_inline_(packed(groups));
+  const Points normals = flat_normals(mesh);
+  request.mutable_normals()->set_scalar(v1::SCALAR_FLOAT64);
+  request.mutable_normals()->mutable_data()->set_inline_(packed(normals));
+  v1::CreateSessionResponse session;
+  ASSERT_TRUE(try_create(request, session).ok());
+  take(session, ends_message(mesh.vertices, 1, 2));
+  const std::string bent = solved(session);
+  v1::Update update = tip_message(2, 3);
+  std::vector<std::int32_t> upper;
+  for (std::int32_t v = 0; v < mesh.vertices.rows(); ++v) {
+    if (mesh.vertices(v, 2) >= 4) upper.push_back(v);
+  }
+  update.mutable_settings()->mutable_region()->mutable_vertices()->set_inline_(packed(upper));
+  take(session, update);  // what is outside stays bent
+  const std::string solved_before = solved(session), seen_before = shown(session);
+  EXPECT_TRUE(solved_before != bent);
+  const std::string file = snapshot(session);
+  const auto copy = restored(file);
+  EXPECT_EQ(shown(copy), seen_before);
+  EXPECT_TRUE(opened(snapshot(copy)).surface().data().inline_() == solved_before);
+  const auto other = restored(file);
+  for (const auto& one : {copy, other}) take(one, tip_message(3, 4));
+  const std::string further = solved(copy);
+  EXPECT_TRUE(further == solved(other));
+  const std::size_t outside = 24 * static_cast<std::size_t>(vertices_at(mesh.vertices, 2)[0]);
+  EXPECT_TRUE(further.substr(outside, 24) == bent.substr(outside, 24));
+}
+
 TEST_F(SnapshotTest, StepsCanBeTakenBackInTheCopyToo) {
   const auto session = create(bar_mesh());
   take(session, ends_message(bar_mesh().vertices, 1, 0));
@@ -317,6 +357,79 @@ TEST_F(SnapshotTest, AFileThatSomebodyMadeUpIsHeldToEveryLimit) {
             }),
             "TOO_MANY_HANDLES");
   EXPECT_EQ(sessions(), 1);
+}
+
+TEST_F(SnapshotTest, AFileThatWouldBecomeManyTimesAsLargeIsRefusedBeforeItIsParsed) {
+  options_.max_bytes = 32 << 20;
+  restart();
+  const std::string file = snapshot(create(bar_mesh()));
+  constexpr int kMany = 200'000;  // of two bytes each
+  using Change = std::function<void(stored::Snapshot&)>;
+  const auto reason = [&](const Change& change) {
+    stored::Snapshot snapshot = opened(file);
+    change(snapshot);
+    v1::CreateSessionResponse session;
+    const std::string made_up = sealed(snapshot);
+    EXPECT_LT(made_up.size(), kMostInline);
+    return details_of(try_restore(made_up, session)).info.reason();
+  };
+  EXPECT_EQ(reason([](auto& s) {
+              for (int k = 0; k < kMany; ++k) s.mutable_head()->mutable_request()->add_handles();
+            }),
+            "MEMORY_FULL");
+  EXPECT_EQ(reason([](auto& s) {
+              stored::Step step;
+              for (int k = 0; k < kMany; ++k) step.add_changes();
+              (*s.mutable_parts())["s:0"] = step.SerializeAsString();
+            }),
+            "MEMORY_FULL");
+  EXPECT_EQ(reason([](auto& s) {  // fields that nobody knows
+              std::string unknown;
+              for (int k = 0; k < 2 * kMany; ++k) unknown += "\x78\x01";
+              s.mutable_surface()->ParseFromString(s.surface().SerializeAsString() + unknown);
+            }),
+            "MEMORY_FULL");
+  restored(file);
+}
+
+TEST_F(SnapshotTest, WhatAMessageTakesParsedIsFoundInItsBytes) {
+  v1::CreateSessionRequest request;
+  const auto estimated = [&] {
+    return parsed_size(*v1::CreateSessionRequest::descriptor(), request.SerializeAsString());
+  };
+  for (int k = 0; k < 1000; ++k) {
+    v1::HandleUpdate& handle = *request.add_handles();
+    handle.set_name("a name that is too long to lie in the text itself");
+    if (k % 3 == 0) handle.mutable_set()->mutable_soft()->set_weight(1);
+    if (k % 3 == 1) handle.mutable_move()->mutable_rigid()->mutable_center()->set_x(1);
+    if (k % 3 == 2) handle.mutable_remove();
+  }
+  EXPECT_GT(estimated(), request.SpaceUsedLong());
+  EXPECT_LT(estimated(), 4 * request.SpaceUsedLong());
+  request.Clear();
+  request.mutable_mesh()->mutable_data()->set_inline_(std::string(1 << 20, 'x'));
+  EXPECT_GT(estimated(), 1u << 20);
+  EXPECT_LT(estimated(), (1u << 20) + 10'000);  // large buffers are what they are
+  const auto of = [](std::string_view bytes) {
+    return parsed_size(*v1::CreateSessionRequest::descriptor(), bytes);
+  };
+  EXPECT_GT(of("\x0b\x08\x01\x0c"), of(""));  // a group
+  EXPECT_GT(of("\x0a\xff\xff"), of(""));      // cut off
+  EXPECT_GT(of("\xff\xff\xff\xff\xff"), 0u);  // no message at all
+}
+
+TEST_F(SnapshotTest, AFileThatCouldNotBeWrittenIsRefused) {
+  const auto shape = shape_of(bar_mesh());
+  Scheduler scheduler(2);
+  SessionParts parts{
+      .name = "sessions/1", .shape = shape, .deformer = deformer_of(shape), .beginning = {}, .memory = {}};
+  const auto session = Session::create(
+      std::move(parts), {scheduler, std::make_shared<ManualTimers>(), std::chrono::seconds(15)});
+  ASSERT_TRUE(session.ok());
+  const auto file = encode_snapshot(**session);
+  ASSERT_TRUE(file.ok());
+  EXPECT_TRUE(encode_snapshot(**session, file->size()).ok());
+  EXPECT_EQ(fault_of(encode_snapshot(**session, 1000).status()).reason, "SNAPSHOT_TOO_LARGE");
 }
 
 TEST_F(SnapshotTest, AnUnknownSessionHasNone) {

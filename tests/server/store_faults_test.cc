@@ -4,7 +4,10 @@
 
 #include <fstream>
 
+#include "redis_server.h"
 #include "restart_fixture.h"
+#include "server/redis_store.h"
+#include "server/stored.pb.h"
 
 namespace lpdeform {
 namespace {
@@ -164,6 +167,78 @@ TEST_F(StoreFaultsTest, ASessionWhoseMeshIsDamagedIsToBeMadeAnew) {
   EXPECT_EQ(damaged.error_code(), grpc::StatusCode::NOT_FOUND);
   EXPECT_EQ(details_of(damaged).info.reason(), "SESSION_DAMAGED");
   EXPECT_TRUE(get(other.session().name(), found).ok());
+}
+
+/// The same with a Redis, whose disk is not always what it was.
+class RedisFaultsTest : public StoreFaultsTest {
+ protected:
+  void SetUp() override { begin(); }
+  /// Another server with the same Redis.
+  void begin() {
+    server_.reset();
+    options_.store.reset();
+    auto store = open_redis_store({.host = "127.0.0.1", .port = redis_.port()});
+    ASSERT_TRUE(store.ok()) << store.status();
+    options_.store = *std::move(store);
+    start();
+  }
+
+  ~RedisFaultsTest() override {
+    server_.reset();  // while there is a Redis
+    options_.store.reset();
+  }
+
+  RedisServer redis_{folder_};
+};
+
+TEST_F(RedisFaultsTest, OneThatWentBackGetsLiveSessionsInWhole) {
+  const auto session = create(mesh_), idle = create(mesh_);
+  ASSERT_TRUE(take(session, ends_message(mesh_.vertices, 1, 1)).kept());
+  ASSERT_TRUE(take(idle, ends_message(mesh_.vertices, 1, 1)).kept());
+  const std::string saved = folder_ + "/saved";
+  redis_.save_as(saved);
+  ASSERT_TRUE(take(session, tip_message(2, 2)).kept());
+  ASSERT_TRUE(take(idle, tip_message(2, 2)).kept());
+  redis_.stop();
+  redis_.go_back_to(saved);  // as one may be that was set to write each second only
+  redis_.start();
+  v1::Update other;
+  other.set_input_seq(3);
+  set_handle(other, "other", vertices_at(mesh_.vertices, 7), 0.5);
+  while (!take(session, other).kept()) other.set_input_seq(other.input_seq() + 1);
+  const std::string before = seen(session), before_idle = seen(idle), positions = solved(session);
+  RedisConnection redis("127.0.0.1", redis_.port(), std::chrono::seconds(5));
+  const std::string key = "lpdeform:s:" + idle.session().name();
+  const auto end = std::chrono::steady_clock::now() + kTestDeadline;
+  stored::Inputs inputs;
+  do {  // nothing tells when it is written again
+    const auto reply = redis.run({"HGET", key, "p:inputs"});
+    ASSERT_TRUE(reply.ok() && inputs.ParseFromString(reply->text));
+  } while (inputs.input_seq() < 2 && std::chrono::steady_clock::now() < end);
+  begin();
+  EXPECT_EQ(seen(session), before);
+  EXPECT_EQ(seen(idle), before_idle);
+  EXPECT_TRUE(solved(session) == positions);
+}
+
+TEST_F(RedisFaultsTest, OneThatCameBackEmptyEndsSessionsThatCanBeMadeAnew) {
+  const auto session = create(mesh_);
+  ASSERT_TRUE(take(session, ends_message(mesh_.vertices, 1, 1)).kept());
+  DeformClient stream(*stub_, session);
+  ASSERT_TRUE(stream.settle(1).has_value());
+  redis_.stop();
+  redis_.lose_all();
+  redis_.start();
+  EXPECT_TRUE(stream.read_to_end().ok());
+  ASSERT_EQ(stream.history.ends.size(), 1u);
+  EXPECT_EQ(stream.history.ends[0].reason(),
+            v1::GO_AWAY_REASON_DRAINING);  // come back, and see what there is
+  v1::Session found;
+  const auto look = [&] { return get(session.session().name(), found); };
+  EXPECT_EQ(details_of(again_and_again(look)).info.reason(), "SESSION_UNKNOWN");
+  v1::CreateSessionResponse anew;
+  EXPECT_TRUE(again_and_again([&] { return try_create(request(), anew); }).ok());
+  EXPECT_TRUE(take(anew, ends_message(mesh_.vertices, 1, 1)).kept());
 }
 
 }  // namespace

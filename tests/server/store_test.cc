@@ -217,7 +217,7 @@ TEST_F(SqliteStoreTest, RemovesWhatNobodyHasUsed) {
   ASSERT_TRUE(commit(*store_, beginning("a")).ok());
   EXPECT_EQ(*store_->remove_unused(60'000), 0u);
   const std::vector<TouchedSession> sessions{{"a", 1, true}};
-  EXPECT_TRUE(store_->touch(sessions)->empty());
+  EXPECT_TRUE(store_->touch(sessions)->lost.empty());
   EXPECT_EQ(*store_->remove_unused(-1000), 1u);  // as a second later
   EXPECT_FALSE(store_->take_over("a", "anna").ok());
 }
@@ -276,9 +276,11 @@ TEST_F(SqliteStoreTest, AFullStoreChangesNothingAndGoesOnWhenThereIsRoom) {
 class RedisStoreTest : public testing::Test {
  protected:
   /// A store as one of several servers has it.
-  std::shared_ptr<Store> open(std::chrono::milliseconds lease = std::chrono::minutes(1)) {
+  std::shared_ptr<Store> open(std::chrono::milliseconds lease = std::chrono::minutes(1),
+                              std::chrono::milliseconds idle = std::chrono::minutes(10)) {
     auto opened = open_redis_store({.host = "127.0.0.1",
                                     .port = redis_.port(),
+                                    .idle = idle,
                                     .lease = lease,
                                     .patience = std::chrono::milliseconds(200)});
     EXPECT_TRUE(opened.ok()) << opened.status();
@@ -300,6 +302,32 @@ TEST_F(RedisStoreTest, ASessionInUseIsHeldUntilItIsLetGo) {
   EXPECT_EQ(second->take_over("a", "anna")->epoch, 2u);
 }
 
+TEST_F(RedisStoreTest, WhoIsRefusedLearnsTheWayAndWhoComesThatWayIsGivenIt) {
+  const auto first = open(), second = open();
+  StoredChange change = beginning("a");
+  change.route = "the way";
+  ASSERT_TRUE(commit(*first, change).ok());
+  const std::vector<TouchedSession> sessions{{"a", 1, true, 0}};
+  const auto is_wanted = [&] { return !first->touch(sessions)->wanted.empty(); };
+  const auto ask = [&](const std::string& route) { return second->take_over("a", "anna", route).status(); };
+  EXPECT_EQ(fault_of(ask("another")).limit, "lpdeform-session: the way");
+  EXPECT_FALSE(is_wanted());
+  EXPECT_EQ(reason(second->take_over("a", "bert", "the way").status()), "SESSION_UNKNOWN");
+  EXPECT_FALSE(is_wanted());
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  do EXPECT_EQ(reason(ask("the way")), "SESSION_ELSEWHERE");
+  while (!is_wanted() && std::chrono::steady_clock::now() < end);
+  EXPECT_TRUE(is_wanted());
+  ASSERT_TRUE(first->let_go("a").ok());
+  const auto taken = second->take_over("a", "anna", "the way");
+  ASSERT_TRUE(taken.ok());
+  EXPECT_EQ(taken->route, "the way");
+  const std::vector<TouchedSession> there{{"a", 2, true, 0}};
+  EXPECT_TRUE(second->touch(there)->wanted.empty());
+  EXPECT_EQ(reason(first->take_over("a", "anna", "the way").status()), "SESSION_ELSEWHERE");
+  EXPECT_TRUE(second->touch(there)->wanted.empty());  // it has just come
+}
+
 TEST_F(RedisStoreTest, ALeaseThatNobodyRenewsEndsAndItsHolderIsFencedOff) {
   const auto first = open(std::chrono::milliseconds(1)), second = open();
   ASSERT_TRUE(commit(*first, beginning("a")).ok());
@@ -313,9 +341,9 @@ TEST_F(RedisStoreTest, ALeaseThatNobodyRenewsEndsAndItsHolderIsFencedOff) {
     EXPECT_EQ(*commit(*first, late), ChangeOutcome::kFenced);
   }
   const std::vector<TouchedSession> sessions{{"a", 1, true}};
-  EXPECT_EQ(*first->touch(sessions), std::vector<std::string>{"a"});
+  EXPECT_EQ(first->touch(sessions)->lost, std::vector<std::string>{"a"});
   const std::vector<TouchedSession> held{{"a", 2, true}};
-  EXPECT_TRUE(second->touch(held)->empty());
+  EXPECT_TRUE(second->touch(held)->lost.empty());
   EXPECT_EQ(second->take_over("a", "anna")->parts.at("inputs"), "1");
 }
 
@@ -340,6 +368,78 @@ TEST_F(RedisStoreTest, RedisAwaySlowOrRestartedIsAnErrorThatPasses) {
   redis_.start();
   EXPECT_TRUE(commit(*store, beginning("b")).ok());
   EXPECT_EQ(store->take_over("a", "anna")->parts.at("inputs"), "1");
+}
+
+TEST_F(RedisStoreTest, ARedisThatWentBackIsTold) {
+  const auto store = open();
+  StoredChange first = beginning("a");
+  first.revision = 1;
+  ASSERT_EQ(*commit(*store, first), ChangeOutcome::kKept);
+  const std::string saved = folder_.path() + "/saved";
+  redis_.save_as(saved);
+  StoredChange next{.session = "a",
+                    .epoch_before = 1,
+                    .epoch = 1,
+                    .revision_before = 1,
+                    .revision = 2,
+                    .parts = {{"m:tip", "there"}}};
+  ASSERT_EQ(*commit(*store, next), ChangeOutcome::kKept);
+  ASSERT_EQ(*commit(*store, next), ChangeOutcome::kKept);  // again: its answer may have been lost
+  const std::vector<TouchedSession> sessions{{"a", 1, true, 2}};
+  EXPECT_TRUE(store->touch(sessions)->behind.empty());
+  redis_.stop();
+  redis_.go_back_to(saved);
+  redis_.start();
+  while (!store->touch(sessions).ok()) {  // once to see that the connection is gone
+  }
+  EXPECT_EQ(store->touch(sessions)->behind, std::vector<std::string>{"a"});
+  StoredChange later{.session = "a",
+                     .epoch_before = 1,
+                     .epoch = 1,
+                     .revision_before = 2,
+                     .revision = 3,
+                     .parts = {{"inputs", "3"}}};
+  absl::StatusOr<ChangeOutcome> outcome;
+  do outcome = commit(*store, later);
+  while (!outcome.ok());
+  EXPECT_EQ(*outcome, ChangeOutcome::kBehind);
+  EXPECT_EQ(store->touch(sessions)->behind, std::vector<std::string>{"a"});  // nothing was changed
+  later.replaces_all = true;
+  later.parts = {{"head", "h"}, {"inputs", "3"}, {"m:tip", "there"}};
+  EXPECT_EQ(*commit(*store, later), ChangeOutcome::kKept);
+  EXPECT_TRUE(store->touch(sessions)->behind.empty());
+  const auto other = store->take_over("a", "anna");
+  ASSERT_TRUE(other.ok());
+  EXPECT_EQ(other->parts.at("m:tip"), "there");
+  next.epoch_before = next.epoch = other->epoch;  // a process that counts anew
+  next.revision_before = 5;
+  EXPECT_EQ(*commit(*store, next), ChangeOutcome::kKept);
+}
+
+TEST_F(RedisStoreTest, AnOwnersListDoesNotGrowWithWhatHasExpired) {
+  const auto brief = open(std::chrono::milliseconds(1), std::chrono::milliseconds(300)), lasting = open();
+  ASSERT_TRUE(commit(*lasting, beginning("z")).ok());
+  RedisConnection redis("127.0.0.1", redis_.port(), std::chrono::seconds(5));
+  const auto run = [&](const RedisConnection::Command& command) {
+    const auto reply = redis.run(command);
+    EXPECT_TRUE(reply.ok()) << reply.status();
+    return reply.ok() ? *reply : RedisReply();
+  };
+  const RedisReply lists = run({"KEYS", "lpdeform:o:*"});
+  ASSERT_EQ(lists.elements.size(), 1u);
+  const std::string list = lists.elements[0].text;
+  const auto size = [&] { return run({"ZCARD", list}).number; };
+  for (int k = 0; k < 40; ++k) {
+    ASSERT_TRUE(commit(*brief, beginning(absl::StrCat("a", k))).ok());
+    run({"PERSIST", list});
+  }
+  const std::vector<TouchedSession> sessions{{"z", 1, true, 0}};
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (size() > 1 && std::chrono::steady_clock::now() < end) ASSERT_TRUE(lasting->touch(sessions).ok());
+  EXPECT_EQ(size(), 1);
+  EXPECT_EQ(*lasting->list("anna", "", 10), std::vector<std::string>{"z"});
+  ASSERT_TRUE(commit(*lasting, {.session = "z", .is_removal = true}).ok());
+  EXPECT_EQ(size(), 0);
 }
 
 TEST(OpenRedisStore, RefusesAServerThatIsNotThere) {

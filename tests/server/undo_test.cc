@@ -82,6 +82,36 @@ TEST_F(UndoTest, TheHistorySurvivesTheServer) {
   goes_to(13, false, 3);
 }
 
+TEST_F(UndoTest, AnAnswerThatWasLostWithItsServerCanBeHadAgain) {
+  const auto session = create(bar_mesh());
+  take(session, ends_message(bar_mesh().vertices, 1, 0));
+  step(session, 2, 2);
+  v1::Update change;
+  change.set_input_seq(3);
+  set_handle(change, "new", vertices_at(bar_mesh().vertices, 7), 1);
+  move_handle(change, "tip", 3);
+  EXPECT_TRUE(take(session, change).kept());
+  const auto same_again = [&](std::uint64_t input_seq, bool redo) {
+    v1::UndoUpdateResponse first, again, other;
+    ASSERT_TRUE(undo(session, input_seq, redo, first).ok());
+    const std::string before = seen(session);
+    restart();
+    const grpc::Status status = undo(session, input_seq, redo, again);
+    ASSERT_TRUE(status.ok()) << status.error_message();
+    EXPECT_EQ(again.DebugString(), first.DebugString());
+    EXPECT_EQ(seen(session), before);
+    EXPECT_EQ(details_of(undo(session, input_seq, !redo, other)).info.reason(), "INPUT_SEQ_PASSED");
+  };
+  same_again(4, false);  // "new" goes
+  same_again(5, true);   // and comes
+  same_again(6, false);
+  same_again(7, false);  // a motion alone
+  EXPECT_TRUE(take(session, tip_message(8, 1)).kept());
+  restart();
+  v1::UndoUpdateResponse response;
+  EXPECT_EQ(details_of(undo(session, 8, false, response)).info.reason(), "INPUT_SEQ_PASSED");
+}
+
 TEST_F(UndoTest, WhoDoesNotWriteTakesNothingBack) {
   auto session = create(bar_mesh());
   take(session, ends_message(bar_mesh().vertices, 1, 0));

@@ -22,6 +22,8 @@ class Lease:
     epoch: int
     input_seq: int
     report: MeshReport
+    route: str = ""
+    """The header lpdeform-session that leads to it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +87,13 @@ def _call_with(
     return answer
 
 
+def route_of(error: LpdeformError) -> str:
+    """The header that leads to a session which is at another of several servers; empty where the error says nothing of that."""
+    said = "lpdeform-session: "
+    is_elsewhere = error.reason == "SESSION_ELSEWHERE" and error.limit.startswith(said)
+    return error.limit[len(said) :] if is_elsewhere else ""
+
+
 def join_session(rpc: Rpc, name: str, as_writer: bool, stop: Stop) -> Lease:
     get = service_pb2.GetSessionRequest(session=name)
     found = rpc.call("GetSession", get, service_pb2.GetSessionResponse, stop)
@@ -107,4 +116,4 @@ def check_vertex_count(count: int, wanted: int) -> None:
 
 def _lease_of(session: service_pb2.Session, writer_token: str) -> Lease:
     report = _wire.report_from_wire(session.mesh)
-    return Lease(session.name, writer_token, session.epoch, session.input_seq, report)
+    return Lease(session.name, writer_token, session.epoch, session.input_seq, report, session.route)

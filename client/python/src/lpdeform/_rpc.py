@@ -12,7 +12,7 @@ import grpc
 from google.protobuf.message import Message
 
 from lpdeform._numbers import crc32c
-from lpdeform.access import Caller, Tls, Token, open_channel
+from lpdeform.access import Caller, Tls, Token, is_header_text, open_channel
 from lpdeform.errors import Code, LpdeformError, from_call, make
 from lpdeform.v1 import data_pb2, service_pb2
 
@@ -84,6 +84,15 @@ class Rpc:
         self.reconnect_for = reconnect_for
         self._caller = Caller(token, new_request_id())
         self._channel = open_channel(address, tls, _channel_options)
+
+    @property
+    def route(self) -> str:
+        return self._caller.route
+
+    def go_by(self, route: str) -> None:
+        """From now on calls come as those do that say this in the header lpdeform-session."""
+        if is_header_text(route):
+            self._caller.route = route
 
     def call(self, name: str, request: Message, response: type[Response], stop: Stop, timeout: float | None = None) -> Response:
         """A call with one answer; waits for it."""

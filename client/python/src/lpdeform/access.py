@@ -35,17 +35,20 @@ class Tls:
 class Caller:
     """What every call over one connection says of its caller."""
 
-    def __init__(self, token: Token, name: str) -> None:
-        """`name`: any, the same for all calls of one client. Raises InvalidInput TOKEN_CHARACTERS."""
-        if isinstance(token, str) and not _is_header_text(token):
+    route: str
+    """A proxy before several servers sends all calls that say the same to one of them."""
+
+    def __init__(self, token: Token, route: str) -> None:
+        """`route`: any, the same for all calls of one client. Raises InvalidInput TOKEN_CHARACTERS."""
+        if isinstance(token, str) and not is_header_text(token):
             text = "The token has a character that a header cannot carry; a line break at its end, perhaps."
             raise invalid(text, "TOKEN_CHARACTERS", "token", "printable ASCII")
         self._token = token
-        self._name = name
+        self.route = route
 
     def metadata(self) -> list[tuple[str, str]]:
         """Raises UNAUTHENTICATED TOKEN_FUNCTION where the caller's function does not give a token that a header can carry."""
-        found = [("lpdeform-session", self._name)]
+        found = [("lpdeform-session", self.route)]
         if token := self._newest():
             found.append(("authorization", f"Bearer {token}"))
         return found
@@ -57,13 +60,13 @@ class Caller:
             token = self._token()
         except Exception as error:
             raise make(Code.UNAUTHENTICATED, f"The function of the token failed: {error!r}", "TOKEN_FUNCTION") from error
-        if not isinstance(token, str) or not _is_header_text(token):
+        if not isinstance(token, str) or not is_header_text(token):
             text = "The function of the token gave something that a header cannot carry."
             raise make(Code.UNAUTHENTICATED, text, "TOKEN_FUNCTION")
         return token
 
 
-def _is_header_text(text: str) -> bool:
+def is_header_text(text: str) -> bool:
     return all(" " <= letter <= "~" for letter in text)
 
 

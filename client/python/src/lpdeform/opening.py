@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy.typing as npt
 
 from lpdeform import _codec, _wire
-from lpdeform._lease import Original, Snapshot, create_session, join_session, restore_session
+from lpdeform._lease import Lease, Original, Snapshot, create_session, join_session, restore_session, route_of
 from lpdeform._link import Link
 from lpdeform._numbers import indices, numbers
 from lpdeform._rpc import Rpc, Stop, default_address, new_request_id
 from lpdeform.access import Tls, Token
-from lpdeform.errors import invalid
+from lpdeform.errors import LpdeformError, invalid
 from lpdeform.session import Session
 from lpdeform.types import Encoding, Field, FreeComponents, Handle, Settings, SolverSettings, Update, WeightKind
 from lpdeform.v1 import frame_pb2
@@ -173,10 +173,25 @@ def join(
 
 def join_link(rpc: Rpc, stop: Stop, name: str, as_writer: bool, options: frame_pb2.FrameOptions) -> Link:
     try:
-        return Link(rpc, join_session(rpc, name, as_writer, stop), options, None)
+        return Link(rpc, _join_where_it_is(rpc, stop, name, as_writer), options, None)
     except BaseException:
         rpc.close()
         raise
+
+
+def _join_where_it_is(rpc: Rpc, stop: Stop, name: str, as_writer: bool) -> Lease:
+    """Where several servers stand behind a proxy: comes as those do who have the session."""
+    try:
+        lease = join_session(rpc, name, as_writer, stop)
+        if lease.route:
+            rpc.go_by(lease.route)
+        return lease
+    except LpdeformError as error:
+        route = route_of(error)
+        if not route or route == rpc.route:
+            raise
+        rpc.go_by(route)
+        return join_session(rpc, name, as_writer, stop)
 
 
 def restore(

@@ -15,6 +15,8 @@ export interface Lease {
   epoch: number;
   inputSeq: number;
   report: MeshReport;
+  /** The header lpdeform-session that leads to it, where one is known. */
+  route?: string;
 }
 
 /** Makes a session. The same request id gives the same session, however often it is tried. */
@@ -71,6 +73,13 @@ export function checkVertexCount(count: number, wanted: number): void {
   });
 }
 
+/** The header that leads to a session which is at another of several servers; empty where the error says nothing of that. */
+export function routeOf(error: LpdeformError): string {
+  const said = "lpdeform-session: ";
+  const isElsewhere = error.reason === "SESSION_ELSEWHERE" && error.limit.startsWith(said);
+  return isElsewhere ? error.limit.slice(said.length) : "";
+}
+
 /** Joins a session by name. */
 export async function joinSession(
   rpc: Rpc,
@@ -87,6 +96,7 @@ export async function joinSession(
     inputSeq: Number(session.inputSeq),
     report: reportFromWire(session.mesh),
   };
+  if (session.route) lease.route = session.route;
   if (role === "reader") return lease;
   const acquired = await rpc.call("acquireWriter", { session: name }, signal);
   return {

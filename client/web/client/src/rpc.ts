@@ -46,19 +46,31 @@ export class Rpc {
     this.client = createClient(DeformService, transport);
   }
 
-  /** The same for the same options, so that sessions share a stream. */
-  static connect({ url, callTimeoutMs, reconnectForMs, token, fetch }: ConnectOptions): Rpc {
+  /** The same for the same options, so that sessions share a stream. `route`: see goingBy(); any where it is left out. */
+  static connect(options: ConnectOptions, route = ""): Rpc {
+    const { url, callTimeoutMs, reconnectForMs, token, fetch } = options;
     const baseUrl = url ?? globalThis.location?.origin;
     if (!baseUrl) throw new TypeError("Outside of a page, `url` is needed: of the gRPC-Web proxy.");
-    const key = `${baseUrl} ${callTimeoutMs} ${reconnectForMs}`;
+    const key = `${baseUrl} ${callTimeoutMs} ${reconnectForMs} ${route}`;
     const shared = fetch ? undefined : sharedBy(token);
     const known = shared?.get(key);
     if (known) return known;
-    const interceptors = [keepTogether(newRequestId()), ...(token ? [bearing(token)] : [])];
+    const id = route || newRequestId();
+    const interceptors = [keepTogether(id), ...(token ? [bearing(token)] : [])];
     const transport = createGrpcWebTransport({ baseUrl, interceptors, ...(fetch && { fetch }) });
     const rpc = new Rpc(transport, callTimeoutMs, reconnectForMs);
+    rpc.#route = id;
+    rpc.#another = (other) => Rpc.connect(options, other);
     shared?.set(key, rpc);
     return rpc;
+  }
+
+  #route = "";
+  #another: ((route: string) => Rpc) | undefined;
+
+  /** The same server or proxy, by another value of the header lpdeform-session: a proxy before several servers goes by it. */
+  goingBy(route: string): Rpc {
+    return route === this.#route ? this : (this.#another?.(route) ?? this);
   }
 
   async call<Name extends Unary>(

@@ -8,6 +8,7 @@ import {
   isUndecided,
   joinSession,
   type Lease,
+  routeOf,
 } from "./lease.js";
 import { type Copy, Link, sessionClosed } from "./link.js";
 import { tell } from "./listeners.js";
@@ -348,8 +349,16 @@ export async function joinSessionByName(name: string, options: JoinOptions = {})
 /** @internal */
 export async function joinWith(rpc: Rpc, name: string, options: JoinOptions): Promise<Session> {
   await prepareFor(options);
-  const lease = await joinSession(rpc, name, options.role ?? "reader", options.signal);
-  return new Session(rpc, lease, options, undefined);
+  const role = options.role ?? "reader";
+  try {
+    const lease = await joinSession(rpc, name, role, options.signal);
+    return new Session(lease.route ? rpc.goingBy(lease.route) : rpc, lease, options, undefined);
+  } catch (error) {
+    const route = routeOf(error as LpdeformError);
+    const there = route ? rpc.goingBy(route) : rpc;
+    if (there === rpc) throw error;
+    return new Session(there, await joinSession(there, name, role, options.signal), options, undefined);
+  }
 }
 
 /** Loads what frames are decompressed with, where any may come. */
