@@ -87,8 +87,10 @@ class Link {
   absl::StatusOr<SolveResult> solve_once(const SolveOptions& options);
   absl::Status send_restore(std::unique_lock<std::mutex>& lock);
   absl::Status send_by_call(std::unique_lock<std::mutex>& lock);
+  absl::Status catch_up(std::unique_lock<std::mutex>& lock);
   absl::Status begin_alone(std::unique_lock<std::mutex>& lock, Clock::time_point deadline);
-  absl::StatusOr<v1::UndoUpdateResponse> undo_patiently(const v1::UndoUpdateRequest& request);
+  absl::StatusOr<v1::UndoUpdateResponse> undo_patiently(const v1::UndoUpdateRequest& request,
+                                                        std::unique_lock<std::mutex>& lock);
   absl::Status make_anew(const std::string& lost);
   absl::Status no_frame() const;
 

@@ -136,25 +136,43 @@ absl::StatusOr<std::uint64_t> Link::undo(bool redo) {
   request.set_writer_token(lease_.writer_token);
   request.set_input_seq(seq);
   request.set_redo(redo);
-  lock.unlock();
-  const auto undone = undo_patiently(request);
+  const auto undone = undo_patiently(request, lock);
   if (!undone.ok()) return undone.status();
   auto change = from_wire(undone->changes());
   if (!change.ok()) return change.status();
-  lock.lock();
   ledger_.accept_change({seq, *std::move(change)}, undone->result().kept());
   return seq;
 }
 
-/// The same call again does no harm, so a server that went away may be asked again.
-absl::StatusOr<v1::UndoUpdateResponse> Link::undo_patiently(const v1::UndoUpdateRequest& request) {
+/// Sends what the server has no more, and only that: it would be a step to it.
+absl::Status Link::catch_up(std::unique_lock<std::mutex>& lock) {
+  v1::GetSessionRequest request;
+  request.set_session(lease_.session);
+  lock.unlock();
+  const auto found = rpc_->call(request, stop_.get_token());
+  lock.lock();
+  if (!found.ok()) return found.status();
+  ledger_.resumed_at(found->session().input_seq());
+  return send_restore(lock);
+}
+
+/// The same call again does no harm, so a server that went away may be asked again: after what it has lost. `lock` is held before
+/// and after.
+absl::StatusOr<v1::UndoUpdateResponse> Link::undo_patiently(const v1::UndoUpdateRequest& request,
+                                                            std::unique_lock<std::mutex>& lock) {
   const Clock::time_point end = Clock::now() + client_options_.call_timeout;
   Backoff backoff;
-  for (;;) {
-    auto undone = rpc_->call(request, stop_.get_token());
+  absl::StatusOr<v1::UndoUpdateResponse> undone;
+  for (absl::Status ready;; ready = catch_up(lock)) {
+    if (ready.ok()) {
+      lock.unlock();
+      undone = rpc_->call(request, stop_.get_token());
+      lock.lock();
+    } else {
+      undone = ready;
+    }
     const auto pause = backoff.next();
     if (!absl::IsUnavailable(undone.status()) || Clock::now() + pause > end) return undone;
-    std::unique_lock lock(mutex_);
     if (changed_.wait_for(lock, pause, [this] { return is_closing_; })) return session_closed();
   }
 }

@@ -243,12 +243,14 @@ class FakeRpc final : public Rpc {
                                               const std::stop_token&) override {
     const std::scoped_lock lock(mutex_);
     undone_.push_back(request);
+    if (undone_.size() <= undos_away) return absl::UnavailableError("away");
     v1::UndoUpdateResponse response;
     response.mutable_result()->set_input_seq(request.input_seq());
     for (const v1::HandleUpdate& change : undo_changes) *response.add_changes() = change;
     return response;
   }
   std::vector<v1::HandleUpdate> undo_changes;
+  std::size_t undos_away = 0;  // so many are not answered first
   std::vector<v1::UndoUpdateRequest> undone() {
     const std::scoped_lock lock(mutex_);
     return undone_;

@@ -297,6 +297,20 @@ TEST_F(LinkTest, SendsAgainAnUpdateWhoseUploadsTheServerDoesNotKnow) {
   EXPECT_EQ(fault_of(next_frame().status()).reason, "UPLOAD_UNKNOWN");
 }
 
+TEST_F(LinkTest, AnUndoIsAskedForAgainAfterWhatAServerThatWentAwayHasLost) {
+  open();
+  link_->update(adding("tip")).value();
+  rpc_->undos_away = 2;  // and the newest input that it then knows is 0
+  const auto undone = link_->undo(false);
+  ASSERT_TRUE(undone.ok()) << undone.status();
+  const auto asked = rpc_->undone();
+  ASSERT_EQ(asked.size(), 3u);
+  for (const v1::UndoUpdateRequest& one : asked) EXPECT_EQ(one.input_seq(), *undone);
+  const auto sent = rpc_->restored();  // before it, and again before each of the others
+  ASSERT_EQ(sent.size(), 3u);
+  for (const v1::UpdateHandlesRequest& one : sent) EXPECT_EQ(one.update().input_seq(), 1u);
+}
+
 TEST_F(LinkTest, AnUndoGoesAfterAllUpdatesAndIsPartOfWhatASessionMadeAnewGets) {
   open();
   link_->update(adding("tip")).value();

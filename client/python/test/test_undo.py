@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from typing import Any
 
 import numpy as np
 import pytest
@@ -62,6 +63,36 @@ def test_every_kind_of_handle_comes_back_and_is_there_after_kill_9(session: lpde
     after = session.settle(PATIENCE).positions  # made anew from this side's book
     assert np.abs(after - before).max() < 1e-2
     assert np.abs(after[[92, 93]] - [[8, 7, 1], [9, 7, 1]]).max() == 0
+
+
+@pytest.mark.parametrize("has_lost", [False, True])
+def test_a_server_that_went_away_is_asked_again_and_gets_what_it_has_lost(
+    session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch, has_lost: bool
+) -> None:
+    session.settle(PATIENCE)
+    session.move("right", translation=[0, 0, 2])
+    call, asked = session._link.rpc.call, []
+
+    def away_at_first(name: str, request: Any, *rest: Any) -> Any:
+        asked.append((name, request))
+        if len(asked) < 3:
+            raise lpdeform.Unavailable(lpdeform.Code.UNAVAILABLE, "away")
+        answer = call(name, request, *rest)
+        if name == "GetSession" and has_lost:
+            answer.session.input_seq = 1
+        return answer
+
+    newest = session.newest_input
+    monkeypatch.setattr(session._link.rpc, "call", away_at_first)
+    number = session.undo()
+    again = ["UpdateHandles"] if has_lost else []
+    assert [name for name, _ in asked] == ["UndoUpdate", "GetSession", "GetSession", *again, "UndoUpdate"]
+    assert asked[0][1] == asked[-1][1]
+    assert asked[-1][1].input_seq == number
+    if has_lost:
+        assert asked[3][1].update.input_seq == newest
+    else:
+        assert session.settle(PATIENCE).positions[11, 2] == 0
 
 
 def test_nothing_to_undo_readers_and_closed_sessions_are_said(server: Server, shape: Grid) -> None:

@@ -30,8 +30,10 @@ async function askPatiently(
   const backoff = new Backoff();
   const { session } = link.lease;
   let seq: number | undefined;
+  let isAgain = false;
   for (;;) {
     try {
+      if (isAgain) await noteLosses(link, signal);
       await link.sendWaiting(signal);
       const { writerToken } = link.lease;
       if (link.lease.session !== session) throw forgotten("not_found", "SESSION_UNKNOWN");
@@ -43,10 +45,16 @@ async function askPatiently(
       signal.throwIfAborted();
       const error = thrown as LpdeformError;
       if (error.code !== "unavailable") throw error;
-      link.ledger.resumedAt(0); // it may have gone back: once more does no harm
+      isAgain = true;
       await pause(Math.max(error.retryAfterMs, backoff.nextMs()), signal);
     }
   }
+}
+
+/** What the server has no more is to be sent first, and only that: it would be a step to it. */
+async function noteLosses({ rpc, lease, ledger }: Link, signal: AbortSignal): Promise<void> {
+  const { session } = await rpc.call("getSession", { session: lease.session }, signal);
+  ledger.resumedAt(Number(session?.inputSeq ?? 0));
 }
 
 /** All the handles of a session that was made anew are a step to the server, and none to anybody else. */

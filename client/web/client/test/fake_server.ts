@@ -106,6 +106,8 @@ export class FakeServer {
   readonly uploads = new Map<string, Uint8Array>();
   readonly restored: RestoreSessionRequest[] = [];
   undoSteps = 0;
+  /** The newest that getSession() says it has. */
+  inputSeq = 0n;
   /** What updates are answered with. */
   isKeeping = false;
   /** What it says of meshes in place of the truth. */
@@ -170,7 +172,9 @@ export class FakeServer {
           this.#note();
           return this.on.undo?.(request, this.undos.length) ?? { result: { inputSeq: request.inputSeq } };
         },
-        getSession: ({ session: name }) => ({ session: { ...session(name).session, undoSteps: this.undoSteps } }),
+        getSession: ({ session: name }) => ({
+          session: { ...session(name).session, undoSteps: this.undoSteps, inputSeq: this.inputSeq },
+        }),
         acquireWriter: () => ({ writerToken: "another", epoch: 7n, inputSeq: 40n }),
         deleteSession: ({ session: name }) => {
           this.deleted.push(name);

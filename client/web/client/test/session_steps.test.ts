@@ -4,10 +4,10 @@ import { describe, expect, test } from "vitest";
 import { changesFromWire } from "../src/fromwire.js";
 import { GoAwayReason, UndoUpdateResponseSchema } from "../src/gen/lpdeform/v1/service_pb.js";
 import { Packer } from "../src/packer.js";
-import { joinWith, restoreWith } from "../src/session.js";
+import { joinWith, openWith, restoreWith } from "../src/session.js";
 import { updateToWire } from "../src/towire.js";
 import type { HandleChange } from "../src/types.js";
-import { FakeServer } from "./fake_server.js";
+import { FakeServer, triangle } from "./fake_server.js";
 import { at, begin, gate, opened, refusal } from "./harness.js";
 
 const backTo = (x: number) => ({
@@ -50,7 +50,20 @@ describe("undo", () => {
     expect(server.updates[2]!.update!.inputSeq).toBe(3n);
   });
 
-  test("is asked for again where the server went away, as the same call, after what that may have lost", async () => {
+  test("is asked for again without what the server has, which would be a step to it", async () => {
+    const { server, session } = await begin();
+    session.setHandle("tip", { vertices: [1] });
+    await server.until(() => server.updates.length === 1);
+    server.inputSeq = 1n;
+    server.on.undo = (_, count) => {
+      if (count <= 2) throw new ConnectError("away", Code.Unavailable);
+      return backTo(0);
+    };
+    expect(await session.redo()).toBe(2);
+    expect([server.undos.length, server.updates.length]).toEqual([3, 1]);
+  });
+
+  test("is asked for again where the server went away, as the same call, after what that has lost", async () => {
     const { server, session } = await begin();
     session.setHandle("tip", { vertices: [1] });
     await server.until(() => server.updates.length === 1);
@@ -120,6 +133,30 @@ describe("undo", () => {
       "second",
     ]);
     expect(server.undos.map(({ redo }) => redo)).toEqual([false, true]);
+  });
+
+  test("after an update that is refused says so", async () => {
+    const server = new FakeServer();
+    const session = await openWith(server.rpc(), triangle, {});
+    opened.push(session);
+    const first = gate();
+    server.on.update = (_, count) => {
+      if (count === 1) return first.isOpen;
+      throw refusal("HANDLE_VERTEX_OUT_OF_RANGE", {});
+    };
+    session.setHandle("tip", { vertices: [1] });
+    session.setHandle("beyond", { vertices: [9] });
+    const undone = session.undo();
+    first.open();
+    await expect(undone).rejects.toMatchObject({ reason: "HANDLE_VERTEX_OUT_OF_RANGE" });
+    expect(session.newestInput).toBe(1);
+  });
+
+  test("waits for another one", async () => {
+    const { server, session } = await begin();
+    server.on.undo = ({ inputSeq }) => ({ result: { inputSeq } });
+    expect(await Promise.all([session.undo(), session.undo(), session.redo()])).toEqual([1, 2, 3]);
+    expect(server.undos.map(({ redo }) => redo)).toEqual([false, false, true]);
   });
 
   test("ends with what the server says, and the session goes on", async () => {
