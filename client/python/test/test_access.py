@@ -191,7 +191,7 @@ def test_calls_of_one_client_say_the_same_name_for_a_proxy() -> None:
             with pytest.raises(lpdeform.LpdeformError):
                 rpc.call("GetSession", service_pb2.GetSessionRequest(), service_pb2.GetSessionResponse, Stop())
         with pytest.raises(grpc.RpcError):
-            list(rpc.deform(iter([service_pb2.DeformRequest()])))
+            list(rpc.deform(iter([service_pb2.DeformRequest().SerializeToString()])))
         rpc.close()
     server.stop(None)
     first, second = calls.headers[:3], calls.headers[3:]
