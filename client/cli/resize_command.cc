@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/local_server.h"
 #include "client/cli/mesh_input.h"
@@ -47,7 +48,12 @@ absl::StatusOr<Scaling> read_scaling(const ResizeOptions& options, const Triangl
                             vector_of(options.y_axis, Eigen::Vector3d::UnitY()));
   if (!axes.ok()) return axes.status();
   scaling.axes = *axes;
-  return scaling;
+  if (absl::Status status = check_scaling(scaling); !status.ok()) return status;
+  const double stretch = scaling.scale.maxCoeff() / shared_factor(scaling.scale);
+  if (stretch <= Scaling::kHighest) return scaling;
+  return invalid_input({"RESIZE_SCALE_OUT_OF_RANGE", "scale", "100 times the least of the three"},
+                       absl::StrCat("The largest factor is ", stretch,
+                                    " times the least; it must be at most 100 times the least."));
 }
 
 /// One solve on the server: along one axis, by `factor`.

@@ -38,11 +38,8 @@ struct IntrinsicDelaunay {
 /// Triangles with a repeated vertex take no part: their edges come with weight 0. O(m) flips in practice.
 ///
 /// Cells take the straight chords p_i - p_j as rest edges, not the lengths along the surface: these alone leave
-/// rigid motions without energy. What it is worth, by tests/bench/weights_bench.cc at p = 1, 2 and 6: a flat
-/// plate of 2601 vertices cut into slivers, 30 % of its edges clamped, comes out within 1e-7 of the diagonal of
-/// where the same vertices cut into squares do, after 609, 78 and 116 iterations; clamped cotangents end 0.7 to
-/// 1.2 % off after 539, 144 and 163. A creature pressed flat, a tenth of its edges clamped, takes 746, 82 and
-/// 175 iterations instead of 765, 160 and 3396. Preparing the shape takes several times as long.
+/// rigid motions without energy. What it is worth: core/README.md. Preparing the shape takes several
+/// times as long.
 IntrinsicDelaunay intrinsic_delaunay(const TriangleMesh& mesh);
 
 }  // namespace lpdeform

@@ -12,7 +12,8 @@ struct Material {
   /// 1e-6 <= s_i <= 1e6. One value, or one a vertex.
   Field stiffness = Field::Ones(1);
   /// The length l of mixed norms, E = sum_i s_i l^2 (E_i / l)^{p_i}, in the caller's units; 0 takes the mean
-  /// rest edge length. Without effect where p is uniform.
+  /// rest edge length. Where p is uniform it only scales E, unless p < 2 and soft or
+  /// orientation handles are there, whose terms have p = 2.
   double length_unit = 0;
 
   static constexpr double kLowestP = 1.0, kHighestP = 64.0;

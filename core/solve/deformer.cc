@@ -88,6 +88,7 @@ absl::Status Deformer::set_positions(const Points& positions) {
   impl_->positions = positions;
   impl_->is_positions_current = true;
   impl_->has_state = true;
+  impl_->is_at_rest = false;
   return absl::OkStatus();
 }
 

@@ -117,15 +117,34 @@ Material Deformer::Impl::effective_material() const {
   return result;
 }
 
+/// A drag back to where it began: a thin shape that was pushed can be left in a dimple, a minimum of its own, where the
+/// rest shape has no distortion at all. Then the rest shape is what is kept.
+bool Deformer::Impl::keep_rest_if_best() {
+  const double zero = zero_objective();
+  const double rounding = kRounding * (1 + constraints->targets.cwiseAbs().maxCoeff());
+  if (best_sum <= zero) return false;
+  if ((constraints->targets - shape->scaled_positions()).cwiseAbs().maxCoeff() > rounding) return false;
+  const Points rest = initial_guess(InitialGuess::kRest);
+  const double sum = objective.evaluate(rest, *norm);
+  if (sum <= zero) {
+    keep(rest, sum);
+    return true;
+  }
+  objective.evaluate(x, *norm);  // the next solve reads off it where soft handles were
+  return false;
+}
+
 /// Called with the evaluation of minimiser->x() in `objective`, and its true sum.
 void Deformer::Impl::keep_if_best(double sum) {
   const bool is_first = summary.iterations == 0;
-  if (!is_first && !(sum < best_sum)) return;
+  if (is_first || sum < best_sum) keep(minimiser->x(), sum);
+}
+
+void Deformer::Impl::keep(const Points& from, double sum) {
   best_sum = std::isnan(sum) ? std::numeric_limits<double>::infinity() : sum;
   best_soft_sum = objective.soft_terms().sum(*norm);
   is_positions_current = false;
   const auto& e2 = objective.cells().squared_energies();
-  const Points& from = minimiser->x();
   x.resize(from.rows(), 3);
   workers().for_chunks(e2.size(), kCopyChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     std::copy(from.data() + 3 * begin, from.data() + 3 * end, x.data() + 3 * begin);
@@ -148,11 +167,12 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   stop = std::move(new_stop);
   summary = {};
   summary.threads = workers().threads();
-  const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state;
+  const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state && !is_at_rest;
   if (!is_warm) x_before_move.resize(0, 3);
   settings.method = summary.method = chosen_method(settings.method, is_warm);
   const bool keeps_metric =
       is_warm && is_metric_live && is_metric_of_rows && metric.is_factored_for(constraints->is_held);
+  is_drag = keeps_metric;
   const bool is_factored = prepare_metric(!is_warm || !is_metric_of_rows);
   is_metric_of_rows = true;
   summary.setup_seconds = seconds();
@@ -184,8 +204,10 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
 void Deformer::Impl::iterate() {
   const StepResult result = minimiser->step();
   ++summary.iterations;
-  const double sum = result.true_sum ? *result.true_sum : objective.sum(*norm);
+  double sum = result.true_sum ? *result.true_sum : objective.sum(*norm);
   keep_if_best(sum);
+  const bool is_over = result.outcome == Outcome::kConverged || result.outcome == Outcome::kStalled;
+  if (is_over && is_drag && keep_rest_if_best()) sum = best_sum;
   record(result, sum);
   switch (result.outcome) {
     case Outcome::kProgress:
@@ -204,6 +226,7 @@ void Deformer::Impl::end(StopReason reason) {
   if (settings.method == Method::kMultiresolution) is_metric_live = reason == StopReason::kConverged;
   minimiser.reset();
   has_state = true;
+  is_at_rest = best_sum <= zero_objective();
   summary.stop_reason = reason;
   summary.solve_seconds = seconds();
   if (!settings.certify || reason == StopReason::kCancelled) return;

@@ -40,6 +40,8 @@ struct Deformer::Impl {
   std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, Warmth warmth);
   bool prepare_metric(bool needs_plain_weights);
   void keep_if_best(double sum);
+  void keep(const Points& from, double sum);
+  bool keep_rest_if_best();
   Material effective_material() const;
   void record(const StepResult& result, double sum);
   void begin(const SolveSettings& new_settings, std::stop_token new_stop);
@@ -71,6 +73,8 @@ struct Deformer::Impl {
   Points x;
   Points x_before_move;  // when the last warm solve began; empty where there was none
   bool has_state = false;
+  bool is_at_rest = false;        // the last solve ended with no distortion: there is nothing to go on from
+  bool is_drag = false;           // the running solve goes on from a state with the same vertices held
   bool is_metric_of_rows = true;  // the last factor knows the present soft terms and linear rows
   bool is_metric_live = false;    // the last factor is quasi_newton's, for this material
   Field best_energies;            // E_i at x, the caller's units

@@ -16,19 +16,6 @@ constexpr double kEnd = 0.01;  // of the extent
 constexpr double kStiffening = 100;
 constexpr double kSmallestSine = 1e-6;
 
-absl::Status check_scaling(const Scaling& scaling) {
-  for (int k = 0; k < 3; ++k) {
-    const double scale = scaling.scale[k];
-    if (scale >= Scaling::kLowest && scale <= Scaling::kHighest) continue;
-    return invalid_input(
-        {"RESIZE_SCALE_OUT_OF_RANGE", absl::StrCat("scale[", k, "]"), "0.01 <= scale <= 100"},
-        absl::StrCat("scale[", k, "] is ", scale, "; it must be from 0.01 to 100"));
-  }
-  if (scaling.origin.allFinite()) return absl::OkStatus();
-  return invalid_input({"RESIZE_ORIGIN_NOT_FINITE", "origin", "finite numbers"},
-                       "the origin of the resizing is not finite");
-}
-
 /// |log scale_k| over the largest of them; (1, 0, 0) where all scales are 1.
 Eigen::Vector3d stretch_shares(const Eigen::Vector3d& scale) {
   const Eigen::Vector3d stretch = scale.array().log().abs();
@@ -73,6 +60,19 @@ std::vector<std::int32_t> ends_of(const RestShape& shape, const Eigen::Matrix3d&
 
 }  // namespace
 
+absl::Status check_scaling(const Scaling& scaling) {
+  for (int k = 0; k < 3; ++k) {
+    const double scale = scaling.scale[k];
+    if (scale >= Scaling::kLowest && scale <= Scaling::kHighest) continue;
+    return invalid_input(
+        {"RESIZE_SCALE_OUT_OF_RANGE", absl::StrCat("scale[", k, "]"), "0.01 <= scale <= 100"},
+        absl::StrCat("scale[", k, "] is ", scale, "; it must be from 0.01 to 100"));
+  }
+  if (scaling.origin.allFinite()) return absl::OkStatus();
+  return invalid_input({"RESIZE_ORIGIN_NOT_FINITE", "origin", "finite numbers"},
+                       "the origin of the resizing is not finite");
+}
+
 Points Scaling::operator()(const Points& points) const {
   const Eigen::Matrix3d matrix = axes.transpose() * scale.asDiagonal() * axes;
   return ((points.rowwise() - origin.transpose()) * matrix).rowwise() + origin.transpose();
@@ -111,7 +111,7 @@ absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const 
 }
 
 double shared_factor(const Eigen::Vector3d& scale) {
-  return std::max(std::min(scale[0], scale[1]), std::min(std::max(scale[0], scale[1]), scale[2]));
+  return scale.minCoeff();
 }
 
 Eigen::Vector3d box_middle(const RestShape& shape) {

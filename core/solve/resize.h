@@ -26,6 +26,9 @@ struct Scaling {
 /// 1e-6).
 absl::StatusOr<Eigen::Matrix3d> axes_of(const Eigen::Vector3d& x_axis, const Eigen::Vector3d& y_axis);
 
+/// INVALID_ARGUMENT: RESIZE_SCALE_OUT_OF_RANGE, RESIZE_ORIGIN_NOT_FINITE.
+absl::Status check_scaling(const Scaling& scaling);
+
 /// What makes a Deformer resize: held places and a material.
 struct ResizeInputs {
   Handle handle;
@@ -33,7 +36,7 @@ struct ResizeInputs {
 };
 
 /// Content-aware resizing (section 5 of the paper names it): the extent becomes that of the scaled shape, and
-/// what is salient keeps its shape and size, by the energy of Eq. 3 against the rest shape.
+/// what is salient keeps its shape and size as far as axes are stretched, by the energy of Eq. 3 against the rest shape.
 ///
 /// The handle holds the ends of each component, the vertices within 1 % of its extent from its lowest and
 /// highest along each axis whose scale is not 1, at their scaled positions; where all are 1, the ends along
@@ -42,13 +45,14 @@ struct ResizeInputs {
 ///
 /// p = 1 matters: it gathers the stretch in places where little resists, which are straight along the
 /// stretch, so that it does not show there. p = 2 spreads it over salient places too, however stiff they are.
-/// A factor that all axes share is no change of shape: scale the mesh by it first (shared_factor), or it is a
-/// stretch like any other.
+/// A factor that all axes share is no change of shape: scale the mesh by the least of them first (shared_factor), so
+/// that what is left only stretches. What is salient then keeps its shape, and has the size that this factor gives it.
 ///
 /// INVALID_ARGUMENT: RESIZE_SCALE_OUT_OF_RANGE, RESIZE_ORIGIN_NOT_FINITE. `axes` must be orthonormal.
 absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling);
 
-/// The middle one of the three factors: at most two axes differ from it.
+/// The least of the three factors. Over it, all three are stretches: by a factor below 1 an axis would be pushed, and a
+/// thin surface that is pushed buckles.
 double shared_factor(const Eigen::Vector3d& scale);
 
 /// The middle of the bounding box of the vertices that faces use: the origin where none is given.

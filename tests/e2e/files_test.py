@@ -3,7 +3,18 @@
 import json
 import math
 
-from programs import OnShapes, main, read_bytes, read_off, read_ply, read_text, run
+from programs import OnShapes, main, read_bytes, read_off, read_off_faces, read_ply, read_text, run
+
+
+def normal(points, face):
+    """Of a triangle, as long as twice its area."""
+    a, b, c = (points[v] for v in face)
+    u, v = [b[k] - a[k] for k in range(3)], [c[k] - a[k] for k in range(3)]
+    return [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+
+
+def dot(u, v):
+    return sum(a * b for a, b in zip(u, v))
 
 
 class Files(OnShapes):
@@ -124,17 +135,31 @@ class Files(OnShapes):
         refusal = self.refused(2, "deform", obj, "--handles", self.at("bar.json"), "--p-group", "back=1")
         self.assertIn("front, rest", refusal)
 
+    def test_resize_makes_a_shape_shorter_without_folds(self):
+        block, out = self.at("block.off"), self.at("shorter.off")
+        self.assertEqual(run("shape", "block", "--out", block).returncode, 0)
+        for factor in (0.9, 0.6):
+            done = run("resize", block, out, "--scale", f"{factor},1,1")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            rest, positions, faces = read_off(block), read_off(out), read_off_faces(block)
+            scaled = [(factor * x, y, z) for x, y, z in rest]
+            folded = [f for f, face in enumerate(faces) if dot(normal(scaled, face), normal(positions, face)) <= 0]
+            self.assertEqual(folded, [], factor)
+
     def test_resize_meets_the_scaled_extent_through_a_server_and_alone(self):
         for options in ([], ["--server", self.server.address]):
             out = self.at("resized.off")
             done = run("resize", self.at("bar.off"), out, "--scale", "1,1.5,3", "--origin", "0,0,0", *options)
             self.assertEqual(done.returncode, 0, done.stderr)
-            self.assertEqual(done.stdout.count("converged"), 2)  # 1.5 is shared; x and z differ from it
+            self.assertEqual(done.stdout.count("converged"), 2)  # 1 is shared; y and z differ from it
             positions = read_off(out)
             for axis, extent, places in ((0, 4, 1), (1, 6, 1), (2, 63, 3)):  # the last solve holds the ends of z alone
                 self.assertAlmostEqual(min(position[axis] for position in positions), 0, places)
                 self.assertAlmostEqual(max(position[axis] for position in positions), extent, places)
         self.assertIn("0.01 to 100", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "1,1,0"))
+        self.assertIn("2000 times", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "0.05,1,100"))
+        self.assertIn("origin", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "1,1,2", "--origin",
+                                             "nan,0,0"))
         self.assertIn("axis", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "1,1,2",
                                            "--x-axis", "0,1,0"))
 

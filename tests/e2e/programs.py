@@ -79,6 +79,12 @@ def read_off(path):
     return [tuple(map(float, numbers[3 + 3 * k:6 + 3 * k])) for k in range(count)]
 
 
+def read_off_faces(path):
+    """The three vertices of each."""
+    words = [line.split() for line in read_text(path).splitlines()]
+    return [tuple(map(int, line[1:])) for line in words if len(line) == 4 and line[0] == "3"]
+
+
 def read_ply(path):
     """Vertices as dicts of their properties."""
     header, body = read_bytes(path).split(b"end_header\n", 1)

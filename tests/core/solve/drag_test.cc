@@ -100,6 +100,41 @@ TEST_P(DragTest, ADragBackToTheStartEndsAtRest) {
   }
 }
 
+/// A thin sheet, one edge turned over and pushed towards the other, out and back by 40 moves each.
+TEST(PushedDragTest, EndsAtRest) {
+  constexpr int kSide = 30, kMoves = 40;
+  const auto handles_at = [](const TriangleMesh& mesh, double degrees, double push) {
+    HandleSet handles;
+    EXPECT_TRUE(handles.set("still", {slice(mesh, 0, 0, 0), Fixed{}}).ok());
+    EXPECT_TRUE(handles
+                    .set("pushed", {slice(mesh, 0, kSide, kSide),
+                                    turn(Eigen::Vector3d::UnitY(), -degrees, {0.5 * kSide, 0, 0},
+                                         Eigen::Vector3d(-push, 0, 0))})
+                    .ok());
+    return handles;
+  };
+  for (const double degrees : {92, 150}) {
+    for (const double push : {0, 9}) {
+      const TriangleMesh mesh = grid(kSide, kSide, push > 0 ? 0 : 1);
+      for (const int iterations : {1, 2, 3}) {
+        const auto live = deformer(rest_shape(mesh), handles_at(mesh, 0, 0), Material::uniform(6));
+        ASSERT_TRUE(live->solve({}).ok());
+        double largest = 0;
+        for (int k = 1; k <= 2 * kMoves; ++k) {
+          const double share = double(std::min(k, 2 * kMoves - k)) / kMoves;
+          ASSERT_TRUE(live->set_handles(handles_at(mesh, share * degrees, share * push)).ok());
+          ASSERT_TRUE(live->start({.initial = InitialGuess::kCurrent}).ok());
+          for (int step = 0; (k == 2 * kMoves || step < iterations) && live->step(); ++step) {
+          }
+          largest = std::max(largest, live->summary().energy);
+        }
+        EXPECT_LE(live->summary().energy, 1e-6 * largest)
+            << degrees << " degrees, pushed by " << push << ", " << iterations << " iterations a move";
+      }
+    }
+  }
+}
+
 std::string name_of(const testing::TestParamInfo<DragCase>& info) {
   return absl::StrCat("P", static_cast<int>(10 * info.param.p),
                       info.param.iterations > 100 ? "Converged" : "InHaste");

