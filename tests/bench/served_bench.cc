@@ -61,7 +61,7 @@ void move(benchmark::State& state) {
     const auto here = deformer(rest_shape(mesh), handles, Material::uniform(kP), {.threads = kThreads});
     (void)here->solve({});
     for (int k = 1; k <= kMoves; ++k) {
-      const Eigen::Vector3d by(0, 0, 0.01 * side * k);
+      const Eigen::Vector3d by(0, 0, 0.002 * side * k);
       served.push_back(milliseconds_of([&] {
         (void)session.move("right", client::RigidMotion{.translation = {by[0], by[1], by[2]}});
         (void)session.settle(kPatience).value();
@@ -78,7 +78,7 @@ void move(benchmark::State& state) {
   state.counters["in_process_ms"] = median(in_process);
   state.counters["ratio"] = median(served) / median(in_process);
 }
-BENCHMARK(move)->Arg(31)->Arg(99)->Arg(315)->Iterations(1)->Unit(benchmark::kSecond);
+BENCHMARK(move)->Arg(31)->Arg(99)->Iterations(1)->Unit(benchmark::kSecond);
 
 }  // namespace
 }  // namespace lpdeform
