@@ -38,9 +38,7 @@ bool Scheduler::LessUsed::operator()(const std::shared_ptr<Runnable>& a,
 Scheduler::Scheduler(int threads, std::function<void(double)> on_waited) : on_waited_(std::move(on_waited)) {
   LPDEFORM_CHECK(threads >= 2);
   const std::scoped_lock lock(mutex_);  // the first threads ask already how many there are
-  for (int k = 0; k < threads; ++k) {
-    threads_.emplace_back([this, &lane = k < threads / 2 ? heavy_ : light_] { run(lane); });
-  }
+  for (int k = 0; k < threads; ++k) threads_.emplace_back([this] { run(); });
 }
 
 Scheduler::~Scheduler() {
@@ -48,8 +46,7 @@ Scheduler::~Scheduler() {
     const std::scoped_lock lock(mutex_);
     is_stopping_ = true;
   }
-  light_.changed.notify_all();
-  heavy_.changed.notify_all();
+  changed_.notify_all();
   for (std::thread& thread : threads_) thread.join();
 }
 
@@ -64,13 +61,12 @@ void Scheduler::run_once(std::function<void()> job) {
 void Scheduler::wake(std::shared_ptr<Runnable> runnable, Urgency urgency) {
   const std::scoped_lock lock(mutex_);
   const bool is_answer = urgency == Urgency::kAnswer;
-  Lane& lane = lane_of(*runnable);
   switch (runnable->state_) {
     case Runnable::State::kAsleep:
       runnable->urgency_ = urgency;
-      runnable->used_seconds_ = std::max(runnable->used_seconds_, lane.level);
+      runnable->used_seconds_ = std::max(runnable->used_seconds_, level_);
       enqueue(std::move(runnable));
-      return lane.changed.notify_one();
+      return changed_.notify_one();
     case Runnable::State::kWaiting:
       if (is_answer && runnable->urgency_ != Urgency::kAnswer) hasten(runnable);
       return;
@@ -78,6 +74,10 @@ void Scheduler::wake(std::shared_ptr<Runnable> runnable, Urgency urgency) {
       runnable->state_ = Runnable::State::kWokenWhileRunning;
       if (is_answer) runnable->urgency_ = Urgency::kAnswer;
   }
+}
+
+Scheduler::Queue& Scheduler::queue_of(Urgency urgency) {
+  return urgency == Urgency::kAnswer ? answers_ : ordinary_;
 }
 
 LoadGauge& Scheduler::gauge_of(Urgency urgency) {
@@ -88,40 +88,47 @@ void Scheduler::enqueue(std::shared_ptr<Runnable> runnable) {
   runnable->state_ = Runnable::State::kWaiting;
   runnable->ticket_ = ++tickets_;
   runnable->ready_since_ = std::chrono::steady_clock::now();
-  lane_of(*runnable).queue_of(runnable->urgency_).insert(runnable);
-  count_answers();
-}
-
-void Scheduler::count_answers() {
-  answers_waiting_ = static_cast<int>(light_.answers.size() + heavy_.answers.size());
+  queue_of(runnable->urgency_).insert(std::move(runnable));
+  answers_waiting_ = static_cast<int>(answers_.size());
 }
 
 /// One that waits in the ordinary queue is to answer now. That it was put off until then counts.
 void Scheduler::hasten(const std::shared_ptr<Runnable>& runnable) {
   const TimePoint now = std::chrono::steady_clock::now();
   ordinary_gauge_.waited(now - runnable->ready_since_, now);
-  lane_of(*runnable).ordinary.erase(runnable);
+  ordinary_.erase(runnable);
   runnable->urgency_ = Urgency::kAnswer;
   enqueue(runnable);
 }
 
-/// Who used the least; the lane is not empty.
-std::shared_ptr<Runnable> Scheduler::take_next(Lane& lane) {
-  const bool is_ordinarys_turn = !lane.ordinary.empty() && (lane.owed_seconds > 0 || lane.answers.empty());
-  Queue& queue = is_ordinarys_turn ? lane.ordinary : lane.answers;
-  std::shared_ptr<Runnable> runnable = std::move(queue.extract(queue.begin()).value());
-  count_answers();
-  lane.level = std::max(lane.level, runnable->used_seconds_);
+/// Who of them may run now and used the least; the end where nobody may.
+Scheduler::Queue::const_iterator Scheduler::first(const Queue& queue) const {
+  const bool may_be_heavy = heavy_running_ < std::max(1, threads() / 2);
+  return std::find_if(queue.begin(), queue.end(),
+                      [&](const auto& runnable) { return may_be_heavy || !runnable->is_heavy_; });
+}
+
+bool Scheduler::may_run(const Queue& queue) const {
+  return first(queue) != queue.end();
+}
+
+std::shared_ptr<Runnable> Scheduler::take_next() {
+  const bool is_ordinarys_turn = may_run(ordinary_) && (owed_seconds_ > 0 || !may_run(answers_));
+  Queue& queue = is_ordinarys_turn ? ordinary_ : answers_;
+  std::shared_ptr<Runnable> runnable = std::move(queue.extract(first(queue)).value());
+  answers_waiting_ = static_cast<int>(answers_.size());
+  level_ = std::max(level_, runnable->used_seconds_);
   runnable->state_ = Runnable::State::kRunning;
+  if (runnable->is_heavy_) ++heavy_running_;
   return runnable;
 }
 
-void Scheduler::run(Lane& lane) {
+void Scheduler::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    lane.changed.wait(lock, [&] { return is_stopping_ || !lane.is_empty(); });
+    changed_.wait(lock, [this] { return is_stopping_ || has_next(); });
     if (is_stopping_) return;
-    std::shared_ptr<Runnable> runnable = take_next(lane);
+    std::shared_ptr<Runnable> runnable = take_next();
     const Urgency urgency = std::exchange(runnable->urgency_, Urgency::kOrdinary);
     const TimePoint begin = std::chrono::steady_clock::now();
     const auto wait = begin - runnable->ready_since_;
@@ -143,13 +150,13 @@ void Scheduler::run(Lane& lane) {
 
 void Scheduler::finish_slice(std::shared_ptr<Runnable> runnable, double seconds, Urgency urgency,
                              bool has_more) {
-  Lane& lane = lane_of(*runnable);
+  if (runnable->is_heavy_) --heavy_running_;
   runnable->used_seconds_ += seconds / runnable->weight_;
-  lane.owed_seconds += urgency == Urgency::kAnswer ? kOwed * seconds : -seconds;
-  lane.owed_seconds = std::clamp(lane.owed_seconds, -kMostOwed, lane.ordinary.empty() ? 0 : kMostOwed);
+  owed_seconds_ += urgency == Urgency::kAnswer ? kOwed * seconds : -seconds;
+  owed_seconds_ = std::clamp(owed_seconds_, -kMostOwed, ordinary_.empty() ? 0 : kMostOwed);
   const bool was_woken = runnable->state_ == Runnable::State::kWokenWhileRunning;
   runnable->state_ = Runnable::State::kAsleep;
-  // Nobody has to be woken: this thread is free now.
+  // Nobody has to be woken: this thread is free now, for this one or for a heavy one that had to wait.
   if (has_more || was_woken) enqueue(std::move(runnable));
 }
 

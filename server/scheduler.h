@@ -50,9 +50,9 @@ class Runnable {
 /// Shares a pool of threads between sessions. Slices that answer somebody go before ordinary ones, which keep a quarter
 /// of the time; within each kind, whoever has used the least time, by its weight, goes next. So where there is too much to
 /// do, what suffers first is how soon and how often answers are refined, not how soon they come. One that slept is put
-/// level with the least of those awake, so sleeping earns no credit. There are more threads than cores: half of them run
-/// heavy Runnables only, the other half never do, so that the operating system shares the cores between a long
-/// factorisation and everybody else, and a crowd of light ones is no more threads than there are cores. Thread-safe.
+/// level with the least of those awake, so sleeping earns no credit. There are more threads than cores, and heavy
+/// Runnables never take more than half of them, so that the operating system shares the cores between a long
+/// factorisation and everybody else. Thread-safe.
 class Scheduler {
  public:
   /// `threads` >= 2. `on_waited` is given the seconds that each slice waited for its thread, on that thread and under
@@ -87,31 +87,26 @@ class Scheduler {
 
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  /// Runnables of one kind, and the threads that run them.
-  struct Lane {
-    Queue answers, ordinary;  // those that wait
-    double owed_seconds = 0;  // to the ordinary ones, of their share
-    double level = 0;         // the least time used by anyone awake, as last seen
-    std::condition_variable changed;
-
-    Queue& queue_of(Urgency urgency) { return urgency == Urgency::kAnswer ? answers : ordinary; }
-    bool is_empty() const { return answers.empty() && ordinary.empty(); }
-  };
-
-  void run(Lane& lane);
-  Lane& lane_of(const Runnable& runnable) { return runnable.is_heavy_ ? heavy_ : light_; }
-  LoadGauge& gauge_of(Urgency urgency);
+  void run();
   void enqueue(std::shared_ptr<Runnable> runnable);
+  Queue& queue_of(Urgency urgency);
+  LoadGauge& gauge_of(Urgency urgency);
   void hasten(const std::shared_ptr<Runnable>& runnable);
-  std::shared_ptr<Runnable> take_next(Lane& lane);
+  std::shared_ptr<Runnable> take_next();
+  bool has_next() const { return may_run(answers_) || may_run(ordinary_); }
+  bool may_run(const Queue& queue) const;
+  Queue::const_iterator first(const Queue& queue) const;
   void finish_slice(std::shared_ptr<Runnable> runnable, double seconds, Urgency urgency, bool has_more);
-  void count_answers();
 
   const std::function<void(double)> on_waited_;
   std::mutex mutex_;
-  Lane light_, heavy_;
-  std::atomic<int> answers_waiting_ = 0;
+  std::condition_variable changed_;
+  Queue answers_, ordinary_;              // those that wait
+  std::atomic<int> answers_waiting_ = 0;  // answers_.size()
   LoadGauge answer_gauge_, ordinary_gauge_;
+  double owed_seconds_ = 0;  // to the ordinary ones, of their share
+  double level_ = 0;         // the least time used by anyone awake, as last seen
+  int heavy_running_ = 0;
   std::uint64_t tickets_ = 0;
   bool is_stopping_ = false;
   std::vector<std::thread> threads_;

@@ -141,10 +141,10 @@ TEST(Scheduler, AnswersGoBeforeRefinements) {
 }
 
 TEST(Scheduler, RefinementsKeepAShareBesideEndlessAnswers) {
-  OneThread one;
   std::promise<void> done;
   std::atomic<int> answers = 0, refinements = 0;
   std::vector<std::shared_ptr<Job>> answering;
+  OneThread one;  // after what its jobs use: one may run yet
   for (int k = 0; k < 3; ++k) {
     answering.push_back(std::make_shared<Job>(false, [&, k] {
       spin(std::chrono::microseconds(100));
@@ -167,9 +167,9 @@ TEST(Scheduler, RefinementsKeepAShareBesideEndlessAnswers) {
 }
 
 TEST(Scheduler, AHeavierWeightHasALargerShare) {
-  OneThread one;
   std::promise<void> done;
   int plain = 0, weighty = 0;
+  OneThread one;
   const auto job = [&](int& count, double weight) {
     return std::make_shared<Job>(
         false,
@@ -189,12 +189,12 @@ TEST(Scheduler, AHeavierWeightHasALargerShare) {
 }
 
 TEST(Scheduler, LongWaitsAreOverload) {
-  OneThread one;
-  EXPECT_FALSE(one.scheduler.is_overloaded());
   std::promise<void> done;
   std::vector<std::shared_ptr<Job>> jobs;
   std::atomic<int> slices = 0;
   std::atomic<bool> was_overloaded = false;
+  OneThread one;
+  EXPECT_FALSE(one.scheduler.is_overloaded());
   for (int k = 0; k < 50; ++k) {
     jobs.push_back(std::make_shared<Job>(false, [&] {
       spin(std::chrono::milliseconds(5));  // so that each waits for a quarter of a second

@@ -146,11 +146,10 @@ TEST_F(SessionTest, AnUpdateAndAStepTakenBackAreAnsweredBeforeRefinements) {
   const auto session = create();
   const std::string token = session->lease().token;
   ASSERT_TRUE(session->update(token, hold_ends(rest_, 1, 1)).ok());
-  const int light = scheduler_.threads() - scheduler_.threads() / 2;  // the others are for large sessions
-  const auto are_busy = std::make_shared<std::latch>(light);
+  const auto are_busy = std::make_shared<std::latch>(scheduler_.threads());
   const auto let_go =
       std::make_shared<std::latch>(1);  // whoever waits may do so for longer than this test lasts
-  for (int k = 0; k < light; ++k) {
+  for (int k = 0; k < scheduler_.threads(); ++k) {
     scheduler_.wake(std::make_shared<Blocker>([are_busy, let_go] {
       are_busy->count_down();
       let_go->wait();
