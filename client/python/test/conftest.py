@@ -20,6 +20,14 @@ PROGRAM = os.environ.get("LPDEFORM_SERVER", str(ROOT / "build/release/bin/lpdefo
 PATIENCE = 60.0  # seconds that anything may take; never reached where all is well
 
 
+def settle_all(session: lpdeform.Session) -> None:
+    """Until every update is answered: the frame may come before the word that its update was taken."""
+    session.settle(PATIENCE)
+    link = session._link
+    with link.changed:
+        assert link.changed.wait_for(lambda: not link.ledger.has_in_flight, PATIENCE)
+
+
 class Server:
     """lpdeform-server on a free port of this machine, which it keeps when it is started again."""
 

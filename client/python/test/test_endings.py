@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import lpdeform
-from conftest import PATIENCE, Grid, Server
+from conftest import PATIENCE, Grid, Server, settle_all
 
 MakeGrid = Callable[[int], Grid]
 
@@ -49,7 +49,7 @@ def test_no_time_takes_what_is_there_and_nothing_else(session: lpdeform.Session)
 def test_a_solve_without_time_says_so_and_sends_nothing(
     session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    session.settle(PATIENCE)
+    settle_all(session)
     with monkeypatch.context() as patched:
         patched.setattr("lpdeform._rpc.Rpc.solve", lambda *_: pytest.fail("it was sent"))
         with pytest.raises(lpdeform.Timeout) as caught:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lpdeform
-from conftest import PATIENCE, Grid, Server
+from conftest import PATIENCE, Grid, Server, settle_all
 from lpdeform.v1 import service_pb2
 
 
@@ -107,7 +107,7 @@ def test_nothing_to_undo_readers_and_closed_sessions_are_said(server: Server, sh
 
 
 def test_a_change_that_is_refused_before_an_undo_is_said_by_it(session: lpdeform.Session) -> None:
-    session.settle(PATIENCE)
+    settle_all(session)
     session._link.is_solving = True  # so that the change waits
     session.set_handle("beyond", [5000])
     session._link.is_solving = False
