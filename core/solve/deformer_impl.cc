@@ -39,11 +39,16 @@ double Deformer::Impl::typical_energy(const Points& guess) {
   return largest > 1e-12 ? largest : 1.0;
 }
 
+/// What rounding leaves of a length.
+double Deformer::Impl::rounding() const {
+  return kRounding * (1 + constraints->targets.cwiseAbs().maxCoeff());
+}
+
 /// The objective where every E_i is what rounding leaves of it.
 double Deformer::Impl::zero_objective() const {
-  const double rounding = kRounding * (1 + constraints->targets.cwiseAbs().maxCoeff());
+  const double e2 = rounding() * rounding();
   double sum = 0;
-  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) sum += norm->term(i, rounding * rounding).value;
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) sum += norm->term(i, e2).value;
   return sum;
 }
 
@@ -120,10 +125,9 @@ Material Deformer::Impl::effective_material() const {
 /// A drag back to where it began: a thin shape that was pushed can be left in a dimple, a minimum of its own, where the
 /// rest shape has no distortion at all. Then the rest shape is what is kept.
 bool Deformer::Impl::keep_rest_if_best() {
+  if ((constraints->targets - shape->scaled_positions()).cwiseAbs().maxCoeff() > rounding()) return false;
   const double zero = zero_objective();
-  const double rounding = kRounding * (1 + constraints->targets.cwiseAbs().maxCoeff());
   if (best_sum <= zero) return false;
-  if ((constraints->targets - shape->scaled_positions()).cwiseAbs().maxCoeff() > rounding) return false;
   const Points rest = initial_guess(InitialGuess::kRest);
   const double sum = objective.evaluate(rest, *norm);
   if (sum <= zero) {

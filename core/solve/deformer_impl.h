@@ -33,6 +33,7 @@ struct Deformer::Impl {
   SoftTerms guess_springs() const;
   Points initial_guess(InitialGuess guess);
   double typical_energy(const Points& guess);
+  double rounding() const;
   double zero_objective() const;
   Problem make_problem();
   Method chosen_method(Method asked, bool is_warm);
