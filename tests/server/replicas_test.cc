@@ -141,6 +141,22 @@ TEST_F(ReplicasTest, ASessionOutlivesEveryServerThatDies) {
   std::printf(" s\n");
 }
 
+TEST_F(ReplicasTest, NoNewClientIsSentToAServerThatHasJustDied) {
+  const client::Mesh mesh = bar(3);
+  const client::Session first = open(mesh);
+  for (std::size_t k = 0; k < servers_.size(); ++k) {
+    servers_[k]->signal(SIGKILL);
+    servers_[k]->wait();
+    for (int other = 0; other < 10; ++other) {  // each by a way of its own, of which a third lead there
+      auto client = client::Client::connect(web_);
+      ASSERT_TRUE(client.ok()) << client.status();
+      const auto session = client->open(mesh);
+      EXPECT_TRUE(session.ok()) << session.status();
+    }
+    begin(k);
+  }
+}
+
 TEST_F(ReplicasTest, ARollingRestartUnderLoadLosesNoSession) {
   const client::Mesh mesh = bar(21);
   std::vector<client::Session> sessions;
