@@ -13,6 +13,7 @@ import pytest
 
 import lpdeform
 from conftest import PATIENCE, Grid, Server, settle_all
+from lpdeform.v1 import service_pb2
 
 MakeGrid = Callable[[int], Grid]
 
@@ -26,6 +27,35 @@ def test_frames_come_to_who_iterates_until_it_is_closed(session: lpdeform.Sessio
             threading.Timer(0.05, session.close).start()
     assert seen
     assert session.connection == "closed"
+
+
+def test_what_the_server_says_about_itself_is_logged_and_there_while_its_stream_lasts(
+    session: lpdeform.Session, server: Server, caplog: pytest.LogCaptureFixture
+) -> None:
+    session.settle(PATIENCE)
+    assert session.notice is None
+    link = session._link
+    assert link._stream is not None
+    caplog.set_level("INFO", "lpdeform")
+    said = (
+        (service_pb2.NOTICE_REASON_OVERLOADED, "overloaded", "WARNING"),
+        (service_pb2.NOTICE_REASON_RECOVERED, "recovered", "INFO"),
+        (9, "other", "INFO"),
+    )
+    for number, reason, level in said:
+        notice = service_pb2.Notice(reason=number, text="Of its own.")  # type: ignore[arg-type]
+        event = service_pb2.StreamEvent(notice=notice)
+        link._take(link._stream, [], service_pb2.DeformResponse(event=event))
+        assert session.notice == lpdeform.Notice(reason, "Of its own.")  # type: ignore[arg-type]
+        assert (caplog.records[-1].levelname, caplog.records[-1].name) == (level, "lpdeform")
+        assert caplog.records[-1].getMessage() == f"{server.address}: Of its own."
+    server.kill()
+    with link.changed:
+        assert link.changed.wait_for(lambda: link._stream is None or link._stream.is_over, PATIENCE)
+    assert session.notice is None
+    server.start()
+    session.move("right", translation=[0, 0, 1], timeout=PATIENCE)  # it goes on
+    assert session.notice is None
 
 
 def test_waiting_ends_at_its_time(session: lpdeform.Session) -> None:

@@ -95,6 +95,45 @@ def test_a_server_that_went_away_is_asked_again_and_gets_what_it_has_lost(
         assert session.settle(PATIENCE).positions[11, 2] == 0
 
 
+def test_a_session_made_anew_takes_back_what_came_after_that_and_not_all_its_handles(
+    session: lpdeform.Session, server: Server
+) -> None:
+    session.move("right", translation=[0, 0, 2])
+    before = session.name
+    server.kill()
+    server.start()
+    session.move("right", translation=[0, 0, 3])
+    assert session.name != before
+    session.undo()
+    assert session.settle(PATIENCE).positions[11, 2] == 2
+    assert refused(session.undo) == "NOTHING_TO_UNDO"
+    session.redo()
+    assert session.settle(PATIENCE).positions[11, 2] == 3
+
+
+def test_an_undo_that_was_taken_and_not_answered_is_no_fewer_steps_to_a_session_made_anew(
+    session: lpdeform.Session, server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session.move("right", translation=[0, 0, 2])
+    server.kill()
+    server.start()
+    session.move("right", translation=[0, 0, 3])
+    call, undone = session._link.rpc.call, []
+
+    def unanswered_at_first(name: str, *rest: Any) -> Any:
+        answer = call(name, *rest)
+        if name == "UndoUpdate":
+            undone.append(answer)
+            if len(undone) == 1:
+                raise lpdeform.Unavailable(lpdeform.Code.UNAVAILABLE, "away")
+        return answer
+
+    monkeypatch.setattr(session._link.rpc, "call", unanswered_at_first)
+    session.undo()
+    assert len(undone) == 2
+    assert session.settle(PATIENCE).positions[11, 2] == 2
+
+
 def test_nothing_to_undo_readers_and_closed_sessions_are_said(server: Server, shape: Grid) -> None:
     with lpdeform.open(shape.vertices, shape.faces, address=server.address) as session:
         assert refused(session.undo) == "NOTHING_TO_UNDO"
@@ -129,6 +168,15 @@ def test_a_session_leaves_as_a_file_and_comes_back_the_same(session: lpdeform.Se
         server.kill()
         server.start()
         assert restored.settle(PATIENCE).positions[11, 2] == 2  # made anew from the file, and what came after it
+        restored.move("right", translation=[0, 0, 4])
+        restored.remove("left")
+        restored.settle(PATIENCE)
+        server.kill()
+        server.start()
+        restored.set_handle("middle", [66])
+        after = restored.settle(PATIENCE).positions
+        assert after[11, 2] == 4  # a handle of the file that was moved, and not set anew
+        assert abs(after[0, 2]) > 0.1  # and one that is no more
 
 
 def test_files_that_are_no_snapshots_are_refused_by_name(session: lpdeform.Session, server: Server) -> None:

@@ -64,7 +64,9 @@ class Ledger:
 
     window = 4
 
-    def __init__(self) -> None:
+    def __init__(self, begins_bare: bool = True) -> None:
+        """`begins_bare`: a session made anew has no handles but those of this book, otherwise also those that it is made with."""
+        self._begins_bare = begins_bare
         self._next_seq = 1
         self._accepted = NumberedUpdate(0, Update())
         self._unkept = NumberedUpdate(0, Update())  # accepted since the server last kept something, as it came
@@ -128,7 +130,8 @@ class Ledger:
             self._unkept = NumberedUpdate(max(self._unkept.seq, change.seq), unkept)
         elif change.seq >= self._unkept.seq:
             self._unkept = NumberedUpdate(0, Update())
-        state = _settled(merged(self._accepted.update, change.update))
+        state = merged(self._accepted.update, change.update)
+        state = _settled(state) if self._begins_bare else _without_old_removals(state)
         self._accepted = NumberedUpdate(max(self._accepted.seq, change.seq), state)
 
     def resumed_at(self, seq: int) -> None:

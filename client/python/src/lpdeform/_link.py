@@ -3,6 +3,7 @@ is kept alive between them."""
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from typing import Any
@@ -31,10 +32,11 @@ from lpdeform.errors import (
     session_closed,
 )
 from lpdeform.frames import Frame, FrameAssembly
-from lpdeform.types import Connection, Update
+from lpdeform.types import Connection, Notice, Update
 from lpdeform.v1 import frame_pb2, service_pb2
 
 _closing_seconds = 3.0
+_log = logging.getLogger("lpdeform")
 
 
 class Link:
@@ -50,13 +52,15 @@ class Link:
         self.original = original
         self.box = FrameBox()
         self.stop = Stop()
-        self.ledger = Ledger()
+        self.ledger = Ledger(begins_bare=not isinstance(original, Snapshot))
         self.changed = threading.Condition()
         self.is_solving = False
         self.is_closing = False
         self.lease = lease
         self.interruption: LpdeformError | None = None
         self.options = options
+        self.is_made_anew = False
+        """All its handles were sent in one update, after it was lost."""
         self._request_id = new_request_id()
         self._renewing = threading.Lock()
         self._over: LpdeformError | None = None
@@ -128,6 +132,12 @@ class Link:
                 return "idle"
             return "reconnecting"
 
+    @property
+    def notice(self) -> Notice | None:
+        with self.changed:
+            stream = self._stream
+            return stream.notice if stream is not None and stream.is_open and not stream.is_over else None
+
     def take_over(self) -> None:
         with self.changed:
             if self.is_closing:
@@ -194,6 +204,7 @@ class Link:
                 self.lease = lease
                 self._request_id = new_request_id()
                 self.ledger.session_lost()
+                self.is_made_anew = isinstance(self.original, Original) and self.ledger.has_restore
                 self.ledger.count_from(lease.input_seq)
                 self.box.begin_session()
 
@@ -320,6 +331,14 @@ class Link:
         elif kind == "go_away":
             with self.changed:
                 stream.go_away = response.event.go_away
+        elif kind == "notice":
+            self._take_notice(stream, response.event.notice)
+
+    def _take_notice(self, stream: Stream, said: service_pb2.Notice) -> None:
+        notice = _wire.notice_from_wire(said)
+        with self.changed:
+            stream.notice = notice
+        _log.log(logging.WARNING if notice.reason == "overloaded" else logging.INFO, "%s: %s", self.rpc.address, notice.text)
 
     def _take_opened(self, stream: Stream, opened: service_pb2.StreamOpened) -> None:
         self.box.begin_epoch(opened.epoch)

@@ -7,6 +7,7 @@ from typing import Any
 
 from lpdeform._rpc import Packer
 from lpdeform.errors import LpdeformError
+from lpdeform.types import Notice
 from lpdeform.v1 import service_pb2
 
 
@@ -24,6 +25,7 @@ class Stream:
         """After so long without a word the connection is dead: three of the heartbeats that the server announces."""
         self.ack_due = 0
         self.go_away: service_pb2.GoAway | None = None
+        self.notice: Notice | None = None
         self.uploads: dict[int, Packer] = {}
         """By the updates that name them, until these are answered."""
         self.done: list[Packer] = []

@@ -10,7 +10,7 @@ from lpdeform._ledger import NumberedUpdate
 from lpdeform._link import Link
 from lpdeform._recovery import Backoff
 from lpdeform._rpc import Stop
-from lpdeform.errors import LpdeformError, Unavailable, session_closed
+from lpdeform.errors import Code, LpdeformError, Unavailable, make, session_closed
 from lpdeform.v1 import service_pb2
 
 
@@ -39,10 +39,14 @@ def _undo_patiently(
     end = time.monotonic() + link.rpc.call_timeout
     backoff = Backoff()
     is_again = False
+    is_to_check = link.is_made_anew and not request.redo
     while True:
         try:
             if is_again:
                 _catch_up(link, stop)
+            if is_to_check:
+                _check_steps(link, request.session, stop)
+                is_to_check = False  # once: a call that was taken and not answered has made the steps fewer
             return link.rpc.call("UndoUpdate", request, service_pb2.UndoUpdateResponse, stop)
         except LpdeformError as error:
             pause = backoff.next()
@@ -56,8 +60,19 @@ def _undo_patiently(
 
 def _catch_up(link: Link, stop: Stop) -> None:
     """Sends what the server has no more, and only that: it would be a step to it."""
-    request = service_pb2.GetSessionRequest(session=link.lease.session)
-    found = link.rpc.call("GetSession", request, service_pb2.GetSessionResponse, stop)
+    found = _session(link, link.lease.session, stop)
     with link.changed:
-        link.ledger.resumed_at(found.session.input_seq)
+        link.ledger.resumed_at(found.input_seq)
     send_restore(link, stop)
+
+
+def _check_steps(link: Link, name: str, stop: Stop) -> None:
+    """All the handles of a session that was made anew are a step to the server, and none to anybody else."""
+    if _session(link, name, stop).undo_steps <= 1:
+        text = "The session was made anew, and knows no step from before."
+        raise make(Code.FAILED_PRECONDITION, text, "NOTHING_TO_UNDO")
+
+
+def _session(link: Link, name: str, stop: Stop) -> service_pb2.Session:
+    request = service_pb2.GetSessionRequest(session=name)
+    return link.rpc.call("GetSession", request, service_pb2.GetSessionResponse, stop).session

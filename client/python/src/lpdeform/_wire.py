@@ -318,6 +318,12 @@ def _vector_to_wire(vector: types.Vector3) -> data_pb2.Vector3:
 # From the wire.
 
 
+def notice_from_wire(notice: service_pb2.Notice) -> types.Notice:
+    if notice.reason == service_pb2.NOTICE_REASON_OVERLOADED:
+        return types.Notice("overloaded", notice.text)
+    return types.Notice("recovered" if notice.reason == service_pb2.NOTICE_REASON_RECOVERED else "other", notice.text)
+
+
 def report_from_wire(report: report_pb2.MeshReport) -> types.MeshReport:
     return types.MeshReport(
         vertices=report.vertices,

@@ -28,6 +28,7 @@ from lpdeform.types import (
     Fixed,
     MeshReport,
     Motion,
+    Notice,
     Removal,
     Resize,
     RigidMotion,
@@ -91,6 +92,12 @@ class Live:
     def interruption(self) -> LpdeformError | None:
         """Why it is "reconnecting", or was the last time: DRAINING where the server shuts down."""
         return self._link.interruption
+
+    @property
+    def notice(self) -> Notice | None:
+        """What the server said about itself last, on the stream of frames that there is; None where it said nothing. Also logged,
+        by the logger "lpdeform": as a warning where it is overloaded."""
+        return self._link.notice
 
     @property
     def newest_input(self) -> int:

@@ -207,6 +207,16 @@ class MeshReport:
     """Copies of a vertex before them."""
 
 
+@dataclass(frozen=True)
+class Notice:
+    """What a server says about itself; nothing failed."""
+
+    reason: Literal["overloaded", "recovered", "other"]
+    """After "overloaded" frames come less often, and the last one of an update later, until "recovered"; "other": of a newer server."""
+    text: str
+    """One sentence for people."""
+
+
 class IterationRecord(NamedTuple):
     iteration: int
     seconds: float
