@@ -182,6 +182,86 @@ class AddOn(unittest.TestCase):
         lean_before, lean = before[lower, 0].mean(), stage.shown(self.tube)[lower, 0].mean()
         self.assertLess(abs(lean), 0.5 * abs(lean_before))  # the stiff half stays straight
 
+    def test_resizing_stretches_along_the_meshs_axes_and_ends_where_it_began(self):
+        stage.activate(self.tube)
+        self.assertEqual(bpy.ops.lpdeform.start(), {"FINISHED"})
+        stage.settle(self.tube)
+        self.tube.lpdeform.resize = (1.0, 1.0, 2.0)
+        stage.settle(self.tube)
+        extent = np.ptp(stage.shown(self.tube), axis=0)
+        self.assertTrue(np.allclose(extent, [0.8, 0.8, 8.0], atol=0.02), extent)
+        self.assertEqual(live.message(self.tube), "")
+        self.tube.lpdeform.p = 3.0  # counts when the resizing ends
+        self.tube.lpdeform.resize = (1.0, 1.0, 1.5)
+        stage.settle(self.tube)
+        self.assertAlmostEqual(float(np.ptp(stage.shown(self.tube)[:, 2])), 6.0, delta=0.02)
+        self.tube.lpdeform.resize = (1.0, 1.0, 1.0)
+        tip = stage.add_handle(self.tube, self.top)
+        stage.add_handle(self.tube, self.bottom)
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube), self.rest, atol=1e-2))
+        told = live.of(self.tube)._told
+        self.assertEqual(set(np.frombuffer(told.last("p").value)), {3.0})
+        self.assertIsNone(told.last("resize"))
+        self.tube.lpdeform.resize = (1.0, 1.0, 2.0)  # which holds the ends that handles hold
+        bpy.context.view_layer.update()
+        stage.turn(lambda: "HANDLE_VERTEX" in live.message(self.tube))
+        self.tube.lpdeform.resize = (1.0, 1.0, 1.0)
+        self.shift(tip, 0.5, 0, 0)
+        stage.settle(self.tube)
+        stage.turn(lambda: live.message(self.tube) == "")
+        self.assertTrue(np.allclose(stage.shown(self.tube)[self.top], self.rest[self.top] + [0.5, 0, 0], atol=1e-5))
+
+    def test_blenders_undo_takes_back_what_a_person_did_and_the_mesh_follows(self):
+        def step(name):
+            bpy.context.view_layer.update()
+            self.assertEqual(bpy.ops.ed.undo_push(message=name), {"FINISHED"})
+
+        def back(how=bpy.ops.ed.undo):
+            self.assertEqual(how(), {"FINISHED"})
+            self.tube = bpy.data.objects["tube"]  # undo exchanges Blender's data
+            return bpy.data.objects["tube handle.001"]
+
+        _, tip = self.held()
+        stage.settle(self.tube)
+        step("Go live")
+        self.shift(tip, 0.5, 0, 0)
+        step("Move")  # before its frame is there
+        stage.settle(self.tube)
+        stage.activate(self.tube)
+        step("Select")
+        stage.activate(bpy.data.objects["tube handle.001"])
+        step("Select again")
+        back()
+        self.assertTrue(np.allclose(stage.shown(self.tube)[self.top], self.rest[self.top] + [0.5, 0, 0], atol=1e-5))
+        tip = back()
+        self.assertTrue(np.allclose(stage.shown(self.tube)[self.top], self.rest[self.top] + [0.5, 0, 0], atol=1e-5))
+        tip = back()  # of the move
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube), self.rest, atol=1e-3))
+        tip = back(bpy.ops.ed.redo)
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube)[self.top], self.rest[self.top] + [0.5, 0, 0], atol=1e-5))
+        stage.activate(tip)
+        self.assertEqual(bpy.ops.lpdeform.remove_handle(), {"FINISHED"})
+        step("Remove handle")
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube), self.rest, atol=1e-3))
+        back()
+        stage.settle(self.tube)
+        self.assertTrue(np.allclose(stage.shown(self.tube)[self.top], self.rest[self.top] + [0.5, 0, 0], atol=1e-5))
+
+    def test_an_overloaded_server_is_said_in_the_panel(self):
+        self.held()
+        stage.settle(self.tube)
+        running = live.of(self.tube)
+        self.assertEqual(running.notice, "")
+        stream = running.session._link._stream
+        stream.notice = client.lpdeform.Notice("overloaded", "Too much.")
+        self.assertEqual(running.notice, "Too much.")
+        stream.notice = client.lpdeform.Notice("recovered", "No more.")
+        self.assertEqual(running.notice, "")
+
     def test_kinds_of_handles_hold_as_they_say(self):
         _, tip = self.held()
         tip.lpdeform_handle.kind = "PLANE"

@@ -21,6 +21,8 @@ _messages: dict = {}
 
 
 _settings = ("p", "stiffness", "region")
+_resize = "resize"
+"""Also the name of the handle that the server makes of it."""
 _taken_all_the_same = ("FAILED_PRECONDITION", "ABORTED")
 """Names of codes that are about solving: the server has taken the update in."""
 
@@ -73,6 +75,12 @@ class LiveMesh:
     @property
     def state(self) -> str:
         return self.session.connection
+
+    @property
+    def notice(self) -> str:
+        """What is to be said of the server while it is overloaded."""
+        notice = self.session.notice
+        return notice.text if notice is not None and notice.reason == "overloaded" else ""
 
     @property
     def has_refusals(self) -> bool:
@@ -137,15 +145,22 @@ class LiveMesh:
         news = self._told.news(present)
         if not news:
             return
-        changes = {key: self._change(key, present.get(key)) for key in news if key not in _settings}
+        resize = present[_resize].setting if _resize in news and _resize in present else None
+        changes = {key: self._change(key, present.get(key)) for key in news if key not in _settings and (key != _resize or not resize)}
         settings = {key: present[key].setting for key in news if key in _settings}
         values = {key: present.get(key) for key in news}
         try:
-            self._told.tell(values, self.session.update(changes, lpdeform.Settings(**settings)))
+            self._told.tell(values, self.session.update(changes, lpdeform.Settings(**settings), resize))
         except lpdeform.LpdeformError:  # it was not even sent
             self._told.tell(values, 0)
             self._told.refused()
             raise
+
+    def undone(self, ob) -> None:
+        """Blender has taken a step back, or has done one again: handles may be others, and what was shown is older than the frame."""
+        self.vertices_changed(ob)
+        if self.shown is not None and len(ob.data.vertices) == len(self._rest):
+            self.show(ob)
 
     def show(self, ob) -> None:
         surface.show_positions(ob, self.shown.positions)
@@ -195,10 +210,17 @@ class LiveMesh:
         powers = between(np.log(settings.stiffness), np.log(settings.stiffness_painted), self._weights["stiffness"])
         self.fields = {"p": np.clip(p, 1.0, 64.0), "stiffness": np.clip(np.exp(powers), 1e-6, 1e6)}
         present = {}
+        scale = tuple(settings.resize)
+        if scale != (1.0, 1.0, 1.0):
+            present[_resize] = Present(scale, setting=lpdeform.Resize(scale))
         for name, field in self.fields.items():
             strength = getattr(settings, f"{name}_automatic")
-            setting = lpdeform.Automatic(strength) if strength > 0 else field
-            present[name] = Present(("automatic", strength) if strength > 0 else field.tobytes(), setting=setting)
+            if _resize in present:
+                present[name] = Present("of the resizing")
+            elif strength > 0:
+                present[name] = Present(("automatic", strength), setting=lpdeform.Automatic(strength))
+            else:
+                present[name] = Present(field.tobytes(), setting=field)
         region = self._weights["region"]
         may_move = np.flatnonzero(region > 0.5) if region is not None else np.zeros(0, int)
         if len(may_move) or self._told.last("region") is not None:
@@ -310,6 +332,14 @@ def _redraw() -> None:
 
 
 @persistent
+def _after_undo(*_) -> None:
+    for name, running in _running.items():
+        ob = bpy.data.objects.get(name)
+        if ob is not None and surface.live_key(ob) is not None and ob.mode != "EDIT":
+            running.undone(ob)
+
+
+@persistent
 def _before_another_file(*_) -> None:
     for name in list(_running):
         _running.pop(name).close()
@@ -318,10 +348,14 @@ def _before_another_file(*_) -> None:
 
 def register() -> None:
     bpy.app.handlers.load_pre.append(_before_another_file)
+    for after in (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
+        after.append(_after_undo)
 
 
 def unregister() -> None:
     bpy.app.handlers.load_pre.remove(_before_another_file)
+    for after in (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
+        after.remove(_after_undo)
     if bpy.app.timers.is_registered(tick):
         bpy.app.timers.unregister(tick)
     for name in list(_running):

@@ -99,6 +99,7 @@ class Start(bpy.types.Operator):
 
     bl_idname = "lpdeform.start"
     bl_label = "Go live"
+    bl_options = {"UNDO"}  # so that the first step taken back is not this one
 
     @classmethod
     def poll(cls, context):
@@ -119,6 +120,7 @@ class Stop(bpy.types.Operator):
 
     bl_idname = "lpdeform.stop"
     bl_label = "Stop"
+    bl_options = {"UNDO"}
 
     @classmethod
     def poll(cls, context):

@@ -37,6 +37,8 @@ class MainPanel(bpy.types.Panel):
             column.operator("lpdeform.solve", icon="SHADERFX")
             column.operator("lpdeform.stop", icon="X")
             column.operator("lpdeform.apply", icon="SHAPEKEY_DATA")
+            if running.notice:
+                layout.label(text=running.notice, icon="TIME")
         if live.message(ob):
             layout.label(text=live.message(ob), icon="ERROR")
         column = layout.column(align=True)
@@ -64,6 +66,7 @@ class MaterialPanel(_Below, bpy.types.Panel):
         self.layout.use_property_split = True
         for name in ("p", "stiffness"):
             column = self.layout.column(align=True)
+            column.enabled = tuple(ob.lpdeform.resize) == (1.0, 1.0, 1.0)  # which gives both
             column.prop(ob.lpdeform, f"{name}_automatic")
             if getattr(ob.lpdeform, f"{name}_automatic") > 0:
                 continue
@@ -72,6 +75,7 @@ class MaterialPanel(_Below, bpy.types.Panel):
             if getattr(ob.lpdeform, f"{name}_group"):
                 column.prop(ob.lpdeform, f"{name}_painted")
         self.layout.prop_search(ob.lpdeform, "region_group", ob, "vertex_groups")
+        self.layout.prop(ob.lpdeform, "resize")
         self.layout.prop(ob.lpdeform, "certify")
 
 

@@ -43,6 +43,11 @@ class MeshSettings(bpy.types.PropertyGroup):
     region_group: StringProperty(
         name="Region", description="Vertex group: only what has a weight over 0.5 may move. Empty: everything may"
     )
+    resize: FloatVectorProperty(
+        name="Resize", default=(1.0, 1.0, 1.0), min=1.0, max=100.0, soft_max=4.0, size=3, subtype="XYZ",
+        description="Stretches the mesh along its own axes in such a way that what stands out keeps its shape. To make it smaller "
+        "along one, scale the object down and stretch it along the others. Gives p and stiffness meanwhile",
+    )  # fmt: skip
     certify: BoolProperty(
         name="Bound", default=False, description="Says how far a result can be from the optimum. Counts from the next start on"
     )
