@@ -9,6 +9,7 @@ import {
   type SurfacePoints,
 } from "./gen/lpdeform/v1/handle_pb.js";
 import type { MeshReport as WireMeshReport } from "./gen/lpdeform/v1/report_pb.js";
+import { NoticeReason, type Notice as WireNotice } from "./gen/lpdeform/v1/service_pb.js";
 import type * as api from "./types.js";
 
 // From messages of the contract to the values of this library.
@@ -25,6 +26,11 @@ const stopReasons: Record<StopReason, api.StopReason> = {
 
 export function stopReasonFromWire(reason: StopReason): api.StopReason {
   return stopReasons[reason] ?? "running";
+}
+
+export function noticeFromWire({ reason, text }: WireNotice): api.Notice {
+  if (reason === NoticeReason.OVERLOADED) return { reason: "overloaded", text };
+  return { reason: reason === NoticeReason.RECOVERED ? "recovered" : "other", text };
 }
 
 /** As in reports: "quasi_newton". Empty where none runs. */

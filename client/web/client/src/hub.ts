@@ -5,6 +5,7 @@ import {
   type Fault,
   type GoAway,
   GoAwayReason,
+  type Notice,
   type StreamEvent,
   type StreamOpened,
   type StreamSessionsRequestSchema,
@@ -18,6 +19,7 @@ export interface LaneSink {
   part(part: FramePart): void;
   fault(fault: Fault): void;
   goAway(goAway: GoAway): void;
+  notice(notice: Notice): void;
   ended(error?: LpdeformError): void;
   /** Nothing is to be sent, and nobody waits but to see what comes. */
   isQuiet(): boolean;
@@ -242,6 +244,9 @@ class SharedStream {
         this.lanes.delete(lane);
         if (event.value.reason !== GoAwayReason.NOT_OPENED) lane.sink.goAway(event.value);
         lane.ended(lane.refusal);
+        break;
+      case "notice":
+        lane.sink.notice(event.value);
         break;
     }
   }

@@ -1,6 +1,7 @@
 import { FrameAssembly } from "./assembly.js";
 import { FrameBox } from "./box.js";
 import { fromFault, LpdeformError } from "./errors.js";
+import { noticeFromWire } from "./fromwire.js";
 import type { GoAway } from "./gen/lpdeform/v1/service_pb.js";
 import type { Lane, WireFrameOptions } from "./hub.js";
 import { checkVertexCount, isSessionLost, isTakenAllTheSame, isUndecided, joinSession, type Lease } from "./lease.js";
@@ -9,7 +10,7 @@ import { Packer } from "./packer.js";
 import { Backoff, recoveryAfter } from "./recovery.js";
 import type { Rpc } from "./rpc.js";
 import { updateToWire } from "./towire.js";
-import type { Connection, Frame, Update } from "./types.js";
+import type { Connection, Frame, Notice, Update } from "./types.js";
 import { newRequestId, Uploads } from "./upload.js";
 import { pause } from "./waiting.js";
 
@@ -29,6 +30,7 @@ const longestRetryMs = 10_000;
 export interface Watcher {
   problem(error: LpdeformError): void;
   connection(state: Connection): void;
+  notice(notice: Notice | undefined): void;
 }
 
 /**
@@ -50,6 +52,7 @@ export class Link {
   /** The stream ended or rests: a server may go on meanwhile from an older state. Updates wait until it says from which. */
   #mayHaveGoneBack = false;
   #connection: Connection = "idle";
+  #notice: Notice | undefined;
   /** Who waits for frames whether they can be seen or not. */
   #waitingForFrames = 0;
   #isStreaming = false;
@@ -84,6 +87,10 @@ export class Link {
 
   get connection(): Connection {
     return this.#connection;
+  }
+
+  get notice(): Notice | undefined {
+    return this.#notice;
   }
 
   /** Nothing is tried, for now or for good. */
@@ -168,6 +175,7 @@ export class Link {
       opened: (opened) => {
         checkVertexCount(opened.vertexCount, this.#lease.report.vertices);
         this.#assembly = new FrameAssembly(opened.vertexCount);
+        this.#setNotice(undefined); // what was said was said of another stream
         this.#resumed(Number(opened.epoch), Number(opened.inputSeq));
         this.#heardFromServer();
         this.#setConnection("connected");
@@ -181,10 +189,12 @@ export class Link {
       },
       fault: (fault) => this.watcher.problem(fromFault(fault)),
       goAway: (goAway) => (this.#goAway = goAway),
+      notice: (notice) => this.#setNotice(noticeFromWire(notice)),
       ended: (error) => void this.#recover(error, session),
       isQuiet: () => !this.ledger.hasWaiting && !this.ledger.hasInFlight && this.#waitingForFrames === 0,
       resting: () => {
         this.#mayHaveGoneBack = true;
+        this.#setNotice(undefined);
         this.#setConnection("idle");
       },
     });
@@ -207,6 +217,7 @@ export class Link {
     const recovery = recoveryAfter(ended, this.#goAway, this.copy !== undefined);
     this.interruption = recovery.why;
     this.#mayHaveGoneBack = true;
+    this.#setNotice(undefined);
     this.#setConnection("reconnecting");
     if (recovery.why.reason === "FRAME_PARTS" && ++this.#misfits >= mostMisfits) return this.#giveUp(recovery.why);
     if (recovery.next === "giveUp" || this.#isTooLate()) return this.#giveUp(recovery.why);
@@ -416,6 +427,12 @@ export class Link {
     for (const resolve of this.#quiet) resolve();
     this.#quiet.clear();
   };
+
+  #setNotice(notice: Notice | undefined): void {
+    if (this.#notice === notice) return;
+    this.#notice = notice;
+    this.watcher.notice(notice);
+  }
 
   #setConnection(state: Connection): void {
     if (this.#connection === state) return;

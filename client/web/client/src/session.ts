@@ -27,6 +27,7 @@ import type {
   Mesh,
   MeshReport,
   Motion,
+  Notice,
   OpenOptions,
   RestoreOptions,
   Settings,
@@ -42,6 +43,8 @@ export interface SessionEvents {
   /** The server refused an update, or cannot solve for it yet; the session goes on. */
   problem: LpdeformError;
   connection: Connection;
+  /** What the server says about itself; undefined where the stream that it was said on has ended. */
+  notice: Notice | undefined;
 }
 
 /**
@@ -57,6 +60,7 @@ export class Session implements AsyncIterable<Frame> {
   readonly #listeners = {
     problem: new Set<(e: LpdeformError) => void>(),
     connection: new Set<(c: Connection) => void>(),
+    notice: new Set<(n: Notice | undefined) => void>(),
   };
 
   /** @internal openSession() and joinSession() make sessions. */
@@ -64,6 +68,7 @@ export class Session implements AsyncIterable<Frame> {
     this.#link = new Link(rpc, lease, frameOptionsToWire(frameOptions), copy, {
       problem: (error) => [...this.#listeners.problem].forEach((listener) => tell(listener, error)),
       connection: (state) => [...this.#listeners.connection].forEach((listener) => tell(listener, state)),
+      notice: (notice) => [...this.#listeners.notice].forEach((listener) => tell(listener, notice)),
     });
   }
 
@@ -84,6 +89,11 @@ export class Session implements AsyncIterable<Frame> {
   /** Why it is "reconnecting", or was the last time: DRAINING where the server shuts down. */
   get interruption(): LpdeformError | undefined {
     return this.#link.interruption;
+  }
+
+  /** What the server said about itself last, on the stream of frames that there is; undefined where it said nothing. */
+  get notice(): Notice | undefined {
+    return this.#link.notice;
   }
 
   /** The newest update that was not refused; 0 where there is none. */

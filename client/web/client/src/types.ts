@@ -271,6 +271,14 @@ export type Weld = "byPosition" | Uint32Array | readonly number[];
  * "idle" before the first frame is asked for, and while the page is hidden, has nothing to send and does not settle(); frames
  * come again when it is seen. "reconnecting" while the server is away; "closed" when all is over.
  */
+/** What a server says about itself; nothing failed. */
+export interface Notice {
+  /** After "overloaded" frames come less often, and the last one of an update later, until "recovered". "other": of a newer server. */
+  reason: "overloaded" | "recovered" | "other";
+  /** One sentence for people. */
+  text: string;
+}
+
 export type Connection = "idle" | "connected" | "reconnecting" | "closed";
 
 /** How frames travel. */

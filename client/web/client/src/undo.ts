@@ -37,7 +37,8 @@ async function askPatiently(
       await link.sendWaiting(signal);
       const { writerToken } = link.lease;
       if (link.lease.session !== session) throw forgotten("not_found", "SESSION_UNKNOWN");
-      if (!redo && link.isMadeAnew) await checkSteps(link, signal);
+      // Once: a call that was taken and not answered has made the steps fewer.
+      if (seq === undefined && !redo && link.isMadeAnew) await checkSteps(link, signal);
       seq ??= link.ledger.takeNumber();
       const request = { session, writerToken, inputSeq: BigInt(seq), redo };
       return { seq, response: await link.rpc.call("undoUpdate", request, signal) };

@@ -1,5 +1,6 @@
 import { describe, expect, test, vi } from "vitest";
 import { Encoding } from "../src/gen/lpdeform/v1/frame_pb.js";
+import { NoticeReason } from "../src/gen/lpdeform/v1/service_pb.js";
 import { openWith } from "../src/session.js";
 import { FakeServer, triangle } from "./fake_server.js";
 import { arrived, at, begin, connected, next, opened } from "./harness.js";
@@ -34,6 +35,28 @@ describe("frames", () => {
     server.stream.frame({ frameSeq: 2n, skippedInputs: 3n });
     await arrived(server, session);
     expect(session.poll()!.skippedInputs).toBe(5);
+  });
+
+  test("come with what the server says about itself, for as long as its stream lasts", async () => {
+    const { server, session } = await begin();
+    const heard: unknown[] = [];
+    session.on("notice", (notice) => heard.push(notice));
+    server.stream.send({ case: "notice", value: { reason: NoticeReason.OVERLOADED, text: "Too much." } });
+    server.stream.send({ case: "notice", value: { reason: NoticeReason.RECOVERED, text: "No more." } });
+    server.stream.send({ case: "notice", value: { reason: 9 as NoticeReason, text: "Something new." } });
+    server.stream.frame({ frameSeq: 1n });
+    await arrived(server, session);
+    const said = [
+      { reason: "overloaded", text: "Too much." },
+      { reason: "recovered", text: "No more." },
+      { reason: "other", text: "Something new." },
+    ];
+    expect(heard).toEqual(said);
+    expect(session.notice).toEqual(said[2]);
+    server.stream.queue.finish();
+    await server.until(() => server.streams.length === 2);
+    expect(session.notice).toBeUndefined();
+    expect(heard).toEqual([...said, undefined]);
   });
 
   test("end when the session is closed", async () => {

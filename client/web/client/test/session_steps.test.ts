@@ -89,10 +89,14 @@ describe("undo", () => {
     await expect(session.undo()).rejects.toMatchObject({ code: "failed_precondition", reason: "NOTHING_TO_UNDO" });
     expect(server.undos).toEqual([]);
     server.undoSteps = 2;
+    server.on.undo = (_, count) => {
+      server.undoSteps = 1;
+      if (count === 1) throw new ConnectError("it was taken, and the answer is lost", Code.Unavailable);
+      return {};
+    };
     await session.undo();
-    server.undoSteps = 1;
     await session.redo();
-    expect(server.undos.map(({ redo }) => redo)).toEqual([false, true]);
+    expect(server.undos.map(({ redo }) => redo)).toEqual([false, false, true]);
   });
 
   test("is not done to a session that was made anew while the server was away", async () => {

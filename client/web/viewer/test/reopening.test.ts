@@ -28,7 +28,8 @@ vi.mock("lpdeform-client", async (original) => {
   };
 });
 
-const watcher = { frame: vi.fn(() => queueMicrotask(() => live.take())), status: vi.fn(), report: vi.fn(), problem: vi.fn() };
+const quiet = { status: vi.fn(), report: vi.fn(), problem: vi.fn(), notice: vi.fn() };
+const watcher = { frame: vi.fn(() => queueMicrotask(() => live.take())), ...quiet };
 let live: Live;
 const begin = (code: ErrorCode, frames: number, reason = "") => {
   Object.assign(server, { opened: 0, frames, code, reason });

@@ -326,6 +326,7 @@ export class App {
       status: () => this.#statusChanged(),
       report: (report) => this.facts.set({ report }),
       problem: (problem) => this.facts.set({ problem }),
+      notice: (text) => this.notify(text),
     });
     return pane;
   }

@@ -18,6 +18,7 @@ export interface PaneWatcher {
   status(status: Status): void;
   report(report: MeshReport): void;
   problem(error: LpdeformError): void;
+  notice(text: string): void;
 }
 
 const nothing: EnergyStatistics = { max: 0, red: 0, top5Share: 0 };
@@ -59,6 +60,7 @@ export class Pane {
       status: (status) => this.watcher.status(status),
       report: (report) => this.watcher.report(report),
       problem: (error) => this.watcher.problem(error),
+      notice: (text) => this.watcher.notice(text),
     };
     this.live = new Live(mesh, document, this.side, view.encoding, watcher);
     this.#isDirty = true;

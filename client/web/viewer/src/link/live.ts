@@ -20,6 +20,8 @@ export interface LiveWatcher {
   report(report: MeshReport): void;
   /** An update was refused, or cannot be solved for yet. */
   problem(error: LpdeformError): void;
+  /** What the server says about itself. */
+  notice(text: string): void;
 }
 
 /** Between attempts: at first, and at most. */
@@ -133,6 +135,7 @@ export class Live {
       this.watcher.report(session.meshReport);
       session.on("problem", (error) => this.watcher.problem(error));
       session.on("connection", () => this.#connection());
+      session.on("notice", (notice) => notice && this.watcher.notice(notice.text));
       this.#tell(performance.now());
       const hadFrames = await this.#readFrames(session);
       if (this.#over.signal.aborted || !isPassing(this.status)) return;
