@@ -2,16 +2,16 @@ import { FrameAssembly } from "./assembly.js";
 import { FrameBox } from "./box.js";
 import { fromFault, LpdeformError } from "./errors.js";
 import { noticeFromWire } from "./fromwire.js";
+import { Holds } from "./holds.js";
 import type { GoAway } from "./gen/lpdeform/v1/service_pb.js";
 import type { Lane, WireFrameOptions } from "./hub.js";
 import { checkVertexCount, isSessionLost, isTakenAllTheSame, isUndecided, joinSession, type Lease } from "./lease.js";
 import { Ledger, type NumberedUpdate } from "./ledger.js";
-import { Packer } from "./packer.js";
 import { Backoff, recoveryAfter } from "./recovery.js";
 import type { Rpc } from "./rpc.js";
-import { updateToWire } from "./towire.js";
+import { sendUpdate } from "./sendupdate.js";
 import type { Connection, Frame, Notice, Update } from "./types.js";
-import { newRequestId, Uploads } from "./upload.js";
+import { newRequestId } from "./upload.js";
 import { pause } from "./waiting.js";
 
 /** What a session that was lost can be made anew from. */
@@ -41,6 +41,12 @@ export class Link {
   readonly box = new FrameBox();
   readonly ledger: Ledger;
   readonly stop = new AbortController();
+  /** For calls that no update may overtake. */
+  readonly holds = new Holds({
+    isQuiet: () => !this.ledger.hasInFlight && !this.#isSending,
+    isClosed: () => this.isClosed,
+    released: () => this.#send(),
+  });
   /** Its handles were sent in one update, after it was lost. */
   isMadeAnew = false;
   /** What ended the stream of frames the last time that one did. */
@@ -57,9 +63,6 @@ export class Link {
   #waitingForFrames = 0;
   #isStreaming = false;
   #isSending = false;
-  /** Calls that no update may overtake. */
-  #holds = 0;
-  #isUndoing = false;
   #requestId = newRequestId();
   #making: Promise<void> | undefined;
   #downSince: number | undefined;
@@ -67,7 +70,6 @@ export class Link {
   #misfits = 0;
   #over: LpdeformError | undefined; // nothing is tried any more, for this reason
   readonly #backoff = new Backoff();
-  readonly #quiet = new Set<() => void>();
 
   constructor(
     readonly rpc: Rpc,
@@ -149,7 +151,7 @@ export class Link {
     this.#lane?.close();
     this.#setConnection("closed");
     this.box.finish("closed");
-    this.#wakeQuiet();
+    this.holds.wake();
     if (this.copy) await this.rpc.call("deleteSession", { session: this.#lease.session });
   }
 
@@ -257,7 +259,7 @@ export class Link {
     this.#lane?.close();
     this.#setConnection("closed");
     this.box.finish(why);
-    this.#wakeQuiet();
+    this.holds.wake();
   }
 
   /** Once for each session that is lost, however many find that out, and however late. */
@@ -290,34 +292,20 @@ export class Link {
   }
 
   get #maySend(): boolean {
-    return !this.isClosed && !this.#isSending && !this.#mayHaveGoneBack && this.#holds === 0;
+    return !this.isClosed && !this.#isSending && !this.#mayHaveGoneBack && !this.holds.areThere;
   }
 
   async #sendOne(update: NumberedUpdate): Promise<void> {
     const lease = this.#lease;
     // What was on its way when the connection or the session was lost is sent again, whatever becomes of the first time.
     try {
-      this.ledger.accept(update, await this.#sendUpdate(update, lease, this.stop.signal));
+      this.ledger.accept(update, await sendUpdate(this.rpc, lease, update, this.stop.signal));
       this.#heardFromServer();
     } catch (thrown) {
       if (this.ledger.isInFlight(update)) await this.#unsent(update, thrown as LpdeformError, lease.session);
     }
-    this.#wakeQuiet();
+    this.holds.wake();
     this.#send();
-  }
-
-  /** Whether the update survives the end of the server. */
-  async #sendUpdate(update: NumberedUpdate, { session, writerToken }: Lease, signal: AbortSignal): Promise<boolean> {
-    const packer = new Packer();
-    const uploads = new Uploads(this.rpc, signal);
-    const message = updateToWire(update.update, update.seq, packer);
-    try {
-      await packer.flush((bytes) => uploads.add(bytes));
-      const { result } = await this.rpc.call("updateHandles", { session, writerToken, update: message }, signal);
-      return result?.kept ?? false;
-    } finally {
-      uploads.discard();
-    }
   }
 
   async #unsent(update: NumberedUpdate, error: LpdeformError, session: string): Promise<void> {
@@ -354,46 +342,6 @@ export class Link {
     return new LpdeformError("aborted", "Another writer took the session over.", { reason: "WRITER_REPLACED" });
   }
 
-  /** Waits until no update is on its way, and keeps others from being sent until the result is called. */
-  async holdUpdates(signal: AbortSignal): Promise<() => void> {
-    ++this.#holds;
-    await this.#until(() => this.#isQuiet && !this.#isUndoing, signal);
-    return () => this.#letGo();
-  }
-
-  /** As holdUpdates(), and keeps solves from beginning, too; waits for those that there are. Rejects where the signal ends it. */
-  async holdAll(signal: AbortSignal): Promise<() => void> {
-    const isFree = () => this.#holds === 0;
-    while (!isFree() && !signal.aborted) await this.#until(isFree, signal);
-    signal.throwIfAborted();
-    ++this.#holds;
-    this.#isUndoing = true;
-    await this.#until(() => this.#isQuiet, signal);
-    return () => {
-      this.#isUndoing = false;
-      this.#letGo();
-    };
-  }
-
-  /** No update is on its way. */
-  get #isQuiet(): boolean {
-    return !this.ledger.hasInFlight && !this.#isSending;
-  }
-
-  #letGo(): void {
-    --this.#holds;
-    this.#wakeQuiet();
-    this.#send();
-  }
-
-  async #until(isSo: () => boolean, signal: AbortSignal): Promise<void> {
-    signal.addEventListener("abort", this.#wakeQuiet, { once: true });
-    while (!isSo() && !this.isClosed && !signal.aborted) {
-      await new Promise<void>((resolve) => this.#quiet.add(resolve));
-    }
-    signal.removeEventListener("abort", this.#wakeQuiet);
-  }
-
   /** Sends what a server that went away may have lost, while updates are held. */
   async sendRestore(signal: AbortSignal): Promise<void> {
     if (this.#mayHaveGoneBack) this.ledger.resumedAt(0);
@@ -409,7 +357,7 @@ export class Link {
   async #sendHeld(signal: AbortSignal): Promise<void> {
     const update = this.ledger.sendNext();
     try {
-      this.ledger.accept(update, await this.#sendUpdate(update, this.#lease, signal));
+      this.ledger.accept(update, await sendUpdate(this.rpc, this.#lease, update, signal));
     } catch (thrown) {
       const error = thrown as LpdeformError;
       if (isUndecided(error)) {
@@ -422,11 +370,6 @@ export class Link {
       this.watcher.problem(why);
     }
   }
-
-  readonly #wakeQuiet = () => {
-    for (const resolve of this.#quiet) resolve();
-    this.#quiet.clear();
-  };
 
   #setNotice(notice: Notice | undefined): void {
     if (this.#notice === notice) return;

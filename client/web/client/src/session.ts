@@ -197,7 +197,7 @@ export class Session implements AsyncIterable<Frame> {
     const end = deadlineMs === undefined ? undefined : performance.now() + deadlineMs;
     const late = deadlineMs === undefined ? undefined : AbortSignal.timeout(timerMs(deadlineMs));
     const signal = AbortSignal.any([link.stop.signal, late, options.signal].filter((one) => one !== undefined));
-    const release = await link.holdUpdates(signal);
+    const release = await link.holds.updates(signal);
     try {
       return await this.#solveUntilDone(options, end, signal);
     } catch (error) {

@@ -10,7 +10,7 @@ import { pause } from "./waiting.js";
  * The number of the update that this is.
  */
 export async function takeStep(link: Link, redo: boolean, signal: AbortSignal): Promise<number> {
-  const release = await link.holdAll(signal);
+  const release = await link.holds.all(signal);
   try {
     signal.throwIfAborted();
     const { seq, response } = await askPatiently(link, redo, signal);
