@@ -1,4 +1,5 @@
 import { describe, expect, it } from "vitest";
+import { MeshBuilder } from "../src/io/builder.js";
 import { readHandleFile, writeHandleFile } from "../src/io/handlefile.js";
 import { writeObj } from "../src/io/obj.js";
 import { writeOff } from "../src/io/off.js";
@@ -89,6 +90,7 @@ describe("meshes", () => {
     ["a.ply", ply("element face 1", "property list float int vertex_indices", "end_header", "x 0"), "A list of NaN"],
     ["a.ply", ply("element face 1", "property list uint int vertex_indices", "end_header", "4e9 0"), "a.ply ends too soon"],
     ["a.off", "OFF\n1 1 0\n0 -2e18 0\n3 0 0 0\n", "a.off, vertex 0: a vertex lies farther out than 1000000000000000000"],
+    ["a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n", "face 0: it says that it has 4 corners, and names 3"],
     ["a.off", "COFFEE", "does not begin with OFF"],
     ["a.off", "OFF\n3 1 0\n0 0 0\n", "ends before vertex 1"],
     ["a.off", "OFF\n3 1 0\n0 0 0\n1 0 x\n0 1 0\n3 0 1 2\n", "vertex 1: a vertex has no three finite coordinates"],
@@ -100,8 +102,19 @@ describe("meshes", () => {
     ["a.ply", "ply\nformat zip 1.0\nend_header\n", "format “zip”"],
     ["a.ply", "nothing", "no PLY header"],
     ["a.stl", "solid\nendsolid", "has no vertices"],
+    ["a.stl", "solid\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nvertex 0 0 0\n", "a.stl ends within triangle 1"],
   ])("%s with a fault is refused by name: %s", (name, text, message) => {
     expect(() => readMesh(name, bytes(text))).toThrow(message);
+  });
+
+  it("with more than a page can take are refused before they are taken in", () => {
+    const builder = new MeshBuilder(2000);
+    for (let k = 0; k < 2000; ++k) builder.vertex(0, 0, 0, "a.off, vertex");
+    expect(() => builder.vertex(0, 0, 0, "a.off, vertex 2000")).toThrow(
+      "a.off, vertex 2000: this page takes 2,000 vertices at most.",
+    );
+    for (let k = 0; k < 2000; ++k) builder.polygon([0, 1, 2], "a.off, face");
+    expect(() => builder.polygon([0, 1, 2], "a.off, face 2000")).toThrow("this page takes 2,000 triangles at most");
   });
 
   it("cut short is refused", () => {

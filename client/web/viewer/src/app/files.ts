@@ -7,6 +7,7 @@ import { readMesh } from "../io/read.js";
 import { writeStl } from "../io/stl.js";
 import { emptyDocument } from "../model/document.js";
 import { isAtRest, type WrittenMesh } from "../model/mesh.js";
+import { short } from "../model/words.js";
 import type { App } from "./app.js";
 import { sentence } from "../link/status.js";
 import { legendCanvas } from "./legend.js";
@@ -14,6 +15,13 @@ import type { Pane } from "./pane.js";
 
 /** For the result that is exported. */
 const solveMs = 60_000;
+/** Of a file: browsers have no longer texts. */
+const mostBytes = 500e6;
+/** From so many on, the page is busy with a file for long enough to be told. */
+const largeBytes = 2e6;
+
+const isHandles = ({ name }: File) => /\.json$/i.test(name);
+const isMesh = ({ name }: File) => /\.(off|obj|ply|stl)$/i.test(name);
 
 interface Exported {
   positions: Float32Array | Float64Array;
@@ -41,19 +49,36 @@ export class Files {
     this.#input.click();
   }
 
-  /** Meshes before handle files, so that both can be dropped together. */
+  /** A mesh, handles, or both, whatever comes first. What lies beside a mesh, as materials do, is left aside. */
   async open(files: readonly File[]): Promise<void> {
-    const isHandles = (file: File) => file.name.toLowerCase().endsWith(".json");
-    const sorted = [...files].sort((a, b) => Number(isHandles(a)) - Number(isHandles(b)));
-    for (const file of sorted) {
+    const meshes = files.filter(isMesh);
+    if (meshes.length > 1) {
+      const names = meshes.map(({ name }) => name).join(", ");
+      return this.app.notify(`One mesh at a time: ${names} are ${meshes.length}.`, true);
+    }
+    const known = [...meshes, ...files.filter(isHandles)];
+    for (const file of known.length > 0 ? known : files) {
       try {
-        if (isHandles(file)) this.#openHandles(file.name, await file.text());
-        else this.#openMesh(file.name, new Uint8Array(await file.arrayBuffer()));
+        await this.#openFile(file);
       } catch (error) {
         const isFault = error instanceof FileFault;
         this.app.notify(isFault ? error.message : `${file.name} cannot be opened: ${(error as Error).message}`, true);
         return;
       }
+    }
+  }
+
+  async #openFile(file: File): Promise<void> {
+    if (file.size > mostBytes) {
+      throw new FileFault(`${file.name} has ${short(file.size)}B; this page reads files of ${short(mostBytes)}B at most.`);
+    }
+    const done = file.size > largeBytes ? this.app.notifyWhile(`Opening ${file.name}…`) : () => undefined;
+    try {
+      if (file.size > largeBytes) await new Promise((seen) => setTimeout(seen, 50));
+      if (isHandles(file)) this.#openHandles(file.name, await file.text());
+      else this.#openMesh(file.name, new Uint8Array(await file.arrayBuffer()));
+    } finally {
+      done();
     }
   }
 
@@ -112,6 +137,9 @@ export class Files {
   }
 
   saveHandles(): void {
+    if (this.app.document.handles.length === 0) {
+      return this.app.notify("There are no handles to save: click the surface to place one.", true);
+    }
     save(`${this.#stem}-handles.json`, writeHandleFile(this.app.document, this.app.mesh.name));
   }
 

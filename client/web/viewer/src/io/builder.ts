@@ -9,6 +9,9 @@ export class MeshBuilder {
   readonly positions: number[] = [];
   readonly faces: number[] = [];
 
+  /** `most`: vertices, and triangles, that a page can take in. */
+  constructor(readonly most = 5_000_000) {}
+
   get vertexCount(): number {
     return this.positions.length / 3;
   }
@@ -18,12 +21,19 @@ export class MeshBuilder {
     if (Math.max(Math.abs(x), Math.abs(y), Math.abs(z)) > mostCoordinate) {
       throw new FileFault(`${where}: a vertex lies farther out than ${mostCoordinate}, which is not drawn.`);
     }
+    this.#checkCount(this.vertexCount + 1, "vertices", where);
     this.positions.push(x, y, z);
   }
 
   polygon(corners: readonly number[], where: string): void {
     if (corners.length < 3) throw new FileFault(`${where}: a face has ${corners.length} corners.`);
     for (let k = 2; k < corners.length; ++k) this.faces.push(corners[0]!, corners[k - 1]!, corners[k]!);
+    this.#checkCount(this.faces.length / 3, "triangles", where);
+  }
+
+  #checkCount(count: number, what: string, where: string): void {
+    if (count <= this.most) return;
+    throw new FileFault(`${where}: this page takes ${this.most.toLocaleString("en")} ${what} at most.`);
   }
 
   finish(name: string): Mesh {

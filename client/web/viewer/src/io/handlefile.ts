@@ -1,6 +1,7 @@
 import type { Hold, SurfacePoint } from "lpdeform-client";
 import { addHandle, type Document, type Handle, paint, withoutPaint } from "../model/document.js";
 import { centroid, type Mesh, type Vector3 } from "../model/mesh.js";
+import { capital } from "../model/words.js";
 import { axisAngle, isAtRest, noRotation, type Pose, quaternionOf } from "../model/pose.js";
 import { FileFault } from "./fault.js";
 import { arrayOf, checkKeys, objectOf, textOf, vector3, vertexNumbers, weightOf } from "./json.js";
@@ -201,8 +202,4 @@ function shortest(value: number): number {
     if (Math.fround(short) === value) return short;
   }
   return value;
-}
-
-function capital(text: string): string {
-  return text[0]!.toUpperCase() + text.slice(1);
 }

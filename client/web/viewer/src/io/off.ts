@@ -26,6 +26,9 @@ export function readOff(name: string, text: string): Mesh {
   }
   for (let f = 0; f < faceCount; ++f) {
     const [count = 0, ...corners] = line(`face ${f}`);
+    if (corners.length < count) {
+      throw new FileFault(`${name}, face ${f}: it says that it has ${count} corners, and names ${corners.length}.`);
+    }
     builder.polygon(corners.slice(0, count), `${name}, face ${f}`);
   }
   return builder.finish(name);

@@ -32,6 +32,7 @@ function readBinary(name: string, bytes: Uint8Array, welder: Welder): void {
 function readText(bytes: Uint8Array, welder: Welder): void {
   const vertex = /vertex\s+(\S+)\s+(\S+)\s+(\S+)/g;
   for (const [, x, y, z] of new TextDecoder().decode(bytes).matchAll(vertex)) welder.corner(Number(x), Number(y), Number(z));
+  welder.end();
 }
 
 class Welder {
@@ -51,6 +52,10 @@ class Welder {
     }
     this.#face.push(vertex);
     if (this.#face.length === 3) this.builder.polygon(this.#face.splice(0), this.name);
+  }
+
+  end(): void {
+    if (this.#face.length > 0) throw new FileFault(`${this.name} ends within triangle ${this.builder.faces.length / 3}.`);
   }
 }
 

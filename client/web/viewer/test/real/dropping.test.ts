@@ -1,0 +1,114 @@
+import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { Service } from "../../../client/test/real/service.js";
+import { writeObj } from "../../src/io/obj.js";
+import { writeOff } from "../../src/io/off.js";
+import { writePly } from "../../src/io/ply.js";
+import { writeStl } from "../../src/io/stl.js";
+import { blockSurface } from "../../src/model/block.js";
+import { User } from "./user.js";
+
+const mesh = blockSurface(2, 2, 6, () => true);
+const vertexCount = mesh.positions.length / 3;
+
+let folder: string;
+let service: Service;
+let user: User;
+
+beforeAll(async () => {
+  folder = mkdtempSync(join(tmpdir(), "lpdeform-drop-"));
+  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
+  user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
+  await user.settled();
+});
+
+afterAll(async () => {
+  await user.close();
+  await service.stop();
+  rmSync(folder, { recursive: true, force: true });
+});
+
+/** As a file manager does: files over the page, then let go. */
+async function drop(files: Record<string, string | Uint8Array>): Promise<void> {
+  const paths = Object.entries(files).map(([name, content]) => {
+    const path = join(folder, name);
+    writeFileSync(path, content);
+    return path;
+  });
+  const devtools = await user.page.context().newCDPSession(user.page);
+  for (const type of ["dragEnter", "dragOver", "drop"] as const) {
+    await devtools.send("Input.dispatchDragEvent", {
+      type,
+      x: 500,
+      y: 400,
+      data: { items: [], files: paths, dragOperationsMask: 1 },
+    });
+    if (type === "dragOver") await user.page.getByText("Drop a mesh or a handle file").waitFor();
+  }
+  await devtools.detach();
+  await user.page.getByText("Drop a mesh or a handle file").waitFor({ state: "hidden" });
+}
+
+const isOpen = (name: string) => user.until(`window.__lpdeform.app.mesh.name === "${name}"`);
+const refusal = (words: string) => user.page.locator(".notice.bad", { hasText: words }).waitFor();
+
+it.each([
+  ["tower.off", writeOff(mesh)],
+  ["tower.obj", writeObj(mesh)],
+  ["tower.ply", writePly(mesh, new Float32Array(vertexCount), 1)],
+  ["Tower.STL", writeStl(mesh)],
+])("%s that is dropped onto the page is there to be worked on", async (name, content) => {
+  await drop({ [name]: content });
+  await isOpen(name);
+  await user.until('window.__lpdeform.status() === "live" && window.__lpdeform.app.facts.now.report');
+  expect(await user.ask("app.facts.now.report.vertices")).toBe(vertexCount);
+  expect(await user.ask("app.panes[0].stage.surface.mesh.name")).toBe(name);
+});
+
+it("a mesh is dropped with its handles and what else lies beside it, in any order", async () => {
+  const handles = JSON.stringify({
+    handles: [
+      { name: "Foot", vertices: [0, 1] },
+      { name: "Top", vertices: [vertexCount - 1], translate: [0, 0, 1] },
+    ],
+  });
+  await drop({ "all.json": handles, "all.mtl": "newmtl x", "all.obj": writeObj(mesh) });
+  await isOpen("all.obj");
+  await expect.poll(() => user.ask("document().handles.map(({ name }) => name)")).toEqual(["Foot", "Top"]);
+  await user.settled();
+  expect(await user.page.locator(".notice.bad").isHidden()).toBe(true);
+});
+
+it("what cannot be opened is refused by name, and what is there stays", async () => {
+  const before = await user.ask("document()");
+  await drop({ "notes.txt": "hello" });
+  await refusal("notes.txt is not a mesh that can be read: OFF, OBJ, PLY and STL can.");
+  await drop({ "a.off": writeOff(mesh), "b.obj": writeObj(mesh) });
+  await refusal("One mesh at a time: a.off, b.obj are 2.");
+  await drop({ "short.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n" });
+  await refusal("short.off, face 0: it says that it has 4 corners, and names 3.");
+  await user.page.evaluate(() => {
+    const file = new File([], "huge.stl"); // as if it were
+    Object.defineProperty(file, "size", { value: 6e8 });
+    const event = new DragEvent("drop", { cancelable: true });
+    Object.defineProperty(event, "dataTransfer", { value: { files: [file] } });
+    document.dispatchEvent(event);
+  });
+  await refusal("huge.stl has 600 MB; this page reads files of 500 MB at most.");
+  expect(await user.ask("app.mesh.name")).toBe("all.obj");
+  expect(await user.ask("document()")).toEqual(before);
+  expect(user.errors).toEqual([]);
+});
+
+it("handles are not saved where there are none", async () => {
+  await user.page.locator("canvas.stage").focus();
+  while ((await user.ask<number>("document().handles.length")) > 0) {
+    await user.page.keyboard.press("n");
+    await user.page.keyboard.press("Delete");
+  }
+  await user.page.getByRole("button", { name: "Save" }).click();
+  await user.page.getByRole("menuitem", { name: "Handles as JSON" }).click();
+  await refusal("There are no handles to save");
+});
