@@ -1,4 +1,5 @@
 import type { Mesh } from "../model/mesh.js";
+import { Pairs } from "../model/pairs.js";
 
 /**
  * What is drawn of a mesh: its vertices, split where faces meet at a sharp edge at rest, so that hard edges stay hard and smooth
@@ -45,6 +46,25 @@ export class DrawMesh {
   }
 }
 
+/** Of the face that was asked for last. */
+const normal = new Float64Array(3);
+
+/** Twice the area long; `a`, `b` and `c`: where its corners begin in the positions. */
+function findNormal(positions: Float32Array, a: number, b: number, c: number): void {
+  const ax = positions[a]!;
+  const ay = positions[a + 1]!;
+  const az = positions[a + 2]!;
+  const ux = positions[b]! - ax;
+  const uy = positions[b + 1]! - ay;
+  const uz = positions[b + 2]! - az;
+  const vx = positions[c]! - ax;
+  const vy = positions[c + 1]! - ay;
+  const vz = positions[c + 2]! - az;
+  normal[0] = uy * vz - uz * vy;
+  normal[1] = uz * vx - ux * vz;
+  normal[2] = ux * vy - uy * vx;
+}
+
 /** Not of length 1: the shader sees to that. */
 function addNormals(positions: Float32Array, faces: Uint32Array, normals: Float32Array): void {
   normals.fill(0);
@@ -52,27 +72,13 @@ function addNormals(positions: Float32Array, faces: Uint32Array, normals: Float3
     const a = 3 * faces[f]!;
     const b = 3 * faces[f + 1]!;
     const c = 3 * faces[f + 2]!;
-    const ax = positions[a]!;
-    const ay = positions[a + 1]!;
-    const az = positions[a + 2]!;
-    const ux = positions[b]! - ax;
-    const uy = positions[b + 1]! - ay;
-    const uz = positions[b + 2]! - az;
-    const vx = positions[c]! - ax;
-    const vy = positions[c + 1]! - ay;
-    const vz = positions[c + 2]! - az;
-    const x = uy * vz - uz * vy;
-    const y = uz * vx - ux * vz;
-    const z = ux * vy - uy * vx;
-    normals[a]! += x;
-    normals[a + 1]! += y;
-    normals[a + 2]! += z;
-    normals[b]! += x;
-    normals[b + 1]! += y;
-    normals[b + 2]! += z;
-    normals[c]! += x;
-    normals[c + 1]! += y;
-    normals[c + 2]! += z;
+    findNormal(positions, a, b, c);
+    for (let axis = 0; axis < 3; ++axis) {
+      const value = normal[axis]!;
+      normals[a + axis]! += value;
+      normals[b + axis]! += value;
+      normals[c + axis]! += value;
+    }
   }
 }
 
@@ -92,17 +98,14 @@ function split({ positions, faces }: Mesh, leastCosine: number): Pick<DrawMesh, 
     return corner;
   };
   const join = (a: number, b: number) => (parents[root(a)] = root(b));
-  const vertexCount = positions.length / 3;
-  const edges = new Map<number, number>(); // of a directed edge: the corner that it begins at
-  for (let corner = 0; corner < faces.length; ++corner) {
-    edges.set(faces[corner]! * vertexCount + faces[nextCorner(corner)]!, corner);
-  }
+  const edges = new Pairs(faces.length); // of a directed edge: the corner that it begins at
+  for (let corner = 0; corner < faces.length; ++corner) edges.set(faces[corner]!, faces[nextCorner(corner)]!, corner);
   let isClosed = edges.size === faces.length;
   for (let corner = 0; corner < faces.length; ++corner) {
     const next = nextCorner(corner);
-    const other = edges.get(faces[next]! * vertexCount + faces[corner]!);
-    if (other === undefined) isClosed = false;
-    if (other === undefined || other > corner) continue;
+    const other = edges.get(faces[next]!, faces[corner]!);
+    if (other < 0) isClosed = false;
+    if (other < 0 || other > corner) continue;
     const [f, g] = [3 * Math.floor(corner / 3), 3 * Math.floor(other / 3)];
     const cosine = normals[f]! * normals[g]! + normals[f + 1]! * normals[g + 1]! + normals[f + 2]! * normals[g + 2]!;
     if (cosine < leastCosine) continue;
@@ -129,14 +132,10 @@ function nextCorner(corner: number): number {
 
 function faceNormals(positions: Float32Array, faces: Uint32Array): Float32Array {
   const normals = new Float32Array(faces.length);
-  const corner = new Float32Array(9);
-  const triangle = new Uint32Array([0, 1, 2]);
-  const sums = new Float32Array(9);
   for (let f = 0; f < faces.length; f += 3) {
-    for (let k = 0; k < 3; ++k) corner.set(positions.subarray(3 * faces[f + k]!, 3 * faces[f + k]! + 3), 3 * k);
-    addNormals(corner, triangle, sums);
-    const length = Math.hypot(sums[0]!, sums[1]!, sums[2]!) || 1;
-    for (let axis = 0; axis < 3; ++axis) normals[f + axis] = sums[axis]! / length;
+    findNormal(positions, 3 * faces[f]!, 3 * faces[f + 1]!, 3 * faces[f + 2]!);
+    const length = Math.hypot(normal[0]!, normal[1]!, normal[2]!) || 1;
+    for (let axis = 0; axis < 3; ++axis) normals[f + axis] = normal[axis]! / length;
   }
   return normals;
 }

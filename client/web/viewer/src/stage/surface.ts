@@ -1,5 +1,6 @@
 import * as three from "three";
 import type { Mesh } from "../model/mesh.js";
+import { Pairs } from "../model/pairs.js";
 import type { ColourBy } from "../model/view.js";
 import { DrawMesh } from "./drawmesh.js";
 import { isSoftware } from "./software.js";
@@ -25,7 +26,10 @@ export class Surface {
   readonly #values: Float32Array;
   readonly #isPerVertex: boolean;
   readonly #material: three.ShaderMaterial;
-  readonly #wire: three.LineSegments;
+  readonly #wire = new three.LineSegments(
+    new three.BufferGeometry(),
+    new three.LineBasicMaterial({ transparent: true, opacity: 0.35 }),
+  );
   readonly #ghost: three.Mesh;
 
   constructor(readonly mesh: Mesh) {
@@ -39,7 +43,6 @@ export class Surface {
     geometry.setAttribute("position", live(this.#draw.positions, 3));
     geometry.setAttribute("normal", live(this.#draw.normals, 3));
     geometry.setAttribute("value", live(this.#values, 1));
-    this.#wire = this.#makeWire();
     this.#ghost = this.#makeGhost();
     const faces = new three.Mesh(geometry, this.#material);
     for (const object of [faces, this.#wire, this.#ghost]) {
@@ -71,6 +74,7 @@ export class Surface {
   }
 
   show({ wireframe, ghost, isDark }: { wireframe: boolean; ghost: boolean; isDark: boolean }): void {
+    if (wireframe) this.#findEdges();
     this.#wire.visible = wireframe;
     this.#ghost.visible = ghost;
     (this.#wire.material as three.LineBasicMaterial).color.set(isDark ? "#05070c" : "#1b2436");
@@ -85,22 +89,23 @@ export class Surface {
     this.#material.dispose();
   }
 
-  #makeWire(): three.LineSegments {
+  /** Once, when they are first asked for: on large meshes that takes a while. */
+  #findEdges(): void {
+    const { geometry } = this.#wire;
+    if (geometry.index) return;
     const { indices, source } = this.#draw;
-    const lines: number[] = [];
-    const known = new Set<number>();
+    const lines = new Uint32Array(2 * indices.length);
+    const known = new Pairs(indices.length);
     for (let corner = 0; corner < indices.length; ++corner) {
       const next = corner % 3 === 2 ? corner - 2 : corner + 1;
       const [a, b] = [source[indices[corner]!]!, source[indices[next]!]!];
-      const edge = Math.min(a, b) * source.length + Math.max(a, b);
-      if (known.has(edge)) continue;
-      known.add(edge);
-      lines.push(indices[corner]!, indices[next]!);
+      const end = 2 * known.size;
+      if (!known.set(Math.min(a, b), Math.max(a, b), corner)) continue;
+      lines[end] = indices[corner]!;
+      lines[end + 1] = indices[next]!;
     }
-    const geometry = new three.BufferGeometry();
-    geometry.setIndex(lines);
+    geometry.setIndex(new three.BufferAttribute(lines.slice(0, 2 * known.size), 1));
     geometry.setAttribute("position", this.#geometry.attributes["position"]!);
-    return new three.LineSegments(geometry, new three.LineBasicMaterial({ transparent: true, opacity: 0.35 }));
   }
 
   #makeGhost(): three.Mesh {
