@@ -138,6 +138,10 @@ describe("words for", () => {
   it("limits are set as people write them", () => {
     const text = statusOf(new LpdeformError("invalid_argument", "allowed are vertices <= 500, faces <= 1500", {})).text;
     expect(text.replaceAll("\u00a0", " ")).toBe("Allowed are vertices ≤ 500, faces ≤ 1500.");
+    const large = "the mesh has 2102500 vertices; allowed are vertices <= 2000000; vertex 123456 is one";
+    expect(statusOf(new LpdeformError("invalid_argument", large, {})).text.replaceAll("\u00a0", " ")).toBe(
+      "The mesh has 2,102,500 vertices; allowed are vertices ≤ 2,000,000; vertex 123456 is one.",
+    );
   });
 
   it("what is wrong name the element and its place", () => {

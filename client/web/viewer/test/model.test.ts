@@ -1,12 +1,13 @@
 import { cornersOf, linesOf, trianglesOf, within } from "../src/model/pointed.js";
 import { describe, expect, it } from "vitest";
 import { adjacencyOf, meanEdge } from "../src/model/adjacency.js";
+import { isAlike } from "../src/model/alike.js";
 import { blueToRed } from "../src/model/colours.js";
 import { fitPose } from "../src/model/fit.js";
 import { History } from "../src/model/history.js";
 import { boundsOf } from "../src/model/mesh.js";
 import { follow, placesOf } from "../src/model/places.js";
-import { apply, axisAngle, quaternionOf, toMotion } from "../src/model/pose.js";
+import { add, anchorOf, apply, axisAngle, quaternionOf, subtract, toMotion, turned, type Pose } from "../src/model/pose.js";
 import { raycast } from "../src/model/raycast.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../src/model/selection.js";
 import { energyStatistics, histogram, percentile } from "../src/model/statistics.js";
@@ -139,6 +140,17 @@ describe("poses", () => {
     expect(fitPose(rest, current, [0, 1]).rotation).toEqual([0, 0, 0, 1]);
   });
 
+  it("are turned on the spot about an axis of the mesh, and back", () => {
+    const once = turned(pose, [0, 0, 1], Math.PI / 2);
+    expect(apply(once, pose.center)).toEqual(apply(pose, pose.center));
+    const [before, after] = [pose, once].map((one) => subtract(apply(one, add(pose.center, [1, 2, 3])), anchorOf(one)));
+    after!.forEach((value, axis) => expect(value).toBeCloseTo([-before![1]!, before![0]!, before![2]!][axis]!, 12));
+    let many: Pose = pose;
+    for (let k = 0; k < 1000; ++k) many = turned(many, [1, 0, 0], Math.PI / 60);
+    for (let k = 0; k < 1000; ++k) many = turned(many, [1, 0, 0], -Math.PI / 60);
+    many.rotation.forEach((value, k) => expect(value).toBeCloseTo(pose.rotation[k]!, 12));
+  });
+
   it("are axis and angle to the server, and nothing at rest", () => {
     const { axis, angle } = axisAngle(turn);
     expect(angle).toBeCloseTo(2.5, 12);
@@ -195,7 +207,7 @@ describe("history", () => {
   });
 
   it("makes no step of a gesture that ends where it began, and keeps a bounded number", () => {
-    const history = new History(0, 3);
+    const history = new History<number>(0, Object.is, 3);
     history.during(1);
     history.during(0);
     history.end();
@@ -204,6 +216,24 @@ describe("history", () => {
     let steps = 0;
     while (history.undo()) ++steps;
     expect(steps).toBe(3);
+  });
+
+  it("makes no step of a value that is made anew and says the same", () => {
+    const made = (p: number, painted: number) => ({
+      p,
+      handles: [{ name: "a", vertices: [1, 2] }],
+      painted: Float32Array.of(NaN, painted),
+    });
+    const history = new History(made(1, 2), isAlike);
+    const begin = history.present;
+    history.push(made(1, 2));
+    expect([history.present === begin, history.canUndo]).toEqual([true, false]);
+    for (const other of [made(2, 2), made(2, 3), { ...made(2, 3), handles: [] }]) {
+      history.push(other);
+      expect(history.present).toBe(other);
+    }
+    expect([history.undo(), history.undo(), history.undo(), history.undo()]).toEqual([true, true, true, false]);
+    expect(isAlike({ a: undefined }, { b: undefined })).toBe(false);
   });
 });
 

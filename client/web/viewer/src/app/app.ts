@@ -1,17 +1,20 @@
 import type { LpdeformError, MeshReport } from "lpdeform-client";
 import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
-import { type Document, emptyDocument, handleOf } from "../model/document.js";
+import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
+import { isAlike } from "../model/alike.js";
 import { History, type Steps } from "../model/history.js";
 import { boundsOf, type Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
 import { nothing, type PointedOut } from "../model/pointed.js";
 import { State } from "../model/state.js";
 import { firstView, type View } from "../model/view.js";
+import { capital } from "../model/words.js";
 import type { Look, Stage } from "../stage/stage.js";
 import { say, type Status } from "../link/status.js";
 import { Pace } from "./pace.js";
 import { Editing } from "./editing.js";
 import { Pane } from "./pane.js";
+import { placeOf, watchPlaces } from "./sides.js";
 
 /** What the page shows beside the pictures. */
 export interface Facts {
@@ -54,7 +57,8 @@ keysText.id = "picture-keys";
 keysText.className = "unseen";
 keysText.textContent =
   "Enter shows a cross: arrow keys move it, Enter places a handle there or selects the one that is there, Escape hides it. " +
-  "Arrow keys move the selected handle, and turn the view where none is selected. Control and arrow keys turn the view, with " +
+  "Arrow keys and Page Up and Down move the selected handle, turn it where it has rings (R), and turn the view where none is " +
+  "selected. Control and arrow keys turn the view, with " +
   "Shift they shift it; plus and minus zoom.";
 
 const noMesh: Mesh = { name: "", positions: new Float32Array(0), faces: new Uint32Array(0) };
@@ -63,7 +67,7 @@ const noMesh: Mesh = { name: "", positions: new Float32Array(0), faces: new Uint
 export class App {
   readonly view = new State<View>(firstView);
   readonly facts: State<Facts>;
-  readonly history = new History<Document>(emptyDocument);
+  readonly history = new History<Document>(emptyDocument, isAlike);
   readonly stages = document.createElement("div");
   panes: Pane[] = [];
   adjacency: Adjacency = adjacencyOf(0, noMesh.faces);
@@ -102,6 +106,7 @@ export class App {
       if (facts.pointedOut !== before.pointedOut) this.#needsMarks = true;
       this.requestDraw();
     });
+    watchPlaces(() => this.#namePanes());
     new ResizeObserver(() => this.requestDraw()).observe(this.stages);
     for (const end of ["keyup", "blur"]) window.addEventListener(end, () => this.#keyUp());
   }
@@ -240,6 +245,16 @@ export class App {
     this.facts.set({ notice: { text, isBad } });
   }
 
+  /** Whether the handle can be dragged to another place; where not, the user is told why. */
+  canShift({ name, isLocked, hold }: Handle): boolean {
+    if (isLocked) this.notify(`“${name}” is locked: its padlock in the list lets it move.`);
+    else if (hold.kind === "orientation") {
+      this.notify(`“${name}” is held by its direction alone: turn it by its rings or with arrow keys.`);
+      this.view.set({ gizmo: "rotate" });
+    } else return true;
+    return false;
+  }
+
   /** A line that stays until the result is called, or another one comes. */
   notifyWhile(text: string): () => void {
     const notice = { text, isBad: false, stays: true };
@@ -273,9 +288,16 @@ export class App {
 
   /** The distortion in full red: the same in both panes, so that they can be compared. */
   get red(): number {
-    const red = this.view.now.pinned ?? Math.max(...this.panes.map((pane) => pane.statistics.red));
-    // What rounding leaves of a surface at rest is no distortion.
-    return red > 1e-8 * this.diagonal ? red : 0;
+    return this.view.now.pinned ?? (this.isDistorted ? this.#red : 0);
+  }
+
+  /** What rounding leaves of a surface at rest is no distortion. */
+  get isDistorted(): boolean {
+    return this.#red > 1e-8 * this.diagonal;
+  }
+
+  get #red(): number {
+    return Math.max(...this.panes.map(({ statistics }) => statistics.red));
   }
 
   togglePin(): void {
@@ -312,7 +334,7 @@ export class App {
     const pose = tool === "move" && handle && !handle.isLocked && !handle.targets ? handle.pose : undefined;
     for (const pane of this.panes) {
       pane.mark(document, this.view.now, pointedOut, colour);
-      pane.stage.gizmo.show(pose, gizmo);
+      pane.stage.gizmo.show(pose, handle?.hold.kind === "orientation" ? "rotate" : gizmo);
     }
   }
 
@@ -393,10 +415,9 @@ export class App {
 
   /** For those who do not see them. */
   #namePanes(): void {
-    const places =
-      this.panes.length > 1 ? { first: "Left picture", second: "Right picture" } : { first: "Picture", second: "" };
     for (const { side, element, stage } of this.panes) {
-      stage.canvas.setAttribute("aria-label", `${places[side]} of the surface, ${element.dataset["label"]}`);
+      const picture = this.panes.length > 1 ? capital(`${placeOf(side)} picture`) : "Picture";
+      stage.canvas.setAttribute("aria-label", `${picture} of the surface, ${element.dataset["label"]}`);
       stage.canvas.setAttribute("aria-describedby", keysText.id);
     }
   }

@@ -7,6 +7,7 @@ import {
   ownersOf,
   paint,
   releaseVertices,
+  shifted,
 } from "../model/document.js";
 import { isAtRest, type Vector3 } from "../model/mesh.js";
 import { nothing, ofVertices, type PointedOut } from "../model/pointed.js";
@@ -110,11 +111,7 @@ export class Editing implements PointingTarget {
     const handle = this.#handleAt(at);
     if (!handle) return undefined;
     this.app.view.set({ selected: handle.name });
-    if (handle.isLocked) {
-      this.app.notify(`“${handle.name}” is locked: its padlock in the list lets it move.`);
-      return undefined;
-    }
-    return this.#drag(handle, at);
+    return this.app.canShift(handle) ? this.#drag(handle, at) : undefined;
   }
 
   /** The handle that holds something of the face that is pointed at, or near by on the screen, for fingers. */
@@ -157,10 +154,7 @@ export class Editing implements PointingTarget {
     const from = onPlane(pane.stage, start.ray, grip) ?? grip;
     const { name } = handle;
     const show = (delta: Vector3, time: number) => {
-      const change: Partial<Handle> = handle.targets
-        ? { targets: handle.targets.map((value, k) => value + delta[k % 3]!) }
-        : { pose: { ...handle.pose, translation: add(handle.pose.translation, delta) } };
-      app.during(changeHandle(app.document, name, change), time);
+      app.during(changeHandle(app.document, name, shifted(handle, delta)), time);
     };
     return {
       move: (at) => {

@@ -1,5 +1,6 @@
-import { changeHandle, handleOf, removeHandle } from "../model/document.js";
+import { changeHandle, handleOf, removeHandle, shifted } from "../model/document.js";
 import { steppedP } from "../model/exponent.js";
+import { turned } from "../model/pose.js";
 import type { ColourBy, Tool } from "../model/view.js";
 import type { App } from "./app.js";
 import type { Files } from "./files.js";
@@ -26,6 +27,9 @@ const zooms: Record<string, number> = { "+": 1 / 1.15, "=": 1 / 1.15, "-": 1.15 
 /** What goes on while the key is held; what turns something on or off does not. */
 const steps = new Set(["[", "]", ",", "."]);
 const turnRadians = Math.PI / 24;
+/** Of a handle, of the mesh's diagonal or about an axis; a tenth of it with Shift. */
+const nudgeShare = 0.01;
+const nudgeRadians = Math.PI / 60;
 /** Of the picture's height. */
 const shiftShare = 0.05;
 
@@ -129,13 +133,19 @@ function selectNext(app: App): void {
   if (handles.length > 0) app.view.set({ selected: handles[(at + 1) % handles.length]!.name, tool: "move" });
 }
 
-/** By a hundredth of the mesh's diagonal, along its axes. */
+/** Along the mesh's axes by a hundredth of its diagonal; about them by three degrees where the handle has rings. */
 function nudge(app: App, direction: readonly [number, number, number], event: KeyboardEvent): boolean {
   const handle = handleOf(app.document, app.view.now.selected);
-  if (!handle || handle.isLocked || handle.targets) return false;
-  const step = 0.01 * app.diagonal * (event.shiftKey ? 0.1 : 1);
-  const [x, y, z] = handle.pose.translation;
-  const translation = [x + step * direction[0], y + step * direction[1], z + step * direction[2]] as const;
-  app.byKey(changeHandle(app.document, handle.name, { pose: { ...handle.pose, translation } }), event);
+  if (!handle) return false;
+  const share = event.shiftKey ? 0.1 : 1;
+  const isTurn = app.view.now.gizmo === "rotate" && !handle.isLocked;
+  if (isTurn && !handle.targets) {
+    const pose = turned(handle.pose, direction, share * nudgeRadians);
+    app.byKey(changeHandle(app.document, handle.name, { pose }), event);
+  } else if (!isTurn && app.canShift(handle)) {
+    const step = share * nudgeShare * app.diagonal;
+    const [x, y, z] = direction;
+    app.byKey(changeHandle(app.document, handle.name, shifted(handle, [step * x, step * y, step * z])), event);
+  }
   return true;
 }

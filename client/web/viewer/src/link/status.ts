@@ -55,10 +55,13 @@ export function isPassing({ kind }: Status): boolean {
   return kind === "away" || kind === "full" || kind === "draining";
 }
 
+/** Of many digits; numbers of elements stay as they are. */
+const amounts = /(?<=≤\u00a0)\d{5,}|\b\d{5,}(?= (?:vertices|faces|bytes))/g;
+
 export function sentence(text: string): string {
   const trimmed = text.trim();
   if (trimmed === "") return "";
-  const plain = trimmed.replaceAll(" <= ", "\u00a0≤\u00a0");
+  const plain = trimmed.replaceAll(" <= ", "\u00a0≤\u00a0").replace(amounts, (digits) => Number(digits).toLocaleString("en"));
   return plain[0]!.toUpperCase() + plain.slice(1) + (/[.!?…]$/.test(plain) ? "" : ".");
 }
 

@@ -2,7 +2,7 @@ import type { Hold, SurfacePoint } from "lpdeform-client";
 import { groupColours } from "./colours.js";
 import { fitPose } from "./fit.js";
 import { centroid, type Vector3 } from "./mesh.js";
-import { about, type Pose } from "./pose.js";
+import { about, add, type Pose } from "./pose.js";
 
 /** A group of vertices that the user holds, or of points inside faces (from a file). */
 export interface Handle {
@@ -88,6 +88,12 @@ export function addHandle(
 export function changeHandle(document: Document, name: string, change: Partial<Handle>): Document {
   const handles = document.handles.map((handle) => (handle.name === name ? { ...handle, ...change } : handle));
   return { ...document, handles };
+}
+
+/** What becomes of a handle that is moved by so much from where it is. */
+export function shifted({ targets, pose }: Handle, by: Vector3): Partial<Handle> {
+  if (targets) return { targets: targets.map((value, k) => value + by[k % 3]!) };
+  return { pose: { ...pose, translation: add(pose.translation, by) } };
 }
 
 export function removeHandle(document: Document, name: string): Document {

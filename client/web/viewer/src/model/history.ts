@@ -12,8 +12,10 @@ export class History<Value> {
   #present: Value;
   #before: Value | undefined;
 
+  /** `isSame`: of values of which the second is no step beyond the first. */
   constructor(
     present: Value,
+    readonly isSame: (a: Value, b: Value) => boolean = Object.is,
     readonly most = 200,
   ) {
     this.#present = present;
@@ -47,7 +49,11 @@ export class History<Value> {
   end(): void {
     const before = this.#before;
     this.#before = undefined;
-    if (before === undefined || before === this.#present) return;
+    if (before === undefined) return;
+    if (this.isSame(before, this.#present)) {
+      this.#present = before;
+      return;
+    }
     this.#past.push(before);
     if (this.#past.length > this.most) this.#past.shift();
     this.#future = [];

@@ -48,6 +48,11 @@ export function apply({ rotation, translation, center }: Pose, point: Vector3): 
   return add(add(rotate(rotation, subtract(point, center)), center), translation);
 }
 
+/** Turned by `angle` radians about an axis through where its center is. */
+export function turned(pose: Pose, axis: Vector3, angle: number): Pose {
+  return { ...pose, rotation: product(quaternionOf(axis, angle), pose.rotation) };
+}
+
 /** The same pose about another center. */
 export function about(pose: Pose, center: Vector3): Pose {
   return { ...pose, center, translation: subtract(apply(pose, center), center) };
@@ -59,6 +64,14 @@ export function add(a: Vector3, b: Vector3): Vector3 {
 
 export function subtract(a: Vector3, b: Vector3): Vector3 {
   return [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+}
+
+/** The second first, of length 1 however often it is done. */
+function product([ax, ay, az, aw]: Quaternion, [bx, by, bz, bw]: Quaternion): Quaternion {
+  const [x, y, z] = add(cross([ax, ay, az], [bx, by, bz]), [aw * bx + bw * ax, aw * by + bw * ay, aw * bz + bw * az]);
+  const w = aw * bw - ax * bx - ay * by - az * bz;
+  const length = Math.hypot(x, y, z, w);
+  return [x / length, y / length, z / length, w / length];
 }
 
 function rotate([x, y, z, w]: Quaternion, v: Vector3): Vector3 {

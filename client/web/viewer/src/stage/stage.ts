@@ -14,6 +14,9 @@ export interface Look {
   target: Vector3;
 }
 
+/** Of a picture on which marks are as large as they can be; on lower ones they would hide the surface. */
+const fullSizeHeight = 700;
+
 /** What lies over a picture of that width at its edges, in pixels. */
 function coveredAt(width: number): { left: number; top: number; bottom: number } {
   return width > 620 ? { left: 70, top: 50, bottom: 120 } : { left: 40, top: 110, bottom: 165 };
@@ -57,10 +60,11 @@ export class Stage {
   }
 
   open(mesh: Mesh): void {
+    const surface = new Surface(mesh); // before the old one goes: there may be no memory for it
     this.surface?.group.removeFromParent();
     this.surface?.dispose();
-    this.surface = new Surface(mesh);
-    this.#scene.add(this.surface.group);
+    this.surface = surface;
+    this.#scene.add(surface.group);
   }
 
   get target(): three.Vector3 {
@@ -81,7 +85,7 @@ export class Stage {
     camera.position.copy(away.normalize());
     camera.lookAt(0, 0, 0);
     this.target.set(...center);
-    camera.position.copy(this.target).addScaledVector(away, this.#distanceFor(min, max));
+    camera.position.copy(this.target).addScaledVector(away, this.#distanceFor(min, max, center));
     camera.near = diagonal / 200;
     camera.far = diagonal * 100;
     camera.updateProjectionMatrix();
@@ -89,8 +93,8 @@ export class Stage {
     this.changed();
   }
 
-  /** From which a box fits into what is free of the picture. */
-  #distanceFor(min: Vector3, max: Vector3): number {
+  /** From `place`, at which a box fits into what is free of the picture as the camera is turned. */
+  #distanceFor(min: Vector3, max: Vector3, place: Vector3): number {
     const { camera } = this;
     const [width, height] = this.#size as [number, number];
     const covered = coveredAt(width);
@@ -100,8 +104,8 @@ export class Stage {
     const turn = camera.quaternion.clone().invert();
     let far = 0;
     for (let corner = 0; corner < 8; ++corner) {
-      const half = min.map((low, axis) => ((corner >> axis) & 1 ? 0.5 : -0.5) * (max[axis]! - low)) as [number, number, number];
-      const seen = new three.Vector3(...half).applyQuaternion(turn);
+      const at = place.map((from, axis) => ((corner >> axis) & 1 ? max : min)[axis]! - from) as [number, number, number];
+      const seen = new three.Vector3(...at).applyQuaternion(turn);
       far = Math.max(far, seen.z + Math.abs(seen.x) / across, seen.z + Math.abs(seen.y) / up);
     }
     return 1.08 * far;
@@ -120,16 +124,26 @@ export class Stage {
     this.changed();
   }
 
-  /** At a place from outside, where `normal` points; from where it looks now where that is nothing. */
-  lookAt(place: Vector3, normal: Vector3, distance: number): void {
+  /**
+   * Towards a place from outside, where `normal` points; from where it looks now where that is nothing. The surface is in sight with
+   * it, from as near as `least` and no farther than `most`; where it is too far from the place for that, the place alone.
+   */
+  lookAt(place: Vector3, normal: Vector3, [least, most]: readonly [number, number]): void {
     const towards = new three.Vector3(...normal);
     if (towards.length() < 1e-6) towards.copy(this.camera.position).sub(this.target);
     // Not from straight above or below, where nobody knows what is left and right.
     const { up } = this.camera;
     towards.normalize().addScaledVector(up, -0.2 * towards.dot(up));
     if (towards.clone().cross(up).length() < 0.1) towards.add(new three.Vector3(0.3, up.z ? -0.3 : 0, up.y ? 0.3 : 0));
-    const position = new three.Vector3(...place).addScaledVector(towards.normalize(), distance);
-    this.lookFrom({ position: position.toArray(), target: place });
+    const { camera, surface } = this;
+    const { min, max, center } = boundsOf(surface!.positions, surface!.mesh.faces);
+    const isOnIt = place.every((value, axis) => value >= min[axis]! && value <= max[axis]!);
+    const middle = new three.Vector3(...place).lerp(new three.Vector3(...center), isOnIt ? 0.5 : 0);
+    camera.position.copy(middle).add(towards.normalize());
+    camera.lookAt(middle);
+    const target = middle.toArray();
+    const distance = Math.max(least, Math.min(this.#distanceFor(min, max, target), most));
+    this.lookFrom({ position: middle.addScaledVector(towards, distance).toArray(), target });
   }
 
   /** As dragging the surface to the right and up by so many radians does. */
@@ -185,7 +199,7 @@ export class Stage {
     this.camera.aspect = width / Math.max(height, 1);
     const covered = coveredAt(width);
     this.camera.setViewOffset(width, height, -covered.left / 2, (covered.bottom - covered.top) / 2, width, height);
-    this.marks.scale(ratio);
+    this.marks.scale(ratio * Math.min(Math.max(height / fullSizeHeight, 0.6), 1));
     this.highlight.resize(width, height);
     return true;
   }

@@ -1,7 +1,8 @@
 import type { App } from "../app/app.js";
+import { placeOf, watchPlaces } from "../app/sides.js";
 import type { Document } from "../model/document.js";
 import { leastP, mostP, steppedP } from "../model/exponent.js";
-import { short } from "../model/words.js";
+import { capital, short } from "../model/words.js";
 import { el, setText, toggle } from "./dom.js";
 
 /** The values of the paper's figures. */
@@ -39,6 +40,7 @@ export function dock(app: App): HTMLElement {
     second.hidden = !isSplit;
     explain();
   });
+  watchPlaces(explain);
   return el(
     "section",
     { className: "dock", aria: { label: "p" } },
@@ -54,7 +56,7 @@ function pSlider(app: App, field: Field): HTMLElement {
     min: "0",
     max: "1",
     step: "0.002",
-    aria: { label: field === "p" ? "p" : "p of the right picture" },
+    aria: { label: "p" },
   });
   const shown = el("output");
   const set = (p: number) => ({ ...app.document, [field]: p, isAutomatic: false });
@@ -90,12 +92,24 @@ function pSlider(app: App, field: Field): HTMLElement {
     ticks.forEach((tick, k) => tick.setAttribute("aria-pressed", String(!document.isAutomatic && stops[k] === p)));
   });
   const track = el("div", { className: "p-track" }, input, el("div", { className: "stops" }, ...ticks));
-  return el("div", { className: "p-row" }, el("span", { className: "p-name" }, "p"), track, shown);
+  const side = field === "p" ? "first" : "second";
+  const place = el("small");
+  const name = () => {
+    const { isSplit } = app.view.now;
+    setText(place, isSplit ? placeOf(side) : "");
+    place.hidden = !isSplit;
+    input.setAttribute("aria-label", isSplit ? `p of the ${placeOf(side)} picture` : "p");
+  };
+  app.view.watch(name);
+  watchPlaces(name);
+  return el("div", { className: "p-row" }, el("span", { className: "p-name" }, "p", place), track, shown);
 }
 
 function wordsOf({ p, secondP, isAutomatic, paintedP, stiffness }: Document, isSplit: boolean): string {
   if (isAutomatic) return "From the shape: joints soft, parts rigid";
-  const words = isSplit ? `Left: ${effectOf(p)}. Right: ${effectOf(secondP)}` : effectOf(p);
+  const words = isSplit
+    ? `${capital(placeOf("first"))}: ${effectOf(p)}. ${capital(placeOf("second"))}: ${effectOf(secondP)}`
+    : effectOf(p);
   return paintedP || stiffness ? `${words} · painted parts as painted` : words;
 }
 

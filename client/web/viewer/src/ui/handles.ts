@@ -100,7 +100,10 @@ function detailsOf(app: App, handle: Handle): Node[] {
   // Points inside faces are held as they are or softly.
   const possible = handle.points ? kinds.slice(0, 2) : kinds;
   for (const [value, text] of possible) kind.append(el("option", { value, textContent: text, selected: value === hold.kind }));
-  kind.addEventListener("change", () => change({ hold: newHold(kind.value as Hold["kind"]) }));
+  kind.addEventListener("change", () => {
+    change({ hold: newHold(kind.value as Hold["kind"]) });
+    if (kind.value === "orientation") app.view.set({ gizmo: "rotate" });
+  });
   const parts: Node[] = [el("label", { className: "pair" }, el("span", {}, "Held"), kind)];
   if (hold.kind === "soft" || hold.kind === "orientation") parts.push(weight(app, name, hold));
   if (hold.kind === "axisLock" || hold.kind === "planeLock") parts.push(direction(app, name, hold));

@@ -23,7 +23,7 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
       ["T  R", "Arrows, rings on the selected handle"],
       ["Enter", "A cross in the picture: arrows move it, Enter places a handle"],
       ["N", "Select the next handle"],
-      ["← → ↑ ↓", "Nudge it; with Page Up, Page Down along z"],
+      ["← → ↑ ↓", "Move it by steps, Page Up and Page Down along z; with rings, turn it"],
       ["Delete", "Delete it"],
       ["L", "Lock it against dragging"],
       ["Ctrl+Z", "Undo; Ctrl+Shift+Z redo"],

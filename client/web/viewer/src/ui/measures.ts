@@ -1,5 +1,6 @@
 import type { App } from "../app/app.js";
 import type { Pane } from "../app/pane.js";
+import { placeOf } from "../app/sides.js";
 import { blueToRed } from "../model/colours.js";
 import { histogram } from "../model/statistics.js";
 import { short } from "../model/words.js";
@@ -102,11 +103,11 @@ function showNumbers(app: App, values: Record<Row, HTMLElement>, now: number): v
   );
   setText(
     values.energy,
-    both(({ frame }) => (frame ? short(frame.energy) : "–")),
+    both(({ frame }) => (frame ? short(app.isDistorted ? frame.energy : 0) : "–")),
   );
   setText(
     values.share,
-    both(({ statistics }) => (app.red > 0 ? `${(100 * statistics.top5Share).toFixed(0)} %` : "–")),
+    both(({ statistics }) => (app.isDistorted ? `${(100 * statistics.top5Share).toFixed(0)} %` : "–")),
   );
   const methods = both(({ frame }) => frame?.method.replaceAll("_", " ") ?? "");
   setText(values.method, methods ? `${methods} · ${both(({ frame }) => String(frame?.iteration ?? 0))}` : "–");
@@ -125,8 +126,6 @@ function gapText(gap: number): string {
   return gap < 1 ? `${short(100 * gap)} %` : "not found";
 }
 
-const second = "#ff7a1a";
-
 interface HistogramFigure {
   figure: HTMLElement;
   caption: HTMLElement;
@@ -142,6 +141,7 @@ function histogramFigure(): HistogramFigure {
 
 function showPlots(app: App, energy: HTMLCanvasElement, histograms: readonly HistogramFigure[]): void {
   const { red } = app;
+  const second = getComputedStyle(energy).getPropertyValue("--second");
   const lines =
     red === 0
       ? []
@@ -149,7 +149,7 @@ function showPlots(app: App, energy: HTMLCanvasElement, histograms: readonly His
           x: trail.iterations,
           y: trail.energies,
           ...(k > 0 && { colour: second }),
-          ...(app.panes.length > 1 && { name: `${side === "first" ? "left" : "right"}: ${element.dataset["label"]}` }),
+          ...(app.panes.length > 1 && { name: `${placeOf(side)}: ${element.dataset["label"]}` }),
         }));
   plotLines(energy, lines, app.panes[0]!.trail.starts, short);
   const most = red > 0 ? Math.max(...app.panes.map(({ statistics }) => statistics.max)) : 0;
@@ -163,8 +163,10 @@ function showPlots(app: App, energy: HTMLCanvasElement, histograms: readonly His
     const pane = app.panes[k];
     figure.hidden = pane === undefined;
     if (!pane) return;
-    const side = pane.side === "first" ? "left" : "right";
-    setText(caption, app.panes.length > 1 ? `Cells by energy, ${side}: ${pane.element.dataset["label"]}` : "Cells by energy");
+    setText(
+      caption,
+      app.panes.length > 1 ? `Cells by energy, ${placeOf(pane.side)}: ${pane.element.dataset["label"]}` : "Cells by energy",
+    );
     bars.setAttribute("aria-label", `${caption.textContent}, up to ${short(pane.statistics.max)}`);
     plotBars(bars, counts[k]!, highest, colourAt, short(most));
   });

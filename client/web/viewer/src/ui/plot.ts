@@ -17,7 +17,7 @@ function begin(canvas: HTMLCanvasElement): Frame | undefined {
   const context = canvas.getContext("2d")!;
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.clearRect(0, 0, width, height);
-  context.font = "10px system-ui, sans-serif";
+  context.font = "11px system-ui, sans-serif";
   const style = getComputedStyle(canvas);
   const [ink, faint, accent] = ["--muted", "--line", "--accent"].map((name) => style.getPropertyValue(name)) as [
     string,
@@ -75,15 +75,18 @@ export function plotLines(
   }
   context.lineWidth = 1;
   context.fillStyle = ink;
-  context.fillText(format(high), 2, 9);
+  context.fillText(format(high), 2, 10);
   context.fillText(isLogarithmic ? `${format(low)} (log)` : format(low), 2, height - 4);
   context.textAlign = "right";
   let at = width - 2;
   for (const { name, colour } of lines.toReversed()) {
     if (!name) continue;
+    context.fillStyle = ink;
+    context.fillText(name, at, 10);
+    at -= context.measureText(name).width + 14;
     context.fillStyle = colour ?? accent;
-    context.fillText(name, at, 9);
-    at -= context.measureText(name).width + 10;
+    context.fillRect(at, 5, 10, 3);
+    at -= 10;
   }
   context.textAlign = "left";
 }

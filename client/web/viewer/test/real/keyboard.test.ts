@@ -131,6 +131,39 @@ it("what a key does while it is held is undone at once, and a key that changes n
   expect(await user.ask("app.history.canRedo")).toBe(true);
 });
 
+it("with rings, arrow keys turn the selected handle on the spot, and it is undone like any step", async () => {
+  const pose = () => user.ask<{ rotation: number[]; translation: number[] }>("document().handles[0].pose");
+  await user.ask("app.view.set({ selected: window.__lpdeform.document().handles[0].name })");
+  await user.page.locator("canvas.stage").focus();
+  await press("r");
+  const before = await pose();
+  for (const [key, axis] of [
+    ["ArrowRight", 0],
+    ["ArrowUp", 1],
+    ["PageUp", 2],
+  ] as const) {
+    await press(key);
+    const { rotation, translation } = await pose();
+    expect(rotation[axis]).toBeCloseTo(Math.sin(Math.PI / 120), 6); // half of three degrees
+    expect(translation).toEqual(before.translation);
+    await press("Control+z");
+    expect(await pose()).toEqual(before);
+  }
+  const rest = await user.positions();
+  await press("PageDown");
+  await user.settled();
+  const turned = await user.positions();
+  expect(Math.max(...turned.map((value, k) => Math.abs(value - rest[k]!)))).toBeGreaterThan(0.01);
+  await press("Control+z");
+  await press("t");
+  await press("l");
+  const locked = await pose();
+  await press("ArrowRight");
+  await user.page.locator(".notice", { hasText: "is locked: its padlock in the list lets it move." }).waitFor();
+  expect(await pose()).toEqual(locked);
+  await press("l");
+});
+
 it("a key that turns something on or off does so once, however long it is held", async () => {
   const { keyboard } = user.page;
   const held = async (key: string) => {
