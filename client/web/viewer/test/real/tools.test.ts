@@ -190,50 +190,6 @@ describe("the gizmo", () => {
   });
 });
 
-describe("a handle that is free in part", () => {
-  const hold = (kind: string) => user.page.getByLabel("How it is held").selectOption(kind);
-  const dragTop = async () => {
-    const { vertices } = (await handles())[1]!;
-    await user.drag(await user.vertexOnPage(vertices[0]!), 50, 25);
-    await user.settled();
-  };
-
-  it("goes along its axis by itself, and where it is dragged across it", async () => {
-    await user.page.getByLabel("Shape").selectOption("bar");
-    await user.settled();
-    await user.page.locator('[data-handle="Top"] .name').click();
-    await hold("axisLock");
-    await press("Escape");
-    await dragTop();
-    const { pose, vertices } = (await handles())[1]!;
-    expect(Math.hypot(pose.translation[0], pose.translation[1])).toBeGreaterThan(0.05);
-    const rest = Object.values(await user.ask<Record<string, number>>("app.mesh.positions"));
-    const places = await user.positions();
-    const went = (axis: number) => vertices.map((vertex) => places[3 * vertex + axis]! - rest[3 * vertex + axis]!);
-    for (const axis of [0, 1]) for (const by of went(axis)) expect(by).toBeCloseTo(pose.translation[axis]!, 2);
-    expect(Math.max(...went(2).map((by) => Math.abs(by - pose.translation[2]!)))).toBeGreaterThan(1e-3);
-    await press("Control+z");
-  });
-
-  it("is turned where it is held by its direction alone, and says so to who drags it", async () => {
-    await user.page.locator('[data-handle="Top"] .name').click();
-    await press("t");
-    await hold("orientation");
-    expect(await user.ask("app.view.now.gizmo")).toBe("rotate");
-    await user.settled();
-    const before = (await handles())[1]!.pose;
-    await dragTop();
-    await user.page.locator(".notice", { hasText: "“Top” is held by its direction alone" }).waitFor();
-    expect((await handles())[1]!.pose).toEqual(before);
-    await user.page.locator("canvas.stage").focus();
-    for (let k = 0; k < 6; ++k) await press("ArrowRight");
-    await user.settled();
-    expect(await user.ask("app.isDistorted")).toBe(true); // the foot is held exactly
-    while (await user.ask("app.history.canUndo")) await press("Control+z");
-    await press("t");
-  });
-});
-
 describe("p", () => {
   it("is painted, with stiffness beside it, and taken away again", async () => {
     await press("5");
