@@ -132,7 +132,7 @@ export class Pane {
     const { diagonal } = boundsOf(positions, mesh.faces);
     const far = (vertex: number) => Math.hypot(...place.map((value, axis) => positions[3 * vertex + axis]! - value));
     const radius = vertices.reduce((most, vertex) => Math.max(most, far(vertex)), 0);
-    this.stage.lookAt(place, centroid(normals, vertices), [Math.max(6 * radius, 1.6 * diagonal), 2.6 * diagonal]);
+    this.stage.lookAt(place, centroid(normals, vertices), [Math.max(6 * radius, 1.6 * diagonal), 3 * diagonal]);
   }
 
   #resize(isMoving: boolean, quality: number): void {

@@ -50,7 +50,9 @@ export function plotLines(
   const [left, right] = [Math.min(...xs), Math.max(...xs)];
   if (ys.length < 2 || !(right > left)) return empty(frame, "Drag a handle");
   let [low, high] = [ys.reduce((a, b) => Math.min(a, b)), ys.reduce((a, b) => Math.max(a, b))];
-  low = Math.max(low, 1e-4 * high); // what rounding leaves at rest is nothing
+  // Rest, where a drag begins, is nothing beside it: without it there is more to see of the rest of the line.
+  const tops = lines.map(({ y }) => y.reduce((a, b) => Math.max(a, b), 0)).filter((top) => top > 0);
+  low = Math.max(low, 0.01 * tops.reduce((a, b) => Math.min(a, b)));
   const isLogarithmic = high / low > 20;
   const scale = isLogarithmic ? Math.log : (y: number) => y;
   if (!isLogarithmic) [low, high] = [low - 0.05 * (high - low || high), high + 0.05 * (high - low || high)];

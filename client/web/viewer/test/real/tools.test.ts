@@ -282,6 +282,10 @@ describe("the look", () => {
   it.each(["light", "dark"])("can be read when it is %s", async (theme) => {
     await user.ask(`app.view.set({ isDark: ${theme === "dark"} })`);
     for (const summary of await user.page.locator(".panel details:not([open]) > summary").all()) await summary.click();
+    // Also what is there at times.
+    await user.ask("app.notify('A line.', true)");
+    await user.ask("app.facts.set({ problem: { reason: 'X', message: 'a sentence', element: 'vertex 1' }, restoredFrom: 1 })");
+    await press("?");
     const faint = await user.page.evaluate(() => {
       const parse = (colour: string) => (colour.match(/[\d.]+/g) ?? []).map(Number);
       const light = ([r, g, b]: number[]) =>
@@ -307,9 +311,17 @@ describe("the look", () => {
         const contrast = (Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05);
         if (contrast < 4.5) found.push(`${text.join(" ")}: ${contrast.toFixed(2)}`); // WCAG 2.2, 1.4.3
       }
+      for (const track of document.querySelectorAll(".track")) {
+        const [one, other] = [light(parse(getComputedStyle(track).backgroundColor)), light(behind(track.parentElement))];
+        const contrast = (Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05);
+        if (contrast < 3) found.push(`the switch ${track.nextElementSibling!.textContent}: ${contrast.toFixed(2)}`); // 1.4.11
+      }
       return found;
     });
     expect(faint).toEqual([]);
+    await user.page.locator(".banner", { hasText: "A sentence." }).waitFor();
+    await press("Escape");
+    await user.ask("app.facts.set({ problem: undefined, restoredFrom: undefined })");
   });
 
   it("is dark and light, and tells its keys", async () => {

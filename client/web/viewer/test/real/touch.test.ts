@@ -90,6 +90,19 @@ it("upright, the sliders of p stay in reach beside the open panel, for one pictu
   await user.settled();
 });
 
+it("everything that fingers press is large enough for them", async () => {
+  await user.page.getByRole("button", { name: "Side panel" }).tap();
+  const small = await user.page.evaluate(() =>
+    [...document.querySelectorAll("button, select, label.toggle, input[type=range], summary")]
+      .filter((one) => one.checkVisibility() && one.getBoundingClientRect().width > 0)
+      .map((one) => ({ name: one.getAttribute("aria-label") ?? one.textContent, ...one.getBoundingClientRect().toJSON() }))
+      .filter(({ width, height }) => Math.min(width, height) < 24) // WCAG 2.2, 2.5.8
+      .map(({ name, width, height }) => `${name}: ${width} by ${height}`),
+  );
+  expect(small).toEqual([]);
+  await user.page.getByRole("button", { name: "Side panel" }).tap();
+});
+
 it("two fingers zoom, also where the first had begun to paint", async () => {
   await user.page.getByRole("button", { name: "Brush", exact: true }).tap();
   const before = await camera();
