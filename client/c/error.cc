@@ -12,22 +12,19 @@ namespace {
 
 constexpr std::string_view kCut = "...";
 
-/// As much as there is room for, never half a UTF-8 character.
-template <std::size_t size>
-void copy_text(std::string_view text, char (&into)[size]) {
-  if (text.size() < size) {
-    std::memcpy(into, text.data(), text.size());
-    into[text.size()] = '\0';
-    return;
-  }
-  std::size_t length = size - 1 - kCut.size();
-  while (length > 0 && (static_cast<unsigned char>(text[length]) & 0xC0) == 0x80) --length;
-  std::memcpy(into, text.data(), length);
-  std::memcpy(into + length, kCut.data(), kCut.size());
-  into[length + kCut.size()] = '\0';
-}
-
 }  // namespace
+
+void copy_text(std::string_view text, char* into, std::size_t size) {
+  if (size == 0) return;
+  std::size_t length = text.size();
+  const std::string_view end = length < size ? "" : kCut.substr(0, size - 1);
+  if (length >= size) length = size - 1 - end.size();
+  while (length > 0 && length < text.size() && (static_cast<unsigned char>(text[length]) & 0xC0) == 0x80)
+    --length;
+  std::memcpy(into, text.data(), length);
+  std::memcpy(into + length, end.data(), end.size());
+  into[length + end.size()] = '\0';
+}
 
 lpdeform_code tell(const absl::Status& status, lpdeform_error* error) {
   const auto code = static_cast<lpdeform_code>(status.code());
@@ -35,10 +32,10 @@ lpdeform_code tell(const absl::Status& status, lpdeform_error* error) {
   lpdeform_error out{};
   out.code = code;
   const Fault fault = fault_of(status);
-  copy_text(fault.reason, out.reason);
-  copy_text(fault.element, out.element);
-  copy_text(fault.limit, out.limit);
-  copy_text(std::string(status.message()), out.message);
+  copy_text(fault.reason, out.reason, sizeof out.reason);
+  copy_text(fault.element, out.element, sizeof out.element);
+  copy_text(fault.limit, out.limit, sizeof out.limit);
+  copy_text(std::string(status.message()), out.message, sizeof out.message);
   write_struct(out, error);
   return code;
 }

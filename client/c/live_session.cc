@@ -166,6 +166,13 @@ absl::StatusOr<std::uint64_t> LiveSession::undo(bool redo) {
   return ours(*seq);
 }
 
+absl::StatusOr<std::string> LiveSession::snapshot() {
+  const auto live = session();
+  if (!live.ok()) return live.status();
+  if (*live == nullptr) return not_there_yet();
+  return (*live)->snapshot();
+}
+
 /// Our number of the session's change `seq`. Callers have seen session_, and seq_offset_ does not change after.
 std::uint64_t LiveSession::ours(std::uint64_t seq) const {
   if (seq < first_seq_) return 0;
@@ -198,6 +205,11 @@ lpdeform_state LiveSession::state(absl::Status& why) const {
       why = session_->last_problem();
       return was_live_ ? LPDEFORM_STATE_RECONNECTING : LPDEFORM_STATE_CONNECTING;
   }
+}
+
+std::optional<client::Notice> LiveSession::notice() const {
+  const auto live = session();
+  return live.ok() && *live != nullptr ? (*live)->notice() : std::nullopt;
 }
 
 absl::StatusOr<std::shared_ptr<client::Session>> LiveSession::session() const {

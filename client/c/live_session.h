@@ -9,6 +9,7 @@
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <thread>
 
 #include "absl/status/status.h"
@@ -46,7 +47,11 @@ class LiveSession {
   absl::StatusOr<std::uint64_t> send(client::Update update);
   /// As lpdeform_undo and lpdeform_redo. Waits.
   absl::StatusOr<std::uint64_t> undo(bool redo);
+  /// As lpdeform_take_snapshot. Waits.
+  absl::StatusOr<std::string> snapshot();
   lpdeform_state state(absl::Status& why) const;
+  /// Empty where there is none.
+  std::optional<client::Notice> notice() const;
   absl::StatusOr<std::string> name() const;
   std::uint32_t vertex_count() const;
 

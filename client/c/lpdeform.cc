@@ -5,6 +5,8 @@
 
 #include <cstring>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -33,6 +35,10 @@ struct lpdeform_client {
 
 struct lpdeform_session {
   std::shared_ptr<engine::LiveSession> live;
+};
+
+struct lpdeform_snapshot {
+  std::string file;
 };
 
 namespace {
@@ -83,6 +89,18 @@ absl::StatusOr<std::shared_ptr<engine::LiveSession>> join(engine::Server& server
       read->facts);
 }
 
+absl::StatusOr<std::shared_ptr<engine::LiveSession>> restore(engine::Server& server, const void* data,
+                                                             std::size_t bytes,
+                                                             const lpdeform_options* options) {
+  if (data == nullptr) return argument_missing("data");
+  auto read = engine::read_options(options);
+  if (!read.ok()) return read.status();
+  return server.start(
+      [file = std::string(static_cast<const char*>(data), bytes), how = read->open](
+          client::Client& to, const std::stop_token& stop) { return to.open_snapshot(file, how, stop); },
+      read->facts);
+}
+
 absl::Status give(absl::StatusOr<std::shared_ptr<engine::LiveSession>> made, lpdeform_session** session) {
   if (!made.ok()) return made.status();
   *session = new lpdeform_session{*std::move(made)};
@@ -130,6 +148,17 @@ lpdeform_code write(lpdeform_session* session, const lpdeform_buffers* buffers, 
     return absl::OkStatus();
   });
   return code == LPDEFORM_OK && !is_there ? LPDEFORM_NO_FRAME : code;
+}
+
+lpdeform_notice notice_reason(client::Notice::Reason reason) {
+  switch (reason) {
+    case client::Notice::Reason::kOverloaded:
+      return LPDEFORM_NOTICE_OVERLOADED;
+    case client::Notice::Reason::kRecovered:
+      return LPDEFORM_NOTICE_RECOVERED;
+    default:
+      return LPDEFORM_NOTICE_OTHER;
+  }
 }
 
 }  // namespace
@@ -190,6 +219,37 @@ lpdeform_code lpdeform_join(lpdeform_client* with, const char* name, lpdeform_ro
   });
 }
 
+lpdeform_code lpdeform_restore(lpdeform_client* with, const void* data, size_t bytes,
+                               const lpdeform_options* options, lpdeform_session** session,
+                               lpdeform_error* error) {
+  return guarded(error, [&]() -> absl::Status {
+    if (with == nullptr) return argument_missing("client");
+    if (session == nullptr) return argument_missing("session");
+    return give(restore(*with->server, data, bytes, options), session);
+  });
+}
+
+lpdeform_code lpdeform_take_snapshot(lpdeform_session* session, lpdeform_snapshot** snapshot,
+                                     lpdeform_error* error) {
+  return guarded(error, [&]() -> absl::Status {
+    if (session == nullptr) return argument_missing("session");
+    if (snapshot == nullptr) return argument_missing("snapshot");
+    absl::StatusOr<std::string> file = session->live->snapshot();
+    if (!file.ok()) return file.status();
+    *snapshot = new lpdeform_snapshot{*std::move(file)};
+    return absl::OkStatus();
+  });
+}
+
+const void* lpdeform_snapshot_data(const lpdeform_snapshot* snapshot, size_t* bytes) {
+  if (bytes != nullptr) *bytes = snapshot == nullptr ? 0 : snapshot->file.size();
+  return snapshot == nullptr ? nullptr : snapshot->file.data();
+}
+
+void lpdeform_free_snapshot(lpdeform_snapshot* snapshot) {
+  delete snapshot;
+}
+
 void lpdeform_close(lpdeform_session* session) {
   if (session == nullptr) return;
   guarded(nullptr, [&] {
@@ -208,6 +268,17 @@ lpdeform_state lpdeform_session_state(const lpdeform_session* session, lpdeform_
     return said;
   });
   return state;
+}
+
+lpdeform_notice lpdeform_session_notice(const lpdeform_session* session, char* text, size_t bytes) {
+  lpdeform_notice said = LPDEFORM_NOTICE_NONE;
+  guarded(nullptr, [&] {
+    const std::optional<client::Notice> notice = session == nullptr ? std::nullopt : session->live->notice();
+    if (text != nullptr) engine::copy_text(notice ? notice->text : "", text, bytes);
+    if (notice) said = notice_reason(notice->reason);
+    return absl::OkStatus();
+  });
+  return said;
 }
 
 lpdeform_code lpdeform_session_name(const lpdeform_session* session, char* name, size_t bytes,

@@ -20,7 +20,7 @@
  * threads of its own, three a session, and calls nothing back.
  *
  * Memory. What a caller passes in is copied before the function returns and stays the caller's; nothing that
- * the library returns is to be freed but clients and sessions.
+ * the library returns is to be freed but clients, sessions and snapshots.
  *
  * Errors. Functions return a code (LPDEFORM_OK is 0) and fill in `error`, which may be NULL. A function that
  * returns an error has changed nothing. No exception leaves the library.
@@ -266,6 +266,26 @@ LPDEFORM_API lpdeform_code lpdeform_join(lpdeform_client* client, const char* na
                                          const lpdeform_options* options, lpdeform_session** session,
                                          lpdeform_error* error);
 
+/* A session as a file: mesh, handles, settings, what can be undone and the surface as it is. */
+typedef struct lpdeform_snapshot lpdeform_snapshot;
+
+/* WAITS for the session as a file, with every change before it; frames go on, and changes made meanwhile are sent after it. The
+ * snapshot is the caller's to lpdeform_free_snapshot. Errors: FAILED_PRECONDITION NOT_CONNECTED while there is no session on the
+ * server yet; DEADLINE_EXCEEDED after call_timeout_seconds; what the server says of it or of a change before it. */
+LPDEFORM_API lpdeform_code lpdeform_take_snapshot(lpdeform_session* session, lpdeform_snapshot** snapshot,
+                                                  lpdeform_error* error);
+/* What is to be written to a file, until the snapshot is freed. NULL, and 0 bytes, of NULL. Cannot fail. */
+LPDEFORM_API const void* lpdeform_snapshot_data(const lpdeform_snapshot* snapshot, size_t* bytes);
+/* NULL is fine. */
+LPDEFORM_API void lpdeform_free_snapshot(lpdeform_snapshot* snapshot);
+
+/* As lpdeform_open, of such a file, on any server of the same version or a later one; the surface is the same to the last bit,
+ * in the coordinates that `options` says. What the file says of the mesh (weights, free_components) is not asked of `options`.
+ * A file that is none, is damaged or of a newer version comes as LPDEFORM_STATE_REFUSED (SNAPSHOT_FOREIGN and so on). */
+LPDEFORM_API lpdeform_code lpdeform_restore(lpdeform_client* client, const void* data, size_t bytes,
+                                            const lpdeform_options* options, lpdeform_session** session,
+                                            lpdeform_error* error);
+
 /* The session is no more for the caller; its end on the server goes on by itself. NULL is fine. */
 LPDEFORM_API void lpdeform_close(lpdeform_session* session);
 
@@ -273,13 +293,26 @@ typedef int32_t lpdeform_state;
 enum {
   LPDEFORM_STATE_CONNECTING = 0, /* not yet there; `why` says what the last attempt met with */
   LPDEFORM_STATE_LIVE = 1,
-  LPDEFORM_STATE_RECONNECTING =
-      2,                     /* the server is away; the last frame stands, work goes on by itself after */
-  LPDEFORM_STATE_REFUSED = 3 /* over for good; `why` says why */
+  LPDEFORM_STATE_RECONNECTING = 2, /* the server is away: the last frame stands, work goes on after */
+  LPDEFORM_STATE_REFUSED = 3       /* over for good; `why` says why */
 };
 
 /* How the session is. `why` may be NULL; its code is LPDEFORM_OK where there is nothing to say. NULL is REFUSED. */
 LPDEFORM_API lpdeform_state lpdeform_session_state(const lpdeform_session* session, lpdeform_error* why);
+
+/* What a server says about itself; nothing failed. */
+typedef int32_t lpdeform_notice;
+enum {
+  LPDEFORM_NOTICE_NONE = 0,
+  LPDEFORM_NOTICE_OVERLOADED = 1, /* it has more to solve than it can: frames come less often */
+  LPDEFORM_NOTICE_RECOVERED = 2,  /* no more */
+  LPDEFORM_NOTICE_OTHER = 3       /* what only a newer server says */
+};
+
+/* What the server said last on the connection that there is; NONE where it said nothing, and of NULL. `text`, of `bytes` bytes,
+ * becomes one sentence for people, cut as those of errors; it may be NULL. For a line in a log when it changes. */
+LPDEFORM_API lpdeform_notice lpdeform_session_notice(const lpdeform_session* session, char* text,
+                                                     size_t bytes);
 
 /* "sessions/<32 hexadecimal digits>", for lpdeform_join; another one after the server lost it. FAILED_PRECONDITION while
  * there is none. INVALID_ARGUMENT where `bytes` are too few: 64 are enough. */
@@ -499,8 +532,8 @@ typedef struct lpdeform_frame {
 LPDEFORM_API lpdeform_code lpdeform_poll(lpdeform_session* session, const lpdeform_buffers* buffers,
                                          lpdeform_frame* frame, lpdeform_error* error);
 
-/* Writes the frame taken last, by whichever thread, once more, for engines whose buffers do not keep what was written. It can be had
- * also while the server is away and after the session is over. LPDEFORM_NO_FRAME where none was taken. */
+/* Writes the frame taken last, by whichever thread, once more, for engines whose buffers do not keep what was written; also
+ * while the server is away and after the session is over. LPDEFORM_NO_FRAME where none was taken. */
 LPDEFORM_API lpdeform_code lpdeform_repeat(lpdeform_session* session, const lpdeform_buffers* buffers,
                                            lpdeform_frame* frame, lpdeform_error* error);
 
@@ -516,11 +549,12 @@ typedef struct lpdeform_solve_options {
   double timeout_seconds; /* of the whole call, waiting for another included; 0 is without limit */
 } lpdeform_solve_options;
 
-/* WAITS for a solve of its own to the end, for the present handles and settings, and writes the result in full precision; for
- * tools. Works beside the frames, of which it takes none: frame_seq and epoch are 0. Normals need no with_normals.
- * `options` may be NULL. One at a time; while one runs no change is sent: those made meanwhile are sent after it, and frames do
- * not follow them until then. Errors: what the server refuses; DEADLINE_EXCEEDED; UNAVAILABLE where it stayed away for
- * reconnect_seconds; by lpdeform_disconnect CANCELLED, or FAILED_PRECONDITION SESSION_CLOSED where it had not begun. A solve that stopped short is no error: frame.stop_reason says so. */
+/* WAITS for a solve of its own to the end, for the present handles and settings, and writes the result in full precision;
+ * for tools. Takes no frames: frame_seq and epoch are 0. Normals need no with_normals. `options` may be NULL. One at a
+ * time; while one runs no change is sent: those made meanwhile are sent after it, and frames do not follow them until then.
+ * Errors: what the server refuses; DEADLINE_EXCEEDED; UNAVAILABLE where it stayed away for reconnect_seconds; by
+ * lpdeform_disconnect CANCELLED, or FAILED_PRECONDITION SESSION_CLOSED where it had not begun. A solve that stopped short
+ * is no error: frame.stop_reason says so. */
 LPDEFORM_API lpdeform_code lpdeform_solve(lpdeform_session* session, const lpdeform_solve_options* options,
                                           const lpdeform_buffers* buffers, lpdeform_frame* frame,
                                           lpdeform_error* error);

@@ -68,6 +68,10 @@ absl::StatusOr<std::uint64_t> Session::redo() {
   return link_->undo(true);
 }
 
+absl::StatusOr<std::string> Session::snapshot() {
+  return link_->snapshot();
+}
+
 absl::StatusOr<SolveResult> Session::solve(const SolveOptions& options) {
   return link_->solve(options);
 }
@@ -96,6 +100,10 @@ absl::Status Session::last_problem() const {
   return link_->last_problem();
 }
 
+std::optional<Notice> Session::notice() const {
+  return link_->notice();
+}
+
 MeshReport Session::mesh_report() const {
   return link_->mesh_report();
 }
@@ -121,8 +129,18 @@ absl::StatusOr<Client> Client::connect(std::string_view address, ClientOptions o
 absl::StatusOr<Session> Client::open(Mesh mesh, OpenOptions options, const std::stop_token& stop) {
   auto lease = create_session(*rpc_, mesh, options, new_request_id(), stop);
   if (!lease.ok()) return lease.status();
-  return Session(std::make_unique<Link>(rpc_, options_, std::move(options),
-                                        std::make_shared<const Mesh>(std::move(mesh)), *std::move(lease)));
+  Copy copy = copy_of(std::move(mesh), options);
+  return Session(
+      std::make_unique<Link>(rpc_, options_, std::move(options), std::move(copy), *std::move(lease)));
+}
+
+absl::StatusOr<Session> Client::open_snapshot(std::string file, OpenOptions options,
+                                              const std::stop_token& stop) {
+  auto lease = restore_session(*rpc_, file, new_request_id(), stop);
+  if (!lease.ok()) return lease.status();
+  Copy copy = copy_of(std::move(file), lease->mesh.vertices);
+  return Session(
+      std::make_unique<Link>(rpc_, options_, std::move(options), std::move(copy), *std::move(lease)));
 }
 
 absl::StatusOr<Session> Client::join(std::string_view session, Role role, OpenOptions options,
@@ -138,7 +156,7 @@ absl::StatusOr<Session> Client::join(std::string_view session, Role role, OpenOp
   }
   if (!lease.ok()) return lease.status();
   return Session(
-      std::make_unique<Link>(std::move(rpc), options_, std::move(options), nullptr, *std::move(lease)));
+      std::make_unique<Link>(std::move(rpc), options_, std::move(options), Copy(), *std::move(lease)));
 }
 
 absl::StatusOr<std::string> Client::snapshot(std::string_view session) {
@@ -146,7 +164,9 @@ absl::StatusOr<std::string> Client::snapshot(std::string_view session) {
 }
 
 absl::StatusOr<std::string> Client::restore(std::string_view snapshot) {
-  return restore_snapshot(*rpc_, snapshot, {});
+  const auto lease = restore_session(*rpc_, snapshot, new_request_id(), {});
+  if (!lease.ok()) return lease.status();
+  return lease->session;
 }
 
 absl::Status Client::remove(std::string_view session) {

@@ -138,6 +138,11 @@ class Session {
   /// DEADLINE_EXCEEDED (SOLVE_UNDER_WAY where it was spent waiting for another solve or update); UNAVAILABLE.
   absl::StatusOr<SolveResult> solve(const SolveOptions& options = {});
 
+  /// The session as a file, with every update before it: for Client::open_snapshot, see Client::snapshot. Waits for it to come in
+  /// parts; updates made meanwhile are sent after it. Errors: what the server says of an update before it; RESOURCE_EXHAUSTED,
+  /// DEADLINE_EXCEEDED, UNAVAILABLE; CANCELLED where close() is called meanwhile, FAILED_PRECONDITION SESSION_CLOSED after.
+  absl::StatusOr<std::string> snapshot();
+
   /// Becomes the writer in place of whoever is, after WRITER_REPLACED or as a reader. Waits for the server.
   absl::Status take_over();
 
@@ -149,6 +154,9 @@ class Session {
   absl::Status ended() const;
   /// What the connection met with when it was lost last, or when reconnecting was tried last; OK while it stands.
   absl::Status last_problem() const;
+  /// What the server said about itself last, on the stream of frames that there is. Empty where it said nothing, and while
+  /// the stream is down.
+  std::optional<Notice> notice() const;
   /// What the server found in the mesh.
   MeshReport mesh_report() const;
   Connection connection() const;
@@ -179,6 +187,13 @@ class Client {
   /// deformed; RESOURCE_EXHAUSTED; UNAVAILABLE. Keeps `mesh` for as long as the session lives.
   absl::StatusOr<Session> open(Mesh mesh, OpenOptions options = {}, const std::stop_token& stop = {});
 
+  /// Makes a session from a file of Session::snapshot or snapshot(), on any server of the same version or a later one, with the
+  /// same surface to the last bit. Of `options`, what the file says of the mesh (weights, free_components, weld) and settings are
+  /// not used. Where the server loses the session, it is made anew from `file` and from what came after. Waits.
+  /// INVALID_ARGUMENT (SNAPSHOT_FOREIGN, SNAPSHOT_NEWER, SNAPSHOT_TRUNCATED, SNAPSHOT_DAMAGED); otherwise as open().
+  absl::StatusOr<Session> open_snapshot(std::string file, OpenOptions options = {},
+                                        const std::stop_token& stop = {});
+
   /// Joins somebody's session by name: as a reader of its frames, or taking over as its writer. Such a
   /// session is not made anew where the server loses it, and not deleted by close(). NOT_FOUND where there is
   /// none.
@@ -189,9 +204,8 @@ class Client {
   /// to come in parts; the session goes on meanwhile. NOT_FOUND where there is none.
   absl::StatusOr<std::string> snapshot(std::string_view session);
 
-  /// Makes a session from such a file, on any server of the same version or a later one; its name, to join(). It shows the same
-  /// surface to the last bit, and goes when nobody has used it for a while, or by remove(). Waits. INVALID_ARGUMENT
-  /// (SNAPSHOT_FOREIGN, SNAPSHOT_NEWER, SNAPSHOT_TRUNCATED, SNAPSHOT_DAMAGED); otherwise as open().
+  /// Makes a session from such a file and leaves it on the server; its name, to join(). It goes when nobody has used it for a
+  /// while, or by remove(). Waits. Errors as open_snapshot().
   absl::StatusOr<std::string> restore(std::string_view snapshot);
 
   /// Deletes a session by name. OK where there is none.

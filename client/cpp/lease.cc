@@ -1,5 +1,6 @@
 #include "client/cpp/lease.h"
 
+#include <memory>
 #include <utility>
 
 #include "absl/strings/match.h"
@@ -9,6 +10,19 @@
 #include "client/cpp/wire.h"
 
 namespace lpdeform::client {
+
+Lease lease_of(const v1::Session& session, const std::string& writer_token) {
+  return {session.name(), writer_token, session.epoch(), session.input_seq(), from_wire(session.mesh()),
+          session.route()};
+}
+
+Copy copy_of(Mesh mesh, OpenOptions options) {
+  const auto kept = std::make_shared<const Mesh>(std::move(mesh));
+  return {.make = [kept, options = std::move(options)](Rpc& rpc, const std::string& request_id,
+                                                       const std::stop_token& stop) {
+    return create_session(rpc, *kept, options, request_id, stop);
+  }};
+}
 
 absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptions& options,
                                      const std::string& request_id, const std::stop_token& stop) {
@@ -34,8 +48,7 @@ absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptio
   const absl::Status checked =
       check_vertex_count(session.mesh().vertices(), static_cast<std::int64_t>(mesh.vertex_count()));
   if (!checked.ok()) return checked;
-  return Lease{session.name(),      created->writer_token(),   session.epoch(),
-               session.input_seq(), from_wire(session.mesh()), session.route()};
+  return lease_of(session, created->writer_token());
 }
 
 std::string route_of(const absl::Status& status) {
@@ -52,12 +65,7 @@ absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role ro
   get.set_session(session);
   const auto found = rpc.call(get, stop);
   if (!found.ok()) return found.status();
-  Lease lease{session,
-              "",
-              found->session().epoch(),
-              found->session().input_seq(),
-              from_wire(found->session().mesh()),
-              found->session().route()};
+  Lease lease = lease_of(found->session(), "");
   if (role == Role::kReader) return lease;
 
   v1::AcquireWriterRequest acquire;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <stop_token>
 #include <string>
 
@@ -20,9 +21,26 @@ struct Lease {
   std::string route;  // the header that leads to it, see Rpc::going_by; may be empty
 };
 
+/// Of a session that a server has told of.
+Lease lease_of(const v1::Session& session, const std::string& writer_token);
+
+/// What a session that the server has lost can be made anew from; nothing for one that was joined.
+struct Copy {
+  /// The same `request_id` gives the same session. Waits.
+  using Make = std::function<absl::StatusOr<Lease>(Rpc& rpc, const std::string& request_id,
+                                                   const std::stop_token& stop)>;
+  Make make = {};
+  bool is_bare = true;  // without handles: all that there were are sent after it
+
+  explicit operator bool() const { return make != nullptr; }
+};
+
 /// Makes a session. The same `request_id` gives the same one. Waits.
 absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptions& options,
                                      const std::string& request_id, const std::stop_token& stop);
+
+/// That does so again.
+Copy copy_of(Mesh mesh, OpenOptions options);
 
 /// What a status says of the header that leads to a session which is at another of several servers; empty where it says
 /// nothing of that.

@@ -23,6 +23,11 @@ void merge_change(Update::Change& older, Update::Change&& newer) {
   }
 }
 
+void forget_removals(Update& update) {
+  std::erase_if(update.handles,
+                [](const auto& entry) { return std::holds_alternative<Update::Removal>(entry.second); });
+}
+
 /// Leaves in `state` what is there once its motions and removals have been carried out.
 void settle_changes(Update& state) {
   std::erase_if(state.handles,
@@ -89,13 +94,15 @@ void Ledger::merge_accepted(NumberedUpdate update, bool is_kept) {
   } else if (update.seq >= unkept_.seq) {
     unkept_ = {};
   }
-  if (unkept_.update.handles.size() > accepted_.update.handles.size() + kMostRemembered) {
-    std::erase_if(unkept_.update.handles,
-                  [](const auto& entry) { return std::holds_alternative<Update::Removal>(entry.second); });
-  }
+  if (unkept_.update.handles.size() > accepted_.update.handles.size() + kMostRemembered)
+    forget_removals(unkept_.update);
   accepted_.seq = std::max(accepted_.seq, update.seq);
   merge(accepted_.update, std::move(update.update));
-  settle_changes(accepted_.update);
+  if (begins_bare_) {
+    settle_changes(accepted_.update);
+  } else if (accepted_.update.handles.size() > 2 * kMostRemembered) {
+    forget_removals(accepted_.update);
+  }
 }
 
 void Ledger::resumed_at(std::uint64_t seq) {

@@ -25,6 +25,9 @@ class Ledger {
  public:
   static constexpr std::size_t kWindow = 4;
 
+  /// `begins_bare`: a session made anew has no handles but those of this book, otherwise also those that it is made with.
+  explicit Ledger(bool begins_bare = true) : begins_bare_(begins_bare) {}
+
   /// Takes an update on; returns its number.
   std::uint64_t add(Update update);
 
@@ -71,8 +74,9 @@ class Ledger {
   static constexpr std::size_t kMostRemembered = 8192;
   void merge_accepted(NumberedUpdate update, bool is_kept);
 
+  const bool begins_bare_;
   std::uint64_t next_seq_ = 1;
-  NumberedUpdate accepted_;  // handles only as Handle, never as Motion or Removal
+  NumberedUpdate accepted_;  // where it begins bare, handles only as Handle, never as Motion or Removal
   NumberedUpdate unkept_;    // what was accepted since the server last kept something, as it came
   std::optional<NumberedUpdate> restore_;
   std::deque<NumberedUpdate> in_flight_;

@@ -34,13 +34,14 @@ v1::DeformRequest open_request(const Lease& lease, const OpenOptions& options) {
 
 }  // namespace
 
-Link::Link(std::shared_ptr<Rpc> rpc, ClientOptions client_options, OpenOptions options,
-           std::shared_ptr<const Mesh> copy, Lease lease)
+Link::Link(std::shared_ptr<Rpc> rpc, ClientOptions client_options, OpenOptions options, Copy copy,
+           Lease lease)
     : rpc_(std::move(rpc)),
       client_options_(client_options),
       options_(std::move(options)),
       copy_(std::move(copy)),
       lease_(std::move(lease)),
+      ledger_(copy_.is_bare),
       request_id_(new_request_id()) {
   ledger_.count_from(lease_.input_seq);
 }
@@ -87,6 +88,7 @@ absl::Status Link::one_stream() {
     uploads_in_use_.clear();  // these will expire
     uploads_done_.clear();
     go_away_.reset();
+    notice_.reset();
     broken_ = absl::OkStatus();
     last_heard_ = Clock::now();
     open = open_request(lease_, options_);
@@ -177,7 +179,7 @@ bool Link::recover(const absl::Status& ended, Backoff& backoff) {
   if (is_closing_) return false;
   if (is_to_reopen_) return true;
 
-  const Recovery recovery = recovery_after(ended, go_away_, copy_ != nullptr);
+  const Recovery recovery = recovery_after(ended, go_away_, bool{copy_});
   last_problem_ = recovery.why;
   const bool is_too_late = Clock::now() - last_open_ > client_options_.reconnect_for;
   if (recovery.next == NextStep::kGiveUp || is_too_late) {

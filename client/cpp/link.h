@@ -31,9 +31,7 @@ namespace lpdeform::client {
 /// to the server and no callback is made under it.
 class Link {
  public:
-  /// `copy`: what the session can be made anew from; empty for one that was joined.
-  Link(std::shared_ptr<Rpc> rpc, ClientOptions client_options, OpenOptions options,
-       std::shared_ptr<const Mesh> copy, Lease lease);
+  Link(std::shared_ptr<Rpc> rpc, ClientOptions client_options, OpenOptions options, Copy copy, Lease lease);
   ~Link();
 
   // As Session has them.
@@ -44,6 +42,7 @@ class Link {
   absl::StatusOr<Frame> settle(FrameBox::Clock::time_point deadline);
   bool is_result(const Frame& frame) const;
   absl::StatusOr<std::uint64_t> undo(bool redo);
+  absl::StatusOr<std::string> snapshot();
   absl::StatusOr<SolveResult> solve(const SolveOptions& options);
   absl::Status take_over();
   absl::Status close();
@@ -51,6 +50,7 @@ class Link {
   void start();
   absl::Status ended() const;
   absl::Status last_problem() const;
+  std::optional<Notice> notice() const;
   MeshReport mesh_report() const;
   Connection connection() const;
 
@@ -88,16 +88,19 @@ class Link {
   absl::Status send_restore(std::unique_lock<std::mutex>& lock);
   absl::Status send_by_call(std::unique_lock<std::mutex>& lock);
   absl::Status catch_up(std::unique_lock<std::mutex>& lock);
+  absl::Status send_waiting(std::unique_lock<std::mutex>& lock);
   absl::Status begin_alone(std::unique_lock<std::mutex>& lock, Clock::time_point deadline);
+  void end_alone(std::unique_lock<std::mutex>& lock);
   absl::StatusOr<v1::UndoUpdateResponse> undo_patiently(const v1::UndoUpdateRequest& request,
                                                         std::unique_lock<std::mutex>& lock);
+  absl::Status check_steps(const v1::UndoUpdateRequest& request, std::unique_lock<std::mutex>& lock);
   absl::Status make_anew(const std::string& lost);
   absl::Status no_frame() const;
 
   const std::shared_ptr<Rpc> rpc_;
   const ClientOptions client_options_;
   const OpenOptions options_;
-  const std::shared_ptr<const Mesh> copy_;
+  const Copy copy_;
   std::stop_source stop_;  // ends every call that is not a stream
   FrameBox box_;
 
@@ -107,7 +110,8 @@ class Link {
   std::condition_variable changed_;
   Lease lease_;
   Ledger ledger_;
-  std::string request_id_;  // of the session to be made next
+  std::string request_id_;     // of the session to be made next
+  bool is_made_anew_ = false;  // all its handles were sent in one update, after it was lost
   bool is_closing_ = false;
   bool is_solving_ = false;
   bool is_taking_over_ = false;
@@ -123,6 +127,7 @@ class Link {
   std::map<std::uint64_t, Uploads> uploads_in_use_;  // by the updates that name them
   std::vector<Uploads> uploads_done_;                // to be deleted
   std::optional<v1::GoAway> go_away_;
+  std::optional<Notice> notice_;
   absl::Status broken_;  // why we gave the stream up
   std::optional<FrameAssembly> assembly_;
   Clock::time_point last_heard_;

@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cpp/link.h"
 #include "client/cpp/names.h"
+#include "client/cpp/snapshot.h"
 #include "client/cpp/solve_call.h"
 #include "client/cpp/upload.h"
 #include "client/cpp/wire.h"
@@ -118,18 +119,18 @@ absl::Status Link::begin_alone(std::unique_lock<std::mutex>& lock, Clock::time_p
   return absl::OkStatus();
 }
 
+void Link::end_alone(std::unique_lock<std::mutex>& lock) {
+  if (!lock.owns_lock()) lock.lock();
+  is_solving_ = false;
+  changed_.notify_all();
+}
+
 absl::StatusOr<std::uint64_t> Link::undo(bool redo) {
   const Clock::time_point deadline = Clock::now() + client_options_.call_timeout;
   std::unique_lock lock(mutex_);
   if (absl::Status alone = begin_alone(lock, deadline); !alone.ok()) return alone;
-  const auto done = absl::MakeCleanup([this, &lock] {
-    if (!lock.owns_lock()) lock.lock();
-    is_solving_ = false;
-    changed_.notify_all();
-  });
-  while (ledger_.has_waiting()) {
-    if (absl::Status sent = send_by_call(lock); !sent.ok()) return sent;
-  }
+  const auto done = absl::MakeCleanup([this, &lock] { end_alone(lock); });
+  if (absl::Status sent = send_waiting(lock); !sent.ok()) return sent;
   const std::uint64_t seq = ledger_.take_number();
   v1::UndoUpdateRequest request;
   request.set_session(lease_.session);
@@ -144,6 +145,17 @@ absl::StatusOr<std::uint64_t> Link::undo(bool redo) {
   return seq;
 }
 
+absl::StatusOr<std::string> Link::snapshot() {
+  const Clock::time_point deadline = Clock::now() + client_options_.call_timeout;
+  std::unique_lock lock(mutex_);
+  if (absl::Status alone = begin_alone(lock, deadline); !alone.ok()) return alone;
+  const auto done = absl::MakeCleanup([this, &lock] { end_alone(lock); });
+  if (absl::Status sent = send_waiting(lock); !sent.ok()) return sent;
+  const std::string session = lease_.session;
+  lock.unlock();
+  return take_snapshot(*rpc_, session, stop_.get_token());
+}
+
 /// Sends what the server has no more, and only that: it would be a step to it.
 absl::Status Link::catch_up(std::unique_lock<std::mutex>& lock) {
   v1::GetSessionRequest request;
@@ -156,14 +168,34 @@ absl::Status Link::catch_up(std::unique_lock<std::mutex>& lock) {
   return send_restore(lock);
 }
 
+/// All the handles of a session that was made anew are a step to the server, and none to anybody else. FAILED_PRECONDITION
+/// NOTHING_TO_UNDO where that one is the newest.
+absl::Status Link::check_steps(const v1::UndoUpdateRequest& undo, std::unique_lock<std::mutex>& lock) {
+  if (undo.redo() || !is_made_anew_) return absl::OkStatus();
+  v1::GetSessionRequest request;
+  request.set_session(undo.session());
+  lock.unlock();
+  const auto found = rpc_->call(request, stop_.get_token());
+  lock.lock();
+  if (!found.ok()) return found.status();
+  if (found->session().undo_steps() > 1) return absl::OkStatus();
+  return make_fault(absl::StatusCode::kFailedPrecondition, {"NOTHING_TO_UNDO", "", ""},
+                    "The session was made anew, and knows no step from before.");
+}
+
 /// The same call again does no harm, so a server that went away may be asked again: after what it has lost. `lock` is held before
 /// and after.
 absl::StatusOr<v1::UndoUpdateResponse> Link::undo_patiently(const v1::UndoUpdateRequest& request,
                                                             std::unique_lock<std::mutex>& lock) {
   const Clock::time_point end = Clock::now() + client_options_.call_timeout;
   Backoff backoff;
+  bool is_checked = false;  // once, since a call that was taken and not answered has made the steps fewer
   absl::StatusOr<v1::UndoUpdateResponse> undone;
   for (absl::Status ready;; ready = catch_up(lock)) {
+    if (ready.ok() && !is_checked) {
+      ready = check_steps(request, lock);
+      is_checked = ready.ok();
+    }
     if (ready.ok()) {
       lock.unlock();
       undone = rpc_->call(request, stop_.get_token());
@@ -187,11 +219,7 @@ absl::StatusOr<SolveResult> Link::solve(const SolveOptions& options) {
   const Clock::time_point deadline = start + std::chrono::duration_cast<Clock::duration>(longest);
   std::unique_lock lock(mutex_);
   if (absl::Status alone = begin_alone(lock, deadline); !alone.ok()) return alone;
-  const auto solved = absl::MakeCleanup([this] {
-    const std::scoped_lock relock(mutex_);
-    is_solving_ = false;
-    changed_.notify_all();
-  });
+  const auto solved = absl::MakeCleanup([this, &lock] { end_alone(lock); });
   lock.unlock();
   return solve_patiently(options, start);
 }
@@ -231,7 +259,7 @@ absl::StatusOr<SolveResult> Link::solve_patiently(const SolveOptions& options, C
 absl::StatusOr<SolveResult> Link::solve_or_make_anew(const SolveOptions& options) {
   const std::string session = name();
   absl::StatusOr<SolveResult> result = solve_once(options);
-  if (!is_session_lost(result.status()) || copy_ == nullptr) return result;
+  if (!is_session_lost(result.status()) || !copy_) return result;
   const absl::Status made = make_anew(session);
   return made.ok() ? solve_once(options) : made;
 }
@@ -262,6 +290,14 @@ absl::StatusOr<SolveResult> Link::solve_once(const SolveOptions& options) {
 /// an update that is not.
 absl::Status Link::send_restore(std::unique_lock<std::mutex>& lock) {
   while (ledger_.has_restore()) {
+    if (absl::Status sent = send_by_call(lock); !sent.ok()) return sent;
+  }
+  return absl::OkStatus();
+}
+
+/// All updates that there are, by calls of their own.
+absl::Status Link::send_waiting(std::unique_lock<std::mutex>& lock) {
+  while (ledger_.has_waiting()) {
     if (absl::Status sent = send_by_call(lock); !sent.ok()) return sent;
   }
   return absl::OkStatus();
@@ -303,12 +339,13 @@ absl::Status Link::make_anew(const std::string& lost) {
     if (lease_.session != lost) return absl::OkStatus();  // another thread was faster
     request_id = request_id_;
   }
-  absl::StatusOr<Lease> made = create_session(*rpc_, *copy_, options_, request_id, stop_.get_token());
+  absl::StatusOr<Lease> made = copy_.make(*rpc_, request_id, stop_.get_token());
   if (!made.ok()) return made.status();
   const std::scoped_lock lock(mutex_);
   lease_ = *std::move(made);
   request_id_ = new_request_id();
   ledger_.session_lost();
+  is_made_anew_ = copy_.is_bare && ledger_.has_restore();
   box_.begin_session();
   return absl::OkStatus();
 }
@@ -347,7 +384,7 @@ absl::Status Link::close() {
     const std::scoped_lock lock(mutex_);
     if (is_closing_) return absl::OkStatus();
     is_closing_ = true;
-    is_ours_to_delete = copy_ != nullptr;
+    is_ours_to_delete = bool{copy_};
     if (call_ != nullptr) call_->cancel();
     changed_.notify_all();
   }
@@ -376,6 +413,11 @@ absl::Status Link::ended() const {
 absl::Status Link::last_problem() const {
   const std::scoped_lock lock(mutex_);
   return is_open_ ? absl::OkStatus() : last_problem_;
+}
+
+std::optional<Notice> Link::notice() const {
+  const std::scoped_lock lock(mutex_);
+  return is_open_ ? notice_ : std::nullopt;
 }
 
 MeshReport Link::mesh_report() const {

@@ -67,6 +67,11 @@ absl::Status Link::take(const v1::StreamEvent& event) {
       go_away_ = event.go_away();
       break;
     }
+    case v1::StreamEvent::kNotice: {
+      const std::scoped_lock lock(mutex_);
+      notice_ = from_wire(event.notice());
+      break;
+    }
     default:
       break;  // a heartbeat, or what a newer server says
   }

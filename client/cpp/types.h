@@ -207,6 +207,17 @@ struct Update {
   bool begins_step = false;
 };
 
+/// What a server says about itself; nothing failed.
+struct Notice {
+  enum class Reason {
+    kOther,       // what only a newer server says
+    kOverloaded,  // it has more to solve than it can: frames come less often, and the last one of an update later
+    kRecovered,  // no more
+  };
+  Reason reason = Reason::kOther;
+  std::string text = {};  // one sentence for people
+};
+
 /// One kind of defect of a mesh.
 struct Defect {
   std::string kind = {};  // "zero_area_faces"

@@ -303,6 +303,17 @@ absl::Status from_wire(const v1::Fault& fault) {
                     {fault.reason(), fault.element(), fault.limit()}, fault.text());
 }
 
+Notice from_wire(const v1::Notice& notice) {
+  switch (notice.reason()) {
+    case v1::NOTICE_REASON_OVERLOADED:
+      return {Notice::Reason::kOverloaded, notice.text()};
+    case v1::NOTICE_REASON_RECOVERED:
+      return {Notice::Reason::kRecovered, notice.text()};
+    default:
+      return {Notice::Reason::kOther, notice.text()};
+  }
+}
+
 std::string stop_reason_name(StopReason reason) {
   switch (reason) {
     case StopReason::kRunning:

@@ -35,5 +35,6 @@ IterationRecord from_wire(const v1::IterationRecord& record);
 void from_wire(const v1::SolveSummary& summary, SolveResult& out);
 /// The error that a stream reports. Keeps reason, element and limit.
 absl::Status from_wire(const v1::Fault& fault);
+Notice from_wire(const v1::Notice& notice);
 
 }  // namespace lpdeform::client

@@ -9,8 +9,8 @@
 #include <vector>
 
 /// The part of the Unreal sample that knows no engine: a session whose vertices are in Unreal's coordinates (left-handed, z up,
-/// centimetres; triangles counter-clockwise seen from outside), in C++17 around lpdeform.h. Errors are std::runtime_error in the constructor alone; on the game thread they
-/// are texts.
+/// centimetres; triangles counter-clockwise seen from outside), in C++17 around lpdeform.h. Errors are std::runtime_error in the
+/// constructor alone; on the game thread they are texts.
 class LpdeformFollower {
  public:
   /// x, y, z of each vertex, three indices a triangle; vertices at one position are one.

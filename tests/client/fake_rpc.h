@@ -207,6 +207,8 @@ class FakeRpc final : public Rpc {
     v1::GetSessionResponse response;
     response.mutable_session()->set_name(request.session());
     response.mutable_session()->mutable_mesh()->set_vertices(vertex_count_);
+    const std::scoped_lock lock(mutex_);
+    response.mutable_session()->set_undo_steps(undo_steps);
     return response;
   }
 
@@ -242,6 +244,8 @@ class FakeRpc final : public Rpc {
   absl::StatusOr<v1::UndoUpdateResponse> call(const v1::UndoUpdateRequest& request,
                                               const std::stop_token&) override {
     const std::scoped_lock lock(mutex_);
+    const bool is_again = !undone_.empty() && undone_.back().input_seq() == request.input_seq();
+    if (!is_again && !request.redo() && undo_steps > 0) --undo_steps;
     undone_.push_back(request);
     if (undone_.size() <= undos_away) return absl::UnavailableError("away");
     v1::UndoUpdateResponse response;
@@ -250,7 +254,8 @@ class FakeRpc final : public Rpc {
     return response;
   }
   std::vector<v1::HandleUpdate> undo_changes;
-  std::size_t undos_away = 0;  // so many are not answered first
+  std::size_t undos_away = 0;    // so many are taken and not answered first
+  std::uint32_t undo_steps = 0;  // that GetSession says there are; an undo makes them fewer
   std::vector<v1::UndoUpdateRequest> undone() {
     const std::scoped_lock lock(mutex_);
     return undone_;

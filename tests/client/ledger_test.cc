@@ -255,5 +255,18 @@ TEST(Ledger, AChangeThatTheServerMadeIsPartOfWhatItHasAccepted) {
   EXPECT_TRUE(ledger.send_next().update.handles.empty());
 }
 
+TEST(Ledger, OfASessionThatIsMadeWithHandlesItKeepsWhatBecameOfThem) {
+  Ledger ledger(false);
+  take(ledger, moving("tip", 1), false);
+  take(ledger, moving("tip", 2), false);
+  take(ledger, removing("base"), false);
+  ledger.session_lost();
+  ASSERT_TRUE(ledger.has_restore());
+  const Update again = ledger.send_next().update;
+  EXPECT_EQ(again.handles.size(), 2u);
+  EXPECT_EQ(translation_x(std::get<Motion>(again.handles.at("tip"))), 2);
+  EXPECT_TRUE(std::holds_alternative<Update::Removal>(again.handles.at("base")));
+}
+
 }  // namespace
 }  // namespace lpdeform::client

@@ -24,7 +24,7 @@ class LinkTest : public testing::Test {
     auto lease = create_session(*rpc_, mesh, {}, "id-of-the-first", {});
     ASSERT_TRUE(lease.ok());
     link_ = std::make_unique<Link>(rpc_, ClientOptions(), OpenOptions(),
-                                   std::make_shared<const Mesh>(std::move(mesh)), *std::move(lease));
+                                   copy_of(std::move(mesh), OpenOptions()), *std::move(lease));
   }
 
   /// The stream that the client opens next, answered with StreamOpened.

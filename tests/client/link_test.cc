@@ -297,6 +297,34 @@ TEST_F(LinkTest, SendsAgainAnUpdateWhoseUploadsTheServerDoesNotKnow) {
   EXPECT_EQ(fault_of(next_frame().status()).reason, "UPLOAD_UNKNOWN");
 }
 
+TEST_F(LinkTest, SaysWhatTheServerSaidAboutItselfForAsLongAsItsStreamLasts) {
+  open();
+  const auto stream = opened_stream();
+  EXPECT_FALSE(link_->notice());
+  v1::DeformResponse said;
+  const auto says = [&](v1::NoticeReason reason, const char* text) {
+    said.mutable_event()->mutable_notice()->set_reason(reason);
+    said.mutable_event()->mutable_notice()->set_text(text);
+    stream->say(said);
+    static std::uint64_t frame_seq = 0;
+    stream->say(frame(++frame_seq, 0));  // after which it was heard
+    EXPECT_TRUE(next_frame().ok());
+    return link_->notice().value_or(Notice{});
+  };
+  Notice notice = says(v1::NOTICE_REASON_OVERLOADED, "Too much.");
+  EXPECT_EQ(notice.reason, Notice::Reason::kOverloaded);
+  EXPECT_EQ(notice.text, "Too much.");
+  notice = says(v1::NOTICE_REASON_RECOVERED, "No more.");
+  EXPECT_EQ(notice.reason, Notice::Reason::kRecovered);
+  notice = says(static_cast<v1::NoticeReason>(9), "Something new.");
+  EXPECT_EQ(notice.reason, Notice::Reason::kOther);
+  EXPECT_EQ(notice.text, "Something new.");
+  stream->end(absl::UnavailableError("away"));
+  const auto next = rpc_->next_stream();
+  EXPECT_FALSE(link_->notice());
+  answered(next);
+}
+
 TEST_F(LinkTest, AnUndoIsAskedForAgainAfterWhatAServerThatWentAwayHasLost) {
   open();
   link_->update(adding("tip")).value();
@@ -335,6 +363,31 @@ TEST_F(LinkTest, AnUndoGoesAfterAllUpdatesAndIsPartOfWhatASessionMadeAnewGets) {
   ASSERT_TRUE(all && all->has_update());
   ASSERT_EQ(all->update().handles_size(), 1);
   EXPECT_EQ(all->update().handles(0).name(), "tip");
+}
+
+TEST_F(LinkTest, AnUndoInASessionMadeAnewTakesBackWhatCameAfterThatAndNotAllItsHandles) {
+  open();
+  const auto stream = opened_stream();
+  link_->update(adding("tip")).value();
+  ASSERT_TRUE(stream->hear());
+  stream->say(result(1));
+  stream->say(go_away(v1::GO_AWAY_REASON_SESSION_EXPIRED));
+  stream->end(absl::OkStatus());
+  const auto anew = answered(rpc_->next_stream());
+  const auto all = anew->hear();
+  ASSERT_TRUE(all && all->has_update());
+  anew->say(result(all->update().input_seq()));
+  rpc_->undo_steps = 1;  // all the handles at once
+  const auto refused = link_->undo(false);
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(fault_of(refused.status()).reason, "NOTHING_TO_UNDO");
+  EXPECT_TRUE(rpc_->undone().empty());
+  rpc_->undo_steps = 2;
+  rpc_->undos_away = 1;  // the server takes it, and the answer is lost
+  const auto undone = link_->undo(false);
+  ASSERT_TRUE(undone.ok()) << undone.status();
+  EXPECT_EQ(rpc_->undone().size(), 2u);
+  ASSERT_TRUE(link_->undo(true).ok());  // what was taken back may be done again all the same
 }
 
 }  // namespace

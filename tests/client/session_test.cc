@@ -324,6 +324,15 @@ TEST_F(SessionTest, ASnapshotMakesTheSameSessionOnAnotherServer) {
   EXPECT_TRUE(copy.settle(kPatience).ok());
   EXPECT_EQ(fault_of(client.restore("nothing of the kind").status()).reason, "SNAPSHOT_FOREIGN");
   EXPECT_EQ(fault_of(client.snapshot("sessions/none").status()).reason, "SESSION_UNKNOWN");
+  EXPECT_TRUE(copy.close().ok());
+  Session opened = client.open_snapshot(session.snapshot().value()).value();
+  EXPECT_TRUE(opened.move("middle", twist(20)).ok());
+  EXPECT_TRUE(opened.settle(kPatience).ok());
+  const std::string opened_name = opened.name();
+  EXPECT_TRUE(opened.close().ok());  // which deletes it, since it was made here
+  EXPECT_EQ(fault_of(client.snapshot(opened_name).status()).reason, "SESSION_UNKNOWN");
+  EXPECT_EQ(fault_of(client.open_snapshot("nothing of the kind").status()).reason, "SNAPSHOT_FOREIGN");
+  EXPECT_EQ(fault_of(opened.snapshot().status()).reason, "SESSION_CLOSED");
   EXPECT_TRUE(client.remove(*name).ok());
   EXPECT_EQ(fault_of(client.snapshot(*name).status()).reason, "SESSION_UNKNOWN");
 }

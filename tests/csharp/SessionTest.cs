@@ -289,6 +289,36 @@ static class SessionTest
         }
     }
 
+    static void ASessionLeavesAsAFileAndComesBackTheSame()
+    {
+        using (var client = new Client(server.Address))
+        {
+            var positions = new float[66];
+            byte[] file;
+            using (var session = OpenStrip(client))
+            {
+                session.Settle(positions);
+                session.Handles.Move("tip", Motion.Move(0, 3, 0));
+                session.Settle(positions);
+                file = session.Snapshot();
+            }
+            using (var session = client.Restore(file))
+            {
+                var restored = new float[66];
+                Eventually(() => session.TryGetFrame(restored), "a frame");
+                Expect(restored.Zip(positions, (a, b) => Math.Abs(a - b)).Max() < 1e-3, "the same, or a step further");
+                session.Undo();
+                session.Settle(restored);
+                Expect(restored[3 * 20 + 1] == 2, "its steps came along");
+            }
+            using (var session = client.Restore(new byte[] { 1, 2, 3 }))
+            {
+                Eventually(() => session.State == SessionState.Refused, "refused");
+                Expect(session.Problem.Reason == "SNAPSHOT_FOREIGN", session.Problem.Reason);
+            }
+        }
+    }
+
     static void SettingsAndReaders()
     {
         using (var client = new Client(server.Address))
@@ -320,7 +350,7 @@ static class SessionTest
         var tests = new Action[] { FramesComeIntoTheCallersSpans, ErrorsCarryTheServersReason, ARefusedMeshIsAState,
                                    WorkGoesOnWhenTheServerComesBack, PerFrameCallsMakeNoGarbage, EmptyArraysAreNothing,
                                    TextsThatCannotBeSaidAreRefused, TargetsPointsAndRegions, ASolveIsItsOwnResult, StepsAreTakenBackAndDoneAgain,
-                                   ResizingScalesAlongUnitysAxes, SettingsAndReaders };
+                                   ResizingScalesAlongUnitysAxes, ASessionLeavesAsAFileAndComesBackTheSame, SettingsAndReaders };
         int failed = 0;
         using (server = new Server(arguments[0]))
         {

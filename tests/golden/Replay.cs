@@ -63,7 +63,15 @@ static class Replay
 
     static void TellFrame(Client client, string name, FrameEncoding encoding, bool doublePrecision)
     {
-        using (var session = OpenStrip(client, encoding, doublePrecision)) TellResult(name, session);
+        using (var session = OpenStrip(client, encoding, doublePrecision))
+        {
+            var notices = 0;
+            session.Noticed += notice => notices += notice.Equals(session.Notice) ? 1 : 0;
+            TellResult(name, session);
+            for (int k = 0; k < 3; ++k) session.TryGetFrame(new float[66]);
+            var text = notices == 1 ? session.Notice.Text : "raised " + notices + " times";
+            output.Write("{0} notice: {1}, {2}\n", name, session.Notice.Reason.ToString().ToLowerInvariant(), text);
+        }
     }
 
     static void TellUndo(Client client)
@@ -74,6 +82,13 @@ static class Replay
             session.Handles.Move("tip", Motion.Move(0, 0, 1));
             session.Undo();
             TellResult("undo", session);
+            var file = session.Snapshot();
+            output.Write("snapshot: {0} bytes\n", file.Length);
+            using (var restored = client.Restore(file, own))
+            {
+                while (restored.State == SessionState.Connecting) Thread.Sleep(1);
+                output.Write("restored: {0}\n", restored.Name);
+            }
         }
     }
 

@@ -384,6 +384,7 @@ Recording record(v1::DeformService::Stub& stub, const std::string& errors_md) {
       out.numbers.push_back(out.numbers.back());
     }
     out.expected += lines_of(way.name, stream.frame().header(), out.numbers.back());
+    out.expected += std::string(way.name) + " notice: overloaded, " + notice().event().notice().text() + "\n";
   }
   const Undo undone = record_undo(stub);
   out.frames["undo"] = {{"response", encoded(undone.response)}, {"result", encoded(undone.result)}};

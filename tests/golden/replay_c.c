@@ -100,9 +100,34 @@ static void tell_result(const char* name, lpdeform_session* session) {
 static void tell_frame(lpdeform_client* client, const char* name, lpdeform_encoding encoding,
                        uint32_t double_precision) {
   lpdeform_session* const session = open_strip(client, encoding, double_precision);
+  char text[200];
+  lpdeform_notice notice;
   hold(session);
   tell_result(name, session);
+  notice = lpdeform_session_notice(session, text, sizeof text);
+  printf("%s notice: %s, %s\n", name, notice == LPDEFORM_NOTICE_OVERLOADED ? "overloaded" : "otherwise", text);
   lpdeform_close(session);
+}
+
+static void tell_snapshot(lpdeform_client* client, lpdeform_session* session) {
+  const struct timespec a_moment = {0, 1000000};
+  lpdeform_snapshot* snapshot = NULL;
+  lpdeform_session* restored = NULL;
+  size_t bytes;
+  const void* data;
+  char name[64];
+  check(lpdeform_take_snapshot(session, &snapshot, &error));
+  data = lpdeform_snapshot_data(snapshot, &bytes);
+  printf("snapshot: %zu bytes\n", bytes);
+  check(lpdeform_restore(client, data, bytes, NULL, &restored, &error));
+  lpdeform_free_snapshot(snapshot);
+  while (lpdeform_session_name(restored, name, sizeof name, &error) != LPDEFORM_OK) {
+    lpdeform_session_state(restored, &error);
+    check(error.code);
+    nanosleep(&a_moment, NULL);
+  }
+  printf("restored: %s\n", name);
+  lpdeform_close(restored);
 }
 
 static void tell_undo(lpdeform_client* client) {
@@ -114,6 +139,7 @@ static void tell_undo(lpdeform_client* client) {
   check(lpdeform_move_handle(session, "tip", &elsewhere, NULL, &error));
   check(lpdeform_undo(session, NULL, &error));
   tell_result("undo", session);
+  tell_snapshot(client, session);
   lpdeform_close(session);
 }
 

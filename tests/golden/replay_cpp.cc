@@ -62,6 +62,9 @@ Session open(Client& client, Encoding encoding, bool double_precision) {
 void tell_frame(Client& client, const char* name, Encoding encoding, bool double_precision) {
   Session session = open(client, encoding, double_precision);
   tell_frame(name, session.settle(kPatience).value());
+  const Notice notice = session.notice().value();
+  std::printf("%s notice: %s, %s\n", name,
+              notice.reason == Notice::Reason::kOverloaded ? "overloaded" : "otherwise", notice.text.c_str());
 }
 
 void tell_calls(Client& client) {
@@ -70,9 +73,9 @@ void tell_calls(Client& client) {
   session.move("tip", RigidMotion{.translation = {0, 0, 1}}).value();
   session.undo().value();
   tell_frame("undo", session.settle(kPatience).value());
-  const std::string file = client.snapshot(session.name()).value();
+  const std::string file = session.snapshot().value();
   std::printf("snapshot: %zu bytes\n", file.size());
-  std::printf("restored: %s\n", client.restore(file).value().c_str());
+  std::printf("restored: %s\n", client.open_snapshot(file).value().name().c_str());
 }
 
 }  // namespace

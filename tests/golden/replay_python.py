@@ -57,6 +57,7 @@ def main(address, errors):
     for encoding in ("float64", "float32", "quantized", "compressed"):
         with open_strip(address, encoding) as session:
             tell_frame(encoding, session.settle(30))
+            print(f"{encoding} notice: {session.notice.reason}, {session.notice.text}")
     tell_calls(address)
     for k in range(errors):
         try:

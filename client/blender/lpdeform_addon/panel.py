@@ -32,7 +32,7 @@ class MainPanel(bpy.types.Panel):
         else:
             layout.label(text=_words[running.state].format(address()), icon="LINKED")
             if running.shown is not None and running.shown.optimality_gap is not None:
-                layout.label(text=f"Within {100 * running.shown.optimality_gap:.2g} % of the optimum", icon="CHECKMARK")
+                layout.label(text=f"Optimal to {100 * running.shown.optimality_gap:.2g} %", icon="CHECKMARK")
             column = layout.column(align=True)
             column.operator("lpdeform.solve", icon="SHADERFX")
             column.operator("lpdeform.stop", icon="X")
@@ -67,7 +67,7 @@ class MaterialPanel(_Below, bpy.types.Panel):
         for name in ("p", "stiffness"):
             column = self.layout.column(align=True)
             column.enabled = tuple(ob.lpdeform.resize) == (1.0, 1.0, 1.0)  # which gives both
-            column.prop(ob.lpdeform, f"{name}_automatic")
+            column.prop(ob.lpdeform, f"{name}_automatic", text="By shape")
             if getattr(ob.lpdeform, f"{name}_automatic") > 0:
                 continue
             column.prop(ob.lpdeform, name)

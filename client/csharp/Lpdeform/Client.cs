@@ -95,6 +95,19 @@ namespace Lpdeform
             return new Session(session);
         }
 
+        /// Begins to make a session from a file of Session.Snapshot; does not wait. The surface is the same to the last bit, in the
+        /// coordinates that `options` says. A file that is none is the state Refused, with why.
+        public Session Restore(byte[] snapshot, SessionOptions options = null)
+        {
+            if (snapshot == null) throw new ArgumentNullException("snapshot");
+            var error = LpdeformException.NewError();
+            IntPtr session;
+            var native = (options ?? new SessionOptions()).ToNative();
+            LpdeformException.Check(
+                Native.lpdeform_restore(client, snapshot, (UIntPtr)(uint)snapshot.Length, ref native, out session, error), error);
+            return new Session(session);
+        }
+
         /// Waits until the sessions are closed, usually milliseconds. To be called before the process ends.
         public void Dispose()
         {

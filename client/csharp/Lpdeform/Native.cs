@@ -149,9 +149,20 @@ namespace Lpdeform
         public static extern int lpdeform_join(IntPtr client, IntPtr name, int role, ref Options options, out IntPtr session,
                                                byte[] error);
         [DllImport(Library, CallingConvention = C)]
+        public static extern int lpdeform_restore(IntPtr client, byte[] data, UIntPtr bytes, ref Options options, out IntPtr session,
+                                                  byte[] error);
+        [DllImport(Library, CallingConvention = C)]
+        public static extern int lpdeform_take_snapshot(IntPtr session, out IntPtr snapshot, byte[] error);
+        [DllImport(Library, CallingConvention = C)]
+        public static extern IntPtr lpdeform_snapshot_data(IntPtr snapshot, out UIntPtr bytes);
+        [DllImport(Library, CallingConvention = C)]
+        public static extern void lpdeform_free_snapshot(IntPtr snapshot);
+        [DllImport(Library, CallingConvention = C)]
         public static extern void lpdeform_close(IntPtr session);
         [DllImport(Library, CallingConvention = C)]
         public static extern int lpdeform_session_state(IntPtr session, byte[] error);
+        [DllImport(Library, CallingConvention = C)]
+        public static extern int lpdeform_session_notice(IntPtr session, byte[] text, UIntPtr bytes);
         [DllImport(Library, CallingConvention = C)]
         public static extern int lpdeform_session_name(IntPtr session, byte[] name, UIntPtr bytes, byte[] error);
         [DllImport(Library, CallingConvention = C)]

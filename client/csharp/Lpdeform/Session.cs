@@ -3,8 +3,8 @@ using System.Runtime.InteropServices;
 
 namespace Lpdeform
 {
-    /// A mesh that deforms on a server while its handles are moved. Nothing here waits but Settle, Solve, Undo and Redo. Members may be used from
-    /// any thread, except that Dispose must not overlap another.
+    /// A mesh that deforms on a server while its handles are moved. Nothing here waits but Settle, Solve, Undo, Redo and Snapshot. Members
+    /// may be used from any thread, except that Dispose must not overlap another.
     public sealed unsafe class Session : IDisposable
     {
         IntPtr session;
@@ -48,6 +48,32 @@ namespace Lpdeform
                 Native.lpdeform_session_state(Pointer, error);
                 return LpdeformException.From(error);
             }
+        }
+
+        /// What the server said about itself last.
+        public Notice Notice
+        {
+            get
+            {
+                var text = new byte[512];
+                var reason = (NoticeReason)Native.lpdeform_session_notice(Pointer, text, (UIntPtr)(uint)text.Length);
+                return new Notice { Reason = reason, Text = System.Text.Encoding.UTF8.GetString(text, 0, Array.IndexOf(text, (byte)0)) };
+            }
+        }
+
+        /// Notice is another one. Raised by TryGetFrame, before it looks for a frame, on the thread that calls it.
+        public event Action<Notice> Noticed;
+
+        NoticeReason noticed;
+
+        void TellNotice()
+        {
+            var told = Noticed;
+            if (told == null || (NoticeReason)Native.lpdeform_session_notice(Pointer, null, UIntPtr.Zero) == noticed) return;
+            var notice = Notice;
+            if (notice.Reason == noticed) return;
+            noticed = notice.Reason;
+            told(notice);
         }
 
         /// "sessions/...", for Client.Join.
@@ -134,6 +160,27 @@ namespace Lpdeform
             return inputSeq;
         }
 
+        /// Waits for the session as a file, for Client.Restore: mesh, handles, settings, what can be undone and the surface as it is, with
+        /// every change before it.
+        public byte[] Snapshot()
+        {
+            IntPtr snapshot;
+            var error = LpdeformException.NewError();
+            LpdeformException.Check(Native.lpdeform_take_snapshot(Pointer, out snapshot, error), error);
+            try
+            {
+                UIntPtr bytes;
+                var data = Native.lpdeform_snapshot_data(snapshot, out bytes);
+                var file = new byte[checked((int)bytes)];
+                Marshal.Copy(data, file, 0, file.Length);
+                return file;
+            }
+            finally
+            {
+                Native.lpdeform_free_snapshot(snapshot);
+            }
+        }
+
         ulong Set(Native.Settings settings)
         {
             ulong inputSeq;
@@ -159,6 +206,7 @@ namespace Lpdeform
         /// The same with normals, colours and distortion.
         public bool TryGetFrame(FrameBuffers buffers, out Frame frame)
         {
+            TellNotice();
             return Write(buffers, out frame, Asked.New, 0);
         }
 

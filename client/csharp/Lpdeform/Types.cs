@@ -146,6 +146,18 @@ namespace Lpdeform
     }
 
     public enum SessionState { Connecting, Live, Reconnecting, Refused }
+    public enum NoticeReason { None, Overloaded, Recovered, Other }
+
+    /// What a server says about itself; nothing failed.
+    public struct Notice
+    {
+        /// None: nothing, on the connection that there is. After Overloaded frames come less often, and the last one of a change
+        /// later, until Recovered. Other: of a newer server.
+        public NoticeReason Reason;
+        /// One sentence for people.
+        public string Text;
+    }
+
     public enum StopReason { Running, Converged, IterationLimit, TimeLimit, Cancelled, Stalled, NumericalBreakdown }
 
     /// What is to be known of a frame.

@@ -73,6 +73,7 @@ public sealed class LpdeformMesh : MonoBehaviour
             WeldByPosition = true  // Unity has several vertices along seams
         };
         session = client.Open(data, new SessionOptions { WithNormals = true, FreeComponents = FreeComponents.Follow });
+        session.Noticed += notice => { if (notice.Reason != NoticeReason.None) Debug.Log("lpdeform: " + notice.Text, this); };
         foreach (var handle in handles) Hold(handle);
     }
 

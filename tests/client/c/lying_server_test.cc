@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <string>
@@ -49,6 +50,9 @@ class LyingServer final : public v1::DeformService::Service {
     response.mutable_event()->mutable_opened()->set_vertex_count(opened);
     response.mutable_event()->mutable_opened()->set_epoch(1);
     stream->Write(response);
+    response.mutable_event()->mutable_notice()->set_reason(v1::NOTICE_REASON_OVERLOADED);
+    response.mutable_event()->mutable_notice()->set_text("Too m\u00fcch to do.");
+    if (is_overloaded) stream->Write(response);
     v1::FramePart& part = *response.mutable_event()->mutable_frame();
     part.set_vertex_count(framed);
     part.set_positions(std::string(12 * framed, '\1'));
@@ -66,7 +70,7 @@ class LyingServer final : public v1::DeformService::Service {
   std::uint32_t created = 3, opened = 3, framed = 3;
   std::atomic<int> calls = 0, deletions = 0;
   int failures = 0;
-  bool hangs = false, deletion_hangs = false;
+  bool hangs = false, deletion_hangs = false, is_overloaded = false;
 };
 
 class LyingServerTest : public testing::Test {
@@ -122,6 +126,33 @@ TEST_F(LyingServerTest, TheTruthIsTaken) {
   const lpdeform_buffers buffers = buffers_of(points);
   EXPECT_EQ(lpdeform_settle(session_, kPatienceSeconds, &buffers, nullptr, &error_), LPDEFORM_OK)
       << error_.message;
+}
+
+TEST_F(LyingServerTest, WhatAServerSaysAboutItselfIsHandedOnAndCutWhereThereIsNoRoom) {
+  service_.is_overloaded = true;
+  start();
+  std::vector<Point> points(3);
+  const lpdeform_buffers buffers = buffers_of(points);
+  EXPECT_EQ(lpdeform_settle(session_, kPatienceSeconds, &buffers, nullptr, &error_), LPDEFORM_OK);
+  const auto said = [&](std::size_t bytes) {
+    std::vector<char> text(bytes + 1, '#');
+    EXPECT_EQ(lpdeform_session_notice(session_, text.data(), bytes), LPDEFORM_NOTICE_OVERLOADED);
+    EXPECT_EQ(text.back(), '#');  // nobody writes beyond
+    return std::string(text.data(), std::find(text.begin(), text.end(), '\0') - text.begin());
+  };
+  EXPECT_EQ(said(100), "Too m\u00fcch to do.");
+  EXPECT_EQ(said(17), "Too m\u00fcch to do.");
+  EXPECT_EQ(said(11), "Too m\u00fc...");
+  EXPECT_EQ(said(10), "Too m...");  // and not half of a character
+  EXPECT_EQ(said(3), "..");
+  EXPECT_EQ(said(1), "");
+  EXPECT_EQ(said(0), "#");
+  EXPECT_EQ(lpdeform_session_notice(session_, nullptr, 0), LPDEFORM_NOTICE_OVERLOADED);
+  EXPECT_EQ(lpdeform_session_notice(nullptr, nullptr, 0), LPDEFORM_NOTICE_NONE);
+  server_->Shutdown(std::chrono::system_clock::now());
+  server_.reset();
+  EXPECT_TRUE(
+      eventually([&] { return lpdeform_session_notice(session_, nullptr, 0) == LPDEFORM_NOTICE_NONE; }));
 }
 
 TEST_F(LyingServerTest, ClosingDoesNotWaitForAServerThatHangs) {

@@ -64,6 +64,23 @@ TEST_F(CStepsTest, AStepIsTakenBackAndDoneAgain) {
   EXPECT_EQ(lpdeform_undo(nullptr, nullptr, &error_), LPDEFORM_INVALID_ARGUMENT);
 }
 
+TEST_F(CStepsTest, ASessionMadeAnewTakesBackWhatCameAfterThatAndNotAllItsHandles) {
+  open(strip_.mesh());
+  hold("base", {0, 1});
+  hold("tip", {20, 21}, shift(0, 1, 0));
+  EXPECT_EQ(height(), 1);
+  server_.stop();
+  server_.start_again();
+  lift(3);
+  EXPECT_EQ(height(), 3);
+  ASSERT_EQ(lpdeform_undo(session_, nullptr, &error_), LPDEFORM_OK) << error_.message;
+  EXPECT_EQ(height(), 1);
+  EXPECT_EQ(lpdeform_undo(session_, nullptr, &error_), LPDEFORM_FAILED_PRECONDITION);
+  EXPECT_STREQ(error_.reason, "NOTHING_TO_UNDO");
+  ASSERT_EQ(lpdeform_redo(session_, nullptr, &error_), LPDEFORM_OK) << error_.message;
+  EXPECT_EQ(height(), 3);
+}
+
 TEST_F(CStepsTest, AReaderTakesNothingBack) {
   open(strip_.mesh());
   hold("base", {0, 1});

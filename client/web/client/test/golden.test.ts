@@ -115,7 +115,9 @@ test.each(frames.streams.filter(({ name }) => name !== "float64"))("the recorded
       server.stream.queue.push({ stream: 0, event: { event: response.value.event as never } });
   }
   const frame = await session.settle();
-  expect(linesOf(stream.name, frame)).toEqual(expected.filter((line) => line.startsWith(stream.name)));
+  const { reason, text } = session.notice!;
+  const said = [...linesOf(stream.name, frame), `${stream.name} notice: ${reason}, ${text}`];
+  expect(said).toEqual(expected.filter((line) => line.startsWith(stream.name)));
 });
 
 test("the recorded undo", async () => {
