@@ -8,13 +8,12 @@ import { type Detail, shapeKinds } from "../model/shapes.js";
 import { nothing, type PointedOut } from "../model/pointed.js";
 import { State } from "../model/state.js";
 import { firstView, type View } from "../model/view.js";
-import { capital } from "../model/words.js";
 import type { Look, Stage } from "../stage/stage.js";
 import { say, type Status } from "../link/status.js";
 import { Pace } from "./pace.js";
 import { Editing } from "./editing.js";
-import { Pane } from "./pane.js";
-import { placeOf, watchPlaces } from "./sides.js";
+import type { Pane } from "./pane.js";
+import { Panes } from "./panes.js";
 
 /** What the page shows beside the pictures. */
 export interface Facts {
@@ -51,16 +50,6 @@ export interface Kept {
   look: Look;
 }
 
-/** What keys do in a picture, for those who have it read to them. */
-const keysText = document.createElement("p");
-keysText.id = "picture-keys";
-keysText.className = "unseen";
-keysText.textContent =
-  "Enter shows a cross: arrow keys move it, Enter places a handle there or selects the one that is there, Escape hides it. " +
-  "Arrow keys and Page Up and Down move the selected handle, turn it where it has rings (R), and turn the view where none is " +
-  "selected. Control and arrow keys turn the view, with " +
-  "Shift they shift it; plus and minus zoom.";
-
 const noMesh: Mesh = { name: "", positions: new Float32Array(0), faces: new Uint32Array(0) };
 
 /** The page's one object: the work, how it is looked at, the panes; and the loop that draws them. */
@@ -68,8 +57,6 @@ export class App {
   readonly view = new State<View>(firstView);
   readonly facts: State<Facts>;
   readonly history = new History<Document>(emptyDocument, isAlike);
-  readonly stages = document.createElement("div");
-  panes: Pane[] = [];
   adjacency: Adjacency = adjacencyOf(0, noMesh.faces);
   diagonal = 1;
   edge = 0;
@@ -78,9 +65,18 @@ export class App {
   #aside: Aside | undefined;
   #isBroughtBack = false;
   #isKeyHeld = false;
-  #turned: Pane | undefined;
   #asked = 0;
   readonly #pace = new Pace(() => this.requestDraw());
+  readonly #panes = new Panes(
+    {
+      changed: () => this.requestDraw(),
+      status: () => this.#statusChanged(),
+      report: (report) => this.facts.set({ report }),
+      problem: (problem) => this.facts.set({ problem }),
+      notice: (text) => this.notify(text),
+    },
+    (pane) => new Editing(this, pane),
+  );
   #needsColours = true;
   #needsMarks = true;
 
@@ -98,17 +94,23 @@ export class App {
       canUndo: false,
       canRedo: false,
     });
-    this.stages.className = "stages";
-    this.stages.append(keysText);
-    this.#addPane(this.#makePane("first"));
+    this.#panes.add("first");
     this.view.watch((view, before) => this.#viewChanged(view, before));
     this.facts.watch((facts, before) => {
       if (facts.pointedOut !== before.pointedOut) this.#needsMarks = true;
       this.requestDraw();
     });
-    watchPlaces(() => this.#namePanes());
     new ResizeObserver(() => this.requestDraw()).observe(this.stages);
     for (const end of ["keyup", "blur"]) window.addEventListener(end, () => this.#keyUp());
+  }
+
+  get panes(): readonly Pane[] {
+    return this.#panes.all;
+  }
+
+  /** Where the panes are on the page. */
+  get stages(): HTMLElement {
+    return this.#panes.element;
   }
 
   get document(): Document {
@@ -275,13 +277,11 @@ export class App {
 
   /** By keys: of the picture that has the focus, or the first; the other one follows. */
   changeView(change: (stage: Stage) => void): void {
-    const pane = this.panes.find(({ stage }) => stage.canvas === globalThis.document.activeElement) ?? this.panes[0]!;
-    this.#turned = pane;
-    change(pane.stage);
+    this.#panes.changeView(change);
   }
 
   lookFrom(look: Look): void {
-    for (const pane of this.panes) pane.stage.lookFrom(look);
+    this.#panes.lookFrom(look);
   }
 
   // The panes.
@@ -338,69 +338,27 @@ export class App {
     }
   }
 
-  /** Throws where the browser does not draw it. */
-  #makePane(side: "first" | "second"): Pane {
-    const pane: Pane = new Pane(side, {
-      changed: () => {
-        this.#follow(pane);
-        this.requestDraw();
-      },
-      status: () => this.#statusChanged(),
-      report: (report) => this.facts.set({ report }),
-      problem: (problem) => this.facts.set({ problem }),
-      notice: (text) => this.notify(text),
-    });
-    return pane;
-  }
-
-  #addPane(pane: Pane): void {
-    for (const turning of ["pointerdown", "wheel"]) {
-      pane.element.addEventListener(turning, () => (this.#turned = pane), { capture: true, passive: true });
-    }
-    new Editing(this, pane);
-    pane.stage.startControls();
-    this.panes.push(pane);
-    this.stages.append(pane.element);
-    if (this.mesh === noMesh) return;
-    pane.open(this.mesh, this.document, this.view.now);
-  }
-
-  /** False, with a word about it, where the browser draws no second picture: it has only so many. */
+  /** False, with a word about it, where the browser draws no second picture. */
   #addSecondPane(): boolean {
-    let pane: Pane;
     try {
-      pane = this.#makePane("second");
+      const pane = this.#panes.add("second");
+      if (this.mesh !== noMesh) pane.open(this.mesh, this.document, this.view.now);
+      return true;
     } catch {
       this.notify("This browser draws no second picture. Close other pages that draw in three dimensions.", true);
       this.view.set({ isSplit: false });
       return false;
     }
-    this.#addPane(pane);
-    return true;
   }
 
-  /** The other pane looks the same way as the one that is being turned. */
-  #follow(pane: Pane): void {
-    if (pane !== this.#turned) return;
-    for (const other of this.panes) {
-      if (other === pane) continue;
-      other.stage.lookAs(pane.stage);
-      other.invalidate();
-    }
-  }
-
-  /** The worst of the panes'. */
   #statusChanged(): void {
-    const order = ["refused", "full", "draining", "away", "opening", "idle", "live"];
-    const [worst] = this.panes.map(({ status }) => status).sort((a, b) => order.indexOf(a.kind) - order.indexOf(b.kind));
-    this.facts.set({ status: worst! });
+    this.facts.set({ status: this.#panes.status });
   }
 
   #viewChanged(view: View, before: View): void {
     if (view.isSplit !== before.isSplit) {
       if (view.isSplit && !this.#addSecondPane()) return;
-      if (!view.isSplit && this.panes.length > 1) this.panes.pop()!.close();
-      this.stages.classList.toggle("split", view.isSplit);
+      if (!view.isSplit) this.#panes.removeSecond();
       this.fit();
       this.#statusChanged();
       this.#documentChanged(performance.now());
@@ -413,27 +371,13 @@ export class App {
     this.requestDraw();
   }
 
-  /** For those who do not see them. */
-  #namePanes(): void {
-    for (const { side, element, stage } of this.panes) {
-      const picture = this.panes.length > 1 ? capital(`${placeOf(side)} picture`) : "Picture";
-      stage.canvas.setAttribute("aria-label", `${picture} of the surface, ${element.dataset["label"]}`);
-      stage.canvas.setAttribute("aria-describedby", keysText.id);
-    }
-  }
-
   #documentChanged(time: number): void {
     const { document, history } = this;
     const { selected } = this.view.now;
     const before = this.facts.now.document;
     if (document.handles !== before.handles) this.#needsMarks = true;
     if (document !== before) this.#needsColours = true;
-    for (const pane of this.panes) {
-      pane.live?.show(document, time);
-      const p = pane.side === "first" ? document.p : document.secondP;
-      pane.element.dataset["label"] = document.isAutomatic ? "p from the shape" : `p = ${p}`;
-    }
-    this.#namePanes();
+    this.#panes.show(document, time);
     this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem: undefined });
     if (selected !== undefined && !handleOf(document, selected)) this.view.set({ selected: undefined });
     this.requestDraw();

@@ -1,0 +1,111 @@
+import type { Document } from "../model/document.js";
+import { capital } from "../model/words.js";
+import type { Status } from "../link/status.js";
+import type { Look, Stage } from "../stage/stage.js";
+import { Pane, type PaneWatcher } from "./pane.js";
+import { placeOf, watchPlaces } from "./sides.js";
+
+/** What keys do in a picture, for those who have it read to them. */
+const keysText = document.createElement("p");
+keysText.id = "picture-keys";
+keysText.className = "unseen";
+keysText.textContent =
+  "Enter shows a cross: arrow keys move it, Enter places a handle there or selects the one that is there, Escape hides it. " +
+  "Arrow keys and Page Up and Down move the selected handle, turn it where it has rings (R), and turn the view where none is " +
+  "selected. Control and arrow keys turn the view, with Shift they shift it; plus and minus zoom.";
+
+/** From the worst on. */
+const worse: readonly Status["kind"][] = ["refused", "full", "draining", "away", "opening", "idle", "live"];
+
+/** The pictures, one or two, which look the same way. */
+export class Panes {
+  readonly element = document.createElement("div");
+  readonly all: Pane[] = [];
+  #turned: Pane | undefined;
+
+  /** `added`: a pane is there, before its view can be turned. */
+  constructor(
+    readonly watcher: PaneWatcher,
+    readonly added: (pane: Pane) => void,
+  ) {
+    this.element.className = "stages";
+    this.element.append(keysText);
+    watchPlaces(() => this.#nameAll());
+  }
+
+  /** Throws where the browser draws no other picture: it has only so many. */
+  add(side: "first" | "second"): Pane {
+    const pane: Pane = new Pane(side, {
+      ...this.watcher,
+      changed: () => {
+        this.#follow(pane);
+        this.watcher.changed();
+      },
+    });
+    for (const turning of ["pointerdown", "wheel"]) {
+      pane.element.addEventListener(turning, () => (this.#turned = pane), { capture: true, passive: true });
+    }
+    this.added(pane);
+    pane.stage.startControls();
+    this.all.push(pane);
+    this.#split();
+    return pane;
+  }
+
+  removeSecond(): void {
+    if (this.all.length < 2) return;
+    this.all.pop()!.close();
+    this.#split();
+  }
+
+  #split(): void {
+    this.element.classList.toggle("split", this.all.length > 1);
+    for (const { element } of this.all) if (!element.isConnected) this.element.append(element);
+  }
+
+  /** The worst of the panes'. */
+  get status(): Status {
+    const [worst] = this.all.map(({ status }) => status).sort((a, b) => worse.indexOf(a.kind) - worse.indexOf(b.kind));
+    return worst!;
+  }
+
+  /** By keys: of the picture that has the focus, or the first; the other one follows. */
+  changeView(change: (stage: Stage) => void): void {
+    const pane = this.all.find(({ stage }) => stage.canvas === document.activeElement) ?? this.all[0]!;
+    this.#turned = pane;
+    change(pane.stage);
+  }
+
+  lookFrom(look: Look): void {
+    for (const pane of this.all) pane.stage.lookFrom(look);
+  }
+
+  /** The other pane looks the same way as the one that is being turned. */
+  #follow(pane: Pane): void {
+    if (pane !== this.#turned) return;
+    for (const other of this.all) {
+      if (other === pane) continue;
+      other.stage.lookAs(pane.stage);
+      other.invalidate();
+    }
+  }
+
+  /** `time`: of the input that made the document so. */
+  show(work: Document, time: number): void {
+    for (const pane of this.all) {
+      pane.live?.show(work, time);
+      const p = pane.side === "first" ? work.p : work.secondP;
+      pane.element.dataset["label"] = work.isAutomatic ? "p from the shape" : `p = ${p}`;
+    }
+    this.#nameAll();
+  }
+
+  /** For those who do not see them. */
+  #nameAll(): void {
+    for (const { side, element, stage } of this.all) {
+      const picture = this.all.length > 1 ? capital(`${placeOf(side)} picture`) : "Picture";
+      stage.canvas.setAttribute("aria-label", `${picture} of the surface, ${element.dataset["label"]}`);
+      stage.canvas.setAttribute("aria-describedby", keysText.id);
+    }
+  }
+}
