@@ -117,7 +117,7 @@ def light_and_camera():
 def render(path):
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
-    scene.cycles.device, scene.cycles.samples, scene.cycles.use_denoising = "CPU", 20, False
+    scene.cycles.device, scene.cycles.samples, scene.cycles.use_denoising = "CPU", 40, False
     scene.cycles.max_bounces = 1
     scene.render.threads_mode, scene.render.threads = "FIXED", 1
     scene.view_settings.view_transform = "Standard"
@@ -133,7 +133,7 @@ class Picture(unittest.TestCase):
         self.addCleanup(server.end)
         stage.clear()
         PREFERENCES.address = server.address
-        tubes = [stage.tube(f"p = {p}", at=(PLACES * k, 0, 0)) for k, p in enumerate((1, 2, 6))]
+        tubes = [stage.tube(f"p = {p}", around=48, along=121, at=(PLACES * k, 0, 0)) for k, p in enumerate((1, 2, 6))]
         coloured = material("distortion", attribute=surface.COLOUR_ATTRIBUTE)
         for ob, p in zip(tubes, (1.0, 2.0, 6.0)):
             ob.lpdeform.p = p
