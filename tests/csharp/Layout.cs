@@ -34,6 +34,8 @@ static class Layout
         Tell("SurfacePoint", typeof(SurfacePoint));
         Tell("Handle", typeof(Native.Handle));
         Tell("Settings", typeof(Native.Settings));
+        Tell("Move", typeof(Native.Move));
+        Tell("Update", typeof(Native.Update));
         Tell("Buffers", typeof(Native.Buffers));
         Tell("Frame", typeof(Native.Frame));
         Tell("SolveOptions", typeof(Native.SolveOptions));

@@ -264,12 +264,19 @@ static class SessionTest
             session.Settle(positions);
             ulong moved = session.Handles.Move("tip", Motion.Move(0, 3, 0));
             session.Settle(positions);
-            Expect(session.Undo() == moved + 1, "it has a number");
+            session.Handles.BeginMove("tip", Motion.Move(0, 4, 0));
+            session.Settle(positions);
+            Expect(positions[3 * 20 + 1] == 4, "moved on");
+            Expect(session.Undo() == moved + 2, "it has a number");
+            session.Settle(positions);
+            Expect(positions[3 * 20 + 1] == 3, "as it was before the step of its own");
+            session.Undo();
             session.Settle(positions);
             Expect(positions[3 * 20 + 1] == 2, "as it was before the move");
             session.Redo();
             session.Settle(positions);
             Expect(positions[3 * 20 + 1] == 3, "and as it was after");
+            session.Redo();
             Refused("NOTHING_TO_REDO", () => session.Redo());
         }
     }
@@ -286,6 +293,56 @@ static class SessionTest
             var across = positions.Where((c, i) => i % 3 == 2);
             Expect(Math.Abs(along.Max() - along.Min() - 20) < 1e-3, "twice as long");
             Expect(Math.Abs(across.Max() - across.Min() - 1.5) < 1e-3, "and half as wide again");
+        }
+    }
+
+    static void SolversStopWhereTheyAreToldTo()
+    {
+        using (var client = new Client(server.Address))
+        using (var session = OpenStrip(client))
+        {
+            session.Handles.Move("tip", Motion.Move(-4, 3, 0));
+            session.Set(p: 1.5);
+            session.SetLengthUnit(2);
+            session.SetSolver(new SolverSettings { Method = Method.LineSearch, MaxIterations = 3 });
+            var frame = session.Solve(new FrameBuffers { Positions = new float[66] }, timeoutSeconds: Patience);
+            Expect(frame.Iteration == 3 && frame.StopReason == StopReason.IterationLimit, frame.Iteration + " iterations, " + frame.StopReason);
+            Refused("LENGTH_UNIT_OUT_OF_RANGE", () =>
+            {
+                session.SetLengthUnit(double.NaN);
+                session.Settle(new float[66]);
+            });
+        }
+    }
+
+    static void GroupsOfVerticesAreOne()
+    {
+        var mesh = Strip();
+        mesh.WeldGroups = Enumerable.Range(0, 22).ToArray();
+        mesh.WeldGroups[21] = 20;  // which lie apart
+        using (var client = new Client(server.Address))
+        {
+            using (var session = client.Open(mesh))
+            {
+                Eventually(() => session.State == SessionState.Refused, "refused");
+                Expect(session.Problem.Reason.StartsWith("WELD_"), session.Problem.Reason);
+            }
+            mesh.WeldGroups = new int[3];
+            try
+            {
+                client.Open(mesh);
+                Expect(false, "refused");
+            }
+            catch (ArgumentException error)
+            {
+                Expect(error.ParamName == "mesh.WeldGroups", error.ParamName);
+            }
+            mesh.WeldGroups = Enumerable.Range(0, 22).ToArray();
+            using (var session = client.Open(mesh, new SessionOptions { WithoutDistortion = true, Credit = 1, LowestEncoding = FrameEncoding.Quantized }))
+            {
+                session.Handles.Set("base", new[] { 0, 1 });
+                session.Settle(new float[66]);
+            }
         }
     }
 
@@ -350,7 +407,8 @@ static class SessionTest
         var tests = new Action[] { FramesComeIntoTheCallersSpans, ErrorsCarryTheServersReason, ARefusedMeshIsAState,
                                    WorkGoesOnWhenTheServerComesBack, PerFrameCallsMakeNoGarbage, EmptyArraysAreNothing,
                                    TextsThatCannotBeSaidAreRefused, TargetsPointsAndRegions, ASolveIsItsOwnResult, StepsAreTakenBackAndDoneAgain,
-                                   ResizingScalesAlongUnitysAxes, ASessionLeavesAsAFileAndComesBackTheSame, SettingsAndReaders };
+                                   ResizingScalesAlongUnitysAxes, SolversStopWhereTheyAreToldTo,
+                                   GroupsOfVerticesAreOne, ASessionLeavesAsAFileAndComesBackTheSame, SettingsAndReaders };
         int failed = 0;
         using (server = new Server(arguments[0]))
         {

@@ -76,11 +76,19 @@ namespace Lpdeform
                     Normals = pinned.Floats(mesh.Normals),
                     Indices = pinned.Array(mesh.Indices),
                     IndexCount = (uint)mesh.Indices.Length,
-                    WeldByPosition = mesh.WeldByPosition ? 1u : 0u
+                    WeldByPosition = mesh.WeldByPosition ? 1u : 0u,
+                    WeldGroups = Groups(mesh, pinned)
                 };
                 LpdeformException.Check(Native.lpdeform_open(client, ref copy, ref native, out session, error), error);
             }
             return new Session(session);
+        }
+
+        static IntPtr Groups(MeshData mesh, Pinned pinned)
+        {
+            if (mesh.WeldGroups != null && mesh.WeldGroups.Length != mesh.Positions.Length / 3)
+                throw new ArgumentException("one number a vertex", "mesh.WeldGroups");
+            return pinned.Array(mesh.WeldGroups);
         }
 
         /// Joins somebody's session by its name: to look on, or as its writer in place of whoever is.

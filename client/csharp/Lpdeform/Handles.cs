@@ -75,6 +75,24 @@ namespace Lpdeform
             return inputSeq;
         }
 
+        /// The same as the beginning of a step of its own for Session.Undo: when a drag begins.
+        public ulong BeginMove(string name, Motion motion)
+        {
+            ulong inputSeq;
+            var error = LpdeformException.NewError();
+            using (var pinned = new Pinned())
+            {
+                var move = new Native.Move { Name = pinned.Array(NameOf(name)), Motion = motion.ToNative() };
+                var update = new Native.Update
+                {
+                    StructSize = (uint)Marshal.SizeOf(typeof(Native.Update)), Moves = pinned.Array(new[] { move }), MoveCount = 1,
+                    BeginsStep = 1
+                };
+                LpdeformException.Check(Native.lpdeform_send(session.Pointer, ref update, out inputSeq, error), error);
+            }
+            return inputSeq;
+        }
+
         /// Moves each vertex or point of a handle to a place of its own: x, y, z of each.
         public ulong MoveTo(string name, double[] positions)
         {

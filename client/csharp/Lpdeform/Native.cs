@@ -98,6 +98,23 @@ namespace Lpdeform
         }
 
         [StructLayout(LayoutKind.Sequential)]
+        public struct Move
+        {
+            public IntPtr Name;
+            public Motion Motion;
+        }
+
+        [StructLayout(LayoutKind.Sequential)]
+        public struct Update
+        {
+            public uint StructSize, SetCount;
+            public IntPtr Sets, Moves, Removals;
+            public uint MoveCount, RemovalCount;
+            public IntPtr Settings;
+            public uint BeginsStep, Reserved;
+        }
+
+        [StructLayout(LayoutKind.Sequential)]
         public struct Buffers
         {
             public uint StructSize, Reserved;
@@ -167,6 +184,8 @@ namespace Lpdeform
         public static extern int lpdeform_session_name(IntPtr session, byte[] name, UIntPtr bytes, byte[] error);
         [DllImport(Library, CallingConvention = C)]
         public static extern uint lpdeform_vertex_count(IntPtr session);
+        [DllImport(Library, CallingConvention = C)]
+        public static extern int lpdeform_send(IntPtr session, ref Update update, out ulong inputSeq, byte[] error);
         [DllImport(Library, CallingConvention = C)]
         public static extern int lpdeform_set_handle(IntPtr session, ref Handle handle, out ulong inputSeq, byte[] error);
         [DllImport(Library, CallingConvention = C)]

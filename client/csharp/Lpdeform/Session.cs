@@ -100,6 +100,22 @@ namespace Lpdeform
             return Set(new Native.Settings { PAutomatic = p, StiffnessAutomatic = stiffness });
         }
 
+        /// Replaces how solves are made, whole. Returns the change's number.
+        public ulong SetSolver(SolverSettings solver)
+        {
+            return Set(new Native.Settings
+            {
+                SetSolver = 1, Method = (int)solver.Method, Tolerance = solver.Tolerance, MaxIterations = (uint)solver.MaxIterations,
+                TimeLimitSeconds = solver.TimeLimitSeconds
+            });
+        }
+
+        /// The length of which edges count in mixed norms; negative takes the mean edge length back. Returns the change's number.
+        public ulong SetLengthUnit(double lengthUnit)
+        {
+            return Set(new Native.Settings { LengthUnit = lengthUnit });
+        }
+
         /// Only these vertices may move from now on; null: all may. Returns the change's number.
         public ulong SetRegion(int[] vertices)
         {
@@ -142,7 +158,7 @@ namespace Lpdeform
         }
 
         /// Waits until the server has taken the newest step of the handles back; frames follow. Moves of the same handles, none over
-        /// a second after the one before, are one step. Returns the change's number. FailedPrecondition NOTHING_TO_UNDO.
+        /// a second after the one before, are one step, unless Handles.BeginMove begins another. Returns the change's number. FailedPrecondition NOTHING_TO_UNDO.
         public ulong Undo()
         {
             ulong inputSeq;

@@ -43,6 +43,8 @@ namespace Lpdeform
         public float[] Normals;
         /// Vertices at exactly the same position are one.
         public bool WeldByPosition;
+        /// In place of that, one number a vertex: those with the same number are one.
+        public int[] WeldGroups;
     }
 
     public enum FrameEncoding { Raw, Quantized, Compressed }
@@ -58,6 +60,11 @@ namespace Lpdeform
         public Weights Weights;
         public FreeComponents FreeComponents;
         public FrameEncoding Encoding;
+        /// What a server with a limit of bytes a second may go down to.
+        public FrameEncoding LowestEncoding;
+        public bool WithoutDistortion;
+        /// Frames under way and not taken yet, 1 to 8; 0 takes 2.
+        public int Credit;
         public bool WithNormals;
         /// Raw frames travel as float64.
         public bool DoublePrecision;
@@ -76,12 +83,27 @@ namespace Lpdeform
                 Weights = (int)Weights,
                 FreeComponents = (int)FreeComponents,
                 Encoding = (int)Encoding,
+                LowestEncoding = (int)LowestEncoding,
+                WithoutDistortion = WithoutDistortion ? 1u : 0u,
+                Credit = (uint)Credit,
                 WithNormals = WithNormals ? 1u : 0u,
                 DoublePrecision = DoublePrecision ? 1u : 0u,
                 Certify = Certify ? 1u : 0u,
                 MaxFramesPerSecond = MaxFramesPerSecond
             };
         }
+    }
+
+    public enum Method { Auto, QuasiNewton, LineSearch, LocalGlobal, Conic, Multiresolution }
+
+    /// How solves are made and when they stop; 0 takes the server's default.
+    public struct SolverSettings
+    {
+        public Method Method;
+        public double Tolerance;
+        public int MaxIterations;
+        /// 0 is without limit.
+        public double TimeLimitSeconds;
     }
 
     /// Where a handle is to be; always relative to the mesh at rest.
