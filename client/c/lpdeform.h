@@ -269,9 +269,9 @@ LPDEFORM_API lpdeform_code lpdeform_join(lpdeform_client* client, const char* na
 /* A session as a file: mesh, handles, settings, what can be undone and the surface as it is. */
 typedef struct lpdeform_snapshot lpdeform_snapshot;
 
-/* WAITS for the session as a file, with every change before it; frames go on, and changes made meanwhile are sent after it. The
- * snapshot is the caller's to lpdeform_free_snapshot. Errors: FAILED_PRECONDITION NOT_CONNECTED while there is no session on the
- * server yet; DEADLINE_EXCEEDED after call_timeout_seconds; what the server says of it or of a change before it. */
+/* WAITS for the session as a file, with every change before it; frames go on, and changes made meanwhile are sent after it.
+ * The snapshot is the caller's to lpdeform_free_snapshot. Errors: FAILED_PRECONDITION NOT_CONNECTED while there is no session
+ * on the server yet; DEADLINE_EXCEEDED after call_timeout_seconds; what the server says of it or of a change before it. */
 LPDEFORM_API lpdeform_code lpdeform_take_snapshot(lpdeform_session* session, lpdeform_snapshot** snapshot,
                                                   lpdeform_error* error);
 /* What is to be written to a file, until the snapshot is freed. NULL, and 0 bytes, of NULL. Cannot fail. */
@@ -319,7 +319,7 @@ LPDEFORM_API lpdeform_notice lpdeform_session_notice(const lpdeform_session* ses
 LPDEFORM_API lpdeform_code lpdeform_session_name(const lpdeform_session* session, char* name, size_t bytes,
                                                  lpdeform_error* error);
 
-/* Of its mesh; 0 while a session that was joined is not there yet. */
+/* Of its mesh; 0 while a session that was joined or restored is not there yet. */
 LPDEFORM_API uint32_t lpdeform_vertex_count(const lpdeform_session* session);
 
 /* ---- handles ---- */
@@ -467,11 +467,12 @@ typedef struct lpdeform_resizing {
 LPDEFORM_API lpdeform_code lpdeform_resize(lpdeform_session* session, const lpdeform_resizing* resizing,
                                            uint64_t* input_seq, lpdeform_error* error);
 
-/* WAITS until the server has taken the newest step of the handles back, as lpdeform_send sends a change: frames follow.
- * A step is what a person sees as one change: changes that move the same handles, none of them over a second after the one
+/* WAITS until the server has taken the newest step of the handles back, as lpdeform_send sends a change: frames follow. A
+ * step is what a person sees as one change: changes that move the same handles, none of them over a second after the one
  * before, or each other change of handles; lpdeform_update.begins_step begins one in any case. Settings are no part of it.
- * Errors: FAILED_PRECONDITION (NOTHING_TO_UNDO; NOT_CONNECTED while there is no session on the server yet; NOT_THE_WRITER),
- * DEADLINE_EXCEEDED after call_timeout_seconds, what the server says of a change before it. */
+ * Errors: FAILED_PRECONDITION (NOTHING_TO_UNDO, also of what came before the server lost the session; NOT_CONNECTED while
+ * there is none on the server yet; NOT_THE_WRITER), DEADLINE_EXCEEDED after call_timeout_seconds, what the server says of a
+ * change before it. */
 LPDEFORM_API lpdeform_code lpdeform_undo(lpdeform_session* session, uint64_t* input_seq,
                                          lpdeform_error* error);
 /* Does again what was taken back last. As lpdeform_undo; NOTHING_TO_REDO. */

@@ -124,9 +124,10 @@ class Session {
   /// Whether a frame of this session is the finished result of the newest update that was not refused.
   bool is_result(const Frame& frame) const;
 
-  /// Takes the newest step of the handles back on the server, or does again what was taken back last: see types.h. Sent after all
-  /// updates before it; waits for the answer, not for the frame. The number of the update that this is. FAILED_PRECONDITION
-  /// (NOTHING_TO_UNDO, NOTHING_TO_REDO; SESSION_CLOSED), ABORTED (INPUT_SEQ_PASSED) where another update came before it; DEADLINE_EXCEEDED.
+  /// Takes the newest step of the handles back on the server, or does again what was taken back last: see types.h. Sent
+  /// after all updates before it; waits for the answer, not for the frame. The number of the update that this is. Errors:
+  /// FAILED_PRECONDITION (NOTHING_TO_UNDO, also of what came before the session had to be made anew; NOTHING_TO_REDO;
+  /// SESSION_CLOSED); ABORTED (INPUT_SEQ_PASSED) where another update came before it; DEADLINE_EXCEEDED.
   absl::StatusOr<std::uint64_t> undo();
   absl::StatusOr<std::uint64_t> redo();
 

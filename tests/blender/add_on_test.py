@@ -15,7 +15,7 @@ sys.path.insert(0, os.path.dirname(__file__))
 import stage  # noqa: E402
 
 PREFERENCES = stage.install()
-from lpdeform_addon import client, live, surface  # noqa: E402
+from lpdeform_addon import client, live, panel, surface  # noqa: E402
 
 
 class AddOn(unittest.TestCase):
@@ -261,6 +261,14 @@ class AddOn(unittest.TestCase):
         self.assertEqual(running.notice, "Too much.")
         stream.notice = client.lpdeform.Notice("recovered", "No more.")
         self.assertEqual(running.notice, "")
+
+    def test_what_is_said_in_the_panel_is_not_cut(self):
+        said = "The target of vertex 1440 of handle 2 is over 1e9 diagonals of the mesh away. (HANDLE_TARGET_TOO_FAR)"
+        for width in (100, 230, 1000):
+            found = panel.lines(said, width)
+            self.assertEqual(" ".join(found).replace(" ", ""), said.replace(" ", ""))
+            self.assertLessEqual(max(map(len, found)), max(12, width / 7.5))
+        self.assertEqual(panel.lines(said, 1000), [said])
 
     def test_kinds_of_handles_hold_as_they_say(self):
         _, tip = self.held()

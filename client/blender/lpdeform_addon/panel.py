@@ -1,5 +1,7 @@
 """The sidebar's tab lpdeform."""
 
+import textwrap
+
 import bpy
 
 from . import live
@@ -12,6 +14,18 @@ _words = {
     "reconnecting": "{} is away; trying again",
     "closed": "Ended",
 }
+
+
+def lines(text: str, width: float) -> list:
+    """Of what fits beside an icon into a sidebar of so many pixels, at Blender's usual size of text."""
+    return textwrap.wrap(text, max(12, int((width - 60) / 7.5)))
+
+
+def _say(layout, context, text: str, icon: str) -> None:
+    column = layout.column(align=True)
+    for line in lines(text, context.region.width / context.preferences.system.ui_scale):
+        column.label(text=line, icon=icon)
+        icon = "BLANK1"
 
 
 class MainPanel(bpy.types.Panel):
@@ -38,9 +52,9 @@ class MainPanel(bpy.types.Panel):
             column.operator("lpdeform.stop", icon="X")
             column.operator("lpdeform.apply", icon="SHAPEKEY_DATA")
             if running.notice:
-                layout.label(text=running.notice, icon="TIME")
+                _say(layout, context, running.notice, "TIME")
         if live.message(ob):
-            layout.label(text=live.message(ob), icon="ERROR")
+            _say(layout, context, live.message(ob), "ERROR")
         column = layout.column(align=True)
         column.operator("lpdeform.add_handle", icon="EMPTY_DATA")
         column.operator("lpdeform.add_handle", text="Add handle in faces", icon="SNAP_FACE_CENTER").in_faces = True

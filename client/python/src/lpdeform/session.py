@@ -283,7 +283,7 @@ class Session(Live):
         A step is what a person sees as one change: updates that move the same handles, none of them over a second after the
         one before, or each other update that changes handles; `begins_step` of update() begins one in any case. Settings are
         no part of it. Sent after all changes before it; waits for the answer, and settle() for the frame. Raises
-        FAILED_PRECONDITION NOTHING_TO_UNDO, NOT_THE_WRITER for a reader, what the server says of a change before it, Timeout.
+        FAILED_PRECONDITION NOTHING_TO_UNDO (also of steps before the session had to be made anew), NOT_THE_WRITER for a reader, what the server says of a change before it, Timeout.
         """
         return undo(self._link, False, self._link.stop)
 
