@@ -16,6 +16,7 @@ import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 KUBERNETES = ROOT / "deploy/kubernetes"
+WITH_TOKENS = ROOT / "deploy/kubernetes-with-tokens"
 SERVER = sys.argv.pop(1)
 
 
@@ -34,8 +35,44 @@ def load(path):
 
 
 KUSTOMIZATION = load(KUBERNETES / "kustomization.yaml")
-OBJECTS = [one for name in KUSTOMIZATION["resources"] for one in yaml.safe_load_all((KUBERNETES / name).read_text())]
+
+
+def rendered():
+    """The objects as kustomize makes them: its labels are those of the objects, and of pods only where it is told so."""
+    found = [one for name in KUSTOMIZATION["resources"] for one in yaml.safe_load_all((KUBERNETES / name).read_text())]
+    for rule in KUSTOMIZATION["labels"]:
+        for one in found:
+            one["metadata"].setdefault("labels", {}).update(rule["pairs"])
+            if rule.get("includeTemplates") and "template" in one["spec"]:
+                one["spec"]["template"]["metadata"].setdefault("labels", {}).update(rule["pairs"])
+    return found
+
+
+OBJECTS = rendered()
 COMPOSE = load(ROOT / "deploy/compose.yaml")
+
+
+def patched(one, operations):
+    """By JSON Patch (RFC 6902), as far as the files here use it."""
+    one = copy.deepcopy(one)
+    for operation in operations:
+        *path, last = [int(step) if step.isdigit() else step for step in operation["path"].split("/")[1:]]
+        place = one
+        for step in path:
+            place = place[step]
+        if operation["op"] == "test":
+            assert place[last] == operation["value"], operation
+        elif operation["op"] == "replace":
+            assert place[last] is not None
+            place[last] = operation["value"]
+        else:
+            assert operation["op"] == "add" and last not in place, operation
+            place[last] = operation["value"]
+    return one
+
+
+def selects(selector, labels):
+    return all(labels.get(name) == value for name, value in selector.get("matchLabels", {}).items())
 
 
 def objects(kind):
@@ -48,6 +85,7 @@ def the(kind, name):
 
 
 WORKLOADS = objects("StatefulSet") + objects("Deployment")
+PODS = {workload["metadata"]["name"]: workload["spec"]["template"]["metadata"]["labels"] for workload in WORKLOADS}
 
 
 def pod(workload):
@@ -85,13 +123,10 @@ class Kubernetes(unittest.TestCase):
         self.assertEqual(the("HorizontalPodAutoscaler", "lpdeform")["spec"]["scaleTargetRef"]["name"], "lpdeform")
 
     def test_selectors_find_the_pods_of_their_name(self):
-        labels = [workload["spec"]["template"]["metadata"]["labels"] for workload in WORKLOADS]
-        for workload, own in zip(WORKLOADS, labels):
-            self.assertEqual(workload["spec"]["selector"]["matchLabels"], own)
-        for one in objects("Service"):
-            self.assertIn(one["spec"]["selector"], labels)
-        for one in objects("PodDisruptionBudget"):
-            self.assertIn(one["spec"]["selector"]["matchLabels"], labels)
+        selectors = [(one["metadata"]["name"], one["spec"]["selector"]) for one in WORKLOADS + objects("PodDisruptionBudget")]
+        selectors += [(one["metadata"]["name"], {"matchLabels": one["spec"]["selector"]}) for one in objects("Service")]
+        for name, selector in selectors:
+            self.assertEqual([pod for pod, labels in PODS.items() if selects(selector, labels)], [name])
 
     def test_services_probes_and_policies_name_ports_that_are_open(self):
         ports = {}
@@ -117,25 +152,84 @@ class Kubernetes(unittest.TestCase):
                 for port in rule["ports"]:
                     self.assertIn(port["port"], target.values())
 
+    def may_reach(self, caller, called, port, protocol="TCP"):
+        """As a cluster that enforces the policies decides it. Who calls or is called: a pod of ours by its name, or (namespace,
+        labels). A pod that no policy of a direction selects is free in that direction."""
+        def labels(who):
+            return PODS[who] if isinstance(who, str) else who[1]
+
+        def fits(peer, who):
+            namespace = {} if isinstance(who, str) else {"kubernetes.io/metadata.name": who[0]}
+            if "namespaceSelector" in peer and not selects(peer["namespaceSelector"], namespace):
+                return False
+            if "namespaceSelector" not in peer and not isinstance(who, str) and who[0] != "lpdeform":
+                return False
+            return selects(peer.get("podSelector", {}), labels(who))
+
+        def lets(who, direction, peers, other):
+            if not isinstance(who, str):
+                return True
+            policies = [one["spec"] for one in objects("NetworkPolicy")
+                        if direction in one["spec"]["policyTypes"] and selects(one["spec"]["podSelector"], labels(who))]
+            rules = [rule for policy in policies for rule in policy.get(direction.lower(), [])]
+            return not policies or any({"protocol": protocol, "port": port} in rule["ports"] and
+                                       (peers not in rule or any(fits(peer, other) for peer in rule[peers])) for rule in rules)
+
+        return lets(caller, "Egress", "to", called) and lets(called, "Ingress", "from", caller)
+
     def test_what_must_reach_what_may(self):
-        """Each address in a command is a Service here, and both policies, of who calls and of who is called, let it through."""
-        policies = {one["metadata"]["name"]: one["spec"] for one in objects("NetworkPolicy")}
-        calls = 0
-        for workload in WORKLOADS:
-            caller = workload["metadata"]["name"]
-            for argument in (argument for container in containers(workload) for argument in container["args"]):
-                found = re.search(r"(lpdeform[a-z-]*):(\d+)$", argument)
-                if not found:
-                    continue
-                calls += 1
-                called, port = found.group(1), int(found.group(2))
-                the("Service", called)
-                label = {"app.kubernetes.io/name": called}
-                self.assertTrue(any(to["podSelector"]["matchLabels"] == label and {"protocol": "TCP", "port": port} in rule["ports"]
-                                    for rule in policies[caller]["egress"] for to in rule["to"]), (caller, called))
-                self.assertTrue(any(source.get("podSelector", {}).get("matchLabels") == {"app.kubernetes.io/name": caller}
-                                    for rule in policies[called]["ingress"] for source in rule.get("from", [])), (caller, called))
-        self.assertEqual(calls, 2)
+        calls = {(workload["metadata"]["name"], found.group(1), int(found.group(2)))
+                 for workload in WORKLOADS for container in containers(workload) for argument in container["args"]
+                 if (found := re.search(r"(lpdeform[a-z-]*):(\d+)$", argument))}
+        self.assertEqual(calls, {("lpdeform", "lpdeform-redis", 6379), ("lpdeform-web", "lpdeform", 50051)})
+        for caller, called, port in calls:
+            the("Service", called)
+            self.assertTrue(self.may_reach(caller, called, port), (caller, called))
+        names = ("kube-system", {"k8s-app": "kube-dns"})
+        for name in PODS:
+            for protocol in ("UDP", "TCP"):
+                self.assertTrue(self.may_reach(name, names, 53, protocol), name)
+        self.assertTrue(self.may_reach(("monitoring", {}), "lpdeform", 9464))
+        self.assertTrue(self.may_reach(("lpdeform", {"lpdeform-client": "true"}), "lpdeform", 50051))
+        self.assertTrue(self.may_reach(("ingress", {}), "lpdeform-web", 8080))
+
+    def test_nothing_else_is_reached(self):
+        anywhere, stranger = ("elsewhere", {}), ("lpdeform", {"app": "other"})
+        for name in PODS:
+            for port in (53, 80, 443, 6379):
+                self.assertFalse(self.may_reach(name, anywhere, port), (name, port))
+        for caller in (anywhere, stranger, "lpdeform-web"):
+            self.assertFalse(self.may_reach(caller, "lpdeform-redis", 6379), caller)
+        for caller in (anywhere, stranger, "lpdeform-redis"):
+            self.assertFalse(self.may_reach(caller, "lpdeform", 50051), caller)
+        self.assertFalse(self.may_reach(stranger, "lpdeform", 9464))
+
+    def test_redis_refuses_what_is_new_before_the_kernel_ends_it(self):
+        """Of a container's memory: a rewrite of its log copies what changes meanwhile."""
+        (container,) = containers(the("StatefulSet", "lpdeform-redis"))
+        for arguments, limit in ((container["args"], container["resources"]["limits"]["memory"].removesuffix("Gi")),
+                                 (COMPOSE["services"]["redis"]["command"], COMPOSE["services"]["redis"]["mem_limit"].removesuffix("gb"))):
+            most = arguments[arguments.index("--maxmemory") + 1]
+            self.assertLessEqual(int(most.removesuffix("gb")), 0.6 * int(limit))
+            self.assertEqual(arguments[arguments.index("--maxmemory-policy") + 1], "noeviction")
+
+    def test_keys_of_tokens_are_one_command_away(self):
+        overlay = load(WITH_TOKENS / "kustomization.yaml")
+        (base,) = overlay["resources"]
+        self.assertEqual((WITH_TOKENS / base).resolve(), KUBERNETES)
+        (patch,) = overlay["patches"]
+        server = patched(the(patch["target"]["kind"], patch["target"]["name"]), yaml.safe_load(patch["patch"]))
+        kubernetes_validate.validate(server, "1.37", strict=True)
+        (container,) = containers(server)
+        self.assertNotIn("--allow-anonymous", container["args"])
+        (keys,) = [argument.removeprefix("--token-keys=") for argument in container["args"] if argument.startswith("--token-keys=")]
+        (mount,) = container["volumeMounts"]
+        self.assertTrue(keys.startswith(mount["mountPath"] + "/"))
+        (volume,) = pod(server)["volumes"]
+        self.assertEqual(volume["name"], mount["name"])
+        told = (WITH_TOKENS / "kustomization.yaml").read_text()
+        self.assertIn(f"create secret generic {volume['secret']['secretName']} ", told)
+        self.assertIn(f"--from-file={keys.removeprefix(mount['mountPath'] + '/')}", told)
 
     def test_nothing_runs_as_root_or_writes_beside_its_volumes(self):
         for workload in WORKLOADS:
@@ -168,7 +262,14 @@ class Kubernetes(unittest.TestCase):
     def test_the_disruption_budget_leaves_replicas(self):
         for budget in objects("PodDisruptionBudget"):
             (workload,) = [one for one in WORKLOADS if one["metadata"]["name"] == budget["metadata"]["name"]]
-            self.assertGreater(workload["spec"]["replicas"], budget["spec"]["maxUnavailable"])
+            scalers = [one["spec"] for one in objects("HorizontalPodAutoscaler") if one["spec"]["scaleTargetRef"]["name"] == workload["metadata"]["name"]]
+            least = scalers[0]["minReplicas"] if scalers else workload["spec"]["replicas"]
+            self.assertGreater(least, budget["spec"]["maxUnavailable"])
+
+    def test_applying_the_files_again_ends_no_replica_that_the_autoscaler_made(self):
+        for scaler in objects("HorizontalPodAutoscaler"):
+            target = scaler["spec"]["scaleTargetRef"]
+            self.assertNotIn("replicas", the(target["kind"], target["name"])["spec"])
 
     def test_the_autoscaler_goes_by_a_metric_that_the_adapter_makes_of_ours(self):
         (metric,) = the("HorizontalPodAutoscaler", "lpdeform")["spec"]["metrics"]
@@ -181,6 +282,38 @@ class Kubernetes(unittest.TestCase):
         version = re.search(r"VERSION (\d+\.\d+\.\d+)", (ROOT / "CMakeLists.txt").read_text()).group(1)
         for image in KUSTOMIZATION["images"]:
             self.assertEqual(image["newTag"], version)
+
+
+class Monitoring(unittest.TestCase):
+    def test_each_way_of_finding_servers_gives_the_job_that_the_alerts_go_by(self):
+        jobs = set(re.findall(r'job="([^"]*)"', (ROOT / "deploy/monitoring/alerts.yaml").read_text()))
+        for name in ("prometheus", "prometheus-kubernetes"):
+            (scrape,) = load(ROOT / f"deploy/monitoring/{name}.yaml")["scrape_configs"]
+            self.assertEqual(jobs, {scrape["job_name"]})
+
+    def test_pods_are_found_by_their_label_and_the_port_by_its_name(self):
+        (scrape,) = load(ROOT / "deploy/monitoring/prometheus-kubernetes.yaml")["scrape_configs"]
+        (discovery,) = scrape["kubernetes_sd_configs"]
+        label, value = discovery["selectors"][0]["label"].split("=")
+        self.assertEqual([name for name, labels in PODS.items() if labels.get(label) == value], ["lpdeform"])
+        (keep,) = [rule for rule in scrape["relabel_configs"] if rule.get("action") == "keep"]
+        ports = [port for container in containers(the("StatefulSet", "lpdeform")) for port in container["ports"]]
+        self.assertEqual([port["containerPort"] for port in ports if re.fullmatch(keep["regex"], port["name"])], [9464])
+
+
+class Unit(unittest.TestCase):
+    """Of systemd."""
+    lines = dict(line.split("=", 1) for line in (ROOT / "deploy/lpdeform.service").read_text().splitlines() if re.match(r"\w+=", line))
+
+    def test_it_is_the_one_that_the_operators_page_names(self):
+        self.assertIn("journalctl -u lpdeform ", (ROOT / "deploy/README.md").read_text())
+
+    def test_it_may_drain_before_it_is_killed_and_is_started_again(self):
+        self.assertGreaterEqual(int(self.lines["TimeoutStopSec"]), seconds_of_grace(self.lines["ExecStart"].split()) + 10)
+        self.assertEqual(self.lines["Restart"], "always")
+
+    def test_the_store_is_in_the_folder_that_it_may_write_to(self):
+        self.assertIn(f"--store=sqlite:/var/lib/{self.lines['StateDirectory']}", self.lines["ExecStart"].split())
 
 
 class Compose(unittest.TestCase):
@@ -224,7 +357,8 @@ class Programs(unittest.TestCase):
     def test_the_server_takes_these_options(self):
         text = subprocess.run([SERVER, "--help"], check=True, capture_output=True, text=True).stdout
         known = set(re.findall(r"--[a-z-]+", text))
-        for arguments in (containers(the("StatefulSet", "lpdeform"))[0]["args"], COMPOSE["services"]["server"]["command"]):
+        for arguments in (containers(the("StatefulSet", "lpdeform"))[0]["args"], COMPOSE["services"]["server"]["command"],
+                          [word for word in Unit.lines["ExecStart"].split()[1:] if word.startswith("--")]):
             self.assertLessEqual({argument.split("=")[0] for argument in arguments}, known)
 
     def test_envoy_is_given_options_that_it_takes(self):

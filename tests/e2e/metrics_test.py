@@ -104,7 +104,7 @@ class Metrics(programs.OnShapes):
         expressions += [rule["expr"] for rule in alerts()]
         self.assertGreater(len(expressions), 30)
         for expression in expressions:
-            self.assertTrue(METRIC.search(expression) or re.match(r"up\{", expression), expression)
+            self.assertTrue(METRIC.search(expression) or re.search(r"\bup\{", expression), expression)
             self.assertEqual(unknown_in(expression, self.scraped), [], expression)
 
     def test_the_check_above_finds_wrong_names_and_labels(self):

@@ -162,13 +162,13 @@ describe("the proxy", () => {
       body: null,
       headers: {
         "access-control-request-method": "POST",
-        "access-control-request-headers": "x-grpc-web,lpdeform-session,authorization",
+        "access-control-request-headers": "x-grpc-web,lpdeform-session,authorization,traceparent",
       },
     });
     expect(preflight.status).toBe(200);
     expect(preflight.headers.get("access-control-allow-origin")).toBe("https://friend.example");
     const allowed = preflight.headers.get("access-control-allow-headers")!.split(", ");
-    expect(allowed).toEqual(expect.arrayContaining(["lpdeform-session", "authorization"]));
+    expect(allowed).toEqual(expect.arrayContaining(["lpdeform-session", "authorization", "traceparent"]));
     const answer = await call("https://friend.example");
     expect(answer.headers.get("access-control-expose-headers")).toBe(
       "grpc-status, grpc-message, grpc-status-details-bin",
