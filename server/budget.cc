@@ -61,6 +61,14 @@ Reservation& Reservation::operator=(Reservation&& other) noexcept {
   return *this;
 }
 
+absl::Status Reservation::grow_to(std::size_t bytes) {
+  if (budget_ == nullptr || bytes <= bytes_) return absl::OkStatus();
+  absl::StatusOr<Reservation> more = budget_->reserve(bytes - bytes_, owner_);
+  if (!more.ok()) return more.status();
+  bytes_ += std::exchange(more->bytes_, 0);
+  return absl::OkStatus();
+}
+
 void Reservation::resize(std::size_t bytes) {
   if (budget_ == nullptr) return;
   budget_->change(owner_, bytes_, bytes);

@@ -46,6 +46,8 @@ class Reservation {
   Reservation& operator=(Reservation&& other) noexcept;
   ~Reservation() { resize(0); }
 
+  /// Errors: as Budget::reserve, for what is more than now; nothing where that is enough.
+  absl::Status grow_to(std::size_t bytes);
   /// Corrects it, also beyond the limit: what is there is there.
   void resize(std::size_t bytes);
   std::size_t bytes() const { return bytes_; }

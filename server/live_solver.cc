@@ -182,6 +182,7 @@ void LiveSolver::report(const SolveJob& job) {
 std::shared_ptr<const Frame> LiveSolver::publish(bool is_final) {
   last_published_ = Clock::now();
   shown_version_ = inputs_.version;
+  deformer_->catch_up();
   const SolveSummary& summary = deformer_->summary();
   Frame frame;
   frame.input_seq = inputs_.input_seq;

@@ -70,6 +70,14 @@ absl::Status SessionFactory::make_shape(const v1::CreateSessionRequest& request,
   parts.free_components = *free_components;
   parts.memory = *std::move(memory);
   if (absl::Status status = make_mesh(request, decoder, parts); !status.ok()) return status;
+  const std::size_t held = parts.shape->memory_bytes() + parts.mesh->memory_bytes();
+  auto deformer = Deformer::create(parts.shape, {.free_components = parts.free_components,
+                                                 .threads = threads(),
+                                                 .admit = [&parts, held](std::size_t bytes) {
+                                                   return parts.memory.grow_to(held + bytes);
+                                                 }});
+  if (!deformer.ok()) return deformer.status();
+  parts.deformer = *std::move(deformer);
   parts.features = std::make_shared<const ShapeFeatures>(parts.shape, Workers(threads()));
   return absl::OkStatus();
 }
@@ -77,15 +85,12 @@ absl::Status SessionFactory::make_shape(const v1::CreateSessionRequest& request,
 /// `surface`: the present state, of the client's vertices.
 absl::StatusOr<std::shared_ptr<Session>> SessionFactory::finish(SessionParts parts,
                                                                 const std::optional<Points>& surface) const {
-  auto deformer = Deformer::create(parts.shape, {parts.free_components, threads()});
-  if (!deformer.ok()) return deformer.status();
   if (surface) {
     const auto positions = parts.mesh->solver_positions(*surface);
     if (!positions.ok()) return positions.status();
-    if (absl::Status status = (*deformer)->set_positions(*positions); !status.ok()) return status;
+    if (absl::Status status = parts.deformer->set_positions(*positions); !status.ok()) return status;
     parts.has_surface = true;
   }
-  parts.deformer = *std::move(deformer);
   return Session::create(std::move(parts), services_);
 }
 

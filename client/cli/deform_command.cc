@@ -119,7 +119,7 @@ absl::Status write_results(const DeformOptions& options, const Inputs& inputs, c
     absl::Status written = options.normals
                                ? write_output_with_normals(path, inputs.file, positions, field,
                                                            points_of(solved.result.normals), options.welds)
-                               : write_output(path, inputs.file, positions, field);
+                               : write_output(path, inputs.file, positions, field, options.welds);
     if (!written.ok()) return written;
     std::printf("wrote %s\n", path.c_str());
   }

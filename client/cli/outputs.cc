@@ -37,8 +37,11 @@ absl::Status check_outputs(std::span<const std::filesystem::path> paths) {
 }
 
 absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
-                          const Field& distortion) {
-  if (ending_of(path) == ".png") return render_png(path, file.mesh.faces, positions, distortion);
+                          const Field& distortion, bool welds) {
+  const std::string ending = ending_of(path);
+  if (ending == ".png") return render_png(path, file.mesh.faces, positions, distortion);
+  if (ending == ".obj" && has_obj_normals(file))
+    return write_text(path, obj_text_with_normals(file, positions, welds));
   return write_mesh(path, file, positions, distortion);
 }
 
@@ -48,7 +51,7 @@ absl::Status write_output_with_normals(const std::filesystem::path& path, const 
   const std::string ending = ending_of(path);
   if (ending == ".obj") return write_text(path, obj_text_with_normals(file, positions, welds));
   if (ending == ".ply") return write_mesh(path, file, positions, distortion, normals);
-  return write_output(path, file, positions, distortion);
+  return write_output(path, file, positions, distortion, welds);
 }
 
 }  // namespace lpdeform::cli

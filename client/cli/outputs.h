@@ -14,11 +14,12 @@ namespace lpdeform::cli {
 absl::Status check_outputs(std::span<const std::filesystem::path> paths);
 
 /// Writes `positions` with the faces of `file`: .ply with distortion and colours, .obj keeping all else that
-/// an OBJ input had, .off, or a picture as .png. `distortion` may be empty.
+/// an OBJ input had, its normals turned with the surface, .off, or a picture as .png. `distortion` may be empty. `welds`:
+/// see obj_text_with_normals.
 absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
-                          const Field& distortion);
+                          const Field& distortion, bool welds);
 
-/// The same, .obj and .ply with normals. `welds`: see obj_text_with_normals. `normals`: one a vertex, for .ply.
+/// The same, .obj and .ply with normals, whatever the input had. `normals`: one a vertex, for .ply.
 absl::Status write_output_with_normals(const std::filesystem::path& path, const MeshFile& file,
                                        const Points& positions, const Field& distortion,
                                        const Points& normals, bool welds);

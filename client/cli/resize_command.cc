@@ -128,11 +128,11 @@ ExitStatus run_resize(const ResizeOptions& options) {
   }
   const absl::StatusOr<Resized> resized =
       resize_on(local ? local->address() : *options.server.address, options.server, *scaling, options.welds,
-                *std::move(file), interrupt);
+                *file, interrupt);
   if (interrupt.happened()) return kInterrupted;
   if (!resized.ok()) return complain(resized.status());
   const absl::Status written =
-      write_output(options.out, resized->file, resized->file.mesh.vertices, resized->distortion);
+      write_output(options.out, *file, resized->file.mesh.vertices, resized->distortion, options.welds);
   if (!written.ok()) return complain(written);
   std::printf("wrote %s\n", options.out.c_str());
   return exit_status_of(resized->stop_reason, false, false);

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "core/base/geometry.h"
 #include "core/linalg/single_factor.h"
 
@@ -30,8 +33,14 @@ struct SupernodePattern {
 };
 
 /// A fill-reducing order and the factor's pattern in it, by the backend. None where it does not work with
-/// supernodes (Eigen).
-std::optional<SupernodePattern> analyse_supernodes(const LowerMatrix& pattern);
+/// supernodes (Eigen). INVALID_ARGUMENT (FACTOR_TOO_LARGE) where the factor has more than `most` entries, which is as far as
+/// the backend counts: a triangulated surface of millions of vertices has fewer, one that is glued together at random
+/// has that many with 300,000.
+absl::StatusOr<std::optional<SupernodePattern>> analyse_supernodes(
+    const LowerMatrix& pattern, std::size_t most = std::numeric_limits<std::int32_t>::max());
+
+/// What the supernodes hold, explicit zeros included.
+std::size_t entry_count(const SupernodePattern& supernodes);
 
 /// Sparse Cholesky factorisation of symmetric positive definite matrices of one pattern. The constructor
 /// orders and analyses; factor() is the numeric phase alone and may be repeated; then solve as often as you

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <mutex>
 
+#include "absl/strings/str_cat.h"
 #include "core/base/check.h"
+#include "core/base/fault.h"
 #include "core/linalg/cholesky.h"
 
 namespace lpdeform {
@@ -140,8 +142,8 @@ struct Cholmod {
   Cholmod(const Cholmod&) = delete;
   Cholmod& operator=(const Cholmod&) = delete;
 
-  /// In the order given, or one that it finds.
-  void analyse(const LowerMatrix& pattern, const std::int32_t* new_to_old) {
+  /// In the order given, or one that it finds. False where the factor is too large to be counted or kept.
+  [[nodiscard]] bool analyse(const LowerMatrix& pattern, const std::int32_t* new_to_old) {
     cholmod_sparse view = view_of(pattern);
     view.xtype = CHOLMOD_PATTERN;
     if (new_to_old == nullptr) {
@@ -150,7 +152,7 @@ struct Cholmod {
       common.method[0].ordering = CHOLMOD_GIVEN;
       factor = cholmod_analyze_p(&view, const_cast<std::int32_t*>(new_to_old), nullptr, 0, &common);
     }
-    LPDEFORM_CHECK(factor != nullptr);
+    return factor != nullptr;
   }
 
   cholmod_common common;
@@ -159,10 +161,18 @@ struct Cholmod {
 
 }  // namespace
 
-std::optional<SupernodePattern> analyse_supernodes(const LowerMatrix& pattern) {
+absl::StatusOr<std::optional<SupernodePattern>> analyse_supernodes(const LowerMatrix& pattern,
+                                                                   std::size_t most) {
   Cholmod cholmod;
   cholmod.common.supernodal = CHOLMOD_SUPERNODAL;
-  cholmod.analyse(pattern, nullptr);
+  const bool is_counted = cholmod.analyse(pattern, nullptr);
+  if (!is_counted || cholmod.factor->xsize > most) {
+    return invalid_input(
+        {"FACTOR_TOO_LARGE", "mesh", absl::StrCat("entries <= ", most)},
+        absl::StrCat("The factorisation of this mesh would have more than ", most,
+                     " entries. Take one with fewer vertices, or whose faces lie beside one another as on a "
+                     "surface in space."));
+  }
   const cholmod_factor& factor = *cholmod.factor;
   const auto* const order = static_cast<const std::int32_t*>(factor.Perm);
   const auto* const first_columns = static_cast<const std::int32_t*>(factor.super);
@@ -212,12 +222,12 @@ struct SparseCholesky::Impl : Cholmod {
 };
 
 SparseCholesky::SparseCholesky(const LowerMatrix& pattern) : impl_(std::make_unique<Impl>()) {
-  impl_->analyse(pattern, nullptr);
+  LPDEFORM_CHECK(impl_->analyse(pattern, nullptr));
 }
 SparseCholesky::SparseCholesky(const LowerMatrix& pattern, const std::vector<std::int32_t>& new_to_old)
     : impl_(std::make_unique<Impl>()) {
   LPDEFORM_CHECK(new_to_old.size() == static_cast<std::size_t>(pattern.size()));
-  impl_->analyse(pattern, new_to_old.data());
+  LPDEFORM_CHECK(impl_->analyse(pattern, new_to_old.data()));
 }
 SparseCholesky::~SparseCholesky() = default;
 SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;

@@ -19,7 +19,7 @@ Eigen::Map<const Sparse> view_of(const LowerMatrix& matrix, const double* values
 
 }  // namespace
 
-std::optional<SupernodePattern> analyse_supernodes(const LowerMatrix&) {
+absl::StatusOr<std::optional<SupernodePattern>> analyse_supernodes(const LowerMatrix&, std::size_t) {
   return std::nullopt;
 }
 

@@ -13,8 +13,9 @@ constexpr float kLowestPivot = 1e-6f;    // of the matrix's diagonal entry
 constexpr std::size_t kTile = 64;        // rows of a supernode that one task computes
 constexpr double kWorthTasks = 200'000;  // multiplications
 
-/// Before wide supernodes are divided, which takes away the upper half of their triangles.
-std::size_t value_count(const SupernodePattern& supernodes) {
+}  // namespace
+
+std::size_t entry_count(const SupernodePattern& supernodes) {
   std::size_t result = 0;
   for (std::size_t k = 0; k + 1 < supernodes.first_columns.size(); ++k) {
     const auto columns =
@@ -24,14 +25,12 @@ std::size_t value_count(const SupernodePattern& supernodes) {
   return result;
 }
 
-}  // namespace
-
 SingleCholesky::SingleCholesky(const LowerMatrix& pattern, const SupernodePattern& supernodes) {
   const std::size_t n = supernodes.new_to_old.size();
   LPDEFORM_CHECK(n == static_cast<std::size_t>(pattern.size()));
   old_to_new_.resize(n);
   for (std::size_t i = 0; i < n; ++i) old_to_new_[supernodes.new_to_old[i]] = static_cast<std::int32_t>(i);
-  factor_.begin(supernodes.new_to_old.data(), n, value_count(supernodes));
+  factor_.begin(supernodes.new_to_old.data(), n, entry_count(supernodes));
   std::vector<std::int32_t> rows;
   for (std::size_t k = 0; k + 1 < supernodes.first_columns.size(); ++k) {
     const std::int32_t end = supernodes.first_columns[k + 1];

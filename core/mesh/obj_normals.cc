@@ -193,4 +193,12 @@ std::string obj_text_with_normals(const MeshFile& file, const Points& positions,
   return Writer(source, positions, drawn, normals).write();
 }
 
+bool has_obj_normals(const MeshFile& file) {
+  TextScanner scanner(file.obj_source, TextScanner::LineEnds::kContinued);
+  do {
+    if (scanner.next_on_line() == "vn") return true;
+  } while (scanner.skip_line());
+  return false;
+}
+
 }  // namespace lpdeform

@@ -17,4 +17,7 @@ namespace lpdeform {
 /// is one that deformable() accepts.
 std::string obj_text_with_normals(const MeshFile& file, const Points& positions, bool welds);
 
+/// The source is an OBJ with vn lines.
+bool has_obj_normals(const MeshFile& file);
+
 }  // namespace lpdeform

@@ -11,6 +11,8 @@
 namespace lpdeform {
 namespace {
 
+constexpr std::size_t kChunk = 4096;  // vertices
+
 /// One value for all, or those of the coarse vertices.
 Field restricted(const Field& field, const std::vector<std::int32_t>& fine_vertex) {
   if (field.size() == 1) return field;
@@ -99,26 +101,30 @@ absl::Status CoarseLevel::take_over(const RestShape& fine, const HandleSet& hand
   return status;
 }
 
-Points CoarseLevel::prolong(const RestShape& fine) const {
+Points CoarseLevel::prolong(const RestShape& fine, const Workers& workers) const {
   const Points coarse = (deformer_->positions().rowwise() - shape_->centre()) / shape_->mean_edge_length();
-  CellPass cells(shape_, Workers(1));
+  CellPass cells(shape_, workers);
   cells.evaluate(coarse, LpNorm(Material::uniform(2), shape_->vertex_count(), 1, 1));
   const std::vector<Eigen::Matrix3d> rotations = cells.rotations();
 
   const double unit = fine.mean_edge_length();
   const Points moved = (deformer_->positions().rowwise() - fine.centre()) / unit;
   Points result(fine.vertex_count(), 3);
-  for (std::int32_t v = 0; v < fine.vertex_count(); ++v) {
+  const auto place = [&](Eigen::Index v) {
     const Eigen::RowVector3d rest = fine.scaled_positions().row(v);
     Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    const Guides& guides = guides_[static_cast<std::size_t>(v)];
     for (std::size_t k = 0; k < kGuides; ++k) {
-      const std::int32_t c = guides_[v].vertex[k];
-      if (guides_[v].weight[k] == 0) continue;
+      const std::int32_t c = guides.vertex[k];
+      if (guides.weight[k] == 0) continue;
       const Eigen::RowVector3d offset = rest - fine.scaled_positions().row(fine_vertex_[c]);
-      sum += guides_[v].weight[k] * (moved.row(c) + offset * rotations[c].transpose());
+      sum += guides.weight[k] * (moved.row(c) + offset * rotations[c].transpose());
     }
     result.row(v) = sum;
-  }
+  };
+  workers.for_chunks(guides_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) place(static_cast<Eigen::Index>(v));
+  });
   return result;
 }
 

@@ -21,7 +21,8 @@ class CoarseLevel {
   /// Null where the mesh cannot be coarsened to half its vertices.
   static std::unique_ptr<CoarseLevel> create(const RestShape& fine, int threads);
 
-  /// Gives the coarse Deformer what the fine one has: coarse_handles, and `material`. Where p_i is not 2, a coarse cell stands for m fine ones with E_i^2 a sum over them, so s_i is multiplied by m^(1 - p_i / 2).
+  /// Gives the coarse Deformer what the fine one has: coarse_handles, and `material`. Where p_i is not 2, a coarse cell
+  /// stands for m fine ones with E_i^2 a sum over them, so s_i is multiplied by m^(1 - p_i / 2).
   absl::Status take_over(const RestShape& fine, const HandleSet& handles, const Constraints& constraints,
                          const Material& material);
 
@@ -29,7 +30,7 @@ class CoarseLevel {
 
   /// The fine shape moved with the coarse one, in scaled units of the fine: each vertex follows the fitted rigid
   /// motions of the nearest of the coarse vertices around it, blended by distance.
-  Points prolong(const RestShape& fine) const;
+  Points prolong(const RestShape& fine, const Workers& workers) const;
 
   std::size_t memory_bytes() const;
 

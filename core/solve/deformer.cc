@@ -25,7 +25,16 @@ absl::StatusOr<std::unique_ptr<Deformer>> Deformer::create(std::shared_ptr<const
     return invalid_input({"THREADS_OUT_OF_RANGE", "threads", "1 <= threads <= 1024"},
                          absl::StrCat("threads is ", options.threads, "; it must be from 1 to 1024"));
   }
-  return std::unique_ptr<Deformer>(new Deformer(std::make_unique<Impl>(std::move(shape), options)));
+  const Metric::Admission admit = [&](std::size_t metric_bytes) {
+    if (!options.admit) return absl::OkStatus();
+    const std::size_t points = 3 * sizeof(double) * static_cast<std::size_t>(shape->vertex_count());
+    return options.admit(metric_bytes + kWorkspace * points);
+  };
+  auto metric = Metric::create(shape, admit);
+  if (!metric.ok()) return metric.status();
+  options.admit = nullptr;
+  return std::unique_ptr<Deformer>(
+      new Deformer(std::make_unique<Impl>(std::move(shape), std::move(options), *std::move(metric))));
 }
 
 const RestShape& Deformer::shape() const {
@@ -118,6 +127,10 @@ bool Deformer::step() {
   else
     self.iterate();
   return self.minimiser != nullptr || self.certificate != nullptr;
+}
+
+void Deformer::catch_up() {
+  impl_->catch_up();
 }
 
 absl::Status Deformer::start_certificate(std::stop_token stop, double max_seconds) {

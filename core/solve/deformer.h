@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <stop_token>
@@ -21,6 +23,8 @@ struct DeformerOptions {
   int threads = 1;
   /// Smaller meshes are computed by the calling thread alone: threads would cost them more than they bring.
   std::int32_t parallel_from = 8000;  // vertices
+  /// Asked once, when it is known how much memory a solve takes and before it is taken; its error is create()'s.
+  std::function<absl::Status(std::size_t bytes)> admit = {};
 };
 
 /// One mesh being deformed: handles, material, the present state and the factorisations that go with them.
@@ -33,6 +37,7 @@ struct DeformerOptions {
 ///   use(deformer->positions(), deformer->cell_energies());
 class Deformer {
  public:
+  /// Errors: INVALID_ARGUMENT (NO_SHAPE, THREADS_OUT_OF_RANGE, FACTOR_TOO_LARGE); those of options.admit.
   static absl::StatusOr<std::unique_ptr<Deformer>> create(std::shared_ptr<const RestShape> shape,
                                                           DeformerOptions options);
   ~Deformer();
@@ -70,6 +75,11 @@ class Deformer {
                                  double max_seconds = std::numeric_limits<double>::infinity());
   /// The steps under way are those of a certificate: positions() do not change any more.
   bool is_certifying() const;
+
+  /// Brings positions(), cell_energies() and summary() up to what the coarse level of a running kMultiresolution has found,
+  /// where that is better than the guess; else does nothing. The steps that follow, and the result, are the same. Takes
+  /// about as long as two iterations, and does nothing where the coarse level has not gone on much since the last call.
+  void catch_up();
 
   /// start, then step until the end.
   absl::StatusOr<SolveSummary> solve(const SolveSettings& settings, std::stop_token stop = {});

@@ -156,10 +156,24 @@ void Deformer::Impl::keep(const Points& from, double sum) {
   });
 }
 
-void Deformer::Impl::record(const StepResult& result, double sum) {
+void Deformer::Impl::catch_up() {
+  if (!minimiser) return;
+  const std::optional<Points> found = minimiser->in_hand();
+  if (!found) return;
+  if (const double sum = objective.sum(*norm); sum < best_sum) keep(*found, sum);
+  summarise();
+}
+
+void Deformer::Impl::summarise() {
   summary.energy = norm->true_energy(best_sum);
   summary.soft_energy = norm->true_energy(best_soft_sum);
   summary.solve_seconds = seconds();
+  summary.evaluations = objective.evaluations() - evaluations_before;
+  summary.back_substitutions = metric.back_substitutions() - back_substitutions_before;
+}
+
+void Deformer::Impl::record(const StepResult& result, double sum) {
+  summarise();
   if (!settings.keep_trace) return;
   summary.trace.push_back(
       {summary.iterations, summary.solve_seconds, norm->true_energy(sum), result.objective, result.stage});
@@ -171,6 +185,8 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   stop = std::move(new_stop);
   summary = {};
   summary.threads = workers().threads();
+  evaluations_before = objective.evaluations();
+  back_substitutions_before = metric.back_substitutions();
   const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state && !is_at_rest;
   if (!is_warm) x_before_move.resize(0, 3);
   settings.method = summary.method = chosen_method(settings.method, is_warm);
@@ -226,6 +242,7 @@ void Deformer::Impl::iterate() {
 }
 
 void Deformer::Impl::end(StopReason reason) {
+  catch_up();
   // Before its end the metric may still be that of the guess.
   if (settings.method == Method::kMultiresolution) is_metric_live = reason == StopReason::kConverged;
   minimiser.reset();

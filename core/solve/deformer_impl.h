@@ -15,11 +15,11 @@ namespace lpdeform {
 
 /// What a Deformer holds, and the loop of a solve. Its guesses are in deformer_guess.cc, the rest in deformer_impl.cc.
 struct Deformer::Impl {
-  Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options)
+  Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options, Metric first_metric)
       : shape(std::move(rest_shape)),
-        options(deformer_options),
+        options(std::move(deformer_options)),
         objective(shape, Workers(shape->vertex_count() < options.parallel_from ? 1 : options.threads)),
-        metric(shape),
+        metric(std::move(first_metric)),
         x(shape->scaled_positions()),
         best_energies(Field::Zero(shape->vertex_count())),
         positions(shape->positions()) {}
@@ -43,7 +43,9 @@ struct Deformer::Impl {
   void keep_if_best(double sum);
   void keep(const Points& from, double sum);
   bool keep_rest_if_best();
+  void catch_up();
   Material effective_material() const;
+  void summarise();
   void record(const StepResult& result, double sum);
   void begin(const SolveSettings& new_settings, std::stop_token new_stop);
   void iterate();
@@ -91,6 +93,7 @@ struct Deformer::Impl {
   std::unique_ptr<Certificate> certificate;  // under way, after the minimiser's end
   std::chrono::steady_clock::time_point started;
   double best_sum = 0, best_soft_sum = 0;
+  int evaluations_before = 0, back_substitutions_before = 0;  // of this Deformer, when the solve began
   SolveSummary summary;
 };
 

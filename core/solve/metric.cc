@@ -10,8 +10,10 @@ namespace {
 
 constexpr std::size_t kChunk = 4096;  // vertices
 constexpr int kPasses = 12;
-constexpr double kRefined = 1e-12;  // the last correction's share of the result
-constexpr double kSlowest = 0.3;    // what a correction is of the one before, at most
+constexpr double kRefined = 1e-12;          // the last correction's share of the result
+constexpr std::size_t kUsualBytes = 1000;   // of a factor, for each vertex of a surface
+constexpr std::size_t kBytesPerEntry = 40;  // of the matrix: itself and its places in the factor
+constexpr double kSlowest = 0.3;            // what a correction is of the one before, at most
 
 LowerMatrix lower_pattern(const RestShape& shape) {
   LowerMatrix matrix;
@@ -31,9 +33,23 @@ LowerMatrix lower_pattern(const RestShape& shape) {
 
 }  // namespace
 
-Metric::Metric(std::shared_ptr<const RestShape> shape)
-    : shape_(std::move(shape)), matrix_(lower_pattern(*shape_)) {
-  if (const auto supernodes = analyse_supernodes(matrix_)) single_.emplace(matrix_, *supernodes);
+absl::StatusOr<Metric> Metric::create(std::shared_ptr<const RestShape> shape, const Admission& admit) {
+  LowerMatrix matrix = lower_pattern(*shape);
+  const auto supernodes = analyse_supernodes(matrix);
+  if (!supernodes.ok()) return supernodes.status();
+  if (admit) {
+    const std::size_t factor = *supernodes ? entry_count(**supernodes) * sizeof(float)
+                                           : kUsualBytes * static_cast<std::size_t>(shape->vertex_count());
+    absl::Status status = admit(factor + kBytesPerEntry * matrix.rows.size());
+    if (!status.ok()) return status;
+  }
+  return Metric(std::move(shape), std::move(matrix), *supernodes);
+}
+
+Metric::Metric(std::shared_ptr<const RestShape> shape, LowerMatrix matrix,
+               const std::optional<SupernodePattern>& supernodes)
+    : shape_(std::move(shape)), matrix_(std::move(matrix)) {
+  if (supernodes) single_.emplace(matrix_, *supernodes);
 }
 
 bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held,
@@ -125,7 +141,7 @@ void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& 
       if (is_held[j]) b.row(i) += edge_weight(i, k) * u.row(j);
     }
   }
-  single().solve(b, u, workers);
+  solve_single(b, u, workers);
   for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
     if (is_held[i]) u.row(i) = b.row(i);
   }
@@ -133,14 +149,14 @@ void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& 
 
 /// x = matrix_^-1 b, x not b, by refinement from single precision. False where that does not converge.
 bool Metric::refine(const Points& b, Points& x, const Workers& workers) const {
-  single().solve(b, x, workers);
+  solve_single(b, x, workers);
   Points rest, correction;
   double before = x.norm();
   const double enough = kRefined * before;
   for (int pass = 0; pass < kPasses; ++pass) {
     rest = b;
     subtract_product(x, rest);
-    single().solve(rest, correction, workers);
+    solve_single(rest, correction, workers);
     const double size = correction.norm();
     if (!(size < kSlowest * before || size <= enough)) return false;
     x += correction;
@@ -156,6 +172,7 @@ void Metric::solve_scaled(const Points& b, Points& x, const Workers& workers) co
     x.setConstant(b.rows(), 3, std::numeric_limits<double>::quiet_NaN());
     return;
   }
+  ++back_substitutions_;
   double_->solve(b, x);
 }
 
@@ -168,6 +185,11 @@ void Metric::subtract_product(const Points& x, Points& b) const {
       if (i != j) b.row(j) -= matrix_.values[entry] * x.row(i);
     }
   }
+}
+
+void Metric::solve_single(const Points& b, Points& x, const Workers& workers, double factor) const {
+  ++back_substitutions_;
+  single().solve(b, x, workers, factor);
 }
 
 const SingleFactor& Metric::single() const {
@@ -183,7 +205,7 @@ void Metric::solve(const Points& b, Points& x, const Workers& workers) const {
 }
 
 void Metric::precondition(const Points& b, Points& x, const Workers& workers) const {
-  single().solve(b, x, workers, 1 / scale_);
+  solve_single(b, x, workers, 1 / scale_);
 }
 
 std::size_t Metric::memory_bytes() const {

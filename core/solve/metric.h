@@ -1,8 +1,11 @@
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "core/base/workers.h"
 #include "core/energy/rest_shape.h"
 #include "core/linalg/cholesky.h"
@@ -36,7 +39,12 @@ class Metric {
     kDouble,  // solve() above all
   };
 
-  explicit Metric(std::shared_ptr<const RestShape> shape);
+  /// Asked with the bytes that something is about to take, before it does; an error keeps it from doing so.
+  using Admission = std::function<absl::Status(std::size_t bytes)>;
+
+  /// Errors: FACTOR_TOO_LARGE (analyse_supernodes), and those of `admit`, which is asked with about what memory_bytes() will be
+  /// in single precision. Without supernodes it is asked with what a triangulated surface needs.
+  static absl::StatusOr<Metric> create(std::shared_ptr<const RestShape> shape, const Admission& admit = {});
 
   /// `is_held` has one entry a vertex. Cell weights are clipped from below at 1e-8 of the largest used, so
   /// that the factorisation stays healthy where cells have no weight. False where the factorisation fails. A
@@ -75,9 +83,14 @@ class Metric {
   /// The common factor of M that adopt() changes: scale() M^-1 is one matrix for a version.
   double scale() const { return scale_; }
 
+  /// Back-substitutions for three right-hand sides so far.
+  int back_substitutions() const { return back_substitutions_; }
+
   std::size_t memory_bytes() const;
 
  private:
+  Metric(std::shared_ptr<const RestShape> shape, LowerMatrix matrix,
+         const std::optional<SupernodePattern>& supernodes);
   double edge_weight(std::int32_t i, std::int32_t k) const {
     return 2 * (cell_weights_[i] + cell_weights_[shape_->neighbours()[k]]) * shape_->weights()[k];
   }
@@ -85,6 +98,7 @@ class Metric {
   void fill_matrix(const Workers& workers);
   bool factor_double() const;
   bool refine(const Points& b, Points& x, const Workers& workers) const;
+  void solve_single(const Points& b, Points& x, const Workers& workers, double factor = 1) const;
   void solve_scaled(const Points& b, Points& x, const Workers& workers) const;
   const SingleFactor& single() const;
   void subtract_product(const Points& x, Points& b) const;
@@ -103,6 +117,7 @@ class Metric {
   mutable std::optional<SparseCholesky> double_;  // made when first needed
   mutable bool is_double_current_ = false;
   mutable SingleFactor copy_;  // of double_, made when first needed, empty until then
+  mutable int back_substitutions_ = 0;
 };
 
 }  // namespace lpdeform

@@ -65,6 +65,10 @@ class Minimiser {
 
   /// The present state: finite, all constraints met.
   virtual const Points& x() const = 0;
+
+  /// What the method has in hand beside x(), new since it was last asked: finite, all constraints met. problem.objective
+  /// then holds the evaluation there. Steps and their results are the same with and without being asked.
+  virtual std::optional<Points> in_hand() { return std::nullopt; }
 };
 
 /// Leaves of `values`, a gradient or a direction, what the constraints allow: rows of held vertices become

@@ -20,14 +20,31 @@ Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level)
     fine_ = std::make_unique<QuasiNewton>(problem_, x_, Warmth::kCold);
 }
 
-/// From the better of the guess and what the coarse level has found.
-void Multiresolution::begin_fine() {
-  Points found = level_.prolong(problem_.shape());
+/// What the coarse level has found, within the constraints. Not always finite.
+Points Multiresolution::prolonged() {
+  Points found = level_.prolong(problem_.shape(), problem_.workers());
   for (Eigen::Index i = 0; i < found.rows(); ++i) {
     if (problem_.constraints.is_held[i]) found.row(i) = problem_.constraints.targets.row(i);
   }
   if (found.allFinite())
     problem_.constraints.linear.satisfy_within(problem_.metric, found, problem_.workers());
+  return found;
+}
+
+std::optional<Points> Multiresolution::in_hand() {
+  const int done = level_.deformer().summary().iterations;
+  if (fine_ || done < next_look_) return std::nullopt;
+  next_look_ = 2 * done;
+  level_.deformer().catch_up();
+  Points found = prolonged();
+  if (!found.allFinite()) return std::nullopt;
+  problem_.objective.evaluate(found, problem_.norm);
+  return found;
+}
+
+/// From the better of the guess and what the coarse level has found.
+void Multiresolution::begin_fine() {
+  Points found = prolonged();
   const bool is_better = found.allFinite() && problem_.objective.evaluate(found, problem_.norm) < objective_;
   if (is_better) {
     x_.swap(found);

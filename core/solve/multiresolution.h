@@ -19,14 +19,21 @@ class Multiresolution : public Minimiser {
 
   StepResult step() override;
   const Points& x() const override { return fine_ ? fine_->x() : x_; }
+  /// The coarse level's state prolonged: about two iterations' work, so only where that has taken twice the iterations
+  /// of the time before.
+  std::optional<Points> in_hand() override;
 
  private:
+  static constexpr int kFirstLook = 8;
+
+  Points prolonged();
   void begin_fine();
 
   Problem problem_;
   Points x_;
   double objective_ = 0;
   CoarseLevel& level_;
+  int next_look_ = kFirstLook;         // of the coarse level's iterations
   std::unique_ptr<QuasiNewton> fine_;  // none while the coarse level runs
 };
 

@@ -5,6 +5,7 @@
 namespace lpdeform {
 
 double Objective::evaluate(const Points& x, const LpNorm& norm) {
+  ++evaluations_;
   return cells_.evaluate(x, norm) + soft_.evaluate(x, norm);
 }
 

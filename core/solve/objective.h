@@ -36,9 +36,13 @@ class Objective {
   /// largest cell's, so that the metric stays definite where a term for p > 2 is met and nothing else holds.
   std::vector<double> soft_weights() const;
 
+  /// Calls of evaluate() so far.
+  int evaluations() const { return evaluations_; }
+
  private:
   CellPass cells_;
   SoftTerms soft_;
+  int evaluations_ = 0;
 };
 
 }  // namespace lpdeform

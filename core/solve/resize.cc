@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
+#include "core/analysis/girth.h"
 #include "core/analysis/salience.h"
 #include "core/base/fault.h"
 
@@ -14,6 +15,9 @@ namespace {
 
 constexpr double kEnd = 0.01;  // of the extent
 constexpr double kStiffening = 100;
+constexpr double kNarrow = 0.75;         // of the mean girth
+constexpr double kLeastGirth = 1.0 / 6;  // of that
+constexpr double kNarrowing = 4;
 constexpr double kSmallestSine = 1e-6;
 
 /// |log scale_k| over the largest of them; (1, 0, 0) where all scales are 1.
@@ -56,6 +60,17 @@ std::vector<std::int32_t> ends_of(const RestShape& shape, const Eigen::Matrix3d&
     if (is_end.any()) ends.push_back(static_cast<std::int32_t>(i));
   }
   return ends;
+}
+
+/// Of the slices across each stretched axis, what makes narrow ones no easier to cut than others.
+Field narrowness(const RestShape& shape, const Eigen::Matrix3d& axes, const Eigen::Vector3d& shares) {
+  Field result = Field::Ones(shape.vertex_count());
+  for (int k = 0; k < 3; ++k) {
+    if (shares[k] == 0) continue;
+    const Field girth = girth_along(shape, axes.row(k));
+    result.array() *= (girth.array() / kNarrow).max(kLeastGirth).min(1).pow(-kNarrowing * shares[k]);
+  }
+  return result;
 }
 
 }  // namespace
@@ -106,7 +121,8 @@ absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const 
   inputs.handle.motion = TargetPositions{std::move(targets)};
   inputs.material = Material::uniform(1);
   const Field stiff = salience(shape, features.bending(), scaling.axes, shares);
-  inputs.material.stiffness = (std::log(kStiffening) * stiff.array()).exp();
+  inputs.material.stiffness =
+      (std::log(kStiffening) * stiff.array()).exp() * narrowness(shape, scaling.axes, shares).array();
   return inputs;
 }
 

@@ -40,8 +40,13 @@ struct ResizeInputs {
 ///
 /// The handle holds the ends of each component, the vertices within 1 % of its extent from its lowest and
 /// highest along each axis whose scale is not 1, at their scaled positions; where all are 1, the ends along
-/// the first axis. The material is p = 1 and the stiffness 100^salience_i, with the salience of
-/// core/analysis/salience.h for the axes, weighted |log scale_k| / max_j |log scale_j|.
+/// the first axis. The material is p = 1 and the stiffness
+///
+///   s_i = 100^salience_i prod_k clamp(girth_ik / 0.75, 1/6, 1)^(-4 a_k),    a_k = |log scale_k| / max_j |log scale_j|
+///
+/// with the salience of core/analysis/salience.h for the axes, weighted a_k, and the girth of core/analysis/girth.h
+/// along axis k. A stretch goes where a cut costs least: without the second factor that is close to the ends, where
+/// slices are small, and a tip is drawn out into a spike.
 ///
 /// p = 1 matters: it gathers the stretch in places where little resists, which are straight along the
 /// stretch, so that it does not show there. p = 2 spreads it over salient places too, however stiff they are.

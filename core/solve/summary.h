@@ -34,6 +34,9 @@ struct SolveSummary {
   double setup_seconds = 0;  // factoring for this handle set; 0 where it was reused
   double solve_seconds = 0;
   int threads = 1;
+  // The work of the fine level: evaluations of all cells, rotations fitted; back-substitutions for three right-hand sides.
+  int evaluations = 0;
+  int back_substitutions = 0;
   std::vector<IterationRecord> trace;
 };
 

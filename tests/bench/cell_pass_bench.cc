@@ -55,7 +55,8 @@ void cell_pass(benchmark::State& state) {
 BENCHMARK(cell_pass)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 struct FactoredMetric {
-  explicit FactoredMetric(int side) : shape(rest_shape(grid(side, side, 2))), metric(shape) {
+  explicit FactoredMetric(int side)
+      : shape(rest_shape(grid(side, side, 2))), metric(Metric::create(shape).value()) {
     is_held.assign(shape->vertex_count(), false);
     is_held[0] = true;
   }

@@ -89,6 +89,22 @@ TEST(Budget, OneOwnerCannotTakeAll) {
   EXPECT_EQ(budget->used(), 0u);
 }
 
+TEST(Budget, AReservationGrowsWhereThereIsRoom) {
+  const auto budget = std::make_shared<Budget>(100, 60);
+  auto grown = budget->reserve(20, "alice");
+  ASSERT_TRUE(grown.ok());
+  EXPECT_TRUE(grown->grow_to(10).ok());
+  EXPECT_EQ(grown->bytes(), 20u);
+  EXPECT_TRUE(grown->grow_to(50).ok());
+  EXPECT_EQ(budget->used(), 50u);
+  EXPECT_EQ(fault_of(grown->grow_to(61)).reason, "CALLER_MEMORY_FULL");
+  const auto other = budget->reserve(45, "bob");
+  EXPECT_EQ(fault_of(grown->grow_to(60)).reason, "MEMORY_FULL");
+  EXPECT_EQ(grown->bytes(), 50u);
+  grown = Reservation();
+  EXPECT_EQ(budget->used(), 45u);
+}
+
 TEST(RetryAdvice, IsWhatWasGivenElseByTheCode) {
   EXPECT_EQ(retry_after_ms(absl::OkStatus()), 0u);
   EXPECT_EQ(retry_after_ms(absl::InvalidArgumentError("")), 0u);

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "service_fixture.h"
+#include "tests/support/glued_shape.h"
 
 namespace lpdeform {
 namespace {
@@ -125,6 +126,26 @@ INSTANTIATE_TEST_SUITE_P(
                        handle.mutable_set()->mutable_vertices()->set_inline_(std::string(371 * 4, '\0'));
                      }}),
     [](const auto& info) { return std::string(info.param.reason); });
+
+class FullServerTest : public ServiceTest {
+ protected:
+  void SetUp() override {
+    options_.max_bytes = 160'000'000;
+    start();
+  }
+};
+
+/// 48,000 vertices, which on a surface would fit.
+TEST_F(FullServerTest, AMeshWhoseFactorisationDoesNotFitIsRefusedBeforeItIsMade) {
+  v1::CreateSessionRequest request;
+  *request.mutable_mesh() = mesh_message(glued_at_random(3000));
+  const std::string bytes = request.mesh().data().inline_();
+  request.mutable_mesh()->mutable_data()->set_upload(upload(bytes));
+  request.set_free_components(v1::FREE_COMPONENTS_STAY);
+  v1::CreateSessionResponse response;
+  EXPECT_EQ(details_of(try_create(request, response)).info.reason(), "MEMORY_FULL");
+  create(grid(180, 180, 1));  // nothing is left of the other
+}
 
 class SmallServerTest : public ServiceTest {
  protected:

@@ -5,13 +5,14 @@
 #include <limits>
 #include <utility>
 
+#include "core/base/fault.h"
 #include "tests/core/linalg/matrices.h"
 
 namespace lpdeform {
 namespace {
 
 SingleCholesky analysed(const LowerMatrix& matrix) {
-  return {matrix, *analyse_supernodes(matrix)};
+  return {matrix, *analyse_supernodes(matrix).value()};
 }
 
 TEST(SingleCholesky, FactorsNarrowAndWideSupernodes) {
@@ -77,9 +78,18 @@ TEST(SingleCholesky, RefusesWhatSinglePrecisionDoesNotCarry) {
   EXPECT_FALSE(analysed(lower(a)).factor(lower(a), Workers(1)));
 }
 
+TEST(SupernodePattern, IsRefusedWhereTheFactorIsTooLarge) {
+  const LowerMatrix matrix = square_laplacian(30);
+  const std::size_t entries = entry_count(*analyse_supernodes(matrix).value());
+  EXPECT_TRUE(analyse_supernodes(matrix, entries).ok());
+  const absl::Status refused = analyse_supernodes(matrix, entries - 1).status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(fault_of(refused).reason, "FACTOR_TOO_LARGE");
+}
+
 TEST(SupernodePattern, LetsTheDoubleFactorisationUseItsOrder) {
   const LowerMatrix matrix = square_laplacian(30);
-  const auto pattern = analyse_supernodes(matrix);
+  const auto pattern = analyse_supernodes(matrix).value();
   ASSERT_TRUE(pattern.has_value());
   SparseCholesky own(matrix), given(matrix, pattern->new_to_old);
   ASSERT_TRUE(own.factor(matrix));

@@ -16,7 +16,7 @@ class CertificateTest : public testing::Test {
       : handles(std::move(pose)),
         constraints(make_constraints(*shape, handles, FreeComponents::kError).value()),
         objective(shape, Workers(1)),
-        metric(shape) {}
+        metric(Metric::create(shape).value()) {}
 
   LpNorm norm(const Material& material) const {
     return LpNorm(material, shape->vertex_count(), shape->mean_edge_length(), 1.0);

@@ -6,6 +6,7 @@
 
 #include "core/base/fault.h"
 #include "tests/core/poses.h"
+#include "tests/support/glued_shape.h"
 
 namespace lpdeform {
 namespace {
@@ -299,6 +300,28 @@ TEST_F(DeformerTest, AStoppedCertificateEndsWithWhatItHas) {
   stop.request_stop();
   EXPECT_FALSE(solver->step());
   EXPECT_EQ(solver->summary().optimality_gap.value(), 1);  // no bound was found yet
+}
+
+// An ordinary surface, and one whose factorisation fills up.
+TEST(Deformer, AsksBeforeItTakesMemory) {
+  for (const TriangleMesh& mesh : {grid(60, 60, 1), glued_at_random(200)}) {
+    const auto shape = rest_shape(mesh);
+    std::vector<std::size_t> asked;
+    DeformerOptions options{.free_components = FreeComponents::kStay, .admit = [&](std::size_t bytes) {
+                              asked.push_back(bytes);
+                              return absl::OkStatus();
+                            }};
+    auto solver = Deformer::create(shape, options).value();
+    ASSERT_EQ(asked.size(), 1u);
+    HandleSet handles;
+    (void)handles.set("some", {{0, 1, 2}, Fixed{}});
+    ASSERT_TRUE(solver->set_handles(handles).ok());
+    ASSERT_TRUE(solver->solve({.method = Method::kQuasiNewton}).ok());
+    const auto held = static_cast<double>(solver->memory_bytes());
+    EXPECT_NEAR(static_cast<double>(asked[0]) / held, 1, 0.4) << mesh.vertices.rows() << " vertices";
+    options.admit = [](std::size_t) { return absl::ResourceExhaustedError("full"); };
+    EXPECT_EQ(Deformer::create(shape, options).status(), absl::ResourceExhaustedError("full"));
+  }
 }
 
 }  // namespace

@@ -16,6 +16,9 @@ namespace {
 /// Of the farthest that a vertex goes from one frame to the first of the next move, in the handles' own moves: what
 /// the guess takes over from the move before, up to three of them, and one iteration.
 constexpr double kFarthestJump = 4;
+/// Of the way that the frames of one move go, each measured at the vertex that goes farthest, in the distance from the
+/// first to the last: 1 where all go straight there.
+constexpr double kLongestWay = 6;
 
 /// The pose with its rigid motions done by `share`.
 HandleSet part_way(const HandleSet& pose, double share) {
@@ -76,6 +79,28 @@ TEST_P(DragTest, FramesDoNotFlicker) {
       move(*live, handles, GetParam().iterations, &first);
       EXPECT_LE(farthest(before, first), kFarthestJump * farthest_of_handles(before, first, handles))
           << pose.name << ", move " << k;
+    }
+  }
+}
+
+TEST_P(DragTest, FramesThatRefineAMoveGoOneWay) {
+  for (const PaperPose& pose : poses()) {
+    const auto live =
+        deformer(rest_shape(pose.mesh), part_way(pose.handles, 0), Material::uniform(GetParam().p));
+    ASSERT_TRUE(live->solve({}).ok());
+    for (int k = 1; k <= GetParam().moves; ++k) {
+      ASSERT_TRUE(live->set_handles(part_way(pose.handles, double(k) / GetParam().moves)).ok());
+      ASSERT_TRUE(live->start({}).ok());
+      const Points guess = live->positions();
+      Points before = guess;
+      double way = 0, energy = live->summary().energy;
+      for (int step = 0; step < GetParam().iterations && live->step(); ++step) {
+        way += farthest(before, live->positions());
+        before = live->positions();
+        EXPECT_LE(live->summary().energy, energy);
+        energy = live->summary().energy;
+      }
+      EXPECT_LE(way, kLongestWay * farthest(guess, before)) << pose.name << ", move " << k;
     }
   }
 }

@@ -136,14 +136,45 @@ TEST_F(MultiresolutionTest, FallsBackWhereTheMeshCannotBeCoarsened) {
   EXPECT_EQ(solver->solve(settings(Method::kMultiresolution)).value().method, Method::kQuasiNewton);
 }
 
-TEST_F(MultiresolutionTest, StopsWithinTheCoarseLevel) {
-  auto nested = deformer(shape, bend(), Material::uniform(1));
-  SolveSettings one = settings(Method::kMultiresolution);
-  one.max_iterations = 1;
-  const SolveSummary summary = nested->solve(one).value();
-  EXPECT_EQ(summary.stop_reason, StopReason::kIterationLimit);
-  EXPECT_EQ(summary.energy, summary.initial_energy);
-  EXPECT_TRUE(nested->positions().allFinite());
+TEST_F(MultiresolutionTest, StoppedWithinTheCoarseLevelHasWhatThatHasFound) {
+  SolveSettings few = settings(Method::kMultiresolution);
+  double before = std::numeric_limits<double>::infinity();
+  for (const int iterations : {1, 10, 40}) {
+    auto nested = deformer(shape, bend(), Material::uniform(1));
+    few.max_iterations = iterations;
+    const SolveSummary summary = nested->solve(few).value();
+    EXPECT_EQ(summary.stop_reason, StopReason::kIterationLimit);
+    EXPECT_EQ(summary.trace.back().energy, summary.initial_energy) << "the fine level had begun";
+    EXPECT_LT(summary.energy, before) << iterations << " iterations";
+    EXPECT_NEAR(summary.energy, nested->cell_energies().sum(), 1e-10 * summary.energy);
+    EXPECT_TRUE(nested->positions().allFinite());
+    for (const std::int32_t v : slice(mesh, 2, 0, 0))
+      EXPECT_EQ(nested->positions().row(v), mesh.vertices.row(v));
+    before = summary.energy;
+  }
+}
+
+TEST_F(MultiresolutionTest, CatchesUpWithTheCoarseLevelWithoutChangingWhatFollows) {
+  for (const double p : {1.0, 2.0}) {
+    auto asked = deformer(shape, bend(), Material::uniform(p));
+    ASSERT_TRUE(asked->start(settings(Method::kMultiresolution)).ok());
+    std::vector<double> shown;
+    do {
+      asked->catch_up();
+      shown.push_back(asked->summary().energy);
+    } while (asked->step());
+    EXPECT_TRUE(std::is_sorted(shown.rbegin(), shown.rend())) << "no frame is worse than the one before";
+    const auto& trace = asked->summary().trace;
+    const auto fine = std::find_if(trace.begin(), trace.end(),
+                                   [](const IterationRecord& record) { return record.stage > 0; });
+    ASSERT_NE(fine, trace.end());
+    EXPECT_LT(shown[fine->iteration - 1], 0.7 * shown[0]) << "before the fine level began";
+
+    auto alone = deformer(shape, bend(), Material::uniform(p));
+    ASSERT_TRUE(alone->solve(settings(Method::kMultiresolution)).ok());
+    EXPECT_EQ(asked->positions(), alone->positions());
+    EXPECT_EQ(asked->summary().iterations, alone->summary().iterations);
+  }
 }
 
 TEST_F(MultiresolutionTest, GivesTheSameBitsOnAnyNumberOfThreads) {

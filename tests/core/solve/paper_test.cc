@@ -129,7 +129,7 @@ TEST(Paper, ConicAndQuasiNewtonAgreeOnTheConvexStep) {
   const auto constraints = make_constraints(*shape, bar_twist(bar), FreeComponents::kError).value();
   const LpNorm norm(Material::uniform(1), shape->vertex_count(), shape->mean_edge_length(), 1.0);
   Objective objective(shape, Workers(1));
-  Metric metric(shape);
+  Metric metric = Metric::create(shape).value();
   const Points x = (solver->positions().rowwise() - shape->centre()) / shape->mean_edge_length();
   const double energy = objective.evaluate(x, norm);
   const Problem problem{

@@ -77,6 +77,36 @@ TEST(Resize, KeepsTheProfileAcrossTheStretch) {
   EXPECT_LT((aware.rightCols(2) - block.vertices.rightCols(2)).cwiseAbs().maxCoeff(), 0.4);  // of 12 and 8
 }
 
+/// How many times its length at rest an edge has become, the worst of those in the outer tenths of the shape along an axis.
+double most_stretched_at_ends(const TriangleMesh& mesh, const Points& positions, int axis) {
+  const auto height = mesh.vertices.col(axis);
+  const double low = height.minCoeff(), high = height.maxCoeff(), tenth = (high - low) / 10;
+  double most = 0;
+  for (const auto& face : mesh.faces.rowwise()) {
+    for (int k = 0; k < 3; ++k) {
+      const auto a = face[k], b = face[(k + 1) % 3];
+      const bool is_outer =
+          std::max(height[a], height[b]) < low + tenth || std::min(height[a], height[b]) > high - tenth;
+      if (!is_outer) continue;
+      most = std::max(most, (positions.row(a) - positions.row(b)).norm() /
+                                (mesh.vertices.row(a) - mesh.vertices.row(b)).norm());
+    }
+  }
+  return most;
+}
+
+// Slices near the ends are small, and would give way first.
+TEST(Resize, DrawsNoTipOutIntoASpike) {
+  for (const TriangleMesh& mesh : {creature(32), rocker_arm(32)}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      Scaling scaling;
+      scaling.scale[axis] = 1.5;
+      EXPECT_LT(most_stretched_at_ends(mesh, resized(mesh, scaling), axis), 1.8)
+          << mesh.vertices.rows() << " vertices, axis " << axis;
+    }
+  }
+}
+
 TEST(Resize, OfAScaleOfOneIsTheRestShape) {
   const TriangleMesh mesh = creature(32);
   EXPECT_LT((resized(mesh, along(1, 1, 1)) - mesh.vertices).cwiseAbs().maxCoeff(), 1e-9);
