@@ -174,7 +174,7 @@ TEST(Scheduler, AHeavierWeightHasALargerShare) {
     return std::make_shared<Job>(
         false,
         [&] {
-          spin(std::chrono::microseconds(200));
+          spin(std::chrono::milliseconds(1));  // a thread that is held up for long counts for little
           ++count;
           if (plain + weighty == 500) done.set_value();
           return plain + weighty < 500;

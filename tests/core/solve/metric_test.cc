@@ -12,7 +12,9 @@ namespace {
 class MetricTest : public testing::Test {
  protected:
   MetricTest()
-      : shape(rest_shape(box_surface(2, 2, 3))), metric(Metric::create(shape).value()), is_held(shape->vertex_count(), false) {
+      : shape(rest_shape(box_surface(2, 2, 3))),
+        metric(Metric::create(shape).value()),
+        is_held(shape->vertex_count(), false) {
     is_held[0] = is_held[7] = is_held[20] = true;
     for (std::int32_t i = 0; i < shape->vertex_count(); ++i) cell_weights.push_back(1 + i % 3);
   }
