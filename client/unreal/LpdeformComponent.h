@@ -2,7 +2,8 @@
 // lpdeform_follower.h into a module that depends on "GeometryFramework" and "GeometryCore", add lpdeform.h's folder to its
 // PublicIncludePaths and liblpdeform_client to its PublicAdditionalLibraries.
 //
-// Not compiled and not run with the engine here; lpdeform_follower.h, which does the work, is tested against a real server.
+// Compiled and tested here with a little of the engine in its place (tests/client/c/unreal_engine), against a real server; not compiled
+// and not run with the engine.
 #pragma once
 
 #include <memory>

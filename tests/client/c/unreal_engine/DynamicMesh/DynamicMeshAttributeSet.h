@@ -1,0 +1,3 @@
+#pragma once
+
+#include "DynamicMesh/DynamicMesh3.h"
