@@ -1,11 +1,12 @@
 import { distortionOf, normalsOf, positionsOf } from "./decode.js";
 import { methodName, stopReasonFromWire } from "./fromwire.js";
 import type { FrameHeader } from "./gen/lpdeform/v1/frame_pb.js";
-import type { Frame, QuantizedSurface, StopReason } from "./types.js";
+import type { DoubleSurface, Frame, QuantizedSurface, StopReason } from "./types.js";
 
 type Surface<Numbers> = Record<"positions" | "distortion" | "normals", Numbers>;
 
 const none = new Float32Array(0);
+const noDoubles = new Float64Array(0);
 
 /** A frame as it is put together: its numbers as they came, or decoded when they are first asked for. */
 export class WireFrame implements Frame {
@@ -44,17 +45,30 @@ export class WireFrame implements Frame {
   }
 
   get positions(): Float32Array {
-    if (!this.quantized) return this.raw.positions as Float32Array;
+    if (!this.quantized) return this.#singles("positions");
     return (this.#decoded.positions ??= positionsOf(this.quantized));
   }
 
   get distortion(): Float32Array {
-    if (!this.quantized) return this.raw.distortion as Float32Array;
+    if (!this.quantized) return this.#singles("distortion");
     return (this.#decoded.distortion ??= distortionOf(this.quantized));
   }
 
   get normals(): Float32Array {
-    if (!this.quantized) return this.raw.normals as Float32Array;
+    if (!this.quantized) return this.#singles("normals");
     return (this.#decoded.normals ??= normalsOf(this.quantized));
+  }
+
+  get doubles(): DoubleSurface | undefined {
+    if (!(this.raw.positions instanceof Float64Array)) return undefined;
+    const [distortion, normals] = [this.raw.distortion, this.raw.normals].map((one) =>
+      one instanceof Float64Array ? one : noDoubles,
+    );
+    return { positions: this.raw.positions, distortion: distortion!, normals: normals! };
+  }
+
+  #singles(what: keyof Surface<unknown>): Float32Array {
+    const numbers = this.raw[what];
+    return numbers instanceof Float32Array ? numbers : (this.#decoded[what] ??= Float32Array.from(numbers));
   }
 }

@@ -2,6 +2,7 @@ import { FrameAssembly } from "./assembly.js";
 import { FrameBox } from "./box.js";
 import { fromFault, LpdeformError } from "./errors.js";
 import { noticeFromWire } from "./fromwire.js";
+import { Scalar } from "./gen/lpdeform/v1/data_pb.js";
 import { Holds } from "./holds.js";
 import type { GoAway } from "./gen/lpdeform/v1/service_pb.js";
 import type { Lane, WireFrameOptions } from "./hub.js";
@@ -176,7 +177,7 @@ export class Link {
     const lane = this.rpc.hub.subscribe(session, this.frameOptions, {
       opened: (opened) => {
         checkVertexCount(opened.vertexCount, this.#lease.report.vertices);
-        this.#assembly = new FrameAssembly(opened.vertexCount);
+        this.#assembly = new FrameAssembly(opened.vertexCount, this.frameOptions.scalar === Scalar.FLOAT64);
         this.#setNotice(undefined); // what was said was said of another stream
         this.#resumed(Number(opened.epoch), Number(opened.inputSeq));
         this.#heardFromServer();

@@ -4,6 +4,7 @@ import {
   type Field,
   MeshSchema,
   type Mesh as WireMesh,
+  Scalar,
   WeldSchema,
   type Weld as WireWeld,
 } from "./gen/lpdeform/v1/data_pb.js";
@@ -52,6 +53,7 @@ export const freeComponents: Record<api.FreeComponents, FreeComponents> = {
 
 const encodings: Record<api.Encoding, Encoding> = {
   float32: Encoding.RAW,
+  float64: Encoding.RAW,
   quantized: Encoding.QUANTIZED,
   compressed: Encoding.COMPRESSED,
 };
@@ -73,6 +75,7 @@ export function frameOptionsToWire(options: api.FrameOptions): MessageInitShape<
     maxFramesPerSecond,
     encoding: encodings[encoding],
     lowestEncoding: encodings[lowestEncoding],
+    ...(encoding === "float64" && { scalar: Scalar.FLOAT64 }),
   };
 }
 

@@ -145,10 +145,11 @@ export type StopReason =
 
 /**
  * How positions, distortion and normals travel. "float32": 16 bytes a vertex with distortion, 12 without; exact to float32.
+ * "float64": twice that, as the server computes (Frame.doubles).
  * "quantized": 8 bytes, off by at most half of 1/65535 of the frame's extent along each axis (distortion: of its largest).
  * "compressed": the same numbers, by meshoptimizer's vertex codec, 3 to 5 bytes on smooth surfaces. The last two always carry distortion.
  */
-export type Encoding = "float32" | "quantized" | "compressed";
+export type Encoding = "float32" | "float64" | "quantized" | "compressed";
 
 /** 16-bit integers, to be used as they are as normalised vertex attributes of four components, at a stride of 8 bytes. */
 export interface QuantizedSurface {
@@ -162,9 +163,16 @@ export interface QuantizedSurface {
   distortionExtent: number;
 }
 
+/** As Frame has them; empty where they were not asked for. */
+export interface DoubleSurface {
+  readonly positions: Float64Array;
+  readonly distortion: Float64Array;
+  readonly normals: Float64Array;
+}
+
 /**
  * A state of the surface on its way to the optimum. The arrays are the caller's to keep, and are views of what came. Where the
- * frame came quantized, positions, distortion and normals are made when they are first read.
+ * frame came as doubles or quantized, positions, distortion and normals are made when they are first read.
  */
 export interface Frame {
   /** x, y, z of each vertex. */
@@ -175,6 +183,8 @@ export interface Frame {
   readonly normals: Float32Array;
   /** What came, where it came "quantized" or "compressed". */
   readonly quantized: QuantizedSurface | undefined;
+  /** What came, where it came as "float64". */
+  readonly doubles: DoubleSurface | undefined;
   /** The newest update it answers: see Session.update; never falls. */
   readonly inputSeq: number;
   /** Rises within an epoch. */

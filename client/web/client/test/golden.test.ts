@@ -6,7 +6,8 @@ import { findTrailerError } from "@connectrpc/connect/protocol-grpc";
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { loadDecompressor } from "../src/decode.js";
 import type { LpdeformError } from "../src/errors.js";
-import { Encoding } from "../src/gen/lpdeform/v1/frame_pb.js";
+import { Scalar } from "../src/gen/lpdeform/v1/data_pb.js";
+import { Encoding as WireEncoding } from "../src/gen/lpdeform/v1/frame_pb.js";
 import { type HandleUpdate } from "../src/gen/lpdeform/v1/handle_pb.js";
 import {
   CreateSessionRequestSchema,
@@ -16,7 +17,7 @@ import {
   UndoUpdateResponseSchema,
   UpdateSchema,
 } from "../src/gen/lpdeform/v1/service_pb.js";
-import type { Frame } from "../src/index.js";
+import type { Encoding, Frame } from "../src/index.js";
 import { openWith, restoreWith } from "../src/session.js";
 import { FakeServer } from "./fake_server.js";
 import { opened, problems } from "./harness.js";
@@ -90,16 +91,16 @@ const byName = (a: { name: string }, b: { name: string }) => a.name.localeCompar
 beforeAll(loadDecompressor);
 afterAll(() => Promise.all(opened.splice(0).map((session) => session.close().catch(() => undefined))));
 
-test.each(frames.streams.filter(({ name }) => name !== "float64"))("the recorded frames in $name", async (stream) => {
+test.each(frames.streams)("the recorded frames in $name", async (stream) => {
   const server = new FakeServer();
-  const encoding = stream.name as "float32" | "quantized" | "compressed";
+  const encoding = stream.name as Encoding;
   const session = await openWith(server.rpc(), strip, { encoding, withNormals: true });
   opened.push(session);
   session.poll();
   await server.until(() => server.streams.length > 0);
-  expect(Encoding[server.stream.request.streams[0]!.options!.encoding]).toBe(
-    encoding === "float32" ? "RAW" : encoding.toUpperCase(),
-  );
+  const asked = server.stream.request.streams[0]!.options!;
+  expect(WireEncoding[asked.encoding]).toBe(encoding.startsWith("float") ? "RAW" : encoding.toUpperCase());
+  expect(asked.scalar === Scalar.FLOAT64).toBe(encoding === "float64");
   session.setHandles({ base, tip: { vertices: tip.vertices, motion: { translation: tip.translation } } });
   await server.until(() => server.updates.length > 0);
 
@@ -115,6 +116,7 @@ test.each(frames.streams.filter(({ name }) => name !== "float64"))("the recorded
       server.stream.queue.push({ stream: 0, event: { event: response.value.event as never } });
   }
   const frame = await session.settle();
+  expect(frame.doubles?.positions.length).toBe(encoding === "float64" ? 66 : undefined);
   const { reason, text } = session.notice!;
   const said = [...linesOf(stream.name, frame), `${stream.name} notice: ${reason}, ${text}`];
   expect(said).toEqual(expected.filter((line) => line.startsWith(stream.name)));

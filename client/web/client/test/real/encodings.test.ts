@@ -62,6 +62,18 @@ describe("encodings", () => {
     expect(largest(frame.normals, exact.normals)).toBeLessThanOrEqual(0.5 / 32767 + 1e-7);
   });
 
+  test("float64 is what float32 was rounded from, at twice the bytes", async () => {
+    const single = await read(service, session, { encoding: "float32" });
+    const frame = await read(service, session, { encoding: "float64" });
+    expect(single.doubles).toBeUndefined();
+    for (const what of ["positions", "distortion", "normals"] as const) {
+      expect(Float32Array.from(frame.doubles![what])).toEqual(single[what]);
+      expect(frame[what]).toEqual(single[what]);
+    }
+    expect(frame.doubles!.positions.some((x) => x !== Math.fround(x))).toBe(true);
+    expect(frame.wireBytes).toBe(2 * single.wireBytes);
+  });
+
   test("compressed is the same as quantized, and smaller", async () => {
     const quantized = await read(service, session, { encoding: "quantized" });
     const compressed = await read(service, session, { encoding: "compressed" });
