@@ -73,12 +73,18 @@ function addNormals(positions: Float32Array, faces: Uint32Array, normals: Float3
     const b = 3 * faces[f + 1]!;
     const c = 3 * faces[f + 2]!;
     findNormal(positions, a, b, c);
-    for (let axis = 0; axis < 3; ++axis) {
-      const value = normal[axis]!;
-      normals[a + axis]! += value;
-      normals[b + axis]! += value;
-      normals[c + axis]! += value;
-    }
+    const x = normal[0]!;
+    const y = normal[1]!;
+    const z = normal[2]!;
+    normals[a]! += x;
+    normals[a + 1]! += y;
+    normals[a + 2]! += z;
+    normals[b]! += x;
+    normals[b + 1]! += y;
+    normals[b + 2]! += z;
+    normals[c]! += x;
+    normals[c + 1]! += y;
+    normals[c + 2]! += z;
   }
 }
 
