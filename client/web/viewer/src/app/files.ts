@@ -10,8 +10,8 @@ import { isAtRest, type WrittenMesh } from "../model/mesh.js";
 import { short } from "../model/words.js";
 import type { App } from "./app.js";
 import { sentence } from "../link/status.js";
-import { legendCanvas } from "./legend.js";
 import type { Pane } from "./pane.js";
+import { pictureOf } from "./picture.js";
 
 /** For the result that is exported. */
 const solveMs = 60_000;
@@ -117,23 +117,11 @@ export class Files {
     }
   }
 
-  /** What the panes show, with the legend, on the page's background. */
   exportPicture(): void {
-    const pictures = this.app.panes.map(({ stage }) => stage.picture());
-    const canvas = document.createElement("canvas");
-    canvas.width = pictures.reduce((sum, picture) => sum + picture.width, 0);
-    canvas.height = pictures[0]!.height;
-    const context = canvas.getContext("2d")!;
-    context.fillStyle = getComputedStyle(document.body).backgroundColor;
-    context.fillRect(0, 0, canvas.width, canvas.height);
-    let left = 0;
-    for (const picture of pictures) {
-      context.drawImage(picture, left, 0);
-      left += picture.width;
-    }
-    const legend = legendCanvas(this.app, canvas.width / this.app.stages.clientWidth);
-    if (legend) context.drawImage(legend, 0, canvas.height - legend.height);
-    canvas.toBlob((blob) => blob && save(`${this.#stem}.png`, blob));
+    pictureOf(this.app).toBlob((blob) => {
+      if (blob) save(`${this.#stem}.png`, blob);
+      else this.app.notify("The browser makes no picture of this size: make the window smaller.", true);
+    });
   }
 
   saveHandles(): void {

@@ -81,6 +81,19 @@ it("a mesh is dropped with its handles and what else lies beside it, in any orde
   expect(await user.page.locator(".notice.bad").isHidden()).toBe(true);
 });
 
+it("a large file is told to be opened while it is", async () => {
+  await user.page.evaluate(`{
+    window.notices = [];
+    window.__lpdeform.app.facts.watch(({ notice }) => notice && window.notices.at(-1) !== notice.text && window.notices.push(notice.text));
+  }`);
+  await drop({ "large.off": `${writeOff(mesh)}#${"x".repeat(2e6)}` });
+  await isOpen("large.off");
+  const notices = await user.page.evaluate<string[]>("window.notices");
+  expect(notices.slice(-2)).toEqual(["Opening large.off…", expect.stringContaining(`large.off: ${vertexCount} vertices.`)]);
+  await user.page.getByRole("button", { name: "Bring it back" }).click(); // the handles that were there
+  await isOpen("all.obj");
+});
+
 it("what cannot be opened is refused by name, and what is there stays", async () => {
   const before = await user.ask("document()");
   await drop({ "notes.txt": "hello" });

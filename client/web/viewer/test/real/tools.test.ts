@@ -1,7 +1,7 @@
 import { join } from "node:path";
 import { afterAll, beforeAll, beforeEach, describe, expect, it } from "vitest";
 import { Service } from "../../../client/test/real/service.js";
-import { User } from "./user.js";
+import { decodePng, User } from "./user.js";
 
 let service: Service;
 let user: User;
@@ -247,6 +247,20 @@ describe("p", () => {
     const bars = (k: number) =>
       captions.nth(k).evaluate((caption) => (caption.nextElementSibling as HTMLCanvasElement).toDataURL());
     expect(await bars(0)).not.toBe(await bars(1));
+    // Both are in an exported picture, each with its name in the upper right corner.
+    const picture = decodePng(await user.save("Picture as PNG"));
+    const pane = (await user.page.locator("canvas.stage").first().boundingBox())!;
+    const ratio = picture.height / pane.height;
+    expect(picture.width / ratio).toBeCloseTo(2 * pane.width, 0);
+    for (const right of [pane.width, 2 * pane.width]) {
+      let dark = 0;
+      for (let y = 10 * ratio; y < 40 * ratio; ++y) {
+        for (let x = Math.round((right - 80) * ratio); x < (right - 10) * ratio; ++x) {
+          if (picture.pixels[(Math.round(y) * picture.width + x) * picture.channels]! < 90) ++dark;
+        }
+      }
+      expect(dark).toBeGreaterThan(50);
+    }
     // The plot compares lengths: the p-th roots of the energies.
     for (const [pane, p] of [await user.ask<number>("document().p"), await user.ask<number>("document().secondP")].entries()) {
       const { energy } = (await user.frame(pane))!;

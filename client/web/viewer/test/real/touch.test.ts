@@ -1,7 +1,7 @@
 import { join } from "node:path";
 import { afterAll, beforeAll, expect, it } from "vitest";
 import { Service } from "../../../client/test/real/service.js";
-import { User } from "./user.js";
+import { decodePng, User } from "./user.js";
 
 let service: Service;
 let user: User;
@@ -85,6 +85,9 @@ it("upright, the sliders of p stay in reach beside the open panel, for one pictu
       expect(isApart).toBe(true);
     }
   });
+  // So they lie in an exported picture.
+  const picture = decodePng(await user.save("Picture as PNG"));
+  expect(picture.height / picture.width).toBeCloseTo((panes[0]!.height + panes[1]!.height) / panes[0]!.width, 1);
   await page.getByTitle("Two values of p side by side").tap();
   await page.getByRole("button", { name: "Side panel" }).tap();
   await user.settled();

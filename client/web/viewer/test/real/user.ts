@@ -158,7 +158,7 @@ export class User {
 }
 
 /** Eight bits a channel, not interlaced: what a screenshot is. */
-function decodePng(png: Buffer): { pixels: Uint8Array; channels: number } {
+export function decodePng(png: Buffer): { pixels: Uint8Array; channels: number; width: number; height: number } {
   const width = png.readUInt32BE(16);
   const height = png.readUInt32BE(20);
   const channels = png[25] === 6 ? 4 : 3;
@@ -181,7 +181,7 @@ function decodePng(png: Buffer): { pixels: Uint8Array; channels: number } {
       pixels[at] = raw[row * (stride + 1) + 1 + k]! + predicted(filter, left, up, corner);
     }
   }
-  return { pixels, channels };
+  return { pixels, channels, width, height };
 }
 
 function predicted(filter: number, left: number, up: number, corner: number): number {
