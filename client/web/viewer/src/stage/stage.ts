@@ -212,8 +212,9 @@ export class Stage {
     this.#renderer.render(this.#scene, this.camera);
   }
 
-  /** What is drawn, without the gizmo. */
+  /** What is drawn, as finely as at rest, without the gizmo. */
   picture(): HTMLCanvasElement {
+    this.resize(this.width, this.height, false);
     const wasVisible = this.gizmo.object.visible;
     this.gizmo.object.visible = false;
     this.draw();
