@@ -190,6 +190,10 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call
   auto decoded = decode_frame_options(options);
   if (!decoded.ok()) return decoded.status();
   decoded->max_bytes_per_second = options_.max_stream_bytes_per_second;
+  if (const double most = options_.max_stream_frames_per_second; most > 0) {
+    double& asked = decoded->max_frames_per_second;  // 0: any number
+    asked = asked > 0 ? std::min(asked, most) : most;
+  }
   auto place = caller_limits_->enter_stream((*session)->owner());
   if (!place.ok()) return place.status();
   auto stream = (*session)->open_stream(token, *decoded);

@@ -139,6 +139,11 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->envname("LPDEFORM_MAX_STREAM_RATE")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  app.add_option("--max-frame-rate", server.max_stream_frames_per_second,
+                 "Frames a second of one stream, 0: without limit; the last of an update always comes")
+      ->envname("LPDEFORM_MAX_FRAME_RATE")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   app.add_option("--session-idle", arguments.session_idle_seconds,
                  "Seconds without use after which a session goes")
       ->envname("LPDEFORM_SESSION_IDLE")

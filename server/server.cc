@@ -47,6 +47,9 @@ absl::Status check(const ServerOptions& options) {
   if (!(options.max_stream_bytes_per_second >= 0) || std::isinf(options.max_stream_bytes_per_second)) {
     return out_of_range("max_stream_bytes_per_second", "finite and >= 0");
   }
+  if (!(options.max_stream_frames_per_second >= 0) || std::isinf(options.max_stream_frames_per_second)) {
+    return out_of_range("max_stream_frames_per_second", "finite and >= 0");
+  }
   if (!(options.max_upload_bytes_per_second >= 0) || std::isinf(options.max_upload_bytes_per_second)) {
     return out_of_range("max_upload_bytes_per_second", "finite and >= 0");
   }

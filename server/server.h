@@ -56,6 +56,8 @@ struct ServerOptions {
 
   /// Of one stream's frames; 0 is without limit. See StreamOptions::max_bytes_per_second.
   double max_stream_bytes_per_second = 0;
+  /// The same of frames: a stream that asks for more, or for any number, gets so many.
+  double max_stream_frames_per_second = 0;
 
   std::chrono::milliseconds session_idle = std::chrono::minutes(10);
   std::chrono::milliseconds upload_idle = std::chrono::minutes(10);

@@ -309,6 +309,10 @@ TEST(ServerOptionsTest, AreChecked) {
        {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     options.max_stream_bytes_per_second = rate;
     EXPECT_EQ(fault_of(Server::start(options).status()).reason, "OPTION_OUT_OF_RANGE");
+    options = {};
+    options.max_stream_frames_per_second = rate;
+    EXPECT_EQ(fault_of(Server::start(options).status()).reason, "OPTION_OUT_OF_RANGE");
+    options = {};
   }
 }
 

@@ -277,6 +277,20 @@ TEST_F(StreamTest, WrongOptionsAreInvalid) {
   EXPECT_EQ(details_of(strange.read_to_end()).info.reason(), "FRAME_RATE_OUT_OF_RANGE");
 }
 
+TEST_F(StreamTest, NoStreamGetsMoreFramesASecondThanTheServerAllows) {
+  options_.max_stream_frames_per_second = 60;
+  start();
+  const auto session = create(bar_mesh());
+  for (const auto& [asked, granted] : {std::pair(0.0, 60.0), {30.0, 30.0}, {90.0, 60.0}}) {
+    v1::FrameOptions options;
+    options.set_max_frames_per_second(asked);
+    DeformClient client(*stub_, session, options);
+    const auto opened = client.read();
+    ASSERT_TRUE(opened && opened->event().has_opened());
+    EXPECT_EQ(opened->event().opened().options().max_frames_per_second(), granted);
+  }
+}
+
 TEST_F(StreamTest, ClosingTheInputLeavesTheFramesFlowing) {
   const auto session = create(bar_mesh());
   DeformClient client(*stub_, session);
