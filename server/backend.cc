@@ -71,7 +71,7 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
     keeper_ = Keeper::create(options.store, {timers, metrics, log_, options.session_idle});
     keeper_->on_lost = [registry = std::weak_ptr(registry)](const Session& session) {
       if (const auto self = registry.lock())
-        self->remove(session.name(), EndReason::kDraining, "Another server has the session now.");
+        self->remove(session, EndReason::kDraining, "Another server has the session now.");
     };
   }
   registry->on_ended = [log = log_, metrics = metrics, keeper = keeper_,
@@ -81,8 +81,10 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
     const std::string why = ended_because(reason);
     metrics->session_ended(why);
     log->info("session_ended", {{"session", abbreviated(session.name())}, {"reason", why}});
-    if (keeper && reason == EndReason::kDraining) keeper->release(session.name());
-    if (keeper && reason != EndReason::kDraining) keeper->remove(session.name());
+    if (!keeper) return;
+    if (reason == EndReason::kDraining) return keeper->release(session);
+    if (reason == EndReason::kSessionExpired) return keeper->expire(session);
+    keeper->remove(session.name());
   };
   metrics->set(Level::kSessionsMost, static_cast<double>(options.max_sessions));
   metrics->set(Level::kMemoryBytesMost, static_cast<double>(options.max_bytes));

@@ -315,11 +315,14 @@ void Backend::when_here(const CallContext& call, const std::string& name, Done t
 
 /// On a thread of the scheduler.
 void Backend::make_again(const std::string& name, absl::StatusOr<Keeper::Found> found) {
+  const auto give_up = [&](const absl::Status& status) {
+    keeper_->give_up(name);
+    end_restoring(name, status);
+  };
   const auto head = decode_head(found->session.parts);
-  if (!head.ok()) return end_restoring(name, head.status());
+  if (!head.ok()) return give_up(head.status());
   const std::string& owner = found->session.owner;
-  if (absl::Status status = registry->begin_restoring(owner); !status.ok())
-    return end_restoring(name, status);
+  if (absl::Status status = registry->begin_restoring(owner); !status.ok()) return give_up(status);
   const auto session = factory_.make_again(name, found->session, *head, found->blobs);
   if (session.ok()) {
     keeper_->adopt(*session, found->session);
@@ -327,7 +330,8 @@ void Backend::make_again(const std::string& name, absl::StatusOr<Keeper::Found> 
     log_session("session_restored", **session, "");
   }
   registry->finish_restoring(owner, session, head->request.request_id(), head->fingerprint);
-  end_restoring(name, session.status());
+  if (!session.ok()) return give_up(session.status());
+  end_restoring(name, absl::OkStatus());
 }
 
 void Backend::end_restoring(const std::string& name, const absl::Status& status) {
@@ -339,6 +343,7 @@ void Backend::end_restoring(const std::string& name, const absl::Status& status)
   }
   // What there is not, find() does not find either.
   const bool is_unknown = fault_of(status).reason == "SESSION_UNKNOWN";
+  if (is_unknown) registry->forget_left(name);
   for (const Done& then : waiting) then(is_unknown ? absl::OkStatus() : status);
 }
 

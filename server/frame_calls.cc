@@ -162,6 +162,13 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
     read();
   }
 
+  /// Then the stream ends in a moment, and an update without an answer is sent again to where the session is; with one that refuses
+  /// it, it would be lost.
+  static bool goes_on_elsewhere(const absl::Status& status) {
+    const std::string reason = fault_of(status).reason;
+    return reason == "DRAINING" || reason == "SESSION_ELSEWHERE";
+  }
+
   /// On any thread.
   void answer(const absl::StatusOr<UpdateResult>& result, std::uint64_t input_seq) {
     if (!result.ok()) record().refused(result.status());
@@ -171,7 +178,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
     }
     if (result.ok()) {
       open_.stream->answer(*result);
-    } else {
+    } else if (!goes_on_elsewhere(result.status())) {
       open_.stream->answer(FaultNote{result.status(), input_seq});
     }
   }

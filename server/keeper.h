@@ -59,17 +59,21 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   /// where that takes too long.
   void changed(const Session& session, std::uint64_t revision, std::uint64_t epoch, OnKept on_kept);
 
-  /// The session goes from the store, too. From now on take_over() does not find it.
+  /// The session goes from the store, too, whoever has it. From now on take_over() does not find it.
   void remove(const std::string& name, OnDone on_done = nullptr);
+
+  /// Nobody has used it here for so long that it goes; not from the store where somebody else has it meanwhile.
+  void expire(const Session& session);
 
   /// It was, and the store may not know yet.
   bool is_being_removed(const std::string& name) const;
 
   /// The session leaves this process and stays in the store.
-  void release(const std::string& name);
+  void release(const Session& session);
 
   /// What Store::take_over finds, with its blobs. Where another process has the session in use, waits for kPatienceForOthers
-  /// whether it lets go: as long as the lease of one that has died. Not where the asker should come by another way.
+  /// whether it lets go: as long as the lease of one that has died; the same while it leaves this one. Not where the asker should
+  /// come by another way. What was found is held until adopt() or give_up().
   struct Found {
     StoredSession session;
     StoredBlobs blobs;
@@ -80,6 +84,9 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
     std::string owner, route;
   };
   void take_over(const std::string& name, const Asker& asker, OnFound on_found);
+
+  /// What take_over() found is not made again after all: another may have it.
+  void give_up(const std::string& name);
 
   using OnName = std::function<void(absl::StatusOr<std::string>)>;
   void find_request(const std::string& owner, const std::string& request_id, OnName on_name);
@@ -119,6 +126,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
     OnDone on_added;  // until it is kept for the first time
     std::vector<OnDone> on_removed;
     bool is_leaving = false;  // forgotten once it is kept
+    bool is_expired = false;  // of one that goes: see StoredChange
   };
   /// What one entry has for the store.
   struct Work {
@@ -147,19 +155,24 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void give_up_new(const std::string& name);
   void take_over_until(const std::string& name, const Asker& asker, Timers::TimePoint end,
                        const OnFound& on_found);
+  absl::StatusOr<Found> find(const std::string& name, const Asker& asker);
   absl::StatusOr<Found> read(const std::string& name, const Asker& asker);
+  bool is_leaving(const std::string& name) const;
   void watch_unused();
   void sweep();
   void touch_all();
-  void drop(const std::vector<std::string>& lost);
-  void write_again(const std::vector<std::string>& names);
-  void hand_over(const std::vector<std::string>& names);
+  using Sessions = std::map<std::string, std::shared_ptr<Session>>;
+  Entry* same_entry(const std::string& name, const Sessions& touched);
+  void drop(const std::vector<std::string>& lost, const Sessions& touched);
+  void write_again(const std::vector<std::string>& names, const Sessions& touched);
+  void hand_over(const std::vector<std::string>& names, const Sessions& touched);
 
   const std::shared_ptr<Store> store_;
   const Services services_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::string, Entry> entries_;
+  std::map<std::string, std::uint64_t> being_made_;  // epochs of those that take_over() found
   std::set<std::string> due_;
   bool is_writing_ = false;
   bool is_failing_ = false;

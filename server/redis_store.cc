@@ -63,8 +63,8 @@ const std::string kCommit =
     "    if string.sub(field, 1, 2) == 'p:' then redis.call('HDEL', KEYS[1], field) end "
     "  end "
     "end "
-    "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'epoch', ARGV[3], 'until', now + ARGV[4], 'revision', "
-    "ARGV[8]); "
+    "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'epoch', ARGV[3], 'until', now + ARGV[4], 'alive', now + "
+    "ARGV[4], 'revision', ARGV[8]); "
     "for k = 9, #ARGV, 2 do "
     "  if string.sub(ARGV[k + 1], 1, 1) == '=' then redis.call('HSET', KEYS[1], ARGV[k], string.sub(ARGV[k + "
     "1], 2)) "
@@ -73,36 +73,51 @@ const std::string kCommit =
     "redis.call('PEXPIRE', KEYS[1], ARGV[5]); " +
     kEnter + "enter(redis.call('HGET', KEYS[1], 'owner'), ARGV[5]); return 1";
 
-/// For so many milliseconds a session stays where it has just come to, whoever wants it.
-const std::string kStays = "1000";
-/// And that somebody wants it is remembered for so many.
+/// That somebody wants a session is remembered for so many milliseconds.
 const std::string kWanted = "1000";
 
-/// ARGV: holder, owner, lease, idle, route. -1: none; -2 and its route: held by another; else the hash, in the new epoch.
+/// ARGV: holder, owner, lease, idle, route, stays. -1: none; -2 and its route: held by another, or for another; else the hash, in
+/// the new epoch. `until`: it is in use; `alive`: its holder lives; `since`: it came; `stays`: for so long at least.
 const std::string kTakeOver =
     kNow +
-    "local has = redis.call('HMGET', KEYS[1], 'holder', 'until', 'owner', 'route', 'since'); "
-    "if not has[3] or has[3] ~= ARGV[2] then return -1 end "
-    "if has[1] ~= ARGV[1] and has[2] and tonumber(has[2]) > now then "
-    "  if has[4] and has[4] ~= '' and has[4] == ARGV[5] and now - tonumber(has[5] or '0') > " +
-    kStays +
-    " then redis.call('HSET', KEYS[1], 'wanted', now) end "
-    "  return {-2, has[4] or ''} "
+    "local has = redis.call('HMGET', KEYS[1], 'holder', 'owner', 'route', 'wanter'); "
+    "if not has[2] or has[2] ~= ARGV[2] then return -1 end "
+    "local function number(field) return tonumber(redis.call('HGET', KEYS[1], field) or '0') end "
+    "local route, stays = has[3] or '', math.max(number('stays'), tonumber(ARGV[6])); "
+    "local is_wanted = now - number('wanted') < " +
+    kWanted +
+    "; "
+    "if has[1] ~= ARGV[1] then "
+    "  local is_astray = route ~= '' and ARGV[5] ~= '' and ARGV[5] ~= route; "
+    "  if number('until') > now or (is_astray and number('alive') > now) then "
+    "    if route ~= '' and route == ARGV[5] and now - number('since') > stays and "
+    "      (not is_wanted or has[4] == ARGV[1]) then "
+    "      redis.call('HSET', KEYS[1], 'wanted', now, 'wanter', ARGV[1]) "
+    "    end "
+    "    return {-2, route} "
+    "  end "
     "end "
+    "if is_wanted and has[4] ~= ARGV[1] then return {-2, route} end "
+    "local is_back_soon = is_wanted and now - number('since') < 4 * stays; "
+    "stays = is_back_soon and math.min(2 * stays, 32 * ARGV[6]) or tonumber(ARGV[6]); "
     "redis.call('HINCRBY', KEYS[1], 'epoch', 1); "
-    "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'until', now + ARGV[3], 'since', now); "
-    "redis.call('HDEL', KEYS[1], 'revision', 'wanted'); "
+    "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'until', now + ARGV[3], 'alive', now + ARGV[3], 'since', "
+    "now, "
+    "'stays', stays); "
+    "redis.call('HDEL', KEYS[1], 'revision', 'wanted', 'wanter'); "
     "redis.call('PEXPIRE', KEYS[1], ARGV[4]); return redis.call('HGETALL', KEYS[1])";
 
-/// ARGV: holder, epoch, lease, 0 where it is not in use, idle, revision. 0: another has it, or it is gone; 2: it is behind;
-/// 3: another wants it. Its blobs live as long.
+/// ARGV: holder, epoch, lease, 1 where it is in use and 2 where it is being made, idle, revision. 0: another has it, or it is
+/// gone; 2: it is behind; 3: another wants it. Its blobs live as long.
 const std::string kTouch =
     kNow +
     "local has = redis.call('HMGET', KEYS[1], 'holder', 'blobs', 'request', 'owner', 'revision', 'wanted'); "
     "if has[1] ~= ARGV[1] then return 0 end " +
     kEnter +
     "enter(has[4], ARGV[5]); "
-    "if ARGV[4] == '1' then redis.call('HSET', KEYS[1], 'until', now + ARGV[3]) end "
+    "redis.call('HSET', KEYS[1], 'alive', now + ARGV[3]); "
+    "if ARGV[4] ~= '0' then redis.call('HSET', KEYS[1], 'until', now + ARGV[3]) end "
+    "if ARGV[4] == '2' then redis.call('HSET', KEYS[1], 'since', now) end "
     "redis.call('PEXPIRE', KEYS[1], ARGV[5]); "
     "for key in string.gmatch(has[2] or '', '%x+') do "
     "  redis.call('PEXPIRE', 'lpdeform:b:' .. key, ARGV[5]); redis.call('PEXPIRE', 'lpdeform:u:' .. key, "
@@ -113,21 +128,28 @@ const std::string kTouch =
     "if has[6] and now - tonumber(has[6]) < " +
     kWanted + " then return 3 end return 1";
 
-/// ARGV: holder, session, then the keys of its blobs, as far as its maker knows. It goes, whoever has it.
+/// ARGV: holder, session, 1 where it goes only if the holder has it, then the keys of its blobs, as far as its maker knows. 0: it
+/// has it no more.
 const std::string kRemove =
+    "local holder = redis.call('HGET', KEYS[1], 'holder'); "
+    "if ARGV[3] == '1' and holder and holder ~= ARGV[1] then return 0 end "
     "local function let_go(key) "
     "  redis.call('SREM', 'lpdeform:u:' .. key, ARGV[2]); "
     "  if redis.call('SCARD', 'lpdeform:u:' .. key) == 0 then redis.call('DEL', 'lpdeform:b:' .. key) end "
     "end "
     "local has = redis.call('HMGET', KEYS[1], 'blobs', 'request', 'owner'); "
     "for key in string.gmatch(has[1] or '', '%x+') do let_go(key) end "
-    "for k = 3, #ARGV do let_go(ARGV[k]) end "
+    "for k = 4, #ARGV do let_go(ARGV[k]) end "
     "if has[2] and has[2] ~= '' then redis.call('DEL', has[2]) end "
     "if has[3] then redis.call('ZREM', 'lpdeform:o:' .. redis.sha1hex(has[3]), KEYS[1]) end "
     "redis.call('DEL', KEYS[1]); return 1";
 
+/// ARGV: holder, epoch. Not where the same holder has taken it over again meanwhile.
 const std::string kLetGo =
-    "if redis.call('HGET', KEYS[1], 'holder') == ARGV[1] then redis.call('HSET', KEYS[1], 'until', 0) end "
+    "local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch'); "
+    "if has[1] == ARGV[1] and has[2] == ARGV[2] then "
+    "  redis.call('HSET', KEYS[1], 'until', 0, 'alive', 0) "
+    "end "
     "return 1";
 
 constexpr std::int64_t kDone = 1, kIsBehind = 2, kIsWanted = 3, kIsHeld = -2;  // as scripts answer
@@ -167,7 +189,7 @@ class RedisStore final : public Store {
   absl::StatusOr<std::string> blob(const std::string& key) override;
   absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) override;
   std::chrono::milliseconds touch_every() const override { return options_.lease / 3; }
-  absl::Status let_go(const std::string& session) override;
+  absl::Status let_go(const std::string& session, std::uint64_t epoch) override;
   /// Keys expire by themselves.
   absl::StatusOr<std::size_t> remove_unused(std::int64_t) override { return 0; }
 
@@ -187,7 +209,7 @@ class RedisStore final : public Store {
 Command RedisStore::command_of(const StoredChange& change) {
   if (change.is_removal) {
     Command command = script(kRemove, change.session);
-    command.insert(command.end(), {holder_, change.session});
+    command.insert(command.end(), {holder_, change.session, change.is_expiry ? "1" : "0"});
     const std::scoped_lock lock(pinning_);
     const auto pinned = pinned_.find(change.session);
     if (pinned != pinned_.end()) command.insert(command.end(), pinned->second.begin(), pinned->second.end());
@@ -235,7 +257,8 @@ absl::StatusOr<std::vector<ChangeOutcome>> RedisStore::commit(std::span<const St
 absl::StatusOr<StoredSession> RedisStore::take_over(const std::string& session, const std::string& owner,
                                                     const std::string& route) {
   Command command = script(kTakeOver, session);
-  command.insert(command.end(), {holder_, owner, lease(), idle(), route});
+  command.insert(command.end(),
+                 {holder_, owner, lease(), idle(), route, absl::StrCat(options_.stays.count())});
   const std::scoped_lock lock(reading_);
   const auto reply = reader_.run(command);
   if (!reply.ok()) return reply.status();
@@ -301,8 +324,9 @@ absl::StatusOr<TouchResult> RedisStore::touch(std::span<const TouchedSession> se
   for (const TouchedSession& session : sessions) {
     commands.push_back(script(kTouch, session.name));
     commands.back().insert(commands.back().end(),
-                           {holder_, absl::StrCat(session.epoch), lease(), session.is_in_use ? "1" : "0",
-                            idle(), absl::StrCat(session.revision)});
+                           {holder_, absl::StrCat(session.epoch), lease(),
+                            session.is_being_made ? "2" : (session.is_in_use ? "1" : "0"), idle(),
+                            absl::StrCat(session.revision)});
   }
   const std::scoped_lock lock(reading_);
   const auto replies = reader_.run(commands);
@@ -317,9 +341,9 @@ absl::StatusOr<TouchResult> RedisStore::touch(std::span<const TouchedSession> se
   return result;
 }
 
-absl::Status RedisStore::let_go(const std::string& session) {
+absl::Status RedisStore::let_go(const std::string& session, std::uint64_t epoch) {
   Command command = script(kLetGo, session);
-  command.push_back(holder_);
+  command.insert(command.end(), {holder_, absl::StrCat(epoch)});
   const std::scoped_lock lock(writing_);
   return writer_.run(command).status();
 }

@@ -39,6 +39,12 @@ inline absl::Status server_draining() {
   return make_fault(absl::StatusCode::kUnavailable, {"DRAINING", "", ""}, "The server is shutting down.");
 }
 
+/// UNAVAILABLE SESSION_ELSEWHERE, of a session that has just gone on elsewhere.
+inline absl::Status session_left() {
+  return make_fault(absl::StatusCode::kUnavailable, {"SESSION_ELSEWHERE", "session", ""},
+                    "The session goes on at another server; try again.");
+}
+
 /// RESOURCE_EXHAUSTED SERVER_BUSY. `wait`: until those that wait now have had their turn.
 inline absl::Status server_busy(std::chrono::duration<double> wait) {
   return retry_after(make_fault(absl::StatusCode::kResourceExhausted, {"SERVER_BUSY", "calls", ""},

@@ -118,6 +118,7 @@ void Registry::finish_creation(const std::string& request_id, absl::StatusOr<std
 /// Under the lock.
 void Registry::enter(const std::shared_ptr<Session>& session, const std::string& request_id) {
   const std::string& name = session->name();
+  left_.erase(name);
   sessions_[name] = {session, request_id, ++numbers_};
   by_age_[numbers_] = name;
   watch(name, timers_->now() + limits_.idle);
@@ -157,6 +158,9 @@ absl::StatusOr<std::shared_ptr<Session>> Registry::find(const std::string& name,
       found->second.session->touch();
       return found->second.session;
     }
+    const auto left = left_.find(name);
+    if (left != left_.end() && left->second.owner == owner && timers_->now() < left->second.until)
+      return session_left();
   }
   return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""},
                     "There is no such session; it may have expired or been deleted.");
@@ -188,12 +192,34 @@ absl::StatusOr<Registry::Page> Registry::list(std::size_t most, const std::strin
 }
 
 bool Registry::remove(const std::string& name, EndReason reason, const std::string& text) {
+  return remove_one(name, nullptr, reason, text);
+}
+
+bool Registry::remove(const Session& session, EndReason reason, const std::string& text) {
+  return remove_one(session.name(), &session, reason, text);
+}
+
+/// Under the lock.
+void Registry::note_left(const Session& session) {
+  const Timers::TimePoint now = timers_->now();
+  std::erase_if(left_, [now](const auto& left) { return left.second.until <= now; });
+  left_[session.name()] = {session.owner(), now + kLeaving};
+}
+
+void Registry::forget_left(const std::string& name) {
+  const std::scoped_lock lock(mutex_);
+  left_.erase(name);
+}
+
+bool Registry::remove_one(const std::string& name, const Session* only, EndReason reason,
+                          const std::string& text) {
   std::shared_ptr<Session> session;
   {
     const std::scoped_lock lock(mutex_);
     const auto found = sessions_.find(name);
-    if (found == sessions_.end()) return false;
+    if (found == sessions_.end() || (only != nullptr && found->second.session.get() != only)) return false;
     session = found->second.session;
+    if (reason == EndReason::kDraining) note_left(*session);
     by_age_.erase(found->second.number);
     requests_.erase({session->owner(), found->second.request_id});
     give_up_place(session->owner());
@@ -219,7 +245,10 @@ void Registry::clear(EndReason reason, const std::string& text) {
     const std::scoped_lock lock(mutex_);
     all.swap(sessions_);
     by_age_.clear();
-    for (const auto& [name, entry] : all) give_up_place(entry.session->owner());
+    for (const auto& [name, entry] : all) {
+      give_up_place(entry.session->owner());
+      if (reason == EndReason::kDraining) note_left(*entry.session);
+    }
     std::erase_if(requests_, [](const auto& request) { return !request.second.name.empty(); });
   }
   for (const auto& [name, entry] : all) {
@@ -250,7 +279,7 @@ void Registry::expire(const std::string& name) {
   }
   const Timers::TimePoint due = session->last_used() + limits_.idle;
   if (timers_->now() < due) return watch(name, due);
-  remove(name, EndReason::kSessionExpired, "The session was idle for too long.");
+  remove(*session, EndReason::kSessionExpired, "The session was idle for too long.");
 }
 
 }  // namespace lpdeform

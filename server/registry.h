@@ -58,7 +58,8 @@ class Registry : public std::enable_shared_from_this<Registry> {
   /// Whether there is a session of this name, whosever it is.
   bool has(const std::string& name) const;
 
-  /// NOT_FOUND SESSION_UNKNOWN, also where it is somebody else's. Counts as use.
+  /// NOT_FOUND SESSION_UNKNOWN, also where it is somebody else's; UNAVAILABLE SESSION_ELSEWHERE where it has just left to go on
+  /// elsewhere (kDraining), for kLeaving or until it is known to be nowhere. Counts as use.
   absl::StatusOr<std::shared_ptr<Session>> find(const std::string& name, const std::string& owner = "") const;
 
   /// The owner's, newest first, at most `most`, those after `page_token` (empty: from the beginning), with the token of
@@ -70,8 +71,13 @@ class Registry : public std::enable_shared_from_this<Registry> {
   absl::StatusOr<Page> list(std::size_t most, const std::string& page_token,
                             const std::string& owner = "") const;
 
-  /// Closes and forgets the session; false where there is none.
+  /// Closes and forgets the session; false where there is none. Of a Session itself: not another one of its name, which came
+  /// after it.
   bool remove(const std::string& name, EndReason reason, const std::string& text);
+  bool remove(const Session& session, EndReason reason, const std::string& text);
+
+  /// A session that left is not elsewhere either.
+  void forget_left(const std::string& name);
 
   /// Ends all streams, now and from now on; Solve calls go on.
   void drain(const std::string& text);
@@ -81,6 +87,9 @@ class Registry : public std::enable_shared_from_this<Registry> {
 
   /// Called with each session that is closed, under no lock. To be set before anything else is called.
   std::function<void(const Session&, EndReason)> on_ended;
+
+  /// Longer than any call needs that has found a session here to ask for it again.
+  static constexpr std::chrono::seconds kLeaving{10};
 
   Timers::Duration idle() const { return limits_.idle; }
   std::size_t size() const;
@@ -97,6 +106,12 @@ class Registry : public std::enable_shared_from_this<Registry> {
     std::string writer_token;
     std::vector<OnCreated> waiting;
   };
+  struct Left {
+    std::string owner;
+    Timers::TimePoint until;
+  };
+  bool remove_one(const std::string& name, const Session* only, EndReason reason, const std::string& text);
+  void note_left(const Session& session);
   void watch(const std::string& name, Timers::TimePoint when);
   void expire(const std::string& name);
   absl::Status check_room(const std::string& owner) const;
@@ -111,6 +126,7 @@ class Registry : public std::enable_shared_from_this<Registry> {
   std::map<std::uint64_t, std::string> by_age_;                      // names, by their numbers
   std::map<std::pair<std::string, std::string>, Request> requests_;  // by owner and request_id
   std::map<std::string, std::size_t> held_;  // sessions of each owner, those being made included
+  std::map<std::string, Left> left_;         // by name
   std::size_t being_made_ = 0;
   std::uint64_t numbers_ = 0;
 };

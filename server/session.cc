@@ -168,7 +168,7 @@ absl::StatusOr<UpdateResult> Session::update(const std::string& token, const Upd
   {
     const std::scoped_lock lock(writing_);
     if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
-    if (is_closed_) return gone(name_);
+    if (is_closed_) return closed();
     result = mailbox_.take(update);
     if (result.ok()) publisher_->took(update.input_seq, since);
   }
@@ -183,7 +183,7 @@ absl::StatusOr<UndoResult> Session::undo(const std::string& token, std::uint64_t
   {
     const std::scoped_lock lock(writing_);
     if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
-    if (is_closed_) return gone(name_);
+    if (is_closed_) return closed();
     result = mailbox_.undo(input_seq, redo);
     if (result.ok()) publisher_->took(input_seq, since);
   }
@@ -202,7 +202,7 @@ absl::Status Session::solve(const std::string& token, const std::optional<Update
       if (absl::Status status = mailbox_.take(*update).status(); !status.ok()) return status;
     }
     const std::scoped_lock job_lock(mutex_);
-    if (is_closed_) return gone(name_);
+    if (is_closed_) return closed();
     job->version = mailbox_.newest().version;
     before = std::exchange(job_, job);
   }
@@ -229,7 +229,7 @@ absl::StatusOr<std::shared_ptr<FrameStream>> Session::open_stream(const std::str
         [&scheduler = services_.scheduler] { return scheduler.is_overloaded(); });
     if (publisher_->reader_count() >= services_.limits.streams)
       return too_many_streams(services_.limits.streams);
-    if (!publisher_->add(stream)) return is_draining_ && !is_closed_ ? server_draining() : gone(name_);
+    if (!publisher_->add(stream)) return is_draining_ && !is_closed_ ? server_draining() : closed();
     std::erase_if(writers_, [](const auto& weak) { return weak.expired(); });
     if (!token.empty()) writers_.push_back(stream);
   }
@@ -251,6 +251,11 @@ absl::Status Session::acknowledge(const std::string& stream_id, std::uint64_t fr
                     "The session has no stream of this id; it may have ended.");
 }
 
+/// To who had it in hand already. One that goes on elsewhere is not gone: its client would make it anew.
+absl::Status Session::closed() const {
+  return closed_by_ == EndReason::kDraining ? server_draining() : gone(name_);
+}
+
 void Session::drain(const std::string& text) {
   is_draining_ = true;
   publisher_->close(EndReason::kDraining, text);
@@ -259,7 +264,9 @@ void Session::drain(const std::string& text) {
 void Session::close(EndReason reason, const std::string& text) {
   {
     const std::scoped_lock lock(mutex_);
-    if (is_closed_.exchange(true)) return;
+    if (is_closed_) return;
+    closed_by_ = reason;
+    is_closed_ = true;
   }
   stop_.request_stop();
   end_job(ended_by(reason, text));

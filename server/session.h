@@ -125,11 +125,12 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   /// A new token and a new epoch; the writer before is one no more, and its Solve and Deform calls end.
   WriterLease acquire_writer();
 
-  /// Errors: as check_writer and Mailbox::take; NOT_FOUND SESSION_UNKNOWN once closed.
+  /// Errors: as check_writer and Mailbox::take; once closed NOT_FOUND SESSION_UNKNOWN, or UNAVAILABLE DRAINING where it goes on
+  /// elsewhere.
   absl::StatusOr<UpdateResult> update(const std::string& token, const Update& update);
 
   /// Takes the newest step of the handles back, or does again what was taken back last. Errors: as check_writer and
-  /// Mailbox::undo; NOT_FOUND SESSION_UNKNOWN once closed.
+  /// Mailbox::undo; once closed as update().
   absl::StatusOr<UndoResult> undo(const std::string& token, std::uint64_t input_seq, bool redo);
 
   /// Takes `update` in, if there is one, and runs `job`; an earlier job ends with ABORTED SUPERSEDED. Errors
@@ -138,8 +139,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
                      const std::shared_ptr<SolveJob>& job);
 
   /// A new stream. With a token, it is the writer's, and ends when another takes over. Errors: as
-  /// check_writer where `token` is not empty; NOT_FOUND SESSION_UNKNOWN once closed; UNAVAILABLE DRAINING;
-  /// RESOURCE_EXHAUSTED STREAMS_FULL.
+  /// check_writer where `token` is not empty; once closed as update(); UNAVAILABLE DRAINING; RESOURCE_EXHAUSTED STREAMS_FULL.
   absl::StatusOr<std::shared_ptr<FrameStream>> open_stream(const std::string& token,
                                                            const StreamOptions& options);
   /// The stream has ended and is forgotten; with the last one, live solving rests.
@@ -165,6 +165,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
  private:
   Session(SessionParts parts, SessionServices services);
   absl::Status check_writer_locked(const std::string& token) const;
+  absl::Status closed() const;
   std::shared_ptr<SolveJob> take_job();
   void end_job(const absl::Status& why);
   std::shared_ptr<SolveJob> job() const;
@@ -181,6 +182,7 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   const bool has_surface_;
   std::atomic<Timers::TimePoint> last_used_;
   std::atomic<bool> is_closed_ = false;
+  std::atomic<EndReason> closed_by_ = EndReason::kSessionDeleted;
   std::atomic<bool> is_draining_ = false;
   std::stop_source stop_;
   Mailbox mailbox_;

@@ -40,6 +40,7 @@ struct StoredChange {
   bool replaces_all = false;            // all parts that are not named here go
   std::map<std::string, std::optional<std::string>> parts = {};  // without a value: the part goes
   bool is_removal = false;                                       // the session goes, whoever has it
+  bool is_expiry = false;  // of a removal: only where this process has it still; else kFenced
 };
 
 /// A session that a process has in its memory.
@@ -48,6 +49,7 @@ struct TouchedSession {
   std::uint64_t epoch = 0;  // that the process knows
   bool is_in_use = false;
   std::uint64_t revision = 0;  // that the store called kept
+  bool is_being_made = false;  // taken over, and not yet there: nobody is given it meanwhile
 };
 
 /// What became of a change.
@@ -70,8 +72,8 @@ struct TouchResult {
 ///
 /// Errors of all functions: UNAVAILABLE STORE_FAILING, the text saying what fails; then nothing has changed, or, of
 /// commit(), all has: repeating it is safe. A store whose own disk went back to an earlier moment (Redis, which may be set to keep
-/// no more) is told from one that has all, as far as sessions live that know better. Functions may take long, as the disk or the network does: to be called by
-/// threads that may wait. Thread-safe.
+/// no more) is told from one that has all, as far as sessions live that know better. Functions may take long, as the disk or the
+/// network does: to be called by threads that may wait. Thread-safe.
 class Store {
  public:
   virtual ~Store() = default;
@@ -81,8 +83,8 @@ class Store {
 
   /// The session, from now on in a new epoch, so that whoever had it is fenced off: their changes are refused.
   /// NOT_FOUND SESSION_UNKNOWN, also where it is not the owner's; SESSION_DAMAGED where it cannot be read; UNAVAILABLE
-  /// SESSION_ELSEWHERE while another process has it in use. `route`: the way by which the caller came; where it is the session's
-  /// own, the process that has it learns from touch() that it is wanted here.
+  /// SESSION_ELSEWHERE while another process has it in use, and to who comes by another way than its callers do (`route`) as long
+  /// as that process lives. To who comes by theirs it is given: the process that has it learns from touch() that it is wanted.
   virtual absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner,
                                                   const std::string& route = "") = 0;
 
@@ -105,8 +107,8 @@ class Store {
   virtual absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) = 0;
   /// How often touch() is to be called; 0: it has no haste.
   virtual std::chrono::milliseconds touch_every() const { return std::chrono::milliseconds(0); }
-  /// This process lets go of the session: another may take it over at once.
-  virtual absl::Status let_go(const std::string& session) = 0;
+  /// This process lets go of the session, which it had in this epoch: another may take it over at once.
+  virtual absl::Status let_go(const std::string& session, std::uint64_t epoch) = 0;
   /// Removes the sessions that nobody has touched for so long, the time that no server ran aside where the store knows it.
   /// How many went.
   virtual absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) = 0;

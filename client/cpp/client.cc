@@ -116,6 +116,16 @@ absl::Status Session::close() {
   return link_->close();
 }
 
+namespace {
+
+/// Null where the status names no other way to a session than this.
+std::shared_ptr<Rpc> way_after(const std::shared_ptr<Rpc>& rpc, const absl::Status& status) {
+  const std::string route = route_of(status);
+  return route.empty() || route == rpc->route() ? nullptr : rpc->going_by(route);
+}
+
+}  // namespace
+
 Client::Client(std::shared_ptr<Rpc> rpc, ClientOptions options)
     : rpc_(std::move(rpc)), options_(std::move(options)) {}
 
@@ -160,7 +170,10 @@ absl::StatusOr<Session> Client::join(std::string_view session, Role role, OpenOp
 }
 
 absl::StatusOr<std::string> Client::snapshot(std::string_view session) {
-  return take_snapshot(*rpc_, std::string(session), {});
+  absl::StatusOr<std::string> file = take_snapshot(*rpc_, std::string(session), {});
+  if (const auto there = way_after(rpc_, file.status()))
+    file = take_snapshot(*there, std::string(session), {});
+  return file;
 }
 
 absl::StatusOr<std::string> Client::restore(std::string_view snapshot) {
@@ -172,7 +185,9 @@ absl::StatusOr<std::string> Client::restore(std::string_view snapshot) {
 absl::Status Client::remove(std::string_view session) {
   v1::DeleteSessionRequest request;
   request.set_session(std::string(session));
-  return rpc_->call(request, {}).status();
+  const absl::Status status = rpc_->call(request, {}).status();
+  const auto there = way_after(rpc_, status);
+  return there ? there->call(request, {}).status() : status;
 }
 
 }  // namespace lpdeform::client

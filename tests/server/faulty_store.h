@@ -58,7 +58,9 @@ class FaultyStore final : public Store {
     if (absl::Status status = pass(); !status.ok()) return status;
     return store_->touch(sessions);
   }
-  absl::Status let_go(const std::string& session) override { return store_->let_go(session); }
+  absl::Status let_go(const std::string& session, std::uint64_t epoch) override {
+    return store_->let_go(session, epoch);
+  }
   absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) override {
     if (absl::Status status = pass(); !status.ok()) return status;
     return store_->remove_unused(idle_ms);

@@ -218,6 +218,8 @@ TEST_F(ReplicasTest, UsersOfOneSessionMeetAtOneServer) {
       do frame = other->next_frame(kPatience);
       while (frame.ok() && frame->input_seq == 0);  // of a session that was just made again
       EXPECT_TRUE(frame.ok()) << frame.status();
+      const auto file = client::Client::connect(web_)->snapshot(name);  // by a way of its own again
+      EXPECT_TRUE(file.ok()) << file.status();
     }
   };
   others_see_it();
@@ -231,6 +233,24 @@ TEST_F(ReplicasTest, UsersOfOneSessionMeetAtOneServer) {
   dragging.join();
   EXPECT_TRUE(moved.ok()) << moved;
   EXPECT_EQ(session.name(), name);
+}
+
+TEST_F(ReplicasTest, WhoLooksOnDoesNotMoveASessionThatNobodyChangesAtTheMoment) {
+  const client::Mesh mesh = bar(21);
+  client::Session session = open(mesh);
+  hold(session, mesh);
+  ASSERT_TRUE(session.move("tip", client::RigidMotion{.translation = {0.5, 0, 0}}).ok());
+  const auto before = session.settle(kPatience);
+  ASSERT_TRUE(before.ok()) << before.status();
+  std::this_thread::sleep_for(
+      std::chrono::milliseconds(2500));  // longer than a session counts as in use after a call
+  for (int k = 0; k < 6; ++k) {
+    auto other = join(web_, session.name());
+    ASSERT_TRUE(other.ok()) << other.status();
+    const auto frame = other->next_frame(kPatience);
+    ASSERT_TRUE(frame.ok()) << frame.status();
+    EXPECT_EQ(frame->epoch, before->epoch);
+  }
 }
 
 }  // namespace

@@ -239,6 +239,44 @@ TEST_F(SessionTest, DeletionEndsStreamsAndSolvesWithTheirReason) {
   EXPECT_EQ(reason(session->open_stream("", {}).status()), "SESSION_UNKNOWN");
 }
 
+TEST_F(SessionTest, WhoHasHoldOfOneThatGoesOnElsewhereIsNotToldThatThereIsNone) {
+  const auto session = create(), deleted = create();
+  const std::string token = session->lease().token;
+  const auto look = [&](const std::shared_ptr<Session>& one, const std::string& owner = "") {
+    return reason(registry_->find(one->name(), owner).status());
+  };
+  ASSERT_TRUE(registry_->remove(*session, EndReason::kDraining, "Another server has it now."));
+  EXPECT_EQ(reason(session->update(token, {}).status()), "DRAINING");
+  EXPECT_EQ(reason(session->undo(token, 9, false).status()), "DRAINING");
+  EXPECT_EQ(reason(session->solve(token, std::nullopt,
+                                  std::make_shared<SolveJob>(SolveOptions{}, nullptr, nullptr))),
+            "DRAINING");
+  EXPECT_EQ(reason(session->open_stream(token, {}).status()), "DRAINING");
+  EXPECT_EQ(look(session), "SESSION_ELSEWHERE");
+  EXPECT_EQ(look(session, "somebody else"), "SESSION_UNKNOWN");
+  ASSERT_TRUE(registry_->remove(deleted->name(), EndReason::kSessionDeleted, ""));
+  EXPECT_EQ(reason(deleted->update(deleted->lease().token, {}).status()), "SESSION_UNKNOWN");
+  EXPECT_EQ(look(deleted), "SESSION_UNKNOWN");
+  registry_->forget_left(session->name());
+  EXPECT_EQ(look(session), "SESSION_UNKNOWN");
+
+  const auto other = create();
+  ASSERT_TRUE(registry_->remove(*other, EndReason::kDraining, ""));
+  timers_->advance(Registry::kLeaving);
+  EXPECT_EQ(look(other), "SESSION_UNKNOWN");
+}
+
+TEST_F(SessionTest, RemovingOneLeavesAnotherOfItsNameThatCameBack) {
+  const auto left = create();
+  ASSERT_TRUE(registry_->remove(*left, EndReason::kDraining, ""));
+  --count_;
+  const auto back = create();
+  ASSERT_EQ(back->name(), left->name());
+  EXPECT_FALSE(registry_->remove(*left, EndReason::kDraining, ""));
+  EXPECT_EQ(*registry_->find(back->name()), back);
+  EXPECT_FALSE(back->is_closed());
+}
+
 TEST_F(SessionTest, ExpiresWhenNobodyUsesItAndAWatcherAloneIsNoUse) {
   const auto session = create();
   Reader reader(open(*session));

@@ -9,6 +9,7 @@
 #include <functional>
 #include <string>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "redis_server.h"
@@ -107,7 +108,7 @@ TEST_P(StoreTest, GivesBackWhatWasCommittedAfterItWasClosed) {
                           .epoch = 1,
                           .parts = {{"inputs", "2"}, {"m:tip", std::nullopt}, {"p", "x"}}};
   ASSERT_EQ(*commit(*store_, next), ChangeOutcome::kKept);
-  ASSERT_TRUE(store_->let_go("a").ok());
+  ASSERT_TRUE(store_->let_go("a", 1).ok());
   open();
   const auto found = store_->take_over("a", "anna");
   ASSERT_TRUE(found.ok()) << found.status();
@@ -277,11 +278,13 @@ class RedisStoreTest : public testing::Test {
  protected:
   /// A store as one of several servers has it.
   std::shared_ptr<Store> open(std::chrono::milliseconds lease = std::chrono::minutes(1),
-                              std::chrono::milliseconds idle = std::chrono::minutes(10)) {
+                              std::chrono::milliseconds idle = std::chrono::minutes(10),
+                              std::chrono::milliseconds stays = std::chrono::seconds(1)) {
     auto opened = open_redis_store({.host = "127.0.0.1",
                                     .port = redis_.port(),
                                     .idle = idle,
                                     .lease = lease,
+                                    .stays = stays,
                                     .patience = std::chrono::milliseconds(200)});
     EXPECT_TRUE(opened.ok()) << opened.status();
     return *std::move(opened);
@@ -296,9 +299,9 @@ TEST_F(RedisStoreTest, ASessionInUseIsHeldUntilItIsLetGo) {
   ASSERT_TRUE(commit(*first, beginning("a")).ok());
   EXPECT_EQ(reason(second->take_over("a", "anna").status()), "SESSION_ELSEWHERE");
   EXPECT_TRUE(absl::IsUnavailable(second->take_over("a", "anna").status()));
-  ASSERT_TRUE(second->let_go("a").ok());  // it is not the second's to let go
+  ASSERT_TRUE(second->let_go("a", 1).ok());  // it is not the second's to let go
   EXPECT_FALSE(second->take_over("a", "anna").ok());
-  ASSERT_TRUE(first->let_go("a").ok());
+  ASSERT_TRUE(first->let_go("a", 1).ok());
   EXPECT_EQ(second->take_over("a", "anna")->epoch, 2u);
 }
 
@@ -318,7 +321,7 @@ TEST_F(RedisStoreTest, WhoIsRefusedLearnsTheWayAndWhoComesThatWayIsGivenIt) {
   do EXPECT_EQ(reason(ask("the way")), "SESSION_ELSEWHERE");
   while (!is_wanted() && std::chrono::steady_clock::now() < end);
   EXPECT_TRUE(is_wanted());
-  ASSERT_TRUE(first->let_go("a").ok());
+  ASSERT_TRUE(first->let_go("a", 1).ok());
   const auto taken = second->take_over("a", "anna", "the way");
   ASSERT_TRUE(taken.ok());
   EXPECT_EQ(taken->route, "the way");
@@ -326,6 +329,126 @@ TEST_F(RedisStoreTest, WhoIsRefusedLearnsTheWayAndWhoComesThatWayIsGivenIt) {
   EXPECT_TRUE(second->touch(there)->wanted.empty());
   EXPECT_EQ(reason(first->take_over("a", "anna", "the way").status()), "SESSION_ELSEWHERE");
   EXPECT_TRUE(second->touch(there)->wanted.empty());  // it has just come
+}
+
+/// A session in Redis whose times a test sets, so that it need not wait for them.
+class HandOverTest : public RedisStoreTest {
+ protected:
+  HandOverTest() {
+    StoredChange change = beginning("a");
+    change.route = "the way";
+    EXPECT_EQ(*commit(*first_, change), ChangeOutcome::kKept);
+  }
+
+  /// As if this moment had been so many milliseconds ago; negative: as if it came then.
+  void set_ago(const std::string& field, std::int64_t ms) {
+    const auto time = redis().run({"TIME"});
+    std::int64_t seconds = 0, microseconds = 0;
+    ASSERT_TRUE(time.ok() && absl::SimpleAtoi(time->elements.at(0).text, &seconds) &&
+                absl::SimpleAtoi(time->elements.at(1).text, &microseconds));
+    const std::string moment = absl::StrCat(1000 * seconds + microseconds / 1000 - ms);
+    ASSERT_TRUE(redis().run({"HSET", "lpdeform:s:a", field, moment}).ok());
+  }
+  RedisConnection& redis() { return connection_; }
+
+  static std::string ask(Store& store, const std::string& route) {
+    return reason(store.take_over("a", "anna", route).status());
+  }
+  static bool is_wanted(Store& store, bool is_being_made = false) {
+    const std::vector<TouchedSession> sessions{{"a", 1, true, 0, is_being_made}};
+    return !store.touch(sessions)->wanted.empty();
+  }
+
+  std::shared_ptr<Store> open_one() { return open(kLong, kLong, std::chrono::milliseconds(kStays)); }
+
+  static constexpr std::int64_t kStays = 100'000, kAges = 100 * kStays;  // longer than any test takes
+  static constexpr std::chrono::hours kLong{1};
+  const std::shared_ptr<Store> first_ = open_one(), second_ = open_one(), third_ = open_one();
+  RedisConnection connection_{"127.0.0.1", redis_.port(), std::chrono::seconds(5)};
+};
+
+TEST_F(HandOverTest, WhoComesAstrayIsShownTheWayAsLongAsTheHolderLives) {
+  set_ago("until", kAges);  // nobody uses it
+  EXPECT_EQ(ask(*second_, "another way"), "SESSION_ELSEWHERE");
+  EXPECT_EQ(fault_of(second_->take_over("a", "anna", "another way").status()).limit,
+            "lpdeform-session: the way");
+  set_ago("alive", kAges);
+  EXPECT_EQ(ask(*second_, "another way"), "");
+  set_ago("until", kAges);
+  EXPECT_EQ(ask(*third_, "the way"), "");  // who comes as they should need not wait for that
+  set_ago("until", kAges);
+  EXPECT_EQ(ask(*second_, ""), "");  // nor who knows of no ways
+  EXPECT_FALSE(is_wanted(*second_));
+}
+
+TEST_F(HandOverTest, OneThatIsBeingMadeIsHeldAndStays) {
+  ASSERT_EQ(ask(*first_, "the way"), "");
+  set_ago("until", kAges);
+  set_ago("alive", kAges);
+  set_ago("since", kAges);  // it takes long
+  EXPECT_FALSE(is_wanted(*first_, true));
+  EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
+  EXPECT_FALSE(is_wanted(*first_));
+}
+
+TEST_F(HandOverTest, WhoWantedItIsGivenItFirst) {
+  EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
+  EXPECT_TRUE(is_wanted(*first_));
+  set_ago("wanted", -kAges);  // however slow this machine is
+  EXPECT_EQ(ask(*third_, "the way"), "SESSION_ELSEWHERE");
+  ASSERT_TRUE(first_->let_go("a", 1).ok());
+  EXPECT_EQ(ask(*first_, "the way"), "SESSION_ELSEWHERE");
+  EXPECT_EQ(ask(*third_, ""), "SESSION_ELSEWHERE");
+  EXPECT_EQ(ask(*second_, "the way"), "");
+}
+
+TEST_F(HandOverTest, WhoWantedItAndIsGoneHoldsNobodyUp) {
+  EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
+  ASSERT_TRUE(first_->let_go("a", 1).ok());
+  set_ago("wanted", kAges);
+  EXPECT_EQ(ask(*third_, "the way"), "");
+}
+
+TEST_F(HandOverTest, TwoThatWantItInTurnGetItLessAndLessOften) {
+  const std::shared_ptr<Store> both[] = {first_, second_};
+  std::uint64_t epoch = 1;
+  for (std::int64_t stays = kStays, turn = 0; turn < 8; ++turn, stays = std::min(2 * stays, 32 * kStays)) {
+    Store &has = *both[turn % 2], &wants = *both[1 - turn % 2];
+    if (turn == 0) set_ago("since", stays + kAges);
+    if (turn > 0) {
+      set_ago("since", stays / 2);
+      EXPECT_EQ(ask(wants, "the way"), "SESSION_ELSEWHERE");
+      EXPECT_FALSE(is_wanted(has)) << stays;
+      set_ago("since", 2 * stays);
+    }
+    EXPECT_EQ(ask(wants, "the way"), "SESSION_ELSEWHERE");
+    EXPECT_TRUE(is_wanted(has)) << stays;
+    set_ago("wanted", -kAges);
+    ASSERT_TRUE(has.let_go("a", epoch).ok());
+    if (turn == 0) stays /= 2;  // it had been there for long
+    const auto taken = wants.take_over("a", "anna", "the way");
+    ASSERT_TRUE(taken.ok()) << taken.status();
+    epoch = taken->epoch;
+  }
+}
+
+TEST_F(HandOverTest, LettingGoOfAnEarlierEpochIsTooLate) {
+  ASSERT_EQ(ask(*first_, "the way"), "");
+  ASSERT_TRUE(first_->let_go("a", 1).ok());  // of the epoch before
+  EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
+  ASSERT_TRUE(first_->let_go("a", 2).ok());
+  EXPECT_EQ(ask(*second_, "the way"), "");
+}
+
+TEST_F(HandOverTest, WhatHasExpiredForTheHolderBeforeIsNotRemoved) {
+  ASSERT_TRUE(first_->let_go("a", 1).ok());
+  ASSERT_EQ(ask(*second_, "the way"), "");
+  const StoredChange expiry{.session = "a", .is_removal = true, .is_expiry = true};
+  EXPECT_EQ(*commit(*first_, expiry), ChangeOutcome::kFenced);
+  EXPECT_EQ(ask(*second_, "the way"), "");
+  EXPECT_EQ(*commit(*second_, expiry), ChangeOutcome::kKept);
+  EXPECT_EQ(ask(*second_, "the way"), "SESSION_UNKNOWN");
+  EXPECT_EQ(*commit(*second_, expiry), ChangeOutcome::kKept);  // its answer may have been lost
 }
 
 TEST_F(RedisStoreTest, ALeaseThatNobodyRenewsEndsAndItsHolderIsFencedOff) {

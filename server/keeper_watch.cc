@@ -1,0 +1,111 @@
+// Keeper: tells the store which sessions this process has, and learns which of them others have or want, and what nobody uses.
+
+#include <utility>
+
+#include "server/keeper.h"
+
+namespace lpdeform {
+namespace {
+
+/// How often those are looked for that nobody uses, in their time without use.
+constexpr int kSweepsPerIdle = 8;
+
+}  // namespace
+
+void Keeper::watch_unused() {
+  const Timers::Duration sweep = services_.idle / kSweepsPerIdle;
+  const Timers::Duration touch = store_->touch_every();
+  const bool is_hasty = touch.count() > 0 && touch < sweep;
+  services_.timers->at(services_.timers->now() + (is_hasty ? touch : sweep), [weak = weak_from_this()] {
+    if (const auto self = weak.lock()) self->sweep();
+  });
+}
+
+void Keeper::sweep() {
+  const auto touched = [this] {  // its thread ends before this does
+    touch_all();
+    watch_unused();
+  };
+  if (!reader_.try_post(touched)) watch_unused();
+}
+
+/// On the reader's thread.
+void Keeper::touch_all() {
+  std::vector<TouchedSession> sessions;
+  Sessions touched_ones;
+  const Timers::TimePoint now = services_.timers->now();
+  bool is_sweep = false;
+  {
+    const std::scoped_lock lock(mutex_);
+    is_sweep = now >= next_sweep_;
+    for (const auto& [name, entry] : entries_) {
+      if (entry.session == nullptr || entry.epoch == 0 || entry.is_leaving) continue;
+      sessions.push_back({name, entry.epoch, now - entry.session->last_used() < kInUse, entry.revision});
+      touched_ones[name] = entry.session;
+    }
+    for (const auto& [name, epoch] : being_made_) sessions.push_back({name, epoch, true, 0, true});
+  }
+  const auto touched = store_->touch(sessions);
+  if (touched.ok()) drop(touched->lost, touched_ones);
+  if (touched.ok()) write_again(touched->behind, touched_ones);
+  if (touched.ok()) hand_over(touched->wanted, touched_ones);
+  absl::Status status = touched.status();
+  if (is_sweep && status.ok()) {
+    const auto idle_ms = std::chrono::duration_cast<std::chrono::milliseconds>(services_.idle).count();
+    status = store_->remove_unused(idle_ms).status();
+    const std::scoped_lock lock(mutex_);
+    next_sweep_ = now + services_.idle / kSweepsPerIdle;
+  }
+  if (!status.ok()) services_.metrics->add(Count::kStoreErrors);
+}
+
+/// Under the lock. Null where the session that was touched has gone, or come back as another, meanwhile.
+Keeper::Entry* Keeper::same_entry(const std::string& name, const Sessions& touched) {
+  const auto found = entries_.find(name);
+  const auto before = touched.find(name);
+  const bool is_same =
+      found != entries_.end() && before != touched.end() && found->second.session == before->second;
+  return is_same ? &found->second : nullptr;
+}
+
+void Keeper::write_again(const std::vector<std::string>& names, const Sessions& touched) {
+  const std::scoped_lock lock(mutex_);
+  for (const std::string& name : names) {
+    if (Entry* const entry = same_entry(name, touched)) write_all(*entry, name);
+  }
+}
+
+/// Their callers come by another process now, where one of them waits already.
+void Keeper::hand_over(const std::vector<std::string>& names, const Sessions& touched) {
+  Calls calls;
+  {
+    const std::scoped_lock lock(mutex_);
+    for (const std::string& name : names) {
+      const Entry* const entry = same_entry(name, touched);
+      if (entry == nullptr || !on_lost) continue;
+      services_.log->info("session_handed_over", {{"session", abbreviated(name)}, {"epoch", entry->epoch}});
+      calls.emplace_back([this, session = entry->session] { on_lost(*session); });
+    }
+  }
+  for (const auto& call : calls) call();  // whoever has them releases them
+}
+
+/// Sessions that another process has now.
+void Keeper::drop(const std::vector<std::string>& lost, const Sessions& touched) {
+  Calls calls;
+  {
+    const std::scoped_lock lock(mutex_);
+    for (const std::string& name : lost) {
+      Entry* const entry = same_entry(name, touched);
+      if (entry == nullptr) continue;
+      services_.log->info("session_lost", {{"session", abbreviated(name)}, {"epoch", entry->epoch}});
+      answer_all(*entry, calls);
+      if (on_lost) calls.emplace_back([this, session = entry->session] { on_lost(*session); });
+      due_.erase(name);
+      entries_.erase(name);
+    }
+  }
+  for (const auto& call : calls) call();
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,193 @@
+// Keeper: one thread writes what has changed in all sessions.
+
+#include <algorithm>
+#include <utility>
+
+#include "server/keeper.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr std::chrono::milliseconds kFirstPause{50}, kLongestPause{2000};
+
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+}  // namespace
+
+void Keeper::run() {
+  std::unique_lock lock(mutex_);
+  for (bool is_last_try = false;;) {
+    if (is_failing_) changed_.wait_until(lock, retry_at_, [this] { return is_stopping_; });
+    changed_.wait(lock, [this] { return is_stopping_ || !due_.empty(); });
+    if (due_.empty() || is_last_try) return;
+    is_last_try = is_stopping_;
+    is_writing_ = true;
+    lock.unlock();
+    write(take_work());
+    lock.lock();
+    is_writing_ = false;
+    changed_.notify_all();
+  }
+}
+
+/// Everything that is due, as it is now.
+std::vector<Keeper::Work> Keeper::take_work() {
+  std::vector<Work> works;
+  {
+    const std::scoped_lock lock(mutex_);
+    for (const std::string& name : std::exchange(due_, {})) {
+      const auto found = entries_.find(name);
+      if (found == entries_.end()) continue;
+      const Entry& entry = found->second;
+      Work work{name, entry.session, entry.head, entry.revision, {}};
+      work.change.session = name;
+      work.change.epoch_before = entry.epoch;
+      work.change.is_expiry = entry.is_expired;
+      if (entry.epoch == 0) {
+        work.change.request_id = entry.request_id;
+        work.change.blobs = entry.blobs;
+      }
+      works.push_back(std::move(work));
+    }
+  }
+  for (Work& work : works) fill_in(work);  // looks into sessions, which may be busy with an update
+  return works;
+}
+
+void Keeper::fill_in(Work& work) {
+  StoredChange& change = work.change;
+  change.is_removal = work.session == nullptr;
+  if (change.is_removal) return;
+  const SessionChanges changes = work.session->changes_since(change.epoch_before == 0 ? 0 : work.revision);
+  change.revision_before = work.revision;
+  change.revision = work.revision = changes.inputs.revision;
+  change.epoch = changes.lease.epoch;
+  change.owner = work.session->owner();
+  change.route = work.session->route();
+  change.parts = encode_changes(changes);
+  change.replaces_all = changes.inputs.is_all;
+  if (change.replaces_all) change.parts["head"] = work.head;
+}
+
+/// All at once; where that fails, each by itself, so that one that cannot be kept does not hold up the others.
+void Keeper::write(std::vector<Work> works) {
+  Calls calls;
+  auto outcomes = commit(works);
+  absl::Status health = outcomes.status();
+  for (std::size_t k = 0; k < works.size(); ++k) {
+    const std::span<const Work> one(&works[k], 1);
+    const bool is_alone = !outcomes.ok() && works.size() > 1;
+    const auto again = is_alone ? commit(one) : outcomes;
+    if (is_alone) health = k == 0 ? again.status() : (health.Update(again.status()), health);
+    const std::scoped_lock lock(mutex_);
+    if (again.ok()) {
+      note_kept(works[k], (*again)[is_alone ? 0 : k], calls);
+    } else {
+      note_failed(works[k], again.status(), calls);
+    }
+  }
+  {
+    const std::scoped_lock lock(mutex_);
+    note_health(health);
+  }
+  for (const auto& call : calls) call();
+}
+
+absl::StatusOr<std::vector<ChangeOutcome>> Keeper::commit(std::span<const Work> works) {
+  std::vector<StoredChange> changes;
+  for (const Work& work : works) changes.push_back(work.change);
+  const Clock::time_point begin = Clock::now();
+  auto outcomes = store_->commit(changes);
+  services_.metrics->observe(Span::kStoreWrite, seconds_since(begin));
+  if (!outcomes.ok()) services_.metrics->add(Count::kStoreErrors);
+  return outcomes;
+}
+
+/// Under the lock; what is to be called afterwards goes into `calls`.
+void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
+  const auto found = entries_.find(work.name);
+  if (found == entries_.end()) return;
+  Entry& entry = found->second;
+  if (entry.session != nullptr && work.session != nullptr && entry.session != work.session)
+    return;  // it left and came back meanwhile: what was written is of an epoch before
+  if (work.change.is_removal || outcome == ChangeOutcome::kFenced) {
+    for (OnDone& on_removed : entry.on_removed)
+      calls.emplace_back([on_removed = std::move(on_removed)] { on_removed(absl::OkStatus()); });
+    answer_all(entry, calls);
+    if (entry.session != nullptr)
+      services_.log->info("session_lost", {{"session", abbreviated(work.name)}, {"epoch", entry.epoch}});
+    if (entry.session != nullptr && on_lost)
+      calls.emplace_back([this, lost = entry.session] { on_lost(*lost); });
+    due_.erase(work.name);
+    entries_.erase(found);
+    return;
+  }
+  if (outcome == ChangeOutcome::kBehind) return write_all(entry, work.name);
+  entry.revision = work.revision;
+  entry.epoch = work.change.epoch;
+  if (entry.on_added)
+    calls.emplace_back([on_added = std::exchange(entry.on_added, nullptr)] { on_added(absl::OkStatus()); });
+  answer_kept(entry, calls);
+  if (entry.is_leaving && !due_.contains(work.name)) {
+    entries_.erase(found);
+    calls.emplace_back(
+        [this, name = work.name, epoch = work.change.epoch] { store_->let_go(name, epoch).IgnoreError(); });
+  }
+}
+
+/// Under the lock. The store lost what it had called kept, and this process has it yet.
+void Keeper::write_all(Entry& entry, const std::string& name) {
+  entry.revision = 0;
+  due(name);
+  services_.log->warning("store_went_back", {{"session", abbreviated(name)},
+                                             {"text", "The session is written again, in whole."}});
+}
+
+/// Under the lock. What has changed stays due; a new session is given up.
+void Keeper::note_failed(const Work& work, const absl::Status& why, Calls& calls) {
+  const auto found = entries_.find(work.name);
+  if (found == entries_.end()) return;
+  Entry& entry = found->second;
+  if (entry.on_added) {
+    calls.emplace_back([on_added = std::exchange(entry.on_added, nullptr), why] { on_added(why); });
+    entry.session.reset();  // the store may have it all the same
+  }
+  for (OnDone& on_removed : std::exchange(entry.on_removed, {}))
+    calls.emplace_back([on_removed = std::move(on_removed), why] { on_removed(why); });
+  services_.metrics->add(Count::kUpdatesNotKept, static_cast<double>(entry.waiting.size()));
+  answer_all(entry, calls);
+  due_.insert(work.name);
+}
+
+/// Those whose updates are kept.
+void Keeper::answer_kept(Entry& entry, Calls& calls) {
+  std::erase_if(entry.waiting, [&](Waiting& one) {
+    const bool is_kept = one.revision <= entry.revision && one.epoch <= entry.epoch;
+    if (!is_kept) return false;
+    services_.metrics->observe(Span::kInputToKept, seconds_since(one.since));
+    calls.emplace_back([on_kept = std::move(one.on_kept)] { on_kept(true); });
+    return true;
+  });
+}
+
+void Keeper::answer_all(Entry& entry, Calls& calls) {
+  for (Waiting& one : std::exchange(entry.waiting, {}))
+    calls.emplace_back([on_kept = std::move(one.on_kept)] { on_kept(false); });
+}
+
+/// Under the lock.
+void Keeper::note_health(const absl::Status& status) {
+  const bool was_failing = std::exchange(is_failing_, !status.ok());
+  services_.metrics->set(Level::kStoreFailing, is_failing_ ? 1 : 0);
+  if (is_failing_) {
+    pause_ = was_failing ? std::min<Clock::duration>(2 * pause_, kLongestPause) : kFirstPause;
+    retry_at_ = Clock::now() + pause_;
+    if (!was_failing) services_.log->warning("store_failing", {{"text", std::string(status.message())}});
+  } else if (was_failing) {
+    services_.log->info("store_works", {{"text", "What was not kept is now."}});
+  }
+}
+
+}  // namespace lpdeform

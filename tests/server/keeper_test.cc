@@ -1,0 +1,220 @@
+// What the keeper asks of a store as sessions come, go on elsewhere and come back: never two of one name for one, and what is not
+// written is not called kept.
+
+#include "server/keeper.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <future>
+#include <mutex>
+
+#include "absl/strings/str_cat.h"
+#include "bar.h"
+#include "core/base/fault.h"
+#include "manual_timers.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr std::chrono::seconds kPatience{60};
+const std::string kName = "sessions/0123456789abcdef0123456789abcdef";
+
+/// Takes all, and writes down what it was asked for; a test can hold its changes up.
+class NotingStore final : public Store {
+ public:
+  void hold_changes(bool is_held) {
+    const std::scoped_lock lock(mutex_);
+    is_held_ = is_held;
+    changed_.notify_all();
+  }
+
+  /// Waits until something was asked for.
+  bool wait_for(const std::string& asked) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, kPatience,
+                             [&] { return std::find(asked_.begin(), asked_.end(), asked) != asked_.end(); });
+  }
+  std::vector<std::string> asked() {
+    const std::scoped_lock lock(mutex_);
+    return asked_;
+  }
+  void forget() {
+    const std::scoped_lock lock(mutex_);
+    asked_.clear();
+  }
+
+  absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) override {
+    std::unique_lock lock(mutex_);
+    for (const StoredChange& change : changes)
+      note(change.is_expiry ? "expiry" : (change.is_removal ? "removal" : "change"));
+    changed_.wait(lock, [this] { return !is_held_; });
+    return std::vector<ChangeOutcome>(changes.size(), ChangeOutcome::kKept);
+  }
+  absl::StatusOr<StoredSession> take_over(const std::string&, const std::string& owner,
+                                          const std::string&) override {
+    const std::scoped_lock lock(mutex_);
+    note("take over");
+    return StoredSession{.owner = owner, .epoch = ++epoch_, .parts = {{"head", ""}}};
+  }
+  absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) override {
+    const std::scoped_lock lock(mutex_);
+    for (const TouchedSession& one : sessions)
+      note(one.is_being_made ? absl::StrCat("is being made ", one.epoch) : "is there");
+    note("touched");
+    return TouchResult();
+  }
+  absl::Status let_go(const std::string&, std::uint64_t epoch) override {
+    const std::scoped_lock lock(mutex_);
+    note(absl::StrCat("let go ", epoch));
+    return absl::OkStatus();
+  }
+  std::chrono::milliseconds touch_every() const override { return kTouch; }
+  absl::StatusOr<std::string> find_request(const std::string&, const std::string&) override { return ""; }
+  absl::StatusOr<std::vector<std::string>> list(const std::string&, const std::string&,
+                                                std::size_t) override {
+    return std::vector<std::string>();
+  }
+  absl::Status keep_blob(const std::string&, const std::string&, std::string_view) override {
+    return absl::OkStatus();
+  }
+  absl::StatusOr<std::string> blob(const std::string&) override { return ""; }
+  absl::StatusOr<std::size_t> remove_unused(std::int64_t) override { return 0; }
+
+  static constexpr std::chrono::milliseconds kTouch{300};
+
+ private:
+  /// Under the lock.
+  void note(const std::string& what) {
+    asked_.push_back(what);
+    changed_.notify_all();
+  }
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::string> asked_;
+  std::uint64_t epoch_ = 1;
+  bool is_held_ = false;
+};
+
+class KeeperTest : public testing::Test {
+ protected:
+  ~KeeperTest() override {
+    store_->hold_changes(false);
+    keeper_.reset();
+  }
+
+  std::shared_ptr<Session> session() {
+    const auto shape = shape_of(bar_mesh());
+    SessionParts parts{.name = kName,
+                       .shape = shape,
+                       .deformer = deformer_of(shape),
+                       .free_components = FreeComponents::kError,
+                       .beginning = {},
+                       .memory = {}};
+    return *Session::create(std::move(parts), {scheduler_, timers_, std::chrono::seconds(15)});
+  }
+
+  /// A session that the store has.
+  std::shared_ptr<Session> kept() {
+    const auto made = session();
+    std::promise<absl::Status> added;
+    keeper_->add(made, {}, "", [&](const absl::Status& status) { added.set_value(status); });
+    EXPECT_TRUE(added.get_future().get().ok());
+    store_->forget();
+    return made;
+  }
+
+  void take_over() {
+    keeper_->take_over(kName, {"anna", ""},
+                       [this](absl::StatusOr<Keeper::Found> found) { found_.set_value(std::move(found)); });
+  }
+
+  /// Lets time go by until something was asked for.
+  bool pass_until(const std::string& asked) {
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    for (;;) {
+      const auto all = store_->asked();
+      if (std::find(all.begin(), all.end(), asked) != all.end()) return true;
+      if (std::chrono::steady_clock::now() > end) return false;
+      timers_->advance(std::chrono::milliseconds(10));
+    }
+  }
+
+  Scheduler scheduler_{2};
+  const std::shared_ptr<ManualTimers> timers_ = std::make_shared<ManualTimers>();
+  const std::shared_ptr<NotingStore> store_ = std::make_shared<NotingStore>();
+  std::promise<absl::StatusOr<Keeper::Found>> found_;
+  std::shared_ptr<Keeper> keeper_ = Keeper::create(
+      store_, {timers_, std::make_shared<Metrics>(), std::make_shared<Log>("off"), std::chrono::minutes(10)});
+};
+
+TEST_F(KeeperTest, OneThatLeavesIsWrittenBeforeItIsTakenOverAgain) {
+  const auto leaving = kept();
+  store_->hold_changes(true);
+  keeper_->release(*leaving);
+  ASSERT_TRUE(store_->wait_for("change"));
+  take_over();
+  timers_->advance(NotingStore::kTouch);
+  ASSERT_TRUE(store_->wait_for("touched"));  // by the thread that takes over, afterwards
+  for (const std::string& asked : store_->asked()) EXPECT_NE(asked, "take over");
+  store_->hold_changes(false);
+  ASSERT_TRUE(store_->wait_for("let go 1"));
+  ASSERT_TRUE(pass_until("take over"));
+  EXPECT_TRUE(found_.get_future().get().ok());
+}
+
+TEST_F(KeeperTest, AnUpdateOfTheOneBeforeIsNotCalledKept) {
+  const auto before = kept();
+  store_->hold_changes(true);
+  std::promise<bool> is_kept;
+  const std::uint64_t next = before->revision() + 1;
+  keeper_->changed(*before, next, 1, [&](bool kept) { is_kept.set_value(kept); });
+  const auto back = session();
+  keeper_->adopt(back, {.owner = "anna", .epoch = 7, .parts = {{"head", ""}}});
+  EXPECT_FALSE(is_kept.get_future().get());
+  std::promise<bool> is_late_one_kept;
+  keeper_->changed(*before, 0, 0, [&](bool kept) { is_late_one_kept.set_value(kept); });
+  EXPECT_FALSE(is_late_one_kept.get_future().get());
+  std::promise<bool> is_new_one_kept;
+  keeper_->changed(*back, 0, 0, [&](bool kept) { is_new_one_kept.set_value(kept); });
+  EXPECT_TRUE(is_new_one_kept.get_future().get());
+}
+
+TEST_F(KeeperTest, TheOneBeforeTakesNothingFromTheOneThatCameBack) {
+  const auto before = session(), back = kept();
+  keeper_->release(*before);
+  keeper_->expire(*before);
+  ASSERT_TRUE(pass_until("is there"));
+  EXPECT_FALSE(keeper_->is_being_removed(kName));
+}
+
+TEST_F(KeeperTest, OneThatIsBeingMadeIsHeldUntilItIsThereOrGivenUp) {
+  take_over();
+  ASSERT_TRUE(found_.get_future().get().ok());
+  ASSERT_TRUE(pass_until("is being made 2"));
+  keeper_->give_up(kName);
+  ASSERT_TRUE(store_->wait_for("let go 2"));
+  store_->forget();
+  ASSERT_TRUE(pass_until("touched"));
+  for (const std::string& asked : store_->asked()) EXPECT_EQ(asked, "touched");
+
+  found_ = std::promise<absl::StatusOr<Keeper::Found>>();
+  take_over();
+  const auto found = found_.get_future().get();
+  ASSERT_TRUE(found.ok());
+  keeper_->adopt(session(), found->session);
+  store_->forget();
+  ASSERT_TRUE(pass_until("is there"));
+  for (const std::string& asked : store_->asked()) EXPECT_NE(asked, "is being made 3");
+}
+
+TEST_F(KeeperTest, OneThatNobodyUsedHereIsNotRemovedFromWhoHasIt) {
+  const auto unused = kept();
+  keeper_->expire(*unused);
+  EXPECT_TRUE(store_->wait_for("expiry"));
+}
+
+}  // namespace
+}  // namespace lpdeform
