@@ -144,11 +144,12 @@ const std::string kRemove =
     "if has[3] then redis.call('ZREM', 'lpdeform:o:' .. redis.sha1hex(has[3]), KEYS[1]) end "
     "redis.call('DEL', KEYS[1]); return 1";
 
-/// ARGV: holder, epoch. Not where the same holder has taken it over again meanwhile.
+/// ARGV: holder, epoch. Not where the same holder has taken it over again meanwhile. Nobody holds it then: a touch that was under way
+/// does not renew the lease.
 const std::string kLetGo =
     "local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch'); "
     "if has[1] == ARGV[1] and has[2] == ARGV[2] then "
-    "  redis.call('HSET', KEYS[1], 'until', 0, 'alive', 0) "
+    "  redis.call('HSET', KEYS[1], 'holder', '', 'until', 0, 'alive', 0) "
     "end "
     "return 1";
 

@@ -437,6 +437,8 @@ TEST_F(HandOverTest, LettingGoOfAnEarlierEpochIsTooLate) {
   ASSERT_TRUE(first_->let_go("a", 1).ok());  // of the epoch before
   EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
   ASSERT_TRUE(first_->let_go("a", 2).ok());
+  const std::vector<TouchedSession> late{{"a", 2, true}};
+  EXPECT_EQ(first_->touch(late)->lost, std::vector<std::string>{"a"});
   EXPECT_EQ(ask(*second_, "the way"), "");
 }
 
