@@ -108,7 +108,7 @@ function pSlider(app: App, field: Field): HTMLElement {
 function wordsOf({ p, secondP, isAutomatic, paintedP, stiffness }: Document, isSplit: boolean): string {
   if (isAutomatic) return "From the shape: joints soft, parts rigid";
   const words = isSplit
-    ? `${capital(placeOf("first"))}: ${effectOf(p)}. ${capital(placeOf("second"))}: ${effectOf(secondP)}`
+    ? `${capital(placeOf("first"))}: ${effectOf(p)}\n${capital(placeOf("second"))}: ${effectOf(secondP)}`
     : effectOf(p);
   return paintedP || stiffness ? `${words} · painted parts as painted` : words;
 }
