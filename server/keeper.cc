@@ -106,7 +106,7 @@ void Keeper::adopt(std::shared_ptr<Session> session, const StoredSession& stored
     being_made_.erase(session->name());
     Entry& entry = entries_[session->name()];  // perhaps of one that is leaving: it comes back
     answer_all(entry, calls);                  // the numbers of its updates mean nothing to the new one
-    entry.is_leaving = false;
+    entry.is_leaving = entry.is_lost = false;
     entry.head = stored.parts.at("head");
     entry.epoch = stored.epoch;
     entry.revision = session->changes_since(std::numeric_limits<std::uint64_t>::max()).inputs.revision;

@@ -127,6 +127,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
     std::vector<OnDone> on_removed;
     bool is_leaving = false;  // forgotten once it is kept
     bool is_expired = false;  // of one that goes: see StoredChange
+    bool is_lost = false;     // by the store, and to be written anew
   };
   /// What one entry has for the store.
   struct Work {
@@ -135,14 +136,18 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
     std::string head;
     std::uint64_t revision = 0;  // kept so far, then: once `change` is
     StoredChange change;
+    absl::Status status = {};                       // why it cannot be written
+    std::map<std::string, std::string> blobs = {};  // where it is written anew
   };
 
   void run();
   std::vector<Work> take_work();
   static void fill_in(Work& work);
+  static void fill_in_anew(Work& work);
   void write(std::vector<Work> works);
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const Work> works);
   void write_all(Entry& entry, const std::string& name);
+  void write_anew(Entry& entry, const std::string& name);
   void note_kept(const Work& work, ChangeOutcome outcome, Calls& calls);
   void note_failed(const Work& work, const absl::Status& why, Calls& calls);
   void note_health(const absl::Status& status);
@@ -164,7 +169,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   using Sessions = std::map<std::string, std::shared_ptr<Session>>;
   Entry* same_entry(const std::string& name, const Sessions& touched);
   void drop(const std::vector<std::string>& lost, const Sessions& touched);
-  void write_again(const std::vector<std::string>& names, const Sessions& touched);
+  void write_again(const TouchResult& result, const Sessions& touched);
   void hand_over(const std::vector<std::string>& names, const Sessions& touched);
 
   const std::shared_ptr<Store> store_;

@@ -47,7 +47,7 @@ void Keeper::touch_all() {
   }
   const auto touched = store_->touch(sessions);
   if (touched.ok()) drop(touched->lost, touched_ones);
-  if (touched.ok()) write_again(touched->behind, touched_ones);
+  if (touched.ok()) write_again(*touched, touched_ones);
   if (touched.ok()) hand_over(touched->wanted, touched_ones);
   absl::Status status = touched.status();
   if (is_sweep && status.ok()) {
@@ -68,10 +68,13 @@ Keeper::Entry* Keeper::same_entry(const std::string& name, const Sessions& touch
   return is_same ? &found->second : nullptr;
 }
 
-void Keeper::write_again(const std::vector<std::string>& names, const Sessions& touched) {
+void Keeper::write_again(const TouchResult& result, const Sessions& touched) {
   const std::scoped_lock lock(mutex_);
-  for (const std::string& name : names) {
+  for (const std::string& name : result.behind) {
     if (Entry* const entry = same_entry(name, touched)) write_all(*entry, name);
+  }
+  for (const std::string& name : result.missing) {
+    if (Entry* const entry = same_entry(name, touched)) write_anew(*entry, name);
   }
 }
 

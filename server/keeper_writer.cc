@@ -41,10 +41,11 @@ std::vector<Keeper::Work> Keeper::take_work() {
       const auto found = entries_.find(name);
       if (found == entries_.end()) continue;
       const Entry& entry = found->second;
-      Work work{name, entry.session, entry.head, entry.revision, {}};
+      Work work{name, entry.session, entry.head, entry.is_lost ? 0 : entry.revision, {}};
       work.change.session = name;
       work.change.epoch_before = entry.epoch;
       work.change.is_expiry = entry.is_expired;
+      work.change.is_anew = entry.is_lost;
       if (entry.epoch == 0) {
         work.change.request_id = entry.request_id;
         work.change.blobs = entry.blobs;
@@ -60,6 +61,7 @@ void Keeper::fill_in(Work& work) {
   StoredChange& change = work.change;
   change.is_removal = work.session == nullptr;
   if (change.is_removal) return;
+  if (change.is_anew) fill_in_anew(work);
   const SessionChanges changes = work.session->changes_since(change.epoch_before == 0 ? 0 : work.revision);
   change.revision_before = work.revision;
   change.revision = work.revision = changes.inputs.revision;
@@ -69,6 +71,18 @@ void Keeper::fill_in(Work& work) {
   change.parts = encode_changes(changes);
   change.replaces_all = changes.inputs.is_all;
   if (change.replaces_all) change.parts["head"] = work.head;
+}
+
+/// Its blobs, too.
+void Keeper::fill_in_anew(Work& work) {
+  auto head = encode_head_again(*work.session, work.head);
+  work.status = head.status();
+  if (!head.ok()) return;
+  work.head = std::move(head->part);
+  work.blobs = std::move(head->blobs);
+  for (const auto& [key, bytes] : work.blobs) work.change.blobs.push_back(key);
+  if (const auto read = decode_head({{"head", work.head}}); read.ok())
+    work.change.request_id = read->request.request_id();
 }
 
 /// All at once; where that fails, each by itself, so that one that cannot be kept does not hold up the others.
@@ -97,9 +111,14 @@ void Keeper::write(std::vector<Work> works) {
 
 absl::StatusOr<std::vector<ChangeOutcome>> Keeper::commit(std::span<const Work> works) {
   std::vector<StoredChange> changes;
-  for (const Work& work : works) changes.push_back(work.change);
   const Clock::time_point begin = Clock::now();
-  auto outcomes = store_->commit(changes);
+  absl::Status status;
+  for (const Work& work : works) {
+    changes.push_back(work.change);
+    status.Update(work.status);
+    for (const auto& [key, bytes] : work.blobs) status.Update(store_->keep_blob(work.name, key, bytes));
+  }
+  auto outcomes = status.ok() ? store_->commit(changes) : status;
   services_.metrics->observe(Span::kStoreWrite, seconds_since(begin));
   if (!outcomes.ok()) services_.metrics->add(Count::kStoreErrors);
   return outcomes;
@@ -125,6 +144,9 @@ void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
     return;
   }
   if (outcome == ChangeOutcome::kBehind) return write_all(entry, work.name);
+  if (outcome == ChangeOutcome::kLost) return write_anew(entry, work.name);
+  if (work.change.is_anew) entry.head = work.head;
+  if (work.change.is_anew) entry.is_lost = false;
   entry.revision = work.revision;
   entry.epoch = work.change.epoch;
   if (entry.on_added)
@@ -143,6 +165,12 @@ void Keeper::write_all(Entry& entry, const std::string& name) {
   due(name);
   services_.log->warning("store_went_back", {{"session", abbreviated(name)},
                                              {"text", "The session is written again, in whole."}});
+}
+
+/// Under the lock. The store lost all that there was of it.
+void Keeper::write_anew(Entry& entry, const std::string& name) {
+  entry.is_lost = true;
+  write_all(entry, name);
 }
 
 /// Under the lock. What has changed stays due; a new session is given up.

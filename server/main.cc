@@ -195,7 +195,7 @@ int serve(Arguments& arguments, const sigset_t& signals) {
   options.upload_idle = milliseconds(arguments.upload_idle_seconds);
   options.heartbeat = milliseconds(arguments.heartbeat_seconds);
   options.log = std::make_shared<lpdeform::Log>(arguments.log_level);
-  auto store = lpdeform::open_store(arguments.store, {arguments.max_store_bytes, options.session_idle});
+  auto store = lpdeform::open_store(arguments.store, {arguments.max_store_bytes});
   if (!store.ok()) return refuse(store.status());
   options.store = *std::move(store);
   const auto server = lpdeform::Server::start(options);

@@ -20,7 +20,7 @@ absl::StatusOr<std::shared_ptr<Store>> open_store(const std::string& name, const
   if (absl::StartsWith(name, kRedis) && colon > kRedis.size() &&
       absl::SimpleAtoi(name.substr(colon + 1), &port) && port >= 1 && port <= 65535) {
     return open_redis_store(
-        {name.substr(kRedis.size(), colon - kRedis.size()), static_cast<int>(port), limits.idle});
+        {name.substr(kRedis.size(), colon - kRedis.size()), static_cast<int>(port)});
   }
   const std::string known = "none, sqlite:DIR or redis://HOST:PORT";
   return invalid_input({"OPTION_OUT_OF_RANGE", "store", known},

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -12,8 +11,6 @@ namespace lpdeform {
 
 struct StoreLimits {
   std::uint64_t most_bytes = 0;  // of sqlite; 0: without limit
-  std::chrono::milliseconds idle =
-      std::chrono::minutes(10);  // of redis: what nobody has touched for so long goes
 };
 
 /// The store that an operator names: "none", which is null, "sqlite:DIR", or "redis://HOST:PORT". Errors: INVALID_ARGUMENT OPTION_OUT_OF_RANGE;

@@ -1,6 +1,5 @@
 #include "server/redis_store.h"
 
-#include <map>
 #include <mutex>
 #include <utility>
 #include <vector>
@@ -16,21 +15,55 @@ namespace {
 
 using Command = RedisConnection::Command;
 
-const std::string kSession = "lpdeform:s:", kBlob = "lpdeform:b:", kUsers = "lpdeform:u:";
+const std::string kSession = "lpdeform:s:", kBlob = "lpdeform:b:";
 const std::string kPart = "p:";
 
-// Of all scripts, KEYS[1] is the session's hash and ARGV[1] the holder.
+/// What needs next to no memory, or frees it, is done where Redis is full, too.
+const std::string kAlways = "#!lua flags=allow-oom\n";
+
+// Of all scripts, KEYS[1] is the session's hash and ARGV[1] the holder, where nothing else is said.
 const std::string kNow = "local t = redis.call('TIME'); local now = t[1] * 1000 + math.floor(t[2] / 1000); ";
 
-/// A function: the session is one of its owner's, a sorted set that lives as long as the youngest of them. Each time two of it
-/// are looked at, so that few are in it that have expired.
-const std::string kEnter =
-    "local function enter(owner, idle) "
-    "  local all = 'lpdeform:o:' .. redis.sha1hex(owner or ''); "
-    "  redis.call('ZADD', all, 0, KEYS[1]); redis.call('PEXPIRE', all, idle); "
-    "  for _, key in ipairs(redis.call('ZRANDMEMBER', all, 2)) do "
-    "    if redis.call('EXISTS', key) == 0 then redis.call('ZREM', all, key) end "
-    "  end "
+/// `ran`: for how long servers have run so far and reached Redis, in milliseconds: what use is dated by.
+const std::string kRan = "local ran = tonumber(redis.call('HGET', 'lpdeform:time', 'ran') or '0'); ";
+
+/// No keys. ARGV: the longest time between two of these that counts: a longer one passed without servers, or without Redis.
+const std::string kTick = kAlways + kNow + kRan +
+                          "local step = now - tonumber(redis.call('HGET', 'lpdeform:time', 'at') or now); "
+                          "step = math.max(0, math.min(step, tonumber(ARGV[1]))); "
+                          "redis.call('HSET', 'lpdeform:time', 'at', now, 'ran', ran + step); return 1";
+
+const std::string kUsed = kRan + "redis.call('ZADD', 'lpdeform:used', ran, KEYS[1]); ";
+
+/// A function: this blob is no more one of the session's.
+const std::string kLetGoOf =
+    "local function let_go_of(blob, name) "
+    "  redis.call('SREM', 'lpdeform:u:' .. blob, name); "
+    "  if redis.call('SCARD', 'lpdeform:u:' .. blob) == 0 then redis.call('DEL', 'lpdeform:b:' .. blob) end "
+    "end ";
+
+/// A function: all that there is of a session goes. What is left says for a day from which epoch on it may be written again.
+const std::string kForget =
+    kLetGoOf +
+    "local function forget(key, epoch) "
+    "  local name = string.sub(key, 12); "
+    "  local has = redis.call('HMGET', key, 'blobs', 'request', 'owner', 'epoch'); "
+    "  for blob in string.gmatch(has[1] or '', '%x+') do let_go_of(blob, name) end "
+    "  for _, blob in ipairs(redis.call('SMEMBERS', 'lpdeform:m:' .. name)) do let_go_of(blob, name) end "
+    "  if has[2] and has[2] ~= '' then redis.call('DEL', has[2]) end "
+    "  if has[3] then redis.call('ZREM', 'lpdeform:o:' .. redis.sha1hex(has[3]), key) end "
+    "  redis.call('ZREM', 'lpdeform:used', key); "
+    "  redis.call('DEL', key, 'lpdeform:m:' .. name); "
+    "  redis.call('SET', 'lpdeform:g:' .. name, epoch or has[4] or '0', 'PX', 86400000) "
+    "end ";
+
+/// A function of what HMGET has of holder and epoch, and the epoch that the holder knows as kept: whether the store has lost the
+/// session, or gone back to before that epoch, and nobody has removed it since.
+const std::string kIsLost =
+    "local function is_lost(has, epoch) "
+    "  if has[1] then return tonumber(has[2]) < tonumber(epoch) end "
+    "  local gone = redis.call('GET', 'lpdeform:g:' .. string.sub(KEYS[1], 12)); "
+    "  return not gone or tonumber(gone) <= tonumber(epoch) "
     "end ";
 
 /// No keys. ARGV: owner, the key of the session before the first, how many. Those that have expired go from the set.
@@ -48,49 +81,65 @@ const std::string kList =
     "end "
     "return found";
 
-/// ARGV: holder, epoch before, epoch, lease, idle, replaces all, revision before, revision, then names and values of hash fields
-/// in turn, "=" before a value that is set and "-" for one that goes. 1: done; 0: fenced; 2: behind, which it is not where
-/// it has more than that (the answer to the change before was lost), nor where nothing was changed since it was taken over.
+/// ARGV: holder, epoch before, epoch, lease, replaces all ("0", "1", or "2" where it is written anew), revision before, revision,
+/// then names and values of hash fields in turn, "=" before a value that is set and "-" for one that goes. 1: done; 0: fenced;
+/// 2: behind, which it is not where it has more than that (the answer to the change before was lost), nor where nothing was
+/// changed since it was taken over; 4: lost.
 const std::string kCommit =
-    kNow +
+    kNow + kIsLost + kLetGoOf +
+    "local name = string.sub(KEYS[1], 12); "
     "if ARGV[2] ~= '0' then "
     "  local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch', 'revision'); "
-    "  if has[1] ~= ARGV[1] or (has[2] ~= ARGV[2] and has[2] ~= ARGV[3]) then return 0 end "
-    "  if ARGV[6] ~= '1' and has[3] and tonumber(has[3]) < tonumber(ARGV[7]) then return 2 end "
+    "  if is_lost(has, ARGV[2]) then "
+    "    if ARGV[5] ~= '2' then return 4 end "
+    "  else "
+    "    if has[1] ~= ARGV[1] or (has[2] ~= ARGV[2] and has[2] ~= ARGV[3]) then return 0 end "
+    "    if ARGV[5] == '0' and has[3] and tonumber(has[3]) < tonumber(ARGV[6]) then return 2 end "
+    "  end "
     "end "
-    "if ARGV[6] == '1' then "
+    "local blobs_before = redis.call('HGET', KEYS[1], 'blobs') or ''; "
+    "if ARGV[5] == '2' then redis.call('DEL', KEYS[1]) end "
+    "if ARGV[5] == '1' then "
     "  for _, field in ipairs(redis.call('HKEYS', KEYS[1])) do "
     "    if string.sub(field, 1, 2) == 'p:' then redis.call('HDEL', KEYS[1], field) end "
     "  end "
     "end "
     "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'epoch', ARGV[3], 'until', now + ARGV[4], 'alive', now + "
-    "ARGV[4], 'revision', ARGV[8]); "
-    "for k = 9, #ARGV, 2 do "
+    "ARGV[4], 'revision', ARGV[7]); "
+    "for k = 8, #ARGV, 2 do "
     "  if string.sub(ARGV[k + 1], 1, 1) == '=' then redis.call('HSET', KEYS[1], ARGV[k], string.sub(ARGV[k + "
     "1], 2)) "
     "  else redis.call('HDEL', KEYS[1], ARGV[k]) end "
     "end "
-    "redis.call('PEXPIRE', KEYS[1], ARGV[5]); " +
-    kEnter + "enter(redis.call('HGET', KEYS[1], 'owner'), ARGV[5]); return 1";
+    "if ARGV[2] == '0' or ARGV[5] == '2' then "
+    "  local has = redis.call('HMGET', KEYS[1], 'owner', 'request', 'blobs'); "
+    "  redis.call('ZADD', 'lpdeform:o:' .. redis.sha1hex(has[1]), 0, KEYS[1]); "
+    "  if has[2] and has[2] ~= '' then redis.call('SET', has[2], name) end "
+    "  for blob in string.gmatch(blobs_before, '%x+') do "
+    "    if not string.find(has[3], blob, 1, true) then let_go_of(blob, name) end "
+    "  end "
+    "  redis.call('DEL', 'lpdeform:m:' .. name) "
+    "end " +
+    kUsed + "return 1";
 
 /// That somebody wants a session is remembered for so many milliseconds.
 const std::string kWanted = "1000";
 
-/// ARGV: holder, owner, lease, idle, route, stays. -1: none; -2 and its route: held by another, or for another; else the hash, in
+/// ARGV: holder, owner, lease, route, stays. -1: none; -2 and its route: held by another, or for another; else the hash, in
 /// the new epoch. `until`: it is in use; `alive`: its holder lives; `since`: it came; `stays`: for so long at least.
 const std::string kTakeOver =
-    kNow +
+    kAlways + kNow +
     "local has = redis.call('HMGET', KEYS[1], 'holder', 'owner', 'route', 'wanter'); "
     "if not has[2] or has[2] ~= ARGV[2] then return -1 end "
     "local function number(field) return tonumber(redis.call('HGET', KEYS[1], field) or '0') end "
-    "local route, stays = has[3] or '', math.max(number('stays'), tonumber(ARGV[6])); "
+    "local route, stays = has[3] or '', math.max(number('stays'), tonumber(ARGV[5])); "
     "local is_wanted = now - number('wanted') < " +
     kWanted +
     "; "
     "if has[1] ~= ARGV[1] then "
-    "  local is_astray = route ~= '' and ARGV[5] ~= '' and ARGV[5] ~= route; "
+    "  local is_astray = route ~= '' and ARGV[4] ~= '' and ARGV[4] ~= route; "
     "  if number('until') > now or (is_astray and number('alive') > now) then "
-    "    if route ~= '' and route == ARGV[5] and now - number('since') > stays and "
+    "    if route ~= '' and route == ARGV[4] and now - number('since') > stays and "
     "      (not is_wanted or has[4] == ARGV[1]) then "
     "      redis.call('HSET', KEYS[1], 'wanted', now, 'wanter', ARGV[1]) "
     "    end "
@@ -99,64 +148,69 @@ const std::string kTakeOver =
     "end "
     "if is_wanted and has[4] ~= ARGV[1] then return {-2, route} end "
     "local is_back_soon = is_wanted and now - number('since') < 4 * stays; "
-    "stays = is_back_soon and math.min(2 * stays, 32 * ARGV[6]) or tonumber(ARGV[6]); "
+    "stays = is_back_soon and math.min(2 * stays, 32 * ARGV[5]) or tonumber(ARGV[5]); "
     "redis.call('HINCRBY', KEYS[1], 'epoch', 1); "
     "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'until', now + ARGV[3], 'alive', now + ARGV[3], 'since', "
     "now, "
     "'stays', stays); "
-    "redis.call('HDEL', KEYS[1], 'revision', 'wanted', 'wanter'); "
-    "redis.call('PEXPIRE', KEYS[1], ARGV[4]); return redis.call('HGETALL', KEYS[1])";
+    "redis.call('HDEL', KEYS[1], 'revision', 'wanted', 'wanter'); " +
+    kUsed + "return redis.call('HGETALL', KEYS[1])";
 
-/// ARGV: holder, epoch, lease, 1 where it is in use and 2 where it is being made, idle, revision. 0: another has it, or it is
-/// gone; 2: it is behind; 3: another wants it. Its blobs live as long.
+/// ARGV: holder, epoch, lease, 1 where it is in use and 2 where it is being made, revision. 0: another has it, or it was
+/// removed; 2: it is behind; 3: another wants it; 4: it, or one of its blobs, is lost.
 const std::string kTouch =
-    kNow +
-    "local has = redis.call('HMGET', KEYS[1], 'holder', 'blobs', 'request', 'owner', 'revision', 'wanted'); "
-    "if has[1] ~= ARGV[1] then return 0 end " +
-    kEnter +
-    "enter(has[4], ARGV[5]); "
+    kAlways + kNow + kIsLost +
+    "local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch', 'blobs', 'revision', 'wanted'); "
+    "if is_lost(has, ARGV[2]) then return 4 end "
+    "if has[1] ~= ARGV[1] then return 0 end "
     "redis.call('HSET', KEYS[1], 'alive', now + ARGV[3]); "
     "if ARGV[4] ~= '0' then redis.call('HSET', KEYS[1], 'until', now + ARGV[3]) end "
-    "if ARGV[4] == '2' then redis.call('HSET', KEYS[1], 'since', now) end "
-    "redis.call('PEXPIRE', KEYS[1], ARGV[5]); "
-    "for key in string.gmatch(has[2] or '', '%x+') do "
-    "  redis.call('PEXPIRE', 'lpdeform:b:' .. key, ARGV[5]); redis.call('PEXPIRE', 'lpdeform:u:' .. key, "
-    "ARGV[5]) "
+    "if ARGV[4] == '2' then redis.call('HSET', KEYS[1], 'since', now) end " +
+    kUsed +
+    "for blob in string.gmatch(has[3] or '', '%x+') do "
+    "  if redis.call('EXISTS', 'lpdeform:b:' .. blob) == 0 then return 4 end "
     "end "
-    "if has[3] and has[3] ~= '' then redis.call('PEXPIRE', has[3], ARGV[5]) end "
-    "if has[5] and tonumber(has[5]) < tonumber(ARGV[6]) then return 2 end "
-    "if has[6] and now - tonumber(has[6]) < " +
+    "if has[4] and tonumber(has[4]) < tonumber(ARGV[5]) then return 2 end "
+    "if has[5] and now - tonumber(has[5]) < " +
     kWanted + " then return 3 end return 1";
 
-/// ARGV: holder, session, 1 where it goes only if the holder has it, then the keys of its blobs, as far as its maker knows. 0: it
-/// has it no more.
+/// ARGV: holder, 1 where it goes only if the holder has it in this epoch or one before, epoch. 0: it has it no more.
 const std::string kRemove =
-    "local holder = redis.call('HGET', KEYS[1], 'holder'); "
-    "if ARGV[3] == '1' and holder and holder ~= ARGV[1] then return 0 end "
-    "local function let_go(key) "
-    "  redis.call('SREM', 'lpdeform:u:' .. key, ARGV[2]); "
-    "  if redis.call('SCARD', 'lpdeform:u:' .. key) == 0 then redis.call('DEL', 'lpdeform:b:' .. key) end "
-    "end "
-    "local has = redis.call('HMGET', KEYS[1], 'blobs', 'request', 'owner'); "
-    "for key in string.gmatch(has[1] or '', '%x+') do let_go(key) end "
-    "for k = 4, #ARGV do let_go(ARGV[k]) end "
-    "if has[2] and has[2] ~= '' then redis.call('DEL', has[2]) end "
-    "if has[3] then redis.call('ZREM', 'lpdeform:o:' .. redis.sha1hex(has[3]), KEYS[1]) end "
-    "redis.call('DEL', KEYS[1]); return 1";
+    kAlways + kForget +
+    "if ARGV[2] == '0' then forget(KEYS[1], '1e18') return 1 end "
+    "local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch'); "
+    "if has[1] and (has[1] ~= ARGV[1] or tonumber(has[2]) > tonumber(ARGV[3])) then return 0 end "
+    "forget(KEYS[1], ARGV[3]); return 1";
+
+/// No keys. ARGV: idle, at most how many. How many went.
+const std::string kRemoveUnused =
+    kAlways + kForget + kRan +
+    "local keys = redis.call('ZRANGEBYSCORE', 'lpdeform:used', '-inf', ran - ARGV[1], 'LIMIT', 0, ARGV[2]); "
+    "for _, key in ipairs(keys) do forget(key) end "
+    "return #keys";
+
+/// ARGV: the blob's key. The session's use of it, which begins before the session is there. 1: the blob is there.
+const std::string kUseBlob =
+    kUsed +
+    "local name = string.sub(KEYS[1], 12); "
+    "redis.call('SADD', 'lpdeform:m:' .. name, ARGV[1]); redis.call('SADD', 'lpdeform:u:' .. ARGV[1], name); "
+    "return redis.call('EXISTS', 'lpdeform:b:' .. ARGV[1])";
 
 /// ARGV: holder, epoch. Not where the same holder has taken it over again meanwhile. Nobody holds it then: a touch that was under way
 /// does not renew the lease.
-const std::string kLetGo =
-    "local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch'); "
-    "if has[1] == ARGV[1] and has[2] == ARGV[2] then "
-    "  redis.call('HSET', KEYS[1], 'holder', '', 'until', 0, 'alive', 0) "
-    "end "
-    "return 1";
+const std::string kLetGo = kAlways +
+                           "local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch'); "
+                           "if has[1] == ARGV[1] and has[2] == ARGV[2] then "
+                           "  redis.call('HSET', KEYS[1], 'holder', '', 'until', 0, 'alive', 0) "
+                           "end "
+                           "return 1";
 
-constexpr std::int64_t kDone = 1, kIsBehind = 2, kIsWanted = 3, kIsHeld = -2;  // as scripts answer
+constexpr std::int64_t kIsFenced = 0, kDone = 1, kIsBehind = 2, kIsWanted = 3, kHasLostIt = 4,
+                       kIsHeld = -2;  // as scripts answer
 
 ChangeOutcome outcome_of(std::int64_t answer) {
   if (answer == kIsBehind) return ChangeOutcome::kBehind;
+  if (answer == kHasLostIt) return ChangeOutcome::kLost;
   return answer == kDone ? ChangeOutcome::kKept : ChangeOutcome::kFenced;
 }
 
@@ -191,36 +245,29 @@ class RedisStore final : public Store {
   absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) override;
   std::chrono::milliseconds touch_every() const override { return options_.lease / 3; }
   absl::Status let_go(const std::string& session, std::uint64_t epoch) override;
-  /// Keys expire by themselves.
-  absl::StatusOr<std::size_t> remove_unused(std::int64_t) override { return 0; }
+  absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) override;
 
  private:
   Command command_of(const StoredChange& change);
   std::string lease() const { return absl::StrCat(options_.lease.count()); }
-  std::string idle() const { return absl::StrCat(options_.idle.count()); }
 
   const RedisStoreOptions options_;
   const std::string holder_ = random_hex_128();
   std::mutex writing_, reading_;
   RedisConnection writer_, reader_;
-  std::mutex pinning_;
-  std::map<std::string, std::vector<std::string>> pinned_;  // blobs of sessions that are being made
 };
 
 Command RedisStore::command_of(const StoredChange& change) {
   if (change.is_removal) {
     Command command = script(kRemove, change.session);
-    command.insert(command.end(), {holder_, change.session, change.is_expiry ? "1" : "0"});
-    const std::scoped_lock lock(pinning_);
-    const auto pinned = pinned_.find(change.session);
-    if (pinned != pinned_.end()) command.insert(command.end(), pinned->second.begin(), pinned->second.end());
+    command.insert(command.end(), {holder_, change.is_expiry ? "1" : "0", absl::StrCat(change.epoch_before)});
     return command;
   }
   Command command = script(kCommit, change.session);
   command.insert(command.end(), {holder_, absl::StrCat(change.epoch_before), absl::StrCat(change.epoch),
-                                 lease(), idle(), change.replaces_all ? "1" : "0",
+                                 lease(), change.is_anew ? "2" : (change.replaces_all ? "1" : "0"),
                                  absl::StrCat(change.revision_before), absl::StrCat(change.revision)});
-  if (change.epoch_before == 0) {
+  if (change.epoch_before == 0 || change.is_anew) {
     const std::string request = change.request_id.empty() ? "" : request_key(change.owner, change.request_id);
     command.insert(
         command.end(),
@@ -236,30 +283,19 @@ Command RedisStore::command_of(const StoredChange& change) {
 
 absl::StatusOr<std::vector<ChangeOutcome>> RedisStore::commit(std::span<const StoredChange> changes) {
   std::vector<Command> commands;
-  for (const StoredChange& change : changes) {
-    commands.push_back(command_of(change));
-    if (change.epoch_before == 0 && !change.is_removal && !change.request_id.empty()) {
-      commands.push_back({"SET", request_key(change.owner, change.request_id), change.session, "PX", idle()});
-    }
-  }
+  for (const StoredChange& change : changes) commands.push_back(command_of(change));
   const std::scoped_lock lock(writing_);
   const auto replies = writer_.run(commands);
   if (!replies.ok()) return replies.status();
   std::vector<ChangeOutcome> outcomes;
-  for (std::size_t k = 0; k < commands.size(); ++k) {
-    if (commands[k][0] != "EVAL") continue;
-    outcomes.push_back(outcome_of((*replies)[k].number));
-  }
-  const std::scoped_lock pinning(pinning_);
-  for (const StoredChange& change : changes) pinned_.erase(change.session);
+  for (const RedisReply& reply : *replies) outcomes.push_back(outcome_of(reply.number));
   return outcomes;
 }
 
 absl::StatusOr<StoredSession> RedisStore::take_over(const std::string& session, const std::string& owner,
                                                     const std::string& route) {
   Command command = script(kTakeOver, session);
-  command.insert(command.end(),
-                 {holder_, owner, lease(), idle(), route, absl::StrCat(options_.stays.count())});
+  command.insert(command.end(), {holder_, owner, lease(), route, absl::StrCat(options_.stays.count())});
   const std::scoped_lock lock(reading_);
   const auto reply = reader_.run(command);
   if (!reply.ok()) return reply.status();
@@ -298,16 +334,12 @@ absl::StatusOr<std::vector<std::string>> RedisStore::list(const std::string& own
 
 absl::Status RedisStore::keep_blob(const std::string& session, const std::string& key,
                                    std::string_view bytes) {
-  {
-    const std::scoped_lock lock(pinning_);
-    pinned_[session].push_back(key);
-  }
+  Command use = script(kUseBlob, session);
+  use.push_back(key);
   const std::scoped_lock lock(reading_);
-  const auto known = reader_.run(std::vector<Command>{
-      {"SADD", kUsers + key, session}, {"PEXPIRE", kUsers + key, idle()}, {"PEXPIRE", kBlob + key, idle()}});
-  if (!known.ok()) return known.status();
-  if (known->at(2).number == 1) return absl::OkStatus();
-  return reader_.run({"SET", kBlob + key, std::string(bytes), "PX", idle()}).status();
+  const auto known = reader_.run(use);
+  if (!known.ok() || known->number == 1) return known.status();
+  return reader_.run({"SET", kBlob + key, std::string(bytes)}).status();
 }
 
 absl::StatusOr<std::string> RedisStore::blob(const std::string& key) {
@@ -319,27 +351,37 @@ absl::StatusOr<std::string> RedisStore::blob(const std::string& key) {
 }
 
 absl::StatusOr<TouchResult> RedisStore::touch(std::span<const TouchedSession> sessions) {
-  TouchResult result;
-  if (sessions.empty()) return result;
-  std::vector<Command> commands;
+  std::vector<Command> commands{{"EVAL", kTick, "0", lease()}};
   for (const TouchedSession& session : sessions) {
     commands.push_back(script(kTouch, session.name));
-    commands.back().insert(commands.back().end(),
-                           {holder_, absl::StrCat(session.epoch), lease(),
-                            session.is_being_made ? "2" : (session.is_in_use ? "1" : "0"), idle(),
-                            absl::StrCat(session.revision)});
+    commands.back().insert(
+        commands.back().end(),
+        {holder_, absl::StrCat(session.epoch), lease(),
+         session.is_being_made ? "2" : (session.is_in_use ? "1" : "0"), absl::StrCat(session.revision)});
   }
   const std::scoped_lock lock(reading_);
   const auto replies = reader_.run(commands);
   if (!replies.ok()) return replies.status();
+  TouchResult result;
   for (std::size_t k = 0; k < sessions.size(); ++k) {
-    const std::int64_t answer = (*replies)[k].number;
+    const std::int64_t answer = (*replies)[k + 1].number;
+    if (answer == kIsFenced) result.lost.push_back(sessions[k].name);
     if (answer == kIsBehind) result.behind.push_back(sessions[k].name);
     if (answer == kIsWanted) result.wanted.push_back(sessions[k].name);
-    if (outcome_of(answer) == ChangeOutcome::kFenced && answer != kIsWanted)
-      result.lost.push_back(sessions[k].name);
+    if (answer == kHasLostIt) result.missing.push_back(sessions[k].name);
   }
   return result;
+}
+
+absl::StatusOr<std::size_t> RedisStore::remove_unused(std::int64_t idle_ms) {
+  constexpr std::int64_t kAtOnce = 100;  // others wait meanwhile
+  const std::scoped_lock lock(reading_);
+  for (std::size_t removed = 0;;) {
+    const auto went = reader_.run({"EVAL", kRemoveUnused, "0", absl::StrCat(idle_ms), absl::StrCat(kAtOnce)});
+    if (!went.ok()) return went.status();
+    removed += static_cast<std::size_t>(went->number);
+    if (went->number < kAtOnce) return removed;
+  }
 }
 
 absl::Status RedisStore::let_go(const std::string& session, std::uint64_t epoch) {

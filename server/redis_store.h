@@ -12,8 +12,6 @@ namespace lpdeform {
 struct RedisStoreOptions {
   std::string host;
   int port = 6379;
-  std::chrono::milliseconds idle =
-      std::chrono::minutes(10);  // keys that nobody has touched for so long expire
   std::chrono::milliseconds lease = std::chrono::milliseconds(900);
   std::chrono::milliseconds stays = std::chrono::seconds(1);     // at least, with whom it has just come to
   std::chrono::milliseconds patience = std::chrono::seconds(2);  // for one answer
@@ -27,8 +25,16 @@ struct RedisStoreOptions {
 /// A session that is wanted by the way of its callers is kept for who wants it first. Where two servers want it from each other
 /// in turn, as behind proxies that know different sets of them, it stays twice as long each time, up to 32 times `stays`.
 ///
-/// Keys: lpdeform:s:SESSION, a hash; lpdeform:b:KEY, a blob, and lpdeform:u:KEY, the set of sessions that have it;
-/// lpdeform:r:OWNER:REQUEST, a session's name. All expire after `idle` without a touch.
+/// Nothing expires by Redis's clock, which goes on while Redis is away and while no server runs: use is dated by the time that
+/// servers have run and reached Redis, and remove_unused() goes by it. A session that Redis has lost, or whose epoch is less than
+/// its holder knows as kept, is told from one that was removed (kLost): the holder writes it anew, with its blobs. One that
+/// was removed leaves behind for a day that it was, and one that was removed as unused the epoch from which on it may be
+/// written anew: by a holder that was cut off and has it in use, where nobody else had it since.
+///
+/// Keys: lpdeform:s:SESSION, a hash; lpdeform:b:KEY, a blob; lpdeform:u:KEY, the set of sessions that have it; lpdeform:m:SESSION,
+/// of one that is being made, the set of its blobs' keys; lpdeform:r:OWNER:REQUEST, a session's name; lpdeform:o:OWNER, the sorted
+/// set of an owner's sessions; lpdeform:used, that of all, by their last use; lpdeform:time, its clock; lpdeform:g:SESSION, one that
+/// is gone. Redis 7.0 or later.
 ///
 /// UNAVAILABLE STORE_FAILING where Redis does not answer; later on the store finds it again by itself.
 absl::StatusOr<std::shared_ptr<Store>> open_redis_store(const RedisStoreOptions& options);

@@ -36,8 +36,9 @@ struct StoredChange {
   std::string owner = {};               // of a new session
   std::string route = {};               // the same: the way by which its callers come
   std::string request_id = {};          // the same; empty, or known again by Store::find_request
-  std::vector<std::string> blobs = {};  // keys of those that a new session has
+  std::vector<std::string> blobs = {};  // the same: keys of those that it has
   bool replaces_all = false;            // all parts that are not named here go
+  bool is_anew = false;  // the store has lost it: owner, route, request and blobs are here, too
   std::map<std::string, std::optional<std::string>> parts = {};  // without a value: the part goes
   bool is_removal = false;                                       // the session goes, whoever has it
   bool is_expiry = false;  // of a removal: only where this process has it still; else kFenced
@@ -57,13 +58,15 @@ enum class ChangeOutcome {
   kKept,
   kFenced,  // the store has another epoch, or no such session
   kBehind,  // not made: the store lost changes that it had called kept, and wants all
+  kLost,    // not made: the store lost the session, and wants it anew, with its blobs
 };
 
 /// Sessions that touch() found to be otherwise than their process takes them to be, by name.
 struct TouchResult {
-  std::vector<std::string> lost;    // another process has taken them over, or the store has them no more
-  std::vector<std::string> behind;  // the store lost changes that it had called kept
-  std::vector<std::string> wanted;  // another process is asked for them by callers who come their way
+  std::vector<std::string> lost;     // another process has taken them over, or they were removed
+  std::vector<std::string> behind;   // the store lost changes that it had called kept
+  std::vector<std::string> missing;  // the store lost them, or their blobs
+  std::vector<std::string> wanted;   // another process is asked for them by callers who come their way
 };
 
 /// Where sessions are kept so that they outlive the process: their parts, and blobs (meshes), which are stored once

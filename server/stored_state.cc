@@ -32,13 +32,10 @@ std::string bytes_of(const google::protobuf::Message& message) {
   return bytes;
 }
 
-absl::Status put_apart(v1::Buffer& buffer, std::string_view what, Decoder& decoder, StoredHead& head) {
-  const auto bytes = decoder.raw(buffer, what);
-  if (!bytes.ok()) return bytes.status();
-  const std::string key = blob_key(*bytes);
+void put_apart(v1::Buffer& buffer, std::string bytes, StoredHead& head) {
+  const std::string key = blob_key(bytes);
   buffer.set_upload(absl::StrCat(absl::string_view(kBlob.data(), kBlob.size()), key));
-  head.blobs[key] = *bytes;
-  return absl::OkStatus();
+  head.blobs[key] = std::move(bytes);
 }
 
 std::vector<v1::Buffer*> large_buffers(v1::CreateSessionRequest& request) {
@@ -164,10 +161,29 @@ absl::StatusOr<StoredHead> encode_head(const v1::CreateSessionRequest& request, 
   kept.clear_settings();
   kept.clear_handles();
   for (v1::Buffer* const buffer : large_buffers(kept)) {
-    if (absl::Status status = put_apart(*buffer, "mesh data", decoder, out); !status.ok()) return status;
+    auto bytes = decoder.raw(*buffer, "mesh data");
+    if (!bytes.ok()) return bytes.status();
+    put_apart(*buffer, *std::move(bytes), out);
   }
   head.set_fingerprint(fingerprint);
   head.set_created_unix_ms(created_unix_ms);
+  out.part = bytes_of(head);
+  return out;
+}
+
+absl::StatusOr<StoredHead> encode_head_again(const Session& session, const std::string& part) {
+  stored::Head head;
+  if (!head.ParseFromString(part)) return session_damaged("its part \"head\" cannot be read");
+  StoredHead out;
+  v1::CreateSessionRequest& kept = *head.mutable_request();
+  kept.clear_mesh();
+  kept.clear_weld();
+  kept.clear_normals();
+  encode_mesh(session.info(), kept);
+  for (v1::Buffer* const buffer : large_buffers(kept)) {
+    std::string bytes = std::move(*buffer->mutable_inline_());
+    put_apart(*buffer, std::move(bytes), out);
+  }
   out.part = bytes_of(head);
   return out;
 }

@@ -30,6 +30,10 @@ struct StoredHead {
 absl::StatusOr<StoredHead> encode_head(const v1::CreateSessionRequest& request, Decoder& decoder,
                                        std::uint64_t fingerprint, std::int64_t created_unix_ms);
 
+/// The same for a session that lives and whose blobs the store has lost: its mesh to the last bit, whatever it came as. `part`: its
+/// "head" as it was. NOT_FOUND SESSION_DAMAGED.
+absl::StatusOr<StoredHead> encode_head_again(const Session& session, const std::string& part);
+
 /// What to write for these changes.
 StoredParts encode_changes(const SessionChanges& changes);
 

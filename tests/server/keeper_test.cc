@@ -44,13 +44,28 @@ class NotingStore final : public Store {
     const std::scoped_lock lock(mutex_);
     asked_.clear();
   }
+  /// Of the next change.
+  void answer_once(ChangeOutcome outcome) {
+    const std::scoped_lock lock(mutex_);
+    next_ = outcome;
+  }
+  void lose_session() {
+    const std::scoped_lock lock(mutex_);
+    is_missing_ = true;
+  }
+  StoredChange newest() {
+    const std::scoped_lock lock(mutex_);
+    return newest_;
+  }
 
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) override {
     std::unique_lock lock(mutex_);
     for (const StoredChange& change : changes)
       note(change.is_expiry ? "expiry" : (change.is_removal ? "removal" : "change"));
+    if (!changes.empty()) newest_ = changes.back();
+    if (newest_.is_anew) note("anew");
     changed_.wait(lock, [this] { return !is_held_; });
-    return std::vector<ChangeOutcome>(changes.size(), ChangeOutcome::kKept);
+    return std::vector<ChangeOutcome>(changes.size(), std::exchange(next_, ChangeOutcome::kKept));
   }
   absl::StatusOr<StoredSession> take_over(const std::string&, const std::string& owner,
                                           const std::string&) override {
@@ -60,10 +75,12 @@ class NotingStore final : public Store {
   }
   absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) override {
     const std::scoped_lock lock(mutex_);
+    TouchResult result;
+    if (std::exchange(is_missing_, false)) result.missing = {kName};
     for (const TouchedSession& one : sessions)
       note(one.is_being_made ? absl::StrCat("is being made ", one.epoch) : "is there");
     note("touched");
-    return TouchResult();
+    return result;
   }
   absl::Status let_go(const std::string&, std::uint64_t epoch) override {
     const std::scoped_lock lock(mutex_);
@@ -76,7 +93,9 @@ class NotingStore final : public Store {
                                                 std::size_t) override {
     return std::vector<std::string>();
   }
-  absl::Status keep_blob(const std::string&, const std::string&, std::string_view) override {
+  absl::Status keep_blob(const std::string&, const std::string& key, std::string_view) override {
+    const std::scoped_lock lock(mutex_);
+    note("blob " + key);
     return absl::OkStatus();
   }
   absl::StatusOr<std::string> blob(const std::string&) override { return ""; }
@@ -95,7 +114,9 @@ class NotingStore final : public Store {
   std::condition_variable changed_;
   std::vector<std::string> asked_;
   std::uint64_t epoch_ = 1;
-  bool is_held_ = false;
+  bool is_held_ = false, is_missing_ = false;
+  ChangeOutcome next_ = ChangeOutcome::kKept;
+  StoredChange newest_;
 };
 
 class KeeperTest : public testing::Test {
@@ -208,6 +229,31 @@ TEST_F(KeeperTest, OneThatIsBeingMadeIsHeldUntilItIsThereOrGivenUp) {
   store_->forget();
   ASSERT_TRUE(pass_until("is there"));
   for (const std::string& asked : store_->asked()) EXPECT_NE(asked, "is being made 3");
+}
+
+TEST_F(KeeperTest, OneThatTheStoreHasLostIsWrittenAnewWithItsMesh) {
+  const auto live = kept();
+  const auto write = [&] { keeper_->changed(*live, live->revision() + 1, 0, [](bool) {}); };
+  const auto expect_all = [&] {
+    const StoredChange anew = store_->newest();
+    EXPECT_TRUE(anew.is_anew && anew.replaces_all);
+    for (const char* const part : {"head", "inputs", "writer"}) EXPECT_TRUE(anew.parts.contains(part));
+    ASSERT_EQ(anew.blobs.size(), 1u);
+    EXPECT_TRUE(store_->wait_for("blob " + anew.blobs[0]));
+  };
+  store_->answer_once(ChangeOutcome::kLost);
+  write();
+  ASSERT_TRUE(store_->wait_for("anew"));
+  expect_all();
+  keeper_->flush(std::chrono::steady_clock::now() + kPatience);
+  store_->forget();
+  write();
+  ASSERT_TRUE(store_->wait_for("change"));
+  EXPECT_FALSE(store_->newest().is_anew);
+  keeper_->flush(std::chrono::steady_clock::now() + kPatience);
+  store_->lose_session();
+  ASSERT_TRUE(pass_until("anew"));
+  expect_all();
 }
 
 TEST_F(KeeperTest, OneThatNobodyUsedHereIsNotRemovedFromWhoHasIt) {

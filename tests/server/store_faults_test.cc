@@ -223,24 +223,48 @@ TEST_F(RedisFaultsTest, OneThatWentBackGetsLiveSessionsInWhole) {
   EXPECT_TRUE(solved(session) == positions);
 }
 
-TEST_F(RedisFaultsTest, OneThatCameBackEmptyEndsSessionsThatCanBeMadeAnew) {
+TEST_F(RedisFaultsTest, OneThatIsAwayForLongerThanSessionsLiveUnusedLosesNone) {
+  constexpr std::chrono::milliseconds kIdle{1200};
+  options_.session_idle = kIdle;
+  begin();
   const auto session = create(mesh_);
-  ASSERT_TRUE(take(session, ends_message(mesh_.vertices, 1, 1)).kept());
+  ASSERT_TRUE(take(session, everything(mesh_)).kept());
+  DeformClient stream(*stub_, session);  // so it is in use
+  ASSERT_TRUE(stream.settle(7).has_value());
+  redis_.stop();
+  const auto end = std::chrono::steady_clock::now() + kIdle + kIdle / 2;
+  std::uint64_t seq = 7;
+  bool was_kept = false;
+  while (std::chrono::steady_clock::now() < end) {
+    ++seq;
+    was_kept = take(session, tip_message(seq, 0.01 * static_cast<double>(seq))).kept();
+  }
+  EXPECT_FALSE(was_kept);
+  redis_.start();
+  until_kept(session, seq + 1);
+  const std::string before = seen(session);
+  begin();
+  EXPECT_EQ(seen(session), before);
+}
+
+TEST_F(RedisFaultsTest, OneThatCameBackEmptyGetsLiveSessionsAnew) {
+  const auto left = create(mesh_);
+  begin();
+  const auto session = create(mesh_);
+  ASSERT_TRUE(take(session, everything(mesh_)).kept());
   DeformClient stream(*stub_, session);
-  ASSERT_TRUE(stream.settle(1).has_value());
+  ASSERT_TRUE(stream.settle(7).has_value());
   redis_.stop();
   redis_.lose_all();
   redis_.start();
-  EXPECT_TRUE(stream.read_to_end().ok());
-  ASSERT_EQ(stream.history.ends.size(), 1u);
-  EXPECT_EQ(stream.history.ends[0].reason(),
-            v1::GO_AWAY_REASON_DRAINING);  // come back, and see what there is
+  const std::uint64_t newest = until_kept(session, 8);
+  ASSERT_TRUE(stream.settle(newest).has_value());  // it has not ended
+  const std::string before = seen(session), positions = solved(session);
+  begin();
+  EXPECT_EQ(seen(session), before);
+  EXPECT_TRUE(solved(session) == positions);
   v1::Session found;
-  const auto look = [&] { return get(session.session().name(), found); };
-  EXPECT_EQ(details_of(again_and_again(look)).info.reason(), "SESSION_UNKNOWN");
-  v1::CreateSessionResponse anew;
-  EXPECT_TRUE(again_and_again([&] { return try_create(request(), anew); }).ok());
-  EXPECT_TRUE(take(anew, ends_message(mesh_.vertices, 1, 1)).kept());
+  EXPECT_EQ(details_of(get(left.session().name(), found)).info.reason(), "SESSION_UNKNOWN");
 }
 
 /// Two servers with one Redis, whose callers all come by one way.

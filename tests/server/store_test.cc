@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <set>
 #include <string>
 
 #include "absl/strings/numbers.h"
@@ -129,6 +130,8 @@ TEST_P(StoreTest, WhoeverTakesASessionOverFencesTheOneBeforeOff) {
   EXPECT_EQ(store_->take_over("a", "anna")->epoch, 2u);
   const StoredChange old{.session = "a", .epoch_before = 1, .epoch = 1, .parts = {{"inputs", "old"}}};
   EXPECT_EQ(*commit(*store_, old), ChangeOutcome::kFenced);
+  ASSERT_TRUE(commit(*store_, beginning("gone")).ok());
+  ASSERT_TRUE(commit(*store_, {.session = "gone", .is_removal = true}).ok());
   const StoredChange removed{.session = "gone", .epoch_before = 1, .epoch = 1};
   EXPECT_EQ(*commit(*store_, removed), ChangeOutcome::kFenced);
   const auto found = store_->take_over("a", "anna");
@@ -278,11 +281,9 @@ class RedisStoreTest : public testing::Test {
  protected:
   /// A store as one of several servers has it.
   std::shared_ptr<Store> open(std::chrono::milliseconds lease = std::chrono::minutes(1),
-                              std::chrono::milliseconds idle = std::chrono::minutes(10),
                               std::chrono::milliseconds stays = std::chrono::seconds(1)) {
     auto opened = open_redis_store({.host = "127.0.0.1",
                                     .port = redis_.port(),
-                                    .idle = idle,
                                     .lease = lease,
                                     .stays = stays,
                                     .patience = std::chrono::milliseconds(200)});
@@ -359,7 +360,7 @@ class HandOverTest : public RedisStoreTest {
     return !store.touch(sessions)->wanted.empty();
   }
 
-  std::shared_ptr<Store> open_one() { return open(kLong, kLong, std::chrono::milliseconds(kStays)); }
+  std::shared_ptr<Store> open_one() { return open(kLong, std::chrono::milliseconds(kStays)); }
 
   static constexpr std::int64_t kStays = 100'000, kAges = 100 * kStays;  // longer than any test takes
   static constexpr std::chrono::hours kLong{1};
@@ -445,7 +446,7 @@ TEST_F(HandOverTest, LettingGoOfAnEarlierEpochIsTooLate) {
 TEST_F(HandOverTest, WhatHasExpiredForTheHolderBeforeIsNotRemoved) {
   ASSERT_TRUE(first_->let_go("a", 1).ok());
   ASSERT_EQ(ask(*second_, "the way"), "");
-  const StoredChange expiry{.session = "a", .is_removal = true, .is_expiry = true};
+  const StoredChange expiry{.session = "a", .epoch_before = 3, .is_removal = true, .is_expiry = true};
   EXPECT_EQ(*commit(*first_, expiry), ChangeOutcome::kFenced);
   EXPECT_EQ(ask(*second_, "the way"), "");
   EXPECT_EQ(*commit(*second_, expiry), ChangeOutcome::kKept);
@@ -541,30 +542,249 @@ TEST_F(RedisStoreTest, ARedisThatWentBackIsTold) {
   EXPECT_EQ(*commit(*store, next), ChangeOutcome::kKept);
 }
 
-TEST_F(RedisStoreTest, AnOwnersListDoesNotGrowWithWhatHasExpired) {
-  const auto brief = open(std::chrono::milliseconds(1), std::chrono::milliseconds(300)), lasting = open();
-  ASSERT_TRUE(commit(*lasting, beginning("z")).ok());
-  RedisConnection redis("127.0.0.1", redis_.port(), std::chrono::seconds(5));
-  const auto run = [&](const RedisConnection::Command& command) {
-    const auto reply = redis.run(command);
+/// Of Redis's own commands.
+class RedisKeys {
+ public:
+  explicit RedisKeys(int port) : redis_("127.0.0.1", port, std::chrono::seconds(5)) {}
+  RedisReply run(const RedisConnection::Command& command) {
+    const auto reply = redis_.run(command);
     EXPECT_TRUE(reply.ok()) << reply.status();
     return reply.ok() ? *reply : RedisReply();
-  };
-  const RedisReply lists = run({"KEYS", "lpdeform:o:*"});
-  ASSERT_EQ(lists.elements.size(), 1u);
-  const std::string list = lists.elements[0].text;
-  const auto size = [&] { return run({"ZCARD", list}).number; };
-  for (int k = 0; k < 40; ++k) {
-    ASSERT_TRUE(commit(*brief, beginning(absl::StrCat("a", k))).ok());
-    run({"PERSIST", list});
   }
-  const std::vector<TouchedSession> sessions{{"z", 1, true, 0}};
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  while (size() > 1 && std::chrono::steady_clock::now() < end) ASSERT_TRUE(lasting->touch(sessions).ok());
-  EXPECT_EQ(size(), 1);
-  EXPECT_EQ(*lasting->list("anna", "", 10), std::vector<std::string>{"z"});
-  ASSERT_TRUE(commit(*lasting, {.session = "z", .is_removal = true}).ok());
-  EXPECT_EQ(size(), 0);
+  std::set<std::string> all() {
+    std::set<std::string> names;
+    for (const RedisReply& name : run({"KEYS", "*"}).elements) names.insert(name.text);
+    return names;
+  }
+
+ private:
+  RedisConnection redis_;
+};
+
+constexpr std::int64_t kIdle = 600'000;
+const std::string kIdleText = "600000";
+const std::vector<TouchedSession> kNone;
+
+TEST_F(RedisStoreTest, WhatNobodyHasUsedWhileServersRanGoesAndLeavesNothing) {
+  const auto store = open(), other = open();
+  RedisKeys redis(redis_.port());
+  ASSERT_TRUE(store->touch(kNone).ok());
+  const std::string mesh = "mesh", key = blob_key(mesh), unused = blob_key("unused");
+  for (const std::string name : {"a", "z"}) {
+    ASSERT_TRUE(store->keep_blob(name, key, mesh).ok());
+    StoredChange made = beginning(name);
+    made.blobs = {key};
+    made.request_id = name;
+    ASSERT_TRUE(commit(*store, made).ok());
+  }
+  ASSERT_TRUE(store->keep_blob("never made", unused, "unused").ok());
+  redis.run({"HINCRBY", "lpdeform:time", "ran", kIdleText});
+  const std::vector<TouchedSession> used{{"z", 1, true, 0}};
+  ASSERT_TRUE(store->touch(used).ok());
+  EXPECT_EQ(*other->remove_unused(kIdle), 2u);
+  EXPECT_EQ(*store->list("anna", "", 10), std::vector<std::string>{"z"});
+  EXPECT_EQ(*store->find_request("anna", "a"), "");
+  EXPECT_EQ(*store->blob(key), mesh);
+  EXPECT_FALSE(store->blob(unused).ok());
+  redis.run({"HINCRBY", "lpdeform:time", "ran", kIdleText});
+  EXPECT_EQ(*other->remove_unused(kIdle), 1u);
+  EXPECT_EQ(redis.all(), (std::set<std::string>{"lpdeform:time", "lpdeform:g:a", "lpdeform:g:z",
+                                                "lpdeform:g:never made"}));
+  for (const std::string name : {"a", "z"}) EXPECT_GT(redis.run({"TTL", "lpdeform:g:" + name}).number, 0);
+}
+
+TEST_F(RedisStoreTest, TheTimeThatRedisWasAwayOrNoServerRanDoesNotCountAsWithoutUse) {
+  const auto store = open();
+  RedisKeys redis(redis_.port());
+  StoredChange made = beginning("a");
+  made.request_id = "request";
+  const std::string key = blob_key("mesh");
+  ASSERT_TRUE(store->keep_blob("a", key, "mesh").ok());
+  ASSERT_TRUE(store->touch(kNone).ok());
+  made.blobs = {key};
+  ASSERT_TRUE(commit(*store, made).ok());
+  redis.run(
+      {"HINCRBY", "lpdeform:time", "at", "-" + kIdleText});  // as if all since then had been such a time
+  redis.run({"HINCRBY", "lpdeform:time", "at", "-" + kIdleText});
+  ASSERT_TRUE(store->touch(kNone).ok());
+  EXPECT_EQ(*store->remove_unused(kIdle), 0u);
+  for (const std::string& name : redis.all()) EXPECT_EQ(redis.run({"TTL", name}).number, -1) << name;
+  EXPECT_EQ(*store->find_request("anna", "request"), "a");
+  EXPECT_EQ(*store->blob(key), "mesh");
+  ASSERT_TRUE(store->let_go("a", 1).ok());
+  EXPECT_EQ(open()->take_over("a", "anna")->epoch, 2u);
+}
+
+StoredChange next_of(const StoredChange& made) {
+  StoredChange next = made;
+  next.epoch_before = next.epoch;
+  next.revision_before = made.revision;
+  next.revision = made.revision + 1;
+  next.parts = {{"inputs", "2"}};
+  return next;
+}
+
+StoredChange anew(const StoredChange& change) {
+  StoredChange all = change;
+  all.parts = {{"head", "h"}, {"inputs", "2"}, {"m:tip", "there"}};
+  all.replaces_all = all.is_anew = true;
+  return all;
+}
+
+TEST_F(RedisStoreTest, WhatRedisHasLostIsToldAndWrittenAnewByItsHolder) {
+  const auto store = open(), other = open();
+  RedisKeys redis(redis_.port());
+  StoredChange made = beginning("a");
+  made.revision = 1;
+  made.request_id = "request";
+  made.route = "way";
+  ASSERT_TRUE(commit(*store, made).ok());
+  const std::vector<TouchedSession> used{{"a", 1, true, 1}};
+  redis.run({"FLUSHALL"});
+  EXPECT_EQ(store->touch(used)->missing, std::vector<std::string>{"a"});
+  const StoredChange next = next_of(made);
+  EXPECT_EQ(*commit(*store, next), ChangeOutcome::kLost);
+  EXPECT_FALSE(store->take_over("a", "anna").ok());
+  EXPECT_EQ(*commit(*store, anew(next)), ChangeOutcome::kKept);
+  EXPECT_EQ(*commit(*store, anew(next)), ChangeOutcome::kKept);  // again: its answer may have been lost
+  EXPECT_TRUE(store->touch(used)->missing.empty());
+  EXPECT_EQ(*store->find_request("anna", "request"), "a");
+  EXPECT_EQ(*store->list("anna", "", 10), std::vector<std::string>{"a"});
+  EXPECT_EQ(reason(other->take_over("a", "anna", "elsewhere").status()), "SESSION_ELSEWHERE");
+  ASSERT_TRUE(store->let_go("a", 1).ok());
+  const auto taken = other->take_over("a", "anna");
+  ASSERT_TRUE(taken.ok()) << taken.status();
+  EXPECT_EQ(taken->route, "way");
+  EXPECT_EQ(taken->parts.at("m:tip"), "there");
+}
+
+TEST_F(RedisStoreTest, ABlobThatRedisHasLostIsToldAndTheOneInItsPlaceIsKept) {
+  const auto store = open();
+  RedisKeys redis(redis_.port());
+  const std::string old = blob_key("old"), fresh = blob_key("fresh"), same = blob_key("same");
+  StoredChange made = beginning("a");
+  made.blobs = {old, same};
+  ASSERT_TRUE(store->keep_blob("a", old, "old").ok() && store->keep_blob("a", same, "same").ok());
+  ASSERT_TRUE(commit(*store, made).ok());
+  const std::vector<TouchedSession> used{{"a", 1, true, 0}};
+  EXPECT_TRUE(store->touch(used)->missing.empty());
+  redis.run({"DEL", "lpdeform:b:" + old});
+  EXPECT_EQ(store->touch(used)->missing, std::vector<std::string>{"a"});
+  StoredChange all = anew(next_of(made));
+  all.blobs = {fresh, same};
+  ASSERT_TRUE(store->keep_blob("a", fresh, "fresh").ok() && store->keep_blob("a", same, "same").ok());
+  EXPECT_EQ(*commit(*store, all), ChangeOutcome::kKept);
+  EXPECT_TRUE(store->touch(used)->missing.empty());
+  EXPECT_EQ(*store->blob(same), "same");
+  EXPECT_FALSE(redis.all().contains("lpdeform:u:" + old));
+  ASSERT_TRUE(commit(*store, {.session = "a", .is_removal = true}).ok());
+  EXPECT_FALSE(store->blob(fresh).ok());
+  EXPECT_FALSE(store->blob(same).ok());
+}
+
+TEST_F(RedisStoreTest, WhatWasRemovedIsNotWrittenAnewByWhoDidNotKnow) {
+  const auto store = open(std::chrono::milliseconds(1)), other = open();
+  const StoredChange made = beginning("a");
+  ASSERT_TRUE(commit(*store, made).ok());
+  absl::StatusOr<StoredSession> taken;
+  do taken = other->take_over("a", "anna");
+  while (!taken.ok());
+  ASSERT_TRUE(commit(*other, {.session = "a", .is_removal = true}).ok());
+  const std::vector<TouchedSession> used{{"a", 1, true, 0}};
+  EXPECT_EQ(store->touch(used)->lost, std::vector<std::string>{"a"});
+  EXPECT_EQ(*commit(*store, anew(next_of(made))), ChangeOutcome::kFenced);
+  EXPECT_FALSE(other->take_over("a", "anna").ok());
+}
+
+TEST_F(RedisStoreTest, WhatExpiresForOneThatHadItBeforeStaysWithTheOneThatHasIt) {
+  RedisKeys redis(redis_.port());
+  const auto before = open(std::chrono::milliseconds(1)), now = open();
+  const StoredChange made = beginning("a");
+  ASSERT_TRUE(commit(*before, made).ok());
+  absl::StatusOr<StoredSession> taken;
+  do taken = now->take_over("a", "anna");
+  while (!taken.ok());
+  const StoredChange expiry{.session = "a", .epoch_before = 1, .is_removal = true, .is_expiry = true};
+  EXPECT_EQ(*commit(*before, expiry), ChangeOutcome::kFenced);
+  const std::vector<TouchedSession> used{{"a", 2, true, 0}};
+  EXPECT_TRUE(now->touch(used)->lost.empty());
+  EXPECT_EQ(*commit(*now, expiry), ChangeOutcome::kFenced);  // it has it again, in a later epoch
+  redis.run({"FLUSHALL"});
+  EXPECT_TRUE(commit(*before, expiry).ok());
+  EXPECT_EQ(now->touch(used)->missing, std::vector<std::string>{"a"});
+  StoredChange next = next_of(made);
+  next.epoch_before = next.epoch = 2;
+  EXPECT_EQ(*commit(*now, anew(next)), ChangeOutcome::kKept);
+}
+
+TEST_F(RedisStoreTest, WhatWasRemovedAsUnusedIsWrittenAnewOnlyByWhoHadItLast) {
+  RedisKeys redis(redis_.port());
+  const auto cut_off = open(std::chrono::milliseconds(1)), other = open();
+  const std::vector<TouchedSession> used{{"a", 1, true, 0}};
+  const StoredChange made = beginning("a");
+  const auto go_unused = [&] {
+    ASSERT_TRUE(other->touch(kNone).ok());
+    redis.run({"HINCRBY", "lpdeform:time", "ran", kIdleText});
+    EXPECT_EQ(*other->remove_unused(kIdle), 1u);
+  };
+  ASSERT_TRUE(commit(*cut_off, made).ok());
+  go_unused();  // while the server that has it in use is cut off
+  EXPECT_EQ(cut_off->touch(used)->missing, std::vector<std::string>{"a"});
+  EXPECT_EQ(*commit(*cut_off, anew(next_of(made))), ChangeOutcome::kKept);
+  absl::StatusOr<StoredSession> taken;
+  do taken = other->take_over("a", "anna");
+  while (!taken.ok());
+  go_unused();
+  EXPECT_EQ(cut_off->touch(used)->lost, std::vector<std::string>{"a"});
+  EXPECT_EQ(*commit(*cut_off, anew(next_of(made))), ChangeOutcome::kFenced);
+}
+
+TEST_F(RedisStoreTest, AHolderOfALaterEpochWinsOverARedisThatWentBack) {
+  const auto first = open(std::chrono::milliseconds(1)), second = open();
+  const StoredChange made = beginning("a");
+  ASSERT_TRUE(commit(*first, made).ok());
+  redis_.save_as(folder_.path() + "/saved");
+  absl::StatusOr<StoredSession> taken;
+  do taken = second->take_over("a", "anna");
+  while (!taken.ok());
+  redis_.stop();
+  redis_.go_back_to(folder_.path() + "/saved");
+  redis_.start();
+  const std::vector<TouchedSession> before{{"a", 1, true, 0}}, after{{"a", 2, true, 0}};
+  while (!second->touch(kNone).ok()) {  // once to see that the connection is gone
+  }
+  EXPECT_EQ(second->touch(after)->missing, std::vector<std::string>{"a"});
+  StoredChange next = next_of(made);
+  next.epoch_before = next.epoch = 2;
+  absl::StatusOr<ChangeOutcome> outcome;
+  do outcome = commit(*second, anew(next));
+  while (!outcome.ok());
+  EXPECT_EQ(*outcome, ChangeOutcome::kKept);
+  while (!first->touch(kNone).ok()) {
+  }
+  EXPECT_EQ(first->touch(before)->lost, std::vector<std::string>{"a"});
+}
+
+TEST_F(RedisStoreTest, AFullRedisTakesNothingNewAndStillLetsGo) {
+  const auto store = open();
+  RedisKeys redis(redis_.port());
+  ASSERT_TRUE(store->touch(kNone).ok());
+  ASSERT_TRUE(commit(*store, beginning("a")).ok());
+  ASSERT_TRUE(commit(*store, beginning("b")).ok());
+  redis.run({"CONFIG", "SET", "maxmemory", "1"});
+  const absl::Status refused = commit(*store, beginning("c")).status();
+  EXPECT_EQ(reason(refused), "STORE_FAILING");
+  EXPECT_NE(refused.message().find("OOM"), std::string::npos) << refused;
+  const std::vector<TouchedSession> used{{"a", 1, true, 0}};
+  EXPECT_TRUE(store->touch(used).ok());
+  ASSERT_TRUE(store->let_go("a", 1).ok());
+  EXPECT_TRUE(store->take_over("a", "anna").ok());
+  ASSERT_TRUE(commit(*store, {.session = "a", .is_removal = true}).ok());
+  redis.run({"CONFIG", "SET", "maxmemory", "0"});
+  redis.run({"HINCRBY", "lpdeform:time", "ran", kIdleText});
+  redis.run({"CONFIG", "SET", "maxmemory", "1"});
+  EXPECT_EQ(*store->remove_unused(kIdle), 1u);
+  EXPECT_TRUE(store->list("anna", "", 10)->empty());
 }
 
 TEST(OpenRedisStore, RefusesAServerThatIsNotThere) {
