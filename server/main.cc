@@ -17,7 +17,7 @@ struct Arguments {
   double session_idle_seconds = 600, upload_idle_seconds = 600, heartbeat_seconds = 15, grace_seconds = 20;
   std::string log_level = "info";
   std::string store = "none";
-  std::uint64_t max_store_bytes = 0;
+  lpdeform::StoreOptions store_options;
   std::string probed;
 };
 
@@ -159,7 +159,16 @@ void describe(CLI::App& app, Arguments& arguments) {
                  "redis://HOST:PORT, shared by several servers; none: in memory alone")
       ->envname("LPDEFORM_STORE")
       ->capture_default_str();
-  app.add_option("--max-store-bytes", arguments.max_store_bytes,
+  CLI::Option* const user =
+      app.add_option("--store-user", arguments.store_options.login.user,
+                     "Who the server is to the Redis of --store, where that knows several")
+          ->envname("LPDEFORM_STORE_USER");
+  app.add_option(
+         "--store-password-file", arguments.store_options.login.password_file,
+         "A file with the password that the Redis of --store asks for; read again with each connection")
+      ->envname("LPDEFORM_STORE_PASSWORD_FILE");
+  user->needs("--store-password-file");
+  app.add_option("--max-store-bytes", arguments.store_options.most_bytes,
                  "What the folder of --store may hold; as 4GiB or in bytes, 0: as much as the disk has")
       ->envname("LPDEFORM_MAX_STORE_BYTES")
       ->transform(CLI::AsSizeValue(false))
@@ -195,7 +204,7 @@ int serve(Arguments& arguments, const sigset_t& signals) {
   options.upload_idle = milliseconds(arguments.upload_idle_seconds);
   options.heartbeat = milliseconds(arguments.heartbeat_seconds);
   options.log = std::make_shared<lpdeform::Log>(arguments.log_level);
-  auto store = lpdeform::open_store(arguments.store, {arguments.max_store_bytes});
+  auto store = lpdeform::open_store(arguments.store, arguments.store_options);
   if (!store.ok()) return refuse(store.status());
   options.store = *std::move(store);
   const auto server = lpdeform::Server::start(options);

@@ -3,6 +3,7 @@
 #include <hiredis.h>
 #include <sys/time.h>
 
+#include <fstream>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -30,8 +31,9 @@ void RedisConnection::Free::operator()(redisContext* context) const {
   redisFree(context);
 }
 
-RedisConnection::RedisConnection(std::string host, int port, std::chrono::milliseconds patience)
-    : host_(std::move(host)), port_(port), patience_(patience) {}
+RedisConnection::RedisConnection(std::string host, int port, std::chrono::milliseconds patience,
+                                 RedisLogin login)
+    : host_(std::move(host)), port_(port), patience_(patience), login_(std::move(login)) {}
 
 RedisConnection::~RedisConnection() = default;
 
@@ -47,7 +49,18 @@ absl::Status RedisConnection::connect() {
   if (context_->err != 0) return failure(context_->errstr);
   redisSetTimeout(context_.get(), time_of(patience_));
   redisEnableKeepAlive(context_.get());
-  return absl::OkStatus();
+  return log_in();
+}
+
+absl::Status RedisConnection::log_in() {
+  if (login_.password_file.empty()) return absl::OkStatus();
+  std::ifstream file(login_.password_file);
+  std::string password;
+  if (!std::getline(file, password) || password.empty())
+    return failure(absl::StrCat("no password can be read in ", login_.password_file));
+  Command command{"AUTH", std::move(password)};
+  if (!login_.user.empty()) command.insert(command.begin() + 1, login_.user);
+  return send({command}).status();
 }
 
 absl::StatusOr<RedisReply> RedisConnection::run(const Command& command) {
@@ -58,6 +71,10 @@ absl::StatusOr<RedisReply> RedisConnection::run(const Command& command) {
 
 absl::StatusOr<std::vector<RedisReply>> RedisConnection::run(const std::vector<Command>& commands) {
   if (absl::Status status = connect(); !status.ok()) return status;
+  return send(commands);
+}
+
+absl::StatusOr<std::vector<RedisReply>> RedisConnection::send(const std::vector<Command>& commands) {
   for (const Command& command : commands) {
     std::vector<const char*> texts;
     std::vector<std::size_t> sizes;

@@ -21,11 +21,18 @@ struct RedisReply {
   std::vector<RedisReply> elements;
 };
 
+/// Who one is to a Redis that asks.
+struct RedisLogin {
+  std::string user = {};           // empty: the one of a Redis that knows a password alone
+  std::string password_file = {};  // its first line; empty: it does not ask
+};
+
 /// A connection to a Redis server, made anew after a failure, when it is next needed. For one thread at a time. Errors are
-/// UNAVAILABLE STORE_FAILING; whether the commands were carried out is not known then.
+/// UNAVAILABLE STORE_FAILING; whether the commands were carried out is not known then. The password is read again with each
+/// connection, and in no text.
 class RedisConnection {
  public:
-  RedisConnection(std::string host, int port, std::chrono::milliseconds patience);
+  RedisConnection(std::string host, int port, std::chrono::milliseconds patience, RedisLogin login = {});
   ~RedisConnection();
 
   using Command = std::vector<std::string>;
@@ -36,6 +43,8 @@ class RedisConnection {
 
  private:
   absl::Status connect();
+  absl::Status log_in();
+  absl::StatusOr<std::vector<RedisReply>> send(const std::vector<Command>& commands);
   absl::Status failure(const std::string& what);
 
   struct Free {
@@ -44,6 +53,7 @@ class RedisConnection {
   const std::string host_;
   const int port_;
   const std::chrono::milliseconds patience_;
+  const RedisLogin login_;
   std::unique_ptr<redisContext, Free> context_;
 };
 

@@ -226,8 +226,8 @@ class RedisStore final : public Store {
  public:
   explicit RedisStore(const RedisStoreOptions& options)
       : options_(options),
-        writer_(options.host, options.port, options.patience),
-        reader_(options.host, options.port, options.patience) {}
+        writer_(options.host, options.port, options.patience, options.login),
+        reader_(options.host, options.port, options.patience, options.login) {}
 
   absl::Status ping() {
     const std::scoped_lock lock(reading_);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "server/redis_connection.h"
 #include "server/store.h"
 
 namespace lpdeform {
@@ -12,6 +13,7 @@ namespace lpdeform {
 struct RedisStoreOptions {
   std::string host;
   int port = 6379;
+  RedisLogin login = {};
   std::chrono::milliseconds lease = std::chrono::milliseconds(900);
   std::chrono::milliseconds stays = std::chrono::seconds(1);     // at least, with whom it has just come to
   std::chrono::milliseconds patience = std::chrono::seconds(2);  // for one answer

@@ -75,6 +75,16 @@ class Store(programs.OnShapes):
     def test_redis_that_is_not_there_is_named(self):
         self.assertIn("127.0.0.1:1", self.refused_start("redis://127.0.0.1:1"))
 
+    def test_a_password_in_the_address_is_refused_and_not_repeated(self):
+        for address in ("redis://user:secret@127.0.0.1:6379", "rediss://:secret@127.0.0.1:6379", "redis://secret@127.0.0.1"):
+            refusal = self.refused_start(address)
+            self.assertIn("--store-password-file", refusal)
+            self.assertNotIn("secret", refusal)
+        done = subprocess.run([programs.server(), "--store", "none", "--store-password-file", "here"], capture_output=True, text=True,
+                              timeout=programs.PATIENCE)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("--store redis://HOST:PORT", done.stderr)
+
 
 if __name__ == "__main__":
     programs.main()

@@ -787,6 +787,36 @@ TEST_F(RedisStoreTest, AFullRedisTakesNothingNewAndStillLetsGo) {
   EXPECT_TRUE(store->list("anna", "", 10)->empty());
 }
 
+TEST_F(RedisStoreTest, APasswordIsReadWithEachConnectionAndInNoText) {
+  RedisKeys redis(redis_.port());
+  const std::string file = folder_.path() + "/password";
+  const auto write = [&](const std::string& password) { std::ofstream(file) << password << "\n"; };
+  const auto open_as = [&](const std::string& user) {
+    return open_redis_store({.host = "127.0.0.1", .port = redis_.port(), .login = {user, file}});
+  };
+  EXPECT_NE(open_as("anna").status().message().find(file), std::string::npos);  // there is none yet
+  redis.run({"ACL", "SETUSER", "anna", "on", ">first secret", "~*", "&*", "+@all"});
+  redis.run({"CONFIG", "SET", "requirepass", "second secret"});
+  const auto unknown = open_redis_store({.host = "127.0.0.1", .port = redis_.port()});
+  EXPECT_EQ(reason(unknown.status()), "STORE_FAILING");
+  EXPECT_NE(unknown.status().message().find("NOAUTH"), std::string::npos) << unknown.status();
+  write("first secret");
+  const auto store = open_as("anna");
+  ASSERT_TRUE(store.ok()) << store.status();
+  const absl::Status refused = open_as("").status();
+  EXPECT_EQ(reason(refused), "STORE_FAILING");
+  EXPECT_EQ(refused.message().find("secret"), std::string::npos) << refused;
+  write("second secret");
+  EXPECT_TRUE(open_as("").ok());
+  redis.run({"ACL", "SETUSER", "anna", "resetpass", ">third secret"});
+  redis.run({"CLIENT", "KILL", "USER", "anna"});
+  EXPECT_FALSE((*store)->touch(kNone).ok());
+  write("third secret");
+  while (!(*store)->touch(kNone).ok()) {  // once to see that the connection is gone
+  }
+  EXPECT_TRUE(commit(**store, beginning("a")).ok());
+}
+
 TEST(OpenRedisStore, RefusesAServerThatIsNotThere) {
   const auto opened = open_redis_store({.host = "127.0.0.1", .port = 1});
   EXPECT_EQ(reason(opened.status()), "STORE_FAILING");
