@@ -14,7 +14,7 @@ A history is a list of events, one JSON object a line. Each has "kind" and "at" 
     go_away   stream, reason
     end       stream, status, by_client         the stream is over; by_client: it was this end that cancelled
     shown     client, session, epoch, frame_seq what the client library gave to its caller
-    fault     what                              "kill", "pause", "slow_store", "drop", "envoy"
+    fault     what                              "kill", "pause", "slow_store", "store", "drop", "envoy"
     last      session, input_seq, since         nothing is sent after this; a converged frame was waited for
     broken    text                              a call failed that must not, after the faults; nothing comes after it
     reference x, probe                          the same handles, solved on a server without faults

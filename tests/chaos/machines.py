@@ -182,7 +182,7 @@ class World:
         return [*self.servers, *filter(None, (self.envoy, self.redis))]
 
     def faults(self) -> list[str]:
-        return ["kill", "kill", "pause", "drop"] + (["slow_store", "envoy"] if self.redis else [])
+        return ["kill", "kill", "pause", "drop"] + (["slow_store", "store", "envoy"] if self.redis else [])
 
     def strike(self, what: str, chance: random.Random) -> None:
         server = chance.choice(self.servers)
@@ -195,6 +195,10 @@ class World:
             self.proxy.cut()
         elif what == "slow_store":
             self._pause(self.redis, chance.uniform(0.1, 0.8))
+        elif what == "store":
+            self.redis.kill()
+            time.sleep(chance.uniform(0, 1.4))
+            self.redis.start()
         elif what == "envoy":
             self.envoy.kill()
             self.envoy.start()
