@@ -28,7 +28,20 @@ Points Multiresolution::prolonged() {
   }
   if (found.allFinite())
     problem_.constraints.linear.satisfy_within(problem_.metric, found, problem_.workers());
+  if (found.allFinite()) even_out(found);
   return found;
+}
+
+/// Blending rigid motions leaves kinks between them: one step of local_global at p = 2 spreads them, by the metric of equal
+/// weights that the guess was made with.
+void Multiresolution::even_out(Points& found) const {
+  const LpNorm even(Material::uniform(2), problem_.shape().vertex_count(), 1, 1);
+  Points step;
+  problem_.objective.evaluate(found, even);
+  problem_.objective.gradient(step);
+  restrict_to_free(problem_.constraints, step);
+  problem_.precondition(step, step);
+  found -= step;
 }
 
 std::optional<Points> Multiresolution::in_hand() {

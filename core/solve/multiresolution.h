@@ -27,6 +27,7 @@ class Multiresolution : public Minimiser {
   static constexpr int kFirstLook = 8;
 
   Points prolonged();
+  void even_out(Points& found) const;
   void begin_fine();
 
   Problem problem_;
