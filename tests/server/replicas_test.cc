@@ -141,19 +141,21 @@ TEST_F(ReplicasTest, ASessionOutlivesEveryServerThatDies) {
   std::printf(" s\n");
 }
 
-TEST_F(ReplicasTest, NoNewClientIsSentToAServerThatHasJustDied) {
+/// Whichever dies: each time the only one, because Envoy takes a second or two to see that one is back.
+class OneOfThreeDiesTest : public ReplicasTest, public testing::WithParamInterface<std::size_t> {};
+
+INSTANTIATE_TEST_SUITE_P(Each, OneOfThreeDiesTest, testing::Values(0, 1, 2));
+
+TEST_P(OneOfThreeDiesTest, NoNewClientIsSentToAServerThatHasJustDied) {
   const client::Mesh mesh = bar(3);
   const client::Session first = open(mesh);
-  for (std::size_t k = 0; k < servers_.size(); ++k) {
-    servers_[k]->signal(SIGKILL);
-    servers_[k]->wait();
-    for (int other = 0; other < 10; ++other) {  // each by a way of its own, of which a third lead there
-      auto client = client::Client::connect(web_);
-      ASSERT_TRUE(client.ok()) << client.status();
-      const auto session = client->open(mesh);
-      EXPECT_TRUE(session.ok()) << session.status();
-    }
-    begin(k);
+  servers_[GetParam()]->signal(SIGKILL);
+  servers_[GetParam()]->wait();
+  for (int other = 0; other < 10; ++other) {  // each by a way of its own, of which a third lead there
+    auto client = client::Client::connect(web_);
+    ASSERT_TRUE(client.ok()) << client.status();
+    const auto session = client->open(mesh);
+    EXPECT_TRUE(session.ok()) << session.status();
   }
 }
 
