@@ -39,9 +39,21 @@ def wait_until_empty(world: World) -> dict[str, float]:
         time.sleep(0.05)
 
 
+def open_patiently(port: int) -> lpdeform.Session:
+    """A server refuses new sessions until its store has taken something again: up to 2 s after the store is back."""
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return lpdeform.open(PLACES, FACES, address=f"127.0.0.1:{port}")
+        except lpdeform.errors.Unavailable:
+            if time.monotonic() > end:
+                raise
+            time.sleep(0.05)
+
+
 def reference(book: Book, port: int, xs: set[float]) -> None:
     """The results for these handles in a session that no fault befell."""
-    with lpdeform.open(PLACES, FACES, address=f"127.0.0.1:{port}") as session:
+    with open_patiently(port) as session:
         session.set_handle("base", ENDS["base"])
         session.set_handle("tip", ENDS["tip"])
         for x in sorted(xs):
