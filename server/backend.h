@@ -17,6 +17,7 @@
 #include "server/call_record.h"
 #include "server/caller_limits.h"
 #include "server/decode.h"
+#include "server/geometry_queue.h"
 #include "server/keeper.h"
 #include "server/log.h"
 #include "server/metrics.h"
@@ -75,6 +76,11 @@ class Backend {
   /// only the store has it, on a thread of the pool when it has been made again. Errors: UNAVAILABLE STORE_FAILING;
   /// NOT_FOUND SESSION_DAMAGED; RESOURCE_EXHAUSTED as CreateSession.
   void when_here(const CallContext& call, const std::string& name, Done then);
+
+  /// Calls `then` with OK once an update of this session can be decoded without waiting for its geometry. Errors: as
+  /// Session::check_writer and GeometryQueue::when_found.
+  void when_decodable(const std::shared_ptr<Session>& session, const std::string& token,
+                      const v1::Update& update, Done then);
 
   /// Ends the process's part in all sessions, as it shuts down, and waits until the store has what has changed.
   void release_sessions(const std::string& text);
@@ -180,6 +186,7 @@ class Backend {
   };
   std::mutex restoring_mutex_;
   std::map<std::string, Restoring> restoring_;  // by the sessions' names
+  GeometryQueue geometry_{scheduler, pool};
 
  public:
   // Last, so that their threads end first.

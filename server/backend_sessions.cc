@@ -132,7 +132,10 @@ absl::StatusOr<NewSession> Backend::make_restored(const SessionMaker& maker,
   if (keeper_ == nullptr) return made;
   static const StoredBlobs no_blobs;
   Decoder decoder = factory_.decoder(snapshot->request, maker.owner).reading_stored(no_blobs);
-  auto head = encode_head(snapshot->request, decoder, fingerprint, made.session->created_unix_ms());
+  // A snapshot does not say by which request it was restored; the store has to, for a server that was restarted.
+  v1::CreateSessionRequest kept = snapshot->request;
+  kept.set_request_id(request.request_id());
+  auto head = encode_head(kept, decoder, fingerprint, made.session->created_unix_ms());
   if (!head.ok()) return head.status();
   made.head = *std::move(head);
   return made;
@@ -234,11 +237,16 @@ void Backend::update_handles(const CallContext& call, const v1::UpdateHandlesReq
                              v1::UpdateHandlesResponse& response, Done done) {
   const auto session = find(call, Access::kChange, request.session());
   if (!session.ok()) return done(session.status());
-  update(call, **session, request.writer_token(), request.update(),
-         [&response, done = std::move(done)](const absl::StatusOr<UpdateResult>& result) {
-           if (result.ok()) encode(*result, *response.mutable_result());
-           done(result.status());
-         });
+  const auto then = [this, &call, &request, &response, session = *session,
+                     done = std::move(done)](const absl::Status& status) {
+    if (!status.ok()) return done(status);
+    update(call, *session, request.writer_token(), request.update(),
+           [&response, done](const absl::StatusOr<UpdateResult>& result) {
+             if (result.ok()) encode(*result, *response.mutable_result());
+             done(result.status());
+           });
+  };
+  when_decodable(*session, request.writer_token(), request.update(), then);
 }
 
 void Backend::undo_update(const CallContext& call, const v1::UndoUpdateRequest& request,
@@ -311,6 +319,12 @@ void Backend::when_here(const CallContext& call, const std::string& name, Done t
     if (!found.ok()) return end_restoring(name, found.status());
     scheduler.run_once([this, name, found = std::move(found)] { make_again(name, found); });
   });
+}
+
+void Backend::when_decodable(const std::shared_ptr<Session>& session, const std::string& token,
+                             const v1::Update& update, Done then) {
+  if (absl::Status status = session->check_writer(token); !status.ok()) return then(status);
+  geometry_.when_found(session, update, std::move(then));
 }
 
 /// On a thread of the scheduler.

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <memory>
+#include <mutex>
 #include <string>
 
 #include "absl/status/status.h"
@@ -13,6 +14,8 @@
 #include "server/metrics.h"
 
 namespace lpdeform {
+
+class Session;
 
 /// One call, from its arrival to its end: lets it through the gate, measures it, and says why it was refused.
 /// Thread-safe.
@@ -36,9 +39,13 @@ class CallRecord {
   void received(std::size_t bytes) { received_ += bytes; }
   void sent(std::size_t bytes) { sent_ += bytes; }
 
+  /// What the call is about, once that is known and is the caller's.
+  void about(const std::shared_ptr<const Session>& session);
+
   /// How it ended; once.
   void ended(const absl::Status& status);
-  /// Something in it was refused, and it goes on.
+  /// Something in it was refused, and it goes on. The log gets the text of what the server says of itself alone: what is said
+  /// of a caller's input may quote its coordinates.
   void refused(const absl::Status& status) const;
 
  private:
@@ -47,6 +54,8 @@ class CallRecord {
   const std::shared_ptr<const Log> log_;
   const std::string method_;
   const CallContext context_;
+  mutable std::mutex mutex_;
+  std::weak_ptr<const Session> session_;
   const std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
   std::atomic<absl::StatusCode> code_ = absl::StatusCode::kCancelled;
   std::atomic<std::size_t> received_ = 0;

@@ -29,6 +29,9 @@ class FrameCall : public WritePump<Reactor, Response> {
                        [self = std::static_pointer_cast<FrameCall>(this->shared_from_this()), session_name,
                         token, options, then](const absl::Status& status) {
                          if (!status.ok()) return self->refuse(status);
+                         const auto session =
+                             self->backend_.find(self->context(), Backend::Access::kRead, session_name);
+                         if (session.ok()) self->record().about(*session);
                          self->open_here(session_name, token, options);
                          then();
                        });
@@ -144,22 +147,28 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   }
 
   void take_update() {
-    const v1::Update& update = request_.update();
-    const auto session = backend_.registry->find(open_.session->name(), open_.session->owner());
-    const auto answered = [self = std::static_pointer_cast<DeformCall>(shared_from_this()),
-                           input_seq = update.input_seq()](const absl::StatusOr<UpdateResult>& result) {
-      self->answer(result, input_seq);
-    };
     {
       const std::scoped_lock lock(mutex_);
       ++unanswered_;
     }
-    if (session.ok()) {
-      backend_.update(context(), **session, token_, update, answered);
-    } else {
-      answered(session.status());
-    }
-    read();
+    backend_.when_decodable(
+        open_.session, token_, request_.update(),
+        [self = std::static_pointer_cast<DeformCall>(shared_from_this())](const absl::Status& status) {
+          self->give_update(status);
+          self->read();
+        });
+  }
+
+  void give_update(absl::Status status) {
+    const v1::Update& update = request_.update();
+    const auto answered = [self = std::static_pointer_cast<DeformCall>(shared_from_this()),
+                           input_seq = update.input_seq()](const absl::StatusOr<UpdateResult>& result) {
+      self->answer(result, input_seq);
+    };
+    if (!status.ok()) return answered(status);
+    const auto session = backend_.registry->find(open_.session->name(), open_.session->owner());
+    if (!session.ok()) return answered(session.status());
+    backend_.update(context(), **session, token_, update, answered);
   }
 
   /// Then the stream ends in a moment, and an update without an answer is sent again to where the session is; with one that refuses

@@ -60,6 +60,19 @@ std::uint64_t inode_of(int fd) {
   return fstat(fd, &about) == 0 ? about.st_ino : 0;
 }
 
+/// Whose a connection is: the bytes of a host's address, or of an IPv6 network of 64 bits, within which hosts choose theirs.
+/// Empty for Unix sockets.
+std::string peer_of(const sockaddr_storage& from) {
+  if (from.ss_family == AF_INET) {
+    const auto& v4 = reinterpret_cast<const sockaddr_in&>(from);
+    return {reinterpret_cast<const char*>(&v4.sin_addr), sizeof(v4.sin_addr)};
+  }
+  if (from.ss_family != AF_INET6) return "";
+  const in6_addr& v6 = reinterpret_cast<const sockaddr_in6&>(from).sin6_addr;
+  const auto* const bytes = reinterpret_cast<const char*>(v6.s6_addr);
+  return IN6_IS_ADDR_V4MAPPED(&v6) ? std::string(bytes + 12, 4) : std::string(bytes, 8);
+}
+
 int port_of(int socket) {
   sockaddr_storage bound{};
   socklen_t size = sizeof(bound);
@@ -168,25 +181,39 @@ absl::Status Listener::add_socket(const addrinfo& info, int port) {
   return absl::OkStatus();
 }
 
-std::size_t Listener::start(std::size_t most_connections, Events events) {
+std::size_t Listener::start(const Limits& limits, Events events) {
   events_ = std::move(events);
   const int first = dup(wake_);  // the lowest that is free
   if (first >= 0) close(first);
-  most_ = std::min<std::size_t>(most_connections, 1 << 20);
-  const int limit = raise_descriptor_limit(first + static_cast<int>(most_) + 2 * kReserved);
+  limits_ = limits;
+  limits_.connections = std::min<std::size_t>(limits.connections, 1 << 20);
+  const int limit = raise_descriptor_limit(first + static_cast<int>(limits_.connections) + 2 * kReserved);
   last_descriptor_ = limit - std::min(kReserved, (limit - first) / 4);
   thread_ = std::thread([this] { run(); });
-  return std::min(most_, static_cast<std::size_t>(std::max(last_descriptor_ - first, 0)));
+  return std::min(limits_.connections, static_cast<std::size_t>(std::max(last_descriptor_ - first, 0)));
 }
 
 /// gRPC does not say when a connection has ended: then its descriptor is closed, or another file's.
-bool Listener::has_room() {
-  if (given_.size() < most_) return true;
+bool Listener::has_room(const std::string& peer) {
+  if (has_room_now(peer)) return true;
   const auto now = std::chrono::steady_clock::now();
   if (now - counted_at_ < kBetweenCounts) return false;
   counted_at_ = now;
-  std::erase_if(given_, [](const auto& one) { return inode_of(one.first) != one.second; });
-  return given_.size() < most_;
+  forget_ended();
+  return has_room_now(peer);
+}
+
+bool Listener::has_room_now(const std::string& peer) const {
+  if (given_.size() >= limits_.connections) return false;
+  const auto theirs = from_.find(peer);
+  return limits_.per_address == 0 || peer.empty() || theirs == from_.end() ||
+         theirs->second < limits_.per_address;
+}
+
+void Listener::forget_ended() {
+  std::erase_if(given_, [](const auto& one) { return inode_of(one.first) != one.second.inode; });
+  from_.clear();
+  for (const auto& one : given_) ++from_[one.second.peer];
 }
 
 void Listener::run() {
@@ -204,13 +231,16 @@ void Listener::run() {
 
 /// A process gets its lowest free descriptor: a high one says that all below are taken.
 void Listener::accept_from(int listening) {
-  const int fd = accept4(listening, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  sockaddr_storage from{};
+  socklen_t size = sizeof(from);
+  const int fd = accept4(listening, reinterpret_cast<sockaddr*>(&from), &size, SOCK_CLOEXEC | SOCK_NONBLOCK);
   if (fd < 0) {
     const bool is_full = errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM;
     if (is_full) std::this_thread::sleep_for(kPause);  // the connection waits in the system's queue
     return;
   }
-  if (fd >= last_descriptor_ || !has_room()) {
+  const std::string peer = peer_of(from);
+  if (fd >= last_descriptor_ || !has_room(peer)) {
     ++refused_;
     close(fd);
     events_.on_refused();
@@ -219,7 +249,10 @@ void Listener::accept_from(int listening) {
   const int yes = 1, patience = kUnacknowledgedMs;
   setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof(yes));
   setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &patience, sizeof(patience));
-  given_[fd] = inode_of(fd);
+  // A descriptor that comes again was another connection's, which has ended.
+  if (const auto before = given_.find(fd); before != given_.end()) --from_[before->second.peer];
+  given_[fd] = {inode_of(fd), peer};
+  ++from_[peer];
   ++accepted_;
   events_.on_connection(listening, fd);
 }

@@ -38,9 +38,14 @@ class Listener {
     /// One was closed at once for want of room.
     std::function<void()> on_refused;
   };
-  /// Takes connections from now on, at most `most_connections` at a time. Raises the process's limit of descriptors for
+  struct Limits {
+    std::size_t connections = 1;  // at a time
+    /// Of them, from one address: a host's, or an IPv6 network's of 64 bits. 0: without limit, as for Unix sockets.
+    std::size_t per_address = 0;
+  };
+  /// Takes connections from now on, within `limits`. Raises the process's limit of descriptors for
   /// that; returns how many there can be within it. Once.
-  std::size_t start(std::size_t most_connections, Events events);
+  std::size_t start(const Limits& limits, Events events);
 
   /// Connections handed over so far.
   std::uint64_t accepted() const { return accepted_; }
@@ -57,7 +62,9 @@ class Listener {
   absl::Status add_socket(const addrinfo& info, int port);
   void run();
   void accept_from(int listening);
-  bool has_room();
+  bool has_room(const std::string& peer);
+  bool has_room_now(const std::string& peer) const;
+  void forget_ended();
 
   std::string address_;
   std::string path_;  // of a Unix socket
@@ -65,10 +72,15 @@ class Listener {
   std::vector<int> sockets_;
   int wake_ = -1;
   Events events_;
-  std::size_t most_ = 0;
+  Limits limits_;
   int last_descriptor_ = 0;  // from here on they are not for connections
   // The listener's thread alone:
-  std::unordered_map<int, std::uint64_t> given_;  // connections handed over: descriptor and inode
+  struct Given {
+    std::uint64_t inode = 0;
+    std::string peer;
+  };
+  std::unordered_map<int, Given> given_;               // connections handed over, by their descriptors
+  std::unordered_map<std::string, std::size_t> from_;  // how many of each peer
   std::chrono::steady_clock::time_point counted_at_;
   std::atomic<std::uint64_t> accepted_ = 0, refused_ = 0;
   std::atomic<bool> is_stopping_ = false;

@@ -12,9 +12,13 @@ namespace {
 
 using lpdeform::ServerOptions;
 
+/// Clocks count no further.
+constexpr double kMostSeconds = 1e9, kLeastSeconds = 1e-3;
+
 struct Arguments {
   ServerOptions server;
   double session_idle_seconds = 600, upload_idle_seconds = 600, heartbeat_seconds = 15, grace_seconds = 20;
+  double connection_idle_seconds = 300;
   std::string log_level = "info";
   std::string store = "none";
   lpdeform::StoreOptions store_options;
@@ -23,6 +27,28 @@ struct Arguments {
 
 std::chrono::milliseconds milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<std::int64_t>(seconds * 1000));
+}
+
+/// "4GiB" or "4096". CLI11's own takes -1 for the largest size.
+CLI::Validator size_in_bytes() {
+  return {[](std::string& text) -> std::string {
+            if (text.find('-') != std::string::npos) return "must not be negative";
+            return CLI::AsSizeValue(false)(text);
+          },
+          "SIZE"};
+}
+
+/// Also refuses what is not a number.
+CLI::Validator seconds_from(double least) {
+  return {[least](std::string& text) -> std::string {
+            double seconds = 0;
+            const bool is_number = CLI::detail::lexical_cast(text, seconds);
+            if (is_number && seconds >= least && seconds <= kMostSeconds) return "";
+            char limits[64];
+            std::snprintf(limits, sizeof(limits), "must be %g to %g seconds", least, kMostSeconds);
+            return limits;
+          },
+          "SECONDS"};
 }
 
 void describe(CLI::App& app, Arguments& arguments) {
@@ -67,6 +93,17 @@ void describe(CLI::App& app, Arguments& arguments) {
                  "Connections at a time, 1 to 10^6; more are closed at once")
       ->envname("LPDEFORM_MAX_CONNECTIONS")
       ->capture_default_str();
+  app.add_option(
+         "--max-connections-per-address", server.max_connections_per_address,
+         "Connections at a time from one address, or one IPv6 network of 64 bits; 0: without limit. Behind a "
+         "proxy all come from its address")
+      ->envname("LPDEFORM_MAX_CONNECTIONS_PER_ADDRESS")
+      ->capture_default_str();
+  app.add_option("--connection-idle", arguments.connection_idle_seconds,
+                 "Seconds without a call after which a connection is closed, 1 to 2e6")
+      ->envname("LPDEFORM_CONNECTION_IDLE")
+      ->check(CLI::Range(1.0, 2e6))
+      ->capture_default_str();
   app.add_option("--max-sessions-per-caller", server.max_sessions_per_caller,
                  "Sessions of one caller at a time, where callers are told apart; 0: without limit")
       ->envname("LPDEFORM_MAX_SESSIONS_PER_CALLER")
@@ -80,7 +117,7 @@ void describe(CLI::App& app, Arguments& arguments) {
          "Memory of one caller's sessions and uploads, where callers are told apart; as 4GiB or in bytes, "
          "0: without limit")
       ->envname("LPDEFORM_MAX_BYTES_PER_CALLER")
-      ->transform(CLI::AsSizeValue(false))
+      ->transform(size_in_bytes())
       ->capture_default_str();
   app.add_option("--max-upload-rate", server.max_upload_bytes_per_second,
                  "Bytes a second of one caller's uploads, where callers are told apart; 0: without limit")
@@ -124,13 +161,14 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->envname("LPDEFORM_MAX_VERTICES")
       ->capture_default_str();
   app.add_option("--max-bytes", server.max_bytes,
-                 "Memory of all sessions and uploads together; as 4GiB or in bytes")
+                 "Memory of all sessions and uploads together; as 4GiB or in bytes, 0: three quarters of "
+                 "what the machine or its control group has")
       ->envname("LPDEFORM_MAX_BYTES")
-      ->transform(CLI::AsSizeValue(false))
+      ->transform(size_in_bytes())
       ->capture_default_str();
   app.add_option("--max-upload-bytes", server.max_upload_bytes, "Size of one upload; as 256MiB or in bytes")
       ->envname("LPDEFORM_MAX_UPLOAD_BYTES")
-      ->transform(CLI::AsSizeValue(false))
+      ->transform(size_in_bytes())
       ->capture_default_str();
   app.add_option("--max-stream-rate", server.max_stream_bytes_per_second,
                  "Bytes a second of one stream's frames, 0: without limit; lowers the frame rate first, to "
@@ -147,12 +185,12 @@ void describe(CLI::App& app, Arguments& arguments) {
   app.add_option("--session-idle", arguments.session_idle_seconds,
                  "Seconds without use after which a session goes")
       ->envname("LPDEFORM_SESSION_IDLE")
-      ->check(CLI::PositiveNumber)
+      ->check(seconds_from(kLeastSeconds))
       ->capture_default_str();
   app.add_option("--upload-idle", arguments.upload_idle_seconds,
                  "Seconds without use after which an upload goes")
       ->envname("LPDEFORM_UPLOAD_IDLE")
-      ->check(CLI::PositiveNumber)
+      ->check(seconds_from(kLeastSeconds))
       ->capture_default_str();
   app.add_option("--store", arguments.store,
                  "Where sessions are kept so that they outlive the server: sqlite:DIR, a folder of its own; "
@@ -171,17 +209,17 @@ void describe(CLI::App& app, Arguments& arguments) {
   app.add_option("--max-store-bytes", arguments.store_options.most_bytes,
                  "What the folder of --store may hold; as 4GiB or in bytes, 0: as much as the disk has")
       ->envname("LPDEFORM_MAX_STORE_BYTES")
-      ->transform(CLI::AsSizeValue(false))
+      ->transform(size_in_bytes())
       ->capture_default_str();
   app.add_option("--heartbeat", arguments.heartbeat_seconds,
                  "Seconds of silence after which a stream says something")
       ->envname("LPDEFORM_HEARTBEAT")
-      ->check(CLI::PositiveNumber)
+      ->check(seconds_from(kLeastSeconds))
       ->capture_default_str();
   app.add_option("--grace", arguments.grace_seconds,
                  "Seconds that calls have to end when the server is stopped")
       ->envname("LPDEFORM_GRACE")
-      ->check(CLI::NonNegativeNumber)
+      ->check(seconds_from(0))
       ->capture_default_str();
   app.add_option("--log-level", arguments.log_level, "What to log on stderr, one JSON object a line")
       ->envname("LPDEFORM_LOG_LEVEL")
@@ -203,6 +241,7 @@ int serve(Arguments& arguments, const sigset_t& signals) {
   options.session_idle = milliseconds(arguments.session_idle_seconds);
   options.upload_idle = milliseconds(arguments.upload_idle_seconds);
   options.heartbeat = milliseconds(arguments.heartbeat_seconds);
+  options.connection_idle = milliseconds(arguments.connection_idle_seconds);
   options.log = std::make_shared<lpdeform::Log>(arguments.log_level);
   auto store = lpdeform::open_store(arguments.store, arguments.store_options);
   if (!store.ok()) return refuse(store.status());

@@ -14,8 +14,10 @@
 #include "core/base/fault.h"
 #include "server/admin.h"
 #include "server/backend.h"
+#include "server/grpc_log.h"
 #include "server/health_probe.h"
 #include "server/listener.h"
+#include "server/machine_memory.h"
 #include "server/service.h"
 #include "server/tokens.h"
 #include "server/transport_security.h"
@@ -28,6 +30,9 @@ constexpr int kKeepaliveMs = 30'000;
 /// Until a new connection has to have spoken HTTP/2, TLS included.
 constexpr int kHandshakeMs = 20'000;
 constexpr std::chrono::seconds kAcceptPatience{5};
+/// gRPC counts milliseconds in an int.
+constexpr std::chrono::milliseconds kLeastIdle = std::chrono::seconds(1),
+                                    kMostIdle = std::chrono::hours(24 * 24);
 /// Between the last answer and the end of the connections: who writes to a connection that has ended loses what he
 /// has not read of it yet, the reason for its end among that.
 constexpr std::chrono::milliseconds kLinger{100};
@@ -62,12 +67,18 @@ absl::Status check(const ServerOptions& options) {
     if (value == 0 || value > 1'000'000) return out_of_range(name, "1 to 10^6");
   }
   if (options.max_undo > 10'000) return out_of_range("max_undo", "0 to 10^4");
+  if (options.max_connections_per_address > 1'000'000) {
+    return out_of_range("max_connections_per_address", "0 to 10^6");
+  }
   if (options.max_connections == 0 || options.max_connections > 1'000'000) {
     return out_of_range("max_connections", "1 to 10^6");
   }
   if (options.heartbeat.count() <= 0) return out_of_range("heartbeat", "more than 0");
   if (options.session_idle.count() <= 0) return out_of_range("session_idle", "more than 0");
   if (options.upload_idle.count() <= 0) return out_of_range("upload_idle", "more than 0");
+  if (options.connection_idle < kLeastIdle || options.connection_idle > kMostIdle) {
+    return out_of_range("connection_idle", "1 s to 24 days");
+  }
   return absl::OkStatus();
 }
 
@@ -187,6 +198,8 @@ absl::Status Server::Impl::start_grpc(const ServerOptions& options,
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kKeepaliveMs / 3);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS,
+                             static_cast<int>(options.connection_idle.count()));
   // Probing grows windows until seconds of frames hide in them, behind the credits' back.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   grpc_server = builder.BuildAndStart();
@@ -205,14 +218,17 @@ void Server::Impl::start_listening(const ServerOptions& options) {
     acceptor->HandleNewConnection(&parameters);
   };
   events.on_refused = [this] { backend.metrics->add(Count::kConnectionsRefused); };
-  const std::size_t most = listener->start(options.max_connections, std::move(events));
+  const std::size_t most =
+      listener->start({options.max_connections, options.max_connections_per_address}, std::move(events));
   if (most < options.max_connections) {
     backend.log().warning("few_descriptors", {{"connections", std::uint64_t{most}},
                                               {"text", "Raise the limit of descriptors (ulimit -n)."}});
   }
 }
 
-absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& options) {
+absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& given) {
+  ServerOptions options = given;
+  if (options.max_bytes == 0) options.max_bytes = default_max_bytes();
   if (absl::Status status = check(options); !status.ok()) return status;
   const auto credentials = make_credentials(options.tls);
   if (!credentials.ok()) return credentials.status();
@@ -222,6 +238,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& optio
   if (!listener.ok()) return listener.status();
   if (absl::Status status = check_anonymous(options, **listener); !status.ok()) return status;
   prepare_grpc();
+  if (options.log) take_grpc_log(options.log);
   auto impl = std::make_unique<Impl>(options, *std::move(listener), *std::move(tokens));
   if (absl::Status status = impl->start_grpc(options, *credentials); !status.ok()) return status;
   impl->start_listening(options);
@@ -235,6 +252,10 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& optio
                        {"tokens", std::string(options.token_keys_file.empty() ? "off" : "on")}});
   warn_of_what_is_open(options, *server->impl_->listener, log);
   return server;
+}
+
+std::size_t default_max_bytes() {
+  return memory_of_process() / 4 * 3;
 }
 
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

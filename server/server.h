@@ -39,6 +39,7 @@ struct ServerOptions {
   int runner_threads = 0;
 
   std::size_t max_connections = 4096;
+  std::size_t max_connections_per_address = 1024;  // of one peer; 0: without limit; see Listener::Limits
   std::size_t max_sessions = 256;
   std::size_t max_sessions_per_caller = 64;                 // where callers are told apart; 0: without limit
   std::size_t max_streams_per_caller = 256;                 // likewise
@@ -48,10 +49,11 @@ struct ServerOptions {
   std::size_t max_handles = InputLimits::kMostHandles;  // of one session
   std::size_t max_undo = InputLimits::kMostUndo;        // steps of handles that one session can take back
   std::size_t max_uploads = Uploads::kMostUploads;
-  std::size_t max_calls_waiting = 4096;          // for a thread that looks at them
-  std::size_t max_calls_per_connection = 256;    // at a time; streams are calls
-  std::uint32_t max_vertices = 2'000'000;        // of one mesh; of faces, three times as many
-  std::size_t max_bytes = std::size_t{8} << 30;  // of all sessions and uploads together, by our own count
+  std::size_t max_calls_waiting = 4096;        // for a thread that looks at them
+  std::size_t max_calls_per_connection = 128;  // at a time; streams are calls
+  std::uint32_t max_vertices = 2'000'000;      // of one mesh; of faces, three times as many
+  std::size_t max_bytes =
+      0;  // of all sessions and uploads together, by our own count; 0: see default_max_bytes
   std::uint64_t max_upload_bytes = std::uint64_t{256} << 20;  // of one upload
 
   /// Of one stream's frames; 0 is without limit. See StreamOptions::max_bytes_per_second.
@@ -62,22 +64,27 @@ struct ServerOptions {
   std::chrono::milliseconds session_idle = std::chrono::minutes(10);
   std::chrono::milliseconds upload_idle = std::chrono::minutes(10);
   std::chrono::milliseconds heartbeat = std::chrono::seconds(15);
+  /// Time without a call after which a connection is closed; clients open another when they call.
+  std::chrono::milliseconds connection_idle = std::chrono::minutes(5);
 
   /// Where sessions are kept so that they outlive this process; empty: in memory alone. See open_store.h.
   std::shared_ptr<Store> store = {};
 
-  /// The clock of the three above; empty takes the system's.
+  /// The clock of sessions, uploads and heartbeats; empty takes the system's.
   std::shared_ptr<Timers> timers = {};
   /// Empty logs nothing.
   std::shared_ptr<Log> log = {};
 };
+
+/// Three quarters of the memory that this process may have: the machine's, or its control group's where that is less.
+std::size_t default_max_bytes();
 
 /// The service, running: from start() until drain() or the destructor. Thread-safe.
 class Server {
  public:
   /// Errors: INVALID_ARGUMENT OPTION_OUT_OF_RANGE, ANONYMOUS_ADDRESS, TLS_FILES, TOKEN_KEYS; UNAVAILABLE
   /// ADDRESS_NOT_BOUND.
-  static absl::StatusOr<std::unique_ptr<Server>> start(const ServerOptions& options);
+  static absl::StatusOr<std::unique_ptr<Server>> start(const ServerOptions& given);
 
   /// Drains, waiting for nobody.
   ~Server();

@@ -78,6 +78,11 @@ grpc::ServerUnaryReactor* in_pool(Backend& backend, grpc::CallbackServerContext&
                  });
 }
 
+void note_session(const Backend& backend, CallRecord& record, const std::string& name) {
+  const auto session = backend.find(record.context(), Backend::Access::kRead, name);
+  if (session.ok()) record.about(*session);
+}
+
 /// A call about a session, which may have to be made again from the store first.
 template <typename Request, typename Response>
 grpc::ServerUnaryReactor* about_session(Backend& backend, grpc::CallbackServerContext& context,
@@ -89,10 +94,15 @@ grpc::ServerUnaryReactor* about_session(Backend& backend, grpc::CallbackServerCo
   record->received(request.ByteSizeLong());
   return in_pool(backend, context, record, response,
                  [&backend, record, handler, &request, &response](const Finish& finish) {
+                   // Only a refusal is told of, so only then is it asked which session it is about.
+                   const auto tell = [&backend, record, &request, finish](const absl::Status& status) {
+                     if (!status.ok()) note_session(backend, *record, request.session());
+                     finish(status);
+                   };
                    const auto then = [&backend, record, handler, &request, &response,
-                                      finish](const absl::Status& status) {
-                     if (!status.ok()) return finish(status);
-                     (backend.*handler)(record->context(), request, response, finish);
+                                      tell](const absl::Status& status) {
+                     if (!status.ok()) return tell(status);
+                     (backend.*handler)(record->context(), request, response, tell);
                    };
                    backend.when_here(record->context(), request.session(), then);
                  });

@@ -23,7 +23,7 @@ class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveRespons
     const auto task = [self, request] {
       self->backend_.when_here(self->context(), request.session(),
                                [self, request](const absl::Status& status) {
-                                 status.ok() ? self->start(request) : self->refuse(status);
+                                 status.ok() ? self->decode(request) : self->refuse(status);
                                });
     };
     if (!backend_.pool.try_post(task)) refuse(server_busy(backend_.pool.expected_wait()));
@@ -48,6 +48,17 @@ class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveRespons
     pump_locked();
     // Still due where a write is under way: its reader has something to read.
     beat_at((is_beat_due_ ? now : last_sent_at_) + backend_.heartbeat());
+  }
+
+  void decode(const v1::SolveRequest& request) {
+    auto self = std::static_pointer_cast<SolveCall>(shared_from_this());
+    const auto session = backend_.find(context(), Backend::Access::kChange, request.session());
+    if (!session.ok()) return refuse(session.status());
+    record().about(*session);
+    backend_.when_decodable(*session, request.writer_token(), request.update(),
+                            [self, request](const absl::Status& status) {
+                              status.ok() ? self->start(request) : self->refuse(status);
+                            });
   }
 
   void start(const v1::SolveRequest& request) {

@@ -8,12 +8,14 @@ namespace lpdeform {
 const Field& ShapeFeatures::joint() const {
   const std::scoped_lock lock(mutex_);
   if (!joint_) joint_ = find_joints(*shape_, workers_).joint;
+  knows_joint_ = true;
   return *joint_;
 }
 
 const BendingMeasure& ShapeFeatures::bending() const {
   const std::scoped_lock lock(mutex_);
   if (!bending_) bending_ = smoothed_bending(*shape_);
+  knows_bending_ = true;
   return *bending_;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -22,6 +23,9 @@ class ShapeFeatures {
   const Field& joint() const;
   /// smoothed_bending of core/analysis/salience.h.
   const BendingMeasure& bending() const;
+  /// Whether joint() or bending() has been found, so that it is there at once. Does not wait.
+  bool knows_joint() const { return knows_joint_; }
+  bool knows_bending() const { return knows_bending_; }
 
  private:
   const std::shared_ptr<const RestShape> shape_;
@@ -29,6 +33,7 @@ class ShapeFeatures {
   mutable std::mutex mutex_;
   mutable std::optional<Field> joint_;
   mutable std::optional<BendingMeasure> bending_;
+  mutable std::atomic<bool> knows_joint_ = false, knows_bending_ = false;
 };
 
 }  // namespace lpdeform

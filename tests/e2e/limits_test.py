@@ -12,7 +12,7 @@ FLAG = re.compile(r"^  --([a-z-]+) \S.*?=(\S+) \(Env:(\w+)\)$", re.MULTILINE)
 ROW = re.compile(r"^\| `--([a-z-]+)` \| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
 UNITS = {"KiB": 2**10, "MiB": 2**20, "GiB": 2**30, "s": 1, "": 1}
 NO_REASON = "-"
-OTHER_LIMITS = {"session-idle", "upload-idle", "heartbeat", "grace"}
+OTHER_LIMITS = {"connection-idle", "session-idle", "upload-idle", "heartbeat", "grace"}
 
 
 def is_limit(flag):
@@ -60,6 +60,20 @@ class Limits(unittest.TestCase):
                                       capture_output=True, text=True, timeout=programs.PATIENCE)
                 self.assertEqual(done.returncode, 1, flag)
                 self.assertIn(f"Option {flag.replace('-', '_')} must be 1 to", done.stderr)
+
+    def test_values_that_are_no_limits_are_refused_by_name(self):
+        for flag, value, why in (("max-bytes", "-1", "must not be negative"), ("max-bytes-per-caller", "-1", "must not be negative"),
+                                 ("max-upload-bytes", "-4KiB", "must not be negative"),
+                                 ("session-idle", "1e300", "must be 0.001 to 1e+09 seconds"),
+                                 ("session-idle", "nan", "must be 0.001 to 1e+09 seconds"),
+                                 ("heartbeat", "0", "must be 0.001 to 1e+09 seconds"),
+                                 ("grace", "-1", "must be 0 to 1e+09 seconds"), ("connection-idle", "0.5", "1"),
+                                 ("max-frame-rate", "-1", "")):
+            done = subprocess.run([programs.server(), "--address", "127.0.0.1:0", f"--{flag}={value}"],
+                                  capture_output=True, text=True, timeout=programs.PATIENCE)
+            self.assertNotEqual(done.returncode, 0, flag)
+            self.assertIn(why, done.stderr, flag)
+            self.assertIn(flag.split("-")[0], done.stderr)
 
 
 if __name__ == "__main__":

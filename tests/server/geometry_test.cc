@@ -1,8 +1,12 @@
 // What the running service finds in a mesh's geometry by itself: automatic fields and resizing.
 
 #include <array>
+#include <condition_variable>
+#include <deque>
 #include <limits>
 #include <map>
+#include <mutex>
+#include <vector>
 
 #include "core/analysis/automatic_material.h"
 #include "core/mesh/weld.h"
@@ -97,6 +101,97 @@ TEST_F(GeometryTest, ASessionMayBeginWithAutomaticFields) {
   ASSERT_TRUE(try_create(request, created).ok());
   EXPECT_TRUE(created.session().settings().p().has_per_vertex());
   EXPECT_TRUE(created.session().settings().stiffness().has_per_vertex());
+}
+
+/// Updates that are under way at once, each with automatic fields, or a resizing.
+class UpdatesUnderWay {
+ public:
+  UpdatesUnderWay(v1::DeformService::Stub& stub, const v1::CreateSessionResponse& session, int count) {
+    for (int k = 0; k < count; ++k) {
+      One& one = ones_.emplace_back();
+      one.context.set_deadline(std::chrono::system_clock::now() + kTestDeadline);
+      one.request.set_session(session.session().name());
+      one.request.set_writer_token(session.writer_token());
+      one.request.mutable_update()->set_input_seq(static_cast<std::uint64_t>(1 + k));
+      if (k == 1) {
+        set_scale(*one.request.mutable_update(), 2, 1, 1);
+      } else {
+        set_automatic(*one.request.mutable_update()->mutable_settings(), 1);
+      }
+      stub.async()->UpdateHandles(&one.context, &one.request, &one.response, [this](grpc::Status status) {
+        const std::scoped_lock lock(mutex_);
+        statuses_.push_back(std::move(status));
+        changed_.notify_all();
+      });
+    }
+  }
+  ~UpdatesUnderWay() { wait(); }
+
+  std::vector<grpc::Status> ended() const {
+    const std::scoped_lock lock(mutex_);
+    return statuses_;
+  }
+  std::vector<grpc::Status> wait() const {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return statuses_.size() == ones_.size(); });
+    return statuses_;
+  }
+
+ private:
+  struct One {
+    grpc::ClientContext context;
+    v1::UpdateHandlesRequest request;
+    v1::UpdateHandlesResponse response;
+  };
+  std::deque<One> ones_;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  std::vector<grpc::Status> statuses_;
+};
+
+TEST_F(GeometryTest, OthersAreAnsweredWhileTheGeometryOfALargeMeshIsLookedAt) {
+  const auto large = create(box_surface(60, 60, 60)), small = create(bar_mesh());
+  const UpdatesUnderWay updates(*stub_, large, 8);  // more than the pool has threads
+  std::uint64_t seq = 0;
+  for (int k = 0; k < 20; ++k) ASSERT_TRUE(update(small, ends_message(bar_mesh().vertices, ++seq, 1)).ok());
+  EXPECT_TRUE(updates.ended().empty());
+  for (const grpc::Status& status : updates.wait()) EXPECT_TRUE(status.ok()) << status.error_message();
+  const v1::Session after = describe(large);
+  EXPECT_TRUE(after.settings().p().has_per_vertex());
+  EXPECT_EQ(after.handles_size(), 1);
+}
+
+TEST_F(GeometryTest, AStreamAndASolveWaitForTheGeometryInTheirTurn) {
+  const auto session = create(block_with_holes(14, 6, 4));
+  DeformClient client(*stub_, session);
+  v1::Update message;
+  message.set_input_seq(1);
+  set_scale(message, 2, 1, 1);
+  ASSERT_TRUE(client.send(message));
+  message.set_input_seq(2);
+  set_automatic(*message.mutable_settings(), 1);
+  ASSERT_TRUE(client.send(message));
+  ASSERT_TRUE(client.settle(2).has_value());
+  ASSERT_EQ(client.history.results.size(), 2u);
+  EXPECT_EQ(client.history.results[0].input_seq(), 1u);
+
+  const auto another = create(neck_mesh());
+  v1::SolveRequest request = solve_request(another);
+  *request.mutable_update() = ends_message(neck_mesh().vertices, 1, 3);
+  set_automatic(*request.mutable_update()->mutable_settings(), 1);
+  EXPECT_TRUE(solve(request).status.ok());
+  EXPECT_TRUE(describe(another).settings().p().has_per_vertex());
+}
+
+TEST_F(GeometryTest, AnUpdateOfSomebodyElseNeverLooksAtTheGeometry) {
+  const auto session = create(neck_mesh());
+  v1::UpdateHandlesRequest request;
+  v1::UpdateHandlesResponse response;
+  grpc::ClientContext context;
+  request.set_session(session.session().name());
+  request.set_writer_token("another");
+  set_automatic(*request.mutable_update()->mutable_settings(), 1);
+  EXPECT_EQ(details_of(stub_->UpdateHandles(&context, request, &response)).info.reason(), "NOT_THE_WRITER");
 }
 
 TEST_F(GeometryTest, AStrengthOutOfRangeIsRefusedWhole) {

@@ -17,10 +17,15 @@
 namespace lpdeform {
 namespace {
 
-/// A TCP connection to a port of this machine.
+/// A TCP connection to a port of this machine, from one of its loopback addresses.
 class Connection {
  public:
-  explicit Connection(const std::string& address) : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+  explicit Connection(const std::string& address, in_addr_t from = INADDR_LOOPBACK)
+      : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in own{};
+    own.sin_family = AF_INET;
+    own.sin_addr.s_addr = htonl(from);
+    EXPECT_EQ(bind(fd_, reinterpret_cast<const sockaddr*>(&own), sizeof(own)), 0);
     sockaddr_in where{};
     where.sin_family = AF_INET;
     where.sin_port = htons(static_cast<in_port_t>(std::stoi(address.substr(address.rfind(':') + 1))));
@@ -49,16 +54,16 @@ class ListenerTest : public testing::Test {
     for (const int fd : taken_) close(fd);
   }
 
-  void start(const std::string& address, std::size_t most) {
+  void start(const std::string& address, std::size_t most, std::size_t per_address = 0) {
     auto bound = Listener::bind(address);
     ASSERT_TRUE(bound.ok()) << bound.status();
     listener_ = *std::move(bound);
-    listener_->start(most, {[this](int, int fd) {
-                              const std::scoped_lock lock(mutex_);
-                              taken_.push_back(fd);
-                              changed_.notify_all();
-                            },
-                            [] {}});
+    listener_->start({most, per_address}, {[this](int, int fd) {
+                                             const std::scoped_lock lock(mutex_);
+                                             taken_.push_back(fd);
+                                             changed_.notify_all();
+                                           },
+                                           [] {}});
   }
 
   bool has_taken(std::size_t count) {
@@ -93,6 +98,22 @@ TEST_F(ListenerTest, TakesNoMoreThanItMayAndAgainWhenOthersHaveGone) {
     let_go_of_all();
   }
   EXPECT_EQ(listener_->accepted(), 6u);
+}
+
+TEST_F(ListenerTest, LetsNoAddressTakeThePlacesOfOthers) {
+  start("127.0.0.1:0", 4, 2);
+  std::vector<std::unique_ptr<Connection>> kept;
+  for (int k = 0; k < 2; ++k) kept.push_back(std::make_unique<Connection>(listener_->address()));
+  ASSERT_TRUE(has_taken(2));
+  EXPECT_TRUE(Connection(listener_->address()).is_closed_by_other(std::chrono::minutes(1)));
+  kept.push_back(std::make_unique<Connection>(listener_->address(), INADDR_LOOPBACK + 1));  // 127.0.0.2
+  ASSERT_TRUE(has_taken(3));
+  let_go_of_all();
+  while (listener_->accepted() < 4) {
+    auto connection = std::make_unique<Connection>(listener_->address());
+    if (!connection->is_closed_by_other(std::chrono::milliseconds(10))) kept.push_back(std::move(connection));
+  }
+  EXPECT_TRUE(has_taken(1));
 }
 
 TEST_F(ListenerTest, KnowsWhatOnlyThisMachineReaches) {

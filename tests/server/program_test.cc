@@ -2,7 +2,10 @@
 
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <signal.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <cstdint>
 #include <map>
@@ -68,8 +71,8 @@ TEST(Program, LogsTellOfSessionEpochSequenceAndTraceAndNothingSecret) {
   const auto traced = [&](grpc::ClientContext& context) {
     context.AddMetadata("traceparent", "00-" + trace + "-00f067aa0ba902b7-01");
   };
-  grpc::ClientContext creating, updating, refused;
-  for (auto* context : {&creating, &updating, &refused}) traced(*context);
+  grpc::ClientContext creating, updating, misplaced, refused;
+  for (auto* context : {&creating, &updating, &misplaced, &refused}) traced(*context);
   v1::CreateSessionResponse session;
   ASSERT_TRUE(stub->CreateSession(&creating, tetrahedron(), &session).ok());
   v1::UpdateHandlesRequest update;
@@ -79,6 +82,16 @@ TEST(Program, LogsTellOfSessionEpochSequenceAndTraceAndNothingSecret) {
   update.mutable_update()->mutable_settings()->mutable_p()->set_uniform(1.5);
   v1::UpdateHandlesResponse taken;
   ASSERT_TRUE(stub->UpdateHandles(&updating, update, &taken).ok());
+  // Refused in words that quote its numbers: to the caller, not to the log.
+  const std::vector<double> weights{0.25, 27182.818, 0.5};
+  v1::UpdateHandlesRequest off = update;
+  v1::HandleUpdate& handle = *off.mutable_update()->add_handles();
+  handle.set_name("off");
+  handle.mutable_set()->mutable_points()->mutable_faces()->set_inline_(std::string(4, '\0'));
+  handle.mutable_set()->mutable_points()->set_scalar(v1::SCALAR_FLOAT64);
+  handle.mutable_set()->mutable_points()->mutable_barycentric()->set_inline_(weights.data(), 24);
+  const grpc::Status told = stub->UpdateHandles(&misplaced, off, &taken);
+  EXPECT_NE(told.error_message().find("27182.8"), std::string::npos) << told.error_message();
   update.set_writer_token("a token that is wrong");
   ASSERT_FALSE(stub->UpdateHandles(&refused, update, &taken).ok());
   program.signal(SIGTERM);
@@ -99,14 +112,64 @@ TEST(Program, LogsTellOfSessionEpochSequenceAndTraceAndNothingSecret) {
   EXPECT_EQ(events["update"]["epoch"], 1);
   EXPECT_EQ(events["refused"]["reason"], "NOT_THE_WRITER");
   EXPECT_EQ(events["refused"]["method"], "lpdeform.v1.DeformService/UpdateHandles");
+  EXPECT_EQ(events["refused"]["session"], digits);
+  EXPECT_EQ(events["refused"]["epoch"], 1);
+  EXPECT_EQ(events["refused"]["input_seq"], 17);
   for (const char* const event : {"session_created", "update", "refused"})
     EXPECT_EQ(events[event]["trace_id"], trace) << event;
   EXPECT_EQ(events["session_ended"]["reason"], "draining");
   for (const std::string& secret :
        {session.session().name().substr(9), session.writer_token(), std::string("a token that is wrong"),
-        std::string("31415"), std::string("31416")}) {
+        std::string("31415"), std::string("31416"), std::string("27182")}) {
     EXPECT_EQ(log.find(secret), std::string::npos) << secret;
   }
+}
+
+/// Bytes sent to a port of this machine; what comes back until the other side closes is thrown away.
+void send_raw(const std::string& address, const std::string& bytes) {
+  const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in where{};
+  where.sin_family = AF_INET;
+  where.sin_port = htons(static_cast<in_port_t>(std::stoi(address.substr(address.rfind(':') + 1))));
+  where.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  ASSERT_EQ(connect(fd, reinterpret_cast<const sockaddr*>(&where), sizeof(where)), 0);
+  ASSERT_EQ(send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL), static_cast<ssize_t>(bytes.size()));
+  shutdown(fd, SHUT_WR);
+  char thrown_away[4096];
+  while (recv(fd, thrown_away, sizeof(thrown_away), 0) > 0) {
+  }
+  close(fd);
+}
+
+std::string http2_frame(char type, char flags, char stream, const std::string& payload) {
+  const auto size = static_cast<char>(payload.size());
+  return std::string{0, 0, size, type, flags, 0, 0, 0, stream} + payload;
+}
+
+TEST(Program, LogsWhatGrpcSaysOfItselfAsJsonAndWithoutWhatCallersSent) {
+  Program program({"--address", "127.0.0.1:0", "--log-level", "debug"});
+  const auto literal = [](const std::string& name, const std::string& value) {
+    return std::string(1, '\0') + static_cast<char>(name.size()) + name + static_cast<char>(value.size()) +
+           value;
+  };
+  // A value that a header "te" must not have: gRPC 1.51 says so on stderr, and quotes it.
+  const std::string headers =
+      "\x83\x86" + literal(":path", "/x/y") + literal(":authority", "x") + literal("te", "Bearer SECRET");
+  send_raw(program.address(),
+           "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + http2_frame(4, 0, 0, "") + http2_frame(1, 5, 1, headers));
+  program.signal(SIGTERM);
+  EXPECT_EQ(program.wait(), 0);
+  const std::string log = program.rest();
+  EXPECT_EQ(log.find("SECRET"), std::string::npos) << log;
+  bool has_grpc = false;
+  std::istringstream lines(log);
+  for (std::string text; std::getline(lines, text);) {
+    const auto event = nlohmann::json::parse(text);
+    if (event.at("event") != "grpc") continue;
+    has_grpc = true;
+    EXPECT_EQ(event.at("file"), "hpack_parser.cc");
+  }
+  EXPECT_TRUE(has_grpc) << log;
 }
 
 TEST(Program, TakesItsOptionsFromTheEnvironmentToo) {

@@ -105,6 +105,40 @@ TEST_F(RestartTest, TheSameRequestGivesTheSameSession) {
   EXPECT_EQ(details_of(try_create(request, second)).info.reason(), "REQUEST_ID_REUSED");
 }
 
+TEST_F(RestartTest, TheSameRequestRestoresTheSameSessionOnce) {
+  const auto session = create(bar_mesh());
+  v1::SnapshotSessionRequest snapshot;
+  snapshot.set_session(session.session().name());
+  grpc::ClientContext taking;
+  const auto reader = stub_->SnapshotSession(&taking, snapshot);
+  std::string file;
+  for (v1::SnapshotSessionResponse part; reader->Read(&part);) file += part.data();
+  ASSERT_TRUE(reader->Finish().ok());
+
+  v1::RestoreSessionRequest request;
+  request.set_request_id("the same request");
+  request.mutable_snapshot()->set_inline_(file);
+  const auto restore = [&](v1::RestoreSessionResponse& response) {
+    grpc::ClientContext context;
+    return stub_->RestoreSession(&context, request, &response);
+  };
+  v1::RestoreSessionResponse first, second, third;
+  ASSERT_TRUE(restore(first).ok());
+  restart();
+  ASSERT_TRUE(restore(second).ok());
+  EXPECT_EQ(second.session().name(), first.session().name());
+  EXPECT_EQ(second.writer_token(), first.writer_token());
+  restart();
+  ASSERT_TRUE(restore(third).ok());
+  EXPECT_EQ(third.session().name(), first.session().name());
+  v1::ListSessionsResponse all;
+  grpc::ClientContext context;
+  ASSERT_TRUE(stub_->ListSessions(&context, {}, &all).ok());
+  EXPECT_EQ(all.sessions_size(), 2);
+  request.mutable_snapshot()->set_inline_(file + "x");
+  EXPECT_EQ(details_of(restore(third)).info.reason(), "REQUEST_ID_REUSED");
+}
+
 TEST_F(RestartTest, ADeletedSessionAndOneThatIsNotThereAreUnknown) {
   const auto session = create(bar_mesh());
   v1::DeleteSessionRequest request;
