@@ -6,7 +6,7 @@
 
 Prints a line for each sample, and exits with 1 where what the server holds at the end is more than at the beginning: of memory,
 the median of the last quarter over that of the second quarter by 5 % and 4 MiB; of descriptors and sessions, any, once idle; of threads, any over the most of the second quarter: gRPC's pool grows as the load
-first does.
+first does. Also where a load falls short: an update that was not answered, or a call that failed.
 """
 
 from __future__ import annotations

@@ -190,8 +190,8 @@ class Kubernetes(unittest.TestCase):
             for protocol in ("UDP", "TCP"):
                 self.assertTrue(self.may_reach(name, names, 53, protocol), name)
         self.assertTrue(self.may_reach(("monitoring", {}), "lpdeform", 9464))
-        self.assertTrue(self.may_reach(("lpdeform", {"lpdeform-client": "true"}), "lpdeform", 50051))
         self.assertTrue(self.may_reach(("ingress", {}), "lpdeform-web", 8080))
+        self.assertTrue(self.may_reach(("elsewhere", {}), "lpdeform-web", 8080))  # native clients, too
 
     def test_nothing_else_is_reached(self):
         anywhere, stranger = ("elsewhere", {}), ("lpdeform", {"app": "other"})
@@ -200,7 +200,8 @@ class Kubernetes(unittest.TestCase):
                 self.assertFalse(self.may_reach(name, anywhere, port), (name, port))
         for caller in (anywhere, stranger, "lpdeform-web"):
             self.assertFalse(self.may_reach(caller, "lpdeform-redis", 6379), caller)
-        for caller in (anywhere, stranger, "lpdeform-redis"):
+        labelled = ("lpdeform", {"lpdeform-client": "true"})
+        for caller in (anywhere, stranger, labelled, "lpdeform-redis"):
             self.assertFalse(self.may_reach(caller, "lpdeform", 50051), caller)
         self.assertFalse(self.may_reach(stranger, "lpdeform", 9464))
 

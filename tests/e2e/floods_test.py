@@ -1,0 +1,244 @@
+"""Hostile HTTP/2: what one client that keeps to no contract can make the server hold, alone and behind Envoy."""
+
+import contextlib
+import os
+import socket
+import struct
+import subprocess
+import threading
+import time
+import urllib.request
+
+import programs
+
+ROOT = os.path.realpath(os.path.join(os.path.dirname(__file__), "..", ".."))
+DATA, HEADERS, RST_STREAM, SETTINGS, PING, GOAWAY, WINDOW_UPDATE, CONTINUATION = 0, 1, 3, 4, 6, 7, 8, 9
+ACK, END_HEADERS = 1, 4
+MAX_CONCURRENT_STREAMS, INITIAL_WINDOW = 3, 4
+MIB = 1 << 20
+
+
+def frame(kind, flags, stream, payload=b""):
+    return struct.pack(">I", len(payload))[1:] + bytes([kind, flags]) + struct.pack(">I", stream) + payload
+
+
+def literal(name, value):
+    return b"\0" + bytes([len(name)]) + name + bytes([len(value)]) + value
+
+
+def call(method):
+    """The headers of a call, POST and http."""
+    return (b"\x83\x86" + literal(b":path", b"/lpdeform.v1.DeformService/" + method) + literal(b":authority", b"x") +
+            literal(b"content-type", b"application/grpc") + literal(b"te", b"trailers"))
+
+
+class Attacker:
+    """A connection that answers pings and settings and keeps to windows, and to nothing else. `answers`: whether it does even that;
+    limits that were not acknowledged are not in force."""
+
+    def __init__(self, port, answers=True):
+        self.socket = socket.create_connection(("127.0.0.1", port), programs.PATIENCE)
+        self.lock = threading.Condition()
+        self.answers = answers
+        self.settings, self.windows, self.initial, self.left, self.is_over = {}, {0: 65535}, 65535, 0, threading.Event()
+        self.send(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + frame(SETTINGS, 0, 0))
+        threading.Thread(target=self.read, daemon=True).start()
+
+    def send(self, data):
+        """False where the other side has closed the connection."""
+        try:
+            self.socket.sendall(data)
+            return True
+        except OSError:
+            self.is_over.set()
+            return False
+
+    def read(self):
+        waiting = b""
+        with contextlib.suppress(OSError):
+            while data := self.socket.recv(65536):
+                waiting += data
+                while len(waiting) >= 9 and len(waiting) >= 9 + (size := int.from_bytes(waiting[:3], "big")):
+                    self.take(waiting[3], waiting[4], int.from_bytes(waiting[5:9], "big"), waiting[9:9 + size])
+                    waiting = waiting[9 + size:]
+        self.is_over.set()
+        with self.lock:
+            self.lock.notify_all()
+
+    def take(self, kind, flags, stream, payload):
+        if kind == PING and not flags & ACK and self.answers:
+            self.send(frame(PING, ACK, 0, payload))
+        with self.lock:
+            if kind == SETTINGS and not flags & ACK and self.answers:
+                told = dict(struct.iter_unpack(">HI", payload))
+                grown = told.get(INITIAL_WINDOW, self.initial) - self.initial
+                self.initial += grown
+                self.windows = {key: size + (grown if key else 0) for key, size in self.windows.items()}
+                self.send(frame(SETTINGS, ACK, 0))
+                self.settings |= told
+            if kind == WINDOW_UPDATE:
+                self.windows[stream] = self.windows.get(stream, 0) + int.from_bytes(payload, "big")
+            if kind == RST_STREAM:
+                self.windows.pop(stream, None)
+            self.lock.notify_all()
+
+    def told(self, setting):
+        with self.lock:
+            self.lock.wait_for(lambda: setting in self.settings, programs.PATIENCE)
+            return self.settings[setting]
+
+    def fill(self, streams, size, seconds):
+        """Sends messages that say they have `size` bytes and lack the last, as far as windows let it; the bytes sent."""
+        sent, heads = 0, {}
+        for stream in streams:
+            heads[stream] = b"\0" + struct.pack(">I", size)
+            with self.lock:
+                self.windows[stream] = self.initial
+            self.send(frame(HEADERS, END_HEADERS, stream, call(b"UploadPart")))
+        left = dict.fromkeys(streams, size + 4)
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and not self.is_over.is_set():
+            with self.lock:
+                able = [s for s in left if min(left[s], self.windows.get(s, 0), self.windows[0]) >= 5]
+                if not able:
+                    self.lock.wait(0.05)
+                    continue
+                parts = []
+                for stream in able:
+                    room = min(16384, self.windows[stream], self.windows[0], left[stream])
+                    if room < 5:  # the head goes in one piece
+                        continue
+                    parts.append(frame(DATA, 0, stream, (heads.pop(stream, b"") + bytes(room))[:room]))
+                    for of in (stream, 0):
+                        self.windows[of] -= room
+                    left[stream] -= room
+                    sent += room
+            self.send(b"".join(parts))
+        return sent
+
+    def reset(self, count):
+        """Begins calls and takes them back at once; how many were sent before the other side closed the connection."""
+        headers, stream = call(b"ListSessions"), 1
+        while stream < 2 * count and not self.is_over.is_set():
+            burst = range(stream, stream + 200, 2)
+            if not self.send(b"".join(frame(HEADERS, END_HEADERS, one, headers) + frame(RST_STREAM, 0, one, b"\0\0\0\x08")
+                                      for one in burst)):
+                break
+            stream += 200
+        return stream // 2
+
+    def endless_headers(self, most_bytes):
+        """One block of headers that goes on and on; the bytes sent."""
+        small = literal(b"a", b"1")
+        block = frame(CONTINUATION, 0, 1, small * (16000 // len(small)))
+        sent = 0
+        self.send(frame(HEADERS, 0, 1, small))
+        while sent < most_bytes and not self.is_over.is_set() and self.send(8 * block):
+            sent += 8 * len(block)
+        return sent
+
+    def close(self):
+        self.socket.close()
+
+
+class Flooded(programs.OnShapes):
+    def serve(self, *arguments):
+        server = programs.RunningServer("--admin-address", "127.0.0.1:0", "--log-level", "off", *arguments)
+        self.addCleanup(server.stop)
+        self.flooded, self.port = server, int(server.address.rsplit(":", 1)[1])
+        return self.memory()
+
+    def attack(self, port=None, answers=True):
+        attacker = Attacker(port or self.port, answers)
+        self.addCleanup(attacker.close)
+        return attacker
+
+    def memory(self):
+        """Of the server, in bytes."""
+        status = programs.read_text(f"/proc/{self.flooded.process.pid}/status")
+        return next(int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith("VmRSS"))
+
+    def admin(self, path):
+        with urllib.request.urlopen(self.flooded.admin + path, timeout=programs.PATIENCE) as answer:
+            return answer.read().decode()
+
+    def calls_started(self, method):
+        return sum(float(line.rsplit(" ", 1)[1]) for line in self.admin("/metrics").splitlines()
+                   if line.startswith("grpc_server_call_started") and f'/{method}"' in line)
+
+    def serves(self, port=None):
+        return programs.run("deform", self.at("bar.off"), "--handles", self.at("bar.json"), "--server",
+                            f"127.0.0.1:{port or self.port}").returncode == 0
+
+
+class TheServerAlone(Flooded):
+    def test_messages_that_never_end_take_what_the_calls_of_a_connection_may_and_no_more(self):
+        before = self.serve("--max-calls-per-connection", "8")
+        attacker = self.attack()
+        self.assertEqual(attacker.told(MAX_CONCURRENT_STREAMS), 8)
+        sent = attacker.fill(range(1, 17, 2), 4 * MIB - 5, 2)
+        self.assertGreater(sent, 8 * MIB)
+        self.assertLess(self.memory() - before, 8 * 4 * MIB + 32 * MIB)
+        greedy = self.attack()
+        greedy.told(MAX_CONCURRENT_STREAMS)
+        greedy.fill(range(1, 129, 2), 4 * MIB - 5, 2)  # more than it was told
+        self.assertLess(self.memory() - before, 2 * 8 * 4 * MIB + 32 * MIB)
+        self.assertTrue(self.serves())
+
+    def test_connections_that_only_answer_pings_are_closed(self):
+        self.serve("--connection-idle", "1")
+        attacker = self.attack()
+        self.assertTrue(attacker.is_over.wait(programs.PATIENCE))
+
+    def test_a_connection_has_so_many_calls_and_an_address_so_many_connections(self):
+        self.serve("--max-connections-per-address", "2", "--max-calls-per-connection", "7")
+        first, second, third = self.attack(), self.attack(), self.attack()
+        self.assertEqual(first.told(MAX_CONCURRENT_STREAMS), 7)
+        self.assertEqual(second.told(MAX_CONCURRENT_STREAMS), 7)
+        self.assertTrue(third.is_over.wait(programs.PATIENCE))
+
+
+class BehindEnvoy(Flooded):
+    """As deploy/web ships it: against what Debian's gRPC has no cure for."""
+
+    def serve_behind_envoy(self):
+        before = self.serve()
+        envoy_port = free_port()
+        envoy = subprocess.Popen([os.path.join(ROOT, "deploy", "web"), "--web", f"127.0.0.1:{envoy_port}", "--server",
+                                  self.flooded.address, "--files", "none", "--access-log", "/dev/null"])
+        self.addCleanup(envoy.wait)
+        self.addCleanup(envoy.terminate)
+        end = time.monotonic() + programs.PATIENCE
+        while not self.serves(envoy_port):
+            self.assertLess(time.monotonic(), end, "Envoy does not reach the server")
+            time.sleep(0.1)
+        return before, envoy_port
+
+    def test_calls_that_are_taken_back_at_once_end_at_envoy(self):
+        before, port = self.serve_behind_envoy()
+        begun = self.calls_started("ListSessions")
+        tried = sum(self.attack(port).reset(20_000) for _ in range(5))
+        self.assertTrue(self.serves(port))
+        reached = self.calls_started("ListSessions") - begun
+        self.assertLess(reached, tried / 2, f"of {tried}")
+        self.assertLess(reached, 20_000)
+        self.assertLess(self.memory() - before, 64 * MIB)
+        self.assertIn('"serving"', self.admin("/livez"))
+
+    def test_headers_without_end_end_at_envoy(self):
+        before, port = self.serve_behind_envoy()
+        for _ in range(5):
+            attacker = self.attack(port, answers=False)
+            self.assertLess(attacker.endless_headers(64 * MIB), 32 * MIB)
+            self.assertTrue(attacker.is_over.wait(programs.PATIENCE))
+        self.assertTrue(self.serves(port))
+        self.assertLess(self.memory() - before, 32 * MIB)
+
+
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        return listening.getsockname()[1]
+
+
+if __name__ == "__main__":
+    programs.main()
