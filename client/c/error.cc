@@ -1,6 +1,5 @@
 #include "client/c/error.h"
 
-#include <cstring>
 #include <string>
 #include <string_view>
 
@@ -21,8 +20,8 @@ void copy_text(std::string_view text, char* into, std::size_t size) {
   if (length >= size) length = size - 1 - end.size();
   while (length > 0 && length < text.size() && (static_cast<unsigned char>(text[length]) & 0xC0) == 0x80)
     --length;
-  std::memcpy(into, text.data(), length);
-  std::memcpy(into + length, end.data(), end.size());
+  text.copy(into, length);
+  end.copy(into + length, end.size());
   into[length + end.size()] = '\0';
 }
 

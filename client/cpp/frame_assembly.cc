@@ -33,6 +33,7 @@ void append_numbers(const std::string& bytes, std::vector<T>& out) {
 template <typename Integer>
 std::vector<std::array<Integer, 4>> quantized(const std::string& bytes, std::size_t count,
                                               bool is_compressed) {
+  if (count == 0) return {};
   std::vector<std::array<Integer, 4>> out(count);
   constexpr std::size_t size = sizeof(out[0]);
   if (is_compressed) {

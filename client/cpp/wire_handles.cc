@@ -24,7 +24,7 @@ absl::Status unpack(const v1::Buffer& buffer, const std::string& what, std::vect
   const std::string& bytes = buffer.inline_();
   if (bytes.size() % sizeof(Number) != 0) return wrong_length(what);
   out.resize(bytes.size() / sizeof(Number));
-  std::memcpy(out.data(), bytes.data(), bytes.size());
+  if (!out.empty()) std::memcpy(out.data(), bytes.data(), bytes.size());
   return absl::OkStatus();
 }
 
