@@ -70,7 +70,7 @@ Field narrowness(const RestShape& shape, const Eigen::Matrix3d& axes, const Eige
     const Field girth = girth_along(shape, axes.row(k));
     result.array() *= (girth.array() / kNarrow).max(kLeastGirth).min(1).pow(-kNarrowing * shares[k]);
   }
-  return result;
+  return result.array().min(std::pow(kLeastGirth, -kNarrowing));  // where several axes are narrow: as one
 }
 
 }  // namespace

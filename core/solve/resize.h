@@ -42,7 +42,7 @@ struct ResizeInputs {
 /// highest along each axis whose scale is not 1, at their scaled positions; where all are 1, the ends along
 /// the first axis. The material is p = 1 and the stiffness
 ///
-///   s_i = 100^salience_i prod_k clamp(girth_ik / 0.75, 1/6, 1)^(-4 a_k),    a_k = |log scale_k| / max_j |log scale_j|
+///   s_i = 100^salience_i min(6^4, prod_k clamp(girth_ik / 0.75, 1/6, 1)^(-4 a_k)),    a_k = |log scale_k| / max_j |log scale_j|
 ///
 /// with the salience of core/analysis/salience.h for the axes, weighted a_k, and the girth of core/analysis/girth.h
 /// along axis k. A stretch goes where a cut costs least: without the second factor that is close to the ends, where

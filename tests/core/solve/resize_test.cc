@@ -147,6 +147,19 @@ TEST(Resize, HoldsTheSameVerticesWithTheSameMaterialWhileOneScaleIsDragged) {
   EXPECT_EQ(a.material, b.material);
 }
 
+// A spindle whose tips are narrow along every axis.
+TEST(Resize, OfAllAxesAtOnceKeepsStiffnessInRange) {
+  TriangleMesh spindle = box_surface(6, 6, 60);
+  for (auto x : spindle.vertices.rowwise()) {
+    const double thick = 1.01 - std::abs(x[2] - 30) / 30;
+    x = Eigen::RowVector3d(thick * (x[0] - 3), thick * (x[1] - 3), x[2] - 30);
+  }
+  const auto turn = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), Eigen::Vector3d::Ones());
+  spindle.vertices = (spindle.vertices * turn.toRotationMatrix().transpose()).eval();
+  const Material material = inputs_for(spindle, along(2, 2, 2)).material;
+  EXPECT_TRUE(check_material(material, static_cast<std::int32_t>(spindle.vertices.rows())).ok());
+}
+
 TEST(Resize, RefusesWhatIsOutOfRange) {
   const ShapeFeatures features(rest_shape(box_surface(1, 1, 2)));
   const auto reason = [&](const Scaling& scaling) {
