@@ -219,6 +219,7 @@ void Backend::acquire_writer(const CallContext& call, const v1::AcquireWriterReq
                              v1::AcquireWriterResponse& response, Done done) {
   const auto session = find(call, Access::kChange, request.session());
   if (!session.ok()) return done(session.status());
+  if (keeper_ && keeper_->is_failing()) return done(store_failing("it has not taken the last change yet"));
   const WriterLease lease = (*session)->acquire_writer();
   response.set_writer_token(lease.token);
   response.set_epoch(lease.epoch);

@@ -49,13 +49,7 @@ void Keeper::due(const std::string& name) {
 
 void Keeper::add(std::shared_ptr<Session> session, StoredHead head, const std::string& request_id,
                  OnDone on_done) {
-  {
-    std::unique_lock lock(mutex_);
-    if (is_failing_) {
-      lock.unlock();
-      return on_done(store_failing("it has not taken the last change yet"));
-    }
-  }
+  if (is_failing()) return on_done(store_failing("it has not taken the last change yet"));
   Entry entry;
   entry.session = std::move(session);
   entry.head = std::move(head.part);
@@ -209,6 +203,11 @@ bool Keeper::is_leaving(const std::string& name) const {
   const std::scoped_lock lock(mutex_);
   const auto found = entries_.find(name);
   return found != entries_.end() && found->second.session != nullptr && !is_failing_;
+}
+
+bool Keeper::is_failing() const {
+  const std::scoped_lock lock(mutex_);
+  return is_failing_;
 }
 
 bool Keeper::is_being_removed(const std::string& name) const {

@@ -65,6 +65,9 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   /// Nobody has used it here for so long that it goes; not from the store where somebody else has it meanwhile.
   void expire(const Session& session);
 
+  /// The store did not take the last change: what has to be kept before it is answered is better not begun.
+  bool is_failing() const;
+
   /// It was, and the store may not know yet.
   bool is_being_removed(const std::string& name) const;
 

@@ -125,7 +125,7 @@ const std::string kCommit =
 /// That somebody wants a session is remembered for so many milliseconds.
 const std::string kWanted = "1000";
 
-/// ARGV: holder, owner, lease, route, stays. -1: none; -2 and its route: held by another, or for another; else the hash, in
+/// ARGV: holder, owner, lease, route, stays, by how much the epoch rises. -1: none; -2 and its route: held by another, or for another; else the hash, in
 /// the new epoch. `until`: it is in use; `alive`: its holder lives; `since`: it came; `stays`: for so long at least.
 const std::string kTakeOver =
     kAlways + kNow +
@@ -149,7 +149,7 @@ const std::string kTakeOver =
     "if is_wanted and has[4] ~= ARGV[1] then return {-2, route} end "
     "local is_back_soon = is_wanted and now - number('since') < 4 * stays; "
     "stays = is_back_soon and math.min(2 * stays, 32 * ARGV[5]) or tonumber(ARGV[5]); "
-    "redis.call('HINCRBY', KEYS[1], 'epoch', 1); "
+    "redis.call('HINCRBY', KEYS[1], 'epoch', ARGV[6]); "
     "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'until', now + ARGV[3], 'alive', now + ARGV[3], 'since', "
     "now, "
     "'stays', stays); "
@@ -295,7 +295,8 @@ absl::StatusOr<std::vector<ChangeOutcome>> RedisStore::commit(std::span<const St
 absl::StatusOr<StoredSession> RedisStore::take_over(const std::string& session, const std::string& owner,
                                                     const std::string& route) {
   Command command = script(kTakeOver, session);
-  command.insert(command.end(), {holder_, owner, lease(), route, absl::StrCat(options_.stays.count())});
+  command.insert(command.end(), {holder_, owner, lease(), route, absl::StrCat(options_.stays.count()),
+                                 absl::StrCat(kEpochsOfALife)});
   const std::scoped_lock lock(reading_);
   const auto reply = reader_.run(command);
   if (!reply.ok()) return reply.status();

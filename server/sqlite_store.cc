@@ -300,16 +300,18 @@ absl::StatusOr<StoredSession> SqliteStore::take_over(const std::string& session,
   const auto row = find.step();
   if (!row.ok()) return row.status();
   StoredSession found;
+  std::uint64_t epoch_before = 0;
   if (*row) {
     found.owner = find.text(0);
-    found.epoch = static_cast<std::uint64_t>(find.number(1)) + 1;
+    epoch_before = static_cast<std::uint64_t>(find.number(1));
+    found.epoch = epoch_before + kEpochsOfALife;
     find.reset();
   }
   if (!*row || found.owner != owner) return session_unknown();
   auto parts = this->parts(session);
   if (!parts.ok()) return parts.status();
   found.parts = *std::move(parts);
-  StoredChange next{.session = session, .epoch_before = found.epoch - 1, .epoch = found.epoch};
+  StoredChange next{.session = session, .epoch_before = epoch_before, .epoch = found.epoch};
   if (const auto is_ours = advance(next); !is_ours.ok()) return is_ours.status();
   if (absl::Status status = transaction->commit(); !status.ok()) return status;
   return found;

@@ -53,6 +53,10 @@ struct TouchedSession {
   bool is_being_made = false;  // taken over, and not yet there: nobody is given it meanwhile
 };
 
+/// By so much take_over() raises a session's epoch. The process before may have begun epochs that the store never heard of, as
+/// writers came while it failed: these are never begun again.
+inline constexpr std::uint64_t kEpochsOfALife = 1'000'000;
+
 /// What became of a change.
 enum class ChangeOutcome {
   kKept,
@@ -84,7 +88,7 @@ class Store {
   /// Makes the changes, at best all at once. One outcome for each.
   virtual absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) = 0;
 
-  /// The session, from now on in a new epoch, so that whoever had it is fenced off: their changes are refused.
+  /// The session, from now on in a new epoch, kEpochsOfALife above the one that is kept, so that whoever had it is fenced off: their changes are refused.
   /// NOT_FOUND SESSION_UNKNOWN, also where it is not the owner's; SESSION_DAMAGED where it cannot be read; UNAVAILABLE
   /// SESSION_ELSEWHERE while another process has it in use, and to who comes by another way than its callers do (`route`) as long
   /// as that process lives. To who comes by theirs it is given: the process that has it learns from touch() that it is wanted.

@@ -140,6 +140,34 @@ TEST_F(StoreFaultsTest, WhileItFailsANewWriterAndADeletionAreNotConfirmed) {
   EXPECT_EQ(details_of(get(session.session().name(), found)).info.reason(), "SESSION_UNKNOWN");
 }
 
+TEST_F(StoreFaultsTest, WhileItIsKnownToFailTheWriterStaysTheWriter) {
+  const auto session = create(mesh_);
+  faults_->set_failing(true);
+  EXPECT_FALSE(take(session, ends_message(mesh_.vertices, 1, 1)).kept());
+  v1::AcquireWriterRequest acquire;
+  acquire.set_session(session.session().name());
+  v1::AcquireWriterResponse lease;
+  grpc::ClientContext context;
+  EXPECT_EQ(details_of(stub_->AcquireWriter(&context, acquire, &lease)).info.reason(), "STORE_FAILING");
+  EXPECT_TRUE(update(session, tip_message(2, 0.1)).ok());
+}
+
+TEST_F(StoreFaultsTest, AnEpochThatTheStoreNeverHeardOfIsNotBegunAgainByTheNextServer) {
+  const auto session = create(mesh_);
+  faults_->set_failing(true);  // which shows with the first that it does not take
+  v1::AcquireWriterRequest acquire;
+  acquire.set_session(session.session().name());
+  v1::AcquireWriterResponse lease;
+  grpc::ClientContext context;
+  EXPECT_EQ(details_of(stub_->AcquireWriter(&context, acquire, &lease)).info.reason(), "STORE_FAILING");
+  v1::Session before, after;
+  ASSERT_TRUE(get(session.session().name(), before).ok());
+  EXPECT_GT(before.epoch(), session.session().epoch());  // its frames have been seen
+  restart();
+  ASSERT_TRUE(get(session.session().name(), after).ok());
+  EXPECT_GT(after.epoch(), before.epoch());
+}
+
 TEST_F(StoreFaultsTest, WhileItHangsUpdatesAreAnsweredSoonAndKeptLater) {
   const auto session = create(mesh_);
   ASSERT_TRUE(take(session, ends_message(mesh_.vertices, 1, 1)).kept());

@@ -42,6 +42,9 @@ class Folder {
   std::string path_;
 };
 
+/// The epoch of a session in its first, once it was taken over.
+constexpr std::uint64_t kSecondLife = 1 + kEpochsOfALife;
+
 StoredChange beginning(const std::string& name) {
   return {.session = name,
           .epoch = 1,
@@ -127,7 +130,7 @@ TEST_P(StoreTest, ReplacesAllPartsWhereItIsToldTo) {
 
 TEST_P(StoreTest, WhoeverTakesASessionOverFencesTheOneBeforeOff) {
   ASSERT_TRUE(commit(*store_, beginning("a")).ok());
-  EXPECT_EQ(store_->take_over("a", "anna")->epoch, 2u);
+  EXPECT_EQ(store_->take_over("a", "anna")->epoch, kSecondLife);
   const StoredChange old{.session = "a", .epoch_before = 1, .epoch = 1, .parts = {{"inputs", "old"}}};
   EXPECT_EQ(*commit(*store_, old), ChangeOutcome::kFenced);
   ASSERT_TRUE(commit(*store_, beginning("gone")).ok());
@@ -135,7 +138,7 @@ TEST_P(StoreTest, WhoeverTakesASessionOverFencesTheOneBeforeOff) {
   const StoredChange removed{.session = "gone", .epoch_before = 1, .epoch = 1};
   EXPECT_EQ(*commit(*store_, removed), ChangeOutcome::kFenced);
   const auto found = store_->take_over("a", "anna");
-  EXPECT_EQ(found->epoch, 3u);
+  EXPECT_EQ(found->epoch, kSecondLife + kEpochsOfALife);
   EXPECT_EQ(found->parts.at("inputs"), "1");
 }
 
@@ -143,7 +146,7 @@ TEST_P(StoreTest, FindsSessionsOfTheirOwnerOnly) {
   ASSERT_TRUE(commit(*store_, beginning("a")).ok());
   EXPECT_EQ(reason(store_->take_over("a", "bert").status()), "SESSION_UNKNOWN");
   EXPECT_EQ(reason(store_->take_over("b", "anna").status()), "SESSION_UNKNOWN");
-  EXPECT_EQ(store_->take_over("a", "anna")->epoch, 2u);  // looking was no taking over
+  EXPECT_EQ(store_->take_over("a", "anna")->epoch, kSecondLife);  // looking was no taking over
 }
 
 TEST_P(StoreTest, ListsTheOwnersSessionsByName) {
@@ -303,7 +306,7 @@ TEST_F(RedisStoreTest, ASessionInUseIsHeldUntilItIsLetGo) {
   ASSERT_TRUE(second->let_go("a", 1).ok());  // it is not the second's to let go
   EXPECT_FALSE(second->take_over("a", "anna").ok());
   ASSERT_TRUE(first->let_go("a", 1).ok());
-  EXPECT_EQ(second->take_over("a", "anna")->epoch, 2u);
+  EXPECT_EQ(second->take_over("a", "anna")->epoch, kSecondLife);
 }
 
 TEST_F(RedisStoreTest, WhoIsRefusedLearnsTheWayAndWhoComesThatWayIsGivenIt) {
@@ -437,8 +440,8 @@ TEST_F(HandOverTest, LettingGoOfAnEarlierEpochIsTooLate) {
   ASSERT_EQ(ask(*first_, "the way"), "");
   ASSERT_TRUE(first_->let_go("a", 1).ok());  // of the epoch before
   EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
-  ASSERT_TRUE(first_->let_go("a", 2).ok());
-  const std::vector<TouchedSession> late{{"a", 2, true}};
+  ASSERT_TRUE(first_->let_go("a", kSecondLife).ok());
+  const std::vector<TouchedSession> late{{"a", kSecondLife, true}};
   EXPECT_EQ(first_->touch(late)->lost, std::vector<std::string>{"a"});
   EXPECT_EQ(ask(*second_, "the way"), "");
 }
@@ -446,7 +449,8 @@ TEST_F(HandOverTest, LettingGoOfAnEarlierEpochIsTooLate) {
 TEST_F(HandOverTest, WhatHasExpiredForTheHolderBeforeIsNotRemoved) {
   ASSERT_TRUE(first_->let_go("a", 1).ok());
   ASSERT_EQ(ask(*second_, "the way"), "");
-  const StoredChange expiry{.session = "a", .epoch_before = 3, .is_removal = true, .is_expiry = true};
+  const StoredChange expiry{
+      .session = "a", .epoch_before = kSecondLife + kEpochsOfALife, .is_removal = true, .is_expiry = true};
   EXPECT_EQ(*commit(*first_, expiry), ChangeOutcome::kFenced);
   EXPECT_EQ(ask(*second_, "the way"), "");
   EXPECT_EQ(*commit(*second_, expiry), ChangeOutcome::kKept);
@@ -462,13 +466,14 @@ TEST_F(RedisStoreTest, ALeaseThatNobodyRenewsEndsAndItsHolderIsFencedOff) {
     taken = second->take_over("a", "anna");
   } while (reason(taken.status()) == "SESSION_ELSEWHERE");
   ASSERT_TRUE(taken.ok());
-  for (const std::uint64_t epoch : {1, 2}) {  // also where it makes up the same next epoch
+  for (const std::uint64_t epoch :
+       {std::uint64_t{1}, kSecondLife}) {  // also where it makes up the same next epoch
     const StoredChange late{.session = "a", .epoch_before = 1, .epoch = epoch, .parts = {{"inputs", "late"}}};
     EXPECT_EQ(*commit(*first, late), ChangeOutcome::kFenced);
   }
   const std::vector<TouchedSession> sessions{{"a", 1, true}};
   EXPECT_EQ(first->touch(sessions)->lost, std::vector<std::string>{"a"});
-  const std::vector<TouchedSession> held{{"a", 2, true}};
+  const std::vector<TouchedSession> held{{"a", kSecondLife, true}};
   EXPECT_TRUE(second->touch(held)->lost.empty());
   EXPECT_EQ(second->take_over("a", "anna")->parts.at("inputs"), "1");
 }
@@ -612,7 +617,7 @@ TEST_F(RedisStoreTest, TheTimeThatRedisWasAwayOrNoServerRanDoesNotCountAsWithout
   EXPECT_EQ(*store->find_request("anna", "request"), "a");
   EXPECT_EQ(*store->blob(key), "mesh");
   ASSERT_TRUE(store->let_go("a", 1).ok());
-  EXPECT_EQ(open()->take_over("a", "anna")->epoch, 2u);
+  EXPECT_EQ(open()->take_over("a", "anna")->epoch, kSecondLife);
 }
 
 StoredChange next_of(const StoredChange& made) {
@@ -706,14 +711,14 @@ TEST_F(RedisStoreTest, WhatExpiresForOneThatHadItBeforeStaysWithTheOneThatHasIt)
   while (!taken.ok());
   const StoredChange expiry{.session = "a", .epoch_before = 1, .is_removal = true, .is_expiry = true};
   EXPECT_EQ(*commit(*before, expiry), ChangeOutcome::kFenced);
-  const std::vector<TouchedSession> used{{"a", 2, true, 0}};
+  const std::vector<TouchedSession> used{{"a", kSecondLife, true, 0}};
   EXPECT_TRUE(now->touch(used)->lost.empty());
   EXPECT_EQ(*commit(*now, expiry), ChangeOutcome::kFenced);  // it has it again, in a later epoch
   redis.run({"FLUSHALL"});
   EXPECT_TRUE(commit(*before, expiry).ok());
   EXPECT_EQ(now->touch(used)->missing, std::vector<std::string>{"a"});
   StoredChange next = next_of(made);
-  next.epoch_before = next.epoch = 2;
+  next.epoch_before = next.epoch = kSecondLife;
   EXPECT_EQ(*commit(*now, anew(next)), ChangeOutcome::kKept);
 }
 
@@ -750,12 +755,12 @@ TEST_F(RedisStoreTest, AHolderOfALaterEpochWinsOverARedisThatWentBack) {
   redis_.stop();
   redis_.go_back_to(folder_.path() + "/saved");
   redis_.start();
-  const std::vector<TouchedSession> before{{"a", 1, true, 0}}, after{{"a", 2, true, 0}};
+  const std::vector<TouchedSession> before{{"a", 1, true, 0}}, after{{"a", kSecondLife, true, 0}};
   while (!second->touch(kNone).ok()) {  // once to see that the connection is gone
   }
   EXPECT_EQ(second->touch(after)->missing, std::vector<std::string>{"a"});
   StoredChange next = next_of(made);
-  next.epoch_before = next.epoch = 2;
+  next.epoch_before = next.epoch = kSecondLife;
   absl::StatusOr<ChangeOutcome> outcome;
   do outcome = commit(*second, anew(next));
   while (!outcome.ok());
