@@ -9,14 +9,15 @@ import subprocess
 P = (1, 1.5, 2, 6)
 THREADS = (1, 2)
 LARGE = 500_000  # vertices, from which on two threads alone are measured
-COLUMNS = (("set-up", "setup"), ("iteration", "iteration"), ("to 1 %", "to_1_percent"), ("to 0.1 %", "to_01_percent"),
-           ("handle change", "handle_change"))
+COLUMNS = (("set-up", "setup"), ("iteration", "iteration"), ("to 5 %", "to_5_percent"), ("to 1 %", "to_1_percent"),
+           ("to 0.1 %", "to_01_percent"), ("handle change", "handle_change"))
 COLOURS = {1: "#c0392b", 1.5: "#d68910", 2: "#2471a3", 6: "#1e8449"}
 
 
 def measure(program, mesh, threads, seconds, known=()):
-    """`known` are runs of the same solves, to the last bit, by more threads: what they found where they ended."""
-    energies = [row["energy"] if row["stop"] != "time_limit" else 0 for row in known]
+    """`known` are runs of the same solves, to the last bit, by other threads or for longer: what they found where they ended."""
+    ended = {row["p"]: row["energy"] for row in known if row["stop"] != "time_limit"}
+    energies = [ended.get(p, 0) for p in P]
     command = [program, "solve", mesh, ",".join(map(str, P)), threads, seconds] + (
         [",".join(f"{energy:.17g}" for energy in energies)] if known else [])
     lines = subprocess.run([str(part) for part in command], check=True, capture_output=True, text=True).stdout
@@ -29,6 +30,10 @@ def shown(seconds):
         return "-"
     value, unit = (seconds, "s") if seconds >= 1 else (1e3 * seconds, "ms")
     return f"{value:.3g} {unit}" if value < 1000 else f"{value:.0f} {unit}"
+
+
+def about(vertices, size):
+    return 0.8 < vertices / size < 1.25
 
 
 def growth(rows, key):
@@ -106,16 +111,19 @@ def main():
     parser.add_argument("--sizes", default="1000,10000,100000,1000000", help="vertices, about")
     parser.add_argument("--seconds", type=float, default=60, help="of a solve, at most")
     parser.add_argument("--large-seconds", type=float, default=120, help="the same from 500,000 vertices on")
+    parser.add_argument("--longer", type=pathlib.Path, help="lines of JSON that scale_bench wrote of longer solves of these meshes")
     parser.add_argument("--picture", type=pathlib.Path, help="where to draw the times to 1 %% and of set-up, as .svg")
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
+    longer = [json.loads(line) for line in options.longer.read_text().splitlines()] if options.longer else []
     rows = []
     for size in map(int, options.sizes.split(",")):
         mesh = options.work / f"creature_{size}.ply"
         if not mesh.exists():
             subprocess.run([str(options.program), "make", str(mesh), str(size)], check=True)
         large = size >= LARGE
-        several = measure(options.program, mesh, max(THREADS), options.large_seconds if large else options.seconds)
+        several = measure(options.program, mesh, max(THREADS), options.large_seconds if large else options.seconds,
+                          [row for row in longer if about(row["vertices"], size)])
         rows += ([] if large else measure(options.program, mesh, 1, options.seconds, several)) + several
         (options.work / "results.json").write_text(json.dumps(rows, indent=1))
     text = table(rows, options.seconds, options.large_seconds)
