@@ -101,8 +101,8 @@ def run(book: Book, seed: int, seconds: float, mode: str | None) -> None:
         for one in (*onlookers, *writers):
             one.finish()
         reference(book, port, results_to_check(book.history, writers))
-        with Wire(port, "last") as wire:
-            for writer in writers:
+        for writer in writers:
+            with Wire(port, writer.seed) as wire:
                 wire.patiently("DeleteSession", service_pb2.DeleteSessionRequest(session=writer.name))
         book.note("memory", when="after", **wait_until_empty(world))
     finally:
