@@ -85,7 +85,13 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
  public:
   using FrameCall::FrameCall;
 
-  void begin() { read(); }
+  void begin() {
+    read();
+    // gRPC holds what has come of a message, up to its 4 MiB, before anybody knows who sends it.
+    backend_.timers->at(backend_.timers->now() + backend_.heartbeat(), [weak = this->weak_from_this()] {
+      if (const auto self = std::static_pointer_cast<DeformCall>(weak.lock())) self->give_up_unopened();
+    });
+  }
 
   void OnReadDone(bool ok) override {
     bool is_open = true;
@@ -132,6 +138,12 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   /// A client that sends no more may go on reading; one that never opened has nothing to read.
   void end_of_input(bool is_open) {
     if (!is_open) break_off("The stream ended before it was opened.");
+  }
+
+  void give_up_unopened() {
+    const std::scoped_lock lock(mutex_);
+    if (is_open_) return;
+    refuse_locked(not_in_contract("The stream was not opened within the time of a heartbeat."));
   }
 
   void post(void (DeformCall::*task)()) {
@@ -202,7 +214,11 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   /// The client does not keep to the contract: reads no more, and says so.
   void break_off(const std::string& why) {
     if (open_.stream) return open_.stream->end(EndReason::kProtocolError, why);
-    refuse(invalid_input({"STREAM_PROTOCOL", "", ""}, why));
+    refuse(not_in_contract(why));
+  }
+
+  static absl::Status not_in_contract(const std::string& why) {
+    return invalid_input({"STREAM_PROTOCOL", "", ""}, why);
   }
 
   Received<v1::DeformRequest> received_;

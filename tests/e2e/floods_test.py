@@ -87,14 +87,14 @@ class Attacker:
             self.lock.wait_for(lambda: setting in self.settings, programs.PATIENCE)
             return self.settings[setting]
 
-    def fill(self, streams, size, seconds):
+    def fill(self, streams, size, seconds, method=b"UploadPart"):
         """Sends messages that say they have `size` bytes and lack the last, as far as windows let it; the bytes sent."""
         sent, heads = 0, {}
         for stream in streams:
             heads[stream] = b"\0" + struct.pack(">I", size)
             with self.lock:
                 self.windows[stream] = self.initial
-            self.send(frame(HEADERS, END_HEADERS, stream, call(b"UploadPart")))
+            self.send(frame(HEADERS, END_HEADERS, stream, call(method)))
         left = dict.fromkeys(streams, size + 4)
         end = time.monotonic() + seconds
         while time.monotonic() < end and not self.is_over.is_set():
@@ -153,18 +153,18 @@ class Flooded(programs.OnShapes):
         self.addCleanup(attacker.close)
         return attacker
 
-    def memory(self):
-        """Of the server, in bytes."""
-        status = programs.read_text(f"/proc/{self.flooded.process.pid}/status")
+    def memory(self, process=None):
+        """Of the server, or of this process, in bytes."""
+        status = programs.read_text(f"/proc/{(process or self.flooded.process).pid}/status")
         return next(int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith("VmRSS"))
 
     def admin(self, path):
         with urllib.request.urlopen(self.flooded.admin + path, timeout=programs.PATIENCE) as answer:
             return answer.read().decode()
 
-    def calls_started(self, method):
+    def calls(self, what, method):
         return sum(float(line.rsplit(" ", 1)[1]) for line in self.admin("/metrics").splitlines()
-                   if line.startswith("grpc_server_call_started") and f'/{method}"' in line)
+                   if line.startswith(f"grpc_server_{what}") and f'/{method}"' in line)
 
     def serves(self, port=None):
         return programs.run("deform", self.at("bar.off"), "--handles", self.at("bar.json"), "--server",
@@ -201,13 +201,13 @@ class TheServerAlone(Flooded):
 class BehindEnvoy(Flooded):
     """As deploy/web ships it: against what Debian's gRPC has no cure for."""
 
-    def serve_behind_envoy(self):
-        before = self.serve()
+    def serve_behind_envoy(self, *arguments):
+        before = self.serve("--heartbeat", "1")
         envoy_port = free_port()
-        envoy = subprocess.Popen([os.path.join(ROOT, "deploy", "web"), "--web", f"127.0.0.1:{envoy_port}", "--server",
-                                  self.flooded.address, "--files", "none", "--access-log", "/dev/null"])
-        self.addCleanup(envoy.wait)
-        self.addCleanup(envoy.terminate)
+        self.envoy = subprocess.Popen([os.path.join(ROOT, "deploy", "web"), "--web", f"127.0.0.1:{envoy_port}", "--server",
+                                       self.flooded.address, "--files", "none", "--access-log", "/dev/null", *arguments])
+        self.addCleanup(self.envoy.wait)
+        self.addCleanup(self.envoy.terminate)
         end = time.monotonic() + programs.PATIENCE
         while not self.serves(envoy_port):
             self.assertLess(time.monotonic(), end, "Envoy does not reach the server")
@@ -216,14 +216,36 @@ class BehindEnvoy(Flooded):
 
     def test_calls_that_are_taken_back_at_once_end_at_envoy(self):
         before, port = self.serve_behind_envoy()
-        begun = self.calls_started("ListSessions")
+        begun = self.calls("call_started", "ListSessions")
         tried = sum(self.attack(port).reset(20_000) for _ in range(5))
         self.assertTrue(self.serves(port))
-        reached = self.calls_started("ListSessions") - begun
+        reached = self.calls("call_started", "ListSessions") - begun
         self.assertLess(reached, tried / 2, f"of {tried}")
         self.assertLess(reached, 20_000)
         self.assertLess(self.memory() - before, 64 * MIB)
         self.assertIn('"serving"', self.admin("/livez"))
+
+    def test_messages_that_never_end_stay_at_envoy_which_ends_the_largest_where_they_are_too_many(self):
+        before, port = self.serve_behind_envoy("--max-heap", "64")
+        envoy_before = self.memory(self.envoy)
+        attackers = [self.attack(port) for _ in range(3)]
+        for attacker in attackers:
+            attacker.told(MAX_CONCURRENT_STREAMS)
+            self.assertGreater(attacker.fill(range(1, 33, 2), 4 * MIB - 5, 2), 24 * MIB)
+        self.assertLess(self.memory() - before, 16 * MIB)
+        self.assertLess(self.memory(self.envoy) - envoy_before, 96 * MIB)
+        self.assertTrue(self.serves(port))
+
+    def test_streams_that_are_never_opened_end(self):
+        _, port = self.serve_behind_envoy()
+        attacker = self.attack(port)
+        attacker.told(MAX_CONCURRENT_STREAMS)
+        attacker.fill(range(1, 33, 2), 4 * MIB - 5, 2, method=b"Deform")
+        end = time.monotonic() + programs.PATIENCE
+        while (ended := self.calls("call_duration_seconds_count", "Deform")) < 16 and time.monotonic() < end:
+            time.sleep(0.05)
+        self.assertEqual(ended, 16)
+        self.assertTrue(self.serves(port))
 
     def test_headers_without_end_end_at_envoy(self):
         before, port = self.serve_behind_envoy()

@@ -372,6 +372,25 @@ TEST_F(ManualTimeTest, SilentStreamsSaySomethingNowAndThen) {
   }
 }
 
+TEST_F(ManualTimeTest, AStreamThatNobodyOpensEnds) {
+  grpc::ClientContext context;
+  const auto stream = stub_->Deform(&context);
+  std::atomic<bool> is_over = false;
+  std::thread reading([&] {
+    v1::DeformResponse response;
+    EXPECT_FALSE(stream->Read(&response));
+    is_over = true;
+  });
+  while (!is_over) {
+    timers_->advance(std::chrono::seconds(15));
+    std::this_thread::yield();
+  }
+  reading.join();
+  const grpc::Status status = stream->Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(details_of(status).info.reason(), "STREAM_PROTOCOL");
+}
+
 TEST_F(ManualTimeTest, AResultComesAgainWithItsCertificateWhereItWasAskedFor) {
   const auto session = create(bar_mesh());
   v1::FrameOptions options = with_credit(8);

@@ -35,6 +35,8 @@ describe("the configuration", () => {
         "/dev/null",
         "--max-requests",
         "7",
+        "--max-heap",
+        "100",
         "--idle",
         "5",
         "--origin",
@@ -75,6 +77,7 @@ describe("the configuration", () => {
     ["--admin-port", "x"],
     ["--idle", "0"],
     ["--max-requests", "0"],
+    ["--max-heap", "9"],
     ["--origin", 'http://a"b'],
     ["--nothing", "1"],
   ])("%s '%s' is refused by name", (option, value) => {
