@@ -75,7 +75,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void release(const Session& session);
 
   /// What Store::take_over finds, with its blobs. Where another process has the session in use, waits for kPatienceForOthers
-  /// whether it lets go: as long as the lease of one that has died; the same while it leaves this one. Not where the asker should
+  /// whether it lets go: as long as the lease of one that was cut off; the same while it leaves this one. Not where the asker should
   /// come by another way. What was found is held until adopt() or give_up().
   struct Found {
     StoredSession session;

@@ -122,13 +122,24 @@ const std::string kCommit =
     "end " +
     kUsed + "return 1";
 
+/// Of holders whose presence Redis sees: as long as they listen on a channel of their name. Their connections end with them.
+const std::string kShown = "shown:", kPresence = "lpdeform:h:";
+
+/// A function: whether this holder has ended. One that is cut off or stopped has not, as far as Redis knows.
+const std::string kIsGone =
+    "local function is_gone(holder) "
+    "  if string.sub(holder or '', 1, 6) ~= 'shown:' then return false end "
+    "  local listening = redis.pcall('PUBSUB', 'NUMSUB', 'lpdeform:h:' .. holder); "
+    "  return not listening.err and listening[2] == 0 "
+    "end ";
+
 /// That somebody wants a session is remembered for so many milliseconds.
 const std::string kWanted = "1000";
 
 /// ARGV: holder, owner, lease, route, stays, by how much the epoch rises. -1: none; -2 and its route: held by another, or for another; else the hash, in
 /// the new epoch. `until`: it is in use; `alive`: its holder lives; `since`: it came; `stays`: for so long at least.
 const std::string kTakeOver =
-    kAlways + kNow +
+    kAlways + kNow + kIsGone +
     "local has = redis.call('HMGET', KEYS[1], 'holder', 'owner', 'route', 'wanter'); "
     "if not has[2] or has[2] ~= ARGV[2] then return -1 end "
     "local function number(field) return tonumber(redis.call('HGET', KEYS[1], field) or '0') end "
@@ -136,7 +147,7 @@ const std::string kTakeOver =
     "local is_wanted = now - number('wanted') < " +
     kWanted +
     "; "
-    "if has[1] ~= ARGV[1] then "
+    "if has[1] ~= ARGV[1] and not is_gone(has[1]) then "
     "  local is_astray = route ~= '' and ARGV[4] ~= '' and ARGV[4] ~= route; "
     "  if number('until') > now or (is_astray and number('alive') > now) then "
     "    if route ~= '' and route == ARGV[4] and now - number('since') > stays and "
@@ -227,10 +238,16 @@ class RedisStore final : public Store {
   explicit RedisStore(const RedisStoreOptions& options)
       : options_(options),
         writer_(options.host, options.port, options.patience, options.login),
-        reader_(options.host, options.port, options.patience, options.login) {}
+        reader_(options.host, options.port, options.patience, options.login),
+        presence_(options.host, options.port, options.patience, options.login) {}
 
-  absl::Status ping() {
+  /// To be called once, before all else.
+  absl::Status begin() {
     const std::scoped_lock lock(reading_);
+    holder_ = kShown + holder_;
+    is_shown_ = show().ok();
+    if (!is_shown_)
+      holder_ = random_hex_128();  // a user who may not listen: others wait for the lease to end
     return reader_.run({"PING"}).status();
   }
 
@@ -250,11 +267,14 @@ class RedisStore final : public Store {
  private:
   Command command_of(const StoredChange& change);
   std::string lease() const { return absl::StrCat(options_.lease.count()); }
+  /// Also where it is shown already. Finds out whether the connection is there.
+  absl::Status show() { return presence_.run({"SUBSCRIBE", kPresence + holder_}).status(); }
 
   const RedisStoreOptions options_;
-  const std::string holder_ = random_hex_128();
+  std::string holder_ = random_hex_128();  // from begin() on the same
+  bool is_shown_ = false;                  // likewise
   std::mutex writing_, reading_;
-  RedisConnection writer_, reader_;
+  RedisConnection writer_, reader_, presence_;  // the last one with the reader
 };
 
 Command RedisStore::command_of(const StoredChange& change) {
@@ -361,6 +381,9 @@ absl::StatusOr<TouchResult> RedisStore::touch(std::span<const TouchedSession> se
          session.is_being_made ? "2" : (session.is_in_use ? "1" : "0"), absl::StrCat(session.revision)});
   }
   const std::scoped_lock lock(reading_);
+  if (is_shown_) {
+    if (absl::Status status = show(); !status.ok()) return status;
+  }
   const auto replies = reader_.run(commands);
   if (!replies.ok()) return replies.status();
   TouchResult result;
@@ -396,7 +419,7 @@ absl::Status RedisStore::let_go(const std::string& session, std::uint64_t epoch)
 
 absl::StatusOr<std::shared_ptr<Store>> open_redis_store(const RedisStoreOptions& options) {
   auto store = std::make_shared<RedisStore>(options);
-  if (absl::Status status = store->ping(); !status.ok()) return status;
+  if (absl::Status status = store->begin(); !status.ok()) return status;
   return store;
 }
 

@@ -24,6 +24,10 @@ struct RedisStoreOptions {
 /// server that was stopped, cut off or slow changes nothing once another has taken over. What is durable is as durable as
 /// Redis is set to make it (appendonly yes, appendfsync always).
 ///
+/// A holder listens on a channel of its name. Where nobody does any more, its process has ended, and its sessions are free at once;
+/// where a server is stopped or cut off, and Redis does not know, they are once the lease has. Who is taken for gone and is not, as its
+/// connection broke, is fenced off as any other. A user of Redis who may not SUBSCRIBE is held by the lease alone.
+///
 /// A session that is wanted by the way of its callers is kept for who wants it first. Where two servers want it from each other
 /// in turn, as behind proxies that know different sets of them, it stays twice as long each time, up to 32 times `stays`.
 ///
@@ -36,7 +40,7 @@ struct RedisStoreOptions {
 /// Keys: lpdeform:s:SESSION, a hash; lpdeform:b:KEY, a blob; lpdeform:u:KEY, the set of sessions that have it; lpdeform:m:SESSION,
 /// of one that is being made, the set of its blobs' keys; lpdeform:r:OWNER:REQUEST, a session's name; lpdeform:o:OWNER, the sorted
 /// set of an owner's sessions; lpdeform:used, that of all, by their last use; lpdeform:time, its clock; lpdeform:g:SESSION, one that
-/// is gone. Redis 7.0 or later.
+/// is gone. A channel: lpdeform:h:HOLDER. Redis 7.0 or later.
 ///
 /// UNAVAILABLE STORE_FAILING where Redis does not answer; later on the store finds it again by itself.
 absl::StatusOr<std::shared_ptr<Store>> open_redis_store(const RedisStoreOptions& options);

@@ -478,6 +478,37 @@ TEST_F(RedisStoreTest, ALeaseThatNobodyRenewsEndsAndItsHolderIsFencedOff) {
   EXPECT_EQ(second->take_over("a", "anna")->parts.at("inputs"), "1");
 }
 
+TEST_F(RedisStoreTest, WhatAServerHeldThatHasEndedIsFreeBeforeItsLeaseEnds) {
+  auto first = open();
+  const auto second = open();
+  StoredChange change = beginning("a");
+  change.route = "the way";
+  ASSERT_TRUE(commit(*first, change).ok());
+  EXPECT_EQ(reason(second->take_over("a", "anna", "the way").status()), "SESSION_ELSEWHERE");
+  first.reset();  // without letting go
+  absl::StatusOr<StoredSession> taken;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  do taken = second->take_over("a", "anna", "astray");
+  while (reason(taken.status()) == "SESSION_ELSEWHERE" && std::chrono::steady_clock::now() < end);
+  EXPECT_TRUE(taken.ok()) << taken.status();
+}
+
+TEST_F(RedisStoreTest, WhoIsNotSeenForAMomentIsSeenAgainAndOneWhoMayNotListenIsHeldByTheLease) {
+  RedisConnection redis("127.0.0.1", redis_.port(), std::chrono::seconds(5));
+  const auto first = open(), second = open();
+  ASSERT_TRUE(commit(*first, beginning("a")).ok());
+  ASSERT_TRUE(redis.run({"CLIENT", "KILL", "TYPE", "pubsub"}).ok());
+  const std::vector<TouchedSession> sessions{{"a", 1, true}};
+  while (!first->touch(sessions).ok()) {  // once to see that the connection is gone
+  }
+  EXPECT_EQ(reason(second->take_over("a", "anna").status()), "SESSION_ELSEWHERE");
+  ASSERT_TRUE(redis.run({"ACL", "SETUSER", "default", "-subscribe", "-pubsub"}).ok());
+  const auto unseen = open();
+  ASSERT_TRUE(commit(*unseen, beginning("b")).ok());
+  EXPECT_TRUE(unseen->touch(std::vector<TouchedSession>{{"b", 1, true}})->lost.empty());
+  EXPECT_EQ(reason(second->take_over("b", "anna").status()), "SESSION_ELSEWHERE");
+}
+
 TEST_F(RedisStoreTest, AChangeWhoseAnswerWasLostCanBeMadeAgain) {
   const auto store = open();
   ASSERT_TRUE(commit(*store, beginning("a")).ok());
