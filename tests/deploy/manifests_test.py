@@ -17,6 +17,7 @@ import yaml
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 KUBERNETES = ROOT / "deploy/kubernetes"
 WITH_TOKENS = ROOT / "deploy/kubernetes-with-tokens"
+WITH_TLS = ROOT / "deploy/kubernetes-with-tls"
 SERVER = sys.argv.pop(1)
 
 
@@ -50,6 +51,7 @@ def rendered():
 
 OBJECTS = rendered()
 COMPOSE = load(ROOT / "deploy/compose.yaml")
+COMPOSE_INTERNET = load(ROOT / "deploy/compose-internet.yaml")
 
 
 def patched(one, operations):
@@ -65,6 +67,9 @@ def patched(one, operations):
         elif operation["op"] == "replace":
             assert place[last] is not None
             place[last] = operation["value"]
+        elif last == "-":
+            assert operation["op"] == "add", operation
+            place.append(operation["value"])
         else:
             assert operation["op"] == "add" and last not in place, operation
             place[last] = operation["value"]
@@ -232,6 +237,24 @@ class Kubernetes(unittest.TestCase):
         self.assertIn(f"create secret generic {volume['secret']['secretName']} ", told)
         self.assertIn(f"--from-file={keys.removeprefix(mount['mountPath'] + '/')}", told)
 
+    def test_tls_is_one_command_away_and_comes_with_tokens(self):
+        overlay = load(WITH_TLS / "kustomization.yaml")
+        (base,) = overlay["resources"]
+        self.assertEqual((WITH_TLS / base).resolve(), WITH_TOKENS)
+        made = {one["target"]["kind"]: patched(the(one["target"]["kind"], one["target"]["name"]), yaml.safe_load(one["patch"]))
+                for one in overlay["patches"]}
+        for one in made.values():
+            kubernetes_validate.validate(one, "1.37", strict=True)
+        (container,) = containers(made["Deployment"])
+        options = dict(zip(container["args"][::2], container["args"][1::2]))
+        (mount,) = [one for one in container["volumeMounts"] if one["name"] == "tls"]
+        self.assertEqual([options["--tls-cert"], options["--tls-key"]], [f"{mount['mountPath']}/tls.{kind}" for kind in ("crt", "key")])
+        (volume,) = [one for one in pod(made["Deployment"])["volumes"] if one["name"] == mount["name"]]
+        self.assertIn(f"create secret tls {volume['secret']['secretName']} ", (WITH_TLS / "kustomization.yaml").read_text())
+        (port,) = made["Service"]["spec"]["ports"]
+        self.assertEqual(port["port"], 443)
+        self.assertIn(port["targetPort"], [one["name"] for one in container["ports"]])
+
     def test_nothing_runs_as_root_or_writes_beside_its_volumes(self):
         for workload in WORKLOADS:
             self.assertTrue(pod(workload)["securityContext"]["runAsNonRoot"])
@@ -321,6 +344,16 @@ class Compose(unittest.TestCase):
     def test_it_fits_the_schema(self):
         check(COMPOSE, "compose-spec")
 
+    def test_what_comes_over_it_fits_too_and_changes_nothing_but_who_is_let_in(self):
+        check(COMPOSE_INTERNET, "compose-spec")
+        server, web = (COMPOSE_INTERNET["services"][name] for name in ("server", "web"))
+        self.assertEqual([one for one in COMPOSE["services"]["server"]["command"] if one != "--allow-anonymous"],
+                         [one for one in server["command"] if not one.startswith("--token-keys=")])
+        self.assertIn("--token-keys=/secrets/keys.pem", server["command"])
+        before = COMPOSE["services"]["web"]["command"]
+        self.assertEqual(web["command"][:len(before)], before)
+        self.assertEqual(web["command"][len(before)::2], ["--tls-cert", "--tls-key"])
+
     def test_a_misspelt_field_is_found(self):
         wrong = copy.deepcopy(COMPOSE)
         wrong["services"]["server"]["depend_on"] = wrong["services"]["server"].pop("depends_on")
@@ -359,14 +392,16 @@ class Programs(unittest.TestCase):
         text = subprocess.run([SERVER, "--help"], check=True, capture_output=True, text=True).stdout
         known = set(re.findall(r"--[a-z-]+", text))
         for arguments in (containers(the("StatefulSet", "lpdeform"))[0]["args"], COMPOSE["services"]["server"]["command"],
+                          COMPOSE_INTERNET["services"]["server"]["command"],
                           [word for word in Unit.lines["ExecStart"].split()[1:] if word.startswith("--")]):
             self.assertLessEqual({argument.split("=")[0] for argument in arguments}, known)
 
     def test_envoy_is_given_options_that_it_takes(self):
         text = (ROOT / "deploy/envoy-config").read_text()
-        for arguments in (containers(the("Deployment", "lpdeform-web"))[0]["args"], COMPOSE["services"]["web"]["command"]):
+        for arguments in (containers(the("Deployment", "lpdeform-web"))[0]["args"], COMPOSE["services"]["web"]["command"],
+                          COMPOSE_INTERNET["services"]["web"]["command"]):
             for option in arguments[::2]:
-                self.assertIn(f"    {option}) ", text)
+                self.assertRegex(text, rf"(?m)^    (--[a-z-]+ \| )*{option}( \| --[a-z-]+)*\) ")
 
 
 if __name__ == "__main__":
