@@ -1,5 +1,6 @@
 #include "server/frame_calls.h"
 
+#include <chrono>
 #include <optional>
 #include <string>
 #include <utility>
@@ -85,13 +86,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
  public:
   using FrameCall::FrameCall;
 
-  void begin() {
-    read();
-    // gRPC holds what has come of a message, up to its 4 MiB, before anybody knows who sends it.
-    backend_.timers->at(backend_.timers->now() + backend_.heartbeat(), [weak = this->weak_from_this()] {
-      if (const auto self = std::static_pointer_cast<DeformCall>(weak.lock())) self->give_up_unopened();
-    });
-  }
+  void begin() { post(&DeformCall::let_in); }
 
   void OnReadDone(bool ok) override {
     bool is_open = true;
@@ -118,6 +113,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
 
  private:
   static constexpr std::size_t kMostAnswers = 64;
+  static constexpr std::chrono::seconds kOpenPatience{10};
 
   /// The next message, unless too many answers wait for the client to read them.
   void read() {
@@ -140,10 +136,21 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
     if (!is_open) break_off("The stream ended before it was opened.");
   }
 
+  /// Who may not call is not read: gRPC holds what has come of a message, up to its 4 MiB.
+  void let_in() {
+    const auto caller = backend_.identify(context(), Backend::Access::kRead);
+    if (!caller.ok()) return refuse(caller.status());
+    read();
+    backend_.timers->at(backend_.timers->now() + kOpenPatience, [weak = weak_from_this()] {
+      if (const auto self = std::static_pointer_cast<DeformCall>(weak.lock())) self->give_up_unopened();
+    });
+  }
+
   void give_up_unopened() {
     const std::scoped_lock lock(mutex_);
     if (is_open_) return;
-    refuse_locked(not_in_contract("The stream was not opened within the time of a heartbeat."));
+    refuse_locked(make_fault(absl::StatusCode::kUnavailable, {"STREAM_UNOPENED", "", ""},
+                             "The stream was not opened within 10 s."));
   }
 
   void post(void (DeformCall::*task)()) {
@@ -214,11 +221,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   /// The client does not keep to the contract: reads no more, and says so.
   void break_off(const std::string& why) {
     if (open_.stream) return open_.stream->end(EndReason::kProtocolError, why);
-    refuse(not_in_contract(why));
-  }
-
-  static absl::Status not_in_contract(const std::string& why) {
-    return invalid_input({"STREAM_PROTOCOL", "", ""}, why);
+    refuse(invalid_input({"STREAM_PROTOCOL", "", ""}, why));
   }
 
   Received<v1::DeformRequest> received_;

@@ -157,7 +157,7 @@ const std::string kTakeOver =
     "    return {-2, route} "
     "  end "
     "end "
-    "if is_wanted and has[4] ~= ARGV[1] then return {-2, route} end "
+    "if is_wanted and has[4] ~= ARGV[1] and not is_gone(has[4]) then return {-2, route} end "
     "local is_back_soon = is_wanted and now - number('since') < 4 * stays; "
     "stays = is_back_soon and math.min(2 * stays, 32 * ARGV[5]) or tonumber(ARGV[5]); "
     "redis.call('HINCRBY', KEYS[1], 'epoch', ARGV[6]); "

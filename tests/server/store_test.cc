@@ -367,7 +367,7 @@ class HandOverTest : public RedisStoreTest {
 
   static constexpr std::int64_t kStays = 100'000, kAges = 100 * kStays;  // longer than any test takes
   static constexpr std::chrono::hours kLong{1};
-  const std::shared_ptr<Store> first_ = open_one(), second_ = open_one(), third_ = open_one();
+  std::shared_ptr<Store> first_ = open_one(), second_ = open_one(), third_ = open_one();
   RedisConnection connection_{"127.0.0.1", redis_.port(), std::chrono::seconds(5)};
 };
 
@@ -411,6 +411,16 @@ TEST_F(HandOverTest, WhoWantedItAndIsGoneHoldsNobodyUp) {
   ASSERT_TRUE(first_->let_go("a", 1).ok());
   set_ago("wanted", kAges);
   EXPECT_EQ(ask(*third_, "the way"), "");
+}
+
+TEST_F(HandOverTest, WhoWantedItAndHasEndedHoldsNobodyUp) {
+  EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
+  set_ago("wanted", -kAges);
+  ASSERT_TRUE(first_->let_go("a", 1).ok());
+  EXPECT_EQ(ask(*third_, "the way"), "SESSION_ELSEWHERE");
+  second_.reset();
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (ask(*third_, "the way") != "") ASSERT_LT(std::chrono::steady_clock::now(), end);
 }
 
 TEST_F(HandOverTest, TwoThatWantItInTurnGetItLessAndLessOften) {
