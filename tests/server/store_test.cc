@@ -863,6 +863,37 @@ TEST_F(RedisStoreTest, APasswordIsReadWithEachConnectionAndInNoText) {
   EXPECT_TRUE(commit(**store, beginning("a")).ok());
 }
 
+TEST_F(RedisStoreTest, AUserOfItsOwnNeedsItsKeysAndItsChannelsAndNothingDangerous) {
+  RedisKeys redis(redis_.port());
+  redis.run(
+      {"ACL", "SETUSER", "lpdeform", "on", ">secret", "~lpdeform:*", "&lpdeform:*", "+@all", "-@dangerous"});
+  std::ofstream(folder_.path() + "/password") << "secret\n";
+  const auto open_as_user = [&] {
+    auto opened = open_redis_store({.host = "127.0.0.1",
+                                    .port = redis_.port(),
+                                    .login = {"lpdeform", folder_.path() + "/password"},
+                                    .lease = std::chrono::minutes(1)});
+    EXPECT_TRUE(opened.ok()) << opened.status();
+    return *std::move(opened);
+  };
+  auto store = open_as_user();
+  StoredChange made = beginning("a");
+  made.request_id = "request";
+  made.blobs = {blob_key("mesh")};
+  ASSERT_TRUE(store->keep_blob("a", made.blobs[0], "mesh").ok());
+  ASSERT_EQ(*commit(*store, made), ChangeOutcome::kKept);
+  EXPECT_TRUE(store->touch(std::vector<TouchedSession>{{"a", 1, true}})->lost.empty());
+  EXPECT_EQ(*store->find_request("anna", "request"), "a");
+  EXPECT_EQ(store->list("anna", "", 10)->size(), 1u);
+  EXPECT_EQ(*store->remove_unused(kIdle), 0u);
+  const auto other = open_as_user();
+  EXPECT_EQ(reason(other->take_over("a", "anna").status()), "SESSION_ELSEWHERE");
+  store.reset();  // its end is seen
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!other->take_over("a", "anna").ok()) ASSERT_LT(std::chrono::steady_clock::now(), end);
+  EXPECT_TRUE(commit(*other, {.session = "a", .is_removal = true}).ok());
+}
+
 TEST(OpenRedisStore, RefusesAServerThatIsNotThere) {
   const auto opened = open_redis_store({.host = "127.0.0.1", .port = 1});
   EXPECT_EQ(reason(opened.status()), "STORE_FAILING");
