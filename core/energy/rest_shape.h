@@ -23,6 +23,10 @@ class RestShape {
 
   std::int32_t vertex_count() const { return static_cast<std::int32_t>(positions_.rows()); }
 
+  /// Vertices that faces use: the others' cells are empty.
+  std::int32_t cell_count() const {
+    return vertex_count() - static_cast<std::int32_t>(report_.unreferenced_vertices.count);
+  }
   std::int32_t face_count() const { return static_cast<std::int32_t>(faces_.rows()); }
 
   /// Rest positions in the caller's units, as given.

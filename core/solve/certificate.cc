@@ -30,6 +30,7 @@ double shrink(double v, double k, double p, double rho) {
   // g(t) = t + a t^{p - 1} - v rises; Newton from the side on which it cannot overshoot.
   const double a = k * p / rho;
   double t = p > 2 ? v : std::min(0.5 * v, std::pow(0.5 * v / a, 1 / (p - 1)));
+  if (p < 2) t = std::max(t, v - a * std::pow(v, p - 1));  // t^{p - 1} <= v^{p - 1}
   for (int step = 0; step < 50 && t > 0; ++step) {
     const double power = a * std::pow(t, p - 1);
     const double next = t - (t + power - v) / (1 + (p - 1) * power / t);
@@ -130,14 +131,16 @@ EdgeVectors term_gradients(const ConvexRows& step, const EdgeVectors& z, double 
 double mean_energy(const Problem& problem) {
   double sum = 0;
   for (const double e2 : problem.objective.cells().squared_energies()) sum += std::sqrt(e2);
-  return sum / static_cast<double>(problem.shape().vertex_count());
+  return sum / static_cast<double>(problem.shape().cell_count());
 }
 
 /// A penalty that treats the 90th percentile of the cells alike in primal and dual: k p E^{p - 2} there.
 double penalty(const Problem& problem, const DualBound& dual) {
   const auto& e2 = problem.objective.cells().squared_energies();
   std::vector<std::pair<double, std::int32_t>> cells;
-  for (std::size_t i = 0; i < e2.size(); ++i) cells.emplace_back(e2[i], static_cast<std::int32_t>(i));
+  for (std::size_t i = 0; i < e2.size(); ++i) {
+    if (problem.shape().components()[i] >= 0) cells.emplace_back(e2[i], static_cast<std::int32_t>(i));
+  }
   const auto percentile =
       cells.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(cells.size()));
   std::nth_element(cells.begin(), percentile, cells.end());
@@ -158,10 +161,10 @@ class Certificate::Search {
         end_(Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
                                 std::min(settings.max_seconds, kLongestSeconds)))),
         primal_(problem_.objective.sum(problem_.norm)),
+        is_zero_(problem_.is_zero(primal_)),
         rows_(problem_),
         dual_(rows_, z_) {
-    is_over_ = primal_ <= problem_.zero_objective || !std::isfinite(primal_) ||
-               problem_.constraints.linear.has_tied_locks();
+    is_over_ = is_zero_ || !std::isfinite(primal_) || problem_.constraints.linear.has_tied_locks();
     if (is_over_) return;
     rows_.residuals(x, z_);
     mean_energy_ = mean_energy(problem_);
@@ -169,18 +172,19 @@ class Certificate::Search {
 
   bool step() {
     if (is_over_ || problem_.stop.stop_requested()) return false;
+    if (share_ > 0 && Clock::now() >= end_) return false;
     if (share_ < kShares.size() && (share_ == 0 || problem_.norm.lowest_p() < 2)) {
       bound_by_gradient(kShares[share_++] * mean_energy_);
       return !is_over_;
     }
     if (!is_polishing_ && !begin_polishing()) return false;
-    if (polished_ == settings_.max_steps || Clock::now() >= end_) return false;
+    if (polished_ == settings_.max_steps) return false;
     polish();
     return !is_over_;
   }
 
   double relative_gap() const {
-    if (primal_ <= problem_.zero_objective) return 0;
+    if (is_zero_) return 0;
     return best_ > -kInfinity ? std::clamp((primal_ - best_) / primal_, 0.0, 1.0) : 1;
   }
 
@@ -204,7 +208,7 @@ class Certificate::Search {
 
   /// False where there is nothing to begin with.
   bool begin_polishing() {
-    is_polishing_ = y_.size() > 0 && Clock::now() < end_ && rows_.factor_equal();
+    is_polishing_ = y_.size() > 0 && rows_.factor_equal();
     if (!is_polishing_) return false;
     rho_ = penalty(problem_, dual_);
     r_ = z_;
@@ -231,6 +235,7 @@ class Certificate::Search {
   const CertificateSettings settings_;
   const Clock::time_point end_;
   const double primal_;
+  const bool is_zero_;
   EdgeVectors z_;  // the residuals at x
   ConvexRows rows_;
   DualBound dual_;

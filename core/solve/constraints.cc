@@ -112,9 +112,15 @@ RigidTransform nearest_handle_motion(const RestShape& shape, const HandleSet& ha
     const double distance = (from.rowwise() - point).rowwise().squaredNorm().minCoeff();
     if (distance < shortest) shortest = distance, nearest = &handle;
   }
+  const Points from = rest_positions(*nearest, rest, shape.faces());
   Points to = target_positions(*nearest, shape.positions(), shape.faces());
   to = (to.rowwise() - shape.centre()) / shape.mean_edge_length();
-  return fit_rigid(rest_positions(*nearest, rest, shape.faces()), to);
+  if (std::holds_alternative<TargetPositions>(nearest->motion)) return fit_rigid(from, to);
+  // Of one vertex, or several in a line, the places alone do not tell how it is turned.
+  RigidTransform motion;
+  motion.rotation = rotation_of(nearest->motion);
+  motion.translation = to.colwise().mean() - from.colwise().mean() * motion.rotation.transpose();
+  return motion;
 }
 
 Points component_centres(const RestShape& shape) {

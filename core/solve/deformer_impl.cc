@@ -52,6 +52,17 @@ double Deformer::Impl::zero_objective() const {
   return sum;
 }
 
+double Deformer::Impl::zero_squares() const {
+  return shape->vertex_count() * rounding() * rounding();
+}
+
+/// What is kept has no distortion but rounding's: see Problem::is_zero.
+bool Deformer::Impl::is_best_zero() const {
+  if (best_sum > zero_objective()) return false;
+  return norm->lowest_p() == norm->highest_p() ||
+         best_energies.squaredNorm() <= unit() * unit() * zero_squares();
+}
+
 Problem Deformer::Impl::make_problem() {
   return {objective,
           metric,
@@ -61,6 +72,7 @@ Problem Deformer::Impl::make_problem() {
           length_unit() / unit(),
           shape->diagonal() / unit(),
           zero_objective(),
+          zero_squares(),
           stop};
 }
 
@@ -126,11 +138,10 @@ Material Deformer::Impl::effective_material() const {
 /// rest shape has no distortion at all. Then the rest shape is what is kept.
 bool Deformer::Impl::keep_rest_if_best() {
   if ((constraints->targets - shape->scaled_positions()).cwiseAbs().maxCoeff() > rounding()) return false;
-  const double zero = zero_objective();
-  if (best_sum <= zero) return false;
+  if (is_best_zero()) return false;
   const Points rest = initial_guess(InitialGuess::kRest);
   const double sum = objective.evaluate(rest, *norm);
-  if (sum <= zero) {
+  if (sum <= zero_objective()) {
     keep(rest, sum);
     return true;
   }
@@ -247,7 +258,7 @@ void Deformer::Impl::end(StopReason reason) {
   if (settings.method == Method::kMultiresolution) is_metric_live = reason == StopReason::kConverged;
   minimiser.reset();
   has_state = true;
-  is_at_rest = best_sum <= zero_objective();
+  is_at_rest = is_best_zero();
   summary.stop_reason = reason;
   summary.solve_seconds = seconds();
   if (!settings.certify || reason == StopReason::kCancelled) return;

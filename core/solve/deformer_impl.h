@@ -35,6 +35,8 @@ struct Deformer::Impl {
   double typical_energy(const Points& guess);
   double rounding() const;
   double zero_objective() const;
+  double zero_squares() const;
+  bool is_best_zero() const;
   Problem make_problem();
   Method chosen_method(Method asked, bool is_warm);
   bool prepare_coarse();

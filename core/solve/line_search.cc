@@ -18,7 +18,7 @@ LineSearch::LineSearch(Problem problem, Points x) : problem_(std::move(problem))
 
 StepResult LineSearch::step() {
   if (!std::isfinite(objective_)) return {Outcome::kBreakdown, objective_, 0};
-  if (objective_ <= problem_.zero_objective) return {Outcome::kConverged, objective_, 0};
+  if (problem_.is_zero(objective_)) return {Outcome::kConverged, objective_, 0};
   problem_.objective.gradient(gradient_);
   restrict_to_free(problem_.constraints, gradient_);
   // The gradient with respect to positions in units of l, X = x / l, is l times the one at hand; a step in X

@@ -4,6 +4,13 @@
 
 namespace lpdeform {
 
+bool Problem::is_zero(double sum) const {
+  if (sum > zero_objective) return false;
+  if (norm.lowest_p() == norm.highest_p()) return true;
+  const auto& e2 = objective.cells().squared_energies();
+  return std::accumulate(e2.begin(), e2.end(), 0.0) <= zero_squares;
+}
+
 bool Problem::factor_metric(const std::vector<double>& cell_weights, Metric::Precision precision) const {
   std::vector<MatrixEntry> entries = objective.soft_terms().matrix_entries(objective.soft_weights());
   if (!constraints.linear.empty()) {

@@ -20,10 +20,15 @@ struct Problem {
   double length_unit;     // l in scaled units, for thresholds that the paper gives in absolute lengths
   double diagonal;        // of the rest mesh, in scaled units
   double zero_objective;  // an unsmoothed objective that is 0 to rounding
+  double zero_squares;    // the sum of E_i^2 that is 0 to rounding
   std::stop_token stop;   // looked at between evaluations
 
   const RestShape& shape() const { return objective.cells().shape(); }
   const Workers& workers() const { return objective.cells().workers(); }
+
+  /// Whether the objective's last evaluation, of the unsmoothed sum `sum`, is 0 to rounding. Where p is mixed, what rounding
+  /// leaves of a cell with p_i = 1 is more than whole distortions of one with p_i = 24, so that E_i are looked at as well.
+  bool is_zero(double sum) const;
 
   /// Factors the metric for the weights of the objective's last evaluation, or for others of the cells; with linear
   /// constraints always in double precision. False where that fails.

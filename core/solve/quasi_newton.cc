@@ -18,7 +18,8 @@ constexpr int kStageIterations = 60;
 constexpr double kStageTolerance = 30;  // times the tolerance ends a stage that is not the last
 constexpr double kSmoothingStep = 0.1;  // of eps^2, from stage to stage
 constexpr double kBias = 3e-4;
-constexpr double kLiveBias = 0.1;  // of the mean cell's E^p
+constexpr double kLeastBias = 0.01;  // with kLeastSmoothing
+constexpr double kLiveBias = 0.1;    // of the mean cell's E^p
 // eps^2 over the squared diagonal:
 constexpr double kColdSmoothing = 1e-8, kPreparedSmoothing = 1e-9;
 constexpr double kLeastSmoothing = 1e-26;  // rounding
@@ -59,7 +60,7 @@ void QuasiNewton::begin_stage(bool keeps_metric) {
 double QuasiNewton::mean_energy() const {
   double sum = 0;
   for (const double e2 : problem_.objective.cells().squared_energies()) sum += std::sqrt(e2);
-  return sum / static_cast<double>(x_.rows());
+  return sum / static_cast<double>(problem_.shape().cell_count());
 }
 
 /// eps^2. A live session's cells have energies to go by; a cold guess's are far too large.
@@ -71,10 +72,22 @@ double QuasiNewton::first_smoothing(Warmth warmth, double lowest_p) const {
   return std::max(eps * eps, kLeastSmoothing * diagonal2);
 }
 
-/// Smoothing adds up to eps^p to a cell's E_i^p: too little to matter beside the mean cell's.
+/// Smoothing adds up to eps^p to a cell's E_i^p where p_i < 2: too little to matter beside the whole, or less would be lost
+/// in rounding.
 bool QuasiNewton::is_smooth_enough() const {
   if (eps2_ <= kLeastSmoothing * problem_.diagonal * problem_.diagonal) return true;
-  return std::pow(std::sqrt(eps2_) / mean_energy(), problem_.norm.lowest_p()) <= kBias;
+  const auto& offsets = problem_.shape().offsets();
+  double most = 0;
+  for (std::int32_t i = 0; i < problem_.shape().vertex_count(); ++i) {
+    if (problem_.norm.p(i) < 2 && offsets[i + 1] > offsets[i]) most += problem_.norm.term(i, eps2_).value;
+  }
+  return most <= kBias * problem_.objective.sum(problem_.norm);
+}
+
+/// What the last stage has minimised is the true objective but for what smoothing may add.
+bool QuasiNewton::is_end_true() const {
+  const double sum = problem_.objective.sum(problem_.norm);
+  return is_true_norm_ || objective_ - sum <= kLeastBias * sum;
 }
 
 /// The cell weights c_i, those for p_i > 2 raised to their mean where they are below it.
@@ -184,12 +197,13 @@ StepResult QuasiNewton::give_up(double slope) {
     is_metric_good_ = refresh_metric();
     return result(Outcome::kProgress);
   }
-  if (!is_last_stage_) {
+  if (!is_last_stage_ || !is_smooth_enough()) {
     ++stage_;
     begin_stage();
     return result(Outcome::kProgress);
   }
-  const bool is_good = slope <= 0 && -0.5 * slope <= problem_.tolerance * norm_.highest_p() * objective_;
+  const bool is_good =
+      slope <= 0 && -0.5 * slope <= problem_.tolerance * norm_.highest_p() * objective_ && is_end_true();
   return result(is_good ? Outcome::kConverged : Outcome::kStalled);
 }
 
@@ -204,7 +218,7 @@ void QuasiNewton::accept(double length) {
 }
 
 StepResult QuasiNewton::step() {
-  if (true_sum_ <= problem_.zero_objective) return result(Outcome::kConverged);
+  if (problem_.is_zero(true_sum_)) return result(Outcome::kConverged);
   if (!is_last_stage_ && (stage_iterations_ >= kStageIterations || is_stage_over())) {
     ++stage_;
     begin_stage();
@@ -217,7 +231,11 @@ StepResult QuasiNewton::step() {
   const double length = slope < 0 ? search(slope) : 0;
   if (length == 0) return give_up(slope);
   accept(length);
-  return result(is_last_stage_ && is_stage_over() ? Outcome::kConverged : Outcome::kProgress);
+  if (is_last_stage_ && is_stage_over()) {
+    if (is_smooth_enough()) return result(is_end_true() ? Outcome::kConverged : Outcome::kStalled);
+    is_last_stage_ = false;  // the energies have fallen so far that it is not any more
+  }
+  return result(Outcome::kProgress);
 }
 
 }  // namespace lpdeform

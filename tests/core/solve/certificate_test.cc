@@ -23,7 +23,7 @@ class CertificateTest : public testing::Test {
   }
   Problem problem(const LpNorm& norm) {
     return {objective, metric, constraints, norm, 1e-5, 1, shape->diagonal() / shape->mean_edge_length(),
-            1e-20,     {}};
+            1e-20,     1e-20,  {}};
   }
   /// Every second cell a million times as stiff.
   Material of_varying_stiffness(double p) const {

@@ -102,6 +102,22 @@ TEST(Constraints, LetAFreeComponentStayOrFollow) {
   EXPECT_FALSE(stay.is_held[5]);
 }
 
+TEST(Constraints, TurnAFreeComponentWithAHandleWhosePlacesDoNotTellHow) {
+  const auto shape = rest_shape(two_boxes());
+  const RigidMotion motion = turn({1, 2, 2}, 90, {0, 0, 1}, {0, 0, 2});
+  for (const std::vector<std::int32_t>& vertices :
+       {std::vector<std::int32_t>{0}, std::vector<std::int32_t>{0, 1}}) {
+    HandleSet handles;
+    ASSERT_TRUE(handles.set("a", {vertices, motion}).ok());
+    const auto follow = make_constraints(*shape, handles, FreeComponents::kFollow).value();
+    for (std::int32_t i = 8; i < 16; ++i) {
+      const Points expected = target_positions({{i}, motion}, shape->positions());
+      const Eigen::RowVector3d moved = follow.targets.row(i) * shape->mean_edge_length() + shape->centre();
+      EXPECT_LT((moved - expected.row(0)).norm(), 1e-13) << vertices.size();
+    }
+  }
+}
+
 TEST(Constraints, RefuseTargetsBeyondReason) {
   const auto shape = rest_shape(box_surface(1, 1, 1));
   HandleSet handles;

@@ -133,7 +133,7 @@ TEST(Paper, ConicAndQuasiNewtonAgreeOnTheConvexStep) {
   const Points x = (solver->positions().rowwise() - shape->centre()) / shape->mean_edge_length();
   const double energy = objective.evaluate(x, norm);
   const Problem problem{
-      objective, metric, constraints, norm, 1e-5, 1, shape->diagonal() / shape->mean_edge_length(), 0, {}};
+      objective, metric, constraints, norm, 1e-5, 1, shape->diagonal() / shape->mean_edge_length(), 0, 0, {}};
   ConicStep cone(problem, objective.cells().rotations(),
                  constraints.targets);  // from elsewhere, with the same rotations
   while (cone.relative_gap() > 1e-8 && cone.iterate()) {

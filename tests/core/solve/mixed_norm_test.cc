@@ -1,0 +1,66 @@
+// Solves of p that differs by much over the surface: what is converged, and what is zero.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+/// Grid(8, 30), two ends held, the far one bent.
+HandleSet small_bend(const TriangleMesh& mesh) {
+  HandleSet handles;
+  (void)handles.set("near", {slice(mesh, 1, 0, 0), Fixed{}});
+  (void)handles.set("far",
+                    {slice(mesh, 1, 30, 30), turn(Eigen::Vector3d::UnitX(), 12, {0, 30, 0}, {0, -0.3, 1})});
+  return handles;
+}
+
+/// p = 1 where y > 15, `p` elsewhere.
+Material half_rigid(const TriangleMesh& mesh, double p) {
+  Material material = Material::uniform(p);
+  material.p = Field::Constant(mesh.vertices.rows(), p);
+  for (const std::int32_t i : slice(mesh, 1, 15.5, 30)) material.p[i] = 1;
+  return material;
+}
+
+class HalfRigid : public testing::TestWithParam<double> {};
+
+// The cells of p = 1 end with no distortion; what is left is the others', and small beside the smoothing that those began with.
+TEST_P(HalfRigid, IsConvergedInTheTrueEnergy) {
+  const TriangleMesh mesh = grid(8, 30, 0.05);
+  const auto solver = deformer(rest_shape(mesh), small_bend(mesh), half_rigid(mesh, GetParam()));
+  const SolveSummary summary = solver->solve({.keep_trace = true}).value();
+  // What rounding leaves of the cells of p = 1 is more than all the others from p = 10 on.
+  EXPECT_EQ(summary.stop_reason, GetParam() < 10 ? StopReason::kConverged : StopReason::kStalled);
+  const SolveSummary further = solver->solve({.initial = InitialGuess::kCurrent}).value();
+  EXPECT_GT(further.energy, std::pow(0.99, GetParam()) * summary.energy);
+}
+INSTANTIATE_TEST_SUITE_P(P, HalfRigid, testing::Values(4.0, 6.0, 10.0, 16.0));
+
+// Rounding of one cell of p = 1 is more than all that the others' distortions come to.
+TEST(MixedNorm, IsNotZeroWhileCellsOfLargePAreDistorted) {
+  const TriangleMesh mesh = grid(12, 20, 0.05);
+  HandleSet handles;
+  (void)handles.set("near", {slice(mesh, 1, 0, 0), Fixed{}});
+  (void)handles.set("far",
+                    {slice(mesh, 1, 20, 20), turn(Eigen::Vector3d::UnitX(), 90, {0, 20, 0}, {0, -8, 5})});
+  const auto shape = rest_shape(mesh);
+  const auto sixteen = deformer(shape, handles, Material::uniform(16));
+  (void)sixteen->solve({});
+  Material material = Material::uniform(20);
+  material.p = Field::Constant(mesh.vertices.rows(), 20);
+  material.p[mesh.vertices.rows() / 2] = 1;
+  const auto mixed = deformer(shape, handles, material);
+  ASSERT_TRUE(mixed->set_positions(sixteen->positions()).ok());
+  const SolveSummary summary = mixed->solve({.initial = InitialGuess::kCurrent, .certify = true}).value();
+  EXPECT_GT(summary.iterations, 10);
+  EXPECT_NE(summary.optimality_gap, 0.0);
+  EXPECT_NE(summary.stop_reason,
+            StopReason::kConverged);  // the cell of p = 1 is at rounding, the others are not through
+}
+
+}  // namespace
+}  // namespace lpdeform
