@@ -27,10 +27,10 @@ COPY deploy/web deploy/envoy-config deploy/envoy.yaml.in deploy/
 COPY --from=build-web /src/build/web-tools/envoy/_bin/envoy build/web-tools/bin/envoy
 COPY --from=build-web /src/client/web/viewer/dist client/web/viewer/dist
 USER 10001:10001
-EXPOSE 8080
+EXPOSE 8080 8081
 HEALTHCHECK --interval=15s --timeout=5s --start-period=10s \
-  CMD ["bash", "-c", "exec 3<>/dev/tcp/127.0.0.1/8080 && printf 'GET /healthz HTTP/1.1\\r\\nHost: lpdeform\\r\\nConnection: close\\r\\n\\r\\n' >&3 && grep -q ^ok <&3"]
-ENTRYPOINT ["deploy/web"]
+  CMD ["bash", "-c", "exec 3<>/dev/tcp/127.0.0.1/8081 && printf 'GET /healthz HTTP/1.1\\r\\nHost: lpdeform\\r\\nConnection: close\\r\\n\\r\\n' >&3 && grep -q ^ok <&3"]
+ENTRYPOINT ["deploy/web", "--health", "0.0.0.0:8081"]
 CMD ["--web", "0.0.0.0:8080", "--server", "lpdeform:50051"]
 
 FROM debian:12

@@ -273,6 +273,14 @@ class Kubernetes(unittest.TestCase):
             user = pod(workload)["securityContext"]["runAsUser"]
             self.assertIn(f"USER {user}:", dockerfile)
 
+    def test_health_is_asked_where_the_image_answers_for_it(self):
+        dockerfile = (ROOT / "Dockerfile").read_text()
+        (port,) = [one["containerPort"] for one in containers(the("Deployment", "lpdeform-web"))[0]["ports"] if one["name"] == "health"]
+        self.assertIn(f'ENTRYPOINT ["deploy/web", "--health", "0.0.0.0:{port}"]', dockerfile)
+        self.assertIn(f"/dev/tcp/127.0.0.1/{port} ", dockerfile)
+        for probe in ("readinessProbe", "livenessProbe"):
+            self.assertEqual(containers(the("Deployment", "lpdeform-web"))[0][probe]["httpGet"], {"path": "/healthz", "port": "health"})
+
     def test_a_pod_may_drain_before_it_is_killed(self):
         workload = the("StatefulSet", "lpdeform")
         grace = seconds_of_grace(containers(workload)[0]["args"])

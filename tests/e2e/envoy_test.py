@@ -1,4 +1,4 @@
-"""TLS through Envoy as deploy/web starts it: browsers and native clients to Envoy, Envoy to a server."""
+"""Envoy as deploy/web starts it: TLS of its clients and its servers, and whom it lets in where many come."""
 
 import json
 import os
@@ -19,8 +19,7 @@ PYTHON = os.path.join(ROOT, "build", "python", "bin", "python")
 SESSION_OF_PYTHON = """
 import sys, lpdeform
 address, *files = sys.argv[1:]
-roots, chain, key = (open(file).read() for file in files)
-tls = lpdeform.Tls(root_certificates=roots, certificate_chain=chain, private_key=key)
+tls = lpdeform.Tls(*(open(file).read() for file in files)) if files else False
 triangle = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 with lpdeform.open(triangle, [[0, 1, 2]], address=address, tls=tls) as session:
     session.set_handle("still", [0])
@@ -30,34 +29,52 @@ with lpdeform.open(triangle, [[0, 1, 2]], address=address, tls=tls) as session:
         print(session.move("moved", translation=(0, 0, 1)).positions[1][2], flush=True)
 """
 
+# Calls once for each line that it is told, by one channel, and says so.
+CALLS_OF_PYTHON = """
+import sys, grpc
+call = grpc.insecure_channel(sys.argv[1]).unary_unary("/lpdeform.v1.DeformService/ListSessions")
+print("open", flush=True)
+for _ in sys.stdin:
+    call(b"", timeout=60)
+    print("answered", flush=True)
+"""
+
 
 class Envoy:
     """deploy/web on a free port. `admin`: the URL of its own page."""
 
     def __init__(self, *arguments):
         self.folder = tempfile.TemporaryDirectory()
+        self.log = os.path.join(self.folder.name, "log")
         admin = os.path.join(self.folder.name, "admin")
         self.process = subprocess.Popen([os.path.join(ROOT, "deploy", "web"), "--admin-file", admin, "--web", "127.0.0.1:0", "--files",
-                                         "none", "--access-log", os.path.join(self.folder.name, "log"), *arguments])
+                                         "none", "--access-log", self.log, *arguments])
         end = time.monotonic() + programs.PATIENCE
         while not (os.path.exists(admin) and programs.read_text(admin)):
             assert self.process.poll() is None and time.monotonic() < end, "Envoy does not start"
             time.sleep(0.02)
         self.admin = f"http://{programs.read_text(admin)}"
-        while not (web := [one for one in self.page("listeners")["listener_statuses"] if one["name"] == "web"]):
+        while len(where := self.page("listeners").get("listener_statuses", [])) < 1 + ("--health" in arguments):
             assert self.process.poll() is None and time.monotonic() < end, "Envoy does not listen"
             time.sleep(0.02)
-        where = web[0]["local_address"]["socket_address"]
-        self.port = where["port_value"]
-        self.address = f"{where['address']}:{self.port}"
+        ports = {one["name"]: one["local_address"]["socket_address"]["port_value"] for one in where}
+        self.port = ports["web"]
+        self.address = f"127.0.0.1:{self.port}"
+        self.health = f"http://127.0.0.1:{ports.get('health')}/healthz"
 
     def page(self, name):
         with urllib.request.urlopen(f"{self.admin}/{name}?format=json", timeout=programs.PATIENCE) as answer:
             return json.load(answer)
 
-    def stop(self):
+    def stats(self):
+        return {one["name"]: one["value"] for one in self.page("stats")["stats"] if "value" in one}
+
+    def end(self):
         self.process.terminate()
         self.process.wait()
+
+    def stop(self):
+        self.end()
         self.folder.cleanup()
 
 
@@ -100,19 +117,25 @@ class ThroughEnvoy(OnFiles):
             self.assertEqual(connection.selected_alpn_protocol(), protocol)
             return ssl.DER_cert_to_PEM_cert(connection.getpeercert(binary_form=True)).split()
 
-    def python_session(self, envoy):
-        client = subprocess.Popen([PYTHON, "-c", SESSION_OF_PYTHON, envoy.address, self.at("authority.pem"), self.at("alice.pem"),
-                                   self.at("alice.key")], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    def until(self, holds):
+        end = time.monotonic() + programs.PATIENCE
+        while not holds():
+            self.assertLess(time.monotonic(), end)
+            time.sleep(0.02)
+
+    def python(self, program, envoy, *files):
+        client = subprocess.Popen([PYTHON, "-c", program, envoy.address, *map(self.at, files)], stdin=subprocess.PIPE,
+                                  stdout=subprocess.PIPE, text=True)
         self.addCleanup(client.stdout.close)
         self.addCleanup(client.wait, programs.PATIENCE)
         self.addCleanup(client.stdin.close)
         self.assertEqual(client.stdout.readline(), "open\n")
         return client
 
-    def moves(self, client):
+    def next_of(self, client):
         client.stdin.write("\n")
         client.stdin.flush()
-        return client.stdout.readline() == "1.0\n"
+        return client.stdout.readline().strip()
 
 
 class Tls(ThroughEnvoy):
@@ -125,14 +148,15 @@ class Tls(ThroughEnvoy):
         self.assertEqual(self.ask(envoy, "--tls-ca", self.at("authority.pem")).returncode, 3)  # shows no certificate
         self.assertEqual(self.ask(envoy, *self.as_caller("mallory")).returncode, 3)
         self.assertEqual(self.ask(envoy).returncode, 3)  # in plain text
-        self.assertTrue(self.moves(self.python_session(envoy)))
+        session = self.python(SESSION_OF_PYTHON, envoy, "authority.pem", "alice.pem", "alice.key")
+        self.assertEqual(self.next_of(session), "1.0")
         for protocol in ("h2", "http/1.1"):
             self.shown(envoy, protocol)
 
     def test_certificates_are_renewed_while_sessions_go_on_and_the_old_one_holds_where_the_new_is_none(self):
         envoy = self.start("--server", self.serve().address, *self.tls_to_clients())
         self.until_served(envoy, *self.as_caller("alice"))
-        session = self.python_session(envoy)
+        session = self.python(SESSION_OF_PYTHON, envoy, "authority.pem", "alice.pem", "alice.key")
         old = programs.read_text(self.at("server.pem")).split()
         self.assertEqual(self.shown(envoy), old)
 
@@ -146,33 +170,67 @@ class Tls(ThroughEnvoy):
         self.put("web.pem", self.at("renewed.pem"))
         renewed = programs.read_text(self.at("renewed.pem")).split()
         self.until(lambda: self.shown(envoy) == renewed)
-        self.assertTrue(self.moves(session))
+        self.assertEqual(self.next_of(session), "1.0")
         self.until_served(envoy, *self.as_caller("alice"))
 
     def failures(self, envoy):
-        stats = self.page_of(envoy)
-        return stats["sds.tls-cert.key_rotation_failed"]
-
-    def page_of(self, envoy):
-        return {one["name"]: one["value"] for one in envoy.page("stats")["stats"] if "value" in one}
-
-    def until(self, holds):
-        end = time.monotonic() + programs.PATIENCE
-        while not holds():
-            self.assertLess(time.monotonic(), end)
-            time.sleep(0.02)
+        return envoy.stats()["sds.tls-cert.key_rotation_failed"]
 
     def test_a_server_that_the_authority_or_its_name_does_not_vouch_for_is_not_called(self):
         server = self.serve("--tls-cert", self.at("server.pem"), "--tls-key", self.at("server.key"))
         for flags, why in ((("--server-ca", self.at("stranger.pem")), "fail_verify_error"),
                            (("--server-ca", self.at("authority.pem"), "--server-name", "elsewhere"), "fail_verify_san")):
             envoy = self.start("--server", server.address, *flags)
-            self.until(lambda: self.page_of(envoy)[f"cluster.lpdeform.ssl.{why}"] > 0)
+            self.until(lambda: envoy.stats()[f"cluster.lpdeform.ssl.{why}"] > 0)
             done = self.ask(envoy)
             self.assertEqual(done.returncode, 3)
             self.assertIn("no healthy upstream", done.stderr)
         named = self.start("--server", server.address, "--server-ca", self.at("authority.pem"), "--server-name", "server")
         self.until_served(named)
+
+
+class Connections(ThroughEnvoy):
+    def open_many(self, envoy, count):
+        """HTTP/2 without a call."""
+        opened = []
+        for _ in range(count):
+            opened.append(socket.create_connection(("127.0.0.1", envoy.port), programs.PATIENCE))
+            self.addCleanup(opened[-1].close)
+            opened[-1].sendall(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0")
+        return opened
+
+    def is_well(self, envoy):
+        with urllib.request.urlopen(envoy.health, timeout=programs.PATIENCE) as answer:
+            return answer.status == 200
+
+    def test_where_they_are_used_up_those_who_are_in_stay_in_and_health_is_answered(self):
+        envoy = self.start("--server", self.serve().address, "--max-connections", "4", "--health", "127.0.0.1:0",
+                           "--connection-idle", "300")
+        self.until_served(envoy)
+        session = self.python(SESSION_OF_PYTHON, envoy)
+        self.open_many(envoy, 8)
+        self.until(lambda: envoy.stats()["http.web.downstream_cx_active"] == 4)
+        for _ in range(3):  # none of which makes a place
+            self.assertTrue(self.is_well(envoy))
+            self.assertEqual(self.ask(envoy).returncode, 3)
+        self.assertEqual(self.next_of(session), "1.0")
+        envoy.end()
+        calls = [json.loads(line) for line in programs.read_text(envoy.log).splitlines()]
+        self.assertTrue(calls)
+        for call in calls:
+            self.assertRegex(call["client"], r"^127\.0\.0\.1:\d+$")
+
+    def test_those_without_a_call_are_closed_and_clients_come_back_by_themselves(self):
+        envoy = self.start("--server", self.serve().address, "--connection-idle", "1")
+        self.until_served(envoy)
+        session, calls = self.python(SESSION_OF_PYTHON, envoy), self.python(CALLS_OF_PYTHON, envoy)
+        self.assertEqual(self.next_of(calls), "answered")
+        for one in self.open_many(envoy, 8):
+            while one.recv(65536):
+                pass
+        self.until(lambda: envoy.stats()["http.web.downstream_cx_active"] == 1)  # the session's, which has a stream
+        self.assertEqual(self.next_of(calls), "answered")
+        self.assertEqual(self.next_of(session), "1.0")
 
 
 class Refused(ThroughEnvoy):
@@ -191,6 +249,9 @@ class Refused(ThroughEnvoy):
         self.assertIn("is not the key of", self.refuses("--tls-cert", cert, "--tls-key", self.at("alice.key")))
         self.assertIn("--tls-client-ca needs --tls-cert", self.refuses("--tls-client-ca", cert))
         self.assertIn("need --server-ca", self.refuses("--server-name", "server"))
+        self.assertIn("--health takes HOST:PORT", self.refuses("--health", "8081"))
+        for option in ("--max-connections", "--connection-idle"):
+            self.assertIn(f"{option} takes 1 to 999999", self.refuses(option, "0"))
         self.assertIn("--server-name takes", self.refuses("--server-ca", cert, "--server-name", "a b"))
 
 
