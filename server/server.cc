@@ -200,6 +200,10 @@ absl::Status Server::Impl::start_grpc(const ServerOptions& options,
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS,
                              static_cast<int>(options.connection_idle.count()));
+  // gRPC unpacks a message before it looks at the size that it has then: 4 MiB on the way can be 4 GiB.
+  builder.AddChannelArgument(GRPC_ARG_ENABLE_PER_MESSAGE_DECOMPRESSION, 0);
+  builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
+  builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   // Probing grows windows until seconds of frames hide in them, behind the credits' back.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   grpc_server = builder.BuildAndStart();

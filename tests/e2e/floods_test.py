@@ -8,12 +8,13 @@ import subprocess
 import threading
 import time
 import urllib.request
+import zlib
 
 import programs
 
 ROOT = os.path.realpath(os.path.join(os.path.dirname(__file__), "..", ".."))
 DATA, HEADERS, RST_STREAM, SETTINGS, PING, GOAWAY, WINDOW_UPDATE, CONTINUATION = 0, 1, 3, 4, 6, 7, 8, 9
-ACK, END_HEADERS = 1, 4
+ACK, END_STREAM, END_HEADERS = 1, 1, 4
 MAX_CONCURRENT_STREAMS, INITIAL_WINDOW = 3, 4
 MIB = 1 << 20
 
@@ -127,6 +128,26 @@ class Attacker:
             stream += 200
         return stream // 2
 
+    def send_whole(self, streams, message, encoding):
+        """A call on each stream, of one message that is marked as compressed, and its end; whether all was sent."""
+        headers = call(b"UploadPart") + (literal(b"grpc-encoding", encoding) if encoding else b"")
+        for stream in streams:
+            with self.lock:
+                self.windows[stream] = self.initial
+            self.send(frame(HEADERS, END_HEADERS, stream, headers))
+            left = b"\1" + struct.pack(">I", len(message)) + message
+            while left:
+                with self.lock:
+                    self.lock.wait_for(lambda: self.is_over.is_set() or stream not in self.windows or
+                                       min(self.windows[stream], self.windows[0]) > 0, programs.PATIENCE)
+                    if self.is_over.is_set() or stream not in self.windows:
+                        break
+                    room = min(16384, self.windows[stream], self.windows[0], len(left))
+                    for of in (stream, 0):
+                        self.windows[of] -= room
+                part, left = left[:room], left[room:]
+                self.send(frame(DATA, 0 if left else END_STREAM, stream, part))
+
     def endless_headers(self, most_bytes):
         """One block of headers that goes on and on; the bytes sent."""
         small = literal(b"a", b"1")
@@ -153,10 +174,21 @@ class Flooded(programs.OnShapes):
         self.addCleanup(attacker.close)
         return attacker
 
-    def memory(self, process=None):
-        """Of the server, or of this process, in bytes."""
+    def memory(self, process=None, which="VmRSS"):
+        """Of the server, or of this process, in bytes. `which`: "VmHWM" for the most that it ever was."""
         status = programs.read_text(f"/proc/{(process or self.flooded.process).pid}/status")
-        return next(int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith("VmRSS"))
+        return next(int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith(which))
+
+    def unpacks_nothing(self, before, port=None):
+        """Messages of a quarter of a MiB that would be 256 MiB each take what they are."""
+        for encoding, bits in (b"gzip", 31), (b"deflate", 15), (b"", 31):
+            packer = zlib.compressobj(9, zlib.DEFLATED, bits)
+            message = b"".join(packer.compress(bytes(MIB)) for _ in range(256)) + packer.flush()
+            attacker = self.attack(port)
+            attacker.told(INITIAL_WINDOW)
+            attacker.send_whole(range(1, 9, 2), message, encoding)
+            self.assertTrue(self.serves(port))
+        self.assertLess(self.memory(which="VmHWM") - before, 64 * MIB)
 
     def admin(self, path):
         with urllib.request.urlopen(self.flooded.admin + path, timeout=programs.PATIENCE) as answer:
@@ -197,6 +229,9 @@ class TheServerAlone(Flooded):
         self.assertLess(sent, 16 * MIB)
         self.assertLess(self.memory() - before, 16 * MIB)
         self.assertEqual(self.calls("call_duration_seconds_count", "Deform"), 16)
+
+    def test_compressed_messages_are_not_unpacked(self):
+        self.unpacks_nothing(self.serve())
 
     def test_connections_that_only_answer_pings_are_closed(self):
         self.serve("--connection-idle", "1")
@@ -248,6 +283,9 @@ class BehindEnvoy(Flooded):
         self.assertLess(self.memory() - before, 16 * MIB)
         self.assertLess(self.memory(self.envoy) - envoy_before, 96 * MIB)
         self.assertTrue(self.serves(port))
+
+    def test_compressed_messages_are_not_unpacked(self):
+        self.unpacks_nothing(*self.serve_behind_envoy())
 
     def test_headers_without_end_end_at_envoy(self):
         before, port = self.serve_behind_envoy()

@@ -75,6 +75,26 @@ TEST_F(CallsTest, TheSameRequestIdCreatesOneSessionAlsoAtTheSameTime) {
   EXPECT_EQ(listed.sessions_size(), 1);
 }
 
+TEST_F(CallsTest, ACompressedMessageIsRefusedAndSaysSo) {
+  for (const auto algorithm : {GRPC_COMPRESS_GZIP, GRPC_COMPRESS_DEFLATE}) {
+    v1::UploadPartRequest part;
+    part.set_data(std::string(1 << 20, '\0'));
+    v1::UploadPartResponse taken;
+    grpc::ClientContext context, stream_context;
+    context.set_compression_algorithm(algorithm);
+    const grpc::Status refused = stub_->UploadPart(&context, part, &taken);
+    EXPECT_EQ(refused.error_code(), grpc::StatusCode::UNIMPLEMENTED);
+    EXPECT_NE(refused.error_message().find("ompression"), std::string::npos) << refused.error_message();
+
+    stream_context.set_compression_algorithm(algorithm);
+    const auto stream = stub_->Deform(&stream_context);
+    v1::DeformRequest open;
+    open.mutable_open()->set_session(std::string(1 << 20, 'a'));
+    stream->Write(open);
+    EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::UNIMPLEMENTED);
+  }
+}
+
 TEST_F(CallsTest, ASessionMayBeginWithHandlesAndSettings) {
   v1::CreateSessionRequest request;
   *request.mutable_mesh() = mesh_message(bar_mesh());
