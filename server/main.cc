@@ -100,7 +100,9 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->envname("LPDEFORM_MAX_CONNECTIONS_PER_ADDRESS")
       ->capture_default_str();
   app.add_option("--connection-idle", arguments.connection_idle_seconds,
-                 "Seconds without a call after which a connection is closed, 1 to 2e6")
+                 "Seconds without a call after which a connection is closed, 1 to 2e6; calls of the health "
+                 "service and "
+                 "of reflection, which need no token, last no longer")
       ->envname("LPDEFORM_CONNECTION_IDLE")
       ->check(CLI::Range(1.0, 2e6))
       ->capture_default_str();

@@ -18,6 +18,7 @@
 #include "server/health_probe.h"
 #include "server/listener.h"
 #include "server/machine_memory.h"
+#include "server/open_calls.h"
 #include "server/service.h"
 #include "server/tokens.h"
 #include "server/transport_security.h"
@@ -30,6 +31,7 @@ constexpr int kKeepaliveMs = 30'000;
 /// Until a new connection has to have spoken HTTP/2, TLS included.
 constexpr int kHandshakeMs = 20'000;
 constexpr std::chrono::seconds kAcceptPatience{5};
+constexpr int kReflectionThreads = 16;
 /// gRPC counts milliseconds in an int.
 constexpr std::chrono::milliseconds kLeastIdle = std::chrono::seconds(1),
                                     kMostIdle = std::chrono::hours(24 * 24);
@@ -200,6 +202,9 @@ absl::Status Server::Impl::start_grpc(const ServerOptions& options,
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS,
                              static_cast<int>(options.connection_idle.count()));
+  // Of reflection, a thread a call; all others have theirs.
+  builder.SetResourceQuota(grpc::ResourceQuota("lpdeform").SetMaxThreads(kReflectionThreads));
+  builder.experimental().SetInterceptorCreators(end_open_calls(backend.timers, options.connection_idle));
   // gRPC unpacks a message before it looks at the size that it has then: 4 MiB on the way can be 4 GiB.
   builder.AddChannelArgument(GRPC_ARG_ENABLE_PER_MESSAGE_DECOMPRESSION, 0);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);

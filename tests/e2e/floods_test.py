@@ -27,9 +27,9 @@ def literal(name, value):
     return b"\0" + bytes([len(name)]) + name + bytes([len(value)]) + value
 
 
-def call(method):
+def call(method, service=b"lpdeform.v1.DeformService"):
     """The headers of a call, POST and http."""
-    return (b"\x83\x86" + literal(b":path", b"/lpdeform.v1.DeformService/" + method) + literal(b":authority", b"x") +
+    return (b"\x83\x86" + literal(b":path", b"/" + service + b"/" + method) + literal(b":authority", b"x") +
             literal(b"content-type", b"application/grpc") + literal(b"te", b"trailers"))
 
 
@@ -41,6 +41,7 @@ class Attacker:
         self.socket = socket.create_connection(("127.0.0.1", port), programs.PATIENCE)
         self.lock = threading.Condition()
         self.answers = answers
+        self.answered = set()  # streams that headers came on
         self.settings, self.windows, self.initial, self.left, self.is_over = {}, {0: 65535}, 65535, 0, threading.Event()
         self.send(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + frame(SETTINGS, 0, 0))
         threading.Thread(target=self.read, daemon=True).start()
@@ -81,12 +82,18 @@ class Attacker:
                 self.windows[stream] = self.windows.get(stream, 0) + int.from_bytes(payload, "big")
             if kind == RST_STREAM:
                 self.windows.pop(stream, None)
+            if kind == HEADERS:
+                self.answered.add(stream)
             self.lock.notify_all()
 
-    def told(self, setting):
+    def waits_for(self, what):
+        """Whether it comes true."""
         with self.lock:
-            self.lock.wait_for(lambda: setting in self.settings, programs.PATIENCE)
-            return self.settings[setting]
+            return self.lock.wait_for(what, programs.PATIENCE)
+
+    def told(self, setting):
+        self.waits_for(lambda: setting in self.settings)
+        return self.settings[setting]
 
     def fill(self, streams, size, seconds, method=b"UploadPart"):
         """Sends messages that say they have `size` bytes and lack the last, as far as windows let it; the bytes sent."""
@@ -237,6 +244,31 @@ class TheServerAlone(Flooded):
         self.serve("--connection-idle", "1")
         attacker = self.attack()
         self.assertTrue(attacker.is_over.wait(programs.PATIENCE))
+
+    def test_calls_that_need_no_token_keep_no_connection(self):
+        self.serve("--connection-idle", "1", "--max-connections", "8")
+        watch, reflect = call(b"Watch", b"grpc.health.v1.Health"), call(b"ServerReflectionInfo", b"grpc.reflection.v1alpha.ServerReflection")
+        attackers = [self.attack() for _ in range(8)]
+        for attacker, headers in zip(attackers, [watch, reflect] * 4):
+            attacker.told(MAX_CONCURRENT_STREAMS)
+            attacker.send(frame(HEADERS, END_HEADERS, 1, headers) + frame(DATA, 0, 1, bytes(5)))
+        for attacker in attackers:
+            self.assertTrue(attacker.is_over.wait(programs.PATIENCE))
+        self.assertTrue(self.serves())
+
+    def test_calls_of_reflection_take_few_threads(self):
+        self.serve()
+        folder = f"/proc/{self.flooded.process.pid}/task"
+        before = len(os.listdir(folder))
+        attacker = self.attack()
+        attacker.told(MAX_CONCURRENT_STREAMS)
+        listing = struct.pack(">BI", 0, 2) + b"\x3a\x00"
+        for stream in range(1, 201, 2):
+            attacker.send(frame(HEADERS, END_HEADERS, stream, call(b"ServerReflectionInfo", b"grpc.reflection.v1alpha.ServerReflection")) +
+                          frame(DATA, 0, stream, listing))
+        self.assertTrue(attacker.waits_for(lambda: len(attacker.answered) == 100))
+        self.assertLess(len(os.listdir(folder)) - before, 32)
+        self.assertTrue(self.serves())
 
     def test_a_connection_has_so_many_calls_and_an_address_so_many_connections(self):
         self.serve("--max-connections-per-address", "2", "--max-calls-per-connection", "7")
