@@ -17,6 +17,7 @@ constexpr double kSufficientDecrease = 1e-4;
 constexpr int kStageIterations = 60;
 constexpr double kStageTolerance = 30;  // times the tolerance ends a stage that is not the last
 constexpr double kSmoothingStep = 0.1;  // of eps^2, from stage to stage
+constexpr double kLargeP = 12;
 constexpr double kBias = 3e-4;
 constexpr double kLeastBias = 0.01;  // with kLeastSmoothing
 constexpr double kLiveBias = 0.1;    // of the mean cell's E^p
@@ -38,6 +39,9 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
   for (const double p : {2.0, 1.6, 1.35, 1.2, 1.1, 1.05}) {
     if (warmth == Warmth::kCold && p > lowest) shares_.push_back((2 - p) / (2 - lowest));
   }
+  // By way of p = 4 where p is larger still: straight on, a bent grid at p = 24 ends at 1.9 times the E^(1/p).
+  const double highest = problem_.norm.highest_p();
+  if (warmth == Warmth::kCold && lowest >= 2 && highest > kLargeP) shares_.push_back((4 - 2) / (highest - 2));
   begin_stage(warmth == Warmth::kWithMetric);
   true_sum_ = problem_.objective.sum(problem_.norm);
 }

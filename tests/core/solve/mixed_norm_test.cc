@@ -1,4 +1,4 @@
-// Solves of p that differs by much over the surface: what is converged, and what is zero.
+// Solves of large p, and of p that differs by much over the surface: which minimum is found, what is converged, and what is zero.
 
 #include <gtest/gtest.h>
 
@@ -39,6 +39,24 @@ TEST_P(HalfRigid, IsConvergedInTheTrueEnergy) {
   EXPECT_GT(further.energy, std::pow(0.99, GetParam()) * summary.energy);
 }
 INSTANTIATE_TEST_SUITE_P(P, HalfRigid, testing::Values(4.0, 6.0, 10.0, 16.0));
+
+// From rest, large p alone leads a bent grid into a fold; by way of a smaller p it does not.
+TEST(LargeP, EndsAsLowFromRestAsFromASmallerP) {
+  const TriangleMesh mesh = grid(12, 20, 0.05);
+  HandleSet handles;
+  (void)handles.set("near", {slice(mesh, 1, 0, 0), Fixed{}});
+  (void)handles.set("far",
+                    {slice(mesh, 1, 20, 20), turn(Eigen::Vector3d::UnitX(), 90, {0, 20, 0}, {0, -8, 5})});
+  const auto shape = rest_shape(mesh);
+  const auto on_the_way = deformer(shape, handles, Material::uniform(6));
+  (void)on_the_way->solve({});
+  for (const double p : {16.0, 24.0, 32.0, 64.0}) {
+    const double energy = deformer(shape, handles, Material::uniform(p))->solve({}).value().energy;
+    ASSERT_TRUE(on_the_way->set_material(Material::uniform(p)).ok());
+    const double other = on_the_way->solve({.initial = InitialGuess::kCurrent}).value().energy;
+    EXPECT_LT(std::pow(energy / other, 1 / p), 1.001) << p;
+  }
+}
 
 // Rounding of one cell of p = 1 is more than all that the others' distortions come to.
 TEST(MixedNorm, IsNotZeroWhileCellsOfLargePAreDistorted) {
