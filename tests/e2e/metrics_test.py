@@ -10,6 +10,7 @@ import unittest
 import urllib.error
 import urllib.request
 
+import promql_parser
 import yaml
 
 import programs
@@ -54,6 +55,23 @@ def unknown_in(expression, scraped):
         asked = re.findall(r"([a-z_]+)\s*(?:=~|!~|!=|=)", selector or "") + grouped
         wrong += [f"{name}{{{label}}}" for label in asked if label not in has]
     return wrong
+
+
+def selectors_in(expression):
+    """(metric, {label: what it must equal}) of each place where a PromQL expression asks for one. Raises where it is none."""
+    found = []
+
+    def walk(part):
+        if isinstance(part, promql_parser.VectorSelector):
+            found.append((part.name, {one.name: one.value for one in part.matchers.matchers if one.op == promql_parser.MatchOp.Equal}))
+        for name in ("lhs", "rhs", "expr", "vector_selector"):
+            if hasattr(part, name):
+                walk(getattr(part, name))
+        for argument in getattr(part, "args", []):
+            walk(argument)
+
+    walk(promql_parser.parse(expression))
+    return found
 
 
 def dashboard():
@@ -111,6 +129,22 @@ class Metrics(programs.OnShapes):
         self.assertEqual(unknown_in('rate(lpdeform_update_total{instance="a"}[5m])', self.scraped), ["lpdeform_update_total"])
         self.assertEqual(unknown_in('sum by (mesh) (lpdeform_sessions)', self.scraped), ["lpdeform_sessions{mesh}"])
         self.assertEqual(unknown_in('lpdeform_sessions{mesh="a"}', self.scraped), ["lpdeform_sessions{mesh}"])
+
+    def test_alerts_and_dashboard_are_promql_and_ask_for_our_servers_alone(self):
+        expressions = [rule["expr"] for rule in alerts()]
+        expressions += [target["expr"].replace("$__rate_interval", "5m") for panel in dashboard()["panels"] for target in panel["targets"]]
+        for expression in expressions:
+            selectors = selectors_in(expression)
+            self.assertTrue(selectors, expression)
+            for metric, equal in selectors:
+                self.assertEqual(equal.get("job"), "lpdeform", f"{metric} in {expression}")
+
+    def test_the_check_above_finds_what_is_no_promql_and_what_others_have_too(self):
+        for wrong in ("sum(up", "rate(up) > 0", "up >", "histogram_quantile(0.9)"):
+            with self.assertRaises(ValueError, msg=wrong):
+                selectors_in(wrong)
+        self.assertEqual(selectors_in('process_open_fds / process_max_fds{job="lpdeform"} > 0.8'),
+                         [("process_open_fds", {}), ("process_max_fds", {"job": "lpdeform"})])
 
     def test_every_metric_is_on_the_dashboard(self):
         shown = json.dumps(dashboard())
