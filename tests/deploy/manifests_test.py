@@ -8,6 +8,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 import unittest
 
 import jsonschema
@@ -335,17 +336,43 @@ class Monitoring(unittest.TestCase):
 
 class Unit(unittest.TestCase):
     """Of systemd."""
-    lines = dict(line.split("=", 1) for line in (ROOT / "deploy/lpdeform.service").read_text().splitlines() if re.match(r"\w+=", line))
+    lines = [line.split("=", 1) for line in (ROOT / "deploy/lpdeform.service").read_text().splitlines() if re.match(r"\w+=", line)]
+    values = dict(lines)
+    environment = dict(value.split("=", 1) for name, value in lines if name == "Environment")
+
+    def started(self, **of_the_operator):
+        """The line in which the unit's command says where it listens, with what /etc/default/lpdeform has; the store is elsewhere,
+        because the test is not root."""
+        names = [name for name, _ in self.lines]
+        self.assertLess(max(k for k, name in enumerate(names) if name == "Environment"), names.index("EnvironmentFile"))
+        with tempfile.TemporaryDirectory() as folder:
+            found = {**self.environment, "LPDEFORM_STORE": f"sqlite:{folder}", "LPDEFORM_ADMIN_ADDRESS": "127.0.0.1:0", **of_the_operator}
+            program, *arguments = self.values["ExecStart"].split()
+            self.assertTrue(program.endswith("/lpdeform-server"))
+            with subprocess.Popen([SERVER, *arguments], env=found, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
+                line = server.stdout.readline()
+                server.terminate()
+                _, told = server.communicate()
+                self.assertEqual(server.returncode, 0, told)
+            return line, told
 
     def test_it_is_the_one_that_the_operators_page_names(self):
         self.assertIn("journalctl -u lpdeform ", (ROOT / "deploy/README.md").read_text())
 
     def test_it_may_drain_before_it_is_killed_and_is_started_again(self):
-        self.assertGreaterEqual(int(self.lines["TimeoutStopSec"]), seconds_of_grace(self.lines["ExecStart"].split()) + 10)
-        self.assertEqual(self.lines["Restart"], "always")
+        self.assertGreaterEqual(int(self.values["TimeoutStopSec"]), int(self.environment["LPDEFORM_GRACE"]) + 10)
+        self.assertEqual(self.values["Restart"], "always")
 
     def test_the_store_is_in_the_folder_that_it_may_write_to(self):
-        self.assertIn(f"--store=sqlite:/var/lib/{self.lines['StateDirectory']}", self.lines["ExecStart"].split())
+        self.assertEqual(self.environment["LPDEFORM_STORE"], f"sqlite:/var/lib/{self.values['StateDirectory']}")
+
+    def test_each_value_is_one_of_the_servers_variables_and_the_operator_may_give_another(self):
+        options = subprocess.run([SERVER, "--help"], capture_output=True, text=True, check=True).stdout
+        self.assertEqual(self.environment["LPDEFORM_ADDRESS"].split(":")[0], "127.0.0.1")
+        for name in self.environment:
+            self.assertRegex(options, rf"\(Env:{name}\)")
+        line, told = self.started(LPDEFORM_ADDRESS="127.0.0.2:0", LPDEFORM_GRACE="1", LPDEFORM_LOG_LEVEL="info")
+        self.assertIn("listens on 127.0.0.2:", line, told)
 
 
 class Compose(unittest.TestCase):
