@@ -7,8 +7,8 @@
 #include "absl/time/clock.h"
 #include "core/base/fault.h"
 #include "server/encode.h"
+#include "server/file_watch.h"
 #include "server/heap_trim.h"
-#include "server/key_watch.h"
 
 namespace lpdeform {
 namespace {
@@ -88,7 +88,7 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
   };
   metrics->set(Level::kSessionsMost, static_cast<double>(options.max_sessions));
   metrics->set(Level::kMemoryBytesMost, static_cast<double>(options.max_bytes));
-  if (tokens_) watch_keys(timers, tokens_, log_);
+  if (tokens_) watch_files(timers, files_of("keys", tokens_), log_);
 }
 
 absl::StatusOr<Caller> Backend::identify(const CallContext& call, Access access) const {

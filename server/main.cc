@@ -67,7 +67,7 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->envname("LPDEFORM_ADMIN_ADDRESS")
       ->capture_default_str();
   app.add_option("--tls-cert", server.tls.certificate_chain,
-                 "Serve with TLS: the certificate chain, in PEM; read again every minute")
+                 "Serve with TLS: the certificate chain, in PEM; read again when it changes")
       ->envname("LPDEFORM_TLS_CERT");
   app.add_option("--tls-key", server.tls.private_key, "The certificate's private key, in PEM")
       ->envname("LPDEFORM_TLS_KEY");

@@ -14,6 +14,8 @@
 #include "core/base/fault.h"
 #include "server/admin.h"
 #include "server/backend.h"
+#include "server/certificates.h"
+#include "server/file_watch.h"
 #include "server/grpc_log.h"
 #include "server/health_probe.h"
 #include "server/listener.h"
@@ -153,8 +155,7 @@ struct Server::Impl {
                      [this] { return listener->refused(); }, [this] { return backend.gate.is_closed(); },
                      backend.scheduler, backend.pool}) {}
 
-  absl::Status start_grpc(const ServerOptions& options,
-                          const std::shared_ptr<grpc::ServerCredentials>& credentials);
+  absl::Status start_grpc(const ServerOptions& options, std::shared_ptr<Certificates> shown);
   void start_listening(const ServerOptions& options);
 
   absl::Status start_admin(const std::string& at);
@@ -163,6 +164,7 @@ struct Server::Impl {
   Backend backend;
   Service service;
   const VitalSigns vital_signs;
+  std::shared_ptr<Certificates> certificates;  // null without TLS
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
   std::unique_ptr<grpc::Server> grpc_server;
   std::mutex draining;
@@ -189,11 +191,15 @@ absl::Status Server::Impl::start_admin(const std::string& at) {
   return absl::OkStatus();
 }
 
-absl::Status Server::Impl::start_grpc(const ServerOptions& options,
-                                      const std::shared_ptr<grpc::ServerCredentials>& credentials) {
+absl::Status Server::Impl::start_grpc(const ServerOptions& options, std::shared_ptr<Certificates> shown) {
+  certificates = std::move(shown);
+  if (certificates)
+    watch_files(backend.timers, files_of("certificate", certificates),
+                options.log ? options.log : std::make_shared<Log>("off"));
   grpc::ServerBuilder builder;
   acceptor = builder.experimental().AddExternalConnectionAcceptor(
-      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, credentials);
+      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+      make_credentials(certificates));
   builder.RegisterService(&service);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                              static_cast<int>(options.max_calls_per_connection));
@@ -239,8 +245,9 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& given
   ServerOptions options = given;
   if (options.max_bytes == 0) options.max_bytes = default_max_bytes();
   if (absl::Status status = check(options); !status.ok()) return status;
-  const auto credentials = make_credentials(options.tls);
-  if (!credentials.ok()) return credentials.status();
+  absl::StatusOr<std::shared_ptr<Certificates>> certificates = nullptr;
+  if (options.tls.is_on()) certificates = Certificates::create(options.tls);
+  if (!certificates.ok()) return certificates.status();
   auto tokens = make_tokens(options);
   if (!tokens.ok()) return tokens.status();
   auto listener = Listener::bind(options.address);
@@ -249,7 +256,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& given
   prepare_grpc();
   if (options.log) take_grpc_log(options.log);
   auto impl = std::make_unique<Impl>(options, *std::move(listener), *std::move(tokens));
-  if (absl::Status status = impl->start_grpc(options, *credentials); !status.ok()) return status;
+  if (absl::Status status = impl->start_grpc(options, *certificates); !status.ok()) return status;
   impl->start_listening(options);
   auto server = std::unique_ptr<Server>(new Server(std::move(impl)));
   const Log& log = server->impl_->backend.log();

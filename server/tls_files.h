@@ -4,7 +4,7 @@
 
 namespace lpdeform {
 
-/// Files in PEM. All empty: plain text. They are looked at again every minute, so certificates can be renewed while the
+/// Files in PEM. All empty: plain text. They are looked at again every other second, so certificates can be renewed while the
 /// server runs.
 struct TlsFiles {
   std::string certificate_chain;  // the server's own first

@@ -1,59 +1,64 @@
 #include "server/transport_security.h"
 
-#include <grpcpp/security/tls_certificate_provider.h>
-#include <grpcpp/security/tls_credentials_options.h>
-#include <openssl/ssl.h>
+#include <grpc/grpc.h>
+#include <grpc/grpc_security.h>
 
-#include "absl/strings/str_cat.h"
-#include "core/base/fault.h"
+#include <string>
+#include <utility>
+
+#include "core/base/check.h"
 
 namespace lpdeform {
 namespace {
 
-constexpr unsigned kRefreshSeconds = 60;
+/// gRPC asks for what is in force before each handshake. Its C++ interface has no way to give it but by files, which it does not
+/// check: where they are damaged it takes no connection.
+class FreshCredentials final : public grpc::ServerCredentials {
+ public:
+  explicit FreshCredentials(std::shared_ptr<Certificates> certificates)
+      : certificates_(std::move(certificates)),
+        credentials_(grpc_ssl_server_credentials_create_with_options(
+                         grpc_ssl_server_credentials_create_options_using_config_fetcher(
+                             certificates_->knows_clients()
+                                 ? GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY
+                                 : GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE,
+                             fetch, this)),
+                     grpc_server_credentials_release) {}
 
-absl::Status bad_file(const std::string& file, const std::string& why) {
-  return invalid_input({"TLS_FILES", file, ""}, absl::StrCat("The TLS file \"", file, "\" ", why, "."));
-}
+  void SetAuthMetadataProcessor(const std::shared_ptr<grpc::AuthMetadataProcessor>&) override {
+    LPDEFORM_CHECK(!"calls are judged by Backend::identify");
+  }
 
-/// gRPC would say nothing, and refuse every connection.
-absl::Status check(const TlsFiles& files) {
-  if (files.certificate_chain.empty() || files.private_key.empty()) {
-    return invalid_input({"TLS_FILES", "", ""}, "TLS needs both a certificate chain and its private key.");
+ private:
+  int AddPortToServer(const std::string& address, grpc_server* server) override {
+    return grpc_server_add_http2_port(server, address.c_str(), credentials_.get());
   }
-  const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> context(SSL_CTX_new(TLS_server_method()),
-                                                                  SSL_CTX_free);
-  const char* const chain = files.certificate_chain.c_str();
-  if (SSL_CTX_use_certificate_chain_file(context.get(), chain) != 1) {
-    return bad_file(chain, "has no certificate that can be read");
+
+  /// gRPC calls it for one connection after the other.
+  static grpc_ssl_certificate_config_reload_status fetch(void* self,
+                                                         grpc_ssl_server_certificate_config** config) {
+    auto& credentials = *static_cast<FreshCredentials*>(self);
+    const Certificates::Current now = credentials.certificates_->current();
+    if (now.number == credentials.given_) return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_UNCHANGED;
+    const grpc_ssl_pem_key_cert_pair pair{now.texts->key.c_str(), now.texts->chain.c_str()};
+    // gRPC insists on authorities. Where no client is asked for a certificate, none is held against them.
+    const std::string& authorities =
+        credentials.certificates_->knows_clients() ? now.texts->authorities : now.texts->chain;
+    *config = grpc_ssl_server_certificate_config_create(authorities.c_str(), &pair, 1);
+    credentials.given_ = now.number;
+    return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_NEW;
   }
-  const char* const key = files.private_key.c_str();
-  if (SSL_CTX_use_PrivateKey_file(context.get(), key, SSL_FILETYPE_PEM) != 1) {
-    return bad_file(key, "has no private key that can be read and fits the certificate");
-  }
-  if (!files.knows_clients()) return absl::OkStatus();
-  const char* const authorities = files.client_authorities.c_str();
-  if (SSL_CTX_load_verify_locations(context.get(), authorities, nullptr) != 1) {
-    return bad_file(authorities, "has no certificate that can be read");
-  }
-  return absl::OkStatus();
-}
+
+  const std::shared_ptr<Certificates> certificates_;
+  std::uint64_t given_ = 0;
+  const std::unique_ptr<grpc_server_credentials, decltype(&grpc_server_credentials_release)> credentials_;
+};
 
 }  // namespace
 
-absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> make_credentials(const TlsFiles& files) {
-  if (!files.is_on()) return grpc::InsecureServerCredentials();
-  if (absl::Status status = check(files); !status.ok()) return status;
-  const auto provider = std::make_shared<grpc::experimental::FileWatcherCertificateProvider>(
-      files.private_key, files.certificate_chain, files.client_authorities, kRefreshSeconds);
-  grpc::experimental::TlsServerCredentialsOptions options(provider);
-  options.watch_identity_key_cert_pairs();
-  options.set_cert_request_type(GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE);
-  if (files.knows_clients()) {
-    options.watch_root_certs();
-    options.set_cert_request_type(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
-  }
-  return grpc::experimental::TlsServerCredentials(options);
+std::shared_ptr<grpc::ServerCredentials> make_credentials(const std::shared_ptr<Certificates>& certificates) {
+  if (certificates == nullptr) return grpc::InsecureServerCredentials();
+  return std::make_shared<FreshCredentials>(certificates);
 }
 
 }  // namespace lpdeform

@@ -4,12 +4,11 @@
 
 #include <memory>
 
-#include "absl/status/statusor.h"
-#include "server/tls_files.h"
+#include "server/certificates.h"
 
 namespace lpdeform {
 
-/// How connections are secured. INVALID_ARGUMENT TLS_FILES where a file is missing or cannot be used.
-absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> make_credentials(const TlsFiles& files);
+/// How connections are secured: each new one by what is in force of `certificates` then. Null: plain text.
+std::shared_ptr<grpc::ServerCredentials> make_credentials(const std::shared_ptr<Certificates>& certificates);
 
 }  // namespace lpdeform

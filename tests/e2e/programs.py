@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import unittest
 
 SERVER, CLI = None, None  # set by main()
@@ -24,7 +25,7 @@ class RunningServer:
     def __init__(self, *arguments, program=None):
         self.process = subprocess.Popen([program or SERVER, "--address", "127.0.0.1:0", *arguments], stdout=subprocess.PIPE,
                                         stderr=subprocess.STDOUT, text=True)
-        self.log = []
+        self.log, self.seen = [], 0
         watchdog = threading.Timer(PATIENCE, self.process.kill)
         watchdog.start()
         try:
@@ -48,6 +49,17 @@ class RunningServer:
             if found:
                 return found.group(0)
         raise AssertionError(f"the server did not say {pattern}:\n" + "".join(self.log))
+
+    def waits_for(self, event):
+        """Returns with the next line of the log that has this event, after those that were returned before."""
+        end = time.monotonic() + PATIENCE
+        while True:
+            for at in range(self.seen, len(self.log)):
+                if f'"event":"{event}"' in self.log[at]:
+                    self.seen = at + 1
+                    return self.log[at]
+            assert time.monotonic() < end, f"no {event} in:\n" + "".join(self.log)
+            time.sleep(0.02)
 
     def stop(self):
         """The exit status after SIGTERM."""

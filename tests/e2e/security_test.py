@@ -80,6 +80,33 @@ class Tls(OnFiles):
         stranger = self.ask(server, *trust, "--tls-cert", self.at("mallory.pem"), "--tls-key", self.at("mallory.key"))
         self.assertEqual(stranger.returncode, 3)
 
+    def replace(self, name, text):
+        self.write("next.pem", text)
+        os.replace(self.at("next.pem"), self.at(name))
+
+    def test_a_certificate_is_renewed_and_a_damaged_one_leaves_the_old_in_force(self):
+        for end in ("pem", "key"):
+            self.replace(f"shown.{end}", programs.read_text(self.at(f"server.{end}")))
+        server = self.serve("--tls-cert", self.at("shown.pem"), "--tls-key", self.at("shown.key"))
+        trust = ("--tls-ca", self.at("authority.pem"))
+        chain = programs.read_text(self.at("server.pem"))
+        stranger = programs.read_text(self.at("mallory.pem"))
+        for damaged in (chain.replace("MII", "MI!", 1), chain[:len(chain) // 2], chain + chain[:200], "", stranger):
+            self.replace("shown.pem", damaged)
+            server.waits_for("certificate_not_read")
+            done = self.ask(server, *trust)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.replace("shown.pem", chain)
+            server.waits_for("certificate_read_again")
+        # One that is good: of another key, in two steps, and then in force for whoever comes.
+        self.replace("shown.pem", stranger)
+        self.replace("shown.key", programs.read_text(self.at("mallory.key")))
+        end = time.monotonic() + programs.PATIENCE
+        while self.ask(server, *trust).returncode == 0:
+            self.assertLess(time.monotonic(), end)
+        done = self.ask(server, "--tls-ca", self.at("stranger.pem"))
+        self.assertEqual(done.returncode, 0, done.stderr)
+
     def test_files_that_cannot_be_used_are_named(self):
         cert, key, missing = self.at("server.pem"), self.at("server.key"), self.at("missing.pem")
         self.assertIn("both a certificate chain and its private key", self.start_fails("--tls-cert", cert))
