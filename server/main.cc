@@ -1,10 +1,12 @@
 #include <CLI/CLI.hpp>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>
 
 #include "server/health_probe.h"
+#include "server/machine_memory.h"
 #include "server/open_store.h"
 #include "server/server.h"
 
@@ -34,6 +36,20 @@ CLI::Validator size_in_bytes() {
   return {[](std::string& text) -> std::string {
             if (text.find('-') != std::string::npos) return "must not be negative";
             return CLI::AsSizeValue(false)(text);
+          },
+          "SIZE"};
+}
+
+/// Also "25%", of what the machine or its control group has.
+CLI::Validator size_or_share() {
+  return {[](std::string& text) -> std::string {
+            if (text.empty() || text.back() != '%') return size_in_bytes()(text);
+            double percent = 0;
+            const bool is_number = CLI::detail::lexical_cast(text.substr(0, text.size() - 1), percent);
+            if (!is_number || !(percent >= 1 && percent <= 100)) return "must be 1% to 100%, or a size";
+            const double bytes = static_cast<double>(lpdeform::memory_of_process()) * percent / 100;
+            text = std::to_string(static_cast<std::uint64_t>(bytes));
+            return "";
           },
           "SIZE"};
 }
@@ -162,11 +178,12 @@ void describe(CLI::App& app, Arguments& arguments) {
   app.add_option("--max-vertices", server.max_vertices, "Vertices of one mesh; of faces, three times as many")
       ->envname("LPDEFORM_MAX_VERTICES")
       ->capture_default_str();
-  app.add_option("--max-bytes", server.max_bytes,
-                 "Memory of all sessions and uploads together; as 4GiB or in bytes, 0: three quarters of "
-                 "what the machine or its control group has")
+  app.add_option(
+         "--max-bytes", server.max_bytes,
+         "Memory of all sessions and uploads together; as 4GiB, in bytes, or as 25% of what the machine or "
+         "its control group has; 0: 75%")
       ->envname("LPDEFORM_MAX_BYTES")
-      ->transform(size_in_bytes())
+      ->transform(size_or_share())
       ->capture_default_str();
   app.add_option("--max-upload-bytes", server.max_upload_bytes, "Size of one upload; as 256MiB or in bytes")
       ->envname("LPDEFORM_MAX_UPLOAD_BYTES")

@@ -399,6 +399,10 @@ class Compose(unittest.TestCase):
         server = COMPOSE["services"]["server"]
         self.assertGreaterEqual(int(server["stop_grace_period"].removesuffix("s")), seconds_of_grace(server["command"]) + 10)
 
+    def test_every_container_has_its_share_of_the_machine(self):
+        for name, service in COMPOSE["services"].items():
+            self.assertRegex(service.get("mem_limit", ""), r"\d+[gm]b", name)
+
     def test_addresses_are_services_of_the_file(self):
         for name, service in COMPOSE["services"].items():
             for argument in service["command"]:

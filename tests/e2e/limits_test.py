@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import unittest
+import urllib.request
 
 import programs
 
@@ -61,8 +62,21 @@ class Limits(unittest.TestCase):
                 self.assertEqual(done.returncode, 1, flag)
                 self.assertIn(f"Option {flag.replace('-', '_')} must be 1 to", done.stderr)
 
+    def memory_limit(self, *arguments):
+        server = programs.RunningServer("--admin-address", "127.0.0.1:0", *arguments)
+        self.addCleanup(server.stop)
+        with urllib.request.urlopen(server.admin + "/metrics", timeout=programs.PATIENCE) as answer:
+            return float(re.search(r"^lpdeform_memory_limit_bytes (\S+)$", answer.read().decode(), re.MULTILINE).group(1))
+
+    def test_memory_may_be_a_share_of_what_there_is(self):
+        unsaid = self.memory_limit()
+        self.assertAlmostEqual(self.memory_limit("--max-bytes", "25%") / unsaid, 1 / 3, places=6)
+        self.assertAlmostEqual(self.memory_limit("--max-bytes", "75%") / unsaid, 1, places=6)
+
     def test_values_that_are_no_limits_are_refused_by_name(self):
-        for flag, value, why in (("max-bytes", "-1", "must not be negative"), ("max-bytes-per-caller", "-1", "must not be negative"),
+        for flag, value, why in (("max-bytes", "-1", "must not be negative"), ("max-bytes", "0.5%", "must be 1% to 100%"),
+                                 ("max-bytes", "101%", "must be 1% to 100%"), ("max-bytes", "x%", "must be 1% to 100%"),
+                                 ("max-bytes-per-caller", "-1", "must not be negative"),
                                  ("max-upload-bytes", "-4KiB", "must not be negative"),
                                  ("session-idle", "1e300", "must be 0.001 to 1e+09 seconds"),
                                  ("session-idle", "nan", "must be 0.001 to 1e+09 seconds"),
