@@ -463,7 +463,8 @@ typedef struct lpdeform_resizing {
 } lpdeform_resizing;
 
 /* Scales the mesh: sets the handle "resize", which holds the ends of each component along the scaled axes, and p and
- * stiffness. To end it, remove that handle and set p and stiffness. As lpdeform_send. */
+ * stiffness. Along other axes the extent changes, unless plane locks hold ends there. To end it, remove that handle and
+ * set p and stiffness. As lpdeform_send. */
 LPDEFORM_API lpdeform_code lpdeform_resize(lpdeform_session* session, const lpdeform_resizing* resizing,
                                            uint64_t* input_seq, lpdeform_error* error);
 

@@ -2,8 +2,12 @@
 
 #include <array>
 #include <cstdio>
+#include <map>
 #include <memory>
+#include <string>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
@@ -14,7 +18,9 @@
 #include "client/cli/progress.h"
 #include "client/cpp/client.h"
 #include "core/base/fault.h"
+#include "core/mesh/weld.h"
 #include "core/solve/resize.h"
+#include "core/solve/resize_extents.h"
 
 namespace lpdeform::cli {
 namespace {
@@ -56,10 +62,29 @@ absl::StatusOr<Scaling> read_scaling(const ResizeOptions& options, const Triangl
                                     " times the least; it must be at most 100 times the least."));
 }
 
+/// As side_locks, by the vertices of the mesh that is not welded.
+std::map<std::string, client::Update::Change> sides(const RestShape& shape, const Weld& weld,
+                                                    const Eigen::Matrix3d& axes, int stretched) {
+  std::map<std::string, client::Update::Change> handles;
+  for (const Handle& lock : side_locks(shape, axes, stretched)) {
+    client::Handle handle{.hold =
+                              client::PlaneLock{.normal = array_of(std::get<PlaneLock>(lock.hold).normal)}};
+    for (const std::int32_t vertex : lock.vertices)
+      handle.vertices.push_back(static_cast<std::uint32_t>(weld.first_copy[vertex]));
+    handles.emplace(absl::StrCat("side ", handles.size() + 1), std::move(handle));
+  }
+  return handles;
+}
+
 /// One solve on the server: along one axis, by `factor`.
 absl::Status stretch(client::Client& server, const Scaling& scaling, bool welds, int axis, double factor,
                      Interrupt& interrupt, Resized& resized) {
   Progress progress;
+  const TriangleMesh& rest = resized.file.mesh;
+  const Weld weld =
+      welds ? weld_by_position(rest.vertices) : no_weld(static_cast<std::int32_t>(rest.vertices.rows()));
+  const auto shape = RestShape::create(welded(rest, weld));
+  if (!shape.ok()) return shape.status();
   absl::StatusOr<client::Session> session =
       server.open(to_client(resized.file.mesh), {.weld = {.by_position = welds}});
   if (!session.ok()) return session.status();
@@ -74,13 +99,16 @@ absl::Status stretch(client::Client& server, const Scaling& scaling, bool welds,
   plain.scale[axis] = factor;
   solve.initial_positions = flat(plain(resized.file.mesh.vertices));
   solve.on_progress = [&progress](const client::SolveProgress& now) { progress.show(now); };
-  const auto sent = session->update({.handles = {}, .settings = {}, .resize = resize});
+  const auto sent = session->update(
+      {.handles = sides(**shape, weld, scaling.axes, axis), .settings = {}, .resize = resize});
   const absl::StatusOr<client::SolveResult> result =
       sent.ok() ? session->solve(solve) : absl::StatusOr<client::SolveResult>(sent.status());
   interrupt.set_action({});
   if (!result.ok()) return result.status();
 
-  resized.file.mesh.vertices = points_of(result->positions);
+  const Points positions = points_of(result->positions)(weld.first_copy, Eigen::all);
+  resized.file.mesh.vertices =
+      scattered(with_extents(**shape, scaling.axes, positions, plain((*shape)->positions())), weld);
   resized.distortion = Eigen::Map<const Field>(result->distortion.data(),
                                                static_cast<Eigen::Index>(result->distortion.size()));
   if (resized.stop_reason == client::StopReason::kConverged) resized.stop_reason = result->stop_reason;

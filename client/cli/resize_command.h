@@ -21,10 +21,10 @@ struct ResizeOptions {
   ServerAccess server;
 };
 
-/// Content-aware resizing of a mesh: as core/solve/resize.h has it, the factor that two of three axes share
-/// (the middle one) by plain scaling, then one solve for each axis that differs from it, each from the result
-/// before. Prints one line a solve. The distortion written to a .ply or shown in a .png is that of the last
-/// solve.
+/// Content-aware resizing of a mesh to the extent of the scaled one along every axis: the least of the three factors by
+/// plain scaling, then, as core/solve/resize.h and resize_extents.h have it, one solve for each axis that
+/// differs from it, each from the result before. Prints one line a solve. The distortion written to a .ply or shown in a .png
+/// is that of the last solve.
 ExitStatus run_resize(const ResizeOptions& options);
 
 }  // namespace lpdeform::cli

@@ -178,9 +178,9 @@ struct Settings {
   std::optional<RegionOfInterest> region = {};
 };
 
-/// A scaling by different factors along three axes in which salient parts keep their shape and size. The server
-/// makes the handle "resize" of it, which holds the ends of the mesh along the scaled axes, and sets p and
-/// stiffness, where the same update does not. To end it, remove that handle and set p and stiffness.
+/// A scaling by different factors along three axes in which salient parts keep their shape and size. The server makes the
+/// handle "resize" of it, which holds the ends of the mesh along the scaled axes (along others the extent changes: hold ends there with plane
+/// locks), and sets p and stiffness, where the same update does not. To end it, remove that handle and set p and stiffness.
 struct Resize {
   /// Along the axes, relative to the rest mesh; each 0.01 to 100. A factor that all share is better given to the mesh.
   std::array<double, 3> scale = {1, 1, 1};

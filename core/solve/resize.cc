@@ -3,17 +3,16 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "absl/strings/str_cat.h"
 #include "core/analysis/girth.h"
 #include "core/analysis/salience.h"
 #include "core/base/fault.h"
+#include "core/solve/resize_extents.h"
 
 namespace lpdeform {
 namespace {
 
-constexpr double kEnd = 0.01;  // of the extent
 constexpr double kStiffening = 100;
 constexpr double kNarrow = 0.75;         // of the mean girth
 constexpr double kLeastGirth = 1.0 / 6;  // of that
@@ -25,41 +24,6 @@ Eigen::Vector3d stretch_shares(const Eigen::Vector3d& scale) {
   const Eigen::Vector3d stretch = scale.array().log().abs();
   const double largest = stretch.maxCoeff();
   return largest > 0 ? Eigen::Vector3d(stretch / largest) : Eigen::Vector3d(1, 0, 0);
-}
-
-/// The lowest and the highest coordinate of each component along each axis.
-struct Extents {
-  std::vector<Eigen::Array3d> low, high;
-};
-
-Extents extents_of(const RestShape& shape, const Points& along) {
-  const double infinity = std::numeric_limits<double>::infinity();
-  const auto count = static_cast<std::size_t>(shape.component_count());
-  Extents extents{std::vector<Eigen::Array3d>(count, Eigen::Array3d::Constant(infinity)),
-                  std::vector<Eigen::Array3d>(count, Eigen::Array3d::Constant(-infinity))};
-  for (Eigen::Index i = 0; i < along.rows(); ++i) {
-    const std::int32_t component = shape.components()[i];
-    if (component < 0) continue;
-    extents.low[component] = extents.low[component].min(along.row(i).transpose().array());
-    extents.high[component] = extents.high[component].max(along.row(i).transpose().array());
-  }
-  return extents;
-}
-
-std::vector<std::int32_t> ends_of(const RestShape& shape, const Eigen::Matrix3d& axes,
-                                  const Eigen::Vector3d& shares) {
-  const Points along = (shape.positions().rowwise() - shape.centre()) * axes.transpose();
-  const Extents extents = extents_of(shape, along);
-  std::vector<std::int32_t> ends;
-  for (Eigen::Index i = 0; i < along.rows(); ++i) {
-    const std::int32_t component = shape.components()[i];
-    if (component < 0) continue;
-    const Eigen::Array3d low = extents.low[component], high = extents.high[component];
-    const Eigen::Array3d x = along.row(i).transpose().array(), margin = kEnd * (high - low);
-    const auto is_end = (x <= low + margin || x >= high - margin) && shares.array() > 0;
-    if (is_end.any()) ends.push_back(static_cast<std::int32_t>(i));
-  }
-  return ends;
 }
 
 /// Of the slices across each stretched axis, what makes narrow ones no easier to cut than others.
@@ -113,7 +77,7 @@ absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const 
   const RestShape& shape = features.shape();
   const Eigen::Vector3d shares = stretch_shares(scaling.scale);
   ResizeInputs inputs;
-  inputs.handle.vertices = ends_of(shape, scaling.axes, shares);
+  inputs.handle.vertices = ends_along(shape, scaling.axes, shares.array() > 0);
   const Points scaled = scaling(shape.positions());
   Points targets(inputs.handle.vertices.size(), 3);
   for (std::size_t k = 0; k < inputs.handle.vertices.size(); ++k)

@@ -35,12 +35,17 @@ struct ResizeInputs {
   Material material;
 };
 
-/// Content-aware resizing (section 5 of the paper names it): the extent becomes that of the scaled shape, and
+/// Content-aware resizing (section 5 of the paper names it): the ends along scaled axes go where the scaled shape has them, and
 /// what is salient keeps its shape and size as far as axes are stretched, by the energy of Eq. 3 against the rest shape.
 ///
 /// The handle holds the ends of each component, the vertices within 1 % of its extent from its lowest and
 /// highest along each axis whose scale is not 1, at their scaled positions; where all are 1, the ends along
-/// the first axis. The material is p = 1 and the stiffness
+/// the first axis. Nothing holds the shape across these axes, where its extent changes by up to a fifth when
+/// others are doubled. For the extent of the scaled shape along all three, as `lpdeform resize` gives it: one solve for each
+/// axis, from the result before it, with the handles of side_locks added, and with_extents of what comes out
+/// (resize_extents.h).
+///
+/// The material is p = 1 and the stiffness
 ///
 ///   s_i = 100^salience_i min(6^4, prod_k clamp(girth_ik / 0.75, 1/6, 1)^(-4 a_k)),    a_k = |log scale_k| / max_j |log scale_j|
 ///

@@ -153,15 +153,30 @@ class Files(OnShapes):
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(done.stdout.count("converged"), 2)  # 1 is shared; y and z differ from it
             positions = read_off(out)
-            for axis, extent, places in ((0, 4, 1), (1, 6, 1), (2, 63, 3)):  # the last solve holds the ends of z alone
-                self.assertAlmostEqual(min(position[axis] for position in positions), 0, places)
-                self.assertAlmostEqual(max(position[axis] for position in positions), extent, places)
+            for axis, extent in enumerate((4, 6, 63)):
+                self.assertAlmostEqual(min(position[axis] for position in positions), 0, 9)
+                self.assertAlmostEqual(max(position[axis] for position in positions), extent, 9)
         self.assertIn("0.01 to 100", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "1,1,0"))
         self.assertIn("2000 times", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "0.05,1,100"))
         self.assertIn("origin", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "1,1,2", "--origin",
                                              "nan,0,0"))
         self.assertIn("axis", self.refused(2, "resize", self.at("bar.off"), self.at("x.off"), "--scale", "1,1,2",
                                            "--x-axis", "0,1,0"))
+
+    def test_resize_gives_the_extent_that_is_asked_for_along_every_axis(self):
+        for shape, scale in (("sphere", (0.5, 1, 1)), ("sphere", (0.01, 1, 1)), ("pierced_block", (2, 1, 1)),
+                             ("pierced_block", (1, 2, 3)), ("creature", (1, 2, 3)), ("arm", (0.5, 1, 1.5))):
+            rest, out = self.at(f"{shape}.off"), self.at("resized.off")
+            self.assertEqual(run("shape", shape, "--out", rest).returncode, 0)
+            done = run("resize", rest, out, "--scale", ",".join(map(str, scale)))
+            self.assertEqual(done.returncode, 0, done.stderr)
+            before, after = read_off(rest), read_off(out)
+            for axis, factor in enumerate(scale):
+                low, high = (end(position[axis] for position in before) for end in (min, max))
+                middle, half = (low + high) / 2, factor * (high - low) / 2
+                for end, wanted in ((min, middle - half), (max, middle + half)):
+                    self.assertAlmostEqual(end(position[axis] for position in after), wanted, delta=1e-9 * (high - low),
+                                           msg=f"{shape} by {scale}, axis {axis}")
 
     def test_a_split_mesh_is_resized_in_one_piece(self):
         mesh, _, copies = self.split_bar()

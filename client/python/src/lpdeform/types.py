@@ -156,7 +156,8 @@ class Settings:
 class Resize:
     """A scaling by different factors along three axes in which salient parts keep their shape and size.
 
-    Makes the handle "resize" and sets p and stiffness, where the same update does not.
+    Makes the handle "resize", which holds the ends along scaled axes, and sets p and stiffness, where the same update does not.
+    Along the other axes the extent changes, unless plane locks hold ends there.
     """
 
     scale: Vector3

@@ -93,7 +93,10 @@ export interface Settings {
   region?: Uint32Array | readonly number[];
 }
 
-/** A scaling by different factors along three axes in which salient parts keep their shape and size. Makes the handle "resize". */
+/**
+ * A scaling by different factors along three axes in which salient parts keep their shape and size. Makes the handle "resize",
+ * which holds the ends along scaled axes; along the others the extent changes, unless plane locks hold ends there.
+ */
 export interface Resize {
   /** Along the axes, relative to the rest mesh; each 0.01 to 100. */
   scale: Vector3;
