@@ -1,6 +1,7 @@
 #include "client/cli/server_access.h"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -10,6 +11,9 @@
 
 namespace lpdeform::cli {
 namespace {
+
+/// A year, which every clock can count.
+constexpr std::chrono::hours kPatience{24 * 365};
 
 absl::Status read_into(const std::string& file, std::string& out) {
   if (file.empty()) return absl::OkStatus();
@@ -34,7 +38,10 @@ absl::StatusOr<std::string> read_token(const std::string& file) {
 
 absl::StatusOr<client::ClientOptions> client_options(const ServerAccess& access) {
   client::ClientOptions options;
-  if (!access.address) return options;
+  if (!access.address) {
+    options.call_timeout = kPatience;  // the work is this process's own, however long it takes
+    return options;
+  }
   if (access.tls || !access.tls_ca.empty() || !access.tls_cert.empty() || !access.tls_key.empty()) {
     client::Tls& tls = options.tls.emplace();
     for (const auto& [file, out] : {std::pair(&access.tls_ca, &tls.root_certificates),

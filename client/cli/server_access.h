@@ -16,7 +16,8 @@ struct ServerAccess {
   std::string token_file;
 };
 
-/// Reads the files; that of the token again for each call, so that it may be renewed. NOT_FOUND FILE_NOT_FOUND;
+/// Reads the files; that of the token again for each call, so that it may be renewed. No call of the server in this process runs
+/// out of time: what it is asked for it does, and Ctrl-C ends it. NOT_FOUND FILE_NOT_FOUND;
 /// INVALID_ARGUMENT TOKEN_FILE where it is not one line of text.
 absl::StatusOr<client::ClientOptions> client_options(const ServerAccess& access);
 
