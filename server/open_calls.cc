@@ -68,11 +68,9 @@ class WatcherFactory final : public ServerInterceptorFactoryInterface {
 
 }  // namespace
 
-std::vector<std::unique_ptr<ServerInterceptorFactoryInterface>> end_open_calls(
-    const std::shared_ptr<Timers>& timers, Timers::Duration after) {
-  std::vector<std::unique_ptr<ServerInterceptorFactoryInterface>> factories;
-  factories.push_back(std::make_unique<WatcherFactory>(timers, after));
-  return factories;
+std::unique_ptr<ServerInterceptorFactoryInterface> end_open_calls(const std::shared_ptr<Timers>& timers,
+                                                                  Timers::Duration after) {
+  return std::make_unique<WatcherFactory>(timers, after);
 }
 
 }  // namespace lpdeform

@@ -15,6 +15,11 @@ absl::StatusOr<std::shared_ptr<Store>> open_store(const std::string& name, const
     return invalid_input({"OPTION_OUT_OF_RANGE", "store_password_file", "--store redis://HOST:PORT"},
                          "Option --store-password-file is for --store redis://HOST:PORT.");
   }
+  if (options.most_bytes != 0 && !absl::StartsWith(name, kSqlite)) {
+    return invalid_input(
+        {"OPTION_OUT_OF_RANGE", "max_store_bytes", "--store sqlite:DIR"},
+        "Option --max-store-bytes is for --store sqlite:DIR; Redis has a maxmemory of its own.");
+  }
   if (name == "none") return nullptr;
   if (absl::StartsWith(name, kSqlite) && name.size() > kSqlite.size()) {
     return open_sqlite_store({name.substr(kSqlite.size()), options.most_bytes});

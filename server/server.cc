@@ -9,6 +9,7 @@
 #include <mutex>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
@@ -24,6 +25,7 @@
 #include "server/service.h"
 #include "server/tokens.h"
 #include "server/transport_security.h"
+#include "server/unread_calls.h"
 #include "server/vital_signs.h"
 
 namespace lpdeform {
@@ -69,6 +71,12 @@ absl::Status check(const ServerOptions& options) {
         std::pair("max_calls_waiting", options.max_calls_waiting),
         std::pair("max_calls_per_connection", options.max_calls_per_connection)}) {
     if (value == 0 || value > 1'000'000) return out_of_range(name, "1 to 10^6");
+  }
+  if (options.max_upload_bytes == 0) return out_of_range("max_upload_bytes", "more than 0");
+  for (const auto& [name, value] : {std::pair("token_issuer", &options.token_issuer),
+                                    std::pair("token_audience", &options.token_audience)}) {
+    if (!value->empty() && options.token_keys_file.empty())
+      return out_of_range(name, "given with token_keys");
   }
   if (options.max_undo > 10'000) return out_of_range("max_undo", "0 to 10^4");
   if (options.max_connections_per_address > 1'000'000) {
@@ -210,7 +218,10 @@ absl::Status Server::Impl::start_grpc(const ServerOptions& options, std::shared_
                              static_cast<int>(options.connection_idle.count()));
   // Of reflection, a thread a call; all others have theirs.
   builder.SetResourceQuota(grpc::ResourceQuota("lpdeform").SetMaxThreads(kReflectionThreads));
-  builder.experimental().SetInterceptorCreators(end_open_calls(backend.timers, options.connection_idle));
+  std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
+  interceptors.push_back(end_open_calls(backend.timers, options.connection_idle));
+  interceptors.push_back(tell_of_unread_calls(backend));
+  builder.experimental().SetInterceptorCreators(std::move(interceptors));
   // gRPC unpacks a message before it looks at the size that it has then: 4 MiB on the way can be 4 GiB.
   builder.AddChannelArgument(GRPC_ARG_ENABLE_PER_MESSAGE_DECOMPRESSION, 0);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);

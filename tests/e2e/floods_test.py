@@ -196,6 +196,7 @@ class Flooded(programs.OnShapes):
             attacker.send_whole(range(1, 9, 2), message, encoding)
             self.assertTrue(self.serves(port))
         self.assertLess(self.memory(which="VmHWM") - before, 64 * MIB)
+        self.assertEqual(self.rejected("MESSAGE_UNREADABLE"), 4)  # those that do not say how they are packed
 
     def admin(self, path):
         with urllib.request.urlopen(self.flooded.admin + path, timeout=programs.PATIENCE) as answer:
@@ -204,6 +205,10 @@ class Flooded(programs.OnShapes):
     def calls(self, what, method):
         return sum(float(line.rsplit(" ", 1)[1]) for line in self.admin("/metrics").splitlines()
                    if line.startswith(f"grpc_server_{what}") and f'/{method}"' in line)
+
+    def rejected(self, reason):
+        return sum(float(line.rsplit(" ", 1)[1]) for line in self.admin("/metrics").splitlines()
+                   if line.startswith("lpdeform_rejections_total") and f'"{reason}"' in line)
 
     def serves(self, port=None):
         return programs.run("deform", self.at("bar.off"), "--handles", self.at("bar.json"), "--server",

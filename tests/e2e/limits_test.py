@@ -82,7 +82,10 @@ class Limits(unittest.TestCase):
                                  ("session-idle", "nan", "must be 0.001 to 1e+09 seconds"),
                                  ("heartbeat", "0", "must be 0.001 to 1e+09 seconds"),
                                  ("grace", "-1", "must be 0 to 1e+09 seconds"), ("connection-idle", "0.5", "1"),
-                                 ("max-frame-rate", "-1", "")):
+                                 ("max-frame-rate", "-1", ""), ("max-upload-bytes", "0", "max_upload_bytes must be more than 0"),
+                                 ("token-issuer", "us", "token_issuer must be given with token_keys"),
+                                 ("token-audience", "us", "token_audience must be given with token_keys"),
+                                 ("max-store-bytes", "1GiB", "--max-store-bytes is for --store sqlite:DIR")):
             done = subprocess.run([programs.server(), "--address", "127.0.0.1:0", f"--{flag}={value}"],
                                   capture_output=True, text=True, timeout=programs.PATIENCE)
             self.assertNotEqual(done.returncode, 0, flag)

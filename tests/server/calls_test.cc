@@ -3,6 +3,7 @@
 #include <grpcpp/generic/generic_stub.h>
 
 #include <functional>
+#include <future>
 #include <limits>
 #include <map>
 #include <thread>
@@ -93,6 +94,20 @@ TEST_F(CallsTest, ACompressedMessageIsRefusedAndSaysSo) {
     stream->Write(open);
     EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::UNIMPLEMENTED);
   }
+}
+
+TEST_F(CallsTest, AMessageThatCannotBeReadIsRefusedByReason) {
+  grpc::GenericStub stub(grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
+  grpc::ClientContext context;
+  const grpc::Slice no_message("\xff\xff\xff");
+  const grpc::ByteBuffer request(&no_message, 1);
+  grpc::ByteBuffer response;
+  std::promise<grpc::Status> ended;
+  stub.UnaryCall(&context, "/lpdeform.v1.DeformService/UploadPart", {}, &request, &response,
+                 [&ended](grpc::Status status) { ended.set_value(std::move(status)); });
+  const grpc::Status status = ended.get_future().get();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(details_of(status).info.reason(), "MESSAGE_UNREADABLE");
 }
 
 TEST_F(CallsTest, ASessionMayBeginWithHandlesAndSettings) {
