@@ -105,6 +105,7 @@ class FrameAssembly:
         self._quantization: frame_pb2.Quantization | None = None
         self._received = 0
         self._whole: dict[str, npt.NDArray[Any]] = {}
+        self._given: dict[str, int] = {}  # for how many vertices
 
     def add(self, part: frame_pb2.FramePart) -> Frame | None:
         """The frame, where this part makes it whole."""
@@ -129,16 +130,18 @@ class FrameAssembly:
             return None
         if self._received != self._vertex_count:
             raise _misfit(f"Frame {part.frame_seq} ends after {self._received} of {self._vertex_count} vertices.")
+        if any(count != self._vertex_count for count in self._given.values()):
+            raise _misfit(f"Frame {part.frame_seq} has distortion or normals for a part of its vertices.")
         self._finish(frame)
         return frame
 
     def _begin(self, header: frame_pb2.FrameHeader) -> Frame:
         if header.vertex_count != self._vertex_count:
             raise _misfit(f"A frame has {header.vertex_count} vertices, the mesh {self._vertex_count}.")
-        if header.encoding > frame_pb2.ENCODING_COMPRESSED:
+        if not frame_pb2.ENCODING_UNSPECIFIED <= header.encoding <= frame_pb2.ENCODING_COMPRESSED:
             raise _misfit(f"A frame comes in encoding {header.encoding}, which was not asked for.")
         self._received = 0
-        self._whole = {}
+        self._whole, self._given = {}, {}
         self._is_compressed = header.encoding == frame_pb2.ENCODING_COMPRESSED
         is_quantized = self._is_compressed or header.encoding == frame_pb2.ENCODING_QUANTIZED
         self._quantization = header.quantization if is_quantized else None
@@ -171,14 +174,14 @@ class FrameAssembly:
 
     def _join(self, name: str, values: npt.NDArray[Any], part: frame_pb2.FramePart) -> None:
         """`values` at their place in the whole, which they are where the part is all of it."""
+        self._given[name] = self._given.get(name, 0) + part.vertex_count
         if part.vertex_count == self._vertex_count:
             self._whole[name] = values
             return
         if name not in self._whole:
-            if part.first_vertex > 0:
-                raise _wrong_size(part)
             self._whole[name] = np.zeros((self._vertex_count, values.shape[1]), values.dtype)
-        self._whole[name][part.first_vertex : part.first_vertex + part.vertex_count] = values
+        if part.vertex_count > 0:  # the whole may be the part before, which cannot be written to
+            self._whole[name][part.first_vertex : part.first_vertex + part.vertex_count] = values
 
     def _finish(self, frame: Frame) -> None:
         whole, self._whole = self._whole, {}
