@@ -110,6 +110,12 @@ absl::Status FrameAssembly::append(const v1::FramePart& part) {
     return misfit(absl::StrCat("Frame ", part.frame_seq(), " ends after ", received_, " of ", vertex_count_,
                                " vertices."));
   }
+  const auto is_none_or_all = [](std::size_t size, std::size_t all) { return size == 0 || size == all; };
+  if (part.last() && (!is_none_or_all(frame_->distortion.size(), vertex_count_) ||
+                      !is_none_or_all(frame_->normals.size(), std::size_t{3} * vertex_count_))) {
+    return misfit(
+        absl::StrCat("Frame ", part.frame_seq(), " has distortion or normals for a part of its vertices."));
+  }
   return absl::OkStatus();
 }
 

@@ -45,6 +45,21 @@ TEST(FrameAssembly, PutsPartsTogetherInOrder) {
   EXPECT_TRUE((*frame)->converged);
 }
 
+TEST(FrameAssembly, RefusesDistortionAndNormalsOfAPartOfTheVertices) {
+  for (const bool is_first : {true, false}) {
+    for (const bool is_distortion : {true, false}) {
+      std::vector<v1::FramePart> parts{first_part(2, {1, 2, 3}, false), part(1, {4, 5, 6}, true)};
+      v1::FramePart& other = parts[is_first ? 0 : 1];
+      if (is_distortion) other.clear_distortion();
+      if (!is_distortion) other.set_normals(bytes(std::vector<float>{0, 0, 1}));
+      FrameAssembly assembly(2);
+      ASSERT_TRUE(assembly.add(parts[0]).ok());
+      const auto refused = assembly.add(parts[1]);
+      EXPECT_EQ(fault_of(refused.status()).reason, "FRAME_PARTS");
+    }
+  }
+}
+
 TEST(FrameAssembly, ReadsACertificateWhereThereIsOne) {
   FrameAssembly assembly(1);
   v1::FramePart whole = first_part(1, {1, 2, 3}, true);

@@ -14,6 +14,8 @@ export class FrameAssembly {
   #frame: WireFrame | undefined;
   #isCompressed = false;
   #received = 0;
+  #withDistortion = 0; // vertices that came with it
+  #withNormals = 0;
 
   /** `isDouble`: what comes raw are doubles. */
   constructor(
@@ -34,12 +36,17 @@ export class FrameAssembly {
     else this.#appendRaw(frame, part);
     frame.wireBytes += part.positions.byteLength + part.distortion.byteLength + part.normals.byteLength;
     this.#received += part.vertexCount;
+    if (part.distortion.length > 0) this.#withDistortion += part.vertexCount;
+    if (part.normals.length > 0) this.#withNormals += part.vertexCount;
     if (!part.last) {
       this.#frame = frame;
       return undefined;
     }
     if (this.#received !== this.vertexCount) {
       throw misfit(`Frame ${part.frameSeq} ends after ${this.#received} of ${this.vertexCount} vertices.`);
+    }
+    if ([this.#withDistortion, this.#withNormals].some((count) => count !== 0 && count !== this.vertexCount)) {
+      throw misfit(`Frame ${part.frameSeq} has distortion or normals for a part of its vertices.`);
     }
     frame.receivedAt = performance.now();
     return frame;
@@ -49,7 +56,7 @@ export class FrameAssembly {
     if (header.vertexCount !== this.vertexCount) {
       throw misfit(`A frame has ${header.vertexCount} vertices, the mesh ${this.vertexCount}.`);
     }
-    this.#received = 0;
+    this.#received = this.#withDistortion = this.#withNormals = 0;
     this.#isCompressed = header.encoding === Encoding.COMPRESSED;
     const frame = new WireFrame(header);
     if (this.#isCompressed || header.encoding === Encoding.QUANTIZED) {
@@ -78,22 +85,25 @@ export class FrameAssembly {
   #appendRaw({ raw }: WireFrame, part: FramePart): void {
     const { positions, distortion, normals } = part;
     const numbers: (bytes: Uint8Array) => Float32Array | Float64Array = this.isDouble ? float64View : float32View;
-    raw.positions = this.#join(raw.positions, numbers(positions), 3, part);
-    if (distortion.length > 0) raw.distortion = this.#join(raw.distortion, numbers(distortion), 1, part);
-    if (normals.length > 0) raw.normals = this.#join(raw.normals, numbers(normals), 3, part);
+    raw.positions = this.#join(raw.positions, numbers(positions), positions, 3, part);
+    if (distortion.length > 0) raw.distortion = this.#join(raw.distortion, numbers(distortion), distortion, 1, part);
+    if (normals.length > 0) raw.normals = this.#join(raw.normals, numbers(normals), normals, 3, part);
   }
 
   #appendQuantized(quantized: NonNullable<WireFrame["quantized"]>, part: FramePart): void {
     const bytesOf = (bytes: Uint8Array) => (this.#isCompressed ? decompress(bytes, part.vertexCount) : bytes);
-    quantized.vertices = this.#join(quantized.vertices, uint16View(bytesOf(part.positions)), 4, part);
+    const vertices = bytesOf(part.positions);
+    quantized.vertices = this.#join(quantized.vertices, uint16View(vertices), vertices, 4, part);
     if (part.normals.length === 0) return;
-    const { buffer, byteOffset, length } = uint16View(bytesOf(part.normals));
-    quantized.normals = this.#join(quantized.normals, new Int16Array(buffer, byteOffset, length), 4, part);
+    const normals = bytesOf(part.normals);
+    const { buffer, byteOffset, length } = uint16View(normals);
+    quantized.normals = this.#join(quantized.normals, new Int16Array(buffer, byteOffset, length), normals, 4, part);
   }
 
-  /** `values` at their place in the whole, which is made with its first part, or is them. */
-  #join<Array extends Numbers>(whole: Array, values: Array, width: number, part: FramePart): Array {
-    if (values.length !== width * part.vertexCount) {
+  /** `values`, which are all that `bytes` hold, at their place in the whole, which is made with its first part, or is them. */
+  #join<Array extends Numbers>(whole: Array, values: Array, bytes: Uint8Array, width: number, part: FramePart): Array {
+    const isWhole = bytes.byteLength === values.byteLength;
+    if (!isWhole || values.length !== width * part.vertexCount) {
       throw misfit(`A part of frame ${part.frameSeq} has the wrong number of bytes for ${part.vertexCount} vertices.`);
     }
     if (part.vertexCount === this.vertexCount) return values;
