@@ -432,7 +432,7 @@ class Programs(unittest.TestCase):
         known = set(re.findall(r"--[a-z-]+", text))
         for arguments in (containers(the("StatefulSet", "lpdeform"))[0]["args"], COMPOSE["services"]["server"]["command"],
                           COMPOSE_INTERNET["services"]["server"]["command"],
-                          [word for word in Unit.lines["ExecStart"].split()[1:] if word.startswith("--")]):
+                          [word for word in Unit.values["ExecStart"].split()[1:] if word.startswith("--")]):
             self.assertLessEqual({argument.split("=")[0] for argument in arguments}, known)
 
     def test_envoy_is_given_options_that_it_takes(self):
