@@ -20,7 +20,9 @@ COPY client/web client/web
 RUN PATH=/src/build/web-tools/bin:$PATH npm run build --prefix client/web
 
 FROM debian:12 AS web
-RUN groupadd --gid 10001 lpdeform && useradd --uid 10001 --gid 10001 --no-create-home --shell /usr/sbin/nologin lpdeform
+COPY deploy/install deploy/packages.txt /opt/lpdeform/deploy/
+RUN /opt/lpdeform/deploy/install web-run && rm -rf /var/lib/apt/lists/* && \
+    groupadd --gid 10001 lpdeform && useradd --uid 10001 --gid 10001 --no-create-home --shell /usr/sbin/nologin lpdeform
 WORKDIR /opt/lpdeform
 COPY LICENSE /usr/share/doc/lpdeform/
 COPY deploy/web deploy/envoy-config deploy/envoy.yaml.in deploy/
