@@ -54,6 +54,28 @@ class Reproduce(unittest.TestCase):
         self.assertEqual(self.verdicts["claims_that_hold"],
                          sum(claim["holds"] for figure in self.verdicts["figures"] for claim in figure["claims"]))
 
+    def test_the_table_says_of_other_sizes_and_other_meshes_that_they_are_not_the_papers(self):
+        text = "".join(self.sections()["table_1"].itertext())
+        self.assertNotIn("All shapes are generated", text)
+        self.assertIn("were added by --mesh", text)
+        self.assertNotIn("paper's own numbers of vertices and faces", text)
+        self.assertIn("0.25 times as many cells", text)
+        self.assertNotIn("mean of all entries", text)
+        self.assertIn("not to be held against these", text)
+
+    def test_a_method_has_one_colour_in_all_plots_of_figure_1(self):
+        styles = {}
+        plots = self.elements("div", self.sections()["figure_1"])[-1]
+        for plot in plots:
+            lines = [line.get("class") for line in plot if line.get("class", "").startswith("line ")]
+            names = [text.text for text in plot if text.text in ("conic", "line_search", "quasi_newton")]
+            self.assertEqual(len(lines), 2 * len(names))  # each in the plot and in the legend
+            for name, line, entry in zip(names, lines, lines[len(names):]):
+                self.assertEqual(line, entry)
+                styles.setdefault(name, set()).add(line)
+        self.assertEqual(set(styles), {"conic", "line_search", "quasi_newton"})
+        self.assertEqual(len(set.union(*styles.values())), 3, styles)
+
     def test_verdicts_follow_from_their_numbers(self):
         claims = {figure["id"]: figure["claims"] for figure in self.verdicts["figures"]}
         for figure in ("figure_3", "figure_4"):

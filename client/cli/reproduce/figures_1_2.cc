@@ -11,9 +11,24 @@
 namespace lpdeform::reproduce {
 namespace {
 
+/// A method has one colour and dash in all plots.
+int style_of(Method method) {
+  switch (method) {
+    case Method::kConic:
+      return 0;
+    case Method::kLineSearch:
+      return 1;
+    case Method::kQuasiNewton:
+      return 2;
+    default:
+      return 3;
+  }
+}
+
 /// E^(1/p) at iterations that stand apart on a logarithmic scale, the last one included.
 Series series_of(const Trace& trace) {
-  Series series{std::string(method_name(trace.summary.method)), {}};
+  const Method method = trace.summary.method;
+  Series series{std::string(method_name(method)), {}, style_of(method)};
   double next = 0;
   for (const IterationRecord& record : trace.summary.trace) {
     if (record.iteration < next && &record != &trace.summary.trace.back()) continue;
@@ -31,29 +46,56 @@ std::string energy_plot(const Measurements& measured, double p) {
   return line_plot(plot);
 }
 
-/// Iterations after which the true energy was higher than before, by more than rounding.
-int rises(const Trace& trace) {
+/// How much of itself the energy must rise by to count: rounding for methods that go down a line, and the accuracy
+/// that a cone program is solved to.
+constexpr double kRounding = 1e-12, kProgramAccuracy = 1e-6;
+
+/// Entries that are above the one before by more than `tolerance` of it.
+int rises(const std::vector<double>& energies, double tolerance) {
   int count = 0;
-  const auto& records = trace.summary.trace;
-  for (std::size_t k = 1; k < records.size(); ++k) {
-    if (records[k].energy > records[k - 1].energy * (1 + 1e-12)) ++count;
+  for (std::size_t k = 1; k < energies.size(); ++k) {
+    if (energies[k] > energies[k - 1] * (1 + tolerance)) ++count;
   }
   return count;
 }
 
+std::vector<double> all_energies(const Trace& trace) {
+  std::vector<double> energies;
+  for (const IterationRecord& record : trace.summary.trace) energies.push_back(record.energy);
+  return energies;
+}
+
+/// After each iteration as the paper counts them: by conic a whole cone program, whose interior points are none.
+std::vector<double> energies_of(const Trace& trace) {
+  if (trace.summary.method != Method::kConic) return all_energies(trace);
+  std::vector<double> energies;
+  const auto& records = trace.summary.trace;
+  for (std::size_t k = 0; k < records.size(); ++k) {
+    const bool ends_program = k + 1 == records.size() || records[k + 1].stage != records[k].stage;
+    if (k == 0 || ends_program) energies.push_back(records[k].energy);
+  }
+  return energies;
+}
+
 Claim energy_falls(const Measurements& measured) {
-  int count = 0, iterations = 0;
+  int count = 0;
+  std::size_t iterations = 0;
   for (const Trace& trace : measured.traces) {
     if (trace.summary.method == Method::kQuasiNewton) continue;
-    count += rises(trace);
-    iterations += trace.summary.iterations;
+    const std::vector<double> energies = energies_of(trace);
+    count += rises(energies, trace.summary.method == Method::kConic ? kProgramAccuracy : kRounding);
+    iterations += energies.size() - 1;
   }
+  const int inside = rises(all_energies(measured.trace(1, Method::kConic)), kRounding);
   return {"The energy consistently decreases with more iterations.",
           absl::StrCat("In ", iterations,
-                       " iterations of the paper's methods (conic, line_search, local_global) it rose ",
-                       count, " times."),
+                       " iterations of the paper's methods (conic, by the cone program; line_search; "
+                       "local_global) it rose ",
+                       count, " times, by more than 1e-6 of itself for conic and 1e-12 for the others."),
           count == 0,
-          {{"rises", count}, {"iterations", iterations}}};
+          {{"rises", count},
+           {"iterations", static_cast<double>(iterations)},
+           {"rises_inside_cone_programs", inside}}};
 }
 
 Claim line_search_takes_many_short_iterations(const Measurements& measured) {
@@ -103,20 +145,22 @@ double lowest_bin_share(const Field& energies) {
 Figure figure_1(const Measurements& measured) {
   std::string plots = "<div class=\"plots\">\n";
   for (const double p : {1.0, 1.5, 6.0}) plots += energy_plot(measured, p);
-  const int smoothed = rises(measured.trace(1, Method::kQuasiNewton));
-  return {
-      "figure_1",
-      "Figure 1: energy by iteration",
-      "The bar of Figure 4, its middle twisted.",
-      {energy_falls(measured), line_search_takes_many_short_iterations(measured),
-       larger_p_converges_sooner(measured)},
-      plots + "</div>\n",
-      {},
-      absl::StrCat(
-          "An iteration of conic is one of the interior-point method inside a cone program. quasi_newton, "
-          "the default here, minimises a smoothed energy for p < 2, which never rises within a stage; "
-          "the true energy, which is shown, rose a little in ",
-          smoothed, " of its iterations at p = 1, and the lowest state is what it returns.")};
+  const int smoothed = rises(all_energies(measured.trace(1, Method::kQuasiNewton)), kRounding);
+  return {"figure_1",
+          "Figure 1: energy by iteration",
+          "The bar of Figure 4, its middle twisted.",
+          {energy_falls(measured), line_search_takes_many_short_iterations(measured),
+           larger_p_converges_sooner(measured)},
+          plots + "</div>\n",
+          {},
+          absl::StrCat(
+              "In the plots an iteration of conic is one of the interior-point method inside a cone program, "
+              "whose "
+              "points on the way may lie higher; the paper counts whole programs, and so does the first "
+              "claim. quasi_newton, "
+              "the default here, minimises a smoothed energy for p < 2, which never rises within a stage; "
+              "the true energy, which is shown, rose a little in ",
+              smoothed, " of its iterations at p = 1, and the lowest state is what it returns.")};
 }
 
 Figure figure_2(const Measurements& measured) {

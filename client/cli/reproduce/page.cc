@@ -94,7 +94,9 @@ std::string header_html(const std::vector<Figure>& figures, const Settings& sett
       "<header>\n<h1>L<sub>p</sub> shape deformation, reproduced</h1>\n<p>Every figure and the table of Gao, "
       "Zhang and "
       "Lai, <cite>L<sub>p</sub> shape deformation</cite>, Science China Information Sciences 55, 2012 (doi "
-      "10.1007/s11432-012-4574-y), made again from solves on generated shapes. Each claim of the paper "
+      "10.1007/s11432-012-4574-y), made again from solves on generated shapes",
+      settings.others.empty() ? "" : ", and meshes that were added beside them",
+      ". Each claim of the paper "
       "stands beside the "
       "number that decides it; the number is computed in the same run.</p>\n<p>",
       count.holding, " of ", count.all, " claims hold here",

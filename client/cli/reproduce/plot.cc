@@ -70,14 +70,15 @@ std::string legend(const std::vector<Series>& series) {
   std::string svg;
   for (std::size_t k = 0; k < series.size(); ++k) {
     const double y = kTop + 12 + 17 * static_cast<double>(k);
-    absl::StrAppend(&svg, line_at(kRight - 118, y, kRight - 92, y, absl::StrCat("line line_", k)),
+    absl::StrAppend(&svg,
+                    line_at(kRight - 118, y, kRight - 92, y, absl::StrCat("line line_", series[k].style)),
                     text_at(kRight - 86, y + 4, "start", "tick", series[k].name));
   }
   return svg;
 }
 
-std::string polyline(const Series& series, const Scale& x, const Scale& y, std::size_t index) {
-  std::string svg = absl::StrCat("<polyline class=\"line line_", index, "\" points=\"");
+std::string polyline(const Series& series, const Scale& x, const Scale& y) {
+  std::string svg = absl::StrCat("<polyline class=\"line line_", series.style, "\" points=\"");
   for (const auto& [at_x, at_y] : series.points) absl::StrAppendFormat(&svg, "%.1f,%.1f ", x(at_x), y(at_y));
   return svg + "\"/>\n";
 }
@@ -123,7 +124,7 @@ std::string line_plot(const LinePlot& plot) {
   const double room = 0.06 * (y_high - y_low);
   const Scale x{x_low, x_high, kLeft, kRight, true}, y{y_low - room, y_high + room, kBottom, kTop};
   std::string svg = begin_svg(plot.title) + axes(x, y, plot.x_label, plot.y_label);
-  for (std::size_t k = 0; k < plot.series.size(); ++k) svg += polyline(plot.series[k], x, y, k);
+  for (const Series& series : plot.series) svg += polyline(series, x, y);
   return svg + legend(plot.series) + "</svg>\n";
 }
 

@@ -13,6 +13,7 @@ namespace lpdeform::reproduce {
 struct Series {
   std::string name;
   std::vector<std::array<double, 2>> points;  // x ascending, finite
+  int style = 0;                              // 0 to 3: colour and dash, the class line_0 to line_3
 };
 
 struct LinePlot {

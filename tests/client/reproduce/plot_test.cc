@@ -45,6 +45,13 @@ TEST(LinePlot, HasALineAndALegendEntryForEachSeries) {
   EXPECT_THAT(svg, HasSubstr("a &lt; b"));
 }
 
+TEST(LinePlot, DrawsASeriesAndItsLegendEntryInItsOwnStyle) {
+  const std::string svg = line_plot({"", "", "", {{"", {{1, 5}, {2, 4}}, 2}, {"", {{1, 3}, {2, 4}}, 0}}});
+  EXPECT_EQ(count(svg, "line_2\""), 2);
+  EXPECT_EQ(count(svg, "line_0\""), 2);
+  EXPECT_EQ(count(svg, "line_1\""), 0);
+}
+
 TEST(LinePlot, PutsTheEndsOfItsRangesOntoTheAxesEnds) {
   const std::string svg = line_plot({"", "", "", {{"", {{1, 0}, {10, 1}, {100, 0}}}}});
   // Logarithmic: 10 lies half-way between 1 and 100.
