@@ -1,4 +1,4 @@
-import { LpdeformError, openSession, type Session } from "../src/index.js";
+import { joinSession, LpdeformError, openSession, type Session } from "../src/index.js";
 import { grid } from "../test/real/shapes.js";
 import { Histogram } from "./histogram.js";
 
@@ -37,15 +37,32 @@ export class Lane {
   readonly vertices: number;
   #pending: { inputSeq: number; due: number }[] = [];
   #moves = 0;
+  #driver: Session; // the one that moves: the owner, or who has taken over from it
+  #isReconnecting = false;
+  #isOver = false;
+  readonly #reading: Promise<void>[] = [];
+  readonly #slow: Session[] = [];
+  readonly #over: Promise<void>;
+  #end = () => {};
 
   private constructor(
-    readonly session: Session,
+    readonly url: string,
+    readonly owner: Session, // made the session, and deletes it
     readonly side: number,
   ) {
     this.vertices = side * side;
-    session.on("problem", (error) => this.#note(error));
+    this.#driver = owner;
+    this.#over = new Promise((end) => (this.#end = end));
+    this.#watch(owner);
+  }
+
+  #watch(session: Session): void {
+    // Of one that another has taken over from, it is its end that is told of.
+    session.on("problem", (error) => {
+      if (session === this.#driver && !this.#isReconnecting) this.#note(error);
+    });
     session.on("connection", (state) => {
-      if (state === "reconnecting") ++this.tally.reconnects;
+      if (state === "reconnecting" && session === this.#driver) ++this.tally.reconnects;
     });
   }
 
@@ -54,9 +71,9 @@ export class Lane {
     const begin = performance.now();
     const side = Math.max(2, Math.round(Math.sqrt(vertices)));
     const { mesh, handles } = grid(side);
-    const lane = new Lane(await openSession(mesh, { url, settings: { p } }), side);
-    lane.session.setHandles({ base: handles.left, tip: { ...handles.right, motion: lane.#lifted(1) } });
-    await lane.session.settle();
+    const lane = new Lane(url, await openSession(mesh, { url, settings: { p } }), side);
+    lane.owner.setHandles({ base: handles.left, tip: { ...handles.right, motion: lane.#lifted(1) } });
+    await lane.owner.settle();
     lane.tally.setup.record(1000 * (performance.now() - begin));
     return lane;
   }
@@ -74,28 +91,78 @@ export class Lane {
   move(due: number): void {
     this.tally.due += 1;
     try {
-      this.#pending.push({ inputSeq: this.session.move("tip", this.#lifted(++this.#moves + 1)), due });
+      this.#pending.push({ inputSeq: this.#driver.move("tip", this.#lifted(++this.#moves + 1)), due });
     } catch (error) {
+      if (this.#isReconnecting) {
+        this.#pending.push({ inputSeq: Infinity, due });
+        return;
+      }
       this.tally.unanswered += 1;
       this.#note(error);
     }
   }
 
-  /** Takes frames until the session is closed. */
-  async read(): Promise<void> {
+  /** Takes frames until the lane is over. */
+  start(): void {
+    this.#reading.push(this.#read(this.#driver));
+  }
+
+  async #read(session: Session): Promise<void> {
     try {
-      for await (const frame of this.session) {
+      for await (const frame of session) {
         const now = performance.now();
         this.tally.frames += 1;
         this.tally.skipped += frame.skippedInputs;
-        if (frame.inputSeq < this.session.newestInput) this.tally.stale += 1;
+        if (frame.inputSeq < session.newestInput) this.tally.stale += 1;
         this.tally.payloadBytes += frame.positions.byteLength + (frame.distortion?.byteLength ?? 0);
         while (this.#pending[0] && this.#pending[0].inputSeq <= frame.inputSeq) {
           this.tally.latency.record(1000 * (now - this.#pending.shift()!.due));
         }
       }
     } catch (error) {
+      if (session === this.#driver && !this.#isReconnecting) this.#note(error);
+    }
+  }
+
+  /** Looks on beside the writer, a frame every `pauseMs`. */
+  async addSlowReader(pauseMs: number): Promise<void> {
+    const reader = await joinSession(this.owner.name, { url: this.url, role: "reader", credit: 1 });
+    reader.on("problem", (error) => this.#note(error));
+    this.#slow.push(reader);
+    this.#reading.push(this.#readSlowly(reader, pauseMs));
+  }
+
+  async #readSlowly(reader: Session, pauseMs: number): Promise<void> {
+    try {
+      for await (const frame of reader) {
+        void frame;
+        await Promise.race([this.#over, new Promise((next) => setTimeout(next, pauseMs))]);
+        if (this.#isOver) return;
+      }
+    } catch (error) {
+      if (!this.#isOver) this.#note(error);
+    }
+  }
+
+  /** Lets go of the connection and takes the session over on a new one. */
+  async reconnect(): Promise<void> {
+    if (this.#isOver || this.#isReconnecting) return;
+    this.#isReconnecting = true;
+    const before = this.#driver;
+    try {
+      const joined = await joinSession(this.owner.name, { url: this.url, role: "writer" });
+      this.#watch(joined);
+      this.#driver = joined;
+      ++this.tally.reconnects;
+      // What the one before did not get through is answered with the first that this one sends.
+      const first = joined.move("tip", this.#lifted(this.#moves + 1));
+      for (const one of this.#pending) one.inputSeq = Math.min(one.inputSeq, first);
+      this.#reading.push(this.#read(joined));
+      if (before !== this.owner) await before.close();
+    } catch (error) {
       this.#note(error);
+    } finally {
+      this.#isReconnecting = false;
     }
   }
 
@@ -106,7 +173,11 @@ export class Lane {
   /** Deletes the session; what is unanswered now stays so. */
   async finish(): Promise<Tally> {
     this.tally.unanswered += this.#pending.length;
-    await this.session.close();
+    this.#isOver = true;
+    this.#end();
+    for (const session of [...this.#slow, this.#driver]) if (session !== this.owner) await session.close();
+    await this.owner.close();
+    await Promise.all(this.#reading);
     return this.tally;
   }
 }

@@ -1,6 +1,6 @@
 // The twin of `lpdeform load`, through gRPC-Web and Envoy: updates at times that nothing puts off, each measured from then on.
 //   npm run load -- --url http://localhost:8080 [--sessions 10] [--vertices 1000,10000] [--rate 10] [--seconds 10] [--p 2]
-//                   [--report FILE.json]
+//                   [--slow-readers N] [--slow-pause SECONDS] [--reconnect SECONDS] [--report FILE.json]
 // Without --url it starts a server and an Envoy of its own. The report has the keys of that of `lpdeform load`.
 import { writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
@@ -16,6 +16,11 @@ export interface LoadOptions {
   rate: number;
   seconds: number;
   p: number;
+  /** So many sessions have a second reader, which takes a frame every `slowPause` seconds (0; 1). */
+  slowReaders?: number;
+  slowPause?: number;
+  /** Each session changes its connection every so many seconds (never). */
+  reconnect?: number;
 }
 
 const lastPatienceMs = 10_000;
@@ -61,14 +66,31 @@ async function drive({ rate, seconds }: LoadOptions, lanes: Lane[]): Promise<num
   return latest;
 }
 
+/** Has each lane change its connection once in `period` seconds, one after the other, until `isOver`. */
+async function reconnectInTurn(lanes: Lane[], period: number, isOver: () => boolean): Promise<void> {
+  const begin = performance.now();
+  for (let k = 0; ; ++k) {
+    const when = begin + (1000 * period * (k + 1)) / lanes.length;
+    while (!isOver() && performance.now() < when) await sleep(Math.min(50, when - performance.now()));
+    if (isOver()) return;
+    await lanes[k % lanes.length]!.reconnect();
+  }
+}
+
 export async function runLoad(options: LoadOptions) {
   const lanes: Lane[] = [];
   for (let k = 0; k < options.sessions; ++k) {
     lanes.push(await Lane.open(options.url, options.vertices[k % options.vertices.length]!, options.p));
   }
-  const reading = lanes.map((lane) => lane.read());
+  const { slowReaders = 0, slowPause = 1, reconnect } = options;
+  for (const lane of lanes.slice(0, slowReaders)) await lane.addSlowReader(1000 * slowPause);
+  for (const lane of lanes) lane.start();
   const begin = performance.now();
+  let isDriven = false;
+  const reconnecting = reconnect === undefined ? undefined : reconnectInTurn(lanes, reconnect, () => isDriven);
   const behind = await drive(options, lanes);
+  isDriven = true;
+  await reconnecting;
   const seconds = (performance.now() - begin) / 1000;
   const end = performance.now() + lastPatienceMs;
   while (!lanes.every((lane) => lane.isAnswered) && performance.now() < end) await sleep(20);
@@ -82,12 +104,11 @@ export async function runLoad(options: LoadOptions) {
     if (!byVertices.has(lane.vertices)) byVertices.set(lane.vertices, new Tally());
     byVertices.get(lane.vertices)!.add(tally);
   }
-  await Promise.all(reading);
   return {
     sessions: options.sessions,
     rate: options.rate,
     seconds,
-    slow_readers: 0,
+    slow_readers: Math.min(slowReaders, lanes.length),
     generator_behind_ms: behind,
     frames_per_session: { least: Math.min(...frames), mean: every.frames / frames.length, most: Math.max(...frames) },
     all: { ...ofTally(every), input_to_frame_histogram_us: every.latency.buckets() },
@@ -105,9 +126,12 @@ function numberOf(name: string, text: string): number {
 async function main(): Promise<void> {
   const one = { type: "string" } as const;
   const { values } = parseArgs({
-    options: { url: one, sessions: one, vertices: one, rate: one, seconds: one, p: one, report: one },
+    options: {
+      ...{ url: one, sessions: one, vertices: one, rate: one, seconds: one, p: one, report: one },
+      ...{ "slow-readers": one, "slow-pause": one, reconnect: one },
+    },
   });
-  const given = (name: "sessions" | "rate" | "seconds" | "p", otherwise: number) =>
+  const given = (name: Exclude<keyof typeof values, "url" | "vertices" | "report">, otherwise: number) =>
     values[name] === undefined ? otherwise : numberOf(name, values[name]);
   const service = values.url === undefined ? await Service.start() : undefined;
   try {
@@ -118,6 +142,9 @@ async function main(): Promise<void> {
       rate: given("rate", 10),
       seconds: given("seconds", 10),
       p: given("p", 2),
+      slowReaders: given("slow-readers", 0),
+      slowPause: given("slow-pause", 1),
+      ...(values.reconnect === undefined ? {} : { reconnect: given("reconnect", 0) }),
     });
     const { updates, input_to_frame_ms: latency, frames } = report.all;
     console.log(

@@ -38,6 +38,17 @@ test("every update is answered through Envoy, and the report is that of lpdeform
   expect(keysOf(report).sort()).toEqual(keysOf(JSON.parse(readFileSync(file, "utf8"))).sort());
 }, 60_000);
 
+test("slow readers and changed connections leave no update without an answer", async () => {
+  const usual = { url: service.url, sessions: 4, vertices: [100], rate: 10, seconds: 3, p: 2 };
+  const before = await service.stat("cluster.lpdeform.upstream_rq_total");
+  const { all, slow_readers } = await runLoad({ ...usual, slowReaders: 2, slowPause: 0.2, reconnect: 1 });
+  expect(slow_readers).toBe(2);
+  expect(all.updates).toEqual({ due: 120, answered: 120, unanswered: 0 });
+  expect(all.errors).toEqual({});
+  expect(all.reconnects).toBeGreaterThanOrEqual(4);
+  expect((await service.stat("cluster.lpdeform.upstream_rq_total")) - before).toBeGreaterThan(120);
+}, 60_000);
+
 test("a server that dies under load and comes back is counted, and no update stays without an answer", async () => {
   const calls = () => service.stat("cluster.lpdeform.upstream_rq_total");
   const before = await calls();
