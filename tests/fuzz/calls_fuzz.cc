@@ -1,9 +1,10 @@
-// libFuzzer: a schedule of calls (schedule.proto) to a server's backend, from the decoding of messages to running sessions. All is
-// there but gRPC. A call that does not end in half a minute counts as hanging.
+// libFuzzer: a schedule of calls (schedule.proto) by two callers to a server's backend, from the decoding of messages to running
+// sessions. All is there but gRPC. What is one caller's the other does not find, see or change. A call that does not end in half a minute counts as hanging.
 
 #include <chrono>
 #include <cstdint>
 #include <future>
+#include <map>
 #include <memory>
 #include <random>
 #include <string>
@@ -47,10 +48,18 @@ Backend& backend() {
   return result;
 }
 
-void wait(std::future<absl::Status> done) {
+absl::Status wait(std::future<absl::Status> done) {
   LPDEFORM_CHECK(done.wait_for(kPatience) == std::future_status::ready);
-  const absl::Status status = done.get();
+  absl::Status status = done.get();
   LPDEFORM_CHECK(status.ok() || !status.message().empty());
+  return status;
+}
+
+/// As certificates of clients tell them apart.
+CallContext caller(bool is_second) {
+  CallContext context;
+  context.peer_identity = is_second ? "second" : "first";
+  return context;
 }
 
 /// A `done` for calls that end later, and the end.
@@ -59,7 +68,7 @@ struct Ending {
   Backend::Done done() const {
     return [promise = promise](absl::Status status) { promise->set_value(std::move(status)); };
   }
-  void wait() const { ::wait(promise->get_future()); }
+  absl::Status wait() const { return ::wait(promise->get_future()); }
 };
 
 /// The newest of what calls refer to.
@@ -70,26 +79,27 @@ class Schedule {
     for (fuzz::Call call : schedule.calls()) {
       if (++count > kMostCalls) break;
       name(call);
+      by_ = call.caller() % 2;
       make(call);
       read_streams();
     }
   }
 
   ~Schedule() {
-    for (const Backend::OpenStream& open : streams_) backend().forget(context_, open);
+    for (std::size_t k = 0; k < streams_.size(); ++k) backend().forget(callers_[streams_by_[k]], streams_[k]);
     for (const std::string& session : sessions_) {
       v1::DeleteSessionRequest request;
       request.set_session(session);
       v1::DeleteSessionResponse response;
       const Ending ending;
-      backend().delete_session(context_, request, response, ending.done());
-      ending.wait();
+      backend().delete_session(callers_[owners_[session]], request, response, ending.done());
+      LPDEFORM_CHECK(ending.wait().ok());
     }
     for (const std::string& upload : uploads_) {
       v1::DeleteUploadRequest request;
       request.set_upload(upload);
       v1::DeleteUploadResponse response;
-      (void)backend().delete_upload(context_, request, response);
+      (void)backend().delete_upload(callers_[owners_[upload]], request, response);
     }
   }
 
@@ -126,82 +136,120 @@ class Schedule {
     }
   }
 
+  const CallContext& context() const { return callers_[by_]; }
+
+  /// It is there, and who calls did not make it.
+  bool is_others(const std::string& name) const {
+    const auto owner = owners_.find(name);
+    return owner != owners_.end() && owner->second != by_;
+  }
+
+  void made(std::vector<std::string>& names, const std::string& name) {
+    names.push_back(name);
+    owners_[name] = by_;
+  }
+
+  /// For whoever made it.
+  bool is_there(const std::string& session) const {
+    const std::size_t owner = owners_.at(session);
+    return backend().find(callers_[owner], Backend::Access::kRead, session).ok();
+  }
+
   template <typename Request, typename Response>
-  void later(void (Backend::*call)(const CallContext&, const Request&, Response&, Backend::Done),
-             const Request& request, Response& response) {
+  absl::Status later(void (Backend::*call)(const CallContext&, const Request&, Response&, Backend::Done),
+                     const Request& request, Response& response) {
     const Ending ending;
-    (backend().*call)(context_, request, response, ending.done());
-    ending.wait();
+    (backend().*call)(context(), request, response, ending.done());
+    return ending.wait();
+  }
+
+  /// A call about a session, which of somebody else's says that there is none.
+  template <typename Request, typename Response>
+  void about_session(void (Backend::*call)(const CallContext&, const Request&, Response&, Backend::Done),
+                     const Request& request, Response& response) {
+    const absl::Status status = later(call, request, response);
+    if (is_others(request.session())) LPDEFORM_CHECK(!status.ok());
   }
 
   void make(const fuzz::Call& call) {
     switch (call.call_case()) {
       case fuzz::Call::kCreateUpload: {
         v1::CreateUploadResponse response;
-        if (backend().create_upload(context_, call.create_upload(), response).ok())
-          uploads_.push_back(response.upload());
+        if (backend().create_upload(context(), call.create_upload(), response).ok())
+          made(uploads_, response.upload());
         return;
       }
       case fuzz::Call::kUploadPart: {
         v1::UploadPartResponse response;
-        (void)backend().upload_part(context_, call.upload_part(), response);
+        const absl::Status status = backend().upload_part(context(), call.upload_part(), response);
+        if (is_others(call.upload_part().upload())) LPDEFORM_CHECK(!status.ok());
         return;
       }
       case fuzz::Call::kDeleteUpload: {
         v1::DeleteUploadResponse response;
-        (void)backend().delete_upload(context_, call.delete_upload(), response);
+        (void)backend().delete_upload(context(), call.delete_upload(), response);
         return;
       }
       case fuzz::Call::kCreateSession: {
         v1::CreateSessionResponse response;
-        later(&Backend::create_session, call.create_session(), response);
+        (void)later(&Backend::create_session, call.create_session(), response);
         if (!response.has_session()) return;
-        sessions_.push_back(response.session().name());
+        made(sessions_, response.session().name());
         token_ = response.writer_token();
         return;
       }
       case fuzz::Call::kGetSession: {
         v1::GetSessionResponse response;
-        return later(&Backend::get_session, call.get_session(), response);
+        return about_session(&Backend::get_session, call.get_session(), response);
       }
       case fuzz::Call::kListSessions: {
         v1::ListSessionsResponse response;
-        return later(&Backend::list_sessions, call.list_sessions(), response);
+        (void)later(&Backend::list_sessions, call.list_sessions(), response);
+        for (const v1::Session& session : response.sessions()) LPDEFORM_CHECK(!is_others(session.name()));
+        return;
       }
       case fuzz::Call::kDeleteSession: {
         v1::DeleteSessionResponse response;
-        return later(&Backend::delete_session, call.delete_session(), response);
+        const std::string& session = call.delete_session().session();
+        const bool was_there = is_others(session) && is_there(session);
+        (void)later(&Backend::delete_session, call.delete_session(), response);
+        if (was_there) LPDEFORM_CHECK(is_there(session));
+        return;
       }
       case fuzz::Call::kAcquireWriter: {
         v1::AcquireWriterResponse response;
-        later(&Backend::acquire_writer, call.acquire_writer(), response);
+        about_session(&Backend::acquire_writer, call.acquire_writer(), response);
         if (!response.writer_token().empty()) token_ = response.writer_token();
         return;
       }
       case fuzz::Call::kUpdateHandles: {
         v1::UpdateHandlesResponse response;
-        return later(&Backend::update_handles, call.update_handles(), response);
+        return about_session(&Backend::update_handles, call.update_handles(), response);
       }
       case fuzz::Call::kAckFrames: {
         v1::AckFramesResponse response;
-        return later(&Backend::ack_frames, call.ack_frames(), response);
+        return about_session(&Backend::ack_frames, call.ack_frames(), response);
       }
       case fuzz::Call::kOpenStream: {
         const v1::DeformOpen& open = call.open_stream();
         if (streams_.size() >= kMostStreams) return;
         auto stream =
-            backend().open_stream(context_, open.session(), open.writer_token(), open.options(), [] {});
-        if (stream.ok()) streams_.push_back(*std::move(stream));
+            backend().open_stream(context(), open.session(), open.writer_token(), open.options(), [] {});
+        if (is_others(open.session())) LPDEFORM_CHECK(!stream.ok());
+        if (!stream.ok()) return;
+        streams_.push_back(*std::move(stream));
+        streams_by_.push_back(by_);
         return;
       }
       case fuzz::Call::kUndoUpdate: {
         v1::UndoUpdateResponse response;
-        return later(&Backend::undo_update, call.undo_update(), response);
+        return about_session(&Backend::undo_update, call.undo_update(), response);
       }
       case fuzz::Call::kRestore:
         return restore(call.restore());
       case fuzz::Call::kSnapshot: {
-        const auto file = backend().snapshot(context_, call.snapshot().session());
+        const auto file = backend().snapshot(context(), call.snapshot().session());
+        if (is_others(call.snapshot().session())) LPDEFORM_CHECK(!file.ok());
         if (!file.ok() || file->bytes.size() > (1u << 20)) return;
         LPDEFORM_CHECK(restore_file(file->bytes).ok());  // what the server wrote it reads
         return;
@@ -224,13 +272,13 @@ class Schedule {
     request.mutable_snapshot()->set_inline_(file);
     v1::RestoreSessionResponse response;
     const auto done = std::make_shared<std::promise<absl::Status>>();
-    backend().restore_session(context_, request, response,
+    backend().restore_session(context(), request, response,
                               [done](const absl::Status& status) { done->set_value(status); });
     auto ended = done->get_future();
     LPDEFORM_CHECK(ended.wait_for(kPatience) == std::future_status::ready);
     const absl::Status status = ended.get();
     if (status.ok()) {
-      sessions_.push_back(response.session().name());
+      made(sessions_, response.session().name());
       token_ = response.writer_token();
     }
     // There may be no room; otherwise it is what is wrong with the file.
@@ -244,13 +292,14 @@ class Schedule {
     const Ending ending;
     std::shared_ptr<SolveJob> job;
     const absl::Status status = backend().solve(
-        context_, request, [](const SolveProgress&) {},
+        context(), request, [](const SolveProgress&) {},
         [done = ending.done()](const absl::StatusOr<SolveResult>& result) {
           if (result.ok()) LPDEFORM_CHECK(result->frame->surface->positions().allFinite());
           done(result.status());
         },
         job);
-    if (status.ok()) ending.wait();
+    if (is_others(request.session())) LPDEFORM_CHECK(!status.ok());
+    if (status.ok()) (void)ending.wait();
   }
 
   /// What a reader would be sent.
@@ -267,10 +316,13 @@ class Schedule {
     }
   }
 
-  const CallContext context_ = {};
+  const std::vector<CallContext> callers_ = {caller(false), caller(true)};
+  std::size_t by_ = 0;                         // who calls now
+  std::map<std::string, std::size_t> owners_;  // who made a session or an upload
   std::vector<std::string> sessions_, uploads_;
   std::string token_ = "none";
   std::vector<Backend::OpenStream> streams_;
+  std::vector<std::size_t> streams_by_;
 };
 
 }  // namespace
