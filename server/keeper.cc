@@ -106,7 +106,7 @@ void Keeper::adopt(std::shared_ptr<Session> session, const StoredSession& stored
     entry.revision = session->changes_since(std::numeric_limits<std::uint64_t>::max()).inputs.revision;
     entry.session = std::move(session);
   }
-  for (const auto& call : calls) call();
+  make(calls);
 }
 
 void Keeper::give_up(const std::string& name) {
@@ -119,7 +119,7 @@ void Keeper::give_up(const std::string& name) {
     being_made_.erase(found);
   }
   // Where this is not done, it is free once the lease has ended.
-  static_cast<void>(reader_.try_post([this, name, epoch] { store_->let_go(name, epoch).IgnoreError(); }));
+  static_cast<void>(reader_.try_post([this, name, epoch] { store_->let_go({{name, epoch}}).IgnoreError(); }));
 }
 
 void Keeper::changed(const Session& session, std::uint64_t revision, std::uint64_t epoch, OnKept on_kept) {
@@ -293,6 +293,7 @@ void Keeper::list(const std::string& owner, const std::string& after, std::size_
 }
 
 void Keeper::flush(Clock::time_point end) {
+  store_->end_by(end);
   std::unique_lock lock(mutex_);
   changed_.wait_until(lock, end, [this] { return is_failing_ || (due_.empty() && !is_writing_); });
 }

@@ -39,7 +39,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   };
 
   static std::shared_ptr<Keeper> create(std::shared_ptr<Store> store, Services services);
-  /// Writes what is left, if it can be written at once.
+  /// Writes what is left, if it can be written before the moment that flush() was given.
   ~Keeper();
 
   using OnDone = std::function<void(absl::Status)>;
@@ -99,7 +99,8 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void list(const std::string& owner, const std::string& after, std::size_t most,
             std::function<bool(const std::string&)> is_wanted, OnNames on_names);
 
-  /// Waits until all is kept, or the store has failed, or this moment.
+  /// Before the process ends: waits until all is kept, or the store has failed, or this moment. After it the store is not waited
+  /// for any more.
   void flush(std::chrono::steady_clock::time_point end);
 
   /// A session that was used so long ago is still in use.
@@ -111,7 +112,13 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
  private:
   Keeper(std::shared_ptr<Store> store, Services services);
   using Clock = std::chrono::steady_clock;
-  using Calls = std::vector<std::function<void()>>;
+  /// To be done without the lock.
+  struct Calls {
+    std::vector<std::function<void()>> all;
+    std::vector<HeldSession> to_let_go;  // by the store, in one journey
+
+    void add(std::function<void()> call) { all.push_back(std::move(call)); }
+  };
 
   struct Waiting {
     std::uint64_t revision = 0, epoch = 0;
@@ -156,6 +163,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void note_health(const absl::Status& status);
   void answer_kept(Entry& entry, Calls& calls);
   static void answer_all(Entry& entry, Calls& calls);
+  void make(const Calls& calls);
   void due(const std::string& name);
   void watch(const std::string& name, Timers::TimePoint when);
   void give_up_waiting(const std::string& name);

@@ -87,10 +87,10 @@ void Keeper::hand_over(const std::vector<std::string>& names, const Sessions& to
       const Entry* const entry = same_entry(name, touched);
       if (entry == nullptr || !on_lost) continue;
       services_.log->info("session_handed_over", {{"session", abbreviated(name)}, {"epoch", entry->epoch}});
-      calls.emplace_back([this, session = entry->session] { on_lost(*session); });
+      calls.add([this, session = entry->session] { on_lost(*session); });
     }
   }
-  for (const auto& call : calls) call();  // whoever has them releases them
+  make(calls);  // whoever has them releases them
 }
 
 /// Sessions that another process has now.
@@ -103,12 +103,12 @@ void Keeper::drop(const std::vector<std::string>& lost, const Sessions& touched)
       if (entry == nullptr) continue;
       services_.log->info("session_lost", {{"session", abbreviated(name)}, {"epoch", entry->epoch}});
       answer_all(*entry, calls);
-      if (on_lost) calls.emplace_back([this, session = entry->session] { on_lost(*session); });
+      if (on_lost) calls.add([this, session = entry->session] { on_lost(*session); });
       due_.erase(name);
       entries_.erase(name);
     }
   }
-  for (const auto& call : calls) call();
+  make(calls);
 }
 
 }  // namespace lpdeform

@@ -85,16 +85,18 @@ void Keeper::fill_in_anew(Work& work) {
     work.change.request_id = read->request.request_id();
 }
 
-/// All at once; where that fails, each by itself, so that one that cannot be kept does not hold up the others.
+/// All at once; where that fails, each by itself, so that one that cannot be kept does not hold up the others. Not where the store does
+/// not answer: each would wait for that.
 void Keeper::write(std::vector<Work> works) {
   Calls calls;
   auto outcomes = commit(works);
   absl::Status health = outcomes.status();
   for (std::size_t k = 0; k < works.size(); ++k) {
     const std::span<const Work> one(&works[k], 1);
-    const bool is_alone = !outcomes.ok() && works.size() > 1;
+    const bool is_alone = !outcomes.ok() && works.size() > 1 && !is_away(health);
     const auto again = is_alone ? commit(one) : outcomes;
-    if (is_alone) health = k == 0 ? again.status() : (health.Update(again.status()), health);
+    if (is_alone && k == 0) health = absl::OkStatus();
+    if (is_alone && (health.ok() || is_away(again.status()))) health = again.status();
     const std::scoped_lock lock(mutex_);
     if (again.ok()) {
       note_kept(works[k], (*again)[is_alone ? 0 : k], calls);
@@ -106,7 +108,7 @@ void Keeper::write(std::vector<Work> works) {
     const std::scoped_lock lock(mutex_);
     note_health(health);
   }
-  for (const auto& call : calls) call();
+  make(calls);
 }
 
 absl::StatusOr<std::vector<ChangeOutcome>> Keeper::commit(std::span<const Work> works) {
@@ -133,12 +135,11 @@ void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
     return;  // it left and came back meanwhile: what was written is of an epoch before
   if (work.change.is_removal || outcome == ChangeOutcome::kFenced) {
     for (OnDone& on_removed : entry.on_removed)
-      calls.emplace_back([on_removed = std::move(on_removed)] { on_removed(absl::OkStatus()); });
+      calls.add([on_removed = std::move(on_removed)] { on_removed(absl::OkStatus()); });
     answer_all(entry, calls);
     if (entry.session != nullptr)
       services_.log->info("session_lost", {{"session", abbreviated(work.name)}, {"epoch", entry.epoch}});
-    if (entry.session != nullptr && on_lost)
-      calls.emplace_back([this, lost = entry.session] { on_lost(*lost); });
+    if (entry.session != nullptr && on_lost) calls.add([this, lost = entry.session] { on_lost(*lost); });
     due_.erase(work.name);
     entries_.erase(found);
     return;
@@ -150,12 +151,11 @@ void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
   entry.revision = work.revision;
   entry.epoch = work.change.epoch;
   if (entry.on_added)
-    calls.emplace_back([on_added = std::exchange(entry.on_added, nullptr)] { on_added(absl::OkStatus()); });
+    calls.add([on_added = std::exchange(entry.on_added, nullptr)] { on_added(absl::OkStatus()); });
   answer_kept(entry, calls);
   if (entry.is_leaving && !due_.contains(work.name)) {
     entries_.erase(found);
-    calls.emplace_back(
-        [this, name = work.name, epoch = work.change.epoch] { store_->let_go(name, epoch).IgnoreError(); });
+    calls.to_let_go.push_back({work.name, work.change.epoch});
   }
 }
 
@@ -179,11 +179,11 @@ void Keeper::note_failed(const Work& work, const absl::Status& why, Calls& calls
   if (found == entries_.end()) return;
   Entry& entry = found->second;
   if (entry.on_added) {
-    calls.emplace_back([on_added = std::exchange(entry.on_added, nullptr), why] { on_added(why); });
+    calls.add([on_added = std::exchange(entry.on_added, nullptr), why] { on_added(why); });
     entry.session.reset();  // the store may have it all the same
   }
   for (OnDone& on_removed : std::exchange(entry.on_removed, {}))
-    calls.emplace_back([on_removed = std::move(on_removed), why] { on_removed(why); });
+    calls.add([on_removed = std::move(on_removed), why] { on_removed(why); });
   services_.metrics->add(Count::kUpdatesNotKept, static_cast<double>(entry.waiting.size()));
   answer_all(entry, calls);
   due_.insert(work.name);
@@ -195,14 +195,20 @@ void Keeper::answer_kept(Entry& entry, Calls& calls) {
     const bool is_kept = one.revision <= entry.revision && one.epoch <= entry.epoch;
     if (!is_kept) return false;
     services_.metrics->observe(Span::kInputToKept, seconds_since(one.since));
-    calls.emplace_back([on_kept = std::move(one.on_kept)] { on_kept(true); });
+    calls.add([on_kept = std::move(one.on_kept)] { on_kept(true); });
     return true;
   });
 }
 
 void Keeper::answer_all(Entry& entry, Calls& calls) {
   for (Waiting& one : std::exchange(entry.waiting, {}))
-    calls.emplace_back([on_kept = std::move(one.on_kept)] { on_kept(false); });
+    calls.add([on_kept = std::move(one.on_kept)] { on_kept(false); });
+}
+
+void Keeper::make(const Calls& calls) {
+  for (const auto& call : calls.all) call();
+  // Where this is not done, they are free once the lease has ended.
+  if (!calls.to_let_go.empty()) store_->let_go(calls.to_let_go).IgnoreError();
 }
 
 /// Under the lock.

@@ -3,6 +3,7 @@
 #include <hiredis.h>
 #include <sys/time.h>
 
+#include <algorithm>
 #include <fstream>
 #include <utility>
 
@@ -11,6 +12,8 @@
 
 namespace lpdeform {
 namespace {
+
+constexpr char kIsEnding[] = "it had not answered when the server ended";
 
 timeval time_of(std::chrono::milliseconds duration) {
   return {duration.count() / 1000, 1000 * (duration.count() % 1000)};
@@ -42,11 +45,26 @@ absl::Status RedisConnection::failure(const std::string& what) {
   return store_failing(absl::StrCat(what, " (Redis at ", host_, ":", port_, ")"));
 }
 
+absl::Status RedisConnection::no_answer(const std::string& what) {
+  context_.reset();
+  return store_away(absl::StrCat(what, " (Redis at ", host_, ":", port_, ")"));
+}
+
+/// For one answer. Not above 0 once there is none left.
+std::chrono::milliseconds RedisConnection::time_left() const {
+  const auto end = end_.load();
+  if (end == std::chrono::steady_clock::time_point::max()) return patience_;
+  const auto left = end - std::chrono::steady_clock::now();
+  return std::min(patience_, std::chrono::duration_cast<std::chrono::milliseconds>(left));
+}
+
 absl::Status RedisConnection::connect() {
   if (context_ != nullptr) return absl::OkStatus();
-  context_.reset(redisConnectWithTimeout(host_.c_str(), port_, time_of(patience_)));
-  if (context_ == nullptr) return failure("no memory");
-  if (context_->err != 0) return failure(context_->errstr);
+  const auto left = time_left();
+  if (left.count() <= 0) return no_answer(kIsEnding);
+  context_.reset(redisConnectWithTimeout(host_.c_str(), port_, time_of(left)));
+  if (context_ == nullptr) return no_answer("no memory");
+  if (context_->err != 0) return no_answer(context_->errstr);
   redisSetTimeout(context_.get(), time_of(patience_));
   redisEnableKeepAlive(context_.get());
   return log_in();
@@ -87,8 +105,11 @@ absl::StatusOr<std::vector<RedisReply>> RedisConnection::send(const std::vector<
   std::vector<RedisReply> replies;
   std::string refused;
   while (replies.size() < commands.size()) {
+    const auto left = time_left();
+    if (left.count() <= 0) return no_answer(kIsEnding);
+    if (left < patience_) redisSetTimeout(context_.get(), time_of(left));
     void* received = nullptr;
-    if (redisGetReply(context_.get(), &received) != REDIS_OK) return failure(context_->errstr);
+    if (redisGetReply(context_.get(), &received) != REDIS_OK) return no_answer(context_->errstr);
     const std::unique_ptr<redisReply, void (*)(void*)> reply(static_cast<redisReply*>(received),
                                                              freeReplyObject);
     if (reply->type == REDIS_REPLY_ERROR && refused.empty()) refused.assign(reply->str, reply->len);

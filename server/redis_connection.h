@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -28,7 +29,7 @@ struct RedisLogin {
 };
 
 /// A connection to a Redis server, made anew after a failure, when it is next needed. For one thread at a time. Errors are
-/// UNAVAILABLE STORE_FAILING; whether the commands were carried out is not known then. The password is read again with each
+/// UNAVAILABLE STORE_FAILING, store_away() where nothing answers; whether the commands were carried out is not known then. The password is read again with each
 /// connection, and in no text.
 class RedisConnection {
  public:
@@ -41,11 +42,16 @@ class RedisConnection {
   /// Sends all, then reads the answers: one journey.
   absl::StatusOr<std::vector<RedisReply>> run(const std::vector<Command>& commands);
 
+  /// After this moment nothing is waited for any more; by another thread, too, which then need not wait for this one.
+  void end_by(std::chrono::steady_clock::time_point end) { end_ = end; }
+
  private:
+  std::chrono::milliseconds time_left() const;
   absl::Status connect();
   absl::Status log_in();
   absl::StatusOr<std::vector<RedisReply>> send(const std::vector<Command>& commands);
   absl::Status failure(const std::string& what);
+  absl::Status no_answer(const std::string& what);
 
   struct Free {
     void operator()(redisContext* context) const;
@@ -55,6 +61,7 @@ class RedisConnection {
   const std::chrono::milliseconds patience_;
   const RedisLogin login_;
   std::unique_ptr<redisContext, Free> context_;
+  std::atomic<std::chrono::steady_clock::time_point> end_{std::chrono::steady_clock::time_point::max()};
 };
 
 }  // namespace lpdeform

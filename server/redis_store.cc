@@ -261,8 +261,11 @@ class RedisStore final : public Store {
   absl::StatusOr<std::string> blob(const std::string& key) override;
   absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) override;
   std::chrono::milliseconds touch_every() const override { return options_.lease / 3; }
-  absl::Status let_go(const std::string& session, std::uint64_t epoch) override;
+  absl::Status let_go(const std::vector<HeldSession>& sessions) override;
   absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) override;
+  void end_by(std::chrono::steady_clock::time_point end) override {
+    for (RedisConnection* const connection : {&writer_, &reader_}) connection->end_by(end);
+  }
 
  private:
   Command command_of(const StoredChange& change);
@@ -408,11 +411,14 @@ absl::StatusOr<std::size_t> RedisStore::remove_unused(std::int64_t idle_ms) {
   }
 }
 
-absl::Status RedisStore::let_go(const std::string& session, std::uint64_t epoch) {
-  Command command = script(kLetGo, session);
-  command.insert(command.end(), {holder_, absl::StrCat(epoch)});
+absl::Status RedisStore::let_go(const std::vector<HeldSession>& sessions) {
+  std::vector<Command> commands;
+  for (const HeldSession& session : sessions) {
+    commands.push_back(script(kLetGo, session.name));
+    commands.back().insert(commands.back().end(), {holder_, absl::StrCat(session.epoch)});
+  }
   const std::scoped_lock lock(writing_);
-  return writer_.run(command).status();
+  return writer_.run(commands).status();
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ class SqliteStore final : public Store {
   absl::Status keep_blob(const std::string& session, const std::string& key, std::string_view bytes) override;
   absl::StatusOr<std::string> blob(const std::string& key) override { return blobs_.read(key); }
   absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) override;
-  absl::Status let_go(const std::string&, std::uint64_t) override { return absl::OkStatus(); }
+  absl::Status let_go(const std::vector<HeldSession>&) override { return absl::OkStatus(); }
   absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) override;
 
  private:

@@ -4,11 +4,17 @@
 
 #include <array>
 
+#include "absl/strings/cord.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 
 namespace lpdeform {
+namespace {
+
+constexpr char kAway[] = "lpdeform/store-away";  // stays in this process
+
+}  // namespace
 
 std::string blob_key(std::string_view bytes) {
   std::array<unsigned char, SHA256_DIGEST_LENGTH> digest;
@@ -20,6 +26,16 @@ absl::Status store_failing(std::string_view why) {
   return make_fault(
       absl::StatusCode::kUnavailable, {"STORE_FAILING", "store", ""},
       absl::StrCat("The server's store of sessions fails: ", absl::string_view(why.data(), why.size()), "."));
+}
+
+absl::Status store_away(std::string_view why) {
+  absl::Status status = store_failing(why);
+  status.SetPayload(kAway, absl::Cord());
+  return status;
+}
+
+bool is_away(const absl::Status& status) {
+  return status.GetPayload(kAway).has_value();
 }
 
 absl::Status session_damaged(std::string_view why) {

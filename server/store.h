@@ -53,6 +53,12 @@ struct TouchedSession {
   bool is_being_made = false;  // taken over, and not yet there: nobody is given it meanwhile
 };
 
+/// A session that a process has, and the epoch in which it has it.
+struct HeldSession {
+  std::string name;
+  std::uint64_t epoch = 0;
+};
+
 /// By so much take_over() raises a session's epoch. The process before may have begun epochs that the store never heard of, as
 /// writers came while it failed: these are never begun again.
 inline constexpr std::uint64_t kEpochsOfALife = 1'000'000;
@@ -114,11 +120,15 @@ class Store {
   virtual absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) = 0;
   /// How often touch() is to be called; 0: it has no haste.
   virtual std::chrono::milliseconds touch_every() const { return std::chrono::milliseconds(0); }
-  /// This process lets go of the session, which it had in this epoch: another may take it over at once.
-  virtual absl::Status let_go(const std::string& session, std::uint64_t epoch) = 0;
+  /// This process lets go of the sessions, each where it had it in this epoch: another may take them over at once.
+  virtual absl::Status let_go(const std::vector<HeldSession>& sessions) = 0;
   /// Removes the sessions that nobody has touched for so long, the time that no server ran aside where the store knows it.
   /// How many went.
   virtual absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) = 0;
+
+  /// The process is about to end: after this moment nobody is waited for, and whatever needs an answer fails. Where waits have
+  /// no end of their own (a disk), this changes nothing.
+  virtual void end_by(std::chrono::steady_clock::time_point) {}
 };
 
 /// SHA-256 of the bytes, as 64 hexadecimal digits.
@@ -126,6 +136,9 @@ std::string blob_key(std::string_view bytes);
 
 /// UNAVAILABLE STORE_FAILING.
 absl::Status store_failing(std::string_view why);
+/// The same, where there is no answer: whatever it is asked next has none either.
+absl::Status store_away(std::string_view why);
+bool is_away(const absl::Status& status);
 /// NOT_FOUND SESSION_DAMAGED: what there is of it cannot be used.
 absl::Status session_damaged(std::string_view why);
 /// What a call's header has to say that is to come this way.

@@ -15,6 +15,7 @@ import urllib.request
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SERVER = os.environ.get("LPDEFORM_SERVER", str(ROOT / "build/release/bin/lpdeform-server"))
 PATIENCE = 60.0  # seconds that anything may take; never reached where all is well
+LONGEST_END = 30.0  # of a server after SIGTERM: its --grace of 2 s, 5 s for the store, and much more where others use the machine
 
 
 def free_port() -> int:
@@ -66,6 +67,14 @@ class Process:
         self.signal(signal.SIGCONT)
         self.process.kill()
         self.process.wait()
+
+    def stop(self) -> None:
+        """As an operator does."""
+        self.signal(signal.SIGTERM)
+        try:
+            self.process.wait(LONGEST_END)
+        except subprocess.TimeoutExpired as error:
+            raise TimeoutError(f"{self.words[0]} did not end within {LONGEST_END:.0f} s of SIGTERM") from error
 
     def pause(self) -> None:
         self.signal(signal.SIGSTOP)
@@ -182,7 +191,7 @@ class World:
         return [*self.servers, *filter(None, (self.envoy, self.redis))]
 
     def faults(self) -> list[str]:
-        return ["kill", "kill", "pause", "drop"] + (["slow_store", "store", "envoy"] if self.redis else [])
+        return ["kill", "kill", "pause", "drop"] + (["slow_store", "store", "envoy", "drain"] if self.redis else [])
 
     def strike(self, what: str, chance: random.Random) -> None:
         server = chance.choice(self.servers)
@@ -195,6 +204,12 @@ class World:
             self.proxy.cut()
         elif what == "slow_store":
             self._pause(self.redis, chance.uniform(0.1, 0.8))
+        elif what == "drain":  # while the store hangs, at times
+            if chance.random() < 0.5:
+                self.redis.pause()
+            server.stop()
+            self.redis.resume()
+            server.start()
         elif what == "store":
             self.redis.kill()
             time.sleep(chance.uniform(0, 1.4))

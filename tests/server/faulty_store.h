@@ -58,9 +58,7 @@ class FaultyStore final : public Store {
     if (absl::Status status = pass(); !status.ok()) return status;
     return store_->touch(sessions);
   }
-  absl::Status let_go(const std::string& session, std::uint64_t epoch) override {
-    return store_->let_go(session, epoch);
-  }
+  absl::Status let_go(const std::vector<HeldSession>& sessions) override { return store_->let_go(sessions); }
   absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) override {
     if (absl::Status status = pass(); !status.ok()) return status;
     return store_->remove_unused(idle_ms);

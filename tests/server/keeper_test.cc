@@ -30,11 +30,11 @@ class NotingStore final : public Store {
     changed_.notify_all();
   }
 
-  /// Waits until something was asked for.
-  bool wait_for(const std::string& asked) {
+  /// Waits until something was asked for, so often.
+  bool wait_for(const std::string& asked, int times = 1) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, kPatience,
-                             [&] { return std::find(asked_.begin(), asked_.end(), asked) != asked_.end(); });
+                             [&] { return std::count(asked_.begin(), asked_.end(), asked) >= times; });
   }
   std::vector<std::string> asked() {
     const std::scoped_lock lock(mutex_);
@@ -53,6 +53,11 @@ class NotingStore final : public Store {
     const std::scoped_lock lock(mutex_);
     is_missing_ = true;
   }
+  /// Of all changes from now on; OK: they are taken.
+  void fail_with(const absl::Status& status) {
+    const std::scoped_lock lock(mutex_);
+    failure_ = status;
+  }
   StoredChange newest() {
     const std::scoped_lock lock(mutex_);
     return newest_;
@@ -60,11 +65,13 @@ class NotingStore final : public Store {
 
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) override {
     std::unique_lock lock(mutex_);
+    note(absl::StrCat("commit of ", changes.size()));
     for (const StoredChange& change : changes)
       note(change.is_expiry ? "expiry" : (change.is_removal ? "removal" : "change"));
     if (!changes.empty()) newest_ = changes.back();
     if (newest_.is_anew) note("anew");
     changed_.wait(lock, [this] { return !is_held_; });
+    if (!failure_.ok()) return failure_;
     return std::vector<ChangeOutcome>(changes.size(), std::exchange(next_, ChangeOutcome::kKept));
   }
   absl::StatusOr<StoredSession> take_over(const std::string&, const std::string& owner,
@@ -82,9 +89,10 @@ class NotingStore final : public Store {
     note("touched");
     return result;
   }
-  absl::Status let_go(const std::string&, std::uint64_t epoch) override {
+  absl::Status let_go(const std::vector<HeldSession>& sessions) override {
     const std::scoped_lock lock(mutex_);
-    note(absl::StrCat("let go ", epoch));
+    note(absl::StrCat("let go of ", sessions.size()));
+    for (const HeldSession& session : sessions) note(absl::StrCat("let go ", session.epoch));
     return absl::OkStatus();
   }
   std::chrono::milliseconds touch_every() const override { return kTouch; }
@@ -117,6 +125,7 @@ class NotingStore final : public Store {
   bool is_held_ = false, is_missing_ = false;
   ChangeOutcome next_ = ChangeOutcome::kKept;
   StoredChange newest_;
+  absl::Status failure_;
 };
 
 class KeeperTest : public testing::Test {
@@ -126,9 +135,9 @@ class KeeperTest : public testing::Test {
     keeper_.reset();
   }
 
-  std::shared_ptr<Session> session() {
+  std::shared_ptr<Session> session(const std::string& name = kName) {
     const auto shape = shape_of(bar_mesh());
-    SessionParts parts{.name = kName,
+    SessionParts parts{.name = name,
                        .shape = shape,
                        .deformer = deformer_of(shape),
                        .free_components = FreeComponents::kError,
@@ -138,13 +147,22 @@ class KeeperTest : public testing::Test {
   }
 
   /// A session that the store has.
-  std::shared_ptr<Session> kept() {
-    const auto made = session();
+  std::shared_ptr<Session> kept(const std::string& name = kName) {
+    const auto made = session(name);
     std::promise<absl::Status> added;
     keeper_->add(made, {}, "", [&](const absl::Status& status) { added.set_value(status); });
     EXPECT_TRUE(added.get_future().get().ok());
     store_->forget();
     return made;
+  }
+
+  /// Three that the store has, while it is held up by a change of the first: what comes to them meanwhile waits together.
+  std::vector<std::shared_ptr<Session>> three_that_wait() {
+    const std::vector<std::shared_ptr<Session>> all{kept(), kept(kName + "a"), kept(kName + "b")};
+    store_->hold_changes(true);
+    keeper_->changed(*all[0], all[0]->revision() + 1, 0, [](bool) {});
+    EXPECT_TRUE(store_->wait_for("commit of 1"));
+    return all;
   }
 
   void take_over() {
@@ -254,6 +272,34 @@ TEST_F(KeeperTest, OneThatTheStoreHasLostIsWrittenAnewWithItsMesh) {
   store_->lose_session();
   ASSERT_TRUE(pass_until("anew"));
   expect_all();
+}
+
+TEST_F(KeeperTest, AStoreThatDoesNotAnswerIsAskedForAllAtOnceAndNotForEach) {
+  const auto all = three_that_wait();
+  for (const auto& one : all) keeper_->changed(*one, one->revision() + 1, 0, [](bool) {});
+  store_->fail_with(store_away("a test wants it to"));
+  store_->forget();
+  store_->hold_changes(false);
+  ASSERT_TRUE(store_->wait_for("commit of 3", 2));
+  for (const std::string& asked : store_->asked()) EXPECT_NE(asked, "commit of 1");
+}
+
+TEST_F(KeeperTest, OneThatTheStoreRefusesDoesNotHoldUpTheOthers) {
+  const auto all = three_that_wait();
+  for (const auto& one : all) keeper_->changed(*one, one->revision() + 1, 0, [](bool) {});
+  store_->fail_with(store_failing("a test wants it to"));
+  store_->forget();
+  store_->hold_changes(false);
+  ASSERT_TRUE(store_->wait_for("commit of 3"));
+  store_->forget();
+  EXPECT_TRUE(store_->wait_for("commit of 1"));
+}
+
+TEST_F(KeeperTest, ThoseThatLeaveTogetherAreLetGoOfTogether) {
+  const auto all = three_that_wait();
+  for (const auto& one : all) keeper_->release(*one);
+  store_->hold_changes(false);
+  EXPECT_TRUE(store_->wait_for("let go of 3"));
 }
 
 TEST_F(KeeperTest, OneThatNobodyUsedHereIsNotRemovedFromWhoHasIt) {

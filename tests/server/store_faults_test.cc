@@ -295,6 +295,18 @@ TEST_F(RedisFaultsTest, OneThatCameBackEmptyGetsLiveSessionsAnew) {
   EXPECT_EQ(details_of(get(left.session().name(), found)).info.reason(), "SESSION_UNKNOWN");
 }
 
+TEST_F(RedisFaultsTest, OneThatHangsDoesNotKeepTheServerFromItsEnd) {
+  constexpr std::chrono::seconds kGrace{1},
+      kEnd{20};  // it takes 6 s at most, and would take 2 s for each session
+  for (int k = 0; k < 20; ++k) create(mesh_);
+  redis_.pause();
+  const auto begin = std::chrono::steady_clock::now();
+  server_->drain(kGrace);
+  server_.reset();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, kEnd);
+  redis_.resume();
+}
+
 /// Two servers with one Redis, whose callers all come by one way.
 class HandOverCallsTest : public RedisFaultsTest {
  protected:
