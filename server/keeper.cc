@@ -23,7 +23,7 @@ bool leads_elsewhere(const Fault& fault, const std::string& route) {
 }  // namespace
 
 Keeper::Keeper(std::shared_ptr<Store> store, Services services)
-    : store_(std::move(store)), services_(std::move(services)), reader_(1, kLongestQueue) {
+    : store_(std::move(store)), services_(std::move(services)), reader_(1, kLongestQueue), toucher_(1, 1) {
   writer_ = std::thread([this] { run(); });
 }
 

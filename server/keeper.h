@@ -25,7 +25,7 @@ namespace lpdeform {
 
 /// Keeps sessions in a store while they live. Nobody who calls it waits for the store: one thread writes whatever has
 /// changed since it last did, of all sessions at once, however many updates that were; so the queue is at most one entry a
-/// session. Another thread reads, and writes blobs.
+/// session. Another thread reads, and writes blobs; a third tells the store which sessions are here.
 ///
 /// While the store fails or is slower than kPatience, updates are answered as taken and not kept, new sessions are refused
 /// and the rest goes on; what has changed is kept as soon as the store works again. Thread-safe. Held by a shared pointer.
@@ -196,7 +196,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   Clock::duration pause_{};
   bool is_stopping_ = false;
   Timers::TimePoint next_sweep_;
-  TaskPool reader_;  // its thread ends before the writer's
+  TaskPool reader_, toucher_;
   std::thread writer_;
 };
 

@@ -26,10 +26,10 @@ void Keeper::sweep() {
     touch_all();
     watch_unused();
   };
-  if (!reader_.try_post(touched)) watch_unused();
+  if (!toucher_.try_post(touched)) watch_unused();
 }
 
-/// On the reader's thread.
+/// On the toucher's thread.
 void Keeper::touch_all() {
   std::vector<TouchedSession> sessions;
   Sessions touched_ones;

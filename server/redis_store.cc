@@ -239,16 +239,17 @@ class RedisStore final : public Store {
       : options_(options),
         writer_(options.host, options.port, options.patience, options.login),
         reader_(options.host, options.port, options.patience, options.login),
+        toucher_(options.host, options.port, options.patience, options.login),
         presence_(options.host, options.port, options.patience, options.login) {}
 
   /// To be called once, before all else.
   absl::Status begin() {
-    const std::scoped_lock lock(reading_);
+    const std::scoped_lock lock(touching_);
     holder_ = kShown + holder_;
     is_shown_ = show().ok();
     if (!is_shown_)
       holder_ = random_hex_128();  // a user who may not listen: others wait for the lease to end
-    return reader_.run({"PING"}).status();
+    return toucher_.run({"PING"}).status();
   }
 
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) override;
@@ -264,7 +265,7 @@ class RedisStore final : public Store {
   absl::Status let_go(const std::vector<HeldSession>& sessions) override;
   absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) override;
   void end_by(std::chrono::steady_clock::time_point end) override {
-    for (RedisConnection* const connection : {&writer_, &reader_}) connection->end_by(end);
+    for (RedisConnection* const connection : {&writer_, &reader_, &toucher_, &presence_}) connection->end_by(end);
   }
 
  private:
@@ -276,8 +277,9 @@ class RedisStore final : public Store {
   const RedisStoreOptions options_;
   std::string holder_ = random_hex_128();  // from begin() on the same
   bool is_shown_ = false;                  // likewise
-  std::mutex writing_, reading_;
-  RedisConnection writer_, reader_, presence_;  // the last one with the reader
+  std::mutex writing_, reading_, touching_;
+  // The third one, so that leases are renewed while a large mesh is on its way; the last one goes with it.
+  RedisConnection writer_, reader_, toucher_, presence_;
 };
 
 Command RedisStore::command_of(const StoredChange& change) {
@@ -383,11 +385,11 @@ absl::StatusOr<TouchResult> RedisStore::touch(std::span<const TouchedSession> se
         {holder_, absl::StrCat(session.epoch), lease(),
          session.is_being_made ? "2" : (session.is_in_use ? "1" : "0"), absl::StrCat(session.revision)});
   }
-  const std::scoped_lock lock(reading_);
+  const std::scoped_lock lock(touching_);
   if (is_shown_) {
     if (absl::Status status = show(); !status.ok()) return status;
   }
-  const auto replies = reader_.run(commands);
+  const auto replies = toucher_.run(commands);
   if (!replies.ok()) return replies.status();
   TouchResult result;
   for (std::size_t k = 0; k < sessions.size(); ++k) {
@@ -402,9 +404,9 @@ absl::StatusOr<TouchResult> RedisStore::touch(std::span<const TouchedSession> se
 
 absl::StatusOr<std::size_t> RedisStore::remove_unused(std::int64_t idle_ms) {
   constexpr std::int64_t kAtOnce = 100;  // others wait meanwhile
-  const std::scoped_lock lock(reading_);
+  const std::scoped_lock lock(touching_);
   for (std::size_t removed = 0;;) {
-    const auto went = reader_.run({"EVAL", kRemoveUnused, "0", absl::StrCat(idle_ms), absl::StrCat(kAtOnce)});
+    const auto went = toucher_.run({"EVAL", kRemoveUnused, "0", absl::StrCat(idle_ms), absl::StrCat(kAtOnce)});
     if (!went.ok()) return went.status();
     removed += static_cast<std::size_t>(went->number);
     if (went->number < kAtOnce) return removed;

@@ -30,6 +30,13 @@ class NotingStore final : public Store {
     changed_.notify_all();
   }
 
+  /// Blobs, as large ones are on a slow way.
+  void hold_blobs(bool are_held) {
+    const std::scoped_lock lock(mutex_);
+    are_blobs_held_ = are_held;
+    changed_.notify_all();
+  }
+
   /// Waits until something was asked for, so often.
   bool wait_for(const std::string& asked, int times = 1) {
     std::unique_lock lock(mutex_);
@@ -102,8 +109,9 @@ class NotingStore final : public Store {
     return std::vector<std::string>();
   }
   absl::Status keep_blob(const std::string&, const std::string& key, std::string_view) override {
-    const std::scoped_lock lock(mutex_);
+    std::unique_lock lock(mutex_);
     note("blob " + key);
+    changed_.wait(lock, [this] { return !are_blobs_held_; });
     return absl::OkStatus();
   }
   absl::StatusOr<std::string> blob(const std::string&) override { return ""; }
@@ -122,7 +130,7 @@ class NotingStore final : public Store {
   std::condition_variable changed_;
   std::vector<std::string> asked_;
   std::uint64_t epoch_ = 1;
-  bool is_held_ = false, is_missing_ = false;
+  bool is_held_ = false, are_blobs_held_ = false, is_missing_ = false;
   ChangeOutcome next_ = ChangeOutcome::kKept;
   StoredChange newest_;
   absl::Status failure_;
@@ -272,6 +280,18 @@ TEST_F(KeeperTest, OneThatTheStoreHasLostIsWrittenAnewWithItsMesh) {
   store_->lose_session();
   ASSERT_TRUE(pass_until("anew"));
   expect_all();
+}
+
+TEST_F(KeeperTest, WhileALargeMeshIsOnItsWayTheOtherSessionsStayHere) {
+  const auto here = kept();
+  store_->hold_blobs(true);
+  std::promise<absl::Status> added;
+  keeper_->add(session(kName + "a"), {.part = "", .blobs = {{"key", "mesh"}}}, "",
+               [&](const absl::Status& status) { added.set_value(status); });
+  ASSERT_TRUE(store_->wait_for("blob key"));
+  EXPECT_TRUE(pass_until("is there"));
+  store_->hold_blobs(false);
+  EXPECT_TRUE(added.get_future().get().ok());
 }
 
 TEST_F(KeeperTest, AStoreThatDoesNotAnswerIsAskedForAllAtOnceAndNotForEach) {
