@@ -42,6 +42,23 @@ Keeper::~Keeper() {
   writer_.join();
 }
 
+/// OK, or why the store is not even asked: it does not answer at the moment, or whoever asks has waited for too long.
+absl::Status Keeper::asked_in_vain(Clock::time_point since) const {
+  if (Clock::now() - since > kPatienceForNew) return store_failing("it is too slow");
+  const std::scoped_lock lock(mutex_);
+  return is_hanging_ ? store_away("it does not answer") : absl::OkStatus();
+}
+
+/// What the store says, on the reader's thread; `since`: when somebody began to wait for that.
+template <typename Ask>
+std::invoke_result_t<Ask> Keeper::ask(Clock::time_point since, const Ask& what) {
+  if (absl::Status status = asked_in_vain(since); !status.ok()) return status;
+  const Clock::time_point begin = Clock::now();
+  auto answer = what();
+  note_read(answer.status(), begin);
+  return answer;
+}
+
 void Keeper::due(const std::string& name) {
   due_.insert(name);
   changed_.notify_all();
@@ -56,18 +73,34 @@ void Keeper::add(std::shared_ptr<Session> session, StoredHead head, const std::s
   entry.request_id = request_id;
   for (const auto& [key, bytes] : head.blobs) entry.blobs.push_back(key);
   entry.on_added = on_done;
-  const bool is_posted =
-      reader_.try_post([this, entry = std::move(entry), blobs = std::move(head.blobs)]() mutable {
+  const bool is_posted = reader_.try_post(
+      [this, entry = std::move(entry), blobs = std::move(head.blobs), since = Clock::now()]() mutable {
         const std::string name = entry.session->name();
         absl::Status status;
-        for (const auto& [key, bytes] : blobs) status.Update(store_->keep_blob(name, key, bytes));
+        for (const auto& [key, bytes] : blobs) {
+          if (status.ok()) status = keep_blob(since, name, key, bytes);
+          since = Clock::now();  // a large one may take its time
+        }
         if (status.ok()) return enter_new(name, std::move(entry));
         const OnDone refused = std::move(entry.on_added);
         remove(name);  // lets go of the blobs
-        services_.metrics->add(Count::kStoreErrors);
         refused(status);
       });
   if (!is_posted) on_done(server_busy(reader_.expected_wait()));
+}
+
+/// One that refuses a blob, as it is full, answers; that it takes no changes then shows with these.
+absl::Status Keeper::keep_blob(Clock::time_point since, const std::string& name, const std::string& key,
+                               const std::string& bytes) {
+  if (absl::Status status = asked_in_vain(since); !status.ok()) return status;
+  const Clock::time_point begin = Clock::now();
+  const absl::Status status = store_->keep_blob(name, key, bytes);
+  if (status.ok() || is_away(status)) {
+    note_read(status, begin);
+  } else {
+    services_.metrics->add(Count::kStoreErrors);
+  }
+  return status;
 }
 
 /// Its blobs are kept.
@@ -132,7 +165,7 @@ void Keeper::changed(const Session& session, std::uint64_t revision, std::uint64
       is_kept = entry.revision >= revision && entry.epoch >= epoch;
       if (!is_kept) {
         due(session.name());
-        if (!is_failing_) {
+        if (!is_writing_failing_) {
           const Timers::TimePoint until = services_.timers->now() + kPatience;
           if (entry.waiting.empty()) watch(session.name(), until);
           entry.waiting.push_back({revision, epoch, until, Clock::now(), std::move(on_kept)});
@@ -153,7 +186,7 @@ void Keeper::watch(const std::string& name, Timers::TimePoint when) {
 
 /// Answers those that have waited for long enough.
 void Keeper::give_up_waiting(const std::string& name) {
-  std::vector<OnKept> late;
+  std::vector<Waiting> late;
   {
     const std::scoped_lock lock(mutex_);
     const auto found = entries_.find(name);
@@ -162,13 +195,16 @@ void Keeper::give_up_waiting(const std::string& name) {
     const Timers::TimePoint now = services_.timers->now();
     std::erase_if(waiting, [&](Waiting& one) {
       const bool is_late = one.until <= now;
-      if (is_late) late.push_back(std::move(one.on_kept));
+      if (is_late) late.push_back(std::move(one));
       return is_late;
     });
     if (!waiting.empty()) watch(name, waiting.front().until);
   }
-  services_.metrics->add(Count::kUpdatesNotKept, static_cast<double>(late.size()));
-  for (const OnKept& on_kept : late) on_kept(false);
+  note_slow(late.size());
+  for (const Waiting& one : late) {
+    note_waited(one);
+    one.on_kept(false);
+  }
 }
 
 void Keeper::remove(const std::string& name, OnDone on_done) {
@@ -202,12 +238,12 @@ void Keeper::release(const Session& session) {
 bool Keeper::is_leaving(const std::string& name) const {
   const std::scoped_lock lock(mutex_);
   const auto found = entries_.find(name);
-  return found != entries_.end() && found->second.session != nullptr && !is_failing_;
+  return found != entries_.end() && found->second.session != nullptr && !is_writing_failing_;
 }
 
 bool Keeper::is_failing() const {
   const std::scoped_lock lock(mutex_);
-  return is_failing_;
+  return is_writing_failing_ || is_reading_failing_;
 }
 
 bool Keeper::is_being_removed(const std::string& name) const {
@@ -222,8 +258,8 @@ void Keeper::take_over(const std::string& name, const Asker& asker, OnFound on_f
 
 void Keeper::take_over_until(const std::string& name, const Asker& asker, Timers::TimePoint end,
                              const OnFound& on_found) {
-  const bool is_posted = reader_.try_post([this, name, asker, end, on_found] {
-    absl::StatusOr<Found> found = find(name, asker);
+  const bool is_posted = reader_.try_post([this, name, asker, end, on_found, since = Clock::now()] {
+    absl::StatusOr<Found> found = find(name, asker, since);
     const Timers::TimePoint now = services_.timers->now();
     const Fault fault = fault_of(found.status());
     if (fault.reason != "SESSION_ELSEWHERE" || now >= end || leads_elsewhere(fault, asker.route))
@@ -235,15 +271,17 @@ void Keeper::take_over_until(const std::string& name, const Asker& asker, Timers
   if (!is_posted) on_found(server_busy(reader_.expected_wait()));
 }
 
-absl::StatusOr<Keeper::Found> Keeper::find(const std::string& name, const Asker& asker) {
+absl::StatusOr<Keeper::Found> Keeper::find(const std::string& name, const Asker& asker,
+                                           Clock::time_point since) {
   if (is_being_removed(name)) return session_unknown();
   if (is_leaving(name)) return session_elsewhere();
-  return read(name, asker);
+  return read(name, asker, since);
 }
 
-absl::StatusOr<Keeper::Found> Keeper::read(const std::string& name, const Asker& asker) {
+absl::StatusOr<Keeper::Found> Keeper::read(const std::string& name, const Asker& asker,
+                                           Clock::time_point since) {
   const Clock::time_point begin = Clock::now();
-  auto session = store_->take_over(name, asker.owner, asker.route);
+  auto session = ask(since, [&] { return store_->take_over(name, asker.owner, asker.route); });
   absl::Status status = session.status();
   Found found;
   if (session.ok()) {
@@ -255,31 +293,32 @@ absl::StatusOr<Keeper::Found> Keeper::read(const std::string& name, const Asker&
     const auto head = decode_head(found.session.parts);
     status = head.status();
     for (const std::string& key : head.ok() ? blobs_of(head->request) : std::vector<std::string>()) {
-      auto bytes = store_->blob(key);
+      auto bytes = ask(Clock::now(), [&] { return store_->blob(key); });
       status.Update(bytes.status());
       if (bytes.ok()) found.blobs["blobs/" + key] = *std::move(bytes);
     }
   }
   services_.metrics->observe(Span::kStoreRead, std::chrono::duration<double>(Clock::now() - begin).count());
-  if (fault_of(status).reason == "STORE_FAILING") services_.metrics->add(Count::kStoreErrors);
   if (status.ok()) return found;
   give_up(name);
   return status;
 }
 
 void Keeper::find_request(const std::string& owner, const std::string& request_id, OnName on_name) {
-  const bool is_posted = reader_.try_post(
-      [this, owner, request_id, on_name] { on_name(store_->find_request(owner, request_id)); });
+  const bool is_posted = reader_.try_post([this, owner, request_id, on_name, since = Clock::now()] {
+    on_name(ask(since, [&] { return store_->find_request(owner, request_id); }));
+  });
   if (!is_posted) on_name(server_busy(reader_.expected_wait()));
 }
 
 void Keeper::list(const std::string& owner, const std::string& after, std::size_t most,
                   std::function<bool(const std::string&)> is_wanted, OnNames on_names) {
-  const auto read = [this, owner, after, most, is_wanted = std::move(is_wanted), on_names] {
+  const auto read = [this, owner, after, most, is_wanted = std::move(is_wanted), on_names,
+                     since = Clock::now()] {
     std::vector<std::string> wanted;
     std::string last = after;
     for (bool has_more = true; has_more && wanted.size() < most;) {
-      const auto names = store_->list(owner, last, most);
+      const auto names = ask(since, [&] { return store_->list(owner, last, most); });
       if (!names.ok()) return on_names(names.status());
       has_more = names->size() == most;
       for (const std::string& name : *names) {
@@ -295,7 +334,7 @@ void Keeper::list(const std::string& owner, const std::string& after, std::size_
 void Keeper::flush(Clock::time_point end) {
   store_->end_by(end);
   std::unique_lock lock(mutex_);
-  changed_.wait_until(lock, end, [this] { return is_failing_ || (due_.empty() && !is_writing_); });
+  changed_.wait_until(lock, end, [this] { return is_writing_failing_ || (due_.empty() && !is_writing_); });
 }
 
 }  // namespace lpdeform

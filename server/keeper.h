@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <thread>
+#include <type_traits>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -28,7 +29,8 @@ namespace lpdeform {
 /// session. Another thread reads, and writes blobs; a third tells the store which sessions are here.
 ///
 /// While the store fails or is slower than kPatience, updates are answered as taken and not kept, new sessions are refused
-/// and the rest goes on; what has changed is kept as soon as the store works again. Thread-safe. Held by a shared pointer.
+/// and the rest goes on; what has changed is kept as soon as the store works again. Where it does not answer, whoever needs one is
+/// refused at once: the first has waited for it. Thread-safe. Held by a shared pointer.
 class Keeper : public std::enable_shared_from_this<Keeper> {
  public:
   struct Services {
@@ -65,7 +67,8 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   /// Nobody has used it here for so long that it goes; not from the store where somebody else has it meanwhile.
   void expire(const Session& session);
 
-  /// The store did not take the last change: what has to be kept before it is answered is better not begun.
+  /// The store did not take the last change, or did not give what it was last asked for: what has to be kept before it is answered
+  /// is better not begun.
   bool is_failing() const;
 
   /// It was, and the store may not know yet.
@@ -160,9 +163,19 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void write_anew(Entry& entry, const std::string& name);
   void note_kept(const Work& work, ChangeOutcome outcome, Calls& calls);
   void note_failed(const Work& work, const absl::Status& why, Calls& calls);
+  void note_written(const absl::Status& status);
+  void note_read(const absl::Status& status, Clock::time_point begin);
   void note_health(const absl::Status& status);
+  void try_again_later();
+  void note_slow(std::size_t updates);
+  absl::Status asked_in_vain(Clock::time_point since) const;
+  absl::Status keep_blob(Clock::time_point since, const std::string& name, const std::string& key,
+                         const std::string& bytes);
+  template <typename Ask>
+  std::invoke_result_t<Ask> ask(Clock::time_point since, const Ask& what);
   void answer_kept(Entry& entry, Calls& calls);
   static void answer_all(Entry& entry, Calls& calls);
+  void note_waited(const Waiting& one);
   void make(const Calls& calls);
   void due(const std::string& name);
   void watch(const std::string& name, Timers::TimePoint when);
@@ -171,8 +184,8 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void give_up_new(const std::string& name);
   void take_over_until(const std::string& name, const Asker& asker, Timers::TimePoint end,
                        const OnFound& on_found);
-  absl::StatusOr<Found> find(const std::string& name, const Asker& asker);
-  absl::StatusOr<Found> read(const std::string& name, const Asker& asker);
+  absl::StatusOr<Found> find(const std::string& name, const Asker& asker, Clock::time_point since);
+  absl::StatusOr<Found> read(const std::string& name, const Asker& asker, Clock::time_point since);
   bool is_leaving(const std::string& name) const;
   void watch_unused();
   void sweep();
@@ -191,7 +204,11 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   std::map<std::string, std::uint64_t> being_made_;  // epochs of those that take_over() found
   std::set<std::string> due_;
   bool is_writing_ = false;
-  bool is_failing_ = false;
+  bool is_writing_failing_ = false, is_reading_failing_ = false;
+  bool was_failing_ = false;  // as the log and the metrics know it
+  bool is_trying_again_ = false;
+  bool is_hanging_ = false;      // what it was last asked for took long, and came to nothing
+  Clock::time_point next_word_;  // of its being slow
   Clock::time_point retry_at_;
   Clock::duration pause_{};
   bool is_stopping_ = false;

@@ -9,6 +9,8 @@ namespace {
 
 /// How often those are looked for that nobody uses, in their time without use.
 constexpr int kSweepsPerIdle = 8;
+/// Of a store that does not give what it is asked for.
+constexpr Timers::Duration kBetweenTries = std::chrono::seconds(1);
 
 }  // namespace
 
@@ -18,6 +20,23 @@ void Keeper::watch_unused() {
   const bool is_hasty = touch.count() > 0 && touch < sweep;
   services_.timers->at(services_.timers->now() + (is_hasty ? touch : sweep), [weak = weak_from_this()] {
     if (const auto self = weak.lock()) self->sweep();
+  });
+}
+
+/// Under the lock. Until the store gives again what it is asked for: where nobody calls, nobody else would find out.
+void Keeper::try_again_later() {
+  if (std::exchange(is_trying_again_, true)) return;
+  services_.timers->at(services_.timers->now() + kBetweenTries, [weak = weak_from_this()] {
+    const auto self = weak.lock();
+    if (self == nullptr) return;
+    {
+      const std::scoped_lock lock(self->mutex_);
+      self->is_trying_again_ = false;
+      if (!self->is_reading_failing_) return;
+      self->try_again_later();
+    }
+    // Where one is under way, that will show it.
+    static_cast<void>(self->toucher_.try_post([keeper = self.get()] { keeper->touch_all(); }));
   });
 }
 
@@ -45,18 +64,18 @@ void Keeper::touch_all() {
     }
     for (const auto& [name, epoch] : being_made_) sessions.push_back({name, epoch, true, 0, true});
   }
+  const Clock::time_point begin = Clock::now();
   const auto touched = store_->touch(sessions);
+  note_read(touched.status(), begin);
   if (touched.ok()) drop(touched->lost, touched_ones);
   if (touched.ok()) write_again(*touched, touched_ones);
   if (touched.ok()) hand_over(touched->wanted, touched_ones);
-  absl::Status status = touched.status();
-  if (is_sweep && status.ok()) {
+  if (is_sweep && touched.ok()) {
     const auto idle_ms = std::chrono::duration_cast<std::chrono::milliseconds>(services_.idle).count();
-    status = store_->remove_unused(idle_ms).status();
+    if (!store_->remove_unused(idle_ms).ok()) services_.metrics->add(Count::kStoreErrors);
     const std::scoped_lock lock(mutex_);
     next_sweep_ = now + services_.idle / kSweepsPerIdle;
   }
-  if (!status.ok()) services_.metrics->add(Count::kStoreErrors);
 }
 
 /// Under the lock. Null where the session that was touched has gone, or come back as another, meanwhile.

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/fault.h"
 #include "server/keeper.h"
 
 namespace lpdeform {
 namespace {
 
 constexpr std::chrono::milliseconds kFirstPause{50}, kLongestPause{2000};
+constexpr std::chrono::minutes kBetweenWords{1};
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -19,9 +21,10 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
 void Keeper::run() {
   std::unique_lock lock(mutex_);
   for (bool is_last_try = false;;) {
-    if (is_failing_) changed_.wait_until(lock, retry_at_, [this] { return is_stopping_; });
-    changed_.wait(lock, [this] { return is_stopping_ || !due_.empty(); });
-    if (due_.empty() || is_last_try) return;
+    if (is_writing_failing_) changed_.wait_until(lock, retry_at_, [this] { return is_stopping_; });
+    // Where nothing is left that it did not take, nothing at all shows whether it works again.
+    changed_.wait(lock, [this] { return is_stopping_ || !due_.empty() || is_writing_failing_; });
+    if ((is_stopping_ && due_.empty()) || is_last_try) return;
     is_last_try = is_stopping_;
     is_writing_ = true;
     lock.unlock();
@@ -106,7 +109,7 @@ void Keeper::write(std::vector<Work> works) {
   }
   {
     const std::scoped_lock lock(mutex_);
-    note_health(health);
+    note_written(health);
   }
   make(calls);
 }
@@ -185,6 +188,7 @@ void Keeper::note_failed(const Work& work, const absl::Status& why, Calls& calls
   for (OnDone& on_removed : std::exchange(entry.on_removed, {}))
     calls.add([on_removed = std::move(on_removed), why] { on_removed(why); });
   services_.metrics->add(Count::kUpdatesNotKept, static_cast<double>(entry.waiting.size()));
+  for (const Waiting& one : entry.waiting) note_waited(one);
   answer_all(entry, calls);
   due_.insert(work.name);
 }
@@ -194,7 +198,7 @@ void Keeper::answer_kept(Entry& entry, Calls& calls) {
   std::erase_if(entry.waiting, [&](Waiting& one) {
     const bool is_kept = one.revision <= entry.revision && one.epoch <= entry.epoch;
     if (!is_kept) return false;
-    services_.metrics->observe(Span::kInputToKept, seconds_since(one.since));
+    note_waited(one);
     calls.add([on_kept = std::move(one.on_kept)] { on_kept(true); });
     return true;
   });
@@ -211,17 +215,50 @@ void Keeper::make(const Calls& calls) {
   if (!calls.to_let_go.empty()) store_->let_go(calls.to_let_go).IgnoreError();
 }
 
+void Keeper::note_waited(const Waiting& one) {
+  services_.metrics->observe(Span::kInputToKept, seconds_since(one.since));
+}
+
 /// Under the lock.
-void Keeper::note_health(const absl::Status& status) {
-  const bool was_failing = std::exchange(is_failing_, !status.ok());
-  services_.metrics->set(Level::kStoreFailing, is_failing_ ? 1 : 0);
-  if (is_failing_) {
+void Keeper::note_written(const absl::Status& status) {
+  const bool was_failing = std::exchange(is_writing_failing_, !status.ok());
+  if (is_writing_failing_) {
     pause_ = was_failing ? std::min<Clock::duration>(2 * pause_, kLongestPause) : kFirstPause;
     retry_at_ = Clock::now() + pause_;
-    if (!was_failing) services_.log->warning("store_failing", {{"text", std::string(status.message())}});
-  } else if (was_failing) {
+  }
+  note_health(status);
+}
+
+/// Whether the store gives what it is asked for: anything but STORE_FAILING is an answer.
+void Keeper::note_read(const absl::Status& status, Clock::time_point begin) {
+  const bool is_failing = fault_of(status).reason == "STORE_FAILING";
+  if (is_failing) services_.metrics->add(Count::kStoreErrors);
+  const std::scoped_lock lock(mutex_);
+  if (!std::exchange(is_reading_failing_, is_failing) && is_failing) try_again_later();
+  is_hanging_ = is_failing && Clock::now() - begin > kPatience;
+  note_health(status);
+}
+
+/// Under the lock, after either of both has changed.
+void Keeper::note_health(const absl::Status& status) {
+  const bool is_failing = is_writing_failing_ || is_reading_failing_;
+  if (std::exchange(was_failing_, is_failing) == is_failing) return;
+  services_.metrics->set(Level::kStoreFailing, is_failing ? 1 : 0);
+  if (is_failing) {
+    services_.log->warning("store_failing", {{"text", std::string(status.message())}});
+  } else {
     services_.log->info("store_works", {{"text", "What was not kept is now."}});
   }
+}
+
+/// Updates were answered before they were kept, as the store took too long. A word in a minute is enough.
+void Keeper::note_slow(std::size_t updates) {
+  services_.metrics->add(Count::kUpdatesNotKept, static_cast<double>(updates));
+  const Clock::time_point now = Clock::now();
+  const std::scoped_lock lock(mutex_);
+  if (updates == 0 || now < next_word_) return;
+  next_word_ = now + kBetweenWords;
+  services_.log->warning("store_slow", {{"text", "Updates are answered before they are kept."}});
 }
 
 }  // namespace lpdeform

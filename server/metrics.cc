@@ -63,7 +63,8 @@ constexpr std::array kSpans{
     Entry{"lpdeform_setup_seconds", "The part of finished solves that factors."},
     Entry{"lpdeform_scheduler_queue_seconds", "From a session's being ready to run to its running."},
     Entry{"lpdeform_call_queue_seconds", "From a call's arrival to its being worked on."},
-    Entry{"lpdeform_input_to_kept_seconds", "From the taking of an update to its being in the store."},
+    Entry{"lpdeform_input_to_kept_seconds",
+          "From the taking of an update to its being in the store, or to its answer where that came first."},
     Entry{"lpdeform_store_write_seconds", "Of commits to the store, each of all that has changed."},
     Entry{"lpdeform_store_read_seconds", "Of reading a session from the store."},
 };

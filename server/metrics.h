@@ -44,7 +44,7 @@ enum class Span {
   kSetup,           // of one solve: the part that factors
   kSchedulerQueue,  // from being ready to run to running, of a session's slice
   kCallQueue,       // the same of a call's task
-  kInputToKept,     // from the taking of an update to its being in the store
+  kInputToKept,     // from the taking of an update to its being in the store, or to its earlier answer
   kStoreWrite,      // of one commit to the store
   kStoreRead,       // of one session out of the store
 };

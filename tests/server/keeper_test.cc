@@ -10,6 +10,7 @@
 #include <future>
 #include <mutex>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "bar.h"
 #include "core/base/fault.h"
@@ -56,9 +57,19 @@ class NotingStore final : public Store {
     const std::scoped_lock lock(mutex_);
     next_ = outcome;
   }
+  void lose_to_another() {
+    const std::scoped_lock lock(mutex_);
+    is_elsewhere_ = true;
+  }
   void lose_session() {
     const std::scoped_lock lock(mutex_);
     is_missing_ = true;
+  }
+  /// What is only read from now on, after this time; OK: it is given.
+  void fail_reads_with(const absl::Status& status, std::chrono::milliseconds after) {
+    const std::scoped_lock lock(mutex_);
+    read_failure_ = status;
+    reading_takes_ = after;
   }
   /// Of all changes from now on; OK: they are taken.
   void fail_with(const absl::Status& status) {
@@ -91,9 +102,14 @@ class NotingStore final : public Store {
     const std::scoped_lock lock(mutex_);
     TouchResult result;
     if (std::exchange(is_missing_, false)) result.missing = {kName};
+    if (std::exchange(is_elsewhere_, false)) {
+      result.lost = {kName};
+      note("lost");
+    }
     for (const TouchedSession& one : sessions)
       note(one.is_being_made ? absl::StrCat("is being made ", one.epoch) : "is there");
     note("touched");
+    if (!read_failure_.ok()) return read_failure_;
     return result;
   }
   absl::Status let_go(const std::vector<HeldSession>& sessions) override {
@@ -103,7 +119,13 @@ class NotingStore final : public Store {
     return absl::OkStatus();
   }
   std::chrono::milliseconds touch_every() const override { return kTouch; }
-  absl::StatusOr<std::string> find_request(const std::string&, const std::string&) override { return ""; }
+  absl::StatusOr<std::string> find_request(const std::string&, const std::string&) override {
+    std::unique_lock lock(mutex_);
+    note("find request");
+    if (read_failure_.ok()) return "";
+    changed_.wait_for(lock, reading_takes_, [] { return false; });
+    return read_failure_;
+  }
   absl::StatusOr<std::vector<std::string>> list(const std::string&, const std::string&,
                                                 std::size_t) override {
     return std::vector<std::string>();
@@ -130,10 +152,11 @@ class NotingStore final : public Store {
   std::condition_variable changed_;
   std::vector<std::string> asked_;
   std::uint64_t epoch_ = 1;
-  bool is_held_ = false, are_blobs_held_ = false, is_missing_ = false;
+  bool is_held_ = false, are_blobs_held_ = false, is_missing_ = false, is_elsewhere_ = false;
   ChangeOutcome next_ = ChangeOutcome::kKept;
   StoredChange newest_;
-  absl::Status failure_;
+  absl::Status failure_, read_failure_;
+  std::chrono::milliseconds reading_takes_{0};
 };
 
 class KeeperTest : public testing::Test {
@@ -178,6 +201,27 @@ class KeeperTest : public testing::Test {
                        [this](absl::StatusOr<Keeper::Found> found) { found_.set_value(std::move(found)); });
   }
 
+  /// The reason; empty where it was answered.
+  std::string find_request() {
+    std::promise<std::string> reason;
+    keeper_->find_request("anna", "request", [&](const absl::StatusOr<std::string>& name) {
+      reason.set_value(fault_of(name.status()).reason);
+    });
+    return reason.get_future().get();
+  }
+
+  /// Lets time go by until the store counts as one that fails, or works.
+  bool pass_until_failing(bool is_failing) {
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    while (keeper_->is_failing() != is_failing) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      timers_->advance(std::chrono::milliseconds(10));
+    }
+    return true;
+  }
+
+  bool shows(const std::string& line) const { return absl::StrContains(metrics_->text(), line + "\n"); }
+
   /// Lets time go by until something was asked for.
   bool pass_until(const std::string& asked) {
     const auto end = std::chrono::steady_clock::now() + kPatience;
@@ -191,10 +235,11 @@ class KeeperTest : public testing::Test {
 
   Scheduler scheduler_{2};
   const std::shared_ptr<ManualTimers> timers_ = std::make_shared<ManualTimers>();
+  const std::shared_ptr<Metrics> metrics_ = std::make_shared<Metrics>();
   const std::shared_ptr<NotingStore> store_ = std::make_shared<NotingStore>();
   std::promise<absl::StatusOr<Keeper::Found>> found_;
-  std::shared_ptr<Keeper> keeper_ = Keeper::create(
-      store_, {timers_, std::make_shared<Metrics>(), std::make_shared<Log>("off"), std::chrono::minutes(10)});
+  std::shared_ptr<Keeper> keeper_ =
+      Keeper::create(store_, {timers_, metrics_, std::make_shared<Log>("off"), std::chrono::minutes(10)});
 };
 
 TEST_F(KeeperTest, OneThatLeavesIsWrittenBeforeItIsTakenOverAgain) {
@@ -280,6 +325,62 @@ TEST_F(KeeperTest, OneThatTheStoreHasLostIsWrittenAnewWithItsMesh) {
   store_->lose_session();
   ASSERT_TRUE(pass_until("anew"));
   expect_all();
+}
+
+TEST_F(KeeperTest, AnUpdateThatIsGivenUpIsMeasuredToo) {
+  const auto live = kept();
+  store_->hold_changes(true);
+  std::promise<bool> is_kept;
+  keeper_->changed(*live, live->revision() + 1, 0, [&](bool kept) { is_kept.set_value(kept); });
+  timers_->advance(Keeper::kPatience);
+  EXPECT_FALSE(is_kept.get_future().get());
+  EXPECT_TRUE(shows("lpdeform_input_to_kept_seconds_count 1"));
+  EXPECT_TRUE(shows("lpdeform_updates_not_kept_total 1"));
+  EXPECT_TRUE(shows("lpdeform_store_failing 0"));
+}
+
+TEST_F(KeeperTest, AStoreThatCannotBeReachedFailsThoughNobodyWrites) {
+  store_->fail_reads_with(store_failing("a test wants it to"), std::chrono::milliseconds(0));
+  ASSERT_TRUE(pass_until_failing(true));
+  EXPECT_TRUE(shows("lpdeform_store_failing 1"));
+  store_->fail_reads_with(absl::OkStatus(), std::chrono::milliseconds(0));
+  ASSERT_TRUE(pass_until_failing(false));
+  EXPECT_TRUE(shows("lpdeform_store_failing 0"));
+}
+
+TEST_F(KeeperTest, WhoAsksAStoreThatFailsAtOnceAsksForItself) {
+  store_->fail_reads_with(store_failing("a test wants it to"), std::chrono::milliseconds(0));
+  EXPECT_EQ(find_request(), "STORE_FAILING");
+  EXPECT_TRUE(keeper_->is_failing());
+  store_->fail_reads_with(absl::OkStatus(), std::chrono::milliseconds(0));
+  EXPECT_EQ(find_request(), "");
+  EXPECT_FALSE(keeper_->is_failing());
+}
+
+TEST_F(KeeperTest, WhoAsksAStoreThatHangsIsRefusedAtOnceUntilItAnswers) {
+  store_->fail_reads_with(store_away("a test wants it to"), Keeper::kPatience + Keeper::kPatience / 2);
+  EXPECT_EQ(find_request(), "STORE_FAILING");
+  for (int k = 0; k < 10; ++k) EXPECT_EQ(find_request(), "STORE_FAILING");
+  const auto asked = store_->asked();
+  EXPECT_EQ(std::count(asked.begin(), asked.end(), "find request"), 1);
+  store_->fail_reads_with(absl::OkStatus(), std::chrono::milliseconds(0));
+  ASSERT_TRUE(pass_until_failing(false));
+  EXPECT_EQ(find_request(), "");
+}
+
+TEST_F(KeeperTest, AStoreThatHasRecoveredIsUsedAgainThoughNothingIsLeftToWrite) {
+  std::promise<void> lost;
+  keeper_->on_lost = [&](const Session&) { lost.set_value(); };
+  const auto live = kept();
+  store_->fail_with(store_failing("a test wants it to"));
+  std::promise<bool> is_kept;
+  keeper_->changed(*live, live->revision() + 1, 0, [&](bool kept) { is_kept.set_value(kept); });
+  EXPECT_FALSE(is_kept.get_future().get());
+  store_->lose_to_another();
+  ASSERT_TRUE(pass_until("lost"));
+  lost.get_future().get();
+  store_->fail_with(absl::OkStatus());
+  EXPECT_TRUE(pass_until_failing(false));
 }
 
 TEST_F(KeeperTest, WhileALargeMeshIsOnItsWayTheOtherSessionsStayHere) {
