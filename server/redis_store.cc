@@ -1,5 +1,6 @@
 #include "server/redis_store.h"
 
+#include <atomic>
 #include <mutex>
 #include <utility>
 #include <vector>
@@ -27,11 +28,12 @@ const std::string kNow = "local t = redis.call('TIME'); local now = t[1] * 1000 
 /// `ran`: for how long servers have run so far and reached Redis, in milliseconds: what use is dated by.
 const std::string kRan = "local ran = tonumber(redis.call('HGET', 'lpdeform:time', 'ran') or '0'); ";
 
-/// No keys. ARGV: the longest time between two of these that counts: a longer one passed without servers, or without Redis.
-const std::string kTick = kAlways + kNow + kRan +
-                          "local step = now - tonumber(redis.call('HGET', 'lpdeform:time', 'at') or now); "
-                          "step = math.max(0, math.min(step, tonumber(ARGV[1]))); "
-                          "redis.call('HSET', 'lpdeform:time', 'at', now, 'ran', ran + step); return 1";
+/// No keys. ARGV: the longest time between two of these that counts: a longer one passed without servers, or without Redis. `ran`.
+const std::string kTick =
+    kAlways + kNow + kRan +
+    "local step = now - tonumber(redis.call('HGET', 'lpdeform:time', 'at') or now); "
+    "step = math.max(0, math.min(step, tonumber(ARGV[1]))); "
+    "redis.call('HSET', 'lpdeform:time', 'at', now, 'ran', ran + step); return ran + step";
 
 const std::string kUsed = kRan + "redis.call('ZADD', 'lpdeform:used', ran, KEYS[1]); ";
 
@@ -42,10 +44,11 @@ const std::string kLetGoOf =
     "  if redis.call('SCARD', 'lpdeform:u:' .. blob) == 0 then redis.call('DEL', 'lpdeform:b:' .. blob) end "
     "end ";
 
-/// A function: all that there is of a session goes. What is left says for a day from which epoch on it may be written again.
+/// A function: all that there is of a session goes. What is left says that it did, and from which epoch on it may be written again, if
+/// at all (false: as it was). Of the `most` that went last; `forgot`: when the last one went of which that is no longer known.
 const std::string kForget =
     kLetGoOf +
-    "local function forget(key, epoch) "
+    "local function forget(key, epoch, most) "
     "  local name = string.sub(key, 12); "
     "  local has = redis.call('HMGET', key, 'blobs', 'request', 'owner', 'epoch'); "
     "  for blob in string.gmatch(has[1] or '', '%x+') do let_go_of(blob, name) end "
@@ -54,16 +57,29 @@ const std::string kForget =
     "  if has[3] then redis.call('ZREM', 'lpdeform:o:' .. redis.sha1hex(has[3]), key) end "
     "  redis.call('ZREM', 'lpdeform:used', key); "
     "  redis.call('DEL', key, 'lpdeform:m:' .. name); "
-    "  redis.call('SET', 'lpdeform:g:' .. name, epoch or has[4] or '0', 'PX', 86400000) "
+    "  redis.call('ZADD', 'lpdeform:gone', redis.call('HGET', 'lpdeform:time', 'ran') or 0, name); "
+    "  if epoch == 'never' then redis.call('HDEL', 'lpdeform:gone:epochs', name) "
+    "  else redis.call('HSET', 'lpdeform:gone:epochs', name, epoch or has[4] or '0') end "
+    "  local over = redis.call('ZCARD', 'lpdeform:gone') - most; "
+    "  if over > 0 then "
+    "    local went = redis.call('ZPOPMIN', 'lpdeform:gone', over); "
+    "    for k = 1, #went, 2 do redis.call('HDEL', 'lpdeform:gone:epochs', went[k]) end "
+    "    redis.call('HSET', 'lpdeform:time', 'forgot', went[#went]) "
+    "  end "
     "end ";
 
-/// A function of what HMGET has of holder and epoch, and the epoch that the holder knows as kept: whether the store has lost the
-/// session, or gone back to before that epoch, and nobody has removed it since.
+/// A function of what HMGET has of holder and epoch, the epoch that the holder knows as kept, and `ran` when it was last told of its
+/// sessions: whether the store has lost the session, or gone back to before that epoch, and nobody has removed it since, nor can have.
 const std::string kIsLost =
-    "local function is_lost(has, epoch) "
+    "local function is_lost(has, epoch, told) "
     "  if has[1] then return tonumber(has[2]) < tonumber(epoch) end "
-    "  local gone = redis.call('GET', 'lpdeform:g:' .. string.sub(KEYS[1], 12)); "
-    "  return not gone or tonumber(gone) <= tonumber(epoch) "
+    "  local name = string.sub(KEYS[1], 12); "
+    "  if redis.call('ZSCORE', 'lpdeform:gone', name) then "
+    "    local from = redis.call('HGET', 'lpdeform:gone:epochs', name); "
+    "    return from and tonumber(from) <= tonumber(epoch) "
+    "  end "
+    "  local forgot = redis.call('HGET', 'lpdeform:time', 'forgot'); "
+    "  return not (forgot and tonumber(told) <= tonumber(forgot)) "
     "end ";
 
 /// No keys. ARGV: owner, the key of the session before the first, how many. Those that have expired go from the set.
@@ -82,7 +98,7 @@ const std::string kList =
     "return found";
 
 /// ARGV: holder, epoch before, epoch, lease, replaces all ("0", "1", or "2" where it is written anew), revision before, revision,
-/// then names and values of hash fields in turn, "=" before a value that is set and "-" for one that goes. 1: done; 0: fenced;
+/// `ran` when told, then names and values of hash fields in turn, "=" before a value that is set and "-" for one that goes. 1: done; 0: fenced;
 /// 2: behind, which it is not where it has more than that (the answer to the change before was lost), nor where nothing was
 /// changed since it was taken over; 4: lost.
 const std::string kCommit =
@@ -90,7 +106,7 @@ const std::string kCommit =
     "local name = string.sub(KEYS[1], 12); "
     "if ARGV[2] ~= '0' then "
     "  local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch', 'revision'); "
-    "  if is_lost(has, ARGV[2]) then "
+    "  if is_lost(has, ARGV[2], ARGV[8]) then "
     "    if ARGV[5] ~= '2' then return 4 end "
     "  else "
     "    if has[1] ~= ARGV[1] or (has[2] ~= ARGV[2] and has[2] ~= ARGV[3]) then return 0 end "
@@ -106,7 +122,7 @@ const std::string kCommit =
     "end "
     "redis.call('HSET', KEYS[1], 'holder', ARGV[1], 'epoch', ARGV[3], 'until', now + ARGV[4], 'alive', now + "
     "ARGV[4], 'revision', ARGV[7]); "
-    "for k = 8, #ARGV, 2 do "
+    "for k = 9, #ARGV, 2 do "
     "  if string.sub(ARGV[k + 1], 1, 1) == '=' then redis.call('HSET', KEYS[1], ARGV[k], string.sub(ARGV[k + "
     "1], 2)) "
     "  else redis.call('HDEL', KEYS[1], ARGV[k]) end "
@@ -167,12 +183,12 @@ const std::string kTakeOver =
     "redis.call('HDEL', KEYS[1], 'revision', 'wanted', 'wanter'); " +
     kUsed + "return redis.call('HGETALL', KEYS[1])";
 
-/// ARGV: holder, epoch, lease, 1 where it is in use and 2 where it is being made, revision. 0: another has it, or it was
+/// ARGV: holder, epoch, lease, 1 where it is in use and 2 where it is being made, revision, `ran` when told. 0: another has it, or it was
 /// removed; 2: it is behind; 3: another wants it; 4: it, or one of its blobs, is lost.
 const std::string kTouch =
     kAlways + kNow + kIsLost +
     "local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch', 'blobs', 'revision', 'wanted'); "
-    "if is_lost(has, ARGV[2]) then return 4 end "
+    "if is_lost(has, ARGV[2], ARGV[6]) then return 4 end "
     "if has[1] ~= ARGV[1] then return 0 end "
     "redis.call('HSET', KEYS[1], 'alive', now + ARGV[3]); "
     "if ARGV[4] ~= '0' then redis.call('HSET', KEYS[1], 'until', now + ARGV[3]) end "
@@ -185,19 +201,19 @@ const std::string kTouch =
     "if has[5] and now - tonumber(has[5]) < " +
     kWanted + " then return 3 end return 1";
 
-/// ARGV: holder, 1 where it goes only if the holder has it in this epoch or one before, epoch. 0: it has it no more.
+/// ARGV: holder, 1 where it goes only if the holder has it in this epoch or one before, epoch, `most_gone`. 0: it has it no more.
 const std::string kRemove =
     kAlways + kForget +
-    "if ARGV[2] == '0' then forget(KEYS[1], '1e18') return 1 end "
+    "if ARGV[2] == '0' then forget(KEYS[1], 'never', tonumber(ARGV[4])) return 1 end "
     "local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch'); "
     "if has[1] and (has[1] ~= ARGV[1] or tonumber(has[2]) > tonumber(ARGV[3])) then return 0 end "
-    "forget(KEYS[1], ARGV[3]); return 1";
+    "forget(KEYS[1], ARGV[3], tonumber(ARGV[4])); return 1";
 
-/// No keys. ARGV: idle, at most how many. How many went.
+/// No keys. ARGV: idle, at most how many, `most_gone`. How many went.
 const std::string kRemoveUnused =
     kAlways + kForget + kRan +
     "local keys = redis.call('ZRANGEBYSCORE', 'lpdeform:used', '-inf', ran - ARGV[1], 'LIMIT', 0, ARGV[2]); "
-    "for _, key in ipairs(keys) do forget(key) end "
+    "for _, key in ipairs(keys) do forget(key, false, tonumber(ARGV[3])) end "
     "return #keys";
 
 /// ARGV: the blob's key. The session's use of it, which begins before the session is there. 1: the blob is there.
@@ -249,7 +265,12 @@ class RedisStore final : public Store {
     is_shown_ = show().ok();
     if (!is_shown_)
       holder_ = random_hex_128();  // a user who may not listen: others wait for the lease to end
-    return toucher_.run({"PING"}).status();
+    const auto ran = toucher_.run({"HGET", "lpdeform:time", "ran"});
+    if (!ran.ok()) return ran.status();
+    if (!ran->is_nothing && !absl::SimpleAtoi(ran->text, &ran_))
+      return store_failing("lpdeform:time, which Redis has, is none of lpdeform's");
+    told_ = ran_;
+    return absl::OkStatus();
   }
 
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const StoredChange> changes) override;
@@ -265,18 +286,24 @@ class RedisStore final : public Store {
   absl::Status let_go(const std::vector<HeldSession>& sessions) override;
   absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) override;
   void end_by(std::chrono::steady_clock::time_point end) override {
-    for (RedisConnection* const connection : {&writer_, &reader_, &toucher_, &presence_}) connection->end_by(end);
+    for (RedisConnection* const connection : {&writer_, &reader_, &toucher_, &presence_})
+      connection->end_by(end);
   }
 
  private:
   Command command_of(const StoredChange& change);
   std::string lease() const { return absl::StrCat(options_.lease.count()); }
+  std::string most_gone() const { return absl::StrCat(options_.most_gone); }
+  std::string told() const { return absl::StrCat(told_.load()); }
   /// Also where it is shown already. Finds out whether the connection is there.
   absl::Status show() { return presence_.run({"SUBSCRIBE", kPresence + holder_}).status(); }
 
   const RedisStoreOptions options_;
   std::string holder_ = random_hex_128();  // from begin() on the same
   bool is_shown_ = false;                  // likewise
+  /// What Redis had of `ran` at the last touch, and at the last one whose answers were all heeded: before the next one began.
+  std::int64_t ran_ = 0;
+  std::atomic<std::int64_t> told_{0};
   std::mutex writing_, reading_, touching_;
   // The third one, so that leases are renewed while a large mesh is on its way; the last one goes with it.
   RedisConnection writer_, reader_, toucher_, presence_;
@@ -285,13 +312,15 @@ class RedisStore final : public Store {
 Command RedisStore::command_of(const StoredChange& change) {
   if (change.is_removal) {
     Command command = script(kRemove, change.session);
-    command.insert(command.end(), {holder_, change.is_expiry ? "1" : "0", absl::StrCat(change.epoch_before)});
+    command.insert(command.end(),
+                   {holder_, change.is_expiry ? "1" : "0", absl::StrCat(change.epoch_before), most_gone()});
     return command;
   }
   Command command = script(kCommit, change.session);
-  command.insert(command.end(), {holder_, absl::StrCat(change.epoch_before), absl::StrCat(change.epoch),
-                                 lease(), change.is_anew ? "2" : (change.replaces_all ? "1" : "0"),
-                                 absl::StrCat(change.revision_before), absl::StrCat(change.revision)});
+  command.insert(command.end(),
+                 {holder_, absl::StrCat(change.epoch_before), absl::StrCat(change.epoch), lease(),
+                  change.is_anew ? "2" : (change.replaces_all ? "1" : "0"),
+                  absl::StrCat(change.revision_before), absl::StrCat(change.revision), told()});
   if (change.epoch_before == 0 || change.is_anew) {
     const std::string request = change.request_id.empty() ? "" : request_key(change.owner, change.request_id);
     command.insert(
@@ -377,20 +406,22 @@ absl::StatusOr<std::string> RedisStore::blob(const std::string& key) {
 }
 
 absl::StatusOr<TouchResult> RedisStore::touch(std::span<const TouchedSession> sessions) {
+  const std::scoped_lock lock(touching_);
+  told_ = ran_;
   std::vector<Command> commands{{"EVAL", kTick, "0", lease()}};
   for (const TouchedSession& session : sessions) {
     commands.push_back(script(kTouch, session.name));
-    commands.back().insert(
-        commands.back().end(),
-        {holder_, absl::StrCat(session.epoch), lease(),
-         session.is_being_made ? "2" : (session.is_in_use ? "1" : "0"), absl::StrCat(session.revision)});
+    commands.back().insert(commands.back().end(),
+                           {holder_, absl::StrCat(session.epoch), lease(),
+                            session.is_being_made ? "2" : (session.is_in_use ? "1" : "0"),
+                            absl::StrCat(session.revision), told()});
   }
-  const std::scoped_lock lock(touching_);
   if (is_shown_) {
     if (absl::Status status = show(); !status.ok()) return status;
   }
   const auto replies = toucher_.run(commands);
   if (!replies.ok()) return replies.status();
+  ran_ = replies->front().number;
   TouchResult result;
   for (std::size_t k = 0; k < sessions.size(); ++k) {
     const std::int64_t answer = (*replies)[k + 1].number;
@@ -406,7 +437,8 @@ absl::StatusOr<std::size_t> RedisStore::remove_unused(std::int64_t idle_ms) {
   constexpr std::int64_t kAtOnce = 100;  // others wait meanwhile
   const std::scoped_lock lock(touching_);
   for (std::size_t removed = 0;;) {
-    const auto went = toucher_.run({"EVAL", kRemoveUnused, "0", absl::StrCat(idle_ms), absl::StrCat(kAtOnce)});
+    const auto went =
+        toucher_.run({"EVAL", kRemoveUnused, "0", absl::StrCat(idle_ms), absl::StrCat(kAtOnce), most_gone()});
     if (!went.ok()) return went.status();
     removed += static_cast<std::size_t>(went->number);
     if (went->number < kAtOnce) return removed;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -17,6 +18,7 @@ struct RedisStoreOptions {
   std::chrono::milliseconds lease = std::chrono::milliseconds(900);
   std::chrono::milliseconds stays = std::chrono::seconds(1);     // at least, with whom it has just come to
   std::chrono::milliseconds patience = std::chrono::seconds(2);  // for one answer
+  std::int64_t most_gone = 100'000;                              // names of sessions that were removed
 };
 
 /// A store in Redis that several servers share. A session is a hash with its parts, its epoch, who holds it and until when,
@@ -34,13 +36,15 @@ struct RedisStoreOptions {
 /// Nothing expires by Redis's clock, which goes on while Redis is away and while no server runs: use is dated by the time that
 /// servers have run and reached Redis, and remove_unused() goes by it. A session that Redis has lost, or whose epoch is less than
 /// its holder knows as kept, is told from one that was removed (kLost): the holder writes it anew, with its blobs. One that
-/// was removed leaves behind for a day that it was, and one that was removed as unused the epoch from which on it may be
-/// written anew: by a holder that was cut off and has it in use, where nobody else had it since.
+/// was removed leaves behind that it was, and one that was removed as unused the epoch from which on it may be
+/// written anew: by a holder that was cut off and has it in use, where nobody else had it since. The last `most_gone` are remembered,
+/// some 200 bytes each; what a holder does not find that was last in touch before one that is forgotten counts as removed.
 ///
 /// Keys: lpdeform:s:SESSION, a hash; lpdeform:b:KEY, a blob; lpdeform:u:KEY, the set of sessions that have it; lpdeform:m:SESSION,
 /// of one that is being made, the set of its blobs' keys; lpdeform:r:OWNER:REQUEST, a session's name; lpdeform:o:OWNER, the sorted
-/// set of an owner's sessions; lpdeform:used, that of all, by their last use; lpdeform:time, its clock; lpdeform:g:SESSION, one that
-/// is gone. A channel: lpdeform:h:HOLDER. Redis 7.0 or later.
+/// set of an owner's sessions; lpdeform:used, that of all, by their last use; lpdeform:time, its clock; lpdeform:gone, the
+/// sorted set of those that are gone, by when; lpdeform:gone:epochs, a hash of those that may be written anew. A
+/// channel: lpdeform:h:HOLDER. Redis 7.0 or later.
 ///
 /// UNAVAILABLE STORE_FAILING where Redis does not answer; later on the store finds it again by itself.
 absl::StatusOr<std::shared_ptr<Store>> open_redis_store(const RedisStoreOptions& options);

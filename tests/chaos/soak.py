@@ -4,7 +4,9 @@
     tests/chaos/soak load [--minutes 30] [--picture FILE.svg]      sessions under `lpdeform load`, with slow readers and
                                                                    reconnects, a new set every half a minute
 
-Prints a line for each sample, and exits with 1 where what the server holds at the end is more than at the beginning: of memory,
+Either with --store none, sqlite or redis.
+
+Prints a line for each sample, and exits with 1 where what the server or its store holds at the end is more than at the beginning: of memory and of the store,
 the median of the last quarter over that of the second quarter by 5 % and 4 MiB; of descriptors and sessions, any, once idle; of threads, any over the most of the second quarter: gRPC's pool grows as the load
 first does. Also where a load falls short: an update that was not answered, or a call that failed.
 """
@@ -14,6 +16,7 @@ from __future__ import annotations
 import argparse
 import os
 import pathlib
+import socket
 import statistics
 import subprocess
 import sys
@@ -23,22 +26,46 @@ import time
 
 from lpdeform.v1 import service_pb2
 
-from machines import PATIENCE, ROOT, Server
+from machines import PATIENCE, ROOT, Redis, Server
 from picture import draw
 from wire import Book, Stream, Wire, create_request, held
 
 CLI = os.environ.get("LPDEFORM_CLI", str(ROOT / "build/release/bin/lpdeform"))
-COLUMNS = ("resident MiB", "descriptors", "threads", "sessions")
+COLUMNS = ("resident MiB", "descriptors", "threads", "sessions", "store MiB")
+SIZES = ("resident MiB", "store MiB")
 
 
-def sample(server: Server) -> dict[str, float]:
+class Soaked(Server):
+    """A server with a store of its own."""
+
+    def __init__(self, kind: str, folder: str) -> None:
+        self.folder = pathlib.Path(folder) / "store"
+        self.redis = Redis(folder) if kind == "redis" else None
+        super().__init__({"none": "none", "sqlite": f"sqlite:{self.folder}"}.get(kind) or f"redis://127.0.0.1:{self.redis.port}")
+
+    def store_bytes(self) -> int:
+        if self.redis is None:
+            return sum(file.stat().st_size for file in self.folder.rglob("*") if file.is_file())
+        with socket.create_connection(("127.0.0.1", self.redis.port), PATIENCE) as connection, connection.makefile("rwb") as lines:
+            lines.write(b"INFO memory\r\n")
+            lines.flush()
+            return int(next(line for line in lines if line.startswith(b"used_memory:")).split(b":")[1])
+
+    def kill(self) -> None:
+        super().kill()
+        if self.redis:
+            self.redis.kill()
+
+
+def sample(server: Soaked) -> dict[str, float]:
     process = pathlib.Path(f"/proc/{server.process.pid}")
     status = dict(line.split(":", 1) for line in (process / "status").read_text().splitlines())
     return {"resident MiB": int(status["VmRSS"].split()[0]) / 1024, "descriptors": len(os.listdir(process / "fd")),
-            "threads": int(status["Threads"]), "sessions": server.metrics()["lpdeform_sessions"]}
+            "threads": int(status["Threads"]), "sessions": server.metrics()["lpdeform_sessions"],
+            "store MiB": server.store_bytes() / 2**20}
 
 
-def idle_sample(server: Server) -> dict[str, float]:
+def idle_sample(server: Soaked) -> dict[str, float]:
     """Once connections that were let go of are gone: the smallest of a few seconds."""
     samples = []
     for _ in range(50):
@@ -50,7 +77,7 @@ def idle_sample(server: Server) -> dict[str, float]:
 class Cycles:
     """Creates, streams and deletes."""
 
-    def __init__(self, server: Server, count: int) -> None:
+    def __init__(self, server: Soaked, count: int) -> None:
         self.server, self.left, self.done, self.faults = server, count, 0, []
         self._lock = threading.Lock()
         self.threads = [threading.Thread(target=self._work, daemon=True) for _ in range(4)]
@@ -89,7 +116,7 @@ class Cycles:
         wire.call("DeleteSession", service_pb2.DeleteSessionRequest(session=made.session.name))
 
 
-def run_cycles(server: Server, options) -> list[dict[str, float]]:
+def run_cycles(server: Soaked, options) -> list[dict[str, float]]:
     cycles = Cycles(server, options.count)
     samples, begin = [], time.monotonic()
     step = max(1, options.count // 100)
@@ -106,7 +133,7 @@ def run_cycles(server: Server, options) -> list[dict[str, float]]:
     return samples
 
 
-def run_load(server: Server, options) -> list[dict[str, float]]:
+def run_load(server: Soaked, options) -> list[dict[str, float]]:
     samples, begin = [], time.monotonic()
     end = begin + 60 * options.minutes
     turn = min(30.0, max(2.0, 10 * options.minutes))
@@ -133,11 +160,12 @@ def growth(samples: list[dict[str, float]], before: dict[str, float], after: dic
     faults = [f"a load fell short at {one['seconds']:.0f} s" for one in samples if one.pop("short", 0)]
     quarter = len(samples) // 4
     early, late = samples[quarter:2 * quarter], samples[-quarter:]
-    median = [statistics.median(one["resident MiB"] for one in part) for part in (early, late)]
-    print(f"resident: {median[0]:.1f} MiB in the second quarter, {median[1]:.1f} in the last; idle before and after: "
-          + ", ".join(f"{column} {before[column]:.0f} and {after[column]:.0f}" for column in COLUMNS))
-    if median[1] > 1.05 * median[0] + 4:
-        faults.append(f"memory grew from {median[0]:.1f} to {median[1]:.1f} MiB")
+    for size in SIZES:
+        median = [statistics.median(one[size] for one in part) for part in (early, late)]
+        print(f"{size}: {median[0]:.1f} in the second quarter, {median[1]:.1f} in the last")
+        if median[1] > 1.05 * median[0] + 4:
+            faults.append(f"{size} grew from {median[0]:.1f} to {median[1]:.1f}")
+    print("idle before and after: " + ", ".join(f"{column} {before[column]:.0f} and {after[column]:.0f}" for column in COLUMNS))
     allowed = before | {"threads": max(one["threads"] for one in early)}
     for column in ("descriptors", "threads", "sessions"):
         if after[column] > allowed[column]:
@@ -150,10 +178,11 @@ def main() -> int:
     parser.add_argument("what", choices=("cycles", "load"))
     parser.add_argument("--count", type=int, default=10000)
     parser.add_argument("--minutes", type=float, default=30)
+    parser.add_argument("--store", choices=("none", "sqlite", "redis"), default="none")
     parser.add_argument("--picture")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory():
-        server = Server("none")
+    with tempfile.TemporaryDirectory() as folder:
+        server = Soaked(options.store, folder)
         try:
             run = run_cycles if options.what == "cycles" else run_load
             warm = argparse.Namespace(count=40, minutes=0.05)
@@ -164,7 +193,8 @@ def main() -> int:
         finally:
             server.kill()
     if options.picture:
-        draw(options.picture, "cycles" if options.what == "cycles" else "seconds", samples, COLUMNS)
+        columns = COLUMNS if options.store != "none" else COLUMNS[:-1]
+        draw(options.picture, "cycles" if options.what == "cycles" else "seconds", samples, columns)
         print(f"wrote {options.picture}")
     faults = growth(samples, before, after)
     for fault in faults:

@@ -652,9 +652,8 @@ TEST_F(RedisStoreTest, WhatNobodyHasUsedWhileServersRanGoesAndLeavesNothing) {
   EXPECT_FALSE(store->blob(unused).ok());
   redis.run({"HINCRBY", "lpdeform:time", "ran", kIdleText});
   EXPECT_EQ(*other->remove_unused(kIdle), 1u);
-  EXPECT_EQ(redis.all(), (std::set<std::string>{"lpdeform:time", "lpdeform:g:a", "lpdeform:g:z",
-                                                "lpdeform:g:never made"}));
-  for (const std::string name : {"a", "z"}) EXPECT_GT(redis.run({"TTL", "lpdeform:g:" + name}).number, 0);
+  EXPECT_EQ(redis.all(), (std::set<std::string>{"lpdeform:time", "lpdeform:gone", "lpdeform:gone:epochs"}));
+  EXPECT_EQ(redis.run({"ZCARD", "lpdeform:gone"}).number, 3);
 }
 
 TEST_F(RedisStoreTest, TheTimeThatRedisWasAwayOrNoServerRanDoesNotCountAsWithoutUse) {
@@ -758,6 +757,40 @@ TEST_F(RedisStoreTest, WhatWasRemovedIsNotWrittenAnewByWhoDidNotKnow) {
   EXPECT_EQ(store->touch(used)->lost, std::vector<std::string>{"a"});
   EXPECT_EQ(*commit(*store, anew(next_of(made))), ChangeOutcome::kFenced);
   EXPECT_FALSE(other->take_over("a", "anna").ok());
+}
+
+TEST_F(RedisStoreTest, OfThoseThatWereRemovedOnlyTheLastAreRemembered) {
+  RedisKeys redis(redis_.port());
+  const auto cut_off = open(std::chrono::milliseconds(1));
+  const auto other = *open_redis_store({.host = "127.0.0.1", .port = redis_.port(), .most_gone = 10});
+  const auto pass = [&] {
+    redis.run({"HINCRBY", "lpdeform:time", "ran", "1000"});
+    ASSERT_TRUE(other->touch({}).ok());
+  };
+  const auto go = [&](const std::string& name) {
+    ASSERT_TRUE(commit(*other, beginning(name)).ok());
+    ASSERT_TRUE(commit(*other, {.session = name, .is_removal = true}).ok());
+  };
+  const StoredChange made = beginning("a");
+  ASSERT_TRUE(commit(*cut_off, made).ok());
+  pass();
+  ASSERT_TRUE(commit(*other, {.session = "a", .is_removal = true}).ok());
+  pass();
+  for (int k = 0; k < 100; ++k) go(absl::StrCat("another", k));
+  EXPECT_EQ(redis.run({"ZCARD", "lpdeform:gone"}).number, 10);
+  EXPECT_EQ(redis.run({"ZSCORE", "lpdeform:gone", "a"}).text, "");  // nothing knows of its end
+  EXPECT_EQ(*commit(*cut_off, anew(next_of(made))), ChangeOutcome::kFenced);
+  const std::vector<TouchedSession> used{{"a", 1, true, 0}};
+  EXPECT_EQ(cut_off->touch(used)->lost, std::vector<std::string>{"a"});
+
+  const StoredChange live = beginning("live");  // of one that was told since
+  ASSERT_TRUE(commit(*cut_off, live).ok());
+  pass();
+  for (int k = 0; k < 2; ++k) EXPECT_TRUE(cut_off->touch({}).ok());
+  redis.run({"DEL", "lpdeform:s:live"});
+  const std::vector<TouchedSession> lost{{"live", 1, true, 0}};
+  EXPECT_EQ(cut_off->touch(lost)->missing, std::vector<std::string>{"live"});
+  EXPECT_EQ(*commit(*cut_off, anew(next_of(live))), ChangeOutcome::kKept);
 }
 
 TEST_F(RedisStoreTest, WhatExpiresForOneThatHadItBeforeStaysWithTheOneThatHasIt) {
