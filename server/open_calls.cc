@@ -2,6 +2,7 @@
 
 #include <grpcpp/server_context.h>
 
+#include <map>
 #include <mutex>
 #include <string_view>
 #include <utility>
@@ -15,55 +16,81 @@ using grpc::experimental::InterceptorBatchMethods;
 using grpc::experimental::ServerInterceptorFactoryInterface;
 using grpc::experimental::ServerRpcInfo;
 
-/// A call, as long as it is under way.
-struct OpenCall {
-  std::mutex mutex;
-  grpc::ServerContextBase* context = nullptr;  // null when it has ended
+/// The calls under way. Thread-safe.
+class OpenCalls {
+ public:
+  void add(const Interceptor* of, grpc::ServerContextBase* context, Timers::TimePoint now) {
+    const std::scoped_lock lock(mutex_);
+    calls_[of] = {context, now};
+  }
+  void forget(const Interceptor* of) {
+    const std::scoped_lock lock(mutex_);
+    calls_.erase(of);
+  }
+  /// Those that began by then. gRPC tells of their ends on threads of its own.
+  void cancel_begun_by(Timers::TimePoint then) {
+    const std::scoped_lock lock(mutex_);
+    for (const auto& [of, call] : calls_) {
+      if (call.began <= then) call.context->TryCancel();
+    }
+  }
 
-  void cancel() {
-    const std::scoped_lock lock(mutex);
-    if (context != nullptr) context->TryCancel();
-  }
-  void forget() {
-    const std::scoped_lock lock(mutex);
-    context = nullptr;
-  }
+ private:
+  struct Call {
+    grpc::ServerContextBase* context = nullptr;
+    Timers::TimePoint began;
+  };
+  std::mutex mutex_;
+  std::map<const Interceptor*, Call> calls_;
 };
 
 class Watcher final : public Interceptor {
  public:
-  explicit Watcher(std::shared_ptr<OpenCall> call) : call_(std::move(call)) {}
-  ~Watcher() override { call_->forget(); }
+  explicit Watcher(std::shared_ptr<OpenCalls> calls) : calls_(std::move(calls)) {}
+  ~Watcher() override { calls_->forget(this); }
 
   void Intercept(InterceptorBatchMethods* methods) override {
-    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_CLOSE)) call_->forget();
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_CLOSE)) calls_->forget(this);
     methods->Proceed();
   }
 
  private:
-  const std::shared_ptr<OpenCall> call_;
+  const std::shared_ptr<OpenCalls> calls_;
 };
+
+/// Looks a few times within what calls may last.
+void look_later(const std::weak_ptr<Timers>& weak_timers, const std::weak_ptr<OpenCalls>& weak_calls,
+                Timers::Duration after) {
+  const auto timers = weak_timers.lock();
+  if (!timers) return;
+  timers->at(timers->now() + after / 4, [weak_timers, weak_calls, after] {
+    const auto calls = weak_calls.lock();
+    const auto alive = weak_timers.lock();
+    if (!calls || !alive) return;
+    calls->cancel_begun_by(alive->now() - after);
+    look_later(weak_timers, weak_calls, after);
+  });
+}
 
 class WatcherFactory final : public ServerInterceptorFactoryInterface {
  public:
-  WatcherFactory(const std::shared_ptr<Timers>& timers, Timers::Duration after)
-      : timers_(timers), after_(after) {}
+  WatcherFactory(const std::shared_ptr<Timers>& timers, Timers::Duration after) : timers_(timers) {
+    look_later(timers_, calls_, after);
+  }
 
   Interceptor* CreateServerInterceptor(ServerRpcInfo* info) override {
-    if (!std::string_view(info->method()).starts_with("/grpc.")) return nullptr;
+    const bool is_open = std::string_view(info->method()).starts_with("/grpc.");
+    if (!is_open || info->type() == ServerRpcInfo::Type::UNARY) return nullptr;
     const auto timers = timers_.lock();
     if (!timers) return nullptr;
-    const auto call = std::make_shared<OpenCall>();
-    call->context = info->server_context();
-    timers->at(timers->now() + after_, [weak = std::weak_ptr(call)] {
-      if (const auto open = weak.lock()) open->cancel();
-    });
-    return new Watcher(call);
+    auto* const watcher = new Watcher(calls_);
+    calls_->add(watcher, info->server_context(), timers->now());
+    return watcher;
   }
 
  private:
   const std::weak_ptr<Timers> timers_;
-  const Timers::Duration after_;
+  const std::shared_ptr<OpenCalls> calls_ = std::make_shared<OpenCalls>();
 };
 
 }  // namespace
