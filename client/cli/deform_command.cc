@@ -53,6 +53,7 @@ client::SolverSettings solver_settings(const DeformOptions& options) {
 
 absl::StatusOr<Inputs> read_inputs(const DeformOptions& options) {
   absl::Status status = check_outputs(options.out);
+  if (status.ok() && options.normals) status = check_normals_have_output(options.out);
   if (status.ok() && options.report) status = check_folder(*options.report);
   if (!status.ok()) return status;
   absl::StatusOr<MeshFile> file = read_deformable(options.mesh);

@@ -209,10 +209,10 @@ void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
       ->allow_extra_args(false)
       ->option_text("FILE");
   add_weld(app, options->welds);
-  app.add_flag(
-      "--normals", options->normals,
-      "Write normals to .obj and .ply; those of an OBJ input are carried along, so that its hard edges "
-      "stay hard");
+  app.add_flag("--normals", options->normals,
+               "Write normals to .obj and .ply, one of which must be among the outputs; those of an OBJ "
+               "input are carried along, so that its hard edges "
+               "stay hard");
   app.add_flag("--certify", options->certify,
                "Print how far the result can be from the best one for its rotations (a report has it, too)");
   app.add_option("--report", options->report, "Where to write what was measured, as JSON")

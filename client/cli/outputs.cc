@@ -36,6 +36,15 @@ absl::Status check_outputs(std::span<const std::filesystem::path> paths) {
   return absl::OkStatus();
 }
 
+absl::Status check_normals_have_output(std::span<const std::filesystem::path> paths) {
+  const bool has_output = std::ranges::any_of(paths, [](const std::filesystem::path& path) {
+    return ending_of(path) == ".obj" || ending_of(path) == ".ply";
+  });
+  if (has_output) return absl::OkStatus();
+  return invalid_input({"OUT_WITHOUT_NORMALS", "--normals", "an output that ends in .obj or .ply"},
+                       "--normals is given, but no --out ends in .obj or .ply, which hold normals.");
+}
+
 absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
                           const Field& distortion, bool welds) {
   const std::string ending = ending_of(path);

@@ -13,6 +13,9 @@ namespace lpdeform::cli {
 /// .png (OUT_FORMAT_UNKNOWN), or no such folder (FILE_NOT_WRITTEN). Asked before the solve, not after it.
 absl::Status check_outputs(std::span<const std::filesystem::path> paths);
 
+/// INVALID_ARGUMENT OUT_WITHOUT_NORMALS where none of `paths` is to hold normals: .obj and .ply do.
+absl::Status check_normals_have_output(std::span<const std::filesystem::path> paths);
+
 /// Writes `positions` with the faces of `file`: .ply with distortion and colours, .obj keeping all else that
 /// an OBJ input had, its normals turned with the surface, .off, or a picture as .png. `distortion` may be empty. `welds`:
 /// see obj_text_with_normals.

@@ -15,6 +15,16 @@ void Conic::begin_stage() {
   stage_start_ = x_;
   objective_ = problem_.objective.evaluate(x_, problem_.norm);
   cone_.emplace(problem_, problem_.objective.cells().rotations(), x_);
+  gap_ = cone_->relative_gap();
+  since_lower_ = 0;
+}
+
+bool Conic::gets_further() {
+  if (cone_->relative_gap() < 0.99 * gap_) {
+    gap_ = cone_->relative_gap();
+    since_lower_ = 0;
+  }
+  return since_lower_++ < kPatience;
 }
 
 StepResult Conic::end_stage() {
@@ -36,7 +46,7 @@ StepResult Conic::step() {
     problem_.objective.evaluate(x_, problem_.norm);
   }
   if (is_solved || cone_->relative_gap() <= kGap) return end_stage();
-  if (is_able) return {Outcome::kProgress, objective_, stage_};
+  if (is_able && gets_further()) return {Outcome::kProgress, objective_, stage_};
   return cone_->relative_gap() <= kAcceptableGap ? end_stage()
                                                  : StepResult{Outcome::kBreakdown, objective_, stage_};
 }

@@ -49,6 +49,15 @@ TEST(Outputs, AreRefusedBeforeAnyWorkWhereTheyCannotBeWritten) {
   EXPECT_EQ(reason_of("x.PNG"), "");
 }
 
+TEST(Outputs, MustHoldTheNormalsThatAreAskedFor) {
+  using Paths = std::vector<std::filesystem::path>;
+  const auto reason_of = [](const Paths& paths) { return fault_of(check_normals_have_output(paths)).reason; };
+  EXPECT_EQ(reason_of({"x.off", "x.png"}), "OUT_WITHOUT_NORMALS");
+  EXPECT_EQ(reason_of({}), "OUT_WITHOUT_NORMALS");
+  EXPECT_EQ(reason_of({"x.off", "x.OBJ"}), "");
+  EXPECT_EQ(reason_of({"x.ply"}), "");
+}
+
 TEST(ExitStatus, IsZeroForWhatTheCallerAskedFor) {
   EXPECT_EQ(exit_status_of(StopReason::kConverged, false, false), kDone);
   EXPECT_EQ(exit_status_of(StopReason::kIterationLimit, true, false), kDone);
