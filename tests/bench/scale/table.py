@@ -104,11 +104,24 @@ def picture(rows, path):
     path.write_text("\n".join(parts) + "\n")
 
 
+def of_two_threads(rows):
+    """How many times as long an iteration of one thread takes as one of two, where both were measured."""
+    lines = ["| vertices | " + " | ".join(f"p = {p:g}" for p in P) + " |", "|--:|" + "--:|" * len(P)]
+    by_size = {}
+    for row in rows:
+        by_size.setdefault(row["vertices"], {})[row["p"], row["threads"]] = row["iteration"]
+    for vertices, seconds in by_size.items():
+        ratios = [seconds[p, 1] / seconds[p, 2] if (p, 1) in seconds and (p, 2) in seconds else None for p in P]
+        if any(ratios):
+            lines.append(f"| {vertices:,} | " + " | ".join(f"{ratio:.2f}" if ratio else "" for ratio in ratios) + " |")
+    return "\n".join(lines)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--program", type=pathlib.Path, required=True)
     parser.add_argument("--work", type=pathlib.Path, required=True)
-    parser.add_argument("--sizes", default="1000,10000,100000,1000000", help="vertices, about")
+    parser.add_argument("--sizes", default="1000,10000,40000,100000,1000000", help="vertices, about")
     parser.add_argument("--seconds", type=float, default=60, help="of a solve, at most")
     parser.add_argument("--large-seconds", type=float, default=120, help="the same from 500,000 vertices on")
     parser.add_argument("--longer", type=pathlib.Path, help="lines of JSON that scale_bench wrote of longer solves of these meshes")
@@ -128,6 +141,7 @@ def main():
         (options.work / "results.json").write_text(json.dumps(rows, indent=1))
     text = table(rows, options.seconds, options.large_seconds)
     print(text)
+    print(f"\nIterations: one thread's time over two threads'\n\n{of_two_threads(rows)}")
     if options.picture:
         picture(rows, options.picture)
 
