@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 
 from programs import OnShapes, main, read_bytes, read_off, read_off_faces, read_ply, read_text, run
 
@@ -77,6 +78,12 @@ class Files(OnShapes):
         self.assertEqual(len(normals), len(posed))
         for normal in normals:
             self.assertAlmostEqual(math.hypot(*normal), 1, delta=1e-6)
+
+    def test_normals_that_no_output_holds_are_refused(self):
+        out = self.at("no_normals.off")
+        refusal = self.refused(2, "deform", self.at("bar.off"), "--handles", self.at("bar.json"), "--normals", "--out", out)
+        self.assertIn(".obj or .ply", refusal)
+        self.assertFalse(os.path.exists(out))
 
     def test_info_prints_the_object_that_the_report_calls_mesh(self):
         info = run("info", self.at("creature.off"), "--json")
