@@ -196,7 +196,11 @@ class Flooded(programs.OnShapes):
             attacker.send_whole(range(1, 9, 2), message, encoding)
             self.assertTrue(self.serves(port))
         self.assertLess(self.memory(which="VmHWM") - before, 64 * MIB)
-        self.assertEqual(self.rejected("MESSAGE_UNREADABLE"), 4)  # those that do not say how they are packed
+        # Those that do not say how they are packed; Envoy passes them on when it comes to it.
+        end = time.monotonic() + programs.PATIENCE
+        while self.rejected("MESSAGE_UNREADABLE") < 4 and time.monotonic() < end:
+            time.sleep(0.05)
+        self.assertEqual(self.rejected("MESSAGE_UNREADABLE"), 4)
 
     def admin(self, path):
         with urllib.request.urlopen(self.flooded.admin + path, timeout=programs.PATIENCE) as answer:
@@ -314,13 +318,14 @@ class BehindEnvoy(Flooded):
         before, port = self.serve_behind_envoy("--max-heap", "64")
         envoy_before = self.memory(self.envoy)
         sent, end = 0, time.monotonic() + programs.PATIENCE
-        while sent < 128 * MIB:
+        while sent < 512 * MIB:
             self.assertLess(time.monotonic(), end)
             attacker = self.attack(port)
             attacker.told(MAX_CONCURRENT_STREAMS)
             sent += attacker.fill(range(1, 65, 2), 4 * MIB - 5, 1)
         self.assertLess(self.memory() - before, 16 * MIB)
-        self.assertLess(self.memory(self.envoy) - envoy_before, 96 * MIB)
+        # Envoy looks at its memory ten times a second, and has what comes between two looks; later, where it waits for a core.
+        self.assertLess(self.memory(self.envoy) - envoy_before, 320 * MIB)
         self.assertTrue(self.serves(port))
 
     def test_compressed_messages_are_not_unpacked(self):
