@@ -18,6 +18,15 @@ HandleSet small_bend(const TriangleMesh& mesh) {
   return handles;
 }
 
+/// Grid(12, 20), the far end bent by 90 degrees.
+HandleSet right_angle(const TriangleMesh& mesh) {
+  HandleSet handles;
+  (void)handles.set("near", {slice(mesh, 1, 0, 0), Fixed{}});
+  (void)handles.set("far",
+                    {slice(mesh, 1, 20, 20), turn(Eigen::Vector3d::UnitX(), 90, {0, 20, 0}, {0, -8, 5})});
+  return handles;
+}
+
 /// p = 1 where y > 15, `p` elsewhere.
 Material half_rigid(const TriangleMesh& mesh, double p) {
   Material material = Material::uniform(p);
@@ -43,10 +52,7 @@ INSTANTIATE_TEST_SUITE_P(P, HalfRigid, testing::Values(4.0, 6.0, 10.0, 16.0));
 // From rest, large p alone leads a bent grid into a fold; by way of a smaller p it does not.
 TEST(LargeP, EndsAsLowFromRestAsFromASmallerP) {
   const TriangleMesh mesh = grid(12, 20, 0.05);
-  HandleSet handles;
-  (void)handles.set("near", {slice(mesh, 1, 0, 0), Fixed{}});
-  (void)handles.set("far",
-                    {slice(mesh, 1, 20, 20), turn(Eigen::Vector3d::UnitX(), 90, {0, 20, 0}, {0, -8, 5})});
+  const HandleSet handles = right_angle(mesh);
   const auto shape = rest_shape(mesh);
   const auto on_the_way = deformer(shape, handles, Material::uniform(6));
   (void)on_the_way->solve({});
@@ -61,10 +67,7 @@ TEST(LargeP, EndsAsLowFromRestAsFromASmallerP) {
 // Rounding of one cell of p = 1 is more than all that the others' distortions come to.
 TEST(MixedNorm, IsNotZeroWhileCellsOfLargePAreDistorted) {
   const TriangleMesh mesh = grid(12, 20, 0.05);
-  HandleSet handles;
-  (void)handles.set("near", {slice(mesh, 1, 0, 0), Fixed{}});
-  (void)handles.set("far",
-                    {slice(mesh, 1, 20, 20), turn(Eigen::Vector3d::UnitX(), 90, {0, 20, 0}, {0, -8, 5})});
+  const HandleSet handles = right_angle(mesh);
   const auto shape = rest_shape(mesh);
   const auto sixteen = deformer(shape, handles, Material::uniform(16));
   (void)sixteen->solve({});
