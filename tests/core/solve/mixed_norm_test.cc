@@ -9,22 +9,17 @@
 namespace lpdeform {
 namespace {
 
-/// Grid(8, 30), two ends held, the far one bent.
-HandleSet small_bend(const TriangleMesh& mesh) {
+/// One end of a grid that is `length` long stays, the other is bent by `degrees` and moved.
+HandleSet bent(const TriangleMesh& mesh, double length, double degrees, const Eigen::Vector3d& translation) {
   HandleSet handles;
   (void)handles.set("near", {slice(mesh, 1, 0, 0), Fixed{}});
-  (void)handles.set("far",
-                    {slice(mesh, 1, 30, 30), turn(Eigen::Vector3d::UnitX(), 12, {0, 30, 0}, {0, -0.3, 1})});
+  (void)handles.set("far", {slice(mesh, 1, length, length),
+                            turn(Eigen::Vector3d::UnitX(), degrees, {0, length, 0}, translation)});
   return handles;
 }
 
-/// Grid(12, 20), the far end bent by 90 degrees.
 HandleSet right_angle(const TriangleMesh& mesh) {
-  HandleSet handles;
-  (void)handles.set("near", {slice(mesh, 1, 0, 0), Fixed{}});
-  (void)handles.set("far",
-                    {slice(mesh, 1, 20, 20), turn(Eigen::Vector3d::UnitX(), 90, {0, 20, 0}, {0, -8, 5})});
-  return handles;
+  return bent(mesh, 20, 90, {0, -8, 5});
 }
 
 /// p = 1 where y > 15, `p` elsewhere.
@@ -40,7 +35,8 @@ class HalfRigid : public testing::TestWithParam<double> {};
 // The cells of p = 1 end with no distortion; what is left is the others', and small beside the smoothing that those began with.
 TEST_P(HalfRigid, IsConvergedInTheTrueEnergy) {
   const TriangleMesh mesh = grid(8, 30, 0.05);
-  const auto solver = deformer(rest_shape(mesh), small_bend(mesh), half_rigid(mesh, GetParam()));
+  const auto solver =
+      deformer(rest_shape(mesh), bent(mesh, 30, 12, {0, -0.3, 1}), half_rigid(mesh, GetParam()));
   const SolveSummary summary = solver->solve({.keep_trace = true}).value();
   // What rounding leaves of the cells of p = 1 is more than all the others from p = 10 on.
   EXPECT_EQ(summary.stop_reason, GetParam() < 10 ? StopReason::kConverged : StopReason::kStalled);
