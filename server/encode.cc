@@ -150,7 +150,7 @@ void encode_header(const FramePiece& piece, v1::FrameHeader& out) {
   out.set_iteration(frame.iteration);
   out.set_energy(frame.energy);
   out.set_soft_energy(frame.soft_energy);
-  out.set_converged(frame.converged);
+  out.set_is_final(frame.is_final);
   out.set_stop_reason(encode_stop(frame.stop_reason));
   out.set_vertex_count(frame.surface->vertex_count());
   out.set_scalar(encode_scalar(piece.format));

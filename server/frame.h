@@ -116,7 +116,7 @@ struct Frame {
   std::uint32_t iteration = 0;
   double energy = 0;
   double soft_energy = 0;  // the part of it that soft and orientation handles have
-  bool converged = false;
+  bool is_final = false;
   StopReason stop_reason = StopReason::kRunning;
   double solve_seconds = 0;
   Method method = Method::kAuto;

@@ -190,7 +190,7 @@ std::shared_ptr<const Frame> LiveSolver::publish(bool is_final) {
   frame.iteration = static_cast<std::uint32_t>(summary.iterations);
   frame.energy = summary.energy;
   frame.soft_energy = summary.soft_energy;
-  frame.converged = is_final;
+  frame.is_final = is_final;
   frame.stop_reason = is_final ? summary.stop_reason : StopReason::kRunning;
   frame.solve_seconds = summary.solve_seconds;
   frame.method = summary.method;

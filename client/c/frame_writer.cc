@@ -201,7 +201,7 @@ lpdeform_frame facts_of(const client::Frame& frame) {
   out.epoch = frame.epoch;
   out.skipped_inputs = frame.skipped_inputs;
   out.iteration = frame.iteration;
-  out.converged = frame.converged;
+  out.is_final = frame.is_final;
   out.stop_reason = static_cast<lpdeform_stop_reason>(frame.stop_reason);
   out.has_optimality_gap = frame.optimality_gap.has_value();
   out.energy = frame.energy;

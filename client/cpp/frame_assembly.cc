@@ -76,7 +76,7 @@ absl::Status FrameAssembly::begin(const v1::FrameHeader& header) {
   frame.iteration = header.iteration();
   frame.energy = header.energy();
   frame.soft_energy = header.soft_energy();
-  frame.converged = header.converged();
+  frame.is_final = header.is_final();
   frame.stop_reason = from_wire(header.stop_reason());
   frame.solve_seconds = header.solve_seconds();
   frame.method = method_name(header.method());

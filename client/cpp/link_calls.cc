@@ -78,7 +78,7 @@ absl::StatusOr<Frame> Link::settle(Clock::time_point deadline) {
 
 bool Link::is_result(const Frame& frame) const {
   const std::scoped_lock lock(mutex_);
-  return frame.converged && frame.input_seq >= ledger_.newest();
+  return frame.is_final && frame.input_seq >= ledger_.newest();
 }
 
 absl::Status Link::no_frame() const {

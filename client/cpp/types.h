@@ -251,7 +251,7 @@ struct Frame {
   double energy = 0;       // E of the positions, Eq. 3 of the paper, in the mesh's unit, with soft terms
   double soft_energy = 0;  // the part of it that soft and orientation handles have
   /// The result for input_seq: no further frame until there is a new update, but for the same one with its gap.
-  bool converged = false;
+  bool is_final = false;
   StopReason stop_reason = StopReason::kRunning;
   double solve_seconds = 0;
   std::string method = {};

@@ -62,10 +62,10 @@ def reference(book: Book, port: int, xs: set[float]) -> None:
 
 
 def results_to_check(history: History, writers: list[Writer]) -> set[float]:
-    """Of the first converged frame of each epoch of a session, and of its last one: where they should have the tip."""
+    """Of the first final frame of each epoch of a session, and of its last one: where they should have the tip."""
     xs, seen = set(), set()
     of = {writer.name: writer.xs for writer in writers}
-    frames = [frame for frame in history.of("frame") if frame["converged"] and frame["input_seq"] in of[frame["session"]]]
+    frames = [frame for frame in history.of("frame") if frame["is_final"] and frame["input_seq"] in of[frame["session"]]]
     for frame in frames:
         if (frame["session"], frame["epoch"]) not in seen:
             seen.add((frame["session"], frame["epoch"]))

@@ -9,13 +9,13 @@ A history is a list of events, one JSON object a line. Each has "kind" and "at" 
     writer    session, epoch, token             AcquireWriter or CreateSession was answered
     opening   stream, session                   a stream is asked for
     opened    stream, session, epoch, input_seq, credit, client
-    frame     stream, session, epoch, frame_seq, input_seq, converged, bytes, probe (positions of some vertices)
+    frame     stream, session, epoch, frame_seq, input_seq, is_final, bytes, probe (positions of some vertices)
     ack       stream, frame_seq                 written before the frames that it makes room for can come
     go_away   stream, reason
     end       stream, status, by_client         the stream is over; by_client: it was this end that cancelled
     shown     client, session, epoch, frame_seq what the client library gave to its caller
     fault     what                              "kill", "pause", "slow_store", "store", "drop", "envoy"
-    last      session, input_seq, since         nothing is sent after this; a converged frame was waited for
+    last      session, input_seq, since         nothing is sent after this; a final frame was waited for
     broken    text                              a call failed that must not, after the faults; nothing comes after it
     reference x, probe                          the same handles, solved on a server without faults
     diagonal  length                            of the mesh
@@ -94,9 +94,9 @@ def the_last_input_is_answered(history: History):
     for event in history.of("broken"):
         yield f"the service did not come back: {event['text']}"
     for last in history.of("last"):
-        if not any(frame["converged"] and frame["input_seq"] >= last["input_seq"] and frame["at"] >= last["since"]
+        if not any(frame["is_final"] and frame["input_seq"] >= last["input_seq"] and frame["at"] >= last["since"]
                    for frame in frames[last["session"]]):
-            yield f"session {last['session']}: no converged frame for its last input, {last['input_seq']}"
+            yield f"session {last['session']}: no final frame for its last input, {last['input_seq']}"
 
 
 def credit_is_kept(history: History):
@@ -167,7 +167,7 @@ def kept_handles_come_back(history: History):
             before = known[event["stream"]]
             if event["input_seq"] < before and not is_void:
                 yield f"session {event['session']}: it came back with input {event['input_seq']}, {before} was kept"
-        if event["kind"] != "frame" or not event["converged"] or "probe" not in event:
+        if event["kind"] != "frame" or not event["is_final"] or "probe" not in event:
             continue
         x = sent.get((event["session"], event["input_seq"]))
         if x is None or x not in references:

@@ -12,9 +12,9 @@ def good():
     def note(kind, **what):
         events.append({"kind": kind, "at": float(len(events)), **what})
 
-    def frame(stream, epoch, seq, input_seq, converged, x=None):
+    def frame(stream, epoch, seq, input_seq, is_final, x=None):
         probe = {} if x is None else {"probe": [[0, 0, 0], [0, 0, x]]}
-        note("frame", stream=stream, session="s", epoch=epoch, frame_seq=seq, input_seq=input_seq, converged=converged, bytes=100,
+        note("frame", stream=stream, session="s", epoch=epoch, frame_seq=seq, input_seq=input_seq, is_final=is_final, bytes=100,
              **probe)
 
     note("diagonal", length=1.0)
@@ -89,7 +89,7 @@ class Judge(unittest.TestCase):
         def change(events):
             of = {"stream": "c", "session": "s", "at": 20.0}
             events += [{"kind": "opened", "epoch": 1, "input_seq": 0, "credit": 1, "client": "w", **of},
-                       {"kind": "frame", "epoch": 1, "frame_seq": 2, "input_seq": 0, "converged": False, "bytes": 1, **of},
+                       {"kind": "frame", "epoch": 1, "frame_seq": 2, "input_seq": 0, "is_final": False, "bytes": 1, **of},
                        {"kind": "end", "status": "OK", "by_client": True, **of}]
         self.broken(2, change)
 
@@ -131,7 +131,7 @@ class Judge(unittest.TestCase):
 
     def test_6_a_frame_after_the_reason(self):
         self.broken(6, self.insert_after("go_away", {"stream": "a"}, kind="frame", stream="a", session="s", epoch=1, frame_seq=4,
-                                         input_seq=1, converged=False, bytes=0))
+                                         input_seq=1, is_final=False, bytes=0))
 
     def test_7_a_kept_update_that_is_lost(self):
         self.broken(7, self.change("opened", {"stream": "b"}, input_seq=2))

@@ -110,7 +110,7 @@ class Cycles:
         end = time.monotonic() + PATIENCE
         while not stream.settled.get(1):
             if time.monotonic() > end or stream.is_over.is_set():
-                raise TimeoutError("no converged frame came")
+                raise TimeoutError("no final frame came")
             time.sleep(0.001)
         stream.end()
         wire.call("DeleteSession", service_pb2.DeleteSessionRequest(session=made.session.name))

@@ -179,9 +179,9 @@ class Stream:
         header = self._header
         places = np.frombuffer(b"".join(self._frame), dtype="<f4").reshape(-1, 3)
         self.book.note("frame", stream=self.name, session=self.session, epoch=header.epoch, frame_seq=header.frame_seq,
-                       input_seq=header.input_seq, converged=header.converged, bytes=places.nbytes,
+                       input_seq=header.input_seq, is_final=header.is_final, bytes=places.nbytes,
                        probe=places[PROBES].astype(float).tolist())
-        if header.converged:
+        if header.is_final:
             self.settled[header.input_seq] = True
         self._unacknowledged = header.frame_seq
         if not self.is_slow.is_set():

@@ -28,7 +28,7 @@ v1::FramePart first_part(std::uint32_t vertex_count, std::vector<float> position
   first.mutable_header()->set_frame_seq(7);
   first.mutable_header()->set_input_seq(3);
   first.mutable_header()->set_vertex_count(vertex_count);
-  first.mutable_header()->set_converged(true);
+  first.mutable_header()->set_is_final(true);
   return first;
 }
 
@@ -42,7 +42,7 @@ TEST(FrameAssembly, PutsPartsTogetherInOrder) {
   EXPECT_EQ((*frame)->positions, (std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8, 9}));
   EXPECT_EQ((*frame)->distortion, (std::vector<double>{0.5, 0.5, 0.5}));
   EXPECT_EQ((*frame)->input_seq, 3u);
-  EXPECT_TRUE((*frame)->converged);
+  EXPECT_TRUE((*frame)->is_final);
 }
 
 TEST(FrameAssembly, RefusesDistortionAndNormalsOfAPartOfTheVertices) {

@@ -66,7 +66,7 @@ TEST_F(SessionTest, AResultComesAgainWithItsGapWhereItWasAskedFor) {
   const Frame again = first.optimality_gap ? first : session.next_frame(kPatience).value();
   ASSERT_TRUE(again.optimality_gap.has_value());
   EXPECT_LT(*again.optimality_gap, 1e-4);
-  EXPECT_TRUE(again.converged);
+  EXPECT_TRUE(again.is_final);
   EXPECT_EQ(again.input_seq, first.input_seq);
   EXPECT_EQ(again.positions, first.positions);
 
@@ -74,7 +74,7 @@ TEST_F(SessionTest, AResultComesAgainWithItsGapWhereItWasAskedFor) {
   Frame frame;
   do {
     frame = session.next_frame(kPatience).value();
-    const bool is_result = frame.converged && frame.input_seq == moved;
+    const bool is_result = frame.is_final && frame.input_seq == moved;
     EXPECT_TRUE(is_result || !frame.optimality_gap.has_value());
   } while (!frame.optimality_gap);
   EXPECT_EQ(frame.input_seq, moved);
@@ -141,7 +141,7 @@ TEST_F(SessionTest, AServerThatCameBackWithoutItsSessionsGetsOursAnew) {
     after = session.next_frame(kPatience);
     ASSERT_TRUE(after.ok()) << after.status();
     EXPECT_GE(after->input_seq, stiff.input_seq);
-  } while (!after->converged);
+  } while (!after->is_final);
   EXPECT_NE(session.name(), name);
   EXPECT_NEAR(after->energy / stiff.energy, 1, 1e-3);
   EXPECT_GT(stiff.energy, 1.5 * before.energy);
@@ -241,7 +241,7 @@ Frame read_as(absl::StatusOr<Client> client, const Session& session, OpenOptions
   Session reader = client->join(session.name(), Role::kReader, std::move(options)).value();
   for (;;) {
     Frame frame = reader.next_frame(kPatience).value();
-    if (frame.converged && frame.input_seq > 0) return frame;
+    if (frame.is_final && frame.input_seq > 0) return frame;
   }
 }
 

@@ -133,7 +133,7 @@ int main(void) {
   FIELD(lpdeform_frame, epoch);
   FIELD(lpdeform_frame, skipped_inputs);
   FIELD(lpdeform_frame, iteration);
-  FIELD(lpdeform_frame, converged);
+  FIELD(lpdeform_frame, is_final);
   FIELD(lpdeform_frame, stop_reason);
   FIELD(lpdeform_frame, has_optimality_gap);
   FIELD(lpdeform_frame, energy);

@@ -53,7 +53,7 @@ static class Replay
     {
         var buffers = new FrameBuffers { Positions = new float[66], Normals = new float[66], Distortion = new float[22] };
         var frame = session.Settle(buffers, 30);
-        output.Write("{0}: result {1}, {2}, iteration {3}, energy {4:x16}\n", name, frame.Converged ? 1 : 0,
+        output.Write("{0}: result {1}, {2}, iteration {3}, energy {4:x16}\n", name, frame.IsFinal ? 1 : 0,
                      frame.StopReason.ToString().ToLowerInvariant(), frame.Iteration,
                      BitConverter.DoubleToInt64Bits(frame.Energy));
         Tell(name, "positions", buffers.Positions.ToArray());

@@ -144,7 +144,7 @@ Stream record_stream(v1::DeformService::Stub& stub, const v1::CreateSessionRespo
     require(part.last(), "a frame came in several parts");
     request.mutable_ack()->set_frame_seq(part.frame_seq());
     call->Write(request);
-    if (part.header().converged() && part.header().input_seq() == 1) result = response;
+    if (part.header().is_final() && part.header().input_seq() == 1) result = response;
   }
   out.responses.push_back(result);
   context.TryCancel();
@@ -204,7 +204,7 @@ Undo record_undo(v1::DeformService::Stub& stub) {
   stream->Write(request);
   const auto is_result = [&] {
     const v1::FrameHeader& header = out.result.event().frame().header();
-    return header.converged() && header.input_seq() == 3;
+    return header.is_final() && header.input_seq() == 3;
   };
   while (!is_result()) {
     require(stream->Read(&out.result), "the stream ended");
@@ -288,7 +288,7 @@ std::string bits_of(const std::vector<double>& numbers) {
 }
 
 std::string lines_of(const std::string& name, const v1::FrameHeader& header, const Numbers& numbers) {
-  return absl::StrFormat("%s: result %d, converged, iteration %d, energy %016x\n", name, header.converged(),
+  return absl::StrFormat("%s: result %d, converged, iteration %d, energy %016x\n", name, header.is_final(),
                          header.iteration(), std::bit_cast<std::uint64_t>(header.energy())) +
          name + " positions:" + bits_of(numbers.positions) + "\n" + name +
          " distortion:" + bits_of(numbers.distortion) + "\n" + name + " normals:" + bits_of(numbers.normals) +

@@ -89,7 +89,7 @@ static void tell_result(const char* name, lpdeform_session* session) {
   into.distortion = (lpdeform_target){distortion, sizeof distortion, 0, 0, LPDEFORM_FLOAT32, 0};
   check(lpdeform_settle(session, patience_seconds, &into, &frame, &error));
   memcpy(&energy, &frame.energy, sizeof energy);
-  printf("%s: result %u, %s, iteration %u, energy %016" PRIx64 "\n", name, (unsigned)frame.converged,
+  printf("%s: result %u, %s, iteration %u, energy %016" PRIx64 "\n", name, (unsigned)frame.is_final,
          frame.stop_reason == LPDEFORM_CONVERGED ? "converged" : "otherwise", (unsigned)frame.iteration,
          energy);
   tell(name, "positions", &positions[0][0], 3 * VERTICES);

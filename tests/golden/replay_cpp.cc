@@ -37,7 +37,7 @@ void tell(const char* where, const absl::Status& status) {
 }
 
 void tell_frame(const char* name, const Frame& frame) {
-  std::printf("%s: result %d, %s, iteration %u, energy %016lx\n", name, frame.converged,
+  std::printf("%s: result %d, %s, iteration %u, energy %016lx\n", name, frame.is_final,
               stop_reason_name(frame.stop_reason).c_str(), frame.iteration,
               std::bit_cast<std::uint64_t>(frame.energy));
   tell(name, "positions", frame.positions);

@@ -34,7 +34,7 @@ def open_strip(address, encoding):
 
 def tell_frame(name, frame):
     energy = struct.pack(">d", frame.energy).hex()
-    print(f"{name}: result {frame.converged:d}, {frame.stop_reason}, iteration {frame.iteration}, energy {energy}")
+    print(f"{name}: result {frame.is_final:d}, {frame.stop_reason}, iteration {frame.iteration}, energy {energy}")
     tell(name, "positions", frame.positions)
     tell(name, "distortion", frame.distortion)
     tell(name, "normals", frame.normals)

@@ -32,11 +32,11 @@ class FrameStreamTest : public testing::Test {
   }
 
   /// Publishes a frame that answers `input` of as many inputs.
-  std::shared_ptr<const Frame> publish(std::uint64_t input, bool converged = false,
+  std::shared_ptr<const Frame> publish(std::uint64_t input, bool is_final = false,
                                        std::uint32_t vertices = 2) {
     Frame frame;
     frame.input_seq = frame.taken = input;
-    frame.converged = converged;
+    frame.is_final = is_final;
     frame.surface = surface(vertices);
     return publisher_->publish(frame);
   }
@@ -68,7 +68,7 @@ TEST_F(FrameStreamTest, SendsNoMoreThanItsCreditAndThenTheNewest) {
   const auto next = drain(*stream);
   ASSERT_EQ(next.size(), 1u);
   EXPECT_EQ(next[0].frame->input_seq, 10u);
-  EXPECT_TRUE(next[0].frame->converged);
+  EXPECT_TRUE(next[0].frame->is_final);
   EXPECT_EQ(next[0].skipped_inputs, 7u);
   EXPECT_TRUE(drain(*stream).empty());
 }
@@ -92,7 +92,7 @@ TEST_F(FrameStreamTest, TheFrameWithACertificateGoesToThoseWhoAskedOrHaveNotSeen
   ASSERT_TRUE(slow->acknowledge(1).ok());
   const auto late = drain(*slow);
   ASSERT_EQ(late.size(), 1u);
-  EXPECT_TRUE(late[0].frame->converged);
+  EXPECT_TRUE(late[0].frame->is_final);
   publisher_->begin_epoch(2);
   EXPECT_EQ(drain(*plain).size(), 1u);
 }
@@ -205,7 +205,7 @@ TEST_F(FrameStreamTest, KeepsToItsRateAndStillSendsTheLastFrame) {
   EXPECT_GT(wakes_, wakes);
   const auto last = drain(*stream);
   ASSERT_EQ(last.size(), 1u);
-  EXPECT_TRUE(last[0].frame->converged);
+  EXPECT_TRUE(last[0].frame->is_final);
 }
 
 TEST_F(FrameStreamTest, EndsWithExactlyOneReasonAndThenIsSilent) {
@@ -306,7 +306,7 @@ TEST_F(FrameStreamTest, SendsALastFrameThatItsLimitHasDelayed) {
   timers_->advance(seconds(1));
   const auto last = drain(*stream);
   ASSERT_EQ(last.size(), 1u);
-  EXPECT_TRUE(last[0].frame->converged);
+  EXPECT_TRUE(last[0].frame->is_final);
 }
 
 TEST(Surface, HoldsBothScalarsOfEveryPosition) {

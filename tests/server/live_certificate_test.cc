@@ -14,7 +14,7 @@ TEST_F(LiveSolverTest, AResultThatStandsComesAgainWithItsCertificate) {
   ASSERT_TRUE(mailbox_.take(update).ok());
   settle();
   const auto result = publisher_->newest();
-  ASSERT_TRUE(result->converged);
+  ASSERT_TRUE(result->is_final);
   EXPECT_FALSE(result->optimality_gap.has_value());
 
   timers_->advance(LiveSolver::kQuiet);
@@ -23,7 +23,7 @@ TEST_F(LiveSolverTest, AResultThatStandsComesAgainWithItsCertificate) {
   const auto certified = publisher_->newest();
   ASSERT_TRUE(certified->optimality_gap.has_value());
   EXPECT_LT(*certified->optimality_gap, 1e-4);
-  EXPECT_TRUE(certified->converged);
+  EXPECT_TRUE(certified->is_final);
   EXPECT_EQ(certified->repeats, result->frame_seq);
   EXPECT_GT(certified->frame_seq, result->frame_seq);
   EXPECT_EQ(certified->input_seq, result->input_seq);
@@ -92,7 +92,7 @@ class LargeBarTest : public LiveSolverTest {
     update.settings.solver = SolveSettings{.tolerance = 1e-2};
     ASSERT_TRUE(mailbox_.take(update).ok());
     settle();
-    ASSERT_TRUE(publisher_->newest()->converged);
+    ASSERT_TRUE(publisher_->newest()->is_final);
     timers_->advance(LiveSolver::kQuiet);
     ASSERT_TRUE(solver_.run_slice(nullptr));
     ASSERT_FALSE(publisher_->newest()->optimality_gap.has_value());
@@ -106,7 +106,7 @@ TEST_F(LargeBarTest, ANewerInputEndsTheSearchForACertificate) {
   solver_.run_slice(nullptr);  // the next one already works for it
   EXPECT_EQ(publisher_->newest()->input_seq, 2u);
   settle();
-  EXPECT_TRUE(publisher_->newest()->converged);
+  EXPECT_TRUE(publisher_->newest()->is_final);
   EXPECT_FALSE(publisher_->newest()->optimality_gap.has_value());
   timers_->advance(LiveSolver::kQuiet);
   settle();

@@ -10,7 +10,7 @@ namespace {
 
 TEST_F(LiveSolverTest, BeginsWithTheRestMeshAsItsResult) {
   const auto frame = publisher_->newest();
-  EXPECT_TRUE(frame->converged);
+  EXPECT_TRUE(frame->is_final);
   EXPECT_EQ(frame->input_seq, 0u);
   EXPECT_EQ(frame->surface->positions(), rest());
 }
@@ -23,7 +23,7 @@ TEST_F(LiveSolverTest, AnswersTheNewestInputWithAConvergedFrame) {
   ASSERT_TRUE(mailbox_.take(move_tip(3, 5)).ok());
   settle();
   const auto frame = publisher_->newest();
-  EXPECT_TRUE(frame->converged);
+  EXPECT_TRUE(frame->is_final);
   EXPECT_EQ(frame->input_seq, 3u);
   EXPECT_EQ(frame->taken, 3u);
   EXPECT_EQ(frame->stop_reason, StopReason::kConverged);
@@ -41,7 +41,7 @@ TEST_F(LiveSolverTest, RestsWhileNobodyLooksOn) {
   const auto stream = look_on();
   settle();
   EXPECT_EQ(publisher_->newest()->input_seq, 1u);
-  EXPECT_TRUE(publisher_->newest()->converged);
+  EXPECT_TRUE(publisher_->newest()->is_final);
 }
 
 TEST_F(LiveSolverTest, WhatWaitsForAReaderWithoutCreditIsRenewed) {
@@ -64,7 +64,7 @@ TEST_F(LiveSolverTest, WhatWaitsForAReaderWithoutCreditIsRenewed) {
       ASSERT_LT(++slices, kMostSlices);
     }
     EXPECT_EQ(publisher_->newest()->input_seq, 1u);
-    EXPECT_FALSE(publisher_->newest()->converged);
+    EXPECT_FALSE(publisher_->newest()->is_final);
   }
 }
 
@@ -82,7 +82,7 @@ TEST_F(LiveSolverTest, FramesKeepComingWhileItRefines) {
       ++seen;
       EXPECT_GT(piece->frame->frame_seq, last_seq);
       last_seq = piece->frame->frame_seq;
-      if (piece->frame->input_seq == 1 && !piece->frame->converged) {
+      if (piece->frame->input_seq == 1 && !piece->frame->is_final) {
         ++refining;
         EXPECT_LE(piece->frame->energy, energy);
         energy = piece->frame->energy;
@@ -125,7 +125,7 @@ TEST_F(LiveSolverTest, ASolveCallRunsWithoutReadersAndReports) {
   EXPECT_TRUE(result.summary.optimality_gap.has_value());
   EXPECT_EQ(result.summary.trace.size(), static_cast<std::size_t>(result.summary.iterations) + 1);
   EXPECT_EQ(result.frame->input_seq, 4u);
-  EXPECT_TRUE(result.frame->converged);
+  EXPECT_TRUE(result.frame->is_final);
   EXPECT_GE(reports_, 0);
 }
 
@@ -159,7 +159,7 @@ TEST_F(LiveSolverTest, AfterACancelledSolveCallTheReadersStillGetTheirResult) {
   solver_.run_slice(solve.get());
   solve->abandon();
   settle();
-  EXPECT_TRUE(publisher_->newest()->converged);
+  EXPECT_TRUE(publisher_->newest()->is_final);
   EXPECT_EQ(publisher_->newest()->input_seq, 1u);
 }
 
@@ -184,7 +184,7 @@ TEST_F(LiveSolverTest, SettingsWithoutHandlesLeaveTheSurfaceAsItIs) {
   update.settings.p = Field::Constant(1, 3.0);
   ASSERT_TRUE(mailbox_.take(update).ok());
   settle();
-  EXPECT_TRUE(publisher_->newest()->converged);
+  EXPECT_TRUE(publisher_->newest()->is_final);
   EXPECT_EQ(publisher_->newest()->input_seq, 1u);
   EXPECT_FALSE(publisher_->standing());
 }
@@ -232,7 +232,7 @@ TEST_F(LiveSolverTest, ADragNeitherFlickersNorLeavesAnythingBehind) {
       settle();
       largest = std::max(largest, publisher_->newest()->energy);
     }
-    EXPECT_TRUE(publisher_->newest()->converged);
+    EXPECT_TRUE(publisher_->newest()->is_final);
     EXPECT_LE(publisher_->newest()->energy, 1e-6 * largest) << "p = " << p;
   }
 }
@@ -256,7 +256,7 @@ TEST_F(LiveSolverTest, AHastyDragBackToTheStartEndsAtRest) {
       ASSERT_TRUE(stream->acknowledge(publisher_->newest()->frame_seq).ok());
     }
     settle();
-    EXPECT_TRUE(publisher_->newest()->converged);
+    EXPECT_TRUE(publisher_->newest()->is_final);
     EXPECT_LE(publisher_->newest()->energy, 1e-6 * largest) << "p = " << p;
   }
 }
@@ -291,7 +291,7 @@ TEST_F(TwoBarsTest, AComponentWithoutAHandleIsAStandingFaultUntilItHasOne) {
   settle();
   EXPECT_FALSE(publisher_->standing());
   EXPECT_EQ(publisher_->newest()->input_seq, 2u);
-  EXPECT_TRUE(publisher_->newest()->converged);
+  EXPECT_TRUE(publisher_->newest()->is_final);
 }
 
 }  // namespace

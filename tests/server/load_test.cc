@@ -86,7 +86,7 @@ TEST_F(LoadTest, TwoSessionsAtOnceBothMakeProgress) {
     for (int frames = 0; frames < 10;) {
       const auto frame = client->next_frame();
       ASSERT_TRUE(frame);
-      ASSERT_FALSE(frame->header.converged() && frame->header.input_seq() == 1);
+      ASSERT_FALSE(frame->header.is_final() && frame->header.input_seq() == 1);
       if (frame->header.iteration() > iteration) ++frames;
       iteration = std::max(iteration, frame->header.iteration());
     }
@@ -126,7 +126,7 @@ TEST_F(LoadTest, ASmallMeshKeepsItsRateBesideALargeOne) {
   EXPECT_GE(large_iteration, 3u);
   EXPECT_GE(seq, 20u);
   for (const auto& frame : large_client.history.frames) {
-    EXPECT_FALSE(frame.input_seq() == 1 && frame.converged());  // it was at work all the time
+    EXPECT_FALSE(frame.input_seq() == 1 && frame.is_final());  // it was at work all the time
   }
 }
 
@@ -171,7 +171,7 @@ TEST_F(LoadTest, AClientThatReadsNothingGetsTheNewestFrameWhenItResumes) {
     frame = sleeper.next_frame();
     ASSERT_TRUE(frame);
   } while (frame->header.input_seq() < seq);
-  EXPECT_TRUE(frame->header.converged());
+  EXPECT_TRUE(frame->header.is_final());
   EXPECT_LE(sleeper.history.frames.size(), 3u);
   expect_invariants(sleeper.history, 2);
   expect_invariants(reader.history, 2);

@@ -201,7 +201,7 @@ std::optional<ReceivedFrame> DeformClient::next_frame(bool acknowledges) {
 
 std::optional<ReceivedFrame> DeformClient::settle(std::uint64_t input_seq) {
   while (auto frame = next_frame()) {
-    if (frame->header.converged() && frame->header.input_seq() >= input_seq) return frame;
+    if (frame->header.is_final() && frame->header.input_seq() >= input_seq) return frame;
   }
   return std::nullopt;
 }

@@ -108,7 +108,7 @@ class DeformClient {
   std::optional<v1::DeformResponse> read();
   /// The next whole frame, acknowledged where asked for; other messages go into the history.
   std::optional<ReceivedFrame> next_frame(bool acknowledges = true);
-  /// Frames until a converged one for this input or a later one.
+  /// Frames until a final one for this input or a later one.
   std::optional<ReceivedFrame> settle(std::uint64_t input_seq);
   /// All that comes until the end, then the status. Again: the status.
   grpc::Status read_to_end();

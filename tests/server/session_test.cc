@@ -137,7 +137,7 @@ TEST_F(SessionTest, AnswersUpdatesOnEveryStream) {
   Reader writer(open(*session, token)), reader(open(*session));
   ASSERT_TRUE(session->update(token, hold_ends(rest_, 1, 1)).ok());
   ASSERT_TRUE(session->update(token, move_tip(2, 2)).ok());
-  const auto is_answer = [](const Frame& frame) { return frame.input_seq == 2 && frame.converged; };
+  const auto is_answer = [](const Frame& frame) { return frame.input_seq == 2 && frame.is_final; };
   EXPECT_TRUE(writer.wait_for_frame(is_answer));
   EXPECT_TRUE(reader.wait_for_frame(is_answer));
 }

@@ -86,7 +86,7 @@ TEST_F(SessionsStreamTest, EachSessionsFramesComeUnderItsNumber) {
     if (!event.has_frame()) continue;
     const std::string& session = response->stream() == 0 ? small.session().name() : large.session().name();
     ASSERT_TRUE(acknowledge(session, stream.ids[response->stream()], event.frame().frame_seq()).ok());
-    if (!event.frame().header().converged() || event.frame().header().input_seq() == 0) continue;
+    if (!event.frame().header().is_final() || event.frame().header().input_seq() == 0) continue;
     float x = 0;
     std::memcpy(&x, event.frame().positions().data() + 12 * tip, sizeof(x));
     tips[response->stream()] = x - bar_mesh().vertices(static_cast<Eigen::Index>(tip), 0);
@@ -103,14 +103,14 @@ TEST_F(SessionsStreamTest, CreditIsEachSessionsOwn) {
   ASSERT_TRUE(stream.next_frame(0));  // never acknowledged
   ASSERT_TRUE(update(one, ends_message(bar_mesh().vertices, 1, 1)).ok());
   ASSERT_TRUE(update(other, ends_message(bar_mesh().vertices, 1, 1)).ok());
-  for (bool converged = false; !converged;) {
+  for (bool is_final = false; !is_final;) {
     const auto response = stream.read();
     ASSERT_TRUE(response);
     if (!response->event().has_frame()) continue;
     ASSERT_EQ(response->stream(), 1u);
     const v1::FramePart& frame = response->event().frame();
     ASSERT_TRUE(acknowledge(other.session().name(), stream.ids[1], frame.frame_seq()).ok());
-    converged = frame.header().converged() && frame.header().input_seq() == 1;
+    is_final = frame.header().is_final() && frame.header().input_seq() == 1;
   }
 }
 

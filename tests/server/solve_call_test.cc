@@ -71,7 +71,7 @@ TEST_F(SolveCallTest, BringsTheSummaryTheTraceAndTheResultInThatOrder) {
   ASSERT_EQ(outcome.trace.size(), outcome.summary.iterations() + 1);
   EXPECT_EQ(outcome.trace[0].energy(), outcome.summary.initial_energy());
   ASSERT_TRUE(outcome.frame);
-  EXPECT_TRUE(outcome.frame->header.converged());
+  EXPECT_TRUE(outcome.frame->header.is_final());
   EXPECT_EQ(outcome.frame->header.energy(), outcome.summary.energy());
   const auto tip = static_cast<std::size_t>(vertices_at(rest(), 21)[0]);
   EXPECT_NEAR(outcome.frame->position<double>(tip, 0), rest()(static_cast<Eigen::Index>(tip), 0) + 4, 1e-12);

@@ -74,7 +74,7 @@ TEST_F(StreamTest, ASlowReaderGetsNothingBeyondItsCreditAndThenTheNewest) {
   const auto next = client.next_frame(false);
   ASSERT_TRUE(next);
   EXPECT_EQ(next->header.input_seq(), 10u);
-  EXPECT_TRUE(next->header.converged());
+  EXPECT_TRUE(next->header.is_final());
   EXPECT_EQ(next->header.skipped_inputs(), 9u);
   expect_invariants(client.history, 1);
 }
@@ -98,7 +98,7 @@ TEST_F(StreamTest, UnaryCallsAndAFrameStreamDoWhatDeformDoes) {
     ASSERT_TRUE(stream->Read(&response));
     ASSERT_TRUE(response.event().has_frame());
     const v1::FrameHeader& header = response.event().frame().header();
-    is_answered = header.input_seq() == 1 && header.converged();
+    is_answered = header.input_seq() == 1 && header.is_final();
     v1::AckFramesRequest ack;
     ack.set_session(session.session().name());
     ack.set_stream_id(opened.stream_id());
@@ -302,7 +302,7 @@ TEST_F(StreamTest, ClosingTheInputLeavesTheFramesFlowing) {
   while (!is_answered) {
     const auto frame = client.next_frame(false);
     ASSERT_TRUE(frame);
-    is_answered = frame->header.converged() && frame->header.input_seq() == 1;
+    is_answered = frame->header.is_final() && frame->header.input_seq() == 1;
     v1::AckFramesRequest ack;
     ack.set_session(session.session().name());
     ack.set_stream_id(opened->event().opened().stream_id());
@@ -408,7 +408,7 @@ TEST_F(ManualTimeTest, AResultComesAgainWithItsCertificateWhereItWasAskedFor) {
   ASSERT_TRUE(again);
   ASSERT_TRUE(again->header.has_certificate());
   EXPECT_LT(again->header.certificate().relative_gap(), 1e-4);
-  EXPECT_TRUE(again->header.converged());
+  EXPECT_TRUE(again->header.is_final());
   EXPECT_GT(again->header.frame_seq(), first->header.frame_seq());
   EXPECT_EQ(again->header.input_seq(), 1u);
   EXPECT_EQ(again->positions, first->positions);

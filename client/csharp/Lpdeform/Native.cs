@@ -127,7 +127,7 @@ namespace Lpdeform
         {
             public uint StructSize, VertexCount;
             public ulong InputSeq, FrameSeq, Epoch, SkippedInputs;
-            public uint Iteration, Converged;
+            public uint Iteration, IsFinal;
             public int StopReason;
             public uint HasOptimalityGap;
             public double Energy, SoftEnergy, SolveSeconds, OptimalityGap, RedDistortion;

@@ -190,7 +190,7 @@ namespace Lpdeform
         public ulong InputSeq;
         public int Iteration;
         /// The result: no further frame until there is a new change.
-        public bool Converged;
+        public bool IsFinal;
         public StopReason StopReason;
         /// Lengths in metres.
         public double Energy;
@@ -207,7 +207,7 @@ namespace Lpdeform
                 VertexCount = (int)frame.VertexCount,
                 InputSeq = frame.InputSeq,
                 Iteration = (int)frame.Iteration,
-                Converged = frame.Converged != 0,
+                IsFinal = frame.IsFinal != 0,
                 StopReason = (StopReason)frame.StopReason,
                 Energy = frame.Energy,
                 SolveSeconds = frame.SolveSeconds,

@@ -93,10 +93,10 @@ def test_a_certificate_and_a_token_let_in(
     with lpdeform.open(shape.vertices, shape.faces, address=locked.address, tls=tls, token=token) as session:
         session.set_handle("left", shape.left)
         session.set_handle("right", shape.right)
-        assert session.move("right", translation=[0, 0, 1]).converged
+        assert session.move("right", translation=[0, 0, 1]).is_final
         assert session.solve().stop_reason == "converged"
         with lpdeform.join(session.name, address=locked.address, tls=tls, token=keys.token("alice")) as reader:
-            assert reader.settle().converged
+            assert reader.settle().is_final
     assert len(asked) > 3  # of each call
 
 

@@ -31,7 +31,7 @@ def test_sessions_are_awaited(server: Server, make_grid: MakeGrid) -> None:
             assert result.energy == pytest.approx(frame.energy, rel=1e-6)
             async with lpdeform.join_async(session.name, address=server.address) as reader:
                 async for seen in reader:
-                    if seen.converged:
+                    if seen.is_final:
                         break
                 await reader.take_over()
             assert "12" in repr(session)
@@ -53,7 +53,7 @@ def test_the_loop_goes_on_while_a_result_is_waited_for(server: Server, make_grid
         while not moving.done():
             await asyncio.sleep(0)
             turns += 1
-        assert (await moving).converged
+        assert (await moving).is_final
         assert turns > 10
         await session.close()
 
@@ -108,6 +108,6 @@ def test_cancelling_ends_a_solve_and_leaves_the_session(server: Server, make_gri
             with pytest.raises(asyncio.CancelledError):
                 await solving
             session.set(solver=lpdeform.SolverSettings(), p=2)
-            assert (await session.move("right", translation=[0, 0, 1])).converged
+            assert (await session.move("right", translation=[0, 0, 1])).is_final
 
     asyncio.run(run())

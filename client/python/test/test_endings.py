@@ -23,7 +23,7 @@ def test_frames_come_to_who_iterates_until_it_is_closed(session: lpdeform.Sessio
     seen = []
     for frame in session:
         seen.append(frame)
-        if frame.converged and frame.input_seq == session.newest_input:
+        if frame.is_final and frame.input_seq == session.newest_input:
             threading.Timer(0.05, session.close).start()
     assert seen
     assert session.connection == "closed"

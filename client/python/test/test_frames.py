@@ -20,7 +20,7 @@ def raw_part(first: int, positions: list[float], last: bool, total: int = 0) -> 
         distortion=np.full(count, 0.5, "<f4").tobytes(),
     )
     if total:
-        part.header.CopyFrom(frame_pb2.FrameHeader(frame_seq=7, input_seq=3, vertex_count=total, converged=True))
+        part.header.CopyFrom(frame_pb2.FrameHeader(frame_seq=7, input_seq=3, vertex_count=total, is_final=True))
     return part
 
 
@@ -32,7 +32,7 @@ def test_parts_are_put_together_in_order() -> None:
     assert frame.positions.tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
     assert frame.distortion.tolist() == [0.5, 0.5, 0.5]
     assert frame.normals.shape == (0, 3)
-    assert (frame.input_seq, frame.converged, frame.optimality_gap) == (3, True, None)
+    assert (frame.input_seq, frame.is_final, frame.optimality_gap) == (3, True, None)
     with pytest.raises(ValueError, match="read-only"):
         frame.positions[0, 0] = 0
 

@@ -21,7 +21,7 @@ def refused(session: lpdeform.Session) -> lpdeform.LpdeformError:
 
 def test_a_move_gives_the_finished_surface(session: lpdeform.Session, shape: Grid) -> None:
     frame = session.move("right", translation=[0, 0, 5])
-    assert frame.converged
+    assert frame.is_final
     assert frame.positions.shape == (144, 3)
     assert frame.distortion.shape == (144,)
     assert frame.positions[shape.left].tolist() == shape.vertices[shape.left].tolist()
@@ -163,7 +163,7 @@ def test_what_the_server_refuses_is_raised_with_its_words(session: lpdeform.Sess
     assert (error.code, error.reason) == (lpdeform.Code.INVALID_ARGUMENT, "HANDLE_VERTEX_OUT_OF_RANGE")
     assert (error.element, error.limit, error.input_seq) == ("vertex 5000", "0 <= vertex < 144", number)
     assert error.metadata == {"element": "vertex 5000", "limit": "0 <= vertex < 144"}
-    assert session.move("right", translation=[0, 0, 1]).converged  # the session goes on without it
+    assert session.move("right", translation=[0, 0, 1]).is_final  # the session goes on without it
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_a_name_that_is_no_text_is_refused_at_once_and_the_session_goes_on(sessi
     with pytest.raises(lpdeform.InvalidInput) as caught:
         session.set_handle("tip \ud800", [0])
     assert (caught.value.reason, caught.value.element) == ("NAME_ENCODING", "handle 'tip \\ud800'")
-    assert session.settle(PATIENCE).converged
+    assert session.settle(PATIENCE).is_final
 
 
 def test_what_cannot_be_sent_is_refused_at_once(session: lpdeform.Session) -> None:
@@ -242,10 +242,10 @@ def test_a_component_without_a_handle_is_named_until_it_has_one(server: Server, 
         error = refused(session)
         assert (error.code, error.reason) == (lpdeform.Code.FAILED_PRECONDITION, "COMPONENT_WITHOUT_HANDLE")
         session.set_handle("other", [144, 145, 146])
-        assert session.settle(PATIENCE).converged
+        assert session.settle(PATIENCE).is_final
     with lpdeform.open(vertices, faces, address=server.address, free_components="stay") as session:
         session.set_handle("one", [0, 1, 2])
-        assert session.settle(PATIENCE).converged
+        assert session.settle(PATIENCE).is_final
 
 
 def test_a_drag_faster_than_the_server_ends_where_it_was_left(session: lpdeform.Session, shape: Grid) -> None:

@@ -138,7 +138,7 @@ def test_nothing_to_undo_readers_and_closed_sessions_are_said(server: Server, sh
     with lpdeform.open(shape.vertices, shape.faces, address=server.address) as session:
         assert refused(session.undo) == "NOTHING_TO_UNDO"
         session.set_handle("left", shape.left)
-        assert session.settle(PATIENCE).converged  # the session goes on
+        assert session.settle(PATIENCE).is_final  # the session goes on
         with lpdeform.join(session.name, address=server.address) as reader:
             assert refused(reader.undo) == "NOT_THE_WRITER"
     for call in (session.undo, session.redo, session.snapshot):

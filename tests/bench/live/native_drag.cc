@@ -68,7 +68,7 @@ void take_frames(Session& session, Tally& tally, std::uint64_t& last_input) {
           std::chrono::duration<double, std::milli>(now - tally.waiting.front().second).count());
       tally.waiting.pop_front();
     }
-    if (last_input != 0 && frame->input_seq >= last_input && frame->converged) return;
+    if (last_input != 0 && frame->input_seq >= last_input && frame->is_final) return;
   }
 }
 

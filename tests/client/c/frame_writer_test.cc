@@ -23,7 +23,7 @@ client::Frame two_vertices() {
   frame.normals = {0, 0.6, -0.8, 1, 0, 0};
   frame.distortion = {0, 4};
   frame.energy = 4;
-  frame.converged = true;
+  frame.is_final = true;
   return frame;
 }
 
@@ -54,7 +54,7 @@ TEST(FrameWriter, PositionsComeInTheEnginesCoordinates) {
   const lpdeform_frame said = write_frame(two_vertices(), unreal(), buffers);
   EXPECT_THAT(at, ElementsAre(100, 300, 200, 500, -100, 200));
   EXPECT_EQ(said.vertex_count, 2);
-  EXPECT_EQ(said.converged, 1);
+  EXPECT_EQ(said.is_final, 1);
   EXPECT_EQ(said.energy, 4);
 }
 

@@ -35,7 +35,7 @@ TEST_F(CSessionTest, WorksThoughTheServerComesLater) {
   EXPECT_EQ(points[20][1], 2);
   EXPECT_EQ(points[0][1], 0);
   EXPECT_GE(frame_.input_seq, seq);
-  EXPECT_EQ(frame_.converged, 1);
+  EXPECT_EQ(frame_.is_final, 1);
 }
 
 TEST_F(CSessionTest, NoFrameClaimsAChangeThatItDoesNotHave) {
@@ -51,7 +51,7 @@ TEST_F(CSessionTest, NoFrameClaimsAChangeThatItDoesNotHave) {
   EXPECT_TRUE(eventually([&] {
     if (lpdeform_poll(session_, &buffers, &frame_, &error_) != LPDEFORM_OK) return false;
     EXPECT_TRUE(frame_.input_seq == 0 || points[20][1] == 2) << frame_.input_seq;
-    return frame_.input_seq == 3 && frame_.converged == 1;
+    return frame_.input_seq == 3 && frame_.is_final == 1;
   }));
 }
 
@@ -135,7 +135,7 @@ TEST_F(CSessionTest, SettlingAfterTheResultWasTakenGivesItAgain) {
   std::vector<Point> points(22);
   const lpdeform_buffers buffers = buffers_of(points);
   EXPECT_TRUE(eventually([&] {
-    return lpdeform_poll(session_, &buffers, &frame_, &error_) == LPDEFORM_OK && frame_.converged == 1 &&
+    return lpdeform_poll(session_, &buffers, &frame_, &error_) == LPDEFORM_OK && frame_.is_final == 1 &&
            frame_.input_seq == seq;
   }));
   const std::vector<Point> polled = points;

@@ -113,7 +113,7 @@ class Link:
 
     def is_result(self, frame: Frame) -> bool:
         with self.changed:
-            return frame.converged and frame.input_seq >= self.ledger.newest
+            return frame.is_final and frame.input_seq >= self.ledger.newest
 
     def no_frame(self) -> LpdeformError:
         with self.changed:

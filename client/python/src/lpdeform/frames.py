@@ -50,7 +50,7 @@ class Frame:
         """E of the positions, Eq. 3 of the paper, in the mesh's unit, with soft terms."""
         self.soft_energy: float = header.soft_energy
         """The part of it that soft and orientation handles have."""
-        self.converged: bool = header.converged
+        self.is_final: bool = header.is_final
         """The result for input_seq: no further frame until there is a new update, but for the same one with its gap."""
         self.stop_reason: str = stop_reason_name(header.stop_reason)
         self.solve_seconds: float = header.solve_seconds
@@ -89,7 +89,7 @@ class Frame:
         return _sealed((self.quantized.normals[:, :3] / _most_signed).astype(np.float32))
 
     def __repr__(self) -> str:
-        state = self.stop_reason if self.converged else f"iteration {self.iteration}"
+        state = self.stop_reason if self.is_final else f"iteration {self.iteration}"
         count = len(self._raw["positions"] if self.quantized is None else self.quantized.vertices)
         return f"<Frame of {count} vertices: {state}, energy {self.energy:.6g}, update {self.input_seq}>"
 

@@ -30,7 +30,7 @@ const moving = setInterval(() => {
 
 for await (const frame of session) {
   // Here a page gives frame.positions to the GPU. Taking the next frame tells the server that this one was shown.
-  if (pointer === 100 && frame.converged && frame.inputSeq >= last) {
+  if (pointer === 100 && frame.isFinal && frame.inputSeq >= last) {
     console.log(`the end is at height ${frame.positions[3 * 20 + 2]!.toFixed(3)}`);
     break;
   }

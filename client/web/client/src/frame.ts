@@ -17,7 +17,7 @@ export class WireFrame implements Frame {
   readonly iteration: number;
   readonly energy: number;
   readonly softEnergy: number;
-  readonly converged: boolean;
+  readonly isFinal: boolean;
   readonly stopReason: StopReason;
   readonly optimalityGap: number | undefined;
   readonly solveSeconds: number;
@@ -37,7 +37,7 @@ export class WireFrame implements Frame {
     this.iteration = header.iteration;
     this.energy = header.energy;
     this.softEnergy = header.softEnergy;
-    this.converged = header.converged;
+    this.isFinal = header.isFinal;
     this.stopReason = stopReasonFromWire(header.stopReason);
     this.optimalityGap = header.certificate?.relativeGap;
     this.solveSeconds = header.solveSeconds;

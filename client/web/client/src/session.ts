@@ -166,7 +166,7 @@ export class Session implements AsyncIterable<Frame> {
       for (;;) {
         const frame = await this.#next(signal);
         if (!frame) throw sessionClosed();
-        if (frame.converged && frame.inputSeq >= this.#link.ledger.newest) return frame;
+        if (frame.isFinal && frame.inputSeq >= this.#link.ledger.newest) return frame;
       }
     } finally {
       release();

@@ -201,7 +201,7 @@ export interface Frame {
   /** The part of it that soft and orientation handles have. */
   readonly softEnergy: number;
   /** The result for inputSeq: no further frame until there is a new update, but for the same one with its optimalityGap. */
-  readonly converged: boolean;
+  readonly isFinal: boolean;
   readonly stopReason: StopReason;
   /** (energy - lower bound) / energy of the convex problem with its rotations held. In results alone, see FrameOptions.certify. */
   readonly optimalityGap: number | undefined;

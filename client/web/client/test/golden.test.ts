@@ -66,7 +66,7 @@ function linesOf(name: string, frame: Frame): string[] {
   view.setFloat64(0, frame.energy);
   const energy = word(view.getUint32(0), 8) + word(view.getUint32(4), 8);
   return [
-    `${name}: result ${Number(frame.converged)}, ${frame.stopReason}, iteration ${frame.iteration}, energy ${energy}`,
+    `${name}: result ${Number(frame.isFinal)}, ${frame.stopReason}, iteration ${frame.iteration}, energy ${energy}`,
     `${name} positions:${bits(frame.positions)}`,
     `${name} distortion:${bits(frame.distortion!)}`,
     `${name} normals:${bits(frame.normals!)}`,

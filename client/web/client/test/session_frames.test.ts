@@ -98,9 +98,9 @@ describe("frames", () => {
 
   test("come again with their certificate", async () => {
     const { server, session } = await begin();
-    server.stream.frame({ frameSeq: 1n, inputSeq: 0n, converged: true });
+    server.stream.frame({ frameSeq: 1n, inputSeq: 0n, isFinal: true });
     const result = await next(session);
-    server.stream.frame({ frameSeq: 2n, inputSeq: 0n, converged: true, certificate: { relativeGap: 0.25 } });
+    server.stream.frame({ frameSeq: 2n, inputSeq: 0n, isFinal: true, certificate: { relativeGap: 0.25 } });
     const certified = await next(session);
     expect([result.optimalityGap, certified.optimalityGap]).toEqual([undefined, 0.25]);
     expect(certified.inputSeq).toBe(result.inputSeq);
@@ -172,7 +172,7 @@ describe("a hidden page", () => {
 
   test("gives its connection back until it is seen again", async () => {
     const { server, session } = await beginOnPage();
-    server.stream.frame({ frameSeq: 1n, converged: true });
+    server.stream.frame({ frameSeq: 1n, isFinal: true });
     await arrived(server, session);
     show(true);
     wait();
@@ -198,10 +198,10 @@ describe("a hidden page", () => {
     show(false);
     await server.until(() => server.streams.length === 2);
     server.stream.open();
-    server.stream.frame({ frameSeq: 1n, inputSeq: 1n, converged: true });
+    server.stream.frame({ frameSeq: 1n, inputSeq: 1n, isFinal: true });
     await connected(session);
     await arrived(server, session);
-    expect(await next(session)).toMatchObject({ inputSeq: 1, converged: true });
+    expect(await next(session)).toMatchObject({ inputSeq: 1, isFinal: true });
   });
 
   test("keeps it while an update is to be sent, and takes it again for one", async () => {
@@ -237,7 +237,7 @@ describe("a hidden page", () => {
     await connected(session);
     wait();
     expect(session.connection).toBe("connected");
-    server.stream.frame({ frameSeq: 1n, converged: true });
+    server.stream.frame({ frameSeq: 1n, isFinal: true });
     expect((await settled).frameSeq).toBe(1);
     wait();
     expect(session.connection).toBe("idle");

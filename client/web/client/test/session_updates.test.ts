@@ -137,11 +137,11 @@ describe("settling", () => {
     const { server, session } = await begin();
     session.setHandle("tip", { vertices: [1] });
     const settled = session.settle();
-    server.stream.frame({ frameSeq: 1n, inputSeq: 0n, converged: true });
+    server.stream.frame({ frameSeq: 1n, inputSeq: 0n, isFinal: true });
     await server.until(() => server.acks.length === 1);
     server.stream.frame({ frameSeq: 2n, inputSeq: 1n });
     await server.until(() => server.acks.length === 2);
-    server.stream.frame({ frameSeq: 3n, inputSeq: 1n, converged: true });
+    server.stream.frame({ frameSeq: 3n, inputSeq: 1n, isFinal: true });
     expect((await settled).frameSeq).toBe(3);
   });
 

@@ -119,7 +119,7 @@ export class BarePage {
   settled(): Promise<void> {
     return this.until(`(() => {
       const facts = window.__lpdeform?.frame(0);
-      return facts && facts.converged && !facts.isSettling && window.__lpdeform.status() === "live";
+      return facts && facts.isFinal && !facts.isSettling && window.__lpdeform.status() === "live";
     })()`);
   }
 

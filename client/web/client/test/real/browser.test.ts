@@ -35,7 +35,7 @@ async function follows(page: Page, height: number): Promise<void> {
   await page.evaluate(async (height) => {
     const views = window.views!;
     const seqs = views.map((view) => view.move(height));
-    const isDone = () => views.every(({ newest }, k) => newest?.converged && newest.inputSeq >= seqs[k]!);
+    const isDone = () => views.every(({ newest }, k) => newest?.isFinal && newest.inputSeq >= seqs[k]!);
     while (!isDone()) await new Promise((again) => setTimeout(again, 5));
     for (const { newest } of views) {
       const z = newest!.positions[3 * 19 + 2]!;

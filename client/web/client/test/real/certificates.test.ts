@@ -24,7 +24,7 @@ test("a result that stands comes again with its gap, each result with its own", 
       certified = frame;
       if (frame.optimalityGap !== undefined) break;
     }
-    expect(certified).toMatchObject({ inputSeq: input, converged: true, energy: result.energy });
+    expect(certified).toMatchObject({ inputSeq: input, isFinal: true, energy: result.energy });
     expect([...certified.positions]).toEqual([...result.positions]);
     expect(certified.frameSeq).toBeGreaterThan(last);
     // Not looser than what Solve finds for the same.

@@ -14,7 +14,7 @@ import { grid } from "./shapes.js";
 async function read(service: Service, { name }: Session, options: FrameOptions): Promise<Frame> {
   const reader = await joinSession(name, { url: service.url, withNormals: true, ...options });
   for await (const frame of reader) {
-    if (!frame.converged || frame.inputSeq === 0) continue;
+    if (!frame.isFinal || frame.inputSeq === 0) continue;
     await reader.close();
     return frame;
   }
@@ -136,7 +136,7 @@ describe("a server with a limit of bytes a second", () => {
     for await (const frame of reader) {
       bytes += frame.wireBytes;
       first ||= frame.wireBytes;
-      if (tick === 150 && frame.converged && frame.inputSeq >= last) break;
+      if (tick === 150 && frame.isFinal && frame.inputSeq >= last) break;
     }
     const seconds = (performance.now() - start) / 1000;
     expect(bytes - first).toBeLessThanOrEqual(12 * n * n * 10 * seconds * 1.1);

@@ -14,10 +14,10 @@ export function exposeForTests(app: App): void {
     frame: (pane = 0) => {
       const { frame, live } = paneAt(pane);
       if (!frame) return undefined;
-      const { inputSeq, converged, energy, stopReason, epoch, iteration } = frame;
+      const { inputSeq, isFinal, energy, stopReason, epoch, iteration } = frame;
       return {
         inputSeq,
-        converged,
+        isFinal,
         energy,
         stopReason,
         epoch,

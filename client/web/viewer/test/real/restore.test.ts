@@ -323,14 +323,14 @@ it("a browser that keeps nothing asks before the page is left", async () => {
   });
   const page = await context.newPage();
   await page.goto(user.page.url());
-  await page.waitForFunction("window.__lpdeform?.frame()?.converged");
+  await page.waitForFunction("window.__lpdeform?.frame()?.isFinal");
   const asked: string[] = [];
   page.on("dialog", (dialog) => {
     asked.push(dialog.type());
     void dialog.accept();
   });
   await page.reload();
-  await page.waitForFunction("window.__lpdeform?.frame()?.converged");
+  await page.waitForFunction("window.__lpdeform?.frame()?.isFinal");
   expect(asked).toEqual([]);
   await page.locator(".dock").getByRole("button", { name: "6", exact: true }).click();
   await page.reload();
@@ -352,7 +352,7 @@ it("a browser that lets the page remember nothing shows it all the same", async 
   const errors: string[] = [];
   page.on("pageerror", ({ message }) => errors.push(message));
   await page.goto(user.page.url());
-  await page.waitForFunction("window.__lpdeform?.frame()?.converged");
+  await page.waitForFunction("window.__lpdeform?.frame()?.isFinal");
   const theme = () => page.evaluate<string>("document.documentElement.dataset.theme");
   const before = await theme();
   await page.evaluate("__lpdeform.app.view.set({ isDark: !__lpdeform.app.view.now.isDark })");

@@ -16,7 +16,7 @@ export const launch = {
 
 export interface FrameFacts {
   inputSeq: number;
-  converged: boolean;
+  isFinal: boolean;
   energy: number;
   stopReason: string;
   epoch: number;
@@ -89,7 +89,7 @@ export class User {
   settled(pane = 0): Promise<void> {
     return this.until(`(() => {
       const facts = window.__lpdeform?.frame(${pane});
-      return facts && facts.converged && !facts.isSettling && window.__lpdeform.status() === "live";
+      return facts && facts.isFinal && !facts.isSettling && window.__lpdeform.status() === "live";
     })()`);
   }
 
