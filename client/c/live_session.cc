@@ -47,7 +47,7 @@ client::Frame frame_of(client::SolveResult result) {
   out.iteration = result.iterations;
   out.energy = result.energy;
   out.soft_energy = result.soft_energy;
-  out.converged = result.stop_reason == client::StopReason::kConverged;
+  out.is_final = true;  // however it ended; stop_reason says how
   out.stop_reason = result.stop_reason;
   out.solve_seconds = result.solve_seconds;
   out.optimality_gap = result.optimality_gap;
