@@ -229,10 +229,12 @@ export class App {
     this.endGesture();
   }
 
-  /** What the gesture has changed is as before, without a step. */
-  cancelGesture(): void {
-    this.history.cancel();
+  /** What the gesture has changed, by pointer, slider or key, is as before, without a step. False where none is under way. */
+  cancelGesture(): boolean {
+    this.#isKeyHeld = false;
+    if (!this.history.cancel()) return false;
     this.#documentChanged(performance.now());
+    return true;
   }
 
   undo(): void {
@@ -378,7 +380,9 @@ export class App {
     if (document.handles !== before.handles) this.#needsMarks = true;
     if (document !== before) this.#needsColours = true;
     this.#panes.show(document, time);
-    this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem: undefined });
+    // A gesture that ends changes nothing: what the server said of its last change stands.
+    const problem = document === before ? this.facts.now.problem : undefined;
+    this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem });
     if (selected !== undefined && !handleOf(document, selected)) this.view.set({ selected: undefined });
     this.requestDraw();
   }

@@ -31,6 +31,7 @@ export class Editing implements PointingTarget {
     const { gizmo } = pane.stage;
     gizmo.onPose = (pose) => this.#pose(pose);
     gizmo.onEnd = () => app.endGesture();
+    gizmo.onCancel = () => app.cancelGesture();
     this.#pointing = new Pointing(pane.stage, this);
     new KeyPointer(pane, {
       hover: (event) => this.app.facts.set({ pointedOut: this.#underCross(event) }),
@@ -38,11 +39,17 @@ export class Editing implements PointingTarget {
     });
     const setViewOnly = (event: KeyboardEvent, isDown: boolean) => {
       if (event.code === "Space") this.#pointing.isViewOnly = isDown;
-      if (event.code === "Escape" && isDown) this.#pointing.cancel();
+      // Escape puts back what is under way, and does nothing else then.
+      if (event.code === "Escape" && isDown && this.#cancel()) event.stopImmediatePropagation();
     };
     const { signal } = pane.over;
     window.addEventListener("keydown", (event) => setViewOnly(event, true), { signal });
     window.addEventListener("keyup", (event) => setViewOnly(event, false), { signal });
+  }
+
+  #cancel(): boolean {
+    const wasHeld = this.pane.stage.gizmo.cancel() || this.#pointing.cancel();
+    return this.app.cancelGesture() || wasHeld;
   }
 
   press(at: PointerAt): Stroke | undefined {

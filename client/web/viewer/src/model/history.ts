@@ -59,10 +59,12 @@ export class History<Value> {
     this.#future = [];
   }
 
-  /** As if the gesture had not been. */
-  cancel(): void {
-    this.#present = this.#before ?? this.#present;
+  /** As if the gesture had not been. False where there is none. */
+  cancel(): boolean {
+    if (this.#before === undefined) return false;
+    this.#present = this.#before;
     this.#before = undefined;
+    return true;
   }
 
   undo(): boolean {

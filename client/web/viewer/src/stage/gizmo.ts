@@ -8,19 +8,26 @@ export class Gizmo {
   onPose: (pose: Pose) => void = () => undefined;
   onDragging: (isDragging: boolean) => void = () => undefined;
   onEnd: () => void = () => undefined;
+  /** It was let go of in the middle: nothing of what it did is to stay. */
+  onCancel: () => void = () => undefined;
   readonly #anchor = new three.Object3D();
   readonly #controls: TransformControls;
   #pose: Pose | undefined;
+  #isCancelled = false;
 
   constructor(camera: three.Camera, canvas: HTMLCanvasElement, changed: () => void) {
     this.#controls = new TransformControls(camera, canvas);
     this.object.add(this.#controls.getHelper(), this.#anchor);
     removeBackwardArrows(this.#controls.getHelper());
+    // The browser has taken the pointer; its own listeners know only of one that is let go.
+    canvas.addEventListener("pointercancel", () => this.cancel());
     this.#controls.setSize(0.72);
     this.#controls.addEventListener("change", changed);
     this.#controls.addEventListener("dragging-changed", ({ value }) => {
       this.onDragging(value === true);
-      if (value !== true) this.onEnd();
+      if (value === true) return;
+      if (this.#isCancelled) this.onCancel();
+      else this.onEnd();
     });
     this.#controls.addEventListener("objectChange", () => this.#moved());
   }
@@ -35,6 +42,16 @@ export class Gizmo {
   /** Whether the pointer is on it. */
   get isHot(): boolean {
     return this.#controls.axis !== null && this.#controls.object !== undefined;
+  }
+
+  /** Lets go in the middle of a drag; what the pointer does until it is up moves nothing. False where there is none. */
+  cancel(): boolean {
+    if (!this.isDragging) return false;
+    this.#isCancelled = true;
+    this.#controls.dragging = false;
+    this.#isCancelled = false;
+    this.#controls.axis = null;
+    return true;
   }
 
   /** Nothing: no handle is selected, or it cannot be moved. */

@@ -59,10 +59,12 @@ export class Pointing {
     return this.#stroke !== undefined;
   }
 
-  cancel(): void {
+  /** False where no stroke is under way. */
+  cancel(): boolean {
     const taken = this.#stroke;
     this.#stroke = undefined;
     taken?.stroke.cancel();
+    return taken !== undefined;
   }
 
   at(event: PointerEvent | MouseEvent): PointerAt {

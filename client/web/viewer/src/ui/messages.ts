@@ -5,6 +5,8 @@ import { pointOutNamed } from "./report.js";
 
 /** How long a line stays. */
 const noticeMs = 6000;
+/** How long the server may be away without a word. */
+const awayMs = 400;
 
 /** What a problem asks of the user; what only says that a newer change came asks nothing. */
 const quiet = new Set(["SUPERSEDED", "NO_HANDLES"]);
@@ -44,13 +46,19 @@ export function messages(app: App, beginAnew: () => void): HTMLElement {
     show.hidden = vertices.length + edges.length + faces.length === 0;
     banner.hidden = !isWrong && !isProblem;
   };
-  app.facts.watch((facts, before) => {
-    // A short interruption is not worth words.
+  const stopWaiting = () => {
     clearTimeout(late);
-    if (facts.status.kind === "away" && before.status.kind === "live")
-      late = setTimeout(() => showStatus(app.facts.now.status), 400);
-    else if (facts.status.kind !== "away" || facts.status !== before.status || !banner.hidden) showStatus(facts.status);
-    else late = setTimeout(() => showStatus(app.facts.now.status), 400);
+    late = undefined;
+  };
+  const sayAway = () => {
+    late = undefined;
+    showStatus(app.facts.now.status);
+  };
+  app.facts.watch((facts, before) => {
+    // A short interruption is not worth words; how long it is does not depend on what else changes meanwhile.
+    if (facts.status.kind !== "away") stopWaiting();
+    else if (before.status.kind === "live") late ??= setTimeout(sayAway, awayMs);
+    if (late === undefined) showStatus(facts.status);
     setText(hint, hintOf(app));
     hint.hidden = hint.textContent === "" || !banner.hidden || facts.restoredFrom !== undefined || facts.setAside !== undefined;
     if (facts.notice === before.notice) return;

@@ -22,7 +22,8 @@ afterEach(async () => {
   while (open.length > 0) await open.pop()!.stop();
 });
 
-const banner = (user: User, words: string) => user.page.locator(".banner", { hasText: words }).waitFor();
+const banner = (user: User, words: string, timeout = 30_000) =>
+  user.page.locator(".banner", { hasText: words }).waitFor({ timeout });
 
 describe("the page says plainly, and goes on by itself when", () => {
   it("the server is full", async () => {
@@ -46,6 +47,38 @@ describe("the page says plainly, and goes on by itself when", () => {
     await service.startServer();
     await user.settled();
     expect(await user.ask("document().handles.length")).toBe(2);
+  });
+
+  it("the server is killed, also while a handle is dragged", async () => {
+    const service = await start();
+    const user = await visit(service);
+    await user.settled();
+    const { mouse } = user.page;
+    const { x, y } = await user.vertexOnPage(await user.ask<number>("document().handles[1].vertices[0]"));
+    await mouse.move(x, y);
+    await mouse.down();
+    await service.killServer();
+    let isOver = false;
+    const said = banner(user, "The server is away", 20_000).finally(() => (isOver = true));
+    for (let k = 0; !isOver; ++k) await mouse.move(x + 60 * Math.sin(k / 20), y + 5); // each changes what the page tells of
+    await said;
+    expect(await user.page.locator(".pill").textContent()).toBe("The server is away");
+    await service.startServer();
+    await mouse.up();
+    await user.settled();
+    await user.page.locator(".banner").waitFor({ state: "hidden" });
+  });
+
+  it("a change is refused, also where that is said as the drag ends", async () => {
+    const service = await start();
+    const user = await visit(service);
+    await user.settled();
+    await user.ask(`app.during({ ...window.__lpdeform.document(), p: 3 }, 0)`);
+    await user.ask(`app.facts.set({ problem: { reason: "P_OUT_OF_RANGE", message: "no", element: "" } })`);
+    await user.ask("app.endGesture()");
+    await banner(user, "The server cannot take this change");
+    await user.ask(`app.change({ ...window.__lpdeform.document(), p: 2 })`);
+    await user.page.locator(".banner").waitFor({ state: "hidden" });
   });
 
   it("there is no server yet", async () => {
