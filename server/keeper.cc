@@ -17,7 +17,7 @@ constexpr std::chrono::milliseconds kBetweenLooks{50};
 
 /// By another way they come to where it is: here they would wait in vain.
 bool leads_elsewhere(const Fault& fault, const std::string& route) {
-  return !route.empty() && !fault.limit.empty() && fault.limit != route_header(route);
+  return !fault.limit.empty() && fault.limit != route_header(route);
 }
 
 }  // namespace
@@ -274,7 +274,7 @@ void Keeper::take_over_until(const std::string& name, const Asker& asker, Timers
 absl::StatusOr<Keeper::Found> Keeper::find(const std::string& name, const Asker& asker,
                                            Clock::time_point since) {
   if (is_being_removed(name)) return session_unknown();
-  if (is_leaving(name)) return session_elsewhere();
+  if (is_leaving(name)) return session_left();
   return read(name, asker, since);
 }
 

@@ -106,7 +106,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   /// for any more.
   void flush(std::chrono::steady_clock::time_point end);
 
-  /// A session that was used so long ago is still in use.
+  /// A session that was used so long ago is still in use, and so is one with a stream: a drag may rest.
   static constexpr std::chrono::milliseconds kInUse{1000};
   static constexpr std::chrono::milliseconds kPatience{250};
   static constexpr std::chrono::milliseconds kPatienceForNew{10'000};

@@ -59,7 +59,8 @@ void Keeper::touch_all() {
     is_sweep = now >= next_sweep_;
     for (const auto& [name, entry] : entries_) {
       if (entry.session == nullptr || entry.epoch == 0 || entry.is_leaving) continue;
-      sessions.push_back({name, entry.epoch, now - entry.session->last_used() < kInUse, entry.revision});
+      const bool is_in_use = entry.session->has_streams() || now - entry.session->last_used() < kInUse;
+      sessions.push_back({name, entry.epoch, is_in_use, entry.revision});
       touched_ones[name] = entry.session;
     }
     for (const auto& [name, epoch] : being_made_) sessions.push_back({name, epoch, true, 0, true});

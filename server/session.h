@@ -142,6 +142,8 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   /// check_writer where `token` is not empty; once closed as update(); UNAVAILABLE DRAINING; RESOURCE_EXHAUSTED STREAMS_FULL.
   absl::StatusOr<std::shared_ptr<FrameStream>> open_stream(const std::string& token,
                                                            const StreamOptions& options);
+  /// Somebody looks on, or may go on with a drag that rests, even where nobody has called for long.
+  bool has_streams() const { return publisher_->reader_count() > 0; }
   /// The stream has ended and is forgotten; with the last one, live solving rests.
   void forget_stream(const FrameStream& stream);
 

@@ -49,10 +49,13 @@ std::string route_header(const std::string& route) {
 }
 
 absl::Status session_elsewhere(const std::string& route) {
-  return make_fault(
-      absl::StatusCode::kUnavailable,
-      {"SESSION_ELSEWHERE", "session", route.empty() ? "" : route_header(route)},
-      "Another server has the session in use; try again, it lets go as soon as nobody uses it there.");
+  const std::string text = route.empty()
+                               ? "Another server has the session in use; try again. It was made without the "
+                                 "header lpdeform-session, so none leads there."
+                               : absl::StrCat("Another server has the session; call again with the header ",
+                                              route_header(route), ".");
+  return make_fault(absl::StatusCode::kUnavailable,
+                    {"SESSION_ELSEWHERE", "session", route.empty() ? "" : route_header(route)}, text);
 }
 
 absl::Status session_unknown() {

@@ -96,8 +96,8 @@ class Store {
 
   /// The session, from now on in a new epoch, kEpochsOfALife above the one that is kept, so that whoever had it is fenced off: their changes are refused.
   /// NOT_FOUND SESSION_UNKNOWN, also where it is not the owner's; SESSION_DAMAGED where it cannot be read; UNAVAILABLE
-  /// SESSION_ELSEWHERE while another process has it in use, and to who comes by another way than its callers do (`route`) as long
-  /// as that process lives. To who comes by theirs it is given: the process that has it learns from touch() that it is wanted.
+  /// SESSION_ELSEWHERE while another process has it in use, and to who comes by another way than its callers do (`route`), or says
+  /// none where they do, as long as that process lives. To who comes by theirs it is given: the process that has it learns from touch() that it is wanted.
   virtual absl::StatusOr<StoredSession> take_over(const std::string& session, const std::string& owner,
                                                   const std::string& route = "") = 0;
 

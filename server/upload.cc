@@ -13,10 +13,12 @@
 namespace lpdeform {
 
 absl::Status check_request_id(const std::string& request_id) {
-  if (request_id.empty() || (request_id.size() >= 8 && request_id.size() <= 64)) return absl::OkStatus();
+  if (request_id.empty() || (request_id.size() >= kLeastRequestId && request_id.size() <= kMostRequestId))
+    return absl::OkStatus();
+  const std::string limit = absl::StrCat(kLeastRequestId, " to ", kMostRequestId);
   return invalid_input(
-      {"REQUEST_ID", "request_id", "empty, or 8 to 64 bytes"},
-      absl::StrCat("The request_id has ", request_id.size(), " bytes; it may be empty or have 8 to 64."));
+      {"REQUEST_ID", "request_id", absl::StrCat("empty, or ", limit, " bytes")},
+      absl::StrCat("The request_id has ", request_id.size(), " bytes; it may be empty or have ", limit, "."));
 }
 
 Upload::Upload(std::string name, std::uint64_t size_bytes, std::uint32_t crc32c, Reservation memory,
@@ -41,9 +43,10 @@ absl::StatusOr<UploadProgress> Upload::add(std::uint64_t offset, std::string_vie
   }
   const std::scoped_lock lock(mutex_);
   if (is_finished_) return UploadProgress{size_, true};
-  if (runs_.size() >= kMostGaps) {
-    return invalid_input({"UPLOAD_SCATTERED", name_, absl::StrCat("gaps < ", kMostGaps)},
-                         "The parts leave too many gaps; send them in order.");
+  if (runs_.size() >= kMostRuns && !is_next_to_others(offset, offset + data.size())) {
+    return invalid_input({"UPLOAD_SCATTERED", name_, absl::StrCat("runs <= ", kMostRuns)},
+                         absl::StrCat("What is there is in ", kMostRuns,
+                                      " runs with gaps between them; send a part that joins one of them."));
   }
   std::memcpy(data_.get() + offset, data.data(), data.size());
   mark(offset, offset + data.size());
@@ -56,6 +59,13 @@ absl::StatusOr<UploadProgress> Upload::add(std::uint64_t offset, std::string_vie
   }
   is_finished_ = true;
   return UploadProgress{size_, true};
+}
+
+/// Whether bytes are there that these touch or overlap, so that no new run begins.
+bool Upload::is_next_to_others(std::uint64_t begin, std::uint64_t end) const {
+  const auto after = runs_.upper_bound(begin);
+  return (after != runs_.end() && after->first <= end) ||
+         (after != runs_.begin() && std::prev(after)->second >= begin);
 }
 
 void Upload::mark(std::uint64_t begin, std::uint64_t end) {

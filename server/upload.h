@@ -34,7 +34,7 @@ class Upload {
   std::uint32_t crc32c() const { return crc32c_; }
 
   /// The last missing part finishes it; later ones are ignored. Errors: INVALID_ARGUMENT UPLOAD_PART_SIZE
-  /// (empty, or over 1 MiB), UPLOAD_PART_OUT_OF_RANGE, UPLOAD_SCATTERED (too many gaps); DATA_LOSS
+  /// (empty, or over 1 MiB), UPLOAD_PART_OUT_OF_RANGE, UPLOAD_SCATTERED (it would begin one run too many); DATA_LOSS
   /// UPLOAD_CHECKSUM (all of it has to be sent again).
   absl::StatusOr<UploadProgress> add(std::uint64_t offset, std::string_view data);
 
@@ -42,9 +42,11 @@ class Upload {
   absl::StatusOr<std::string_view> bytes() const;
 
   static constexpr std::uint32_t kMostPartBytes = 1u << 20;
-  static constexpr std::size_t kMostGaps = 1024;
+  /// Of bytes that are there, with gaps between them: an upload cut into at most twice as many parts may come in any order.
+  static constexpr std::size_t kMostRuns = 1024;
 
  private:
+  bool is_next_to_others(std::uint64_t begin, std::uint64_t end) const;
   void mark(std::uint64_t begin, std::uint64_t end);
 
   const std::string name_;
@@ -105,7 +107,9 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
   std::map<std::pair<std::string, std::string>, std::string> requested_;  // names, by owner and request_id
 };
 
-/// INVALID_ARGUMENT REQUEST_ID where it is neither empty nor 8 to 64 bytes.
+inline constexpr std::size_t kLeastRequestId = 8, kMostRequestId = 64;  // bytes
+
+/// INVALID_ARGUMENT REQUEST_ID where it is neither empty nor so long.
 absl::Status check_request_id(const std::string& request_id);
 
 /// INVALID_ARGUMENT REQUEST_ID_REUSED.

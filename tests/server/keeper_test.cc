@@ -108,6 +108,7 @@ class NotingStore final : public Store {
     }
     for (const TouchedSession& one : sessions)
       note(one.is_being_made ? absl::StrCat("is being made ", one.epoch) : "is there");
+    for (const TouchedSession& one : sessions) note(one.is_in_use ? "in use" : "not in use");
     note("touched");
     if (!read_failure_.ok()) return read_failure_;
     return result;
@@ -300,6 +301,19 @@ TEST_F(KeeperTest, OneThatIsBeingMadeIsHeldUntilItIsThereOrGivenUp) {
   store_->forget();
   ASSERT_TRUE(pass_until("is there"));
   for (const std::string& asked : store_->asked()) EXPECT_NE(asked, "is being made 3");
+}
+
+TEST_F(KeeperTest, ASessionIsInUseAsLongAsItHasAStreamHoweverLongNobodyCalls) {
+  const auto live = kept();
+  const auto stream = live->open_stream("", {});
+  ASSERT_TRUE(stream.ok());
+  timers_->advance(2 * Keeper::kInUse);
+  store_->forget();
+  ASSERT_TRUE(pass_until("is there"));
+  ASSERT_TRUE(store_->wait_for("touched"));
+  for (const std::string& asked : store_->asked()) EXPECT_NE(asked, "not in use");
+  live->forget_stream(**stream);
+  ASSERT_TRUE(pass_until("not in use"));
 }
 
 TEST_F(KeeperTest, OneThatTheStoreHasLostIsWrittenAnewWithItsMesh) {

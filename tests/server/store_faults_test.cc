@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <thread>
 
 #include "redis_server.h"
 #include "restart_fixture.h"
@@ -305,79 +304,6 @@ TEST_F(RedisFaultsTest, OneThatHangsDoesNotKeepTheServerFromItsEnd) {
   server_.reset();
   EXPECT_LT(std::chrono::steady_clock::now() - begin, kEnd);
   redis_.resume();
-}
-
-/// Two servers with one Redis, whose callers all come by one way.
-class HandOverCallsTest : public RedisFaultsTest {
- protected:
-  void SetUp() override {
-    begin();
-    auto store = open_redis_store({.host = "127.0.0.1", .port = redis_.port()});
-    ASSERT_TRUE(store.ok()) << store.status();
-    ServerOptions options = options_;
-    options.store = *std::move(store);
-    auto server = Server::start(options);
-    ASSERT_TRUE(server.ok()) << server.status();
-    other_server_ = *std::move(server);
-    other_ = v1::DeformService::NewStub(
-        grpc::CreateChannel(other_server_->address(), grpc::InsecureChannelCredentials()));
-  }
-  ~HandOverCallsTest() override { other_server_.reset(); }
-
-  v1::CreateSessionResponse create_by(const std::string& way) {
-    grpc::ClientContext context;
-    context.AddMetadata("lpdeform-session", way);
-    v1::CreateSessionResponse response;
-    EXPECT_TRUE(stub_->CreateSession(&context, request(), &response).ok());
-    return response;
-  }
-
-  static grpc::Status get_by(const std::string& way, v1::DeformService::Stub& stub, const std::string& name,
-                             v1::Session& session) {
-    grpc::ClientContext context;
-    context.AddMetadata("lpdeform-session", way);
-    v1::GetSessionRequest request;
-    request.set_session(name);
-    v1::GetSessionResponse response;
-    const grpc::Status status = stub.GetSession(&context, request, &response);
-    session = response.session();
-    return status;
-  }
-
-  std::unique_ptr<Server> other_server_;
-  std::unique_ptr<v1::DeformService::Stub> other_;
-};
-
-TEST_F(HandOverCallsTest, InTheMiddleOfADragNoUpdateIsRefusedAndNoneThatWasKeptIsLost) {
-  const auto session = create_by("the way");
-  const std::string name = session.session().name();
-  ASSERT_TRUE(take(session, ends_message(mesh_.vertices, 1, 1)).kept());
-  DeformClient stream(*stub_, session);
-  std::thread dragging([&] {
-    for (std::uint64_t seq = 2; stream.send(tip_message(seq, 0.001 * static_cast<double>(seq % 1000)));
-         ++seq) {
-    }
-  });
-  v1::Session found;
-  grpc::Status given;
-  std::thread asking(
-      [&] { given = again_and_again([&] { return get_by("the way", *other_, name, found); }); });
-  EXPECT_TRUE(stream.read_to_end().ok());
-  dragging.join();
-  asking.join();
-  ASSERT_TRUE(given.ok()) << given.error_message();
-  ASSERT_EQ(stream.history.ends.size(), 1u);
-  EXPECT_EQ(stream.history.ends[0].reason(), v1::GO_AWAY_REASON_DRAINING);
-  EXPECT_TRUE(stream.history.faults.empty());
-  std::uint64_t kept = 1;
-  for (const v1::UpdateResult& result : stream.history.results) {
-    if (result.kept()) kept = std::max(kept, result.input_seq());
-  }
-  EXPECT_GE(found.input_seq(), kept);
-  EXPECT_GT(found.epoch(), session.session().epoch());
-  v1::Session astray;
-  const grpc::Status elsewhere = get_by("another way", *stub_, name, astray);
-  EXPECT_EQ(details_of(elsewhere).info.reason(), "SESSION_ELSEWHERE");
 }
 
 }  // namespace

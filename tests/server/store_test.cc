@@ -377,12 +377,16 @@ TEST_F(HandOverTest, WhoComesAstrayIsShownTheWayAsLongAsTheHolderLives) {
   EXPECT_EQ(ask(*second_, "another way"), "SESSION_ELSEWHERE");
   EXPECT_EQ(fault_of(second_->take_over("a", "anna", "another way").status()).limit,
             "lpdeform-session: the way");
+  EXPECT_EQ(fault_of(second_->take_over("a", "anna").status()).limit, "lpdeform-session: the way");
+  EXPECT_FALSE(is_wanted(*first_));
+  set_ago("until", kAges);
   set_ago("alive", kAges);
   EXPECT_EQ(ask(*second_, "another way"), "");
   set_ago("until", kAges);
   EXPECT_EQ(ask(*third_, "the way"), "");  // who comes as they should need not wait for that
   set_ago("until", kAges);
-  EXPECT_EQ(ask(*second_, ""), "");  // nor who knows of no ways
+  set_ago("alive", kAges);
+  EXPECT_EQ(ask(*second_, ""), "");  // nor, once the holder is dead, who says none
   EXPECT_FALSE(is_wanted(*second_));
 }
 

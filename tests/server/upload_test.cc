@@ -87,13 +87,25 @@ TEST_F(UploadTest, RefusesTooManySmallOnes) {
   EXPECT_EQ(reason(uploads->create("", 1, 0).status()), "UPLOADS_FULL");
 }
 
-TEST_F(UploadTest, RefusesToKeepTrackOfTooManyGaps) {
-  const auto budget = std::make_shared<Budget>(1 << 20);
-  const auto uploads =
-      std::make_shared<Uploads>(budget, timers_, Uploads::Limits{1 << 20, std::chrono::minutes(10)});
-  const auto upload = *uploads->create("", 4 * Upload::kMostGaps, 0);
-  for (std::size_t k = 0; k < Upload::kMostGaps; ++k) ASSERT_TRUE(upload->add(2 * k, "x").ok());
-  EXPECT_EQ(reason(upload->add(2 * Upload::kMostGaps, "x").status()), "UPLOAD_SCATTERED");
+TEST_F(UploadTest, ComesInAnyOrderWhereItIsCutIntoAtMostTwiceAsManyPartsAsRuns) {
+  const auto uploads = std::make_shared<Uploads>(std::make_shared<Budget>(1 << 20), timers_,
+                                                 Uploads::Limits{1 << 20, std::chrono::minutes(10)});
+  const std::string bytes(2 * Upload::kMostRuns, 'x');
+  const auto upload = *uploads->create("", bytes.size(), crc32c(bytes));
+  for (std::size_t k = 0; k < bytes.size(); k += 2) ASSERT_TRUE(upload->add(k, "x").ok());
+  for (std::size_t k = 1; k < bytes.size(); k += 2) ASSERT_TRUE(upload->add(k, "x").ok()) << k;
+  EXPECT_TRUE(upload->bytes().ok());
+}
+
+TEST_F(UploadTest, RefusesOneRunTooManyAndGoesOnWithWhatJoinsOne) {
+  const auto uploads = std::make_shared<Uploads>(std::make_shared<Budget>(1 << 20), timers_,
+                                                 Uploads::Limits{1 << 20, std::chrono::minutes(10)});
+  const auto upload = *uploads->create("", 4 * Upload::kMostRuns, 0);
+  for (std::size_t k = 0; k < Upload::kMostRuns; ++k) ASSERT_TRUE(upload->add(2 * k, "x").ok());
+  const std::size_t apart = 3 * Upload::kMostRuns;
+  EXPECT_EQ(reason(upload->add(apart, "x").status()), "UPLOAD_SCATTERED");
+  EXPECT_EQ(upload->add(1, "x")->received_bytes, Upload::kMostRuns + 1);
+  EXPECT_TRUE(upload->add(apart, "x").ok());  // two runs have become one
 }
 
 TEST_F(UploadTest, TheSameRequestIdGivesTheSameUpload) {
