@@ -78,6 +78,8 @@ export function serverSilent(): LpdeformError {
   return new LpdeformError("unavailable", "The server has fallen silent.", { reason: "SILENCE" });
 }
 
+export const cannotBeReached = "The server cannot be reached.";
+
 /** Whatever a call has thrown. */
 export function fromCall(thrown: unknown): LpdeformError {
   if (thrown instanceof LpdeformError) return thrown;
@@ -92,7 +94,7 @@ export function fromCall(thrown: unknown): LpdeformError {
   // What fetch throws where nobody listens, or the connection breaks.
   const isNetwork = error.cause instanceof TypeError || thrown instanceof TypeError;
   const code = isNetwork ? "unavailable" : (codes.get(error.code) ?? "unknown");
-  return new LpdeformError(code, isNetwork ? "The server cannot be reached." : error.rawMessage, details, thrown);
+  return new LpdeformError(code, isNetwork ? cannotBeReached : error.rawMessage, details, thrown);
 }
 
 /** Calls `visit` for each field of a serialised message; it reads the value where it returns true. */

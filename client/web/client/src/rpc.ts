@@ -4,6 +4,7 @@ import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { fromCall } from "./errors.js";
 import { DeformService } from "./gen/lpdeform/v1/service_pb.js";
 import { StreamHub } from "./hub.js";
+import { explained } from "./origin.js";
 import { bearing } from "./token.js";
 import type { ConnectOptions } from "./types.js";
 import { newRequestId } from "./upload.js";
@@ -60,12 +61,16 @@ export class Rpc {
     const transport = createGrpcWebTransport({ baseUrl, interceptors, ...(fetch && { fetch }) });
     const rpc = new Rpc(transport, callTimeoutMs, reconnectForMs);
     rpc.#route = id;
+    if (!fetch) rpc.#baseUrl = baseUrl;
     rpc.#another = (other) => Rpc.connect(options, other);
     shared?.set(key, rpc);
     return rpc;
   }
 
   #route = "";
+  #baseUrl = "";
+  /** A call was answered: it is no matter of what the proxy allows. */
+  #wasAnswered = false;
   #another: ((route: string) => Rpc) | undefined;
 
   /** The same server or proxy, by another value of the header lpdeform-session: a proxy before several servers goes by it. */
@@ -80,12 +85,15 @@ export class Rpc {
   ): Promise<MessageShape<Methods[Name]["output"]>> {
     type Call = (request: unknown, options: CallOptions) => Promise<MessageShape<Methods[Name]["output"]>>;
     try {
-      return await (this.client[name] as unknown as Call)(request, {
+      const answer = await (this.client[name] as unknown as Call)(request, {
         timeoutMs: this.callTimeoutMs,
         ...(signal && { signal }),
       });
+      this.#wasAnswered = true;
+      return answer;
     } catch (thrown) {
-      throw fromCall(thrown);
+      const error = fromCall(thrown);
+      throw this.#wasAnswered || !this.#baseUrl ? error : await explained(error, this.#baseUrl);
     }
   }
 }

@@ -10,6 +10,15 @@ import {
   type Lease,
   routeOf,
 } from "./lease.js";
+import {
+  checkCallOptions,
+  checkJoinOptions,
+  checkMesh,
+  checkOpenOptions,
+  checkRestoreOptions,
+  checkSolveOptions,
+  checkUpdate,
+} from "./keys.js";
 import { type Copy, Link, sessionClosed } from "./link.js";
 import { tell } from "./listeners.js";
 import { Backoff } from "./recovery.js";
@@ -110,9 +119,11 @@ export class Session implements AsyncIterable<Frame> {
 
   /**
    * Sends a change and returns its number: a frame whose inputSeq is at least that takes it into account. What the server
-   * refuses comes as a "problem", once; the session goes on without it. Throws once closed or over, or for a reader.
+   * refuses comes as a "problem", once; the session goes on without it. Throws once closed or over, for a reader, and for
+   * a key or a word that it does not know (UNKNOWN_KEY).
    */
   update(update: Update): number {
+    checkUpdate(update);
     return this.#link.update(update);
   }
 
@@ -157,6 +168,7 @@ export class Session implements AsyncIterable<Frame> {
 
   /** The finished result of the newest update. Takes frames until it is there. Rejects with the first "problem". */
   async settle(options: { timeoutMs?: number; signal?: AbortSignal } = {}): Promise<Frame> {
+    checkCallOptions(options, "timeoutMs", "signal");
     const signals = [options.signal, options.timeoutMs !== undefined && AbortSignal.timeout(options.timeoutMs)];
     const problem = new AbortController();
     const stopListening = this.on("problem", (error) => problem.abort(error));
@@ -192,6 +204,7 @@ export class Session implements AsyncIterable<Frame> {
   solve(options?: SolveOptions): Promise<SolveResult>;
   async solve(options: SolveOptions | DoubleSolveOptions = {}): Promise<SolveResult<Float32Array | Float64Array>> {
     const link = this.#link;
+    checkSolveOptions(options);
     if (link.isClosed) throw sessionClosed();
     const { deadlineMs } = options;
     const end = deadlineMs === undefined ? undefined : performance.now() + deadlineMs;
@@ -275,18 +288,19 @@ export class Session implements AsyncIterable<Frame> {
    * happens meanwhile, NOTHING_TO_UNDO afterwards.
    */
   undo(options: { signal?: AbortSignal } = {}): Promise<number> {
-    return this.#step(false, options.signal);
+    return this.#step(false, options);
   }
 
   redo(options: { signal?: AbortSignal } = {}): Promise<number> {
-    return this.#step(true, options.signal);
+    return this.#step(true, options);
   }
 
-  async #step(redo: boolean, given?: AbortSignal): Promise<number> {
+  async #step(redo: boolean, options: { signal?: AbortSignal }): Promise<number> {
+    checkCallOptions(options, "signal");
     const link = this.#link;
     link.checkWriter();
     const late = AbortSignal.timeout(link.rpc.callTimeoutMs);
-    const signal = AbortSignal.any([link.stop.signal, late, given].filter((one) => one !== undefined));
+    const signal = AbortSignal.any([link.stop.signal, late, options.signal].filter((one) => one !== undefined));
     try {
       return await takeStep(link, redo, signal);
     } catch (error) {
@@ -299,6 +313,7 @@ export class Session implements AsyncIterable<Frame> {
    * goes on meanwhile. For restoreSession(), on any server of the same version or a later one.
    */
   async snapshot(options: { signal?: AbortSignal } = {}): Promise<Uint8Array<ArrayBuffer>> {
+    checkCallOptions(options, "signal");
     const { isClosed, rpc, lease, stop } = this.#link;
     if (isClosed) throw sessionClosed();
     const signal = AbortSignal.any([stop.signal, options.signal].filter((one) => one !== undefined));
@@ -323,6 +338,7 @@ export async function openSession(mesh: Mesh, options: OpenOptions = {}): Promis
 
 /** @internal */
 export async function openWith(rpc: Rpc, mesh: Mesh, options: OpenOptions): Promise<Session> {
+  checkOpenOptions(options);
   checkMesh(mesh);
   await prepareFor(options);
   const lease = await createSession(rpc, mesh, options, newRequestId(), options.signal);
@@ -341,6 +357,7 @@ export async function restoreSession(snapshot: Uint8Array, options: RestoreOptio
 
 /** @internal */
 export async function restoreWith(rpc: Rpc, snapshot: Uint8Array, options: RestoreOptions): Promise<Session> {
+  checkRestoreOptions(options);
   await prepareFor(options);
   const lease = await restoreSnapshot(rpc, snapshot, newRequestId(), options.signal);
   const make: Copy["make"] = async (requestId, signal) => {
@@ -358,6 +375,7 @@ export async function joinSessionByName(name: string, options: JoinOptions = {})
 
 /** @internal */
 export async function joinWith(rpc: Rpc, name: string, options: JoinOptions): Promise<Session> {
+  checkJoinOptions(options);
   await prepareFor(options);
   const role = options.role ?? "reader";
   try {
@@ -374,25 +392,6 @@ export async function joinWith(rpc: Rpc, name: string, options: JoinOptions): Pr
 /** Loads what frames are decompressed with, where any may come. */
 async function prepareFor({ encoding, lowestEncoding }: FrameOptions): Promise<void> {
   if (encoding === "compressed" || lowestEncoding === "compressed") await loadDecompressor();
-}
-
-/** What the contract has no room for. */
-function checkMesh({ vertices, faces }: Mesh): void {
-  for (const [what, numbers] of [
-    ["vertices", vertices],
-    ["faces", faces],
-  ] as const) {
-    if (numbers.length % 3 === 0) continue;
-    throw new LpdeformError(
-      "invalid_argument",
-      `The ${what} are ${numbers.length} numbers, which are not three each.`,
-      {
-        reason: "MESH_SIZE",
-        element: what,
-        limit: "a multiple of 3",
-      },
-    );
-  }
 }
 
 /** What timers take. */

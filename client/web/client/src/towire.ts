@@ -95,7 +95,8 @@ export function meshToWire(mesh: api.Mesh, packer: Packer): WireMesh {
 
 export function weldToWire(weld: api.Weld, packer: Packer): WireWeld {
   if (weld === "byPosition") return create(WeldSchema, { by: { case: "position", value: {} } });
-  return create(WeldSchema, { by: { case: "groups", value: packer.indices(weld) } });
+  if ("length" in weld) return create(WeldSchema, { by: { case: "groups", value: packer.indices(weld) } });
+  return create(WeldSchema, { by: { case: "position", value: { tolerance: weld.tolerance ?? 0 } } });
 }
 
 export function updateToWire(update: api.Update, inputSeq: number, packer: Packer): WireUpdate {

@@ -277,8 +277,16 @@ export type FreeComponents = "error" | "stay" | "follow";
 
 export type WeightKind = "cotangent" | "uniform" | "intrinsicDelaunay";
 
-/** Vertices that are copies of one: by exactly the same position, or one number a vertex, the same for copies. */
-export type Weld = "byPosition" | Uint32Array | readonly number[];
+export interface WeldByPosition {
+  /**
+   * Vertices no farther apart than this share of the bounding box's diagonal are one, as are those that a chain of such steps
+   * connects. 0 to 0.001; 1e-9 where left out or 0.
+   */
+  tolerance?: number;
+}
+
+/** Vertices that are copies of one: by position, "byPosition" being {}; or one number a vertex, the same for copies. */
+export type Weld = "byPosition" | WeldByPosition | Uint32Array | readonly number[];
 
 /**
  * "idle" before the first frame is asked for, and while the page is hidden, has nothing to send and does not settle(); frames

@@ -187,7 +187,23 @@ describe("a handle file", () => {
   it.each([
     ["{", "not JSON"],
     ["[]", "the handle file is not an object"],
-    ['{"handles": [], "what": 1}', "“what”, which is not a key"],
+    ['{"handles": [], "what": 1}', "“what”, which is not a key of it; known are handles, region, groups, mesh, note."],
+    [
+      handles({ name: "a", vertices: [0], rotation: [1, 0, 0], translate: [0, 0, 1] }),
+      "handle “a” has “rotation”, which is not a key of it; known are name, vertices, points, translate, rotate,",
+    ],
+    [
+      handles({ name: "a", vertices: [0], rotate: { axis: [0, 0, 1], angle: 30 } }),
+      "“rotate” of handle “a” has “angle”, which is not a key of it; known are axis, angle_degrees, center.",
+    ],
+    [
+      handles({ name: "a", points: [{ face: 0, barycentric: [1, 0, 0], weight: 1 }] }),
+      "a point of handle “a” has “weight”, which is not a key of it; known are face, barycentric.",
+    ],
+    [
+      '{"handles": [{"name": "a", "vertices": [0]}], "groups": [{"name": "g", "vertices": [1], "P": 2}]}',
+      "group “g” has “P”, which is not a key of it; known are name, vertices, p, stiffness.",
+    ],
     [handles(), "has no handle"],
     [handles({ name: "a", vertices: [0] }, { name: "a", vertices: [1] }), "two handles “a”"],
     [handles({ name: "a", vertices: [0] }, { name: "b", vertices: [0] }), "a vertex that another handle has"],

@@ -110,3 +110,26 @@ test.each([1, 2])(
   },
   60_000,
 );
+
+test("a page of another address is told what lets it in, and is let in by that", async () => {
+  const context = await browser.newContext({ bypassCSP: true }); // pages that Envoy serves may call no other
+  const page = await context.newPage();
+  await page.goto(service.url);
+  await page.waitForFunction(() => window.views);
+  const tryAt = (url: string) => page.evaluate((url) => window.tryAt(url), url);
+  const [strict, open] = await Promise.all([Service.start({}), Service.start({ origins: [service.url] })]);
+  try {
+    const refused = await tryAt(strict.url);
+    expect(refused).toMatchObject({ code: "permission_denied", reason: "ORIGIN_NOT_ALLOWED", element: service.url });
+    expect(refused!.message).toContain(`"deploy/up --origin ${service.url}"`);
+    expect(await tryAt(open.url)).toBeUndefined();
+    // Nobody there, or nobody behind it, is another matter.
+    await strict.killEnvoy();
+    expect(await tryAt(strict.url)).toMatchObject({ code: "unavailable", message: "The server cannot be reached." });
+    await open.killServer();
+    expect(await tryAt(open.url)).toMatchObject({ code: "unavailable" });
+  } finally {
+    await context.close();
+    await Promise.all([strict.stop(), open.stop()]);
+  }
+}, 60_000);

@@ -2,7 +2,7 @@ import type { LpdeformError, MeshReport } from "lpdeform-client";
 import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import { isAlike } from "../model/alike.js";
-import { History, type Steps } from "../model/history.js";
+import { History } from "../model/history.js";
 import { boundsOf, type Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
 import { nothing, type PointedOut } from "../model/pointed.js";
@@ -10,6 +10,7 @@ import { State } from "../model/state.js";
 import { firstView, type View } from "../model/view.js";
 import type { Look, Stage } from "../stage/stage.js";
 import { say, type Status } from "../link/status.js";
+import { type AsideName, Asides, type Kept } from "./asides.js";
 import { Pace } from "./pace.js";
 import { Editing } from "./editing.js";
 import type { Pane } from "./pane.js";
@@ -27,27 +28,12 @@ export interface Facts {
   notice: { text: string; isBad: boolean; stays?: boolean } | undefined;
   /** When the work was kept that a reload has brought back, of Date.now(). */
   restoredFrom: number | undefined;
-  /** The name of the work whose place other work has taken; bringBack() swaps them. */
-  setAside: string | undefined;
+  /** Work whose place other work has taken, the newest first; bringBack() swaps them. */
+  setAside: readonly AsideName[];
   /** What a brush or a warning points out. */
   pointedOut: PointedOut;
   canUndo: boolean;
   canRedo: boolean;
-}
-
-/** Work that has made room for other work. */
-interface Aside extends Kept {
-  steps: Steps<Document>;
-  /** The user wants it no more: it is here until the page is left. */
-  isLetGo: boolean;
-}
-
-/** All of some work but what can be undone. */
-export interface Kept {
-  mesh: Mesh;
-  document: Document;
-  view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned">;
-  look: Look;
 }
 
 const noMesh: Mesh = { name: "", positions: new Float32Array(0), faces: new Uint32Array(0) };
@@ -62,7 +48,7 @@ export class App {
   edge = 0;
   /** Called after each picture that was drawn. */
   readonly afterDrawing = new Set<(now: number) => void>();
-  #aside: Aside | undefined;
+  readonly #asides = new Asides();
   #isBroughtBack = false;
   #isKeyHeld = false;
   #asked = 0;
@@ -89,7 +75,7 @@ export class App {
       problem: undefined,
       notice: undefined,
       restoredFrom: undefined,
-      setAside: undefined,
+      setAside: [],
       pointedOut: nothing,
       canUndo: false,
       canRedo: false,
@@ -136,8 +122,9 @@ export class App {
 
   /** Without anything of what was there before. */
   beginAnew(id: string, detail: Detail): void {
+    const { isTouched } = this;
     this.#openShape(id, detail, emptyDocument);
-    if (this.#aside) this.#aside.isLetGo = true;
+    if (isTouched) this.#asides.letGo();
   }
 
   /** There is more than what was opened. */
@@ -147,7 +134,7 @@ export class App {
 
   /** `isBroughtBack`: somebody has worked on it. */
   open(mesh: Mesh, document: Document, isBroughtBack = false): void {
-    if (this.isTouched) this.#aside = { ...this.#present(), steps: this.history.steps, isLetGo: false };
+    if (this.isTouched) this.#asides.put({ ...this.#present(), steps: this.history.steps });
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
     this.adjacency = adjacencyOf(mesh.positions.length / 3, mesh.faces);
@@ -160,7 +147,7 @@ export class App {
       problem: undefined,
       restoredFrom: undefined,
       pointedOut: nothing,
-      setAside: this.#aside?.mesh.name,
+      setAside: this.#asides.names,
     });
     for (const pane of this.panes) pane.open(mesh, document, this.view.now);
     this.#documentChanged(performance.now());
@@ -174,30 +161,39 @@ export class App {
   }
 
   /**
-   * What the user would miss: the work that is here, or what has made room for it, as long as nothing was done to what is here. A
-   * mesh that only was opened is missed where no work is.
+   * What the user would miss, first what a reload is to show: the work that is here, where something was done to it, and what has
+   * made room. A mesh that only was opened is missed where no work is.
    */
-  get worthKeeping(): Kept | undefined {
-    const aside = this.#aside?.isLetGo ? undefined : this.#aside;
-    const isShape = this.view.now.shape !== "";
-    return this.isTouched || (!aside && !isShape) ? this.#present() : aside;
+  get worthKeeping(): readonly Kept[] {
+    const { wanted } = this.#asides;
+    const isMissed = this.isTouched || (wanted.length === 0 && this.view.now.shape === "");
+    return isMissed ? [this.#present(), ...wanted] : wanted;
   }
 
-  dismissAside(): void {
-    this.#aside = undefined;
-    this.facts.set({ setAside: undefined });
+  /** Work that was kept over a reload, the newest first, beside what is here. */
+  setAside(works: readonly Kept[]): void {
+    for (const work of works.toReversed()) this.#asides.put(work);
+    this.#tellAsides();
+  }
+
+  dismissAside(id: number): void {
+    this.#asides.take(id);
+    this.#tellAsides();
   }
 
   /** The work that was set aside, with what can be undone; what is there now is set aside in its place. */
-  bringBack(): void {
-    const aside = this.#aside;
+  bringBack(id: number): void {
+    const aside = this.#asides.take(id);
     if (!aside) return;
-    this.#aside = undefined;
     this.open(aside.mesh, aside.document, true);
-    this.history.restore(aside.steps);
+    if (aside.steps) this.history.restore(aside.steps);
     this.view.set({ ...aside.view, tool: "move" });
     this.lookFrom(aside.look);
     this.#documentChanged(performance.now());
+  }
+
+  #tellAsides(): void {
+    this.facts.set({ setAside: this.#asides.names });
   }
 
   /** A step that can be undone. */

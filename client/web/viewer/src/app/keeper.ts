@@ -1,8 +1,9 @@
 import { forget, remember, remembered } from "../io/remember.js";
-import { Store, type Work } from "../io/store.js";
+import { type AsideWork, Store, type Work } from "../io/store.js";
 import type { Mesh } from "../model/mesh.js";
 import type { View } from "../model/view.js";
 import type { App } from "./app.js";
+import type { Kept } from "./asides.js";
 import type { Answer } from "../ui/wants_back.js";
 import { claim, whileFree } from "./claim.js";
 
@@ -26,7 +27,8 @@ export class Keeper {
   isKeeping = false;
   #store: Store | undefined;
   #id = "";
-  #keptMesh: Mesh | undefined;
+  /** Of the meshes that are kept: their keys. */
+  #kept = new Map<Mesh, string>();
   /** The tab's work is yet that which was put off. */
   #hasPutOff = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
@@ -43,7 +45,7 @@ export class Keeper {
     try {
       const store = await within(Store.open(), patienceMs);
       const work = await this.#claimWork(store);
-      const mesh = work && (await store.mesh(work.id));
+      const mesh = work && (await store.mesh(work.meshKey));
       this.#store = store;
       if (!work || !mesh) return false;
       const when = remembered(restoringKey(work.id)) ? await this.wantsBack(mesh.name) : "now";
@@ -51,6 +53,7 @@ export class Keeper {
       if (when === "later") await this.#putOff();
       if (when !== "now") return false;
       this.#show(work, mesh);
+      await this.#showAsides(store, work);
       return true;
     } catch {
       return false;
@@ -97,7 +100,7 @@ export class Keeper {
   }
 
   async #claimNew(): Promise<void> {
-    this.#id = [...crypto.getRandomValues(new Uint8Array(8))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+    this.#id = newId();
     await claim(this.#id, patienceMs);
   }
 
@@ -118,7 +121,7 @@ export class Keeper {
     }
   }
 
-  #show({ document, view, camera, savedAt }: Work, mesh: Mesh): void {
+  #show({ document, view, camera, savedAt, meshKey }: Work, mesh: Mesh): void {
     const { app } = this;
     const { selected, pinned, shape, ...look } = view;
     this.#watchOver();
@@ -127,8 +130,19 @@ export class Keeper {
     app.view.set({ selected, pinned, shape: shape ?? "" });
     app.lookFrom(camera);
     app.facts.set({ restoredFrom: savedAt });
-    this.#keptMesh = mesh;
+    this.#kept.set(mesh, meshKey);
     this.isKeeping = true;
+  }
+
+  async #showAsides(store: Store, { asides = [] }: Work): Promise<void> {
+    const works: Kept[] = [];
+    for (const { meshKey, document, view, camera } of asides) {
+      const mesh = await store.mesh(meshKey);
+      if (!mesh) continue;
+      works.push({ mesh, document, view, look: camera });
+      this.#kept.set(mesh, meshKey);
+    }
+    this.app.setAside(works);
   }
 
   /** Until the first picture, or until the page is left in good order. */
@@ -153,28 +167,38 @@ export class Keeper {
     clearTimeout(this.#timer);
     this.#timer = undefined;
     const { isDark: _, hasSingleKeys: __, ...view }: View = this.app.view.now;
-    const kept = this.app.worthKeeping;
+    const works = this.app.worthKeeping;
+    const keys = new Map(works.map(({ mesh }) => [mesh, this.#kept.get(mesh) ?? `${this.#id}/${newId()}`]));
+    const [kept, ...asides] = works.map((one) => ({ ...one, meshKey: keys.get(one.mesh)!, camera: one.look }));
     try {
       if (kept) {
-        const { mesh, document, look: camera } = kept;
+        const { document, camera, meshKey } = kept;
         const { search: address } = location;
-        const work = { version: 1, id: this.#id, address, savedAt: Date.now(), document, camera } as const;
-        await this.#store!.put({ ...work, view: { ...view, ...kept.view } }, mesh === this.#keptMesh ? undefined : mesh);
-        this.#keptMesh = mesh;
+        const work = { version: 2, id: this.#id, address, savedAt: Date.now(), document, camera, meshKey } as const;
+        const newMeshes = [...keys].filter(([mesh]) => !this.#kept.has(mesh));
+        await this.#store!.put({ ...work, view: { ...view, ...kept.view }, asides: asides.map(withoutMesh) }, newMeshes);
         if (this.#hasPutOff) {
           sessionStorage.setItem(key, this.#id);
           this.#hasPutOff = false;
         }
       } else {
         await this.#store!.remove([this.#id]);
-        this.#keptMesh = undefined;
       }
+      this.#kept = keys;
       this.isKeeping = true;
     } catch {
       this.isKeeping = false;
-      this.#keptMesh = undefined; // full, or forbidden: the page asks before it is left
+      this.#kept.clear(); // full, or forbidden: the page asks before it is left
     }
   }
+}
+
+function withoutMesh({ document, view, camera, meshKey }: AsideWork): AsideWork {
+  return { document, view, camera, meshKey };
+}
+
+function newId(): string {
+  return [...crypto.getRandomValues(new Uint8Array(8))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
 function within<Value>(promise: Promise<Value>, milliseconds: number): Promise<Value> {

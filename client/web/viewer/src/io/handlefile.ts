@@ -116,6 +116,7 @@ function direction(json: unknown, owner: string): Vector3 {
 function surfacePoints(json: unknown, owner: string, mesh: Mesh): SurfacePoint[] {
   return arrayOf(json, `the points of ${owner}`).map((one) => {
     const point = objectOf(one, `a point of ${owner}`);
+    checkKeys(point, ["face", "barycentric"], `a point of ${owner}`);
     const { face } = point;
     const faces = mesh.faces.length / 3;
     if (typeof face !== "number" || !Number.isInteger(face) || face < 0 || face >= faces) {

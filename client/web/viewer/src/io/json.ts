@@ -33,7 +33,8 @@ export function weightOf(json: unknown, what: string, most: number): number {
 
 export function checkKeys(object: Record<string, unknown>, known: readonly string[], what: string): void {
   for (const key of Object.keys(object)) {
-    if (!known.includes(key)) throw new FileFault(`In the handle file, ${what} has “${key}”, which is not a key of it.`);
+    if (known.includes(key)) continue;
+    throw new FileFault(`In the handle file, ${what} has “${key}”, which is not a key of it; known are ${known.join(", ")}.`);
   }
 }
 

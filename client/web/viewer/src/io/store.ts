@@ -5,7 +5,7 @@ import type { View } from "../model/view.js";
 /** The work of one tab, as it is kept over a reload; its mesh lies beside it, since that seldom changes. */
 export interface Work {
   /** Raised where the shape of what is kept changes: what another version kept is left alone. */
-  version: 1;
+  version: 2;
   id: string;
   /** What followed the page's path: location.search. */
   address: string;
@@ -15,7 +15,18 @@ export interface Work {
   view: Partial<View>;
   /** From where to where it looks. */
   camera: { position: Vector3; target: Vector3 };
+  /** Begins with the id and "/". */
+  meshKey: string;
+  /** What has made room for it, the newest first; their keys begin with this id, too. */
+  asides: AsideWork[];
 }
+
+export interface AsideWork extends Pick<Work, "document" | "camera" | "meshKey"> {
+  view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned">;
+}
+
+/** What comes after all keys that begin with an id and "/". */
+const end = (id: string) => `${id}/\uffff`;
 
 /** The browser's database (IndexedDB), which everything of this page shares. Rejects with what the browser says. */
 export class Store {
@@ -33,11 +44,15 @@ export class Store {
     return new Store(database);
   }
 
-  /** All of it or nothing. `mesh`: where it is not the one that is kept already. */
-  put(work: Work, mesh: Mesh | undefined): Promise<void> {
+  /** All of it or nothing. `newMeshes`: those that are not kept already, with their keys. */
+  put(work: Work, newMeshes: readonly (readonly [Mesh, string])[]): Promise<void> {
+    const { id, meshKey, asides } = work;
     return this.#write((works, meshes) => {
       works.put(work);
-      if (mesh) meshes.put(mesh, work.id);
+      for (const [mesh, key] of newMeshes) meshes.put(mesh, key);
+      // Between the keys that there are lie those of what is here no more.
+      const keys = [`${id}/`, ...new Set([meshKey, ...asides.map((aside) => aside.meshKey)]), end(id)].sort();
+      for (let k = 1; k < keys.length; ++k) meshes.delete(IDBKeyRange.bound(keys[k - 1], keys[k], true, true));
     });
   }
 
@@ -45,7 +60,7 @@ export class Store {
     return this.#write((works, meshes) => {
       for (const id of ids) {
         works.delete(id);
-        meshes.delete(id);
+        meshes.delete(IDBKeyRange.bound(`${id}/`, end(id)));
       }
     });
   }
@@ -53,7 +68,7 @@ export class Store {
   /** The newest first. */
   async works(): Promise<Work[]> {
     const all = await answer<Work[]>(this.database.transaction("works").objectStore("works").getAll());
-    return all.filter(({ version }) => version === 1).sort((a, b) => b.savedAt - a.savedAt);
+    return all.filter(({ version }) => version === 2).sort((a, b) => b.savedAt - a.savedAt);
   }
 
   mesh(id: string): Promise<Mesh | undefined> {

@@ -60,7 +60,7 @@ export function messages(app: App, beginAnew: () => void): HTMLElement {
     else if (before.status.kind === "live") late ??= setTimeout(sayAway, awayMs);
     if (late === undefined) showStatus(facts.status);
     setText(hint, hintOf(app));
-    hint.hidden = hint.textContent === "" || !banner.hidden || facts.restoredFrom !== undefined || facts.setAside !== undefined;
+    hint.hidden = hint.textContent === "" || !banner.hidden || facts.restoredFrom !== undefined || facts.setAside.length > 0;
     if (facts.notice === before.notice) return;
     clearTimeout(timer);
     notice.hidden = facts.notice === undefined;
@@ -89,17 +89,24 @@ function restoredNote(app: App, beginAnew: () => void): HTMLElement {
   return note;
 }
 
-/** Says what other work has taken the place of, until that is worked on. */
+/** Says what has made room for other work: each can be brought back. */
 function asideNote(app: App): HTMLElement {
   const text = el("span");
+  const which = el("select", { aria: { label: "Work that has made room" } });
   const back = el("button", { type: "button", className: "plain", textContent: "Bring it back" });
   const dismiss = el("button", { type: "button", className: "plain", textContent: "Dismiss" });
-  back.addEventListener("click", () => app.bringBack());
-  dismiss.addEventListener("click", () => app.dismissAside());
-  const note = el("div", { className: "aside", role: "status", hidden: true }, text, back, dismiss);
-  app.facts.watch(({ setAside }) => {
-    note.hidden = setAside === undefined;
-    if (setAside !== undefined) setText(text, `“${setAside}” has made room, with your work on it.`);
+  back.addEventListener("click", () => app.bringBack(Number(which.value)));
+  dismiss.addEventListener("click", () => app.dismissAside(Number(which.value)));
+  const note = el("div", { className: "aside", role: "status", hidden: true }, text, which, back, dismiss);
+  app.facts.watch(({ setAside }, before) => {
+    if (setAside === before.setAside && which.childElementCount === setAside.length) return;
+    const [newest] = setAside;
+    note.hidden = newest === undefined;
+    which.hidden = setAside.length < 2;
+    which.replaceChildren(...setAside.map(({ id, name }) => el("option", { value: String(id), textContent: name })));
+    if (!newest) return;
+    const one = `“${newest.name}” has made room, with your work on it.`;
+    setText(text, setAside.length > 1 ? `${setAside.length} have made room, with your work on them:` : one);
   });
   return note;
 }

@@ -179,6 +179,56 @@ it("work that has made room stays, however much is opened after it and left as i
   expect(await work()).toBe(bent);
 });
 
+it("each work that is followed by another stays, however many there are, over a reload too", async () => {
+  await bend();
+  const works = [await work()];
+  const tower = writeOff(blockSurface(2, 2, 6, () => true));
+  for (const name of ["second.off", "third.off"]) {
+    await user.openFiles({ name, content: tower });
+    await user.until(`window.__lpdeform.app.mesh.name === '${name}' && window.__lpdeform.app.facts.now.report`);
+    const { x, y } = await user.vertexOnPage(await user.vertexNear([1, 0, 5]));
+    await user.page.mouse.click(x, y);
+    works.push(await work());
+  }
+  const aside = user.page.locator(".aside");
+  const names = () => aside.locator("option").allTextContents();
+  const expectThird = async () => {
+    expect([await user.ask("app.mesh.name"), await work()]).toEqual(["third.off", works[2]]);
+    expect(await names()).toEqual(["second.off", "bar"]);
+    expect(await aside.textContent()).toContain("2 have made room, with your work on them:");
+  };
+  await expectThird();
+  await user.page.waitForTimeout(700);
+  await user.page.reload();
+  await user.until("window.__lpdeform?.status() === 'live'");
+  await expectThird();
+
+  const bringBack = async (name: string) => {
+    await aside.getByLabel("Work that has made room").selectOption(name);
+    await aside.getByRole("button", { name: "Bring it back" }).click();
+    await user.until(`window.__lpdeform.app.mesh.name === '${name}'`);
+    return work();
+  };
+  expect(await bringBack("bar")).toBe(works[0]);
+  expect(await names()).toEqual(["third.off", "second.off"]);
+  expect(await bringBack("second.off")).toBe(works[1]);
+  expect(await names()).toEqual(["bar", "third.off"]);
+  await aside.getByRole("button", { name: "Dismiss" }).click();
+  expect(await names()).toEqual(["third.off"]);
+  expect(await aside.textContent()).toContain("“third.off” has made room, with your work on it.");
+  await user.page.waitForTimeout(700);
+  await user.page.reload();
+  await user.until("window.__lpdeform?.status() === 'live'");
+  expect([await user.ask("app.mesh.name"), await names()]).toEqual(["second.off", ["third.off"]]);
+  const keys = await user.page.evaluate(`new Promise((resolve) => {
+    indexedDB.open("lpdeform").onsuccess = ({ target }) => {
+      const meshes = target.result.transaction("meshes").objectStore("meshes");
+      meshes.getAllKeys().onsuccess = ({ target: { result } }) => resolve(result.length);
+    };
+  })`);
+  expect(keys).toBe(2); // what was dismissed takes no room
+});
+
 it("work at which the page stopped is shown again only where that is wanted", async () => {
   await bend();
   const bent = await work();

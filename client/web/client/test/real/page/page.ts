@@ -1,6 +1,6 @@
 // A page in split view: the same handles at two values of p. What it shows is in window.views; it can also watch a session of
 // somebody else's.
-import { type Frame, joinSession, openSession } from "../../../src/index.js";
+import { type Frame, joinSession, LpdeformError, openSession } from "../../../src/index.js";
 import { grid } from "../shapes.js";
 
 export interface View {
@@ -13,6 +13,8 @@ declare global {
   interface Window {
     views?: View[];
     watch(name: string, credit: number): Promise<Watched[]>;
+    /** Opens a session there and closes it; what it was told where that failed. */
+    tryAt(url: string): Promise<Refused | undefined>;
   }
 }
 
@@ -21,6 +23,18 @@ export interface Watched {
   inputSeq: number;
   at: number;
 }
+
+export type Refused = Pick<LpdeformError, "code" | "reason" | "element" | "limit" | "message">;
+
+window.tryAt = async (url) => {
+  try {
+    await (await openSession(grid(3).mesh, { url })).close();
+    return undefined;
+  } catch (thrown) {
+    const { code, reason, element, limit, message } = thrown as LpdeformError;
+    return { code, reason, element, limit, message };
+  }
+};
 
 window.watch = async (name, credit) => {
   const session = await joinSession(name, { credit });

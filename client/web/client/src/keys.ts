@@ -1,0 +1,190 @@
+import { LpdeformError } from "./errors.js";
+import type * as api from "./types.js";
+
+// What callers hand over, key by key: one that is not known is refused by name, since ignoring it would do something else than was
+// meant. The compiler sees to it that no key of types.ts is missing here.
+
+type Keys<Bag> = Readonly<Record<Bag extends unknown ? keyof Bag : never, true>>;
+
+const connect: Keys<api.ConnectOptions> = {
+  url: true,
+  callTimeoutMs: true,
+  reconnectForMs: true,
+  token: true,
+  fetch: true,
+};
+const frames: Keys<api.FrameOptions> = {
+  credit: true,
+  withoutDistortion: true,
+  withNormals: true,
+  certify: true,
+  maxFramesPerSecond: true,
+  encoding: true,
+  lowestEncoding: true,
+};
+const restore: Keys<api.RestoreOptions> = { ...connect, ...frames, signal: true };
+const join: Keys<api.JoinOptions> = { ...restore, role: true };
+const open: Keys<api.OpenOptions> = { ...restore, weights: true, freeComponents: true, weld: true, settings: true };
+const solve: Keys<api.DoubleSolveOptions> = {
+  certify: true,
+  trace: true,
+  withNormals: true,
+  initialPositions: true,
+  onProgress: true,
+  deadlineMs: true,
+  signal: true,
+  scalar: true,
+};
+const byPosition: Keys<api.WeldByPosition> = { tolerance: true };
+const mesh: Keys<api.Mesh> = { vertices: true, faces: true, normals: true };
+const update: Keys<api.Update> = { handles: true, settings: true, resize: true, beginsStep: true };
+const change: Keys<api.HandleChange> = { set: true, move: true, remove: true };
+const handle: Keys<api.Handle> = { vertices: true, points: true, motion: true, hold: true, footprint: true };
+const point: Keys<api.SurfacePoint> = { face: true, barycentric: true };
+const rigid: Keys<api.RigidMotion> = { axis: true, angle: true, center: true, translation: true };
+const targets: Keys<api.TargetPositions> = { targets: true };
+const settings: Keys<api.Settings> = { p: true, stiffness: true, lengthUnit: true, solver: true, region: true };
+const solver: Keys<api.SolverSettings> = {
+  method: true,
+  tolerance: true,
+  maxIterations: true,
+  timeLimitSeconds: true,
+  initial: true,
+};
+const resize: Keys<api.Resize> = { scale: true, origin: true, axes: true };
+const weight = { kind: true, weight: true } as const;
+const holds: Readonly<Record<api.Hold["kind"], Readonly<Record<string, true>>>> = {
+  exact: { kind: true },
+  soft: weight,
+  orientation: weight,
+  axisLock: { kind: true, axis: true },
+  planeLock: { kind: true, normal: true },
+};
+
+const methods: Readonly<Record<api.Method, true>> = {
+  auto: true,
+  quasiNewton: true,
+  lineSearch: true,
+  localGlobal: true,
+  conic: true,
+  multiresolution: true,
+};
+const guesses: Readonly<Record<api.InitialGuess, true>> = { current: true, laplacian: true, rest: true };
+const weights: Readonly<Record<api.WeightKind, true>> = { cotangent: true, uniform: true, intrinsicDelaunay: true };
+const free: Readonly<Record<api.FreeComponents, true>> = { error: true, stay: true, follow: true };
+const encodings: Readonly<Record<api.Encoding, true>> = {
+  float32: true,
+  float64: true,
+  quantized: true,
+  compressed: true,
+};
+
+/** Its keys, and what the contract has no room for. */
+export function checkMesh(given: api.Mesh): void {
+  checkKeys(given, mesh, "mesh");
+  for (const element of ["vertices", "faces"] as const) {
+    const { length } = given[element];
+    if (length % 3 === 0) continue;
+    const text = `The ${element} are ${length} numbers, which are not three each.`;
+    throw new LpdeformError("invalid_argument", text, { reason: "MESH_SIZE", element, limit: "a multiple of 3" });
+  }
+}
+
+export function checkOpenOptions(given: api.OpenOptions): void {
+  checkKeys(given, open, "options");
+  checkEncodings(given);
+  checkWord(given.weights, weights, "weights");
+  checkWord(given.freeComponents, free, "freeComponents");
+  const { weld } = given;
+  if (typeof weld === "string") checkWord(weld, { byPosition: true }, "weld");
+  else if (weld && !isNumbers(weld)) checkKeys(weld, byPosition, "weld");
+  if (given.settings) checkSettings(given.settings);
+}
+
+export function checkRestoreOptions(given: api.RestoreOptions): void {
+  checkKeys(given, restore, "options");
+  checkEncodings(given);
+}
+
+export function checkJoinOptions(given: api.JoinOptions): void {
+  checkKeys(given, join, "options");
+  checkEncodings(given);
+  checkWord(given.role, { reader: true, writer: true }, "role");
+}
+
+export function checkSolveOptions(given: api.SolveOptions | api.DoubleSolveOptions): void {
+  checkKeys(given, solve, "options");
+  if ("scalar" in given) checkWord(given.scalar, { float64: true }, "scalar");
+}
+
+/** Of calls that take few: `known` by name. */
+export function checkCallOptions(given: object, ...known: string[]): void {
+  checkKeys(given, Object.fromEntries(known.map((key) => [key, true])), "options");
+}
+
+export function checkUpdate(given: api.Update): void {
+  checkKeys(given, update, "update");
+  for (const [name, one] of Object.entries(given.handles ?? {})) checkChange(one, `handle "${name}"`);
+  if (given.settings) checkSettings(given.settings);
+  if (given.resize) checkKeys(given.resize, resize, "resize");
+}
+
+function checkChange(given: api.HandleChange, owner: string): void {
+  checkKeys(given, change, owner);
+  if (Object.keys(given).length !== 1) throw refused(`${owner} needs one of set, move and remove`, owner, change);
+  if ("move" in given) checkMotion(given.move, owner);
+  if ("set" in given) checkHandle(given.set, owner);
+}
+
+function checkHandle(given: api.Handle, owner: string): void {
+  checkKeys(given, handle, owner);
+  for (const one of given.points ?? []) checkKeys(one, point, `a point of ${owner}`);
+  if (given.motion !== undefined) checkMotion(given.motion, owner);
+  if (!given.hold) return;
+  checkWord(given.hold.kind, holds, `hold of ${owner}`);
+  checkKeys(given.hold, holds[given.hold.kind], `hold of ${owner}`);
+}
+
+function checkMotion(given: api.Motion, owner: string): void {
+  const element = `motion of ${owner}`;
+  if (typeof given === "string") checkWord(given, { fixed: true }, element);
+  else checkKeys(given, "targets" in given ? targets : rigid, element);
+}
+
+function checkSettings(given: api.Settings): void {
+  checkKeys(given, settings, "settings");
+  for (const field of ["p", "stiffness"] as const) {
+    const value = given[field];
+    if (typeof value === "object" && !isNumbers(value)) checkKeys(value, { automatic: true }, field);
+  }
+  if (!given.solver) return;
+  checkKeys(given.solver, solver, "solver");
+  checkWord(given.solver.method, methods, "method");
+  checkWord(given.solver.initial, guesses, "initial");
+}
+
+function checkEncodings({ encoding, lowestEncoding }: api.FrameOptions): void {
+  checkWord(encoding, encodings, "encoding");
+  checkWord(lowestEncoding, encodings, "lowestEncoding");
+}
+
+function isNumbers(value: object): boolean {
+  return Array.isArray(value) || ArrayBuffer.isView(value);
+}
+
+function checkKeys(given: object, known: Readonly<Record<string, true>>, element: string): void {
+  for (const key of Object.keys(given)) {
+    if (!Object.hasOwn(known, key)) throw refused(`${element} has the unknown key "${key}"`, element, known);
+  }
+}
+
+function checkWord(given: string | undefined, known: Readonly<Record<string, unknown>>, element: string): void {
+  if (given === undefined || Object.hasOwn(known, given)) return;
+  throw refused(`${element} is "${given}", which is not known`, element, known);
+}
+
+function refused(what: string, element: string, known: object): LpdeformError {
+  const limit = Object.keys(known).join(", ");
+  const text = `${what[0]!.toUpperCase()}${what.slice(1)}; known are ${limit}.`;
+  return new LpdeformError("invalid_argument", text, { reason: "UNKNOWN_KEY", element, limit });
+}
