@@ -100,14 +100,14 @@ void LiveSession::open_patiently() {
       opening_ = nullptr;  // and with it its copy of the mesh
       return hand_over(*std::move(opened));
     }
-    if (is_final(opened.status(), start)) return refuse(opened.status());
+    if (is_past_help(opened.status(), start)) return refuse(opened.status());
     std::unique_lock lock(mutex_);
     last_problem_ = opened.status();
     if (changed_.wait_for(lock, backoff.next(), [this] { return is_closing_; })) return;
   }
 }
 
-bool LiveSession::is_final(const absl::Status& failed, Clock::time_point since) const {
+bool LiveSession::is_past_help(const absl::Status& failed, Clock::time_point since) const {
   const bool may_pass = client::is_undecided(failed) && !client::is_session_lost(failed);
   const std::chrono::duration<double> tried = Clock::now() - since;
   return !may_pass || (facts_.reconnect_seconds > 0 && tried.count() > facts_.reconnect_seconds);

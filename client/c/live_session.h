@@ -77,7 +77,7 @@ class LiveSession {
   void run();
   void refuse(absl::Status why);
   void open_patiently();
-  bool is_final(const absl::Status& failed, Clock::time_point since) const;
+  bool is_past_help(const absl::Status& failed, Clock::time_point since) const;
   void hand_over(client::Session session);
   std::uint64_t ours(std::uint64_t seq) const;
   absl::Status check(const lpdeform_buffers& buffers) const;

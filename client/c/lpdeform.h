@@ -514,7 +514,7 @@ typedef struct lpdeform_frame {
   uint64_t epoch;
   uint64_t skipped_inputs; /* changes since the frame before that no frame answers */
   uint32_t iteration;
-  uint32_t is_final; /* 1: the result; no further frame until there is a new change */
+  uint32_t is_final; /* 1: the result, however it ended; no further frame until there is a new change */
   lpdeform_stop_reason stop_reason;
   uint32_t has_optimality_gap;
   double energy; /* lengths in metres */

@@ -250,7 +250,8 @@ struct Frame {
   std::uint32_t iteration = 0;
   double energy = 0;       // E of the positions, Eq. 3 of the paper, in the mesh's unit, with soft terms
   double soft_energy = 0;  // the part of it that soft and orientation handles have
-  /// The result for input_seq: no further frame until there is a new update, but for the same one with its gap.
+  /// The result for input_seq, however its solve ended (stop_reason): no further frame until there is a new update, but for the
+  /// same one with its gap.
   bool is_final = false;
   StopReason stop_reason = StopReason::kRunning;
   double solve_seconds = 0;

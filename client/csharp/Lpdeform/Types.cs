@@ -189,7 +189,7 @@ namespace Lpdeform
         /// The newest change that it answers: see Handles.
         public ulong InputSeq;
         public int Iteration;
-        /// The result: no further frame until there is a new change.
+        /// The result, however its solve ended (StopReason): no further frame until there is a new change.
         public bool IsFinal;
         public StopReason StopReason;
         /// Lengths in metres.

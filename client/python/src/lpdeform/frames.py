@@ -51,7 +51,8 @@ class Frame:
         self.soft_energy: float = header.soft_energy
         """The part of it that soft and orientation handles have."""
         self.is_final: bool = header.is_final
-        """The result for input_seq: no further frame until there is a new update, but for the same one with its gap."""
+        """The result for input_seq, however its solve ended (stop_reason): no further frame until there is a new update, but for
+        the same one with its gap."""
         self.stop_reason: str = stop_reason_name(header.stop_reason)
         self.solve_seconds: float = header.solve_seconds
         self.method: str = method_name(header.method)

@@ -200,7 +200,10 @@ export interface Frame {
   readonly energy: number;
   /** The part of it that soft and orientation handles have. */
   readonly softEnergy: number;
-  /** The result for inputSeq: no further frame until there is a new update, but for the same one with its optimalityGap. */
+  /**
+   * The result for inputSeq, however its solve ended (stopReason): no further frame until there is a new update, but for the same one
+   * with its optimalityGap.
+   */
   readonly isFinal: boolean;
   readonly stopReason: StopReason;
   /** (energy - lower bound) / energy of the convex problem with its rotations held. In results alone, see FrameOptions.certify. */
