@@ -8,6 +8,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "server/local_host.h"
 
 namespace lpdeform {
 namespace {
@@ -49,6 +50,14 @@ absl::StatusOr<std::unique_ptr<Admin>> Admin::start(const std::string& address,
   server.set_write_timeout(kPatienceSeconds);
   server.set_keep_alive_max_count(1);
   server.set_payload_max_length(kLargestBody);
+  if (names_this_machine(address)) {
+    server.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
+      if (names_this_machine(request.get_header_value("Host"))) return httplib::Server::HandlerResponse::Unhandled;
+      response.status = 403;
+      response.set_content("The admin port must be called localhost, 127.0.0.1 or [::1].\n", "text/plain");
+      return httplib::Server::HandlerResponse::Handled;
+    });
+  }
   for (const auto& [path, page] : pages) {
     server.Get(path, [page = page](const httplib::Request&, httplib::Response& response) {
       const Answer answer = page();

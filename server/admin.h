@@ -10,7 +10,7 @@
 namespace lpdeform {
 
 /// A few pages over plain HTTP for whoever runs the server: read only, without authentication, for private networks.
-/// Answers GET and HEAD.
+/// Answers GET and HEAD. On an address of this machine alone, to who calls it by a name of this machine: see names_this_machine().
 class Admin {
  public:
   struct Answer {

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/escaping.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "core/base/fault.h"
 #include "server/encode.h"
 #include "server/file_watch.h"
 #include "server/heap_trim.h"
+#include "server/local_host.h"
 
 namespace lpdeform {
 namespace {
@@ -38,6 +41,12 @@ void end_at(const std::shared_ptr<Timers>& timers, const std::weak_ptr<FrameStre
   timers->at(std::min(when, timers->now() + kBetweenLooks), look);
 }
 
+/// Whether nobody but this machine's own programs is meant to be let in, and nothing else keeps others out.
+bool is_for_this_machine(const ServerOptions& options) {
+  return options.token_keys_file.empty() && !options.tls.knows_clients() && !options.allow_anonymous &&
+         !absl::StartsWith(options.address, "unix:");
+}
+
 std::string ended_because(EndReason reason) {
   if (reason == EndReason::kSessionExpired) return "expired";
   return reason == EndReason::kDraining ? "draining" : "deleted";
@@ -51,6 +60,7 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
                                                                    options.max_sessions_per_caller})),
       options_(options),
       tokens_(std::move(tokens)),
+      is_for_this_machine_(is_for_this_machine(options)),
       log_(options.log ? options.log : std::make_shared<Log>("off")),
       budget_(std::make_shared<Budget>(options.max_bytes, options.max_bytes_per_caller)),
       uploads_(std::make_shared<Uploads>(
@@ -92,6 +102,12 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
 }
 
 absl::StatusOr<Caller> Backend::identify(const CallContext& call, Access access) const {
+  if (is_for_this_machine_ && !names_this_machine(call.authority)) {
+    return make_fault(
+        absl::StatusCode::kPermissionDenied, {"HOST_FOREIGN", "host", "localhost"},
+        absl::StrCat("The server has no authentication, so it must be called localhost, 127.0.0.1 or [::1], and not '",
+                     absl::CHexEscape(call.authority), "'; --allow-anonymous lets everybody in."));
+  }
   absl::StatusOr<Caller> caller = Caller{};
   if (tokens_ != nullptr) {
     caller = tokens_->check(call.authorization, absl::ToUnixSeconds(absl::Now()));

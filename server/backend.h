@@ -87,7 +87,7 @@ class Backend {
 
   /// What a call is going to do.
   enum class Access { kRead, kChange };
-  /// Who calls. UNAUTHENTICATED as Tokens::check; PERMISSION_DENIED READ_ONLY.
+  /// Who calls. UNAUTHENTICATED as Tokens::check; PERMISSION_DENIED READ_ONLY, HOST_FOREIGN.
   absl::StatusOr<Caller> identify(const CallContext& call, Access access) const;
   /// A session of the caller's. Errors: as identify; NOT_FOUND SESSION_UNKNOWN.
   absl::StatusOr<std::shared_ptr<Session>> find(const CallContext& call, Access access,
@@ -173,6 +173,7 @@ class Backend {
 
   const ServerOptions options_;
   const std::shared_ptr<Tokens> tokens_;
+  const bool is_for_this_machine_;  // see names_this_machine()
   const std::shared_ptr<const Log> log_;
   const std::shared_ptr<Budget> budget_;
   const std::shared_ptr<Uploads> uploads_;

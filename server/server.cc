@@ -32,6 +32,11 @@ namespace lpdeform {
 namespace {
 
 constexpr int kKeepaliveMs = 30'000;
+/// Who pings more often is sent away. A proxy pings each connection once or twice a second, to see a hung server.
+constexpr int kLeastBetweenPingsMs = 200;
+/// Of the headers of one call, 32 for each header among that. Beyond it gRPC 1.51 ends the connection, and all calls on it: more than a
+/// proxy lets through (max_request_headers_kb in deploy/envoy.yaml.in). A bearer token may have 8 KiB.
+constexpr int kMostHeaderBytes = 64 * 1024;
 /// Until a new connection has to have spoken HTTP/2, TLS included.
 constexpr int kHandshakeMs = 20'000;
 constexpr std::chrono::seconds kAcceptPatience{5};
@@ -212,7 +217,9 @@ absl::Status Server::Impl::start_grpc(const ServerOptions& options, std::shared_
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                              static_cast<int>(options.max_calls_per_connection));
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kKeepaliveMs / 3);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kLeastBetweenPingsMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, kMostHeaderBytes);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS,
                              static_cast<int>(options.connection_idle.count()));

@@ -1,5 +1,6 @@
 #include "server/service.h"
 
+#include <algorithm>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -18,6 +19,7 @@ namespace {
 
 constexpr std::size_t kLongestTraceParent = 256;
 constexpr std::size_t kLongestRoute = 128;
+constexpr std::size_t kLongestAuthority = 512;  // what is cut off of a longer one does not make it this machine's name
 
 std::string text_of(const grpc::CallbackServerContext& context, const char* header) {
   const auto found = context.client_metadata().find(header);
@@ -31,6 +33,8 @@ std::shared_ptr<CallRecord> begin_record(Backend& backend, const grpc::CallbackS
   CallContext call;
   if (trace_parent.size() <= kLongestTraceParent) call.trace_id = trace_id_of(trace_parent);
   call.authorization = text_of(context, "authorization");
+  const grpc::string_ref authority = context.ExperimentalGetAuthority();
+  call.authority.assign(authority.data(), std::min(authority.size(), kLongestAuthority));
   const std::string route = text_of(context, "lpdeform-session");
   if (route.size() <= kLongestRoute) call.route = route;
   if (const auto auth = context.auth_context(); auth && auth->IsPeerAuthenticated()) {
