@@ -38,8 +38,8 @@ struct ServerOptions {
   /// Threads that sessions take turns on, at least 2; 0 takes max(4, 2 * cores).
   int runner_threads = 0;
 
-  std::size_t max_connections = 8192;
-  std::size_t max_connections_per_address = 5000;  // of one peer; 0: without limit; see Listener::Limits
+  std::size_t max_connections = 4096;
+  std::size_t max_connections_per_address = 1024;  // of one peer; 0: without limit; see Listener::Limits
   std::size_t max_sessions = 256;
   std::size_t max_sessions_per_caller = 64;                 // where callers are told apart; 0: without limit
   std::size_t max_streams_per_caller = 256;                 // likewise

@@ -29,7 +29,7 @@ def literal(name, value):
 
 def call(method, service=b"lpdeform.v1.DeformService"):
     """The headers of a call, POST and http."""
-    return (b"\x83\x86" + literal(b":path", b"/" + service + b"/" + method) + literal(b":authority", b"x") +
+    return (b"\x83\x86" + literal(b":path", b"/" + service + b"/" + method) + literal(b":authority", b"localhost") +
             literal(b"content-type", b"application/grpc") + literal(b"te", b"trailers"))
 
 

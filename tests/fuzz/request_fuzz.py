@@ -202,6 +202,8 @@ def fuzz(world, options):
             if wrong:
                 found += 1
                 report(world, options.seed, numbers, wrong)
+            if number % (50 * BATCH) == 0:
+                print(f"{number} cases, {time.monotonic() - begin:.0f} s", flush=True)
             time.sleep(0.5)  # quiet, for comparison
             gaps, wrong = world.look()
             pace.quiet += gaps
