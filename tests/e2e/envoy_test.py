@@ -41,13 +41,13 @@ for _ in sys.stdin:
 
 
 class Envoy:
-    """deploy/web on a free port. `admin`: the URL of its own page."""
+    """deploy/web on a free port. `admin`: the URL of its own page. `root`: of a clone with another deploy/."""
 
-    def __init__(self, *arguments):
+    def __init__(self, *arguments, root=ROOT):
         self.folder = tempfile.TemporaryDirectory()
         self.log = os.path.join(self.folder.name, "log")
         admin = os.path.join(self.folder.name, "admin")
-        self.process = subprocess.Popen([os.path.join(ROOT, "deploy", "web"), "--admin-file", admin, "--web", "127.0.0.1:0", "--files",
+        self.process = subprocess.Popen([os.path.join(root, "deploy", "web"), "--admin-file", admin, "--web", "127.0.0.1:0", "--files",
                                          "none", "--access-log", self.log, *arguments])
         end = time.monotonic() + programs.PATIENCE
         while not (os.path.exists(admin) and programs.read_text(admin)):

@@ -1,6 +1,6 @@
 """Requests of strangers through the real Envoy, beside two callers with a token who must not notice.
 
-    request_fuzz.py SERVER [--minutes M | --cases N] [--seed S] [--only NUMBER ...]
+    request_fuzz.py SERVER [--minutes M] [--cases N] [--seed S] [--only NUMBER ... | --unguarded]
 
 SERVER: lpdeform-server. Cases are sent in batches, several at a time; after each batch the two callers are asked. A violation is
 - a stream of theirs that ended, a call of theirs that failed, or frames that came much later than in quiet times between;
@@ -20,6 +20,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import socket
 import statistics
 import subprocess
@@ -86,16 +87,33 @@ def token_files(folder, *subjects):
     return public, tokens
 
 
+def wait_until_reached(envoy):
+    """Until Envoy has found its server well."""
+    end = time.monotonic() + PATIENCE
+    while not envoy.stats().get("cluster.lpdeform.membership_healthy"):
+        assert time.monotonic() < end, "Envoy does not reach the server"
+        time.sleep(0.02)
+
+
+def without_guards(folder):
+    """A root whose Envoy passes on what a server ends connections for."""
+    shutil.copytree(ROOT / "deploy", f"{folder}/deploy")
+    os.symlink(ROOT / "build", f"{folder}/build")
+    template = pathlib.Path(folder, "deploy/envoy.yaml.in")
+    lines = [line for line in template.read_text().splitlines() if "max_request_headers_kb" not in line]
+    template.write_text("\n".join(line.replace('suffix: "-bin"', 'suffix: "-none"') for line in lines) + "\n")
+    return folder
+
+
 class World:
-    def __init__(self, server):
+    """`are_guarded`: false for Envoy as it was, to see that this program finds what its configuration keeps out."""
+
+    def __init__(self, server, are_guarded=True):
         self.folder = tempfile.TemporaryDirectory(prefix="lpdeform-requests-")
         public, (token, self.token) = token_files(self.folder.name, "victim", "somebody else")
         self.server = programs.RunningServer("--token-keys", public, "--log-level", "warning", "--heartbeat", "1", program=server)
-        self.envoy = Envoy("--server", self.server.address)
-        end = time.monotonic() + PATIENCE
-        while not self.envoy.stats().get("cluster.lpdeform.membership_healthy"):
-            assert time.monotonic() < end, "Envoy does not reach the server"
-            time.sleep(0.02)
+        self.envoy = Envoy("--server", self.server.address, root=ROOT if are_guarded else without_guards(self.folder.name))
+        wait_until_reached(self.envoy)
         self.native = Native(self.envoy.port, token)
         self.page = Page(self.envoy.port, token, self.native.session)
         self.seen = self.counts()
@@ -187,6 +205,18 @@ class Pace:
         return ["frames came late"] if is_late else []
 
 
+def find_one(world, options):
+    end, number = time.monotonic() + 60 * options.minutes, 0
+    while time.monotonic() < end:
+        wrong = breaks(world, request_cases.make(options.seed, number))
+        if wrong:
+            print(f"case {number}: {in_short(wrong[0])}", flush=True)
+            return 0
+        number += 1
+    print(f"{number} cases, and none was found", flush=True)
+    return 1
+
+
 def fuzz(world, options):
     begin, number, found, pace = time.monotonic(), 0, 0, Pace()
     end = begin + 60 * options.minutes
@@ -224,9 +254,12 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--most", type=int, default=5, help="ends after so many batches that broke something")
     parser.add_argument("--only", type=int, nargs="+", help="these cases of the seed alone, printed")
+    parser.add_argument("--unguarded", action="store_true", help="by an Envoy that lets such requests through: status 0 once one is found")
     options = parser.parse_args()
-    world = World(options.server)
+    world = World(options.server, not options.unguarded)
     try:
+        if options.unguarded:
+            return find_one(world, options)
         if not options.only:
             return fuzz(world, options)
         status = 0
