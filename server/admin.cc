@@ -52,7 +52,8 @@ absl::StatusOr<std::unique_ptr<Admin>> Admin::start(const std::string& address,
   server.set_payload_max_length(kLargestBody);
   if (names_this_machine(address)) {
     server.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
-      if (names_this_machine(request.get_header_value("Host"))) return httplib::Server::HandlerResponse::Unhandled;
+      if (names_this_machine(request.get_header_value("Host")))
+        return httplib::Server::HandlerResponse::Unhandled;
       response.status = 403;
       response.set_content("The admin port must be called localhost, 127.0.0.1 or [::1].\n", "text/plain");
       return httplib::Server::HandlerResponse::Handled;

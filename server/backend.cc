@@ -105,8 +105,9 @@ absl::StatusOr<Caller> Backend::identify(const CallContext& call, Access access)
   if (is_for_this_machine_ && !names_this_machine(call.authority)) {
     return make_fault(
         absl::StatusCode::kPermissionDenied, {"HOST_FOREIGN", "host", "localhost"},
-        absl::StrCat("The server has no authentication, so it must be called localhost, 127.0.0.1 or [::1], and not '",
-                     absl::CHexEscape(call.authority), "'; --allow-anonymous lets everybody in."));
+        absl::StrCat(
+            "The server has no authentication, so it must be called localhost, 127.0.0.1 or [::1], and not '",
+            absl::CHexEscape(call.authority), "'; --allow-anonymous lets everybody in."));
   }
   absl::StatusOr<Caller> caller = Caller{};
   if (tokens_ != nullptr) {

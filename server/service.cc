@@ -19,7 +19,8 @@ namespace {
 
 constexpr std::size_t kLongestTraceParent = 256;
 constexpr std::size_t kLongestRoute = 128;
-constexpr std::size_t kLongestAuthority = 512;  // what is cut off of a longer one does not make it this machine's name
+constexpr std::size_t kLongestAuthority =
+    512;  // what is cut off of a longer one does not make it this machine's name
 
 std::string text_of(const grpc::CallbackServerContext& context, const char* header) {
   const auto found = context.client_metadata().find(header);
