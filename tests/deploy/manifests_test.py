@@ -386,6 +386,9 @@ class Compose(unittest.TestCase):
                          [one for one in server["command"] if not one.startswith("--token-keys=")])
         self.assertIn("--token-keys=/secrets/keys.pem", server["command"])
         before = COMPOSE["services"]["web"]["command"]
+        of_this_machine = ["--host", "localhost", "--host", "127.0.0.1"]  # where all names are let in, tokens keep others out
+        self.assertEqual(before[-4:], of_this_machine)
+        before = before[:-4]
         self.assertEqual(web["command"][:len(before)], before)
         self.assertEqual(web["command"][len(before)::2], ["--tls-cert", "--tls-key"])
 
