@@ -77,7 +77,8 @@ class Decoder {
   absl::StatusOr<Points> positions(const v1::Positions& message);
   /// No rows where the message is empty.
   absl::StatusOr<Points> normals(const v1::Normals& message);
-  /// Null where the message is empty. Also WELD_SIZE, WELD_OUT_OF_RANGE, WELD_TOO_FAR.
+  /// Null where the message is empty. Also WELD_SIZE, WELD_OUT_OF_RANGE, WELD_TOO_FAR, WELD_TOLERANCE,
+  /// WELD_TOO_DENSE.
   absl::StatusOr<std::shared_ptr<const Weld>> weld(const v1::Weld& message, const Points& positions);
 
  private:

@@ -102,7 +102,11 @@ absl::StatusOr<Points> Decoder::normals(const v1::Normals& message) {
 
 absl::StatusOr<std::shared_ptr<const Weld>> Decoder::weld(const v1::Weld& message, const Points& positions) {
   if (message.by_case() == v1::Weld::BY_NOT_SET) return nullptr;
-  if (message.has_position()) return std::make_shared<const Weld>(weld_by_position(positions));
+  if (message.has_position()) {
+    auto weld = weld_by_position(positions, message.position().tolerance());
+    if (!weld.ok()) return weld.status();
+    return std::make_shared<const Weld>(*std::move(weld));
+  }
   const auto data = bytes(message.groups(), "weld groups");
   if (!data.ok()) return data.status();
   if (data->view.size() % sizeof(std::uint32_t) != 0)

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "client/cpp/guarded.h"
 #include "client/cpp/lease.h"
 #include "client/cpp/ledger.h"
@@ -210,6 +211,12 @@ lpdeform_state LiveSession::state(absl::Status& why) const {
 std::optional<client::Notice> LiveSession::notice() const {
   const auto live = session();
   return live.ok() && *live != nullptr ? (*live)->notice() : std::nullopt;
+}
+
+std::string LiveSession::mesh_notice() const {
+  const auto live = session();
+  if (!live.ok() || *live == nullptr) return "";
+  return absl::StrJoin((*live)->mesh_report().notices, " ");
 }
 
 absl::StatusOr<std::shared_ptr<client::Session>> LiveSession::session() const {

@@ -52,6 +52,8 @@ class LiveSession {
   lpdeform_state state(absl::Status& why) const;
   /// Empty where there is none.
   std::optional<client::Notice> notice() const;
+  /// What the server has to say of the mesh; empty where that is nothing.
+  std::string mesh_notice() const;
   absl::StatusOr<std::string> name() const;
   std::uint32_t vertex_count() const;
 

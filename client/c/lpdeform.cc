@@ -274,7 +274,9 @@ lpdeform_notice lpdeform_session_notice(const lpdeform_session* session, char* t
   lpdeform_notice said = LPDEFORM_NOTICE_NONE;
   guarded(nullptr, [&] {
     const std::optional<client::Notice> notice = session == nullptr ? std::nullopt : session->live->notice();
-    if (text != nullptr) engine::copy_text(notice ? notice->text : "", text, bytes);
+    const std::string of_mesh = session == nullptr || notice ? "" : session->live->mesh_notice();
+    if (text != nullptr) engine::copy_text(notice ? notice->text : of_mesh, text, bytes);
+    if (!of_mesh.empty()) said = LPDEFORM_NOTICE_MESH;
     if (notice) said = notice_reason(notice->reason);
     return absl::OkStatus();
   });

@@ -181,12 +181,15 @@ typedef struct lpdeform_mesh {
   const void* indices;  /* three a triangle */
   uint32_t index_count; /* a multiple of 3 */
   lpdeform_index_format index_format;
-  /* Engines have several vertices where texture coordinates or normals change along a seam. 1: those at exactly
-   * the same position are one, deform as one, and get the same positions to the last bit. */
+  /* Engines have several vertices where texture coordinates or normals change along a seam. 1: those in the same
+   * place are one, deform as one, and get the same positions to the last bit. See weld_tolerance. */
   uint32_t weld_by_position;
   uint32_t reserved; /* 0 */
   /* In place of that, one number a vertex: those with the same number are one. May be NULL. */
   const uint32_t* weld_groups;
+  /* With weld_by_position: how far apart vertices of one place may be, as a share of the bounding box's diagonal, 0 to
+   * 0.001; 0 is the server's, 1e-9. */
+  double weld_tolerance;
 } lpdeform_mesh;
 
 /* The engine's coordinates. The server's are right-handed, with y up, in metres, and triangles are
@@ -300,17 +303,18 @@ enum {
 /* How the session is. `why` may be NULL; its code is LPDEFORM_OK where there is nothing to say. NULL is REFUSED. */
 LPDEFORM_API lpdeform_state lpdeform_session_state(const lpdeform_session* session, lpdeform_error* why);
 
-/* What a server says about itself; nothing failed. */
+/* What a server says about itself, or about the mesh; nothing failed. */
 typedef int32_t lpdeform_notice;
 enum {
   LPDEFORM_NOTICE_NONE = 0,
   LPDEFORM_NOTICE_OVERLOADED = 1, /* it has more to solve than it can: frames come less often */
   LPDEFORM_NOTICE_RECOVERED = 2,  /* no more */
-  LPDEFORM_NOTICE_OTHER = 3       /* what only a newer server says */
+  LPDEFORM_NOTICE_OTHER = 3,      /* what only a newer server says */
+  LPDEFORM_NOTICE_MESH = 4 /* of the mesh: where it is split and comes apart. Until something else is said */
 };
 
-/* What the server said last on the connection that there is; NONE where it said nothing, and of NULL. `text`, of `bytes` bytes,
- * becomes one sentence for people, cut as those of errors; it may be NULL. For a line in a log when it changes. */
+/* What the server said last on the connection that there is, or of the mesh; NONE where it said nothing, and of NULL.
+ * `text`, of `bytes` bytes, becomes one sentence for people, cut as those of errors; it may be NULL. For a line in a log when it changes. */
 LPDEFORM_API lpdeform_notice lpdeform_session_notice(const lpdeform_session* session, char* text,
                                                      size_t bytes);
 

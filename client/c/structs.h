@@ -20,6 +20,8 @@ template <typename Struct>
 inline constexpr std::size_t kFirstSize = sizeof(Struct);
 template <>
 inline constexpr std::size_t kFirstSize<lpdeform_update> = offsetof(lpdeform_update, begins_step);
+template <>
+inline constexpr std::size_t kFirstSize<lpdeform_mesh> = offsetof(lpdeform_mesh, weld_tolerance);
 
 /// What `given` says, in a struct of this library's own size. `name` is for errors: INVALID_ARGUMENT
 /// ARGUMENT_MISSING where it is NULL, STRUCT_SIZE where it is smaller than in the first version, STRUCT_TOO_NEW where bytes

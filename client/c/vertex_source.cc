@@ -115,6 +115,7 @@ absl::StatusOr<client::Mesh> read_mesh(const lpdeform_mesh& mesh, const Space& s
 client::Weld read_weld(const lpdeform_mesh& mesh) {
   client::Weld weld;
   weld.by_position = mesh.weld_by_position != 0;
+  weld.tolerance = mesh.weld_tolerance;
   if (mesh.weld_groups != nullptr) weld.groups.assign(mesh.weld_groups, mesh.weld_groups + mesh.vertex_count);
   return weld;
 }

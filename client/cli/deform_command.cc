@@ -67,7 +67,7 @@ absl::StatusOr<Inputs> read_inputs(const DeformOptions& options) {
     inputs.update.settings.region = client::RegionOfInterest{std::move(held->region)};
   for (NamedHandle& handle : held->handles)
     inputs.update.handles.emplace(std::move(handle.name), std::move(handle.handle));
-  status = read_material(options.material, inputs.file, std::move(held->groups), options.welds,
+  status = read_material(options.material, inputs.file, std::move(held->groups), options.weld,
                          inputs.update.settings);
   if (!status.ok()) return status;
   inputs.p = *inputs.update.settings.p;
@@ -95,8 +95,10 @@ absl::StatusOr<Solved> solve_on(const std::string& address, const DeformOptions&
   absl::StatusOr<client::Session> session =
       server->open(to_client(inputs.file.mesh), {.weights = options.weights,
                                                  .free_components = options.free_components,
-                                                 .weld = {.by_position = options.welds}});
+                                                 .weld = by_position(options.weld)});
   if (!session.ok()) return session.status();
+  progress.clear();
+  print_notices(session->mesh_report());
   interrupt.set_action([&session] { session->close().IgnoreError(); });
 
   client::SolveOptions solve{.certify = options.certify || options.report.has_value(),
@@ -119,8 +121,8 @@ absl::Status write_results(const DeformOptions& options, const Inputs& inputs, c
   for (const std::filesystem::path& path : options.out) {
     absl::Status written = options.normals
                                ? write_output_with_normals(path, inputs.file, positions, field,
-                                                           points_of(solved.result.normals), options.welds)
-                               : write_output(path, inputs.file, positions, field, options.welds);
+                                                           points_of(solved.result.normals), options.weld)
+                               : write_output(path, inputs.file, positions, field, options.weld);
     if (!written.ok()) return written;
     std::printf("wrote %s\n", path.c_str());
   }

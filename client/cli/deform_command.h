@@ -25,10 +25,10 @@ struct DeformOptions {
   std::optional<std::uint32_t> max_iterations;
   double tolerance = 0;  // 0: the server's default
   std::optional<double> time_limit_seconds;
-  int threads = 0;       // of the server in this process; 0: all cores
-  bool welds = false;    // vertices at one position are one
-  bool normals = false;  // in .obj and .ply
-  bool certify = false;  // print the optimality gap
+  int threads = 0;             // of the server in this process; 0: all cores
+  std::optional<double> weld;  // its tolerance, 0: the default; none: vertices stay as they are
+  bool normals = false;        // in .obj and .ply
+  bool certify = false;        // print the optimality gap
   std::vector<std::filesystem::path> out;
   std::optional<std::filesystem::path> report;
   ServerAccess server;

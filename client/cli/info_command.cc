@@ -13,6 +13,7 @@ ExitStatus run_info(const InfoOptions& options) {
   const MeshReport report = full_report(file->mesh, WeightKind::kCotangent);
   const client::MeshReport shown = to_client(report);
   std::fputs((options.is_json ? mesh_json(shown) : mesh_text(shown)).c_str(), stdout);
+  print_notices(shown);
   const absl::Status verdict = deformable(report);
   return verdict.ok() ? kDone : complain(verdict);
 }

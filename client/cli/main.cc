@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -151,10 +152,26 @@ void add_solver_options(CLI::App& app, DeformOptions& options) {
       ->option_text("SECONDS");
 }
 
-void add_weld(CLI::App& app, bool& welds) {
-  app.add_flag("--weld", welds,
-               "Vertices at exactly the same position are one: for meshes split along seams of texture or "
-               "normals");
+void add_weld(CLI::App& app, std::optional<double>& weld) {
+  app.add_option(
+         "--weld", weld,
+         "Vertices in the same place are one: for meshes split along seams of texture or normals. They "
+         "may be apart by a share of the bounding box's diagonal, 0 to 0.001 (1e-9)")
+      ->check(within(0, 1e-3))
+      ->option_text("[TOLERANCE]");
+}
+
+/// A number after --weld is its tolerance; without one it is the default, and what follows is no part of it.
+std::vector<std::string> with_weld_told(int argc, char** argv) {
+  std::vector<std::string> told;
+  for (int k = 0; k < argc; ++k) {
+    double number = 0;
+    const bool is_weld = argv[k] == std::string("--weld");
+    const bool has_number = is_weld && k + 1 < argc && CLI::detail::lexical_cast(argv[k + 1], number);
+    told.emplace_back(argv[k]);
+    if (is_weld) told.back() += has_number ? absl::StrCat("=", argv[++k]) : "=0";
+  }
+  return told;
 }
 
 void add_access_options(CLI::App& app, ServerAccess& access, CLI::Option* server) {
@@ -208,7 +225,7 @@ void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
                  ".off, or a picture as .png")
       ->allow_extra_args(false)
       ->option_text("FILE");
-  add_weld(app, options->welds);
+  add_weld(app, options->weld);
   app.add_flag("--normals", options->normals,
                "Write normals to .obj and .ply, one of which must be among the outputs; those of an OBJ "
                "input are carried along, so that its hard edges "
@@ -263,7 +280,7 @@ void add_resize(CLI::App& program, std::function<ExitStatus()>& command) {
   add_vector(app, "--origin", options->origin, "What stays where it is (the middle of the bounding box)");
   add_vector(app, "--x-axis", options->x_axis, "The direction of the first factor (1,0,0)");
   add_vector(app, "--y-axis", options->y_axis, "The direction of the second factor (0,1,0)");
-  add_weld(app, options->welds);
+  add_weld(app, options->weld);
   CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")
                                    ->check(CLI::Range(1, 1024))
                                    ->option_text("N");
@@ -391,7 +408,10 @@ int run(int argc, char** argv) {
   add_restore(program, command);
   add_reproduce(program, command);
   try {
-    program.parse(argc, argv);
+    const std::vector<std::string> arguments = with_weld_told(argc, argv);
+    std::vector<const char*> words;
+    for (const std::string& argument : arguments) words.push_back(argument.c_str());
+    program.parse(static_cast<int>(words.size()), words.data());
   } catch (const CLI::Success& asked_for_help) {
     return program.exit(asked_for_help);
   } catch (const CLI::ParseError& error) {

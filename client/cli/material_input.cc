@@ -4,6 +4,7 @@
 
 #include "absl/strings/numbers.h"
 #include "client/cli/field_file.h"
+#include "client/cli/mesh_input.h"
 #include "client/cli/painting.h"
 #include "core/analysis/automatic_material.h"
 #include "core/mesh/weld.h"
@@ -70,23 +71,24 @@ bool paints_anything(const std::vector<VertexGroup>& groups, const MaterialOptio
 }  // namespace
 
 absl::Status read_material(const MaterialOptions& options, const MeshFile& file,
-                           std::vector<VertexGroup> groups, bool welds, client::Settings& into) {
+                           std::vector<VertexGroup> groups, std::optional<double> welding,
+                           client::Settings& into) {
   const std::int64_t vertex_count = file.mesh.vertices.rows();
   if (absl::Status status = read_base(options, vertex_count, into); !status.ok()) return status;
   for (VertexGroup& group : obj_groups(file.obj_source)) groups.push_back(std::move(group));
   if (!paints_anything(groups, options)) return absl::OkStatus();
 
-  const Weld weld =
-      welds ? weld_by_position(file.mesh.vertices) : no_weld(static_cast<std::int32_t>(vertex_count));
-  if (welds) {
-    for (VertexGroup& group : groups) add_copies(weld, group);
+  const absl::StatusOr<Weld> weld = weld_of(file.mesh, welding);
+  if (!weld.ok()) return weld.status();
+  if (welding) {
+    for (VertexGroup& group : groups) add_copies(*weld, group);
   }
   const auto p_paints = parse_paints(options.p_groups),
              stiffness_paints = parse_paints(options.stiffness_groups);
   if (!p_paints.ok()) return p_paints.status();
   if (!stiffness_paints.ok()) return stiffness_paints.status();
-  auto p = numbers_of(*into.p, file.mesh, weld, &Material::p);
-  auto stiffness = numbers_of(into.stiffness.value_or(1.0), file.mesh, weld, &Material::stiffness);
+  auto p = numbers_of(*into.p, file.mesh, *weld, &Material::p);
+  auto stiffness = numbers_of(into.stiffness.value_or(1.0), file.mesh, *weld, &Material::stiffness);
   if (!p.ok()) return p.status();
   if (!stiffness.ok()) return stiffness.status();
   PaintedFields fields{*std::move(p), *std::move(stiffness)};

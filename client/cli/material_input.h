@@ -24,10 +24,11 @@ struct MaterialOptions {
 
 /// Reads what `options` name and sets p, and stiffness where it is not left at 1. `groups` are those of the
 /// handle file; those of an OBJ mesh come after them. The server finds the automatic fields; only where groups
-/// are painted over them they are found here, by the same code. `welds`: vertices at one position are one; a
+/// are painted over them they are found here, by the same code. `welding`: the tolerance where vertices are welded by position; a
 /// group that names a copy has them all. Errors: as read_field and painting.h have them.
 absl::Status read_material(const MaterialOptions& options, const MeshFile& file,
-                           std::vector<VertexGroup> groups, bool welds, client::Settings& into);
+                           std::vector<VertexGroup> groups, std::optional<double> welding,
+                           client::Settings& into);
 
 /// The value of --p: a number from 1 to 64, "auto" (strength 1) or "auto:STRENGTH" with a strength from 0 to
 /// 1. False where it is none of them.

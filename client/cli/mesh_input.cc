@@ -1,6 +1,9 @@
 #include "client/cli/mesh_input.h"
 
 #include <algorithm>
+#include <cstdio>
+
+#include "client/cpp/mesh_notices.h"
 
 namespace lpdeform::cli {
 
@@ -37,7 +40,22 @@ client::MeshReport to_client(const MeshReport& report) {
     const DefectCount& found = report.of(defect);
     out.defects.push_back({std::string(defect_name(defect)), found.count, found.first});
   }
+  out.notices = client::mesh_notices(out.defects);
   return out;
+}
+
+absl::StatusOr<Weld> weld_of(const TriangleMesh& mesh, std::optional<double> tolerance) {
+  if (tolerance) return weld_by_position(mesh.vertices, *tolerance);
+  return no_weld(static_cast<std::int32_t>(mesh.vertices.rows()));
+}
+
+client::Weld by_position(std::optional<double> tolerance) {
+  return {.by_position = tolerance.has_value(), .tolerance = tolerance.value_or(0), .groups = {}};
+}
+
+void print_notices(const client::MeshReport& report) {
+  for (const std::string& notice : report.notices)
+    std::fprintf(stderr, "lpdeform: %s With this program: --weld.\n", notice.c_str());
 }
 
 std::vector<double> flat(const Points& points) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "core/energy/weights.h"
 #include "core/mesh/io.h"
 #include "core/mesh/report.h"
+#include "core/mesh/weld.h"
 
 namespace lpdeform::cli {
 
@@ -17,6 +19,13 @@ absl::StatusOr<MeshFile> read_deformable(const std::filesystem::path& path);
 
 /// What a session on a server would report of `mesh`, which need not be fit for one.
 MeshReport full_report(const TriangleMesh& mesh, WeightKind weights);
+
+/// By position with this tolerance (0: the default), or none.
+absl::StatusOr<Weld> weld_of(const TriangleMesh& mesh, std::optional<double> tolerance);
+client::Weld by_position(std::optional<double> tolerance);
+
+/// What the report's owner should know, a line each on stderr.
+void print_notices(const client::MeshReport& report);
 
 /// For the client library.
 client::Mesh to_client(const TriangleMesh& mesh);

@@ -46,21 +46,21 @@ absl::Status check_normals_have_output(std::span<const std::filesystem::path> pa
 }
 
 absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
-                          const Field& distortion, bool welds) {
+                          const Field& distortion, std::optional<double> weld) {
   const std::string ending = ending_of(path);
   if (ending == ".png") return render_png(path, file.mesh.faces, positions, distortion);
   if (ending == ".obj" && has_obj_normals(file))
-    return write_text(path, obj_text_with_normals(file, positions, welds));
+    return write_text(path, obj_text_with_normals(file, positions, weld));
   return write_mesh(path, file, positions, distortion);
 }
 
 absl::Status write_output_with_normals(const std::filesystem::path& path, const MeshFile& file,
                                        const Points& positions, const Field& distortion,
-                                       const Points& normals, bool welds) {
+                                       const Points& normals, std::optional<double> weld) {
   const std::string ending = ending_of(path);
-  if (ending == ".obj") return write_text(path, obj_text_with_normals(file, positions, welds));
+  if (ending == ".obj") return write_text(path, obj_text_with_normals(file, positions, weld));
   if (ending == ".ply") return write_mesh(path, file, positions, distortion, normals);
-  return write_output(path, file, positions, distortion, welds);
+  return write_output(path, file, positions, distortion, weld);
 }
 
 }  // namespace lpdeform::cli

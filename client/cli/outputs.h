@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,14 +18,14 @@ absl::Status check_outputs(std::span<const std::filesystem::path> paths);
 absl::Status check_normals_have_output(std::span<const std::filesystem::path> paths);
 
 /// Writes `positions` with the faces of `file`: .ply with distortion and colours, .obj keeping all else that
-/// an OBJ input had, its normals turned with the surface, .off, or a picture as .png. `distortion` may be empty. `welds`:
+/// an OBJ input had, its normals turned with the surface, .off, or a picture as .png. `distortion` may be empty. `weld`:
 /// see obj_text_with_normals.
 absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
-                          const Field& distortion, bool welds);
+                          const Field& distortion, std::optional<double> weld);
 
 /// The same, .obj and .ply with normals, whatever the input had. `normals`: one a vertex, for .ply.
 absl::Status write_output_with_normals(const std::filesystem::path& path, const MeshFile& file,
                                        const Points& positions, const Field& distortion,
-                                       const Points& normals, bool welds);
+                                       const Points& normals, std::optional<double> weld);
 
 }  // namespace lpdeform::cli

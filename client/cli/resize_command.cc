@@ -77,16 +77,14 @@ std::map<std::string, client::Update::Change> sides(const RestShape& shape, cons
 }
 
 /// One solve on the server: along one axis, by `factor`.
-absl::Status stretch(client::Client& server, const Scaling& scaling, bool welds, int axis, double factor,
-                     Interrupt& interrupt, Resized& resized) {
+absl::Status stretch(client::Client& server, const Scaling& scaling, std::optional<double> welding,
+                     const Weld& weld, int axis, double factor, Interrupt& interrupt, Resized& resized) {
   Progress progress;
   const TriangleMesh& rest = resized.file.mesh;
-  const Weld weld =
-      welds ? weld_by_position(rest.vertices) : no_weld(static_cast<std::int32_t>(rest.vertices.rows()));
   const auto shape = RestShape::create(welded(rest, weld));
   if (!shape.ok()) return shape.status();
   absl::StatusOr<client::Session> session =
-      server.open(to_client(resized.file.mesh), {.weld = {.by_position = welds}});
+      server.open(to_client(resized.file.mesh), {.weld = by_position(welding)});
   if (!session.ok()) return session.status();
   interrupt.set_action([&session] { session->close().IgnoreError(); });
   client::Resize resize;
@@ -119,7 +117,8 @@ absl::Status stretch(client::Client& server, const Scaling& scaling, bool welds,
 }
 
 absl::StatusOr<Resized> resize_on(const std::string& address, const ServerAccess& access,
-                                  const Scaling& scaling, bool welds, MeshFile file, Interrupt& interrupt) {
+                                  const Scaling& scaling, std::optional<double> welding, MeshFile file,
+                                  Interrupt& interrupt) {
   auto connecting = client_options(access);
   if (!connecting.ok()) return connecting.status();
   absl::StatusOr<client::Client> server = client::Client::connect(address, *std::move(connecting));
@@ -128,11 +127,14 @@ absl::StatusOr<Resized> resize_on(const std::string& address, const ServerAccess
   const double shared = shared_factor(scaling.scale);
   Scaling plain = scaling;
   plain.scale.setConstant(shared);
-  resized.file.mesh.vertices = plain(resized.file.mesh.vertices);
+  const absl::StatusOr<Weld> weld = weld_of(resized.file.mesh, welding);
+  if (!weld.ok()) return weld.status();
+  print_notices(to_client(scattered(check_mesh(welded(resized.file.mesh, *weld)), *weld)));
+  resized.file.mesh.vertices = scattered(plain(welded(resized.file.mesh, *weld).vertices), *weld);
   for (int axis = 0; axis < 3; ++axis) {
     const double factor = scaling.scale[axis] / shared;
     if (factor == 1) continue;
-    absl::Status status = stretch(*server, scaling, welds, axis, factor, interrupt, resized);
+    absl::Status status = stretch(*server, scaling, welding, *weld, axis, factor, interrupt, resized);
     if (!status.ok()) return status;
   }
   return resized;
@@ -154,13 +156,12 @@ ExitStatus run_resize(const ResizeOptions& options) {
     if (!started.ok()) return complain(started.status());
     local = *std::move(started);
   }
-  const absl::StatusOr<Resized> resized =
-      resize_on(local ? local->address() : *options.server.address, options.server, *scaling, options.welds,
-                *file, interrupt);
+  const absl::StatusOr<Resized> resized = resize_on(local ? local->address() : *options.server.address,
+                                                    options.server, *scaling, options.weld, *file, interrupt);
   if (interrupt.happened()) return kInterrupted;
   if (!resized.ok()) return complain(resized.status());
   const absl::Status written =
-      write_output(options.out, *file, resized->file.mesh.vertices, resized->distortion, options.welds);
+      write_output(options.out, *file, resized->file.mesh.vertices, resized->distortion, options.weld);
   if (!written.ok()) return complain(written);
   std::printf("wrote %s\n", options.out.c_str());
   return exit_status_of(resized->stop_reason, false, false);

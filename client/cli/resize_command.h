@@ -16,7 +16,7 @@ struct ResizeOptions {
   std::vector<double> scale = {1, 1, 1};  // along the axes, each 0.01 to 100
   std::vector<double> origin;             // x, y, z; empty: the middle of the mesh's bounding box
   std::vector<double> x_axis, y_axis;     // directions; both or none
-  bool welds = false;                     // vertices at one position are one
+  std::optional<double> weld;             // its tolerance, 0: the default; none: vertices stay as they are
   int threads = 0;                        // of the server in this process; 0: all cores
   ServerAccess server;
 };

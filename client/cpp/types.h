@@ -131,7 +131,10 @@ enum class Encoding {
 /// They are deformed as one and get the same positions to the last bit. Handles, fields and positions go on
 /// speaking of the mesh's own vertices; what is said of copies must be the same (COPIES_DIFFER).
 struct Weld {
-  bool by_position = false;  // vertices at exactly the same position are one
+  bool by_position = false;  // vertices in the same place are one
+  /// How far apart such vertices may be, as a share of the bounding box's diagonal, 0 to 1e-3; 0 is the server's, 1e-9. All
+  /// copies get the position of the lowest, at rest, too.
+  double tolerance = 0;
   /// Otherwise one number a vertex: those with the same number are one. Empty: nothing is welded.
   std::vector<std::uint32_t> groups = {};
 };
@@ -233,6 +236,8 @@ struct MeshReport {
   std::int64_t boundary_loops = 0;
   std::vector<Defect> defects = {};  // every kind, also those with count 0
   std::int64_t welded_vertices = 0;  // copies of a vertex before them
+  /// What is to be known before the mesh is deformed, one sentence for people each: that it comes apart where it is split.
+  std::vector<std::string> notices = {};
 };
 
 /// A state of the surface on its way to the optimum.

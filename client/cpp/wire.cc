@@ -6,6 +6,7 @@
 #include <utility>
 #include <variant>
 
+#include "client/cpp/mesh_notices.h"
 #include "core/base/fault.h"
 
 namespace lpdeform::client {
@@ -159,7 +160,7 @@ absl::Status to_wire(const Mesh& mesh, Packer& packer, v1::Mesh& out) {
 }
 
 absl::Status to_wire(const Weld& weld, Packer& packer, v1::CreateSessionRequest& out) {
-  if (weld.by_position) out.mutable_weld()->mutable_position();
+  if (weld.by_position) out.mutable_weld()->mutable_position()->set_tolerance(weld.tolerance);
   if (weld.by_position || weld.groups.empty()) return absl::OkStatus();
   return packer.pack(bytes_of(weld.groups), *out.mutable_weld()->mutable_groups());
 }
@@ -241,6 +242,7 @@ MeshReport from_wire(const v1::MeshReport& report) {
   for (const v1::Defect& defect : report.defects()) {
     out.defects.push_back({defect.kind(), defect.count(), {defect.first().begin(), defect.first().end()}});
   }
+  out.notices = mesh_notices(out.defects);
   return out;
 }
 

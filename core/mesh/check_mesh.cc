@@ -3,6 +3,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/mesh/coincident.h"
 #include "core/mesh/half_edges.h"
 #include "core/mesh/report.h"
 #include "core/mesh/topology.h"
@@ -163,6 +164,27 @@ std::int64_t count_boundary_loops(const TriangleMesh& mesh, const EdgeTable& tab
   return std::unique(boundary.begin(), boundary.end()) - boundary.begin();
 }
 
+/// Vertices of boundary edges that coincide with others of them.
+void check_borders(const TriangleMesh& mesh, const EdgeTable& table, MeshReport& report) {
+  std::vector<bool> is_at_border(mesh.vertices.rows());
+  table.for_edges([&](std::int32_t low, std::int32_t high, std::span<const HalfEdge> sides) {
+    if (sides.size() == 1) is_at_border[low] = is_at_border[high] = true;
+  });
+  std::vector<std::int32_t> border;
+  for (std::size_t v = 0; v < is_at_border.size(); ++v) {
+    if (is_at_border[v]) border.push_back(static_cast<std::int32_t>(v));
+  }
+  if (border.empty()) return;
+  const std::vector<std::int32_t> lowest = coincident(mesh.vertices, border, kSamePlace).lowest;
+  std::vector<bool> is_shared(mesh.vertices.rows());
+  for (const std::int32_t v : border) {
+    if (lowest[v] != v) is_shared[lowest[v]] = is_shared[v] = true;
+  }
+  for (const std::int32_t v : border) {
+    if (is_shared[v]) count(report.split_border_vertices, v);
+  }
+}
+
 DisjointSets united_by_edges(const TriangleMesh& mesh, const std::vector<FaceState>& states) {
   DisjointSets sets(mesh.vertices.rows());
   for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
@@ -217,6 +239,7 @@ MeshReport check_mesh(const TriangleMesh& mesh) {
   DisjointSets fans = check_edges(mesh, sound, is_not_manifold, report);
   check_fans(mesh, states, fans, is_not_manifold, report);
   report.boundary_loops = count_boundary_loops(mesh, sound, fans);
+  check_borders(mesh, sound, report);
 
   for (const std::int32_t component : number_components(mesh, states)) {
     report.components = std::max<std::int64_t>(report.components, component + 1);

@@ -94,9 +94,9 @@ Points rows_of(const Points& points, const std::vector<std::int32_t>& rows) {
   return points(rows, Eigen::all);
 }
 
-/// Draw vertices of one vertex are copies of one; where `welds`, so are those at one position.
-Weld weld_of(const Drawn& drawn, const Points& rest, bool welds) {
-  if (welds) return weld_by_position(rest);
+/// Draw vertices of one vertex are copies of one; with `weld`, so are those at one position.
+Weld weld_of(const Drawn& drawn, const Points& rest, std::optional<double> weld) {
+  if (weld) return weld_by_position(rest, *weld).value();
   std::map<std::int32_t, std::uint32_t> first;
   std::vector<std::uint32_t> groups;
   for (const std::int32_t vertex : drawn.vertices)
@@ -104,13 +104,14 @@ Weld weld_of(const Drawn& drawn, const Points& rest, bool welds) {
   return weld_by_groups(rest, groups).value();
 }
 
-Points normals_at(const Drawn& drawn, const Points& rest, const Points& positions, bool welds) {
+Points normals_at(const Drawn& drawn, const Points& rest, const Points& positions,
+                  std::optional<double> weld) {
   Faces faces(static_cast<Eigen::Index>(drawn.faces.size()), 3);
   for (std::size_t f = 0; f < drawn.faces.size(); ++f) {
     for (int k = 0; k < 3; ++k) faces(static_cast<Eigen::Index>(f), k) = drawn.faces[f][k];
   }
   const Points at_rest = rows_of(rest, drawn.vertices);
-  const CarriedNormals carried(std::move(faces), at_rest, weld_of(drawn, at_rest, welds),
+  const CarriedNormals carried(std::move(faces), at_rest, weld_of(drawn, at_rest, weld),
                                drawn.has_normals ? drawn.normals : Points(0, 3));
   return carried.at(rows_of(positions, drawn.vertices));
 }
@@ -185,11 +186,11 @@ class Writer {
 
 }  // namespace
 
-std::string obj_text_with_normals(const MeshFile& file, const Points& positions, bool welds) {
+std::string obj_text_with_normals(const MeshFile& file, const Points& positions, std::optional<double> weld) {
   LPDEFORM_CHECK(positions.rows() == file.mesh.vertices.rows());
   const std::string source = obj_text(file, file.mesh.vertices);
   const Drawn drawn = Reader(source).read();
-  const Points normals = normals_at(drawn, file.mesh.vertices, positions, welds);
+  const Points normals = normals_at(drawn, file.mesh.vertices, positions, weld);
   return Writer(source, positions, drawn, normals).write();
 }
 

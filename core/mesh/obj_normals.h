@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "core/mesh/io.h"
@@ -13,9 +14,9 @@ namespace lpdeform {
 /// smooth one. Texture coordinates, groups and materials stay; the source's own vn lines, which are out of
 /// date, go. A source of another format than OBJ gets smooth normals.
 ///
-/// `welds`: vertices at the same position are copies of one, as in a session that welds by position. `file`
-/// is one that deformable() accepts.
-std::string obj_text_with_normals(const MeshFile& file, const Points& positions, bool welds);
+/// `weld`: the tolerance where vertices are welded by position, as in a session that does so and that took it.
+/// `file` is one that deformable() accepts.
+std::string obj_text_with_normals(const MeshFile& file, const Points& positions, std::optional<double> weld);
 
 /// The source is an OBJ with vn lines.
 bool has_obj_normals(const MeshFile& file);

@@ -15,7 +15,7 @@ struct DefectEntry {
 };
 
 /// In the order of the enum.
-constexpr std::array<DefectEntry, 11> kDefects{{
+constexpr std::array<DefectEntry, 12> kDefects{{
     {"not_finite", &MeshReport::not_finite},
     {"index_out_of_range", &MeshReport::index_out_of_range},
     {"unreferenced_vertices", &MeshReport::unreferenced_vertices},
@@ -24,6 +24,7 @@ constexpr std::array<DefectEntry, 11> kDefects{{
     {"non_manifold_edges", &MeshReport::non_manifold_edges},
     {"non_manifold_vertices", &MeshReport::non_manifold_vertices},
     {"inconsistent_orientation", &MeshReport::inconsistent_orientation},
+    {"split_border_vertices", &MeshReport::split_border_vertices},
     {"clamped_edges", &MeshReport::clamped_edges},
     {"floored_vertices", &MeshReport::floored_vertices},
     {"flipped_edges", &MeshReport::flipped_edges},

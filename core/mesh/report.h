@@ -21,9 +21,10 @@ enum class Defect {
   kNonManifoldEdge,          // edge: more than two faces
   kNonManifoldVertex,        // vertex: its faces do not form one fan
   kInconsistentOrientation,  // edge: its two faces run along it in the same direction
-  kClampedEdge,              // edge: negative cotangent weight, clamped to 0
-  kFlooredVertex,            // vertex: kept attached by the floor on its edges' weights
-  kFlippedEdge,              // edge: not Delaunay; gave way to another with intrinsic Delaunay weights
+  kSplitBorderVertex,  // vertex: at a border, where another vertex at a border is. Comes apart unless welded.
+  kClampedEdge,        // edge: negative cotangent weight, clamped to 0
+  kFlooredVertex,      // vertex: kept attached by the floor on its edges' weights
+  kFlippedEdge,        // edge: not Delaunay; gave way to another with intrinsic Delaunay weights
 };
 
 /// The name in reports and on the wire: "zero_area_faces".
@@ -47,7 +48,7 @@ struct MeshReport {
   std::int64_t boundary_loops = 0;
 
   DefectCount not_finite, index_out_of_range, unreferenced_vertices, duplicate_faces, zero_area_faces,
-      non_manifold_edges, non_manifold_vertices, inconsistent_orientation;
+      non_manifold_edges, non_manifold_vertices, inconsistent_orientation, split_border_vertices;
   /// Known once weights are chosen (count_weight_defects in core/energy/weights.h); 0 before.
   DefectCount clamped_edges, floored_vertices, flipped_edges;
 

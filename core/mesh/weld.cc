@@ -6,15 +6,17 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/mesh/coincident.h"
 
 namespace lpdeform {
 namespace {
 
-constexpr double kFarthestCopy = 1e-6;  // of the diagonal
+constexpr double kFarthestCopy = 1e-6, kLargestTolerance = 1e-3;  // of the diagonal
 
 /// From the lowest copy of each vertex.
-Weld from_lowest(const std::vector<std::int32_t>& lowest) {
+Weld from_lowest(const Points& positions, const std::vector<std::int32_t>& lowest) {
   Weld weld;
+  weld.same_place = kSamePlace * diagonal_of(positions);
   weld.to_welded.resize(lowest.size());
   for (std::size_t v = 0; v < lowest.size(); ++v) {
     const auto vertex = static_cast<std::int32_t>(v);
@@ -69,26 +71,21 @@ Weld no_weld(std::int32_t vertex_count) {
   return weld;
 }
 
-Weld weld_by_position(const Points& positions) {
-  std::vector<std::int32_t> order, lowest(positions.rows());
-  std::iota(lowest.begin(), lowest.end(), 0);
-  for (const std::int32_t v : lowest) {
-    if (positions.row(v).allFinite()) order.push_back(v);
+absl::StatusOr<Weld> weld_by_position(const Points& positions, double tolerance) {
+  if (!(tolerance >= 0 && tolerance <= kLargestTolerance)) {
+    return invalid_input(
+        {"WELD_TOLERANCE", "weld tolerance", absl::StrCat("0 <= tolerance <= ", kLargestTolerance)},
+        absl::StrCat("The weld's tolerance is ", tolerance, " of the diagonal; it must be 0 to ",
+                     kLargestTolerance, "."));
   }
-  const auto compare = [&](std::int32_t a, std::int32_t b) {
-    for (int axis = 0; axis < 3; ++axis) {
-      if (positions(a, axis) != positions(b, axis)) return positions(a, axis) < positions(b, axis) ? -1 : 1;
-    }
-    return 0;
-  };
-  std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-    const int order_of_places = compare(a, b);
-    return order_of_places != 0 ? order_of_places < 0 : a < b;
-  });
-  for (std::size_t k = 1; k < order.size(); ++k) {
-    if (compare(order[k - 1], order[k]) == 0) lowest[order[k]] = lowest[order[k - 1]];
-  }
-  return from_lowest(lowest);
+  std::vector<std::int32_t> all(positions.rows());
+  std::iota(all.begin(), all.end(), 0);
+  const double share = tolerance == 0 ? kSamePlace : tolerance;
+  const Coincident found = coincident(positions, all, share);
+  if (found.is_complete) return from_lowest(positions, found.lowest);
+  return invalid_input({"WELD_TOO_DENSE", "weld tolerance", absl::StrCat("tolerance < ", share)},
+                       absl::StrCat("Too many different vertices lie within ", share,
+                                    " of the diagonal of each other to be welded by position."));
 }
 
 absl::StatusOr<Weld> weld_by_groups(const Points& positions, std::span<const std::uint32_t> groups) {
@@ -99,7 +96,7 @@ absl::StatusOr<Weld> weld_by_groups(const Points& positions, std::span<const std
     lowest[v] = first[groups[v]];
   }
   if (absl::Status status = check_distances(positions, lowest); !status.ok()) return status;
-  return from_lowest(lowest);
+  return from_lowest(positions, lowest);
 }
 
 TriangleMesh welded(const TriangleMesh& split, const Weld& weld) {

@@ -17,6 +17,8 @@ namespace lpdeform {
 struct Weld {
   std::vector<std::int32_t> to_welded;   // one a split vertex
   std::vector<std::int32_t> first_copy;  // one a welded vertex: its lowest copy, ascending
+  double same_place =
+      0;  // what is said of copies' positions may differ by so much: kSamePlace of the diagonal
 
   std::int32_t split_count() const { return static_cast<std::int32_t>(to_welded.size()); }
   std::int32_t welded_count() const { return static_cast<std::int32_t>(first_copy.size()); }
@@ -25,9 +27,12 @@ struct Weld {
 /// Every vertex by itself.
 Weld no_weld(std::int32_t vertex_count);
 
-/// Vertices at exactly the same position (0 and -0 are equal) are copies of one, also where parts of the
-/// surface merely touch there; a vertex with a NaN or infinite coordinate is one by itself. O(n log n).
-Weld weld_by_position(const Points& positions);
+/// Vertices that coincide (core/mesh/coincident.h) are copies of one, also where parts of the surface merely
+/// touch there; a vertex with a NaN or infinite coordinate is one by itself. `tolerance` is the share of the
+/// diagonal, 0 to 1e-3; 0 is kSamePlace. The welded vertex lies where its lowest copy does. O(n) expected.
+/// Errors, INVALID_ARGUMENT: WELD_TOLERANCE (NaN or out of range), WELD_TOO_DENSE (so many vertices lie within
+/// the tolerance of each other that the search would not end: over 1000 distances a vertex).
+absl::StatusOr<Weld> weld_by_position(const Points& positions, double tolerance = 0);
 
 /// Vertices with the same number in `groups`, one a vertex, are copies of one. The welded vertex lies where
 /// its lowest copy does. Errors, INVALID_ARGUMENT: WELD_SIZE (not one number a vertex), WELD_OUT_OF_RANGE (a

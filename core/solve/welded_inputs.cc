@@ -27,15 +27,23 @@ bool is_same(const One& a, const Other& b) {
   return (a.array() == b.array()).all();
 }
 
-/// Rows for welded vertices from rows for split ones.
-template <typename Matrix>
-absl::StatusOr<Matrix> merged(const Matrix& split, const Weld& weld, std::string_view what) {
+/// Whether positions are the same up to their rounding, so that a mesh whose copies are 1e-16 apart can be moved
+/// as it is.
+template <typename One, typename Other>
+bool is_same_place(const One& a, const Other& b, const Weld& weld) {
+  return is_same(a, b) || (a - b).norm() <= weld.same_place;
+}
+
+/// Rows for welded vertices from rows for split ones; where `same(copy, first copy)`, those of the first.
+template <typename Matrix, typename Same>
+absl::StatusOr<Matrix> merged(const Matrix& split, const Weld& weld, std::string_view what,
+                              const Same& same) {
   Matrix result(weld.welded_count(), split.cols());
   for (std::int32_t v = 0; v < weld.split_count(); ++v) {
     const std::int32_t vertex = weld.to_welded[v], first = weld.first_copy[vertex];
     if (v == first) {
       result.row(vertex) = split.row(v);
-    } else if (!is_same(split.row(v), result.row(vertex))) {
+    } else if (!same(split.row(v), result.row(vertex))) {
       return copies_differ(what, first, v);
     }
   }
@@ -72,8 +80,9 @@ absl::StatusOr<Handle> merged_handle(std::string_view name, const Handle& split,
       continue;
     }
     if (holder.handle != name) return held_twice(holder, name, copy);
-    if (targets != nullptr && !is_same(targets->positions.row(static_cast<Eigen::Index>(k)),
-                                       targets->positions.row(static_cast<Eigen::Index>(holder.place)))) {
+    if (targets != nullptr &&
+        !is_same_place(targets->positions.row(static_cast<Eigen::Index>(k)),
+                       targets->positions.row(static_cast<Eigen::Index>(holder.place)), weld)) {
       return copies_differ(absl::StrCat("target positions in ", quoted(name)), holder.copy, copy);
     }
   }
@@ -83,7 +92,7 @@ absl::StatusOr<Handle> merged_handle(std::string_view name, const Handle& split,
 
 absl::StatusOr<Field> merged_field(const Field& split, const Weld& weld, std::string_view what) {
   if (split.size() == 1) return split;
-  return merged(split, weld, what);
+  return merged(split, weld, what, [](const auto& a, const auto& b) { return is_same(a, b); });
 }
 
 }  // namespace
@@ -115,7 +124,7 @@ absl::StatusOr<Material> welded(const Material& split, const Weld& weld) {
 }
 
 absl::StatusOr<Points> welded(const Points& split, const Weld& weld, std::string_view what) {
-  return merged(split, weld, what);
+  return merged(split, weld, what, [&](const auto& a, const auto& b) { return is_same_place(a, b, weld); });
 }
 
 }  // namespace lpdeform

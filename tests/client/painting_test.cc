@@ -94,11 +94,11 @@ TEST(Painting, NamesWhatIsWrongWithAGroup) {
 TEST(Painting, GivesAllCopiesOfAVertexTheSameWhereTheyAreWelded) {
   const TriangleMesh mesh = necked_bar(4, 20, 2, 4);
   const MeshFile split{split_at_every_corner(mesh), ""};
-  const Weld weld = weld_by_position(split.mesh.vertices);
+  const Weld weld = weld_by_position(split.mesh.vertices).value();
   MaterialOptions options;
   options.automatic = 1;
   client::Settings settings;
-  ASSERT_TRUE(read_material(options, split, {{"one copy", {7}, 1.25, {}}}, true, settings).ok());
+  ASSERT_TRUE(read_material(options, split, {{"one copy", {7}, 1.25, {}}}, 0.0, settings).ok());
   const auto& p = std::get<std::vector<double>>(*settings.p);
   const auto& stiffness = std::get<std::vector<double>>(*settings.stiffness);
   ASSERT_EQ(p.size(), static_cast<std::size_t>(split.mesh.vertices.rows()));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <map>
 #include <utility>
 
@@ -37,6 +38,28 @@ inline TriangleMesh split_along_seam(const TriangleMesh& mesh) {
   split.vertices.conservativeResize(mesh.vertices.rows() + static_cast<Eigen::Index>(copies.size()), 3);
   for (const auto& [vertex, copy] : copies) split.vertices.row(copy) = mesh.vertices.row(vertex);
   return split;
+}
+
+/// A sphere of radius 1 as modellers make it for textures: (rings + 1) x (segments + 1) vertices in a grid of
+/// latitudes and longitudes. The last column lies on the first up to rounding; each pole is segments + 1 vertices, and
+/// every second face there has no inside.
+inline TriangleMesh uv_sphere(int rings, int segments) {
+  const int columns = segments + 1;
+  TriangleMesh mesh{Points((rings + 1) * columns, 3), Faces(2 * rings * segments, 3)};
+  Eigen::Index f = 0;
+  for (int ring = 0; ring <= rings; ++ring) {
+    const double latitude = M_PI * ring / rings;
+    for (int column = 0; column < columns; ++column) {
+      const double longitude = 2 * M_PI * column / segments;
+      const int v = ring * columns + column;
+      mesh.vertices.row(v) << std::sin(latitude) * std::cos(longitude),
+          std::sin(latitude) * std::sin(longitude), std::cos(latitude);
+      if (ring == rings || column == segments) continue;
+      mesh.faces.row(f++) << v, v + columns, v + 1;
+      mesh.faces.row(f++) << v + 1, v + columns, v + columns + 1;
+    }
+  }
+  return mesh;
 }
 
 /// The normal of each corner's face, for a mesh of split_at_every_corner.

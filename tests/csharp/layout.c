@@ -42,6 +42,7 @@ int main(void) {
   FIELD(lpdeform_mesh, weld_by_position);
   FIELD(lpdeform_mesh, reserved);
   FIELD(lpdeform_mesh, weld_groups);
+  FIELD(lpdeform_mesh, weld_tolerance);
   STRUCT("Options", lpdeform_options);
   FIELD(lpdeform_options, struct_size);
   FIELD(lpdeform_options, handedness);

@@ -63,6 +63,8 @@ class Files(OnShapes):
         out, report = self.at("posed.obj"), self.at("posed.json")
         apart = run("deform", mesh, "--handles", handles, "--out", out)
         self.assertEqual(apart.returncode, 2, "each face is a component of its own")
+        self.assertIn("comes apart where it is split", apart.stderr)
+        self.assertIn("--weld", apart.stderr)
         done = run("deform", mesh, "--handles", handles, "--weld", "--normals", "--out", out, "--report", report)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertGreater(json.loads(read_text(report))["mesh"]["welded_vertices"], 0)
@@ -198,6 +200,33 @@ class Files(OnShapes):
             for axis, word in enumerate(posed[same[0]].split()[1:]):
                 self.assertAlmostEqual(float(word), whole[v][axis], delta=0.02)
         self.assertIn("--weld", run("resize", "--help").stdout)
+
+    def test_a_weld_takes_a_tolerance(self):
+        mesh, _, copies = self.split_bar()
+        lines = read_text(mesh).splitlines()
+        corners = [k for k, line in enumerate(lines) if line.startswith("v ")]
+        for k in corners[::2]:  # copies are apart by rather more than rounding
+            x, y, z = map(float, lines[k].split()[1:])
+            lines[k] = f"v {x + 1e-5} {y} {z}"
+        mesh, out = self.write("apart.obj", "\n".join(lines) + "\n"), self.at("apart_long.obj")
+        resize = ("resize", mesh, out, "--scale", "1,1,2")
+        for weld in (("--weld", "1e-4"), ("--weld=1e-4",)):
+            done = run(*resize, *weld)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            posed = [line for line in read_text(out).splitlines() if line.startswith("v ")]
+            self.assertEqual({len({posed[copy] for copy in same}) for same in copies.values()}, {1})
+        self.assertNotEqual(run("resize", "--weld", mesh, out, "--scale", "1,1,2").returncode, 2, "MESH is no tolerance")
+        for tolerance in ("0.0011", "-1e-9", "nan"):
+            refused = run(*resize, f"--weld={tolerance}")
+            self.assertEqual(refused.returncode, 2)
+            self.assertIn("0.001", refused.stderr)
+
+    def test_info_says_that_a_mesh_is_split(self):
+        mesh, _, copies = self.split_bar()
+        told = run("info", mesh, "--json")
+        self.assertEqual(json.loads(told.stdout)["split_border_vertices"], sum(map(len, copies.values())))
+        self.assertIn("comes apart where it is split", told.stderr)
+        self.assertNotIn("split", run("info", self.at("bar.off")).stderr)
 
 
 if __name__ == "__main__":

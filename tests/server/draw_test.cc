@@ -3,6 +3,7 @@
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <map>
 
 #include "core/mesh/carried_normals.h"
 #include "service_fixture.h"
@@ -60,7 +61,7 @@ class DrawTest : public ServiceTest {
 
   const TriangleMesh bar_ = box_surface(2, 2, 8);
   const TriangleMesh split_ = split_at_every_corner(bar_);
-  const Weld weld_ = weld_by_position(split_.vertices);
+  const Weld weld_ = weld_by_position(split_.vertices).value();
 };
 
 TEST_F(DrawTest, ASplitMeshIsDeformedAsOneAndItsCopiesStayTogether) {
@@ -247,6 +248,10 @@ TEST_F(DrawTest, WeldsAndNormalsThatDoNotFitAreRefused) {
   const std::vector<std::pair<std::string, std::function<void(v1::CreateSessionRequest&)>>> cases{
       {"WELD_TOO_FAR", groups_of(all)},
       {"WELD_OUT_OF_RANGE", groups_of(too_high)},
+      {"WELD_TOLERANCE",
+       [](auto& request) { request.mutable_weld()->mutable_position()->set_tolerance(2e-3); }},
+      {"WELD_TOLERANCE",
+       [&](auto& request) { request.mutable_weld()->mutable_position()->set_tolerance(nan); }},
       {"WELD_SIZE", groups_of({0, 1})},
       {"WELD_SIZE", groups_of({})},
       {"MESH_EMPTY",
@@ -273,13 +278,45 @@ TEST_F(DrawTest, WeldsAndNormalsThatDoNotFitAreRefused) {
 TEST_F(DrawTest, GroupsWeldWhatPositionsWouldNot) {
   TriangleMesh near = split_;
   std::vector<std::int32_t> groups = weld_.to_welded;
-  for (Eigen::Index v = 0; v < near.vertices.rows(); ++v) near.vertices(v, 0) += 1e-9 * double(v % 7);
+  for (Eigen::Index v = 0; v < near.vertices.rows(); ++v) near.vertices(v, 0) += 1e-7 * double(v % 7);
   v1::CreateSessionRequest request;
   *request.mutable_mesh() = mesh_message(near);
   request.mutable_weld()->mutable_groups()->set_inline_(packed(groups));
   EXPECT_EQ(created(request).session().mesh().components(), 1u);
   request.mutable_weld()->mutable_position();
   EXPECT_GT(created(request).session().mesh().components(), 1u);
+  request.mutable_weld()->mutable_position()->set_tolerance(1e-6);
+  EXPECT_EQ(created(request).session().mesh().components(), 1u);
+}
+
+TEST_F(DrawTest, TheReportSaysWhereAMeshIsSplitUnlessItIsWelded) {
+  const TriangleMesh sphere = uv_sphere(12, 16);
+  v1::CreateSessionRequest request;
+  *request.mutable_mesh() = mesh_message(sphere);
+  const v1::MeshReport apart = created(request).session().mesh();
+  std::map<std::string, v1::Defect> defects;
+  for (const v1::Defect& defect : apart.defects()) defects[defect.kind()] = defect;
+  EXPECT_GT(defects["split_border_vertices"].count(), 0u);
+  EXPECT_EQ(defects["split_border_vertices"].first_size(), 10);
+  request.mutable_weld()->mutable_position();
+  const v1::MeshReport whole = created(request).session().mesh();
+  for (const v1::Defect& defect : whole.defects())
+    EXPECT_TRUE(defect.kind() != "split_border_vertices" || defect.count() == 0);
+  EXPECT_EQ(whole.boundary_loops(), 0u);
+}
+
+TEST_F(DrawTest, AWeldedUvSphereIsDeformedInOnePiece) {
+  const TriangleMesh sphere = uv_sphere(12, 16);
+  v1::CreateSessionRequest request = split_request(sphere);
+  v1::Update handles;
+  set_handle(handles, "south", vertices_at(sphere.vertices, -1), 0);
+  set_handle(handles, "north", vertices_at(sphere.vertices, 1), 1);
+  *request.mutable_handles() = handles.handles();
+  const SolveOutcome outcome = solve(solve_of(created(request)));
+  ASSERT_TRUE(outcome.status.ok()) << outcome.status.error_message();
+  const Points bent = points_of(outcome.frame->positions);
+  EXPECT_TRUE(bent.allFinite());
+  for (int ring = 0; ring <= 12; ++ring) EXPECT_EQ(bent.row(17 * ring), bent.row(17 * ring + 16)) << ring;
 }
 
 }  // namespace

@@ -261,7 +261,7 @@ TEST_F(GeometryTest, AutomaticFieldsOfAWeldedMeshAreThoseOfTheWhole) {
   ASSERT_TRUE(update(session, message).ok());
   const SolveOutcome outcome = solve_in_doubles(session);
   ASSERT_TRUE(outcome.status.ok()) << outcome.status.error_message();
-  const TriangleMesh whole = welded(split, weld_by_position(split.vertices));
+  const TriangleMesh whole = welded(split, weld_by_position(split.vertices).value());
   const Material material = automatic_material(*shape_of(whole), 0.7).value();
   EXPECT_DOUBLE_EQ(outcome.summary.energy(), energy_of(whole, hold_ends(whole.vertices, 1, 3), material));
   EXPECT_TRUE(describe(session).settings().p().has_per_vertex());

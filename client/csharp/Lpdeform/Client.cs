@@ -77,7 +77,8 @@ namespace Lpdeform
                     Indices = pinned.Array(mesh.Indices),
                     IndexCount = (uint)mesh.Indices.Length,
                     WeldByPosition = mesh.WeldByPosition ? 1u : 0u,
-                    WeldGroups = Groups(mesh, pinned)
+                    WeldGroups = Groups(mesh, pinned),
+                    WeldTolerance = mesh.WeldTolerance
                 };
                 LpdeformException.Check(Native.lpdeform_open(client, ref copy, ref native, out session, error), error);
             }

@@ -42,6 +42,7 @@ namespace Lpdeform
             public int IndexFormat;
             public uint WeldByPosition, Reserved;
             public IntPtr WeldGroups;
+            public double WeldTolerance;
         }
 
         [StructLayout(LayoutKind.Sequential)]

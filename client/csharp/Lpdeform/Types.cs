@@ -41,8 +41,10 @@ namespace Lpdeform
         public int[] Indices;
         /// x, y, z of each vertex's normal as drawn at rest; null: smooth ones.
         public float[] Normals;
-        /// Vertices at exactly the same position are one.
+        /// Vertices in the same place are one.
         public bool WeldByPosition;
+        /// How far apart these may be, as a share of the bounding box's diagonal, 0 to 0.001; 0 is the server's, 1e-9.
+        public double WeldTolerance;
         /// In place of that, one number a vertex: those with the same number are one.
         public int[] WeldGroups;
     }
@@ -168,13 +170,14 @@ namespace Lpdeform
     }
 
     public enum SessionState { Connecting, Live, Reconnecting, Refused }
-    public enum NoticeReason { None, Overloaded, Recovered, Other }
+    public enum NoticeReason { None, Overloaded, Recovered, Other, Mesh }
 
-    /// What a server says about itself; nothing failed.
+    /// What a server says about itself, or about the mesh; nothing failed.
     public struct Notice
     {
         /// None: nothing, on the connection that there is. After Overloaded frames come less often, and the last one of a change
         /// later, until Recovered. Other: of a newer server.
+        /// Mesh: it is split and comes apart there, until something else is said.
         public NoticeReason Reason;
         /// One sentence for people.
         public string Text;

@@ -154,6 +154,27 @@ def test_welded_copies_come_out_the_same(server: Server, make_grid: MakeGrid) ->
             assert np.unique(frame.positions[copies.reshape(-1) == group], axis=0).shape[0] == 1
 
 
+def test_a_split_mesh_is_noticed_and_welded_with_a_tolerance(
+    server: Server, make_grid: MakeGrid, caplog: pytest.LogCaptureFixture
+) -> None:
+    shape = make_grid(6)
+    corners = shape.vertices[shape.faces].reshape(-1, 3)
+    corners[:, 2] = np.arange(len(corners)) % 2 * 1e-5  # copies are apart
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    with lpdeform.open(corners, faces, address=server.address, weld=1e-4) as session:
+        assert session.mesh_report.welded_vertices == len(corners) - 36
+        assert session.mesh_report.notices == ()
+    assert not caplog.records
+    with lpdeform.open(corners.round(3), faces, address=server.address) as session:
+        (notice,) = session.mesh_report.notices
+        assert "comes apart where it is split" in notice
+        split = next(defect for defect in session.mesh_report.defects if defect.kind == "split_border_vertices")
+        assert split.count == len(corners) - 2  # all but two corners of the grid
+    assert notice in caplog.text
+    with pytest.raises(lpdeform.InvalidInput, match="0.002"):
+        lpdeform.open(corners, faces, address=server.address, weld=0.002)
+
+
 def test_what_the_server_refuses_is_raised_with_its_words(session: lpdeform.Session) -> None:
     session.settle(PATIENCE)
     number = session.set_handle("bad", [5000])

@@ -120,6 +120,8 @@ TEST_F(CSessionTest, SplitVerticesComeBackInTheirOrderAndTogether) {
   }
   lpdeform_mesh mesh = split.mesh();
   mesh.weld_by_position = 1;
+  split.points[0][0] += 1e-5;  // within the tolerance below
+  mesh.weld_tolerance = 1e-4;
   open(mesh);
   std::vector<std::uint32_t> base, tip;
   for (std::uint32_t i = 0; i < whole.indices.size(); ++i) {
@@ -134,6 +136,28 @@ TEST_F(CSessionTest, SplitVerticesComeBackInTheirOrderAndTogether) {
   for (const auto& [vertex, its] : places)
     EXPECT_EQ(its.size(), 1) << "copies of vertex " << vertex << " are apart";
   EXPECT_EQ(*places[20].begin(), (Point{8, 3, 1}));
+}
+
+TEST_F(CSessionTest, ANoticeSaysWhereAMeshIsSplit) {
+  Strip split = strip_;
+  for (std::uint32_t& index : split.indices) {
+    if (index != 2) continue;
+    split.points.push_back(split.points[2]);
+    index = static_cast<std::uint32_t>(split.points.size() - 1);
+  }
+  lpdeform_mesh mesh = split.mesh();
+  open(mesh);
+  std::array<char, 512> text{};
+  EXPECT_TRUE(eventually(
+      [&] { return lpdeform_session_notice(session_, text.data(), text.size()) == LPDEFORM_NOTICE_MESH; }));
+  EXPECT_THAT(text.data(), testing::HasSubstr("comes apart where it is split"));
+  lpdeform_close(session_);
+  session_ = nullptr;
+  mesh.weld_by_position = 1;
+  open(mesh);
+  hold("base", {0, 1});
+  settle(split.points.size());
+  EXPECT_EQ(lpdeform_session_notice(session_, text.data(), text.size()), LPDEFORM_NOTICE_NONE);
 }
 
 }  // namespace

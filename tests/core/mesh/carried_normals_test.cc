@@ -8,7 +8,7 @@ namespace {
 
 /// Of a split mesh, welded by position.
 CarriedNormals normals_of(const TriangleMesh& split, const Points& rest_normals = Points(0, 3)) {
-  return {split.faces, split.vertices, weld_by_position(split.vertices), rest_normals};
+  return {split.faces, split.vertices, weld_by_position(split.vertices).value(), rest_normals};
 }
 
 Eigen::Matrix3d some_turn() {
@@ -31,7 +31,7 @@ TEST(CarriedNormals, OfABoxesCornerDoNotDependOnItsTriangles) {
 TEST(CarriedNormals, ShowNoTextureSeamOnASphere) {
   const TriangleMesh mesh = sphere(3), split = split_along_seam(mesh);
   ASSERT_GT(split.vertices.rows(), mesh.vertices.rows() + 20);
-  const Weld weld = weld_by_position(split.vertices);
+  const Weld weld = weld_by_position(split.vertices).value();
   const Points drawn = split.vertices.rowwise().normalized();  // as a modelling program would give them
   for (const Points& rest_normals : {Points(0, 3), drawn}) {
     const CarriedNormals carried = normals_of(split, rest_normals);
@@ -52,7 +52,7 @@ TEST(CarriedNormals, ShowNoTextureSeamOnASphere) {
 
 TEST(CarriedNormals, KeepABoxesHardEdgesHard) {
   const TriangleMesh split = split_at_every_corner(box_surface(4, 4, 12));
-  const Weld weld = weld_by_position(split.vertices);
+  const Weld weld = weld_by_position(split.vertices).value();
   const Points rest = flat_normals(split);
   const CarriedNormals carried = normals_of(split, rest);
   const Points pose = bent_along_z(split.vertices, 0.1);
@@ -77,7 +77,7 @@ TEST(CarriedNormals, KeepABoxesHardEdgesHard) {
 
 TEST(CarriedNormals, WithoutRestNormalsAreSmoothOverABoxesEdges) {
   const TriangleMesh split = split_at_every_corner(box_surface(2, 2, 2));
-  const Weld weld = weld_by_position(split.vertices);
+  const Weld weld = weld_by_position(split.vertices).value();
   const Points normals = normals_of(split).at(split.vertices);
   for (std::int32_t v = 0; v < weld.split_count(); ++v)
     EXPECT_TRUE(same_bits(normals.row(v), normals.row(weld.first_copy[weld.to_welded[v]])));

@@ -3,7 +3,9 @@
 
 #include "core/mesh/report.h"
 #include "core/mesh/shapes.h"
+#include "core/mesh/weld.h"
 #include "tests/core/mesh/support.h"
+#include "tests/core/split_shapes.h"
 
 namespace lpdeform {
 namespace {
@@ -38,6 +40,11 @@ TriangleMesh ring(int length, bool is_twisted) {
   return make_mesh(vertices, faces);
 }
 
+TriangleMesh welded_uv_sphere() {
+  const TriangleMesh split = uv_sphere(12, 16);
+  return welded(split, weld_by_position(split.vertices).value());
+}
+
 TEST(CheckMesh, FindsNothingInASoundMesh) {
   const MeshReport report = check_mesh(box_surface(2, 3, 4));
   EXPECT_EQ(report.vertices, 54);
@@ -55,10 +62,26 @@ TEST(CheckMesh, FindsNothingInASoundMesh) {
 TEST(CheckMesh, CountsTheDefectsOfEveryKindUnderDifferentNames) {
   std::vector<std::string_view> names;
   for (const Defect defect : all_defects()) names.push_back(defect_name(defect));
-  EXPECT_THAT(names,
-              ElementsAre("not_finite", "index_out_of_range", "unreferenced_vertices", "duplicate_faces",
-                          "zero_area_faces", "non_manifold_edges", "non_manifold_vertices",
-                          "inconsistent_orientation", "clamped_edges", "floored_vertices", "flipped_edges"));
+  EXPECT_THAT(names, ElementsAre("not_finite", "index_out_of_range", "unreferenced_vertices",
+                                 "duplicate_faces", "zero_area_faces", "non_manifold_edges",
+                                 "non_manifold_vertices", "inconsistent_orientation", "split_border_vertices",
+                                 "clamped_edges", "floored_vertices", "flipped_edges"));
+}
+
+TEST(CheckMesh, NamesVerticesAtBordersThatCoincide) {
+  const TriangleMesh whole = sphere(2), split = split_along_seam(whole);
+  const std::int64_t copies = split.vertices.rows() - whole.vertices.rows();
+  const MeshReport report = check_mesh(split);
+  EXPECT_EQ(report.split_border_vertices.count, 2 * copies);
+  EXPECT_EQ(report.split_border_vertices.first.size(), 10u);
+  EXPECT_GT(check_mesh(uv_sphere(12, 16)).split_border_vertices.count, 2 * 13)
+      << "copies that are apart by rounding";
+}
+
+TEST(CheckMesh, FindsNoSplitVerticesAtABorderOfItsOwn) {
+  for (const TriangleMesh& mesh : {grid(5, 4), sphere(2), welded_uv_sphere()}) {
+    EXPECT_EQ(check_mesh(mesh).split_border_vertices.count, 0);
+  }
 }
 
 TEST(CheckMesh, NamesVerticesThatAreNotFinite) {

@@ -55,18 +55,18 @@ std::vector<std::array<double, 3>> part(const std::vector<std::array<double, 3>>
 
 TEST(ObjNormals, TurnWithTheSurfaceAndKeepAHardEdgeHard) {
   const MeshFile file = obj(kCorner);
-  const auto at_rest = corner_normals(obj_text_with_normals(file, file.mesh.vertices, false));
+  const auto at_rest = corner_normals(obj_text_with_normals(file, file.mesh.vertices, std::nullopt));
   ASSERT_EQ(at_rest.size(), 8u);
   EXPECT_THAT(part(at_rest, 0, 4), Each(ElementsAre(0, 0, 1)));
   EXPECT_THAT(part(at_rest, 4, 8), Each(ElementsAre(0, 1, 0)));
-  const auto moved = corner_normals(obj_text_with_normals(file, turned(file.mesh.vertices), false));
+  const auto moved = corner_normals(obj_text_with_normals(file, turned(file.mesh.vertices), std::nullopt));
   for (const auto& normal : part(moved, 0, 4)) EXPECT_NEAR(normal[1], -1, 1e-6);
   for (const auto& normal : part(moved, 4, 8)) EXPECT_NEAR(normal[2], 1, 1e-6);
 }
 
 TEST(ObjNormals, KeepEverythingElseOfTheSource) {
   const MeshFile file = obj(kCorner);
-  const std::string text = obj_text_with_normals(file, 2 * file.mesh.vertices, false);
+  const std::string text = obj_text_with_normals(file, 2 * file.mesh.vertices, std::nullopt);
   for (const char* kept : {"# a corner\nmtllib x.mtl\n", "v 2 2 0\n", "vt 0 0\n", "g one\nusemtl red\n",
                            "f 1/1/1 2/1/2 3/1/3 4/1/4\ns off\nf 2//5 1//6 5//7 6//8 # two\n"}) {
     EXPECT_THAT(text, HasSubstr(kept));
@@ -83,7 +83,7 @@ TEST(ObjNormals, OfCornersWithoutOneAreSmooth) {
       text.erase(at, std::string_view(of).size());
   }
   const MeshFile file = obj(text);
-  const std::string with = obj_text_with_normals(file, file.mesh.vertices, false);
+  const std::string with = obj_text_with_normals(file, file.mesh.vertices, std::nullopt);
   EXPECT_THAT(with, HasSubstr("f 1//1 2//2 3//3 4//4\n"));
   const auto normals = corner_normals(with);
   EXPECT_EQ(normals[0], normals[5]) << "vertex 1 has one normal on both sides of the edge";
@@ -97,23 +97,23 @@ TEST(ObjNormals, DoNotShowASeamOfVerticesAtOnePosition) {
           "vn 0 0 1\nf 1//1 2//1 3//1 4//1\nf 5//1 6//1 7//1 8//1\n");
   Points bent = file.mesh.vertices;
   bent(4, 2) = bent(5, 2) = 0.5;
-  const auto apart = corner_normals(obj_text_with_normals(file, bent, false));
+  const auto apart = corner_normals(obj_text_with_normals(file, bent, std::nullopt));
   EXPECT_NE(apart[0], apart[7]);
-  const auto welded = corner_normals(obj_text_with_normals(file, bent, true));
+  const auto welded = corner_normals(obj_text_with_normals(file, bent, 0.0));
   EXPECT_EQ(welded[0], welded[7]);
   EXPECT_EQ(welded[1], welded[6]);
 }
 
 TEST(ObjNormals, ThatAreMissingOrNoNumbersAreSmooth) {
   const MeshFile file = obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn nan 0 1\nvn x\nf 1//1 2//9 3//2\n");
-  const auto normals = corner_normals(obj_text_with_normals(file, file.mesh.vertices, false));
+  const auto normals = corner_normals(obj_text_with_normals(file, file.mesh.vertices, std::nullopt));
   EXPECT_THAT(normals, Each(ElementsAre(0, 0, 1)));
-  EXPECT_THAT(obj_text_with_normals(file, file.mesh.vertices, false), Not(HasSubstr("vn nan")));
+  EXPECT_THAT(obj_text_with_normals(file, file.mesh.vertices, std::nullopt), Not(HasSubstr("vn nan")));
 }
 
 TEST(ObjNormals, ComeWithMeshesOfOtherFormatsToo) {
   const MeshFile file{make_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}), ""};
-  EXPECT_EQ(obj_text_with_normals(file, file.mesh.vertices, false),
+  EXPECT_EQ(obj_text_with_normals(file, file.mesh.vertices, std::nullopt),
             "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvn 0 0 1\nvn 0 0 1\nf 1//1 2//2 3//3\n");
 }
 

@@ -33,7 +33,8 @@ class Original:
     vertices: Copied
     faces: Copied
     normals: Copied | None
-    weld: Copied | bool
+    weld: Copied | float | None
+    """One number a vertex, or the tolerance of a weld by position."""
     weights: report_pb2.WeightKind
     free_components: service_pb2.FreeComponents
     settings: Settings
@@ -56,9 +57,8 @@ def create_session(rpc: Rpc, original: Original, request_id: str, stop: Stop) ->
         free_components=original.free_components,
         settings=_wire.settings_to_wire(original.settings, packer),
     )
-    if original.weld is not False:
-        groups = None if original.weld is True else original.weld
-        request.weld.CopyFrom(_wire.weld_to_wire(groups, packer))
+    if original.weld is not None:
+        request.weld.CopyFrom(_wire.weld_to_wire(original.weld, packer))
     if original.normals is not None:
         request.normals.CopyFrom(_wire.normals_to_wire(original.normals, packer))
     created = _call_with(packer, rpc, "CreateSession", request, service_pb2.CreateSessionResponse, stop)

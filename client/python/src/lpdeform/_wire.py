@@ -172,10 +172,10 @@ def mesh_to_wire(vertices: Copied, faces: Copied, packer: Packer) -> data_pb2.Me
     )
 
 
-def weld_to_wire(weld: Copied | None, packer: Packer) -> data_pb2.Weld:
-    """`weld`: one number a vertex, or None for by position."""
-    if weld is None:
-        return data_pb2.Weld(position=data_pb2.WeldByPosition())
+def weld_to_wire(weld: Copied | float, packer: Packer) -> data_pb2.Weld:
+    """`weld`: one number a vertex, or the tolerance of a weld by position."""
+    if isinstance(weld, float):
+        return data_pb2.Weld(position=data_pb2.WeldByPosition(tolerance=weld))
     return data_pb2.Weld(groups=_packed(weld, packer))
 
 
@@ -325,14 +325,27 @@ def notice_from_wire(notice: service_pb2.Notice) -> types.Notice:
 
 
 def report_from_wire(report: report_pb2.MeshReport) -> types.MeshReport:
+    defects = tuple(types.Defect(one.kind, one.count, tuple(one.first)) for one in report.defects)
     return types.MeshReport(
         vertices=report.vertices,
         faces=report.faces,
         edges=report.edges,
         components=report.components,
         boundary_loops=report.boundary_loops,
-        defects=tuple(types.Defect(one.kind, one.count, tuple(one.first)) for one in report.defects),
+        defects=defects,
         welded_vertices=report.welded_vertices,
+        notices=_mesh_notices(defects),
+    )
+
+
+def _mesh_notices(defects: Iterable[types.Defect]) -> tuple[str, ...]:
+    """The same as in client/cpp/mesh_notices.h."""
+    return tuple(
+        f"The mesh comes apart where it is split: {defect.count} vertices at its borders lie in the same place as others "
+        f"(vertices {', '.join(map(str, defect.first))}{', ...' if defect.count > len(defect.first) else ''}). "
+        "Weld it by position to hold it together there."
+        for defect in defects
+        if defect.kind == "split_border_vertices" and defect.count > 0
     )
 
 

@@ -202,7 +202,7 @@ def open_async(
     normals: npt.ArrayLike | None = None,
     weights: WeightKind = "cotangent",
     free_components: FreeComponents = "error",
-    weld: npt.ArrayLike | bool = False,
+    weld: npt.ArrayLike | float | bool = False,
     encoding: Encoding = "float32",
     lowest_encoding: Encoding | None = None,
     credit: int = 0,

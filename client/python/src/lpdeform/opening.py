@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
+from numbers import Real
 
 import numpy.typing as npt
 
 from lpdeform import _codec, _wire
 from lpdeform._lease import Lease, Original, Snapshot, create_session, join_session, restore_session, route_of
 from lpdeform._link import Link
-from lpdeform._numbers import indices, numbers
+from lpdeform._numbers import Copied, indices, numbers
 from lpdeform._rpc import Rpc, Stop, default_address, new_request_id
 from lpdeform.access import Tls, Token
 from lpdeform.errors import LpdeformError, invalid
@@ -17,11 +19,19 @@ from lpdeform.session import Session
 from lpdeform.types import Encoding, Field, FreeComponents, Handle, Settings, SolverSettings, Update, WeightKind
 from lpdeform.v1 import frame_pb2
 
+_log = logging.getLogger("lpdeform")
+
 
 def connect(
     address: str | None, call_timeout: float, reconnect_for: float, token: Token, tls: Tls | bool
 ) -> Rpc:
     return Rpc(address or default_address(), call_timeout, reconnect_for, token, tls)
+
+
+def _weld_of(weld: npt.ArrayLike | float | bool) -> Copied | float | None:
+    if weld is True or weld is False:
+        return 0.0 if weld else None
+    return float(weld) if isinstance(weld, Real) else indices(weld, "weld")
 
 
 def open_link(
@@ -34,14 +44,14 @@ def open_link(
     settings: Settings,
     weights: WeightKind,
     free_components: FreeComponents,
-    weld: npt.ArrayLike | bool,
+    weld: npt.ArrayLike | float | bool,
     frame_options: frame_pb2.FrameOptions,
 ) -> Link:
     original = Original(
         vertices=numbers(vertices, "vertices", 3),
         faces=indices(faces, "faces", 3),
         normals=None if normals is None else numbers(normals, "normals", 3),
-        weld=weld if isinstance(weld, bool) else indices(weld, "weld"),
+        weld=_weld_of(weld),
         weights=_wire.weights_to_wire(weights),
         free_components=_wire.free_components_to_wire(free_components),
         settings=_wire.checked_settings(settings),
@@ -51,6 +61,8 @@ def open_link(
     except BaseException:
         rpc.close()
         raise
+    for notice in lease.report.notices:
+        _log.warning("%s: %s", rpc.address, notice)
     link = Link(rpc, lease, frame_options, original)
     if handles:
         try:
@@ -95,7 +107,7 @@ def open(  # noqa: A001  (called as lpdeform.open)
     normals: npt.ArrayLike | None = None,
     weights: WeightKind = "cotangent",
     free_components: FreeComponents = "error",
-    weld: npt.ArrayLike | bool = False,
+    weld: npt.ArrayLike | float | bool = False,
     encoding: Encoding = "float32",
     lowest_encoding: Encoding | None = None,
     credit: int = 0,
@@ -115,7 +127,8 @@ def open(  # noqa: A001  (called as lpdeform.open)
     handles: to begin with. p, stiffness, length_unit, solver, region: as in Settings.
     normals: n x 3, as drawn at rest, for frames with normals.
     free_components: what becomes of a connected component that no handle holds: "error" is raised, "stay", "follow".
-    weld: True where vertices at the same position are copies of one, or one number a vertex, the same for copies.
+    weld: True where vertices in the same place are copies of one; or how far apart these may be, as a share of the bounding box's
+        diagonal, at most 1e-3 (True: 1e-9); or one number a vertex, the same for copies.
     encoding: how frames travel: "float64", "float32" (16 bytes a vertex), "quantized" (8, off by half of 1/65535 of the frame's
         extent), "compressed" (the same, 3 to 5; needs the system's meshoptimizer).
     lowest_encoding: what the server may go down to where its limit of bytes a second asks for it.

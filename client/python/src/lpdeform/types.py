@@ -206,6 +206,8 @@ class MeshReport:
     """Every kind, also those with count 0."""
     welded_vertices: int
     """Copies of a vertex before them."""
+    notices: tuple[str, ...]
+    """What is to be known before the mesh is deformed, one sentence for people each: that it comes apart where it is split."""
 
 
 @dataclass(frozen=True)

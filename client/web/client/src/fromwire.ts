@@ -47,7 +47,18 @@ export function reportFromWire(report: WireMeshReport): api.MeshReport {
     boundaryLoops: report.boundaryLoops,
     defects: report.defects.map(({ kind, count, first }) => ({ kind, count, first: [...first] })),
     weldedVertices: report.weldedVertices,
+    notices: report.defects.flatMap(noticesOf),
   };
+}
+
+/** The same as in client/cpp/mesh_notices.h. */
+function noticesOf({ kind, count, first }: api.Defect): string[] {
+  if (kind !== "split_border_vertices" || count === 0) return [];
+  const named = [...first, ...(count > first.length ? ["..."] : [])].join(", ");
+  return [
+    `The mesh comes apart where it is split: ${count} vertices at its borders lie in the same place as others ` +
+      `(vertices ${named}). Weld it by position to hold it together there.`,
+  ];
 }
 
 /** Changes of handles that the server made. */

@@ -141,6 +141,8 @@ export interface MeshReport {
   defects: readonly Defect[];
   /** Copies of a vertex before them. */
   weldedVertices: number;
+  /** What is to be known before the mesh is deformed, one sentence for people each: that it comes apart where it is split. */
+  notices: readonly string[];
 }
 
 export type StopReason =
