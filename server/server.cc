@@ -32,7 +32,7 @@ namespace lpdeform {
 namespace {
 
 constexpr int kKeepaliveMs = 30'000;
-/// Who pings more often is sent away. A proxy pings each connection once or twice a second, to see a hung server.
+/// Who pings more often is sent away. A proxy pings each connection three times a second, to see a hung server.
 constexpr int kLeastBetweenPingsMs = 200;
 /// Of the headers of one call, 32 for each header among that. Beyond it gRPC 1.51 ends the connection, and all calls on it: more than a
 /// proxy lets through (max_request_headers_kb in deploy/envoy.yaml.in). A bearer token may have 8 KiB.
