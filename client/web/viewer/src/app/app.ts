@@ -1,53 +1,32 @@
-import type { LpdeformError, MeshReport } from "lpdeform-client";
 import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import { isAlike } from "../model/alike.js";
 import { History } from "../model/history.js";
 import { boundsOf, type Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
-import { nothing, type PointedOut } from "../model/pointed.js";
+import { type Seams, seamsOf } from "../model/seams.js";
+import { nothing } from "../model/pointed.js";
 import { State } from "../model/state.js";
 import { firstView, type View } from "../model/view.js";
 import type { Look, Stage } from "../stage/stage.js";
-import { say, type Status } from "../link/status.js";
-import { type AsideName, Asides, type Kept } from "./asides.js";
+import { Asides, type Kept } from "./asides.js";
+import { type Facts, firstFacts, noMesh } from "./facts.js";
 import { Pace } from "./pace.js";
 import { Editing } from "./editing.js";
 import type { Pane } from "./pane.js";
 import { Panes } from "./panes.js";
 
-/** What the page shows beside the pictures. */
-export interface Facts {
-  document: Document;
-  mesh: Mesh;
-  report: MeshReport | undefined;
-  status: Status;
-  /** Why the newest change cannot be shown. */
-  problem: LpdeformError | undefined;
-  /** One line that goes by itself, or stays until what it tells of is over. */
-  notice: { text: string; isBad: boolean; stays?: boolean } | undefined;
-  /** When the work was kept that a reload has brought back, of Date.now(). */
-  restoredFrom: number | undefined;
-  /** Work whose place other work has taken, the newest first; bringBack() swaps them. */
-  setAside: readonly AsideName[];
-  /** What a brush or a warning points out. */
-  pointedOut: PointedOut;
-  canUndo: boolean;
-  canRedo: boolean;
-}
-
-const noMesh: Mesh = { name: "", positions: new Float32Array(0), faces: new Uint32Array(0) };
-
 /** The page's one object: the work, how it is looked at, the panes; and the loop that draws them. */
 export class App {
   readonly view = new State<View>(firstView);
-  readonly facts: State<Facts>;
+  readonly facts = new State<Facts>(firstFacts);
   readonly history = new History<Document>(emptyDocument, isAlike);
   adjacency: Adjacency = adjacencyOf(0, noMesh.faces);
   diagonal = 1;
   edge = 0;
   /** Called after each picture that was drawn. */
   readonly afterDrawing = new Set<(now: number) => void>();
+  #seams: Seams | undefined;
   readonly #asides = new Asides();
   #isBroughtBack = false;
   #isKeyHeld = false;
@@ -67,19 +46,6 @@ export class App {
   #needsMarks = true;
 
   constructor() {
-    this.facts = new State<Facts>({
-      document: emptyDocument,
-      mesh: noMesh,
-      report: undefined,
-      status: say("idle", ""),
-      problem: undefined,
-      notice: undefined,
-      restoredFrom: undefined,
-      setAside: [],
-      pointedOut: nothing,
-      canUndo: false,
-      canRedo: false,
-    });
     this.#panes.add("first");
     this.view.watch((view, before) => this.#viewChanged(view, before));
     this.facts.watch((facts, before) => {
@@ -132,15 +98,36 @@ export class App {
     return this.#isBroughtBack || this.history.canUndo || this.history.canRedo;
   }
 
+  /** Which vertices are taken for one, where any are. */
+  get seams(): Seams | undefined {
+    return this.view.now.isWelded ? this.#seams : undefined;
+  }
+
+  /** Whether vertices along seams move as one from now on. */
+  weld(isWelded: boolean): void {
+    if (!this.#seams) return;
+    this.view.set({ isWelded });
+    this.facts.set({ report: undefined, problem: undefined });
+    this.#openPanes();
+  }
+
+  #openPanes(): void {
+    const { mesh, seams } = this;
+    this.adjacency = adjacencyOf(mesh.positions.length / 3, seams?.faces ?? mesh.faces);
+    for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, seams);
+    this.#needsMarks = true;
+    this.#documentChanged(performance.now());
+  }
+
   /** `isBroughtBack`: somebody has worked on it. */
-  open(mesh: Mesh, document: Document, isBroughtBack = false): void {
+  open(mesh: Mesh, document: Document, isBroughtBack = false, isWelded = true): void {
     if (this.isTouched) this.#asides.put({ ...this.#present(), steps: this.history.steps });
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
-    this.adjacency = adjacencyOf(mesh.positions.length / 3, mesh.faces);
-    this.edge = meanEdge(this.adjacency, mesh.positions);
+    this.#seams = seamsOf(mesh);
+    this.edge = meanEdge(adjacencyOf(mesh.positions.length / 3, mesh.faces), mesh.positions);
     this.diagonal = boundsOf(mesh.positions, mesh.faces).diagonal;
-    this.view.set({ selected: undefined, shape: "", pinned: undefined });
+    this.view.set({ selected: undefined, shape: "", pinned: undefined, isWelded });
     this.facts.set({
       mesh,
       report: undefined,
@@ -148,16 +135,16 @@ export class App {
       restoredFrom: undefined,
       pointedOut: nothing,
       setAside: this.#asides.names,
+      seamVertices: this.#seams?.copyCount ?? 0,
     });
-    for (const pane of this.panes) pane.open(mesh, document, this.view.now);
-    this.#documentChanged(performance.now());
+    this.#openPanes();
     this.fit();
   }
 
   #present(): Kept {
-    const { shape, detail, selected, isYUp, pinned } = this.view.now;
+    const { shape, detail, selected, isYUp, pinned, isWelded } = this.view.now;
     const { look } = this.panes[0]!.stage;
-    return { mesh: this.mesh, document: this.document, view: { shape, detail, selected, isYUp, pinned }, look };
+    return { mesh: this.mesh, document: this.document, view: { shape, detail, selected, isYUp, pinned, isWelded }, look };
   }
 
   /**
@@ -185,7 +172,7 @@ export class App {
   bringBack(id: number): void {
     const aside = this.#asides.take(id);
     if (!aside) return;
-    this.open(aside.mesh, aside.document, true);
+    this.open(aside.mesh, aside.document, true, aside.view.isWelded);
     if (aside.steps) this.history.restore(aside.steps);
     this.view.set({ ...aside.view, tool: "move" });
     this.lookFrom(aside.look);
@@ -340,7 +327,7 @@ export class App {
   #addSecondPane(): boolean {
     try {
       const pane = this.#panes.add("second");
-      if (this.mesh !== noMesh) pane.open(this.mesh, this.document, this.view.now);
+      if (this.mesh !== noMesh) pane.open(this.mesh, this.document, this.view.now, this.seams);
       return true;
     } catch {
       this.notify("This browser draws no second picture. Close other pages that draw in three dimensions.", true);
@@ -363,7 +350,7 @@ export class App {
       this.#needsMarks = true;
     }
     if (view.encoding !== before.encoding && this.mesh !== noMesh)
-      for (const pane of this.panes) pane.open(this.mesh, this.document, view);
+      for (const pane of this.panes) pane.open(this.mesh, this.document, view, this.seams);
     if (view.isYUp !== before.isYUp) this.fit();
     this.#needsColours = this.#needsMarks = true;
     this.requestDraw();

@@ -8,7 +8,7 @@ import type { Look } from "../stage/stage.js";
 export interface Kept {
   mesh: Mesh;
   document: Document;
-  view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned">;
+  view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned" | "isWelded">;
   look: Look;
 }
 

@@ -111,7 +111,14 @@ export class Editing implements PointingTarget {
   #dabAt({ hit }: PointerAt): number[] {
     const { app, pane } = this;
     const radius = app.view.now.radius * app.diagonal;
-    return dab(pane.stage.surface!.positions, app.adjacency, hit!.vertex, hit!.point, radius);
+    const { seams, adjacency } = app;
+    const seed = seams?.groups[hit!.vertex] ?? hit!.vertex;
+    return this.#withCopies(dab(pane.stage.surface!.positions, adjacency, seed, hit!.point, radius));
+  }
+
+  /** What is said of a vertex is said of all that are one with it. */
+  #withCopies(vertices: number[]): number[] {
+    return this.app.seams?.withCopies(vertices) ?? vertices;
   }
 
   #pressHandle(at: PointerAt): Stroke | undefined {
@@ -229,8 +236,9 @@ export class Editing implements PointingTarget {
     const { stage } = this.pane;
     const { positions, mesh } = stage.surface!;
     const inside = insidePolygon(project(positions, viewProjection(stage), stage.width, stage.height), polygon);
-    if (this.app.view.now.isThrough) return inside;
-    return facing(inside, positions, vertexNormals(positions, mesh.faces), stage.camera.position.toArray());
+    if (this.app.view.now.isThrough) return this.#withCopies(inside);
+    const normals = vertexNormals(positions, mesh.faces);
+    return this.#withCopies(facing(inside, positions, normals, stage.camera.position.toArray()));
   }
 
   #select(vertices: readonly number[], mode: "new" | "add" | "release"): void {

@@ -1,12 +1,13 @@
 import { FileFault } from "../io/fault.js";
 import { readHandleFile, writeHandleFile } from "../io/handlefile.js";
 import { writeObj } from "../io/obj.js";
+import { rewriteObj } from "../io/obj_rewrite.js";
 import { writeOff } from "../io/off.js";
 import { writePly } from "../io/ply.js";
 import { readMesh } from "../io/read.js";
 import { writeStl } from "../io/stl.js";
 import { emptyDocument } from "../model/document.js";
-import { isAtRest, type WrittenMesh } from "../model/mesh.js";
+import { isAtRest, type Mesh, type WrittenMesh } from "../model/mesh.js";
 import { short } from "../model/words.js";
 import type { App } from "./app.js";
 import { sentence } from "../link/status.js";
@@ -87,14 +88,20 @@ export class Files {
     const panes = [...this.app.panes];
     const stem = this.#stem;
     for (const pane of panes) {
-      const { faces } = pane.stage.surface!.mesh;
+      const { mesh } = pane.stage.surface!;
       const { positions, distortion } = await this.#exactly(pane);
-      const deformed: WrittenMesh = { positions, faces };
+      const { faces, corners, obj } = mesh;
+      const deformed: WrittenMesh = { positions, faces, ...(corners && { corners }) };
       const name = `${stem}-deformed${panes.length > 1 ? `-${pane.side}` : ""}.${format}`;
       if (format === "ply") save(name, writePly(deformed, distortion, this.app.red));
-      if (format === "obj") save(name, writeObj(deformed));
+      if (format === "obj") save(name, obj ? rewriteObj({ ...mesh, obj }, positions) : writeObj(deformed));
       if (format === "off") save(name, writeOff(deformed));
       if (format === "stl") save(name, writeStl(deformed));
+      const lost = lostIn(mesh, format);
+      if (lost.length > 0) {
+        const better = obj ? " Saved as OBJ, they stay." : "";
+        this.app.notify(`${name} is without what the file had beside: ${lost.join(", ")}.${better}`);
+      }
     }
   }
 
@@ -140,14 +147,16 @@ export class Files {
     const { p, secondP } = this.app.document;
     this.app.open(mesh, { ...emptyDocument, p, secondP });
     this.app.view.set({ tool: "move" });
-    this.app.notify(
-      `${name}: ${(mesh.positions.length / 3).toLocaleString("en")} vertices. Click the surface to place handles.`,
-    );
+    const count = (mesh.positions.length / 3).toLocaleString("en");
+    const { seamVertices } = this.app.facts.now;
+    const welded = `, ${seamVertices.toLocaleString("en")} of them copies along seams, welded: the panel “Mesh” has a switch`;
+    this.app.notify(`${name}: ${count} vertices${seamVertices > 0 ? welded : ""}. Click the surface to place handles.`);
   }
 
   #openHandles(name: string, text: string): void {
     const { app } = this;
-    app.change(readHandleFile(text, app.document, app.mesh));
+    const { seams } = app;
+    app.change(readHandleFile(text, app.document, app.mesh, (vertices) => seams?.withCopies(vertices) ?? vertices));
     app.view.set({ selected: app.document.handles.at(-1)!.name });
     app.notify(`${name}: ${app.document.handles.length} handles.`);
   }
@@ -167,6 +176,12 @@ export class Files {
       void this.open([...(event.dataTransfer?.files ?? [])]);
     });
   }
+}
+
+/** What a file had that it has not where it is saved in the format, in words. */
+function lostIn({ beside = [], corners, obj }: Mesh, format: MeshFormat): readonly string[] {
+  if (format === "obj" && obj) return [];
+  return format === "stl" && corners ? [...beside, "faces of more than three corners"] : beside;
 }
 
 function save(name: string, content: Blob | string | Uint8Array<ArrayBuffer>): void {

@@ -126,7 +126,7 @@ export class Keeper {
     const { selected, pinned, shape, ...look } = view;
     this.#watchOver();
     app.view.set(look);
-    app.open(mesh, document, true);
+    app.open(mesh, document, true, view.isWelded);
     app.view.set({ selected, pinned, shape: shape ?? "" });
     app.lookFrom(camera);
     app.facts.set({ restoredFrom: savedAt });

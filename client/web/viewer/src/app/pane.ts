@@ -5,6 +5,7 @@ import type { Side } from "../model/changes.js";
 import { type Document, pField } from "../model/document.js";
 import { boundsOf, centroid, type Mesh } from "../model/mesh.js";
 import { cornersOf, type PointedOut } from "../model/pointed.js";
+import type { Seams } from "../model/seams.js";
 import { type EnergyStatistics, energyStatistics } from "../model/statistics.js";
 import type { View } from "../model/view.js";
 import { vertexNormals } from "../stage/drawmesh.js";
@@ -49,9 +50,9 @@ export class Pane {
     this.element.append(this.stage.canvas, this.overlay.element);
   }
 
-  open(mesh: Mesh, document: Document, view: View): void {
+  open(mesh: Mesh, document: Document, view: View, seams: Seams | undefined): void {
     this.live?.close();
-    this.stage.open(mesh);
+    this.stage.open(mesh, seams?.faces);
     this.frame = this.#onScreenNext = undefined;
     this.statistics = nothing;
     this.trail.reset();
@@ -62,7 +63,7 @@ export class Pane {
       problem: (error) => this.watcher.problem(error),
       notice: (text) => this.watcher.notice(text),
     };
-    this.live = new Live(mesh, document, this.side, view.encoding, watcher);
+    this.live = new Live(mesh, document, this.side, view.encoding, watcher, seams?.groups);
     this.#isDirty = true;
   }
 

@@ -8,6 +8,8 @@ const mostCoordinate = 1e18;
 export class MeshBuilder {
   readonly positions: number[] = [];
   readonly faces: number[] = [];
+  readonly #corners: number[] = [];
+  readonly #beside = new Set<string>();
 
   /** `most`: vertices, and triangles, that a page can take in. */
   constructor(readonly most = 5_000_000) {}
@@ -28,7 +30,13 @@ export class MeshBuilder {
   polygon(corners: readonly number[], where: string): void {
     if (corners.length < 3) throw new FileFault(`${where}: a face has ${corners.length} corners.`);
     for (let k = 2; k < corners.length; ++k) this.faces.push(corners[0]!, corners[k - 1]!, corners[k]!);
+    this.#corners.push(corners.length);
     this.#checkCount(this.faces.length / 3, "triangles", where);
+  }
+
+  /** The file has something that a mesh here has not, in words. */
+  leftAside(what: string): void {
+    this.#beside.add(what);
   }
 
   #checkCount(count: number, what: string, where: string): void {
@@ -47,6 +55,14 @@ export class MeshBuilder {
     const faces = Uint32Array.from(this.faces);
     const positions = Float32Array.from(this.positions);
     const isExact = this.positions.every((value, k) => value === positions[k]);
-    return { name, positions, faces, ...(!isExact && { exact: Float64Array.from(this.positions) }) };
+    const hasPolygons = this.#corners.some((count) => count !== 3);
+    return {
+      name,
+      positions,
+      faces,
+      ...(!isExact && { exact: Float64Array.from(this.positions) }),
+      ...(hasPolygons && { corners: Uint32Array.from(this.#corners) }),
+      ...(this.#beside.size > 0 && { beside: [...this.#beside] }),
+    };
   }
 }

@@ -11,8 +11,16 @@ import { arrayOf, checkKeys, objectOf, textOf, vector3, vertexNumbers, weightOf 
 const handleKeys = ["name", "vertices", "points", "translate", "rotate", "positions", "footprint", "soft", "orientation"];
 const lockKeys = ["axis_lock", "plane_lock"];
 
-/** The document with the handles, region and painted groups of a file in place of its own. Throws a FileFault. */
-export function readHandleFile(text: string, document: Document, mesh: Mesh): Document {
+/**
+ * The document with the handles, region and painted groups of a file in place of its own. Throws a FileFault. `withCopies`: adds
+ * what is painted with a vertex, being one with it.
+ */
+export function readHandleFile(
+  text: string,
+  document: Document,
+  mesh: Mesh,
+  withCopies = (vertices: number[]): number[] => vertices,
+): Document {
   let json: unknown;
   try {
     json = JSON.parse(text);
@@ -31,7 +39,7 @@ export function readHandleFile(text: string, document: Document, mesh: Mesh): Do
     const { region: _, ...rest } = result;
     result = rest;
   }
-  for (const one of arrayOf(file["groups"] ?? [], "“groups”")) result = withGroup(result, one, vertexCount);
+  for (const one of arrayOf(file["groups"] ?? [], "“groups”")) result = withGroup(result, one, vertexCount, withCopies);
   return result;
 }
 
@@ -138,11 +146,16 @@ function centerOf(points: readonly SurfacePoint[], mesh: Mesh): Vector3 {
   return sum;
 }
 
-function withGroup(document: Document, json: unknown, vertexCount: number): Document {
+function withGroup(
+  document: Document,
+  json: unknown,
+  vertexCount: number,
+  withCopies: (vertices: number[]) => number[],
+): Document {
   const group = objectOf(json, "a group");
   const owner = `group “${textOf(group["name"], "the name of a group")}”`;
   checkKeys(group, ["name", "vertices", "p", "stiffness"], owner);
-  const vertices = vertexNumbers(group["vertices"], owner, vertexCount);
+  const vertices = withCopies(vertexNumbers(group["vertices"], owner, vertexCount));
   let result = document;
   for (const [field, least, most] of [
     ["p", 1, 64],

@@ -1,34 +1,46 @@
-import type { Mesh, WrittenMesh } from "../model/mesh.js";
+import { polygonsOf, type Mesh, type WrittenMesh } from "../model/mesh.js";
 import { MeshBuilder } from "./builder.js";
+import { cornerOf, logicalLines } from "./obj_lines.js";
 
-/** The positions and faces of an OBJ file; texture coordinates, normals, groups and materials are left aside. */
+/** What a keyword stands for that a mesh here has not. */
+const beside: Readonly<Record<string, string>> = {
+  vt: "texture coordinates",
+  vn: "normals",
+  g: "groups",
+  o: "objects",
+  s: "smoothing groups",
+  usemtl: "materials",
+  mtllib: "materials",
+  l: "lines",
+  p: "points",
+  curv: "curves",
+  surf: "curved surfaces",
+};
+
+/** The positions and faces of an OBJ file; what it has beside is named. */
 export function readObj(name: string, text: string): Mesh {
   const builder = new MeshBuilder();
-  let number = 0;
-  for (const line of text.replace(/\\\r?\n/g, " ").split(/\r?\n|\r/)) {
-    ++number;
-    const [key, ...words] = line.trim().split(/\s+/);
+  for (const { words, number } of logicalLines(text)) {
+    const [key, ...values] = words;
     if (key === "v") {
-      const [x = NaN, y = NaN, z = NaN] = words.map(Number);
+      const [x = NaN, y = NaN, z = NaN] = values.map(Number);
       builder.vertex(x, y, z, `${name}, line ${number}`);
+      if (values.length > 5) builder.leftAside("colours of vertices");
     } else if (key === "f") {
-      const end = words.findIndex((word) => word.startsWith("#"));
-      const corners = (end < 0 ? words : words.slice(0, end)).map((word) => cornerOf(word, builder.vertexCount));
+      const corners = values.map((word) => cornerOf(word, builder.vertexCount));
       builder.polygon(corners, `${name}, line ${number}`);
+    } else if (key !== undefined && Object.hasOwn(beside, key)) {
+      builder.leftAside(beside[key]!);
     }
   }
   return builder.finish(name);
 }
 
-/** Numbers count from 1, negative ones back from the newest vertex. */
-function cornerOf(word: string, vertexCount: number): number {
-  const number = Number(word.split("/")[0]);
-  return number < 0 ? vertexCount + number : number - 1;
-}
-
-export function writeObj({ positions, faces }: WrittenMesh): string {
+export function writeObj({ positions, faces, corners }: WrittenMesh): string {
   const lines: string[] = [];
   for (let k = 0; k < positions.length; k += 3) lines.push(`v ${positions[k]} ${positions[k + 1]} ${positions[k + 2]}`);
-  for (let k = 0; k < faces.length; k += 3) lines.push(`f ${faces[k]! + 1} ${faces[k + 1]! + 1} ${faces[k + 2]! + 1}`);
+  for (const polygon of polygonsOf({ faces, ...(corners && { corners }) })) {
+    lines.push(`f ${polygon.map((vertex) => vertex + 1).join(" ")}`);
+  }
   return `${lines.join("\n")}\n`;
 }

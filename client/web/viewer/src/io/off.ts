@@ -1,6 +1,8 @@
-import type { Mesh, WrittenMesh } from "../model/mesh.js";
+import { polygonsOf, type Mesh, type WrittenMesh } from "../model/mesh.js";
 import { MeshBuilder } from "./builder.js";
 import { FileFault } from "./fault.js";
+
+const beside = { ST: "texture coordinates", C: "colours of vertices", N: "normals" };
 
 /** OFF, and its variants with normals, colours and texture coordinates, of which the positions are read. */
 export function readOff(name: string, text: string): Mesh {
@@ -8,13 +10,14 @@ export function readOff(name: string, text: string): Mesh {
     .split(/\r?\n|\r/)
     .map((line) => line.replace(/#.*/, "").trim())
     .filter((line) => line !== "");
-  const header = /^(ST)?C?N?OFF\b\s*(.*)$/.exec(lines[0] ?? "");
+  const header = /^((?:ST)?C?N?)OFF\b\s*(.*)$/.exec(lines[0] ?? "");
   if (!header) throw new FileFault(`${name} does not begin with OFF.`);
   let next = 1;
   const counts = (header[2] || lines[next++] || "").split(/\s+/).map(Number);
   const [vertexCount = NaN, faceCount = NaN] = counts;
   if (!(vertexCount >= 0 && faceCount >= 0)) throw new FileFault(`${name} does not say how many vertices and faces it has.`);
   const builder = new MeshBuilder();
+  for (const [letter, what] of Object.entries(beside)) if (header[1]!.includes(letter)) builder.leftAside(what);
   const line = (what: string) => {
     const words = lines[next++];
     if (words === undefined) throw new FileFault(`${name} ends before ${what}.`);
@@ -30,13 +33,15 @@ export function readOff(name: string, text: string): Mesh {
       throw new FileFault(`${name}, face ${f}: it says that it has ${count} corners, and names ${corners.length}.`);
     }
     builder.polygon(corners.slice(0, count), `${name}, face ${f}`);
+    if (corners.length > count) builder.leftAside("colours of faces");
   }
   return builder.finish(name);
 }
 
-export function writeOff({ positions, faces }: WrittenMesh): string {
-  const lines = ["OFF", `${positions.length / 3} ${faces.length / 3} 0`];
+export function writeOff({ positions, faces, corners }: WrittenMesh): string {
+  const lines = ["OFF", `${positions.length / 3} ${corners?.length ?? faces.length / 3} 0`];
   for (let k = 0; k < positions.length; k += 3) lines.push(`${positions[k]} ${positions[k + 1]} ${positions[k + 2]}`);
-  for (let k = 0; k < faces.length; k += 3) lines.push(`3 ${faces[k]} ${faces[k + 1]} ${faces[k + 2]}`);
+  for (const polygon of polygonsOf({ faces, ...(corners && { corners }) }))
+    lines.push(`${polygon.length} ${polygon.join(" ")}`);
   return `${lines.join("\n")}\n`;
 }

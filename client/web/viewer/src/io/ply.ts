@@ -1,5 +1,5 @@
 import { blueToRed } from "../model/colours.js";
-import type { Mesh, WrittenMesh } from "../model/mesh.js";
+import { polygonsOf, type Mesh, type WrittenMesh } from "../model/mesh.js";
 import { MeshBuilder } from "./builder.js";
 import { FileFault } from "./fault.js";
 
@@ -45,6 +45,7 @@ export function readPly(name: string, bytes: Uint8Array): Mesh {
   const next = format === "ascii" ? textReader(name, body) : binaryReader(name, body, format === "binary_little_endian");
   const builder = new MeshBuilder();
   for (const element of elements) {
+    for (const what of besideOf(element)) builder.leftAside(what);
     for (let k = 0; k < element.count; ++k) readRow(name, element, k, next, builder);
   }
   return builder.finish(name);
@@ -79,6 +80,24 @@ function readHeader(name: string, bytes: Uint8Array): { format: string; elements
     if (count > 0 && properties.length === 0) throw new FileFault(`Element “${element}” of ${name} has no property.`);
   }
   return { format, elements, length: end.index + end[0].length };
+}
+
+/** What properties stand for that a mesh here has not. */
+const beside: readonly (readonly [RegExp, string])[] = [
+  [/^n[xyz]$/, "normals"],
+  [/^(s|t|u|v|texture_[uv]|texcoord|texnumber)$/, "texture coordinates"],
+  [/^(red|green|blue|alpha)$/, "colours"],
+];
+
+function besideOf({ name, count, properties }: Element): string[] {
+  if (count === 0) return [];
+  if (name !== "vertex" && name !== "face") return [`its element “${name}”`];
+  const names = properties.map((property) => property.name);
+  const own = name === "face" ? /^vertex_ind/ : /^[xyz]$/;
+  const others = names.filter((property) => !own.test(property));
+  // What this page itself has written beside a distortion is written anew.
+  if (names.includes("distortion")) return others.filter((property) => !/^(distortion|red|green|blue)$/.test(property));
+  return others.map((property) => beside.find(([key]) => key.test(property))?.[1] ?? `“${property}”`);
 }
 
 function countOf(name: string, [element, count]: readonly string[]): number {
@@ -158,7 +177,7 @@ function binaryReader(name: string, bytes: Uint8Array, littleEndian: boolean): (
  * float or double as they are given.
  */
 export function writePly(
-  { positions, faces }: WrittenMesh,
+  { positions, faces, corners }: WrittenMesh,
   distortion: Float32Array | Float64Array,
   red: number,
 ): Uint8Array<ArrayBuffer> {
@@ -166,6 +185,9 @@ export function writePly(
   const size = isDouble ? 8 : 4;
   const vertexBytes = 4 * size + 3;
   const vertexCount = positions.length / 3;
+  const faceCount = corners?.length ?? faces.length / 3;
+  const cornerCount = corners?.reduce((sum, count) => sum + count, 0) ?? faces.length;
+  const isLong = corners?.some((count) => count > 255) ?? false;
   const header = new TextEncoder().encode(
     [
       "ply",
@@ -173,13 +195,13 @@ export function writePly(
       `element vertex ${vertexCount}`,
       ...["x", "y", "z", "distortion"].map((property) => `property ${isDouble ? "double" : "float"} ${property}`),
       ...["red", "green", "blue"].map((property) => `property uchar ${property}`),
-      `element face ${faces.length / 3}`,
-      "property list uchar int vertex_indices",
+      `element face ${faceCount}`,
+      `property list ${isLong ? "uint" : "uchar"} int vertex_indices`,
       "end_header",
       "",
     ].join("\n"),
   );
-  const bytes = new Uint8Array(header.length + vertexBytes * vertexCount + (13 * faces.length) / 3);
+  const bytes = new Uint8Array(header.length + vertexBytes * vertexCount + (isLong ? 4 : 1) * faceCount + 4 * cornerCount);
   bytes.set(header);
   const view = new DataView(bytes.buffer);
   let at = header.length;
@@ -190,9 +212,14 @@ export function writePly(
     set(at + 3 * size, value);
     blueToRed(red > 0 ? value / red : 0).forEach((channel, k) => view.setUint8(at + 4 * size + k, channel));
   }
-  for (let f = 0; f < faces.length; f += 3, at += 13) {
-    view.setUint8(at, 3);
-    for (let corner = 0; corner < 3; ++corner) view.setInt32(at + 1 + 4 * corner, faces[f + corner]!, true);
+  for (const polygon of polygonsOf({ faces, ...(corners && { corners }) })) {
+    if (isLong) view.setUint32(at, polygon.length, true);
+    else view.setUint8(at, polygon.length);
+    at += isLong ? 4 : 1;
+    for (const vertex of polygon) {
+      view.setInt32(at, vertex, true);
+      at += 4;
+    }
   }
   return bytes;
 }

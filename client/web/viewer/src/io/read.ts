@@ -11,7 +11,7 @@ export function readMesh(name: string, bytes: Uint8Array): Mesh {
     case "off":
       return readOff(name, text(bytes));
     case "obj":
-      return readObj(name, text(bytes));
+      return { ...readObj(name, text(bytes)), obj: bytes };
     case "ply":
       return readPly(name, bytes);
     case "stl":

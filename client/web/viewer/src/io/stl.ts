@@ -22,6 +22,7 @@ function readBinary(name: string, bytes: Uint8Array, welder: Welder): void {
   const count = view.getUint32(80, true);
   if (bytes.length < 84 + 50 * count) throw new FileFault(`${name} has ${count} triangles by its header and ends too soon.`);
   for (let f = 0; f < count; ++f) {
+    if (view.getUint16(84 + 50 * f + 48, true) !== 0) welder.builder.leftAside("attributes of triangles");
     for (let number = 3; number < 12; number += 3) {
       const at = 84 + 50 * f + 4 * number;
       welder.corner(view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true));
@@ -30,8 +31,10 @@ function readBinary(name: string, bytes: Uint8Array, welder: Welder): void {
 }
 
 function readText(bytes: Uint8Array, welder: Welder): void {
+  const text = new TextDecoder().decode(bytes);
+  if ((text.match(/^\s*solid\b/gm) ?? []).length > 1) welder.builder.leftAside("solids");
   const vertex = /vertex\s+(\S+)\s+(\S+)\s+(\S+)/g;
-  for (const [, x, y, z] of new TextDecoder().decode(bytes).matchAll(vertex)) welder.corner(Number(x), Number(y), Number(z));
+  for (const [, x, y, z] of text.matchAll(vertex)) welder.corner(Number(x), Number(y), Number(z));
   welder.end();
 }
 

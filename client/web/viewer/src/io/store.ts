@@ -22,7 +22,7 @@ export interface Work {
 }
 
 export interface AsideWork extends Pick<Work, "document" | "camera" | "meshKey"> {
-  view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned">;
+  view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned" | "isWelded">;
 }
 
 /** What comes after all keys that begin with an id and "/". */

@@ -54,6 +54,8 @@ export class Live {
     readonly side: Side,
     readonly encoding: Encoding,
     readonly watcher: LiveWatcher,
+    /** Of each vertex, a number that those have which are taken for one with it. */
+    readonly weld?: Uint32Array,
   ) {
     void this.#run();
   }
@@ -161,6 +163,7 @@ export class Live {
             certify: true,
             maxFramesPerSecond: 60,
             signal,
+            ...(this.weld && { weld: this.weld }),
           },
         );
       } catch (thrown) {

@@ -7,12 +7,28 @@ export interface Mesh {
   exact?: Float64Array;
   /** Three vertices a triangle, counter-clockwise seen from outside. */
   faces: Uint32Array;
+  /** Of each face of the file, where some are no triangles: a polygon of n corners is a fan of n - 2 triangles about its first. */
+  corners?: Uint32Array;
+  /** What the file has beside, in words: "texture coordinates". */
+  beside?: readonly string[];
+  /** An OBJ file itself: what it has beside is saved with it. */
+  obj?: Uint8Array;
 }
 
 /** A mesh to be written, in the precision of its numbers. */
-export interface WrittenMesh {
+export interface WrittenMesh extends Pick<Mesh, "corners"> {
   positions: Float32Array | Float64Array;
   faces: Uint32Array;
+}
+
+/** The faces of the file, polygon by polygon. */
+export function* polygonsOf({ faces, corners }: Pick<Mesh, "faces" | "corners">): Generator<number[]> {
+  for (let at = 0, face = 0; at < faces.length; ++face) {
+    const count = corners?.[face] ?? 3;
+    const polygon = [faces[at]!, faces[at + 1]!];
+    for (let k = 2; k < count; ++k, at += 3) polygon.push(faces[at + 2]!);
+    yield polygon;
+  }
 }
 
 export type Vector3 = readonly [number, number, number];

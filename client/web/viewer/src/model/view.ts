@@ -29,6 +29,8 @@ export interface View {
   pinned: number | undefined;
   isSplit: boolean;
   isYUp: boolean;
+  /** Vertices in one place along seams are taken for one; see Seams. */
+  isWelded: boolean;
   isDark: boolean;
   isPanelOpen: boolean;
   /** Letters, digits and signs are shortcuts. */
@@ -54,6 +56,7 @@ export const firstView: View = {
   pinned: undefined,
   isSplit: false,
   isYUp: false,
+  isWelded: true,
   isDark: true,
   isPanelOpen: true,
   hasSingleKeys: true,

@@ -59,8 +59,9 @@ export class Stage {
     this.#controls = controls;
   }
 
-  open(mesh: Mesh): void {
-    const surface = new Surface(mesh); // before the old one goes: there may be no memory for it
+  /** `faces`: across which it is drawn smoothly, where these are not the mesh's own. */
+  open(mesh: Mesh, faces?: Uint32Array): void {
+    const surface = new Surface(mesh, faces); // before the old one goes: there may be no memory for it
     this.surface?.group.removeFromParent();
     this.surface?.dispose();
     this.surface = surface;

@@ -32,9 +32,12 @@ export class Surface {
   );
   readonly #ghost: three.Mesh;
 
-  constructor(readonly mesh: Mesh) {
+  constructor(
+    readonly mesh: Mesh,
+    faces = mesh.faces,
+  ) {
     this.positions = mesh.positions;
-    this.#draw = new DrawMesh(mesh);
+    this.#draw = new DrawMesh({ ...mesh, faces });
     this.#values = new Float32Array(this.#draw.source.length);
     this.#isPerVertex = isSoftware && mesh.positions.length > 3 * denseVertices;
     this.#material = surfaceMaterial(this.#isPerVertex, this.#draw.isClosed);
@@ -44,8 +47,8 @@ export class Surface {
     geometry.setAttribute("normal", live(this.#draw.normals, 3));
     geometry.setAttribute("value", live(this.#values, 1));
     this.#ghost = this.#makeGhost();
-    const faces = new three.Mesh(geometry, this.#material);
-    for (const object of [faces, this.#wire, this.#ghost]) {
+    const drawn = new three.Mesh(geometry, this.#material);
+    for (const object of [drawn, this.#wire, this.#ghost]) {
       object.frustumCulled = false;
       this.group.add(object);
     }

@@ -106,7 +106,7 @@ function asideNote(app: App): HTMLElement {
     which.replaceChildren(...setAside.map(({ id, name }) => el("option", { value: String(id), textContent: name })));
     if (!newest) return;
     const one = `“${newest.name}” has made room, with your work on it.`;
-    setText(text, setAside.length > 1 ? `${setAside.length} have made room, with your work on them:` : one);
+    setText(text, setAside.length > 1 ? `${setAside.length} have made room, with your work:` : one);
   });
   return note;
 }

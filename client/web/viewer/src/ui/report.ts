@@ -2,7 +2,7 @@ import type { Defect, MeshReport } from "lpdeform-client";
 import type { App } from "../app/app.js";
 import { elementsIn } from "../link/status.js";
 import { cornersOf, nothing, type PointedOut, within } from "../model/pointed.js";
-import { el } from "./dom.js";
+import { el, setText, toggle } from "./dom.js";
 import { icon } from "./icons.js";
 
 /** What a defect is of: the numbers in its list are of vertices, faces, or pairs of vertices. */
@@ -30,6 +30,26 @@ export function warningsOf(report: MeshReport | undefined): Defect[] {
 export function reportPanel(app: App): HTMLElement {
   const summary = el("p", { className: "quiet" });
   const list = el("ul", { className: "warnings" });
+  const seams = el("p", { className: "quiet" });
+  const weld = toggle(
+    "Weld seams",
+    true,
+    (isWelded) => app.weld(isWelded),
+    "Vertices in one place on open borders move as one; saved files have them all",
+  );
+  const seamBox = el("div", { className: "seams", hidden: true }, seams, weld.element);
+  const showSeams = () => {
+    const { seamVertices } = app.facts.now;
+    const { isWelded } = app.view.now;
+    weld.input.checked = isWelded;
+    seamBox.hidden = seamVertices === 0;
+    seamBox.classList.toggle("torn", !isWelded);
+    const copies = seamVertices === 1 ? "vertex lies on another" : "vertices lie on others";
+    const fate = isWelded ? "They move as one." : "The surface tears there.";
+    setText(seams, `${seamVertices.toLocaleString("en")} ${copies} along seams of textures or normals. ${fate}`);
+  };
+  app.facts.watch(showSeams);
+  app.view.watch(showSeams);
   app.facts.watch(({ report, mesh }, before) => {
     if (report === before.report && mesh === before.mesh && summary.textContent !== "") return;
     const defects = defectsOf(report);
@@ -42,9 +62,10 @@ export function reportPanel(app: App): HTMLElement {
     ];
     summary.textContent = parts ? `${mesh.name}: ${parts.join(", ")}.` : mesh.name;
     list.replaceChildren(...defects.map((defect) => warning(app, defect)));
-    if (report && defects.length === 0) list.append(el("li", { className: "good" }, "Nothing wrong with it."));
+    const isTorn = app.facts.now.seamVertices > 0 && !app.seams;
+    if (report && defects.length === 0 && !isTorn) list.append(el("li", { className: "good" }, "Nothing wrong with it."));
   });
-  return el("div", {}, summary, list);
+  return el("div", {}, summary, list, seamBox);
 }
 
 /** "zero_area_faces" as "zero area face" or "faces". */

@@ -15,9 +15,10 @@ export function sidePanel(app: App): HTMLElement {
     section("Measures", measures(app), true),
     mesh,
   );
-  app.facts.watch(({ report }, before) => {
+  app.facts.watch(({ report, seamVertices }, before) => {
     if (report === before.report) return;
-    const count = warningsOf(report).length;
+    const isSplit = report !== undefined && seamVertices > 0 && !app.view.now.isWelded;
+    const count = warningsOf(report).length + (isSplit ? 1 : 0);
     mesh.classList.toggle("warned", count > 0);
     if (count > 0) mesh.open = true;
   });

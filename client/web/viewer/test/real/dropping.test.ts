@@ -125,3 +125,29 @@ it("handles are not saved where there are none", async () => {
   await user.page.getByRole("menuitem", { name: "Handles as JSON" }).click();
   await refusal("There are no handles to save");
 });
+
+it("an OBJ file keeps what it has beside where it is saved as such, and it is said where it is not", async () => {
+  const [ring, top] = ["v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n", "v 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"];
+  const beside = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\ng tower\nusemtl brick\n";
+  const faces = ["1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8"].map((face) =>
+    face.split(" ").map((vertex, corner) => `${vertex}/${corner + 1}`),
+  );
+  await drop({ "chimney.obj": `${ring}${top}${beside}${faces.map((face) => `f ${face.join(" ")}\n`).join("")}` });
+  await isOpen("chimney.obj");
+  const handles = [
+    { name: "Foot", vertices: [0, 1, 2, 3] },
+    { name: "Top", vertices: [4, 5, 6, 7], translate: [0, 0, 2] },
+  ];
+  await drop({ "handles.json": JSON.stringify({ handles }) });
+  await user.settled();
+  const saved = (await user.save("Mesh as OBJ")).toString();
+  expect(saved).toContain(beside);
+  expect(saved).toContain(`f ${faces[0]!.join(" ")}\n`);
+  expect(saved.split("\n")[4]).toBe("v 0 0 3");
+  await user.save("Mesh as STL");
+  const notice = user.page.locator(".notice", { hasText: "chimney-deformed.stl is without what the file had beside" });
+  await notice.waitFor();
+  expect(await notice.textContent()).toContain(
+    "texture coordinates, groups, materials, faces of more than three corners. Saved as OBJ, they stay.",
+  );
+});

@@ -195,7 +195,7 @@ it("each work that is followed by another stays, however many there are, over a 
   const expectThird = async () => {
     expect([await user.ask("app.mesh.name"), await work()]).toEqual(["third.off", works[2]]);
     expect(await names()).toEqual(["second.off", "bar"]);
-    expect(await aside.textContent()).toContain("2 have made room, with your work on them:");
+    expect(await aside.textContent()).toContain("2 have made room, with your work:");
   };
   await expectThird();
   await user.page.waitForTimeout(700);

@@ -1,0 +1,57 @@
+import type { Mesh } from "../model/mesh.js";
+import { cornerOf, indexOf, logicalLines } from "./obj_lines.js";
+import { type Numbers, NormalTurner } from "./turned_normals.js";
+
+/**
+ * The OBJ file with other positions: every line stays as it is but those of vertices (what follows their three numbers stays, too)
+ * and of normals, which turn with the surface. Since a normal may stand with many vertices, each pair gets one of its own.
+ */
+export function rewriteObj({ obj, positions: drawn, exact, faces }: Mesh & { obj: Uint8Array }, positions: Numbers): string {
+  const turner = new NormalTurner(exact ?? drawn, positions, faces);
+  const normals: number[][] = [];
+  const pairs = new Map<string, number>();
+  const newNormals: string[] = [];
+  const out: string[] = [];
+  let vertexCount = 0;
+  let firstFace: number | undefined;
+
+  const withNormal = (word: string): string => {
+    const [vertex, texture, normal] = word.split("/");
+    if (!normal) return word;
+    const at = indexOf(normal, normals.length);
+    const from = normals[at];
+    if (!from) return word;
+    const corner = cornerOf(vertex!, vertexCount);
+    const key = `${corner} ${at}`;
+    let number = pairs.get(key);
+    if (number === undefined) {
+      number = newNormals.push(`vn ${turner.turned(corner, from).map(shortest).join(" ")}`);
+      pairs.set(key, number);
+    }
+    return `${vertex}/${texture}/${number}`;
+  };
+
+  for (const { text, words } of logicalLines(new TextDecoder().decode(obj))) {
+    const [key, ...values] = words;
+    const end = text.endsWith("\r") ? "\r" : "";
+    if (key === "v") {
+      const place = [0, 1, 2].map((axis) => String(positions[3 * vertexCount + axis]));
+      out.push(["v", ...place, ...values.slice(3)].join(" ") + end);
+      ++vertexCount;
+    } else if (key === "vn") {
+      normals.push(values.slice(0, 3).map(Number));
+    } else if (key === "f") {
+      firstFace ??= out.push("") - 1;
+      out.push(values.some((word) => /\/.*\/./.test(word)) ? ["f", ...values.map(withNormal)].join(" ") + end : text);
+    } else {
+      out.push(text);
+    }
+  }
+  if (firstFace !== undefined) out.splice(firstFace, 1, ...newNormals);
+  return out.join("\n");
+}
+
+/** A direction needs no more. */
+function shortest(value: number): string {
+  return String(Number(value.toPrecision(7)));
+}

@@ -1,0 +1,105 @@
+import { join } from "node:path";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { Service } from "../../../client/test/real/service.js";
+import { readOff, writeOff } from "../../src/io/off.js";
+import { splitTube } from "../split_tube.js";
+import { User } from "./user.js";
+
+const [columns, rows] = [16, 10];
+const tube = splitTube(columns, rows);
+const vertexCount = tube.positions.length / 3;
+const ring = (row: number) => Array.from({ length: columns + 1 }, (_, column) => row * (columns + 1) + column);
+
+let service: Service;
+let user: User;
+
+beforeAll(async () => {
+  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
+  user = await User.open(`${service.url}/?shape=bar&detail=coarse&encoding=float32`);
+  await user.settled();
+  await user.openFiles({ name: "tube.off", content: writeOff(tube) });
+});
+
+afterAll(async () => {
+  await user.close();
+  await service.stop();
+});
+
+/** The largest distance of vertices that were in one place. */
+async function gap(): Promise<number> {
+  await user.settled();
+  return gapOf(await user.positions());
+}
+
+function gapOf(positions: ArrayLike<number>): number {
+  const far = (a: number, b: number) =>
+    Math.hypot(...[0, 1, 2].map((axis) => positions[3 * a + axis]! - positions[3 * b + axis]!));
+  return Math.max(...Array.from({ length: rows + 1 }, (_, row) => far(row * (columns + 1), row * (columns + 1) + columns)));
+}
+
+const notice = (words: string) => user.page.locator(".notice", { hasText: words }).waitFor();
+const weldSwitch = () => user.page.locator(".seams .toggle");
+
+it("a mesh with seams is opened as one surface, and says so", async () => {
+  await notice(`${vertexCount} vertices, ${rows + 1} of them copies along seams, welded`);
+  await user.until("window.__lpdeform.app.facts.now.report");
+  expect(await user.ask("app.facts.now.report.weldedVertices")).toBe(rows + 1);
+  const handles = [
+    { name: "Base", vertices: ring(0) },
+    { name: "Top", vertices: ring(rows), translate: [3, 1, -1], rotate: { axis: [0, 0, 1], angle_degrees: 100 } },
+  ];
+  // One of two copies: the other has the same p.
+  const groups = [{ name: "g", vertices: [3 * (columns + 1)], p: 1 }];
+  await user.openFiles({ name: "handles.json", content: JSON.stringify({ handles, groups }) });
+  await user.until("window.__lpdeform.document().handles.length === 2");
+  expect(await gap()).toBe(0);
+  expect(await user.page.locator(".banner").isHidden()).toBe(true);
+  expect(await user.ask("document().paintedP")).toMatchObject({ [3 * (columns + 1)]: 1, [3 * (columns + 1) + columns]: 1 });
+});
+
+it("what is saved has the file's own vertices and faces", async () => {
+  const saved = readOff("saved.off", (await user.save("Mesh as OFF")).toString());
+  expect([saved.positions.length, saved.faces]).toEqual([3 * vertexCount, tube.faces]);
+  expect(gapOf(saved.exact ?? saved.positions)).toBe(0);
+});
+
+it("a brush goes over a seam, and takes all that is in one place", async () => {
+  await user.settled();
+  await user.ask("app.view.set({ tool: 'paint', radius: 0.1 })");
+  await user.ask("app.lookAt([5 * 17])");
+  const { x, y } = await user.vertexOnPage(5 * (columns + 1));
+  await user.drag({ x, y }, 3, 3);
+  await expect.poll(() => user.ask("document().paintedP[5 * 17]")).toBe(1);
+  const painted = await user.ask<Record<string, number>>("document().paintedP");
+  for (let row = 0; row <= rows; ++row) {
+    expect(painted[row * (columns + 1) + columns]).toEqual(painted[row * (columns + 1)]);
+  }
+  expect([painted[5 * (columns + 1) + 1], painted[5 * (columns + 1) + columns - 1]]).toEqual([1, 1]); // either side
+  await user.settled();
+  expect(await user.page.locator(".banner").isHidden()).toBe(true);
+  await user.page.keyboard.press("Control+z");
+});
+
+it("the switch lets the surface tear, and closes it again", async () => {
+  await user.page.locator(".panel summary", { hasText: "Mesh" }).click();
+  await weldSwitch().click();
+  await user.until("window.__lpdeform.app.facts.now.report && window.__lpdeform.status() === 'live'");
+  expect(await gap()).toBeGreaterThan(0.1);
+  expect(await user.ask("app.facts.now.report.weldedVertices")).toBe(0);
+  await user.page.locator(".seams.torn", { hasText: "The surface tears there." }).waitFor();
+  expect(await user.page.getByText("Nothing wrong with it.").isVisible()).toBe(false);
+  await user.page.waitForTimeout(700);
+  await user.page.reload(); // it is remembered with the work
+  await user.until("window.__lpdeform?.app.facts.now.report && window.__lpdeform.status() === 'live'");
+  expect(await gap()).toBeGreaterThan(0.1);
+  await weldSwitch().click();
+  await user.until("window.__lpdeform.app.facts.now.report?.weldedVertices > 0");
+  expect(await gap()).toBe(0);
+  expect(user.errors).toEqual([]);
+});
+
+it("a mesh without seams has no switch", async () => {
+  await user.page.getByLabel("Shape").selectOption("bar");
+  await user.settled();
+  expect(await weldSwitch().isHidden()).toBe(true);
+});

@@ -1,0 +1,72 @@
+import { expect, it } from "vitest";
+import type { Mesh } from "../src/model/mesh.js";
+import { seamsOf } from "../src/model/seams.js";
+import { shapeKinds } from "../src/model/shapes.js";
+import { splitTube } from "./split_tube.js";
+
+const columns = 12;
+const rows = 4;
+
+/** Two meshes beside each other in one file. */
+function together(...meshes: Mesh[]): Mesh {
+  const faces: number[] = [];
+  let begin = 0;
+  for (const mesh of meshes) {
+    for (const vertex of mesh.faces) faces.push(begin + vertex);
+    begin += mesh.positions.length / 3;
+  }
+  const positions = Float32Array.from(meshes.flatMap((mesh) => [...mesh.positions]));
+  return { name: "together", positions, faces: Uint32Array.from(faces) };
+}
+
+it("vertices in one place on open borders are found, and the faces that use them", () => {
+  const mesh = splitTube(columns, rows);
+  const seams = seamsOf(mesh)!;
+  expect(seams.copyCount).toBe(rows + 1);
+  // Row by row, each with one column more than there are places.
+  const first = Array.from({ length: rows + 1 }, (_, row) => row * (columns + 1));
+  for (const vertex of first) expect(seams.groups[vertex + columns]).toBe(vertex);
+  expect(new Set(seams.groups).size).toBe((rows + 1) * columns);
+  expect(seams.faces).toEqual(mesh.faces.map((vertex) => seams.groups[vertex]!));
+  expect(seams.withCopies([columns, 1, 0])).toEqual([0, columns, 1]);
+});
+
+it.each([
+  [1e-16, true],
+  [1e-10, true],
+  [1e-6, false],
+])("as in one place counts what is %d of the size apart: %s", (share, isSeam) => {
+  const mesh = splitTube(columns, rows);
+  const exact = Float64Array.from(mesh.positions);
+  for (let row = 0; row <= rows; ++row) exact[3 * (row * (columns + 1) + columns)]! += share;
+  expect(seamsOf({ ...mesh, exact }) !== undefined).toBe(isSeam);
+});
+
+it("also where that lies on both sides of 0, or of any other number", () => {
+  const mesh = splitTube(columns, rows);
+  for (const shift of [0, 1e-9, 0.1, 1000 * 1e-9]) {
+    const exact = Float64Array.from(mesh.positions, (value, k) => value + (k % 3 === 1 ? shift : 0));
+    for (let row = 0; row <= rows; ++row) {
+      exact[3 * (row * (columns + 1)) + 1] = shift - 1e-10;
+      exact[3 * (row * (columns + 1) + columns) + 1] = shift + 1e-10;
+    }
+    expect(seamsOf({ ...mesh, exact })?.copyCount).toBe(rows + 1);
+  }
+});
+
+it("surfaces that are closed, or whose borders lie apart, have none", () => {
+  const { mesh } = shapeKinds.find(({ id }) => id === "block")!.make("coarse");
+  expect(seamsOf(mesh)).toBeUndefined();
+  expect(seamsOf(together(mesh, mesh))).toBeUndefined(); // in one place, and yet two bodies
+  for (const { make } of shapeKinds) expect(seamsOf(make("coarse").mesh)).toBeUndefined();
+});
+
+it("a heap of single triangles is one surface", () => {
+  const { mesh } = shapeKinds.find(({ id }) => id === "block")!.make("coarse");
+  const heap: Mesh = {
+    name: "heap",
+    positions: Float32Array.from([...mesh.faces].flatMap((vertex) => [...mesh.positions.subarray(3 * vertex, 3 * vertex + 3)])),
+    faces: Uint32Array.from({ length: mesh.faces.length }, (_, corner) => corner),
+  };
+  expect(new Set(seamsOf(heap)!.groups).size).toBe(mesh.positions.length / 3);
+});
