@@ -47,12 +47,35 @@ bool is_for_this_machine(const ServerOptions& options) {
          !absl::StartsWith(options.address, "unix:");
 }
 
+/// Clients count from an earlier moment than the server, and gRPC rounds what it is told to about a hundredth.
+bool is_reached(const CallContext::Deadline& deadline) {
+  const auto slack = std::chrono::milliseconds(50) + deadline.given / 50;
+  return deadline.when - slack <= std::chrono::system_clock::now();
+}
+
 std::string ended_because(EndReason reason) {
   if (reason == EndReason::kSessionExpired) return "expired";
+  if (reason == EndReason::kElsewhere) return "elsewhere";
   return reason == EndReason::kDraining ? "draining" : "deleted";
 }
 
+/// Where a flood is followed by nothing, nothing else would.
+void sum_up_later(const std::weak_ptr<Timers>& weak_timers, const std::weak_ptr<const Log>& weak_log) {
+  const auto timers = weak_timers.lock();
+  if (!timers) return;
+  timers->at(timers->now() + Log::kWindow, [weak_timers, weak_log] {
+    const auto log = weak_log.lock();
+    if (!log) return;
+    log->sum_up();
+    sum_up_later(weak_timers, weak_log);
+  });
+}
+
 }  // namespace
+
+RefusedInput refused_input(const v1::Update& update) {
+  return {update.input_seq(), update.handles_size() == 1 ? update.handles(0).name() : ""};
+}
 
 Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
     : timers(or_system(options.timers)),
@@ -81,7 +104,7 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
     keeper_ = Keeper::create(options.store, {timers, metrics, log_, options.session_idle});
     keeper_->on_lost = [registry = std::weak_ptr(registry)](const Session& session) {
       if (const auto self = registry.lock())
-        self->remove(session, EndReason::kDraining, "Another server has the session now.");
+        self->remove(session, EndReason::kElsewhere, "Another server has the session now.");
     };
   }
   registry->on_ended = [log = log_, metrics = metrics, keeper = keeper_,
@@ -92,12 +115,13 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
     metrics->session_ended(why);
     log->info("session_ended", {{"session", abbreviated(session.name())}, {"reason", why}});
     if (!keeper) return;
-    if (reason == EndReason::kDraining) return keeper->release(session);
+    if (goes_on(reason)) return keeper->release(session);
     if (reason == EndReason::kSessionExpired) return keeper->expire(session);
     keeper->remove(session.name());
   };
   metrics->set(Level::kSessionsMost, static_cast<double>(options.max_sessions));
   metrics->set(Level::kMemoryBytesMost, static_cast<double>(options.max_bytes));
+  sum_up_later(timers, log_);
   if (tokens_) watch_files(timers, files_of("keys", tokens_), log_);
 }
 
@@ -233,15 +257,22 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call
   return OpenStream{*std::move(session), *std::move(stream), *std::move(place)};
 }
 
-void Backend::forget(const CallContext& call, const OpenStream& open) {
+void Backend::forget(const CallContext& call, const OpenStream& open, CallEnd how) {
   open.session->forget_stream(*open.stream);
   metrics->change(Level::kStreams, -1);
+  how.is_past_deadline = is_reached(call.deadline);
+  how.unread = std::max<std::chrono::duration<double>>(how.unread, open.stream->waited_for_credit());
+  const std::string reason = stream_end_name(stream_end_of(open.stream->ended_by(), how));
+  metrics->stream_ended(reason);
   const WriterLease lease = open.session->lease();
   log().info("stream_ended", {{"session", abbreviated(open.session->name())},
                               {"stream", abbreviated(open.stream->id())},
+                              {"reason", reason},
                               {"epoch", lease.epoch},
                               {"input_seq", lease.input_seq},
                               {"frame_seq", open.stream->last_frame_seq()},
+                              {"unread_seconds", where_known(how.unread.count())},
+                              {"fault", open.session->standing_fault()},
                               {"trace_id", call.trace_id}});
 }
 

@@ -25,6 +25,7 @@
 #include "server/scheduler.h"
 #include "server/server.h"
 #include "server/session_factory.h"
+#include "server/stream_end.h"
 #include "server/task_pool.h"
 #include "server/tokens.h"
 #include "server/upload.h"
@@ -36,6 +37,9 @@ struct NewSession {
   std::shared_ptr<Session> session;
   StoredHead head;  // empty without a store
 };
+
+/// What the log says of an update that is refused.
+RefusedInput refused_input(const v1::Update& update);
 
 /// All that the calls of a server share, and what they do, without gRPC: each function takes a request to its
 /// response. Called from the task pool and the scheduler, never from gRPC's threads. Thread-safe.
@@ -111,8 +115,8 @@ class Backend {
                                          const std::string& token, const v1::FrameOptions& options,
                                          std::function<void()> wake);
 
-  /// Lets go of a stream that is over.
-  void forget(const CallContext& call, const OpenStream& open);
+  /// Lets go of a stream that is over, and says why it is.
+  void forget(const CallContext& call, const OpenStream& open, CallEnd how);
 
   /// Decodes an update for a session and gives it to it. `answered` is called with an error at once, else when the update
   /// is in the store, or when that takes too long.

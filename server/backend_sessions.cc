@@ -356,6 +356,10 @@ void Backend::end_restoring(const std::string& name, const absl::Status& status)
     waiting.swap(restoring_.at(name).waiting);
     restoring_.erase(name);
   }
+  if (const std::string damage = damage_of(status); !damage.empty()) {
+    metrics->add(Count::kSessionsDamaged);
+    log().error("session_damaged", {{"session", abbreviated(name)}, {"text", damage}});
+  }
   // What there is not, find() does not find either.
   const bool is_unknown = fault_of(status).reason == "SESSION_UNKNOWN";
   if (is_unknown) registry->forget_left(name);

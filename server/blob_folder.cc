@@ -86,7 +86,7 @@ absl::Status BlobFolder::write(const std::string& key, std::string_view bytes) c
 absl::StatusOr<std::string> BlobFolder::read(const std::string& key) const {
   const std::string path = file_of(key);
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0 && errno == ENOENT) return session_damaged(absl::StrCat(path, " is missing"));
+  if (fd < 0 && errno == ENOENT) return session_damaged("its mesh is missing", path);
   if (fd < 0) return failed(path, errno);
   const absl::Cleanup close_it = [fd] { close(fd); };
   struct stat about = {};
@@ -101,7 +101,7 @@ absl::StatusOr<std::string> BlobFolder::read(const std::string& key) const {
     done += static_cast<std::size_t>(got);
   }
   if (done == bytes.size() && blob_key(bytes) == key) return bytes;
-  return session_damaged(absl::StrCat(path, " is not what was written"));
+  return session_damaged("its mesh is not what was written", path);
 }
 
 void BlobFolder::remove(const std::string& key) const {

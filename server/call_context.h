@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <string>
 
 namespace lpdeform {
@@ -16,6 +17,12 @@ struct CallContext {
   std::string authority = {};
   /// The header "lpdeform-session", by which a proxy chose this server; empty where there is none.
   std::string route = {};
+  /// By when the client wants the call to be over, and how long that was when it came; long from now where it did not say.
+  struct Deadline {
+    std::chrono::system_clock::time_point when = std::chrono::system_clock::time_point::max();
+    std::chrono::system_clock::duration given{0};
+  };
+  Deadline deadline = {};
 };
 
 }  // namespace lpdeform

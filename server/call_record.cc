@@ -8,11 +8,26 @@
 namespace lpdeform {
 namespace {
 
+bool is_servers_fault(absl::StatusCode code) {
+  return code == absl::StatusCode::kInternal || code == absl::StatusCode::kUnknown ||
+         code == absl::StatusCode::kDataLoss;
+}
+
 /// Errors whose texts speak of the server or of the caller's rights, never of what was sent.
 bool is_of_the_server(absl::StatusCode code) {
   return code == absl::StatusCode::kUnavailable || code == absl::StatusCode::kResourceExhausted ||
          code == absl::StatusCode::kUnauthenticated || code == absl::StatusCode::kPermissionDenied ||
-         code == absl::StatusCode::kInternal;
+         is_servers_fault(code);
+}
+
+/// A name that nobody has may be anything, also a token in the wrong place.
+std::string element_of(const Fault& fault) {
+  return fault.reason == "SESSION_UNKNOWN" ? abbreviated(fault.element) : quoted(fault.element);
+}
+
+/// Of a distance it is made from the mesh, which is nobody's business.
+std::string limit_of(const Fault& fault) {
+  return fault.reason.ends_with("_TOO_FAR") ? "" : quoted(fault.limit);
 }
 
 }  // namespace
@@ -34,7 +49,13 @@ CallRecord::~CallRecord() {
 
 void CallRecord::ended(const absl::Status& status) {
   code_ = status.code();
-  if (!status.ok()) refused(status);
+  if (status.ok()) return;
+  RefusedInput input;
+  {
+    const std::scoped_lock lock(mutex_);
+    input = input_;
+  }
+  refused(status, input);
 }
 
 void CallRecord::about(const std::shared_ptr<const Session>& session) {
@@ -42,29 +63,42 @@ void CallRecord::about(const std::shared_ptr<const Session>& session) {
   session_ = session;
 }
 
-void CallRecord::refused(const absl::Status& status) const {
-  const std::string reason = fault_of(status).reason;
-  if (reason.empty()) return;  // the client's own doing
+void CallRecord::about(RefusedInput input) {
+  const std::scoped_lock lock(mutex_);
+  input_ = std::move(input);
+}
+
+void CallRecord::refused(const absl::Status& status, const RefusedInput& input) const {
+  std::string reason = fault_of(status).reason;
+  if (reason.empty()) {
+    if (!is_servers_fault(status.code())) return;  // the client's own doing
+    reason = absl::StatusCodeToString(status.code());
+  }
   metrics_->rejected(reason);
-  const std::string text = is_of_the_server(status.code()) ? std::string(status.message()) : "";
+  tell(status, reason, input);
+}
+
+void CallRecord::tell(const absl::Status& status, const std::string& reason,
+                      const RefusedInput& input) const {
   std::shared_ptr<const Session> session;
   {
     const std::scoped_lock lock(mutex_);
     session = session_.lock();
   }
-  if (session == nullptr) {
-    return log_->info(
-        "refused",
-        {{"method", method_}, {"reason", reason}, {"text", text}, {"trace_id", context_.trace_id}});
-  }
-  const WriterLease lease = session->lease();
-  log_->info("refused", {{"method", method_},
-                         {"session", abbreviated(session->name())},
-                         {"epoch", lease.epoch},
-                         {"input_seq", lease.input_seq},
-                         {"reason", reason},
-                         {"text", text},
-                         {"trace_id", context_.trace_id}});
+  const WriterLease lease = session ? session->lease() : WriterLease{};
+  const Fault fault = fault_of(status);
+  const auto write = is_servers_fault(status.code()) ? &Log::error : &Log::info;
+  ((*log_).*write)("refused", {{"method", method_},
+                               {"session", session ? abbreviated(session->name()) : ""},
+                               {"epoch", where_known(lease.epoch)},
+                               {"session_input_seq", where_known(lease.input_seq)},
+                               {"input_seq", where_known(input.input_seq)},
+                               {"handle", quoted(input.handle)},
+                               {"reason", reason},
+                               {"element", element_of(fault)},
+                               {"limit", limit_of(fault)},
+                               {"text", is_of_the_server(status.code()) ? std::string(status.message()) : ""},
+                               {"trace_id", context_.trace_id}});
 }
 
 }  // namespace lpdeform

@@ -85,6 +85,7 @@ v1::GoAwayReason encode_reason(EndReason reason) {
     case EndReason::kSessionExpired:
       return v1::GO_AWAY_REASON_SESSION_EXPIRED;
     case EndReason::kDraining:
+    case EndReason::kElsewhere:
       return v1::GO_AWAY_REASON_DRAINING;
     case EndReason::kWriterReplaced:
       return v1::GO_AWAY_REASON_WRITER_REPLACED;
@@ -211,8 +212,7 @@ void encode_event(const Note& note, const FrameStream& stream, std::uint32_t ver
                   [&](const EndNote& end) {
                     out.mutable_go_away()->set_reason(encode_reason(end.reason));
                     out.mutable_go_away()->set_text(end.text);
-                    if (end.reason == EndReason::kDraining)
-                      out.mutable_go_away()->set_reconnect_after_ms(1000);
+                    if (goes_on(end.reason)) out.mutable_go_away()->set_reconnect_after_ms(1000);
                   }};
   std::visit(put, note);
 }

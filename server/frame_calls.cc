@@ -46,7 +46,7 @@ class FrameCall : public WritePump<Reactor, Response> {
         });
     const std::scoped_lock lock(this->mutex_);
     if (!open.ok()) return this->refuse_locked(open.status());
-    if (this->is_over_locked()) return backend_.forget(this->context(), *open);
+    if (this->is_over_locked()) return backend_.forget(this->context(), *open, this->how_ended_locked());
     open_ = *std::move(open);
     token_ = token;
     this->pump_locked();
@@ -62,7 +62,8 @@ class FrameCall : public WritePump<Reactor, Response> {
   }
 
   void let_go() final {
-    if (open_.stream && !std::exchange(is_forgotten_, true)) backend_.forget(this->context(), open_);
+    if (open_.stream && !std::exchange(is_forgotten_, true))
+      backend_.forget(this->context(), open_, this->how_ended_locked());
   }
 
   Backend& backend_;
@@ -181,8 +182,8 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   void give_update(absl::Status status) {
     const v1::Update& update = request_.update();
     const auto answered = [self = std::static_pointer_cast<DeformCall>(shared_from_this()),
-                           input_seq = update.input_seq()](const absl::StatusOr<UpdateResult>& result) {
-      self->answer(result, input_seq);
+                           input = refused_input(update)](const absl::StatusOr<UpdateResult>& result) {
+      self->answer(result, input);
     };
     if (!status.ok()) return answered(status);
     const auto session = backend_.registry->find(open_.session->name(), open_.session->owner());
@@ -198,8 +199,8 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   }
 
   /// On any thread.
-  void answer(const absl::StatusOr<UpdateResult>& result, std::uint64_t input_seq) {
-    if (!result.ok()) record().refused(result.status());
+  void answer(const absl::StatusOr<UpdateResult>& result, const RefusedInput& input) {
+    if (!result.ok()) record().refused(result.status(), input);
     {
       const std::scoped_lock lock(mutex_);
       --unanswered_;
@@ -207,7 +208,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
     if (result.ok()) {
       open_.stream->answer(*result);
     } else if (!goes_on_elsewhere(result.status())) {
-      open_.stream->answer(FaultNote{result.status(), input_seq});
+      open_.stream->answer(FaultNote{result.status(), input.input_seq});
     }
   }
 
@@ -220,7 +221,13 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
 
   /// The client does not keep to the contract: reads no more, and says so.
   void break_off(const std::string& why) {
-    if (open_.stream) return open_.stream->end(EndReason::kProtocolError, why);
+    if (open_.stream) {
+      backend_.log().info("stream_misused", {{"session", abbreviated(open_.session->name())},
+                                             {"stream", abbreviated(open_.stream->id())},
+                                             {"text", why},
+                                             {"trace_id", context().trace_id}});
+      return open_.stream->end(EndReason::kProtocolError, why);
+    }
     refuse(invalid_input({"STREAM_PROTOCOL", "", ""}, why));
   }
 

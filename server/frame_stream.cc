@@ -97,8 +97,10 @@ void FrameStream::begin_frame(Timers::TimePoint now) {
   const bool was_sent = newest->repeats != 0 && newest->repeats == last_seq_;
   if (was_sent && !options_.with_certificate) return;
   if (in_flight_.size() >= options_.credit) {
-    if (!std::exchange(is_stalled_, true)) publisher_->metrics().add(Count::kCreditStalls);
-    return;
+    if (is_stalled_) return;
+    is_stalled_ = true;
+    stalled_since_ = now;
+    return publisher_->metrics().add(Count::kCreditStalls);
   }
   if (const Timers::TimePoint when = next_frame_at(); now < when) return arm(is_pace_armed_, when);
   is_stalled_ = false;
@@ -197,8 +199,19 @@ void FrameStream::end(EndReason reason, std::string text) {
     const std::scoped_lock lock(mutex_);
     if (end_ || is_ended_) return;
     end_ = EndNote{reason, std::move(text)};
+    ended_by_ = reason;
   }
   wake();
+}
+
+std::optional<EndReason> FrameStream::ended_by() const {
+  const std::scoped_lock lock(mutex_);
+  return ended_by_;
+}
+
+Timers::Duration FrameStream::waited_for_credit() const {
+  const std::scoped_lock lock(mutex_);
+  return is_stalled_ ? timers_->now() - stalled_since_ : Timers::Duration(0);
 }
 
 bool FrameStream::wants_frame() const {

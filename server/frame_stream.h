@@ -42,11 +42,17 @@ struct StreamOptions {
 enum class EndReason {
   kSessionDeleted,
   kSessionExpired,
-  kDraining,
+  kDraining,   // the server shuts down
+  kElsewhere,  // another server has the session; clients are told the same
   kWriterReplaced,
   kProtocolError,
   kTokenExpired
 };
+
+/// The session is not gone: its clients find it at another server, or at this one once it runs again.
+inline bool goes_on(EndReason reason) {
+  return reason == EndReason::kDraining || reason == EndReason::kElsewhere;
+}
 
 // What a stream may have to send.
 struct OpenedNote {
@@ -100,6 +106,12 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
 
   std::size_t answers_waiting() const;
 
+  /// Why the server ended it; empty where it did not.
+  std::optional<EndReason> ended_by() const;
+
+  /// How long a frame has waited for its reader to acknowledge those before it; 0 where none does.
+  Timers::Duration waited_for_credit() const;
+
   /// Of the last frame that was begun; 0 where there was none.
   std::uint64_t last_frame_seq() const;
 
@@ -134,12 +146,14 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   std::deque<Note> answers_;
   bool was_answer_ = false;  // answers go first, but take turns with the pieces of a frame
   std::optional<EndNote> end_;
+  std::optional<EndReason> ended_by_;
   FrameCutter cutter_;
   std::deque<std::uint64_t> in_flight_;  // frame_seqs begun and not acknowledged, ascending
   std::uint64_t last_seq_ = 0;           // of the last frame begun
   std::uint64_t last_taken_ = 0;
   bool has_sent_frame_ = false;
   bool is_stalled_ = false;  // a frame waits for credit
+  Timers::TimePoint stalled_since_;
   bool has_said_overloaded_ = false;
   std::uint64_t last_fault_ = 0;
   std::size_t last_bytes_ = 0;  // of the last frame's numbers

@@ -190,6 +190,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void watch_unused();
   void sweep();
   void touch_all();
+  void show_figures(Timers::TimePoint now);
   using Sessions = std::map<std::string, std::shared_ptr<Session>>;
   Entry* same_entry(const std::string& name, const Sessions& touched);
   void drop(const std::vector<std::string>& lost, const Sessions& touched);
@@ -213,6 +214,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   Clock::duration pause_{};
   bool is_stopping_ = false;
   Timers::TimePoint next_sweep_;
+  Timers::TimePoint next_figures_;  // the toucher's thread alone
   TaskPool reader_, toucher_;
   std::thread writer_;
 };

@@ -11,6 +11,8 @@ namespace {
 constexpr int kSweepsPerIdle = 8;
 /// Of a store that does not give what it is asked for.
 constexpr Timers::Duration kBetweenTries = std::chrono::seconds(1);
+/// Between looks at what a store says of itself.
+constexpr Timers::Duration kBetweenFigures = std::chrono::seconds(5);
 
 }  // namespace
 
@@ -71,12 +73,31 @@ void Keeper::touch_all() {
   if (touched.ok()) drop(touched->lost, touched_ones);
   if (touched.ok()) write_again(*touched, touched_ones);
   if (touched.ok()) hand_over(touched->wanted, touched_ones);
+  if (touched.ok() && now >= next_figures_) show_figures(now);
   if (is_sweep && touched.ok()) {
     const auto idle_ms = std::chrono::duration_cast<std::chrono::milliseconds>(services_.idle).count();
     if (!store_->remove_unused(idle_ms).ok()) services_.metrics->add(Count::kStoreErrors);
     const std::scoped_lock lock(mutex_);
     next_sweep_ = now + services_.idle / kSweepsPerIdle;
   }
+}
+
+/// Where it may not be asked, it keeps sessions all the same.
+void Keeper::show_figures(Timers::TimePoint now) {
+  next_figures_ = now + kBetweenFigures;
+  const auto told = store_->figures();
+  if (!told.ok() || !*told) return;
+  const StoreFigures& figures = **told;
+  for (const auto& [level, value] :
+       {std::pair(Level::kRedisMemory, figures.memory_bytes),
+        std::pair(Level::kRedisMemoryMost, figures.memory_limit_bytes),
+        std::pair(Level::kRedisEvicted, figures.evicted), std::pair(Level::kRedisClients, figures.clients),
+        std::pair(Level::kRedisClientsRefused, figures.clients_refused),
+        std::pair(Level::kRedisReplicas, figures.replicas),
+        std::pair(Level::kRedisSyncsDelayed, figures.syncs_delayed),
+        std::pair(Level::kRedisInMemoryAlone, figures.is_in_memory_alone ? 1.0 : 0.0),
+        std::pair(Level::kRedisPersistenceFailing, figures.is_persistence_failing ? 1.0 : 0.0)})
+    services_.metrics->set(level, value);
 }
 
 /// Under the lock. Null where the session that was touched has gone, or come back as another, meanwhile.

@@ -3,6 +3,8 @@
 #include <spdlog/async.h>
 #include <spdlog/sinks/stdout_sinks.h>
 
+#include <cctype>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "absl/strings/str_cat.h"
@@ -14,6 +16,24 @@ namespace {
 
 constexpr std::size_t kLongestQueue = 8192;
 constexpr std::size_t kDigitsShown = 8;
+
+std::string text_of(const LogField& field) {
+  const auto* const text = std::get_if<std::string>(&field.value);
+  if (text != nullptr) return *text;
+  const auto* const number = std::get_if<std::uint64_t>(&field.value);
+  return number == nullptr ? "" : absl::StrCat(*number);
+}
+
+/// A line of gRPC's own has a place in its source for a reason.
+LogBound::Kind kind_of(int level, std::string_view event, Log::Fields fields) {
+  LogBound::Kind kind{level, std::string(event), "", ""};
+  for (const LogField& field : fields) {
+    if (field.name == "session") kind.session = text_of(field);
+    if (field.name == "reason" || field.name == "file" || field.name == "line")
+      absl::StrAppend(&kind.reason, kind.reason.empty() ? "" : ":", text_of(field));
+  }
+  return kind;
+}
 
 }  // namespace
 
@@ -30,6 +50,10 @@ Log::Log(std::string_view level)
 }
 
 Log::~Log() {
+  {
+    const std::scoped_lock lock(mutex_);
+    end_window(Clock::now());
+  }
   thread_.reset();  // writes what waits, and ends before the logger that it writes to
 }
 
@@ -43,9 +67,48 @@ void Log::warning(std::string_view event, Fields fields) const {
   write(spdlog::level::warn, event, fields);
 }
 
+void Log::error(std::string_view event, Fields fields) const {
+  write(spdlog::level::err, event, fields);
+}
+
 void Log::write(int level, std::string_view event, Fields fields) const {
+  if (!logger_->should_log(static_cast<spdlog::level::level_enum>(level))) return;
+  if (level == spdlog::level::debug) return write_line(level, event, fields);
+  const LogBound::Kind kind = kind_of(level, event, fields);
+  const std::scoped_lock lock(mutex_);
+  if (const Clock::time_point now = Clock::now(); now - window_began_ >= kWindow) end_window(now);
+  if (bound_.admits(kind)) write_line(level, event, fields);
+}
+
+void Log::sum_up() const {
+  const std::scoped_lock lock(mutex_);
+  if (const Clock::time_point now = Clock::now(); now - window_began_ >= kWindow) end_window(now);
+}
+
+/// Under the lock.
+void Log::end_window(Clock::time_point now) const {
+  const double seconds = std::chrono::duration<double>(now - window_began_).count();
+  for (const auto& [kind, count] : bound_.take()) {
+    write_line(
+        kind.level, "left_out",
+        {{"of", kind.event},
+         {"session", kind.session},
+         {"reason", kind.reason},
+         {"count", count},
+         {"seconds", seconds},
+         {"text", absl::StrCat(kind.event, " ", count, " more times in ", std::lround(seconds), " s")}});
+  }
+  window_began_ = now;
+  if (const std::size_t lost = thread_->overrun_counter(); lost != lines_lost_) {
+    write_line(
+        spdlog::level::warn, "lines_lost",
+        {{"count", std::uint64_t{lost - lines_lost_}}, {"text", "Whoever reads the log is too slow."}});
+    lines_lost_ = lost;
+  }
+}
+
+void Log::write_line(int level, std::string_view event, Fields fields) const {
   const auto at = static_cast<spdlog::level::level_enum>(level);
-  if (!logger_->should_log(at)) return;
   nlohmann::ordered_json line;
   line["time"] = absl::FormatTime(absl::RFC3339_full, absl::Now(), absl::UTCTimeZone());
   line["level"] = spdlog::level::to_string_view(at).data();
@@ -61,6 +124,16 @@ void Log::write(int level, std::string_view event, Fields fields) const {
 std::string abbreviated(std::string_view name) {
   const std::size_t slash = name.rfind('/');
   return std::string(name.substr(slash == std::string_view::npos ? 0 : slash + 1, kDigitsShown));
+}
+
+std::string quoted(std::string_view text) {
+  std::string out;
+  std::size_t digits = 0;  // in this run
+  for (const char c : text.substr(0, kLongestQuote)) {
+    digits = std::isxdigit(static_cast<unsigned char>(c)) != 0 ? digits + 1 : 0;
+    if (digits <= kDigitsShown) out.push_back(c);
+  }
+  return out;
 }
 
 }  // namespace lpdeform

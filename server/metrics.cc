@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/process_metrics.h"
+#include "server/stream_end.h"
 
 namespace lpdeform {
 namespace {
@@ -40,6 +41,8 @@ constexpr std::array kCounts{
     Entry{"lpdeform_connections_refused_total",
           "Connections closed at once for want of room (--max-connections)."},
     Entry{"lpdeform_sessions_restored_total", "Sessions made again from the store."},
+    Entry{"lpdeform_sessions_damaged_total",
+          "Sessions not made again, because what is stored of them cannot be used; once each try."},
     Entry{"lpdeform_updates_not_kept_total",
           "Updates answered before they were in the store, which failed or was slow."},
     Entry{"lpdeform_store_errors_total", "Operations of the store that failed."},
@@ -55,6 +58,16 @@ constexpr std::array kLevels{
     Entry{"lpdeform_overloaded",
           "1 while sessions wait for a thread for too long and frames come less often."},
     Entry{"lpdeform_store_failing", "1 while the store does not take what has changed."},
+    Entry{"lpdeform_redis_memory_bytes", "Of Redis, by its own word; so all of lpdeform_redis_*."},
+    Entry{"lpdeform_redis_memory_limit_bytes", "Its maxmemory; 0: none."},
+    Entry{"lpdeform_redis_evicted_keys", "Keys that it threw away for want of memory, since it was started."},
+    Entry{"lpdeform_redis_clients", "Its connections."},
+    Entry{"lpdeform_redis_clients_refused", "Connections that it refused, since it was started."},
+    Entry{"lpdeform_redis_replicas", "Of it that follow it."},
+    Entry{"lpdeform_redis_syncs_delayed",
+          "Writes to its disk that waited for over 2 s, since it was started."},
+    Entry{"lpdeform_redis_in_memory_alone", "1 where it keeps nothing on a disk (appendonly no)."},
+    Entry{"lpdeform_redis_persistence_failing", "1 while its log on the disk fails."},
 };
 constexpr std::array kSpans{
     Entry{"lpdeform_input_to_frame_seconds",
@@ -112,6 +125,7 @@ struct Metrics::Impl {
       levels.push_back(&family<Gauge>(registry, entry.name, entry.help).Add({}));
     for (const Entry& entry : kSpans)
       spans.push_back(&family<Histogram>(registry, entry.name, entry.help).Add({}, our_seconds()));
+    for (const StreamEnd end : kStreamEnds) streams_ended.Add({{"reason", stream_end_name(end)}});
   }
 
   prometheus::Registry registry;
@@ -132,6 +146,8 @@ struct Metrics::Impl {
       registry, "lpdeform_rejections_total", "Calls and updates refused, by the reason of proto/errors.md.");
   Family<Counter>& sessions_ended =
       family<Counter>(registry, "lpdeform_sessions_ended_total", "Sessions ended, by why.");
+  Family<Counter>& streams_ended =
+      family<Counter>(registry, "lpdeform_streams_ended_total", "Streams of frames ended, by why.");
 };
 
 Metrics::Metrics() : impl_(std::make_unique<Impl>()) {}
@@ -170,6 +186,10 @@ void Metrics::rejected(const std::string& reason) {
 
 void Metrics::session_ended(const std::string& reason) {
   impl_->sessions_ended.Add({{"reason", reason}}).Increment();
+}
+
+void Metrics::stream_ended(const std::string& reason) {
+  impl_->streams_ended.Add({{"reason", reason}}).Increment();
 }
 
 std::string Metrics::text() const {

@@ -20,6 +20,7 @@ enum class Count {
   kConnections,         // taken
   kConnectionsRefused,  // for want of room
   kSessionsRestored,    // made again from the store
+  kSessionsDamaged,     // not made again, because what is stored of them cannot be used
   kUpdatesNotKept,      // answered before they were in the store, which failed or was slow
   kStoreErrors,
 };
@@ -34,7 +35,17 @@ enum class Level {
   kMemoryBytesMost,
   kDraining,
   kOverloaded,
-  kStoreFailing
+  kStoreFailing,
+  // What Redis says of itself; 0 with another store.
+  kRedisMemory,
+  kRedisMemoryMost,
+  kRedisEvicted,
+  kRedisClients,
+  kRedisClientsRefused,
+  kRedisReplicas,
+  kRedisSyncsDelayed,
+  kRedisInMemoryAlone,
+  kRedisPersistenceFailing
 };
 
 /// What takes time, in seconds.
@@ -74,8 +85,10 @@ class Metrics {
 
   /// `reason` as in proto/errors.md.
   void rejected(const std::string& reason);
-  /// "deleted", "expired", "draining".
+  /// "deleted", "expired", "draining", "elsewhere".
   void session_ended(const std::string& reason);
+  /// `reason`: stream_end_name().
+  void stream_ended(const std::string& reason);
 
   /// All of it and the process's own (process_open_fds and so on), in Prometheus's text format 0.0.4.
   std::string text() const;

@@ -10,6 +10,7 @@
 #include "absl/strings/str_join.h"
 #include "server/random_name.h"
 #include "server/redis_connection.h"
+#include "server/redis_figures.h"
 #include "server/redis_scripts.h"
 
 namespace lpdeform {
@@ -39,7 +40,8 @@ class RedisStore final : public Store {
         writer_(options.host, options.port, options.patience, options.login),
         reader_(options.host, options.port, options.patience, options.login),
         toucher_(options.host, options.port, options.patience, options.login),
-        presence_(options.host, options.port, options.patience, options.login) {}
+        presence_(options.host, options.port, options.patience, options.login),
+        teller_(options.host, options.port, options.patience, options.login) {}
 
   /// To be called once, before all else.
   absl::Status begin() {
@@ -68,8 +70,13 @@ class RedisStore final : public Store {
   std::chrono::milliseconds touch_every() const override { return options_.lease / 3; }
   absl::Status let_go(const std::vector<HeldSession>& sessions) override;
   absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) override;
+  absl::StatusOr<std::optional<StoreFigures>> figures() override {
+    const auto info = teller_.run({"INFO"});
+    if (!info.ok()) return info.status();
+    return redis_figures(info->text);
+  }
   void end_by(std::chrono::steady_clock::time_point end) override {
-    for (RedisConnection* const connection : {&writer_, &reader_, &toucher_, &presence_})
+    for (RedisConnection* const connection : {&writer_, &reader_, &toucher_, &presence_, &teller_})
       connection->end_by(end);
   }
 
@@ -88,8 +95,9 @@ class RedisStore final : public Store {
   std::int64_t ran_ = 0;
   std::atomic<std::int64_t> told_{0};
   std::mutex writing_, reading_, touching_;
-  // The third one, so that leases are renewed while a large mesh is on its way; the last one goes with it.
-  RedisConnection writer_, reader_, toucher_, presence_;
+  // The third one, so that leases are renewed while a large mesh is on its way; the fourth goes with it. The last one asks what a
+  // user may not be allowed to ask, which ends a connection.
+  RedisConnection writer_, reader_, toucher_, presence_, teller_;
 };
 
 Command RedisStore::command_of(const StoredChange& change) {
@@ -185,7 +193,8 @@ absl::StatusOr<std::string> RedisStore::blob(const std::string& key) {
   const auto reply = reader_.run({"GET", kBlob + key});
   if (!reply.ok()) return reply.status();
   if (!reply->is_nothing && blob_key(reply->text) == key) return reply->text;
-  return session_damaged(reply->is_nothing ? "its mesh is missing" : "its mesh is not what was written");
+  return session_damaged(reply->is_nothing ? "its mesh is missing" : "its mesh is not what was written",
+                         kBlob + key);
 }
 
 absl::StatusOr<TouchResult> RedisStore::touch(std::span<const TouchedSession> sessions) {

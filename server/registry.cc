@@ -219,7 +219,7 @@ bool Registry::remove_one(const std::string& name, const Session* only, EndReaso
     const auto found = sessions_.find(name);
     if (found == sessions_.end() || (only != nullptr && found->second.session.get() != only)) return false;
     session = found->second.session;
-    if (reason == EndReason::kDraining) note_left(*session);
+    if (goes_on(reason)) note_left(*session);
     by_age_.erase(found->second.number);
     requests_.erase({session->owner(), found->second.request_id});
     give_up_place(session->owner());
@@ -247,7 +247,7 @@ void Registry::clear(EndReason reason, const std::string& text) {
     by_age_.clear();
     for (const auto& [name, entry] : all) {
       give_up_place(entry.session->owner());
-      if (reason == EndReason::kDraining) note_left(*entry.session);
+      if (goes_on(reason)) note_left(*entry.session);
     }
     std::erase_if(requests_, [](const auto& request) { return !request.second.name.empty(); });
   }

@@ -250,7 +250,11 @@ void Server::Impl::start_listening(const ServerOptions& options) {
     parameters.fd = fd;
     acceptor->HandleNewConnection(&parameters);
   };
-  events.on_refused = [this] { backend.metrics->add(Count::kConnectionsRefused); };
+  events.on_refused = [this] {
+    backend.metrics->add(Count::kConnectionsRefused);
+    backend.log().warning("connection_refused",
+                          {{"text", "There are as many as the flags or descriptors allow."}});
+  };
   const std::size_t most =
       listener->start({options.max_connections, options.max_connections_per_address}, std::move(events));
   if (most < options.max_connections) {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -38,6 +39,8 @@ std::shared_ptr<CallRecord> begin_record(Backend& backend, const grpc::CallbackS
   call.authority.assign(authority.data(), std::min(authority.size(), kLongestAuthority));
   const std::string route = text_of(context, "lpdeform-session");
   if (route.size() <= kLongestRoute) call.route = route;
+  if (const auto when = context.deadline(); when != std::chrono::system_clock::time_point::max())
+    call.deadline = {when, when - std::chrono::system_clock::now()};
   if (const auto auth = context.auth_context(); auth && auth->IsPeerAuthenticated()) {
     for (const grpc::string_ref& name : auth->GetPeerIdentity()) {
       call.peer_identity.assign(name.data(), name.size());
@@ -88,6 +91,15 @@ void note_session(const Backend& backend, CallRecord& record, const std::string&
   if (session.ok()) record.about(*session);
 }
 
+/// Of a call that brings an update or takes one back, which.
+template <typename Request>
+void note_input(CallRecord& record, const Request& request) {
+  if constexpr (std::is_same_v<Request, v1::UpdateHandlesRequest>)
+    record.about(refused_input(request.update()));
+  if constexpr (std::is_same_v<Request, v1::UndoUpdateRequest>)
+    record.about(RefusedInput{request.input_seq()});
+}
+
 /// A call about a session, which may have to be made again from the store first.
 template <typename Request, typename Response>
 grpc::ServerUnaryReactor* about_session(Backend& backend, grpc::CallbackServerContext& context,
@@ -101,7 +113,10 @@ grpc::ServerUnaryReactor* about_session(Backend& backend, grpc::CallbackServerCo
                  [&backend, record, handler, &request, &response](const Finish& finish) {
                    // Only a refusal is told of, so only then is it asked which session it is about.
                    const auto tell = [&backend, record, &request, finish](const absl::Status& status) {
-                     if (!status.ok()) note_session(backend, *record, request.session());
+                     if (!status.ok()) {
+                       note_session(backend, *record, request.session());
+                       note_input(*record, request);
+                     }
                      finish(status);
                    };
                    const auto then = [&backend, record, handler, &request, &response,

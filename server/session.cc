@@ -48,7 +48,7 @@ absl::Status too_many_streams(std::size_t most) {
 }
 
 absl::Status ended_by(EndReason reason, const std::string& text) {
-  if (reason == EndReason::kDraining) return server_draining();
+  if (goes_on(reason)) return server_draining();
   const char* const name = reason == EndReason::kSessionExpired ? "SESSION_EXPIRED" : "SESSION_DELETED";
   return make_fault(absl::StatusCode::kAborted, {name, "", ""}, text);
 }
@@ -109,6 +109,11 @@ SessionInfo Session::info() const {
           memory_bytes_.load(),
           history.undo_steps,
           history.redo_steps};
+}
+
+std::string Session::standing_fault() const {
+  const auto standing = publisher_->standing();
+  return standing ? fault_of(standing->fault.status).reason : "";
 }
 
 WriterLease Session::lease() const {
@@ -253,7 +258,7 @@ absl::Status Session::acknowledge(const std::string& stream_id, std::uint64_t fr
 
 /// To who had it in hand already. One that goes on elsewhere is not gone: its client would make it anew.
 absl::Status Session::closed() const {
-  return closed_by_ == EndReason::kDraining ? server_draining() : gone(name_);
+  return goes_on(closed_by_) ? server_draining() : gone(name_);
 }
 
 void Session::drain(const std::string& text) {

@@ -111,6 +111,8 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   /// The newest frame, of this epoch or of one before; and whether its surface comes from a solve, here or in the session that
   /// this one was made from.
   std::shared_ptr<const Frame> newest_frame() const { return publisher_->newest(); }
+  /// The reason of the fault for which there are no frames of the newest inputs; empty where there is none.
+  std::string standing_fault() const;
   bool has_surface() const { return has_surface_ || newest_frame()->method != Method::kAuto; }
   WriterLease lease() const;
   std::int64_t created_unix_ms() const { return created_unix_ms_; }

@@ -168,7 +168,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_again(const std::s
   auto session = made.ok() ? finish(std::move(parts)) : made;
   // What was right once is right unless it was damaged.
   if (absl::IsInvalidArgument(session.status()) || absl::IsFailedPrecondition(session.status()))
-    return session_damaged(std::string(session.status().message()));
+    return session_damaged(session.status());
   return session;
 }
 

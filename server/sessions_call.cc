@@ -64,7 +64,7 @@ class StreamSessionsCall final
       auto open = missing == not_here_.end()
                       ? backend_.open_stream(context(), one.session(), "", one.options(), pump)
                       : missing->second;
-      if (!open.ok()) record().refused(open.status());
+      if (!open.ok()) record().refused(open.status(), {});
       lanes.push_back({open.ok() ? *std::move(open) : Backend::OpenStream{}, open.status(), false});
     }
     const std::scoped_lock lock(mutex_);
@@ -116,7 +116,7 @@ class StreamSessionsCall final
 
   void forget_all() {
     for (Lane& lane : lanes_) {
-      if (lane.open.stream) backend_.forget(context(), lane.open);
+      if (lane.open.stream) backend_.forget(context(), lane.open, how_ended_locked());
     }
     lanes_.clear();
   }

@@ -55,6 +55,7 @@ class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveRespons
     const auto session = backend_.find(context(), Backend::Access::kChange, request.session());
     if (!session.ok()) return refuse(session.status());
     record().about(*session);
+    if (request.has_update()) record().about(refused_input(request.update()));
     backend_.when_decodable(*session, request.writer_token(), request.update(),
                             [self, request](const absl::Status& status) {
                               status.ok() ? self->start(request) : self->refuse(status);

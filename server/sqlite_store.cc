@@ -56,7 +56,7 @@ absl::StatusOr<std::string> unsealed(const std::string& session, const std::stri
     bytes.erase(0, 4);
     if (checksum(session, part, bytes) == sum) return bytes;
   }
-  return session_damaged("a part of it has the wrong checksum");
+  return session_damaged("a part of it has the wrong checksum", part);
 }
 
 class SqliteStore final : public Store {

@@ -12,6 +12,7 @@
 namespace lpdeform {
 namespace {
 
+constexpr char kDamage[] = "lpdeform/damage";    // likewise: for the log
 constexpr char kAway[] = "lpdeform/store-away";  // stays in this process
 
 }  // namespace
@@ -38,10 +39,29 @@ bool is_away(const absl::Status& status) {
   return status.GetPayload(kAway).has_value();
 }
 
-absl::Status session_damaged(std::string_view why) {
-  return make_fault(absl::StatusCode::kNotFound, {"SESSION_DAMAGED", "session", ""},
-                    absl::StrCat("What is stored of the session cannot be used: ",
-                                 absl::string_view(why.data(), why.size()), "."));
+absl::Status session_damaged(std::string_view why, std::string_view where) {
+  const absl::string_view text(why.data(), why.size());
+  absl::Status status = make_fault(absl::StatusCode::kNotFound, {"SESSION_DAMAGED", "session", ""},
+                                   absl::StrCat("What is stored of the session cannot be used: ", text, "."));
+  status.SetPayload(
+      kDamage,
+      absl::Cord(where.empty() ? std::string(why)
+                               : absl::StrCat(text, ": ", absl::string_view(where.data(), where.size()))));
+  return status;
+}
+
+absl::Status session_damaged(const absl::Status& why) {
+  if (!damage_of(why).empty()) return why;
+  const Fault fault = fault_of(why);
+  absl::Status status = session_damaged(std::string_view(why.message().data(), why.message().size()));
+  status.SetPayload(kDamage,
+                    absl::Cord(absl::StrCat("what it holds is refused: ", fault.reason, " ", fault.element)));
+  return status;
+}
+
+std::string damage_of(const absl::Status& status) {
+  const auto damage = status.GetPayload(kDamage);
+  return damage ? std::string(*damage) : "";
 }
 
 std::string route_header(const std::string& route) {

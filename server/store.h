@@ -44,6 +44,17 @@ struct StoredChange {
   bool is_expiry = false;  // of a removal: only where this process has it still; else kFenced
 };
 
+/// What a store that is a server of its own says of itself, for whoever runs it. Counts are since it was started.
+struct StoreFigures {
+  double memory_bytes = 0, memory_limit_bytes = 0;  // a limit of 0: none
+  double evicted = 0;                               // what it threw away for want of memory
+  double clients = 0, clients_refused = 0;
+  double replicas = 0;
+  double syncs_delayed = 0;  // writes to its disk that took over two seconds
+  bool is_in_memory_alone = false;
+  bool is_persistence_failing = false;
+};
+
 /// A session that a process has in its memory.
 struct TouchedSession {
   std::string name;
@@ -126,6 +137,9 @@ class Store {
   /// How many went.
   virtual absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) = 0;
 
+  /// Nothing where it is no server of its own. On the thread that calls touch().
+  virtual absl::StatusOr<std::optional<StoreFigures>> figures() { return std::nullopt; }
+
   /// The process is about to end: after this moment nobody is waited for, and whatever needs an answer fails. Where waits have
   /// no end of their own (a disk), this changes nothing.
   virtual void end_by(std::chrono::steady_clock::time_point) {}
@@ -140,7 +154,12 @@ absl::Status store_failing(std::string_view why);
 absl::Status store_away(std::string_view why);
 bool is_away(const absl::Status& status);
 /// NOT_FOUND SESSION_DAMAGED: what there is of it cannot be used.
-absl::Status session_damaged(std::string_view why);
+/// `where`: a file or a part, for the log alone.
+absl::Status session_damaged(std::string_view why, std::string_view where = "");
+/// The same, where reading it again as a caller's input gave this error: its text may quote coordinates.
+absl::Status session_damaged(const absl::Status& why);
+/// What of it is damaged, for the log; empty of other errors.
+std::string damage_of(const absl::Status& status);
 /// What a call's header has to say that is to come this way.
 std::string route_header(const std::string& route);
 /// UNAVAILABLE SESSION_ELSEWHERE, its limit route_header(). `route`: of the session; may be empty.

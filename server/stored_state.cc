@@ -128,7 +128,7 @@ absl::Status read_history(const std::map<std::string, std::string>& parts, const
     if (!step.ok()) return step.status();
     Update update;
     absl::Status status = Decoder(decoder).handles(step->changes(), update);
-    if (!status.ok()) return session_damaged(std::string(status.message()));
+    if (!status.ok()) return session_damaged(status);
     out.steps.push_back(std::move(update.handles));
   }
   return absl::OkStatus();
@@ -278,13 +278,13 @@ absl::StatusOr<SessionState> decode_state(const StoredSession& stored, const Ses
   absl::Status status = read_settings(stored.parts, *inputs, settings);
   if (!status.ok()) return status;
   auto decoded = Decoder(decoder).settings(settings);
-  if (!decoded.ok()) return session_damaged(std::string(decoded.status().message()));
+  if (!decoded.ok()) return session_damaged(decoded.status());
   out.state.settings = *std::move(decoded);
   out.state.input_seq = inputs->input_seq();
   for (const auto& [part, bytes] : stored.parts) {
     if (!absl::StartsWith(part, kGroup)) continue;
     status = read_handle(stored.parts, part.substr(2), decoder, out);
-    if (!status.ok()) return session_damaged(std::string(status.message()));
+    if (!status.ok()) return session_damaged(status);
   }
   status = read_history(stored.parts, *inputs, decoder, out.past.history);
   if (!status.ok()) return status;

@@ -2,6 +2,7 @@
 
 #include <grpcpp/support/server_callback.h>
 
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -42,7 +43,7 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
   void OnWriteDone(bool ok) final {
     const std::scoped_lock lock(mutex_);
     is_writing_ = false;
-    if (!ok) is_cancelled_ = true;
+    if (!ok) is_cancelled_ = was_cut_ = true;
     pump_locked();
   }
 
@@ -85,6 +86,7 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
     const Made made = make(response_);
     if (made == Made::kNothing) return;
     is_writing_ = true;
+    write_began_ = std::chrono::steady_clock::now();
     is_last_written_ = made == Made::kLastMessage;
     record_->sent(response_.ByteSizeLong());
     this->StartWrite(&response_);
@@ -95,6 +97,13 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
   const CallContext& context() const { return record_->context(); }
 
   bool is_over_locked() const { return is_finished_ || is_cancelled_; }
+
+  CallEnd how_ended_locked() const {
+    CallEnd end;
+    end.is_refused = !refusal_.ok();
+    if (is_writing_ || was_cut_) end.unread = std::chrono::steady_clock::now() - write_began_;
+    return end;
+  }
 
   std::mutex mutex_;
 
@@ -111,6 +120,8 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
   Response response_;
   absl::Status refusal_;
   bool is_writing_ = false;
+  bool was_cut_ = false;  // the call, in the middle of a write
+  std::chrono::steady_clock::time_point write_began_;
   bool is_last_written_ = false;
   bool is_cancelled_ = false;
   bool is_finished_ = false;

@@ -196,6 +196,7 @@ class Kubernetes(unittest.TestCase):
             for protocol in ("UDP", "TCP"):
                 self.assertTrue(self.may_reach(name, names, 53, protocol), name)
         self.assertTrue(self.may_reach(("monitoring", {}), "lpdeform", 9464))
+        self.assertTrue(self.may_reach(("monitoring", {}), "lpdeform-web", 8082))
         self.assertTrue(self.may_reach(("ingress", {}), "lpdeform-web", 8080))
         self.assertTrue(self.may_reach(("elsewhere", {}), "lpdeform-web", 8080))  # native clients, too
 
@@ -210,6 +211,8 @@ class Kubernetes(unittest.TestCase):
         for caller in (anywhere, stranger, labelled, "lpdeform-redis"):
             self.assertFalse(self.may_reach(caller, "lpdeform", 50051), caller)
         self.assertFalse(self.may_reach(stranger, "lpdeform", 9464))
+        for caller in (anywhere, stranger, labelled, "lpdeform", "lpdeform-redis"):
+            self.assertFalse(self.may_reach(caller, "lpdeform-web", 8082), caller)
 
     def test_redis_refuses_what_is_new_before_the_kernel_ends_it(self):
         """Of a container's memory: a rewrite of its log copies what changes meanwhile."""
@@ -320,18 +323,32 @@ class Kubernetes(unittest.TestCase):
 class Monitoring(unittest.TestCase):
     def test_each_way_of_finding_servers_gives_the_job_that_the_alerts_go_by(self):
         jobs = set(re.findall(r'job="([^"]*)"', (ROOT / "deploy/monitoring/alerts.yaml").read_text()))
+        self.assertEqual(jobs, {"lpdeform", "lpdeform-web"})
         for name in ("prometheus", "prometheus-kubernetes"):
-            (scrape,) = load(ROOT / f"deploy/monitoring/{name}.yaml")["scrape_configs"]
-            self.assertEqual(jobs, {scrape["job_name"]})
+            scrapes = load(ROOT / f"deploy/monitoring/{name}.yaml")["scrape_configs"]
+            self.assertEqual(jobs, {scrape["job_name"] for scrape in scrapes})
 
     def test_pods_are_found_by_their_label_and_the_port_by_its_name(self):
-        (scrape,) = load(ROOT / "deploy/monitoring/prometheus-kubernetes.yaml")["scrape_configs"]
-        (discovery,) = scrape["kubernetes_sd_configs"]
-        label, value = discovery["selectors"][0]["label"].split("=")
-        self.assertEqual([name for name, labels in PODS.items() if labels.get(label) == value], ["lpdeform"])
-        (keep,) = [rule for rule in scrape["relabel_configs"] if rule.get("action") == "keep"]
-        ports = [port for container in containers(the("StatefulSet", "lpdeform")) for port in container["ports"]]
-        self.assertEqual([port["containerPort"] for port in ports if re.fullmatch(keep["regex"], port["name"])], [9464])
+        own = {"lpdeform": ("StatefulSet", 9464), "lpdeform-web": ("Deployment", 8082)}
+        for scrape in load(ROOT / "deploy/monitoring/prometheus-kubernetes.yaml")["scrape_configs"]:
+            kind, number = own[scrape["job_name"]]
+            (discovery,) = scrape["kubernetes_sd_configs"]
+            label, value = discovery["selectors"][0]["label"].split("=")
+            self.assertEqual([name for name, labels in PODS.items() if labels.get(label) == value], [scrape["job_name"]])
+            (keep,) = [rule for rule in scrape["relabel_configs"] if rule.get("action") == "keep"]
+            ports = [port for container in containers(the(kind, scrape["job_name"])) for port in container["ports"]]
+            self.assertEqual([port["containerPort"] for port in ports if re.fullmatch(keep["regex"], port["name"])], [number])
+
+    def test_envoy_shows_its_metrics_where_prometheus_looks_and_publishes_them_to_nobody(self):
+        (container,) = containers(the("Deployment", "lpdeform-web"))
+        for arguments in (container["args"], COMPOSE["services"]["web"]["command"], COMPOSE_INTERNET["services"]["web"]["command"]):
+            self.assertEqual(arguments[arguments.index("--stats") + 1], "0.0.0.0:8082")
+        for file in (COMPOSE, COMPOSE_INTERNET):
+            self.assertEqual([port for port in file["services"]["web"]["ports"] if "8082" in port], [])
+        (service,) = [one for one in objects("Service") if one["metadata"]["name"] == "lpdeform-web"]
+        self.assertEqual([port["targetPort"] for port in service["spec"]["ports"]], ["http"])
+        (scrape,) = [one for one in load(ROOT / "deploy/monitoring/prometheus.yaml")["scrape_configs"] if one["job_name"] == "lpdeform-web"]
+        self.assertIn(f'--stats {scrape["static_configs"][0]["targets"][0]}`', (ROOT / "deploy/README.md").read_text())
 
 
 class Unit(unittest.TestCase):
@@ -357,7 +374,7 @@ class Unit(unittest.TestCase):
             return line, told
 
     def test_it_is_the_one_that_the_operators_page_names(self):
-        self.assertIn("journalctl -u lpdeform ", (ROOT / "deploy/README.md").read_text())
+        self.assertIn("journalctl -u lpdeform ", (ROOT / "deploy/operating.md").read_text())
 
     def test_it_may_drain_before_it_is_killed_and_is_started_again(self):
         self.assertGreaterEqual(int(self.values["TimeoutStopSec"]), int(self.environment["LPDEFORM_GRACE"]) + 10)

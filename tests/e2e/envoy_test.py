@@ -54,13 +54,14 @@ class Envoy:
             assert self.process.poll() is None and time.monotonic() < end, "Envoy does not start"
             time.sleep(0.02)
         self.admin = f"http://{programs.read_text(admin)}"
-        while len(where := self.page("listeners").get("listener_statuses", [])) < 1 + ("--health" in arguments):
+        while len(where := self.page("listeners").get("listener_statuses", [])) < 1 + sum(option in arguments for option in ("--health", "--stats")):
             assert self.process.poll() is None and time.monotonic() < end, "Envoy does not listen"
             time.sleep(0.02)
         ports = {one["name"]: one["local_address"]["socket_address"]["port_value"] for one in where}
         self.port = ports["web"]
         self.address = f"127.0.0.1:{self.port}"
         self.health = f"http://127.0.0.1:{ports.get('health')}/healthz"
+        self.metrics = f"http://127.0.0.1:{ports.get('stats')}"
 
     def page(self, name):
         with urllib.request.urlopen(f"{self.admin}/{name}?format=json", timeout=programs.PATIENCE) as answer:
@@ -249,7 +250,9 @@ class Refused(ThroughEnvoy):
         self.assertIn("is not the key of", self.refuses("--tls-cert", cert, "--tls-key", self.at("alice.key")))
         self.assertIn("--tls-client-ca needs --tls-cert", self.refuses("--tls-client-ca", cert))
         self.assertIn("need --server-ca", self.refuses("--server-name", "server"))
-        self.assertIn("--health takes HOST:PORT", self.refuses("--health", "8081"))
+        for option in ("--health", "--stats"):
+            self.assertIn(f"{option} takes HOST:PORT", self.refuses(option, "8081"))
+        self.assertIn("--stats needs an --admin-port other than 0", self.refuses("--stats", "127.0.0.1:0", "--admin-port", "0"))
         for option in ("--max-connections", "--connection-idle"):
             self.assertIn(f"{option} takes 1 to 999999", self.refuses(option, "0"))
         self.assertIn("--server-name takes", self.refuses("--server-ca", cert, "--server-name", "a b"))

@@ -1,4 +1,5 @@
-"""The admin port of lpdeform-server, and that the dashboard and the alerts of deploy/monitoring ask for what it shows."""
+"""The admin port of lpdeform-server, and that the dashboard and the alerts of deploy/monitoring ask for what it shows. What they ask
+of Envoy: operations_test.py."""
 
 import json
 import os
@@ -42,10 +43,10 @@ def samples(text):
     return found
 
 
-def unknown_in(expression, scraped):
+def unknown_in(expression, scraped, names=METRIC):
     """What the expression asks for and the scrape does not have: names of metrics, "name{label}" where the label is missing."""
     wrong = []
-    used = METRIC.findall(expression)
+    used = names.findall(expression)
     grouped = [label.strip() for group in re.findall(r"\bby\s*\(([^)]*)\)", expression) for label in group.split(",")]
     for name, selector in used:
         if name not in scraped:
@@ -83,6 +84,17 @@ def alerts():
             for rule in group["rules"]]
 
 
+def expressions():
+    """What dashboard and alerts ask Prometheus."""
+    found = [target["expr"].replace("$__rate_interval", "5m") for panel in dashboard()["panels"] for target in panel["targets"]]
+    return found + [rule["expr"] for rule in alerts()]
+
+
+def of_job(job):
+    """Those of them about this job alone."""
+    return [one for one in expressions() if {equal.get("job") for _, equal in selectors_in(one)} == {job}]
+
+
 class Metrics(programs.OnShapes):
     @classmethod
     def setUpClass(cls):
@@ -118,10 +130,10 @@ class Metrics(programs.OnShapes):
         return sum(value for has, value in self.scraped[name] if labels.items() <= has.items())
 
     def test_every_metric_of_the_dashboard_and_the_alerts_is_in_a_scrape(self):
-        expressions = [target["expr"] for panel in dashboard()["panels"] for target in panel["targets"]]
-        expressions += [rule["expr"] for rule in alerts()]
-        self.assertGreater(len(expressions), 30)
-        for expression in expressions:
+        asked = of_job("lpdeform")
+        self.assertGreater(len(asked), 60)
+        self.assertEqual(len(asked) + len(of_job("lpdeform-web")), len(expressions()))
+        for expression in asked:
             self.assertTrue(METRIC.search(expression) or re.search(r"\bup\{", expression), expression)
             self.assertEqual(unknown_in(expression, self.scraped), [], expression)
 
@@ -131,13 +143,11 @@ class Metrics(programs.OnShapes):
         self.assertEqual(unknown_in('lpdeform_sessions{mesh="a"}', self.scraped), ["lpdeform_sessions{mesh}"])
 
     def test_alerts_and_dashboard_are_promql_and_ask_for_our_servers_alone(self):
-        expressions = [rule["expr"] for rule in alerts()]
-        expressions += [target["expr"].replace("$__rate_interval", "5m") for panel in dashboard()["panels"] for target in panel["targets"]]
-        for expression in expressions:
+        for expression in expressions():
             selectors = selectors_in(expression)
             self.assertTrue(selectors, expression)
             for metric, equal in selectors:
-                self.assertEqual(equal.get("job"), "lpdeform", f"{metric} in {expression}")
+                self.assertIn(equal.get("job"), ("lpdeform", "lpdeform-web"), f"{metric} in {expression}")
 
     def test_the_check_above_finds_what_is_no_promql_and_what_others_have_too(self):
         for wrong in ("sum(up", "rate(up) > 0", "up >", "histogram_quantile(0.9)"):

@@ -55,6 +55,26 @@ class FrameStreamTest : public testing::Test {
   int wakes_ = 0;
 };
 
+TEST_F(FrameStreamTest, TellsHowLongAFrameHasWaitedForItsReaderAndWhatItWasEndedFor) {
+  const auto stream = open({.credit = 1});
+  publish(1);
+  drain(*stream);
+  timers_->advance(seconds(3));
+  EXPECT_EQ(stream->waited_for_credit(), seconds(0));  // it has taken all there was
+  publish(2);
+  drain(*stream);
+  timers_->advance(seconds(7));
+  publish(3);
+  drain(*stream);
+  EXPECT_EQ(stream->waited_for_credit(), seconds(7));
+  ASSERT_TRUE(stream->acknowledge(1).ok());
+  drain(*stream);
+  EXPECT_EQ(stream->waited_for_credit(), seconds(0));
+  EXPECT_EQ(stream->ended_by(), std::nullopt);
+  stream->end(EndReason::kElsewhere, "");
+  EXPECT_EQ(stream->ended_by(), EndReason::kElsewhere);
+}
+
 TEST_F(FrameStreamTest, SendsNoMoreThanItsCreditAndThenTheNewest) {
   const auto stream = open({.credit = 2});
   std::vector<std::uint64_t> sent;

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <optional>
+
+#include "server/frame_stream.h"
+
+namespace lpdeform {
+
+/// Why a stream of frames is over. Closed: these are all the reasons of `stream_ended` in the log and of
+/// lpdeform_streams_ended_total. deploy/operating.md says what each means for an operator.
+enum class StreamEnd {
+  // The server ended it, and told the client (GoAway).
+  kSessionDeleted,
+  kSessionExpired,
+  kSessionElsewhere,  // another server has the session now
+  kDraining,          // this server shuts down
+  kWriterReplaced,
+  kMisuse,  // the client does not keep to the contract
+  kTokenExpired,
+  kRefused,  // with an error: the line `refused` before says why
+  // It ended from outside. gRPC does not say whether the client took its call back or is gone.
+  kDeadline,     // the client's own
+  kReaderStuck,  // and for kStuckAfter before that the reader had taken nothing of what waited for it
+  kCancelled
+};
+
+inline constexpr std::array kStreamEnds{
+    StreamEnd::kSessionDeleted, StreamEnd::kSessionExpired, StreamEnd::kSessionElsewhere,
+    StreamEnd::kDraining,       StreamEnd::kWriterReplaced, StreamEnd::kMisuse,
+    StreamEnd::kTokenExpired,   StreamEnd::kRefused,        StreamEnd::kDeadline,
+    StreamEnd::kReaderStuck,    StreamEnd::kCancelled};
+
+inline constexpr std::chrono::seconds kStuckAfter{10};
+
+/// "session_deleted", ..., as the log and the metrics have it.
+const char* stream_end_name(StreamEnd end);
+
+/// How the call ended that carried the stream.
+struct CallEnd {
+  bool is_refused = false;
+  bool is_past_deadline = false;
+  std::chrono::duration<double> unread{0};  // how long its reader has taken nothing of what waited for it
+};
+
+/// `by_server`: what the stream was ended with first, where it was. That counts even if the call was cut before it could be said.
+StreamEnd stream_end_of(const std::optional<EndReason>& by_server, const CallEnd& call);
+
+}  // namespace lpdeform
