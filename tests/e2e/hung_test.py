@@ -20,6 +20,8 @@ for folder in ("chaos", "fuzz"):
 
 import lpdeform
 import machines
+import request_fuzz
+from envoy_test import Envoy
 from lpdeform.v1 import service_pb2
 from request_victims import SERVICE, SIDE, held, sheet
 
@@ -210,6 +212,21 @@ class HungServer(unittest.TestCase):
         for drag in drags:
             self.assertLess(drag.longest, LONGEST)
         self.assertEqual(self.sessions(self.servers[1]), before + len(drags))
+
+    def test_a_quiet_stream_is_not_taken_for_a_hung_one(self):
+        """A server ends a connection that brings it pings more often than it likes, where nothing else is sent: gRPC's default is five
+        minutes."""
+        server = programs.RunningServer("--heartbeat", "4")
+        self.addCleanup(server.stop)
+        envoy = Envoy("--server", server.address)
+        self.addCleanup(envoy.stop)
+        request_fuzz.wait_until_reached(envoy)
+        page = Page(envoy.port)
+        self.addCleanup(page.close)
+        events = iter(page.next_of_stream, None)
+        kinds = [next(events).WhichOneof("event") for _ in range(4)]
+        self.assertEqual((kinds[0], kinds[-1]), ("opened", "heartbeat"))
+        self.assertEqual(envoy.stats()["cluster.lpdeform.upstream_cx_total"], 1)
 
 
 if __name__ == "__main__":
