@@ -21,11 +21,22 @@ def free_port():
 
 
 def start(server):
-    """Until the port of Envoy's own page is one that nobody else has taken."""
+    """Until the port of Envoy's own page is one that nobody else has taken; then until Envoy takes connections, which is after it has
+    said where."""
     for _ in range(20):
         with contextlib.suppress(AssertionError):
-            return Envoy("--server", server, "--stats", "127.0.0.1:0", "--admin-port", str(free_port()), "--health", "127.0.0.1:0")
-    raise AssertionError("Envoy does not start")
+            envoy = Envoy("--server", server, "--stats", "127.0.0.1:0", "--admin-port", str(free_port()), "--health", "127.0.0.1:0")
+            break
+    else:
+        raise AssertionError("Envoy does not start")
+    host, port = envoy.metrics.removeprefix("http://").split(":")
+    end = time.monotonic() + programs.PATIENCE
+    while time.monotonic() < end:
+        with contextlib.suppress(ConnectionRefusedError):
+            socket.create_connection((host, int(port)), programs.PATIENCE).close()
+            return envoy
+        time.sleep(0.02)
+    raise AssertionError("Envoy takes no connections")
 
 
 class EnvoyMetrics(programs.OnShapes):
