@@ -117,8 +117,9 @@ class Session {
   /// Waits until next_frame has something to say, a frame or an error, and takes nothing. False where the time passed first.
   bool wait(std::chrono::milliseconds timeout);
 
-  /// Takes frames until one is the finished result of the newest update. Waits, in vain where that one was
-  /// taken before; not for its optimality_gap, which the next frame has. Errors as next_frame.
+  /// The finished result of the newest update. Takes frames until it is there; at once, and also with a timeout of 0, where the
+  /// newest frame that was taken before, here or by next_frame or poll, is that result: also while the connection is down.
+  /// Does not wait for its optimality_gap, which the next frame has. Errors as next_frame.
   absl::StatusOr<Frame> settle(std::chrono::milliseconds timeout);
 
   /// Whether a frame of this session is the finished result of the newest update that was not refused.

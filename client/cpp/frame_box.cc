@@ -49,6 +49,7 @@ absl::Status FrameBox::end() const {
 void FrameBox::resume() {
   const std::scoped_lock lock(mutex_);
   end_.reset();
+  last_final_.reset();
 }
 
 absl::StatusOr<std::optional<FrameBox::Taken>> FrameBox::take(Clock::time_point deadline) {
@@ -58,9 +59,17 @@ absl::StatusOr<std::optional<FrameBox::Taken>> FrameBox::take(Clock::time_point 
   if (!problems_.empty()) {
     absl::Status problem = std::move(problems_.front());
     problems_.pop_front();
+    ++takes_;
+    changed_.notify_all();
     return problem;
   }
-  if (newest_) return std::exchange(newest_, std::nullopt);
+  if (newest_) {
+    last_final_.reset();
+    if (newest_->frame.is_final) last_final_ = newest_->frame;
+    ++takes_;
+    changed_.notify_all();
+    return std::exchange(newest_, std::nullopt);
+  }
   if (end_) return *end_;
   return std::nullopt;
 }
@@ -68,6 +77,21 @@ absl::StatusOr<std::optional<FrameBox::Taken>> FrameBox::take(Clock::time_point 
 bool FrameBox::wait(Clock::time_point deadline) {
   std::unique_lock lock(mutex_);
   return changed_.wait_until(lock, deadline, [this] { return has_something(); });
+}
+
+bool FrameBox::wait(Clock::time_point deadline, std::uint64_t takes) {
+  std::unique_lock lock(mutex_);
+  return changed_.wait_until(lock, deadline, [&] { return has_something() || takes_ != takes; });
+}
+
+std::uint64_t FrameBox::takes() const {
+  const std::scoped_lock lock(mutex_);
+  return takes_;
+}
+
+std::optional<Frame> FrameBox::last_final() const {
+  const std::scoped_lock lock(mutex_);
+  return last_final_;
 }
 
 }  // namespace lpdeform::client

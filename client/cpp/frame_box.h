@@ -40,13 +40,20 @@ class FrameBox {
   void finish(absl::Status why);
   /// Why nothing more comes; OK while something may.
   absl::Status end() const;
-  /// Undoes finish().
+  /// Undoes finish(). What was taken before is forgotten: another writer may have been there since.
   void resume();
 
   /// Waits until `deadline` for an error, a frame or the end. Empty where none came.
   absl::StatusOr<std::optional<Taken>> take(Clock::time_point deadline);
   /// The same without taking anything. False where there was nothing.
   bool wait(Clock::time_point deadline);
+  /// The same, and ends with true as soon as take() has handed out more than `takes` frames and errors.
+  bool wait(Clock::time_point deadline, std::uint64_t takes);
+
+  /// How many frames and errors take() has handed out.
+  std::uint64_t takes() const;
+  /// The frame that take() handed out last, where that one was final.
+  std::optional<Frame> last_final() const;
 
  private:
   bool has_something() const { return newest_ || !problems_.empty() || end_; }
@@ -56,6 +63,8 @@ class FrameBox {
   std::uint64_t epoch_ = 0;
   std::uint64_t input_seq_ = 0;
   std::optional<Taken> newest_;
+  std::optional<Frame> last_final_;
+  std::uint64_t takes_ = 0;
   std::deque<absl::Status> problems_;
   std::optional<absl::Status> end_;
 };

@@ -69,10 +69,14 @@ absl::StatusOr<Frame> Link::next_frame(Clock::time_point deadline) {
   return *std::move(*frame);
 }
 
+/// Another thread may take the result meanwhile: it is ours as well.
 absl::StatusOr<Frame> Link::settle(Clock::time_point deadline) {
   for (;;) {
-    absl::StatusOr<Frame> frame = next_frame(deadline);
-    if (!frame.ok() || is_result(*frame)) return frame;
+    const std::uint64_t takes = box_.takes();
+    const absl::StatusOr<std::optional<Frame>> taken = take_frame(Clock::now());
+    if (!taken.ok()) return taken.status();
+    if (std::optional<Frame> last = box_.last_final(); last && is_result(*last)) return *std::move(last);
+    if (!box_.wait(deadline, takes)) return no_frame();
   }
 }
 

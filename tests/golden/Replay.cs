@@ -74,14 +74,31 @@ static class Replay
         }
     }
 
+    /// What Settle says that may not wait.
+    static void SettleAgain(Session session)
+    {
+        try
+        {
+            var frame = session.Settle(new float[66], 0);
+            output.Write("settled again: {0}, iteration {1}\n", frame.StopReason.ToString().ToLowerInvariant(), frame.Iteration);
+        }
+        catch (LpdeformException error)
+        {
+            output.Write("settled again: {0}\n", error.Reason);
+        }
+    }
+
     static void TellUndo(Client client)
     {
         using (var session = OpenStrip(client, FrameEncoding.Raw, false))
         {
             session.Settle(new float[66], 30);
+            SettleAgain(session);
             session.Handles.Move("tip", Motion.Move(0, 0, 1));
+            SettleAgain(session);
             session.Undo();
             TellResult("undo", session);
+            SettleAgain(session);
             var file = session.Snapshot();
             output.Write("snapshot: {0} bytes\n", file.Length);
             using (var restored = client.Restore(file, own))

@@ -5,8 +5,9 @@ and compares what the program prints with expected.txt. The program
 
 - opens a session of the mesh of the recording for each encoding that it has, sets both handles, waits for the result, and prints it
   and what the server said about itself;
-- does so once more in float32, moves the tip elsewhere, takes that back, waits for the result, and prints it ("undo"); prints how
-  long the snapshot of the session is, and the name of the session restored from it;
+- does so once more in float32, moves the tip elsewhere, takes that back, waits for the result, and prints it ("undo"); prints what
+  settling says that may not wait, once the result was taken, while the move is under way, and once the result after the undo was
+  taken ("settled again"); prints how long the snapshot of the session is, and the name of the session restored from it;
 - opens a mesh of 1000 + k vertices for each error k, and prints what the call ended with;
 - in one more session moves a handle named after each k, one after the other, and prints the fault that answers it.
 

@@ -130,15 +130,29 @@ static void tell_snapshot(lpdeform_client* client, lpdeform_session* session) {
   lpdeform_close(restored);
 }
 
+/* What a settle says that may not wait. */
+static void settle_again(lpdeform_session* session) {
+  const lpdeform_buffers none = {.struct_size = sizeof none};
+  lpdeform_frame frame = {.struct_size = sizeof frame};
+  if (lpdeform_settle(session, 0, &none, &frame, &error) == LPDEFORM_OK)
+    printf("settled again: %s, iteration %u\n", frame.stop_reason == LPDEFORM_CONVERGED ? "converged" : "otherwise",
+           (unsigned)frame.iteration);
+  else
+    printf("settled again: %s\n", error.reason);
+}
+
 static void tell_undo(lpdeform_client* client) {
   const lpdeform_motion elsewhere = {LPDEFORM_RIGID, 0, {0}, {0}, {0, 0, 1}, NULL};
   const lpdeform_buffers none = {.struct_size = sizeof none};
   lpdeform_session* const session = open_strip(client, LPDEFORM_ENCODING_RAW, 0);
   hold(session);
   check(lpdeform_settle(session, patience_seconds, &none, NULL, &error));
+  settle_again(session);
   check(lpdeform_move_handle(session, "tip", &elsewhere, NULL, &error));
+  settle_again(session);
   check(lpdeform_undo(session, NULL, &error));
   tell_result("undo", session);
+  settle_again(session);
   tell_snapshot(client, session);
   lpdeform_close(session);
 }

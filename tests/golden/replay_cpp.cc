@@ -67,12 +67,25 @@ void tell_frame(Client& client, const char* name, Encoding encoding, bool double
               notice.reason == Notice::Reason::kOverloaded ? "overloaded" : "otherwise", notice.text.c_str());
 }
 
+/// What settle() says that may not wait.
+void settle_again(Session& session) {
+  const absl::StatusOr<Frame> frame = session.settle(std::chrono::seconds(0));
+  if (frame.ok())
+    std::printf("settled again: %s, iteration %u\n", stop_reason_name(frame->stop_reason).c_str(),
+                frame->iteration);
+  else
+    std::printf("settled again: %s\n", lpdeform::fault_of(frame.status()).reason.c_str());
+}
+
 void tell_calls(Client& client) {
   Session session = open(client, Encoding::kRaw, false);
   session.settle(kPatience).value();
+  settle_again(session);
   session.move("tip", RigidMotion{.translation = {0, 0, 1}}).value();
+  settle_again(session);
   session.undo().value();
   tell_frame("undo", session.settle(kPatience).value());
+  settle_again(session);
   const std::string file = session.snapshot().value();
   std::printf("snapshot: %zu bytes\n", file.size());
   std::printf("restored: %s\n", client.open_snapshot(file).value().name().c_str());

@@ -40,12 +40,24 @@ def tell_frame(name, frame):
     tell(name, "normals", frame.normals)
 
 
+def settle_again(session):
+    """What settle() says that may not wait."""
+    try:
+        frame = session.settle(0)
+        print(f"settled again: {frame.stop_reason}, iteration {frame.iteration}")
+    except lpdeform.Timeout as error:
+        print(f"settled again: {error.reason}")
+
+
 def tell_calls(address):
     with open_strip(address, "float32") as session:
         session.settle(30)
+        settle_again(session)
         session.drag("tip", translation=[0, 0, 1])
+        settle_again(session)
         session.undo()
         tell_frame("undo", session.settle(30))
+        settle_again(session)
         file = session.snapshot()
         print(f"snapshot: {len(file)} bytes")
     with lpdeform.restore(file, address=address) as restored:

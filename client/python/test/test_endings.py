@@ -72,7 +72,7 @@ def test_no_time_takes_what_is_there_and_nothing_else(session: lpdeform.Session)
         session.next_frame(0)
     assert caught.value.reason == "NO_FRAME"
     session.drag("right", translation=[0, 0, 1])
-    assert session._link.box.wait(time.monotonic() + PATIENCE)
+    assert session._link.box.wait(time.monotonic() + PATIENCE, session._link.box.takes)
     assert session.next_frame(0).positions.shape == (144, 3)
 
 

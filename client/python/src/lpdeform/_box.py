@@ -27,6 +27,10 @@ class FrameBox:
     def __init__(self) -> None:
         self._changed = threading.Condition()
         self._newest: Taken | None = None
+        self.last_final: Frame | None = None
+        """The frame that take() returned last, where that one is final."""
+        self.takes = 0
+        """How often take() had something to say."""
         self._epoch = 0
         self._input_seq = 0
         self._problems: deque[LpdeformError] = deque(maxlen=_most_problems)
@@ -68,29 +72,43 @@ class FrameBox:
             self._wake()
 
     def resume(self) -> None:
+        """Undoes finish(). What was taken before is forgotten: another writer may have been there since."""
         with self._changed:
-            self._end = None
+            self._end = self.last_final = None
 
     def take(self) -> Taken | None:
         """What there is. Raises what the server had to say, each once; then, once nothing more comes, why, each time."""
         with self._changed:
             if self._problems:
+                self._count_take()
                 raise again(self._problems.popleft())
             taken, self._newest = self._newest, None
             if taken is None and self._end is not None:
                 raise again(self._end)
+            if taken is not None:
+                self.last_final = taken.frame if taken.frame.is_final else None
+                self._count_take()
             return taken
 
-    def wait(self, deadline: float) -> bool:
-        """Waits until take() has something to say; False where time.monotonic() reached the deadline first."""
+    def _count_take(self) -> None:
+        self.takes += 1
+        self._wake()
+
+    def wait(self, deadline: float, takes: int) -> bool:
+        """Waits until take() has something to say, or has said more than `takes` times what it had.
+
+        False where time.monotonic() reached the deadline first.
+        """
         with self._changed:
-            return self._changed.wait_for(self._has_news, max(0.0, deadline - time.monotonic()))
+            return self._changed.wait_for(
+                lambda: self._has_news() or self.takes != takes, max(0.0, deadline - time.monotonic())
+            )
 
     def _has_news(self) -> bool:
         return bool(self._problems) or self._newest is not None or self._end is not None
 
     def listen(self, listener: Callable[[], None]) -> None:
-        """Calls `listener` whenever take() has something new to say, and now where it has. It must not wait."""
+        """Calls `listener` whenever take() has something new to say or has said it, and now where it has. It must not wait."""
         with self._changed:
             self._listeners.add(listener)
             if self._has_news():

@@ -111,9 +111,12 @@ class Link:
         self._acknowledge(taken.frame.frame_seq, taken.stream)
         return taken.frame
 
-    def is_result(self, frame: Frame) -> bool:
+    def take_result(self) -> Frame | None:
+        """The frame taken last, whoever took it, where it is the finished result of the newest update."""
+        self.take()
+        last = self.box.last_final
         with self.changed:
-            return frame.is_final and frame.input_seq >= self.ledger.newest
+            return last if last is not None and last.input_seq >= self.ledger.newest else None
 
     def no_frame(self) -> LpdeformError:
         with self.changed:

@@ -69,17 +69,13 @@ class AsyncSession(Live):
 
     async def next_frame(self, timeout: float = 60.0) -> Frame:
         """As Session.next_frame()."""
-        return await self._next(deadline_after(timeout))
+        return await self._wait_for(self._link.take, deadline_after(timeout))
 
     async def settle(self, timeout: float = 60.0) -> Frame:
         """As Session.settle()."""
-        deadline = deadline_after(timeout)
-        while True:
-            frame = await self._next(deadline)
-            if self._link.is_result(frame):
-                return frame
+        return await self._wait_for(self._link.take_result, deadline_after(timeout))
 
-    async def _next(self, deadline: float) -> Frame:
+    async def _wait_for(self, ask: Callable[[], Frame | None], deadline: float) -> Frame:
         loop, news = asyncio.get_running_loop(), asyncio.Event()
 
         def tell() -> None:
@@ -89,7 +85,7 @@ class AsyncSession(Live):
         try:
             while True:
                 news.clear()
-                frame = self._link.take()
+                frame = ask()
                 if frame is not None:
                     return frame
                 try:
@@ -102,7 +98,7 @@ class AsyncSession(Live):
     async def __aiter__(self) -> AsyncIterator[Frame]:
         while not self._link.is_closing:
             try:
-                yield await self._next(time.monotonic() + 3600)
+                yield await self._wait_for(self._link.take, time.monotonic() + 3600)
             except LpdeformError as error:
                 if error.reason == "SESSION_CLOSED":
                     return

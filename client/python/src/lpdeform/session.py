@@ -226,30 +226,31 @@ class Session(Live):
 
     def next_frame(self, timeout: float = 60.0) -> Frame:
         """The newest frame not yet taken; waits for one. Raises as poll(), and Timeout (NO_FRAME); at once where the timeout is 0."""
-        return self._next(deadline_after(timeout))
+        return self._wait_for(self._link.take, deadline_after(timeout))
 
     def settle(self, timeout: float = 60.0) -> Frame:
-        """Takes frames until one is the finished result of the newest update. Waits in vain where that one was taken before;
-        not for its optimality_gap, which the next frame has. Raises as next_frame()."""
-        deadline = deadline_after(timeout)
-        while True:
-            frame = self._next(deadline)
-            if self._link.is_result(frame):
-                return frame
+        """The finished result of the newest update. Takes frames until it is there.
 
-    def _next(self, deadline: float) -> Frame:
+        At once, also with a timeout of 0, where the newest frame that was taken before, here or by next_frame() or poll(), is
+        that result: also while the connection is down. Does not wait for its optimality_gap, which the next frame has. Raises
+        as next_frame().
+        """
+        return self._wait_for(self._link.take_result, deadline_after(timeout))
+
+    def _wait_for(self, ask: Callable[[], Frame | None], deadline: float) -> Frame:
         while True:
-            frame = self._link.take()
+            takes = self._link.box.takes
+            frame = ask()
             if frame is not None:
                 return frame
-            if not self._link.box.wait(deadline):
+            if not self._link.box.wait(deadline, takes):
                 raise self._link.no_frame()
 
     def __iter__(self) -> Iterator[Frame]:
         """Ends when the session is closed; raises why where it is over otherwise."""
         while not self._link.is_closing:
             try:
-                yield self._next(time.monotonic() + 3600)
+                yield self._wait_for(self._link.take, time.monotonic() + 3600)
             except LpdeformError as error:
                 if error.reason == "SESSION_CLOSED":
                     return

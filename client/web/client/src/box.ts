@@ -14,6 +14,18 @@ export class FrameBox {
   #inputSeq = 0;
   #end: LpdeformError | "closed" | undefined;
   #waiting = new Set<() => void>();
+  #lastFinal: WireFrame | undefined;
+  #takes = 0;
+
+  /** The frame that take() returned last, where that one is final. */
+  get lastFinal(): WireFrame | undefined {
+    return this.#lastFinal;
+  }
+
+  /** How many frames take() has returned. */
+  get takes(): number {
+    return this.#takes;
+  }
 
   /** False where the frame is dropped. */
   put(frame: WireFrame, streamId: string): boolean {
@@ -45,7 +57,9 @@ export class FrameBox {
     this.#wake();
   }
 
+  /** Undoes finish(). What was taken before is forgotten: another writer may have been there since. */
   resume(): void {
+    this.#lastFinal = undefined;
     if (this.#end !== "closed") this.#end = undefined;
   }
 
@@ -54,6 +68,11 @@ export class FrameBox {
     const taken = this.#newest;
     this.#newest = undefined;
     if (!taken && this.#end && this.#end !== "closed") throw this.#end;
+    if (taken) {
+      this.#lastFinal = taken.frame.isFinal ? taken.frame : undefined;
+      ++this.#takes;
+      this.#wake();
+    }
     return taken;
   }
 
@@ -61,9 +80,12 @@ export class FrameBox {
     return this.#end === "closed" && !this.#newest;
   }
 
-  /** Waits until take() has something to say, or the signal says that nobody wants to know any more. */
-  async wait(signal?: AbortSignal): Promise<void> {
-    while (!this.#newest && !this.#end && !signal?.aborted) {
+  /**
+   * Waits until take() has something to say or has returned more than `takes` frames, or the signal says that nobody wants to
+   * know any more.
+   */
+  async wait(takes: number, signal?: AbortSignal): Promise<void> {
+    while (!this.#newest && !this.#end && this.#takes === takes && !signal?.aborted) {
       await new Promise<void>((resolve) => {
         const done = () => {
           this.#waiting.delete(done);

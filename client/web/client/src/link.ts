@@ -138,6 +138,13 @@ export class Link {
     return taken?.frame;
   }
 
+  /** The frame taken last, whoever took it, where it is the finished result of the newest update. */
+  takeResult(): Frame | undefined {
+    if (!this.take() && this.box.isClosed) return undefined;
+    const last = this.box.lastFinal;
+    return last && last.inputSeq >= this.ledger.newest ? last : undefined;
+  }
+
   /** Frames come on a page that is hidden as well, until the result is called. */
   holdStream(): () => void {
     ++this.#waitingForFrames;

@@ -163,10 +163,15 @@ export class Session implements AsyncIterable<Frame> {
 
   /** Frames as they come, the newest first, until the session is closed. Throws why, where the session is over otherwise. */
   async *[Symbol.asyncIterator](): AsyncGenerator<Frame, void, undefined> {
-    for (let frame = await this.#next(); frame; frame = await this.#next()) yield frame;
+    const next = () => this.#waitFor(() => this.#link.take());
+    for (let frame = await next(); frame; frame = await next()) yield frame;
   }
 
-  /** The finished result of the newest update. Takes frames until it is there. Rejects with the first "problem". */
+  /**
+   * The finished result of the newest update. Takes frames until it is there; at once, also with a timeout of 0, where the
+   * newest frame that was taken before, here or by poll() or by iterating, is that result: also while the connection is down.
+   * Rejects with the first "problem".
+   */
   async settle(options: { timeoutMs?: number; signal?: AbortSignal } = {}): Promise<Frame> {
     checkCallOptions(options, "timeoutMs", "signal");
     const signals = [options.signal, options.timeoutMs !== undefined && AbortSignal.timeout(options.timeoutMs)];
@@ -175,24 +180,25 @@ export class Session implements AsyncIterable<Frame> {
     const signal = AbortSignal.any([problem.signal, ...signals.filter((one) => one instanceof AbortSignal)]);
     const release = this.#link.holdStream();
     try {
-      for (;;) {
-        const frame = await this.#next(signal);
-        if (!frame) throw sessionClosed();
-        if (frame.isFinal && frame.inputSeq >= this.#link.ledger.newest) return frame;
-      }
+      const frame = await this.#waitFor(() => this.#link.takeResult(), signal);
+      if (!frame) throw sessionClosed();
+      return frame;
     } finally {
       release();
       stopListening();
     }
   }
 
-  async #next(signal?: AbortSignal): Promise<Frame | undefined> {
+  /** What `ask` returns as soon as that is something; nothing where the session is closed. */
+  async #waitFor(ask: () => Frame | undefined, signal?: AbortSignal): Promise<Frame | undefined> {
+    const { box } = this.#link;
     this.#link.startStream();
     for (;;) {
-      const frame = this.#link.take();
-      if (frame || this.#link.box.isClosed) return frame;
+      const { takes } = box;
+      const frame = ask();
+      if (frame || box.isClosed) return frame;
       if (signal?.aborted) throw abortReason(signal, "No new frame came in time.", "NO_FRAME");
-      await this.#link.box.wait(signal);
+      await box.wait(takes, signal);
     }
   }
 
