@@ -73,7 +73,7 @@ inline v1::DeformResponse frame(std::uint64_t frame_seq, std::uint64_t input_seq
   header.set_input_seq(input_seq);
   header.set_epoch(epoch);
   header.set_vertex_count(kVertexCount);
-  header.set_converged(true);
+  header.set_is_final(true);
   return response;
 }
 

@@ -60,7 +60,7 @@ class LyingServer final : public v1::DeformService::Service {
     part.set_last(true);
     part.mutable_header()->set_vertex_count(framed);
     part.mutable_header()->set_epoch(1);
-    part.mutable_header()->set_converged(true);
+    part.mutable_header()->set_is_final(true);
     stream->Write(response);
     while (stream->Read(&request)) {
     }

@@ -195,6 +195,7 @@ export class Session implements AsyncIterable<Frame> {
     this.#link.startStream();
     for (;;) {
       const { takes } = box;
+      if (signal?.reason instanceof LpdeformError) throw signal.reason; // what the server refuses comes before any result
       const frame = ask();
       if (frame || box.isClosed) return frame;
       if (signal?.aborted) throw abortReason(signal, "No new frame came in time.", "NO_FRAME");
