@@ -104,7 +104,8 @@ void LiveSession::open_patiently() {
     if (is_past_help(opened.status(), start)) return refuse(opened.status());
     std::unique_lock lock(mutex_);
     last_problem_ = opened.status();
-    if (changed_.wait_for(lock, backoff.next(), [this] { return is_closing_; })) return;
+    const auto pause = backoff.next(client::retry_after(opened.status()));
+    if (changed_.wait_for(lock, pause, [this] { return is_closing_; })) return;
   }
 }
 

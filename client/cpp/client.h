@@ -29,6 +29,9 @@ namespace lpdeform::client {
 class Rpc;
 class Link;
 
+/// After how long the server asks to try again what failed with this status; 0 where trying again does not help.
+std::chrono::milliseconds retry_after(const absl::Status& status);
+
 /// Connecting with TLS. Texts in PEM.
 struct Tls {
   std::string root_certificates = {};  // whom to trust; empty: whom the system trusts

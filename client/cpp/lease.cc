@@ -90,8 +90,9 @@ bool is_session_lost(const absl::Status& status) {
 }
 
 bool is_undecided(const absl::Status& status) {
+  const bool may_have_room = absl::IsResourceExhausted(status) && retry_after(status).count() > 0;
   return absl::IsUnavailable(status) || absl::IsCancelled(status) || absl::IsDeadlineExceeded(status) ||
-         absl::IsResourceExhausted(status) || is_session_lost(status) ||
+         absl::IsUnknown(status) || may_have_room || is_session_lost(status) ||
          fault_of(status).reason == "UPLOAD_UNKNOWN";
 }
 

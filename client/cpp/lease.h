@@ -57,7 +57,7 @@ absl::Status check_vertex_count(std::int64_t count, std::int64_t wanted);
 bool is_session_lost(const absl::Status& status);
 
 /// The server may still take in what failed like this, an update or a session to be made: it is to be sent again. Among
-/// them a server that began anew between an upload and its use.
+/// them a server that began anew between an upload and its use, and one that has no room and says when it may have.
 bool is_undecided(const absl::Status& status);
 
 /// The error is about solving, not about the update: the server has taken that in.

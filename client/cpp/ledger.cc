@@ -23,15 +23,19 @@ void merge_change(Update::Change& older, Update::Change&& newer) {
   }
 }
 
+/// Bounds what is remembered of handles that are there no more. Motions stay: of handles that the session was made with.
 void forget_removals(Update& update) {
-  std::erase_if(update.handles,
-                [](const auto& entry) { return std::holds_alternative<Update::Removal>(entry.second); });
+  const auto is_removal = [](const auto& entry) { return std::holds_alternative<Update::Removal>(entry.second); };
+  if (update.handles.size() <= Ledger::kMostRemovals) return;
+  const auto count = static_cast<std::size_t>(std::ranges::count_if(update.handles, is_removal));
+  if (count > Ledger::kMostRemovals) std::erase_if(update.handles, is_removal);
 }
 
 /// Leaves in `state` what is there once its motions and removals have been carried out.
 void settle_changes(Update& state) {
   std::erase_if(state.handles,
                 [](const auto& entry) { return !std::holds_alternative<Handle>(entry.second); });
+  state.begins_step = false;
 }
 
 /// A resizing replaces the handle and the fields that it sets, and a later change of its handle replaces it.
@@ -94,13 +98,12 @@ void Ledger::merge_accepted(NumberedUpdate update, bool is_kept) {
   } else if (update.seq >= unkept_.seq) {
     unkept_ = {};
   }
-  if (unkept_.update.handles.size() > accepted_.update.handles.size() + kMostRemembered)
-    forget_removals(unkept_.update);
+  forget_removals(unkept_.update);
   accepted_.seq = std::max(accepted_.seq, update.seq);
   merge(accepted_.update, std::move(update.update));
   if (begins_bare_) {
     settle_changes(accepted_.update);
-  } else if (accepted_.update.handles.size() > 2 * kMostRemembered) {
+  } else {
     forget_removals(accepted_.update);
   }
 }
@@ -111,6 +114,12 @@ void Ledger::resumed_at(std::uint64_t seq) {
 
 void Ledger::refuse(std::uint64_t seq) {
   std::erase_if(in_flight_, [seq](const NumberedUpdate& sent) { return sent.seq == seq; });
+}
+
+void Ledger::reopened(std::uint64_t epoch, std::uint64_t seq) {
+  const bool is_another = epoch > epoch_;
+  epoch_ = std::max(epoch, epoch_);
+  resumed_at(is_another ? 0 : seq);
 }
 
 void Ledger::connection_lost() {

@@ -24,6 +24,8 @@ struct NumberedUpdate {
 class Ledger {
  public:
   static constexpr std::size_t kWindow = 4;
+  /// Handles of which it is remembered that they were let go of; of more than that, none.
+  static constexpr std::size_t kMostRemovals = 8192;
 
   /// `begins_bare`: a session made anew has no handles but those of this book, otherwise also those that it is made with.
   explicit Ledger(bool begins_bare = true) : begins_bare_(begins_bare) {}
@@ -52,6 +54,12 @@ class Ledger {
   /// The session goes on, and the newest update that it has is `seq`: what it took after that and did not keep is to be sent
   /// first, on its own.
   void resumed_at(std::uint64_t seq);
+  /// The same of a session that is at `epoch`. In a newer one than before another server has it, and its newest update says
+  /// nothing of those before that: a call may have brought it there. So all that was not kept is sent; of what the server has
+  /// that changes nothing.
+  void reopened(std::uint64_t epoch, std::uint64_t seq);
+  /// Of a session just made, joined or taken over.
+  void begin_epoch(std::uint64_t epoch) { epoch_ = epoch; }
 
   /// The connection is gone: what was on its way waits again. Sending it twice does no harm, it is the same
   /// value.
@@ -70,12 +78,11 @@ class Ledger {
   std::uint64_t newest() const;
 
  private:
-  /// Handles that were let go of, and of which that is remembered in unkept_, beside those that there are.
-  static constexpr std::size_t kMostRemembered = 8192;
   void merge_accepted(NumberedUpdate update, bool is_kept);
 
   const bool begins_bare_;
   std::uint64_t next_seq_ = 1;
+  std::uint64_t epoch_ = 0;
   NumberedUpdate accepted_;  // where it begins bare, handles only as Handle, never as Motion or Removal
   NumberedUpdate unkept_;    // what was accepted since the server last kept something, as it came
   std::optional<NumberedUpdate> restore_;

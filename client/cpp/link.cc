@@ -12,9 +12,6 @@
 namespace lpdeform::client {
 namespace {
 
-/// After which it is seen whether the server has stayed away for too long.
-constexpr std::chrono::milliseconds kLongestWait{1000};
-
 v1::DeformRequest open_request(const Lease& lease, const OpenOptions& options) {
   v1::DeformRequest request;
   v1::DeformOpen& open = *request.mutable_open();
@@ -42,8 +39,10 @@ Link::Link(std::shared_ptr<Rpc> rpc, ClientOptions client_options, OpenOptions o
       copy_(std::move(copy)),
       lease_(std::move(lease)),
       ledger_(copy_.is_bare),
+      rules_(bool{copy_}, client_options_.reconnect_for),
       request_id_(new_request_id()) {
   ledger_.count_from(lease_.input_seq);
+  ledger_.begin_epoch(lease_.epoch);
 }
 
 Link::~Link() {
@@ -60,8 +59,7 @@ void Link::start_stream() {
 
 void Link::run() {
   const absl::Status failed = guarded([this] {
-    Backoff backoff;
-    while (recover(one_stream(), backoff)) {
+    while (recover(one_stream())) {
     }
     return absl::OkStatus();
   });
@@ -78,6 +76,7 @@ absl::Status Link::one_stream() {
     call_ = nullptr;
   });
   v1::DeformRequest open;
+  assembly_.reset();
   {
     const std::scoped_lock lock(mutex_);
     if (is_closing_) call->cancel();
@@ -166,12 +165,14 @@ void Link::send_update(DeformCall& call, const NumberedUpdate& update, std::uniq
 }
 
 /// After a stream has ended: pauses, makes the session anew where it is lost. False where it is all over.
-bool Link::recover(const absl::Status& ended, Backoff& backoff) {
+bool Link::recover(const absl::Status& ended) {
   std::unique_lock lock(mutex_);
-  if (is_open_) {
-    last_open_ = Clock::now();
-    if (last_open_ - opened_ >= Backoff::kMost) backoff.reset();  // one that breaks at once is no success
-  }
+  const Clock::time_point now = Clock::now();
+  if (is_open_) last_open_ = now;
+  const auto since = [&](Clock::time_point then) {
+    return std::chrono::duration_cast<std::chrono::milliseconds>(now - then);
+  };
+  const Ending ending{ended, go_away_, is_open_ ? since(opened_) : since(now), since(last_open_)};
   is_open_ = false;
   ledger_.connection_lost();
   changed_.notify_all();
@@ -179,37 +180,37 @@ bool Link::recover(const absl::Status& ended, Backoff& backoff) {
   if (is_closing_) return false;
   if (is_to_reopen_) return true;
 
-  const Recovery recovery = recovery_after(ended, go_away_, bool{copy_});
+  const Recovery recovery = rules_.after(ending);
   last_problem_ = recovery.why;
-  const bool is_too_late = Clock::now() - last_open_ > client_options_.reconnect_for;
-  if (recovery.next == NextStep::kGiveUp || is_too_late) {
+  if (recovery.next == NextStep::kGiveUp) {
     give_up(recovery.why);
     return false;
   }
-  if (!wait_to_try_again(recovery, backoff, lock)) return false;
+  if (!wait_to_try_again(recovery, lock)) return false;
   if (recovery.next == NextStep::kResume) return true;
 
   const std::string lost = lease_.session;
   lock.unlock();
   const absl::Status made = make_anew(lost);
   lock.lock();
-  if (made.ok() || is_undecided(made)) return true;
+  if (made.ok()) return true;
+  const Recovery failed = rules_.after_failed_making(made);
+  last_problem_ = made;
+  if (failed.next == NextStep::kMakeAnew) return wait_to_try_again(failed, lock);
   give_up(made);
   return false;
 }
 
-/// While the server is away gRPC's own pauses count, otherwise ours. False when the session is to be closed.
-bool Link::wait_to_try_again(const Recovery& recovery, Backoff& backoff, std::unique_lock<std::mutex>& lock) {
-  const auto longest = std::min(kLongestWait, client_options_.reconnect_for);
+/// As soon as there is a connection where there was none, but for what the server asks. False when the session is to be closed.
+bool Link::wait_to_try_again(const Recovery& recovery, std::unique_lock<std::mutex>& lock) {
+  const Clock::time_point start = Clock::now();
   lock.unlock();
   const Rpc::Connected connected = absl::IsUnavailable(recovery.why)
-                                       ? rpc_->wait_for_connection(longest, stop_.get_token())
+                                       ? rpc_->wait_for_connection(recovery.pause, stop_.get_token())
                                        : Rpc::Connected::kWas;
   lock.lock();
-  auto pause = recovery.pause;
-  if (connected == Rpc::Connected::kWas) pause = std::max(pause, backoff.next());
-  if (connected == Rpc::Connected::kCame) pause = std::max(pause, Backoff().next());
-  return !changed_.wait_for(lock, pause, [this] { return is_closing_; });
+  const auto pause = connected == Rpc::Connected::kCame ? recovery.asked : recovery.pause;
+  return !changed_.wait_until(lock, start + pause, [this] { return is_closing_; });
 }
 
 void Link::give_up(absl::Status why) {

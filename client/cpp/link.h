@@ -64,8 +64,8 @@ class Link {
   void pump(DeformCall& call);
   bool send_one(DeformCall& call, std::unique_lock<std::mutex>& lock);
   void send_update(DeformCall& call, const NumberedUpdate& update, std::unique_lock<std::mutex>& lock);
-  bool recover(const absl::Status& ended, Backoff& backoff);
-  bool wait_to_try_again(const Recovery& recovery, Backoff& backoff, std::unique_lock<std::mutex>& lock);
+  bool recover(const absl::Status& ended);
+  bool wait_to_try_again(const Recovery& recovery, std::unique_lock<std::mutex>& lock);
   void give_up(absl::Status why);
 
   // On the reading thread.
@@ -76,7 +76,7 @@ class Link {
   /// DATA_LOSS FRAME_VERTICES.
   absl::Status take(const v1::StreamOpened& opened);
   void note_answered(std::uint64_t input_seq);
-  void take(const v1::Fault& fault);
+  absl::Status take(const v1::Fault& fault);
 
   // On any thread.
   void acknowledge(std::uint64_t frame_seq, std::uint64_t stream);
@@ -85,6 +85,7 @@ class Link {
   absl::StatusOr<SolveResult> solve_patiently(const SolveOptions& options, Clock::time_point start);
   absl::StatusOr<SolveResult> solve_or_make_anew(const SolveOptions& options);
   absl::StatusOr<SolveResult> solve_once(const SolveOptions& options);
+  void note_answer(std::uint64_t seq, const absl::Status& status);
   absl::Status send_restore(std::unique_lock<std::mutex>& lock);
   absl::Status send_by_call(std::unique_lock<std::mutex>& lock);
   absl::Status catch_up(std::unique_lock<std::mutex>& lock);
@@ -110,6 +111,7 @@ class Link {
   std::condition_variable changed_;
   Lease lease_;
   Ledger ledger_;
+  RecoveryRules rules_;
   std::string request_id_;     // of the session to be made next
   bool is_made_anew_ = false;  // all its handles were sent in one update, after it was lost
   bool is_closing_ = false;

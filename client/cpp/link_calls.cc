@@ -168,7 +168,7 @@ absl::Status Link::catch_up(std::unique_lock<std::mutex>& lock) {
   const auto found = rpc_->call(request, stop_.get_token());
   lock.lock();
   if (!found.ok()) return found.status();
-  ledger_.resumed_at(found->session().input_seq());
+  ledger_.reopened(found->session().epoch(), found->session().input_seq());
   return send_restore(lock);
 }
 
@@ -207,7 +207,7 @@ absl::StatusOr<v1::UndoUpdateResponse> Link::undo_patiently(const v1::UndoUpdate
     } else {
       undone = ready;
     }
-    const auto pause = backoff.next();
+    const auto pause = backoff.next(retry_after(undone.status()));
     if (!absl::IsUnavailable(undone.status()) || Clock::now() + pause > end) return undone;
     if (changed_.wait_for(lock, pause, [this] { return is_closing_; })) return session_closed();
   }
@@ -243,7 +243,7 @@ absl::StatusOr<SolveResult> Link::solve_patiently(const SolveOptions& options, C
     absl::StatusOr<SolveResult> result = solve_or_make_anew(left);
     if (!absl::IsUnavailable(result.status())) return result;
     const Clock::time_point now = Clock::now();
-    const auto pause = backoff.next();
+    const auto pause = backoff.next(retry_after(result.status()));
     if (!latest) latest = now + client_options_.reconnect_for;
     if (now + pause > *latest) return result;
     if (options.deadline_seconds > 0) {
@@ -279,15 +279,20 @@ absl::StatusOr<SolveResult> Link::solve_once(const SolveOptions& options) {
 
   absl::StatusOr<SolveResult> result = run_solve(*rpc_, lease, update, options, stop_.get_token());
   lock.lock();
-  if (!update) return result;
-  if (result.ok() || is_taken_all_the_same(result.status())) {
-    ledger_.accept(update->seq);
-  } else if (is_undecided(result.status())) {
-    ledger_.connection_lost();
-  } else {
-    ledger_.refuse(update->seq);
-  }
-  return result;
+  if (update) note_answer(update->seq, result.status());
+  if (absl::IsUnavailable(result.status())) ledger_.resumed_at(0);  // it may have gone back: once more does no harm
+  if (!result.ok() || result->input_seq >= ledger_.newest_accepted()) return result;
+  ledger_.resumed_at(result->input_seq);
+  if (!ledger_.has_restore()) return result;
+  return absl::UnavailableError("The server went back to an earlier state.");
+}
+
+/// What became of an update that a call was made with. Under the lock.
+void Link::note_answer(std::uint64_t seq, const absl::Status& status) {
+  const Answer answer = status.ok() ? Answer::kTaken : answer_of(status);
+  if (answer == Answer::kTaken) ledger_.accept(seq);
+  if (answer == Answer::kRefused) ledger_.refuse(seq);
+  if (answer == Answer::kAgain || answer == Answer::kMakeAnew) ledger_.connection_lost();
 }
 
 /// Gives a session made anew what the lost one had, on its own: it was accepted once and must not fall with
@@ -349,6 +354,8 @@ absl::Status Link::make_anew(const std::string& lost) {
   lease_ = *std::move(made);
   request_id_ = new_request_id();
   ledger_.session_lost();
+  ledger_.count_from(lease_.input_seq);
+  ledger_.begin_epoch(lease_.epoch);
   is_made_anew_ = copy_.is_bare && ledger_.has_restore();
   box_.begin_session();
   return absl::OkStatus();
@@ -372,6 +379,7 @@ absl::Status Link::take_over() {
     if (is_closing_) return session_closed();
     lease_ = *std::move(lease);
     ledger_.count_from(lease_.input_seq);
+    ledger_.begin_epoch(lease_.epoch);
     box_.begin_epoch(lease_.epoch);
     is_to_reopen_ = is_running_;
     if (call_ != nullptr) call_->cancel();

@@ -6,6 +6,7 @@
 #include "client/cpp/guarded.h"
 #include "client/cpp/link.h"
 #include "client/cpp/wire.h"
+#include "core/base/fault.h"
 
 namespace lpdeform::client {
 
@@ -55,13 +56,7 @@ absl::Status Link::take(const v1::StreamEvent& event) {
     case v1::StreamEvent::kFrame:
       return take(event.frame());
     case v1::StreamEvent::kFault:
-      // Its uploads went with a server that has ended, or to another one: the next stream sends it again, with new ones. Once:
-      // a server that loses those as well will not do better.
-      if (event.fault().reason() == "UPLOAD_UNKNOWN" &&
-          std::exchange(sent_again_, event.fault().input_seq()) != event.fault().input_seq())
-        return from_wire(event.fault());
-      take(event.fault());
-      break;
+      return take(event.fault());
     case v1::StreamEvent::kGoAway: {
       const std::scoped_lock lock(mutex_);
       go_away_ = event.go_away();
@@ -92,7 +87,7 @@ absl::Status Link::take(const v1::StreamOpened& opened) {
     longest_silence_ = 3 * std::chrono::milliseconds(opened.heartbeat_interval_ms());
   }
   ledger_.count_from(opened.input_seq());
-  ledger_.resumed_at(opened.input_seq());
+  ledger_.reopened(opened.epoch(), opened.input_seq());
   is_open_ = true;
   opened_ = Clock::now();
   changed_.notify_all();
@@ -100,7 +95,10 @@ absl::Status Link::take(const v1::StreamOpened& opened) {
 }
 
 absl::Status Link::take(const v1::FramePart& part) {
-  if (!assembly_) return absl::DataLossError("A frame came before the stream was open.");
+  if (!assembly_) {
+    return make_fault(absl::StatusCode::kDataLoss, {"FRAME_PARTS", "", ""},
+                      "A frame came before the stream was open.");
+  }
   absl::StatusOr<std::optional<Frame>> frame = assembly_->add(part);
   if (!frame.ok()) return frame.status();
   if (!frame->has_value()) return absl::OkStatus();
@@ -109,6 +107,7 @@ absl::Status Link::take(const v1::FramePart& part) {
   {
     const std::scoped_lock lock(mutex_);
     stream = stream_;
+    rules_.frame_fitted();
   }
   const std::uint64_t frame_seq = (*frame)->frame_seq;
   if (box_.put(*std::move(*frame), stream)) return absl::OkStatus();
@@ -116,19 +115,25 @@ absl::Status Link::take(const v1::FramePart& part) {
   return absl::OkStatus();
 }
 
-void Link::take(const v1::Fault& fault) {
+/// An error ends the stream: the next one sends the update again, after the pause that the error asks for. Uploads went with a
+/// server that has ended, or to another one, and are sent anew; once, for a server that loses those as well will not do better.
+absl::Status Link::take(const v1::Fault& fault) {
   const absl::Status status = from_wire(fault);
+  const std::uint64_t seq = fault.input_seq();
   {
     const std::scoped_lock lock(mutex_);
-    if (is_taken_all_the_same(status)) {
-      ledger_.accept(fault.input_seq());
-    } else if (!is_session_lost(status)) {  // then it waits for the session made anew
-      ledger_.refuse(fault.input_seq());
+    const Answer answer = answer_of(status, seq == sent_again_);
+    if (seq != 0 && answer == Answer::kAgain) {
+      sent_again_ = seq;
+      return status;
     }
-    note_answered(fault.input_seq());
+    if (answer == Answer::kTaken) ledger_.accept(seq);
+    if (answer == Answer::kRefused) ledger_.refuse(seq);
+    note_answered(seq);
     changed_.notify_all();
   }
   box_.put_problem(status);
+  return absl::OkStatus();
 }
 
 }  // namespace lpdeform::client

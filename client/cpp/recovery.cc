@@ -1,8 +1,11 @@
 #include "client/cpp/recovery.h"
 
 #include <algorithm>
+#include <cmath>
+#include <random>
 #include <string>
 
+#include "client/cpp/lease.h"
 #include "core/base/fault.h"
 
 namespace lpdeform::client {
@@ -12,29 +15,27 @@ absl::Status ended_because(absl::StatusCode code, const char* reason, const v1::
   return make_fault(code, {reason, "", ""}, go_away.text());
 }
 
-Recovery after_go_away(const v1::GoAway& go_away, bool has_copy) {
-  const std::chrono::milliseconds pause(go_away.reconnect_after_ms());
+/// What the server meant to end, and why.
+std::pair<NextStep, absl::Status> after_go_away(const v1::GoAway& go_away, bool has_copy) {
   switch (go_away.reason()) {
     case v1::GO_AWAY_REASON_SESSION_DELETED:
-      return {NextStep::kGiveUp, ended_because(absl::StatusCode::kNotFound, "SESSION_DELETED", go_away),
-              pause};
+      return {NextStep::kGiveUp, ended_because(absl::StatusCode::kNotFound, "SESSION_DELETED", go_away)};
     case v1::GO_AWAY_REASON_SESSION_EXPIRED:
       return {has_copy ? NextStep::kMakeAnew : NextStep::kGiveUp,
-              ended_because(absl::StatusCode::kNotFound, "SESSION_EXPIRED", go_away), pause};
+              ended_because(absl::StatusCode::kNotFound, "SESSION_EXPIRED", go_away)};
     case v1::GO_AWAY_REASON_WRITER_REPLACED:
-      return {NextStep::kGiveUp, ended_because(absl::StatusCode::kAborted, "WRITER_REPLACED", go_away),
-              pause};
+      return {NextStep::kGiveUp, ended_because(absl::StatusCode::kAborted, "WRITER_REPLACED", go_away)};
     case v1::GO_AWAY_REASON_PROTOCOL_ERROR:
-      return {NextStep::kGiveUp, ended_because(absl::StatusCode::kInternal, "PROTOCOL_ERROR", go_away),
-              pause};
+      return {NextStep::kGiveUp, ended_because(absl::StatusCode::kInternal, "PROTOCOL_ERROR", go_away)};
+    case v1::GO_AWAY_REASON_TOKEN_EXPIRED:
+      return {NextStep::kResume, ended_because(absl::StatusCode::kUnauthenticated, "TOKEN_EXPIRED", go_away)};
     default:
-      return {NextStep::kResume, ended_because(absl::StatusCode::kUnavailable, "DRAINING", go_away), pause};
+      return {NextStep::kResume, ended_because(absl::StatusCode::kUnavailable, "DRAINING", go_away)};
   }
 }
 
 bool is_passing(absl::StatusCode code) {
   switch (code) {
-    case absl::StatusCode::kOk:  // the server ended the stream without a word
     case absl::StatusCode::kCancelled:
     case absl::StatusCode::kUnknown:
     case absl::StatusCode::kDeadlineExceeded:
@@ -48,27 +49,61 @@ bool is_passing(absl::StatusCode code) {
   }
 }
 
-}  // namespace
-
-Recovery recovery_after(const absl::Status& ended, const std::optional<v1::GoAway>& go_away, bool has_copy) {
-  if (go_away) return after_go_away(*go_away, has_copy);
-  if (fault_of(ended).reason == "FRAME_VERTICES")
-    return {NextStep::kGiveUp, ended, {}};  // it is another mesh
-  if (is_passing(ended.code())) return {NextStep::kResume, ended, {}};
-  if (absl::IsNotFound(ended) && has_copy) return {NextStep::kMakeAnew, ended, {}};
-  if (fault_of(ended).reason == "NOT_THE_WRITER") {  // it happened while we were away
-    return {NextStep::kGiveUp,
-            make_fault(absl::StatusCode::kAborted, {"WRITER_REPLACED", "", ""},
-                       "Another writer took the session over."),
-            {}};
+std::pair<NextStep, absl::Status> after_status(const absl::Status& ended, bool has_copy) {
+  const std::string reason = fault_of(ended).reason;
+  if (ended.ok()) return {NextStep::kResume, absl::UnavailableError("The server ended the stream.")};
+  // It is another mesh; it would happen again.
+  if (reason == "FRAME_VERTICES" || reason == "EXCEPTION") return {NextStep::kGiveUp, ended};
+  if (is_session_lost(ended)) return {has_copy ? NextStep::kMakeAnew : NextStep::kGiveUp, ended};
+  if (is_passing(ended.code()) || is_undecided(ended)) return {NextStep::kResume, ended};
+  if (reason == "NOT_THE_WRITER") {  // it happened while we were away
+    return {NextStep::kGiveUp, make_fault(absl::StatusCode::kAborted, {"WRITER_REPLACED", "", ""},
+                                          "Another writer took the session over.")};
   }
-  return {NextStep::kGiveUp, ended, {}};
+  return {NextStep::kGiveUp, ended};
 }
 
-std::chrono::milliseconds Backoff::next() {
-  std::uniform_int_distribution<std::int64_t> spread(longest_.count() / 2, longest_.count());
+double by_chance() {
+  thread_local std::minstd_rand chance{std::random_device{}()};
+  return std::uniform_real_distribution<double>()(chance);
+}
+
+}  // namespace
+
+std::chrono::milliseconds Backoff::next(std::chrono::milliseconds asked) {
+  const double chance = chance_ ? chance_() : by_chance();
+  const auto longest = static_cast<double>(longest_.count());
   longest_ = std::min(longest_ * 2, kMost);
-  return std::chrono::milliseconds(spread(chance_));
+  const std::chrono::milliseconds own(std::llround(longest * (0.5 + 0.5 * chance)));
+  return std::clamp(asked, std::chrono::milliseconds(0), kMostAsked) + own;
+}
+
+Recovery RecoveryRules::with_pause(NextStep next, absl::Status why, std::chrono::milliseconds asked) {
+  const auto obeyed = std::min(asked, Backoff::kMostAsked);
+  return {next, std::move(why), obeyed, backoff_.next(asked)};
+}
+
+Recovery RecoveryRules::after(const Ending& ending) {
+  if (ending.stood >= Backoff::kMost) backoff_.reset();  // one that breaks at once is no success
+  auto [next, why] = ending.go_away ? after_go_away(*ending.go_away, has_copy_)
+                                    : after_status(ending.status, has_copy_);
+  const bool is_misfit = fault_of(why).reason == "FRAME_PARTS" && ++misfits_ >= kMostMisfits;
+  if (is_misfit || ending.away > reconnect_for_) next = NextStep::kGiveUp;
+  const auto asked = ending.go_away ? std::chrono::milliseconds(ending.go_away->reconnect_after_ms())
+                                    : retry_after(ending.status);
+  return with_pause(next, std::move(why), asked);
+}
+
+Recovery RecoveryRules::after_failed_making(const absl::Status& failed) {
+  return with_pause(is_undecided(failed) ? NextStep::kMakeAnew : NextStep::kGiveUp, failed,
+                    retry_after(failed));
+}
+
+Answer answer_of(const absl::Status& status, bool is_second) {
+  if (is_session_lost(status)) return Answer::kMakeAnew;
+  if (is_taken_all_the_same(status)) return Answer::kTaken;
+  const bool is_in_vain = is_second && fault_of(status).reason == "UPLOAD_UNKNOWN";
+  return is_undecided(status) && !is_in_vain ? Answer::kAgain : Answer::kRefused;
 }
 
 }  // namespace lpdeform::client

@@ -2,9 +2,15 @@
 
 #include <google/protobuf/unknown_field_set.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <functional>
 
+#include "absl/strings/cord.h"
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "client/cpp/client.h"
 #include "core/base/fault.h"
 
 namespace lpdeform::client {
@@ -19,6 +25,11 @@ constexpr int kStatusDetails = 3;
 constexpr int kAnyTypeUrl = 1, kAnyValue = 2;
 constexpr int kErrorInfoReason = 1, kErrorInfoMetadata = 3;
 constexpr int kEntryKey = 1, kEntryValue = 2;
+constexpr int kRetryDelay = 1, kDurationSeconds = 1, kDurationNanos = 2;
+
+constexpr char kRetryPayload[] = "lpdeform/retry_after_ms";
+/// A day: what is longer is as good as never, and would not fit a clock.
+constexpr std::uint64_t kMostSeconds = 24 * 60 * 60;
 
 /// Calls `visit` for each length-delimited field of a serialised message. Reads nothing where it is not one.
 void for_each_field(const std::string& message,
@@ -49,8 +60,31 @@ void read_error_info(const std::string& error_info, Fault& fault) {
   });
 }
 
-Fault fault_in(const std::string& details) {
+std::chrono::milliseconds read_retry_info(const std::string& retry_info) {
+  std::uint64_t milliseconds = 0;
+  for_each_field(retry_info, [&](int number, const std::string& duration) {
+    UnknownFieldSet fields;
+    if (number != kRetryDelay || !fields.ParseFromString(duration)) return;
+    for (int k = 0; k < fields.field_count(); ++k) {
+      const UnknownField& field = fields.field(k);
+      if (field.type() != UnknownField::TYPE_VARINT) continue;
+      const auto value = static_cast<std::int64_t>(field.varint());
+      if (value < 0) continue;
+      const auto positive = static_cast<std::uint64_t>(value);
+      if (field.number() == kDurationSeconds) milliseconds += 1000 * std::min(positive, kMostSeconds);
+      if (field.number() == kDurationNanos) milliseconds += std::min<std::uint64_t>(positive, 999'999'999) / 1'000'000;
+    }
+  });
+  return std::chrono::milliseconds(milliseconds);
+}
+
+struct Details {
   Fault fault;
+  std::chrono::milliseconds retry_after{0};
+};
+
+Details read_details(const std::string& details) {
+  Details out;
   for_each_field(details, [&](int number, const std::string& any) {
     if (number != kStatusDetails) return;
     std::string type;
@@ -59,16 +93,30 @@ Fault fault_in(const std::string& details) {
       if (part == kAnyTypeUrl) type = bytes;
       if (part == kAnyValue) value = bytes;
     });
-    if (absl::EndsWith(type, "/google.rpc.ErrorInfo")) read_error_info(value, fault);
+    if (absl::EndsWith(type, "/google.rpc.ErrorInfo")) read_error_info(value, out.fault);
+    if (absl::EndsWith(type, "/google.rpc.RetryInfo")) out.retry_after = read_retry_info(value);
   });
-  return fault;
+  return out;
 }
 
 }  // namespace
 
 absl::Status with_details(absl::StatusCode code, std::string_view text, const std::string& details) {
-  const Fault fault = fault_in(details);
-  return fault == Fault{} ? absl::Status(code, std::string(text)) : make_fault(code, fault, text);
+  const auto [fault, pause] = read_details(details);
+  return with_retry_after(fault == Fault{} ? absl::Status(code, std::string(text)) : make_fault(code, fault, text),
+                          pause);
+}
+
+absl::Status with_retry_after(absl::Status status, std::chrono::milliseconds pause) {
+  if (pause.count() > 0) status.SetPayload(kRetryPayload, absl::Cord(absl::StrCat(pause.count())));
+  return status;
+}
+
+std::chrono::milliseconds retry_after(const absl::Status& status) {
+  const auto said = status.GetPayload(kRetryPayload);
+  std::int64_t milliseconds = 0;
+  if (said) (void)absl::SimpleAtoi(std::string(*said), &milliseconds);
+  return std::chrono::milliseconds(milliseconds);
 }
 
 }  // namespace lpdeform::client

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "client/cpp/mesh_notices.h"
+#include "client/cpp/status_details.h"
 #include "core/base/fault.h"
 
 namespace lpdeform::client {
@@ -301,8 +302,9 @@ void from_wire(const v1::SolveSummary& summary, SolveResult& out) {
 }
 
 absl::Status from_wire(const v1::Fault& fault) {
-  return make_fault(static_cast<absl::StatusCode>(fault.code()),
-                    {fault.reason(), fault.element(), fault.limit()}, fault.text());
+  absl::Status status = make_fault(static_cast<absl::StatusCode>(fault.code()),
+                                   {fault.reason(), fault.element(), fault.limit()}, fault.text());
+  return with_retry_after(std::move(status), std::chrono::milliseconds(fault.retry_after_ms()));
 }
 
 Notice from_wire(const v1::Notice& notice) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -279,6 +280,7 @@ class FakeRpc final : public Rpc {
       }
     }
     v1::SolveResponse summary;
+    summary.mutable_summary()->set_input_seq(newest_input());
     summary.mutable_summary()->set_stop_reason(v1::STOP_REASON_CONVERGED);
     absl::Status taken = on_response(summary);
     v1::SolveResponse frame;
@@ -300,6 +302,15 @@ class FakeRpc final : public Rpc {
     streams_.push_back(std::make_shared<Stream>());
     changed_.notify_all();
     return std::make_unique<FakeCall>(streams_.back());
+  }
+
+  /// Of the updates that came with calls.
+  std::uint64_t newest_input() {
+    const std::scoped_lock lock(mutex_);
+    std::uint64_t newest = 0;
+    for (const v1::SolveRequest& one : solved_) newest = std::max(newest, one.update().input_seq());
+    for (const v1::UpdateHandlesRequest& one : restored_) newest = std::max(newest, one.update().input_seq());
+    return newest;
   }
 
  private:

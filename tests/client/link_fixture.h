@@ -94,6 +94,10 @@ inline v1::DeformResponse refusal(std::uint64_t input_seq) {
   return response;
 }
 
+inline absl::Status session_unknown() {
+  return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""}, "There is no such session.");
+}
+
 inline v1::DeformResponse go_away(v1::GoAwayReason reason) {
   v1::DeformResponse response;
   response.mutable_event()->mutable_go_away()->set_reason(reason);

@@ -1,74 +1,114 @@
+// The table of what clients do after a stream, an answer or a loss: tests/golden/recovery.json, which all of them replay.
+
 #include "client/cpp/recovery.h"
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "client/cpp/client.h"
+#include "client/cpp/status_details.h"
 #include "core/base/fault.h"
 
 namespace lpdeform::client {
 namespace {
 
-v1::GoAway go_away(v1::GoAwayReason reason) {
-  v1::GoAway message;
-  message.set_reason(reason);
-  message.set_reconnect_after_ms(250);
-  return message;
+using Json = nlohmann::json;
+
+const Json& table() {
+  static const Json read = Json::parse(std::ifstream(RECOVERY_TABLE));
+  return read;
 }
 
-NextStep after(v1::GoAwayReason reason, bool has_copy = true) {
-  return recovery_after(absl::OkStatus(), go_away(reason), has_copy).next;
+const std::map<std::string, absl::StatusCode>& codes() {
+  static const std::map<std::string, absl::StatusCode> all{
+      {"ok", absl::StatusCode::kOk},
+      {"cancelled", absl::StatusCode::kCancelled},
+      {"unknown", absl::StatusCode::kUnknown},
+      {"invalid_argument", absl::StatusCode::kInvalidArgument},
+      {"deadline_exceeded", absl::StatusCode::kDeadlineExceeded},
+      {"not_found", absl::StatusCode::kNotFound},
+      {"already_exists", absl::StatusCode::kAlreadyExists},
+      {"permission_denied", absl::StatusCode::kPermissionDenied},
+      {"resource_exhausted", absl::StatusCode::kResourceExhausted},
+      {"failed_precondition", absl::StatusCode::kFailedPrecondition},
+      {"aborted", absl::StatusCode::kAborted},
+      {"out_of_range", absl::StatusCode::kOutOfRange},
+      {"unimplemented", absl::StatusCode::kUnimplemented},
+      {"internal", absl::StatusCode::kInternal},
+      {"unavailable", absl::StatusCode::kUnavailable},
+      {"data_loss", absl::StatusCode::kDataLoss},
+      {"unauthenticated", absl::StatusCode::kUnauthenticated}};
+  return all;
 }
 
-NextStep after(const absl::Status& ended, bool has_copy = true) {
-  return recovery_after(ended, std::nullopt, has_copy).next;
+absl::Status error_of(const Json& said) {
+  const absl::StatusCode code = codes().at(said.at("code"));
+  const std::string reason = said.value("reason", "");
+  const absl::Status error = reason.empty() ? absl::Status(code, "No.") : make_fault(code, {reason, "", ""}, "No.");
+  return with_retry_after(error, std::chrono::milliseconds(said.value("retry_after_ms", 0)));
 }
 
-TEST(Recovery, ResumesWhereTheServerOrTheConnectionWentAway) {
-  EXPECT_EQ(after(v1::GO_AWAY_REASON_DRAINING), NextStep::kResume);
-  EXPECT_EQ(after(absl::UnavailableError("connection reset")), NextStep::kResume);
-  EXPECT_EQ(after(absl::InternalError("RST_STREAM")), NextStep::kResume);
-  EXPECT_EQ(after(absl::OkStatus()), NextStep::kResume);
+Ending ending_of(const Json& step) {
+  Ending ending;
+  if (step.contains("ended")) ending.status = error_of(step["ended"]);
+  if (step.contains("go_away")) {
+    v1::GoAwayReason reason{};
+    EXPECT_TRUE(v1::GoAwayReason_Parse("GO_AWAY_REASON_" + step["go_away"].value("reason", ""), &reason));
+    ending.go_away.emplace().set_reason(reason);
+    ending.go_away->set_reconnect_after_ms(step["go_away"].at("reconnect_after_ms"));
+  }
+  ending.stood = std::chrono::milliseconds(step.value("stood_ms", 0));
+  ending.away = std::chrono::milliseconds(step.value("away_ms", 0));
+  return ending;
 }
 
-TEST(Recovery, MakesALostSessionAnewWhereThereIsACopy) {
-  EXPECT_EQ(after(absl::NotFoundError("no such session")), NextStep::kMakeAnew);
-  EXPECT_EQ(after(v1::GO_AWAY_REASON_SESSION_EXPIRED), NextStep::kMakeAnew);
-  EXPECT_EQ(after(absl::NotFoundError("no such session"), false), NextStep::kGiveUp);
-  EXPECT_EQ(after(v1::GO_AWAY_REASON_SESSION_EXPIRED, false), NextStep::kGiveUp);
+const std::map<std::string, NextStep> kNextSteps{
+    {"resume", NextStep::kResume}, {"make_anew", NextStep::kMakeAnew}, {"give_up", NextStep::kGiveUp}};
+const std::map<std::string, Answer> kAnswers{{"again", Answer::kAgain},
+                                             {"make_anew", Answer::kMakeAnew},
+                                             {"taken", Answer::kTaken},
+                                             {"refused", Answer::kRefused}};
+
+TEST(Recovery, IsAsTheTableOfAllClientsHasIt) {
+  ASSERT_GT(table().at("ends").size(), 40u);
+  for (const int chance : {0, 1}) {
+    for (const Json& one : table().at("ends")) {
+      SCOPED_TRACE(one.at("name"));
+      RecoveryRules rules(one.at("has_copy"), std::chrono::milliseconds(one.at("reconnect_for_ms")),
+                          Backoff([chance] { return chance; }));
+      for (const Json& step : one.at("steps")) {
+        if (step.value("fitted", false)) rules.frame_fitted();
+        const Recovery recovery = step.contains("failed_making")
+                                      ? rules.after_failed_making(error_of(step["failed_making"]))
+                                      : rules.after(ending_of(step));
+        EXPECT_EQ(recovery.next, kNextSteps.at(step.at("next")));
+        EXPECT_EQ(recovery.why.code(), codes().at(step.at("code")));
+        EXPECT_EQ(fault_of(recovery.why).reason, step.at("reason"));
+        EXPECT_EQ(recovery.pause.count(), step.at("pause_ms").at(chance));
+      }
+    }
+  }
 }
 
-TEST(Recovery, GivesUpWhereSomebodyMeantIt) {
-  EXPECT_EQ(after(v1::GO_AWAY_REASON_SESSION_DELETED), NextStep::kGiveUp);
-  EXPECT_EQ(after(v1::GO_AWAY_REASON_WRITER_REPLACED), NextStep::kGiveUp);
-  EXPECT_EQ(after(v1::GO_AWAY_REASON_PROTOCOL_ERROR), NextStep::kGiveUp);
-  EXPECT_EQ(after(absl::UnauthenticatedError("no token")), NextStep::kGiveUp);
-  EXPECT_EQ(after(absl::InvalidArgumentError("credit 9")), NextStep::kGiveUp);
+TEST(Recovery, AnswersMeanWhatTheTableOfAllClientsSays) {
+  ASSERT_GT(table().at("answers").size(), 20u);
+  for (const Json& one : table().at("answers")) {
+    SCOPED_TRACE(one.dump());
+    EXPECT_EQ(answer_of(error_of(one.at("error")), one.value("is_second", false)),
+              kAnswers.at(one.at("outcome")));
+  }
 }
 
-TEST(Recovery, KeepsTheReasonAndThePauseOfAGoAway) {
-  const Recovery recovery = recovery_after({}, go_away(v1::GO_AWAY_REASON_WRITER_REPLACED), true);
-  EXPECT_EQ(fault_of(recovery.why).reason, "WRITER_REPLACED");
-  EXPECT_TRUE(absl::IsAborted(recovery.why));
-  EXPECT_EQ(recovery.pause, std::chrono::milliseconds(250));
-}
-
-TEST(Recovery, SaysThatAnotherWriterTookOverWhileTheConnectionWasDown) {
-  const Recovery recovery =
-      recovery_after(make_fault(absl::StatusCode::kPermissionDenied, {"NOT_THE_WRITER", "writer_token", ""},
-                                "Not the writer."),
-                     std::nullopt, true);
-  EXPECT_EQ(recovery.next, NextStep::kGiveUp);
-  EXPECT_EQ(fault_of(recovery.why).reason, "WRITER_REPLACED");
-}
-
-TEST(Backoff, GrowsFromFiftyMillisecondsToFiveSecondsAndStartsAgain) {
-  Backoff backoff;
-  EXPECT_LE(backoff.next(), std::chrono::milliseconds(50));
-  for (int k = 0; k < 10; ++k) backoff.next();
-  const auto longest = backoff.next();
-  EXPECT_GE(longest, std::chrono::milliseconds(2500));
-  EXPECT_LE(longest, std::chrono::milliseconds(5000));
-  backoff.reset();
-  EXPECT_LE(backoff.next(), std::chrono::milliseconds(50));
+TEST(Backoff, SpreadsItsPausesByChance) {
+  std::map<std::int64_t, int> pauses;
+  for (int k = 0; k < 100; ++k) ++pauses[Backoff().next().count()];
+  EXPECT_GT(pauses.size(), 5u);
+  EXPECT_GE(pauses.begin()->first, 25);
+  EXPECT_LE(pauses.rbegin()->first, 50);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from lpdeform import FrameAssembly, LpdeformError
-from lpdeform._recovery import Backoff, Next, recovery_after
 from lpdeform.errors import Code, make
 from lpdeform.v1 import data_pb2, frame_pb2, service_pb2
 
@@ -92,39 +91,3 @@ def test_what_does_not_fit_is_refused() -> None:
     unknown = quantized_part()
     unknown.header.encoding = 9  # type: ignore[assignment]
     assert "not asked for" in refused(FrameAssembly(2), unknown)
-
-
-def go_away(reason: service_pb2.GoAwayReason) -> service_pb2.GoAway:
-    return service_pb2.GoAway(reason=reason, text="so it is", reconnect_after_ms=250)
-
-
-@pytest.mark.parametrize(
-    ("reason", "step"),
-    [
-        (service_pb2.GO_AWAY_REASON_DRAINING, Next.RESUME),
-        (service_pb2.GO_AWAY_REASON_SESSION_EXPIRED, Next.MAKE_ANEW),
-        (service_pb2.GO_AWAY_REASON_SESSION_DELETED, Next.GIVE_UP),
-        (service_pb2.GO_AWAY_REASON_WRITER_REPLACED, Next.GIVE_UP),
-        (service_pb2.GO_AWAY_REASON_PROTOCOL_ERROR, Next.GIVE_UP),
-    ],
-)
-def test_each_way_of_going_away_has_its_answer(reason: service_pb2.GoAwayReason, step: Next) -> None:
-    assert recovery_after(None, go_away(reason), True).next is step
-
-
-def test_what_cannot_be_made_anew_is_given_up() -> None:
-    lost = make(Code.NOT_FOUND, "There is no such session.", "SESSION_UNKNOWN")
-    assert recovery_after(lost, None, True).next is Next.MAKE_ANEW
-    assert recovery_after(lost, None, False).next is Next.GIVE_UP
-    assert recovery_after(None, go_away(service_pb2.GO_AWAY_REASON_SESSION_EXPIRED), False).next is Next.GIVE_UP
-    assert recovery_after(make(Code.UNAVAILABLE, "Gone."), None, False).next is Next.RESUME
-    assert recovery_after(make(Code.INVALID_ARGUMENT, "No."), None, True).next is Next.GIVE_UP
-
-
-def test_pauses_grow_and_stay_below_the_longest() -> None:
-    backoff = Backoff()
-    pauses = [backoff.next() for _ in range(20)]
-    assert 0.025 <= pauses[0] <= 0.05
-    assert all(Backoff.most / 2 <= pause <= Backoff.most for pause in pauses[8:])
-    backoff.reset()
-    assert backoff.next() <= 0.05

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "client/cpp/status_details.h"
 #include "core/base/fault.h"
 #include "tests/client/c/session_fixture.h"
 
@@ -35,7 +36,8 @@ TEST(LiveSession, WhatMayPassIsTriedAgain) {
   for (const absl::Status& passing :
        {absl::CancelledError("The server goes down."), failure(absl::StatusCode::kNotFound, "UPLOAD_UNKNOWN"),
         failure(absl::StatusCode::kUnavailable, "DRAINING"), absl::DeadlineExceededError("late"),
-        failure(absl::StatusCode::kResourceExhausted, "SESSIONS_FULL")}) {
+        client::with_retry_after(failure(absl::StatusCode::kResourceExhausted, "SESSIONS_FULL"),
+                                 std::chrono::milliseconds(1))}) {
     absl::Status why;
     EXPECT_EQ(state_after(
                   3, [&](const std::stop_token&) { return passing; }, why),
@@ -48,7 +50,8 @@ TEST(LiveSession, WhatMayPassIsTriedAgain) {
 TEST(LiveSession, WhatStaysIsFinal) {
   for (const absl::Status& final :
        {failure(absl::StatusCode::kNotFound, "SESSION_UNKNOWN"),
-        failure(absl::StatusCode::kInvalidArgument, "MESH_EMPTY"), absl::UnauthenticatedError("no token")}) {
+        failure(absl::StatusCode::kInvalidArgument, "MESH_EMPTY"), absl::UnauthenticatedError("no token"),
+        failure(absl::StatusCode::kResourceExhausted, "CALLER_SESSIONS_FULL")}) {
     absl::Status why;
     EXPECT_EQ(state_after(
                   2, [&](const std::stop_token&) { return final; }, why),

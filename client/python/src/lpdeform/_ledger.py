@@ -8,7 +8,6 @@ from typing import NamedTuple
 from lpdeform.types import Change, Handle, Removal, Settings, Update
 
 _resize_handle = "resize"
-_most_remembered = 16384
 
 
 class NumberedUpdate(NamedTuple):
@@ -51,8 +50,11 @@ def _settled(state: Update) -> Update:
 
 
 def _without_old_removals(update: Update) -> Update:
-    """Bounds what is remembered of handles that are there no more."""
-    return update if len(update.handles) <= _most_remembered else _settled(update)
+    """Bounds what is remembered of handles that are there no more. Motions stay: of handles that the session was made with."""
+    if sum(isinstance(change, Removal) for change in update.handles.values()) <= Ledger.most_removals:
+        return update
+    kept = {name: change for name, change in update.handles.items() if not isinstance(change, Removal)}
+    return replace(update, handles=kept)
 
 
 class Ledger:
@@ -63,11 +65,14 @@ class Ledger:
     """
 
     window = 4
+    most_removals = 8192
+    """Handles of which it is remembered that they were let go of; of more than that, none."""
 
     def __init__(self, begins_bare: bool = True) -> None:
         """`begins_bare`: a session made anew has no handles but those of this book, otherwise also those that it is made with."""
         self._begins_bare = begins_bare
         self._next_seq = 1
+        self._epoch = 0
         self._accepted = NumberedUpdate(0, Update())
         self._unkept = NumberedUpdate(0, Update())  # accepted since the server last kept something, as it came
         self._restore: NumberedUpdate | None = None
@@ -141,6 +146,20 @@ class Ledger:
         """
         if seq < self._unkept.seq and self._restore is None:
             self._restore = NumberedUpdate(self._accepted.seq, self._unkept.update)
+
+    def reopened(self, epoch: int, seq: int) -> None:
+        """The same of a session that is at `epoch`.
+
+        In a newer one than before another server has it, and its newest update says nothing of those before that: a call may
+        have brought it there. So all that was not kept is sent; of what the server has that changes nothing.
+        """
+        is_another = epoch > self._epoch
+        self._epoch = max(epoch, self._epoch)
+        self.resumed_at(0 if is_another else seq)
+
+    def begin_epoch(self, epoch: int) -> None:
+        """Of a session just made, joined or taken over."""
+        self._epoch = epoch
 
     @property
     def newest_accepted(self) -> int:

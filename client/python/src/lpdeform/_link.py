@@ -14,7 +14,7 @@ from lpdeform import _wire
 from lpdeform._box import FrameBox
 from lpdeform._lease import Lease, Original, Snapshot, check_vertex_count, create_session, join_session, restore_session
 from lpdeform._ledger import Ledger
-from lpdeform._recovery import Backoff, Next, recovery_after
+from lpdeform._recovery import Answer, Backoff, Ending, Next, RecoveryRules, answer_of
 from lpdeform._rpc import Rpc, Stop, new_request_id
 from lpdeform._sending import requests
 from lpdeform._stream import Stream
@@ -25,9 +25,6 @@ from lpdeform.errors import (
     exception,
     from_call,
     from_fault,
-    is_session_lost,
-    is_taken_all_the_same,
-    is_undecided,
     make,
     session_closed,
 )
@@ -70,7 +67,11 @@ class Link:
         self._last_open = 0.0
         self._is_to_reopen = False
         self._is_taking_over = False
+        self._rules = RecoveryRules(original is not None, rpc.reconnect_for)
+        self._sent_again = 0
+        """The last update that the server asked for again."""
         self.ledger.count_from(lease.input_seq)
+        self.ledger.begin_epoch(lease.epoch)
 
     # What callers ask, on their own threads.
 
@@ -158,6 +159,7 @@ class Link:
             self._is_taking_over = False
             self.lease = lease
             self.ledger.count_from(lease.input_seq)
+            self.ledger.begin_epoch(lease.epoch)
             self.box.begin_epoch(lease.epoch)
             self._is_to_reopen = self._thread is not None and self._over is None
             if self._over is not None:
@@ -209,14 +211,14 @@ class Link:
                 self.ledger.session_lost()
                 self.is_made_anew = isinstance(self.original, Original) and self.ledger.has_restore
                 self.ledger.count_from(lease.input_seq)
+                self.ledger.begin_epoch(lease.epoch)
                 self.box.begin_session()
 
     # The stream, on its thread.
 
     def _run(self) -> None:
-        backoff = Backoff()
         try:
-            while self._recover(self._one_stream(), backoff):
+            while self._recover(self._one_stream()):
                 pass
         except Exception as error:  # no memory for a frame: whoever waits is told
             with self.changed:
@@ -259,15 +261,16 @@ class Link:
         except ValueError:  # the channel was closed meanwhile
             raise session_closed() from None
 
-    def _recover(self, ended: LpdeformError | None, backoff: Backoff) -> bool:
+    def _recover(self, ended: LpdeformError | None) -> bool:
         """Pauses, makes the session anew where it is lost. False where it is all over."""
         with self.changed:
             stream = self._stream
             assert stream is not None
+            now = time.monotonic()
             if stream.is_open:
-                self._last_open = time.monotonic()
-                if self._last_open - stream.opened_at >= Backoff.most:
-                    backoff.reset()  # one that breaks at once is no success
+                self._last_open = now
+            stood = now - stream.opened_at if stream.is_open else 0.0
+            ending = Ending(ended, stream.go_away, stood, now - self._last_open)
             self.ledger.connection_lost()
             self.changed.notify_all()
             self.changed.wait_for(lambda: not self._is_taking_over or self.is_closing)
@@ -275,24 +278,29 @@ class Link:
                 return False
             if self._is_to_reopen:
                 return True
-            recovery = recovery_after(ended, stream.go_away, self.original is not None)
+            recovery = self._rules.after(ending)
             self.interruption = recovery.why
-            is_too_late = time.monotonic() - self._last_open > self.rpc.reconnect_for
-            if recovery.next is Next.GIVE_UP or is_too_late:
+            if recovery.next is Next.GIVE_UP:
                 self._give_up(recovery.why)
                 return False
-            if self.changed.wait_for(lambda: self.is_closing, max(recovery.pause, backoff.next())):
+            if self.changed.wait_for(lambda: self.is_closing, recovery.pause):
                 return False
             lost = self.lease.session
         self.rpc.reach(lost, self.stop, Backoff.most)
         if recovery.next is Next.RESUME:
             return True
+        return self._make_anew_or_pause(lost)
+
+    def _make_anew_or_pause(self, lost: str) -> bool:
         try:
             self.make_anew(lost)
         except LpdeformError as error:
-            if not is_undecided(error):
-                with self.changed:
-                    self._give_up(error)
+            with self.changed:
+                failed = self._rules.after_failed_making(error)
+                self.interruption = error
+                if failed.next is Next.MAKE_ANEW:
+                    return not self.changed.wait_for(lambda: self.is_closing, failed.pause)
+                self._give_up(error)
                 return False
         return True
 
@@ -327,6 +335,9 @@ class Link:
             if not assembly:
                 raise make(Code.DATA_LOSS, "A frame came before the stream was open.", "FRAME_PARTS")
             frame = assembly[0].add(response.event.frame)
+            if frame is not None:
+                with self.changed:
+                    self._rules.frame_fitted()
             if frame is not None and not self.box.put(frame, stream.number):
                 self._acknowledge(frame.frame_seq, stream.number)  # dropped, but its credit is owed
         elif kind == "fault":
@@ -349,18 +360,27 @@ class Link:
             if opened.heartbeat_interval_ms > 0:
                 stream.longest_silence = 3 * opened.heartbeat_interval_ms / 1000
             self.ledger.count_from(opened.input_seq)
-            self.ledger.resumed_at(opened.input_seq)
+            self.ledger.reopened(opened.epoch, opened.input_seq)
             stream.is_open = True
             stream.opened_at = time.monotonic()
             self.changed.notify_all()
 
     def _take_fault(self, stream: Stream, fault: service_pb2.Fault) -> None:
+        """An error that is raised ends the stream: the next one sends the update again, after the pause that it asks for.
+
+        Uploads went with a server that has ended, or to another one, and are sent anew; once, for a server that loses those as
+        well will not do better.
+        """
         error = from_fault(fault)
         with self.changed:
-            is_void = is_taken_all_the_same(error) and 0 < error.input_seq < self.ledger.newest
-            if is_taken_all_the_same(error):
+            answer = answer_of(error, error.input_seq == self._sent_again)
+            if error.input_seq and answer is Answer.AGAIN:
+                self._sent_again = error.input_seq
+                raise error
+            is_void = answer is Answer.TAKEN and 0 < error.input_seq < self.ledger.newest
+            if answer is Answer.TAKEN:
                 self.ledger.accept(error.input_seq)
-            elif not is_session_lost(error):  # then it waits for the session made anew
+            elif answer is Answer.REFUSED:
                 self.ledger.refuse(error.input_seq)
             self._note_answered(stream, error.input_seq)
         if not is_void:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
 from enum import Enum
 from typing import NamedTuple
 
-from lpdeform.errors import Code, LpdeformError, make
+from lpdeform.errors import Code, LpdeformError, is_session_lost, is_taken_all_the_same, is_undecided, make
 from lpdeform.v1 import service_pb2
 
 
@@ -23,6 +24,87 @@ class Recovery(NamedTuple):
     """Seconds; not to be tried before."""
 
 
+class Ending(NamedTuple):
+    """How a stream ended."""
+
+    error: LpdeformError | None
+    """None where it ended without one."""
+    go_away: service_pb2.GoAway | None = None
+    """The server's reason, where it gave one; goes before `error`."""
+    stood: float = 0.0
+    """Seconds for which it was open."""
+    away: float = 0.0
+    """Seconds since a stream was open last."""
+
+
+class Backoff:
+    """Growing pauses: 50 ms doubled up to 2 s, each between half and the whole of that by chance.
+
+    So that the clients of a restarted server do not all come at once.
+    """
+
+    first = 0.05
+    most = 2.0
+    most_asked = 60.0
+    """The longest pause that a server may ask for."""
+
+    def __init__(self, chance: Callable[[], float] = random.random) -> None:
+        self._chance = chance
+        self._longest = self.first
+
+    def next(self, asked: float = 0.0) -> float:
+        """On top of `asked`, what the server asks for."""
+        pause = (0.5 + 0.5 * self._chance()) * self._longest
+        self._longest = min(2 * self._longest, self.most)
+        return min(max(asked, 0.0), self.most_asked) + pause
+
+    def reset(self) -> None:
+        self._longest = self.first
+
+
+class RecoveryRules:
+    """What a session does after each of its streams.
+
+    tests/golden/recovery.json has the rules as a table, which the clients in all languages replay.
+    """
+
+    most_misfits = 5
+    """Streams in a row that may end by something that does not fit, before it is taken to be of another version."""
+
+    def __init__(self, has_copy: bool, reconnect_for: float, chance: Callable[[], float] = random.random) -> None:
+        """`has_copy`: the session can be made anew. Gives up after `reconnect_for` seconds without an open stream."""
+        self._has_copy = has_copy
+        self._reconnect_for = reconnect_for
+        self._backoff = Backoff(chance)
+        self._misfits = 0
+
+    def frame_fitted(self) -> None:
+        """A whole frame came."""
+        self._misfits = 0
+
+    def after(self, ending: Ending) -> Recovery:
+        if ending.stood >= Backoff.most:
+            self._backoff.reset()  # one that breaks at once is no success
+        if ending.go_away is not None:
+            next_step, why = _after_go_away(ending.go_away, self._has_copy)
+            asked = ending.go_away.reconnect_after_ms / 1000
+        else:
+            next_step, why = _after_error(ending.error, self._has_copy)
+            asked = ending.error.retry_after if ending.error is not None else 0.0
+        if why.reason == "FRAME_PARTS":
+            self._misfits += 1
+            if self._misfits >= self.most_misfits:
+                next_step = Next.GIVE_UP
+        if ending.away > self._reconnect_for:
+            next_step = Next.GIVE_UP
+        return Recovery(next_step, why, self._backoff.next(asked))
+
+    def after_failed_making(self, error: LpdeformError) -> Recovery:
+        """After the session could not be made anew."""
+        step = Next.MAKE_ANEW if is_undecided(error) else Next.GIVE_UP
+        return Recovery(step, error, self._backoff.next(error.retry_after))
+
+
 _passing = {
     Code.CANCELLED,
     Code.UNKNOWN,
@@ -34,60 +116,49 @@ _passing = {
 }
 
 
-def recovery_after(ended: LpdeformError | None, go_away: service_pb2.GoAway | None, has_copy: bool) -> Recovery:
-    """By the go-away message, where one came, or by what the call ended with: None where it ended without an error.
-
-    `has_copy`: the session can be made anew.
-    """
-    if go_away is not None:
-        return _after_go_away(go_away, has_copy)
-    why = ended or make(Code.UNAVAILABLE, "The server ended the stream.")
-    if why.reason in ("FRAME_VERTICES", "EXCEPTION"):  # it is another mesh; it would happen again
-        return Recovery(Next.GIVE_UP, why, 0.0)
-    if why.code in _passing:
-        return Recovery(Next.RESUME, why, why.retry_after)
-    if why.code is Code.NOT_FOUND and has_copy:
-        return Recovery(Next.MAKE_ANEW, why, why.retry_after)
-    if why.reason == "NOT_THE_WRITER":  # it happened while we were away
-        return Recovery(Next.GIVE_UP, writer_replaced("Another writer took the session over."), 0.0)
-    return Recovery(Next.GIVE_UP, why, 0.0)
+def _after_error(error: LpdeformError | None, has_copy: bool) -> tuple[Next, LpdeformError]:
+    if error is None:
+        return Next.RESUME, make(Code.UNAVAILABLE, "The server ended the stream.")
+    if error.reason in ("FRAME_VERTICES", "EXCEPTION"):  # it is another mesh; it would happen again
+        return Next.GIVE_UP, error
+    if is_session_lost(error):
+        return (Next.MAKE_ANEW if has_copy else Next.GIVE_UP), error
+    if error.code in _passing or is_undecided(error):
+        return Next.RESUME, error
+    if error.reason == "NOT_THE_WRITER":  # it happened while we were away
+        return Next.GIVE_UP, make(Code.ABORTED, "Another writer took the session over.", "WRITER_REPLACED")
+    return Next.GIVE_UP, error
 
 
-def writer_replaced(text: str) -> LpdeformError:
-    return make(Code.ABORTED, text, "WRITER_REPLACED")
-
-
-def _after_go_away(go_away: service_pb2.GoAway, has_copy: bool) -> Recovery:
-    pause = go_away.reconnect_after_ms / 1000
+def _after_go_away(go_away: service_pb2.GoAway, has_copy: bool) -> tuple[Next, LpdeformError]:
     text = go_away.text
     if go_away.reason == service_pb2.GO_AWAY_REASON_SESSION_DELETED:
-        return Recovery(Next.GIVE_UP, make(Code.NOT_FOUND, text, "SESSION_DELETED"), pause)
+        return Next.GIVE_UP, make(Code.NOT_FOUND, text, "SESSION_DELETED")
     if go_away.reason == service_pb2.GO_AWAY_REASON_SESSION_EXPIRED:
-        step = Next.MAKE_ANEW if has_copy else Next.GIVE_UP
-        return Recovery(step, make(Code.NOT_FOUND, text, "SESSION_EXPIRED"), pause)
+        return (Next.MAKE_ANEW if has_copy else Next.GIVE_UP), make(Code.NOT_FOUND, text, "SESSION_EXPIRED")
     if go_away.reason == service_pb2.GO_AWAY_REASON_WRITER_REPLACED:
-        return Recovery(Next.GIVE_UP, writer_replaced(text), pause)
+        return Next.GIVE_UP, make(Code.ABORTED, text, "WRITER_REPLACED")
     if go_away.reason == service_pb2.GO_AWAY_REASON_PROTOCOL_ERROR:
-        return Recovery(Next.GIVE_UP, make(Code.INTERNAL, text, "PROTOCOL_ERROR"), pause)
-    return Recovery(Next.RESUME, make(Code.UNAVAILABLE, text, "DRAINING"), pause)
+        return Next.GIVE_UP, make(Code.INTERNAL, text, "PROTOCOL_ERROR")
+    if go_away.reason == service_pb2.GO_AWAY_REASON_TOKEN_EXPIRED:
+        return Next.RESUME, make(Code.UNAUTHENTICATED, text, "TOKEN_EXPIRED")
+    return Next.RESUME, make(Code.UNAVAILABLE, text, "DRAINING")
 
 
-class Backoff:
-    """Growing pauses: 50 ms doubled up to 2 s, each between half and the whole of that by chance.
+class Answer(Enum):
+    """What an error says of the update that it answers, or that a call was made with."""
 
-    So that the clients of a restarted server do not all come at once.
-    """
+    AGAIN = "it is to be sent again, not before error.retry_after"
+    MAKE_ANEW = "it waits for the session made anew"
+    TAKEN = "the server has it and cannot solve for it yet"
+    REFUSED = "it is void"
 
-    first = 0.05
-    most = 2.0
 
-    def __init__(self) -> None:
-        self._longest = self.first
-
-    def next(self) -> float:
-        pause = random.uniform(0.5, 1.0) * self._longest
-        self._longest = min(2 * self._longest, self.most)
-        return pause
-
-    def reset(self) -> None:
-        self._longest = self.first
+def answer_of(error: LpdeformError, is_second: bool = False) -> Answer:
+    """`is_second`: this update had the same answer before."""
+    if is_session_lost(error):
+        return Answer.MAKE_ANEW
+    if is_taken_all_the_same(error):
+        return Answer.TAKEN
+    is_in_vain = is_second and error.reason == "UPLOAD_UNKNOWN"
+    return Answer.AGAIN if is_undecided(error) and not is_in_vain else Answer.REFUSED

@@ -14,18 +14,19 @@ import numpy.typing as npt
 from lpdeform import _wire
 from lpdeform._alone import alone, send_restore
 from lpdeform._lease import Lease
-from lpdeform._ledger import NumberedUpdate
+from lpdeform._ledger import Ledger, NumberedUpdate
 from lpdeform._link import Link
 from lpdeform._numbers import Copied, numbers
-from lpdeform._recovery import Backoff
+from lpdeform._recovery import Answer, Backoff, answer_of
 from lpdeform._rpc import Packer, Stop
 from lpdeform.errors import (
     Code,
     LpdeformError,
+    Unavailable,
+    Unavailable,
     from_call,
     invalid,
     is_session_lost,
-    is_taken_all_the_same,
     is_undecided,
     make,
 )
@@ -78,7 +79,7 @@ def _solve_patiently(link: Link, options: SolveOptions, deadline: float | None, 
             is_lost = is_session_lost(error) and link.original is not None
             if stop.is_set or link.is_closing or not (is_lost or error.code is Code.UNAVAILABLE):
                 raise
-            pause = backoff.next()
+            pause = backoff.next(error.retry_after)
             now = time.monotonic()
             latest = latest or now + link.rpc.reconnect_for
             if now + pause > min(latest, latest if deadline is None else deadline):
@@ -112,19 +113,31 @@ def _solve_once(link: Link, options: SolveOptions, timeout: float | None, stop: 
     try:
         result = _run(link, lease, update, options, timeout, stop)
     except BaseException as error:  # an interrupt in a notebook, too
-        if update is not None:
-            with link.changed:
-                if isinstance(error, LpdeformError) and is_taken_all_the_same(error):
-                    link.ledger.accept(update.seq)
-                elif not isinstance(error, LpdeformError) or is_undecided(error):
-                    link.ledger.connection_lost()
-                else:
-                    link.ledger.refuse(update.seq)
-        raise
-    if update is not None:
         with link.changed:
+            if update is not None:
+                _note_answer(link.ledger, update.seq, error)
+            if isinstance(error, Unavailable):
+                link.ledger.resumed_at(0)  # the server may have gone back: once more does no harm
+        raise
+    with link.changed:
+        if update is not None:
             link.ledger.accept(update.seq)
+        if result.input_seq < link.ledger.newest_accepted:
+            link.ledger.resumed_at(result.input_seq)
+            if link.ledger.has_restore:
+                raise make(Code.UNAVAILABLE, "The server went back to an earlier state.")
     return result
+
+
+def _note_answer(ledger: Ledger, seq: int, error: BaseException) -> None:
+    """What became of an update that a call was made with."""
+    answer = answer_of(error) if isinstance(error, LpdeformError) else Answer.AGAIN
+    if answer is Answer.TAKEN:
+        ledger.accept(seq)
+    elif answer is Answer.REFUSED:
+        ledger.refuse(seq)
+    else:
+        ledger.connection_lost()
 
 
 def _run(

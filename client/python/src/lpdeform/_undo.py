@@ -49,7 +49,7 @@ def _undo_patiently(
                 is_to_check = False  # once: a call that was taken and not answered has made the steps fewer
             return link.rpc.call("UndoUpdate", request, service_pb2.UndoUpdateResponse, stop)
         except LpdeformError as error:
-            pause = backoff.next()
+            pause = backoff.next(error.retry_after)
             if not isinstance(error, Unavailable) or time.monotonic() + pause > end:
                 raise
         with link.changed:
@@ -62,7 +62,7 @@ def _catch_up(link: Link, stop: Stop) -> None:
     """Sends what the server has no more, and only that: it would be a step to it."""
     found = _session(link, link.lease.session, stop)
     with link.changed:
-        link.ledger.resumed_at(found.input_seq)
+        link.ledger.reopened(found.epoch, found.input_seq)
     send_restore(link, stop)
 
 

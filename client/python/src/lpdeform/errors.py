@@ -189,8 +189,9 @@ def is_session_lost(error: LpdeformError) -> bool:
 
 def is_undecided(error: LpdeformError) -> bool:
     """Whether the server took the call is not known, or may change: it is to be tried again."""
-    passing = (Code.UNAVAILABLE, Code.CANCELLED, Code.DEADLINE_EXCEEDED, Code.RESOURCE_EXHAUSTED)
-    return error.code in passing or is_session_lost(error) or error.reason == "UPLOAD_UNKNOWN"
+    passing = (Code.UNAVAILABLE, Code.CANCELLED, Code.DEADLINE_EXCEEDED, Code.UNKNOWN)
+    may_have_room = error.code is Code.RESOURCE_EXHAUSTED and error.retry_after > 0
+    return error.code in passing or may_have_room or is_session_lost(error) or error.reason == "UPLOAD_UNKNOWN"
 
 
 def is_taken_all_the_same(error: LpdeformError) -> bool:

@@ -114,8 +114,9 @@ export function isSessionLost(error: LpdeformError): boolean {
 
 /** Whether the server took the call is not known, or may change: it is to be tried again. */
 export function isUndecided(error: LpdeformError): boolean {
-  const passing = ["unavailable", "cancelled", "deadline_exceeded", "resource_exhausted", "unknown"];
-  return passing.includes(error.code) || isSessionLost(error) || error.reason === "UPLOAD_UNKNOWN";
+  const passing = ["unavailable", "cancelled", "deadline_exceeded", "unknown"];
+  const mayHaveRoom = error.code === "resource_exhausted" && error.retryAfterMs > 0;
+  return passing.includes(error.code) || mayHaveRoom || isSessionLost(error) || error.reason === "UPLOAD_UNKNOWN";
 }
 
 /** The server took the update, and cannot solve for it yet. */

@@ -38,11 +38,12 @@ function settled(state: Update): Update {
   return { ...lasting, handles: Object.assign(Object.create(null), Object.fromEntries(kept)) };
 }
 
-const mostRemembered = 16384;
-
-/** Bounds what is remembered of handles that are there no more. */
+/** Bounds what is remembered of handles that are there no more. Motions stay: of handles that the session was made with. */
 function withoutOldRemovals(update: Update): Update {
-  return Object.keys(update.handles ?? {}).length <= mostRemembered ? update : settled(update);
+  const entries = Object.entries(update.handles ?? {});
+  const kept = entries.filter(([, change]) => !("remove" in change));
+  if (entries.length - kept.length <= Ledger.mostRemovals) return update;
+  return { ...update, handles: Object.assign(Object.create(null), Object.fromEntries(kept)) };
 }
 
 function isMovesOnly({ update }: NumberedUpdate): boolean {
@@ -62,8 +63,11 @@ function isMovesOnly({ update }: NumberedUpdate): boolean {
 export class Ledger {
   /** Updates on their way; of these, several at a time only where all merely move handles, so that order does not matter. */
   static readonly window = 2;
+  /** Handles of which it is remembered that they were let go of; of more than that, none. */
+  static readonly mostRemovals = 8192;
 
   #nextSeq = 1;
+  #epoch = 0;
   #accepted: NumberedUpdate = { seq: 0, update: {} };
   /** What was accepted since the server last kept something, as it came. */
   #unkept: NumberedUpdate = { seq: 0, update: {} };
@@ -176,6 +180,22 @@ export class Ledger {
    */
   resumedAt(seq: number): void {
     if (seq < this.#unkept.seq) this.#restore ??= { seq: this.#accepted.seq, update: this.#unkept.update };
+  }
+
+  /**
+   * The same of a session that is at `epoch`. In a newer one than before another server has it, and its newest update says
+   * nothing of those before that: a call may have brought it there. So all that was not kept is sent; of what the server has
+   * that changes nothing.
+   */
+  reopened(epoch: number, seq: number): void {
+    const isAnother = epoch > this.#epoch;
+    this.#epoch = Math.max(epoch, this.#epoch);
+    this.resumedAt(isAnother ? 0 : seq);
+  }
+
+  /** Of a session just made, joined or taken over. */
+  beginEpoch(epoch: number): void {
+    this.#epoch = epoch;
   }
 
   /** What was on its way waits again. Sending it twice does no harm, it is the same value. */

@@ -6,9 +6,9 @@ import { Scalar } from "./gen/lpdeform/v1/data_pb.js";
 import { Holds } from "./holds.js";
 import type { GoAway } from "./gen/lpdeform/v1/service_pb.js";
 import type { Lane, WireFrameOptions } from "./hub.js";
-import { checkVertexCount, isSessionLost, isTakenAllTheSame, isUndecided, joinSession, type Lease } from "./lease.js";
+import { checkVertexCount, isUndecided, joinSession, type Lease } from "./lease.js";
 import { Ledger, type NumberedUpdate } from "./ledger.js";
-import { Backoff, recoveryAfter } from "./recovery.js";
+import { type Answer, answerOf, Backoff, RecoveryRules, writerReplaced } from "./recovery.js";
 import type { Rpc } from "./rpc.js";
 import { sendUpdate } from "./sendupdate.js";
 import type { Connection, Frame, Notice, Update } from "./types.js";
@@ -22,11 +22,6 @@ export interface Copy {
   /** Without handles. */
   isBare: boolean;
 }
-
-/** What did not fit so often never will: it is of another version, or something on the way breaks it. */
-const mostMisfits = 5;
-/** Whatever a server asks for. */
-const longestRetryMs = 10_000;
 
 export interface Watcher {
   problem(error: LpdeformError): void;
@@ -66,10 +61,14 @@ export class Link {
   #isSending = false;
   #requestId = newRequestId();
   #making: Promise<void> | undefined;
+  /** When the stream was opened that there is. */
+  #openedAt: number | undefined;
   #downSince: number | undefined;
-  /** Streams in a row that ended with a frame that does not fit. */
-  #misfits = 0;
+  /** The last update whose uploads the server knew no more. */
+  #sentAgain = 0;
   #over: LpdeformError | undefined; // nothing is tried any more, for this reason
+  readonly #rules: RecoveryRules;
+  /** Of updates where the server is away. */
   readonly #backoff = new Backoff();
 
   constructor(
@@ -82,6 +81,8 @@ export class Link {
     this.#lease = lease;
     this.ledger = new Ledger(copy?.isBare);
     this.ledger.countFrom(lease.inputSeq);
+    this.ledger.beginEpoch(lease.epoch);
+    this.#rules = new RecoveryRules(copy !== undefined, rpc.reconnectForMs);
   }
 
   get lease(): Lease {
@@ -168,9 +169,11 @@ export class Link {
     const lease = await joinSession(this.rpc, this.#lease.session, "writer", this.stop.signal);
     this.#lease = lease;
     this.ledger.countFrom(lease.inputSeq);
+    this.ledger.beginEpoch(lease.epoch);
     this.box.beginEpoch(lease.epoch);
     this.#over = undefined;
-    this.#misfits = 0;
+    this.#downSince = undefined;
+    this.#rules.begin();
     this.#backoff.reset();
     this.box.resume();
     this.#send();
@@ -187,13 +190,14 @@ export class Link {
         this.#assembly = new FrameAssembly(opened.vertexCount, this.frameOptions.scalar === Scalar.FLOAT64);
         this.#setNotice(undefined); // what was said was said of another stream
         this.#resumed(Number(opened.epoch), Number(opened.inputSeq));
-        this.#heardFromServer();
+        this.#openedAt = performance.now();
+        this.#downSince = undefined;
         this.#setConnection("connected");
         this.#send();
       },
       part: (part) => {
         const frame = this.#assembly.add(part);
-        if (frame) this.#fitted();
+        if (frame) this.#rules.frameFitted();
         if (!frame || this.box.put(frame, lane.streamId)) return;
         lane.acknowledge(frame.frameSeq, lane.streamId); // dropped, but its credit is owed
       },
@@ -203,6 +207,7 @@ export class Link {
       ended: (error) => void this.#recover(error, session),
       isQuiet: () => !this.ledger.hasWaiting && !this.ledger.hasInFlight && this.#waitingForFrames === 0,
       resting: () => {
+        this.#openedAt = undefined;
         this.#mayHaveGoneBack = true;
         this.#setNotice(undefined);
         this.#setConnection("idle");
@@ -211,27 +216,27 @@ export class Link {
     this.#lane = lane;
   }
 
-  /** The newest update that the server has is `inputSeq`. In a new epoch that says nothing of those before it. */
+  /** The newest update that the server has is `inputSeq`. */
   #resumed(epoch: number, inputSeq: number): void {
-    const isAnotherServer = epoch > this.#lease.epoch;
-    if (isAnotherServer) this.#lease = { ...this.#lease, epoch };
     this.#mayHaveGoneBack = false;
     this.box.beginEpoch(epoch);
     this.ledger.countFrom(inputSeq);
-    this.ledger.resumedAt(isAnotherServer ? 0 : inputSeq);
+    this.ledger.reopened(epoch, inputSeq);
   }
 
   /** `session`: which the stream was of. */
   async #recover(ended: LpdeformError | undefined, session: string): Promise<void> {
     if (this.isClosed) return;
-    const recovery = recoveryAfter(ended, this.#goAway, this.copy !== undefined);
+    const now = performance.now();
+    const stoodMs = this.#openedAt === undefined ? 0 : now - this.#openedAt;
+    this.#openedAt = undefined;
+    const recovery = this.#rules.after({ error: ended, goAway: this.#goAway, stoodMs, awayMs: this.#awayMs() });
     this.interruption = recovery.why;
     this.#mayHaveGoneBack = true;
     this.#setNotice(undefined);
     this.#setConnection("reconnecting");
-    if (recovery.why.reason === "FRAME_PARTS" && ++this.#misfits >= mostMisfits) return this.#giveUp(recovery.why);
-    if (recovery.next === "giveUp" || this.#isTooLate()) return this.#giveUp(recovery.why);
-    await pause(Math.max(recovery.pauseMs, this.#backoff.nextMs()), this.stop.signal);
+    if (recovery.next === "giveUp") return this.#giveUp(recovery.why);
+    await pause(recovery.pauseMs, this.stop.signal);
     if (this.#isOver) return;
     if (recovery.next === "makeAnew") {
       try {
@@ -243,20 +248,10 @@ export class Link {
     if (!this.#isOver) this.#subscribe();
   }
 
-  #heardFromServer(): void {
-    this.#downSince = undefined;
-    if (this.#misfits === 0) this.#backoff.reset();
-  }
-
-  #fitted(): void {
-    if (this.#misfits === 0) return;
-    this.#misfits = 0;
-    this.#backoff.reset();
-  }
-
-  #isTooLate(): boolean {
+  /** Since the server was there last. */
+  #awayMs(): number {
     this.#downSince ??= performance.now();
-    return performance.now() - this.#downSince > this.rpc.reconnectForMs;
+    return performance.now() - this.#downSince;
   }
 
   #giveUp(why: LpdeformError): void {
@@ -279,9 +274,10 @@ export class Link {
 
   /** After makeAnew() has failed, and the pause that the server asks for. False where it is the end. */
   async #mayMakeAgain(failure: LpdeformError): Promise<boolean> {
-    if (isUndecided(failure)) await pause(Math.min(failure.retryAfterMs, longestRetryMs), this.stop.signal);
-    else this.#giveUp(failure);
-    return isUndecided(failure);
+    const { next, pauseMs } = this.#rules.afterFailedMaking(failure);
+    if (next === "giveUp") this.#giveUp(failure);
+    else await pause(pauseMs, this.stop.signal);
+    return next !== "giveUp";
   }
 
   async #make(): Promise<void> {
@@ -290,6 +286,7 @@ export class Link {
     this.ledger.sessionLost();
     this.isMadeAnew = this.copy!.isBare && this.ledger.hasRestore;
     this.ledger.countFrom(this.#lease.inputSeq);
+    this.ledger.beginEpoch(this.#lease.epoch);
     this.box.beginSession();
   }
 
@@ -308,7 +305,8 @@ export class Link {
     // What was on its way when the connection or the session was lost is sent again, whatever becomes of the first time.
     try {
       this.ledger.accept(update, await sendUpdate(this.rpc, lease, update, this.stop.signal));
-      this.#heardFromServer();
+      this.#downSince = undefined;
+      this.#backoff.reset();
     } catch (thrown) {
       if (this.ledger.isInFlight(update)) await this.#unsent(update, thrown as LpdeformError, lease.session);
     }
@@ -318,15 +316,17 @@ export class Link {
 
   async #unsent(update: NumberedUpdate, error: LpdeformError, session: string): Promise<void> {
     if (this.isClosed) return;
-    if (isUndecided(error)) {
+    const answer = answerOf(error, update.seq === this.#sentAgain);
+    if (answer === "again" || answer === "makeAnew") {
+      if (error.reason === "UPLOAD_UNKNOWN") this.#sentAgain = update.seq;
       this.#isSending = true;
       this.ledger.connectionLost();
       // Where no stream says what the server has, once more does no harm.
       if (!this.#isStreaming && error.code !== "resource_exhausted") this.ledger.resumedAt(0);
       try {
-        if (this.#isTooLate()) return this.#giveUp(error);
-        await pause(Math.max(error.retryAfterMs, this.#backoff.nextMs()), this.stop.signal);
-        if (isSessionLost(error)) {
+        if (this.#awayMs() > this.rpc.reconnectForMs) return this.#giveUp(error);
+        await pause(this.#backoff.nextMs(error.retryAfterMs), this.stop.signal);
+        if (answer === "makeAnew") {
           if (!this.copy) return this.#giveUp(error);
           await this.makeAnew(session);
         }
@@ -337,17 +337,17 @@ export class Link {
       }
       return;
     }
-    this.watcher.problem(this.#judged(update, error));
+    this.watcher.problem(this.#judged(update, error, answer));
   }
 
   /** The server refuses the update, or cannot solve for it yet: what the caller is told. */
-  #judged(update: NumberedUpdate, error: LpdeformError): LpdeformError {
-    if (isTakenAllTheSame(error)) this.ledger.accept(update);
+  #judged(update: NumberedUpdate, error: LpdeformError, answer: Answer): LpdeformError {
+    if (answer === "taken") this.ledger.accept(update);
     else this.ledger.refuse(update);
     if (error.reason !== "NOT_THE_WRITER") return error;
     this.ledger.dropUnaccepted();
     this.#lease = { ...this.#lease, writerToken: "" };
-    return new LpdeformError("aborted", "Another writer took the session over.", { reason: "WRITER_REPLACED" });
+    return writerReplaced();
   }
 
   /** Sends what a server that went away may have lost, while updates are held. */
@@ -373,8 +373,9 @@ export class Link {
         throw error;
       }
       if (!this.ledger.isInFlight(update)) return; // of a session that was lost meanwhile
-      const why = this.#judged(update, error);
-      if (!isTakenAllTheSame(error)) throw why;
+      const answer = answerOf(error);
+      const why = this.#judged(update, error, answer);
+      if (answer !== "taken") throw why;
       this.watcher.problem(why);
     }
   }

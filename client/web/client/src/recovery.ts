@@ -1,26 +1,123 @@
 import { LpdeformError } from "./errors.js";
 import { type GoAway, GoAwayReason } from "./gen/lpdeform/v1/service_pb.js";
-import { isSessionLost } from "./lease.js";
+import { isSessionLost, isTakenAllTheSame, isUndecided } from "./lease.js";
+
+export type NextStep = "resume" | "makeAnew" | "giveUp";
 
 /** What to do when a stream has ended. */
 export interface Recovery {
-  next: "resume" | "makeAnew" | "giveUp";
+  next: NextStep;
   why: LpdeformError;
+  /** Not to be tried before. */
   pauseMs: number;
 }
 
-/** `ended`: nothing where the server ended the stream without an error. `hasCopy`: the session can be made anew. */
-export function recoveryAfter(
-  ended: LpdeformError | undefined,
-  goAway: GoAway | undefined,
-  hasCopy: boolean,
-): Recovery {
-  if (goAway) return afterGoAway(goAway, hasCopy);
-  const why = ended ?? new LpdeformError("unavailable", "The server ended the stream.");
-  const pauseMs = why.retryAfterMs;
-  if (why.reason === "FRAME_VERTICES") return { next: "giveUp", why, pauseMs }; // it is another mesh
-  if (isSessionLost(why)) return { next: hasCopy ? "makeAnew" : "giveUp", why, pauseMs };
-  return { next: passing.has(why.code) ? "resume" : "giveUp", why, pauseMs };
+/** How a stream ended. */
+export interface Ending {
+  /** Nothing where it ended without one. */
+  error?: LpdeformError | undefined;
+  /** The server's reason, where it gave one; goes before `error`. */
+  goAway?: GoAway | undefined;
+  /** For which it was open. */
+  stoodMs: number;
+  /** Since a stream was open last. */
+  awayMs: number;
+}
+
+/** Growing pauses, 50 ms to 2 s, each spread over its upper half so that clients do not come back all at once. */
+export class Backoff {
+  static readonly mostMs = 2000;
+  /** The longest pause that a server may ask for. */
+  static readonly mostAskedMs = 60_000;
+  static readonly #firstMs = 50;
+  #longestMs = Backoff.#firstMs;
+
+  /** `chance`: from 0 to 1. */
+  constructor(readonly chance: () => number = Math.random) {}
+
+  /** On top of what the server asks for. */
+  nextMs(askedMs = 0): number {
+    const longest = this.#longestMs;
+    this.#longestMs = Math.min(2 * longest, Backoff.mostMs);
+    return Math.min(Math.max(askedMs, 0), Backoff.mostAskedMs) + longest * (0.5 + 0.5 * this.chance());
+  }
+
+  reset(): void {
+    this.#longestMs = Backoff.#firstMs;
+  }
+}
+
+/**
+ * What a session does after each of its streams. tests/golden/recovery.json has the rules as a table, which the clients in all
+ * languages replay.
+ */
+export class RecoveryRules {
+  /** Streams in a row that may end by something that does not fit, before it is taken to be of another version. */
+  static readonly mostMisfits = 5;
+  readonly backoff: Backoff;
+  #misfits = 0;
+
+  /** `hasCopy`: the session can be made anew. Gives up after `reconnectForMs` without an open stream. */
+  constructor(
+    readonly hasCopy: boolean,
+    readonly reconnectForMs: number,
+    chance: () => number = Math.random,
+  ) {
+    this.backoff = new Backoff(chance);
+  }
+
+  /** A whole frame came. */
+  frameFitted(): void {
+    this.#misfits = 0;
+  }
+
+  /** Another try is meant. */
+  begin(): void {
+    this.#misfits = 0;
+    this.backoff.reset();
+  }
+
+  after({ error, goAway, stoodMs, awayMs }: Ending): Recovery {
+    if (stoodMs >= Backoff.mostMs) this.backoff.reset(); // one that breaks at once is no success
+    const found = goAway ? afterGoAway(goAway, this.hasCopy) : afterError(error, this.hasCopy);
+    const isMisfit = found.why.reason === "FRAME_PARTS" && ++this.#misfits >= RecoveryRules.mostMisfits;
+    const next = isMisfit || awayMs > this.reconnectForMs ? "giveUp" : found.next;
+    const askedMs = goAway ? goAway.reconnectAfterMs : (error?.retryAfterMs ?? 0);
+    return { next, why: found.why, pauseMs: this.backoff.nextMs(askedMs) };
+  }
+
+  /** After the session could not be made anew. */
+  afterFailedMaking(error: LpdeformError): Recovery {
+    const next = isUndecided(error) ? "makeAnew" : "giveUp";
+    return { next, why: error, pauseMs: this.backoff.nextMs(error.retryAfterMs) };
+  }
+}
+
+/** What an error says of the update that it answers, or that a call was made with. */
+export type Answer = "again" | "makeAnew" | "taken" | "refused";
+
+/** `isSecond`: this update had the same answer before. */
+export function answerOf(error: LpdeformError, isSecond = false): Answer {
+  if (isSessionLost(error)) return "makeAnew";
+  if (isTakenAllTheSame(error)) return "taken";
+  const isInVain = isSecond && error.reason === "UPLOAD_UNKNOWN";
+  return isUndecided(error) && !isInVain ? "again" : "refused";
+}
+
+type Found = Pick<Recovery, "next" | "why">;
+
+function afterError(error: LpdeformError | undefined, hasCopy: boolean): Found {
+  if (!error) return { next: "resume", why: new LpdeformError("unavailable", "The server ended the stream.") };
+  // It is another mesh; it would happen again.
+  if (error.reason === "FRAME_VERTICES" || error.reason === "EXCEPTION") return { next: "giveUp", why: error };
+  if (isSessionLost(error)) return { next: hasCopy ? "makeAnew" : "giveUp", why: error };
+  if (passing.has(error.code) || isUndecided(error)) return { next: "resume", why: error };
+  return { next: "giveUp", why: error.reason === "NOT_THE_WRITER" ? writerReplaced() : error };
+}
+
+/** What a writer is told that is none any more. */
+export function writerReplaced(text = "Another writer took the session over."): LpdeformError {
+  return new LpdeformError("aborted", text, { reason: "WRITER_REPLACED" });
 }
 
 const passing = new Set([
@@ -33,46 +130,22 @@ const passing = new Set([
   "data_loss",
 ]);
 
-function afterGoAway(goAway: GoAway, hasCopy: boolean): Recovery {
-  const pauseMs = goAway.reconnectAfterMs;
-  switch (goAway.reason) {
+function afterGoAway({ reason, text }: GoAway, hasCopy: boolean): Found {
+  switch (reason) {
     case GoAwayReason.SESSION_DELETED:
-      return {
-        next: "giveUp",
-        why: new LpdeformError("not_found", goAway.text, { reason: "SESSION_DELETED" }),
-        pauseMs,
-      };
+      return { next: "giveUp", why: new LpdeformError("not_found", text, { reason: "SESSION_DELETED" }) };
     case GoAwayReason.SESSION_EXPIRED:
       return {
         next: hasCopy ? "makeAnew" : "giveUp",
-        why: new LpdeformError("not_found", goAway.text, { reason: "SESSION_EXPIRED" }),
-        pauseMs,
+        why: new LpdeformError("not_found", text, { reason: "SESSION_EXPIRED" }),
       };
+    case GoAwayReason.WRITER_REPLACED:
+      return { next: "giveUp", why: writerReplaced(text) };
     case GoAwayReason.PROTOCOL_ERROR:
-      return { next: "giveUp", why: new LpdeformError("internal", goAway.text, { reason: "PROTOCOL_ERROR" }), pauseMs };
+      return { next: "giveUp", why: new LpdeformError("internal", text, { reason: "PROTOCOL_ERROR" }) };
     case GoAwayReason.TOKEN_EXPIRED:
-      return {
-        next: "resume",
-        why: new LpdeformError("unauthenticated", goAway.text, { reason: "TOKEN_EXPIRED" }),
-        pauseMs,
-      };
+      return { next: "resume", why: new LpdeformError("unauthenticated", text, { reason: "TOKEN_EXPIRED" }) };
     default:
-      return { next: "resume", why: new LpdeformError("unavailable", goAway.text, { reason: "DRAINING" }), pauseMs };
-  }
-}
-
-/** Growing pauses, 100 ms to 2 s, each spread over its upper half so that clients do not come back all at once. */
-export class Backoff {
-  static readonly mostMs = 2000;
-  #longestMs = 100;
-
-  nextMs(): number {
-    const longest = this.#longestMs;
-    this.#longestMs = Math.min(2 * longest, Backoff.mostMs);
-    return longest * (0.5 + 0.5 * Math.random());
-  }
-
-  reset(): void {
-    this.#longestMs = 100;
+      return { next: "resume", why: new LpdeformError("unavailable", text, { reason: "DRAINING" }) };
   }
 }

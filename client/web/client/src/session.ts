@@ -256,7 +256,7 @@ export class Session implements AsyncIterable<Frame> {
         else if (lost === undefined) link.ledger.resumedAt(0); // it may have gone back: once more does no harm
         latest ??= performance.now() + link.rpc.reconnectForMs;
         if (performance.now() > latest) throw error;
-        await pause(Math.max(error.retryAfterMs, backoff.nextMs()), signal);
+        await pause(backoff.nextMs(error.retryAfterMs), signal);
       }
     }
   }

@@ -47,7 +47,7 @@ async function askPatiently(
       const error = thrown as LpdeformError;
       if (error.code !== "unavailable") throw error;
       isAgain = true;
-      await pause(Math.max(error.retryAfterMs, backoff.nextMs()), signal);
+      await pause(backoff.nextMs(error.retryAfterMs), signal);
     }
   }
 }
@@ -55,7 +55,7 @@ async function askPatiently(
 /** What the server has no more is to be sent first, and only that: it would be a step to it. */
 async function noteLosses({ rpc, lease, ledger }: Link, signal: AbortSignal): Promise<void> {
   const { session } = await rpc.call("getSession", { session: lease.session }, signal);
-  ledger.resumedAt(Number(session?.inputSeq ?? 0));
+  ledger.reopened(Number(session?.epoch ?? 0), Number(session?.inputSeq ?? 0));
 }
 
 /** All the handles of a session that was made anew are a step to the server, and none to anybody else. */

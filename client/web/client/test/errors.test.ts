@@ -47,10 +47,10 @@ test("pauses grow to two seconds and are spread", () => {
   const backoff = new Backoff();
   const pauses = Array.from({ length: 12 }, () => backoff.nextMs());
   pauses.forEach((pause, k) => {
-    const longest = Math.min(100 * 2 ** k, 2000);
+    const longest = Math.min(50 * 2 ** k, 2000);
     expect(pause).toBeGreaterThanOrEqual(longest / 2);
     expect(pause).toBeLessThanOrEqual(longest);
   });
   backoff.reset();
-  expect(backoff.nextMs()).toBeLessThanOrEqual(100);
+  expect(backoff.nextMs()).toBeLessThanOrEqual(50);
 });
