@@ -144,7 +144,8 @@ class Service:
                 yield service_pb2.DeformResponse(result=service_pb2.UpdateResult(input_seq=update.input_seq))
                 continue
             if moved:
-                yield self.fault(int(moved[0].name), update.input_seq)
+                newest = max(int(one.name) for one in moved)  # the others were not answered, and came again with it
+                yield from self.answer(newest, update.input_seq)
                 continue
             have.update({u.name: meaning_of_handle(u.set) for u in update.handles})
             yield service_pb2.DeformResponse(result=service_pb2.UpdateResult(input_seq=update.input_seq))
@@ -198,10 +199,16 @@ class Service:
             self.differs(context, "another snapshot comes back")
         return message(service_pb2.RestoreSessionResponse, self.snapshot["restore_response"])
 
-    def fault(self, number, input_seq):
+    def answer(self, number, input_seq):
+        """The update's fault. One that passes is said of no update: that update would be sent again (recovery.json)."""
         fault = message(service_pb2.Fault, self.errors[number]["fault"])
+        code = grpc.StatusCode
+        passing = (code.CANCELLED, code.UNKNOWN, code.DEADLINE_EXCEEDED, code.UNAVAILABLE)
+        if fault.retry_after_ms or fault.code in [one.value[0] for one in passing]:
+            yield service_pb2.DeformResponse(result=service_pb2.UpdateResult(input_seq=input_seq))
+            input_seq = 0
         fault.input_seq = input_seq
-        return service_pb2.DeformResponse(event=service_pb2.StreamEvent(fault=fault))
+        yield service_pb2.DeformResponse(event=service_pb2.StreamEvent(fault=fault))
 
     def handlers(self):
         service, calls = service_pb2.DESCRIPTOR.services_by_name["DeformService"], {}

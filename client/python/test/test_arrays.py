@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from lpdeform import InvalidInput
+from lpdeform import Handle, InvalidInput, Settings, SurfacePoints, Targets, Update
 from lpdeform._numbers import crc32c, indices, numbers
+from lpdeform._wire import checked_update
 
 
 def test_the_checksum_is_that_of_the_published_vectors() -> None:
@@ -28,8 +29,43 @@ def test_the_checksum_over_lanes_is_that_byte_by_byte(size: int) -> None:
 
 
 def test_a_mask_means_where_it_is_true() -> None:
-    assert indices(np.array([False, True, True]), "vertices").tolist() == [1, 2]
-    assert indices([], "vertices").tolist() == []
+    assert indices(np.array([False, True, True]), "vertices", mask_length=3).tolist() == [1, 2]
+    assert indices([False, True, True], "vertices", mask_length=3).tolist() == [1, 2]
+    assert indices([], "vertices", mask_length=3).tolist() == []
+
+
+@pytest.mark.parametrize("length", [0, 2, 4])
+def test_a_mask_of_another_length_is_refused_with_both(length: int) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        indices(np.ones(length, bool), "vertices of handle 'tip'", mask_length=3)
+    assert (caught.value.reason, caught.value.element) == ("MASK_SIZE", "vertices of handle 'tip'")
+    assert caught.value.limit == "length = 3"
+    assert f"a mask of {length} and not 3" in str(caught.value)
+
+
+SHORT = np.ones(41, bool)
+MANY = np.ones(43)
+
+
+@pytest.mark.parametrize(
+    ("update", "reason", "element"),
+    [
+        (Update({"tip": Handle(SHORT)}), "MASK_SIZE", "vertices of handle 'tip'"),
+        (Update({"tip": Handle(points=SurfacePoints(SHORT, []))}), "MASK_SIZE", "faces of the points of handle 'tip'"),
+        (Update(settings=Settings(region=SHORT)), "MASK_SIZE", "region"),
+        (Update(settings=Settings(p=MANY)), "FIELD_SIZE", "p"),
+        (Update(settings=Settings(stiffness=MANY)), "FIELD_SIZE", "stiffness"),
+        (Update(settings=Settings(p=np.ones(42, bool))), "ARRAY_TYPE", "p"),
+        (Update(settings=Settings(stiffness=True)), "ARRAY_TYPE", "stiffness"),
+        (Update({"tip": Handle(np.ones(42))}), "ARRAY_TYPE", "vertices of handle 'tip'"),
+        (Update({"tip": Handle([0, -1])}), "INDEX_OUT_OF_RANGE", "vertices of handle 'tip', number 1"),
+        (Update({"tip": Targets(np.ones((2, 3), bool))}), "ARRAY_TYPE", "targets of handle 'tip'"),
+    ],
+)
+def test_what_cannot_be_of_this_mesh_is_refused_before_it_is_sent(update: Update, reason: str, element: str) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        checked_update(update, 42, 40)
+    assert (caught.value.reason, caught.value.element) == (reason, element)
 
 
 def test_arrays_are_copied() -> None:
@@ -58,6 +94,7 @@ def test_strided_arrays_come_out_in_order() -> None:
         ([2, 2**32], 1, "INDEX_OUT_OF_RANGE", "vertices, number 1"),
         ([0.5], 1, "ARRAY_TYPE", "vertices"),
         (["a"], 1, "ARRAY_TYPE", "vertices"),
+        ([True, False], 1, "ARRAY_TYPE", "vertices"),  # as numbers of vertices to be welded to
         ([[0, 1]], 1, "ARRAY_SHAPE", "vertices"),
         ([0, 1, 2, 3], 3, "ARRAY_SHAPE", "vertices"),
     ],

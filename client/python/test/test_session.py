@@ -191,7 +191,6 @@ def test_what_the_server_refuses_is_raised_with_its_words(session: lpdeform.Sess
     ("settings", "reason"),
     [
         ({"p": 0.5}, "P_OUT_OF_RANGE"),
-        ({"p": [1.0, 2.0]}, "FIELD_SIZE"),
         ({"stiffness": -1.0}, "STIFFNESS_OUT_OF_RANGE"),
         ({"p": lpdeform.Automatic(2)}, "STRENGTH_OUT_OF_RANGE"),
         ({"length_unit": -1.0}, "LENGTH_UNIT_OUT_OF_RANGE"),

@@ -76,7 +76,8 @@ class Link:
     # What callers ask, on their own threads.
 
     def update(self, update: Update) -> int:
-        checked = _wire.checked_update(update)
+        report = self.lease.report
+        checked = _wire.checked_update(update, report.vertices, report.faces)
         with self.changed:
             if self.is_closing:
                 raise session_closed()

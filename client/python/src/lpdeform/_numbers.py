@@ -23,16 +23,20 @@ def _array(values: npt.ArrayLike, what: str) -> Copied:
 def numbers(values: npt.ArrayLike, what: str, width: int = 1) -> Copied:
     """float32 where they are, otherwise float64: a copy of shape (k,), or (k, width)."""
     array = _array(values, what)
-    if array.dtype.kind not in "fiub":
+    if array.dtype.kind not in "fiu":
         raise invalid(f"The {what} are of type {array.dtype} and not numbers.", "ARRAY_TYPE", what, "float32 or float64")
     copied = np.array(array, dtype="<f4" if array.dtype.itemsize == 4 and array.dtype.kind == "f" else "<f8", order="C")
     return _shaped(copied, what, width)
 
 
-def indices(values: npt.ArrayLike, what: str, width: int = 1) -> Copied:
-    """uint32, a copy. Of a boolean mask, where it is true."""
+def indices(values: npt.ArrayLike, what: str, width: int = 1, mask_length: int | None = None) -> Copied:
+    """uint32, a copy. Of a boolean mask of `mask_length`, where it is true; None: there is no such mask."""
     array = _array(values, what)
-    if array.dtype.kind == "b" and width == 1 and array.ndim == 1:
+    if array.dtype.kind == "b" and array.ndim == 1 and mask_length is not None:
+        if array.size != mask_length:
+            raise invalid(
+                f"The {what} are a mask of {array.size} and not {mask_length}.", "MASK_SIZE", what, f"length = {mask_length}"
+            )
         array = np.flatnonzero(array)
     if array.size == 0:
         array = array.astype(np.int64)

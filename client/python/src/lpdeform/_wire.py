@@ -58,11 +58,14 @@ def named(table: Mapping[Any, T], name: object, what: str) -> T:
 # Checked and copied.
 
 
-def checked_update(update: types.Update) -> types.Update:
-    handles = {_checked_name(name): _checked_change(str(name), change) for name, change in update.handles.items()}
+def checked_update(update: types.Update, vertices: int, faces: int) -> types.Update:
+    """Of a mesh of so many vertices and faces."""
+    handles = {
+        _checked_name(name): _checked_change(str(name), change, vertices, faces) for name, change in update.handles.items()
+    }
     if update.resize is not None:
         _vector(update.resize.scale, "resize.scale")
-    return types.Update(handles, checked_settings(update.settings), update.resize, bool(update.begins_step))
+    return types.Update(handles, checked_settings(update.settings, vertices), update.resize, bool(update.begins_step))
 
 
 def _checked_name(name: object) -> str:
@@ -76,17 +79,18 @@ def _checked_name(name: object) -> str:
     return text
 
 
-def _checked_change(name: str, change: types.Change) -> types.Change:
+def _checked_change(name: str, change: types.Change, vertices: int, faces: int) -> types.Change:
     what = f"handle {name!r}"
     if isinstance(change, types.Handle):
         points = change.points
         if points is not None:
-            faces = indices(points.faces, f"faces of the points of {what}")
-            barycentric = numbers(points.barycentric, f"barycentric coordinates of {what}", 3)
-            points = types.SurfacePoints(faces, barycentric)
+            points = types.SurfacePoints(
+                indices(points.faces, f"faces of the points of {what}", mask_length=faces),
+                numbers(points.barycentric, f"barycentric coordinates of {what}", 3),
+            )
         return replace(
             change,
-            vertices=indices(change.vertices, f"vertices of {what}"),
+            vertices=indices(change.vertices, f"vertices of {what}", mask_length=vertices),
             points=points,
             motion=_checked_motion(change.motion, what),
             hold=_checked_hold(change.hold, what),
@@ -121,27 +125,32 @@ def _checked_hold(hold: types.Hold, what: str) -> types.Hold:
     raise invalid(f"The hold of {what} is of type {type(hold).__name__}.", "HOLD_TYPE", what)
 
 
-def checked_settings(settings: types.Settings) -> types.Settings:
+def checked_settings(settings: types.Settings, vertices: int) -> types.Settings:
+    """Of a mesh of so many vertices."""
     if settings.solver is not None:
         named(_methods, settings.solver.method, "method")
         named(_guesses, settings.solver.initial, "initial guess")
     return replace(
         settings,
-        p=_checked_field(settings.p, "p"),
-        stiffness=_checked_field(settings.stiffness, "stiffness"),
-        region=None if settings.region is None else indices(settings.region, "region"),
+        p=_checked_field(settings.p, "p", vertices),
+        stiffness=_checked_field(settings.stiffness, "stiffness", vertices),
+        region=None if settings.region is None else indices(settings.region, "region", mask_length=vertices),
     )
 
 
-def _checked_field(value: types.Field | None, what: str) -> types.Field | None:
+def _checked_field(value: types.Field | None, what: str, vertices: int) -> types.Field | None:
     if value is None or isinstance(value, types.Automatic):
         return value
-    if np.ndim(value) == 0 and not isinstance(value, (str, bytes)):
+    if np.ndim(value) == 0 and not isinstance(value, (str, bytes, bool, np.bool_)):
         try:
             return float(value)  # type: ignore[arg-type]
         except (TypeError, ValueError):
             raise invalid(f"{what} is of type {type(value).__name__}.", "ARRAY_TYPE", what) from None
-    return numbers(value, what)
+    array = numbers(value, what)
+    if array.size != vertices:
+        text = f"{what} has {array.size} values, neither one nor {vertices}, one for each vertex."
+        raise invalid(text, "FIELD_SIZE", what, f"values = {vertices}")
+    return array
 
 
 def _vector(values: types.Vector3, what: str) -> types.Vector3:

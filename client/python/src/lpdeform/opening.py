@@ -47,14 +47,15 @@ def open_link(
     weld: npt.ArrayLike | float | bool,
     frame_options: frame_pb2.FrameOptions,
 ) -> Link:
+    rest = numbers(vertices, "vertices", 3)
     original = Original(
-        vertices=numbers(vertices, "vertices", 3),
+        vertices=rest,
         faces=indices(faces, "faces", 3),
         normals=None if normals is None else numbers(normals, "normals", 3),
         weld=_weld_of(weld),
         weights=_wire.weights_to_wire(weights),
         free_components=_wire.free_components_to_wire(free_components),
-        settings=_wire.checked_settings(settings),
+        settings=_wire.checked_settings(settings, len(rest)),
     )
     try:
         lease = create_session(rpc, original, new_request_id(), stop)

@@ -5,14 +5,14 @@ Where vertices are meant, indices and boolean masks over all vertices do equally
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, Union
 
 import numpy as np
 import numpy.typing as npt
 
-Vector3 = Union[tuple[float, float, float], npt.NDArray[np.floating[Any]]]
+Vector3 = Union[Sequence[float], npt.NDArray[Any]]
 Floats = npt.NDArray[np.floating[Any]]
 Method = Literal["auto", "quasi_newton", "line_search", "local_global", "conic", "multiresolution"]
 InitialGuess = Literal["current", "laplacian", "rest"]

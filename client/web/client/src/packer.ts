@@ -1,4 +1,5 @@
 import { create } from "@bufbuild/protobuf";
+import { LpdeformError } from "./errors.js";
 import { type Buffer, BufferSchema, Scalar } from "./gen/lpdeform/v1/data_pb.js";
 
 export type Numbers = Float32Array | Float64Array | readonly number[];
@@ -51,8 +52,21 @@ export function bytesOfNumbers(numbers: Numbers): { scalar: Scalar; bytes: Uint8
   return { scalar: Scalar.FLOAT64, bytes: bytesOf(doubles) };
 }
 
+/** Throws where a number is no index: a Uint32Array would take -1 for 4294967295, 1.5 for 1 and NaN for 0. */
 export function bytesOfIndices(indices: Indices): Uint8Array {
-  return bytesOf(indices instanceof Uint32Array ? indices : Uint32Array.from(indices));
+  if (indices instanceof Uint32Array) return bytesOf(indices);
+  const exact = Uint32Array.from(indices);
+  const wrong = exact.findIndex((index, k) => index !== indices[k]);
+  if (wrong < 0) return bytesOf(exact);
+  throw new LpdeformError(
+    "invalid_argument",
+    `Number ${wrong} of the indices is ${indices[wrong]}, which is no index.`,
+    {
+      reason: "INDEX_OUT_OF_RANGE",
+      element: `number ${wrong}`,
+      limit: `0 <= index < ${2 ** 32}`,
+    },
+  );
 }
 
 function bytesOf(array: ArrayBufferView): Uint8Array {

@@ -39,6 +39,19 @@ describe("updates", () => {
     expect(server.updates[1]!.update!.handles.map(({ name }) => name)).toEqual(["base"]);
   });
 
+  test.each([
+    [[0, -1], "number 1"],
+    [[1.5], "number 0"],
+    [[0, 1, NaN], "number 2"],
+    [[2 ** 32], "number 0"],
+  ])("with %j in place of indices are refused before they are sent", async (vertices, element) => {
+    const { server, session } = await begin();
+    const problem = problems(session, 1);
+    session.setHandles({ tip: { vertices } });
+    expect((await problem)[0]).toMatchObject({ code: "invalid_argument", reason: "INDEX_OUT_OF_RANGE", element });
+    expect(server.updates.length).toBe(0);
+  });
+
   test("are sent again where the server is away, until it is back", async () => {
     const { server, session } = await begin();
     server.on.update = (_, count) => {
