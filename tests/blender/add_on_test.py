@@ -4,7 +4,9 @@ import os
 import signal
 import sys
 import tempfile
+import time
 import unittest
+from unittest import mock
 
 import bmesh
 import bpy
@@ -162,9 +164,43 @@ class AddOn(unittest.TestCase):
         stage.activate(self.tube)
         bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
         group.add(np.arange(len(self.rest)).tolist(), 0.0, "REPLACE")  # painted away
+        self.tube.data.update_tag()  # as a stroke does
         stage.turn(lambda: not live.of(self.tube)._weights["p"].any())
         stage.settle(self.tube)
         self.assertEqual(set(live.of(self.tube).fields["p"].tolist()), {2.0})
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+    def test_weights_are_read_once_after_a_stroke_and_not_while_nothing_is_painted(self):
+        _, tip = self.held()
+        group = self.tube.vertex_groups.new(name="soft")
+        self.tube.lpdeform.p_group, self.tube.lpdeform.p_painted = "soft", 1.0
+        stage.settle(self.tube)
+        stage.activate(self.tube)
+        bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+        stage.settle(self.tube)
+        now = [time.monotonic()]
+        with mock.patch.object(live.surface, "group_weights", wraps=live.surface.group_weights) as reads, \
+                mock.patch.object(live, "_now", lambda: now[0]):
+
+            def reads_after(seconds):
+                """Of this group, so often as Blender's timer looks in that time."""
+                before = [call.args[1] for call in reads.call_args_list].count("soft")
+                for _ in range(int(30 * seconds)):
+                    now[0] += 1 / 30
+                    bpy.context.view_layer.update()
+                    live.tick()
+                return [call.args[1] for call in reads.call_args_list].count("soft") - before
+
+            reads_after(1)  # as the mode began
+            self.assertEqual(reads_after(10), 0)
+            for _ in range(30):  # a stroke of a second
+                group.add([0], 0.5, "ADD")
+                self.tube.data.update_tag()
+                self.assertEqual(reads_after(1 / 30), 0)
+            self.assertEqual(reads_after(10), 1)
+            self.assertEqual(live.of(self.tube)._weights["p"][0], 1.0)
+            live.of(self.tube).show(self.tube)  # a frame changes the mesh, and no weight
+            self.assertEqual(reads_after(10), 0)
         bpy.ops.object.mode_set(mode="OBJECT")
 
     def test_stiffness_is_a_property_and_a_group(self):

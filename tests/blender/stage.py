@@ -136,7 +136,8 @@ def turn(is_done):
         if is_done():
             return
         for running in live._running.values():
-            running.session._link.box.wait(time.monotonic() + 0.05)
+            box = running.session._link.box
+            box.wait(time.monotonic() + 0.05, box.takes)
             break
     raise AssertionError("it did not happen in time")
 

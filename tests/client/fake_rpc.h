@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -156,6 +155,8 @@ class FakeRpc final : public Rpc {
   std::deque<absl::Status> create_ends;
   /// What Solve calls end with, in turn; OK once they are used up.
   std::deque<absl::Status> solve_ends;
+  /// The newest updates that the results of Solve calls say they know, in turn; all there are once they are used up.
+  std::deque<std::uint64_t> solve_inputs;
   /// Opening a stream throws.
   bool deform_throws = false;
 
@@ -280,7 +281,11 @@ class FakeRpc final : public Rpc {
       }
     }
     v1::SolveResponse summary;
-    summary.mutable_summary()->set_input_seq(newest_input());
+    {
+      const std::scoped_lock lock(mutex_);
+      summary.mutable_summary()->set_input_seq(solve_inputs.empty() ? kNewest : solve_inputs.front());
+      if (!solve_inputs.empty()) solve_inputs.pop_front();
+    }
     summary.mutable_summary()->set_stop_reason(v1::STOP_REASON_CONVERGED);
     absl::Status taken = on_response(summary);
     v1::SolveResponse frame;
@@ -304,16 +309,8 @@ class FakeRpc final : public Rpc {
     return std::make_unique<FakeCall>(streams_.back());
   }
 
-  /// Of the updates that came with calls.
-  std::uint64_t newest_input() {
-    const std::scoped_lock lock(mutex_);
-    std::uint64_t newest = 0;
-    for (const v1::SolveRequest& one : solved_) newest = std::max(newest, one.update().input_seq());
-    for (const v1::UpdateHandlesRequest& one : restored_) newest = std::max(newest, one.update().input_seq());
-    return newest;
-  }
-
  private:
+  static constexpr std::uint64_t kNewest = 1'000'000;
   const std::uint32_t vertex_count_;
   std::mutex mutex_;
   std::condition_variable changed_;

@@ -80,6 +80,33 @@ TEST_F(LinkTest, TheDeadlineOfASolveCountsWhileAnUpdateIsUnderWay) {
   EXPECT_EQ(rpc_->solve_deadlines()[1], 0);
 }
 
+/// The update was taken on the stream and not kept; the server that solves has not heard of it.
+TEST_F(LinkTest, SolveBeginsAgainWithWhatTheServerLostWhereItWentBack) {
+  open();
+  const auto stream = opened_stream();
+  link_->update(adding("base")).value();
+  stream->hear();
+  stream->say(result(1));
+  rpc_->solve_inputs = {0, 1};
+  ASSERT_TRUE(link_->solve({}).ok());
+  EXPECT_EQ(rpc_->solved().size(), 2u);
+  ASSERT_EQ(rpc_->restored().size(), 1u);
+  EXPECT_EQ(rpc_->restored()[0].update().input_seq(), 1u);
+}
+
+/// A call may reach another server, which has only that update of all that were not kept.
+TEST_F(LinkTest, SolveSendsWhatWasNotKeptWhereTheServerWentAwayMeanwhile) {
+  open();
+  const auto stream = opened_stream();
+  link_->update(adding("base")).value();
+  stream->hear();
+  stream->say(result(1));
+  rpc_->solve_ends = {absl::UnavailableError("killed")};
+  ASSERT_TRUE(link_->solve({}).ok());
+  ASSERT_EQ(rpc_->restored().size(), 1u);
+  EXPECT_TRUE(rpc_->restored()[0].update().handles(0).has_set());
+}
+
 TEST_F(LinkTest, CloseEndsASolveThatWaitsForTheServer) {
   open();
   rpc_->solve_ends.assign(1000, absl::UnavailableError("refused"));

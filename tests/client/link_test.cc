@@ -257,44 +257,6 @@ TEST_F(LinkTest, DeletesItsUploadsOnceTheyHaveServed) {
   EXPECT_EQ(deleted[1], sent->update().settings().p().per_vertex().values().upload());
 }
 
-TEST_F(LinkTest, SendsAgainWhatWasAnsweredAndLostWithTheServer) {
-  open();
-  const auto first = opened_stream();
-  link_->update(adding("tip")).value();
-  first->hear();
-  first->say(result(1, true));
-  link_->update(adding("ear")).value();
-  first->hear();
-  first->say(result(2, false));
-  first->say(frame(1, 2));
-  EXPECT_TRUE(next_frame().ok());  // so it was read
-  first->end(absl::UnavailableError("killed"));
-  const auto second = answered(rpc_->next_stream(), 2, 1);
-  std::optional<v1::DeformRequest> again = second->hear();
-  while (again && again->has_ack()) again = second->hear();
-  ASSERT_TRUE(again && again->has_update());
-  EXPECT_EQ(again->update().input_seq(), 2u);
-  ASSERT_EQ(again->update().handles_size(), 1);
-  EXPECT_EQ(again->update().handles(0).name(), "ear");
-}
-
-TEST_F(LinkTest, SendsAgainAnUpdateWhoseUploadsTheServerDoesNotKnow) {
-  open();
-  const auto first = opened_stream();
-  link_->update(adding("tip")).value();
-  first->hear();
-  v1::DeformResponse fault = refusal(1);
-  fault.mutable_event()->mutable_fault()->set_code(5);
-  fault.mutable_event()->mutable_fault()->set_reason("UPLOAD_UNKNOWN");
-  first->say(fault);
-  const auto second = answered(rpc_->next_stream());
-  const auto again = second->hear();
-  ASSERT_TRUE(again && again->has_update());
-  EXPECT_EQ(again->update().input_seq(), 1u);
-  second->say(fault);  // once is enough
-  EXPECT_EQ(fault_of(next_frame().status()).reason, "UPLOAD_UNKNOWN");
-}
-
 TEST_F(LinkTest, SaysWhatTheServerSaidAboutItselfForAsLongAsItsStreamLasts) {
   open();
   const auto stream = opened_stream();

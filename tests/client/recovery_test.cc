@@ -9,8 +9,10 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "absl/strings/escaping.h"
 #include "client/cpp/client.h"
 #include "client/cpp/status_details.h"
+#include "client/cpp/wire.h"
 #include "core/base/fault.h"
 
 namespace lpdeform::client {
@@ -101,6 +103,27 @@ TEST(Recovery, AnswersMeanWhatTheTableOfAllClientsSays) {
     EXPECT_EQ(answer_of(error_of(one.at("error")), one.value("is_second", false)),
               kAnswers.at(one.at("outcome")));
   }
+}
+
+/// Of a call in google.rpc.RetryInfo, inside a stream in Fault.
+TEST(RetryAfter, IsReadFromEveryRecordedError) {
+  int asking = 0;
+  for (const Json& one : Json::parse(std::ifstream(RECORDED_ERRORS))) {
+    SCOPED_TRACE(one.at("text"));
+    const auto decoded = [&one](const char* field) {
+      std::string bytes;
+      EXPECT_TRUE(absl::Base64Unescape(one.at(field).get<std::string>(), &bytes));
+      return bytes;
+    };
+    v1::Fault fault;
+    ASSERT_TRUE(fault.ParseFromString(decoded("fault")));
+    const absl::Status of_call =
+        with_details(static_cast<absl::StatusCode>(one.at("code").get<int>()), "", decoded("details"));
+    EXPECT_EQ(retry_after(of_call).count(), fault.retry_after_ms());
+    EXPECT_EQ(retry_after(from_wire(fault)).count(), fault.retry_after_ms());
+    asking += fault.retry_after_ms() > 0 ? 1 : 0;
+  }
+  EXPECT_GT(asking, 5);
 }
 
 TEST(Backoff, SpreadsItsPausesByChance) {

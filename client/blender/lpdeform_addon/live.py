@@ -12,10 +12,13 @@ from .client import NotReady, access, address, lpdeform, require
 from .told import Told
 
 _interval = 1 / 30  # seconds between two looks
-_paint_interval = 0.2  # weights are read by a loop, so less often
+_stroke_pause = 0.2  # seconds without a change of weights, after which they are read: that is a loop over all vertices
 
+_now = time.monotonic
 _running: dict = {}
 """By the names of mesh objects."""
+_showing: set = set()
+"""Names of mesh objects that change because a frame is shown."""
 _messages: dict = {}
 """What was last to be said of a mesh object."""
 
@@ -69,7 +72,7 @@ class LiveMesh:
         self._told = Told()
         self.fields = {}
         self._weights = {}
-        self._weights_read = 0.0
+        self._painted = None
         self.frame = self.result = None
 
     @property
@@ -109,7 +112,7 @@ class LiveMesh:
         if was == "EDIT" or len(ob.data.vertices) != len(self._rest):
             self._look_again(ob)
         if was != ob.mode:
-            self._weights, self._weights_read = {}, 0.0  # to be read anew
+            self._weights = {}  # to be read anew
         self._tell(ob)
         try:
             frame = self.session.poll()
@@ -163,9 +166,18 @@ class LiveMesh:
             self.show(ob)
 
     def show(self, ob) -> None:
+        bpy.context.view_layer.update()  # of what others did: that is theirs
         surface.show_positions(ob, self.shown.positions)
         if ob.lpdeform.show_distortion:
             surface.show_distortion(ob, self.shown.distortion, ob.lpdeform.distortion_limit)
+        _showing.add(self.name)
+        bpy.context.view_layer.update()
+        _showing.discard(self.name)
+
+    def mesh_changed(self, ob) -> None:
+        """By somebody else. In weight paint mode that is a stroke."""
+        if ob.mode == "WEIGHT_PAINT":
+            self._painted = _now()
 
     def _look_again(self, ob) -> None:
         """Where the mesh at rest may have become another one."""
@@ -229,12 +241,12 @@ class LiveMesh:
 
     def _read_weights(self, ob) -> None:
         settings = ob.lpdeform
-        is_painting = ob.mode == "WEIGHT_PAINT" and time.monotonic() - self._weights_read >= _paint_interval
+        is_painted = self._painted is not None and _now() - self._painted >= _stroke_pause
         names = {name: getattr(settings, f"{name}_group") for name in _settings}
-        if is_painting or self._weights.get("names") != names:
+        if is_painted or self._weights.get("names") != names:
             self._weights = {name: surface.group_weights(ob, group) for name, group in names.items()}
             self._weights["names"] = names
-            self._weights_read = time.monotonic()
+            self._painted = None
 
 
 def between(plain: float, painted: float, weights):
@@ -340,6 +352,15 @@ def _after_undo(*_) -> None:
 
 
 @persistent
+def _after_changes(_scene, graph) -> None:
+    for update in graph.updates:
+        one = update.id.original
+        running = _running.get(one.name) if isinstance(one, bpy.types.Object) and update.is_updated_geometry else None
+        if running is not None and one.name not in _showing:
+            running.mesh_changed(one)
+
+
+@persistent
 def _before_another_file(*_) -> None:
     for name in list(_running):
         _running.pop(name).close()
@@ -350,12 +371,14 @@ def register() -> None:
     bpy.app.handlers.load_pre.append(_before_another_file)
     for after in (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
         after.append(_after_undo)
+    bpy.app.handlers.depsgraph_update_post.append(_after_changes)
 
 
 def unregister() -> None:
     bpy.app.handlers.load_pre.remove(_before_another_file)
     for after in (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
         after.remove(_after_undo)
+    bpy.app.handlers.depsgraph_update_post.remove(_after_changes)
     if bpy.app.timers.is_registered(tick):
         bpy.app.timers.unregister(tick)
     for name in list(_running):

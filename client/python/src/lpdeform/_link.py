@@ -117,8 +117,11 @@ class Link:
         """The frame taken last, whoever took it, where it is the finished result of the newest update."""
         self.take()
         last = self.box.last_final
+        return last if last is not None and self.is_result(last) else None
+
+    def is_result(self, frame: Frame) -> bool:
         with self.changed:
-            return last if last is not None and last.input_seq >= self.ledger.newest else None
+            return frame.is_final and frame.input_seq >= self.ledger.newest
 
     def no_frame(self) -> LpdeformError:
         with self.changed:
