@@ -26,7 +26,7 @@
  * returns an error has changed nothing. No exception leaves the library.
  *
  * Versions. A struct that is passed by itself begins with its size in bytes as the caller was compiled, so that it may
- * grow at its end: `lpdeform_mesh mesh = {sizeof mesh};`. Those that lie within others have none, and stay as they are
+ * grow at its end: `lpdeform_mesh mesh = {.struct_size = sizeof mesh};`. Those that lie within others have none, and stay as they are
  * for as long as LPDEFORM_ABI does: lpdeform_source, _target, _motion, _point and _move. Fields are zero unless set, and
  * zero is the default everywhere; reserved ones must be (RESERVED_SET). A library that is older than its caller refuses
  * fields that it does not know, if they are set (STRUCT_TOO_NEW), rather than leave them out.

@@ -86,14 +86,14 @@ static void check(lpdeform_code code, const char* what) {
 
 static lpdeform_session* open_sheet(lpdeform_client* client, const sheet* sheet) {
   const size_t bytes = sheet->vertex_count * sizeof(vertex);
-  lpdeform_mesh mesh = {sizeof mesh};
+  lpdeform_mesh mesh = {.struct_size = sizeof mesh};
   mesh.vertex_count = sheet->vertex_count;
   mesh.positions =
       (lpdeform_source){sheet->vertices, bytes, offsetof(vertex, position), sizeof(vertex), 0, 0};
   mesh.normals = (lpdeform_source){sheet->vertices, bytes, offsetof(vertex, normal), sizeof(vertex), 0, 0};
   mesh.indices = sheet->indices;
   mesh.index_count = sheet->index_count;
-  lpdeform_options options = {sizeof options};
+  lpdeform_options options = {.struct_size = sizeof options};
   options.with_normals = 1;
   lpdeform_session* session = NULL;
   check(lpdeform_open(client, &mesh, &options, &session, &error), "open");
@@ -101,7 +101,7 @@ static lpdeform_session* open_sheet(lpdeform_client* client, const sheet* sheet)
 }
 
 static void hold(lpdeform_session* session, const char* name, const uint32_t* vertices, uint32_t count) {
-  lpdeform_handle handle = {sizeof handle};
+  lpdeform_handle handle = {.struct_size = sizeof handle};
   handle.name = name;
   handle.vertices = vertices;
   handle.vertex_count = count;
@@ -122,7 +122,7 @@ static lpdeform_motion pose(double t) {
 
 static lpdeform_buffers buffers_of(const sheet* sheet) {
   const size_t bytes = sheet->vertex_count * sizeof(vertex);
-  lpdeform_buffers into = {sizeof into};
+  lpdeform_buffers into = {.struct_size = sizeof into};
   into.positions =
       (lpdeform_target){sheet->vertices, bytes, offsetof(vertex, position), sizeof(vertex), 0, 0};
   into.normals = (lpdeform_target){sheet->vertices, bytes, offsetof(vertex, normal), sizeof(vertex), 0, 0};
@@ -198,7 +198,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   const sheet sheet = make_sheet(argc > 2 ? (uint32_t)atoi(argv[2]) : 100);
-  lpdeform_connection connection = {sizeof connection};
+  lpdeform_connection connection = {.struct_size = sizeof connection};
   connection.address = argv[1];
   lpdeform_client* client = NULL;
   check(lpdeform_connect(&connection, &client, &error), "connect");
@@ -210,7 +210,7 @@ int main(int argc, char** argv) {
 
   /* The last pose, as good as it gets. */
   const lpdeform_buffers into = buffers_of(&sheet);
-  lpdeform_frame frame = {sizeof frame};
+  lpdeform_frame frame = {.struct_size = sizeof frame};
   lpdeform_motion motion = pose(0);
   check(lpdeform_move_handle(session, "edge", &motion, NULL, &error), "move");
   check(lpdeform_settle(session, 60, &into, &frame, &error), "settle");

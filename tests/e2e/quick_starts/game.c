@@ -20,14 +20,14 @@ int main(void) {
   const uint32_t corners[6] = {0, 2, 3, 0, 3, 1}, first[2] = {0, 1}, last[2] = {20, 21};
   uint32_t indices[60];
   int k;
-  lpdeform_error error = {sizeof error};
-  lpdeform_connection connection = {sizeof connection};
-  lpdeform_mesh mesh = {sizeof mesh};
-  lpdeform_options options = {sizeof options};
-  lpdeform_handle base = {sizeof base}, tip = {sizeof tip};
-  lpdeform_motion motion = {LPDEFORM_RIGID};
-  lpdeform_buffers buffers = {sizeof buffers};
-  lpdeform_frame frame = {sizeof frame};
+  lpdeform_error error = {.struct_size = sizeof error};
+  lpdeform_connection connection = {.struct_size = sizeof connection};
+  lpdeform_mesh mesh = {.struct_size = sizeof mesh};
+  lpdeform_options options = {.struct_size = sizeof options};
+  lpdeform_handle base = {sizeof base}, tip = {.struct_size = sizeof tip};
+  lpdeform_motion motion = {.kind = LPDEFORM_RIGID};
+  lpdeform_buffers buffers = {.struct_size = sizeof buffers};
+  lpdeform_frame frame = {.struct_size = sizeof frame};
   lpdeform_client* client;
   lpdeform_session* session;
 
