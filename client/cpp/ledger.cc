@@ -25,7 +25,9 @@ void merge_change(Update::Change& older, Update::Change&& newer) {
 
 /// Bounds what is remembered of handles that are there no more. Motions stay: of handles that the session was made with.
 void forget_removals(Update& update) {
-  const auto is_removal = [](const auto& entry) { return std::holds_alternative<Update::Removal>(entry.second); };
+  const auto is_removal = [](const auto& entry) {
+    return std::holds_alternative<Update::Removal>(entry.second);
+  };
   if (update.handles.size() <= Ledger::kMostRemovals) return;
   const auto count = static_cast<std::size_t>(std::ranges::count_if(update.handles, is_removal));
   if (count > Ledger::kMostRemovals) std::erase_if(update.handles, is_removal);

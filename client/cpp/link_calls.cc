@@ -280,7 +280,8 @@ absl::StatusOr<SolveResult> Link::solve_once(const SolveOptions& options) {
   absl::StatusOr<SolveResult> result = run_solve(*rpc_, lease, update, options, stop_.get_token());
   lock.lock();
   if (update) note_answer(update->seq, result.status());
-  if (absl::IsUnavailable(result.status())) ledger_.resumed_at(0);  // it may have gone back: once more does no harm
+  if (absl::IsUnavailable(result.status()))
+    ledger_.resumed_at(0);  // it may have gone back: once more does no harm
   if (!result.ok() || result->input_seq >= ledger_.newest_accepted()) return result;
   ledger_.resumed_at(result->input_seq);
   if (!ledger_.has_restore()) return result;

@@ -85,8 +85,8 @@ Recovery RecoveryRules::with_pause(NextStep next, absl::Status why, std::chrono:
 
 Recovery RecoveryRules::after(const Ending& ending) {
   if (ending.stood >= Backoff::kMost) backoff_.reset();  // one that breaks at once is no success
-  auto [next, why] = ending.go_away ? after_go_away(*ending.go_away, has_copy_)
-                                    : after_status(ending.status, has_copy_);
+  auto [next, why] =
+      ending.go_away ? after_go_away(*ending.go_away, has_copy_) : after_status(ending.status, has_copy_);
   const bool is_misfit = fault_of(why).reason == "FRAME_PARTS" && ++misfits_ >= kMostMisfits;
   if (is_misfit || ending.away > reconnect_for_) next = NextStep::kGiveUp;
   const auto asked = ending.go_away ? std::chrono::milliseconds(ending.go_away->reconnect_after_ms())

@@ -84,9 +84,9 @@ class RecoveryRules {
 
 /// What an error says of the update that it answers, or that a call was made with.
 enum class Answer {
-  kAgain,      // it is to be sent again, not before retry_after()
-  kMakeAnew,   // it waits for the session made anew
-  kTaken,      // the server has it and cannot solve for it yet
+  kAgain,     // it is to be sent again, not before retry_after()
+  kMakeAnew,  // it waits for the session made anew
+  kTaken,     // the server has it and cannot solve for it yet
   kRefused,
 };
 

@@ -72,7 +72,8 @@ std::chrono::milliseconds read_retry_info(const std::string& retry_info) {
       if (value < 0) continue;
       const auto positive = static_cast<std::uint64_t>(value);
       if (field.number() == kDurationSeconds) milliseconds += 1000 * std::min(positive, kMostSeconds);
-      if (field.number() == kDurationNanos) milliseconds += std::min<std::uint64_t>(positive, 999'999'999) / 1'000'000;
+      if (field.number() == kDurationNanos)
+        milliseconds += std::min<std::uint64_t>(positive, 999'999'999) / 1'000'000;
     }
   });
   return std::chrono::milliseconds(milliseconds);
@@ -103,8 +104,8 @@ Details read_details(const std::string& details) {
 
 absl::Status with_details(absl::StatusCode code, std::string_view text, const std::string& details) {
   const auto [fault, pause] = read_details(details);
-  return with_retry_after(fault == Fault{} ? absl::Status(code, std::string(text)) : make_fault(code, fault, text),
-                          pause);
+  return with_retry_after(
+      fault == Fault{} ? absl::Status(code, std::string(text)) : make_fault(code, fault, text), pause);
 }
 
 absl::Status with_retry_after(absl::Status status, std::chrono::milliseconds pause) {

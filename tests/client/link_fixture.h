@@ -95,7 +95,8 @@ inline v1::DeformResponse refusal(std::uint64_t input_seq) {
 }
 
 inline absl::Status session_unknown() {
-  return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""}, "There is no such session.");
+  return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""},
+                    "There is no such session.");
 }
 
 inline v1::DeformResponse go_away(v1::GoAwayReason reason) {

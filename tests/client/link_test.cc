@@ -209,7 +209,8 @@ TEST_F(LinkTest, AnExceptionOnAThreadOfItsEndsTheSessionWithItsText) {
   EXPECT_EQ(link_->connection(), Connection::kClosed);
 }
 
-TEST_F(LinkTest, AnExceptionWhileReadingEndsTheSessionWithItsText) {  // it would happen again on the next stream
+TEST_F(LinkTest,
+       AnExceptionWhileReadingEndsTheSessionWithItsText) {  // it would happen again on the next stream
   open();
   opened_stream()->throw_once();
   const absl::Status ended = next_frame().status();

@@ -390,8 +390,7 @@ Recording record(v1::DeformService::Stub& stub, const std::string& errors_md) {
   out.frames["undo"] = {{"response", encoded(undone.response)}, {"result", encoded(undone.result)}};
   out.numbers.push_back(raw_numbers(undone.result.event().frame()));
   const v1::FrameHeader& settled = undone.result.event().frame().header();
-  const std::string again =
-      absl::StrFormat("settled again: converged, iteration %d\n", settled.iteration());
+  const std::string again = absl::StrFormat("settled again: converged, iteration %d\n", settled.iteration());
   out.expected += again + "settled again: NO_FRAME\n" + lines_of("undo", settled, out.numbers.back()) + again;
   const std::string file = take_snapshot(stub, create(stub).session().name());
   const v1::RestoreSessionResponse restored = restore(stub, file);

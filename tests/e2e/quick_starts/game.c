@@ -24,7 +24,7 @@ int main(void) {
   lpdeform_connection connection = {.struct_size = sizeof connection};
   lpdeform_mesh mesh = {.struct_size = sizeof mesh};
   lpdeform_options options = {.struct_size = sizeof options};
-  lpdeform_handle base = {sizeof base}, tip = {.struct_size = sizeof tip};
+  lpdeform_handle base = {.struct_size = sizeof base}, tip = {.struct_size = sizeof tip};
   lpdeform_motion motion = {.kind = LPDEFORM_RIGID};
   lpdeform_buffers buffers = {.struct_size = sizeof buffers};
   lpdeform_frame frame = {.struct_size = sizeof frame};
