@@ -20,9 +20,14 @@ class SettleTest : public LinkTest {
     return stream;
   }
 
-  /// Takes the client's next update in.
-  void answer(Stream& stream, std::uint64_t input_seq) {
+  /// The client's next update has come.
+  static void hear_update(Stream& stream) {
     for (auto request = stream.hear(); request && !request->has_update();) request = stream.hear();
+  }
+
+  /// Takes the client's next update in.
+  static void answer(Stream& stream, std::uint64_t input_seq) {
+    hear_update(stream);
     stream.say(result(input_seq));
   }
 
@@ -53,6 +58,7 @@ TEST_F(SettleTest, WaitsWhereANewerUpdateIsUnderWay) {
 TEST_F(SettleTest, ReturnsTheResultBeforeAnUpdateThatWasRefusedOnceThatIsSaid) {
   const auto stream = settled_stream();
   EXPECT_EQ(link_->update(adding("tip")).value(), 2u);
+  hear_update(*stream);
   stream->say(refusal(2));
   EXPECT_EQ(fault_of(settle().status()).reason, "HANDLE_VERTEX_OUT_OF_RANGE");
   EXPECT_EQ(settle_now().value().frame_seq, 1u);
