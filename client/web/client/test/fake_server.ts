@@ -147,7 +147,16 @@ export class FakeServer {
   }
 
   #transport(): Transport {
-    const report = { vertices: 3, faces: 1, edges: 3, components: 1, boundaryLoops: 1, defects: [], weldedVertices: 0, notices: [] };
+    const report = {
+      vertices: 3,
+      faces: 1,
+      edges: 3,
+      components: 1,
+      boundaryLoops: 1,
+      defects: [],
+      weldedVertices: 0,
+      notices: [],
+    };
     const session = (name: string, vertices = 3) => ({
       session: { name, epoch: 1n, mesh: { ...report, vertices: this.vertexCount ?? vertices } },
     });
