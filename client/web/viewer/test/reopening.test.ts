@@ -13,7 +13,7 @@ vi.mock("lpdeform-client", async (original) => {
     openSession: () => {
       ++server.opened;
       return Promise.resolve({
-        meshReport: {},
+        meshReport: { notices: [] },
         on: () => undefined,
         update: () => 1,
         poll: () => undefined,

@@ -61,6 +61,15 @@ it("surfaces that are closed, or whose borders lie apart, have none", () => {
   for (const { make } of shapeKinds) expect(seamsOf(make("coarse").mesh)).toBeUndefined();
 });
 
+it("any number may be in one place", () => {
+  const count = 60_000;
+  const positions = new Float32Array(3 * count);
+  positions[0] = 1; // the rest lie on the origin
+  const faces = Uint32Array.from({ length: count }, (_, corner) => corner);
+  const seams = seamsOf({ name: "heap", positions, faces })!;
+  expect([seams.copyCount, seams.groups[1], seams.groups[count - 1]]).toEqual([count - 2, 1, 1]);
+});
+
 it("a heap of single triangles is one surface", () => {
   const { mesh } = shapeKinds.find(({ id }) => id === "block")!.make("coarse");
   const heap: Mesh = {

@@ -1,3 +1,4 @@
+import type { MeshReport } from "lpdeform-client";
 import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import { isAlike } from "../model/alike.js";
@@ -36,7 +37,7 @@ export class App {
     {
       changed: () => this.requestDraw(),
       status: () => this.#statusChanged(),
-      report: (report) => this.facts.set({ report }),
+      report: (report) => this.#showReport(report),
       problem: (problem) => this.facts.set({ problem }),
       notice: (text) => this.notify(text),
     },
@@ -54,6 +55,13 @@ export class App {
     });
     new ResizeObserver(() => this.requestDraw()).observe(this.stages);
     for (const end of ["keyup", "blur"]) window.addEventListener(end, () => this.#keyUp());
+  }
+
+  /** Both panes have the same. */
+  #showReport(report: MeshReport): void {
+    const isKnown = this.facts.now.report !== undefined;
+    this.facts.set({ report });
+    if (!isKnown) for (const notice of report.notices) this.notify(notice, true);
   }
 
   get panes(): readonly Pane[] {

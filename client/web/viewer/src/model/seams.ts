@@ -89,12 +89,16 @@ function forEachInOnePlace(
   const size = 1000 * distance;
   const cells = new Map<string, number[]>();
   for (const vertex of vertices) {
+    let isThere = false; // exactly: then one of them stands for both, however many there are
     for (const other of cellsNear(positions, vertex, size, distance).flatMap((cell) => cells.get(cell) ?? [])) {
-      if (distanceBetween(positions, vertex, other) <= distance) found(other, vertex);
+      const far = distanceBetween(positions, vertex, other);
+      if (far <= distance) found(other, vertex);
+      isThere ||= far === 0;
     }
+    if (isThere) continue;
     const [own] = cellsNear(positions, vertex, size, 0) as [string];
-    const there = cells.get(own);
-    if (there) there.push(vertex);
+    const inCell = cells.get(own);
+    if (inCell) inCell.push(vertex);
     else cells.set(own, [vertex]);
   }
 }
