@@ -134,19 +134,17 @@ double mean_energy(const Problem& problem) {
   return sum / static_cast<double>(problem.shape().cell_count());
 }
 
-/// A penalty that treats the 90th percentile of the cells alike in primal and dual: k p E^{p - 2} there.
-double penalty(const Problem& problem, const DualBound& dual) {
+/// The 90th percentile of the cells' energies.
+double high_energy(const Problem& problem) {
   const auto& e2 = problem.objective.cells().squared_energies();
-  std::vector<std::pair<double, std::int32_t>> cells;
+  std::vector<double> cells;
   for (std::size_t i = 0; i < e2.size(); ++i) {
-    if (problem.shape().components()[i] >= 0) cells.emplace_back(e2[i], static_cast<std::int32_t>(i));
+    if (problem.shape().components()[i] >= 0) cells.push_back(e2[i]);
   }
   const auto percentile =
       cells.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(cells.size()));
   std::nth_element(cells.begin(), percentile, cells.end());
-  const double energy = std::sqrt(std::max(percentile->first, 1e-20));
-  const std::int32_t i = percentile->second;
-  return dual.k(i) * dual.p(i) * std::pow(energy, dual.p(i) - 2);
+  return std::sqrt(std::max(*percentile, 1e-20));
 }
 
 }  // namespace
@@ -208,27 +206,34 @@ class Certificate::Search {
 
   /// False where there is nothing to begin with.
   bool begin_polishing() {
-    is_polishing_ = y_.size() > 0 && rows_.factor_equal();
-    if (!is_polishing_) return false;
-    rho_ = penalty(problem_, dual_);
+    // A penalty of each cell's own treats primal and dual alike at that energy, however stiff the cell is: one for all of them
+    // would leave the multipliers of stiff cells, or the residuals of soft ones, where they began.
+    const double energy = high_energy(problem_);
+    rho_.resize(rows_.count());
+    for (std::int32_t i = 0; i < rows_.count(); ++i)
+      rho_[i] = dual_.k(i) * dual_.p(i) * std::pow(energy, dual_.p(i) - 2);
+    is_polishing_ = y_.size() > 0 && rows_.factor(rho_);
     r_ = z_;
-    return true;
+    return is_polishing_;
   }
 
   /// One step of ADMM; its present residuals are r_, its multipliers y_.
   void polish() {
-    const EdgeVectors v = r_ + y_ / rho_;
-    EdgeVectors z = v;
+    EdgeVectors dual = y_;  // rho (r - z) + y
     for (std::int32_t i = 0; i < rows_.count(); ++i) {
-      const double size = rows_.norm(v, i);
-      const double factor = size > 0 ? shrink(size, dual_.k(i), dual_.p(i), rho_) / size : 0;
-      rows_.rows(z, i) *= factor;
+      auto y = rows_.rows(y_, i);
+      const EdgeVectors v = rows_.rows(r_, i) + y / rho_[i];
+      const double size = v.norm();
+      const double factor = size > 0 ? shrink(size, dual_.k(i), dual_.p(i), rho_[i]) / size : 0;
+      y = rho_[i] * (1 - factor) * v;
+      rows_.rows(dual, i) = rho_[i] * (rows_.rows(r_, i) - factor * v) + y;
     }
-    y_ = rho_ * (v - z);
-    // x minimises |r - z + y / rho|; what remains of that vector, times rho, has A^T (.) = 0: a dual point.
-    rows_.apply(least_squares(problem_, rows_, r_ - z + y_ / rho_), image_);
+    // x minimises sum_i rho_i |r_i - z_i + y_i / rho_i|^2; what remains of rho (r - z) + y has A^T (.) = 0: a dual point.
+    rows_.apply(least_squares(problem_, rows_, dual), image_);
     r_ -= image_;
-    if (++polished_ % kBetweenBounds == 0) take(dual_.scaled_bound(rho_ * (r_ - z) + y_));
+    if (++polished_ % kBetweenBounds != 0) return;
+    for (std::int32_t i = 0; i < rows_.count(); ++i) rows_.rows(dual, i) -= rho_[i] * rows_.rows(image_, i);
+    take(dual_.scaled_bound(dual));
   }
 
   const Problem problem_;
@@ -245,7 +250,7 @@ class Certificate::Search {
   double mean_energy_ = 0;
   bool is_polishing_ = false;
   int polished_ = 0;
-  double rho_ = 0;
+  std::vector<double> rho_;  // of each cell and term
   EdgeVectors y_, r_, image_;
 };
 

@@ -24,7 +24,8 @@ namespace lpdeform {
 ///   y - C A (A^T C A)^-1 A^T y,   C = the cells' weights c_i,
 ///
 /// and is scaled so that D is largest. Where that bound is loose, y is polished by ADMM on the convex
-/// problem, whose multipliers are feasible by construction, at one back-substitution a step; it begins with
+/// problem, each cell with a penalty in proportion to its k_i, so that the stiffest and the softest converge alike. Its
+/// multipliers are feasible by construction, at one back-substitution a step; it begins with
 /// the best of several smoothed gradients k_i p_i (|z_i|^2 + eps^2)^{p_i / 2 - 1} z_i.
 struct CertificateSettings {
   double good_enough = 1e-4;  // stop polishing at this relative gap

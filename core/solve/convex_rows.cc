@@ -61,13 +61,13 @@ bool ConvexRows::factor() {
   return problem_.factor_metric(Metric::Precision::kSingle);
 }
 
-bool ConvexRows::factor_equal() {
-  soft_weights_.assign(soft_.size(), 1.0);
+bool ConvexRows::factor(const std::vector<double>& weights) {
+  const auto soft = weights.begin() + shape_.vertex_count();
+  soft_weights_.assign(soft, weights.end());
   std::vector<MatrixEntry> entries = soft_.matrix_entries(soft_weights_);
   problem_.constraints.linear.add_ties(2, entries);
-  const std::vector<double> equal(shape_.vertex_count(), 1.0);
-  return problem_.metric.factor(equal, problem_.constraints.is_held, entries, problem_.workers(),
-                                Metric::Precision::kDouble);
+  return problem_.metric.factor({weights.begin(), soft}, problem_.constraints.is_held, entries,
+                                problem_.workers(), Metric::Precision::kDouble);
 }
 
 }  // namespace lpdeform

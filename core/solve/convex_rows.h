@@ -36,10 +36,10 @@ class ConvexRows {
   /// A^T y, what constraints forbid projected out.
   void apply_transposed(const EdgeVectors& y, Points& result) const;
 
-  /// Factors the metric for C, the weights of the objective's last evaluation, or for C = 1; M = 2 A^T C A along
-  /// what the constraints allow. False where that fails.
+  /// Factors the metric for C, the weights of the objective's last evaluation, or those given, one for each of count();
+  /// M = 2 A^T C A along what the constraints allow. False where that fails.
   [[nodiscard]] bool factor();
-  [[nodiscard]] bool factor_equal();
+  [[nodiscard]] bool factor(const std::vector<double>& weights);
   /// C of cell or term i, as last factored.
   double weight(std::int32_t i) const;
 

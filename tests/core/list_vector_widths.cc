@@ -1,0 +1,22 @@
+// Writes for CTest a test per vector width of this processor but the widest, which the tests run with anyway:
+// list_vector_widths PROGRAM PREFIX FILE. PROGRAM runs its tests with the instruction set that LPDEFORM_INSTRUCTION_SET
+// names, but for those that go through all sets by themselves.
+
+#include <fstream>
+
+#include "tests/core/instruction_sets.h"
+
+int main(int count, char** words) {
+  if (count != 4) return 2;
+  const std::string program = words[1], prefix = words[2];
+  std::ofstream file(words[3]);
+  for (const auto& [bits, set] : lpdeform::best_of_each_width()) {
+    if (set == lpdeform::instruction_sets().front()) continue;
+    const std::string name = prefix + ".With" + std::to_string(bits) + "BitVectors";
+    file << "add_test(\"" << name << "\" \"" << program
+         << "\" --gtest_brief=1 --gtest_filter=-Targets/*:InstructionSets.*)\n"
+         << "set_tests_properties(\"" << name
+         << "\" PROPERTIES ENVIRONMENT LPDEFORM_INSTRUCTION_SET=" << hwy::TargetName(set) << ")\n";
+  }
+  return file.good() ? 0 : 1;
+}
