@@ -10,6 +10,7 @@
 #include "core/solve/line_search.h"
 #include "core/solve/local_global.h"
 #include "core/solve/multiresolution.h"
+#include "core/solve/two_attempts.h"
 
 namespace lpdeform {
 namespace {
@@ -18,7 +19,12 @@ constexpr double kCertificateSeconds = 1;    // it gets, whatever is left of the
 constexpr std::size_t kCopyChunk = 4096;     // vertices
 constexpr std::int32_t kLargeMesh = 5000;    // vertices, from which on a coarse level pays
 constexpr std::int32_t kLargeAtTwo = 60000;  // the same where every p is 2: there is less to gain
-constexpr double kRounding = 1e-13;          // of the largest coordinate, in scaled units
+// Where some p is at most kManyMinima, cold solves of kAuto try both methods: in meshes of so many vertices, the second for so
+// many iterations times vertices.
+constexpr double kManyMinima = 1.2;
+constexpr std::int32_t kFewestForTwo = 300, kMostForTwo = 15000;
+constexpr double kSecondWork = 2e7;
+constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
 
@@ -90,6 +96,28 @@ Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {
   }
   if (asked != Method::kMultiresolution || (!is_warm && prepare_coarse())) return asked;
   return Method::kQuasiNewton;
+}
+
+/// What to try after settings.method, which kAuto has chosen; kAuto where that is nothing.
+Method Deformer::Impl::second_method(Method asked, bool is_warm) {
+  const std::int32_t n = shape->vertex_count();
+  const bool tries = asked == Method::kAuto && !is_warm && n >= kFewestForTwo && n <= kMostForTwo &&
+                     material.p.minCoeff() <= kManyMinima;
+  if (!tries) return Method::kAuto;
+  if (settings.method == Method::kMultiresolution) return Method::kQuasiNewton;
+  return prepare_coarse() ? Method::kMultiresolution : Method::kAuto;
+}
+
+/// `first`, then the other method from the same guess with a metric of equal weights, as if it were alone.
+std::unique_ptr<Minimiser> Deformer::Impl::with_second(std::unique_ptr<Minimiser> first,
+                                                       const Points& guess) {
+  const auto make = [this, guess] {
+    is_metric_live = false;
+    if (prepare_metric(true)) objective.evaluate(guess, *norm);
+    return make_minimiser(second, guess, Warmth::kCold);
+  };
+  const int most = static_cast<int>(kSecondWork / shape->vertex_count());
+  return std::make_unique<TwoAttempts>(std::move(first), make, most, zero_objective());
 }
 
 std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points guess, Warmth warmth) {
@@ -200,7 +228,9 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   back_substitutions_before = metric.back_substitutions();
   const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state && !is_at_rest;
   if (!is_warm) x_before_move.resize(0, 3);
-  settings.method = summary.method = chosen_method(settings.method, is_warm);
+  const Method asked = settings.method;
+  settings.method = summary.method = chosen_method(asked, is_warm);
+  second = second_method(asked, is_warm);
   const bool keeps_metric =
       is_warm && is_metric_live && is_metric_of_rows && metric.is_factored_for(constraints->is_held);
   is_drag = keeps_metric;
@@ -223,7 +253,8 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   objective.reweigh(*norm);  // typical_energy has evaluated the guess
   best_sum = std::numeric_limits<double>::infinity();
   const Warmth warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
-  minimiser = make_minimiser(settings.method, std::move(guess), warmth);
+  minimiser = make_minimiser(settings.method, guess, warmth);
+  if (second != Method::kAuto) minimiser = with_second(std::move(minimiser), guess);
   is_metric_live = settings.method == Method::kQuasiNewton;
   const double sum = objective.sum(*norm);
   keep_if_best(sum);
@@ -252,10 +283,28 @@ void Deformer::Impl::iterate() {
   }
 }
 
+/// Of two methods that were tried: which of them the result is of, and what goes with it.
+void Deformer::Impl::settle_methods() {
+  if (!minimiser || second == Method::kAuto) return;
+  if (!minimiser->outcome_before()) return;  // the first was at work to the end
+  if (minimiser->is_best_present()) {
+    settings.method = summary.method = second;
+    is_metric_live = second == Method::kQuasiNewton;
+  } else {
+    objective.evaluate(x, *norm);  // the next solve reads off it where soft handles were
+  }
+}
+
 void Deformer::Impl::end(StopReason reason) {
   catch_up();
+  const bool is_limit = reason == StopReason::kTimeLimit || reason == StopReason::kIterationLimit;
+  if (is_limit && minimiser && minimiser->outcome_before() == Outcome::kConverged)
+    reason = StopReason::kConverged;
+  settle_methods();
+  const bool has_metric = !minimiser || minimiser->is_best_present();
   // Before its end the metric may still be that of the guess.
   if (settings.method == Method::kMultiresolution) is_metric_live = reason == StopReason::kConverged;
+  is_metric_live = is_metric_live && has_metric;
   minimiser.reset();
   has_state = true;
   is_at_rest = is_best_zero();

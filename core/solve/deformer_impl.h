@@ -41,6 +41,8 @@ struct Deformer::Impl {
   Method chosen_method(Method asked, bool is_warm);
   bool prepare_coarse();
   std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, Warmth warmth);
+  Method second_method(Method asked, bool is_warm);
+  std::unique_ptr<Minimiser> with_second(std::unique_ptr<Minimiser> first, const Points& guess);
   bool prepare_metric(bool needs_plain_weights);
   void keep_if_best(double sum);
   void keep(const Points& from, double sum);
@@ -49,6 +51,7 @@ struct Deformer::Impl {
   Material effective_material() const;
   void summarise();
   void record(const StepResult& result, double sum);
+  void settle_methods();
   void begin(const SolveSettings& new_settings, std::stop_token new_stop);
   void iterate();
   void end(StopReason reason);
@@ -88,6 +91,7 @@ struct Deformer::Impl {
 
   // The running solve.
   SolveSettings settings;
+  Method second = Method::kAuto;  // what is tried after settings.method; kAuto: nothing
   std::stop_token stop;
   std::optional<LpNorm> norm;           // true norm, and the reference of the running solve
   std::unique_ptr<CoarseLevel> coarse;  // made when first needed

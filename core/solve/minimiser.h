@@ -74,6 +74,11 @@ class Minimiser {
   /// What the method has in hand beside x(), new since it was last asked: finite, all constraints met. problem.objective
   /// then holds the evaluation there. Steps and their results are the same with and without being asked.
   virtual std::optional<Points> in_hand() { return std::nullopt; }
+
+  /// How the solve stands where it is ended by a limit now: none where it is not over in any sense.
+  virtual std::optional<Outcome> outcome_before() const { return std::nullopt; }
+  /// Whether the best state seen is of the method that is at work, so that the metric goes with it.
+  virtual bool is_best_present() const { return true; }
 };
 
 /// Leaves of `values`, a gradient or a direction, what the constraints allow: rows of held vertices become
