@@ -26,6 +26,7 @@ struct Inputs {
   client::Update update;
   client::FieldValue p;
   std::optional<std::vector<double>> initial_positions;
+  PictureStyle style;
 };
 
 absl::Status read_initial(const DeformOptions& options, Inputs& inputs) {
@@ -58,7 +59,9 @@ absl::StatusOr<Inputs> read_inputs(const DeformOptions& options) {
   if (!status.ok()) return status;
   absl::StatusOr<MeshFile> file = read_deformable(options.mesh);
   if (!file.ok()) return file.status();
-  Inputs inputs{*std::move(file), {}, {}, {}};
+  auto style = picture_style(options.picture);
+  if (!style.ok()) return style.status();
+  Inputs inputs{*std::move(file), {}, {}, {}, *std::move(style)};
   const std::int64_t vertex_count = inputs.file.mesh.vertices.rows();
 
   absl::StatusOr<HandleFile> held = read_handles(options.handles, vertex_count);
@@ -119,10 +122,11 @@ absl::Status write_results(const DeformOptions& options, const Inputs& inputs, c
   const Field field =
       Eigen::Map<const Field>(distortion.data(), static_cast<Eigen::Index>(distortion.size()));
   for (const std::filesystem::path& path : options.out) {
-    absl::Status written = options.normals
-                               ? write_output_with_normals(path, inputs.file, positions, field,
-                                                           points_of(solved.result.normals), options.weld)
-                               : write_output(path, inputs.file, positions, field, options.weld);
+    absl::Status written =
+        options.normals
+            ? write_output_with_normals(path, inputs.file, positions, field, points_of(solved.result.normals),
+                                        options.weld, inputs.style)
+            : write_output(path, inputs.file, positions, field, options.weld, inputs.style);
     if (!written.ok()) return written;
     std::printf("wrote %s\n", path.c_str());
   }

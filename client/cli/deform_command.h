@@ -8,6 +8,7 @@
 
 #include "client/cli/exit_status.h"
 #include "client/cli/material_input.h"
+#include "client/cli/outputs.h"
 #include "client/cli/server_access.h"
 #include "client/cpp/types.h"
 
@@ -30,6 +31,7 @@ struct DeformOptions {
   bool normals = false;        // in .obj and .ply
   bool certify = false;        // print the optimality gap
   std::vector<std::filesystem::path> out;
+  PictureOptions picture;
   std::optional<std::filesystem::path> report;
   ServerAccess server;
 };

@@ -152,6 +152,23 @@ void add_solver_options(CLI::App& app, DeformOptions& options) {
       ->option_text("SECONDS");
 }
 
+void add_picture_options(CLI::App& app, PictureOptions& picture) {
+  app.add_option("--size", picture.size,
+                 "Width and height of a picture in pixels, each 1 to 16384 (1200,900)")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(CLI::Range(1, 16384))
+      ->option_text("W,H");
+  app.add_option("--camera", picture.camera,
+                 "A mesh that pictures are framed by, so that several can be compared: the camera stands "
+                 "where it would "
+                 "for that mesh (each picture's own)")
+      ->option_text("MESH");
+  app.add_option("--red", picture.red, "The distortion that pictures show in full red (each picture's own)")
+      ->check(positive())
+      ->option_text("E");
+}
+
 void add_weld(CLI::App& app, std::optional<double>& weld) {
   app.add_option(
          "--weld", weld,
@@ -225,6 +242,7 @@ void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
                  ".off, or a picture as .png")
       ->allow_extra_args(false)
       ->option_text("FILE");
+  add_picture_options(app, options->picture);
   add_weld(app, options->weld);
   app.add_flag("--normals", options->normals,
                "Write normals to .obj and .ply, one of which must be among the outputs; those of an OBJ "
@@ -280,6 +298,7 @@ void add_resize(CLI::App& program, std::function<ExitStatus()>& command) {
   add_vector(app, "--origin", options->origin, "What stays where it is (the middle of the bounding box)");
   add_vector(app, "--x-axis", options->x_axis, "The direction of the first factor (1,0,0)");
   add_vector(app, "--y-axis", options->y_axis, "The direction of the second factor (0,1,0)");
+  add_picture_options(app, options->picture);
   add_weld(app, options->weld);
   CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")
                                    ->check(CLI::Range(1, 1024))

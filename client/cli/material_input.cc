@@ -1,5 +1,6 @@
 #include "client/cli/material_input.h"
 
+#include <cstdio>
 #include <utility>
 
 #include "absl/strings/numbers.h"
@@ -7,6 +8,7 @@
 #include "client/cli/mesh_input.h"
 #include "client/cli/painting.h"
 #include "core/analysis/automatic_material.h"
+#include "core/analysis/shape_features.h"
 #include "core/mesh/weld.h"
 
 namespace lpdeform::cli {
@@ -43,6 +45,16 @@ absl::StatusOr<std::vector<double>> numbers_of(const client::FieldValue& value, 
 }
 
 /// What is said of one copy is said of all.
+/// One line where --p auto finds nothing to go by.
+absl::Status tell_of_joints(const MaterialOptions& options, const TriangleMesh& mesh, const Weld& weld) {
+  if (options.automatic.value_or(0) == 0) return absl::OkStatus();
+  auto shape = RestShape::create(welded(mesh, weld));
+  if (!shape.ok()) return shape.status();
+  if (!has_joints(ShapeFeatures(*std::move(shape)).joint()))
+    std::fprintf(stderr, "lpdeform: No joints were found in the mesh: p = 2 everywhere.\n");
+  return absl::OkStatus();
+}
+
 void add_copies(const Weld& weld, VertexGroup& group) {
   std::vector<bool> is_named(static_cast<std::size_t>(weld.welded_count()));
   for (const std::uint32_t vertex : group.vertices) is_named[weld.to_welded[vertex]] = true;
@@ -76,10 +88,13 @@ absl::Status read_material(const MaterialOptions& options, const MeshFile& file,
   const std::int64_t vertex_count = file.mesh.vertices.rows();
   if (absl::Status status = read_base(options, vertex_count, into); !status.ok()) return status;
   for (VertexGroup& group : obj_groups(file.obj_source)) groups.push_back(std::move(group));
-  if (!paints_anything(groups, options)) return absl::OkStatus();
+  const bool paints = paints_anything(groups, options);
+  if (!paints && !options.automatic) return absl::OkStatus();
 
   const absl::StatusOr<Weld> weld = weld_of(file.mesh, welding);
   if (!weld.ok()) return weld.status();
+  if (absl::Status status = tell_of_joints(options, file.mesh, *weld); !status.ok()) return status;
+  if (!paints) return absl::OkStatus();
   if (welding) {
     for (VertexGroup& group : groups) add_copies(*weld, group);
   }

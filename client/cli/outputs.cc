@@ -5,7 +5,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
-#include "client/cli/render/render.h"
+#include "client/cli/mesh_input.h"
 #include "client/cli/text_file.h"
 #include "core/base/fault.h"
 #include "core/mesh/obj_normals.h"
@@ -21,6 +21,20 @@ std::string ending_of(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+absl::StatusOr<PictureStyle> picture_style(const PictureOptions& options) {
+  PictureStyle style;
+  if (options.size.size() == 2) style.width = options.size[0], style.height = options.size[1];
+  style.red = options.red;
+  if (!options.camera) return style;
+  const auto file = read_deformable(*options.camera);
+  if (!file.ok()) return file.status();
+  const Faces& faces = file->mesh.faces;
+  style.frame.resize(faces.size(), 3);
+  for (Eigen::Index k = 0; k < faces.size(); ++k)
+    style.frame.row(k) = file->mesh.vertices.row(faces.reshaped()[k]);
+  return style;
+}
 
 absl::Status check_outputs(std::span<const std::filesystem::path> paths) {
   for (const std::filesystem::path& path : paths) {
@@ -46,9 +60,13 @@ absl::Status check_normals_have_output(std::span<const std::filesystem::path> pa
 }
 
 absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
-                          const Field& distortion, std::optional<double> weld) {
+                          const Field& distortion, std::optional<double> weld, const PictureStyle& style) {
   const std::string ending = ending_of(path);
-  if (ending == ".png") return render_png(path, file.mesh.faces, positions, distortion);
+  if (ending == ".png") {
+    PictureStyle with_colours = style;
+    with_colours.distortion = distortion;
+    return render_png(path, file.mesh.faces, positions, with_colours);
+  }
   if (ending == ".obj" && has_obj_normals(file))
     return write_text(path, obj_text_with_normals(file, positions, weld));
   return write_mesh(path, file, positions, distortion);
@@ -56,11 +74,12 @@ absl::Status write_output(const std::filesystem::path& path, const MeshFile& fil
 
 absl::Status write_output_with_normals(const std::filesystem::path& path, const MeshFile& file,
                                        const Points& positions, const Field& distortion,
-                                       const Points& normals, std::optional<double> weld) {
+                                       const Points& normals, std::optional<double> weld,
+                                       const PictureStyle& style) {
   const std::string ending = ending_of(path);
   if (ending == ".obj") return write_text(path, obj_text_with_normals(file, positions, weld));
   if (ending == ".ply") return write_mesh(path, file, positions, distortion, normals);
-  return write_output(path, file, positions, distortion, weld);
+  return write_output(path, file, positions, distortion, weld, style);
 }
 
 }  // namespace lpdeform::cli

@@ -97,8 +97,10 @@ absl::Status stretch(client::Client& server, const Scaling& scaling, std::option
   plain.scale[axis] = factor;
   solve.initial_positions = flat(plain(resized.file.mesh.vertices));
   solve.on_progress = [&progress](const client::SolveProgress& now) { progress.show(now); };
-  const auto sent = session->update(
-      {.handles = sides(**shape, weld, scaling.axes, axis), .settings = {}, .resize = resize});
+  std::map<std::string, client::Update::Change> locks;
+  // Without salient parts the server holds all vertices.
+  if (has_salient_parts(ShapeFeatures(*shape), plain)) locks = sides(**shape, weld, scaling.axes, axis);
+  const auto sent = session->update({.handles = std::move(locks), .settings = {}, .resize = resize});
   const absl::StatusOr<client::SolveResult> result =
       sent.ok() ? session->solve(solve) : absl::StatusOr<client::SolveResult>(sent.status());
   interrupt.set_action({});
@@ -147,6 +149,8 @@ ExitStatus run_resize(const ResizeOptions& options) {
   if (absl::Status status = check_outputs(std::array{options.out}); !status.ok()) return complain(status);
   absl::StatusOr<MeshFile> file = read_deformable(options.mesh);
   if (!file.ok()) return complain(file.status());
+  const absl::StatusOr<PictureStyle> style = picture_style(options.picture);
+  if (!style.ok()) return complain(style.status());
   const absl::StatusOr<Scaling> scaling = read_scaling(options, file->mesh);
   if (!scaling.ok()) return complain(scaling.status());
 
@@ -160,8 +164,8 @@ ExitStatus run_resize(const ResizeOptions& options) {
                                                     options.server, *scaling, options.weld, *file, interrupt);
   if (interrupt.happened()) return kInterrupted;
   if (!resized.ok()) return complain(resized.status());
-  const absl::Status written =
-      write_output(options.out, *file, resized->file.mesh.vertices, resized->distortion, options.weld);
+  const absl::Status written = write_output(options.out, *file, resized->file.mesh.vertices,
+                                            resized->distortion, options.weld, *style);
   if (!written.ok()) return complain(written);
   std::printf("wrote %s\n", options.out.c_str());
   return exit_status_of(resized->stop_reason, false, false);

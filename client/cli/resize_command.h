@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/cli/exit_status.h"
+#include "client/cli/outputs.h"
 #include "client/cli/server_access.h"
 
 namespace lpdeform::cli {
@@ -18,6 +19,7 @@ struct ResizeOptions {
   std::vector<double> x_axis, y_axis;     // directions; both or none
   std::optional<double> weld;             // its tolerance, 0: the default; none: vertices stay as they are
   int threads = 0;                        // of the server in this process; 0: all cores
+  PictureOptions picture;
   ServerAccess server;
 };
 

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kJointP = 2;
 constexpr double kSoftening = 10;
+constexpr double kLeastJoint = 0.1;
 
 }  // namespace
 
@@ -20,10 +21,14 @@ absl::Status check_strength(double strength) {
                        absl::StrCat("the strength is ", strength, "; it must be from 0 to 1"));
 }
 
+bool has_joints(const Field& joint) {
+  return joint.size() > 0 && joint.maxCoeff() >= kLeastJoint;
+}
+
 absl::StatusOr<Material> automatic_material(const Field& joint, double strength) {
   if (absl::Status status = check_strength(strength); !status.ok()) return status;
   Material material;
-  if (strength == 0) return material;
+  if (strength == 0 || !has_joints(joint)) return material;
   material.p = kJointP - strength * (1 - joint.array());
   material.stiffness = (-strength * std::log(kSoftening) * joint.array()).exp();
   return material;

@@ -18,9 +18,15 @@ namespace lpdeform {
 /// are nearly free, so the joints take all of them and share them evenly. The other way round joints are
 /// stiffer than with the same p everywhere. Strength 0 is p = 2 and stiffness 1 everywhere.
 ///
+/// Without joints there are no parts to be kept rigid, and p = 1 everywhere would kink a tube somewhere: then, too, it is p = 2
+/// and stiffness 1 everywhere (has_joints).
+///
 /// The length unit is left at its default. INVALID_ARGUMENT: STRENGTH_OUT_OF_RANGE.
 absl::StatusOr<Material> automatic_material(const RestShape& shape, double strength,
                                             const Workers& workers = Workers(1));
+
+/// Whether joint_i reaches 0.1 anywhere.
+bool has_joints(const Field& joint);
 
 /// The same where the joints are known: one value of `joint` a vertex.
 absl::StatusOr<Material> automatic_material(const Field& joint, double strength);

@@ -12,6 +12,7 @@
 #include "client/cli/render/shading.h"
 #include "core/base/check.h"
 #include "core/base/fault.h"
+#include "core/base/workers.h"
 #include "core/mesh/whole_file.h"
 
 namespace lpdeform {
@@ -60,9 +61,12 @@ struct ToUnitSize {
   double half_size;
 };
 
-/// The colour of a pixel of side x side samples.
+/// The colour of a pixel of side x side samples. Within one face it hardly changes, so that one sample tells it; at
+/// edges all do.
 Rgb mean_colour(const Scene& scene, int x, int y, int side) {
-  const double openness = scene.openness_at(side * x + side / 2, side * y + side / 2);
+  const int middle_x = side * x + side / 2, middle_y = side * y + side / 2;
+  const double openness = scene.openness_at(middle_x, middle_y);
+  if (scene.is_one_face(side * x, side * y, side)) return scene.colour_at(middle_x, middle_y, openness);
   std::array<int, 3> sum{};
   for (int k = 0; k < side * side; ++k) {
     const Rgb colour = scene.colour_at(side * x + k % side, side * y + k / side, openness);
@@ -109,9 +113,12 @@ Image render(const Faces& faces, const Points& positions, const PictureStyle& st
   const Scene scene({kept, to_unit_size(positions), heat_of(style.distortion, red_of(style)), style.colours},
                     Camera(to_unit_size(frame), side * width, side * height), side * width, side * height);
   Image image(width, height);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) image.set(x, y, mean_colour(scene, x, y, side));
-  }
+  const auto rows = static_cast<std::size_t>(height);
+  Workers(available_cores()).for_chunks(rows, 16, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
+      for (int x = 0; x < width; ++x) image.set(x, y, mean_colour(scene, x, y, side));
+    }
+  });
   if (style.has_legend && style.distortion.size() > 0) draw_legend(image, red_of(style));
   return image;
 }
@@ -125,13 +132,23 @@ Image render(const Faces& faces, const Points& positions, const Field& distortio
 }
 
 absl::Status render_png(const std::filesystem::path& path, const Faces& faces, const Points& positions,
-                        const Field& distortion, int width, int height) {
+                        const PictureStyle& style) {
+  const int width = style.width, height = style.height;
   if (width < 1 || width > kLargestSide || height < 1 || height > kLargestSide) {
     return invalid_input({"IMAGE_SIZE", "", absl::StrCat("1 <= width, height <= ", kLargestSide)},
                          absl::StrCat("A picture of ", width, " x ", height,
                                       " pixels is out of range: each side is 1 to ", kLargestSide, "."));
   }
-  return write_whole_file(path, png_bytes(render(faces, positions, distortion, width, height)));
+  return write_whole_file(path, png_bytes(render(faces, positions, style)));
+}
+
+absl::Status render_png(const std::filesystem::path& path, const Faces& faces, const Points& positions,
+                        const Field& distortion, int width, int height) {
+  PictureStyle style;
+  style.width = width;
+  style.height = height;
+  style.distortion = distortion;
+  return render_png(path, faces, positions, style);
 }
 
 }  // namespace lpdeform

@@ -37,6 +37,8 @@ Image render(const Faces& faces, const Points& positions, const Field& distortio
 /// The same as a PNG file, written whole or not at all. INVALID_ARGUMENT (IMAGE_SIZE) where width or height
 /// is out of range; FILE_NOT_WRITTEN.
 absl::Status render_png(const std::filesystem::path& path, const Faces& faces, const Points& positions,
+                        const PictureStyle& style);
+absl::Status render_png(const std::filesystem::path& path, const Faces& faces, const Points& positions,
                         const Field& distortion, int width = 1200, int height = 900);
 
 }  // namespace lpdeform

@@ -1,6 +1,7 @@
 #include "client/cli/render/scene.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <utility>
@@ -44,6 +45,22 @@ double diagonal(const Points& points) {
   return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
 }
 
+constexpr int kNeighbours = 40;
+
+/// Points of the unit disc, evenly spread.
+const std::array<std::array<double, 2>, kNeighbours>& spiral() {
+  static const auto points = [] {
+    constexpr double kGoldenAngle = 2.39996322972865;
+    std::array<std::array<double, 2>, kNeighbours> result{};
+    for (int k = 0; k < kNeighbours; ++k) {
+      const double radius = (k + 0.5) / kNeighbours;
+      result[k] = {radius * std::cos(k * kGoldenAngle), radius * std::sin(k * kGoldenAngle)};
+    }
+    return result;
+  }();
+  return points;
+}
+
 /// An angle that looks random from one pixel to the next.
 double scattered_angle(int x, int y) {
   const double seed = 52.9829189 * std::fmod(0.06711056 * x + 0.00583715 * y, 1.0);
@@ -70,12 +87,6 @@ Scene::Scene(const Surface& surface, Camera camera, int width, int height)
 Scene::Scene(const Faces& faces, const Points& positions, const Field& heat, int width, int height)
     : Scene({faces, positions, heat, {}}, Camera(at_corners(faces, positions), width, height), width,
             height) {}
-
-Eigen::RowVector3d Scene::inside(const Points& corner_values, const Raster::Sample& sample) {
-  const Eigen::Index first = 3 * Eigen::Index{sample.face};
-  return (1 - sample.b - sample.c) * corner_values.row(first) + sample.b * corner_values.row(first + 1) +
-         sample.c * corner_values.row(first + 2);
-}
 
 Eigen::RowVector3d Scene::normal_towards_camera(const Raster::Sample& sample) const {
   const Eigen::RowVector3d normal = inside(normals_, sample).normalized();
@@ -105,26 +116,32 @@ Rgb Scene::colour_at(int x, int y, double openness) const {
                 camera_.towards_camera(inside(corners_, sample)), openness);
 }
 
+bool Scene::is_one_face(int x, int y, int side) const {
+  const std::int32_t face = raster_.at(x, y).face;
+  for (int k = 1; k < side * side; ++k) {
+    if (raster_.at(x + k % side, y + k / side).face != face) return false;
+  }
+  return true;
+}
+
 double Scene::openness_at(int x, int y) const {
   const Raster::Sample& sample = raster_.at(x, y);
   if (sample.face < 0) return 1;
   const Eigen::RowVector3d point = inside(corners_, sample), normal = normal_towards_camera(sample);
-  constexpr int kNeighbours = 40;
-  constexpr double kGoldenAngle = 2.39996322972865;
   const double start = scattered_angle(x, y), pixels = kReachInHeights * raster_.height();
+  const double turn = std::sin(start), level = std::cos(start), reach2 = reach_ * reach_;
   double hidden = 0;
-  for (int k = 0; k < kNeighbours; ++k) {
-    const double radius = pixels * (k + 0.5) / kNeighbours, angle = start + k * kGoldenAngle;
-    const int other_x = x + static_cast<int>(std::lround(radius * std::cos(angle)));
-    const int other_y = y + static_cast<int>(std::lround(radius * std::sin(angle)));
+  for (const auto& [right, down] : spiral()) {
+    const int other_x = x + static_cast<int>(std::floor(pixels * (level * right - turn * down) + 0.5));
+    const int other_y = y + static_cast<int>(std::floor(pixels * (turn * right + level * down) + 0.5));
     if (other_x < 0 || other_x >= raster_.width() || other_y < 0 || other_y >= raster_.height()) continue;
     const Raster::Sample& other = raster_.at(other_x, other_y);
     if (other.face < 0) continue;
     const Eigen::RowVector3d towards = inside(corners_, other) - point;
-    const double distance = towards.norm();
+    const double distance2 = towards.squaredNorm();
     // Below a tenth, curvature and rounding raise neighbours above the tangent plane, too.
-    const double height = std::max(0.0, normal.dot(towards) / std::max(distance, 1e-300) - 0.1);
-    hidden += height / (1 + std::pow(distance / reach_, 2));
+    const double height = std::max(0.0, normal.dot(towards) / std::sqrt(std::max(distance2, 1e-300)) - 0.1);
+    hidden += height / (1 + distance2 / reach2);
   }
   return std::clamp(1 - 2.2 * hidden / kNeighbours, 0.0, 1.0);
 }

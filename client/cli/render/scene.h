@@ -31,13 +31,20 @@ class Scene {
   /// `openness` as in shaded().
   Rgb colour_at(int x, int y, double openness) const;
 
+  /// Whether the side x side samples from (x, y) on show one face, or all of them the background.
+  bool is_one_face(int x, int y, int side) const;
+
   /// The share of the sky that the point at this sample sees, as far as the picture tells: 1 in the open and
   /// on the background, less in holes and folds, judged by the samples around it.
   double openness_at(int x, int y) const;
 
  private:
   Rgb albedo_at(const Raster::Sample& sample) const;
-  static Eigen::RowVector3d inside(const Points& corner_values, const Raster::Sample& sample);
+  static Eigen::RowVector3d inside(const Points& corner_values, const Raster::Sample& sample) {
+    const Eigen::Index first = 3 * Eigen::Index{sample.face};
+    return (1 - sample.b - sample.c) * corner_values.row(first) + sample.b * corner_values.row(first + 1) +
+           sample.c * corner_values.row(first + 2);
+  }
   Eigen::RowVector3d normal_towards_camera(const Raster::Sample& sample) const;
 
   Points corners_, normals_;  // 3 f + k for corner k of face f

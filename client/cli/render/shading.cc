@@ -1,17 +1,33 @@
 #include "client/cli/render/shading.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace lpdeform {
 namespace {
 
+constexpr double kGamma = 2.2;
+
 double to_linear(std::uint8_t channel) {
-  return std::pow(channel / 255.0, 2.2);
+  static const auto table = [] {
+    std::array<double, 256> result{};
+    for (std::size_t k = 0; k < result.size(); ++k)
+      result[k] = std::pow(static_cast<double>(k) / 255, kGamma);
+    return result;
+  }();
+  return table[channel];
 }
 
+/// The channel whose range of linear values, from half a channel below to half a channel above, holds `linear`.
 std::uint8_t to_channel(double linear) {
-  return static_cast<std::uint8_t>(std::lround(255 * std::pow(std::clamp(linear, 0.0, 1.0), 1 / 2.2)));
+  static const auto lowest = [] {  // of channel k + 1
+    std::array<double, 255> result{};
+    for (std::size_t k = 0; k < result.size(); ++k)
+      result[k] = std::pow((static_cast<double>(k) + 0.5) / 255, kGamma);
+    return result;
+  }();
+  return static_cast<std::uint8_t>(std::upper_bound(lowest.begin(), lowest.end(), linear) - lowest.begin());
 }
 
 /// Lambert's cosine, softened so that the terminator lies behind the silhouette of a ball.

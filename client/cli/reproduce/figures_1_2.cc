@@ -115,15 +115,41 @@ Claim line_search_takes_many_short_iterations(const Measurements& measured) {
            {"cone_program_milliseconds", conic_ms}}};
 }
 
+/// After how many iterations E^(1/p) is within `share` of where the trace ends.
+int iterations_to(const Trace& trace, double share) {
+  const auto& records = trace.summary.trace;
+  const double wanted = std::pow(1 + share, trace.p) * records.back().energy;
+  const auto near =
+      std::ranges::find_if(records, [&](const IterationRecord& record) { return record.energy <= wanted; });
+  return near == records.end() ? trace.summary.iterations : near->iteration;
+}
+
+/// By the paper's own rule and by three others: a single one would decide by where it happens to stop.
 Claim larger_p_converges_sooner(const Measurements& measured) {
-  const int low = measured.trace(1.5, Method::kLineSearch).summary.iterations;
-  const int high = measured.trace(6, Method::kLineSearch).summary.iterations;
-  return {
+  const Trace& low = measured.trace(1.5, Method::kLineSearch);
+  const Trace& high = measured.trace(6, Method::kLineSearch);
+  Claim claim{
       "Using a larger p, line search is likely to converge in fewer iterations (the bar: 92 for L1.5, 12 for "
       "L6).",
-      absl::StrFormat("%d iterations for L1.5, %d for L6.", low, high),
-      high < low,
-      {{"iterations_p1_5", low}, {"iterations_p6", high}}};
+      absl::StrFormat(
+          "By the paper's rule (root-mean-square step below 5e-5) %d iterations for L1.5, %d for L6",
+          low.summary.iterations, high.summary.iterations),
+      high.summary.iterations < low.summary.iterations,
+      {{"iterations_p1_5", low.summary.iterations}, {"iterations_p6", high.summary.iterations}}};
+  for (const double share : {1e-1, 1e-2, 1e-3}) {
+    const int of_low = iterations_to(low, share), of_high = iterations_to(high, share);
+    absl::StrAppendFormat(&claim.measured, "; until E^(1/p) is within %g of the end %d and %d", share, of_low,
+                          of_high);
+    claim.holds = claim.holds && of_high < of_low;
+    claim.numbers.emplace_back(absl::StrFormat("iterations_p1_5_to_%g", share), of_low);
+    claim.numbers.emplace_back(absl::StrFormat("iterations_p6_to_%g", share), of_high);
+  }
+  absl::StrAppend(
+      &claim.measured,
+      ". It holds where all four say so. The paper does not give its bar's unit of length, and its counts "
+      "depend on it: the rule stops at a step of 5e-5 units, and the search begins at t = 1. Here the "
+      "unit is the mean edge length, so the counts differ.");
+  return claim;
 }
 
 constexpr int kBins = 40;

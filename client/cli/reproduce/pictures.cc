@@ -36,12 +36,20 @@ Picture drawn(const Experiment& experiment, const Points& positions, PictureStyl
   return picture;
 }
 
+/// One scale of colours for all p: the distortion that the most distorted of them needs for its own red.
+double red_of(const Experiment& experiment) {
+  double red = 0;
+  for (const auto& [p, solve] : experiment.by_p) red = std::max(red, distortion_of_red(solve.energies));
+  return red;
+}
+
 Picture distortion_picture(const Experiment& experiment, const Solve& solve, Picture picture) {
   PictureStyle style;
   style.distortion = solve.energies;
-  style.red = solve.energies.maxCoeff();
+  style.red = red_of(experiment);
   style.frame = frame_of(experiment);
-  absl::StrAppend(&picture.caption, ", largest ", number_text(style.red));
+  absl::StrAppend(&picture.caption, ", largest ", number_text(solve.energies.maxCoeff()), ", red from ",
+                  number_text(style.red));
   return drawn(experiment, solve.positions, std::move(style), std::move(picture));
 }
 

@@ -139,6 +139,7 @@ std::string methods_text(const Measurements& measured) {
           ? ", and where a number has a † multiresolution, which is chosen for large meshes and counts the "
             "iterations on the fine level"
           : " for every p",
+      "; at p = 1 both are tried, the better is kept, and the count is of both",
       absl::StrFormat(
           ", from the naive Laplacian guess, to a relative tolerance of 1e-5; %d thread%s; seconds "
           "are set-up and solve, the median of up to five runs; * ended short of the tolerance. ",

@@ -31,6 +31,35 @@ TEST(AutomaticMaterial, OfStrengthZeroIsTheSameEverywhere) {
   EXPECT_EQ(automatic_material(*shape, 0).value(), Material::uniform(2));
 }
 
+/// A tube of 24 faces around and `length` rings, open at both ends.
+TriangleMesh tube(int length) {
+  constexpr int kAround = 24;
+  TriangleMesh mesh{Points((length + 1) * kAround, 3), Faces(2 * length * kAround, 3)};
+  Eigen::Index f = 0;
+  for (int ring = 0; ring <= length; ++ring) {
+    for (int k = 0; k < kAround; ++k) {
+      const double angle = 2 * std::numbers::pi * k / kAround;
+      const int v = ring * kAround + k, beside = ring * kAround + (k + 1) % kAround;
+      mesh.vertices.row(v) << 4 * std::cos(angle), 4 * std::sin(angle), ring;
+      if (ring == length) continue;
+      mesh.faces.row(f++) << v, beside, v + kAround;
+      mesh.faces.row(f++) << beside, beside + kAround, v + kAround;
+    }
+  }
+  return mesh;
+}
+
+TEST(AutomaticMaterial, OfAShapeWithoutJointsIsTwoEverywhere) {
+  for (const TriangleMesh& mesh : {tube(40), box_surface(4, 4, 21), sphere(3)}) {
+    const auto shape = rest_shape(mesh);
+    EXPECT_FALSE(has_joints(ShapeFeatures(shape).joint()));
+    EXPECT_EQ(automatic_material(*shape, 1).value(), Material::uniform(2));
+  }
+  const ShapeFeatures necked(rest_shape(necked_bar(8, 42, 4, 6)));
+  EXPECT_TRUE(has_joints(necked.joint()));
+  EXPECT_LT(automatic_material(necked.joint(), 1).value().p.minCoeff(), 1.1);
+}
+
 TEST(AutomaticMaterial, RefusesAStrengthOutOfRange) {
   const auto shape = rest_shape(box_surface(1, 1, 1));
   for (const double strength : {-0.1, 1.1, std::nan(""), std::numeric_limits<double>::infinity()}) {

@@ -107,6 +107,23 @@ TEST(Resize, DrawsNoTipOutIntoASpike) {
   }
 }
 
+TEST(Resize, OfAShapeWithoutSalientPartsIsPlainScaling) {
+  for (const TriangleMesh& mesh : {sphere(3), sphere(4)}) {
+    const Scaling twice = along(2, 1, 1);
+    EXPECT_FALSE(has_salient_parts(ShapeFeatures(rest_shape(mesh)), twice));
+    const Points ellipsoid = twice(mesh.vertices);
+    EXPECT_LT((resized(mesh, twice) - ellipsoid).rowwise().norm().maxCoeff(), 1e-9);
+    EXPECT_LT(most_stretched_at_ends(mesh, resized(mesh, twice), 0), 2.01);
+  }
+  for (const TriangleMesh& mesh : {creature(32), block_with_holes(14, 6, 4), box_surface(2, 2, 6)}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      Scaling scaling;
+      scaling.scale[axis] = 2;
+      EXPECT_TRUE(has_salient_parts(ShapeFeatures(rest_shape(mesh)), scaling)) << axis;
+    }
+  }
+}
+
 TEST(Resize, OfAScaleOfOneIsTheRestShape) {
   const TriangleMesh mesh = creature(32);
   EXPECT_LT((resized(mesh, along(1, 1, 1)) - mesh.vertices).cwiseAbs().maxCoeff(), 1e-9);
