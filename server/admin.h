@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <map>
 #include <memory>
@@ -11,6 +12,8 @@ namespace lpdeform {
 
 /// A few pages over plain HTTP for whoever runs the server: read only, without authentication, for private networks.
 /// Answers GET and HEAD. On an address of this machine alone, to who calls it by a name of this machine: see names_this_machine().
+/// Connections are waited for by one thread together, so no number of slow ones keeps another from its
+/// page; and each page is made by a thread of its own, so no page keeps another from being made.
 class Admin {
  public:
   struct Answer {
@@ -20,10 +23,16 @@ class Admin {
   };
   using Page = std::function<Answer()>;
 
-  /// `address`: HOST:PORT, port 0 for a free one; `pages` by their paths ("/metrics"). Pages are made on threads of
-  /// their own, several at a time. Errors: UNAVAILABLE ADDRESS_NOT_BOUND.
+  /// For a peer to send its whole request, and to take the whole answer.
+  static constexpr std::chrono::milliseconds kPatience{5000};
+  /// Of connections that wait for their peers; beyond that, the oldest of them is closed for a new one.
+  static constexpr std::size_t kMostPatient = 128;
+
+  /// `address`: HOST:PORT, port 0 for a free one; `pages` by their paths ("/metrics"). A page is made for all together who
+  /// have asked for it while it was made the last time. Errors: UNAVAILABLE ADDRESS_NOT_BOUND.
   static absl::StatusOr<std::unique_ptr<Admin>> start(const std::string& address,
-                                                      const std::map<std::string, Page>& pages);
+                                                      const std::map<std::string, Page>& pages,
+                                                      std::chrono::milliseconds patience = kPatience);
   /// Waits for the pages under way.
   ~Admin();
 

@@ -28,8 +28,6 @@ namespace lpdeform {
 namespace {
 
 constexpr int kUnacknowledgedMs = 20'000;
-/// Descriptors that the rest of the server may need; of a low limit, a quarter.
-constexpr int kReserved = 96;
 /// Who is still there is counted no more often.
 constexpr std::chrono::milliseconds kBetweenCounts{10};
 /// Between two tries to take a connection while there are no descriptors.
@@ -187,8 +185,9 @@ std::size_t Listener::start(const Limits& limits, Events events) {
   if (first >= 0) close(first);
   limits_ = limits;
   limits_.connections = std::min<std::size_t>(limits.connections, 1 << 20);
-  const int limit = raise_descriptor_limit(first + static_cast<int>(limits_.connections) + 2 * kReserved);
-  last_descriptor_ = limit - std::min(kReserved, (limit - first) / 4);
+  const int limit =
+      raise_descriptor_limit(first + static_cast<int>(limits_.connections) + 2 * limits_.spare_descriptors);
+  last_descriptor_ = limit - std::min(limits_.spare_descriptors, (limit - first) / 4);
   thread_ = std::thread([this] { run(); });
   return std::min(limits_.connections, static_cast<std::size_t>(std::max(last_descriptor_ - first, 0)));
 }

@@ -42,6 +42,8 @@ class Listener {
     std::size_t connections = 1;  // at a time
     /// Of them, from one address: a host's, or an IPv6 network's of 64 bits. 0: without limit, as for Unix sockets.
     std::size_t per_address = 0;
+    /// That the rest of the process may need; of a low limit of descriptors, at most a quarter.
+    int spare_descriptors = 96;
   };
   /// Takes connections from now on, within `limits`. Raises the process's limit of descriptors for
   /// that; returns how many there can be within it. Once.

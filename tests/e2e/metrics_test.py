@@ -5,6 +5,7 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import time
 import unittest
@@ -128,6 +129,23 @@ class Metrics(programs.OnShapes):
 
     def value(self, name, **labels):
         return sum(value for has, value in self.scraped[name] if labels.items() <= has.items())
+
+    def test_slow_peers_keep_nobody_from_the_pages(self):
+        server = programs.RunningServer("--admin-address", "127.0.0.1:0")
+        self.addCleanup(server.stop)
+        host, port = server.admin.removeprefix("http://").split(":")
+        tricklers = [socket.create_connection((host, int(port))) for _ in range(64)]
+        for trickler in tricklers:
+            self.addCleanup(trickler.close)
+            trickler.sendall(b"GET /livez HTTP/1.1\r\n")
+            trickler.setblocking(False)
+        for page in ("/livez", "/healthz", "/metrics"):
+            for trickler in tricklers:
+                trickler.send(b"x")
+            self.assertEqual(get(server.admin + page)[0], 200)
+        for trickler in tricklers:
+            with self.assertRaises(BlockingIOError):  # it is still there, and has not been answered
+                trickler.recv(1)
 
     def test_every_metric_of_the_dashboard_and_the_alerts_is_in_a_scrape(self):
         asked = of_job("lpdeform")
