@@ -114,9 +114,11 @@ class Files(OnShapes):
         self.assertAlmostEqual(doubled["energy"] / plain["energy"], 2, delta=1e-3)  # twice the tolerance's worth
 
     def test_p_from_the_geometry_is_the_same_through_a_server_and_may_be_painted_over(self):
-        alone = self.deform("--p", "auto:0.5")
+        made = run("shape", "neck", "--out", self.at("neck.off"), "--handles", self.at("neck.json"))
+        self.assertEqual(made.returncode, 0, made.stderr)
+        alone = self.deform("--p", "auto:0.5", shape="neck")
         self.assertEqual(alone["p"], {"automatic": 0.5})
-        served = self.deform("--p", "auto:0.5", "--server", self.server.address)
+        served = self.deform("--p", "auto:0.5", "--server", self.server.address, shape="neck")
         self.assertEqual(served["energy"], alone["energy"])
         handles = json.loads(read_text(self.at("bar.json")))
         handles["groups"] = [{"name": "low", "vertices": [0, 1, 2], "p": 1, "stiffness": 7}]
