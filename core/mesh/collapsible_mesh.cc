@@ -26,7 +26,8 @@ CollapsibleMesh to_collapsible(const TriangleMesh& mesh) {
 
 bool keeps_orientation(const CollapsibleMesh& mesh, OpenMesh::SmartHalfedgeHandle half_edge, double cosine) {
   const OpenMesh::Vec3d target = mesh.point(half_edge.to());
-  for (const auto out : half_edge.from().outgoing_halfedges()) {
+  const auto origin = half_edge.from();
+  for (const auto out : origin.outgoing_halfedges()) {
     if (out.is_boundary()) continue;
     const auto b = out.to(), c = out.next().to();
     if (b == half_edge.to() || c == half_edge.to()) continue;

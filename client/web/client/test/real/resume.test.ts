@@ -1,5 +1,6 @@
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { type Frame, openSession, type Session } from "../../src/index.js";
+import { resultMadeAnew } from "./made_anew.js";
 import { Service } from "./service.js";
 import { grid } from "./shapes.js";
 
@@ -29,8 +30,7 @@ test("after kill -9 the session is made anew and shows the same surface", async 
   const { name } = session;
   await service.killServer();
   await service.startServer();
-  const after = await session.settle({ timeoutMs: 20_000 });
-  expect(session.name).not.toBe(name);
+  const after = await resultMadeAnew(session, name);
   expect(after.inputSeq).toBe(before.inputSeq);
   expect(largestDifference(before, after)).toBeLessThan(1e-4 * 27);
   session.move("right", lifted(6));
