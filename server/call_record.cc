@@ -22,12 +22,12 @@ bool is_of_the_server(absl::StatusCode code) {
 
 /// A name that nobody has may be anything, also a token in the wrong place.
 std::string element_of(const Fault& fault) {
-  return fault.reason == "SESSION_UNKNOWN" ? abbreviated(fault.element) : quoted(fault.element);
+  return fault.reason == "SESSION_UNKNOWN" ? abbreviated(fault.element) : in_quotes(fault.element);
 }
 
 /// Of a distance it is made from the mesh, which is nobody's business.
 std::string limit_of(const Fault& fault) {
-  return fault.reason.ends_with("_TOO_FAR") ? "" : quoted(fault.limit);
+  return fault.reason.ends_with("_TOO_FAR") ? "" : in_quotes(fault.limit);
 }
 
 }  // namespace
@@ -93,7 +93,7 @@ void CallRecord::tell(const absl::Status& status, const std::string& reason,
                                {"epoch", where_known(lease.epoch)},
                                {"session_input_seq", where_known(lease.input_seq)},
                                {"input_seq", where_known(input.input_seq)},
-                               {"handle", quoted(input.handle)},
+                               {"handle", in_quotes(input.handle)},
                                {"reason", reason},
                                {"element", element_of(fault)},
                                {"limit", limit_of(fault)},

@@ -126,7 +126,7 @@ std::string abbreviated(std::string_view name) {
   return std::string(name.substr(slash == std::string_view::npos ? 0 : slash + 1, kDigitsShown));
 }
 
-std::string quoted(std::string_view text) {
+std::string in_quotes(std::string_view text) {
   std::string out;
   std::size_t digits = 0;  // in this run
   for (const char c : text.substr(0, kLongestQuote)) {

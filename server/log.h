@@ -76,7 +76,7 @@ std::string abbreviated(std::string_view name);
 
 /// What a caller sent or is told, for the log: the first kLongestQuote bytes, and of what may be a name or a token, any long run of
 /// hexadecimal digits, the first ones.
-std::string quoted(std::string_view text);
+std::string in_quotes(std::string_view text);
 inline constexpr std::size_t kLongestQuote = 80;
 
 }  // namespace lpdeform

@@ -65,7 +65,7 @@ absl::StatusOr<std::optional<FrameBox::Taken>> FrameBox::take(Clock::time_point 
   }
   if (newest_) {
     last_final_.reset();
-    if (newest_->frame.is_final) last_final_ = newest_->frame;
+    if (newest_->frame.is_final) last_final_.emplace(newest_->frame);
     ++takes_;
     changed_.notify_all();
     return std::exchange(newest_, std::nullopt);

@@ -10,7 +10,7 @@
 namespace lpdeform {
 namespace {
 
-std::string quoted(std::string_view name) {
+std::string in_quotes(std::string_view name) {
   return absl::StrCat("handle \"", std::string(name), "\"");
 }
 
@@ -59,8 +59,8 @@ struct Holder {
 
 absl::Status held_twice(const Holder& holder, std::string_view other, std::int32_t copy) {
   return invalid_input({"HANDLE_VERTEX_TWICE", absl::StrCat("vertex ", copy), "one handle a vertex"},
-                       absl::StrCat("vertex ", holder.copy, " is in ", quoted(holder.handle), " and vertex ",
-                                    copy, " in ", quoted(other), ", and both are copies of one vertex"));
+                       absl::StrCat("vertex ", holder.copy, " is in ", in_quotes(holder.handle), " and vertex ",
+                                    copy, " in ", in_quotes(other), ", and both are copies of one vertex"));
 }
 
 absl::StatusOr<Handle> merged_handle(std::string_view name, const Handle& split, const Weld& weld,
@@ -83,7 +83,7 @@ absl::StatusOr<Handle> merged_handle(std::string_view name, const Handle& split,
     if (targets != nullptr &&
         !is_same_place(targets->positions.row(static_cast<Eigen::Index>(k)),
                        targets->positions.row(static_cast<Eigen::Index>(holder.place)), weld)) {
-      return copies_differ(absl::StrCat("target positions in ", quoted(name)), holder.copy, copy);
+      return copies_differ(absl::StrCat("target positions in ", in_quotes(name)), holder.copy, copy);
     }
   }
   if (targets != nullptr) handle.motion = TargetPositions{targets->positions(rows, Eigen::all)};
