@@ -154,7 +154,7 @@ bool Admin::Impl::take_news() {
 }
 
 void Admin::Impl::ask(std::uint64_t number, HttpExchange& exchange) {
-  if (is_for_this_machine && !names_this_machine(exchange.host())) {
+  if (is_for_this_machine && exchange.host() && !names_this_machine(*exchange.host())) {
     return exchange.answer(403, "text/plain",
                            "The admin port must be called localhost, 127.0.0.1 or [::1].\n");
   }
@@ -208,8 +208,8 @@ absl::StatusOr<std::unique_ptr<Admin>> Admin::start(const std::string& address,
   }
   auto impl = std::make_unique<Impl>();
   impl->patience = patience;
-  impl->is_for_this_machine = names_this_machine(address);
   impl->listener = *std::move(listener);
+  impl->is_for_this_machine = impl->listener->is_local();
   Impl* const self = impl.get();
   for (const auto& [path, page] : pages) {
     impl->makers[path] = std::make_unique<PageMaker>(page, [self](const Asked& asked, const Answer& answer) {

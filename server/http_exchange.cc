@@ -79,7 +79,7 @@ void HttpExchange::parse(const std::string& head) {
   int hosts = 0;
   for (absl::string_view header : absl::MakeConstSpan(lines).subspan(1)) {
     if (!absl::StartsWithIgnoreCase(header, "host:")) continue;
-    host_ = ++hosts == 1 ? std::string(absl::StripAsciiWhitespace(header.substr(5))) : "";
+    host_ = ++hosts == 1 ? std::string(absl::StripAsciiWhitespace(header.substr(5))) : std::string();
   }
   state_ = State::kAsked;
   until_ = Clock::time_point::max();

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <optional>
 #include <string>
 
 namespace lpdeform {
@@ -38,8 +39,8 @@ class HttpExchange {
 
   /// Of a GET or HEAD, without what follows a question mark; empty for any other request.
   const std::string& path() const { return path_; }
-  /// The header "Host"; empty where there is none, or more than one.
-  const std::string& host() const { return host_; }
+  /// The header "Host"; empty where there is more than one.
+  const std::optional<std::string>& host() const { return host_; }
   /// Somebody is to answer it later.
   void wait() { state_ = State::kWaiting; }
   bool is_waited_for() const { return state_ == State::kReading || state_ == State::kWriting; }
@@ -57,7 +58,8 @@ class HttpExchange {
   const Clock::duration patience_;
   State state_ = State::kReading;
   Clock::time_point until_;
-  std::string in_, out_, path_, host_;
+  std::string in_, out_, path_;
+  std::optional<std::string> host_;
   std::size_t written_ = 0;
   bool is_head_ = false;
 };

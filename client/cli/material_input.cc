@@ -44,7 +44,6 @@ absl::StatusOr<std::vector<double>> numbers_of(const client::FieldValue& value, 
   return std::vector<double>(field.begin(), field.end());
 }
 
-/// What is said of one copy is said of all.
 /// One line where --p auto finds nothing to go by.
 absl::Status tell_of_joints(const MaterialOptions& options, const TriangleMesh& mesh, const Weld& weld) {
   if (options.automatic.value_or(0) == 0) return absl::OkStatus();
@@ -55,6 +54,7 @@ absl::Status tell_of_joints(const MaterialOptions& options, const TriangleMesh& 
   return absl::OkStatus();
 }
 
+/// What is said of one copy is said of all.
 void add_copies(const Weld& weld, VertexGroup& group) {
   std::vector<bool> is_named(static_cast<std::size_t>(weld.welded_count()));
   for (const std::uint32_t vertex : group.vertices) is_named[weld.to_welded[vertex]] = true;

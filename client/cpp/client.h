@@ -18,8 +18,8 @@
 ///
 ///   auto client = Client::connect("localhost:7070");
 ///   auto session = client->open(mesh);
-///   session->set_handle("base", {.vertices = base});
-///   session->set_handle("tip", {.vertices = tip, .motion = RigidMotion{.translation = {0, 0, 1}}});
+///   session->set_handle("base", {.vertices = base}).value();
+///   session->set_handle("tip", {.vertices = tip, .motion = RigidMotion{.translation = {0, 0, 1}}}).value();
 ///   auto frame = session->settle(std::chrono::seconds(10));
 ///
 /// Errors are absl::Status. What the server says about one is kept: fault_of(status) gives the stable reason,

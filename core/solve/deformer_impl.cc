@@ -298,7 +298,8 @@ void Deformer::Impl::settle_methods() {
 void Deformer::Impl::end(StopReason reason) {
   catch_up();
   const bool is_limit = reason == StopReason::kTimeLimit || reason == StopReason::kIterationLimit;
-  if (is_limit && minimiser && minimiser->outcome_before() == Outcome::kConverged)
+  const bool is_of_first = minimiser && !minimiser->is_best_present();
+  if (is_limit && is_of_first && minimiser->outcome_before() == Outcome::kConverged)
     reason = StopReason::kConverged;
   settle_methods();
   const bool has_metric = !minimiser || minimiser->is_best_present();

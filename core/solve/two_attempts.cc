@@ -57,7 +57,7 @@ StepResult TwoAttempts::step() {
   lowest_ = std::min(lowest_, sums_.back());
   result.true_sum = lowest_;
   const bool is_over = result.outcome != Outcome::kProgress;
-  if (is_over ? !is_second_best_ : is_hopeless()) result.outcome = *best_outcome_;
+  if (!is_second_best_ && (is_over || is_hopeless())) result.outcome = *best_outcome_;
   return result;
 }
 

@@ -14,7 +14,7 @@ namespace lpdeform {
 /// is not known before. The caller's loop keeps the best state of both; the true sums of steps are the lowest so far, and the
 /// stages of the second follow those of the first. Outcome: that of the better one.
 ///
-/// The second is given up after `most_iterations`, and where in 60 iterations its true sum has come nearer to the lowest by
+/// Unless it is the better one, the second is given up after `most_iterations`, and where in 60 iterations its true sum has come nearer to the lowest by
 /// less than a tenth of what is left. Iterations of a coarse level, in which it does not change, do not count.
 class TwoAttempts : public Minimiser {
  public:

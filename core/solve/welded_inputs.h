@@ -8,7 +8,8 @@
 namespace lpdeform {
 
 // What the owner of a split mesh says about its vertices, said about the welded ones. One rule for all of it:
-// copies of a vertex may be named each or in part, and what is said of them must be the same to the last bit.
+// copies of a vertex may be named each or in part, and what is said of them must be the same: target positions up to
+// Weld::same_place, the rest to the last bit.
 // Errors, INVALID_ARGUMENT: COPIES_DIFFER, naming two copies; and what is listed below.
 
 /// Each handle holds the vertices that its copies belong to, each once, in the order in which they are first

@@ -88,6 +88,7 @@ class Service:
         self.errors = json.loads((HERE / "errors.json").read_text())
         self.undo, self.snapshot = recorded["undo"], recorded["snapshot"]
         self.problems = []
+        self.newest_moved = 0  # of the handles that are named after errors
         self.newest = queue.Queue()
         """What the newest stream is asked for, and None where that ends."""
         self.newest_input = 0
@@ -144,7 +145,11 @@ class Service:
                 yield service_pb2.DeformResponse(result=service_pb2.UpdateResult(input_seq=update.input_seq))
                 continue
             if moved:
-                newest = max(int(one.name) for one in moved)  # the others were not answered, and came again with it
+                newest = max(int(one.name) for one in moved)  # the others came again with it, or alone, on another stream
+                if newest < self.newest_moved:
+                    yield service_pb2.DeformResponse(result=service_pb2.UpdateResult(input_seq=update.input_seq))
+                    continue
+                self.newest_moved = newest
                 yield from self.answer(newest, update.input_seq)
                 continue
             have.update({u.name: meaning_of_handle(u.set) for u in update.handles})

@@ -176,7 +176,9 @@ TEST_F(AdminTest, WhatIsNoRequestIsRefusedAndHarmsNothing) {
       {"POST /livez HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 5\r\n\r\nhello", "404"},
       {"GET /livez HTTP/1.1\r\nHost: example.org\r\n\r\n", "403"},
       {"GET /livez HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n", "403"},
-      {"GET /livez HTTP/1.1\r\n\r\n", "403"},
+      {"GET /livez HTTP/1.1\r\nHost:\r\n\r\n", "403"},
+      {"GET /livez HTTP/1.1\r\n\r\n", "200"},  // no browser's
+      {"GET /livez HTTP/1.0\r\n\r\n", "200"},
       {"GET /nothing HTTP/1.1\r\nHost: localhost\r\n\r\n", "404"},
       {std::string(20'000, 'x'), "431"},
       {"GET /livez HTTP/1.1\r\nx: " + std::string(20'000, 'x') + "\r\n\r\n", "431"},

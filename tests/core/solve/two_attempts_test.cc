@@ -90,6 +90,21 @@ TEST_F(TwoAttemptsTest, ALimitAfterTheFirstHasConvergedLeavesItsResult) {
   EXPECT_EQ(solve(bent, few).stop_reason, StopReason::kIterationLimit);
 }
 
+// Where the second is the better one already and not at its end, that is no convergence, though the first had converged.
+TEST_F(TwoAttemptsTest, ALimitAfterTheSecondIsTheBetterSaysThatItIsNotAtItsEnd) {
+  const Bent bent = lifted_grid(5);
+  const SolveSummary one = solve(bent, cold(Method::kQuasiNewton));
+  const SolveSummary both = solve(bent, cold(Method::kAuto));
+  ASSERT_EQ(both.method, Method::kMultiresolution);
+  SolveSettings few = cold(Method::kAuto);
+  few.max_iterations = both.iterations - 5;
+  const SolveSummary cut = solve(bent, few);
+  ASSERT_LT(cut.energy, one.energy);
+  ASSERT_GT(cut.energy, both.energy);
+  EXPECT_EQ(cut.stop_reason, StopReason::kIterationLimit);
+  EXPECT_EQ(cut.method, Method::kMultiresolution);
+}
+
 TEST_F(TwoAttemptsTest, ADragGoesOnFromTheBetterWithoutASecond) {
   Bent bent = bar(80);
   auto solver = deformer(rest_shape(bent.mesh), bent.handles, Material::uniform(1));
