@@ -90,7 +90,7 @@ TEST(Recovery, IsAsTheTableOfAllClientsHasIt) {
                                       : rules.after(ending_of(step));
         EXPECT_EQ(recovery.next, kNextSteps.at(step.at("next")));
         EXPECT_EQ(recovery.why.code(), codes().at(step.at("code")));
-        EXPECT_EQ(fault_of(recovery.why).reason, step.at("reason"));
+        EXPECT_EQ(fault_of(recovery.why).reason, step.at("reason").get<std::string>());
         EXPECT_EQ(recovery.pause.count(), step.at("pause_ms").at(chance));
       }
     }
