@@ -54,6 +54,7 @@ void QuasiNewton::begin_stage(bool keeps_metric) {
   is_true_norm_ = !is_on_the_way && eps2_ == 0;
   objective_ = problem_.objective.reweigh(norm_);
   is_last_stage_ = !is_on_the_way && is_smooth_enough();
+  smoothing_sum_ = is_last_stage_ && norm_.lowest_p() < norm_.highest_p() ? smoothing_sum() : 0;
   history_.assign(1, objective_);
   stage_iterations_ = 0;
   find_gradient();
@@ -76,16 +77,21 @@ double QuasiNewton::first_smoothing(Warmth warmth, double lowest_p) const {
   return std::max(eps * eps, kLeastSmoothing * diagonal2);
 }
 
+/// What the cells with p_i < 2 add to the smoothed objective where they have no distortion.
+double QuasiNewton::smoothing_sum() const {
+  const auto& offsets = problem_.shape().offsets();
+  double sum = 0;
+  for (std::int32_t i = 0; i < problem_.shape().vertex_count(); ++i) {
+    if (problem_.norm.p(i) < 2 && offsets[i + 1] > offsets[i]) sum += problem_.norm.term(i, eps2_).value;
+  }
+  return sum;
+}
+
 /// Smoothing adds up to eps^p to a cell's E_i^p where p_i < 2: too little to matter beside the whole, or less would be lost
 /// in rounding.
 bool QuasiNewton::is_smooth_enough() const {
   if (eps2_ <= kLeastSmoothing * problem_.diagonal * problem_.diagonal) return true;
-  const auto& offsets = problem_.shape().offsets();
-  double most = 0;
-  for (std::int32_t i = 0; i < problem_.shape().vertex_count(); ++i) {
-    if (problem_.norm.p(i) < 2 && offsets[i + 1] > offsets[i]) most += problem_.norm.term(i, eps2_).value;
-  }
-  return most <= kBias * problem_.objective.sum(problem_.norm);
+  return smoothing_sum() <= kBias * problem_.objective.sum(problem_.norm);
 }
 
 /// What the last stage has minimised is the true objective but for what smoothing may add.
@@ -183,7 +189,8 @@ double QuasiNewton::search(double slope) {
 bool QuasiNewton::is_stage_over() const {
   if (history_.size() <= kWindow) return false;
   const double tolerance = (is_last_stage_ ? 1 : kStageTolerance) * problem_.tolerance;
-  return history_.front() - history_.back() <= tolerance * norm_.highest_p() * history_.back();
+  const double to_lower = std::max(0.0, history_.back() - smoothing_sum_);
+  return history_.front() - history_.back() <= tolerance * norm_.highest_p() * to_lower;
 }
 
 /// problem_.objective holds the evaluation at x_.

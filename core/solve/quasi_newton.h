@@ -33,7 +33,8 @@ enum class Warmth {
 /// Converged when, in the last stage, the objective f fell over 20 iterations by at most tolerance * p * f, p
 /// the largest p_i (a relative decrease of E^(1/p) of at most the tolerance); or when no step lowers f and
 /// the decrease that the fresh metric promises, -<gradient, direction> / 2, is at most that; or when E is 0
-/// to rounding. Stalled where cells of p_i < 2 are at rounding and what this leaves of them is over a hundredth of the
+/// to rounding. Where p is mixed, f is meant without what smoothing adds to cells of p_i < 2: beside large p that can be more
+/// than all the energy there is. Stalled where cells of p_i < 2 are at rounding and what this leaves of them is over a hundredth of the
 /// rest, as with p = 1 and 10 side by side.
 class QuasiNewton : public Minimiser {
  public:
@@ -46,6 +47,7 @@ class QuasiNewton : public Minimiser {
   void begin_stage(bool keeps_metric = false);
   double mean_energy() const;
   double first_smoothing(Warmth warmth, double lowest_p) const;
+  double smoothing_sum() const;
   bool is_smooth_enough() const;
   bool is_end_true() const;
   std::vector<double> metric_weights() const;
@@ -74,6 +76,7 @@ class QuasiNewton : public Minimiser {
   double last_length_ = 1;                         // of a step
   double step_length_ = 0;                         // of the last step along direction_, not yet remembered
   double objective_ = 0;
+  double smoothing_sum_ = 0;  // in objective_, where p is mixed and the stage the last
   double true_sum_ = 0;  // of problem_.norm at x_
   PairMemory memory_;
   std::deque<double> history_;  // objectives of the stage's last 21 iterations
