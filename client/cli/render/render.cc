@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/render/camera.h"
 #include "client/cli/render/legend.h"
+#include "client/cli/render/openness.h"
 #include "client/cli/render/scene.h"
 #include "client/cli/render/shading.h"
 #include "core/base/check.h"
@@ -63,9 +64,9 @@ struct ToUnitSize {
 
 /// The colour of a pixel of side x side samples. Within one face it hardly changes, so that one sample tells it; at
 /// edges all do.
-Rgb mean_colour(const Scene& scene, int x, int y, int side) {
+Rgb mean_colour(const Scene& scene, const Openness& openness_at, int x, int y, int side) {
   const int middle_x = side * x + side / 2, middle_y = side * y + side / 2;
-  const double openness = scene.openness_at(middle_x, middle_y);
+  const double openness = openness_at.at(x, y);
   if (scene.is_one_face(side * x, side * y, side)) return scene.colour_at(middle_x, middle_y, openness);
   std::array<int, 3> sum{};
   for (int k = 0; k < side * side; ++k) {
@@ -114,9 +115,11 @@ Image render(const Faces& faces, const Points& positions, const PictureStyle& st
                     Camera(to_unit_size(frame), side * width, side * height), side * width, side * height);
   Image image(width, height);
   const auto rows = static_cast<std::size_t>(height);
-  Workers(available_cores()).for_chunks(rows, 16, [&](std::size_t, std::size_t begin, std::size_t end) {
+  const Workers workers(available_cores());
+  const Openness openness(scene, side, workers);
+  workers.for_chunks(rows, 16, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
-      for (int x = 0; x < width; ++x) image.set(x, y, mean_colour(scene, x, y, side));
+      for (int x = 0; x < width; ++x) image.set(x, y, mean_colour(scene, openness, x, y, side));
     }
   });
   if (style.has_legend && style.distortion.size() > 0) draw_legend(image, red_of(style));

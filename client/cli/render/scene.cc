@@ -1,9 +1,9 @@
 #include "client/cli/render/scene.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <utility>
 
 #include "client/cli/render/corner_normals.h"
@@ -13,8 +13,6 @@ namespace lpdeform {
 namespace {
 
 constexpr Rgb kPlain{196, 190, 180};
-constexpr double kReachInDiagonals = 0.05;
-constexpr double kReachInHeights = 0.06;  // the same distance on the picture, about
 
 Points at_corners(const Faces& faces, const Points& positions) {
   Points corners(3 * faces.rows(), 3);
@@ -41,32 +39,6 @@ Points at_corners(const Faces& faces, const std::vector<Rgb>& colours) {
   return corners;
 }
 
-double diagonal(const Points& points) {
-  return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
-}
-
-constexpr int kNeighbours = 40;
-
-/// Points of the unit disc, evenly spread.
-const std::array<std::array<double, 2>, kNeighbours>& spiral() {
-  static const auto points = [] {
-    constexpr double kGoldenAngle = 2.39996322972865;
-    std::array<std::array<double, 2>, kNeighbours> result{};
-    for (int k = 0; k < kNeighbours; ++k) {
-      const double radius = (k + 0.5) / kNeighbours;
-      result[k] = {radius * std::cos(k * kGoldenAngle), radius * std::sin(k * kGoldenAngle)};
-    }
-    return result;
-  }();
-  return points;
-}
-
-/// An angle that looks random from one pixel to the next.
-double scattered_angle(int x, int y) {
-  const double seed = 52.9829189 * std::fmod(0.06711056 * x + 0.00583715 * y, 1.0);
-  return 2 * M_PI * (seed - std::floor(seed));
-}
-
 }  // namespace
 
 Scene::Scene(const Surface& surface, Camera camera, int width, int height)
@@ -74,7 +46,6 @@ Scene::Scene(const Surface& surface, Camera camera, int width, int height)
       normals_(corner_normals(surface.positions, surface.faces)),
       heat_(at_corners(surface.faces, surface.heat)),
       colours_(at_corners(surface.faces, surface.colours)),
-      reach_(kReachInDiagonals * diagonal(corners_)),
       camera_(std::move(camera)),
       raster_(width, height) {
   for (Eigen::Index first = 0; first < corners_.rows(); first += 3) {
@@ -124,26 +95,14 @@ bool Scene::is_one_face(int x, int y, int side) const {
   return true;
 }
 
-double Scene::openness_at(int x, int y) const {
+double Scene::diagonal() const {
+  return (corners_.colwise().maxCoeff() - corners_.colwise().minCoeff()).norm();
+}
+
+Eigen::RowVector3d Scene::point_at(int x, int y) const {
   const Raster::Sample& sample = raster_.at(x, y);
-  if (sample.face < 0) return 1;
-  const Eigen::RowVector3d point = inside(corners_, sample), normal = normal_towards_camera(sample);
-  const double start = scattered_angle(x, y), pixels = kReachInHeights * raster_.height();
-  const double turn = std::sin(start), level = std::cos(start), reach2 = reach_ * reach_;
-  double hidden = 0;
-  for (const auto& [right, down] : spiral()) {
-    const int other_x = x + static_cast<int>(std::floor(pixels * (level * right - turn * down) + 0.5));
-    const int other_y = y + static_cast<int>(std::floor(pixels * (turn * right + level * down) + 0.5));
-    if (other_x < 0 || other_x >= raster_.width() || other_y < 0 || other_y >= raster_.height()) continue;
-    const Raster::Sample& other = raster_.at(other_x, other_y);
-    if (other.face < 0) continue;
-    const Eigen::RowVector3d towards = inside(corners_, other) - point;
-    const double distance2 = towards.squaredNorm();
-    // Below a tenth, curvature and rounding raise neighbours above the tangent plane, too.
-    const double height = std::max(0.0, normal.dot(towards) / std::sqrt(std::max(distance2, 1e-300)) - 0.1);
-    hidden += height / (1 + distance2 / reach2);
-  }
-  return std::clamp(1 - 2.2 * hidden / kNeighbours, 0.0, 1.0);
+  if (sample.face < 0) return Eigen::RowVector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  return inside(corners_, sample);
 }
 
 }  // namespace lpdeform

@@ -28,15 +28,21 @@ class Scene {
   /// The same without colours, before a camera that holds the points that faces use.
   Scene(const Faces& faces, const Points& positions, const Field& heat, int width, int height);
 
-  /// `openness` as in shaded().
+  /// `openness` as in shaded(), which Openness finds.
   Rgb colour_at(int x, int y, double openness) const;
 
   /// Whether the side x side samples from (x, y) on show one face, or all of them the background.
   bool is_one_face(int x, int y, int side) const;
 
-  /// The share of the sky that the point at this sample sees, as far as the picture tells: 1 in the open and
-  /// on the background, less in holes and folds, judged by the samples around it.
-  double openness_at(int x, int y) const;
+  /// The point of the surface that this sample shows; not a number on the background.
+  Eigen::RowVector3d point_at(int x, int y) const;
+  /// Its normal on the viewer's side, of length 1. Not to be asked on the background.
+  Eigen::RowVector3d normal_at(int x, int y) const { return normal_towards_camera(raster_.at(x, y)); }
+
+  int width() const { return raster_.width(); }
+  int height() const { return raster_.height(); }
+  /// Of the bounding box of what is drawn, in the mesh's unit of length.
+  double diagonal() const;
 
  private:
   Rgb albedo_at(const Raster::Sample& sample) const;
@@ -50,7 +56,6 @@ class Scene {
   Points corners_, normals_;  // 3 f + k for corner k of face f
   Field heat_;                // the same, or empty
   Points colours_;            // the same: red, green, blue, or empty
-  double reach_;              // how far a point shades others, in the mesh's unit of length
   Camera camera_;
   Raster raster_;
 };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "client/cli/render/corner_normals.h"
+#include "client/cli/render/openness.h"
 #include "core/mesh/shapes.h"
 
 namespace lpdeform {
@@ -111,11 +112,12 @@ TEST(Scene, FoldsAreLessOpenThanFlatParts) {
   Faces faces(4, 3);
   faces << 0, 2, 3, 0, 3, 1, 0, 1, 5, 0, 5, 4;
   const Scene book(faces, positions, {}, 300, 300);
+  const Openness openness(book, 1, Workers(1));
   double least = 1, most = 0;
   for (int y = 0; y < 300; ++y) {
     for (int x = 0; x < 300; ++x) {
-      least = std::min(least, book.openness_at(x, y));
-      most = std::max(most, book.openness_at(x, y));
+      least = std::min(least, openness.at(x, y));
+      most = std::max(most, openness.at(x, y));
     }
   }
   EXPECT_LT(least, 0.9);
