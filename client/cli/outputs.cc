@@ -28,7 +28,10 @@ absl::StatusOr<PictureStyle> picture_style(const PictureOptions& options) {
   style.red = options.red;
   if (!options.camera) return style;
   const auto file = read_deformable(*options.camera);
-  if (!file.ok()) return file.status();
+  if (!file.ok()) {
+    return make_fault(file.status().code(), fault_of(file.status()),
+                      absl::StrCat("--camera: ", std::string(file.status().message())));
+  }
   const Faces& faces = file->mesh.faces;
   style.frame.resize(faces.size(), 3);
   for (Eigen::Index k = 0; k < faces.size(); ++k)

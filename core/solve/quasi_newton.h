@@ -77,7 +77,7 @@ class QuasiNewton : public Minimiser {
   double step_length_ = 0;                         // of the last step along direction_, not yet remembered
   double objective_ = 0;
   double smoothing_sum_ = 0;  // in objective_, where p is mixed and the stage the last
-  double true_sum_ = 0;  // of problem_.norm at x_
+  double true_sum_ = 0;       // of problem_.norm at x_
   PairMemory memory_;
   std::deque<double> history_;  // objectives of the stage's last 21 iterations
   int stage_iterations_ = 0, since_refresh_ = 0;

@@ -7,8 +7,8 @@
 namespace lpdeform {
 
 enum class Method {
-  kAuto,  // kMultiresolution for cold solves of large meshes, else kQuasiNewton; cold with p near 1, up to
-          // 15,000 vertices, both, and the better result is kept
+  kAuto,  // kMultiresolution for cold solves of large meshes, else kQuasiNewton; cold with some p_i <= 1.2, from 300
+          // up to 15,000 vertices, both, and the better result is kept
   kQuasiNewton,      // L-BFGS on E(x) in the metric of the prefactored, reweighted Laplacian. Every p.
   kMultiresolution,  // a coarse level first, then kQuasiNewton. Every p.
   kLineSearch,       // the paper's section 3.2: gradient descent with backtracking. Every p.

@@ -37,7 +37,7 @@ class Reproduce(unittest.TestCase):
         return {section.get("id"): section for section in self.elements("section")}
 
     def test_every_figure_of_the_paper_and_the_other_mesh_is_there(self):
-        wanted = ["table_1", *(f"figure_{k}" for k in range(1, 10)), "appendix", "mesh_my_bar"]
+        wanted = ["table_1", *(f"figure_{k}" for k in range(1, 10)), "section_3_2", "section_5", "appendix", "mesh_my_bar"]
         self.assertEqual([figure["id"] for figure in self.verdicts["figures"]], wanted)
         self.assertEqual(list(self.sections()), wanted)
 
@@ -88,6 +88,16 @@ class Reproduce(unittest.TestCase):
             self.assertEqual(claims[figure][0]["holds"], one < two)
         one, two = claims["figure_6"][0]["numbers"].values()
         self.assertEqual(claims["figure_6"][0]["holds"], one < two)
+        starts, proof = claims["section_3_2"]
+        self.assertEqual((len(starts["numbers"]), len(proof["numbers"])), (13, 13))
+        self.assertTrue(starts["holds"] and max(starts["numbers"].values()) <= 1e-6, starts)
+        self.assertTrue(proof["holds"] and max(proof["numbers"].values()) <= 1e-3, proof)
+        for claim, cases in zip(claims["section_5"], (15, 5)):
+            self.assertEqual(len(claim["numbers"]), cases)
+            self.assertEqual(claim["holds"], max(claim["numbers"].values()) <= 0.75)
+        sooner = claims["figure_1"][3]
+        self.assertEqual(len(sooner["numbers"]), 9)
+        self.assertEqual(sooner["holds"], sooner["numbers"]["shapes_where_p6_is_sooner"] == 4)
         sparsity = claims["appendix"][1]
         self.assertEqual(sparsity["numbers"]["shapes"], 6)
         self.assertEqual(sparsity["holds"], sparsity["numbers"]["sparser_shapes"] == 6)

@@ -35,16 +35,18 @@ struct Figure {
 };
 
 Figure table_1(const Measurements& measured);
-Figure figure_1(const Measurements& measured);  // energy by iteration
-Figure figure_2(const Measurements& measured);  // histograms of cell energies
-Figure figure_3(const Measurements& measured);  // the sheet, folded
-Figure figure_4(const Measurements& measured);  // the bar, twisted
-Figure figure_5(const Measurements& measured);  // the block, stretched
-Figure figure_6(const Measurements& measured);  // the creature, its head moved
-Figure figure_7(const Measurements& measured);  // the arm, stretched
-Figure figure_8(const Measurements& measured);  // the sheet with two norms
-Figure figure_9(const Measurements& measured);  // the block with two norms
-Figure appendix(const Measurements& measured);  // sparsity
+Figure figure_1(const Measurements& measured);     // energy by iteration
+Figure figure_2(const Measurements& measured);     // histograms of cell energies
+Figure figure_3(const Measurements& measured);     // the sheet, folded
+Figure figure_4(const Measurements& measured);     // the bar, twisted
+Figure figure_5(const Measurements& measured);     // the block, stretched
+Figure figure_6(const Measurements& measured);     // the creature, its head moved
+Figure figure_7(const Measurements& measured);     // the arm, stretched
+Figure figure_8(const Measurements& measured);     // the sheet with two norms
+Figure figure_9(const Measurements& measured);     // the block with two norms
+Figure section_3_2(const Measurements& measured);  // the global minimum of the convex step
+Figure section_5(const Measurements& measured);    // continuous variation with p
+Figure appendix(const Measurements& measured);     // sparsity
 Figure other_mesh(const Experiment& experiment);
 
 }  // namespace lpdeform::reproduce

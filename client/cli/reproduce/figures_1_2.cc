@@ -152,6 +152,51 @@ Claim larger_p_converges_sooner(const Measurements& measured) {
   return claim;
 }
 
+std::string iterations_text(const Trace& trace) {
+  const bool is_over = trace.summary.stop_reason == StopReason::kConverged;
+  return absl::StrCat(is_over ? "" : "over ", trace.summary.iterations);
+}
+
+/// By the paper's rule and by the same three others, on each shape.
+bool converges_sooner(const Trace& high, const Trace& low) {
+  bool sooner =
+      high.summary.stop_reason == StopReason::kConverged && high.summary.iterations < low.summary.iterations;
+  for (const double share : {1e-1, 1e-2, 1e-3})
+    sooner = sooner && iterations_to(high, share) < iterations_to(low, share);
+  return sooner;
+}
+
+Claim larger_p_converges_sooner_elsewhere(const Measurements& measured) {
+  Claim claim{
+      "From the experiments, using larger p, the convergence is likely to be much faster (the sheet: 1496 "
+      "iterations for L1.5, 32 for L6).",
+      "By line_search and the paper's rule, for L1.5 and for L6",
+      true,
+      {}};
+  int sooner = 0;
+  for (const Descents& one : measured.descents) {
+    const bool is_sooner = converges_sooner(one.high, one.low);
+    sooner += is_sooner ? 1 : 0;
+    absl::StrAppend(&claim.measured, &one == &measured.descents.front() ? ": " : "; ", one.shape, " (",
+                    one.vertices, " vertices) ", iterations_text(one.low), " and ",
+                    iterations_text(one.high));
+    claim.numbers.emplace_back(absl::StrCat(one.shape, "_iterations_p1_5"), one.low.summary.iterations);
+    claim.numbers.emplace_back(absl::StrCat(one.shape, "_iterations_p6"), one.high.summary.iterations);
+  }
+  claim.holds = sooner == std::ssize(measured.descents);
+  claim.numbers.emplace_back("shapes_where_p6_is_sooner", sooner);
+  absl::StrAppend(&claim.measured,
+                  ". L6 takes fewer, also until E^(1/p) is within 10 %, 1 % and 0.1 % of the end, on ",
+                  sooner, " of ", measured.descents.size(), " shapes; it holds where it does on all.");
+  if (const double share = measured.descents.front().share; share < 1) {
+    absl::StrAppend(
+        &claim.measured, " The shapes have ", number_text(share),
+        " times as many cells along each side as elsewhere on this page, so that line search ends within "
+        "seconds.");
+  }
+  return claim;
+}
+
 constexpr int kBins = 40;
 
 std::string energy_histogram(const Experiment& experiment, double p) {
@@ -176,7 +221,7 @@ Figure figure_1(const Measurements& measured) {
           "Figure 1: energy by iteration",
           "The bar of Figure 4, its middle twisted.",
           {energy_falls(measured), line_search_takes_many_short_iterations(measured),
-           larger_p_converges_sooner(measured)},
+           larger_p_converges_sooner(measured), larger_p_converges_sooner_elsewhere(measured)},
           plots + "</div>\n",
           {},
           absl::StrCat(

@@ -16,6 +16,7 @@ namespace {
 constexpr int kMostRuns = 5;             // of a solve for its time
 constexpr double kSecondsForRuns = 0.6;  // no further run once they took so long
 constexpr int kTraceIterations = 20000;
+constexpr double kVariationTolerance = 1e-6;
 
 /// Makes one measurement after the other. After the first error all that it returns is empty and nothing is
 /// done any more; status() has the error.
@@ -27,6 +28,9 @@ class Laboratory {
   Experiment experiment(const std::function<PaperPose()>& make_pose);
   Mixed mixed(const Experiment& on, int axis, double border);
   Trace trace(const Experiment& on, double p, Method method);
+  Descents descents(const PaperPose& pose, double share);
+  Minimum minimum(const Experiment& on, double p);
+  Variation variation(const Experiment& on, double p);
   Sparse sparse(Eigen::Index rows, Eigen::Index columns, Eigen::Index rank);
 
   const absl::Status& status() const { return status_; }
@@ -36,6 +40,7 @@ class Laboratory {
   absl::StatusOr<Solve> try_solve(const Experiment& on, const Material& material,
                                   const SolveSettings& settings);
   Solve solve(const Experiment& on, const Material& material, SolveSettings settings, int most_runs);
+  absl::StatusOr<Variation> vary(const Experiment& on, double p);
 
   const Settings& settings_;
   const Watch& watch_;
@@ -131,6 +136,56 @@ Trace Laboratory::trace(const Experiment& on, double p, Method method) {
   return {p, solve(on, Material::uniform(p), settings, 1).summary};
 }
 
+Descents Laboratory::descents(const PaperPose& pose, double share) {
+  Descents result{pose.name, pose.mesh.vertices.rows(), share, {}, {}};
+  Experiment coarse{settings_.size, pose, nullptr, {}};
+  if (!status_.ok()) return result;
+  absl::StatusOr<std::shared_ptr<const RestShape>> shape = RestShape::create(pose.mesh);
+  status_ = shape.status();
+  if (!shape.ok()) return result;
+  coarse.shape = *std::move(shape);
+  result.low = trace(coarse, 1.5, Method::kLineSearch);
+  result.high = trace(coarse, 6, Method::kLineSearch);
+  return result;
+}
+
+Minimum Laboratory::minimum(const Experiment& on, double p) {
+  if (!begin(absl::StrCat(on.pose.name, ", p = ", p, ", rotations held"))) return {};
+  absl::StatusOr<ConvexStep> step = convex_step(on.shape, on.pose, p, kRandomStarts, watch_.stop);
+  if (!step.ok()) status_ = step.status();
+  return {on.pose.name, step.ok() ? *std::move(step) : ConvexStep{}};
+}
+
+/// From the result for p each time, as a user changes one number.
+absl::StatusOr<Variation> Laboratory::vary(const Experiment& on, double p) {
+  auto deformer = Deformer::create(on.shape, {.threads = settings_.threads});
+  if (!deformer.ok()) return deformer.status();
+  absl::Status status = (*deformer)->set_handles(on.pose.handles);
+  const SolveSettings settings{.initial = InitialGuess::kCurrent, .tolerance = kVariationTolerance};
+  const auto solve_from = [&](const Points& positions, double other_p) {
+    if (status.ok()) status = (*deformer)->set_material(Material::uniform(other_p));
+    if (status.ok()) status = (*deformer)->set_positions(positions);
+    if (status.ok()) status = (*deformer)->solve(settings, watch_.stop).status();
+    return (*deformer)->positions();
+  };
+  const Points base = solve_from(on.by_p.at(p).positions, p);
+  Variation result{on.pose.name, p, {}};
+  for (const double step : kSteps) {
+    const Points moved = solve_from(base, p + step) - base;
+    result.displacements.push_back(moved.rowwise().norm().maxCoeff() / on.shape->diagonal());
+  }
+  if (watch_.stop.stop_requested()) return absl::CancelledError();
+  if (!status.ok()) return status;
+  return result;
+}
+
+Variation Laboratory::variation(const Experiment& on, double p) {
+  if (!begin(absl::StrCat(on.pose.name, ", p from ", p))) return {};
+  absl::StatusOr<Variation> result = vary(on, p);
+  if (!result.ok()) status_ = result.status();
+  return result.ok() ? *std::move(result) : Variation{};
+}
+
 Sparse Laboratory::sparse(Eigen::Index rows, Eigen::Index columns, Eigen::Index rank) {
   if (!begin(absl::StrCat("min |Ax + b|, ", rows, " x ", columns))) return {};
   std::mt19937 random(static_cast<std::uint32_t>(1000 * rows + rank));
@@ -177,7 +232,7 @@ const Trace& Measurements::trace(double p, Method method) const {
 
 absl::StatusOr<Measurements> measure(const Settings& settings, const Watch& watch) {
   const auto solves = static_cast<int>((5 + settings.others.size()) * std::size(kPaperP));
-  const auto rest = static_cast<int>(2 + std::size(kTraces) + std::size(kSparse));
+  const auto rest = static_cast<int>(2 + std::size(kTraces) + std::size(kSparse) + 8 + 13 + 20);
   Laboratory laboratory(settings, watch, solves + rest);
   Measurements result;
   result.threads = settings.threads;
@@ -196,6 +251,19 @@ absl::StatusOr<Measurements> measure(const Settings& settings, const Watch& watc
   result.mixed_sheet = laboratory.mixed(result.sheet, 1, middle_of_sheet);
   result.mixed_block = laboratory.mixed(result.block, 2, 0);
   for (const auto& [p, method] : kTraces) result.traces.push_back(laboratory.trace(result.bar, p, method));
+  const double half = std::max(kSmallestPoseSize, size / 2);
+  for (const auto pose : {paper_sheet, paper_block, paper_creature, paper_arm})
+    result.descents.push_back(laboratory.descents(pose(half), half / size));
+  for (const Experiment* const experiment : {&result.bar, &result.block, &result.creature, &result.arm}) {
+    for (const double p : kPaperP) {
+      const bool is_quick = p > 1 || experiment == &result.bar;
+      if (is_quick) result.minima.push_back(laboratory.minimum(*experiment, p));
+    }
+  }
+  for (const Experiment* const experiment :
+       {&result.sheet, &result.bar, &result.block, &result.creature, &result.arm}) {
+    for (const double p : kPaperP) result.variations.push_back(laboratory.variation(*experiment, p));
+  }
   for (const auto& [rows, columns, rank] : kSparse)
     result.sparse.push_back(laboratory.sparse(rows, columns, rank));
   if (!laboratory.status().ok()) return laboratory.status();

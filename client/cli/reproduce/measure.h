@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "client/cli/reproduce/convex_step.h"
 #include "core/solve/deformer.h"
 #include "core/solve/paper_poses.h"
 
@@ -62,11 +63,37 @@ struct Sparse {
   double gap = 0;  // (value - lower bound) / value
 };
 
+/// A pose on a coarser mesh, solved by line_search: "larger p converges sooner", judged beyond the bar.
+struct Descents {
+  std::string shape;
+  Eigen::Index vertices = 0;
+  double share = 1;  // of the cells along each side that the other measurements of this shape have
+  Trace low, high;   // p = 1.5 and 6
+};
+
+/// How far the result moves as p goes from `p` to p + dp, by the largest displacement of a vertex.
+struct Variation {
+  std::string shape;
+  double p = 1;
+  std::vector<double> displacements;  // over the diagonal at rest, one for each of kSteps
+};
+inline constexpr double kSteps[] = {0.2, 0.1, 0.05};
+
+/// The convex step of a pose for one p.
+struct Minimum {
+  std::string shape;
+  ConvexStep step;
+};
+inline constexpr int kRandomStarts = 3;
+
 struct Measurements {
   Experiment sheet, bar, block, creature, arm;
   std::vector<Experiment> others;
   Mixed mixed_sheet, mixed_block;
-  std::vector<Trace> traces;  // of the bar: Fig. 1, and local_global
+  std::vector<Trace> traces;       // of the bar: Fig. 1, and local_global
+  std::vector<Descents> descents;  // of the paper's shapes but the bar
+  std::vector<Minimum> minima;
+  std::vector<Variation> variations;  // of the paper's shapes, by p
   std::vector<Sparse> sparse;
   int threads = 1;
 

@@ -118,9 +118,10 @@ std::vector<Figure> all_figures(const Measurements& measured,
                                 const std::function<bool(const std::string& title)>& begins) {
   using Maker = Figure (*)(const Measurements&);
   constexpr std::pair<const char*, Maker> kMakers[] = {
-      {"Table 1", table_1},   {"Figure 1", figure_1}, {"Figure 2", figure_2}, {"Figure 3", figure_3},
-      {"Figure 4", figure_4}, {"Figure 5", figure_5}, {"Figure 6", figure_6}, {"Figure 7", figure_7},
-      {"Figure 8", figure_8}, {"Figure 9", figure_9}, {"appendix", appendix}};
+      {"Table 1", table_1},   {"Figure 1", figure_1}, {"Figure 2", figure_2},       {"Figure 3", figure_3},
+      {"Figure 4", figure_4}, {"Figure 5", figure_5}, {"Figure 6", figure_6},       {"Figure 7", figure_7},
+      {"Figure 8", figure_8}, {"Figure 9", figure_9}, {"section 3.2", section_3_2}, {"section 5", section_5},
+      {"appendix", appendix}};
   std::vector<Figure> figures;
   for (const auto& [title, make] : kMakers) {
     if (!begins(title)) return figures;

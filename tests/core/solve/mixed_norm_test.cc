@@ -41,7 +41,8 @@ Halves halves(const Deformer& solver, const Material& material, double length) {
   Halves result;
   for (Eigen::Index i = 0; i < energies.size(); ++i) {
     if (material.p[i] == 1) result.rigid_cell = std::max(result.rigid_cell, energies[i]);
-    if (material.p[i] != 1) result.soft_energy += length * length * std::pow(energies[i] / length, material.p[i]);
+    if (material.p[i] != 1)
+      result.soft_energy += length * length * std::pow(energies[i] / length, material.p[i]);
   }
   return result;
 }
