@@ -67,7 +67,7 @@ class LiveMesh:
         """Raises NotReady, and then everything is as it was."""
         rest, faces = surface.rest_positions(ob), surface.triangles(ob)
         self.session = _open_session(ob, rest, faces)
-        self._rest, self._faces = rest, faces
+        self._rest, self._faces, self._weld = rest, faces, ob.lpdeform.weld
         self.vertices_changed(ob)
         self._told = Told()
         self.fields = {}
@@ -81,9 +81,14 @@ class LiveMesh:
 
     @property
     def notice(self) -> str:
-        """What is to be said of the server while it is overloaded."""
+        """What the server says about itself, but that it is well again."""
         notice = self.session.notice
-        return notice.text if notice is not None and notice.reason == "overloaded" else ""
+        return notice.text if notice is not None and notice.reason != "recovered" else ""
+
+    @property
+    def mesh_notices(self) -> tuple:
+        """What is to be known of the mesh: that it comes apart where it is split."""
+        return self.session.mesh_report.notices
 
     @property
     def has_refusals(self) -> bool:
@@ -109,7 +114,7 @@ class LiveMesh:
         was, self._mode = self._mode, ob.mode
         if ob.mode == "EDIT":
             return
-        if was == "EDIT" or len(ob.data.vertices) != len(self._rest):
+        if was == "EDIT" or len(ob.data.vertices) != len(self._rest) or ob.lpdeform.weld != self._weld:
             self._look_again(ob)
         if was != ob.mode:
             self._weights = {}  # to be read anew
@@ -180,9 +185,9 @@ class LiveMesh:
             self._painted = _now()
 
     def _look_again(self, ob) -> None:
-        """Where the mesh at rest may have become another one."""
+        """Where the mesh at rest may have become another one, or is to be welded or no longer."""
         is_same = len(ob.data.vertices) == len(self._rest) and np.array_equal(surface.rest_positions(ob), self._rest)
-        if is_same and np.array_equal(surface.triangles(ob), self._faces):
+        if is_same and np.array_equal(surface.triangles(ob), self._faces) and ob.lpdeform.weld == self._weld:
             self.vertices_changed(ob)
             return
         before = self.session
@@ -281,7 +286,10 @@ def _open_session(ob, rest, faces):
     except OSError as error:
         raise NotReady(f"A file of the add-on's preferences cannot be read: {error}") from error
     try:
-        return lpdeform.open(rest, faces, address=address(), free_components="stay", certify=ob.lpdeform.certify, **how)
+        settings = ob.lpdeform
+        return lpdeform.open(
+            rest, faces, address=address(), free_components="stay", weld=settings.weld, certify=settings.certify, **how
+        )
     except lpdeform.Unavailable as error:
         over_tls = ", or its certificates, since TLS is on" if how["tls"] else ""
         raise NotReady(

@@ -53,6 +53,8 @@ class MainPanel(bpy.types.Panel):
             column.operator("lpdeform.apply", icon="SHAPEKEY_DATA")
             if running.notice:
                 _say(layout, context, running.notice, "TIME")
+            for notice in running.mesh_notices:
+                _say(layout, context, notice, "INFO")
         if live.message(ob):
             _say(layout, context, live.message(ob), "ERROR")
         column = layout.column(align=True)
@@ -90,6 +92,7 @@ class MaterialPanel(_Below, bpy.types.Panel):
                 column.prop(ob.lpdeform, f"{name}_painted")
         self.layout.prop_search(ob.lpdeform, "region_group", ob, "vertex_groups")
         self.layout.prop(ob.lpdeform, "resize")
+        self.layout.prop(ob.lpdeform, "weld")
         self.layout.prop(ob.lpdeform, "certify")
 
 

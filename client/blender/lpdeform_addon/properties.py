@@ -48,6 +48,11 @@ class MeshSettings(bpy.types.PropertyGroup):
         description="Stretches the mesh along its own axes in such a way that what stands out keeps its shape. To make it smaller "
         "along one, scale the object down and stretch it along the others. Gives p and stiffness meanwhile",
     )  # fmt: skip
+    weld: BoolProperty(
+        name="Weld", default=False,
+        description="Takes vertices that lie in the same place for one: the mesh holds together where it is split. Handles and paint "
+        "must be the same for all of them",
+    )  # fmt: skip
     certify: BoolProperty(
         name="Bound", default=False, description="Says how far a result can be from the optimum. Counts from the next start on"
     )

@@ -33,6 +33,7 @@ export class App {
   #isKeyHeld = false;
   #asked = 0;
   readonly #pace = new Pace(() => this.requestDraw());
+  readonly #editings = new Set<Editing>();
   readonly #panes = new Panes(
     {
       changed: () => this.requestDraw(),
@@ -41,7 +42,7 @@ export class App {
       problem: (problem) => this.facts.set({ problem }),
       notice: (text) => this.notify(text),
     },
-    (pane) => new Editing(this, pane),
+    (pane) => this.#edit(pane),
   );
   #needsColours = true;
   #needsMarks = true;
@@ -55,6 +56,15 @@ export class App {
     });
     new ResizeObserver(() => this.requestDraw()).observe(this.stages);
     for (const end of ["keyup", "blur"]) window.addEventListener(end, () => this.#keyUp());
+  }
+
+  #edit(pane: Pane): void {
+    const editing = new Editing(this, pane);
+    this.#editings.add(editing);
+    pane.over.signal.addEventListener("abort", () => {
+      editing.letGo();
+      this.#editings.delete(editing);
+    });
   }
 
   /** Both panes have the same. */
@@ -129,6 +139,7 @@ export class App {
 
   /** `isBroughtBack`: somebody has worked on it. */
   open(mesh: Mesh, document: Document, isBroughtBack = false, isWelded = true): void {
+    for (const editing of this.#editings) editing.letGo();
     if (this.isTouched) this.#asides.put({ ...this.#present(), steps: this.history.steps });
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
@@ -226,6 +237,12 @@ export class App {
     if (!this.history.cancel()) return false;
     this.#documentChanged(performance.now());
     return true;
+  }
+
+  /** As cancelGesture(); also lets go of what the pointer holds, in whichever picture. */
+  cancelAll(): boolean {
+    const held = [...this.#editings].map((editing) => editing.cancel());
+    return this.cancelGesture() || held.includes(true);
   }
 
   undo(): void {

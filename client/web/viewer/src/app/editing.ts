@@ -39,17 +39,22 @@ export class Editing implements PointingTarget {
     });
     const setViewOnly = (event: KeyboardEvent, isDown: boolean) => {
       if (event.code === "Space") this.#pointing.isViewOnly = isDown;
-      // Escape puts back what is under way, and does nothing else then.
-      if (event.code === "Escape" && isDown && this.#cancel()) event.stopImmediatePropagation();
     };
     const { signal } = pane.over;
     window.addEventListener("keydown", (event) => setViewOnly(event, true), { signal });
     window.addEventListener("keyup", (event) => setViewOnly(event, false), { signal });
   }
 
-  #cancel(): boolean {
-    const wasHeld = this.pane.stage.gizmo.cancel() || this.#pointing.cancel();
-    return this.app.cancelGesture() || wasHeld;
+  /** Puts back what the pointer does in this picture. False where it holds nothing. */
+  cancel(): boolean {
+    return this.pane.stage.gizmo.cancel() || this.#pointing.cancel();
+  }
+
+  /** As if the pointer were up: what it has moved is a step. What it has drawn is dropped. */
+  letGo(): void {
+    if (!this.pane.stage.gizmo.isDragging && !this.#pointing.isBusy) return;
+    this.app.endGesture();
+    this.cancel();
   }
 
   press(at: PointerAt): Stroke | undefined {

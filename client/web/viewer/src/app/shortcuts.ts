@@ -35,6 +35,10 @@ const shiftShare = 0.05;
 
 /** Keys, where nothing is being written. ui/help.ts tells them. */
 export function startShortcuts(app: App, files: Files, help: HTMLDialogElement): void {
+  // Escape puts back what is under way, and does nothing else then. One listener: the pictures share the gesture.
+  window.addEventListener("keydown", (event) => {
+    if (event.code === "Escape" && app.cancelAll()) event.stopImmediatePropagation();
+  });
   window.addEventListener("keydown", (event) => {
     const target = event.target as HTMLElement;
     if (

@@ -1,4 +1,5 @@
 import {
+  Backoff,
   type Encoding,
   type Frame,
   LpdeformError,
@@ -24,9 +25,6 @@ export interface LiveWatcher {
   notice(text: string): void;
 }
 
-/** Between attempts: at first, and at most. */
-const [firstPauseMs, longestPauseMs] = [300, 3000];
-
 /** Frames answer one of the newest inputs. */
 const mostExponents = 100;
 
@@ -46,6 +44,8 @@ export class Live {
   #drawn = 0;
   /** p from each input on that changed it. */
   #exponents: { seq: number; p: number }[] = [];
+  /** Of sessions that cannot be opened or break at once: by the client's rules, on top of what the server asks for. */
+  readonly #backoff = new Backoff();
   readonly #over = new AbortController();
 
   constructor(
@@ -126,7 +126,7 @@ export class Live {
   }
 
   async #run(): Promise<void> {
-    for (let pauseMs = firstPauseMs; !this.#over.signal.aborted;) {
+    while (!this.#over.signal.aborted) {
       const session = await this.#open();
       if (!session) return;
       this.#session = session;
@@ -139,11 +139,12 @@ export class Live {
       session.on("connection", () => this.#connection());
       session.on("notice", (notice) => notice && this.watcher.notice(notice.text));
       this.#tell(performance.now());
-      const hadFrames = await this.#readFrames(session);
+      const openedAt = performance.now();
+      const { hadFrames, askedMs } = await this.#readFrames(session);
       if (this.#over.signal.aborted || !isPassing(this.status)) return;
-      // A server that opens sessions and gives no frames must not be sent the mesh over and over.
-      if (!hadFrames) await pause(pauseMs);
-      pauseMs = hadFrames ? firstPauseMs : Math.min(2 * pauseMs, longestPauseMs);
+      // A server that opens sessions and gives no frames, or breaks at once, must not be sent the mesh over and over.
+      if (hadFrames && performance.now() - openedAt >= Backoff.mostMs) this.#backoff.reset();
+      await pause(this.#backoff.nextMs(askedMs), this.#over.signal);
     }
   }
 
@@ -151,7 +152,7 @@ export class Live {
   async #open(): Promise<Session | undefined> {
     const { positions, exact, faces } = this.mesh;
     const { signal } = this.#over;
-    for (let pauseMs = firstPauseMs; ; pauseMs = Math.min(2 * pauseMs, longestPauseMs)) {
+    for (;;) {
       if (!isPassing(this.status)) this.#setStatus(say("opening", "Preparing…"));
       try {
         return await openSession(
@@ -171,15 +172,15 @@ export class Live {
         const error = thrown as LpdeformError;
         this.#setStatus(statusOf(error));
         if (!isPassing(this.status)) return undefined;
-        await pause(Math.max(pauseMs, Math.min(error.retryAfterMs, 10_000)));
+        await pause(this.#backoff.nextMs(error.retryAfterMs), signal);
         if (signal.aborted) return undefined;
       }
     }
   }
 
-  /** Until the session is over; whether there was any. */
-  async #readFrames(session: Session): Promise<boolean> {
-    let hadFrames = false;
+  /** Until the session is over; whether there was any, and the pause that the server asked for at the end. */
+  async #readFrames(session: Session): Promise<{ hadFrames: boolean; askedMs: number }> {
+    let [hadFrames, askedMs] = [false, 0];
     try {
       for await (const frame of session) {
         if (this.#over.signal.aborted) break;
@@ -190,12 +191,14 @@ export class Live {
         await taken;
       }
     } catch (thrown) {
-      if (this.#over.signal.aborted) return hadFrames;
-      this.#setStatus(statusAtEnd(thrown as LpdeformError));
+      const error = thrown as LpdeformError;
+      askedMs = error.retryAfterMs;
+      if (this.#over.signal.aborted) return { hadFrames, askedMs };
+      this.#setStatus(statusAtEnd(error));
       void session.close().catch(() => undefined);
       this.#session = undefined;
     }
-    return hadFrames;
+    return { hadFrames, askedMs };
   }
 
   #tell(time: number): void {
@@ -234,6 +237,16 @@ export class Live {
   }
 }
 
-function pause(milliseconds: number): Promise<void> {
-  return new Promise((done) => setTimeout(done, milliseconds));
+/** Ends early where the signal says so. */
+function pause(milliseconds: number, signal: AbortSignal): Promise<void> {
+  return new Promise((resolve) => {
+    const done = () => {
+      clearTimeout(timer);
+      signal.removeEventListener("abort", done);
+      resolve();
+    };
+    const timer = setTimeout(done, milliseconds);
+    signal.addEventListener("abort", done);
+    if (signal.aborted) done();
+  });
 }

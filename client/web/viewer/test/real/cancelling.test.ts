@@ -1,5 +1,5 @@
 import { join } from "node:path";
-import { afterAll, afterEach, beforeAll, beforeEach, expect, it } from "vitest";
+import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from "vitest";
 import { Service } from "../../../client/test/real/service.js";
 import { User } from "./user.js";
 
@@ -9,6 +9,8 @@ let service: Service;
 let user: User;
 let before: string;
 let rest: number[];
+/** There are two pictures, and what is asked of the server is asked of both. */
+let isSplit: boolean;
 
 beforeAll(async () => {
   service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
@@ -24,6 +26,7 @@ beforeEach(async () => {
   await user.settled();
   await user.page.locator('[data-handle="Top"] .name').click();
   await user.page.locator("canvas.stage").focus();
+  isSplit = false;
   [before, rest] = [await work(), await user.positions()];
 });
 
@@ -32,18 +35,32 @@ afterEach(async () => {
   await user.close();
 });
 
+async function settled(): Promise<void> {
+  await user.settled();
+  if (isSplit) await user.settled(1);
+}
+
+/** Two pictures; what is done next is done in the second. */
+async function split(): Promise<void> {
+  await user.page.keyboard.press("s");
+  isSplit = true;
+  await settled();
+  await user.page.locator("canvas.stage").nth(1).focus();
+}
+
 /** Something has moved, on the server as well. */
 async function isMoved(): Promise<void> {
-  await user.settled();
+  await settled();
   expect(await work()).not.toBe(before);
   expect(far(await user.positions(), rest)).toBeGreaterThan(0.01);
 }
 
 async function isAsBefore(): Promise<void> {
-  await user.settled();
+  await settled();
   expect(await work()).toBe(before);
   // Frames of 16 bits, of an extent of 5 at most, and a result that is one to its tolerance.
   expect(far(await user.positions(), rest)).toBeLessThan(2e-3);
+  if (isSplit) expect(far(await user.positions(1), rest)).toBeLessThan(2e-3);
   expect(await user.ask("app.history.canUndo")).toBe(false);
   expect(await user.ask("app.view.now.selected")).toBe("Top");
 }
@@ -61,7 +78,7 @@ async function pull(from: { x: number; y: number }, then: () => Promise<void>): 
   await isAsBefore();
 }
 
-const anchor = () => user.ask<{ x: number; y: number }>("anchorOnPage()");
+const anchor = (pane = 0) => user.ask<{ x: number; y: number }>(`anchorOnPage(${pane})`);
 const escape = () => user.page.keyboard.press("Escape");
 
 it.each(["t", "r"])("a handle that the gizmo drags goes back (%s)", async (mode) => {
@@ -74,6 +91,71 @@ it.each(["t", "r"])("a handle that the gizmo drags goes back (%s)", async (mode)
 it("a handle that is dragged by its vertices goes back, and stays selected", async () => {
   const [vertex] = await user.ask<number[]>("document().handles[1].vertices");
   await pull(await user.vertexOnPage(vertex!), escape);
+});
+
+describe("in the second of two pictures", () => {
+  beforeEach(split);
+
+  it.each(["t", "r"])("a handle that the gizmo drags goes back (%s)", async (mode) => {
+    await user.page.keyboard.press(mode);
+    const { x, y } = await anchor(1);
+    const from = mode === "t" ? { x, y: y - 55 } : { x: x + 3, y: y - 6 };
+    await pull(from, escape);
+    await pull(from, escape); // it can be taken again
+  });
+
+  it("a handle that is dragged by its vertices goes back, and stays selected", async () => {
+    const [vertex] = await user.ask<number[]>("document().handles[1].vertices");
+    await pull(await user.vertexOnPage(vertex!, 1), escape);
+  });
+
+  it("a drag whose picture is closed is a step, and can be undone", async () => {
+    const { keyboard, mouse } = user.page;
+    await keyboard.press("t");
+    const { x, y } = await anchor(1);
+    await mouse.move(x, y - 55);
+    await mouse.down();
+    await mouse.move(x + 16, y - 95, { steps: 8 });
+    await isMoved();
+    await keyboard.press("s");
+    isSplit = false;
+    await escape(); // there is nothing under way
+    await isMoved();
+    await mouse.up();
+    await keyboard.press("Control+z");
+    await keyboard.press("n");
+    await keyboard.press("n"); // Escape has let go of what was selected
+    await isAsBefore();
+  });
+
+  it("what the brush has painted is let go of, and what is selected stays so", async () => {
+    const { keyboard, mouse } = user.page;
+    await keyboard.press("2");
+    const from = await user.vertexOnPage(await user.vertexNear([0.5, 0, 2]), 1);
+    await mouse.move(from.x, from.y);
+    await mouse.down();
+    await mouse.move(from.x, from.y - 30, { steps: 5 });
+    expect(await user.ask("app.facts.now.pointedOut.vertices.length")).toBeGreaterThan(0);
+    await escape();
+    expect(await user.ask("app.facts.now.pointedOut.vertices.length")).toBe(0);
+    await mouse.up();
+    await isAsBefore();
+  });
+});
+
+it("a drag whose mesh makes room for another leaves that one alone", async () => {
+  await user.page.keyboard.press("t");
+  const { x, y } = await anchor();
+  const { mouse } = user.page;
+  await mouse.move(x, y - 55);
+  await mouse.down();
+  await mouse.move(x + 16, y - 95, { steps: 8 });
+  expect(await work()).not.toBe(before);
+  await user.page.evaluate('__lpdeform.app.openShape("bar", "coarse")'); // as by a file that was slow to read
+  await mouse.move(x + 60, y, { steps: 4 });
+  await mouse.up();
+  await isAsBefore();
+  expect(await user.ask("app.facts.now.setAside.length")).toBe(1); // with what the drag has done
 });
 
 it("a handle whose drag the browser ends goes back", async () => {
