@@ -105,7 +105,7 @@ INSTANTIATE_TEST_SUITE_P(
                      [](auto& request) {
                        request.mutable_settings()->mutable_region()->mutable_vertices()->set_inline_("");
                      }},
-        WrongSession{"REGION_VERTEX_OUT_OF_RANGE", "vertex 2147483647",
+        WrongSession{"REGION_VERTEX_OUT_OF_RANGE", "vertex 4294967295",
                      [](auto& request) {
                        request.mutable_settings()->mutable_region()->mutable_vertices()->set_inline_(
                            std::string(4, '\xff'));
