@@ -13,6 +13,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "grpc/health/v1/health.pb.h"
 #include "server/admin.h"
 #include "server/backend.h"
 #include "server/certificates.h"
@@ -108,6 +109,8 @@ void prepare_grpc() {
     grpc_init();
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    // Reflection lists the health service and can describe only what a program has linked in.
+    grpc::health::v1::HealthCheckRequest::descriptor();
   });
 }
 

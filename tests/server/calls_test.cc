@@ -1,7 +1,5 @@
 // The unary calls of the running service, and the errors that they share.
 
-#include <grpcpp/generic/generic_stub.h>
-
 #include <functional>
 #include <future>
 #include <limits>
@@ -299,37 +297,6 @@ TEST_F(CallsTest, HealthSaysServingUntilTheServerDrains) {
   const std::string address = server_->address();
   server_->drain(std::chrono::milliseconds(0));
   EXPECT_FALSE(is_serving(address));
-}
-
-TEST_F(CallsTest, ReflectionNamesTheService) {
-  grpc::GenericStub stub(grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kTestDeadline);
-  grpc::CompletionQueue queue;
-  void* tag = nullptr;
-  bool is_ok = false;
-  const auto call =
-      stub.PrepareCall(&context, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", &queue);
-  call->StartCall(nullptr);
-  ASSERT_TRUE(queue.Next(&tag, &is_ok) && is_ok);
-  // ServerReflectionRequest with list_services, field 7, "*".
-  const grpc::Slice ask(std::string("\x3a\x01*"));
-  call->Write(grpc::ByteBuffer(&ask, 1), nullptr);
-  ASSERT_TRUE(queue.Next(&tag, &is_ok) && is_ok);
-  grpc::ByteBuffer answer;
-  call->Read(&answer, nullptr);
-  ASSERT_TRUE(queue.Next(&tag, &is_ok) && is_ok);
-  std::vector<grpc::Slice> slices;
-  ASSERT_TRUE(answer.Dump(&slices).ok());
-  std::string bytes;
-  for (const grpc::Slice& slice : slices)
-    bytes.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
-  EXPECT_NE(bytes.find("lpdeform.v1.DeformService"), std::string::npos);
-  EXPECT_NE(bytes.find("grpc.health.v1.Health"), std::string::npos);
-  context.TryCancel();
-  grpc::Status status;
-  call->Finish(&status, nullptr);
-  queue.Next(&tag, &is_ok);
 }
 
 TEST_F(CallsTest, ATakenPortIsAnError) {
