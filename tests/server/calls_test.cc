@@ -185,7 +185,8 @@ TEST_F(CallsTest, EveryCallSaysNotFoundForASessionThatIsNot) {
     EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
     const ErrorDetails details = details_of(status);
     EXPECT_EQ(details.info.reason(), "SESSION_UNKNOWN");
-    EXPECT_TRUE(details.resource.has_value());
+    ASSERT_TRUE(details.resource.has_value());
+    EXPECT_EQ(details.resource->resource_type(), "lpdeform.v1.Session");
     EXPECT_FALSE(details.retry.has_value());
   }
 }
