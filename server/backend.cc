@@ -134,10 +134,19 @@ absl::StatusOr<Caller> Backend::identify(const CallContext& call, Access access)
             absl::CHexEscape(call.authority), "'; --allow-anonymous lets everybody in."));
   }
   absl::StatusOr<Caller> caller = Caller{};
+  if (tokens_ != nullptr && call.is_authorization_doubled) {
+    return make_fault(absl::StatusCode::kUnauthenticated,
+                      {"AUTHORIZATION_TWICE", "authorization", "one header"},
+                      "The call has the header authorization more than once; send it once.");
+  }
   if (tokens_ != nullptr) {
     caller = tokens_->check(call.authorization, absl::ToUnixSeconds(absl::Now()));
   } else if (!call.peer_identity.empty()) {
     caller->subject = absl::StrCat("certificate:", call.peer_identity);
+  }
+  if (caller.ok() && call.is_route_doubled) {
+    return invalid_input({"ROUTE_TWICE", "lpdeform-session", "one header"},
+                         "The call has the header lpdeform-session more than once; send it once.");
   }
   if (!caller.ok() || access == Access::kRead || !caller->is_viewer) return caller;
   return make_fault(absl::StatusCode::kPermissionDenied, {"READ_ONLY", "authorization", ""},
