@@ -192,7 +192,7 @@ class Backend {
   };
   std::mutex restoring_mutex_;
   std::map<std::string, Restoring> restoring_;  // by the sessions' names
-  GeometryQueue geometry_{scheduler, pool};
+  GeometryQueue geometry_{scheduler, pool, budget_};
 
  public:
   // Last, so that their threads end first.
