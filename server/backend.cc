@@ -85,10 +85,11 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
       tokens_(std::move(tokens)),
       is_for_this_machine_(is_for_this_machine(options)),
       log_(options.log ? options.log : std::make_shared<Log>("off")),
-      budget_(std::make_shared<Budget>(options.max_bytes, options.max_bytes_per_caller)),
-      uploads_(std::make_shared<Uploads>(
-          budget_, timers,
-          Uploads::Limits{options.max_upload_bytes, options.upload_idle, options.max_uploads})),
+      budget_(std::make_shared<Budget>(options.max_bytes, caller_max_bytes(options))),
+      uploads_(
+          std::make_shared<Uploads>(budget_, timers,
+                                    Uploads::Limits{options.max_upload_bytes, options.upload_idle,
+                                                    options.max_uploads, options.max_uploads_per_caller})),
       caller_limits_(std::make_shared<CallerLimits>(
           timers, CallerLimits::Limits{options.max_streams_per_caller, options.max_upload_bytes_per_second})),
       factory_(options, budget_, uploads_,

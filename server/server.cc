@@ -79,6 +79,9 @@ absl::Status check(const ServerOptions& options) {
     if (value == 0 || value > 1'000'000) return out_of_range(name, "1 to 10^6");
   }
   if (options.max_upload_bytes == 0) return out_of_range("max_upload_bytes", "more than 0");
+  const ByteLimit& each = options.max_bytes_per_caller;
+  if (!each.bytes && !(each.percent >= 1 && each.percent <= 100))
+    return out_of_range("max_bytes_per_caller", "1% to 100%, or a size");
   for (const auto& [name, value] : {std::pair("token_issuer", &options.token_issuer),
                                     std::pair("token_audience", &options.token_audience)}) {
     if (!value->empty() && options.token_keys_file.empty())
@@ -297,6 +300,13 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& given
 
 std::size_t default_max_bytes() {
   return memory_of_process() / 4 * 3;
+}
+
+std::size_t caller_max_bytes(const ServerOptions& options) {
+  const ByteLimit& limit = options.max_bytes_per_caller;
+  if (limit.bytes) return *limit.bytes;
+  return std::max<std::size_t>(
+      1, static_cast<std::size_t>(static_cast<double>(options.max_bytes) * limit.percent / 100));
 }
 
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

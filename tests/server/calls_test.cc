@@ -307,6 +307,24 @@ TEST_F(CallsTest, ATakenPortIsAnError) {
   EXPECT_TRUE(absl::IsUnavailable(second.status())) << second.status();
 }
 
+TEST(ServerOptionsTest, TheMemoryOfACallerIsAShareOfAll) {
+  ServerOptions options;
+  options.max_bytes = 1000;
+  EXPECT_EQ(caller_max_bytes(options), 500u);
+  options.max_bytes_per_caller.percent = 25;
+  EXPECT_EQ(caller_max_bytes(options), 250u);
+  options.max_bytes = 1;  // 0 would be without limit
+  EXPECT_EQ(caller_max_bytes(options), 1u);
+  options.max_bytes_per_caller.bytes = 7;
+  EXPECT_EQ(caller_max_bytes(options), 7u);
+  options.max_bytes_per_caller.bytes = 0;
+  EXPECT_EQ(caller_max_bytes(options), 0u);
+  for (const double percent : {0.5, 101.0, std::numeric_limits<double>::quiet_NaN()}) {
+    options.max_bytes_per_caller = {.percent = percent};
+    EXPECT_EQ(fault_of(Server::start(options).status()).element, "max_bytes_per_caller");
+  }
+}
+
 TEST(ServerOptionsTest, AreChecked) {
   ServerOptions options;
   options.runner_threads = 1;
