@@ -1,5 +1,7 @@
 // The unary calls of the running service, and the errors that they share.
 
+#include <grpcpp/generic/generic_stub.h>
+
 #include <functional>
 #include <future>
 #include <limits>
