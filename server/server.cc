@@ -78,6 +78,11 @@ absl::Status check(const ServerOptions& options) {
         std::pair("max_calls_per_connection", options.max_calls_per_connection)}) {
     if (value == 0 || value > 1'000'000) return out_of_range(name, "1 to 10^6");
   }
+  for (const auto& [name, value] : {std::pair("max_sessions_per_caller", options.max_sessions_per_caller),
+                                    std::pair("max_streams_per_caller", options.max_streams_per_caller),
+                                    std::pair("max_uploads_per_caller", options.max_uploads_per_caller)}) {
+    if (value > 1'000'000) return out_of_range(name, "0 to 10^6");  // also of what was below 0
+  }
   if (options.max_upload_bytes == 0) return out_of_range("max_upload_bytes", "more than 0");
   const ByteLimit& each = options.max_bytes_per_caller;
   if (!each.bytes && !(each.percent >= 1 && each.percent <= 100))
