@@ -85,10 +85,11 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
       tokens_(std::move(tokens)),
       is_for_this_machine_(is_for_this_machine(options)),
       log_(options.log ? options.log : std::make_shared<Log>("off")),
-      budget_(std::make_shared<Budget>(options.max_bytes, options.max_bytes_per_caller)),
-      uploads_(std::make_shared<Uploads>(
-          budget_, timers,
-          Uploads::Limits{options.max_upload_bytes, options.upload_idle, options.max_uploads})),
+      budget_(std::make_shared<Budget>(options.max_bytes, caller_max_bytes(options))),
+      uploads_(
+          std::make_shared<Uploads>(budget_, timers,
+                                    Uploads::Limits{options.max_upload_bytes, options.upload_idle,
+                                                    options.max_uploads, options.max_uploads_per_caller})),
       caller_limits_(std::make_shared<CallerLimits>(
           timers, CallerLimits::Limits{options.max_streams_per_caller, options.max_upload_bytes_per_second})),
       factory_(options, budget_, uploads_,
@@ -134,10 +135,19 @@ absl::StatusOr<Caller> Backend::identify(const CallContext& call, Access access)
             absl::CHexEscape(call.authority), "'; --allow-anonymous lets everybody in."));
   }
   absl::StatusOr<Caller> caller = Caller{};
+  if (tokens_ != nullptr && call.is_authorization_doubled) {
+    return make_fault(absl::StatusCode::kUnauthenticated,
+                      {"AUTHORIZATION_TWICE", "authorization", "one header"},
+                      "The call has the header authorization more than once; send it once.");
+  }
   if (tokens_ != nullptr) {
     caller = tokens_->check(call.authorization, absl::ToUnixSeconds(absl::Now()));
   } else if (!call.peer_identity.empty()) {
     caller->subject = absl::StrCat("certificate:", call.peer_identity);
+  }
+  if (caller.ok() && call.is_route_doubled) {
+    return invalid_input({"ROUTE_TWICE", "lpdeform-session", "one header"},
+                         "The call has the header lpdeform-session more than once; send it once.");
   }
   if (!caller.ok() || access == Access::kRead || !caller->is_viewer) return caller;
   return make_fault(absl::StatusCode::kPermissionDenied, {"READ_ONLY", "authorization", ""},

@@ -91,7 +91,8 @@ class Backend {
 
   /// What a call is going to do.
   enum class Access { kRead, kChange };
-  /// Who calls. UNAUTHENTICATED as Tokens::check; PERMISSION_DENIED READ_ONLY, HOST_FOREIGN.
+  /// Who calls. UNAUTHENTICATED as Tokens::check, AUTHORIZATION_TWICE; PERMISSION_DENIED READ_ONLY, HOST_FOREIGN; INVALID_ARGUMENT
+  /// ROUTE_TWICE.
   absl::StatusOr<Caller> identify(const CallContext& call, Access access) const;
   /// A session of the caller's. Errors: as identify; NOT_FOUND SESSION_UNKNOWN.
   absl::StatusOr<std::shared_ptr<Session>> find(const CallContext& call, Access access,
@@ -191,7 +192,7 @@ class Backend {
   };
   std::mutex restoring_mutex_;
   std::map<std::string, Restoring> restoring_;  // by the sessions' names
-  GeometryQueue geometry_{scheduler, pool};
+  GeometryQueue geometry_{scheduler, pool, budget_};
 
  public:
   // Last, so that their threads end first.

@@ -9,6 +9,21 @@ namespace lpdeform {
 
 absl::StatusOr<Reservation> Budget::reserve(std::size_t bytes, const std::string& owner) {
   const std::scoped_lock lock(mutex_);
+  if (absl::Status status = check_locked(bytes, owner); !status.ok()) return status;
+  change_locked(owner, 0, bytes);
+  return Reservation(shared_from_this(), owner, bytes);
+}
+
+Reservation Budget::nothing_yet(const std::string& owner) {
+  return Reservation(shared_from_this(), owner, 0);
+}
+
+absl::Status Budget::check(std::size_t bytes, const std::string& owner) const {
+  const std::scoped_lock lock(mutex_);
+  return check_locked(bytes, owner);
+}
+
+absl::Status Budget::check_locked(std::size_t bytes, const std::string& owner) const {
   if (bytes > most_ || used_ > most_ - bytes) {
     return make_fault(absl::StatusCode::kResourceExhausted,
                       {"MEMORY_FULL", "memory", absl::StrCat("bytes <= ", most_)},
@@ -25,8 +40,7 @@ absl::StatusOr<Reservation> Budget::reserve(std::size_t bytes, const std::string
                      " that one caller may have in use. Delete a session or an upload first, or take a "
                      "smaller mesh."));
   }
-  change_locked(owner, 0, bytes);
-  return Reservation(shared_from_this(), owner, bytes);
+  return absl::OkStatus();
 }
 
 std::size_t Budget::used() const {

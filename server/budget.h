@@ -23,12 +23,17 @@ class Budget : public std::enable_shared_from_this<Budget> {
 
   /// RESOURCE_EXHAUSTED MEMORY_FULL where there is no room for so many more, CALLER_MEMORY_FULL where the owner has none.
   absl::StatusOr<Reservation> reserve(std::size_t bytes, const std::string& owner = "");
+  /// A share of no bytes, which grows.
+  Reservation nothing_yet(const std::string& owner = "");
+  /// Whether so many could be reserved now. Errors: as reserve.
+  absl::Status check(std::size_t bytes, const std::string& owner = "") const;
 
   std::size_t most() const { return most_; }
   std::size_t used() const;
 
  private:
   friend class Reservation;
+  absl::Status check_locked(std::size_t bytes, const std::string& owner) const;
   void change(const std::string& owner, std::size_t from, std::size_t to);
   void change_locked(const std::string& owner, std::size_t from, std::size_t to);
 

@@ -15,6 +15,7 @@ namespace lpdeform {
 namespace {
 
 constexpr std::size_t kMostInlineBytes = 1u << 20;
+constexpr std::uint32_t kMostIterations = std::numeric_limits<int>::max();
 
 absl::StatusOr<Method> decode_method(v1::Method method) {
   switch (method) {
@@ -73,11 +74,13 @@ absl::StatusOr<SolveSettings> decode_solver(const v1::SolverSettings& message) {
   settings.initial = *initial;
   if (message.tolerance() != 0) settings.tolerance = message.tolerance();
   if (message.time_limit_seconds() != 0) settings.time_limit_seconds = message.time_limit_seconds();
-  if (message.max_iterations() != 0) {
-    const bool fits = message.max_iterations() <= static_cast<std::uint32_t>(std::numeric_limits<int>::max());
-    settings.max_iterations =
-        fits ? static_cast<int>(message.max_iterations()) : -1;  // refused with a better text
+  if (message.max_iterations() > kMostIterations) {
+    return invalid_input({"ITERATIONS_OUT_OF_RANGE", "max_iterations",
+                          absl::StrCat("0 <= max_iterations <= ", kMostIterations)},
+                         absl::StrCat("The number of iterations is ", message.max_iterations(), ", over ",
+                                      kMostIterations, "."));
   }
+  if (message.max_iterations() != 0) settings.max_iterations = static_cast<int>(message.max_iterations());
   return settings;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -27,8 +28,9 @@ using StoredBlobs = std::map<std::string, std::string>;
 /// often a message names an upload, no more numbers come out than the mesh has room for. What a value means
 /// is checked where it is used. Errors are INVALID_ARGUMENT: INLINE_TOO_LARGE, BUFFER_MISSING, BUFFER_SIZE,
 /// ENUM_UNKNOWN, FIELD_MISSING, FIELD_SIZE, POSITIONS_SIZE, HANDLE_CHANGE_MISSING, HANDLE_TOO_MANY_VERTICES,
-/// HANDLE_POINT_COUNT, REGION_EMPTY, MOTION_MISSING, NORMALS_SIZE, NORMALS_NOT_FINITE; of uploads what
-/// Uploads::find and Upload::bytes have. For one message, one thread.
+/// HANDLE_POINT_COUNT, REGION_EMPTY, MOTION_MISSING, NORMALS_SIZE, NORMALS_NOT_FINITE; of numbers over 2^31 - 1, which nothing
+/// behind could name, HANDLE_VERTEX_OUT_OF_RANGE, HANDLE_FACE_OUT_OF_RANGE, REGION_VERTEX_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE; of
+/// uploads what Uploads::find and Upload::bytes have. For one message, one thread.
 ///
 /// What a message leaves to the server to find in the geometry (AutomaticField, Resize) becomes plain fields and
 /// handles here, in the client's vertices like all others, so that nothing behind knows of it; also
@@ -62,8 +64,8 @@ class Decoder {
   /// A copy of them.
   absl::StatusOr<std::string> raw(const v1::Buffer& buffer, std::string_view what);
 
-  /// Also MESH_TOO_LARGE. Does not look at coordinates and indices; a vertex index over 2^31 - 1 becomes
-  /// that.
+  /// Also MESH_TOO_LARGE. Does not look at coordinates and indices; a vertex index of a face over 2^31 - 1 becomes
+  /// that, and errors name the face.
   struct MeshLimits {
     std::uint32_t most_vertices;
     std::uint32_t most_faces;
@@ -83,10 +85,12 @@ class Decoder {
 
  private:
   absl::StatusOr<HandleChange> handle(const v1::HandleUpdate& message);
-  absl::StatusOr<Handle> group(const v1::Handle& message);
+  absl::StatusOr<Handle> group(const v1::Handle& message, const std::string& name);
+  using OutOfRange = std::function<absl::Status(std::uint32_t index)>;
   absl::StatusOr<std::vector<std::int32_t>> indices(const v1::Buffer& buffer, std::string_view what,
-                                                    std::uint64_t& room);
-  absl::StatusOr<std::vector<SurfacePoint>> surface_points(const v1::SurfacePoints& message);
+                                                    std::uint64_t& room, const OutOfRange& out_of_range);
+  absl::StatusOr<std::vector<SurfacePoint>> surface_points(const v1::SurfacePoints& message,
+                                                           const std::string& name);
   absl::StatusOr<std::vector<std::int32_t>> region(const v1::RegionOfInterest& message);
   absl::StatusOr<HandleMotion> motion(const v1::Motion& message);
   absl::StatusOr<Field> field(const v1::Field& message, std::string_view what, Field Material::*part);

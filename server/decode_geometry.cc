@@ -112,7 +112,7 @@ absl::StatusOr<std::shared_ptr<const Weld>> Decoder::weld(const v1::Weld& messag
   if (data->view.size() % sizeof(std::uint32_t) != 0)
     return wrong_size("weld groups", data->view.size(), "a multiple of 4");
   std::vector<std::uint32_t> groups(data->view.size() / sizeof(std::uint32_t));
-  unpack_indices(data->view, groups.size(), groups.data());
+  for (std::size_t k = 0; k < groups.size(); ++k) groups[k] = packed_index(data->view, k);
   auto weld = weld_by_groups(positions, groups);
   if (!weld.ok()) return weld.status();
   return std::make_shared<const Weld>(*std::move(weld));

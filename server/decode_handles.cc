@@ -58,7 +58,8 @@ absl::StatusOr<HandleMotion> Decoder::motion(const v1::Motion& message) {
 }
 
 absl::StatusOr<std::vector<std::int32_t>> Decoder::indices(const v1::Buffer& buffer, std::string_view what,
-                                                           std::uint64_t& room) {
+                                                           std::uint64_t& room,
+                                                           const OutOfRange& out_of_range) {
   const auto data = bytes(buffer, what);
   if (!data.ok()) return data.status();
   if (data->view.size() % sizeof(std::uint32_t) != 0) {
@@ -66,13 +67,20 @@ absl::StatusOr<std::vector<std::int32_t>> Decoder::indices(const v1::Buffer& buf
   }
   const std::size_t count = data->view.size() / sizeof(std::uint32_t);
   if (absl::Status status = take_room(room, count, what); !status.ok()) return status;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (packed_index(data->view, k) > kMostIndex) return out_of_range(packed_index(data->view, k));
+  }
   std::vector<std::int32_t> result(count);
   unpack_indices(data->view, count, result.data());
   return result;
 }
 
-absl::StatusOr<std::vector<SurfacePoint>> Decoder::surface_points(const v1::SurfacePoints& message) {
-  const auto faces = indices(message.faces(), "handle points", room_for_vertices_);
+absl::StatusOr<std::vector<SurfacePoint>> Decoder::surface_points(const v1::SurfacePoints& message,
+                                                                  const std::string& name) {
+  const auto faces =
+      indices(message.faces(), "handle points", room_for_vertices_, [this, &name](std::uint32_t face) {
+        return handle_face_out_of_range(name, face, features_ ? features_->shape().face_count() : kMostIndex);
+      });
   if (!faces.ok()) return faces.status();
   const auto coordinates = points(message.scalar(), message.barycentric(), "barycentric coordinates");
   if (!coordinates.ok()) return coordinates.status();
@@ -91,21 +99,26 @@ absl::StatusOr<std::vector<SurfacePoint>> Decoder::surface_points(const v1::Surf
 
 absl::StatusOr<std::vector<std::int32_t>> Decoder::region(const v1::RegionOfInterest& message) {
   if (!message.has_vertices()) return std::vector<std::int32_t>{};
-  auto vertices = indices(message.vertices(), "region vertices", room_for_region_);
+  auto vertices =
+      indices(message.vertices(), "region vertices", room_for_region_,
+              [this](std::uint32_t vertex) { return region_vertex_out_of_range(vertex, vertex_count_); });
   if (!vertices.ok() || !vertices->empty()) return vertices;
   return invalid_input({"REGION_EMPTY", "region", "at least 1 vertex"},
                        "The region of interest has no vertex; nothing could move.");
 }
 
-absl::StatusOr<Handle> Decoder::group(const v1::Handle& message) {
+absl::StatusOr<Handle> Decoder::group(const v1::Handle& message, const std::string& name) {
   Handle handle;
   if (message.has_vertices() || !message.has_points()) {
-    auto vertices = indices(message.vertices(), "handle vertices", room_for_vertices_);
+    auto vertices = indices(message.vertices(), "handle vertices", room_for_vertices_,
+                            [this, &name](std::uint32_t vertex) {
+                              return handle_vertex_out_of_range(name, vertex, vertex_count_);
+                            });
     if (!vertices.ok()) return vertices.status();
     handle.vertices = *std::move(vertices);
   }
   if (message.has_points()) {
-    auto points = surface_points(message.points());
+    auto points = surface_points(message.points(), name);
     if (!points.ok()) return points.status();
     handle.points = *std::move(points);
   }
@@ -132,7 +145,7 @@ absl::StatusOr<HandleChange> Decoder::handle(const v1::HandleUpdate& message) {
     return invalid_input({"HANDLE_CHANGE_MISSING", "handles", ""},
                          "A change of a handle says neither set nor move nor remove.");
   }
-  auto handle = group(message.set());
+  auto handle = group(message.set(), message.name());
   if (!handle.ok()) return handle.status();
   out.change = *std::move(handle);
   return out;

@@ -38,15 +38,20 @@ void unpack(Scalar scalar, std::string_view bytes, Result& out) {
   }
 }
 
-/// Vertex indices; what does not fit becomes the largest that does, which no mesh has.
-template <typename Out>
-void unpack_indices(std::string_view bytes, std::size_t count, Out* out) {
-  for (std::size_t k = 0; k < count; ++k) {
-    std::uint32_t index;
-    std::memcpy(&index, bytes.data() + k * sizeof(index), sizeof(index));
-    out[k] = static_cast<std::int32_t>(
-        std::min<std::uint32_t>(index, static_cast<std::uint32_t>(std::numeric_limits<std::int32_t>::max())));
-  }
+inline constexpr std::uint32_t kMostIndex = std::numeric_limits<std::int32_t>::max();
+
+/// Index number k of those that are packed there.
+inline std::uint32_t packed_index(std::string_view bytes, std::size_t k) {
+  std::uint32_t index;
+  std::memcpy(&index, bytes.data() + k * sizeof(index), sizeof(index));
+  return index;
+}
+
+/// Indices of vertices or faces; what is over kMostIndex becomes that, which no mesh has. Who names them in an error looks for such
+/// first, so as to name what was sent.
+inline void unpack_indices(std::string_view bytes, std::size_t count, std::int32_t* out) {
+  for (std::size_t k = 0; k < count; ++k)
+    out[k] = static_cast<std::int32_t>(std::min(packed_index(bytes, k), kMostIndex));
 }
 
 inline Eigen::Vector3d decode_vector(const v1::Vector3& message) {

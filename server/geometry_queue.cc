@@ -17,6 +17,9 @@ void GeometryQueue::when_found(const std::shared_ptr<const Session>& session, co
   Waiting waiting{settings.p().has_automatic() || settings.stiffness().has_automatic(), update.has_resize(),
                   std::move(then)};
   if (waiting.missing(session->features()) == Part::kNone) return waiting.then(absl::OkStatus());
+  auto memory = budget_->reserve(update.SpaceUsedLong(), session->owner());
+  if (!memory.ok()) return waiting.then(memory.status());
+  waiting.memory = *std::move(memory);
   wait(session, std::move(waiting));
 }
 

@@ -4,10 +4,12 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "lpdeform/v1/service.pb.h"
+#include "server/budget.h"
 #include "server/scheduler.h"
 #include "server/session.h"
 #include "server/task_pool.h"
@@ -20,11 +22,12 @@ class GeometryQueue {
  public:
   using Then = std::function<void(absl::Status)>;
 
-  GeometryQueue(Scheduler& scheduler, TaskPool& pool) : scheduler_(scheduler), pool_(pool) {}
+  GeometryQueue(Scheduler& scheduler, TaskPool& pool, std::shared_ptr<Budget> budget)
+      : scheduler_(scheduler), pool_(pool), budget_(std::move(budget)) {}
 
   /// Calls `then` with OK once decoding `update` for this session does not wait for its geometry: at once where it asks for
-  /// nothing that is not known, else on a thread of the pool. RESOURCE_EXHAUSTED SERVER_BUSY where kMostWaiting wait for the
-  /// session, or too many for the pool.
+  /// nothing that is not known, else on a thread of the pool. What waits is memory of the session's owner. RESOURCE_EXHAUSTED
+  /// SERVER_BUSY where kMostWaiting wait for the session, or too many for the pool; MEMORY_FULL, CALLER_MEMORY_FULL.
   void when_found(const std::shared_ptr<const Session>& session, const v1::Update& update, Then then);
 
   /// Calls that wait for one session's geometry; each holds its message.
@@ -35,6 +38,7 @@ class GeometryQueue {
   struct Waiting {
     bool needs_joint, needs_bending;
     Then then;
+    Reservation memory = {};  // of its message
     Part missing(const ShapeFeatures& features) const;
   };
   void wait(const std::shared_ptr<const Session>& session, Waiting waiting);
@@ -42,6 +46,7 @@ class GeometryQueue {
 
   Scheduler& scheduler_;
   TaskPool& pool_;
+  const std::shared_ptr<Budget> budget_;
   std::mutex mutex_;
   std::map<std::shared_ptr<const Session>, std::vector<Waiting>>
       waiting_;  // of each session that is looked at

@@ -1,6 +1,8 @@
 #include "server/grpc_status.h"
 
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "core/base/fault.h"
 #include "google/rpc/error_details.pb.h"
@@ -41,9 +43,24 @@ void add_quota_failure(const absl::Status& status, const Fault& fault, google::r
   out.add_details()->PackFrom(quota);
 }
 
+/// What is not found, by the beginning of the reason.
+constexpr std::pair<std::string_view, const char*> kResourceTypes[] = {
+    {"SESSION_", "lpdeform.v1.Session"},
+    {"UPLOAD_", "lpdeform.v1.Upload"},
+    {"STREAM_", "lpdeform.v1.Stream"},
+    {"HANDLE_", "lpdeform.v1.Handle"},
+};
+
+std::string resource_type_of(const std::string& reason) {
+  for (const auto& [beginning, type] : kResourceTypes) {
+    if (reason.starts_with(beginning)) return type;
+  }
+  return kDomain;
+}
+
 void add_resource_info(const absl::Status& status, const Fault& fault, google::rpc::Status& out) {
   google::rpc::ResourceInfo resource;
-  resource.set_resource_type(kDomain);
+  resource.set_resource_type(resource_type_of(fault.reason));
   resource.set_resource_name(fault.element);
   resource.set_description(std::string(status.message()));
   out.add_details()->PackFrom(resource);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "server/health_probe.h"
@@ -21,6 +22,7 @@ struct Arguments {
   ServerOptions server;
   double session_idle_seconds = 600, upload_idle_seconds = 600, heartbeat_seconds = 15, grace_seconds = 20;
   double connection_idle_seconds = 300;
+  std::string max_bytes_per_caller = "50%";
   std::string log_level = "info";
   std::string store = "none";
   lpdeform::StoreOptions store_options;
@@ -40,15 +42,31 @@ CLI::Validator size_in_bytes() {
           "SIZE"};
 }
 
+/// The number before "%"; empty where that is none from 1 to 100.
+std::optional<double> percent_of(const std::string& text) {
+  double percent = 0;
+  if (text.empty() || text.back() != '%') return std::nullopt;
+  const bool is_number = CLI::detail::lexical_cast(text.substr(0, text.size() - 1), percent);
+  return is_number && percent >= 1 && percent <= 100 ? std::optional(percent) : std::nullopt;
+}
+
+/// Also "25%", which stays as it is.
+CLI::Validator size_or_percent() {
+  return {[](std::string& text) -> std::string {
+            if (text.empty() || text.back() != '%') return size_in_bytes()(text);
+            return percent_of(text) ? "" : "must be 1% to 100%, or a size";
+          },
+          "SIZE"};
+}
+
 /// Also "25%", of what the machine or its control group has.
 CLI::Validator size_or_share() {
   return {[](std::string& text) -> std::string {
-            if (text.empty() || text.back() != '%') return size_in_bytes()(text);
-            double percent = 0;
-            const bool is_number = CLI::detail::lexical_cast(text.substr(0, text.size() - 1), percent);
-            if (!is_number || !(percent >= 1 && percent <= 100)) return "must be 1% to 100%, or a size";
-            const double bytes = static_cast<double>(lpdeform::memory_of_process()) * percent / 100;
-            text = std::to_string(static_cast<std::uint64_t>(bytes));
+            if (std::string why = size_or_percent()(text); !why.empty()) return why;
+            if (const auto percent = percent_of(text)) {
+              const double bytes = static_cast<double>(lpdeform::memory_of_process()) * *percent / 100;
+              text = std::to_string(static_cast<std::uint64_t>(bytes));
+            }
             return "";
           },
           "SIZE"};
@@ -130,12 +148,16 @@ void describe(CLI::App& app, Arguments& arguments) {
                  "Streams of one caller at a time, where callers are told apart; 0: without limit")
       ->envname("LPDEFORM_MAX_STREAMS_PER_CALLER")
       ->capture_default_str();
-  app.add_option(
-         "--max-bytes-per-caller", server.max_bytes_per_caller,
-         "Memory of one caller's sessions and uploads, where callers are told apart; as 4GiB or in bytes, "
-         "0: without limit")
+  app.add_option("--max-uploads-per-caller", server.max_uploads_per_caller,
+                 "Uploads of one caller at a time, where callers are told apart; 0: without limit")
+      ->envname("LPDEFORM_MAX_UPLOADS_PER_CALLER")
+      ->capture_default_str();
+  app.add_option("--max-bytes-per-caller", arguments.max_bytes_per_caller,
+                 "Memory of one caller's sessions and uploads, where callers are told apart; as 4GiB, in "
+                 "bytes, or as "
+                 "25% of --max-bytes; 0: without limit")
       ->envname("LPDEFORM_MAX_BYTES_PER_CALLER")
-      ->transform(size_in_bytes())
+      ->transform(size_or_percent())
       ->capture_default_str();
   app.add_option("--max-upload-rate", server.max_upload_bytes_per_second,
                  "Bytes a second of one caller's uploads, where callers are told apart; 0: without limit")
@@ -178,10 +200,10 @@ void describe(CLI::App& app, Arguments& arguments) {
   app.add_option("--max-vertices", server.max_vertices, "Vertices of one mesh; of faces, three times as many")
       ->envname("LPDEFORM_MAX_VERTICES")
       ->capture_default_str();
-  app.add_option(
-         "--max-bytes", server.max_bytes,
-         "Memory of all sessions and uploads together; as 4GiB, in bytes, or as 25% of what the machine or "
-         "its control group has; 0: 75%")
+  app.add_option("--max-bytes", server.max_bytes,
+                 "Memory of all sessions and of what has come of uploads; as 4GiB, in bytes, or as 25% of "
+                 "what the machine or "
+                 "its control group has; 0: 75%")
       ->envname("LPDEFORM_MAX_BYTES")
       ->transform(size_or_share())
       ->capture_default_str();
@@ -255,12 +277,19 @@ int refuse(const absl::Status& why) {
   return 1;
 }
 
+/// Of text that size_or_percent() has let through.
+lpdeform::ByteLimit byte_limit(const std::string& text) {
+  if (const auto percent = percent_of(text)) return {.percent = *percent};
+  return {.bytes = std::stoull(text)};
+}
+
 int serve(Arguments& arguments, const sigset_t& signals) {
   ServerOptions& options = arguments.server;
   options.session_idle = milliseconds(arguments.session_idle_seconds);
   options.upload_idle = milliseconds(arguments.upload_idle_seconds);
   options.heartbeat = milliseconds(arguments.heartbeat_seconds);
   options.connection_idle = milliseconds(arguments.connection_idle_seconds);
+  options.max_bytes_per_caller = byte_limit(arguments.max_bytes_per_caller);
   options.log = std::make_shared<lpdeform::Log>(arguments.log_level);
   auto store = lpdeform::open_store(arguments.store, arguments.store_options);
   if (!store.ok()) return refuse(store.status());

@@ -13,6 +13,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "grpc/health/v1/health.pb.h"
 #include "server/admin.h"
 #include "server/backend.h"
 #include "server/certificates.h"
@@ -77,7 +78,15 @@ absl::Status check(const ServerOptions& options) {
         std::pair("max_calls_per_connection", options.max_calls_per_connection)}) {
     if (value == 0 || value > 1'000'000) return out_of_range(name, "1 to 10^6");
   }
+  for (const auto& [name, value] : {std::pair("max_sessions_per_caller", options.max_sessions_per_caller),
+                                    std::pair("max_streams_per_caller", options.max_streams_per_caller),
+                                    std::pair("max_uploads_per_caller", options.max_uploads_per_caller)}) {
+    if (value > 1'000'000) return out_of_range(name, "0 to 10^6");  // also of what was below 0
+  }
   if (options.max_upload_bytes == 0) return out_of_range("max_upload_bytes", "more than 0");
+  const ByteLimit& each = options.max_bytes_per_caller;
+  if (!each.bytes && !(each.percent >= 1 && each.percent <= 100))
+    return out_of_range("max_bytes_per_caller", "1% to 100%, or a size");
   for (const auto& [name, value] : {std::pair("token_issuer", &options.token_issuer),
                                     std::pair("token_audience", &options.token_audience)}) {
     if (!value->empty() && options.token_keys_file.empty())
@@ -108,6 +117,8 @@ void prepare_grpc() {
     grpc_init();
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    // Reflection lists the health service and can describe only what a program has linked in.
+    grpc::health::v1::HealthCheckRequest::descriptor();
   });
 }
 
@@ -294,6 +305,13 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& given
 
 std::size_t default_max_bytes() {
   return memory_of_process() / 4 * 3;
+}
+
+std::size_t caller_max_bytes(const ServerOptions& options) {
+  const ByteLimit& limit = options.max_bytes_per_caller;
+  if (limit.bytes) return *limit.bytes;
+  return std::max<std::size_t>(
+      1, static_cast<std::size_t>(static_cast<double>(options.max_bytes) * limit.percent / 100));
 }
 
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

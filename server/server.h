@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -16,6 +17,12 @@
 namespace lpdeform {
 
 class Store;
+
+/// A number of bytes, or a share of another limit.
+struct ByteLimit {
+  double percent = 50;                    // of that limit, where `bytes` is not given
+  std::optional<std::size_t> bytes = {};  // 0: without limit
+};
 
 struct ServerOptions {
   /// "host:port", port 0 for a free one, or "unix:/path/of/socket".
@@ -41,10 +48,11 @@ struct ServerOptions {
   std::size_t max_connections = 4096;
   std::size_t max_connections_per_address = 1024;  // of one peer; 0: without limit; see Listener::Limits
   std::size_t max_sessions = 256;
-  std::size_t max_sessions_per_caller = 64;                 // where callers are told apart; 0: without limit
-  std::size_t max_streams_per_caller = 256;                 // likewise
-  std::size_t max_bytes_per_caller = std::size_t{4} << 30;  // likewise, of sessions and uploads
-  double max_upload_bytes_per_second = 0;                   // likewise; see CallerLimits
+  std::size_t max_sessions_per_caller = 64;  // where callers are told apart; 0: without limit
+  std::size_t max_streams_per_caller = 256;  // likewise
+  std::size_t max_uploads_per_caller = 256;  // likewise
+  ByteLimit max_bytes_per_caller = {};       // likewise, of sessions and uploads; a share is one of max_bytes
+  double max_upload_bytes_per_second = 0;    // likewise; see CallerLimits
   std::size_t max_streams_per_session = SessionLimits().streams;
   std::size_t max_handles = InputLimits::kMostHandles;  // of one session
   std::size_t max_undo = InputLimits::kMostUndo;        // steps of handles that one session can take back
@@ -78,6 +86,9 @@ struct ServerOptions {
 
 /// Three quarters of the memory that this process may have: the machine's, or its control group's where that is less.
 std::size_t default_max_bytes();
+
+/// What one caller may take of max_bytes, which is not 0; 0: without limit.
+std::size_t caller_max_bytes(const ServerOptions& options);
 
 /// The service, running: from start() until drain() or the destructor. Thread-safe.
 class Server {

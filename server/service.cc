@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -23,21 +24,24 @@ constexpr std::size_t kLongestRoute = 128;
 constexpr std::size_t kLongestAuthority =
     512;  // what is cut off of a longer one does not make it this machine's name
 
-std::string text_of(const grpc::CallbackServerContext& context, const char* header) {
-  const auto found = context.client_metadata().find(header);
-  if (found == context.client_metadata().end()) return "";
-  return {found->second.data(), found->second.size()};
+/// A header's value; empty where it is not there, or more than once: then `is_doubled`.
+std::string text_of(const grpc::CallbackServerContext& context, const char* header, bool& is_doubled) {
+  const auto [first, last] = context.client_metadata().equal_range(header);
+  is_doubled = first != last && std::next(first) != last;
+  if (first == last || is_doubled) return "";
+  return {first->second.data(), first->second.size()};
 }
 
 std::shared_ptr<CallRecord> begin_record(Backend& backend, const grpc::CallbackServerContext& context,
                                          std::string_view method) {
-  const std::string trace_parent = text_of(context, "traceparent");
   CallContext call;
+  bool is_parent_doubled = false;  // then there is none: W3C Trace Context, 3.2
+  const std::string trace_parent = text_of(context, "traceparent", is_parent_doubled);
   if (trace_parent.size() <= kLongestTraceParent) call.trace_id = trace_id_of(trace_parent);
-  call.authorization = text_of(context, "authorization");
+  call.authorization = text_of(context, "authorization", call.is_authorization_doubled);
   const grpc::string_ref authority = context.ExperimentalGetAuthority();
   call.authority.assign(authority.data(), std::min(authority.size(), kLongestAuthority));
-  const std::string route = text_of(context, "lpdeform-session");
+  const std::string route = text_of(context, "lpdeform-session", call.is_route_doubled);
   if (route.size() <= kLongestRoute) call.route = route;
   if (const auto when = context.deadline(); when != std::chrono::system_clock::time_point::max())
     call.deadline = {when, when - std::chrono::system_clock::now()};

@@ -1,8 +1,5 @@
 #include "server/upload.h"
 
-#include <algorithm>
-#include <cstring>
-#include <iterator>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -24,69 +21,61 @@ absl::Status check_request_id(const std::string& request_id) {
 Upload::Upload(std::string name, std::uint64_t size_bytes, std::uint32_t crc32c, Reservation memory,
                std::string owner)
     : name_(std::move(name)),
-      size_(size_bytes),
       crc32c_(crc32c),
-      memory_(std::move(memory)),
       owner_(std::move(owner)),
-      data_(std::make_unique_for_overwrite<char[]>(size_bytes)) {}
+      memory_(std::move(memory)),
+      bytes_(size_bytes) {}
 
 absl::StatusOr<UploadProgress> Upload::add(std::uint64_t offset, std::string_view data) {
+  if (absl::Status status = check_part(offset, data); !status.ok()) return status;
+  const std::scoped_lock lock(mutex_);
+  if (is_finished_) return UploadProgress{size(), true};
+  if (bytes_.runs() >= kMostRuns && !bytes_.joins_a_run(offset, offset + data.size())) {
+    return invalid_input({"UPLOAD_SCATTERED", name_, absl::StrCat("runs <= ", kMostRuns)},
+                         absl::StrCat("What is there is in ", kMostRuns,
+                                      " runs with gaps between them; send a part that joins one of them."));
+  }
+  if (absl::Status status = put(offset, data); !status.ok()) return status;
+  if (bytes_.received() < size()) return UploadProgress{bytes_.received(), false};
+  return finish();
+}
+
+absl::Status Upload::check_part(std::uint64_t offset, std::string_view data) const {
   if (data.empty() || data.size() > kMostPartBytes) {
     return invalid_input(
         {"UPLOAD_PART_SIZE", name_, absl::StrCat("1 to ", kMostPartBytes, " bytes")},
         absl::StrCat("The part has ", data.size(), " bytes, not 1 to ", kMostPartBytes, "."));
   }
-  if (offset > size_ || data.size() > size_ - offset) {
-    return invalid_input({"UPLOAD_PART_OUT_OF_RANGE", name_, absl::StrCat("offset + size <= ", size_)},
-                         absl::StrCat("The part of ", data.size(), " bytes at ", offset,
-                                      " does not lie within the upload's ", size_, " bytes."));
-  }
-  const std::scoped_lock lock(mutex_);
-  if (is_finished_) return UploadProgress{size_, true};
-  if (runs_.size() >= kMostRuns && !is_next_to_others(offset, offset + data.size())) {
-    return invalid_input({"UPLOAD_SCATTERED", name_, absl::StrCat("runs <= ", kMostRuns)},
-                         absl::StrCat("What is there is in ", kMostRuns,
-                                      " runs with gaps between them; send a part that joins one of them."));
-  }
-  std::memcpy(data_.get() + offset, data.data(), data.size());
-  mark(offset, offset + data.size());
-  if (received_ < size_) return UploadProgress{received_, false};
-  if (lpdeform::crc32c({data_.get(), size_}) != crc32c_) {
-    runs_.clear();
-    received_ = 0;
-    return make_fault(absl::StatusCode::kDataLoss, {"UPLOAD_CHECKSUM", name_, ""},
-                      "The bytes received do not have the announced checksum; send all of them again.");
-  }
-  is_finished_ = true;
-  return UploadProgress{size_, true};
+  if (offset <= size() && data.size() <= size() - offset) return absl::OkStatus();
+  return invalid_input({"UPLOAD_PART_OUT_OF_RANGE", name_, absl::StrCat("offset + size <= ", size())},
+                       absl::StrCat("The part of ", data.size(), " bytes at ", offset,
+                                    " does not lie within the upload's ", size(), " bytes."));
 }
 
-/// Whether bytes are there that these touch or overlap, so that no new run begins.
-bool Upload::is_next_to_others(std::uint64_t begin, std::uint64_t end) const {
-  const auto after = runs_.upper_bound(begin);
-  return (after != runs_.end() && after->first <= end) ||
-         (after != runs_.begin() && std::prev(after)->second >= begin);
+absl::Status Upload::put(std::uint64_t offset, std::string_view data) {
+  absl::Status status = memory_.grow_to(bytes_.memory_with(offset, data.size()));
+  if (!status.ok() || bytes_.put(offset, data)) return status;
+  memory_.resize(bytes_.memory());
+  return make_fault(
+      absl::StatusCode::kResourceExhausted, {"MEMORY_FULL", name_, ""},
+      absl::StrCat("The machine has no memory for an upload of ", size(), " bytes; try again later."));
 }
 
-void Upload::mark(std::uint64_t begin, std::uint64_t end) {
-  auto run = runs_.upper_bound(begin);
-  if (run != runs_.begin() && std::prev(run)->second >= begin) run = std::prev(run);
-  while (run != runs_.end() && run->first <= end) {
-    begin = std::min(begin, run->first);
-    end = std::max(end, run->second);
-    received_ -= run->second - run->first;
-    run = runs_.erase(run);
-  }
-  runs_.emplace(begin, end);
-  received_ += end - begin;
+absl::StatusOr<UploadProgress> Upload::finish() {
+  is_finished_ = lpdeform::crc32c(bytes_.whole()) == crc32c_;
+  if (is_finished_) return UploadProgress{size(), true};
+  bytes_.clear();
+  memory_.resize(0);
+  return make_fault(absl::StatusCode::kDataLoss, {"UPLOAD_CHECKSUM", name_, ""},
+                    "The bytes received do not have the announced checksum; send all of them again.");
 }
 
 absl::StatusOr<std::string_view> Upload::bytes() const {
   const std::scoped_lock lock(mutex_);
-  if (is_finished_) return std::string_view(data_.get(), size_);
+  if (is_finished_) return bytes_.whole();
   return make_fault(absl::StatusCode::kFailedPrecondition,
-                    {"UPLOAD_UNFINISHED", name_, absl::StrCat(size_, " bytes")},
-                    absl::StrCat("The upload has ", received_, " of its ", size_, " bytes."));
+                    {"UPLOAD_UNFINISHED", name_, absl::StrCat(size(), " bytes")},
+                    absl::StrCat("The upload has ", bytes_.received(), " of its ", size(), " bytes."));
 }
 
 absl::Status request_id_reused() {
@@ -112,20 +101,34 @@ absl::StatusOr<std::shared_ptr<Upload>> Uploads::create(const std::string& reque
     if (upload->size() == size_bytes && upload->crc32c() == crc32c) return upload;
     return request_id_reused();
   }
+  if (absl::Status status = check_room(size_bytes, owner); !status.ok()) return status;
+  auto upload = std::make_shared<Upload>(absl::StrCat("uploads/", random_hex_128()), size_bytes, crc32c,
+                                         budget_->nothing_yet(owner), owner);
+  uploads_[upload->name()] = {upload, request_id, timers_->now()};
+  if (!request_id.empty()) requested_[{owner, request_id}] = upload->name();
+  ++owned_[owner];
+  watch(upload->name(), timers_->now() + limits_.idle);
+  return upload;
+}
+
+/// Whether the owner may have one more, and it would fit if it came now.
+absl::Status Uploads::check_room(std::uint64_t size_bytes, const std::string& owner) const {
+  const auto found = owned_.find(owner);
+  const std::size_t theirs = found == owned_.end() ? 0 : found->second;
+  if (!owner.empty() && limits_.most_uploads_each != 0 && theirs >= limits_.most_uploads_each) {
+    return make_fault(
+        absl::StatusCode::kResourceExhausted,
+        {"CALLER_UPLOADS_FULL", "uploads", absl::StrCat("uploads <= ", limits_.most_uploads_each)},
+        absl::StrCat("The caller has all of the ", limits_.most_uploads_each,
+                     " uploads that one caller may have; delete those that have served."));
+  }
   if (uploads_.size() >= limits_.most_uploads) {
     return make_fault(absl::StatusCode::kResourceExhausted,
                       {"UPLOADS_FULL", "uploads", absl::StrCat("uploads <= ", limits_.most_uploads)},
                       absl::StrCat("The server has all of its ", limits_.most_uploads,
                                    " uploads in use; delete those that have served, or try again later."));
   }
-  absl::StatusOr<Reservation> memory = budget_->reserve(size_bytes, owner);
-  if (!memory.ok()) return memory.status();
-  auto upload = std::make_shared<Upload>(absl::StrCat("uploads/", random_hex_128()), size_bytes, crc32c,
-                                         *std::move(memory), owner);
-  uploads_[upload->name()] = {upload, request_id, timers_->now()};
-  if (!request_id.empty()) requested_[{owner, request_id}] = upload->name();
-  watch(upload->name(), timers_->now() + limits_.idle);
-  return upload;
+  return budget_->check(size_bytes, owner);
 }
 
 absl::StatusOr<std::shared_ptr<Upload>> Uploads::find(const std::string& name, const std::string& owner) {
@@ -151,7 +154,9 @@ std::size_t Uploads::size() const {
 }
 
 void Uploads::forget(std::map<std::string, Entry>::iterator entry) {
-  requested_.erase({entry->second.upload->owner(), entry->second.request_id});
+  const std::string& owner = entry->second.upload->owner();
+  requested_.erase({owner, entry->second.request_id});
+  if (const auto owned = owned_.find(owner); --owned->second == 0) owned_.erase(owned);
   uploads_.erase(entry);
 }
 

@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "server/budget.h"
 #include "server/timers.h"
+#include "server/upload_bytes.h"
 
 namespace lpdeform {
 
@@ -24,18 +25,20 @@ struct UploadProgress {
 /// Bytes that come in parts, in any order. Thread-safe.
 class Upload {
  public:
+  /// `memory`: empty, of the owner's; it grows with what comes (UploadBytes).
   Upload(std::string name, std::uint64_t size_bytes, std::uint32_t crc32c, Reservation memory,
          std::string owner = "");
 
   const std::string& name() const { return name_; }
   /// The subject of the caller that made it.
   const std::string& owner() const { return owner_; }
-  std::uint64_t size() const { return size_; }
+  std::uint64_t size() const { return bytes_.size(); }
   std::uint32_t crc32c() const { return crc32c_; }
 
   /// The last missing part finishes it; later ones are ignored. Errors: INVALID_ARGUMENT UPLOAD_PART_SIZE
-  /// (empty, or over 1 MiB), UPLOAD_PART_OUT_OF_RANGE, UPLOAD_SCATTERED (it would begin one run too many); DATA_LOSS
-  /// UPLOAD_CHECKSUM (all of it has to be sent again).
+  /// (empty, or over 1 MiB), UPLOAD_PART_OUT_OF_RANGE, UPLOAD_SCATTERED (it would begin one run too many); RESOURCE_EXHAUSTED
+  /// MEMORY_FULL, CALLER_MEMORY_FULL: the upload stays as it is, and the part may be sent again; DATA_LOSS
+  /// UPLOAD_CHECKSUM (all of it has to be sent again; its memory is given back until then).
   absl::StatusOr<UploadProgress> add(std::uint64_t offset, std::string_view data);
 
   /// The whole, for as long as the upload lives. FAILED_PRECONDITION UPLOAD_UNFINISHED.
@@ -46,24 +49,21 @@ class Upload {
   static constexpr std::size_t kMostRuns = 1024;
 
  private:
-  bool is_next_to_others(std::uint64_t begin, std::uint64_t end) const;
-  void mark(std::uint64_t begin, std::uint64_t end);
+  absl::Status check_part(std::uint64_t offset, std::string_view data) const;
+  absl::Status put(std::uint64_t offset, std::string_view data);
+  absl::StatusOr<UploadProgress> finish();
 
   const std::string name_;
-  const std::uint64_t size_;
   const std::uint32_t crc32c_;
-  const Reservation memory_;
   const std::string owner_;
   mutable std::mutex mutex_;
-  std::unique_ptr<char[]> data_;
-  std::map<std::uint64_t, std::uint64_t>
-      runs_;  // begin to end of what is there; they neither touch nor overlap
-  std::uint64_t received_ = 0;
+  Reservation memory_;
+  UploadBytes bytes_;
   bool is_finished_ = false;
 };
 
-/// All uploads of a server. They go when nobody has touched them for a while. Thread-safe. Held by
-/// a shared pointer.
+/// All uploads of a server. They go when nobody has touched them for a while. One that was announced takes no memory before its
+/// bytes come. Thread-safe. Held by a shared pointer.
 class Uploads : public std::enable_shared_from_this<Uploads> {
  public:
   static constexpr std::size_t kMostUploads = 4096;  // small ones cost more than their bytes
@@ -72,12 +72,14 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
     std::uint64_t most_bytes_each;
     Timers::Duration idle;
     std::size_t most_uploads = kMostUploads;
+    std::size_t most_uploads_each =
+        0;  // of one owner; 0: without limit. Not for the owner "", who is everybody.
   };
 
   Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers, Limits limits);
 
-  /// Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED MEMORY_FULL,
-  /// CALLER_MEMORY_FULL, UPLOADS_FULL.
+  /// Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED UPLOADS_FULL, CALLER_UPLOADS_FULL;
+  /// MEMORY_FULL, CALLER_MEMORY_FULL where there is no room for all of it now: that there is promises nothing.
   absl::StatusOr<std::shared_ptr<Upload>> create(const std::string& request_id, std::uint64_t size_bytes,
                                                  std::uint32_t crc32c, const std::string& owner = "");
 
@@ -95,6 +97,7 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
     std::string request_id;
     Timers::TimePoint last_used;
   };
+  absl::Status check_room(std::uint64_t size_bytes, const std::string& owner) const;
   void forget(std::map<std::string, Entry>::iterator entry);
   void watch(const std::string& name, Timers::TimePoint when);
   void expire(const std::string& name);
@@ -105,6 +108,7 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
   mutable std::mutex mutex_;
   std::map<std::string, Entry> uploads_;                                  // by name
   std::map<std::pair<std::string, std::string>, std::string> requested_;  // names, by owner and request_id
+  std::map<std::string, std::size_t> owned_;                              // how many each owner has
 };
 
 inline constexpr std::size_t kLeastRequestId = 8, kMostRequestId = 64;  // bytes

@@ -18,19 +18,13 @@ absl::Status check_region(const std::vector<std::int32_t>& region, std::int32_t 
   }
   if (region.front() >= 0 && region.back() < vertex_count) return absl::OkStatus();
   const std::int32_t vertex = region.front() < 0 ? region.front() : region.back();
-  return invalid_input({"REGION_VERTEX_OUT_OF_RANGE", absl::StrCat("vertex ", vertex),
-                        absl::StrCat("0 <= vertex < ", vertex_count)},
-                       absl::StrCat("the region of interest has vertex ", vertex, "; the mesh has ",
-                                    vertex_count, " vertices"));
+  return region_vertex_out_of_range(vertex, vertex_count);
 }
 
 absl::Status check_faces(const std::string& name, const Handle& handle, std::int32_t face_count) {
   for (const SurfacePoint& point : handle.points) {
     if (point.face >= 0 && point.face < face_count) continue;
-    return invalid_input({"HANDLE_FACE_OUT_OF_RANGE", absl::StrCat("face ", point.face),
-                          absl::StrCat("0 <= face < ", face_count)},
-                         absl::StrCat(handle_element(name), " has a point in face ", point.face,
-                                      "; the mesh has ", face_count, " faces"));
+    return handle_face_out_of_range(name, point.face, face_count);
   }
   return absl::OkStatus();
 }
@@ -89,23 +83,37 @@ absl::Status check_handles(const HandleSet& handles, std::int32_t vertex_count, 
   for (const auto& [name, handle] : handles.handles()) {
     if (absl::Status status = check_faces(name, handle, face_count); !status.ok()) return status;
     for (const std::int32_t vertex : handle.vertices) {
-      const std::string element = absl::StrCat("vertex ", vertex);
-      if (vertex < 0 || vertex >= vertex_count) {
-        return invalid_input(
-            {"HANDLE_VERTEX_OUT_OF_RANGE", element, absl::StrCat("0 <= vertex < ", vertex_count)},
-            absl::StrCat(handle_element(name), " holds vertex ", vertex, "; the mesh has ", vertex_count,
-                         " vertices, 0 to ", vertex_count - 1));
-      }
+      if (vertex < 0 || vertex >= vertex_count) return handle_vertex_out_of_range(name, vertex, vertex_count);
       const auto [entry, is_new] = owner.emplace(vertex, name);
       if (is_new) continue;
       const std::string where = entry->second == name ? absl::StrCat("twice in ", handle_element(name))
                                                       : absl::StrCat("in ", handle_element(entry->second),
                                                                      " and in ", handle_element(name));
-      return invalid_input({"HANDLE_VERTEX_TWICE", element, "one handle a vertex"},
+      return invalid_input({"HANDLE_VERTEX_TWICE", absl::StrCat("vertex ", vertex), "one handle a vertex"},
                            absl::StrCat("vertex ", vertex, " is ", where));
     }
   }
   return absl::OkStatus();
+}
+
+absl::Status handle_vertex_out_of_range(std::string_view handle, std::int64_t vertex, std::int64_t count) {
+  return invalid_input(
+      {"HANDLE_VERTEX_OUT_OF_RANGE", absl::StrCat("vertex ", vertex), absl::StrCat("0 <= vertex < ", count)},
+      absl::StrCat(handle_element(handle), " holds vertex ", vertex, "; the mesh has ", count,
+                   " vertices, 0 to ", count - 1));
+}
+
+absl::Status handle_face_out_of_range(std::string_view handle, std::int64_t face, std::int64_t count) {
+  return invalid_input(
+      {"HANDLE_FACE_OUT_OF_RANGE", absl::StrCat("face ", face), absl::StrCat("0 <= face < ", count)},
+      absl::StrCat(handle_element(handle), " has a point in face ", face, "; the mesh has ", count,
+                   " faces"));
+}
+
+absl::Status region_vertex_out_of_range(std::int64_t vertex, std::int64_t count) {
+  return invalid_input(
+      {"REGION_VERTEX_OUT_OF_RANGE", absl::StrCat("vertex ", vertex), absl::StrCat("0 <= vertex < ", count)},
+      absl::StrCat("the region of interest has vertex ", vertex, "; the mesh has ", count, " vertices"));
 }
 
 Points rest_positions(const Handle& handle, const Points& rest, const Faces& faces) {

@@ -11,7 +11,7 @@ import programs
 ROOT = os.path.join(os.path.dirname(__file__), "..", "..")
 FLAG = re.compile(r"^  --([a-z-]+) \S.*?=(\S+) \(Env:(\w+)\)$", re.MULTILINE)
 ROW = re.compile(r"^\| `--([a-z-]+)` \| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
-UNITS = {"KiB": 2**10, "MiB": 2**20, "GiB": 2**30, "s": 1, "": 1}
+UNITS = {"KiB": 2**10, "MiB": 2**20, "GiB": 2**30, "s": 1, "": 1, "%": 0.01}
 NO_REASON = "-"
 OTHER_LIMITS = {"connection-idle", "session-idle", "upload-idle", "heartbeat", "grace"}
 
@@ -21,8 +21,8 @@ def is_limit(flag):
 
 
 def value_of(text):
-    number, unit = re.fullmatch(r"([\d,]+) ?(\w*)", text).groups()
-    return int(number.replace(",", "")) * UNITS[unit]
+    number, unit = re.fullmatch(r"([\d,.]+) ?(\w*|%)", text).groups()
+    return float(number.replace(",", "")) * UNITS[unit]
 
 
 class Limits(unittest.TestCase):
@@ -39,7 +39,7 @@ class Limits(unittest.TestCase):
 
     def test_the_defaults_are_those_of_the_flags(self):
         for flag, (default, _, _) in self.rows.items():
-            self.assertEqual(value_of(default), float(self.flags[flag][0]), flag)
+            self.assertEqual(value_of(default), value_of(self.flags[flag][0]), flag)
 
     def test_every_flag_has_the_variable_of_its_name(self):
         for flag, (_, variable) in self.flags.items():
@@ -77,6 +77,12 @@ class Limits(unittest.TestCase):
         for flag, value, why in (("max-bytes", "-1", "must not be negative"), ("max-bytes", "0.5%", "must be 1% to 100%"),
                                  ("max-bytes", "101%", "must be 1% to 100%"), ("max-bytes", "x%", "must be 1% to 100%"),
                                  ("max-bytes-per-caller", "-1", "must not be negative"),
+                                 ("max-bytes-per-caller", "0.5%", "must be 1% to 100%"),
+                                 ("max-bytes-per-caller", "101%", "must be 1% to 100%"),
+                                 ("max-bytes-per-caller", "%", "must be 1% to 100%"),
+                                 ("max-uploads-per-caller", "-1", "max_uploads_per_caller must be 0 to 10^6"),
+                                 ("max-streams-per-caller", "-1", "max_streams_per_caller must be 0 to 10^6"),
+                                 ("max-sessions-per-caller", "-1", "max_sessions_per_caller must be 0 to 10^6"),
                                  ("max-upload-bytes", "-4KiB", "must not be negative"),
                                  ("session-idle", "1e300", "must be 0.001 to 1e+09 seconds"),
                                  ("session-idle", "nan", "must be 0.001 to 1e+09 seconds"),

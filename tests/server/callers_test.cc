@@ -200,7 +200,8 @@ class CallersWithLimitsTest : public CallersTest {
   CallersWithLimitsTest() {
     timers_ = std::make_shared<ManualTimers>();
     options_.max_streams_per_caller = 1;
-    options_.max_bytes_per_caller = std::size_t{5} << 19;  // two small sessions by the estimate, not three
+    options_.max_bytes_per_caller.bytes = std::size_t{5}
+                                          << 19;  // two small sessions by the estimate, not three
     options_.max_upload_bytes_per_second = 1 << 20;
     options_.max_sessions_per_caller = 0;
   }

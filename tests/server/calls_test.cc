@@ -187,7 +187,8 @@ TEST_F(CallsTest, EveryCallSaysNotFoundForASessionThatIsNot) {
     EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
     const ErrorDetails details = details_of(status);
     EXPECT_EQ(details.info.reason(), "SESSION_UNKNOWN");
-    EXPECT_TRUE(details.resource.has_value());
+    ASSERT_TRUE(details.resource.has_value());
+    EXPECT_EQ(details.resource->resource_type(), "lpdeform.v1.Session");
     EXPECT_FALSE(details.retry.has_value());
   }
 }
@@ -301,42 +302,29 @@ TEST_F(CallsTest, HealthSaysServingUntilTheServerDrains) {
   EXPECT_FALSE(is_serving(address));
 }
 
-TEST_F(CallsTest, ReflectionNamesTheService) {
-  grpc::GenericStub stub(grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kTestDeadline);
-  grpc::CompletionQueue queue;
-  void* tag = nullptr;
-  bool is_ok = false;
-  const auto call =
-      stub.PrepareCall(&context, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", &queue);
-  call->StartCall(nullptr);
-  ASSERT_TRUE(queue.Next(&tag, &is_ok) && is_ok);
-  // ServerReflectionRequest with list_services, field 7, "*".
-  const grpc::Slice ask(std::string("\x3a\x01*"));
-  call->Write(grpc::ByteBuffer(&ask, 1), nullptr);
-  ASSERT_TRUE(queue.Next(&tag, &is_ok) && is_ok);
-  grpc::ByteBuffer answer;
-  call->Read(&answer, nullptr);
-  ASSERT_TRUE(queue.Next(&tag, &is_ok) && is_ok);
-  std::vector<grpc::Slice> slices;
-  ASSERT_TRUE(answer.Dump(&slices).ok());
-  std::string bytes;
-  for (const grpc::Slice& slice : slices)
-    bytes.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
-  EXPECT_NE(bytes.find("lpdeform.v1.DeformService"), std::string::npos);
-  EXPECT_NE(bytes.find("grpc.health.v1.Health"), std::string::npos);
-  context.TryCancel();
-  grpc::Status status;
-  call->Finish(&status, nullptr);
-  queue.Next(&tag, &is_ok);
-}
-
 TEST_F(CallsTest, ATakenPortIsAnError) {
   ServerOptions options;
   options.address = server_->address();
   const auto second = Server::start(options);
   EXPECT_TRUE(absl::IsUnavailable(second.status())) << second.status();
+}
+
+TEST(ServerOptionsTest, TheMemoryOfACallerIsAShareOfAll) {
+  ServerOptions options;
+  options.max_bytes = 1000;
+  EXPECT_EQ(caller_max_bytes(options), 500u);
+  options.max_bytes_per_caller.percent = 25;
+  EXPECT_EQ(caller_max_bytes(options), 250u);
+  options.max_bytes = 1;  // 0 would be without limit
+  EXPECT_EQ(caller_max_bytes(options), 1u);
+  options.max_bytes_per_caller.bytes = 7;
+  EXPECT_EQ(caller_max_bytes(options), 7u);
+  options.max_bytes_per_caller.bytes = 0;
+  EXPECT_EQ(caller_max_bytes(options), 0u);
+  for (const double percent : {0.5, 101.0, std::numeric_limits<double>::quiet_NaN()}) {
+    options.max_bytes_per_caller = {.percent = percent};
+    EXPECT_EQ(fault_of(Server::start(options).status()).element, "max_bytes_per_caller");
+  }
 }
 
 TEST(ServerOptionsTest, AreChecked) {

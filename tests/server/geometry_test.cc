@@ -194,6 +194,34 @@ TEST_F(GeometryTest, AnUpdateOfSomebodyElseNeverLooksAtTheGeometry) {
   EXPECT_EQ(details_of(stub_->UpdateHandles(&context, request, &response)).info.reason(), "NOT_THE_WRITER");
 }
 
+class GeometryWithLittleMemoryTest : public GeometryTest {
+ protected:
+  void SetUp() override {
+    options_.max_bytes = 2'000'000;
+    start();
+  }
+};
+
+TEST_F(GeometryWithLittleMemoryTest, WhatWaitsForTheGeometryIsCountedUntilItsTurn) {
+  const auto session = create(neck_mesh());
+  v1::Update message;
+  message.set_input_seq(1);
+  set_automatic(*message.mutable_settings(), 1);
+  for (const char* const name : {"a", "b"}) {
+    v1::HandleUpdate& handle = *message.add_handles();
+    handle.set_name(name);
+    handle.mutable_set()->mutable_vertices()->set_inline_(std::string(1 << 20, '\0'));
+  }
+  const ErrorDetails details = details_of(update(session, message));
+  EXPECT_EQ(details.info.reason(), "MEMORY_FULL");
+  EXPECT_TRUE(details.retry.has_value());
+  message.clear_handles();
+  for (std::uint64_t seq = 2; seq < 5; ++seq) {
+    message.set_input_seq(seq);
+    EXPECT_TRUE(update(session, message).ok());
+  }
+}
+
 TEST_F(GeometryTest, AStrengthOutOfRangeIsRefusedWhole) {
   const auto session = create(neck_mesh());
   for (const double strength : {-0.5, 1.5, std::numeric_limits<double>::quiet_NaN()}) {

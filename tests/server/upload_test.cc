@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 #include "core/base/crc32c.h"
 #include "core/base/fault.h"
 #include "manual_timers.h"
+#include "server/refusals.h"
 
 namespace lpdeform {
 namespace {
@@ -63,9 +65,87 @@ TEST_F(UploadTest, RefusesSizesBeyondTheLimitsBeforeTakingMemory) {
   EXPECT_EQ(reason(uploads_->create("", 0, 0).status()), "UPLOAD_SIZE");
   EXPECT_EQ(reason(uploads_->create("", ~std::uint64_t{0}, 0).status()), "UPLOAD_SIZE");
   const auto first = create(std::string(600, 'a'));
+  ASSERT_TRUE(first->add(0, "a").ok());
   const auto second = uploads_->create("", 600, 0);
   EXPECT_TRUE(absl::IsResourceExhausted(second.status()));
   EXPECT_EQ(reason(second.status()), "MEMORY_FULL");
+}
+
+TEST_F(UploadTest, AnnouncedUploadsLeaveAllMemoryToOthers) {
+  std::vector<std::shared_ptr<Upload>> announced;
+  for (int k = 0; k < 95; ++k) announced.push_back(create(std::string(800, 'a')));
+  EXPECT_EQ(budget_->used(), 0u);
+  EXPECT_TRUE(budget_->reserve(1000).ok());
+}
+
+TEST_F(UploadTest, APartWithoutRoomLeavesTheUploadAsItIsAndMayComeAgain) {
+  const auto budget = std::make_shared<Budget>(10 * UploadBytes::kStep);
+  const auto uploads =
+      std::make_shared<Uploads>(budget, timers_, Uploads::Limits{1 << 20, std::chrono::minutes(10)});
+  const std::string bytes(3 * UploadBytes::kStep, 'a');
+  const auto upload = *uploads->create("", bytes.size(), crc32c(bytes));
+  const std::string_view first = std::string_view(bytes).substr(0, UploadBytes::kStep + 1),
+                         second = std::string_view(bytes).substr(first.size());
+  ASSERT_TRUE(upload->add(0, first).ok());
+  EXPECT_EQ(budget->used(), 2 * UploadBytes::kStep);
+  auto others = budget->reserve(8 * UploadBytes::kStep);
+  ASSERT_TRUE(others.ok());
+  for (int times = 0; times < 2; ++times) {
+    const absl::Status refused = upload->add(first.size(), second).status();
+    EXPECT_TRUE(absl::IsResourceExhausted(refused));
+    EXPECT_EQ(reason(refused), "MEMORY_FULL");
+    EXPECT_EQ(fault_of(refused).limit, "bytes <= 655360");
+    EXPECT_GT(retry_after_ms(refused), 0u);
+    EXPECT_EQ(budget->used(), 10 * UploadBytes::kStep);
+  }
+  EXPECT_EQ(upload->add(0, "a")->received_bytes, first.size());  // what is there may come again, however full
+  *others = Reservation();
+  EXPECT_TRUE(upload->add(first.size(), second)->is_finished);
+  EXPECT_EQ(budget->used(), bytes.size());
+  EXPECT_EQ(*upload->bytes(), bytes);
+}
+
+TEST_F(UploadTest, TheCallersShareBoundsWhatComesOfItsUploads) {
+  const auto budget = std::make_shared<Budget>(1 << 20, 2 * UploadBytes::kStep);
+  const auto uploads =
+      std::make_shared<Uploads>(budget, timers_, Uploads::Limits{1 << 20, std::chrono::minutes(10)});
+  const std::uint64_t size = 2 * UploadBytes::kStep;
+  const auto first = *uploads->create("", size, 0, "alice"), second = *uploads->create("", size, 0, "alice");
+  EXPECT_EQ(reason(uploads->create("", size + 1, 0, "alice").status()), "CALLER_MEMORY_FULL");
+  ASSERT_TRUE(first->add(0, "a").ok());
+  ASSERT_TRUE(second->add(0, "a").ok());
+  EXPECT_EQ(reason(first->add(UploadBytes::kStep, "a").status()), "CALLER_MEMORY_FULL");
+  EXPECT_TRUE((*uploads->create("", size, 0, "bob"))->add(0, "a").ok());
+  uploads->remove(second->name(), "alice");
+}
+
+TEST_F(UploadTest, AWrongChecksumGivesItsMemoryBackUntilItComesAgain) {
+  const auto upload = create("abcd");
+  ASSERT_TRUE(upload->add(0, "ab").ok());
+  EXPECT_EQ(budget_->used(), 4u);
+  EXPECT_EQ(reason(upload->add(2, "xx").status()), "UPLOAD_CHECKSUM");
+  EXPECT_EQ(budget_->used(), 0u);
+  EXPECT_TRUE(upload->add(0, "abcd")->is_finished);
+  EXPECT_EQ(budget_->used(), 4u);
+}
+
+TEST_F(UploadTest, OneOwnerHasSoManyUploadsAndNoMore) {
+  const auto uploads = std::make_shared<Uploads>(
+      budget_, timers_,
+      Uploads::Limits{.most_bytes_each = 8, .idle = std::chrono::minutes(10), .most_uploads_each = 2});
+  const auto first = *uploads->create("request-1", 8, 0, "alice");
+  ASSERT_TRUE(uploads->create("", 8, 0, "alice").ok());
+  const absl::Status third = uploads->create("", 8, 0, "alice").status();
+  EXPECT_EQ(reason(third), "CALLER_UPLOADS_FULL");
+  EXPECT_EQ(fault_of(third).limit, "uploads <= 2");
+  EXPECT_GT(retry_after_ms(third), 0u);
+  EXPECT_EQ(*uploads->create("request-1", 8, 0, "alice"), first);  // no other one
+  EXPECT_TRUE(uploads->create("", 8, 0, "bob").ok());
+  for (int k = 0; k < 10; ++k) EXPECT_TRUE(uploads->create("", 8, 0).ok());  // everybody's
+  uploads->remove(first->name(), "alice");
+  EXPECT_TRUE(uploads->create("", 8, 0, "alice").ok());
+  timers_->advance(std::chrono::minutes(10));
+  for (int k = 0; k < 2; ++k) EXPECT_TRUE(uploads->create("", 8, 0, "alice").ok());
 }
 
 TEST_F(UploadTest, RefusesAnIdThatWasUsedForAnother) {
@@ -117,16 +197,20 @@ TEST_F(UploadTest, TheSameRequestIdGivesTheSameUpload) {
 
 TEST_F(UploadTest, DeletingItGivesItsMemoryAndItsIdBackAndMayBeRepeated) {
   const auto first = uploads_->create("request-1", 8, 0).value();
+  ASSERT_TRUE(first->add(0, "a").ok());
   const std::string name = first->name();
   uploads_->remove(name);
   uploads_->remove(name);
   EXPECT_TRUE(absl::IsNotFound(uploads_->find(name).status()));
-  EXPECT_NE(uploads_->create("request-1", 4, 0).value()->name(), name);
+  const auto second = uploads_->create("request-1", 4, 0).value();
+  EXPECT_NE(second->name(), name);
+  ASSERT_TRUE(second->add(0, "a").ok());
   EXPECT_EQ(budget_->used(), 12u);  // 8 of it as long as `first` is held
 }
 
 TEST_F(UploadTest, GoesWhenNobodyTouchesItAndGivesItsMemoryBack) {
   const std::string name = create("abcd", "request-1")->name();
+  ASSERT_TRUE(uploads_->find(name).value()->add(0, "a").ok());
   timers_->advance(std::chrono::minutes(9));
   EXPECT_TRUE(uploads_->find(name).ok());
   timers_->advance(std::chrono::minutes(9));

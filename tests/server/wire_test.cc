@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <string>
+#include <tuple>
 
 #include "core/base/crc32c.h"
 #include "core/base/fault.h"
@@ -92,12 +93,43 @@ TEST_F(WireTest, FloatsAndDoublesBothBecomeDoubles) {
   EXPECT_EQ(reason(decoder(2).positions(message).status()), "POSITIONS_SIZE");
 }
 
-TEST_F(WireTest, AnIndexThatDoesNotFitStaysOutOfRange) {
+/// Numbers that no std::int32_t can hold.
+TEST_F(WireTest, AnIndexThatDoesNotFitIsNamedAsItWasSent) {
+  for (const std::uint32_t index : {0x80000000u, 0xffffffffu}) {
+    const std::string bytes(reinterpret_cast<const char*>(&index), 4), number = std::to_string(index);
+    v1::Update vertices, points, region;
+    v1::HandleUpdate& handle = *vertices.add_handles();
+    handle.set_name("a");
+    handle.mutable_set()->mutable_vertices()->set_inline_(bytes);
+    *points.add_handles() = handle;
+    points.mutable_handles(0)->mutable_set()->clear_vertices();
+    points.mutable_handles(0)->mutable_set()->mutable_points()->mutable_faces()->set_inline_(bytes);
+    region.mutable_settings()->mutable_region()->mutable_vertices()->set_inline_(bytes);
+    for (const auto& [message, why, element] :
+         {std::tuple(vertices, "HANDLE_VERTEX_OUT_OF_RANGE", "vertex " + number),
+          std::tuple(points, "HANDLE_FACE_OUT_OF_RANGE", "face " + number),
+          std::tuple(region, "REGION_VERTEX_OUT_OF_RANGE", "vertex " + number)}) {
+      const absl::Status status = decoder(10).update(message).status();
+      EXPECT_EQ(reason(status), why);
+      EXPECT_EQ(fault_of(status).element, element);
+      EXPECT_TRUE(status.message().find(number) != std::string_view::npos) << status;
+    }
+    v1::Weld weld;
+    weld.mutable_groups()->set_inline_(bytes);
+    const absl::Status status = decoder(1).weld(weld, Points::Zero(1, 3)).status();
+    EXPECT_EQ(reason(status), "WELD_OUT_OF_RANGE");
+    EXPECT_TRUE(status.message().find(number) != std::string_view::npos) << status;
+    v1::SettingsUpdate settings;
+    settings.mutable_solver()->set_max_iterations(index);
+    const absl::Status too_many = decoder(1).settings(settings).status();
+    EXPECT_EQ(reason(too_many), "ITERATIONS_OUT_OF_RANGE");
+    EXPECT_TRUE(too_many.message().find(number) != std::string_view::npos) << too_many;
+  }
+}
+
+TEST_F(WireTest, AnIndexThatJustFitsIsLeftToTheCheckOfTheMesh) {
   v1::Update message;
-  v1::HandleUpdate& handle = *message.add_handles();
-  const std::uint32_t index = 0x80000000u;
-  handle.mutable_set()->mutable_vertices()->set_inline_(
-      std::string(reinterpret_cast<const char*>(&index), 4));
+  message.add_handles()->mutable_set()->mutable_vertices()->set_inline_("\xff\xff\xff\x7f");
   const auto update = decoder(10).update(message);
   ASSERT_TRUE(update.ok());
   EXPECT_EQ(std::get<Handle>(update->handles[0].change).vertices[0],

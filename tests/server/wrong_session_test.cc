@@ -105,7 +105,7 @@ INSTANTIATE_TEST_SUITE_P(
                      [](auto& request) {
                        request.mutable_settings()->mutable_region()->mutable_vertices()->set_inline_("");
                      }},
-        WrongSession{"REGION_VERTEX_OUT_OF_RANGE", "vertex 2147483647",
+        WrongSession{"REGION_VERTEX_OUT_OF_RANGE", "vertex 4294967295",
                      [](auto& request) {
                        request.mutable_settings()->mutable_region()->mutable_vertices()->set_inline_(
                            std::string(4, '\xff'));
@@ -181,12 +181,12 @@ TEST_F(SmallServerTest, TooLargeAMeshNamesTheLimit) {
   EXPECT_EQ(details.info.metadata().at("limit"), "vertices <= 400, faces <= 1200");
 }
 
-TEST_F(SmallServerTest, MemoryIsPromisedOnceOnly) {
+TEST_F(SmallServerTest, MemoryIsGivenOnceOnly) {
+  upload(std::string(1'500'000, 'x'));
   v1::CreateUploadRequest announce;
   announce.set_size_bytes(1'500'000);
   v1::CreateUploadResponse created;
-  grpc::ClientContext first, second;
-  EXPECT_TRUE(stub_->CreateUpload(&first, announce, &created).ok());
+  grpc::ClientContext second;
   const grpc::Status status = stub_->CreateUpload(&second, announce, &created);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_EQ(details_of(status).info.reason(), "MEMORY_FULL");

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string_view>
+
+namespace lpdeform {
+
+/// Bytes of a size that is known, which come in parts, in any order. Only what has come takes memory, by steps, however large the
+/// size is: it comes from the system, page by page as it is written, and goes back to it at once. One thread at a time.
+class UploadBytes {
+ public:
+  /// Bytes whose memory is counted together; the last step may be shorter.
+  static constexpr std::uint64_t kStep = 64u << 10;
+
+  explicit UploadBytes(std::uint64_t size) : size_(size), data_(nullptr, Unmap{size}) {}
+
+  std::uint64_t size() const { return size_; }
+  /// How many have come.
+  std::uint64_t received() const { return received_; }
+  /// Stretches without gaps in which they lie.
+  std::size_t runs() const { return runs_.size(); }
+  /// Whether bytes are there that those from `begin` to `end` touch or overlap, so that no new run begins.
+  bool joins_a_run(std::uint64_t begin, std::uint64_t end) const;
+
+  /// Bytes of memory that are taken.
+  std::size_t memory() const { return memory_; }
+  /// The same once `count` bytes from `begin` on have come, too: 1 or more, within the size.
+  std::size_t memory_with(std::uint64_t begin, std::uint64_t count) const;
+
+  /// `part` lies within the size, and is not empty. False, and nothing changes, where the system has no memory for it.
+  bool put(std::uint64_t begin, std::string_view part);
+  /// From the first to the last; zero where nothing has come. After the first part, until clear().
+  std::string_view whole() const { return {data_.get(), size_}; }
+
+  /// As if nothing had come.
+  void clear();
+
+ private:
+  struct Unmap {
+    std::uint64_t size;
+    void operator()(char* data) const;
+  };
+  bool has_some(std::uint64_t begin, std::uint64_t end) const;
+  void mark(std::uint64_t begin, std::uint64_t end);
+
+  const std::uint64_t size_;
+  std::unique_ptr<char, Unmap> data_;  // null before the first part
+  // Begin to end of what is there; they neither touch nor overlap.
+  std::map<std::uint64_t, std::uint64_t> runs_;
+  std::uint64_t received_ = 0;
+  std::size_t memory_ = 0;
+};
+
+}  // namespace lpdeform
