@@ -171,12 +171,19 @@ class FullDisk(OfServers):
 
     def test_a_server_that_begins_on_a_full_disk_removes(self):
         server, client = self.begin(self.store)
-        sessions = [client.create(height) for height in range(3)]
-        self.assertEqual(self.stopped(server)[0], 0)
-        self.fill()
-        _, client = self.begin(self.store)
-        client.delete(sessions[0])
-        client.create(3)
+        sessions = [client.create(height) for height in range(4)]
+        for how in (signal.SIGTERM, signal.SIGKILL):
+            self.fill()
+            server.process.send_signal(how)
+            self.assertEqual(server.process.wait(programs.PATIENCE), 0 if how == signal.SIGTERM else -signal.SIGKILL)
+            server.reader.join()
+            server.process.stdout.close()
+            self.fill()  # what an end gives back, somebody else takes
+            server, client = self.begin(self.store)
+            client.delete(sessions.pop())
+            sessions.append(client.create(9 + how))
+        for session in sessions:
+            client.call("GetSession", session=session.session.name)
 
     def test_what_a_full_disk_did_not_take_is_named_at_the_end(self):
         server, client = self.begin(self.store)
