@@ -86,8 +86,10 @@ class Backend {
   void when_decodable(const std::shared_ptr<Session>& session, const std::string& token,
                       const v1::Update& update, Done then);
 
-  /// Ends the process's part in all sessions, as it shuts down, and waits until the store has what has changed.
-  void release_sessions(const std::string& text);
+  /// Ends the process's part in all sessions, as it shuts down, and waits until the store has what has changed, up to kFlushPatience.
+  /// Whether it has.
+  bool release_sessions(const std::string& text);
+  static constexpr std::chrono::seconds kFlushPatience{5};
 
   /// What a call is going to do.
   enum class Access { kRead, kChange };

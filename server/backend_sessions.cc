@@ -22,7 +22,6 @@ constexpr std::uint32_t kDefaultPage = 100, kLargestPage = 1000;
 constexpr std::string_view kKeptOnly = "kept:";
 
 /// That a server which shuts down gives its store.
-constexpr std::chrono::seconds kFlushPatience{5};
 
 }  // namespace
 
@@ -219,7 +218,8 @@ void Backend::acquire_writer(const CallContext& call, const v1::AcquireWriterReq
                              v1::AcquireWriterResponse& response, Done done) {
   const auto session = find(call, Access::kChange, request.session());
   if (!session.ok()) return done(session.status());
-  if (keeper_ && keeper_->is_failing()) return done(store_failing("it has not taken the last change yet"));
+  if (absl::Status status = keeper_ ? keeper_->may_keep(**session) : absl::OkStatus(); !status.ok())
+    return done(status);
   const WriterLease lease = (*session)->acquire_writer();
   response.set_writer_token(lease.token);
   response.set_epoch(lease.epoch);
@@ -229,9 +229,12 @@ void Backend::acquire_writer(const CallContext& call, const v1::AcquireWriterReq
                                  {"input_seq", lease.input_seq},
                                  {"trace_id", call.trace_id}});
   if (keeper_ == nullptr) return done(absl::OkStatus());
-  keeper_->changed(**session, 0, lease.epoch, [done = std::move(done)](bool is_kept) {
-    done(is_kept ? absl::OkStatus() : store_failing("the new writer could not be kept; take over again"));
-  });
+  keeper_->changed(
+      **session, 0, lease.epoch, [this, session = *session, done = std::move(done)](bool is_kept) {
+        if (is_kept) return done(absl::OkStatus());
+        const absl::Status why = keeper_->may_keep(*session);
+        done(is_full(why) ? why : store_failing("the new writer could not be kept; take over again"));
+      });
 }
 
 void Backend::update_handles(const CallContext& call, const v1::UpdateHandlesRequest& request,
@@ -366,9 +369,9 @@ void Backend::end_restoring(const std::string& name, const absl::Status& status)
   for (const Done& then : waiting) then(is_unknown ? absl::OkStatus() : status);
 }
 
-void Backend::release_sessions(const std::string& text) {
+bool Backend::release_sessions(const std::string& text) {
   registry->clear(EndReason::kDraining, text);
-  if (keeper_) keeper_->flush(std::chrono::steady_clock::now() + kFlushPatience);
+  return !keeper_ || keeper_->flush(std::chrono::steady_clock::now() + kFlushPatience).empty();
 }
 
 }  // namespace lpdeform

@@ -20,11 +20,12 @@ namespace {
 constexpr const char* kUnfinished = ".unfinished";
 
 absl::Status failed(const std::string& path, int error) {
-  return store_failing(absl::StrCat(std::system_category().message(error), " (", path, ")"));
+  const std::string why = absl::StrCat(std::system_category().message(error), " (", path, ")");
+  return error == ENOSPC || error == EDQUOT ? store_full(why) : store_failing(why);
 }
 
 absl::Status failed(const std::string& path, const std::error_code& error) {
-  return store_failing(absl::StrCat(error.message(), " (", path, ")"));
+  return failed(path, error.value());
 }
 
 absl::Status write_all(int fd, std::string_view bytes, const std::string& path) {
@@ -54,10 +55,21 @@ absl::Status write_file(const std::string& path, std::string_view bytes) {
 
 }  // namespace
 
-absl::StatusOr<BlobFolder> BlobFolder::open(const std::string& path) {
+absl::Status make_private_folder(const std::string& path) {
   std::error_code error;
-  std::filesystem::create_directories(path, error);
+  const std::filesystem::path above = std::filesystem::path(path).parent_path();
+  if (!above.empty()) std::filesystem::create_directories(above, error);
   if (error) return failed(path, error);
+  if (mkdir(path.c_str(), S_IRWXU) == 0) return absl::OkStatus();
+  const int why = errno;
+  return std::filesystem::is_directory(path, error) ? absl::OkStatus() : failed(path, why);
+}
+
+absl::StatusOr<BlobFolder> BlobFolder::open(const std::string& path) {
+  if (absl::Status status = make_private_folder(path); !status.ok()) return status;
+  // One of a server before this one's time may be open to all. Where the disk knows no modes, it stays so.
+  static_cast<void>(chmod(path.c_str(), S_IRWXU));
+  std::error_code error;
   for (auto file = std::filesystem::directory_iterator(path, error); !error && file != end(file);
        file.increment(error)) {
     if (absl::StrContains(file->path().filename().string(), kUnfinished)) {

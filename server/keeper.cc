@@ -30,6 +30,7 @@ Keeper::Keeper(std::shared_ptr<Store> store, Services services)
 std::shared_ptr<Keeper> Keeper::create(std::shared_ptr<Store> store, Services services) {
   std::shared_ptr<Keeper> keeper(new Keeper(std::move(store), std::move(services)));
   keeper->watch_unused();
+  keeper->watch_room();
   return keeper;
 }
 
@@ -59,8 +60,11 @@ std::invoke_result_t<Ask> Keeper::ask(Clock::time_point since, const Ask& what) 
   return answer;
 }
 
+/// Under the lock.
 void Keeper::due(const std::string& name) {
   due_.insert(name);
+  const auto found = entries_.find(name);
+  has_fresh_ = has_fresh_ || found == entries_.end() || !found->second.is_refused;
   changed_.notify_all();
 }
 
@@ -99,6 +103,8 @@ absl::Status Keeper::keep_blob(Clock::time_point since, const std::string& name,
     note_read(status, begin);
   } else {
     services_.metrics->add(Count::kStoreErrors);
+    const std::scoped_lock lock(mutex_);
+    note_full(status);
   }
   return status;
 }
@@ -120,6 +126,7 @@ void Keeper::give_up_new(const std::string& name) {
     const auto entry = entries_.find(name);
     if (entry == entries_.end() || !entry->second.on_added) return;
     on_done = std::exchange(entry->second.on_added, nullptr);
+    entry->second.is_refused = false;
     entry->second.session.reset();  // it may be in the store already
     due(name);
   }
@@ -133,10 +140,12 @@ void Keeper::adopt(std::shared_ptr<Session> session, const StoredSession& stored
     being_made_.erase(session->name());
     Entry& entry = entries_[session->name()];  // perhaps of one that is leaving: it comes back
     answer_all(entry, calls);                  // the numbers of its updates mean nothing to the new one
-    entry.is_leaving = entry.is_lost = false;
+    entry.is_leaving = entry.is_lost = entry.is_refused = false;
     entry.head = stored.parts.at("head");
     entry.epoch = stored.epoch;
-    entry.revision = session->changes_since(std::numeric_limits<std::uint64_t>::max()).inputs.revision;
+    const SessionChanges none = session->changes_since(std::numeric_limits<std::uint64_t>::max());
+    entry.revision = none.inputs.revision;
+    entry.input_seq = none.lease.input_seq;
     entry.session = std::move(session);
   }
   make(calls);
@@ -165,7 +174,7 @@ void Keeper::changed(const Session& session, std::uint64_t revision, std::uint64
       is_kept = entry.revision >= revision && entry.epoch >= epoch;
       if (!is_kept) {
         due(session.name());
-        if (!is_writing_failing_) {
+        if (!is_writing_failing_ && !entry.is_refused) {
           const Timers::TimePoint until = services_.timers->now() + kPatience;
           if (entry.waiting.empty()) watch(session.name(), until);
           entry.waiting.push_back({revision, epoch, until, Clock::now(), std::move(on_kept)});
@@ -211,7 +220,7 @@ void Keeper::remove(const std::string& name, OnDone on_done) {
   const std::scoped_lock lock(mutex_);
   Entry& entry = entries_[name];
   entry.session.reset();
-  entry.is_leaving = entry.is_expired = false;
+  entry.is_leaving = entry.is_expired = entry.is_refused = false;
   if (on_done) entry.on_removed.push_back(std::move(on_done));
   due(name);
 }
@@ -221,7 +230,7 @@ void Keeper::expire(const Session& session) {
   const auto found = entries_.find(session.name());
   if (found == entries_.end() || found->second.session.get() != &session) return;
   found->second.session.reset();
-  found->second.is_leaving = false;
+  found->second.is_leaving = found->second.is_refused = false;
   found->second.is_expired = true;
   due(session.name());
 }
@@ -244,6 +253,14 @@ bool Keeper::is_leaving(const std::string& name) const {
 bool Keeper::is_failing() const {
   const std::scoped_lock lock(mutex_);
   return is_writing_failing_ || is_reading_failing_;
+}
+
+absl::Status Keeper::may_keep(const Session& session) const {
+  if (is_failing()) return store_failing("it has not taken the last change yet");
+  const std::scoped_lock lock(mutex_);
+  const auto found = entries_.find(session.name());
+  const bool is_refused = found != entries_.end() && found->second.is_refused;
+  return is_refused ? store_full("it has not taken the last change of the session") : absl::OkStatus();
 }
 
 bool Keeper::is_being_removed(const std::string& name) const {
@@ -329,12 +346,6 @@ void Keeper::list(const std::string& owner, const std::string& after, std::size_
     on_names(std::move(wanted));
   };
   if (!reader_.try_post(read)) on_names(server_busy(reader_.expected_wait()));
-}
-
-void Keeper::flush(Clock::time_point end) {
-  store_->end_by(end);
-  std::unique_lock lock(mutex_);
-  changed_.wait_until(lock, end, [this] { return is_writing_failing_ || (due_.empty() && !is_writing_); });
 }
 
 }  // namespace lpdeform

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -29,7 +30,8 @@ namespace lpdeform {
 /// session. Another thread reads, and writes blobs; a third tells the store which sessions are here.
 ///
 /// While the store fails or is slower than kPatience, updates are answered as taken and not kept, new sessions are refused
-/// and the rest goes on; what has changed is kept as soon as the store works again. Where it does not answer, whoever needs one is
+/// and the rest goes on; what has changed is kept as soon as the store works again. Of one that is full the same holds for what it has no
+/// room for, and for that alone: it is tried again now and then, and what goes or needs no more room is written at once. Where it does not answer, whoever needs one is
 /// refused at once: the first has waited for it. Thread-safe. Held by a shared pointer.
 class Keeper : public std::enable_shared_from_this<Keeper> {
  public:
@@ -51,7 +53,8 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   /// else is called.
   std::function<void(const Session&)> on_lost;
 
-  /// A new session. `on_done`: OK once it is kept; else UNAVAILABLE STORE_FAILING, and it is not kept at all.
+  /// A new session. `on_done`: OK once it is kept; else UNAVAILABLE STORE_FAILING or RESOURCE_EXHAUSTED STORE_FULL, and it is not kept
+  /// at all.
   void add(std::shared_ptr<Session> session, StoredHead head, const std::string& request_id, OnDone on_done);
 
   /// A session made again from what take_over() gave.
@@ -68,8 +71,10 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void expire(const Session& session);
 
   /// The store did not take the last change, or did not give what it was last asked for: what has to be kept before it is answered
-  /// is better not begun.
+  /// is better not begun. One that is full does not fail.
   bool is_failing() const;
+  /// OK where a change of the session may be kept as things are: else STORE_FAILING, or STORE_FULL where the store has refused one of it.
+  absl::Status may_keep(const Session& session) const;
 
   /// It was, and the store may not know yet.
   bool is_being_removed(const std::string& name) const;
@@ -102,9 +107,17 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void list(const std::string& owner, const std::string& after, std::size_t most,
             std::function<bool(const std::string&)> is_wanted, OnNames on_names);
 
-  /// Before the process ends: waits until all is kept, or the store has failed, or this moment. After it the store is not waited
-  /// for any more.
-  void flush(std::chrono::steady_clock::time_point end);
+  /// What of a session the store has not taken when the process ends.
+  struct Unkept {
+    std::string name;
+    std::uint64_t updates = 0;                  // how many
+    std::uint64_t input_seq = 0, kept_seq = 0;  // the newest one, and the newest that is kept
+    bool is_removal = false;                    // it was deleted, and comes back
+  };
+
+  /// Before the process ends: waits until all is kept, and tries again and again where the store fails, until this moment. After it the
+  /// store is neither asked nor waited for any more. What is not kept, with a line in the log for each session.
+  std::vector<Unkept> flush(std::chrono::steady_clock::time_point end);
 
   /// A session that was used so long ago is still in use, and so is one with a stream: a drag may rest.
   static constexpr std::chrono::milliseconds kInUse{1000};
@@ -135,12 +148,14 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
     std::vector<std::string> blobs;
     std::string request_id;
     std::uint64_t revision = 0, epoch = 0;  // kept
+    std::uint64_t input_seq = 0;            // the same
     std::vector<Waiting> waiting;
     OnDone on_added;  // until it is kept for the first time
     std::vector<OnDone> on_removed;
     bool is_leaving = false;  // forgotten once it is kept
     bool is_expired = false;  // of one that goes: see StoredChange
     bool is_lost = false;     // by the store, and to be written anew
+    bool is_refused = false;  // by the store, which has no room for it
   };
   /// What one entry has for the store.
   struct Work {
@@ -149,21 +164,28 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
     std::string head;
     std::uint64_t revision = 0;  // kept so far, then: once `change` is
     StoredChange change;
+    std::uint64_t input_seq = 0;                    // of it
     absl::Status status = {};                       // why it cannot be written
     std::map<std::string, std::string> blobs = {};  // where it is written anew
   };
 
   void run();
-  std::vector<Work> take_work();
+  std::vector<Work> take_work(bool is_retry);
   static void fill_in(Work& work);
   static void fill_in_anew(Work& work);
-  void write(std::vector<Work> works);
+  void write(std::vector<Work> works, bool is_all);
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const Work> works);
   void write_all(Entry& entry, const std::string& name);
   void write_anew(Entry& entry, const std::string& name);
   void note_kept(const Work& work, ChangeOutcome outcome, Calls& calls);
   void note_failed(const Work& work, const absl::Status& why, Calls& calls);
-  void note_written(const absl::Status& status);
+  void note_written(const absl::Status& status, bool is_all);
+  void note_full(const absl::Status& status);
+  bool is_last() const { return is_stopping_ || is_over_; }
+  bool is_pausing() const { return is_writing_failing_ || is_full_; }
+  std::vector<Unkept> unkept() const;
+  static std::optional<Unkept> unkept_of(const std::string& name, const Entry& entry);
+  void tell_of(const std::vector<Unkept>& unkept) const;
   void note_read(const absl::Status& status, Clock::time_point begin);
   void note_health(const absl::Status& status);
   void try_again_later();
@@ -191,6 +213,8 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void sweep();
   void touch_all();
   void show_figures(Timers::TimePoint now);
+  void watch_room();
+  void show_room();
   using Sessions = std::map<std::string, std::shared_ptr<Session>>;
   Entry* same_entry(const std::string& name, const Sessions& touched);
   void drop(const std::vector<std::string>& lost, const Sessions& touched);
@@ -206,6 +230,11 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   std::set<std::string> due_;
   bool is_writing_ = false;
   bool is_writing_failing_ = false, is_reading_failing_ = false;
+  bool is_full_ = false;      // it has no room for something that is due
+  bool was_full_ = false;     // as the log and the metrics know it
+  bool has_fresh_ = false;    // something is due that it has not refused
+  bool is_ending_ = false;    // flush() waits
+  bool is_over_ = false;      // it has waited for long enough
   bool was_failing_ = false;  // as the log and the metrics know it
   bool is_trying_again_ = false;
   bool is_hanging_ = false;      // what it was last asked for took long, and came to nothing

@@ -70,11 +70,15 @@ void Keeper::touch_all() {
   const Clock::time_point begin = Clock::now();
   const auto touched = store_->touch(sessions);
   note_read(touched.status(), begin);
+  {
+    const std::scoped_lock lock(mutex_);
+    note_full(touched.status());
+  }
   if (touched.ok()) drop(touched->lost, touched_ones);
   if (touched.ok()) write_again(*touched, touched_ones);
   if (touched.ok()) hand_over(touched->wanted, touched_ones);
   if (touched.ok() && now >= next_figures_) show_figures(now);
-  if (is_sweep && touched.ok()) {
+  if (is_sweep && (touched.ok() || is_full(touched.status()))) {
     const auto idle_ms = std::chrono::duration_cast<std::chrono::milliseconds>(services_.idle).count();
     if (!store_->remove_unused(idle_ms).ok()) services_.metrics->add(Count::kStoreErrors);
     const std::scoped_lock lock(mutex_);
@@ -98,6 +102,28 @@ void Keeper::show_figures(Timers::TimePoint now) {
         std::pair(Level::kRedisInMemoryAlone, figures.is_in_memory_alone ? 1.0 : 0.0),
         std::pair(Level::kRedisPersistenceFailing, figures.is_persistence_failing ? 1.0 : 0.0)})
     services_.metrics->set(level, value);
+}
+
+/// On the toucher's thread, again and again.
+void Keeper::watch_room() {
+  services_.timers->at(services_.timers->now() + kBetweenFigures, [weak = weak_from_this()] {
+    const auto self = weak.lock();
+    if (self == nullptr) return;
+    static_cast<void>(self->toucher_.try_post([keeper = self.get()] { keeper->show_room(); }));
+    self->watch_room();
+  });
+}
+
+void Keeper::show_room() {
+  const std::optional<StoreRoom> room = store_->room();
+  if (room) {
+    services_.metrics->set(Level::kStoreFree, room->free_bytes);
+    services_.metrics->set(Level::kStoreLimit, room->limit_bytes);
+  }
+  const std::scoped_lock lock(mutex_);
+  if (is_full_ || (room && room->is_full) || !std::exchange(was_full_, false)) return;
+  services_.metrics->set(Level::kStoreFull, 0);
+  services_.log->info("store_has_room", {{"text", "What it had no room for may come again."}});
 }
 
 /// Under the lock. Null where the session that was touched has gone, or come back as another, meanwhile.

@@ -10,10 +10,19 @@ namespace lpdeform {
 namespace {
 
 constexpr std::chrono::milliseconds kFirstPause{50}, kLongestPause{2000};
+/// Where the process is about to end.
+constexpr std::chrono::milliseconds kLastPause{200};
 constexpr std::chrono::minutes kBetweenWords{1};
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+/// What is wrong with the store counts by the worst of what it says.
+int gravity(const absl::Status& status) {
+  if (status.ok()) return 0;
+  if (is_full(status)) return 1;
+  return is_away(status) ? 3 : 2;
 }
 
 }  // namespace
@@ -21,28 +30,38 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
 void Keeper::run() {
   std::unique_lock lock(mutex_);
   for (bool is_last_try = false;;) {
-    if (is_writing_failing_) changed_.wait_until(lock, retry_at_, [this] { return is_stopping_; });
+    // What a full store has not refused need not wait.
+    const auto is_time = [this] {
+      return is_last() || (!is_writing_failing_ && has_fresh_) || Clock::now() >= retry_at_;
+    };
+    if (is_pausing()) changed_.wait_until(lock, retry_at_, is_time);
     // Where nothing is left that it did not take, nothing at all shows whether it works again.
-    changed_.wait(lock, [this] { return is_stopping_ || !due_.empty() || is_writing_failing_; });
-    if ((is_stopping_ && due_.empty()) || is_last_try) return;
+    changed_.wait(lock, [this] { return is_last() || !due_.empty() || is_pausing(); });
+    if ((is_stopping_ && due_.empty()) || is_last_try || is_over_) return;
     is_last_try = is_stopping_;
+    const bool is_all = is_stopping_ || !is_pausing() || Clock::now() >= retry_at_;
     is_writing_ = true;
     lock.unlock();
-    write(take_work());
+    write(take_work(is_all), is_all);
     lock.lock();
     is_writing_ = false;
     changed_.notify_all();
   }
 }
 
-/// Everything that is due, as it is now.
-std::vector<Keeper::Work> Keeper::take_work() {
+/// Everything that is due, as it is now; without `is_all`, but for what a full store has refused.
+std::vector<Keeper::Work> Keeper::take_work(bool is_all) {
   std::vector<Work> works;
   {
     const std::scoped_lock lock(mutex_);
+    has_fresh_ = false;
     for (const std::string& name : std::exchange(due_, {})) {
       const auto found = entries_.find(name);
       if (found == entries_.end()) continue;
+      if (!is_all && found->second.is_refused) {
+        due_.insert(name);
+        continue;
+      }
       const Entry& entry = found->second;
       Work work{name, entry.session, entry.head, entry.is_lost ? 0 : entry.revision, {}};
       work.change.session = name;
@@ -69,6 +88,7 @@ void Keeper::fill_in(Work& work) {
   change.revision_before = work.revision;
   change.revision = work.revision = changes.inputs.revision;
   change.epoch = changes.lease.epoch;
+  work.input_seq = changes.lease.input_seq;
   change.owner = work.session->owner();
   change.route = work.session->route();
   change.parts = encode_changes(changes);
@@ -90,16 +110,16 @@ void Keeper::fill_in_anew(Work& work) {
 
 /// All at once; where that fails, each by itself, so that one that cannot be kept does not hold up the others. Not where the store does
 /// not answer: each would wait for that.
-void Keeper::write(std::vector<Work> works) {
+void Keeper::write(std::vector<Work> works, bool is_all) {
   Calls calls;
   auto outcomes = commit(works);
   absl::Status health = outcomes.status();
+  const bool is_alone = !outcomes.ok() && works.size() > 1 && !is_away(health);
+  if (is_alone) health = absl::OkStatus();
   for (std::size_t k = 0; k < works.size(); ++k) {
     const std::span<const Work> one(&works[k], 1);
-    const bool is_alone = !outcomes.ok() && works.size() > 1 && !is_away(health);
     const auto again = is_alone ? commit(one) : outcomes;
-    if (is_alone && k == 0) health = absl::OkStatus();
-    if (is_alone && (health.ok() || is_away(again.status()))) health = again.status();
+    if (is_alone && gravity(again.status()) > gravity(health)) health = again.status();
     const std::scoped_lock lock(mutex_);
     if (again.ok()) {
       note_kept(works[k], (*again)[is_alone ? 0 : k], calls);
@@ -109,7 +129,7 @@ void Keeper::write(std::vector<Work> works) {
   }
   {
     const std::scoped_lock lock(mutex_);
-    note_written(health);
+    note_written(health, is_all);
   }
   make(calls);
 }
@@ -151,8 +171,10 @@ void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
   if (outcome == ChangeOutcome::kLost) return write_anew(entry, work.name);
   if (work.change.is_anew) entry.head = work.head;
   if (work.change.is_anew) entry.is_lost = false;
+  entry.is_refused = false;
   entry.revision = work.revision;
   entry.epoch = work.change.epoch;
+  entry.input_seq = work.input_seq;
   if (entry.on_added)
     calls.add([on_added = std::exchange(entry.on_added, nullptr)] { on_added(absl::OkStatus()); });
   answer_kept(entry, calls);
@@ -164,7 +186,7 @@ void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
 
 /// Under the lock. The store lost what it had called kept, and this process has it yet.
 void Keeper::write_all(Entry& entry, const std::string& name) {
-  entry.revision = 0;
+  entry.revision = entry.input_seq = 0;
   due(name);
   services_.log->warning("store_went_back", {{"session", abbreviated(name)},
                                              {"text", "The session is written again, in whole."}});
@@ -176,21 +198,23 @@ void Keeper::write_anew(Entry& entry, const std::string& name) {
   write_all(entry, name);
 }
 
-/// Under the lock. What has changed stays due; a new session is given up.
+/// Under the lock. What has changed stays due; a new session is given up, and is removed where the store has it all the same.
 void Keeper::note_failed(const Work& work, const absl::Status& why, Calls& calls) {
   const auto found = entries_.find(work.name);
   if (found == entries_.end()) return;
   Entry& entry = found->second;
+  entry.is_refused = is_full(why);
   if (entry.on_added) {
     calls.add([on_added = std::exchange(entry.on_added, nullptr), why] { on_added(why); });
-    entry.session.reset();  // the store may have it all the same
+    entry.session.reset();
+    entry.is_refused = false;
   }
   for (OnDone& on_removed : std::exchange(entry.on_removed, {}))
     calls.add([on_removed = std::move(on_removed), why] { on_removed(why); });
   services_.metrics->add(Count::kUpdatesNotKept, static_cast<double>(entry.waiting.size()));
   for (const Waiting& one : entry.waiting) note_waited(one);
   answer_all(entry, calls);
-  due_.insert(work.name);
+  due(work.name);
 }
 
 /// Those whose updates are kept.
@@ -219,14 +243,25 @@ void Keeper::note_waited(const Waiting& one) {
   services_.metrics->observe(Span::kInputToKept, seconds_since(one.since));
 }
 
-/// Under the lock.
-void Keeper::note_written(const absl::Status& status) {
-  const bool was_failing = std::exchange(is_writing_failing_, !status.ok());
-  if (is_writing_failing_) {
-    pause_ = was_failing ? std::min<Clock::duration>(2 * pause_, kLongestPause) : kFirstPause;
+/// Under the lock. Without `is_all`, what the store had refused before was not tried.
+void Keeper::note_written(const absl::Status& status, bool is_all) {
+  const bool was_pausing = is_pausing();
+  is_writing_failing_ = gravity(status) > 1;
+  is_full_ = is_full(status) || (is_full_ && !is_all);
+  if (!status.ok()) {
+    const Clock::duration longest = is_ending_ ? kLastPause : kLongestPause;
+    pause_ = was_pausing ? std::min<Clock::duration>(2 * pause_, longest) : kFirstPause;
     retry_at_ = Clock::now() + pause_;
   }
+  note_full(status);
   note_health(status);
+}
+
+/// Under the lock. That there is room again, show_room() finds out.
+void Keeper::note_full(const absl::Status& status) {
+  if (!is_full(status) || std::exchange(was_full_, true)) return;
+  services_.metrics->set(Level::kStoreFull, 1);
+  services_.log->warning("store_full", {{"text", std::string(status.message())}});
 }
 
 /// Whether the store gives what it is asked for: anything but STORE_FAILING is an answer.

@@ -15,6 +15,9 @@ namespace {
 
 using lpdeform::ServerOptions;
 
+/// The statuses that it exits with, beside 0.
+constexpr int kRefused = 1, kNotKept = 2;
+
 /// Clocks count no further.
 constexpr double kMostSeconds = 1e9, kLeastSeconds = 1e-3;
 
@@ -90,7 +93,9 @@ void describe(CLI::App& app, Arguments& arguments) {
   app.description(
       "Deforms triangle meshes as a gRPC service (lpdeform.v1). Every option may also be given by the "
       "environment "
-      "variable named beside it. SIGTERM and SIGINT stop it gracefully.");
+      "variable named beside it. SIGTERM and SIGINT stop it gracefully. It exits with 0 then; with 2 where "
+      "the store did not take all that "
+      "was answered, which the log says by session; with 1 where it does not start.");
   app.add_option("--address", server.address, "Where to listen: HOST:PORT (port 0: a free one) or unix:/PATH")
       ->envname("LPDEFORM_ADDRESS")
       ->capture_default_str();
@@ -257,8 +262,9 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->envname("LPDEFORM_HEARTBEAT")
       ->check(seconds_from(kLeastSeconds))
       ->capture_default_str();
-  app.add_option("--grace", arguments.grace_seconds,
-                 "Seconds that calls have to end when the server is stopped")
+  app.add_option(
+         "--grace", arguments.grace_seconds,
+         "Seconds that calls have to end when the server is stopped; a store that fails then has 5 more")
       ->envname("LPDEFORM_GRACE")
       ->check(seconds_from(0))
       ->capture_default_str();
@@ -274,7 +280,7 @@ void describe(CLI::App& app, Arguments& arguments) {
 
 int refuse(const absl::Status& why) {
   std::fprintf(stderr, "lpdeform-server: %s\n", std::string(why.message()).c_str());
-  return 1;
+  return kRefused;
 }
 
 /// Of text that size_or_percent() has let through.
@@ -303,8 +309,7 @@ int serve(Arguments& arguments, const sigset_t& signals) {
   std::fflush(stdout);
   int signal = 0;
   sigwait(&signals, &signal);
-  (*server)->drain(milliseconds(arguments.grace_seconds));
-  return 0;
+  return (*server)->drain(milliseconds(arguments.grace_seconds)) ? 0 : kNotKept;
 }
 
 const pthread_t main_thread = pthread_self();

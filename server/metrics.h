@@ -36,6 +36,9 @@ enum class Level {
   kDraining,
   kOverloaded,
   kStoreFailing,
+  kStoreFull,
+  kStoreFree,   // bytes that a store on this machine's disk has left; 0 with another
+  kStoreLimit,  // of which
   // What Redis says of itself; 0 with another store.
   kRedisMemory,
   kRedisMemoryMost,

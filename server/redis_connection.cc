@@ -7,6 +7,7 @@
 #include <fstream>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "server/store.h"
 
@@ -116,6 +117,9 @@ absl::StatusOr<std::vector<RedisReply>> RedisConnection::send(const std::vector<
     replies.push_back(read(*reply));
   }
   if (refused.empty()) return replies;
+  // Its word for: over maxmemory.
+  if (absl::StartsWith(refused, "OOM"))
+    return store_full(absl::StrCat(refused, " (Redis at ", host_, ":", port_, ")"));
   return failure(refused);
 }
 

@@ -192,7 +192,7 @@ struct Server::Impl {
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
   std::unique_ptr<grpc::Server> grpc_server;
   std::mutex draining;
-  bool is_drained = false;
+  bool is_drained = false, is_all_kept = true;
   std::unique_ptr<Admin> admin;  // last, so that its threads end first
 };
 
@@ -328,9 +328,9 @@ std::string Server::admin_address() const {
   return impl_->admin ? impl_->admin->address() : "";
 }
 
-void Server::drain(std::chrono::milliseconds grace) {
+bool Server::drain(std::chrono::milliseconds grace) {
   const std::scoped_lock lock(impl_->draining);
-  if (std::exchange(impl_->is_drained, true)) return;
+  if (std::exchange(impl_->is_drained, true)) return impl_->is_all_kept;
   Backend& backend = impl_->backend;
   const std::string text = "The server is shutting down.";
   backend.log().info("draining", {});
@@ -339,12 +339,13 @@ void Server::drain(std::chrono::milliseconds grace) {
   backend.registry->drain(text);
   backend.gate.wait_until_empty(std::chrono::steady_clock::now() + grace);
   std::this_thread::sleep_for(std::min(grace, kLinger));
-  backend.release_sessions(text);
+  impl_->is_all_kept = backend.release_sessions(text);
   impl_->listener->stop();
   impl_->grpc_server->Shutdown(std::chrono::system_clock::now());  // cancels what is still under way
   impl_->grpc_server->Wait();
   backend.gate.wait_until_empty(std::chrono::steady_clock::time_point::max());
   backend.log().info("stopped", {});
+  return impl_->is_all_kept;
 }
 
 }  // namespace lpdeform

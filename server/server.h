@@ -106,9 +106,10 @@ class Server {
   std::string admin_address() const;
 
   /// Stops: health says NOT_SERVING, new calls are refused as UNAVAILABLE, streams get a go-away, Solve calls
-  /// may go on until `grace` has passed and are ended then. Returns when nothing runs any more. Again: at
-  /// once.
-  void drain(std::chrono::milliseconds grace);
+  /// may go on until `grace` has passed and are ended then; then a store that fails has 5 s more to take what has changed. Returns when
+  /// nothing runs any more: true where the store has all that was answered; else the log has a line for each session ("session_not_kept").
+  /// Again: the same, at once.
+  bool drain(std::chrono::milliseconds grace);
 
  private:
   struct Impl;

@@ -13,12 +13,26 @@ struct sqlite3_stmt;
 
 namespace lpdeform {
 
-/// An SQLite database file of this process's own. For one thread at a time. Errors are UNAVAILABLE STORE_FAILING with what
-/// SQLite says.
+/// An SQLite database file of this process's own, which nobody but its user may read, in WAL mode with synchronous=FULL. For one thread
+/// at a time. Errors are UNAVAILABLE STORE_FAILING with what SQLite says; RESOURCE_EXHAUSTED STORE_FULL where there is no room.
+///
+/// Its log (`-wal`) is of kLogBytes and on the disk from the beginning, also while nobody has the database open: whatever else fills
+/// the disk, changes that fit into it can be made, as long as the file need not grow. See SqliteRoom for that.
 class SqliteDatabase {
  public:
+  static constexpr std::int64_t kLogBytes = std::int64_t{16} << 20;
+  /// The file is always a multiple of this, once it has grown.
+  static constexpr int kChunkBytes = 1 << 20;
+
   /// Opens the file, or makes it. Nobody else may have it open.
   static absl::StatusOr<std::unique_ptr<SqliteDatabase>> open(const std::string& path);
+  /// Empties the log, and leaves it where it is.
+  ~SqliteDatabase();
+
+  /// Gives the log its bytes, where it does not have them yet. STORE_FULL.
+  absl::Status reserve_log();
+  /// Makes the file this long at least, in blocks of the disk. STORE_FULL; then it may have become longer by less.
+  absl::Status grow_to(std::int64_t bytes);
 
   /// Runs statements that give no rows, separated by semicolons.
   absl::Status run(const char* statements);
@@ -36,8 +50,11 @@ class SqliteDatabase {
   SqliteDatabase(std::string path, sqlite3* database);
   absl::Status failure() const;
 
+  bool empty_log();
+
   std::string path_;
   std::unique_ptr<sqlite3, Close> database_;
+  bool has_log_ = false;  // of kLogBytes
 };
 
 /// A statement, prepared once and run often. Parameters count from 1, columns from 0.

@@ -29,6 +29,17 @@ absl::Status store_failing(std::string_view why) {
       absl::StrCat("The server's store of sessions fails: ", absl::string_view(why.data(), why.size()), "."));
 }
 
+absl::Status store_full(std::string_view why, std::string_view limit) {
+  return make_fault(
+      absl::StatusCode::kResourceExhausted, {"STORE_FULL", "store", std::string(limit)},
+      absl::StrCat("The server's store of sessions is full: ", absl::string_view(why.data(), why.size()),
+                   ". Delete sessions, or make room; then try again."));
+}
+
+bool is_full(const absl::Status& status) {
+  return fault_of(status).reason == "STORE_FULL";
+}
+
 absl::Status store_away(std::string_view why) {
   absl::Status status = store_failing(why);
   status.SetPayload(kAway, absl::Cord());

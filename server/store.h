@@ -55,6 +55,13 @@ struct StoreFigures {
   bool is_persistence_failing = false;
 };
 
+/// What is left to a store that has a disk to itself or shares one.
+struct StoreRoom {
+  double free_bytes = 0;   // for what is new
+  double limit_bytes = 0;  // all of it, whoever has it
+  bool is_full = false;    // what it last refused for want of room would be refused again
+};
+
 /// A session that a process has in its memory.
 struct TouchedSession {
   std::string name;
@@ -94,8 +101,9 @@ struct TouchResult {
 /// however many sessions have them. What a function has returned as done is durable, and survives the end of the process
 /// at any moment. Changes are whole: a reader sees all of one or nothing of it.
 ///
-/// Errors of all functions: UNAVAILABLE STORE_FAILING, the text saying what fails; then nothing has changed, or, of
-/// commit(), all has: repeating it is safe. A store whose own disk went back to an earlier moment (Redis, which may be set to keep
+/// Errors of all functions: UNAVAILABLE STORE_FAILING, the text saying what fails; RESOURCE_EXHAUSTED STORE_FULL, where there is no room.
+/// Then nothing has changed, or, of commit(), all has: repeating it is safe. A store that is full still removes, and what it removes
+/// makes room. A store whose own disk went back to an earlier moment (Redis, which may be set to keep
 /// no more) is told from one that has all, as far as sessions live that know better. Functions may take long, as the disk or the
 /// network does: to be called by threads that may wait. Thread-safe.
 class Store {
@@ -140,6 +148,9 @@ class Store {
   /// Nothing where it is no server of its own. On the thread that calls touch().
   virtual absl::StatusOr<std::optional<StoreFigures>> figures() { return std::nullopt; }
 
+  /// Nothing where the store cannot tell. On the thread that calls touch().
+  virtual std::optional<StoreRoom> room() { return std::nullopt; }
+
   /// The process is about to end: after this moment nobody is waited for, and whatever needs an answer fails. Where waits have
   /// no end of their own (a disk), this changes nothing.
   virtual void end_by(std::chrono::steady_clock::time_point) {}
@@ -150,6 +161,9 @@ std::string blob_key(std::string_view bytes);
 
 /// UNAVAILABLE STORE_FAILING.
 absl::Status store_failing(std::string_view why);
+/// RESOURCE_EXHAUSTED STORE_FULL. `limit`: the bound, where it is one that somebody set.
+absl::Status store_full(std::string_view why, std::string_view limit = "");
+bool is_full(const absl::Status& status);
 /// The same, where there is no answer: whatever it is asked next has none either.
 absl::Status store_away(std::string_view why);
 bool is_away(const absl::Status& status);

@@ -150,7 +150,7 @@ class UpdatesUnderWay {
 };
 
 TEST_F(GeometryTest, OthersAreAnsweredWhileTheGeometryOfALargeMeshIsLookedAt) {
-  const auto large = create(box_surface(60, 60, 60)), small = create(bar_mesh());
+  const auto large = create(necked_bar(60, 80, 20, 20)), small = create(bar_mesh());
   const UpdatesUnderWay updates(*stub_, large, 8);  // more than the pool has threads
   std::uint64_t seq = 0;
   for (int k = 0; k < 20; ++k) ASSERT_TRUE(update(small, ends_message(bar_mesh().vertices, ++seq, 1)).ok());

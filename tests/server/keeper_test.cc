@@ -9,6 +9,7 @@
 #include <condition_variable>
 #include <future>
 #include <mutex>
+#include <thread>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -76,6 +77,12 @@ class NotingStore final : public Store {
     const std::scoped_lock lock(mutex_);
     failure_ = status;
   }
+  /// The same of changes of this session alone, its removal aside.
+  void refuse(const std::string& session, const absl::Status& status) {
+    const std::scoped_lock lock(mutex_);
+    refused_ = session;
+    refusal_ = status;
+  }
   StoredChange newest() {
     const std::scoped_lock lock(mutex_);
     return newest_;
@@ -90,6 +97,9 @@ class NotingStore final : public Store {
     if (newest_.is_anew) note("anew");
     changed_.wait(lock, [this] { return !is_held_; });
     if (!failure_.ok()) return failure_;
+    for (const StoredChange& change : changes) {
+      if (!refusal_.ok() && change.session == refused_ && !change.is_removal) return refusal_;
+    }
     return std::vector<ChangeOutcome>(changes.size(), std::exchange(next_, ChangeOutcome::kKept));
   }
   absl::StatusOr<StoredSession> take_over(const std::string&, const std::string& owner,
@@ -156,7 +166,8 @@ class NotingStore final : public Store {
   bool is_held_ = false, are_blobs_held_ = false, is_missing_ = false, is_elsewhere_ = false;
   ChangeOutcome next_ = ChangeOutcome::kKept;
   StoredChange newest_;
-  absl::Status failure_, read_failure_;
+  absl::Status failure_, read_failure_, refusal_;
+  std::string refused_;
   std::chrono::milliseconds reading_takes_{0};
 };
 
@@ -219,6 +230,21 @@ class KeeperTest : public testing::Test {
       timers_->advance(std::chrono::milliseconds(10));
     }
     return true;
+  }
+
+  /// Gives it an update and says whether it was kept.
+  bool is_kept(Session& one, std::uint64_t seq) {
+    Update update;
+    update.input_seq = seq;
+    update.settings.p = Field::Constant(1, 1 + 0.001 * static_cast<double>(seq));
+    const auto taken = one.update(one.lease().token, update);
+    EXPECT_TRUE(taken.ok()) << taken.status();
+    std::promise<bool> kept;
+    keeper_->changed(one, one.revision(), 0, [&](bool is) { kept.set_value(is); });
+    return kept.get_future().get();
+  }
+  static std::chrono::steady_clock::time_point soon() {
+    return std::chrono::steady_clock::now() + std::chrono::milliseconds(300);
   }
 
   bool shows(const std::string& line) const { return absl::StrContains(metrics_->text(), line + "\n"); }
@@ -441,6 +467,75 @@ TEST_F(KeeperTest, OneThatNobodyUsedHereIsNotRemovedFromWhoHasIt) {
   const auto unused = kept();
   keeper_->expire(*unused);
   EXPECT_TRUE(store_->wait_for("expiry"));
+}
+
+TEST_F(KeeperTest, WhatAFullStoreRefusesHoldsNothingElseUp) {
+  const auto large = kept(), small = kept(kName + "a");
+  store_->refuse(kName, store_full("a test wants it to"));
+  EXPECT_FALSE(is_kept(*large, 1));
+  EXPECT_TRUE(shows("lpdeform_store_full 1"));
+  EXPECT_TRUE(shows("lpdeform_store_failing 0"));
+  EXPECT_EQ(fault_of(keeper_->may_keep(*large)).reason, "STORE_FULL");
+  EXPECT_TRUE(keeper_->may_keep(*small).ok());
+  for (std::uint64_t seq = 1; seq < 20; ++seq) EXPECT_TRUE(is_kept(*small, seq));
+  std::promise<absl::Status> removed;
+  keeper_->remove(kName + "a", [&](const absl::Status& status) { removed.set_value(status); });
+  EXPECT_TRUE(removed.get_future().get().ok());
+  store_->refuse("", absl::OkStatus());
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (!keeper_->may_keep(*large).ok() && std::chrono::steady_clock::now() < end) {
+  }
+  EXPECT_TRUE(is_kept(*large, 2));
+  while (!shows("lpdeform_store_full 0") && std::chrono::steady_clock::now() < end)
+    timers_->advance(std::chrono::seconds(1));
+  EXPECT_TRUE(shows("lpdeform_store_full 0"));
+}
+
+TEST_F(KeeperTest, ANewSessionThatAFullStoreRefusesIsToldSo) {
+  store_->refuse(kName, store_full("a test wants it to"));
+  std::promise<absl::Status> added;
+  keeper_->add(session(), {}, "", [&](const absl::Status& status) { added.set_value(status); });
+  EXPECT_EQ(fault_of(added.get_future().get()).reason, "STORE_FULL");
+  EXPECT_TRUE(store_->wait_for("removal"));
+  EXPECT_TRUE(keeper_->flush(soon()).empty());  // nobody was told that it is kept
+}
+
+TEST_F(KeeperTest, TheEndWaitsForAStoreThatFailsAndSaysWhatItHasNotTaken) {
+  const auto one = kept(), other = kept(kName + "a"), gone = kept(kName + "b"), never = kept(kName + "c");
+  ASSERT_TRUE(is_kept(*one, 1));
+  store_->fail_with(store_failing("a test wants it to"));
+  for (std::uint64_t seq = 2; seq < 102; ++seq) EXPECT_FALSE(is_kept(*one, seq));
+  keeper_->remove(gone->name());
+  keeper_->release(*other);  // of which it has all
+  keeper_->expire(*never);
+  const auto begin = std::chrono::steady_clock::now();
+  const auto left = keeper_->flush(soon());
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(300));
+  ASSERT_EQ(left.size(), 2u);
+  EXPECT_EQ(left[0].name, kName);
+  EXPECT_EQ(left[0].updates, 100u);
+  EXPECT_EQ(left[0].kept_seq, 1u);
+  EXPECT_EQ(left[0].input_seq, 101u);
+  EXPECT_EQ(left[1].name, kName + "b");
+  EXPECT_TRUE(left[1].is_removal);
+  store_->fail_with(absl::OkStatus());
+  store_->forget();
+  keeper_.reset();
+  EXPECT_TRUE(store_->asked().empty());  // what was said not to be kept is not
+}
+
+TEST_F(KeeperTest, TheEndTriesAgainAndNamesNothingWhereTheStoreWorksInTime) {
+  const auto one = kept();
+  store_->fail_with(store_failing("a test wants it to"));
+  EXPECT_FALSE(is_kept(*one, 1));
+  std::thread later([&] {
+    store_->forget();
+    EXPECT_TRUE(store_->wait_for("commit of 1", 2));
+    store_->fail_with(absl::OkStatus());
+  });
+  EXPECT_TRUE(keeper_->flush(std::chrono::steady_clock::now() + kPatience).empty());
+  later.join();
+  EXPECT_EQ(store_->newest().revision, one->revision());
 }
 
 }  // namespace

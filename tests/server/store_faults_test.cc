@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <thread>
 
 #include "redis_server.h"
 #include "restart_fixture.h"
@@ -180,6 +181,37 @@ TEST_F(StoreFaultsTest, WhileItHangsUpdatesAreAnsweredSoonAndKeptLater) {
   const std::string before = seen(session);
   restart();
   EXPECT_EQ(seen(session), before);
+}
+
+TEST_F(StoreFaultsTest, AServerThatIsStoppedWhileItFailsWaitsForItAndThenSaysSo) {
+  constexpr std::chrono::seconds kPromised{5};
+  const auto session = create(mesh_);
+  ASSERT_TRUE(take(session, ends_message(mesh_.vertices, 1, 1)).kept());
+  faults_->set_failing(true);
+  for (std::uint64_t seq = 2; seq < 102; ++seq)
+    EXPECT_FALSE(take(session, tip_message(seq, 0.01 * static_cast<double>(seq))).kept());
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_FALSE(server_->drain(std::chrono::milliseconds(0)));
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, kPromised);
+  EXPECT_FALSE(server_->drain(std::chrono::milliseconds(0)));  // again: the same
+}
+
+TEST_F(StoreFaultsTest, OneThatWorksAgainInTimeTakesAll) {
+  const auto session = create(mesh_);
+  ASSERT_TRUE(take(session, ends_message(mesh_.vertices, 1, 1)).kept());
+  const std::string before = seen(session);
+  faults_->set_failing(true);
+  EXPECT_FALSE(take(session, tip_message(2, 0.5)).kept());
+  const std::string after = seen(session);
+  EXPECT_NE(before, after);
+  std::thread mending([this] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));  // while the server waits
+    faults_->set_failing(false);
+  });
+  EXPECT_TRUE(server_->drain(std::chrono::milliseconds(0)));
+  mending.join();
+  restart();
+  EXPECT_EQ(seen(session), after);
 }
 
 TEST_F(StoreFaultsTest, ASessionWhoseMeshIsDamagedIsToBeMadeAnew) {

@@ -270,9 +270,9 @@ TEST_F(SqliteStoreTest, AFullStoreChangesNothingAndGoesOnWhenThereIsRoom) {
                            .epoch_before = 1,
                            .epoch = 1,
                            .parts = {{"inputs", "2"}, {"p", std::string(300'000, 'p')}}};
-  EXPECT_EQ(reason(commit(*store_, large).status()), "STORE_FAILING");
+  EXPECT_EQ(reason(commit(*store_, large).status()), "STORE_FULL");
   const std::string mesh(300'000, 'm');
-  EXPECT_EQ(reason(store_->keep_blob("b", blob_key(mesh), mesh)), "STORE_FAILING");
+  EXPECT_EQ(reason(store_->keep_blob("b", blob_key(mesh), mesh)), "STORE_FULL");
   EXPECT_EQ(folder_.blobs(), 0u);
   const StoredChange small{.session = "a", .epoch_before = 1, .epoch = 1, .parts = {{"m:tip", "there"}}};
   EXPECT_TRUE(commit(*store_, small).ok());
@@ -874,7 +874,7 @@ TEST_F(RedisStoreTest, AFullRedisTakesNothingNewAndStillLetsGo) {
   ASSERT_TRUE(commit(*store, beginning("b")).ok());
   redis.run({"CONFIG", "SET", "maxmemory", "1"});
   const absl::Status refused = commit(*store, beginning("c")).status();
-  EXPECT_EQ(reason(refused), "STORE_FAILING");
+  EXPECT_EQ(reason(refused), "STORE_FULL");
   EXPECT_NE(refused.message().find("OOM"), std::string::npos) << refused;
   const std::vector<TouchedSession> used{{"a", 1, true, 0}};
   EXPECT_TRUE(store->touch(used).ok());
