@@ -136,7 +136,8 @@ void add_solver_options(CLI::App& app, DeformOptions& options) {
        {"local_global", client::Method::kLocalGlobal},
        {"conic", client::Method::kConic}},
       "The algorithm; local_global needs p = 2, conic p = 1 and stops as the paper does, "
-      "some percent above the minimum; auto takes quasi_newton, or multiresolution on large meshes, and where "
+      "some percent above the minimum; auto takes quasi_newton, or multiresolution on large meshes, and "
+      "where "
       "p is 1.2 or less somewhere, from 300 up to 15,000 vertices, tries both and keeps the better (auto)");
   app.add_option("--initial", options.initial,
                  "Where to start; a mesh has as many vertices as MESH (laplacian)")

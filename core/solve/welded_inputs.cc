@@ -58,9 +58,10 @@ struct Holder {
 };
 
 absl::Status held_twice(const Holder& holder, std::string_view other, std::int32_t copy) {
-  return invalid_input({"HANDLE_VERTEX_TWICE", absl::StrCat("vertex ", copy), "one handle a vertex"},
-                       absl::StrCat("vertex ", holder.copy, " is in ", in_quotes(holder.handle), " and vertex ",
-                                    copy, " in ", in_quotes(other), ", and both are copies of one vertex"));
+  return invalid_input(
+      {"HANDLE_VERTEX_TWICE", absl::StrCat("vertex ", copy), "one handle a vertex"},
+      absl::StrCat("vertex ", holder.copy, " is in ", in_quotes(holder.handle), " and vertex ", copy, " in ",
+                   in_quotes(other), ", and both are copies of one vertex"));
 }
 
 absl::StatusOr<Handle> merged_handle(std::string_view name, const Handle& split, const Weld& weld,

@@ -86,7 +86,8 @@ class Schedule {
   }
 
   ~Schedule() {
-    for (std::size_t k = 0; k < streams_.size(); ++k) backend().forget(callers_[streams_by_[k]], streams_[k], {});
+    for (std::size_t k = 0; k < streams_.size(); ++k)
+      backend().forget(callers_[streams_by_[k]], streams_[k], {});
     for (const std::string& session : sessions_) {
       v1::DeleteSessionRequest request;
       request.set_session(session);
