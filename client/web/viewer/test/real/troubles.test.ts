@@ -27,7 +27,8 @@ const banner = (user: User, words: string, timeout = 30_000) =>
 
 describe("the page says plainly, and goes on by itself when", () => {
   it("the server is full", async () => {
-    const service = await start("--max-sessions", "1");
+    // It asks for a pause until a session can expire, at most a minute.
+    const service = await start("--max-sessions", "1", "--session-idle", "10");
     const first = await visit(service);
     await first.settled();
     const second = await visit(service);
