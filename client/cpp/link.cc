@@ -79,6 +79,7 @@ absl::Status Link::one_stream() {
   assembly_.reset();
   {
     const std::scoped_lock lock(mutex_);
+    trying_ = std::stop_source();
     if (is_closing_) call->cancel();
     call_ = call.get();
     ++stream_;
@@ -88,7 +89,7 @@ absl::Status Link::one_stream() {
     uploads_done_.clear();
     go_away_.reset();
     notice_.reset();
-    broken_ = absl::OkStatus();
+    broken_ = unsent_ = absl::OkStatus();
     last_heard_ = Clock::now();
     open = open_request(lease_, options_);
   }
@@ -102,7 +103,8 @@ absl::Status Link::one_stream() {
   const absl::Status ended = call->finish();
   const std::scoped_lock lock(mutex_);
   if (!pumped.ok()) return pumped;
-  return broken_.ok() ? ended : broken_;
+  if (!broken_.ok()) return broken_;
+  return unsent_.ok() ? ended : unsent_;
 }
 
 void Link::pump(DeformCall& call) {
@@ -143,9 +145,10 @@ bool Link::send_one(DeformCall& call, std::unique_lock<std::mutex>& lock) {
 }
 
 void Link::send_update(DeformCall& call, const NumberedUpdate& update, std::unique_lock<std::mutex>& lock) {
+  const std::stop_token stop = trying_.get_token();
   lock.unlock();
   v1::DeformRequest request;
-  Uploads uploads(*rpc_, stop_.get_token());
+  Uploads uploads(*rpc_, stop);
   Packer packer([&](std::string_view bytes) { return uploads.add(bytes); });
   const absl::Status packed = to_wire(update.update, update.seq, packer, *request.mutable_update());
   if (packed.ok() && !uploads.empty()) {
@@ -155,8 +158,10 @@ void Link::send_update(DeformCall& call, const NumberedUpdate& update, std::uniq
   if (packed.ok()) call.write(request);
   lock.lock();
   if (packed.ok()) return;
-  if (is_undecided(packed)) {
-    call.cancel();  // what is in flight waits again for the next stream
+  const Answer answer = judge(update.seq, packed);
+  if (answer == Answer::kAgain || answer == Answer::kMakeAnew) {
+    if (!is_over_) unsent_ = packed;  // otherwise the stream's own end says more
+    call.cancel();                    // what is in flight waits again for the next stream
     changed_.wait(lock, [this] { return is_over_; });
     return;
   }
@@ -187,13 +192,13 @@ bool Link::recover(const absl::Status& ended) {
     return false;
   }
   if (!wait_to_try_again(recovery, lock)) return false;
-  if (recovery.next == NextStep::kResume) return true;
+  if (recovery.next == NextStep::kResume || is_to_reopen_) return true;
 
   const std::string lost = lease_.session;
   lock.unlock();
   const absl::Status made = make_anew(lost);
   lock.lock();
-  if (made.ok()) return true;
+  if (made.ok() || is_to_reopen_) return true;
   const Recovery failed = rules_.after_failed_making(made);
   last_problem_ = made;
   if (failed.next == NextStep::kMakeAnew) return wait_to_try_again(failed, lock);
@@ -201,16 +206,22 @@ bool Link::recover(const absl::Status& ended) {
   return false;
 }
 
-/// As soon as there is a connection where there was none, but for what the server asks. False when the session is to be closed.
+/// As soon as there is a connection where there was none, but for what the server asks; at once where the session was taken over.
+/// False when the session is to be closed.
 bool Link::wait_to_try_again(const Recovery& recovery, std::unique_lock<std::mutex>& lock) {
+  const auto is_woken = [this] { return is_closing_ || is_to_reopen_; };
+  if (is_woken()) return !is_closing_;
+  trying_ = std::stop_source();
+  const std::stop_token stop = trying_.get_token();
   const Clock::time_point start = Clock::now();
   lock.unlock();
   const Rpc::Connected connected = absl::IsUnavailable(recovery.why)
-                                       ? rpc_->wait_for_connection(recovery.pause, stop_.get_token())
+                                       ? rpc_->wait_for_connection(recovery.pause, stop)
                                        : Rpc::Connected::kWas;
   lock.lock();
   const auto pause = connected == Rpc::Connected::kCame ? recovery.asked : recovery.pause;
-  return !changed_.wait_until(lock, start + pause, [this] { return is_closing_; });
+  changed_.wait_until(lock, start + pause, is_woken);
+  return !is_closing_;
 }
 
 void Link::give_up(absl::Status why) {

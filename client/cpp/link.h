@@ -76,6 +76,7 @@ class Link {
   /// DATA_LOSS FRAME_VERTICES.
   absl::Status take(const v1::StreamOpened& opened);
   void note_answered(std::uint64_t input_seq);
+  Answer judge(std::uint64_t seq, const absl::Status& status);
   absl::Status take(const v1::Fault& fault);
 
   // On any thread.
@@ -125,12 +126,14 @@ class Link {
   bool is_open_ = false;        // StreamOpened came
   bool is_over_ = false;        // nothing more comes
   bool is_to_reopen_ = false;   // ended by us, to begin again with another token
+  std::stop_source trying_;     // ends the uploads of the stream that there is, or the wait for the next one
   std::optional<std::uint64_t> ack_due_;
   std::map<std::uint64_t, Uploads> uploads_in_use_;  // by the updates that name them
   std::vector<Uploads> uploads_done_;                // to be deleted
   std::optional<v1::GoAway> go_away_;
   std::optional<Notice> notice_;
   absl::Status broken_;  // why we gave the stream up
+  absl::Status unsent_;  // what kept an update from being sent on it
   std::optional<FrameAssembly> assembly_;
   Clock::time_point last_heard_;
   /// After so long without a word the connection is dead: three of the heartbeats that the server announces.

@@ -382,7 +382,10 @@ absl::Status Link::take_over() {
     ledger_.count_from(lease_.input_seq);
     ledger_.begin_epoch(lease_.epoch);
     box_.begin_epoch(lease_.epoch);
+    rules_.begin();
+    last_open_ = Clock::now();
     is_to_reopen_ = is_running_;
+    trying_.request_stop();
     if (call_ != nullptr) call_->cancel();
     if (!is_running_) finished = std::move(thread_);
   }
@@ -399,6 +402,7 @@ absl::Status Link::close() {
     is_closing_ = true;
     is_ours_to_delete = bool{copy_};
     if (call_ != nullptr) call_->cancel();
+    trying_.request_stop();
     changed_.notify_all();
   }
   stop_.request_stop();

@@ -25,6 +25,7 @@ void Link::listen(DeformCall& call) {
   const std::scoped_lock lock(mutex_);
   broken_ = std::move(broken);
   is_over_ = true;
+  trying_.request_stop();  // what is uploaded for this stream would be sent anew for the next
   changed_.notify_all();
 }
 
@@ -115,24 +116,31 @@ absl::Status Link::take(const v1::FramePart& part) {
   return absl::OkStatus();
 }
 
-/// An error ends the stream: the next one sends the update again, after the pause that the error asks for. Uploads went with a
-/// server that has ended, or to another one, and are sent anew; once, for a server that loses those as well will not do better.
+/// What an error says of an update of ours. Uploads went with a server that has ended, or to another one, and are sent anew; once,
+/// for a server that loses those as well will not do better. Under the lock.
+Answer Link::judge(std::uint64_t seq, const absl::Status& status) {
+  const Answer answer = answer_of(status, seq == sent_again_);
+  if (fault_of(status).reason == "UPLOAD_UNKNOWN") sent_again_ = seq;
+  return answer;
+}
+
+/// An error ends the stream: the next one sends the update again, after the pause that the error asks for. One that
+/// only says why a solve for it failed is nothing to the caller once a newer update is there.
 absl::Status Link::take(const v1::Fault& fault) {
   const absl::Status status = from_wire(fault);
   const std::uint64_t seq = fault.input_seq();
+  bool is_void = false;
   {
     const std::scoped_lock lock(mutex_);
-    const Answer answer = answer_of(status, seq == sent_again_);
-    if (seq != 0 && answer == Answer::kAgain) {
-      sent_again_ = seq;
-      return status;
-    }
+    const Answer answer = judge(seq, status);
+    if (seq != 0 && answer == Answer::kAgain) return status;
+    is_void = answer == Answer::kTaken && seq != 0 && seq < ledger_.newest();
     if (answer == Answer::kTaken) ledger_.accept(seq);
     if (answer == Answer::kRefused) ledger_.refuse(seq);
     note_answered(seq);
     changed_.notify_all();
   }
-  box_.put_problem(status);
+  if (!is_void) box_.put_problem(status);
   return absl::OkStatus();
 }
 

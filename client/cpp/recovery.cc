@@ -83,6 +83,11 @@ Recovery RecoveryRules::with_pause(NextStep next, absl::Status why, std::chrono:
   return {next, std::move(why), obeyed, backoff_.next(asked)};
 }
 
+void RecoveryRules::begin() {
+  misfits_ = 0;
+  backoff_.reset();
+}
+
 Recovery RecoveryRules::after(const Ending& ending) {
   if (ending.stood >= Backoff::kMost) backoff_.reset();  // one that breaks at once is no success
   auto [next, why] =

@@ -72,6 +72,8 @@ class RecoveryRules {
   Recovery after_failed_making(const absl::Status& failed);
   /// A whole frame came.
   void frame_fitted() { misfits_ = 0; }
+  /// Another try is meant: what went wrong before does not count.
+  void begin();
 
  private:
   Recovery with_pause(NextStep next, absl::Status why, std::chrono::milliseconds asked);

@@ -147,6 +147,7 @@ class GrpcRpc final : public Rpc {
         caller_{other.caller_.token, route} {}
 
   std::string route() const override { return caller_.route; }
+  std::chrono::milliseconds call_timeout() const override { return call_timeout_; }
   std::shared_ptr<Rpc> going_by(const std::string& route) const override {
     return std::make_shared<GrpcRpc>(*this, is_header_text(route) ? route : caller_.route);
   }

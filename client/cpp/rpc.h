@@ -44,6 +44,8 @@ class Rpc {
   /// The value of the header lpdeform-session, which every call has: where a proxy stands before several servers, all calls
   /// with the same one come to the same server.
   virtual std::string route() const = 0;
+  /// What a call may take where nothing else is said.
+  virtual std::chrono::milliseconds call_timeout() const = 0;
   /// The same channel by another way.
   virtual std::shared_ptr<Rpc> going_by(const std::string& route) const = 0;
 

@@ -1,10 +1,14 @@
 #include "client/cpp/upload.h"
 
 #include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <random>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/cpp/recovery.h"
 #include "core/base/crc32c.h"
 #include "core/base/fault.h"
 
@@ -12,6 +16,13 @@ namespace lpdeform::client {
 namespace {
 
 constexpr std::uint32_t kMostPartBytes = 1u << 20;
+
+/// Ends early where `stop` is requested.
+void sleep_for(std::chrono::milliseconds pause, const std::stop_token& stop) {
+  std::mutex mutex;
+  std::unique_lock lock(mutex);
+  std::condition_variable_any().wait_for(lock, stop, pause, [] { return false; });
+}
 
 }  // namespace
 
@@ -34,13 +45,29 @@ absl::StatusOr<std::string> Uploads::add(std::string_view bytes) {
   for (std::size_t offset = 0; offset < bytes.size(); offset += part_bytes) {
     part.set_offset(offset);
     part.set_data(std::string(bytes.substr(offset, part_bytes)));
-    const auto sent = rpc_->call(part, stop_);
+    const auto sent = send(part);
     if (!sent.ok()) return sent.status();
     finished = sent->finished();
   }
   if (finished) return created->upload();
   return make_fault(absl::StatusCode::kDataLoss, {"UPLOAD_INCOMPLETE", created->upload(), ""},
                     "The server misses parts of an upload that were all sent.");
+}
+
+/// A part that the server has no room for yet goes again after the pause that it asks for, within the time of a call; the upload
+/// is as it was. Not so where the server says of no pause.
+absl::StatusOr<v1::UploadPartResponse> Uploads::send(const v1::UploadPartRequest& part) {
+  const auto end = std::chrono::steady_clock::now() + rpc_->call_timeout();
+  Backoff backoff;
+  for (;;) {
+    auto sent = rpc_->call(part, stop_);
+    const auto asked = retry_after(sent.status());
+    if (!absl::IsResourceExhausted(sent.status()) || asked.count() == 0) return sent;
+    const auto pause = backoff.next(asked);
+    if (std::chrono::steady_clock::now() + pause > end) return sent;
+    sleep_for(pause, stop_);
+    if (stop_.stop_requested()) return absl::CancelledError("The upload was stopped.");
+  }
 }
 
 void Uploads::discard() {

@@ -19,7 +19,8 @@ class Uploads {
   /// The same bytes in the same order with the same `id` are the same uploads.
   Uploads(Rpc& rpc, std::stop_token stop, std::string id = new_request_id());
 
-  /// Sends `bytes` in parts of at most 1 MiB with a checksum; returns the upload's name. Waits.
+  /// Sends `bytes` in parts of at most 1 MiB with a checksum; returns the upload's name. Waits, also for as long as a server asks
+  /// for that limits the bytes a second of its callers.
   absl::StatusOr<std::string> add(std::string_view bytes);
 
   bool empty() const { return names_.empty(); }
@@ -28,6 +29,8 @@ class Uploads {
   void discard();
 
  private:
+  absl::StatusOr<v1::UploadPartResponse> send(const v1::UploadPartRequest& part);
+
   Rpc* rpc_;
   std::stop_token stop_;
   std::string id_;

@@ -113,6 +113,8 @@ class FakeRpc final : public Rpc {
   std::string route() const override { return "a way of its own"; }
   std::shared_ptr<Rpc> going_by(const std::string&) const override { return nullptr; }  // there is one server
 
+  std::chrono::milliseconds call_timeout() const override { return longest_call; }
+
   /// The next stream that the client opens; null where it opens none.
   std::shared_ptr<Stream> next_stream() {
     std::unique_lock lock(mutex_);
@@ -151,6 +153,18 @@ class FakeRpc final : public Rpc {
     return uploads_deleted_;
   }
 
+  /// The offset of each part that came, also where it was refused.
+  std::vector<std::uint64_t> parts() {
+    const std::scoped_lock lock(mutex_);
+    return parts_;
+  }
+
+  std::chrono::milliseconds longest_call = std::chrono::seconds(30);
+  /// There is no connection, for as long as anybody waits for one.
+  bool is_unreachable = false;
+  /// What CreateUpload and UploadPart calls end with, in turn; OK once they are used up.
+  std::deque<absl::Status> upload_ends;
+  std::deque<absl::Status> part_ends;
   /// What CreateSession calls fail with, in turn; they succeed once these are used up.
   std::deque<absl::Status> create_ends;
   /// What Solve calls end with, in turn; OK once they are used up.
@@ -163,6 +177,7 @@ class FakeRpc final : public Rpc {
   absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
                                                 const std::stop_token&) override {
     const std::scoped_lock lock(mutex_);
+    if (const absl::Status end = next_of(upload_ends); !end.ok()) return end;
     upload_bytes_left_ = request.size_bytes();
     v1::CreateUploadResponse response;
     response.set_upload("uploads/" + request.request_id());
@@ -173,6 +188,8 @@ class FakeRpc final : public Rpc {
   absl::StatusOr<v1::UploadPartResponse> call(const v1::UploadPartRequest& request,
                                               const std::stop_token&) override {
     const std::scoped_lock lock(mutex_);
+    parts_.push_back(request.offset());
+    if (const absl::Status end = next_of(part_ends); !end.ok()) return end;
     upload_bytes_left_ -= request.data().size();
     v1::UploadPartResponse response;
     response.set_finished(upload_bytes_left_ == 0);
@@ -297,8 +314,12 @@ class FakeRpc final : public Rpc {
     return taken;
   }
 
-  Connected wait_for_connection(std::chrono::milliseconds, const std::stop_token&) override {
-    return Connected::kWas;
+  Connected wait_for_connection(std::chrono::milliseconds longest, const std::stop_token& stop) override {
+    if (!is_unreachable) return Connected::kWas;
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable_any().wait_for(lock, stop, longest, [] { return false; });
+    return Connected::kIsNot;
   }
 
   std::unique_ptr<DeformCall> deform() override {
@@ -311,6 +332,13 @@ class FakeRpc final : public Rpc {
 
  private:
   static constexpr std::uint64_t kNewest = 1'000'000;
+  static absl::Status next_of(std::deque<absl::Status>& ends) {
+    if (ends.empty()) return absl::OkStatus();
+    absl::Status end = std::move(ends.front());
+    ends.pop_front();
+    return end;
+  }
+
   const std::uint32_t vertex_count_;
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -323,6 +351,7 @@ class FakeRpc final : public Rpc {
   std::vector<v1::UpdateHandlesRequest> restored_;
   std::vector<v1::UndoUpdateRequest> undone_;
   std::size_t upload_bytes_left_ = 0;
+  std::vector<std::uint64_t> parts_;
 };
 
 }  // namespace lpdeform::client

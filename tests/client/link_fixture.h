@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/cpp/link.h"
+#include "client/cpp/status_details.h"
 #include "core/base/fault.h"
 #include "tests/client/fake_rpc.h"
 
@@ -92,6 +93,22 @@ inline v1::DeformResponse refusal(std::uint64_t input_seq) {
   fault.set_element("vertex 9");
   fault.set_input_seq(input_seq);
   return response;
+}
+
+/// The same for another reason.
+inline v1::DeformResponse fault(std::uint64_t input_seq, absl::StatusCode code, const char* reason,
+                                std::uint32_t retry_after_ms = 0) {
+  v1::DeformResponse response = refusal(input_seq);
+  v1::Fault& fault = *response.mutable_event()->mutable_fault();
+  fault.set_code(static_cast<int>(code));
+  fault.set_reason(reason);
+  fault.set_retry_after_ms(retry_after_ms);
+  return response;
+}
+
+/// No room, and when there will be.
+inline absl::Status full(const char* reason, std::chrono::milliseconds pause) {
+  return with_retry_after(make_fault(absl::StatusCode::kResourceExhausted, {reason, "", ""}, "Full."), pause);
 }
 
 inline absl::Status session_unknown() {

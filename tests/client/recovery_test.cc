@@ -85,6 +85,7 @@ TEST(Recovery, IsAsTheTableOfAllClientsHasIt) {
                           Backoff([chance] { return chance; }));
       for (const Json& step : one.at("steps")) {
         if (step.value("fitted", false)) rules.frame_fitted();
+        if (step.value("begin", false)) rules.begin();
         const Recovery recovery = step.contains("failed_making")
                                       ? rules.after_failed_making(error_of(step["failed_making"]))
                                       : rules.after(ending_of(step));

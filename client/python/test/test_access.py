@@ -136,6 +136,18 @@ def test_who_is_not_let_in_is_told_why(
     assert reason(lpdeform.Tls(keys.text("stranger.pem"), tls.certificate_chain, tls.private_key), good) == "NO_SERVER"
 
 
+def test_a_large_mesh_is_opened_however_few_bytes_a_second_the_server_takes(
+    keys: Keys, make_grid: Callable[[int], Grid]
+) -> None:
+    shape = make_grid(500)  # 12 MB, of which 4 MiB may come at once
+    limited = Server("--token-keys", keys.at("token.pub"), "--max-upload-rate", "6000000")
+    try:
+        with lpdeform.open(shape.vertices, shape.faces, address=limited.address, token=keys.token("alice")) as session:
+            assert session.mesh_report.vertices == 250_000
+    finally:
+        limited.stop()
+
+
 def test_what_cannot_be_used_is_named(keys: Keys) -> None:
     def fault(**how: object) -> tuple[str, str]:
         with pytest.raises(lpdeform.InvalidInput) as caught:

@@ -1,11 +1,19 @@
 """What is given, before any server sees it."""
 
+from __future__ import annotations
+
+from typing import cast
+
 import numpy as np
 import pytest
 
 from lpdeform import Handle, InvalidInput, Settings, SurfacePoints, Targets, Update
 from lpdeform._numbers import crc32c, indices, numbers
-from lpdeform._wire import checked_update
+from lpdeform._rpc import Packer
+from lpdeform._wire import checked_update, settings_to_wire
+from lpdeform.opening import _weld_of
+from lpdeform.types import Field
+from lpdeform.v1 import data_pb2, handle_pb2
 
 
 def test_the_checksum_is_that_of_the_published_vectors() -> None:
@@ -66,6 +74,30 @@ def test_what_cannot_be_of_this_mesh_is_refused_before_it_is_sent(update: Update
     with pytest.raises(InvalidInput) as caught:
         checked_update(update, 42, 40)
     assert (caught.value.reason, caught.value.element) == (reason, element)
+
+
+@pytest.mark.parametrize("one", [2.0, 2, np.float32(2), [2], [2.0], np.array([2.0], np.float32), np.array(2.0)])
+def test_one_value_is_that_of_every_vertex(one: Field) -> None:
+    settings = checked_update(Update(settings=Settings(p=one, stiffness=one)), 42, 40).settings
+    assert settings_to_wire(settings, cast(Packer, None)) == handle_pb2.SettingsUpdate(
+        p=data_pb2.Field(uniform=2), stiffness=data_pb2.Field(uniform=2)
+    )
+
+
+@pytest.mark.parametrize("size", [0, 2, 41, 43])
+def test_a_field_of_another_size_is_refused_with_both(size: int) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        checked_update(Update(settings=Settings(p=np.ones(size))), 42, 40)
+    assert (caught.value.reason, caught.value.limit) == ("FIELD_SIZE", "values = 42")
+    assert f"p has {size} values, neither one nor 42" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("weld", "tolerance"),
+    [(True, 0.0), (np.True_, 0.0), (False, None), (np.False_, None), (0, 0.0), (0.0, 0.0), (1e-6, 1e-6), (np.float32(0.5), 0.5)],
+)
+def test_a_weld_by_position_is_a_yes_or_a_tolerance(weld: float, tolerance: float | None) -> None:
+    assert _weld_of(weld) == tolerance
 
 
 def test_arrays_are_copied() -> None:

@@ -45,6 +45,8 @@ def test_after_a_stream(case: Json, chance: int) -> None:
     for step in case["steps"]:
         if step.get("fitted"):
             rules.frame_fitted()
+        if step.get("begin"):
+            rules.begin()
         if "failed_making" in step:
             failed = error_of(step["failed_making"])
             assert failed is not None

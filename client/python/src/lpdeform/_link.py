@@ -14,20 +14,11 @@ from lpdeform import _wire
 from lpdeform._box import FrameBox
 from lpdeform._lease import Lease, Original, Snapshot, check_vertex_count, create_session, join_session, restore_session
 from lpdeform._ledger import Ledger
-from lpdeform._recovery import Answer, Backoff, Ending, Next, RecoveryRules, answer_of
+from lpdeform._recovery import Answer, Backoff, Ending, Judge, Next, RecoveryRules
 from lpdeform._rpc import Rpc, Stop, new_request_id
 from lpdeform._sending import requests
 from lpdeform._stream import Stream
-from lpdeform.errors import (
-    Code,
-    LpdeformError,
-    again,
-    exception,
-    from_call,
-    from_fault,
-    make,
-    session_closed,
-)
+from lpdeform.errors import Code, LpdeformError, again, exception, from_call, from_fault, make, session_closed
 from lpdeform.frames import Frame, FrameAssembly
 from lpdeform.types import Connection, Notice, Update
 from lpdeform.v1 import frame_pb2, service_pb2
@@ -50,6 +41,7 @@ class Link:
         self.box = FrameBox()
         self.stop = Stop()
         self.ledger = Ledger(begins_bare=not isinstance(original, Snapshot))
+        self.judge = Judge()
         self.changed = threading.Condition()
         self.is_solving = False
         self.is_closing = False
@@ -68,8 +60,6 @@ class Link:
         self._is_to_reopen = False
         self._is_taking_over = False
         self._rules = RecoveryRules(original is not None, rpc.reconnect_for)
-        self._sent_again = 0
-        """The last update that the server asked for again."""
         self.ledger.count_from(lease.input_seq)
         self.ledger.begin_epoch(lease.epoch)
 
@@ -165,6 +155,8 @@ class Link:
             self.ledger.count_from(lease.input_seq)
             self.ledger.begin_epoch(lease.epoch)
             self.box.begin_epoch(lease.epoch)
+            self._rules.begin()
+            self._last_open = time.monotonic()
             self._is_to_reopen = self._thread is not None and self._over is None
             if self._over is not None:
                 self._thread, self._over = None, None
@@ -252,6 +244,7 @@ class Link:
             ended = error
         except grpc.RpcError as error:
             ended = from_call(error, self.rpc.address)
+        stream.stop.set()
         with self.changed:
             stream.is_over = True
             self.changed.notify_all()
@@ -287,23 +280,30 @@ class Link:
             if recovery.next is Next.GIVE_UP:
                 self._give_up(recovery.why)
                 return False
-            if self.changed.wait_for(lambda: self.is_closing, recovery.pause):
+            if not self._wait_to_try_again(recovery.pause):
                 return False
             lost = self.lease.session
         self.rpc.reach(lost, self.stop, Backoff.most)
-        if recovery.next is Next.RESUME:
+        if recovery.next is Next.RESUME or self._is_to_reopen:
             return True
         return self._make_anew_or_pause(lost)
+
+    def _wait_to_try_again(self, pause: float) -> bool:
+        """Not where the session was taken over. False where it is closed."""
+        self.changed.wait_for(lambda: self.is_closing or self._is_to_reopen, pause)
+        return not self.is_closing
 
     def _make_anew_or_pause(self, lost: str) -> bool:
         try:
             self.make_anew(lost)
         except LpdeformError as error:
             with self.changed:
+                if self._is_to_reopen:
+                    return True
                 failed = self._rules.after_failed_making(error)
                 self.interruption = error
                 if failed.next is Next.MAKE_ANEW:
-                    return not self.changed.wait_for(lambda: self.is_closing, failed.pause)
+                    return self._wait_to_try_again(failed.pause)
                 self._give_up(error)
                 return False
         return True
@@ -370,16 +370,11 @@ class Link:
             self.changed.notify_all()
 
     def _take_fault(self, stream: Stream, fault: service_pb2.Fault) -> None:
-        """An error that is raised ends the stream: the next one sends the update again, after the pause that it asks for.
-
-        Uploads went with a server that has ended, or to another one, and are sent anew; once, for a server that loses those as
-        well will not do better.
-        """
+        """An error that is raised ends the stream: the next one sends the update again, after the pause that it asks for."""
         error = from_fault(fault)
         with self.changed:
-            answer = answer_of(error, error.input_seq == self._sent_again)
+            answer = self.judge.answer_of(error, error.input_seq)
             if error.input_seq and answer is Answer.AGAIN:
-                self._sent_again = error.input_seq
                 raise error
             is_void = answer is Answer.TAKEN and 0 < error.input_seq < self.ledger.newest
             if answer is Answer.TAKEN:

@@ -82,6 +82,11 @@ class RecoveryRules:
         """A whole frame came."""
         self._misfits = 0
 
+    def begin(self) -> None:
+        """Another try is meant: what went wrong before does not count."""
+        self._misfits = 0
+        self._backoff.reset()
+
     def after(self, ending: Ending) -> Recovery:
         if ending.stood >= Backoff.most:
             self._backoff.reset()  # one that breaks at once is no success
@@ -162,3 +167,20 @@ def answer_of(error: LpdeformError, is_second: bool = False) -> Answer:
         return Answer.TAKEN
     is_in_vain = is_second and error.reason == "UPLOAD_UNKNOWN"
     return Answer.AGAIN if is_undecided(error) and not is_in_vain else Answer.REFUSED
+
+
+class Judge:
+    """What errors say of updates that were sent.
+
+    Uploads went with a server that has ended, or to another one, and are sent anew; once, for a server that loses those as well
+    will not do better.
+    """
+
+    def __init__(self) -> None:
+        self._sent_anew = 0
+
+    def answer_of(self, error: LpdeformError, seq: int) -> Answer:
+        answer = answer_of(error, seq == self._sent_anew)
+        if error.reason == "UPLOAD_UNKNOWN":
+            self._sent_anew = seq
+        return answer

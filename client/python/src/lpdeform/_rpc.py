@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import threading
+import time
 from collections.abc import Iterator
 from typing import Any, Protocol, TypeVar
 
@@ -12,6 +13,7 @@ import grpc
 from google.protobuf.message import Message
 
 from lpdeform._numbers import crc32c
+from lpdeform._recovery import Backoff
 from lpdeform.access import Caller, Tls, Token, is_header_text, open_channel
 from lpdeform.errors import Code, LpdeformError, from_call, make
 from lpdeform.v1 import data_pb2, service_pb2
@@ -47,12 +49,14 @@ class Stop:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._calls: set[Ended] = set()
+        self._came = threading.Event()
         self.is_set = False
 
     def set(self) -> None:
         with self._lock:
             self.is_set = True
             calls = list(self._calls)
+        self._came.set()
         for call in calls:
             call.cancel()
 
@@ -66,6 +70,10 @@ class Stop:
     def remove(self, call: Ended) -> None:
         with self._lock:
             self._calls.discard(call)
+
+    def wait(self, seconds: float) -> bool:
+        """True as soon as it is set, False after that time."""
+        return self._came.wait(seconds)
 
 
 class Rpc:
@@ -206,11 +214,26 @@ class Packer:
             part = service_pb2.UploadPartRequest(
                 upload=created.upload, offset=offset, data=data[offset : offset + part_bytes]
             )
-            is_finished = self._rpc.call("UploadPart", part, service_pb2.UploadPartResponse, self._stop).finished
+            is_finished = self._send(part).finished
         if not is_finished:
             text = "The server misses parts of an upload that were all sent."
             raise make(Code.DATA_LOSS, text, "UPLOAD_INCOMPLETE", created.upload)
         return created.upload
+
+    def _send(self, part: service_pb2.UploadPartRequest) -> service_pb2.UploadPartResponse:
+        """A part that the server has no room for yet goes again after the pause that it asks for, within the time of a call."""
+        end = time.monotonic() + self._rpc.call_timeout
+        backoff = Backoff()
+        while True:
+            try:
+                return self._rpc.call("UploadPart", part, service_pb2.UploadPartResponse, self._stop)
+            except LpdeformError as error:
+                pause = backoff.next(error.retry_after)
+                is_late = time.monotonic() + pause > end
+                if error.code is not Code.RESOURCE_EXHAUSTED or error.retry_after <= 0 or is_late:
+                    raise
+            if self._stop.wait(pause):
+                raise make(Code.CANCELLED, "The upload was stopped.")
 
     def discard(self) -> None:
         """Gives the memory back before the uploads expire."""

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from lpdeform import _wire
 from lpdeform._lease import Lease
 from lpdeform._ledger import NumberedUpdate
+from lpdeform._recovery import Answer
 from lpdeform._rpc import Packer
 from lpdeform._stream import Stream
-from lpdeform.errors import LpdeformError, exception, is_undecided
+from lpdeform.errors import LpdeformError, exception
 from lpdeform.v1 import service_pb2
 
 if TYPE_CHECKING:
@@ -71,16 +72,17 @@ def _wait_for_work(link: Link, stream: Stream) -> bool:
 
 
 def _packed(link: Link, stream: Stream, update: NumberedUpdate) -> service_pb2.Update | None:
-    packer = Packer(link.rpc, link.stop)
+    packer = Packer(link.rpc, stream.stop)
     try:
         message = _wire.update_to_wire(update.update, update.seq, packer)
     except LpdeformError as error:
         with link.changed:
-            if not is_undecided(error):
+            if link.judge.answer_of(error, update.seq) not in (Answer.AGAIN, Answer.MAKE_ANEW):
                 link.ledger.refuse(update.seq)
                 link.box.put_problem(error)
                 return None
-            stream.failure = error  # what is in flight waits again for the next stream
+            if not stream.stop.is_set:  # otherwise its own end says more
+                stream.failure = error  # what is in flight waits again for the next stream
         stream.cancel()
         return None
     if packer.uploads:

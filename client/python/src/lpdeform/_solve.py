@@ -23,7 +23,6 @@ from lpdeform.errors import (
     Code,
     LpdeformError,
     Unavailable,
-    Unavailable,
     from_call,
     invalid,
     is_session_lost,

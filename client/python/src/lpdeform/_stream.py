@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from lpdeform._rpc import Packer
+from lpdeform._rpc import Packer, Stop
 from lpdeform.errors import LpdeformError
 from lpdeform.types import Notice
 from lpdeform.v1 import service_pb2
@@ -17,6 +17,8 @@ class Stream:
     def __init__(self, number: int) -> None:
         self.number = number
         self.call: Any = None
+        self.stop = Stop()
+        """Ends the uploads for it: those would be sent anew for the next."""
         self.is_open = False
         self.is_over = False
         self.opened_at = 0.0
@@ -33,5 +35,6 @@ class Stream:
         """What kept an update from being sent."""
 
     def cancel(self) -> None:
+        self.stop.set()
         if self.call is not None:
             self.call.cancel()

@@ -147,6 +147,8 @@ def _checked_field(value: types.Field | None, what: str, vertices: int) -> types
         except (TypeError, ValueError):
             raise invalid(f"{what} is of type {type(value).__name__}.", "ARRAY_TYPE", what) from None
     array = numbers(value, what)
+    if array.size == 1:
+        return float(array[0])
     if array.size != vertices:
         text = f"{what} has {array.size} values, neither one nor {vertices}, one for each vertex."
         raise invalid(text, "FIELD_SIZE", what, f"values = {vertices}")

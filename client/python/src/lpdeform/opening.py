@@ -6,6 +6,7 @@ import logging
 from collections.abc import Mapping
 from numbers import Real
 
+import numpy as np
 import numpy.typing as npt
 
 from lpdeform import _codec, _wire
@@ -29,7 +30,7 @@ def connect(
 
 
 def _weld_of(weld: npt.ArrayLike | float | bool) -> Copied | float | None:
-    if weld is True or weld is False:
+    if isinstance(weld, (bool, np.bool_)):
         return 0.0 if weld else None
     return float(weld) if isinstance(weld, Real) else indices(weld, "weld")
 
@@ -129,7 +130,8 @@ def open(  # noqa: A001  (called as lpdeform.open)
     normals: n x 3, as drawn at rest, for frames with normals.
     free_components: what becomes of a connected component that no handle holds: "error" is raised, "stay", "follow".
     weld: True where vertices in the same place are copies of one; or how far apart these may be, as a share of the bounding box's
-        diagonal, at most 1e-3 (True: 1e-9); or one number a vertex, the same for copies.
+        diagonal, at most 1e-3; or one number a vertex, the same for copies. True and 0 are 1e-9, as copies may be apart by rounding;
+        False is none.
     encoding: how frames travel: "float64", "float32" (16 bytes a vertex), "quantized" (8, off by half of 1/65535 of the frame's
         extent), "compressed" (the same, 3 to 5; needs the system's meshoptimizer).
     lowest_encoding: what the server may go down to where its limit of bytes a second asks for it.

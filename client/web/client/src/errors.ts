@@ -78,6 +78,10 @@ export function serverSilent(): LpdeformError {
   return new LpdeformError("unavailable", "The server has fallen silent.", { reason: "SILENCE" });
 }
 
+export function sessionClosed(): LpdeformError {
+  return new LpdeformError("failed_precondition", "The session is closed.", { reason: "SESSION_CLOSED" });
+}
+
 export const cannotBeReached = "The server cannot be reached.";
 
 /** Whatever a call has thrown. */

@@ -19,6 +19,14 @@ export interface Lease {
   route?: string;
 }
 
+/** What a session that was lost can be made anew from. */
+export interface Copy {
+  /** The same session for the same request id. */
+  make(requestId: string, signal: AbortSignal): Promise<Lease>;
+  /** Without handles. */
+  isBare: boolean;
+}
+
 /** Makes a session. The same request id gives the same session, however often it is tried. */
 export async function createSession(
   rpc: Rpc,

@@ -1,33 +1,20 @@
 import { FrameAssembly } from "./assembly.js";
 import { FrameBox } from "./box.js";
-import { fromFault, LpdeformError } from "./errors.js";
+import { fromFault, LpdeformError, sessionClosed } from "./errors.js";
 import { noticeFromWire } from "./fromwire.js";
 import { Scalar } from "./gen/lpdeform/v1/data_pb.js";
 import { Holds } from "./holds.js";
 import type { GoAway } from "./gen/lpdeform/v1/service_pb.js";
 import type { Lane, WireFrameOptions } from "./hub.js";
-import { checkVertexCount, isUndecided, joinSession, type Lease } from "./lease.js";
+import { checkVertexCount, type Copy, isUndecided, joinSession, type Lease } from "./lease.js";
 import { Ledger, type NumberedUpdate } from "./ledger.js";
+import type { Watcher } from "./listeners.js";
 import { type Answer, answerOf, Backoff, RecoveryRules, writerReplaced } from "./recovery.js";
 import type { Rpc } from "./rpc.js";
 import { sendUpdate } from "./sendupdate.js";
 import type { Connection, Frame, Notice, Update } from "./types.js";
 import { newRequestId } from "./upload.js";
-import { pause } from "./waiting.js";
-
-/** What a session that was lost can be made anew from. */
-export interface Copy {
-  /** The same session for the same request id. */
-  make(requestId: string, signal: AbortSignal): Promise<Lease>;
-  /** Without handles. */
-  isBare: boolean;
-}
-
-export interface Watcher {
-  problem(error: LpdeformError): void;
-  connection(state: Connection): void;
-  notice(notice: Notice | undefined): void;
-}
+import { Pauses } from "./waiting.js";
 
 /**
  * A session from within: the lease on the server's session, the ledger of updates, the box of frames, and the feed that is
@@ -67,6 +54,8 @@ export class Link {
   /** The last update whose uploads the server knew no more. */
   #sentAgain = 0;
   #over: LpdeformError | undefined; // nothing is tried any more, for this reason
+  /** Before the next try. */
+  readonly #pauses = new Pauses(this.stop.signal);
   readonly #rules: RecoveryRules;
   /** Of updates where the server is away. */
   readonly #backoff = new Backoff();
@@ -157,6 +146,7 @@ export class Link {
   async close(): Promise<void> {
     if (this.isClosed) return;
     this.stop.abort();
+    this.#pauses.end();
     this.#lane?.close();
     this.#setConnection("closed");
     this.box.finish("closed");
@@ -175,6 +165,7 @@ export class Link {
     this.#downSince = undefined;
     this.#rules.begin();
     this.#backoff.reset();
+    this.#pauses.end();
     this.box.resume();
     this.#send();
   }
@@ -201,13 +192,17 @@ export class Link {
         if (!frame || this.box.put(frame, lane.streamId)) return;
         lane.acknowledge(frame.frameSeq, lane.streamId); // dropped, but its credit is owed
       },
-      fault: (fault) => this.watcher.problem(fromFault(fault)),
+      fault: (fault) => {
+        const error = fromFault(fault);
+        this.#report(error, error.inputSeq, answerOf(error));
+      },
       goAway: (goAway) => (this.#goAway = goAway),
       notice: (notice) => this.#setNotice(noticeFromWire(notice)),
       ended: (error) => void this.#recover(error, session),
       isQuiet: () => !this.ledger.hasWaiting && !this.ledger.hasInFlight && this.#waitingForFrames === 0,
       resting: () => {
         this.#openedAt = undefined;
+        this.#downSince = undefined; // nothing is tried meanwhile
         this.#mayHaveGoneBack = true;
         this.#setNotice(undefined);
         this.#setConnection("idle");
@@ -229,6 +224,7 @@ export class Link {
     if (this.isClosed) return;
     const now = performance.now();
     const stoodMs = this.#openedAt === undefined ? 0 : now - this.#openedAt;
+    if (this.#openedAt !== undefined) this.#downSince = undefined; // the server was there until now
     this.#openedAt = undefined;
     const recovery = this.#rules.after({ error: ended, goAway: this.#goAway, stoodMs, awayMs: this.#awayMs() });
     this.interruption = recovery.why;
@@ -236,9 +232,9 @@ export class Link {
     this.#setNotice(undefined);
     this.#setConnection("reconnecting");
     if (recovery.next === "giveUp") return this.#giveUp(recovery.why);
-    await pause(recovery.pauseMs, this.stop.signal);
+    const isTakenOver = await this.#pauses.wait(recovery.pauseMs);
     if (this.#isOver) return;
-    if (recovery.next === "makeAnew") {
+    if (recovery.next === "makeAnew" && !isTakenOver) {
       try {
         await this.makeAnew(session);
       } catch (error) {
@@ -256,6 +252,7 @@ export class Link {
 
   #giveUp(why: LpdeformError): void {
     this.#over = why;
+    this.#pauses.end();
     this.#mayHaveGoneBack = false;
     this.ledger.dropUnaccepted();
     this.#isStreaming = false;
@@ -276,12 +273,13 @@ export class Link {
   async #mayMakeAgain(failure: LpdeformError): Promise<boolean> {
     const { next, pauseMs } = this.#rules.afterFailedMaking(failure);
     if (next === "giveUp") this.#giveUp(failure);
-    else await pause(pauseMs, this.stop.signal);
+    else await this.#pauses.wait(pauseMs);
     return next !== "giveUp";
   }
 
   async #make(): Promise<void> {
     this.#lease = await this.copy!.make(this.#requestId, this.stop.signal);
+    this.#downSince = undefined;
     this.#requestId = newRequestId();
     this.ledger.sessionLost();
     this.isMadeAnew = this.copy!.isBare && this.ledger.hasRestore;
@@ -324,9 +322,10 @@ export class Link {
       // Where no stream says what the server has, once more does no harm.
       if (!this.#isStreaming && error.code !== "resource_exhausted") this.ledger.resumedAt(0);
       try {
+        if (error.code === "resource_exhausted" || error.reason === "UPLOAD_UNKNOWN") this.#downSince = undefined;
         if (this.#awayMs() > this.rpc.reconnectForMs) return this.#giveUp(error);
-        await pause(this.#backoff.nextMs(error.retryAfterMs), this.stop.signal);
-        if (answer === "makeAnew") {
+        const isTakenOver = await this.#pauses.wait(this.#backoff.nextMs(error.retryAfterMs));
+        if (answer === "makeAnew" && !isTakenOver) {
           if (!this.copy) return this.#giveUp(error);
           await this.makeAnew(session);
         }
@@ -337,7 +336,13 @@ export class Link {
       }
       return;
     }
-    this.watcher.problem(this.#judged(update, error, answer));
+    this.#downSince = undefined;
+    this.#report(this.#judged(update, error, answer), update.seq, answer);
+  }
+
+  /** That the server cannot solve for an update yet is nothing to the caller once a newer one is there. */
+  #report(why: LpdeformError, seq: number, answer: Answer): void {
+    if (answer !== "taken" || seq === 0 || seq >= this.ledger.newest) this.watcher.problem(why);
   }
 
   /** The server refuses the update, or cannot solve for it yet: what the caller is told. */
@@ -376,7 +381,7 @@ export class Link {
       const answer = answerOf(error);
       const why = this.#judged(update, error, answer);
       if (answer !== "taken") throw why;
-      this.watcher.problem(why);
+      this.#report(why, update.seq, answer);
     }
   }
 
@@ -391,8 +396,4 @@ export class Link {
     this.#connection = state;
     this.watcher.connection(state);
   }
-}
-
-export function sessionClosed(): LpdeformError {
-  return new LpdeformError("failed_precondition", "The session is closed.", { reason: "SESSION_CLOSED" });
 }

@@ -1,7 +1,8 @@
 import { loadDecompressor } from "./decode.js";
-import { LpdeformError } from "./errors.js";
+import { LpdeformError, sessionClosed } from "./errors.js";
 import {
   checkVertexCount,
+  type Copy,
   createSession,
   isSessionLost,
   isTakenAllTheSame,
@@ -19,7 +20,7 @@ import {
   checkSolveOptions,
   checkUpdate,
 } from "./keys.js";
-import { type Copy, Link, sessionClosed } from "./link.js";
+import { Link } from "./link.js";
 import { tell } from "./listeners.js";
 import { Backoff } from "./recovery.js";
 import { Rpc } from "./rpc.js";

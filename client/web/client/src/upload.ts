@@ -1,6 +1,9 @@
 import { crc32c } from "./crc32c.js";
 import { LpdeformError } from "./errors.js";
+import type { UploadPartResponse } from "./gen/lpdeform/v1/service_pb.js";
+import { Backoff } from "./recovery.js";
 import type { Rpc } from "./rpc.js";
+import { pause } from "./waiting.js";
 
 const mostPartBytes = 1 << 20;
 
@@ -33,13 +36,30 @@ export class Uploads {
     let finished = false;
     for (let offset = 0; offset < bytes.byteLength; offset += partBytes) {
       const data = bytes.subarray(offset, offset + partBytes);
-      ({ finished } = await this.rpc.call("uploadPart", { upload, offset: BigInt(offset), data }, this.signal));
+      ({ finished } = await this.#send({ upload, offset: BigInt(offset), data }));
     }
     if (finished) return upload;
     throw new LpdeformError("data_loss", "The server misses parts of an upload that were all sent.", {
       reason: "UPLOAD_INCOMPLETE",
       element: upload,
     });
+  }
+
+  /** A part that the server has no room for yet goes again after the pause that it asks for, within the time of a call. */
+  async #send(part: { upload: string; offset: bigint; data: Uint8Array }): Promise<UploadPartResponse> {
+    const end = performance.now() + this.rpc.callTimeoutMs;
+    const backoff = new Backoff();
+    for (;;) {
+      try {
+        return await this.rpc.call("uploadPart", part, this.signal);
+      } catch (thrown) {
+        const error = thrown as LpdeformError;
+        const pauseMs = backoff.nextMs(error.retryAfterMs);
+        const mayPass = error.code === "resource_exhausted" && error.retryAfterMs > 0;
+        if (!mayPass || performance.now() + pauseMs > end) throw error;
+        await pause(pauseMs, this.signal);
+      }
+    }
   }
 
   /** Gives the memory back before the uploads expire; does not wait. */

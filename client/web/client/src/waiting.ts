@@ -1,14 +1,14 @@
 /** Ends early where the signal says so. */
-export function pause(milliseconds: number, signal: AbortSignal): Promise<void> {
+export function pause(milliseconds: number, signal?: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
     const done = () => {
       clearTimeout(timer);
-      signal.removeEventListener("abort", done);
+      signal?.removeEventListener("abort", done);
       resolve();
     };
     const timer = setTimeout(done, milliseconds);
-    signal.addEventListener("abort", done);
-    if (signal.aborted) done();
+    signal?.addEventListener("abort", done);
+    if (signal?.aborted) done();
   });
 }
 
@@ -21,4 +21,26 @@ export function unlessAborted<Value>(promise: Promise<Value>, signal: AbortSigna
     promise.then(resolve, reject).finally(done);
     if (signal.aborted) stop();
   });
+}
+
+/** Pauses that can be cut short. */
+export class Pauses {
+  #abort = new AbortController();
+
+  /** `over`: none any more. */
+  constructor(readonly over: AbortSignal) {}
+
+  /** True where end() came before the time was over. */
+  async wait(milliseconds: number): Promise<boolean> {
+    if (this.over.aborted) return true;
+    const { signal } = this.#abort;
+    await pause(milliseconds, signal);
+    return signal.aborted;
+  }
+
+  /** Of all that wait now. */
+  end(): void {
+    this.#abort.abort();
+    this.#abort = new AbortController();
+  }
 }

@@ -15,6 +15,7 @@ import {
   type UndoUpdateRequest,
   type UndoUpdateResponseSchema,
   type UpdateHandlesRequest,
+  type UploadPartRequest,
 } from "../src/gen/lpdeform/v1/service_pb.js";
 import { Rpc } from "../src/rpc.js";
 import type { Mesh } from "../src/types.js";
@@ -104,6 +105,7 @@ export class FakeServer {
   readonly deleted: string[] = [];
   readonly streams: FakeStream[] = [];
   readonly uploads = new Map<string, Uint8Array>();
+  readonly parts: UploadPartRequest[] = [];
   readonly restored: RestoreSessionRequest[] = [];
   undoSteps = 0;
   /** The newest that getSession() says it has. */
@@ -120,6 +122,8 @@ export class FakeServer {
     snapshot?: ServiceImpl<typeof DeformService>["snapshotSession"];
     ack?: (request: AckFramesRequest) => void | Promise<void>;
     stream?: (stream: FakeStream, count: number) => void;
+    /** `count`: of all parts that came. */
+    part?: (request: UploadPartRequest, count: number) => void;
     solve?: ServiceImpl<typeof DeformService>["solve"];
   } = {};
   #changed = new Set<() => void>();
@@ -206,7 +210,11 @@ export class FakeServer {
           this.uploads.set(upload, new Uint8Array(Number(sizeBytes)));
           return { upload, maxPartBytes: 1 << 20 };
         },
-        uploadPart: ({ upload, offset, data }) => {
+        uploadPart: (request) => {
+          const { upload, offset, data } = request;
+          this.parts.push(request);
+          this.#note();
+          this.on.part?.(request, this.parts.length);
           const whole = this.uploads.get(upload)!;
           whole.set(data, Number(offset));
           return { finished: Number(offset) + data.length === whole.length };

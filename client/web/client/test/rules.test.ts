@@ -21,6 +21,7 @@ interface EndStep {
   stood_ms?: number;
   away_ms?: number;
   fitted?: boolean;
+  begin?: boolean;
   next: "resume" | "make_anew" | "give_up";
   code: string;
   reason: string;
@@ -58,6 +59,7 @@ const steps = { resume: "resume", make_anew: "makeAnew", give_up: "giveUp" } as 
 
 function recoveryOf(rules: RecoveryRules, step: EndStep) {
   if (step.fitted) rules.frameFitted();
+  if (step.begin) rules.begin();
   if (step.failed_making) return rules.afterFailedMaking(errorOf(step.failed_making)!);
   const said = step.go_away;
   const goAway =

@@ -210,6 +210,104 @@ describe("a stream that ends", () => {
   });
 });
 
+describe("a server that was away for a moment", () => {
+  const blip = new ConnectError("away", Code.Unavailable);
+
+  /** A session that gives up after 300 ms; its first update meets a blip, `then` what the server answers after that. */
+  async function beginWithBlip(then: () => void) {
+    const server = new FakeServer();
+    const { session } = await begin(server, server.rpc(5000, 300));
+    session.on("problem", () => undefined);
+    server.on.update = (_, count) => {
+      if (count === 1) throw blip;
+      then();
+    };
+    session.move("tip", at(1));
+    await server.until(() => server.updates.length >= 2);
+    await new Promise((resolve) => setTimeout(resolve, 400));
+    return { server, session };
+  }
+
+  test.each([
+    ["takes the update", () => undefined],
+    [
+      "refuses the update",
+      () => {
+        throw refusal("HANDLE_UNKNOWN", {}, Code.NotFound);
+      },
+    ],
+    [
+      "cannot solve for it yet",
+      () => {
+        throw refusal("NO_HANDLES", {}, Code.FailedPrecondition);
+      },
+    ],
+    [
+      "is full",
+      () => {
+        throw refusal("SERVER_BUSY", {}, Code.ResourceExhausted, 900);
+      },
+    ],
+  ])("and %s is not away when its stream breaks later", async (_, then) => {
+    const { server, session } = await beginWithBlip(then);
+    server.stream.queue.finish(new ConnectError("broken", Code.Unavailable));
+    await server.until(() => server.streams.length === 2);
+    server.stream.open();
+    await connected(session);
+  });
+
+  test("and is tried again later is not away when its stream breaks before that", async () => {
+    const server = new FakeServer();
+    const { session } = await begin(server, server.rpc(5000, 300));
+    server.on.update = (_, count) => {
+      if (count === 1) throw refusal("DRAINING", {}, Code.Unavailable, 900);
+    };
+    session.move("tip", at(1));
+    await new Promise((resolve) => setTimeout(resolve, 400));
+    server.stream.queue.finish(new ConnectError("broken", Code.Unavailable));
+    await server.until(() => server.streams.length === 2);
+    server.stream.open();
+    await connected(session);
+    await server.until(() => server.updates.length === 2);
+  });
+});
+
+describe("a session that is taken over", () => {
+  test("does not wait for the pause between two tries", async () => {
+    const { server, session } = await begin();
+    server.stream.queue.finish(refusal("SERVER_BUSY", {}, Code.ResourceExhausted, 900));
+    await new Promise((resolve) => setTimeout(resolve, 50));
+    const start = performance.now();
+    await session.takeOver();
+    await server.until(() => server.streams.length === 2);
+    expect(performance.now() - start).toBeLessThan(500);
+  });
+
+  test("is not made anew for what went before", async () => {
+    const { server, session } = await begin();
+    server.stream.queue.finish(refusal("SESSION_UNKNOWN", {}, Code.NotFound));
+    await new Promise((resolve) => setTimeout(resolve, 5));
+    await session.takeOver();
+    await server.until(() => server.streams.length === 2);
+    expect(server.creations.length).toBe(1);
+  });
+
+  test("sends what waits at once", async () => {
+    const { server, session } = await begin();
+    server.on.update = (_, count) => {
+      if (count === 1) throw refusal("SERVER_BUSY", {}, Code.ResourceExhausted, 900);
+    };
+    session.move("tip", at(1));
+    await server.until(() => server.updates.length === 1);
+    await new Promise((resolve) => setTimeout(resolve, 50));
+    const start = performance.now();
+    await session.takeOver();
+    await server.until(() => server.updates.length === 2);
+    expect(performance.now() - start).toBeLessThan(500);
+    expect(server.updates[1]!.writerToken).toBe("another");
+  });
+});
+
 describe("a server that speaks of another mesh", () => {
   const another = { code: "data_loss", reason: "FRAME_VERTICES", limit: "vertices = 3" };
 

@@ -88,6 +88,28 @@ describe("updates", () => {
     expect(server.updates[4]!.update!.handles.map(({ name }) => name)).toEqual(["base", "tip"]);
   });
 
+  test("that cannot be solved for yet are reported, but not where newer ones are there", async () => {
+    const { server, session } = await begin();
+    const first = gate();
+    server.on.update = async (_, count) => {
+      if (count === 1) await first.isOpen;
+      if (count !== 2) throw refusal("NO_HANDLES", { element: `update ${count}` }, Code.FailedPrecondition);
+    };
+    const reported = problems(session, 1);
+    session.set({ p: 2 });
+    await server.until(() => server.updates.length === 1);
+    session.set({ p: 3 });
+    first.open();
+    await server.until(() => server.updates.length === 2);
+    const fault = { code: Code.FailedPrecondition, reason: "NO_HANDLES" };
+    server.stream.send({ case: "fault", value: { ...fault, element: "overtaken", inputSeq: 1n } });
+    server.stream.send({ case: "fault", value: { ...fault, element: "newest", inputSeq: 2n } });
+    expect((await reported)[0]).toMatchObject({ element: "newest" });
+    const last = problems(session, 1);
+    session.set({ p: 4 });
+    expect((await last)[0]).toMatchObject({ element: "update 3" });
+  });
+
   test("wait as long as a full server asks for", async () => {
     const { server, session } = await begin();
     server.on.update = (_, count) => {
@@ -142,6 +164,54 @@ describe("updates", () => {
     expect(sent.length).toBe(12 * count + 12);
     expect(new Float32Array(sent.buffer, 0, 3 * count)).toEqual(mesh.vertices);
     expect(new Uint32Array(sent.buffer, 12 * count)).toEqual(mesh.faces);
+  });
+});
+
+describe("a part of an upload that the server has no room for yet", () => {
+  const large = { vertices: new Float32Array(600_000), faces: new Uint32Array([0, 1, 2]) };
+
+  test("is sent again after the pause that the server asks for", async () => {
+    const server = new FakeServer();
+    server.on.part = (_, count) => {
+      if (count === 2 || count === 3) throw refusal("UPLOAD_RATE", {}, Code.ResourceExhausted, 200);
+    };
+    const start = performance.now();
+    opened.push(await openWith(server.rpc(), large, {}));
+    expect(performance.now() - start).toBeGreaterThan(390);
+    expect(server.parts.map(({ offset }) => Number(offset) / 2 ** 20)).toEqual([0, 1, 1, 1, 2]);
+  });
+
+  test("is sent again for no longer than a call may take", async () => {
+    const server = new FakeServer();
+    server.on.part = () => {
+      throw refusal("UPLOAD_RATE", {}, Code.ResourceExhausted, 900);
+    };
+    const failing = { code: "resource_exhausted", reason: "UPLOAD_RATE", retryAfterMs: 900 };
+    await expect(openWith(server.rpc(500), large, {})).rejects.toMatchObject(failing);
+    expect(server.parts.length).toBe(1);
+  });
+
+  test("is not sent again where the server says of no pause", async () => {
+    const server = new FakeServer();
+    server.on.part = () => {
+      throw refusal("CALLER_MEMORY_FULL", {}, Code.ResourceExhausted);
+    };
+    await expect(openWith(server.rpc(), large, {})).rejects.toMatchObject({ reason: "CALLER_MEMORY_FULL" });
+    expect(server.parts.length).toBe(1);
+  });
+
+  test("is waited for no more once the caller has enough of it", async () => {
+    const server = new FakeServer();
+    server.on.part = () => {
+      throw refusal("UPLOAD_RATE", {}, Code.ResourceExhausted, 900);
+    };
+    const enough = new AbortController();
+    const opening = openWith(server.rpc(20_000), large, { signal: enough.signal });
+    const start = performance.now();
+    await server.until(() => server.parts.length === 1);
+    enough.abort();
+    await expect(opening).rejects.toMatchObject({ code: "cancelled" });
+    expect(performance.now() - start).toBeLessThan(500);
   });
 });
 
