@@ -40,7 +40,7 @@ void check_keys(const json& object, const std::string& owner, std::initializer_l
   }
 }
 
-const json& required(const json& object, std::string_view owner, const char* key) {
+const json& required(const json& object, absl::string_view owner, const char* key) {
   if (!object.contains(key)) {
     refuse("HANDLE_FILE_KEY", std::string(owner), absl::StrCat(owner, " has no \"", key, "\"."));
   }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/strings/string_view.h"
 
 namespace lpdeform::cli {
 
@@ -37,7 +38,7 @@ std::string shown(const json& value);
 void check_keys(const json& object, const std::string& owner, std::initializer_list<const char*> known);
 
 /// HANDLE_FILE_KEY where there is none.
-const json& required(const json& object, std::string_view owner, const char* key);
+const json& required(const json& object, absl::string_view owner, const char* key);
 
 double number(const json& value, const std::string& place);
 std::array<double, 3> vector3(const json& value, const std::string& place);

@@ -64,8 +64,7 @@ absl::StatusOr<std::optional<FrameBox::Taken>> FrameBox::take(Clock::time_point 
     return problem;
   }
   if (newest_) {
-    last_final_.reset();
-    if (newest_->frame.is_final) last_final_.emplace(newest_->frame);
+    last_final_ = newest_->frame.is_final ? std::optional(newest_->frame) : std::nullopt;
     ++takes_;
     changed_.notify_all();
     return std::exchange(newest_, std::nullopt);
