@@ -92,7 +92,7 @@ TEST_F(TwoAttemptsTest, ALimitAfterTheFirstHasConvergedLeavesItsResult) {
 
 // Where the second is the better one already and not at its end, that is no convergence, though the first had converged.
 TEST_F(TwoAttemptsTest, ALimitAfterTheSecondIsTheBetterSaysThatItIsNotAtItsEnd) {
-  const Bent bent = lifted_grid(5);
+  const Bent bent = sheet(0.5);
   const SolveSummary one = solve(bent, cold(Method::kQuasiNewton));
   const SolveSummary both = solve(bent, cold(Method::kAuto));
   ASSERT_EQ(both.method, Method::kMultiresolution);
