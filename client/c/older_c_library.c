@@ -1,6 +1,6 @@
 /* What the archives that the library is linked from take from a newer C library than it has to need. The linker prefers these, and
- * exports.map hides them. libstdc++'s std::random_device takes arc4random, c-ares arc4random_buf (of glibc 2.36); what was compiled as C++ with the headers of
- * glibc 2.38 or newer takes the functions of C23 that read numbers, which take "0b1" as well. */
+ * exports.map hides them. libstdc++'s std::random_device takes arc4random, c-ares arc4random_buf (of glibc 2.36). What was compiled as
+ * C++ with the headers of glibc 2.38 or newer takes the functions of C23 that read numbers, which take "0b1" as well. */
 #include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
