@@ -1,10 +1,12 @@
 #include "client/cpp/client.h"
 
+#include <thread>
 #include <utility>
 
 #include "client/cpp/lease.h"
 #include "client/cpp/link.h"
 #include "client/cpp/names.h"
+#include "client/cpp/recovery.h"
 #include "client/cpp/rpc.h"
 #include "client/cpp/snapshot.h"
 #include "client/cpp/upload.h"
@@ -118,10 +120,23 @@ absl::Status Session::close() {
 
 namespace {
 
-/// Null where the status names no other way to a session than this.
-std::shared_ptr<Rpc> way_after(const std::shared_ptr<Rpc>& rpc, const absl::Status& status) {
-  const std::string route = route_of(status);
-  return route.empty() || route == rpc->route() ? nullptr : rpc->going_by(route);
+constexpr int kMostWays = 5;
+
+/// What `call` returns by the way that `rpc` goes, or by that which the answer names; `rpc` goes there then. While sessions move
+/// from server to server, that way may lead elsewhere for a moment, too: a few times, with pauses of at most 0.4 s.
+template <typename Call>
+auto by_its_way(std::shared_ptr<Rpc>& rpc, const Call& call) {
+  Backoff backoff;
+  for (int ways = 1;; ++ways) {
+    auto result = call(*rpc);
+    const std::string route = route_of(result.status());
+    if (route.empty() || ways == kMostWays) return result;
+    if (route != rpc->route()) {
+      rpc = rpc->going_by(route);
+    } else {
+      std::this_thread::sleep_for(backoff.next());
+    }
+  }
 }
 
 }  // namespace
@@ -158,22 +173,17 @@ absl::StatusOr<Session> Client::join(std::string_view session, Role role, OpenOp
   const absl::Status checked = check_name("session", session);
   if (!checked.ok()) return checked;
   std::shared_ptr<Rpc> rpc = rpc_;
-  auto lease = join_session(*rpc, std::string(session), role, stop);
-  const std::string route = lease.ok() ? lease->route : route_of(lease.status());
-  if (!route.empty() && route != rpc->route()) {  // come as those do who have it
-    rpc = rpc->going_by(route);
-    if (!lease.ok()) lease = join_session(*rpc, std::string(session), role, stop);
-  }
+  auto lease = by_its_way(rpc, [&](Rpc& way) { return join_session(way, std::string(session), role, stop); });
+  if (lease.ok() && !lease->route.empty() && lease->route != rpc->route())
+    rpc = rpc->going_by(lease->route);  // come as those do who have it
   if (!lease.ok()) return lease.status();
   return Session(
       std::make_unique<Link>(std::move(rpc), options_, std::move(options), Copy(), *std::move(lease)));
 }
 
 absl::StatusOr<std::string> Client::snapshot(std::string_view session) {
-  absl::StatusOr<std::string> file = take_snapshot(*rpc_, std::string(session), {});
-  if (const auto there = way_after(rpc_, file.status()))
-    file = take_snapshot(*there, std::string(session), {});
-  return file;
+  std::shared_ptr<Rpc> rpc = rpc_;
+  return by_its_way(rpc, [&](Rpc& way) { return take_snapshot(way, std::string(session), {}); });
 }
 
 absl::StatusOr<std::string> Client::restore(std::string_view snapshot) {
@@ -185,9 +195,8 @@ absl::StatusOr<std::string> Client::restore(std::string_view snapshot) {
 absl::Status Client::remove(std::string_view session) {
   v1::DeleteSessionRequest request;
   request.set_session(std::string(session));
-  const absl::Status status = rpc_->call(request, {}).status();
-  const auto there = way_after(rpc_, status);
-  return there ? there->call(request, {}).status() : status;
+  std::shared_ptr<Rpc> rpc = rpc_;
+  return by_its_way(rpc, [&](Rpc& way) { return way.call(request, {}); }).status();
 }
 
 }  // namespace lpdeform::client
