@@ -62,8 +62,7 @@ TEST_P(HalfRigid, IsConvergedInTheTrueEnergy) {
   const Halves then = halves(*solver, material, shape->mean_edge_length());
 
   // To go on gains at most 1 % of the others' E^(1/p): so far is what the solver calls its end. Measured: below 0.1 % on Debian 12,
-  // 0.33 % on Debian 13;
-  // it differs between processors and versions of the libraries.
+  // 0.33 % on Debian 13; it differs between processors and versions of the libraries.
   EXPECT_GT(then.soft_energy, std::pow(0.99, p) * first.soft_energy);
   // What rounding leaves of the cells of p = 1 is more than all the others from p = 10 on, and then most of the energy. It
   // differs between widths of vectors. The solver's last smoothing, 1e-13 of the diagonal, hides what is below.
