@@ -13,6 +13,12 @@ bool is_servers_fault(absl::StatusCode code) {
          code == absl::StatusCode::kDataLoss;
 }
 
+/// Bytes that are not those of their checksum are their sender's, or the network's, though the code is DATA_LOSS: who calls can have
+/// as many of these errors as it likes.
+bool is_servers_fault(const absl::Status& status, const std::string& reason) {
+  return is_servers_fault(status.code()) && reason != "UPLOAD_CHECKSUM";
+}
+
 /// Errors whose texts speak of the server or of the caller's rights, never of what was sent.
 bool is_of_the_server(absl::StatusCode code) {
   return code == absl::StatusCode::kUnavailable || code == absl::StatusCode::kResourceExhausted ||
@@ -87,7 +93,7 @@ void CallRecord::tell(const absl::Status& status, const std::string& reason,
   }
   const WriterLease lease = session ? session->lease() : WriterLease{};
   const Fault fault = fault_of(status);
-  const auto write = is_servers_fault(status.code()) ? &Log::error : &Log::info;
+  const auto write = is_servers_fault(status, reason) ? &Log::error : &Log::info;
   ((*log_).*write)("refused", {{"method", method_},
                                {"session", session ? abbreviated(session->name()) : ""},
                                {"epoch", where_known(lease.epoch)},

@@ -194,6 +194,13 @@ class Refusals(Log):
         self.assertEqual((line["input_seq"], line["handle"]), (8, "base"))
         stream.cancel()
 
+    def test_a_wrong_checksum_is_no_fault_of_the_servers(self):
+        server, client = self.serve()
+        upload = client.call("CreateUpload", service_pb2.CreateUploadRequest(size_bytes=4, crc32c=1)).upload
+        client.refused("UploadPart", service_pb2.UploadPartRequest(upload=upload, data=b"abcd"))
+        line = json.loads(server.waits_for("refused"))
+        self.assertEqual((line["reason"], line["level"]), ("UPLOAD_CHECKSUM", "info"))
+
     def test_a_name_or_a_token_in_the_wrong_place_is_not_repeated(self):
         server, client = self.serve()
         session = client.create()
