@@ -1,11 +1,13 @@
 #include "server/upload.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/crc32c.h"
 #include "core/base/fault.h"
 #include "server/random_name.h"
+#include "server/refusals.h"
 
 namespace lpdeform {
 
@@ -54,8 +56,11 @@ absl::Status Upload::check_part(std::uint64_t offset, std::string_view data) con
 
 absl::Status Upload::put(std::uint64_t offset, std::string_view data) {
   absl::Status status = memory_.grow_to(bytes_.memory_with(offset, data.size()));
-  if (!status.ok() || bytes_.put(offset, data)) return status;
+  if (!status.ok()) return status;
+  const bool is_put = bytes_.put(offset, data);
   memory_.resize(bytes_.memory());
+  is_empty_ = bytes_.received() == 0;
+  if (is_put) return absl::OkStatus();
   return make_fault(
       absl::StatusCode::kResourceExhausted, {"MEMORY_FULL", name_, ""},
       absl::StrCat("The machine has no memory for an upload of ", size(), " bytes; try again later."));
@@ -65,6 +70,7 @@ absl::StatusOr<UploadProgress> Upload::finish() {
   is_finished_ = lpdeform::crc32c(bytes_.whole()) == crc32c_;
   if (is_finished_) return UploadProgress{size(), true};
   bytes_.clear();
+  is_empty_ = true;
   memory_.resize(0);
   return make_fault(absl::StatusCode::kDataLoss, {"UPLOAD_CHECKSUM", name_, ""},
                     "The bytes received do not have the announced checksum; send all of them again.");
@@ -101,34 +107,60 @@ absl::StatusOr<std::shared_ptr<Upload>> Uploads::create(const std::string& reque
     if (upload->size() == size_bytes && upload->crc32c() == crc32c) return upload;
     return request_id_reused();
   }
-  if (absl::Status status = check_room(size_bytes, owner); !status.ok()) return status;
+  if (absl::Status status = check_share(owner); !status.ok()) return status;
+  if (absl::Status status = budget_->check(size_bytes, owner); !status.ok()) return status;  // if it came now
+  if (absl::Status status = make_place(); !status.ok()) return status;
   auto upload = std::make_shared<Upload>(absl::StrCat("uploads/", random_hex_128()), size_bytes, crc32c,
                                          budget_->nothing_yet(owner), owner);
-  uploads_[upload->name()] = {upload, request_id, timers_->now()};
+  const Timers::TimePoint now = timers_->now();
+  uploads_[upload->name()] = {upload, request_id, now, now};
   if (!request_id.empty()) requested_[{owner, request_id}] = upload->name();
   ++owned_[owner];
-  watch(upload->name(), timers_->now() + limits_.idle);
+  watch(now + limits_.idle);
   return upload;
 }
 
-/// Whether the owner may have one more, and it would fit if it came now.
-absl::Status Uploads::check_room(std::uint64_t size_bytes, const std::string& owner) const {
+/// Whether the owner may have one more.
+absl::Status Uploads::check_share(const std::string& owner) const {
   const auto found = owned_.find(owner);
   const std::size_t theirs = found == owned_.end() ? 0 : found->second;
-  if (!owner.empty() && limits_.most_uploads_each != 0 && theirs >= limits_.most_uploads_each) {
-    return make_fault(
-        absl::StatusCode::kResourceExhausted,
-        {"CALLER_UPLOADS_FULL", "uploads", absl::StrCat("uploads <= ", limits_.most_uploads_each)},
-        absl::StrCat("The caller has all of the ", limits_.most_uploads_each,
-                     " uploads that one caller may have; delete those that have served."));
+  if (owner.empty() || limits_.most_uploads_each == 0 || theirs < limits_.most_uploads_each)
+    return absl::OkStatus();
+  return make_fault(
+      absl::StatusCode::kResourceExhausted,
+      {"CALLER_UPLOADS_FULL", "uploads", absl::StrCat("uploads <= ", limits_.most_uploads_each)},
+      absl::StrCat("The caller has all of the ", limits_.most_uploads_each,
+                   " uploads that one caller may have; delete those that have served."));
+}
+
+/// Where there is no place for one more, forgets an empty one. A flood of calls looks through all of them only when that may help.
+absl::Status Uploads::make_place() {
+  if (uploads_.size() < limits_.most_uploads) return absl::OkStatus();
+  const Timers::TimePoint now = timers_->now();
+  if (now >= no_place_before_) {
+    no_place_before_ = now + kEmptyPatience;
+    auto longest_untouched = uploads_.end();
+    for (auto entry = uploads_.begin(); entry != uploads_.end(); ++entry) {
+      if (!entry->second.upload->is_empty()) continue;
+      const Timers::TimePoint old_enough = entry->second.created + kEmptyPatience;
+      no_place_before_ = std::min(no_place_before_, old_enough);
+      if (old_enough > now) continue;
+      if (longest_untouched == uploads_.end() ||
+          entry->second.last_used < longest_untouched->second.last_used) {
+        longest_untouched = entry;
+      }
+    }
+    if (longest_untouched != uploads_.end()) {
+      forget(longest_untouched);
+      return absl::OkStatus();
+    }
   }
-  if (uploads_.size() >= limits_.most_uploads) {
-    return make_fault(absl::StatusCode::kResourceExhausted,
-                      {"UPLOADS_FULL", "uploads", absl::StrCat("uploads <= ", limits_.most_uploads)},
-                      absl::StrCat("The server has all of its ", limits_.most_uploads,
-                                   " uploads in use; delete those that have served, or try again later."));
-  }
-  return budget_->check(size_bytes, owner);
+  return retry_after(
+      make_fault(absl::StatusCode::kResourceExhausted,
+                 {"UPLOADS_FULL", "uploads", absl::StrCat("uploads <= ", limits_.most_uploads)},
+                 absl::StrCat("The server has all of its ", limits_.most_uploads,
+                              " uploads in use; delete those that have served, or try again later.")),
+      no_place_before_ - now);
 }
 
 absl::StatusOr<std::shared_ptr<Upload>> Uploads::find(const std::string& name, const std::string& owner) {
@@ -160,20 +192,30 @@ void Uploads::forget(std::map<std::string, Entry>::iterator entry) {
   uploads_.erase(entry);
 }
 
-void Uploads::watch(const std::string& name, Timers::TimePoint when) {
-  timers_->at(when, [weak = weak_from_this(), name] {
-    if (const auto self = weak.lock()) self->expire(name);
+/// One alarm for all, however many come and go.
+void Uploads::watch(Timers::TimePoint when) {
+  if (std::exchange(is_watching_, true)) return;
+  timers_->at(when, [weak = weak_from_this()] {
+    if (const auto self = weak.lock()) self->expire();
   });
 }
 
-/// Forgets the upload when it has been idle for long enough; looks again later where it has not.
-void Uploads::expire(const std::string& name) {
+/// Forgets the uploads that have been idle for long enough; looks again when the next one may have been.
+void Uploads::expire() {
   const std::scoped_lock lock(mutex_);
-  const auto found = uploads_.find(name);
-  if (found == uploads_.end()) return;
-  const Timers::TimePoint due = found->second.last_used + limits_.idle;
-  if (timers_->now() < due) return watch(name, due);
-  forget(found);
+  is_watching_ = false;
+  const Timers::TimePoint now = timers_->now();
+  Timers::TimePoint next = Timers::TimePoint::max();
+  for (auto entry = uploads_.begin(); entry != uploads_.end();) {
+    const auto here = entry++;
+    const Timers::TimePoint due = here->second.last_used + limits_.idle;
+    if (due <= now) {
+      forget(here);
+    } else {
+      next = std::min(next, due);
+    }
+  }
+  if (!uploads_.empty()) watch(next);
 }
 
 }  // namespace lpdeform

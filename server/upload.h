@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -34,6 +35,8 @@ class Upload {
   const std::string& owner() const { return owner_; }
   std::uint64_t size() const { return bytes_.size(); }
   std::uint32_t crc32c() const { return crc32c_; }
+  /// Whether nothing of it is there: nothing has come, or it had a wrong checksum. Waits for nobody.
+  bool is_empty() const { return is_empty_; }
 
   /// The last missing part finishes it; later ones are ignored. Errors: INVALID_ARGUMENT UPLOAD_PART_SIZE
   /// (empty, or over 1 MiB), UPLOAD_PART_OUT_OF_RANGE, UPLOAD_SCATTERED (it would begin one run too many); RESOURCE_EXHAUSTED
@@ -60,13 +63,17 @@ class Upload {
   Reservation memory_;
   UploadBytes bytes_;
   bool is_finished_ = false;
+  std::atomic<bool> is_empty_ = true;
 };
 
 /// All uploads of a server. They go when nobody has touched them for a while. One that was announced takes no memory before its
-/// bytes come. Thread-safe. Held by a shared pointer.
+/// bytes come, and its place only as long as nobody else needs it. Thread-safe. Held by a shared pointer.
 class Uploads : public std::enable_shared_from_this<Uploads> {
  public:
   static constexpr std::size_t kMostUploads = 4096;  // small ones cost more than their bytes
+  /// For so long the place of an upload is its own though nothing has come: a client sends the first part at once. Where all places
+  /// are taken, an older one without a byte makes room.
+  static constexpr std::chrono::seconds kEmptyPatience{10};
 
   struct Limits {
     std::uint64_t most_bytes_each;
@@ -78,8 +85,9 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
 
   Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers, Limits limits);
 
-  /// Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED UPLOADS_FULL, CALLER_UPLOADS_FULL;
-  /// MEMORY_FULL, CALLER_MEMORY_FULL where there is no room for all of it now: that there is promises nothing.
+  /// Where all places are taken, the upload goes that nobody has touched for longest, of those that have nothing and are older than
+  /// kEmptyPatience. Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED UPLOADS_FULL (there is
+  /// none such; it says when there may be), CALLER_UPLOADS_FULL; MEMORY_FULL, CALLER_MEMORY_FULL where there is no room for all of it now: that there is promises nothing.
   absl::StatusOr<std::shared_ptr<Upload>> create(const std::string& request_id, std::uint64_t size_bytes,
                                                  std::uint32_t crc32c, const std::string& owner = "");
 
@@ -95,12 +103,13 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
   struct Entry {
     std::shared_ptr<Upload> upload;
     std::string request_id;
-    Timers::TimePoint last_used;
+    Timers::TimePoint created, last_used;
   };
-  absl::Status check_room(std::uint64_t size_bytes, const std::string& owner) const;
+  absl::Status check_share(const std::string& owner) const;
+  absl::Status make_place();
   void forget(std::map<std::string, Entry>::iterator entry);
-  void watch(const std::string& name, Timers::TimePoint when);
-  void expire(const std::string& name);
+  void watch(Timers::TimePoint when);
+  void expire();
 
   const std::shared_ptr<Budget> budget_;
   const std::shared_ptr<Timers> timers_;
@@ -109,6 +118,8 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
   std::map<std::string, Entry> uploads_;                                  // by name
   std::map<std::pair<std::string, std::string>, std::string> requested_;  // names, by owner and request_id
   std::map<std::string, std::size_t> owned_;                              // how many each owner has
+  Timers::TimePoint no_place_before_{};                                   // no empty one is old enough before
+  bool is_watching_ = false;                                              // an alarm is set, one for all
 };
 
 inline constexpr std::size_t kLeastRequestId = 8, kMostRequestId = 64;  // bytes

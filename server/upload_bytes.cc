@@ -18,16 +18,23 @@ char* map_without_memory(std::uint64_t size) {
   return static_cast<char*>(data);
 }
 
+/// The bytes of the pages that so many are in: no more than a step.
+std::uint64_t in_pages(std::uint64_t bytes) {
+  return (bytes + UploadBytes::kPage - 1) / UploadBytes::kPage * UploadBytes::kPage;
+}
+
 }  // namespace
 
 void UploadBytes::Unmap::operator()(char* data) const {
   munmap(data, size);
 }
 
-bool UploadBytes::joins_a_run(std::uint64_t begin, std::uint64_t end) const {
-  const auto after = runs_.upper_bound(begin);
-  return (after != runs_.end() && after->first <= end) ||
-         (after != runs_.begin() && std::prev(after)->second >= begin);
+/// How many runs the bytes from `begin` to `end` touch or overlap.
+std::size_t UploadBytes::runs_joined(std::uint64_t begin, std::uint64_t end) const {
+  const auto first = runs_.upper_bound(begin);
+  const bool joins_one_before = first != runs_.begin() && std::prev(first)->second >= begin;
+  const auto joined = std::distance(first, runs_.upper_bound(end));
+  return static_cast<std::size_t>(joined) + (joins_one_before ? 1 : 0);
 }
 
 bool UploadBytes::has_some(std::uint64_t begin, std::uint64_t end) const {
@@ -36,11 +43,15 @@ bool UploadBytes::has_some(std::uint64_t begin, std::uint64_t end) const {
 }
 
 std::size_t UploadBytes::memory_with(std::uint64_t begin, std::uint64_t count) const {
-  std::size_t memory = memory_;
+  return memory_of(steps_memory_with(begin, count), runs_.size() + 1 - runs_joined(begin, begin + count));
+}
+
+std::size_t UploadBytes::steps_memory_with(std::uint64_t begin, std::uint64_t count) const {
+  std::size_t memory = steps_memory_;
   const std::uint64_t last = (begin + count - 1) / kStep;
   for (std::uint64_t step = begin / kStep; step <= last; ++step) {
     const std::uint64_t from = step * kStep, to = from + std::min(kStep, size_ - from);
-    if (!has_some(from, to)) memory += to - from;
+    if (!has_some(from, to)) memory += in_pages(to - from);
   }
   return memory;
 }
@@ -48,7 +59,7 @@ std::size_t UploadBytes::memory_with(std::uint64_t begin, std::uint64_t count) c
 bool UploadBytes::put(std::uint64_t begin, std::string_view part) {
   if (data_ == nullptr) data_.reset(map_without_memory(size_));
   if (data_ == nullptr) return false;
-  memory_ = memory_with(begin, part.size());
+  steps_memory_ = steps_memory_with(begin, part.size());
   std::memcpy(data_.get() + begin, part.data(), part.size());
   mark(begin, begin + part.size());
   return true;
@@ -71,7 +82,7 @@ void UploadBytes::clear() {
   data_.reset();
   runs_.clear();
   received_ = 0;
-  memory_ = 0;
+  steps_memory_ = 0;
 }
 
 }  // namespace lpdeform

@@ -12,8 +12,12 @@ namespace lpdeform {
 /// size is: it comes from the system, page by page as it is written, and goes back to it at once. One thread at a time.
 class UploadBytes {
  public:
-  /// Bytes whose memory is counted together; the last step may be shorter.
+  /// Bytes whose memory is counted together; the last step may be shorter, by whole pages.
   static constexpr std::uint64_t kStep = 64u << 10;
+  /// The least that the system gives.
+  static constexpr std::uint64_t kPage = 4096;
+  /// What is taken to know where a run lies. Counted for each run but the first.
+  static constexpr std::size_t kRunBytes = 64;
 
   explicit UploadBytes(std::uint64_t size) : size_(size), data_(nullptr, Unmap{size}) {}
 
@@ -23,10 +27,10 @@ class UploadBytes {
   /// Stretches without gaps in which they lie.
   std::size_t runs() const { return runs_.size(); }
   /// Whether bytes are there that those from `begin` to `end` touch or overlap, so that no new run begins.
-  bool joins_a_run(std::uint64_t begin, std::uint64_t end) const;
+  bool joins_a_run(std::uint64_t begin, std::uint64_t end) const { return runs_joined(begin, end) != 0; }
 
-  /// Bytes of memory that are taken.
-  std::size_t memory() const { return memory_; }
+  /// Bytes of memory that are taken: less again where runs become one.
+  std::size_t memory() const { return memory_of(steps_memory_, runs_.size()); }
   /// The same once `count` bytes from `begin` on have come, too: 1 or more, within the size.
   std::size_t memory_with(std::uint64_t begin, std::uint64_t count) const;
 
@@ -43,7 +47,12 @@ class UploadBytes {
     std::uint64_t size;
     void operator()(char* data) const;
   };
+  static std::size_t memory_of(std::size_t steps_memory, std::size_t runs) {
+    return steps_memory + kRunBytes * (runs - (runs == 0 ? 0 : 1));
+  }
+  std::size_t runs_joined(std::uint64_t begin, std::uint64_t end) const;
   bool has_some(std::uint64_t begin, std::uint64_t end) const;
+  std::size_t steps_memory_with(std::uint64_t begin, std::uint64_t count) const;
   void mark(std::uint64_t begin, std::uint64_t end);
 
   const std::uint64_t size_;
@@ -51,7 +60,7 @@ class UploadBytes {
   // Begin to end of what is there; they neither touch nor overlap.
   std::map<std::uint64_t, std::uint64_t> runs_;
   std::uint64_t received_ = 0;
-  std::size_t memory_ = 0;
+  std::size_t steps_memory_ = 0;
 };
 
 }  // namespace lpdeform

@@ -3,15 +3,18 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
+#include <memory>
 #include <random>
 #include <set>
 #include <string>
+#include <vector>
 
 namespace lpdeform {
 namespace {
 
-constexpr std::uint64_t kStep = UploadBytes::kStep;
+constexpr std::uint64_t kStep = UploadBytes::kStep, kPage = UploadBytes::kPage, kRun = UploadBytes::kRunBytes;
 
 /// Of this process, in bytes.
 std::size_t resident() {
@@ -27,11 +30,11 @@ TEST(UploadBytes, TakeMemoryByStepsAsTheyCome) {
   ASSERT_TRUE(bytes.put(7, "x"));
   EXPECT_EQ(bytes.memory(), kStep);
   EXPECT_EQ(bytes.memory_with(0, kStep), kStep);
-  EXPECT_EQ(bytes.memory_with(kStep - 1, 2), 2 * kStep);
-  EXPECT_EQ(bytes.memory_with(3 * kStep + 4, 1), kStep + 5);
+  EXPECT_EQ(bytes.memory_with(kStep - 1, 2), 2 * kStep + kRun);
+  EXPECT_EQ(bytes.memory_with(3 * kStep + 4, 1), kStep + kPage + kRun);
   ASSERT_TRUE(bytes.put(3 * kStep, "ends"));
-  EXPECT_EQ(bytes.memory(), kStep + 5);
-  EXPECT_EQ(bytes.memory_with(0, bytes.size()), bytes.size());
+  EXPECT_EQ(bytes.memory(), kStep + kPage + kRun);
+  EXPECT_EQ(bytes.memory_with(0, bytes.size()), 3 * kStep + kPage);
 }
 
 TEST(UploadBytes, AByteAtTheEndOfManyGigabytesTakesOneStep) {
@@ -40,10 +43,28 @@ TEST(UploadBytes, AByteAtTheEndOfManyGigabytesTakesOneStep) {
   const std::size_t before = resident();
   ASSERT_TRUE(bytes.put(kSize - 1, "x"));
   ASSERT_TRUE(bytes.put(kSize / 2, "y"));
-  EXPECT_EQ(bytes.memory(), 2 * kStep);
+  EXPECT_EQ(bytes.memory(), 2 * kStep + kRun);
   EXPECT_LT(resident() - before, 16 * kStep);
   EXPECT_EQ(bytes.whole().size(), kSize);
   EXPECT_EQ(bytes.whole().back(), 'x');
+}
+
+TEST(UploadBytes, InTinyPartsTakeNoMoreThanIsCounted) {
+  constexpr std::size_t kRuns = 1024, kMany = 100;
+  std::vector<std::unique_ptr<UploadBytes>> all;
+  std::size_t counted = 0;
+  const std::size_t before = resident();
+  for (std::size_t k = 0; k < kMany; ++k) {
+    all.push_back(std::make_unique<UploadBytes>(2 * kRuns));
+    for (std::size_t run = 0; run < kRuns; ++run) ASSERT_TRUE(all.back()->put(2 * run, "x"));
+    EXPECT_EQ(all.back()->memory(), kPage + (kRuns - 1) * kRun);
+    counted += all.back()->memory();
+  }
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // they take memory of their own
+  EXPECT_LT(resident() - before, counted + (1 << 20));
+#endif
+  for (std::size_t run = 0; run + 1 < kRuns; ++run) ASSERT_TRUE(all[0]->put(2 * run + 1, "y"));
+  EXPECT_EQ(all[0]->memory(), kPage);
 }
 
 TEST(UploadBytes, OfASizeThatNoMachineHasTakeNothing) {
@@ -69,13 +90,17 @@ TEST(UploadBytes, WhateverTheOrderAreThoseThatCameAndCountTheStepsThatTheyAreIn)
       there.insert(at);
     }
     expected.replace(begin, count, part);
-    const std::uint64_t memory = steps.size() * kStep - (steps.contains(9) ? kStep - 1234 : 0);
-    ASSERT_EQ(bytes.memory_with(begin, count), memory);
+    const std::uint64_t with_it = bytes.memory_with(begin, count);
     ASSERT_TRUE(bytes.put(begin, part));
-    ASSERT_EQ(bytes.memory(), memory);
+    const std::uint64_t pages = steps.size() * kStep - (steps.contains(9) ? kStep - kPage : 0);
+    ASSERT_EQ(bytes.memory(), pages + (bytes.runs() - 1) * kRun);
+    ASSERT_EQ(with_it, bytes.memory());
     ASSERT_EQ(bytes.received(), there.size());
   }
   EXPECT_TRUE(bytes.whole() == expected);
+  const auto ends =
+      std::count_if(there.begin(), there.end(), [&](auto at) { return !there.contains(at + 1); });
+  EXPECT_EQ(bytes.runs(), static_cast<std::size_t>(ends));
   bytes.clear();
   EXPECT_EQ(bytes.memory() + bytes.received() + bytes.runs(), 0u);
   ASSERT_TRUE(bytes.put(0, "again"));

@@ -13,6 +13,8 @@
 namespace lpdeform {
 namespace {
 
+constexpr std::size_t kPage = UploadBytes::kPage;
+
 class UploadTest : public testing::Test {
  protected:
   std::shared_ptr<Upload> create(const std::string& bytes, const std::string& request_id = "") {
@@ -24,9 +26,9 @@ class UploadTest : public testing::Test {
   static std::string reason(const absl::Status& status) { return fault_of(status).reason; }
 
   std::shared_ptr<ManualTimers> timers_ = std::make_shared<ManualTimers>();
-  std::shared_ptr<Budget> budget_ = std::make_shared<Budget>(1000);
+  std::shared_ptr<Budget> budget_ = std::make_shared<Budget>(10 * kPage);
   std::shared_ptr<Uploads> uploads_ =
-      std::make_shared<Uploads>(budget_, timers_, Uploads::Limits{800, std::chrono::minutes(10)});
+      std::make_shared<Uploads>(budget_, timers_, Uploads::Limits{8 * kPage, std::chrono::minutes(10)});
 };
 
 TEST_F(UploadTest, TakesPartsInAnyOrderAndTwice) {
@@ -64,18 +66,18 @@ TEST_F(UploadTest, RefusesPartsThatDoNotFit) {
 TEST_F(UploadTest, RefusesSizesBeyondTheLimitsBeforeTakingMemory) {
   EXPECT_EQ(reason(uploads_->create("", 0, 0).status()), "UPLOAD_SIZE");
   EXPECT_EQ(reason(uploads_->create("", ~std::uint64_t{0}, 0).status()), "UPLOAD_SIZE");
-  const auto first = create(std::string(600, 'a'));
+  const auto first = create(std::string(6 * kPage, 'a'));
   ASSERT_TRUE(first->add(0, "a").ok());
-  const auto second = uploads_->create("", 600, 0);
+  const auto second = uploads_->create("", 6 * kPage, 0);
   EXPECT_TRUE(absl::IsResourceExhausted(second.status()));
   EXPECT_EQ(reason(second.status()), "MEMORY_FULL");
 }
 
 TEST_F(UploadTest, AnnouncedUploadsLeaveAllMemoryToOthers) {
   std::vector<std::shared_ptr<Upload>> announced;
-  for (int k = 0; k < 95; ++k) announced.push_back(create(std::string(800, 'a')));
+  for (int k = 0; k < 95; ++k) announced.push_back(create(std::string(8 * kPage, 'a')));
   EXPECT_EQ(budget_->used(), 0u);
-  EXPECT_TRUE(budget_->reserve(1000).ok());
+  EXPECT_TRUE(budget_->reserve(10 * kPage).ok());
 }
 
 TEST_F(UploadTest, APartWithoutRoomLeavesTheUploadAsItIsAndMayComeAgain) {
@@ -122,11 +124,11 @@ TEST_F(UploadTest, TheCallersShareBoundsWhatComesOfItsUploads) {
 TEST_F(UploadTest, AWrongChecksumGivesItsMemoryBackUntilItComesAgain) {
   const auto upload = create("abcd");
   ASSERT_TRUE(upload->add(0, "ab").ok());
-  EXPECT_EQ(budget_->used(), 4u);
+  EXPECT_EQ(budget_->used(), kPage);
   EXPECT_EQ(reason(upload->add(2, "xx").status()), "UPLOAD_CHECKSUM");
   EXPECT_EQ(budget_->used(), 0u);
   EXPECT_TRUE(upload->add(0, "abcd")->is_finished);
-  EXPECT_EQ(budget_->used(), 4u);
+  EXPECT_EQ(budget_->used(), kPage);
 }
 
 TEST_F(UploadTest, OneOwnerHasSoManyUploadsAndNoMore) {
@@ -167,6 +169,39 @@ TEST_F(UploadTest, RefusesTooManySmallOnes) {
   EXPECT_EQ(reason(uploads->create("", 1, 0).status()), "UPLOADS_FULL");
 }
 
+TEST_F(UploadTest, EmptyOnesMakeRoomAndThoseInUseDoNot) {
+  const auto uploads = std::make_shared<Uploads>(
+      budget_, timers_,
+      Uploads::Limits{.most_bytes_each = 8, .idle = std::chrono::minutes(10), .most_uploads = 4});
+  const auto in_use = *uploads->create("", 8, 0), first = *uploads->create("request-1", 8, 0),
+             second = *uploads->create("", 8, 0), damaged = *uploads->create("", 1, 0);
+  ASSERT_TRUE(in_use->add(0, "a").ok());
+  EXPECT_EQ(reason(damaged->add(0, "x").status()), "UPLOAD_CHECKSUM");
+  timers_->advance(std::chrono::seconds(4));
+  const absl::Status refused = uploads->create("", 8, 0).status();
+  EXPECT_EQ(reason(refused), "UPLOADS_FULL");
+  EXPECT_EQ(retry_after_ms(refused), 6000u);
+  EXPECT_TRUE(uploads->find(first->name()).ok());
+  EXPECT_TRUE(uploads->find(damaged->name()).ok());
+  timers_->advance(std::chrono::seconds(6));
+  // By how long nobody has touched them.
+  ASSERT_TRUE(uploads->create("", 8, 0).ok());
+  EXPECT_EQ(reason(uploads->find(second->name()).status()), "UPLOAD_UNKNOWN");
+  ASSERT_TRUE(uploads->create("", 8, 0).ok());
+  ASSERT_TRUE(uploads->create("", 8, 0).ok());
+  EXPECT_EQ(reason(uploads->find(first->name()).status()), "UPLOAD_UNKNOWN");
+  EXPECT_EQ(reason(uploads->find(damaged->name()).status()), "UPLOAD_UNKNOWN");
+  EXPECT_TRUE(uploads->find(in_use->name()).ok());
+  EXPECT_EQ(uploads->size(), 4u);
+  EXPECT_EQ(retry_after_ms(uploads->create("", 8, 0).status()), 10'000u);
+  EXPECT_EQ(reason(first->add(0, "a").status()), "");  // who has it keeps it
+}
+
+TEST_F(UploadTest, ManyThatComeAndGoLeaveNoAlarms) {
+  for (int k = 0; k < 1000; ++k) uploads_->remove(create("abcd")->name());
+  EXPECT_LE(timers_->waiting(), 1u);
+}
+
 TEST_F(UploadTest, ComesInAnyOrderWhereItIsCutIntoAtMostTwiceAsManyPartsAsRuns) {
   const auto uploads = std::make_shared<Uploads>(std::make_shared<Budget>(1 << 20), timers_,
                                                  Uploads::Limits{1 << 20, std::chrono::minutes(10)});
@@ -205,7 +240,7 @@ TEST_F(UploadTest, DeletingItGivesItsMemoryAndItsIdBackAndMayBeRepeated) {
   const auto second = uploads_->create("request-1", 4, 0).value();
   EXPECT_NE(second->name(), name);
   ASSERT_TRUE(second->add(0, "a").ok());
-  EXPECT_EQ(budget_->used(), 12u);  // 8 of it as long as `first` is held
+  EXPECT_EQ(budget_->used(), 2 * kPage);  // one of them as long as `first` is held
 }
 
 TEST_F(UploadTest, GoesWhenNobodyTouchesItAndGivesItsMemoryBack) {
