@@ -111,7 +111,11 @@ absl::Status Keeper::keep_blob(Clock::time_point since, const std::string& name,
 
 /// Its blobs are kept.
 void Keeper::enter_new(const std::string& name, Entry entry) {
-  const std::scoped_lock lock(mutex_);
+  std::unique_lock lock(mutex_);
+  if (is_over_) {
+    lock.unlock();
+    return entry.on_added(store_failing(kEnds));
+  }
   entries_[name] = std::move(entry);
   due(name);
   services_.timers->at(services_.timers->now() + kPatienceForNew, [weak = weak_from_this(), name] {
@@ -172,7 +176,7 @@ void Keeper::changed(const Session& session, std::uint64_t revision, std::uint64
     if (found != entries_.end() && found->second.session.get() == &session) {
       Entry& entry = found->second;
       is_kept = entry.revision >= revision && entry.epoch >= epoch;
-      if (!is_kept) {
+      if (!is_kept && !is_over_) {
         due(session.name());
         if (!is_writing_failing_ && !entry.is_refused) {
           const Timers::TimePoint until = services_.timers->now() + kPatience;
@@ -217,7 +221,12 @@ void Keeper::give_up_waiting(const std::string& name) {
 }
 
 void Keeper::remove(const std::string& name, OnDone on_done) {
-  const std::scoped_lock lock(mutex_);
+  std::unique_lock lock(mutex_);
+  if (is_over_) {
+    lock.unlock();
+    if (on_done) on_done(store_failing(kEnds));
+    return;
+  }
   Entry& entry = entries_[name];
   entry.session.reset();
   entry.is_leaving = entry.is_expired = entry.is_refused = false;

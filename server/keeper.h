@@ -116,7 +116,8 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   };
 
   /// Before the process ends: waits until all is kept, and tries again and again where the store fails, until this moment. After it the
-  /// store is neither asked nor waited for any more. What is not kept, with a line in the log for each session.
+  /// store is neither asked nor waited for any more, and whoever waits for it, or comes later, is told STORE_FAILING, or that an update is
+  /// not kept. What is not kept, with a line in the log for each session.
   std::vector<Unkept> flush(std::chrono::steady_clock::time_point end);
 
   /// A session that was used so long ago is still in use, and so is one with a stream: a drag may rest.
@@ -169,6 +170,8 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
     std::map<std::string, std::string> blobs = {};  // where it is written anew
   };
 
+  static constexpr char kEnds[] = "the server ends";
+
   void run();
   std::vector<Work> take_work(bool is_retry);
   static void fill_in(Work& work);
@@ -197,6 +200,8 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   std::invoke_result_t<Ask> ask(Clock::time_point since, const Ask& what);
   void answer_kept(Entry& entry, Calls& calls);
   static void answer_all(Entry& entry, Calls& calls);
+  void answer_failed(Entry& entry, const absl::Status& why, Calls& calls);
+  void answer_everybody(Calls& calls);
   void note_waited(const Waiting& one);
   void make(const Calls& calls);
   void due(const std::string& name);

@@ -12,6 +12,7 @@ namespace lpdeform {
 std::vector<Keeper::Unkept> Keeper::flush(Clock::time_point end) {
   store_->end_by(end);
   std::vector<Unkept> left;
+  Calls calls;
   {
     std::unique_lock lock(mutex_);
     is_ending_ = true;
@@ -19,10 +20,17 @@ std::vector<Keeper::Unkept> Keeper::flush(Clock::time_point end) {
     changed_.notify_all();
     is_over_ = !changed_.wait_until(lock, end, [this] { return due_.empty() && !is_writing_; });
     if (is_over_) left = unkept();
+    if (is_over_) answer_everybody(calls);
   }
   changed_.notify_all();
   tell_of(left);
+  make(calls);
   return left;
+}
+
+/// Under the lock. A store that hangs may answer one day; nobody tells those who wait for it then.
+void Keeper::answer_everybody(Calls& calls) {
+  for (auto& [name, entry] : entries_) answer_failed(entry, store_failing(kEnds), calls);
 }
 
 /// Under the lock. In the order of their names.
@@ -41,6 +49,7 @@ std::optional<Keeper::Unkept> Keeper::unkept_of(const std::string& name, const E
     const bool is_known = entry.epoch != 0 && !entry.is_expired;
     return is_known ? std::optional(Unkept{.name = name, .is_removal = true}) : std::nullopt;
   }
+  if (entry.on_added) return std::nullopt;
   const SessionChanges changes = entry.session->changes_since(entry.revision);
   const std::uint64_t revision = changes.inputs.revision;
   if (revision <= entry.revision && changes.lease.epoch <= entry.epoch && !entry.is_lost) return std::nullopt;
@@ -55,11 +64,11 @@ void Keeper::tell_of(const std::vector<Unkept>& unkept) const {
     const std::string text =
         one.is_removal ? "It was deleted, and the store still has it."
                        : "The store has not taken its last updates; its client may send them again.";
-    services_.log->error("session_not_kept", {{"session", abbreviated(one.name)},
-                                              {"updates", where_known(one.updates)},
-                                              {"kept_input_seq", one.kept_seq},
-                                              {"input_seq", where_known(one.input_seq)},
-                                              {"text", text}});
+    services_.log->error_each("session_not_kept", {{"session", abbreviated(one.name)},
+                                                   {"updates", where_known(one.updates)},
+                                                   {"kept_input_seq", one.kept_seq},
+                                                   {"input_seq", where_known(one.input_seq)},
+                                                   {"text", text}});
   }
   if (!unkept.empty())
     services_.log->error("not_kept", {{"sessions", std::uint64_t{unkept.size()}},

@@ -205,16 +205,21 @@ void Keeper::note_failed(const Work& work, const absl::Status& why, Calls& calls
   Entry& entry = found->second;
   entry.is_refused = is_full(why);
   if (entry.on_added) {
-    calls.add([on_added = std::exchange(entry.on_added, nullptr), why] { on_added(why); });
     entry.session.reset();
     entry.is_refused = false;
   }
+  answer_failed(entry, why, calls);
+  due(work.name);
+}
+
+/// Under the lock. All who wait for something of the entry.
+void Keeper::answer_failed(Entry& entry, const absl::Status& why, Calls& calls) {
+  if (entry.on_added) calls.add([on_added = std::exchange(entry.on_added, nullptr), why] { on_added(why); });
   for (OnDone& on_removed : std::exchange(entry.on_removed, {}))
     calls.add([on_removed = std::move(on_removed), why] { on_removed(why); });
   services_.metrics->add(Count::kUpdatesNotKept, static_cast<double>(entry.waiting.size()));
   for (const Waiting& one : entry.waiting) note_waited(one);
   answer_all(entry, calls);
-  due(work.name);
 }
 
 /// Those whose updates are kept.

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
@@ -50,10 +51,14 @@ Log::Log(std::string_view level)
 }
 
 Log::~Log() {
-  {
-    const std::scoped_lock lock(mutex_);
-    end_window(Clock::now());
-  }
+  end();
+}
+
+void Log::end() const {
+  const std::scoped_lock lock(mutex_);
+  if (thread_ == nullptr) return;
+  end_window(Clock::now());
+  logger_->set_level(spdlog::level::off);
   thread_.reset();  // writes what waits, and ends before the logger that it writes to
 }
 
@@ -71,17 +76,45 @@ void Log::error(std::string_view event, Fields fields) const {
   write(spdlog::level::err, event, fields);
 }
 
+void Log::error_each(std::string_view event, Fields fields) const {
+  if (!logger_->should_log(spdlog::level::err)) return;
+  wait_for_room();
+  const std::scoped_lock lock(mutex_);
+  if (thread_ != nullptr) write_line(spdlog::level::err, event, fields);
+}
+
+/// In the queue, which others fill, too.
+bool Log::has_room() const {
+  const std::scoped_lock lock(mutex_);
+  return thread_ == nullptr || thread_->queue_size() < kLongestQueue / 2;
+}
+
+/// Once in vain is enough: of a queue that is stuck the oldest lines go.
+void Log::wait_for_room() const {
+  const Clock::time_point end = Clock::now() + (is_stuck_ ? std::chrono::seconds(0) : kStall);
+  while (!has_room()) {
+    if (Clock::now() >= end) {
+      is_stuck_ = true;
+      return;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  is_stuck_ = false;
+}
+
 void Log::write(int level, std::string_view event, Fields fields) const {
   if (!logger_->should_log(static_cast<spdlog::level::level_enum>(level))) return;
   if (level == spdlog::level::debug) return write_line(level, event, fields);
   const LogBound::Kind kind = kind_of(level, event, fields);
   const std::scoped_lock lock(mutex_);
+  if (thread_ == nullptr) return;
   if (const Clock::time_point now = Clock::now(); now - window_began_ >= kWindow) end_window(now);
   if (bound_.admits(kind)) write_line(level, event, fields);
 }
 
 void Log::sum_up() const {
   const std::scoped_lock lock(mutex_);
+  if (thread_ == nullptr) return;
   if (const Clock::time_point now = Clock::now(); now - window_began_ >= kWindow) end_window(now);
 }
 

@@ -9,6 +9,7 @@
 #include "server/health_probe.h"
 #include "server/machine_memory.h"
 #include "server/open_store.h"
+#include "server/process_end.h"
 #include "server/server.h"
 
 namespace {
@@ -17,6 +18,9 @@ using lpdeform::ServerOptions;
 
 /// The statuses that it exits with, beside 0.
 constexpr int kRefused = 1, kNotKept = 2;
+
+/// What it has to end by itself after the store was waited for: less where that hangs, and nothing is to be saved any more.
+constexpr std::chrono::seconds kToEnd{10}, kToEndWithout{2};
 
 /// Clocks count no further.
 constexpr double kMostSeconds = 1e9, kLeastSeconds = 1e-3;
@@ -289,7 +293,7 @@ lpdeform::ByteLimit byte_limit(const std::string& text) {
   return {.bytes = std::stoull(text)};
 }
 
-int serve(Arguments& arguments, const sigset_t& signals) {
+int serve(Arguments& arguments, const sigset_t& signals, lpdeform::ProcessEnd& end) {
   ServerOptions& options = arguments.server;
   options.session_idle = milliseconds(arguments.session_idle_seconds);
   options.upload_idle = milliseconds(arguments.upload_idle_seconds);
@@ -309,7 +313,10 @@ int serve(Arguments& arguments, const sigset_t& signals) {
   std::fflush(stdout);
   int signal = 0;
   sigwait(&signals, &signal);
-  return (*server)->drain(milliseconds(arguments.grace_seconds)) ? 0 : kNotKept;
+  const auto status = [](bool is_all_kept) { return is_all_kept ? 0 : kNotKept; };
+  return status((*server)->drain(milliseconds(arguments.grace_seconds), [&](bool is_all_kept) {
+    end.within(is_all_kept ? kToEnd : kToEndWithout, status(is_all_kept), options.log);
+  }));
 }
 
 const pthread_t main_thread = pthread_self();
@@ -339,11 +346,12 @@ int main(int argc, char** argv) {
   const sigset_t signals = signals_for_sigwait();
   signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of the write to it
 
+  lpdeform::ProcessEnd end;  // outlives the store
   Arguments arguments;
   CLI::App app;
   arguments.server.address = "127.0.0.1:50051";
   describe(app, arguments);
   CLI11_PARSE(app, argc, argv);
   if (!arguments.probed.empty()) return lpdeform::is_serving(arguments.probed) ? 0 : 1;
-  return serve(arguments, signals);
+  return serve(arguments, signals, end);
 }

@@ -328,7 +328,7 @@ std::string Server::admin_address() const {
   return impl_->admin ? impl_->admin->address() : "";
 }
 
-bool Server::drain(std::chrono::milliseconds grace) {
+bool Server::drain(std::chrono::milliseconds grace, const OnFlushed& on_flushed) {
   const std::scoped_lock lock(impl_->draining);
   if (std::exchange(impl_->is_drained, true)) return impl_->is_all_kept;
   Backend& backend = impl_->backend;
@@ -340,6 +340,7 @@ bool Server::drain(std::chrono::milliseconds grace) {
   backend.gate.wait_until_empty(std::chrono::steady_clock::now() + grace);
   std::this_thread::sleep_for(std::min(grace, kLinger));
   impl_->is_all_kept = backend.release_sessions(text);
+  if (on_flushed) on_flushed(impl_->is_all_kept);
   impl_->listener->stop();
   impl_->grpc_server->Shutdown(std::chrono::system_clock::now());  // cancels what is still under way
   impl_->grpc_server->Wait();

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -108,8 +109,10 @@ class Server {
   /// Stops: health says NOT_SERVING, new calls are refused as UNAVAILABLE, streams get a go-away, Solve calls
   /// may go on until `grace` has passed and are ended then; then a store that fails has 5 s more to take what has changed. Returns when
   /// nothing runs any more: true where the store has all that was answered; else the log has a line for each session ("session_not_kept").
-  /// Again: the same, at once.
-  bool drain(std::chrono::milliseconds grace);
+  /// Again: the same, at once. `on_flushed`: called, with what is to be returned, once the store is waited for no more. What comes after
+  /// may still need it to answer: calls that read, and the destructor.
+  using OnFlushed = std::function<void(bool is_all_kept)>;
+  bool drain(std::chrono::milliseconds grace, const OnFlushed& on_flushed = nullptr);
 
  private:
   struct Impl;

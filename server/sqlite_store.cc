@@ -375,9 +375,7 @@ absl::StatusOr<std::size_t> SqliteStore::remove_unused(std::int64_t idle_ms) {
   return removals.size();
 }
 
-}  // namespace
-
-absl::StatusOr<std::shared_ptr<Store>> open_sqlite_store(const SqliteStoreOptions& options) {
+absl::StatusOr<std::shared_ptr<Store>> open(const SqliteStoreOptions& options) {
   if (absl::Status status = make_private_folder(options.folder); !status.ok()) return status;
   auto database =
       SqliteDatabase::open(options.folder + "/sessions.db");  // first: it is the lock of the whole folder
@@ -390,6 +388,13 @@ absl::StatusOr<std::shared_ptr<Store>> open_sqlite_store(const SqliteStoreOption
   auto store = std::make_shared<SqliteStore>(*std::move(database), *std::move(blobs), options);
   if (absl::Status status = store->prepare(); !status.ok()) return status;
   return store;
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<Store>> open_sqlite_store(const SqliteStoreOptions& options) {
+  auto store = open(options);
+  return is_full(store.status()) ? store_full_at_start(store.status(), options.folder) : store;
 }
 
 }  // namespace lpdeform

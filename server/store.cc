@@ -7,11 +7,13 @@
 #include "absl/strings/cord.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
 #include "core/base/fault.h"
 
 namespace lpdeform {
 namespace {
 
+constexpr char kMakeRoom[] = ". Delete sessions, or make room; then try again.";
 constexpr char kDamage[] = "lpdeform/damage";    // likewise: for the log
 constexpr char kAway[] = "lpdeform/store-away";  // stays in this process
 
@@ -30,10 +32,18 @@ absl::Status store_failing(std::string_view why) {
 }
 
 absl::Status store_full(std::string_view why, std::string_view limit) {
-  return make_fault(
-      absl::StatusCode::kResourceExhausted, {"STORE_FULL", "store", std::string(limit)},
-      absl::StrCat("The server's store of sessions is full: ", absl::string_view(why.data(), why.size()),
-                   ". Delete sessions, or make room; then try again."));
+  return make_fault(absl::StatusCode::kResourceExhausted, {"STORE_FULL", "store", std::string(limit)},
+                    absl::StrCat("The server's store of sessions is full: ",
+                                 absl::string_view(why.data(), why.size()), kMakeRoom));
+}
+
+absl::Status store_full_at_start(const absl::Status& full, const std::string& folder) {
+  const Fault fault = fault_of(full);
+  const absl::string_view why = absl::StripSuffix(full.message(), kMakeRoom);
+  const std::string what = fault.limit.empty() ? absl::StrCat("Make 20 MiB of room on the disk of ", folder)
+                                               : "Raise --max-store-bytes by 20 MiB";
+  return make_fault(full.code(), fault,
+                    absl::StrCat(why, ". ", what, ": the server cannot start until then."));
 }
 
 bool is_full(const absl::Status& status) {

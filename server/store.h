@@ -164,6 +164,8 @@ absl::Status store_failing(std::string_view why);
 /// RESOURCE_EXHAUSTED STORE_FULL. `limit`: the bound, where it is one that somebody set.
 absl::Status store_full(std::string_view why, std::string_view limit = "");
 bool is_full(const absl::Status& status);
+/// The same for whoever starts a server and has not room enough for it: how much it takes, and where, in a folder of this name.
+absl::Status store_full_at_start(const absl::Status& full, const std::string& folder);
 /// The same, where there is no answer: whatever it is asked next has none either.
 absl::Status store_away(std::string_view why);
 bool is_away(const absl::Status& status);

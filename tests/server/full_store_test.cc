@@ -146,6 +146,23 @@ TEST_F(FullStoreTest, AServerThatBeginsOnAFullDiskRemoves) {
   EXPECT_TRUE(store_->take_over("old8", "anna").ok());
 }
 
+TEST_F(FullStoreTest, AServerThatHasNoRoomToStartSaysHowMuchItTakesAndWhere) {
+  ASSERT_TRUE(make("a", 1000).ok());
+  store_.reset();
+  std::filesystem::remove(folder_ + "/sessions.db-wal");
+  disk_.set_full(true);
+  const auto refused = open_sqlite_store({folder_});
+  EXPECT_EQ(reason(refused.status()), "STORE_FULL");
+  const std::string text(refused.status().message());
+  EXPECT_NE(
+      text.find("Make 20 MiB of room on the disk of " + folder_ + ": the server cannot start until then."),
+      std::string::npos)
+      << text;
+  EXPECT_EQ(text.find("Delete sessions"), std::string::npos) << text;
+  disk_.set_full(false);
+  open();
+}
+
 TEST_F(FullStoreTest, TheDiskGetsBackWhatALargeSessionTook) {
   ASSERT_TRUE(make("large", 60 << 20).ok());
   const std::uintmax_t before = size_of("sessions.db");

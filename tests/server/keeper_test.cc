@@ -524,6 +524,47 @@ TEST_F(KeeperTest, TheEndWaitsForAStoreThatFailsAndSaysWhatItHasNotTaken) {
   EXPECT_TRUE(store_->asked().empty());  // what was said not to be kept is not
 }
 
+TEST_F(KeeperTest, TheEndAnswersAllWhoWaitForAStoreThatHangs) {
+  const auto all = three_that_wait();
+  std::promise<absl::Status> removed, added, removed_late;
+  std::promise<bool> kept;
+  auto is_removed = removed.get_future(), is_added = added.get_future(),
+       is_removed_late = removed_late.get_future();
+  auto is_kept = kept.get_future();
+  keeper_->remove(all[0]->name(), [&](const absl::Status& status) { removed.set_value(status); });
+  keeper_->add(session(kName + "c"), {}, "", [&](const absl::Status& status) { added.set_value(status); });
+  keeper_->changed(*all[1], all[1]->revision() + 1, 0, [&](bool is) { kept.set_value(is); });
+  const auto left = keeper_->flush(soon());
+  ASSERT_FALSE(left.empty());
+  EXPECT_EQ(left[0].name, all[0]->name());
+  EXPECT_TRUE(left[0].is_removal);
+  for (const auto& one : left) EXPECT_NE(one.name, kName + "c");  // nobody was told that it is there
+  keeper_->remove(all[2]->name(), [&](const absl::Status& status) { removed_late.set_value(status); });
+  constexpr std::chrono::seconds kSoon{10};
+  for (auto* const answer : {&is_removed, &is_added, &is_removed_late}) {
+    ASSERT_EQ(answer->wait_for(kSoon), std::future_status::ready);
+    EXPECT_EQ(fault_of(answer->get()).reason, "STORE_FAILING");
+  }
+  ASSERT_EQ(is_kept.wait_for(kSoon), std::future_status::ready);
+  EXPECT_FALSE(is_kept.get());
+}
+
+TEST_F(KeeperTest, TheEndNamesEverySessionHoweverManyThereAre) {
+  constexpr std::size_t kMany = 300;
+  keeper_ =
+      Keeper::create(store_, {timers_, metrics_, std::make_shared<Log>("error"), std::chrono::minutes(10)});
+  std::vector<std::shared_ptr<Session>> all;
+  for (std::size_t k = 0; k < kMany; ++k) all.push_back(kept(absl::StrCat("sessions/", k)));
+  store_->fail_with(store_failing("a test wants it to"));
+  for (const auto& one : all) EXPECT_FALSE(is_kept(*one, 1));
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(keeper_->flush(soon()).size(), kMany);
+  keeper_.reset();  // the log, too: it writes what waits
+  const std::string said = testing::internal::GetCapturedStderr();
+  for (std::size_t k = 0; k < kMany; ++k)
+    EXPECT_TRUE(absl::StrContains(said, absl::StrCat("\"session_not_kept\",\"session\":\"", k, "\""))) << k;
+}
+
 TEST_F(KeeperTest, TheEndTriesAgainAndNamesNothingWhereTheStoreWorksInTime) {
   const auto one = kept();
   store_->fail_with(store_failing("a test wants it to"));

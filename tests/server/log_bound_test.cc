@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <string>
+
+#include "server/log.h"
 
 namespace lpdeform {
 namespace {
@@ -53,6 +56,24 @@ TEST(LogBound, ManySessionsTakeNoMoreThanAReasonHasAndNoneIsLostFromTheCount) {
   EXPECT_EQ(written + left_out, 10'000u);
   EXPECT_LE(all.size(), LogBound::kOfAReason + 1);
   EXPECT_EQ(all.back().kind.session, "");
+}
+
+TEST(Log, OneLineForEachOfManyThingsIsWrittenHoweverManyTheseAre) {
+  constexpr std::uint64_t kMany = 20'000;  // more than its queue has
+  testing::internal::CaptureStderr();
+  {
+    const Log log("info");
+    for (std::uint64_t k = 0; k < kMany; ++k) log.error_each("one_of_many", {{"number", k}});
+    log.error("last", {});
+    log.end();
+    log.error("too_late", {});
+    log.sum_up();
+  }
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), kMany + 1);
+  EXPECT_EQ(said.find("lines_lost"), std::string::npos);
+  EXPECT_NE(said.find("\"last\""), std::string::npos);
+  EXPECT_EQ(said.find("too_late"), std::string::npos);
 }
 
 }  // namespace

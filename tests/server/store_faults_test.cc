@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <future>
 #include <thread>
 
 #include "redis_server.h"
@@ -194,6 +195,27 @@ TEST_F(StoreFaultsTest, AServerThatIsStoppedWhileItFailsWaitsForItAndThenSaysSo)
   EXPECT_FALSE(server_->drain(std::chrono::milliseconds(0)));
   EXPECT_GE(std::chrono::steady_clock::now() - begin, kPromised);
   EXPECT_FALSE(server_->drain(std::chrono::milliseconds(0)));  // again: the same
+}
+
+TEST_F(StoreFaultsTest, ADeletionThatIsOpenWhileItHangsDoesNotKeepTheServerFromItsEnd) {
+  const auto session = create(mesh_);
+  faults_->set_hanging(true);
+  grpc::Status deleted;
+  std::thread deleting([&] {
+    v1::DeleteSessionRequest request;
+    request.set_session(session.session().name());
+    v1::DeleteSessionResponse response;
+    grpc::ClientContext context;
+    deleted = stub_->DeleteSession(&context, request, &response);
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  auto drained =
+      std::async(std::launch::async, [&] { return server_->drain(std::chrono::milliseconds(200)); });
+  EXPECT_EQ(drained.wait_for(kTestDeadline), std::future_status::ready);  // it hangs still
+  faults_->set_hanging(false);
+  EXPECT_FALSE(drained.get());
+  deleting.join();
+  EXPECT_EQ(deleted.error_code(), grpc::StatusCode::UNAVAILABLE) << deleted.error_message();
 }
 
 TEST_F(StoreFaultsTest, OneThatWorksAgainInTimeTakesAll) {

@@ -1,0 +1,45 @@
+#include "server/process_end.h"
+
+#include <unistd.h>
+
+#include <future>
+#include <utility>
+
+namespace lpdeform {
+namespace {
+
+/// On a thread of its own: whoever reads the log may hang, too.
+[[noreturn]] void end_with(int status, const std::weak_ptr<const Log>& to) {
+  if (const std::shared_ptr<const Log> log = to.lock()) {
+    const auto written = std::make_shared<std::promise<void>>();
+    std::thread([log, written] {
+      log->warning("end_forced",
+                   {{"text", "Not all ends, as where a disk does not answer; the process ends without it."}});
+      log->end();
+      written->set_value();
+    }).detach();
+    written->get_future().wait_for(ProcessEnd::kForLog);
+  }
+  _exit(status);
+}
+
+}  // namespace
+
+ProcessEnd::~ProcessEnd() {
+  {
+    const std::scoped_lock lock(mutex_);
+    is_ended_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void ProcessEnd::within(std::chrono::milliseconds patience, int status, std::weak_ptr<const Log> log) {
+  const auto end = std::chrono::steady_clock::now() + patience;
+  thread_ = std::thread([this, end, status, log = std::move(log)] {
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait_until(lock, end, [this] { return is_ended_; })) end_with(status, log);
+  });
+}
+
+}  // namespace lpdeform
