@@ -30,7 +30,8 @@ class OnFiles(programs.OnShapes):
         super().setUpClass()
         for name in ("authority", "stranger"):
             openssl("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-subj", f"/CN={name}",
-                    "-days", "2", "-keyout", cls.at(f"{name}.key"), "-out", cls.at(f"{name}.pem"))
+                    "-addext", "keyUsage=critical,keyCertSign,cRLSign", "-days", "2", "-keyout", cls.at(f"{name}.key"),
+                    "-out", cls.at(f"{name}.pem"))
         for name, authority in (("server", "authority"), ("alice", "authority"), ("mallory", "stranger")):
             cls.certify(name, authority)
 
@@ -39,7 +40,7 @@ class OnFiles(programs.OnShapes):
         openssl("req", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-subj", f"/CN={name}",
                 "-keyout", cls.at(f"{name}.key"), "-out", cls.at(f"{name}.csr"))
         with open(cls.at("extensions"), "w") as file:
-            file.write(f"subjectAltName=DNS:{name},IP:127.0.0.1\n")
+            file.write(f"subjectAltName=DNS:{name},IP:127.0.0.1\nauthorityKeyIdentifier=keyid\n")
         openssl("x509", "-req", "-in", cls.at(f"{name}.csr"), "-CA", cls.at(f"{authority}.pem"), "-CAkey",
                 cls.at(f"{authority}.key"), "-CAcreateserial", "-days", "2", "-extfile", cls.at("extensions"),
                 "-out", cls.at(f"{name}.pem"))

@@ -38,8 +38,8 @@ class Keys:
         ec = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes")
         for name in ("authority", "stranger"):
             keys = ("-keyout", self.at(f"{name}.key"), "-out", self.at(f"{name}.pem"))
-            _openssl("req", "-x509", *ec, "-subj", f"/CN={name}", "-days", "2", *keys)
-        (folder / "extensions").write_text("subjectAltName=IP:127.0.0.1\n")
+            _openssl("req", "-x509", *ec, "-subj", f"/CN={name}", "-addext", "keyUsage=critical,keyCertSign,cRLSign", "-days", "2", *keys)
+        (folder / "extensions").write_text("subjectAltName=IP:127.0.0.1\nauthorityKeyIdentifier=keyid\n")
         for name in ("server", "alice"):
             _openssl("req", *ec, "-subj", f"/CN={name}", "-keyout", self.at(f"{name}.key"), "-out", self.at(f"{name}.csr"))
             signer = ("-CA", self.at("authority.pem"), "-CAkey", self.at("authority.key"), "-CAcreateserial")
