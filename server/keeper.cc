@@ -14,6 +14,8 @@ namespace {
 constexpr std::size_t kLongestQueue = 4096;
 /// Between looks whether another process has let go of a session.
 constexpr std::chrono::milliseconds kBetweenLooks{50};
+/// Of a mesh that is read, for which the store has its time: nobody knows its size beforehand.
+constexpr std::size_t kLargeBlob = std::size_t{32} << 20;
 
 /// By another way they come to where it is: here they would wait in vain.
 bool leads_elsewhere(const Fault& fault, const std::string& route) {
@@ -31,6 +33,7 @@ std::shared_ptr<Keeper> Keeper::create(std::shared_ptr<Store> store, Services se
   std::shared_ptr<Keeper> keeper(new Keeper(std::move(store), std::move(services)));
   keeper->watch_unused();
   keeper->watch_room();
+  keeper->watch_calls();
   return keeper;
 }
 
@@ -47,15 +50,18 @@ Keeper::~Keeper() {
 absl::Status Keeper::asked_in_vain(Clock::time_point since) const {
   if (Clock::now() - since > kPatienceForNew) return store_failing("it is too slow");
   const std::scoped_lock lock(mutex_);
-  return is_hanging_ ? store_away("it does not answer") : absl::OkStatus();
+  return is_hanging_ || is_stuck_ ? store_away("it does not answer") : absl::OkStatus();
 }
 
-/// What the store says, on the reader's thread; `since`: when somebody began to wait for that.
+/// What the store says, on the reader's thread; `since`: when somebody began to wait for that. `bytes`: how much it may be.
 template <typename Ask>
-std::invoke_result_t<Ask> Keeper::ask(Clock::time_point since, const Ask& what) {
+std::invoke_result_t<Ask> Keeper::ask(Clock::time_point since, const Ask& what, std::size_t bytes) {
   if (absl::Status status = asked_in_vain(since); !status.ok()) return status;
   const Clock::time_point begin = Clock::now();
-  auto answer = what();
+  auto answer = [&] {
+    const StoreCalls::UnderWay call(calls_, begin, bytes);
+    return what();
+  }();
   note_read(answer.status(), begin);
   return answer;
 }
@@ -76,10 +82,15 @@ void Keeper::add(std::shared_ptr<Session> session, StoredHead head, const std::s
   entry.head = std::move(head.part);
   entry.request_id = request_id;
   for (const auto& [key, bytes] : head.blobs) entry.blobs.push_back(key);
-  entry.on_added = on_done;
+  const std::string name = entry.session->name();
+  const WaitingCallers::Id caller = callers_.add(on_done);
+  const OnDone on_added = [this, name, caller, on_done = std::move(on_done)](const absl::Status& status) {
+    if (callers_.take(caller)) return on_done(status);
+    if (status.ok()) remove(name);  // its caller was told meanwhile that it is not there
+  };
+  entry.on_added = on_added;
   const bool is_posted = reader_.try_post(
-      [this, entry = std::move(entry), blobs = std::move(head.blobs), since = Clock::now()]() mutable {
-        const std::string name = entry.session->name();
+      [this, name, entry = std::move(entry), blobs = std::move(head.blobs), since = Clock::now()]() mutable {
         absl::Status status;
         for (const auto& [key, bytes] : blobs) {
           if (status.ok()) status = keep_blob(since, name, key, bytes);
@@ -90,7 +101,7 @@ void Keeper::add(std::shared_ptr<Session> session, StoredHead head, const std::s
         remove(name);  // lets go of the blobs
         refused(status);
       });
-  if (!is_posted) on_done(server_busy(reader_.expected_wait()));
+  if (!is_posted) on_added(server_busy(reader_.expected_wait()));
 }
 
 /// One that refuses a blob, as it is full, answers; that it takes no changes then shows with these.
@@ -98,7 +109,10 @@ absl::Status Keeper::keep_blob(Clock::time_point since, const std::string& name,
                                const std::string& bytes) {
   if (absl::Status status = asked_in_vain(since); !status.ok()) return status;
   const Clock::time_point begin = Clock::now();
-  const absl::Status status = store_->keep_blob(name, key, bytes);
+  const absl::Status status = [&] {
+    const StoreCalls::UnderWay call(calls_, begin, bytes.size());
+    return store_->keep_blob(name, key, bytes);
+  }();
   if (status.ok() || is_away(status)) {
     note_read(status, begin);
   } else {
@@ -178,7 +192,7 @@ void Keeper::changed(const Session& session, std::uint64_t revision, std::uint64
       is_kept = entry.revision >= revision && entry.epoch >= epoch;
       if (!is_kept && !is_over_) {
         due(session.name());
-        if (!is_writing_failing_ && !entry.is_refused) {
+        if (!is_writing_failing_ && !is_stuck_ && !entry.is_refused) {
           const Timers::TimePoint until = services_.timers->now() + kPatience;
           if (entry.waiting.empty()) watch(session.name(), until);
           entry.waiting.push_back({revision, epoch, until, Clock::now(), std::move(on_kept)});
@@ -230,7 +244,7 @@ void Keeper::remove(const std::string& name, OnDone on_done) {
   Entry& entry = entries_[name];
   entry.session.reset();
   entry.is_leaving = entry.is_expired = entry.is_refused = false;
-  if (on_done) entry.on_removed.push_back(std::move(on_done));
+  if (on_done) entry.on_removed.push_back(answered_once(std::move(on_done)));
   due(name);
 }
 
@@ -261,7 +275,7 @@ bool Keeper::is_leaving(const std::string& name) const {
 
 bool Keeper::is_failing() const {
   const std::scoped_lock lock(mutex_);
-  return is_writing_failing_ || is_reading_failing_;
+  return is_writing_failing_ || is_reading_failing_ || is_stuck_;
 }
 
 absl::Status Keeper::may_keep(const Session& session) const {
@@ -279,7 +293,12 @@ bool Keeper::is_being_removed(const std::string& name) const {
 }
 
 void Keeper::take_over(const std::string& name, const Asker& asker, OnFound on_found) {
-  take_over_until(name, asker, services_.timers->now() + kPatienceForOthers, on_found);
+  const WaitingCallers::Id caller = callers_.add(on_found);
+  const OnFound once = [this, name, caller, on_found = std::move(on_found)](absl::StatusOr<Found> found) {
+    if (callers_.take(caller)) return on_found(std::move(found));
+    if (found.ok()) give_up(name);  // its caller was told meanwhile that nothing came
+  };
+  take_over_until(name, asker, services_.timers->now() + kPatienceForOthers, once);
 }
 
 void Keeper::take_over_until(const std::string& name, const Asker& asker, Timers::TimePoint end,
@@ -319,7 +338,8 @@ absl::StatusOr<Keeper::Found> Keeper::read(const std::string& name, const Asker&
     const auto head = decode_head(found.session.parts);
     status = head.status();
     for (const std::string& key : head.ok() ? blobs_of(head->request) : std::vector<std::string>()) {
-      auto bytes = ask(Clock::now(), [&] { return store_->blob(key); });
+      auto bytes = ask(
+          Clock::now(), [&] { return store_->blob(key); }, kLargeBlob);
       status.Update(bytes.status());
       if (bytes.ok()) found.blobs["blobs/" + key] = *std::move(bytes);
     }
@@ -330,7 +350,17 @@ absl::StatusOr<Keeper::Found> Keeper::read(const std::string& name, const Asker&
   return status;
 }
 
+/// Where the store does not answer, the caller has another answer already.
+template <typename Answer>
+std::function<void(Answer)> Keeper::answered_once(std::function<void(Answer)> on_answer) {
+  const WaitingCallers::Id caller = callers_.add(on_answer);
+  return [this, caller, on_answer = std::move(on_answer)](Answer answer) {
+    if (callers_.take(caller)) on_answer(std::move(answer));
+  };
+}
+
 void Keeper::find_request(const std::string& owner, const std::string& request_id, OnName on_name) {
+  on_name = answered_once(std::move(on_name));
   const bool is_posted = reader_.try_post([this, owner, request_id, on_name, since = Clock::now()] {
     on_name(ask(since, [&] { return store_->find_request(owner, request_id); }));
   });
@@ -339,6 +369,7 @@ void Keeper::find_request(const std::string& owner, const std::string& request_i
 
 void Keeper::list(const std::string& owner, const std::string& after, std::size_t most,
                   std::function<bool(const std::string&)> is_wanted, OnNames on_names) {
+  on_names = answered_once(std::move(on_names));
   const auto read = [this, owner, after, most, is_wanted = std::move(is_wanted), on_names,
                      since = Clock::now()] {
     std::vector<std::string> wanted;

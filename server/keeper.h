@@ -19,6 +19,7 @@
 #include "server/metrics.h"
 #include "server/session.h"
 #include "server/store.h"
+#include "server/store_calls.h"
 #include "server/stored_state.h"
 #include "server/task_pool.h"
 #include "server/timers.h"
@@ -31,8 +32,8 @@ namespace lpdeform {
 ///
 /// While the store fails or is slower than kPatience, updates are answered as taken and not kept, new sessions are refused
 /// and the rest goes on; what has changed is kept as soon as the store works again. Of one that is full the same holds for what it has no
-/// room for, and for that alone: it is tried again now and then, and what goes or needs no more room is written at once. Where it does not answer, whoever needs one is
-/// refused at once: the first has waited for it. Thread-safe. Held by a shared pointer.
+/// room for, and for that alone: it is tried again now and then, and what goes or needs no more room is written at once. Where it does not answer, whoever needs an answer is
+/// refused at once: the first has waited for it, or everybody until a call of it has been under way for too long (StoreCalls). Thread-safe. Held by a shared pointer.
 class Keeper : public std::enable_shared_from_this<Keeper> {
  public:
   struct Services {
@@ -178,6 +179,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   static void fill_in_anew(Work& work);
   void write(std::vector<Work> works, bool is_all);
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const Work> works);
+  static std::size_t bytes_of(std::span<const Work> works);
   void write_all(Entry& entry, const std::string& name);
   void write_anew(Entry& entry, const std::string& name);
   void note_kept(const Work& work, ChangeOutcome outcome, Calls& calls);
@@ -197,7 +199,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   absl::Status keep_blob(Clock::time_point since, const std::string& name, const std::string& key,
                          const std::string& bytes);
   template <typename Ask>
-  std::invoke_result_t<Ask> ask(Clock::time_point since, const Ask& what);
+  std::invoke_result_t<Ask> ask(Clock::time_point since, const Ask& what, std::size_t bytes = 0);
   void answer_kept(Entry& entry, Calls& calls);
   static void answer_all(Entry& entry, Calls& calls);
   void answer_failed(Entry& entry, const absl::Status& why, Calls& calls);
@@ -219,6 +221,10 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void touch_all();
   void show_figures(Timers::TimePoint now);
   void watch_room();
+  void watch_calls();
+  void look_at_calls();
+  template <typename Answer>
+  std::function<void(Answer)> answered_once(std::function<void(Answer)> on_answer);
   void show_room();
   using Sessions = std::map<std::string, std::shared_ptr<Session>>;
   Entry* same_entry(const std::string& name, const Sessions& touched);
@@ -242,7 +248,10 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   bool is_over_ = false;      // it has waited for long enough
   bool was_failing_ = false;  // as the log and the metrics know it
   bool is_trying_again_ = false;
-  bool is_hanging_ = false;      // what it was last asked for took long, and came to nothing
+  bool is_hanging_ = false;  // what it was last asked for took long, and came to nothing
+  bool is_stuck_ = false;    // a call has been under way for too long
+  StoreCalls calls_;
+  WaitingCallers callers_;
   Clock::time_point next_word_;  // of its being slow
   Clock::time_point retry_at_;
   Clock::duration pause_{};

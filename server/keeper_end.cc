@@ -13,18 +13,21 @@ std::vector<Keeper::Unkept> Keeper::flush(Clock::time_point end) {
   store_->end_by(end);
   std::vector<Unkept> left;
   Calls calls;
+  bool is_cut_off = false;
   {
     std::unique_lock lock(mutex_);
     is_ending_ = true;
     retry_at_ = Clock::now();  // it may have begun to work again
     changed_.notify_all();
     is_over_ = !changed_.wait_until(lock, end, [this] { return due_.empty() && !is_writing_; });
+    is_cut_off = is_over_;
     if (is_over_) left = unkept();
     if (is_over_) answer_everybody(calls);
   }
   changed_.notify_all();
   tell_of(left);
   make(calls);
+  if (is_cut_off) callers_.refuse_all(store_failing(kEnds));
   return left;
 }
 

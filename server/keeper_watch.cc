@@ -68,7 +68,10 @@ void Keeper::touch_all() {
     for (const auto& [name, epoch] : being_made_) sessions.push_back({name, epoch, true, 0, true});
   }
   const Clock::time_point begin = Clock::now();
-  const auto touched = store_->touch(sessions);
+  const auto touched = [&] {
+    const StoreCalls::UnderWay call(calls_, begin);
+    return store_->touch(sessions);
+  }();
   note_read(touched.status(), begin);
   {
     const std::scoped_lock lock(mutex_);
@@ -124,6 +127,27 @@ void Keeper::show_room() {
   if (is_full_ || (room && room->is_full) || !std::exchange(was_full_, false)) return;
   services_.metrics->set(Level::kStoreFull, 0);
   services_.log->info("store_has_room", {{"text", "What it had no room for may come again."}});
+}
+
+void Keeper::watch_calls() {
+  services_.timers->at(services_.timers->now() + kBetweenTries, [weak = weak_from_this()] {
+    const auto self = weak.lock();
+    if (self == nullptr) return;
+    self->look_at_calls();
+    self->watch_calls();
+  });
+}
+
+/// Whoever waits for a call that does not return is answered; the call itself goes on.
+void Keeper::look_at_calls() {
+  const bool is_late = calls_.is_any_late(Clock::now());
+  const absl::Status away = store_away("it does not answer");
+  {
+    const std::scoped_lock lock(mutex_);
+    is_stuck_ = is_late;
+    note_health(is_late ? away : absl::OkStatus());
+  }
+  if (is_late) callers_.refuse_all(away);
 }
 
 /// Under the lock. Null where the session that was touched has gone, or come back as another, meanwhile.

@@ -134,10 +134,21 @@ void Keeper::write(std::vector<Work> works, bool is_all) {
   make(calls);
 }
 
+/// What is on its way to the store with them.
+std::size_t Keeper::bytes_of(std::span<const Work> works) {
+  std::size_t bytes = 0;
+  for (const Work& work : works) {
+    for (const auto& [key, blob] : work.blobs) bytes += blob.size();
+    for (const auto& [key, part] : work.change.parts) bytes += part ? part->size() : 0;
+  }
+  return bytes;
+}
+
 absl::StatusOr<std::vector<ChangeOutcome>> Keeper::commit(std::span<const Work> works) {
   std::vector<StoredChange> changes;
   const Clock::time_point begin = Clock::now();
   absl::Status status;
+  const StoreCalls::UnderWay call(calls_, begin, bytes_of(works));
   for (const Work& work : works) {
     changes.push_back(work.change);
     status.Update(work.status);
@@ -281,7 +292,7 @@ void Keeper::note_read(const absl::Status& status, Clock::time_point begin) {
 
 /// Under the lock, after either of both has changed.
 void Keeper::note_health(const absl::Status& status) {
-  const bool is_failing = is_writing_failing_ || is_reading_failing_;
+  const bool is_failing = is_writing_failing_ || is_reading_failing_ || is_stuck_;
   if (std::exchange(was_failing_, is_failing) == is_failing) return;
   services_.metrics->set(Level::kStoreFailing, is_failing ? 1 : 0);
   if (is_failing) {

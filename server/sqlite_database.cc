@@ -124,6 +124,12 @@ bool SqliteDatabase::empty_log() {
   return pwrite(fd, nothing.data(), nothing.size(), 0) == static_cast<ssize_t>(nothing.size());
 }
 
+bool SqliteDatabase::is_in_place() const {
+  int has_moved = 0;
+  const int result = sqlite3_file_control(database_.get(), "main", SQLITE_FCNTL_HAS_MOVED, &has_moved);
+  return result != SQLITE_OK || has_moved == 0;
+}
+
 absl::Status SqliteDatabase::run(const char* statements) {
   const int result = sqlite3_exec(database_.get(), statements, nullptr, nullptr, nullptr);
   return result == SQLITE_OK ? absl::OkStatus() : failure();

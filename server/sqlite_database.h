@@ -34,6 +34,9 @@ class SqliteDatabase {
   /// Makes the file this long at least, in blocks of the disk. STORE_FULL; then it may have become longer by less.
   absl::Status grow_to(std::int64_t bytes);
 
+  /// Whether its file is where it was opened: what is written into one that was removed or moved goes with this process.
+  bool is_in_place() const;
+
   /// Runs statements that give no rows, separated by semicolons.
   absl::Status run(const char* statements);
 

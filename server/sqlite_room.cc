@@ -38,6 +38,8 @@ SqliteRoom::SqliteRoom(SqliteDatabase& database, std::string folder, std::uint64
     : database_(database), folder_(std::move(folder)), most_bytes_(most_bytes) {}
 
 absl::StatusOr<SqliteRoom::Pages> SqliteRoom::pages() {
+  if (!database_.is_in_place())
+    return store_failing(absl::StrCat(database_.path(), " was removed or moved while the server runs"));
   Pages pages;
   for (const auto& [pragma, value] :
        {std::pair("PRAGMA page_size", &pages.size), std::pair("PRAGMA page_count", &pages.used),

@@ -408,6 +408,55 @@ TEST_F(KeeperTest, WhoAsksAStoreThatHangsIsRefusedAtOnceUntilItAnswers) {
   EXPECT_EQ(find_request(), "");
 }
 
+TEST_F(KeeperTest, AStoreWhoseCallNeverReturnsFailsAndWhoeverWaitsIsAnswered) {
+  const auto live = kept();
+  store_->hold_blobs(true);
+  std::promise<absl::Status> added, removed;
+  std::promise<std::string> asked;
+  keeper_->add(session(kName + "a"), {.part = "", .blobs = {{"key", "mesh"}}}, "",
+               [&](const absl::Status& status) { added.set_value(status); });
+  ASSERT_TRUE(store_->wait_for("blob key"));
+  keeper_->find_request("anna", "request", [&](const absl::StatusOr<std::string>& name) {
+    asked.set_value(fault_of(name.status()).reason);
+  });
+  take_over();
+  EXPECT_FALSE(keeper_->is_failing());
+  ASSERT_TRUE(pass_until_failing(true));
+  EXPECT_TRUE(shows("lpdeform_store_failing 1"));
+  EXPECT_EQ(fault_of(added.get_future().get()).reason, "STORE_FAILING");
+  EXPECT_EQ(asked.get_future().get(), "STORE_FAILING");
+  EXPECT_EQ(fault_of(found_.get_future().get().status()).reason, "STORE_FAILING");
+  EXPECT_FALSE(is_kept(*live, 1));  // at once
+  store_->hold_blobs(false);
+  ASSERT_TRUE(pass_until_failing(false));
+  EXPECT_TRUE(shows("lpdeform_store_failing 0"));
+  EXPECT_TRUE(store_->wait_for("removal"));  // of the one whose caller was told that it is not there
+  EXPECT_EQ(find_request(), "");
+  EXPECT_TRUE(is_kept(*live, 2));
+}
+
+TEST_F(KeeperTest, ADeletionIsAnsweredThoughTheStoreNeverReturns) {
+  const auto live = kept();
+  store_->hold_changes(true);
+  std::promise<absl::Status> removed;
+  keeper_->remove(live->name(), [&](const absl::Status& status) { removed.set_value(status); });
+  ASSERT_TRUE(store_->wait_for("removal"));
+  ASSERT_TRUE(pass_until_failing(true));
+  EXPECT_EQ(fault_of(removed.get_future().get()).reason, "STORE_FAILING");
+  store_->hold_changes(false);
+  EXPECT_TRUE(pass_until_failing(false));
+}
+
+TEST(StoreCallsTest, ALargeMeshHasItsTimeBeforeTheStoreCountsAsOneThatHangs) {
+  StoreCalls calls;
+  const auto begin = StoreCalls::Clock::now();
+  const StoreCalls::UnderWay large(calls, begin, std::size_t{10} << 20);
+  EXPECT_FALSE(calls.is_any_late(begin + std::chrono::seconds(12)));
+  EXPECT_TRUE(calls.is_any_late(begin + std::chrono::seconds(13)));
+  const StoreCalls::UnderWay small(calls, begin);
+  EXPECT_TRUE(calls.is_any_late(begin + std::chrono::milliseconds(2001)));
+}
+
 TEST_F(KeeperTest, AStoreThatHasRecoveredIsUsedAgainThoughNothingIsLeftToWrite) {
   std::promise<void> lost;
   keeper_->on_lost = [&](const Session&) { lost.set_value(); };

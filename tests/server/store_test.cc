@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
@@ -235,6 +236,14 @@ TEST_F(SqliteStoreTest, ItsFolderIsForOneServer) {
   EXPECT_TRUE(absl::IsUnavailable(second.status()));
   EXPECT_EQ(reason(second.status()), "STORE_FAILING");
   EXPECT_TRUE(commit(*store_, beginning("a")).ok());
+}
+
+TEST_F(SqliteStoreTest, CallsNothingKeptInAFolderThatWasRemoved) {
+  ASSERT_TRUE(commit(*store_, beginning("a")).ok());
+  std::filesystem::remove_all(folder_.path());
+  const auto refused = commit(*store_, beginning("b"));
+  EXPECT_EQ(fault_of(refused.status()).reason, "STORE_FAILING");
+  EXPECT_TRUE(absl::StrContains(refused.status().message(), "sessions.db")) << refused.status();
 }
 
 TEST_F(SqliteStoreTest, FindsAChangedBitInAPartAndInABlob) {
