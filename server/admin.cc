@@ -202,9 +202,9 @@ absl::StatusOr<std::unique_ptr<Admin>> Admin::start(const std::string& address,
                                                     std::chrono::milliseconds patience) {
   auto listener = Listener::bind(address);
   if (!listener.ok()) {
-    return make_fault(absl::StatusCode::kUnavailable, {"ADDRESS_NOT_BOUND", address, ""},
-                      absl::StrCat("The admin port cannot listen on ", address, "; is it taken? ",
-                                   absl::string_view(listener.status().message())));
+    return make_fault(
+        absl::StatusCode::kUnavailable, {"ADDRESS_NOT_BOUND", address, ""},
+        absl::StrCat("The admin port does not open. ", absl::string_view(listener.status().message())));
   }
   auto impl = std::make_unique<Impl>();
   impl->patience = patience;

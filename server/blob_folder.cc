@@ -20,8 +20,8 @@ namespace {
 constexpr const char* kUnfinished = ".unfinished";
 
 absl::Status failed(const std::string& path, int error) {
-  const std::string why = absl::StrCat(std::system_category().message(error), " (", path, ")");
-  return error == ENOSPC || error == EDQUOT ? store_full(why) : store_failing(why);
+  const std::string why = std::system_category().message(error);
+  return error == ENOSPC || error == EDQUOT ? store_full(why, "", path) : store_failing(why, path);
 }
 
 absl::Status failed(const std::string& path, const std::error_code& error) {

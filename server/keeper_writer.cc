@@ -277,7 +277,7 @@ void Keeper::note_written(const absl::Status& status, bool is_all) {
 void Keeper::note_full(const absl::Status& status) {
   if (!is_full(status) || std::exchange(was_full_, true)) return;
   services_.metrics->set(Level::kStoreFull, 1);
-  services_.log->warning("store_full", {{"text", std::string(status.message())}});
+  services_.log->warning("store_full", {{"text", text_for_operators(status)}});
 }
 
 /// Whether the store gives what it is asked for: anything but STORE_FAILING is an answer.
@@ -296,7 +296,7 @@ void Keeper::note_health(const absl::Status& status) {
   if (std::exchange(was_failing_, is_failing) == is_failing) return;
   services_.metrics->set(Level::kStoreFailing, is_failing ? 1 : 0);
   if (is_failing) {
-    services_.log->warning("store_failing", {{"text", std::string(status.message())}});
+    services_.log->warning("store_failing", {{"text", text_for_operators(status)}});
   } else {
     services_.log->info("store_works", {{"text", "What was not kept is now."}});
   }

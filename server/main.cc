@@ -1,11 +1,14 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "core/base/fault.h"
 #include "server/health_probe.h"
 #include "server/machine_memory.h"
 #include "server/open_store.h"
@@ -282,8 +285,29 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->type_name("ADDRESS");
 }
 
+/// What an option of the service is called on the command line.
+std::string flag_of(std::string name) {
+  static const std::map<std::string, std::string> kOthers{{"max_stream_bytes_per_second", "max_stream_rate"},
+                                                          {"max_stream_frames_per_second", "max_frame_rate"},
+                                                          {"max_upload_bytes_per_second", "max_upload_rate"}};
+  if (const auto found = kOthers.find(name); found != kOthers.end()) name = found->second;
+  std::replace(name.begin(), name.end(), '_', '-');
+  return "--" + name;
+}
+
 int refuse(const absl::Status& why) {
-  std::fprintf(stderr, "lpdeform-server: %s\n", std::string(why.message()).c_str());
+  const lpdeform::Fault fault = lpdeform::fault_of(why);
+  std::string text = lpdeform::text_for_operators(why);
+  if (text.starts_with("Option " + fault.element + " must be"))
+    text = flag_of(fault.element) + " must be " + fault.limit + ".";
+  std::fprintf(stderr, "lpdeform-server: %s\n", text.c_str());
+  return kRefused;
+}
+
+/// Help is asked for; anything else is an error.
+int end_of_parse(const CLI::App& app, const CLI::ParseError& error) {
+  if (error.get_exit_code() == 0) return app.exit(error);
+  std::fprintf(stderr, "lpdeform-server: %s (see lpdeform-server --help)\n", error.what());
   return kRefused;
 }
 
@@ -351,7 +375,11 @@ int main(int argc, char** argv) {
   CLI::App app;
   arguments.server.address = "127.0.0.1:50051";
   describe(app, arguments);
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return end_of_parse(app, error);
+  }
   if (!arguments.probed.empty()) return lpdeform::is_serving(arguments.probed) ? 0 : 1;
   return serve(arguments, signals, end);
 }

@@ -41,14 +41,18 @@ RedisConnection::RedisConnection(std::string host, int port, std::chrono::millis
 
 RedisConnection::~RedisConnection() = default;
 
+std::string RedisConnection::place() const {
+  return absl::StrCat("Redis at ", host_, ":", port_);
+}
+
 absl::Status RedisConnection::failure(const std::string& what) {
   context_.reset();
-  return store_failing(absl::StrCat(what, " (Redis at ", host_, ":", port_, ")"));
+  return store_failing(what, place());
 }
 
 absl::Status RedisConnection::no_answer(const std::string& what) {
   context_.reset();
-  return store_away(absl::StrCat(what, " (Redis at ", host_, ":", port_, ")"));
+  return store_away(what, place());
 }
 
 /// For one answer. Not above 0 once there is none left.
@@ -118,8 +122,7 @@ absl::StatusOr<std::vector<RedisReply>> RedisConnection::send(const std::vector<
   }
   if (refused.empty()) return replies;
   // Its word for: over maxmemory.
-  if (absl::StartsWith(refused, "OOM"))
-    return store_full(absl::StrCat(refused, " (Redis at ", host_, ":", port_, ")"));
+  if (absl::StartsWith(refused, "OOM")) return store_full(refused, "", place());
   return failure(refused);
 }
 

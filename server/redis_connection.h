@@ -50,6 +50,7 @@ class RedisConnection {
   absl::Status connect();
   absl::Status log_in();
   absl::StatusOr<std::vector<RedisReply>> send(const std::vector<Command>& commands);
+  std::string place() const;
   absl::Status failure(const std::string& what);
   absl::Status no_answer(const std::string& what);
 

@@ -90,7 +90,7 @@ absl::Status check(const ServerOptions& options) {
   for (const auto& [name, value] : {std::pair("token_issuer", &options.token_issuer),
                                     std::pair("token_audience", &options.token_audience)}) {
     if (!value->empty() && options.token_keys_file.empty())
-      return out_of_range(name, "given with token_keys");
+      return out_of_range(name, "given with --token-keys");
   }
   if (options.max_undo > 10'000) return out_of_range("max_undo", "0 to 10^4");
   if (options.max_connections_per_address > 1'000'000) {

@@ -39,8 +39,8 @@ bool is_out_of_room(sqlite3* database) {
 }
 
 absl::Status failed(const std::string& path, int error) {
-  const std::string why = absl::StrCat(std::system_category().message(error), " (", path, ")");
-  return error == ENOSPC || error == EDQUOT ? store_full(why) : store_failing(why);
+  const std::string why = std::system_category().message(error);
+  return error == ENOSPC || error == EDQUOT ? store_full(why, "", path) : store_failing(why, path);
 }
 
 }  // namespace
@@ -58,8 +58,8 @@ SqliteDatabase::~SqliteDatabase() {
 
 absl::Status SqliteDatabase::failure() const {
   const std::string why = absl::StrCat(sqlite3_errmsg(database_.get()), " (SQLite ",
-                                       sqlite3_extended_errcode(database_.get()), ", ", path_, ")");
-  return is_out_of_room(database_.get()) ? store_full(why) : store_failing(why);
+                                       sqlite3_extended_errcode(database_.get()), ")");
+  return is_out_of_room(database_.get()) ? store_full(why, "", path_) : store_failing(why, path_);
 }
 
 absl::StatusOr<std::unique_ptr<SqliteDatabase>> SqliteDatabase::open(const std::string& path) {
@@ -105,7 +105,7 @@ absl::Status SqliteDatabase::grow_to(std::int64_t bytes) {
   sqlite3_int64 size = bytes;
   const int result = sqlite3_file_control(database_.get(), "main", SQLITE_FCNTL_SIZE_HINT, &size);
   if (result == SQLITE_OK) return absl::OkStatus();
-  return store_full(absl::StrCat("its file cannot grow (SQLite ", result, ", ", path_, ")"));
+  return store_full(absl::StrCat("its file cannot grow (SQLite ", result, ")"), "", path_);
 }
 
 /// All of it into the database. Its header goes while nobody else can have the database: so what is left of it is never taken for a

@@ -39,7 +39,7 @@ SqliteRoom::SqliteRoom(SqliteDatabase& database, std::string folder, std::uint64
 
 absl::StatusOr<SqliteRoom::Pages> SqliteRoom::pages() {
   if (!database_.is_in_place())
-    return store_failing(absl::StrCat(database_.path(), " was removed or moved while the server runs"));
+    return store_failing("its folder was removed or moved while the server runs", database_.path());
   Pages pages;
   for (const auto& [pragma, value] :
        {std::pair("PRAGMA page_size", &pages.size), std::pair("PRAGMA page_count", &pages.used),
@@ -117,8 +117,7 @@ absl::StatusOr<StoreRoom> SqliteRoom::left(std::uint64_t blob_bytes) {
   const auto now = pages();
   if (!now.ok()) return now.status();
   struct statvfs disk = {};
-  if (statvfs(folder_.c_str(), &disk) != 0)
-    return store_failing(absl::StrCat("no answer from the disk of ", folder_));
+  if (statvfs(folder_.c_str(), &disk) != 0) return store_failing("no answer from its disk", folder_);
   const auto unit = static_cast<double>(disk.f_frsize);
   StoreRoom room{static_cast<double>(disk.f_bavail) * unit, static_cast<double>(disk.f_blocks) * unit};
   if (most_bytes_ != 0) {

@@ -14,8 +14,14 @@ namespace lpdeform {
 namespace {
 
 constexpr char kMakeRoom[] = ". Delete sessions, or make room; then try again.";
-constexpr char kDamage[] = "lpdeform/damage";    // likewise: for the log
-constexpr char kAway[] = "lpdeform/store-away";  // stays in this process
+constexpr char kDamage[] = "lpdeform/damage";      // likewise: for the log
+constexpr char kAway[] = "lpdeform/store-away";    // stays in this process
+constexpr char kWhere[] = "lpdeform/store-where";  // the same
+
+absl::Status at(std::string_view where, absl::Status status) {
+  if (!where.empty()) status.SetPayload(kWhere, absl::Cord(std::string(where)));
+  return status;
+}
 
 }  // namespace
 
@@ -25,16 +31,23 @@ std::string blob_key(std::string_view bytes) {
   return absl::BytesToHexString({reinterpret_cast<const char*>(digest.data()), digest.size()});
 }
 
-absl::Status store_failing(std::string_view why) {
-  return make_fault(
-      absl::StatusCode::kUnavailable, {"STORE_FAILING", "store", ""},
-      absl::StrCat("The server's store of sessions fails: ", absl::string_view(why.data(), why.size()), "."));
+absl::Status store_failing(std::string_view why, std::string_view where) {
+  return at(where, make_fault(absl::StatusCode::kUnavailable, {"STORE_FAILING", "store", ""},
+                              absl::StrCat("The server's store of sessions fails: ",
+                                           absl::string_view(why.data(), why.size()), ".")));
 }
 
-absl::Status store_full(std::string_view why, std::string_view limit) {
-  return make_fault(absl::StatusCode::kResourceExhausted, {"STORE_FULL", "store", std::string(limit)},
-                    absl::StrCat("The server's store of sessions is full: ",
-                                 absl::string_view(why.data(), why.size()), kMakeRoom));
+absl::Status store_full(std::string_view why, std::string_view limit, std::string_view where) {
+  return at(where,
+            make_fault(absl::StatusCode::kResourceExhausted, {"STORE_FULL", "store", std::string(limit)},
+                       absl::StrCat("The server's store of sessions is full: ",
+                                    absl::string_view(why.data(), why.size()), kMakeRoom)));
+}
+
+std::string text_for_operators(const absl::Status& status) {
+  const auto where = status.GetPayload(kWhere);
+  const std::string text(status.message());
+  return where ? absl::StrCat(text, " (", std::string(*where), ")") : text;
 }
 
 absl::Status store_full_at_start(const absl::Status& full, const std::string& folder) {
@@ -42,16 +55,18 @@ absl::Status store_full_at_start(const absl::Status& full, const std::string& fo
   const absl::string_view why = absl::StripSuffix(full.message(), kMakeRoom);
   const std::string what = fault.limit.empty() ? absl::StrCat("Make 20 MiB of room on the disk of ", folder)
                                                : "Raise --max-store-bytes by 20 MiB";
-  return make_fault(full.code(), fault,
-                    absl::StrCat(why, ". ", what, ": the server cannot start until then."));
+  const auto where = full.GetPayload(kWhere);
+  return at(
+      where ? std::string(*where) : "",
+      make_fault(full.code(), fault, absl::StrCat(why, ". ", what, ": the server cannot start until then.")));
 }
 
 bool is_full(const absl::Status& status) {
   return fault_of(status).reason == "STORE_FULL";
 }
 
-absl::Status store_away(std::string_view why) {
-  absl::Status status = store_failing(why);
+absl::Status store_away(std::string_view why, std::string_view where) {
+  absl::Status status = store_failing(why, where);
   status.SetPayload(kAway, absl::Cord());
   return status;
 }

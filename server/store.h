@@ -159,15 +159,17 @@ class Store {
 /// SHA-256 of the bytes, as 64 hexadecimal digits.
 std::string blob_key(std::string_view bytes);
 
-/// UNAVAILABLE STORE_FAILING.
-absl::Status store_failing(std::string_view why);
+/// UNAVAILABLE STORE_FAILING. `where`, here and below: a file or an address, for operators alone (see text_for_operators).
+absl::Status store_failing(std::string_view why, std::string_view where = "");
 /// RESOURCE_EXHAUSTED STORE_FULL. `limit`: the bound, where it is one that somebody set.
-absl::Status store_full(std::string_view why, std::string_view limit = "");
+absl::Status store_full(std::string_view why, std::string_view limit = "", std::string_view where = "");
+/// What callers are told, and where that was: for the log and for whoever starts a server.
+std::string text_for_operators(const absl::Status& status);
 bool is_full(const absl::Status& status);
 /// The same for whoever starts a server and has not room enough for it: how much it takes, and where, in a folder of this name.
 absl::Status store_full_at_start(const absl::Status& full, const std::string& folder);
 /// The same, where there is no answer: whatever it is asked next has none either.
-absl::Status store_away(std::string_view why);
+absl::Status store_away(std::string_view why, std::string_view where = "");
 bool is_away(const absl::Status& status);
 /// NOT_FOUND SESSION_DAMAGED: what there is of it cannot be used.
 /// `where`: a file or a part, for the log alone.

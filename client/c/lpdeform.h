@@ -188,7 +188,7 @@ typedef struct lpdeform_mesh {
   /* In place of that, one number a vertex: those with the same number are one. May be NULL. */
   const uint32_t* weld_groups;
   /* With weld_by_position: how far apart vertices of one place may be, as a share of the bounding box's diagonal, 0 to
-   * 0.001; 0 is the server's, 1e-9. */
+   * 0.001; 0 is the server's, 1e-6. */
   double weld_tolerance;
 } lpdeform_mesh;
 

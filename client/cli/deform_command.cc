@@ -1,9 +1,11 @@
 #include "client/cli/deform_command.h"
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/handle_file.h"
@@ -31,7 +33,7 @@ struct Inputs {
 
 absl::Status read_initial(const DeformOptions& options, Inputs& inputs) {
   if (options.initial == "laplacian" || options.initial == "rest") return absl::OkStatus();
-  const absl::StatusOr<MeshFile> initial = read_mesh(options.initial);
+  const absl::StatusOr<MeshFile> initial = read_mesh_file(options.initial);
   if (!initial.ok()) return initial.status();
   const Eigen::Index given = initial->mesh.vertices.rows(), wanted = inputs.file.mesh.vertices.rows();
   if (given != wanted) {
@@ -52,8 +54,24 @@ client::SolverSettings solver_settings(const DeformOptions& options) {
       .initial = options.initial == "rest" ? client::InitialGuess::kRest : client::InitialGuess::kLaplacian};
 }
 
+/// The mesh may be overwritten by the result, what else is read may not, and no output by another.
+absl::Status check_files_apart(const DeformOptions& options) {
+  std::vector<NamedFile> written, read{{"--handles", options.handles}};
+  for (const auto& [option, file] : {std::pair("--p-field", options.material.p_field),
+                                     std::pair("--stiffness-field", options.material.stiffness_field)}) {
+    if (file) read.push_back({option, *file});
+  }
+  for (const std::filesystem::path& path : options.out) written.push_back({"--out", path});
+  if (options.report) written.push_back({"--report", *options.report});
+  if (absl::Status status = check_apart(written, read); !status.ok()) return status;
+  if (!options.report) return absl::OkStatus();
+  return check_apart(std::array{NamedFile{"--report", *options.report}},
+                     std::array{NamedFile{"MESH", options.mesh}});
+}
+
 absl::StatusOr<Inputs> read_inputs(const DeformOptions& options) {
   absl::Status status = check_outputs(options.out);
+  if (status.ok()) status = check_files_apart(options);
   if (status.ok() && options.normals) status = check_normals_have_output(options.out);
   if (status.ok() && options.report) status = check_folder(*options.report);
   if (!status.ok()) return status;

@@ -1,8 +1,11 @@
 // The program `lpdeform`: what it takes on the command line.
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -21,6 +24,7 @@
 #include "client/cli/server_access.h"
 #include "client/cli/shape_command.h"
 #include "client/cli/snapshot_command.h"
+#include "core/base/fault.h"
 #include "core/solve/paper_poses.h"
 
 namespace lpdeform::cli {
@@ -180,12 +184,14 @@ void add_weld(CLI::App& app, std::optional<double>& weld) {
       ->option_text("[TOLERANCE]");
 }
 
-/// A number after --weld is its tolerance; without one it is the default, and what follows is no part of it.
+/// A number after --weld is its tolerance; without one it is the default, and what follows is no part of it. Only of the commands
+/// that weld.
 std::vector<std::string> with_weld_told(int argc, char** argv) {
   std::vector<std::string> told;
+  const std::string command = argc > 1 ? argv[1] : "";
   for (int k = 0; k < argc; ++k) {
     double number = 0;
-    const bool is_weld = argv[k] == std::string("--weld");
+    const bool is_weld = (command == "deform" || command == "resize") && argv[k] == std::string("--weld");
     const bool has_number = is_weld && k + 1 < argc && CLI::detail::lexical_cast(argv[k + 1], number);
     told.emplace_back(argv[k]);
     if (is_weld) told.back() += has_number ? absl::StrCat("=", argv[++k]) : "=0";
@@ -440,14 +446,26 @@ int run(int argc, char** argv) {
       return complain(absl::InvalidArgumentError("There is no command \"" + unknown.front() +
                                                  "\" (see lpdeform --help)"));
     }
-    return complain(absl::InvalidArgumentError(std::string(error.what()) + " (see lpdeform --help)"));
+    const auto chosen = program.get_subcommands();
+    const std::string help =
+        chosen.empty() ? "lpdeform --help" : "lpdeform " + chosen.front()->get_name() + " --help";
+    return complain(absl::InvalidArgumentError(absl::StrCat(error.what(), " (see ", help, ")")));
   }
   return command();
+}
+
+/// A script that reads what is printed is told where that was lost, as on a full disk.
+int with_output_checked(int status) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
+  const std::string why = std::strerror(errno);
+  return complain(make_fault(absl::StatusCode::kDataLoss, {"FILE_NOT_WRITTEN", "standard output", ""},
+                             absl::StrCat("What was printed could not be written: ", why, ".")));
 }
 
 }  // namespace
 }  // namespace lpdeform::cli
 
 int main(int argc, char** argv) {
-  return lpdeform::cli::run(argc, argv);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of the write to it
+  return lpdeform::cli::with_output_checked(lpdeform::cli::run(argc, argv));
 }

@@ -3,15 +3,29 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
 #include "client/cpp/mesh_notices.h"
+#include "core/base/fault.h"
 
 namespace lpdeform::cli {
 
-absl::StatusOr<MeshFile> read_deformable(const std::filesystem::path& path) {
+absl::Status said_of(const std::string& what, const absl::Status& error) {
+  if (absl::StrContains(error.message(), what)) return error;
+  return make_fault(error.code(), fault_of(error), absl::StrCat(what, ": ", error.message()));
+}
+
+absl::StatusOr<MeshFile> read_mesh_file(const std::filesystem::path& path) {
   absl::StatusOr<MeshFile> file = read_mesh(path);
+  if (!file.ok()) return said_of(path.string(), file.status());
+  return file;
+}
+
+absl::StatusOr<MeshFile> read_deformable(const std::filesystem::path& path) {
+  absl::StatusOr<MeshFile> file = read_mesh_file(path);
   if (!file.ok()) return file;
   const absl::Status verdict = deformable(check_mesh(file->mesh));
-  if (!verdict.ok()) return verdict;
+  if (!verdict.ok()) return said_of(path.string(), verdict);
   return file;
 }
 
@@ -55,7 +69,7 @@ client::Weld by_position(std::optional<double> tolerance) {
 
 void print_notices(const client::MeshReport& report) {
   for (const std::string& notice : report.notices)
-    std::fprintf(stderr, "lpdeform: %s With this program: --weld.\n", notice.c_str());
+    std::fprintf(stderr, "lpdeform: %s With this program: --weld of deform and resize.\n", notice.c_str());
 }
 
 std::vector<double> flat(const Points& points) {

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -13,6 +14,12 @@
 #include "core/mesh/weld.h"
 
 namespace lpdeform::cli {
+
+/// The same error, whose text begins with what it is about, a file or an option, unless it names that already.
+absl::Status said_of(const std::string& what, const absl::Status& error);
+
+/// As read_mesh; errors name the file.
+absl::StatusOr<MeshFile> read_mesh_file(const std::filesystem::path& path);
 
 /// A mesh file that was read, examined, and can be deformed. Errors: as read_mesh and deformable have them.
 absl::StatusOr<MeshFile> read_deformable(const std::filesystem::path& path);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cctype>
 #include <string>
+#include <system_error>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/mesh_input.h"
@@ -20,6 +22,18 @@ std::string ending_of(const std::filesystem::path& path) {
   return ending;
 }
 
+/// Also by different ways, as ./a and a. Streams such as /dev/stdout may be named as often as one likes.
+bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::error_code error;
+  if (std::filesystem::exists(a, error) && !std::filesystem::is_regular_file(a, error)) return false;
+  const auto whole = [&](const std::filesystem::path& path) {
+    std::filesystem::path found =
+        std::filesystem::weakly_canonical(std::filesystem::absolute(path, error), error);
+    return error ? path : found;
+  };
+  return whole(a) == whole(b);
+}
+
 }  // namespace
 
 absl::StatusOr<PictureStyle> picture_style(const PictureOptions& options) {
@@ -28,10 +42,7 @@ absl::StatusOr<PictureStyle> picture_style(const PictureOptions& options) {
   style.red = options.red;
   if (!options.camera) return style;
   const auto file = read_deformable(*options.camera);
-  if (!file.ok()) {
-    return make_fault(file.status().code(), fault_of(file.status()),
-                      absl::StrCat("--camera: ", std::string(file.status().message())));
-  }
+  if (!file.ok()) return said_of("--camera", file.status());
   const Faces& faces = file->mesh.faces;
   style.frame.resize(faces.size(), 3);
   for (Eigen::Index k = 0; k < faces.size(); ++k)
@@ -49,6 +60,20 @@ absl::Status check_outputs(std::span<const std::filesystem::path> paths) {
     }
     absl::Status folder = check_folder(path);
     if (!folder.ok()) return folder;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status check_apart(std::span<const NamedFile> written, std::span<const NamedFile> read) {
+  std::vector<NamedFile> before(read.begin(), read.end());
+  for (const NamedFile& file : written) {
+    for (const NamedFile& other : before) {
+      if (!is_same_file(file.path, other.path)) continue;
+      return invalid_input({"OUT_TWICE", file.path.string(), "a file of its own"},
+                           absl::StrCat("\"", file.path.string(), "\" is given for ", other.option,
+                                        " and for ", file.option, "; it would be overwritten."));
+    }
+    before.push_back(file);
   }
   return absl::OkStatus();
 }

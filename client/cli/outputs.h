@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -25,6 +26,15 @@ absl::StatusOr<PictureStyle> picture_style(const PictureOptions& options);
 /// INVALID_ARGUMENT where one of `paths` cannot become an output: an ending other than .ply, .obj, .off and
 /// .png (OUT_FORMAT_UNKNOWN), or no such folder (FILE_NOT_WRITTEN). Asked before the solve, not after it.
 absl::Status check_outputs(std::span<const std::filesystem::path> paths);
+
+/// A file that the command line names, and as what.
+struct NamedFile {
+  std::string option;  // "--out"
+  std::filesystem::path path;
+};
+
+/// INVALID_ARGUMENT OUT_TWICE where two of `written` are the same file, or one of them is also among `read`.
+absl::Status check_apart(std::span<const NamedFile> written, std::span<const NamedFile> read);
 
 /// INVALID_ARGUMENT OUT_WITHOUT_NORMALS where none of `paths` is to hold normals: .obj and .ply do.
 absl::Status check_normals_have_output(std::span<const std::filesystem::path> paths);

@@ -13,6 +13,9 @@ namespace {
 absl::Status write_shape(const ShapeOptions& options) {
   absl::Status status = check_outputs(std::array{options.out});
   if (status.ok() && options.handles) status = check_folder(*options.handles);
+  if (status.ok() && options.handles)
+    status = check_apart(std::array{NamedFile{"--handles", *options.handles}},
+                         std::array{NamedFile{"--out", options.out}});
   if (!status.ok()) return status;
   const absl::StatusOr<GeneratedShape> shape = generate_shape(options.name, options.detail);
   if (!shape.ok()) return shape.status();

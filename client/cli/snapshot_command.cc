@@ -2,12 +2,9 @@
 
 #include <cstdio>
 #include <string>
-#include <system_error>
 
-#include "absl/strings/str_cat.h"
 #include "client/cli/text_file.h"
 #include "client/cpp/client.h"
-#include "core/base/fault.h"
 
 namespace lpdeform::cli {
 namespace {
@@ -18,22 +15,6 @@ absl::StatusOr<client::Client> connect(const ServerAccess& access) {
   return client::Client::connect(*access.address, *std::move(options));
 }
 
-/// Beside its place first, so that what was there stays until the new one is whole.
-absl::Status write_whole(const std::filesystem::path& path, const std::string& bytes) {
-  std::filesystem::path aside = path;
-  aside += ".part";
-  absl::Status written = write_text(aside, bytes);
-  std::error_code error;
-  if (written.ok()) std::filesystem::rename(aside, path, error);
-  if (error) {
-    written =
-        invalid_input({"FILE_NOT_WRITTEN", path.string(), ""},
-                      absl::StrCat("\"", path.string(), "\" cannot be written: ", error.message(), "."));
-  }
-  if (!written.ok()) std::filesystem::remove(aside, error);
-  return written;
-}
-
 }  // namespace
 
 ExitStatus run_snapshot(const SnapshotOptions& options) {
@@ -42,7 +23,7 @@ ExitStatus run_snapshot(const SnapshotOptions& options) {
   if (!server.ok()) return complain(server.status());
   const auto bytes = server->snapshot(options.session);
   if (!bytes.ok()) return complain(bytes.status());
-  if (absl::Status status = write_whole(options.file, *bytes); !status.ok()) return complain(status);
+  if (absl::Status status = write_text(options.file, *bytes); !status.ok()) return complain(status);
   std::printf("wrote %s, %zu bytes\n", options.file.c_str(), bytes->size());
   return kDone;
 }

@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/mesh/whole_file.h"
 
 namespace lpdeform::cli {
 namespace {
@@ -32,10 +33,7 @@ absl::StatusOr<std::string> read_text(const std::filesystem::path& path) {
 }
 
 absl::Status write_text(const std::filesystem::path& path, std::string_view text) {
-  std::ofstream file(path, std::ios::binary);
-  file.write(text.data(), static_cast<std::streamsize>(text.size()));
-  file.close();
-  return file ? absl::OkStatus() : not_written(path, "the disk or the folder refuses");
+  return write_whole_file(path, text);
 }
 
 absl::Status check_folder(const std::filesystem::path& path) {

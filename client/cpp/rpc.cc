@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/cpp/address.h"
 #include "client/cpp/status_details.h"
 #include "client/cpp/tls_texts.h"
 #include "client/cpp/upload.h"
@@ -269,7 +270,8 @@ class GrpcRpc final : public Rpc {
 
 absl::StatusOr<std::shared_ptr<Rpc>> Rpc::connect(const std::string& address, const ClientOptions& options,
                                                   const std::stop_token& stop) {
-  const absl::Status checked = options.tls ? check_tls(*options.tls) : absl::OkStatus();
+  absl::Status checked = check_address(address);
+  if (checked.ok() && options.tls) checked = check_tls(*options.tls);
   if (!checked.ok()) return checked;
   keep_grpc();
   const auto channel = grpc::CreateCustomChannel(address, credentials_of(options.tls), channel_arguments());

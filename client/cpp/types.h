@@ -132,7 +132,7 @@ enum class Encoding {
 /// speaking of the mesh's own vertices; what is said of copies must be the same (COPIES_DIFFER).
 struct Weld {
   bool by_position = false;  // vertices in the same place are one
-  /// How far apart such vertices may be, as a share of the bounding box's diagonal, 0 to 1e-3; 0 is the server's, 1e-9. All
+  /// How far apart such vertices may be, as a share of the bounding box's diagonal, 0 to 1e-3; 0 is the server's, 1e-6. All
   /// copies get the position of the lowest, at rest, too.
   double tolerance = 0;
   /// Otherwise one number a vertex: those with the same number are one. Empty: nothing is welded.

@@ -31,11 +31,20 @@ FaceState state_of(const Faces& faces, Eigen::Index f, Eigen::Index vertices) {
   return a == b || b == c || c == a ? FaceState::kRepeatedVertex : FaceState::kSound;
 }
 
+/// The first index of the face that no vertex has; there is one.
+std::int32_t wrong_index(const TriangleMesh& mesh, Eigen::Index f) {
+  int corner = 0;
+  while (mesh.faces(f, corner) >= 0 && mesh.faces(f, corner) < mesh.vertices.rows()) ++corner;
+  return mesh.faces(f, corner);
+}
+
 std::vector<FaceState> check_indices(const TriangleMesh& mesh, MeshReport& report) {
   std::vector<FaceState> states(mesh.faces.rows());
   for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
     states[f] = state_of(mesh.faces, f, mesh.vertices.rows());
-    if (states[f] == FaceState::kOutOfRange) count(report.index_out_of_range, f);
+    if (states[f] != FaceState::kOutOfRange) continue;
+    if (report.index_out_of_range.count == 0) report.wrong_index = wrong_index(mesh, f);
+    count(report.index_out_of_range, f);
   }
   return states;
 }

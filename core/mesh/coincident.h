@@ -7,9 +7,10 @@
 
 namespace lpdeform {
 
-/// Points that lie in one place, up to rounding of where they come from: no farther apart than this share of the
-/// diagonal of all points' bounding box.
-inline constexpr double kSamePlace = 1e-9;
+/// Points no farther apart than this share of the diagonal of all points' bounding box are in one place. Coordinates in single
+/// precision are rounded by 6e-8 of their size, so two copies of a vertex may be apart by twice that, or by ten times as much where the
+/// mesh lies some diagonals away from the origin.
+inline constexpr double kSamePlace = 1e-6;
 
 struct Coincident {
   /// One a point: the lowest point that it coincides with, over any number of steps, or itself.

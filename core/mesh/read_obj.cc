@@ -26,6 +26,7 @@ absl::Status read_face(TextScanner& scanner, std::vector<std::int32_t>& corners,
   for (std::string_view word = scanner.next_on_line(); !word.empty(); word = scanner.next_on_line()) {
     const auto number = to_index(word.substr(0, word.find('/')));
     if (!number) return scanner.error("a corner of an f line starts with a vertex number");
+    if (*number == 0) return scanner.error("an f line names vertex 0, and the first vertex is 1");
     corners.push_back(to_zero_based(*number, builder.vertices()));
   }
   if (corners.size() < 3) return scanner.error("an f line needs at least three corners");

@@ -69,10 +69,11 @@ absl::Status deformable(const MeshReport& report) {
   if (report.vertices == 0 || report.faces == 0) return empty_mesh(report);
   if (report.index_out_of_range.count > 0) {
     const std::int32_t face = report.index_out_of_range.first.front();
-    return invalid_input({"MESH_INDEX_OUT_OF_RANGE", absl::StrCat("face ", face),
-                          absl::StrCat("0 <= index < ", report.vertices)},
-                         absl::StrCat("Face ", face, " has a vertex index outside 0 to ", report.vertices - 1,
-                                      " (", report.index_out_of_range.count, " such faces)."));
+    return invalid_input(
+        {"MESH_INDEX_OUT_OF_RANGE", absl::StrCat("face ", face),
+         absl::StrCat("0 <= index < ", report.vertices)},
+        absl::StrCat("Face ", face, " has the vertex index ", report.wrong_index, ", outside 0 to ",
+                     report.vertices - 1, " (", report.index_out_of_range.count, " such faces)."));
   }
   if (report.not_finite.count > 0) {
     const std::int32_t vertex = report.not_finite.first.front();

@@ -49,6 +49,7 @@ struct MeshReport {
 
   DefectCount not_finite, index_out_of_range, unreferenced_vertices, duplicate_faces, zero_area_faces,
       non_manifold_edges, non_manifold_vertices, inconsistent_orientation, split_border_vertices;
+  std::int32_t wrong_index = 0;  // of the first face of index_out_of_range
   /// Known once weights are chosen (count_weight_defects in core/energy/weights.h); 0 before.
   DefectCount clamped_edges, floored_vertices, flipped_edges;
 

@@ -105,7 +105,7 @@ TriangleMesh welded(const TriangleMesh& split, const Weld& weld) {
     mesh.vertices.row(w) = split.vertices.row(weld.first_copy[w]);
   for (std::int32_t& index : mesh.faces.reshaped()) {
     const bool is_in_range = index >= 0 && index < weld.split_count();
-    index = is_in_range ? weld.to_welded[index] : std::numeric_limits<std::int32_t>::max();
+    if (is_in_range) index = weld.to_welded[index];
   }
   return mesh;
 }

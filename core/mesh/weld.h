@@ -41,7 +41,7 @@ absl::StatusOr<Weld> weld_by_position(const Points& positions, double tolerance 
 absl::StatusOr<Weld> weld_by_groups(const Points& positions, std::span<const std::uint32_t> groups);
 
 /// The welded mesh: faces in the same order, their indices those of welded vertices; an index out of range
-/// stays out of range.
+/// stays as it is, which is out of range there, too.
 TriangleMesh welded(const TriangleMesh& split, const Weld& weld);
 
 /// Rows of welded vertices as rows of split ones: copies get the same bits.

@@ -1,12 +1,14 @@
 #include "core/mesh/whole_file.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <optional>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
@@ -38,12 +40,58 @@ std::filesystem::path name_beside(const std::filesystem::path& path) {
   return name;
 }
 
+/// The status of what is there; nothing where there is nothing.
+std::optional<struct stat> status_of(const std::filesystem::path& path) {
+  struct stat found = {};
+  return ::stat(path.c_str(), &found) == 0 ? std::optional(found) : std::nullopt;
+}
+
+/// What another program has open, or a device: it is written to, not replaced.
+bool is_stream(const std::filesystem::path& path, const std::optional<struct stat>& there) {
+  const std::string name = path.lexically_normal().string();
+  return (there && !S_ISREG(there->st_mode)) || name.starts_with("/dev/") || name.starts_with("/proc/");
+}
+
+/// Returns 0 or the errno of what went wrong.
+int write_stream(const std::filesystem::path& path, std::string_view bytes) {
+  const int file = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  if (file < 0) return errno;
+  const int error = write_all(file, bytes);
+  return ::close(file) != 0 && error == 0 ? errno : error;
+}
+
+/// The same.
+int replace(const std::filesystem::path& path, const std::optional<struct stat>& there,
+            std::string_view bytes) {
+  const std::filesystem::path partial = name_beside(path);
+  const int file = ::open(partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (file < 0) return errno;
+  int error = write_all(file, bytes);
+  if (there) {
+    // Somebody else's file may be replaced by whoever may write to its folder, and then is theirs.
+    if (::fchown(file, there->st_uid, there->st_gid) != 0)
+      static_cast<void>(::fchown(file, -1, there->st_gid));
+    static_cast<void>(::fchmod(file, there->st_mode & 0777));
+  }
+  if (::close(file) != 0 && error == 0) error = errno;
+  if (error == 0 && std::rename(partial.c_str(), path.c_str()) != 0) error = errno;
+  if (error != 0) ::unlink(partial.c_str());
+  return error;
+}
+
 }  // namespace
 
 absl::StatusOr<std::string> read_whole_file(const std::filesystem::path& path) {
   std::error_code error;
-  std::ifstream stream(path, std::ios::binary);
+  // Asked first: to open a pipe would wait for whoever writes to it.
   const bool is_file = std::filesystem::is_regular_file(path, error);
+  if (!is_file && std::filesystem::exists(path, error)) {
+    const bool is_folder = std::filesystem::is_directory(path, error);
+    return make_fault(absl::StatusCode::kNotFound, {"MESH_FILE_NOT_FOUND", path.string(), "a plain file"},
+                      absl::StrCat(path.string(), " is a ", is_folder ? "folder" : "pipe or a device",
+                                   "; a mesh is read from a plain file."));
+  }
+  std::ifstream stream(path, std::ios::binary);
   const std::uintmax_t size = is_file ? std::filesystem::file_size(path, error) : 0;
   std::string bytes(error ? 0 : size, '\0');
   if (!is_file || error || !stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) {
@@ -54,15 +102,15 @@ absl::StatusOr<std::string> read_whole_file(const std::filesystem::path& path) {
 }
 
 absl::Status write_whole_file(const std::filesystem::path& path, std::string_view bytes) {
-  const std::filesystem::path partial = name_beside(path);
-  const int file = ::open(partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (file < 0) return not_written(path, errno);
-  int error = write_all(file, bytes);
-  if (::close(file) != 0 && error == 0) error = errno;
-  if (error == 0 && std::rename(partial.c_str(), path.c_str()) != 0) error = errno;
-  if (error == 0) return absl::OkStatus();
-  ::unlink(partial.c_str());
-  return not_written(path, error);
+  const std::optional<struct stat> there = status_of(path);
+  std::error_code ignored;
+  int error = 0;
+  if (is_stream(path, there)) {
+    error = write_stream(path, bytes);
+  } else {
+    error = replace(there ? std::filesystem::canonical(path, ignored) : path, there, bytes);
+  }
+  return error == 0 ? absl::OkStatus() : not_written(path, error);
 }
 
 }  // namespace lpdeform

@@ -42,15 +42,16 @@ inline TriangleMesh split_along_seam(const TriangleMesh& mesh) {
 
 /// A sphere of radius 1 as modellers make it for textures: (rings + 1) x (segments + 1) vertices in a grid of
 /// latitudes and longitudes. The last column lies on the first up to rounding; each pole is segments + 1 vertices, and
-/// every second face there has no inside.
-inline TriangleMesh uv_sphere(int rings, int segments) {
+/// every second face there has no inside. Number: the precision in which it is computed.
+template <typename Number = double>
+TriangleMesh uv_sphere(int rings, int segments) {
   const int columns = segments + 1;
   TriangleMesh mesh{Points((rings + 1) * columns, 3), Faces(2 * rings * segments, 3)};
   Eigen::Index f = 0;
   for (int ring = 0; ring <= rings; ++ring) {
-    const double latitude = M_PI * ring / rings;
+    const auto latitude = static_cast<Number>(M_PI * ring / rings);
     for (int column = 0; column < columns; ++column) {
-      const double longitude = 2 * M_PI * column / segments;
+      const auto longitude = static_cast<Number>(2 * M_PI * column / segments);
       const int v = ring * columns + column;
       mesh.vertices.row(v) << std::sin(latitude) * std::cos(longitude),
           std::sin(latitude) * std::sin(longitude), std::cos(latitude);

@@ -50,11 +50,11 @@ class EnvoyMetrics(programs.OnShapes):
         cls.envoy.stop()
         super().tearDownClass()
 
-    def ask(self, path, method="GET"):
+    def ask(self, path, method="GET", **headers):
         """Status and text; the path as it is."""
         connection = http.client.HTTPConnection(self.envoy.metrics.removeprefix("http://"), timeout=programs.PATIENCE)
         with contextlib.closing(connection):
-            connection.request(method, path)
+            connection.request(method, path, headers=headers)
             answer = connection.getresponse()
             return answer.status, answer.read().decode()
 
@@ -72,6 +72,10 @@ class EnvoyMetrics(programs.OnShapes):
     def healthy(self):
         return [value for labels, value in self.scraped()["envoy_cluster_membership_healthy"]
                 if labels["envoy_cluster_name"] == "lpdeform"]
+
+    def test_a_foreign_host_is_answered_nothing(self):
+        for host, status in (("localhost", 200), ("127.0.0.1:8082", 200), ("[::1]:1", 200), ("evil.example", 404), ("127.0.0.1.evil.example:80", 404)):
+            self.assertEqual(self.ask("/stats/prometheus", Host=host)[0], status, host)
 
     def test_they_are_all_that_the_port_answers(self):
         for path in ("/", "/stats", "/config_dump", "/quitquitquit", "//quitquitquit", "/stats/prometheus/", "/stats/prometheus/../config_dump",

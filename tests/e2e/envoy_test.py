@@ -1,5 +1,6 @@
 """Envoy as deploy/web starts it: TLS of its clients and its servers, and whom it lets in where many come."""
 
+import contextlib
 import json
 import os
 import socket
@@ -7,6 +8,7 @@ import ssl
 import subprocess
 import tempfile
 import time
+import urllib.parse
 import urllib.request
 
 import programs
@@ -47,7 +49,7 @@ class Envoy:
         self.folder = tempfile.TemporaryDirectory()
         self.log = os.path.join(self.folder.name, "log")
         admin = os.path.join(self.folder.name, "admin")
-        self.process = subprocess.Popen([os.path.join(root, "deploy", "web"), "--admin-file", admin, "--web", "127.0.0.1:0", "--files",
+        self.process = subprocess.Popen([os.path.join(root, "deploy", "web"), "--web", "127.0.0.1:0", "--admin-file", admin, "--files",
                                          "none", "--access-log", self.log, *arguments])
         end = time.monotonic() + programs.PATIENCE
         while not (os.path.exists(admin) and programs.read_text(admin)):
@@ -220,6 +222,19 @@ class Connections(ThroughEnvoy):
         self.assertTrue(calls)
         for call in calls:
             self.assertRegex(call["client"], r"^127\.0\.0\.1:\d+$")
+
+    def test_whoever_trickles_headers_at_the_port_for_probes_keeps_nobody_else_from_it(self):
+        envoy = self.start("--server", self.serve().address, "--health", "127.0.0.1:0")
+        place = urllib.parse.urlsplit(envoy.health)
+        tricklers = [socket.create_connection((place.hostname, place.port), programs.PATIENCE) for _ in range(200)]
+        for one in tricklers:
+            self.addCleanup(one.close)
+        for letter in "GET /":
+            for one in tricklers:
+                with contextlib.suppress(OSError):  # it has had its time
+                    one.sendall(letter.encode())
+            self.assertTrue(self.is_well(envoy))
+            time.sleep(0.3)
 
     def test_those_without_a_call_are_closed_and_clients_come_back_by_themselves(self):
         envoy = self.start("--server", self.serve().address, "--connection-idle", "1")

@@ -3,7 +3,9 @@
 import json
 import math
 import os
+import subprocess
 
+import programs
 from programs import OnShapes, main, read_bytes, read_off, read_off_faces, read_ply, read_text, run
 
 
@@ -223,6 +225,63 @@ class Files(OnShapes):
             refused = run(*resize, f"--weld={tolerance}")
             self.assertEqual(refused.returncode, 2)
             self.assertIn("0.001", refused.stderr)
+
+    def test_an_output_is_whole_or_what_was_there_stays(self):
+        mesh, handles, _ = self.split_bar()  # with normals, which are written by another way than without
+        out, report = self.write("hero.obj", "what was there\n"), self.write("hero.json", "this, too\n")
+        os.chmod(out, 0o660)
+        deform = ("deform", mesh, "--handles", handles, "--weld", "--out", out, "--report", report)
+        limited = subprocess.run(["bash", "-c", 'ulimit -f 2; exec "$@"', "-", programs.cli(), *deform], capture_output=True, text=True,
+                                 timeout=programs.PATIENCE)
+        self.assertEqual(limited.returncode, 2, limited.stderr)
+        self.assertIn("File too large", limited.stderr)
+        self.assertEqual(read_text(out), "what was there\n")
+        self.assertEqual(read_text(report), "this, too\n")
+        self.assertEqual([name for name in os.listdir(os.path.dirname(out)) if "partial" in name], [])
+        link = self.at("latest.obj")
+        os.symlink(out, link)
+        done = run("deform", mesh, "--handles", handles, "--weld", "--out", link, "--report", "/dev/stdout")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue(os.path.islink(link))
+        self.assertIn("\nf ", read_text(out), "the file behind the link")
+        self.assertEqual(os.stat(out).st_mode & 0o777, 0o660)
+        self.assertIn('"stop_reason"', done.stdout)
+
+    def test_a_file_is_named_once(self):
+        bar, handles = self.at("bar.off"), self.at("bar.json")
+        same = self.at("same.obj")
+        for arguments in (("deform", bar, "--handles", handles, "--out", same, "--report", same),
+                          ("deform", bar, "--handles", handles, "--out", same, "--out", os.path.join(os.path.dirname(same), ".", "same.obj")),
+                          ("deform", bar, "--handles", handles, "--report", handles), ("deform", bar, "--handles", handles, "--report", bar),
+                          ("shape", "bar", "--out", same, "--handles", same)):
+            refused = run(*arguments)
+            self.assertEqual(refused.returncode, 2, arguments)
+            self.assertIn("it would be overwritten", refused.stderr)
+        self.assertFalse(os.path.exists(same))
+        own = self.write("own.off", read_text(bar))
+        self.assertEqual(run("deform", own, "--handles", handles, "--out", own).returncode, 0, "in its own place is meant")
+
+    def test_what_cannot_be_printed_is_an_error(self):
+        for arguments in (("info", self.at("bar.off"), "--json"), ("--help",), ("deform", self.at("bar.off"), "--handles", self.at("bar.json"))):
+            with open("/dev/full", "w") as full:
+                done = subprocess.run([programs.cli(), *arguments], stdout=full, stderr=subprocess.PIPE, text=True, timeout=programs.PATIENCE)
+            self.assertEqual(done.returncode, 2, arguments)
+            self.assertIn("No space left on device", done.stderr)
+
+    def test_errors_of_a_mesh_name_its_file_and_what_is_wrong(self):
+        corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+        for text, why in (("f 0 1 2\n", "Line 4: an f line names vertex 0"), ("f 1 2 5\n", "the vertex index 4, outside 0 to 2"),
+                          ("f 1 2 -9\n", "the vertex index -6, outside 0 to 2")):
+            mesh = self.write("wrong.obj", corners + text)
+            refused = run("info", mesh)
+            self.assertEqual(refused.returncode, 2)
+            self.assertIn("wrong.obj", refused.stderr)
+            self.assertIn(why, refused.stderr)
+        refused = run("deform", self.at("bar.off"), "--handles", self.at("bar.json"), "--initial", mesh)
+        self.assertIn("wrong.obj", refused.stderr)
+        os.mkfifo(self.at("pipe.obj"))
+        self.assertIn("pipe", run("info", self.at("pipe.obj")).stderr)
+        self.assertIn("(see lpdeform deform --help)", run("deform", "--what").stderr)
 
     def test_info_says_that_a_mesh_is_split(self):
         mesh, _, copies = self.split_bar()

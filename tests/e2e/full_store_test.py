@@ -132,6 +132,7 @@ class FullDisk(OfServers):
         error = errors.from_call(caught.exception, "")
         self.assertEqual(error.reason, "STORE_FULL")
         self.assertGreaterEqual(error.retry_after, 1)
+        self.assertNotIn(self.disk, str(caught.exception), "where the store is, is nobody's business")
         return caught.exception.details()
 
     def test_it_removes_on_a_full_disk_and_takes_again_without_a_restart(self):

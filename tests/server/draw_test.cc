@@ -283,9 +283,9 @@ TEST_F(DrawTest, GroupsWeldWhatPositionsWouldNot) {
   *request.mutable_mesh() = mesh_message(near);
   request.mutable_weld()->mutable_groups()->set_inline_(packed(groups));
   EXPECT_EQ(created(request).session().mesh().components(), 1u);
-  request.mutable_weld()->mutable_position();
+  request.mutable_weld()->mutable_position()->set_tolerance(1e-9);
   EXPECT_GT(created(request).session().mesh().components(), 1u);
-  request.mutable_weld()->mutable_position()->set_tolerance(1e-6);
+  request.mutable_weld()->mutable_position()->set_tolerance(0);  // 1e-6
   EXPECT_EQ(created(request).session().mesh().components(), 1u);
 }
 

@@ -43,7 +43,7 @@ namespace Lpdeform
         public float[] Normals;
         /// Vertices in the same place are one.
         public bool WeldByPosition;
-        /// How far apart these may be, as a share of the bounding box's diagonal, 0 to 0.001; 0 is the server's, 1e-9.
+        /// How far apart these may be, as a share of the bounding box's diagonal, 0 to 0.001; 0 is the server's, 1e-6.
         public double WeldTolerance;
         /// In place of that, one number a vertex: those with the same number are one.
         public int[] WeldGroups;

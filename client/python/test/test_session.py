@@ -175,6 +175,22 @@ def test_a_split_mesh_is_noticed_and_welded_with_a_tolerance(
         lpdeform.open(corners, faces, address=server.address, weld=0.002)
 
 
+def test_a_sphere_of_single_precision_is_noticed_and_welded(server: Server) -> None:
+    rings, segments = 8, 16
+    latitude = np.linspace(0, np.pi, rings + 1, dtype=np.float32)[:, None]
+    longitude = np.linspace(0, 2 * np.pi, segments + 1, dtype=np.float32)[None, :]
+    sphere = np.stack([np.sin(latitude) * np.cos(longitude), np.sin(latitude) * np.sin(longitude), np.cos(latitude) + 0 * longitude], axis=-1)
+    corner = np.arange((rings + 1) * (segments + 1)).reshape(rings + 1, segments + 1)
+    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[:-1, 1:], corner[1:, 1:]
+    faces = np.concatenate([np.stack([a, b, c], axis=-1).reshape(-1, 3), np.stack([c, b, d], axis=-1).reshape(-1, 3)])
+    for weld in (False, True):
+        with lpdeform.open(sphere.reshape(-1, 3), faces, address=server.address, weld=weld) as session:
+            assert len(session.mesh_report.notices) == (not weld)
+            split = {defect.kind: defect.count for defect in session.mesh_report.defects}.get("split_border_vertices", 0)
+            assert split == (0 if weld else 2 * (rings - 1) + 2 * segments)
+            assert session.mesh_report.welded_vertices == (rings + 1) * (segments + 1) - 2 - (rings - 1) * segments if weld else True
+
+
 def test_what_the_server_refuses_is_raised_with_its_words(session: lpdeform.Session) -> None:
     session.settle(PATIENCE)
     number = session.set_handle("bad", [5000])

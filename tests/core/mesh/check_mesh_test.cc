@@ -76,6 +76,9 @@ TEST(CheckMesh, NamesVerticesAtBordersThatCoincide) {
   EXPECT_EQ(report.split_border_vertices.first.size(), 10u);
   EXPECT_GT(check_mesh(uv_sphere(12, 16)).split_border_vertices.count, 2 * 13)
       << "copies that are apart by rounding";
+  EXPECT_EQ(check_mesh(uv_sphere<float>(12, 16)).split_border_vertices.count,
+            check_mesh(uv_sphere(12, 16)).split_border_vertices.count)
+      << "the same in single precision";
 }
 
 TEST(CheckMesh, FindsNoSplitVerticesAtABorderOfItsOwn) {

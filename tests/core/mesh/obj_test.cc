@@ -35,8 +35,8 @@ TEST(Obj, CountsNegativeIndicesBackFromTheNewestVertex) {
 }
 
 TEST(Obj, KeepsIndicesThatOthersWillJudge) {
-  const Faces faces = faces_of(square_with("f 0 1 5\nf -5 1 99999999999\n"));
-  EXPECT_TRUE(same_faces(faces, make_mesh({}, {{-1, 0, 4}, {-1, 0, 2147483646}}).faces));
+  const Faces faces = faces_of(square_with("f 6 1 5\nf -5 1 99999999999\n"));
+  EXPECT_TRUE(same_faces(faces, make_mesh({}, {{5, 0, 4}, {-1, 0, 2147483646}}).faces));
 }
 
 TEST(Obj, SkipsNumbersAfterTheThirdOfAVertex) {

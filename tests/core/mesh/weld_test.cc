@@ -132,9 +132,18 @@ TEST(Weld, ConnectsChainsAndTakesTheLowestCopysPosition) {
 TEST(Weld, DoesNotDependOnTheUnitOfLength) {
   for (const double unit : {1e-300, 1e-160, 1.0, 1e160, 1e307}) {
     Points points(4, 3);
-    points << 0, 0, 0, 1, 0, 0, 1, 5e-10, 0, 1, 5e-9, 0;
+    points << 0, 0, 0, 1, 0, 0, 1, 5e-7, 0, 1, 5e-6, 0;
     const Weld weld = weld_by_position(unit * points).value();
     EXPECT_THAT(weld.to_welded, ElementsAre(0, 1, 1, 2)) << unit;
+  }
+}
+
+TEST(Weld, HoldsTogetherASphereOfSinglePrecisionWherever) {
+  for (const double place : {0.0, 5.0}) {
+    TriangleMesh mesh = uv_sphere<float>(16, 32);
+    mesh.vertices.col(0).array() += place;
+    mesh.vertices = mesh.vertices.cast<float>().cast<double>().eval();
+    EXPECT_EQ(weld_by_position(mesh.vertices)->welded_count(), 2 + 15 * 32) << place;
   }
 }
 

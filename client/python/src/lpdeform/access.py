@@ -13,6 +13,8 @@ import grpc
 
 from lpdeform.errors import Code, invalid, make
 
+_SCHEMES = ("unix:", "unix-abstract:", "dns:", "ipv4:", "ipv6:", "xds:", "vsock:")
+
 Token: TypeAlias = str | Callable[[], str] | None
 """A bearer token, or what gives the newest one when a call begins, on any thread; None: none."""
 
@@ -72,6 +74,7 @@ def is_header_text(text: str) -> bool:
 
 def open_channel(address: str, tls: Tls | bool, options: list[tuple[str, int]]) -> Any:
     """Raises InvalidInput where a text of `tls` cannot be used: gRPC would only find no way to the server."""
+    _check_address(address)
     if tls is False:
         return grpc.insecure_channel(address, options=options)
     given = tls if isinstance(tls, Tls) else Tls()
@@ -86,6 +89,17 @@ def open_channel(address: str, tls: Tls | bool, options: list[tuple[str, int]]) 
     if chain is not None and key is not None:
         _check_own(chain, key)
     return grpc.secure_channel(address, grpc.ssl_channel_credentials(roots, key, chain), options=options)
+
+
+def _check_address(address: str) -> None:
+    """Without this, a port above 65535 would reach another one."""
+    if address.startswith(_SCHEMES):
+        return  # gRPC looks at it itself
+    host, colon, port = address.rpartition(":")
+    is_host = host != "" and "/" not in host and (":" not in host or (host[0] == "[" and host[-1] == "]"))
+    if not (colon and is_host and port.isascii() and port.isdigit() and len(port) <= 5 and 1 <= int(port) <= 65535):
+        text = f'"{address}" is no address of a server: that is HOST:PORT, with a port from 1 to 65535, or unix:PATH.'
+        raise invalid(text, "ADDRESS_INVALID", address, "HOST:PORT or unix:PATH, port = 1 to 65535")
 
 
 def _bytes(text: str | bytes | None) -> bytes | None:

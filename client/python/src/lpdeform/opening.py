@@ -130,7 +130,7 @@ def open(  # noqa: A001  (called as lpdeform.open)
     normals: n x 3, as drawn at rest, for frames with normals.
     free_components: what becomes of a connected component that no handle holds: "error" is raised, "stay", "follow".
     weld: True where vertices in the same place are copies of one; or how far apart these may be, as a share of the bounding box's
-        diagonal, at most 1e-3; or one number a vertex, the same for copies. True and 0 are 1e-9, as copies may be apart by rounding;
+        diagonal, at most 1e-3; or one number a vertex, the same for copies. True and 0 are 1e-6, as copies may be apart by rounding;
         False is none.
     encoding: how frames travel: "float64", "float32" (16 bytes a vertex), "quantized" (8, off by half of 1/65535 of the frame's
         extent), "compressed" (the same, 3 to 5; needs the system's meshoptimizer).

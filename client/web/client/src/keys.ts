@@ -126,7 +126,10 @@ export function checkUpdate(given: api.Update): void {
   checkKeys(given, update, "update");
   for (const [name, one] of Object.entries(given.handles ?? {})) checkChange(one, `handle "${name}"`);
   if (given.settings) checkSettings(given.settings);
-  if (given.resize) checkKeys(given.resize, resize, "resize");
+  if (!given.resize) return;
+  checkKeys(given.resize, resize, "resize");
+  checkVectors(given.resize, ["scale", "origin"], "resize");
+  given.resize.axes?.forEach((axis, k) => checkVector(axis, `axes[${k}] of resize`));
 }
 
 function checkChange(given: api.HandleChange, owner: string): void {
@@ -143,24 +146,52 @@ function checkHandle(given: api.Handle, owner: string): void {
   if (!given.hold) return;
   checkWord(given.hold.kind, holds, `hold of ${owner}`);
   checkKeys(given.hold, holds[given.hold.kind], `hold of ${owner}`);
+  if (given.hold.kind === "axisLock") checkVector(given.hold.axis, `axis of ${owner}`);
+  if (given.hold.kind === "planeLock") checkVector(given.hold.normal, `normal of ${owner}`);
 }
 
 function checkMotion(given: api.Motion, owner: string): void {
   const element = `motion of ${owner}`;
   if (typeof given === "string") checkWord(given, { fixed: true }, element);
-  else checkKeys(given, "targets" in given ? targets : rigid, element);
+  else if ("targets" in given) checkKeys(given, targets, element);
+  else {
+    checkKeys(given, rigid, element);
+    checkVectors(given, ["axis", "center", "translation"], element);
+  }
 }
 
 function checkSettings(given: api.Settings): void {
   checkKeys(given, settings, "settings");
   for (const field of ["p", "stiffness"] as const) {
-    const value = given[field];
-    if (typeof value === "object" && !isNumbers(value)) checkKeys(value, { automatic: true }, field);
+    checkField(given[field], field);
   }
   if (!given.solver) return;
   checkKeys(given.solver, solver, "solver");
   checkWord(given.solver.method, methods, "method");
   checkWord(given.solver.initial, guesses, "initial");
+}
+
+function checkField(value: unknown, field: string): void {
+  if (value === undefined || typeof value === "number") return;
+  if (typeof value !== "object" || value === null)
+    throw mistyped(`${field} is ${String(value)}`, field, "a number, one a vertex, or { automatic: strength }");
+  if (!isNumbers(value)) checkKeys(value, { automatic: true }, field);
+}
+
+/** Vectors among the values of `given`. */
+function checkVectors<Bag extends object>(given: Bag, keys: readonly (keyof Bag & string)[], owner: string): void {
+  for (const key of keys) checkVector(given[key], `${key} of ${owner}`);
+}
+
+function checkVector(value: unknown, element: string): void {
+  if (value === undefined) return;
+  const isVector =
+    typeof value === "object" &&
+    value !== null &&
+    isNumbers(value) &&
+    (value as ArrayLike<unknown>).length === 3 &&
+    Array.from(value as ArrayLike<unknown>).every((number) => typeof number === "number");
+  if (!isVector) throw mistyped(`${element} is ${JSON.stringify(value)}`, element, "three numbers");
 }
 
 function checkEncodings({ encoding, lowestEncoding }: api.FrameOptions): void {
@@ -181,6 +212,11 @@ function checkKeys(given: object, known: Readonly<Record<string, true>>, element
 function checkWord(given: string | undefined, known: Readonly<Record<string, unknown>>, element: string): void {
   if (given === undefined || Object.hasOwn(known, given)) return;
   throw refused(`${element} is "${given}", which is not known`, element, known);
+}
+
+function mistyped(what: string, element: string, limit: string): LpdeformError {
+  const text = `${what[0]!.toUpperCase()}${what.slice(1)}; it must be ${limit}.`;
+  return new LpdeformError("invalid_argument", text, { reason: "ARRAY_TYPE", element, limit });
 }
 
 function refused(what: string, element: string, known: object): LpdeformError {

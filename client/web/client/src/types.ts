@@ -285,7 +285,7 @@ export type WeightKind = "cotangent" | "uniform" | "intrinsicDelaunay";
 export interface WeldByPosition {
   /**
    * Vertices no farther apart than this share of the bounding box's diagonal are one, as are those that a chain of such steps
-   * connects. 0 to 0.001; 1e-9 where left out or 0.
+   * connects. 0 to 0.001; 1e-6 where left out or 0.
    */
   tolerance?: number;
 }

@@ -51,6 +51,23 @@ describe("an update is refused at once, by the name of the key that is not known
     expect([server.updates.length, session.newestInput]).toEqual([0, 0]);
   });
 
+  test.each<[string, unknown, string]>([
+    ["p", { settings: { p: "auto" } }, "p"],
+    ["p", { settings: { p: true } }, "p"],
+    ["a stiffness", { settings: { stiffness: null } }, "stiffness"],
+    ["a translation", tip({ move: { translation: [1, 2] } }), 'translation of motion of handle "tip"'],
+    ["a center", tip({ move: { center: [1, 2, 3, 4] } }), 'center of motion of handle "tip"'],
+    ["an axis", set({ vertices: [1], motion: { axis: ["0", 0, 1] } }), 'axis of motion of handle "tip"'],
+    ["a lock's axis", set({ vertices: [1], hold: { kind: "axisLock", axis: 1 } }), 'axis of handle "tip"'],
+    ["a scale", { resize: { scale: 2 } }, "scale of resize"],
+    ["an axis of a resize", { resize: { scale: [1, 1, 2], axes: [[1, 0, 0], [0]] } }, "axes[1] of resize"],
+  ])("%s that is none: %j", async (_, update, element) => {
+    const { server, session } = await begin();
+    const refusal = { code: "invalid_argument", reason: "ARRAY_TYPE", element };
+    expect(() => session.update(untyped<Update>(update))).toThrow(expect.objectContaining(refusal));
+    expect([server.updates.length, session.newestInput]).toEqual([0, 0]);
+  });
+
   test("a change that says nothing, or two things", async () => {
     const { session } = await begin();
     for (const change of [{}, { move: "fixed", remove: true }]) {

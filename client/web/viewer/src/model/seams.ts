@@ -2,7 +2,7 @@ import { boundsOf, type Mesh } from "./mesh.js";
 import { Pairs } from "./pairs.js";
 
 /** In shares of the diagonal: what is no farther apart is in one place, as the server has it by default. */
-const samePlace = 1e-9;
+const samePlace = 1e-6;
 
 /**
  * Vertices on open borders that are in one place: files of engines have them where texture coordinates or normals change along a
