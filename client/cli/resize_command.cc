@@ -100,34 +100,41 @@ absl::StatusOr<client::Update> update_for(const std::shared_ptr<const RestShape>
   return update;
 }
 
-/// One solve on the server, along one axis, blended with the plain scaling; `shares` is sparing(), which is that of the mesh
-/// as it is in its file.
+absl::StatusOr<client::SolveResult> solve_on(client::Client& server, const TriangleMesh& mesh,
+                                             std::optional<double> welding, client::Update update,
+                                             const Points& initial, Interrupt& interrupt) {
+  absl::StatusOr<client::Session> session = server.open(to_client(mesh), {.weld = by_position(welding)});
+  if (!session.ok()) return session.status();
+  interrupt.set_action([&session] { session->close().IgnoreError(); });
+  Progress progress;
+  client::SolveOptions solve;
+  solve.initial_positions = flat(initial);
+  solve.on_progress = [&progress](const client::SolveProgress& now) { progress.show(now); };
+  const auto sent = session->update(std::move(update));
+  absl::StatusOr<client::SolveResult> result =
+      sent.ok() ? session->solve(solve) : absl::StatusOr<client::SolveResult>(sent.status());
+  interrupt.set_action({});
+  return result;
+}
+
+/// One solve along one axis, blended with the plain scaling; `shares` is sparing(), which is that of the mesh as it is in its
+/// file.
 absl::Status stretch(client::Client& server, const Scaling& plain, std::optional<double> welding,
                      const Weld& weld, int axis, const std::vector<double>& shares, Interrupt& interrupt,
                      Resized& resized) {
-  const auto shape = RestShape::create(welded(resized.file.mesh, weld));
+  TriangleMesh& mesh = resized.file.mesh;
+  const auto shape = RestShape::create(welded(mesh, weld));
   if (!shape.ok()) return shape.status();
   std::vector<char> is_spared;
   for (const double share : shares) is_spared.push_back(share > 0 ? 1 : 0);
   auto update = update_for(*shape, weld, plain, axis, is_spared);
   if (!update.ok()) return update.status();
-  absl::StatusOr<client::Session> session =
-      server.open(to_client(resized.file.mesh), {.weld = by_position(welding)});
-  if (!session.ok()) return session.status();
-  interrupt.set_action([&session] { session->close().IgnoreError(); });
-  Progress progress;
-  client::SolveOptions solve;
-  solve.initial_positions = flat(plain(resized.file.mesh.vertices));
-  solve.on_progress = [&progress](const client::SolveProgress& now) { progress.show(now); };
-  const auto sent = session->update(*std::move(update));
-  const absl::StatusOr<client::SolveResult> result =
-      sent.ok() ? session->solve(solve) : absl::StatusOr<client::SolveResult>(sent.status());
-  interrupt.set_action({});
+  const auto result = solve_on(server, mesh, welding, *std::move(update), plain(mesh.vertices), interrupt);
   if (!result.ok()) return result.status();
 
   const Points scaled = plain((*shape)->positions());
   const Points spared = points_of(result->positions)(weld.first_copy, Eigen::all);
-  resized.file.mesh.vertices =
+  mesh.vertices =
       scattered(with_extents(**shape, plain.axes, blended(**shape, shares, scaled, spared), scaled), weld);
   resized.distortion = Eigen::Map<const Field>(result->distortion.data(),
                                                static_cast<Eigen::Index>(result->distortion.size()));

@@ -16,9 +16,10 @@ constexpr double kWhole = 0.01;
 // (100^0.5), and keeps its shape. At 0.4 it turns by 24 degrees. A ball, whose parts do not stand out, turns by 16 everywhere.
 constexpr double kLeastSalience = 0.4, kFullSalience = 0.5;
 
-// Of the radius. With noise of 1 % the worst of some thousand vertices is 4 % away. The corners of a cube are 29 % away. Of
-// whatever has limbs, holes or a long straight stretch, a hundredth of the area is over 25 % away.
-constexpr double kLeastDistance = 0.05, kFullDistance = 0.15;
+// Of the radius. With noise of 1 % the worst of some thousand vertices is 4 % away. An egg, or a capsule twice as long as
+// thick, is up to 9 % away, and is as round to the eye as an ellipsoid. A hundredth of the area of the paper's bar is over
+// 26 % away, and more of shapes with limbs or holes.
+constexpr double kLeastDistance = 0.1, kFullDistance = 0.25;
 
 double ramp(double x, double low, double high) {
   const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);

@@ -9,14 +9,14 @@ namespace lpdeform {
 
 /// How much of each component's resizing spares what is salient, 0 to 1; the rest is plain scaling:
 ///
-///   sparing = share(ramp(salience_i; 0.4, 0.5)) share(ramp(d_i; 0.05, 0.15))
+///   sparing = share(ramp(salience_i; 0.4, 0.5)) share(ramp(d_i; 0.1, 0.25))
 ///   ramp(x; a, b) = 0 up to a, 1 from b, smooth in between
 ///   share(c)      = min(1, (mean of c_i over the component's area) / 0.01)
 ///
 /// with the salience of core/analysis/salience.h for the axes of the scaling, weighted by |log scale_k| over the largest
 /// of these, and the distance d from the nearest ellipsoid of core/analysis/ellipsoid.h. Both factors are needed. A
 /// component that bends nowhere along the axes has nothing to be spared, such as a tube along its length. A ball or an
-/// ellipsoid bends everywhere, more so on a coarse mesh and with noise, and no part of it stands out.
+/// ellipsoid bends everywhere, and more on a coarse mesh or with noise, but no part of it stands out.
 ///
 /// To be asked of the shape as it is given, once for each axis, and not of one that is stretched already: the next
 /// axis would then be judged by what the one before has left.
