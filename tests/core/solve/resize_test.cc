@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -115,6 +116,11 @@ struct Round {
   std::string name;
   TriangleMesh mesh;
 };
+
+/// For names of tests, which would have the bytes of the mesh.
+void PrintTo(const Round& round, std::ostream* out) {
+  *out << round.name;
+}
 
 /// Balls and ellipsoids, from coarse to fine.
 std::vector<Round> round_shapes() {
