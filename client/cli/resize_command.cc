@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdio>
-#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -21,6 +20,7 @@
 #include "core/mesh/weld.h"
 #include "core/solve/resize.h"
 #include "core/solve/resize_extents.h"
+#include "core/solve/sparing.h"
 
 namespace lpdeform::cli {
 namespace {
@@ -62,57 +62,84 @@ absl::StatusOr<Scaling> read_scaling(const ResizeOptions& options, const Triangl
                                     " times the least; it must be at most 100 times the least."));
 }
 
-/// As side_locks, by the vertices of the mesh that is not welded.
-std::map<std::string, client::Update::Change> sides(const RestShape& shape, const Weld& weld,
-                                                    const Eigen::Matrix3d& axes, int stretched) {
-  std::map<std::string, client::Update::Change> handles;
-  for (const Handle& lock : side_locks(shape, axes, stretched)) {
-    client::Handle handle{.hold =
-                              client::PlaneLock{.normal = array_of(std::get<PlaneLock>(lock.hold).normal)}};
-    for (const std::int32_t vertex : lock.vertices)
-      handle.vertices.push_back(static_cast<std::uint32_t>(weld.first_copy[vertex]));
-    handles.emplace(absl::StrCat("side ", handles.size() + 1), std::move(handle));
-  }
-  return handles;
+/// By the vertices of the mesh that is not welded.
+std::vector<std::uint32_t> first_copies(const std::vector<std::int32_t>& vertices, const Weld& weld) {
+  std::vector<std::uint32_t> copies;
+  for (const std::int32_t vertex : vertices)
+    copies.push_back(static_cast<std::uint32_t>(weld.first_copy[vertex]));
+  return copies;
 }
 
-/// One solve on the server: along one axis, by `factor`.
-absl::Status stretch(client::Client& server, const Scaling& scaling, std::optional<double> welding,
-                     const Weld& weld, int axis, double factor, Interrupt& interrupt, Resized& resized) {
-  Progress progress;
-  const TriangleMesh& rest = resized.file.mesh;
-  const auto shape = RestShape::create(welded(rest, weld));
-  if (!shape.ok()) return shape.status();
-  absl::StatusOr<client::Session> session =
-      server.open(to_client(resized.file.mesh), {.weld = by_position(welding)});
+client::FieldValue field_value(const Field& field, const Weld& weld) {
+  if (field.size() == 1) return field[0];
+  const Field split = scattered(field, weld);
+  return std::vector<double>(split.begin(), split.end());
+}
+
+/// What makes a server stretch the shape along one axis: of components that are spared its ends there, and its sides in their
+/// planes.
+absl::StatusOr<client::Update> update_for(const std::shared_ptr<const RestShape>& shape, const Weld& weld,
+                                          const Scaling& plain, int axis,
+                                          const std::vector<char>& is_spared) {
+  const auto inputs = resize_inputs(ShapeFeatures(shape), plain, is_spared);
+  if (!inputs.ok()) return inputs.status();
+  client::Update update;
+  update.handles.emplace(
+      "resize", client::Handle{.vertices = first_copies(inputs->handle.vertices, weld),
+                               .motion = client::TargetPositions{
+                                   flat(std::get<TargetPositions>(inputs->handle.motion).positions)}});
+  update.settings.p = field_value(inputs->material.p, weld);
+  update.settings.stiffness = field_value(inputs->material.stiffness, weld);
+  for (Handle& lock : side_locks(*shape, plain.axes, axis)) {
+    std::erase_if(lock.vertices, [&](std::int32_t i) { return is_spared[shape->components()[i]] == 0; });
+    if (lock.vertices.empty()) continue;
+    const client::PlaneLock plane{.normal = array_of(std::get<PlaneLock>(lock.hold).normal)};
+    update.handles.emplace(absl::StrCat("side ", update.handles.size()),
+                           client::Handle{.vertices = first_copies(lock.vertices, weld), .hold = plane});
+  }
+  return update;
+}
+
+absl::StatusOr<client::SolveResult> solve_on(client::Client& server, const TriangleMesh& mesh,
+                                             std::optional<double> welding, client::Update update,
+                                             const Points& initial, Interrupt& interrupt) {
+  absl::StatusOr<client::Session> session = server.open(to_client(mesh), {.weld = by_position(welding)});
   if (!session.ok()) return session.status();
   interrupt.set_action([&session] { session->close().IgnoreError(); });
-  client::Resize resize;
-  resize.scale[static_cast<std::size_t>(axis)] = factor;
-  resize.origin = array_of(scaling.origin);
-  resize.axes = {array_of(scaling.axes.row(0).transpose()), array_of(scaling.axes.row(1).transpose())};
+  Progress progress;
   client::SolveOptions solve;
-  Scaling plain = scaling;
-  plain.scale = Eigen::Vector3d::Ones();
-  plain.scale[axis] = factor;
-  solve.initial_positions = flat(plain(resized.file.mesh.vertices));
+  solve.initial_positions = flat(initial);
   solve.on_progress = [&progress](const client::SolveProgress& now) { progress.show(now); };
-  std::map<std::string, client::Update::Change> locks;
-  // Without salient parts the server holds all vertices.
-  if (has_salient_parts(ShapeFeatures(*shape), plain)) locks = sides(**shape, weld, scaling.axes, axis);
-  const auto sent = session->update({.handles = std::move(locks), .settings = {}, .resize = resize});
-  const absl::StatusOr<client::SolveResult> result =
+  const auto sent = session->update(std::move(update));
+  absl::StatusOr<client::SolveResult> result =
       sent.ok() ? session->solve(solve) : absl::StatusOr<client::SolveResult>(sent.status());
   interrupt.set_action({});
+  return result;
+}
+
+/// One solve along one axis, blended with the plain scaling; `shares` is sparing(), which is that of the mesh as it is in its
+/// file.
+absl::Status stretch(client::Client& server, const Scaling& plain, std::optional<double> welding,
+                     const Weld& weld, int axis, const std::vector<double>& shares, Interrupt& interrupt,
+                     Resized& resized) {
+  TriangleMesh& mesh = resized.file.mesh;
+  const auto shape = RestShape::create(welded(mesh, weld));
+  if (!shape.ok()) return shape.status();
+  std::vector<char> is_spared;
+  for (const double share : shares) is_spared.push_back(share > 0 ? 1 : 0);
+  auto update = update_for(*shape, weld, plain, axis, is_spared);
+  if (!update.ok()) return update.status();
+  const auto result = solve_on(server, mesh, welding, *std::move(update), plain(mesh.vertices), interrupt);
   if (!result.ok()) return result.status();
 
-  const Points positions = points_of(result->positions)(weld.first_copy, Eigen::all);
-  resized.file.mesh.vertices =
-      scattered(with_extents(**shape, scaling.axes, positions, plain((*shape)->positions())), weld);
+  const Points scaled = plain((*shape)->positions());
+  const Points spared = points_of(result->positions)(weld.first_copy, Eigen::all);
+  mesh.vertices =
+      scattered(with_extents(**shape, plain.axes, blended(**shape, shares, scaled, spared), scaled), weld);
   resized.distortion = Eigen::Map<const Field>(result->distortion.data(),
                                                static_cast<Eigen::Index>(result->distortion.size()));
   if (resized.stop_reason == client::StopReason::kConverged) resized.stop_reason = result->stop_reason;
-  std::printf("axis %d by %.6g: %s after %u iterations, %.3f s\n", axis + 1, factor,
+  std::printf("axis %d by %.6g: %s after %u iterations, %.3f s\n", axis + 1, plain.scale[axis],
               stop_reason_name(result->stop_reason).c_str(), result->iterations,
               result->setup_seconds + result->solve_seconds);
   return absl::OkStatus();
@@ -132,11 +159,17 @@ absl::StatusOr<Resized> resize_on(const std::string& address, const ServerAccess
   const absl::StatusOr<Weld> weld = weld_of(resized.file.mesh, welding);
   if (!weld.ok()) return weld.status();
   print_notices(to_client(scattered(check_mesh(welded(resized.file.mesh, *weld)), *weld)));
+  const auto rest = RestShape::create(welded(resized.file.mesh, *weld));
+  if (!rest.ok()) return rest.status();
+  const ShapeFeatures features(*rest);
   resized.file.mesh.vertices = scattered(plain(welded(resized.file.mesh, *weld).vertices), *weld);
   for (int axis = 0; axis < 3; ++axis) {
     const double factor = scaling.scale[axis] / shared;
     if (factor == 1) continue;
-    absl::Status status = stretch(*server, scaling, welding, *weld, axis, factor, interrupt, resized);
+    plain.scale.setOnes();
+    plain.scale[axis] = factor;
+    absl::Status status =
+        stretch(*server, plain, welding, *weld, axis, sparing(features, plain), interrupt, resized);
     if (!status.ok()) return status;
   }
   return resized;

@@ -20,4 +20,13 @@ FaceGeometry face_geometry(const RestShape& shape, Eigen::Index face) {
   return geometry;
 }
 
+Field vertex_areas(const RestShape& shape) {
+  Field areas = Field::Zero(shape.vertex_count());
+  for (Eigen::Index f = 0; f < shape.faces().rows(); ++f) {
+    const double share = face_geometry(shape, f).area / 3;
+    for (int corner = 0; corner < 3; ++corner) areas[shape.faces()(f, corner)] += share;
+  }
+  return areas;
+}
+
 }  // namespace lpdeform

@@ -13,4 +13,7 @@ struct FaceGeometry {
 
 FaceGeometry face_geometry(const RestShape& shape, Eigen::Index face);
 
+/// A third of the area of each vertex's faces, in scaled units.
+Field vertex_areas(const RestShape& shape);
+
 }  // namespace lpdeform

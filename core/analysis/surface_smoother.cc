@@ -8,11 +8,7 @@ namespace {
 constexpr double kSmallestArea = 1e-9;  // of the mean: a vertex of zero-area faces alone
 
 Field cell_areas(const RestShape& shape) {
-  Field areas = Field::Zero(shape.vertex_count());
-  for (Eigen::Index f = 0; f < shape.faces().rows(); ++f) {
-    const double share = face_geometry(shape, f).area / 3;
-    for (int corner = 0; corner < 3; ++corner) areas[shape.faces()(f, corner)] += share;
-  }
+  const Field areas = vertex_areas(shape);
   return areas.cwiseMax(kSmallestArea * areas.mean());
 }
 

@@ -5,11 +5,11 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
-#include "core/analysis/face_geometry.h"
 #include "core/analysis/girth.h"
 #include "core/analysis/salience.h"
 #include "core/base/fault.h"
 #include "core/solve/resize_extents.h"
+#include "core/solve/sparing.h"
 
 namespace lpdeform {
 namespace {
@@ -19,21 +19,19 @@ constexpr double kNarrow = 0.75;         // of the mean girth
 constexpr double kLeastGirth = 1.0 / 6;  // of that
 constexpr double kNarrowing = 4;
 constexpr double kSmallestSine = 1e-6;
-constexpr double kSalient = 0.5, kLeastSalientShare = 0.01;  // of the area
+constexpr double kMostlySpared = 0.5;  // of sparing: the nearer of the two
 
-/// |log scale_k| over the largest of them; (1, 0, 0) where all scales are 1.
-Eigen::Vector3d stretch_shares(const Eigen::Vector3d& scale) {
-  const Eigen::Vector3d stretch = scale.array().log().abs();
-  const double largest = stretch.maxCoeff();
-  return largest > 0 ? Eigen::Vector3d(stretch / largest) : Eigen::Vector3d(1, 0, 0);
-}
-
-std::vector<std::int32_t> used_vertices(const RestShape& shape) {
-  std::vector<std::int32_t> used;
+/// Of components that are spared the ends along the stretched axes, of the others all vertices; ascending.
+std::vector<std::int32_t> held_vertices(const RestShape& shape, const Eigen::Matrix3d& axes,
+                                        const Eigen::Vector3d& shares, const std::vector<char>& is_spared) {
+  std::vector<char> is_held(static_cast<std::size_t>(shape.vertex_count()), 0);
+  for (const std::int32_t end : ends_along(shape, axes, shares.array() > 0)) is_held[end] = 1;
+  std::vector<std::int32_t> held;
   for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
-    if (shape.components()[i] >= 0) used.push_back(i);
+    const std::int32_t component = shape.components()[i];
+    if (component >= 0 && (is_spared[component] == 0 || is_held[i] != 0)) held.push_back(i);
   }
-  return used;
+  return held;
 }
 
 /// Of the slices across each stretched axis, what makes narrow ones no easier to cut than others.
@@ -82,34 +80,32 @@ absl::StatusOr<Eigen::Matrix3d> axes_of(const Eigen::Vector3d& x_axis, const Eig
   return axes;
 }
 
-bool has_salient_parts(const ShapeFeatures& features, const Scaling& scaling) {
-  const RestShape& shape = features.shape();
-  const Field stands_out = salience(shape, features.bending(), scaling.axes, stretch_shares(scaling.scale));
-  double all = 0, salient = 0;
-  for (Eigen::Index f = 0; f < shape.faces().rows(); ++f) {
-    const double third = face_geometry(shape, f).area / 3;
-    for (const std::int32_t corner : shape.faces().row(f)) {
-      all += third;
-      if (stands_out[corner] >= kSalient) salient += third;
-    }
-  }
-  return salient >= kLeastSalientShare * all;
+Eigen::Vector3d stretch_shares(const Eigen::Vector3d& scale) {
+  const Eigen::Vector3d stretch = scale.array().log().abs();
+  const double largest = stretch.maxCoeff();
+  return largest > 0 ? Eigen::Vector3d(stretch / largest) : Eigen::Vector3d(1, 0, 0);
 }
 
 absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling) {
   if (absl::Status status = check_scaling(scaling); !status.ok()) return status;
+  std::vector<char> is_spared;
+  for (const double share : sparing(features, scaling)) is_spared.push_back(share >= kMostlySpared ? 1 : 0);
+  return resize_inputs(features, scaling, is_spared);
+}
+
+absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling,
+                                           const std::vector<char>& is_spared) {
+  if (absl::Status status = check_scaling(scaling); !status.ok()) return status;
   const RestShape& shape = features.shape();
   const Eigen::Vector3d shares = stretch_shares(scaling.scale);
   ResizeInputs inputs;
-  const bool is_plain = !has_salient_parts(features, scaling);
-  inputs.handle.vertices =
-      is_plain ? used_vertices(shape) : ends_along(shape, scaling.axes, shares.array() > 0);
+  inputs.handle.vertices = held_vertices(shape, scaling.axes, shares, is_spared);
   const Points scaled = scaling(shape.positions());
   Points targets(inputs.handle.vertices.size(), 3);
   for (std::size_t k = 0; k < inputs.handle.vertices.size(); ++k)
     targets.row(k) = scaled.row(inputs.handle.vertices[k]);
   inputs.handle.motion = TargetPositions{std::move(targets)};
-  if (is_plain) return inputs;
+  if (std::ranges::count(is_spared, 1) == 0) return inputs;
   inputs.material = Material::uniform(1);
   const Field stiff = salience(shape, features.bending(), scaling.axes, shares);
   inputs.material.stiffness =

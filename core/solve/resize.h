@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "absl/status/statusor.h"
 #include "core/analysis/shape_features.h"
 #include "core/energy/material.h"
@@ -53,9 +55,10 @@ struct ResizeInputs {
 /// along axis k. A stretch goes where a cut costs least: without the second factor that is close to the ends, where
 /// slices are small, and a tip is drawn out into a spike.
 ///
-/// A shape without salient parts (has_salient_parts), as a ball, has nothing to be spared: the handle then holds all its
-/// vertices where the plain scaling has them, and the material is p = 2. With the above a ball became a ball with two
-/// cones: its slices are cheapest some way from the ends, and p = 1 gathers the whole stretch there.
+/// A component of which less than half is spared (core/solve/sparing.h), as a ball or an ellipsoid, is held whole: all its
+/// vertices where the plain scaling has them; where none is spared, the material is p = 2. With the above a ball became a
+/// ball with two cones: its slices are cheapest some way from the ends, and p = 1 gathers the whole stretch there. A handle
+/// holds a vertex or does not, so this is a switch; `lpdeform resize` blends the two results.
 ///
 /// p = 1 matters: it gathers the stretch in places where little resists, which are straight along the
 /// stretch, so that it does not show there. p = 2 spreads it over salient places too, however stiff they are.
@@ -65,8 +68,12 @@ struct ResizeInputs {
 /// INVALID_ARGUMENT: RESIZE_SCALE_OUT_OF_RANGE, RESIZE_ORIGIN_NOT_FINITE. `axes` must be orthonormal.
 absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling);
 
-/// Whether at least 1 % of the area has a salience of 0.5 and more for the axes, weighted a_k as above.
-bool has_salient_parts(const ShapeFeatures& features, const Scaling& scaling);
+/// With components chosen by the caller: not 0 where one is spared.
+absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling,
+                                           const std::vector<char>& is_spared);
+
+/// a_k above; (1, 0, 0) where all scales are 1.
+Eigen::Vector3d stretch_shares(const Eigen::Vector3d& scale);
 
 /// The least of the three factors. Over it, all three are stretches: by a factor below 1 an axis would be pushed, and a
 /// thin surface that is pushed buckles.

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import random
 import subprocess
 
 import programs
@@ -18,6 +19,29 @@ def normal(points, face):
 
 def dot(u, v):
     return sum(a * b for a, b in zip(u, v))
+
+
+def noisy_ball(rows, noise):
+    """A ball of radius 1 with poles on the z axis, as the text of an OFF file; `noise` is the standard deviation of the radii."""
+    around, pick = 2 * rows, random.Random(11)
+    points, faces = [], []
+    for row in range(rows + 1):
+        for k in range(around if 0 < row < rows else 1):
+            down, turn, radius = math.pi * row / rows, 2 * math.pi * k / around, pick.gauss(1, noise)
+            points.append((radius * math.sin(down) * math.cos(turn), radius * math.sin(down) * math.sin(turn),
+                           radius * math.cos(down)))
+
+    def at(row, k):
+        return 0 if row == 0 else len(points) - 1 if row == rows else 1 + (row - 1) * around + k % around
+
+    for row in range(rows):
+        for k in range(around):
+            if row > 0:
+                faces.append((at(row, k), at(row + 1, k), at(row, k + 1)))
+            if row + 1 < rows:
+                faces.append((at(row, k + 1), at(row + 1, k), at(row + 1, k + 1)))
+    lines = [f"{x!r} {y!r} {z!r}" for x, y, z in points] + ["3 {} {} {}".format(*face) for face in faces]
+    return "\n".join(["OFF", f"{len(points)} {len(faces)} 0", *lines]) + "\n"
 
 
 class Files(OnShapes):
@@ -191,6 +215,17 @@ class Files(OnShapes):
                 for end, wanted in ((min, middle - half), (max, middle + half)):
                     self.assertAlmostEqual(end(position[axis] for position in after), wanted, delta=1e-9 * (high - low),
                                            msg=f"{shape} by {scale}, axis {axis}")
+
+    def test_a_round_shape_is_scaled_plainly_however_it_is_sampled(self):
+        for rows, noise, scale in ((8, 0, (2, 1, 1)), (16, 0, (2, 3, 1)), (16, 0, (0.5, 1, 1)), (16, 0.002, (2, 1, 1)),
+                                   (16, 0.01, (2, 3, 1)), (17, 0.01, (1, 1, 2))):
+            rest, out = self.write("ball.off", noisy_ball(rows, noise)), self.at("resized.off")
+            done = run("resize", rest, out, "--scale", ",".join(map(str, scale)))
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            before, after = read_off(rest), read_off(out)
+            middle = [(min(axis) + max(axis)) / 2 for axis in zip(*before)]
+            plain = [[m + s * (x - m) for x, m, s in zip(point, middle, scale)] for point in before]
+            self.assertLess(max(map(math.dist, plain, after)), 0.03, f"{rows} rows, noise {noise}, by {scale}")
 
     def test_a_split_mesh_is_resized_in_one_piece(self):
         mesh, _, copies = self.split_bar()

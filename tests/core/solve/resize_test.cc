@@ -7,10 +7,15 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <ostream>
+#include <string>
+#include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "core/analysis/salience.h"
 #include "core/base/fault.h"
 #include "tests/core/poses.h"
+#include "tests/core/round_shapes.h"
 
 namespace lpdeform {
 namespace {
@@ -107,22 +112,50 @@ TEST(Resize, DrawsNoTipOutIntoASpike) {
   }
 }
 
-TEST(Resize, OfAShapeWithoutSalientPartsIsPlainScaling) {
-  for (const TriangleMesh& mesh : {sphere(3), sphere(4)}) {
-    const Scaling twice = along(2, 1, 1);
-    EXPECT_FALSE(has_salient_parts(ShapeFeatures(rest_shape(mesh)), twice));
-    const Points ellipsoid = twice(mesh.vertices);
-    EXPECT_LT((resized(mesh, twice) - ellipsoid).rowwise().norm().maxCoeff(), 1e-9);
-    EXPECT_LT(most_stretched_at_ends(mesh, resized(mesh, twice), 0), 2.01);
+struct Round {
+  std::string name;
+  TriangleMesh mesh;
+};
+
+/// For names of tests, which would have the bytes of the mesh.
+void PrintTo(const Round& round, std::ostream* out) {
+  *out << round.name;
+}
+
+/// Balls and ellipsoids, from coarse to fine.
+std::vector<Round> round_shapes() {
+  std::vector<Round> shapes;
+  for (const int rows : {8, 12, 16, 32})
+    shapes.push_back({absl::StrCat("rows_", rows), ball_with_poles(2 * rows, rows)});
+  for (const int levels : {1, 2, 3, 4}) shapes.push_back({absl::StrCat("levels_", levels), sphere(levels)});
+  const Eigen::Matrix3d turn(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized()));
+  for (const Eigen::Vector3d& axes :
+       {Eigen::Vector3d(1, 2, 3), Eigen::Vector3d(3, 1, 1), Eigen::Vector3d(1, 1, 0.3)}) {
+    TriangleMesh ellipsoid = ball_with_poles(32, 16);
+    ellipsoid.vertices *= axes.asDiagonal();
+    shapes.push_back({absl::StrCat("ellipsoid_", shapes.size()), ellipsoid});
+    ellipsoid.vertices *= turn;
+    shapes.push_back({absl::StrCat("ellipsoid_", shapes.size()), ellipsoid});
   }
-  for (const TriangleMesh& mesh : {creature(32), block_with_holes(14, 6, 4), box_surface(2, 2, 6)}) {
-    for (int axis = 0; axis < 3; ++axis) {
-      Scaling scaling;
-      scaling.scale[axis] = 2;
-      EXPECT_TRUE(has_salient_parts(ShapeFeatures(rest_shape(mesh)), scaling)) << axis;
+  return shapes;
+}
+
+class RoundResize : public testing::TestWithParam<Round> {};
+
+TEST_P(RoundResize, IsPlainScalingHoweverItIsSampled) {
+  for (const double noise : {0.0, 0.002, 0.01}) {
+    TriangleMesh mesh = GetParam().mesh;
+    mesh.vertices = with_noisy_radii(mesh.vertices, noise);
+    for (const Scaling& scaling : {along(2, 1, 1), along(1, 1, 2), along(2, 3, 1), along(0.5, 1, 1)}) {
+      const Points plain = scaling(mesh.vertices);
+      EXPECT_LT((resized(mesh, scaling) - plain).rowwise().norm().maxCoeff(), 0.03)
+          << "noise " << noise << ", by " << scaling.scale.transpose();
     }
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Shapes, RoundResize, testing::ValuesIn(round_shapes()),
+                         [](const auto& info) { return info.param.name; });
 
 TEST(Resize, OfAScaleOfOneIsTheRestShape) {
   const TriangleMesh mesh = creature(32);
