@@ -14,7 +14,7 @@ constexpr double kJointP = 2;
 constexpr double kSoftening = 10;
 
 // How deep the deepest joint is where p begins to differ from 2, and where it differs by the whole strength. What noise
-// of 5 % of the radius leaves on tubes is up to 0.21; the joints of the shapes that lpdeform generates reach 0.49 and more.
+// of 5 % of the radius leaves on tubes is up to 0.17. The joints of the shapes that lpdeform generates are 0.49 and more.
 constexpr double kNoJoint = 0.2, kWholeJoint = 0.4;
 
 double deepest(const Field& joint) {

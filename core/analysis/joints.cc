@@ -19,11 +19,15 @@ constexpr double kAround = 4;  // times rho: what a place is compared with
 constexpr double kHalfCrease = std::numbers::pi / 9, kHalfNarrowing = 0.25;
 
 /// Integrals over the cells of 1/t, 1/t^2 and of 1 where t is known.
-Points slenderness(const RestShape& shape, const std::vector<double>& thickness) {
+Points slenderness(const RestShape& shape, const std::vector<double>& thickness,
+                   const std::vector<Enclosure>& components) {
   Points sums = Points::Zero(shape.vertex_count(), 3);
   for (Eigen::Index f = 0; f < shape.faces().rows(); ++f) {
     if (!std::isfinite(thickness[f])) continue;
-    const double thin = 1 / thickness[f], share = face_geometry(shape, f).area / 3;
+    const Enclosure& component = components[shape.components()[shape.faces()(f, 0)]];
+    // A few crumpled faces, with another side at once behind them, would outweigh all others in 1 / t^2.
+    const double thin = 1 / std::max(thickness[f], component.noise_length());
+    const double share = face_geometry(shape, f).area / 3;
     for (int corner = 0; corner < 3; ++corner)
       sums.row(shape.faces()(f, corner)) += share * Eigen::RowVector3d(thin, thin * thin, 1);
   }
@@ -57,7 +61,7 @@ Joints joints_of(const RestShape& shape, const std::vector<double>& thickness) {
   SurfaceSmoother smoother(shape);
   const std::vector<double> lengths = component_lengths(shape);
   const std::vector<Enclosure> components = enclosures(shape, thickness);
-  const Points thin = slenderness(shape, thickness);
+  const Points thin = slenderness(shape, thickness, components);
   if (!smoother.set_lengths(times(lengths, kAround))) return joints;
   const Points far = smoother.spread(thin);
   if (!smoother.set_lengths(lengths)) return joints;

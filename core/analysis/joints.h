@@ -17,7 +17,8 @@ namespace lpdeform {
 ///   B         = S_rho[bending measure of core/analysis/bending.h],  a curvature
 ///   theta_i   = 2 rho max(0, -lowest eigenvalue of B_i)             the angle of the crease, in radians: of
 ///               a straight concave crease alone in a plane, at its edge, the angle itself
-///   a_r       = S_r[1 / t^2] / S_r[1 / t],  t the thickness behind a face (core/analysis/thickness.h)
+///   a_r       = S_r[1 / t^2] / S_r[1 / t],  t the thickness behind a face (core/analysis/thickness.h),
+///               at least Enclosure::noise_length()
 ///   n_i       = max(0, a_rho / a_{4 rho} - 1)                       how much narrower than around
 ///   joint     = S_rho[1 - 1 / (1 + (theta / 20 degrees)^2) / (1 + (n / 0.25)^2)]
 ///
