@@ -18,9 +18,10 @@ namespace lpdeform {
 /// are nearly free, so the joints take all of them and share them evenly. The other way round joints are
 /// stiffer than with the same p everywhere. Strength 0 is p = 2 and stiffness 1 everywhere.
 ///
-/// Without joints there are no parts to be kept rigid, and p = 1 everywhere would kink a tube somewhere. So c is the
-/// strength times clamp((J - 0.2) / 0.2, 0, 1), with J the largest joint_i: from joints of 0.4 on the whole of it, and from
-/// 0.2 down nothing, p = 2 and stiffness 1 everywhere (has_joints). Between, the material changes continuously with J.
+/// Without joints there are no parts to be kept rigid, and p = 1 everywhere would kink a tube somewhere. So the
+/// effect fades with J, the largest joint_i: c is the strength times clamp((J - 0.2) / 0.2, 0, 1). From J = 0.4
+/// on it is the whole strength. Up to J = 0.2 it is nothing: p = 2 and stiffness 1 everywhere (has_joints).
+/// Between, the material changes continuously with J.
 ///
 /// The length unit is left at its default. INVALID_ARGUMENT: STRENGTH_OUT_OF_RANGE.
 absl::StatusOr<Material> automatic_material(const RestShape& shape, double strength,

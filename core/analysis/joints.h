@@ -8,8 +8,8 @@ namespace lpdeform {
 /// Where a shape would bend if it were made of parts that are rigid: at concave creases, where parts meet,
 /// and at places narrower than what is around them, thin ends among them. From the geometry alone.
 ///
-/// Noise at the scale of edges is no joint: all is measured on the shape that without_noise of core/analysis/enclosure.h
-/// gives.
+/// Noise at the scale of edges is no joint: all is measured on the shape that without_noise() of
+/// core/analysis/enclosure.h gives.
 ///
 /// All is measured at the distance rho of core/analysis/component_lengths.h; S_r is the smoothing of
 /// SurfaceSmoother with length r.
@@ -24,8 +24,12 @@ namespace lpdeform {
 ///
 /// A surface that encloses nothing has no inside, and either way of folding is a crease. With
 /// h = S_rho[1 where a ray meets another side, 0 elsewhere] and H the component's share of such area,
-/// o_i = (1 - h_i) max(0, 1 - 2 H) and theta_i = 2 rho max(-lowest, o_i highest). H is there because rays from faces
-/// that noise has turned leave a solid beside its edges; its convex edges must not become creases there.
+///
+///   o_i       = (1 - h_i) max(0, 1 - 2 H)
+///   theta_i   = 2 rho max(0, -lowest, o_i highest)
+///
+/// H keeps the convex edges of a solid from being creases: rays from faces that noise has turned leave the
+/// solid beside its edges, so that h alone takes those places for open.
 struct Joints {
   Field crease_radians;  // theta_i >= 0
   Field narrowing;       // n_i >= 0

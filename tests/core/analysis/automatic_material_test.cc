@@ -33,8 +33,8 @@ TEST(AutomaticMaterial, OfStrengthZeroIsTheSameEverywhere) {
   EXPECT_EQ(automatic_material(*shape, 0).value(), Material::uniform(2));
 }
 
-/// A tube of `around` faces around and `length` rings, open at both ends, of square cells but for their diagonals
-/// and of the radius around / 6.
+/// A tube of `around` faces around and `length` rings, open at both ends, with the radius around / 6: its cells
+/// are about square.
 TriangleMesh tube(int around, int length) {
   TriangleMesh mesh{Points((length + 1) * around, 3), Faces(2 * length * around, 3)};
   const double radius = around / 6.0;
@@ -115,13 +115,13 @@ INSTANTIATE_TEST_SUITE_P(AutomaticMaterial, NoisyShapes, testing::Values(0, 0.01
                            return std::to_string(static_cast<int>(100 * info.param + 0.5)) + "Percent";
                          });
 
-TEST(AutomaticMaterial, ChangesContinuouslyWithTheDeepestJoint) {
+TEST(AutomaticMaterial, ChangesContinuouslyWithTheLargestJoint) {
   Field before;
-  for (double deepest = 0; deepest <= 1; deepest += 0.001) {
-    const Material material = automatic_material(Field{{0, deepest}}, 1).value();
+  for (double largest = 0; largest <= 1; largest += 0.001) {
+    const Material material = automatic_material(Field{{0, largest}}, 1).value();
     const Field p = material.p.size() == 1 ? Field(Field::Constant(2, material.p[0])) : material.p;
     if (before.size() > 0) {
-      EXPECT_LT((p - before).cwiseAbs().maxCoeff(), 0.01) << deepest;
+      EXPECT_LT((p - before).cwiseAbs().maxCoeff(), 0.01) << largest;
     }
     before = p;
   }
