@@ -8,7 +8,8 @@
 namespace lpdeform {
 
 /// p and stiffness from the geometry: softer at joints, stiffer on rigid parts (section 5 of the paper names
-/// this as future work). With joint_i of core/analysis/joints.h, and c the strength, in [0, 1]:
+/// this as future work). With joint_i of core/analysis/joints.h, and c in [0, 1], which is the strength where
+/// there are joints:
 ///
 ///   p_i = 2 - c (1 - joint_i)          2 at joints; on rigid parts 2 - c
 ///   s_i = 10^(-c joint_i)              1 on rigid parts; at joints down to 1/10
