@@ -12,8 +12,8 @@ namespace lpdeform {
 namespace {
 
 // Noise of 5 % of the radius leaves joints of up to 0.17 on tubes of 12 to 48 faces around. With 0.1 it leaves
-// up to 0.23, more than automatic_material() takes for none. With 0.2 the round tunnels of pierced_block(34)
-// change by a quarter more.
+// up to 0.23, more than automatic_material() takes for none. With 0.2 the joints of pierced_block(34), which is
+// thick for the size of its tunnels, move by a quarter more from what they are without smoothing.
 constexpr double kShareOfThickness = 0.15;
 constexpr double kNoLength = 1e-6;  // scaled units: moves nothing
 
