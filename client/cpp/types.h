@@ -163,7 +163,8 @@ struct SolverSettings {
 
 /// p or stiffness from the shape's geometry, found by the server: softer at joints (concave creases, and places
 /// narrower than what is around them), stiffer on rigid parts. With joint_i in [0, 1),
-/// p_i = 2 - strength (1 - joint_i) and s_i = 10^(-strength joint_i).
+/// p_i = 2 - c (1 - joint_i) and s_i = 10^(-c joint_i), c = strength clamp((largest joint_i - 0.2) / 0.2, 0, 1):
+/// p = 2 and stiffness 1 everywhere where no joint_i exceeds 0.2.
 struct Automatic {
   double strength = 1;  // 0 to 1; 0 is p = 2 and stiffness 1 everywhere
 };

@@ -1,5 +1,6 @@
 #include "core/analysis/automatic_material.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
@@ -11,7 +12,15 @@ namespace {
 
 constexpr double kJointP = 2;
 constexpr double kSoftening = 10;
-constexpr double kLeastJoint = 0.1;
+
+// The largest joint where p begins to differ from 2, and where it differs by the whole strength. Noise of 5 %
+// of the radius leaves up to 0.17 on tubes of 12 to 48 faces around. The largest joint of each shape with
+// joints that lpdeform generates is 0.48 or more.
+constexpr double kNoJoint = 0.2, kWholeJoint = 0.4;
+
+double largest(const Field& joint) {
+  return joint.size() > 0 ? joint.maxCoeff() : 0;
+}
 
 }  // namespace
 
@@ -22,15 +31,16 @@ absl::Status check_strength(double strength) {
 }
 
 bool has_joints(const Field& joint) {
-  return joint.size() > 0 && joint.maxCoeff() >= kLeastJoint;
+  return largest(joint) > kNoJoint;
 }
 
 absl::StatusOr<Material> automatic_material(const Field& joint, double strength) {
   if (absl::Status status = check_strength(strength); !status.ok()) return status;
   Material material;
   if (strength == 0 || !has_joints(joint)) return material;
-  material.p = kJointP - strength * (1 - joint.array());
-  material.stiffness = (-strength * std::log(kSoftening) * joint.array()).exp();
+  const double c = strength * std::min(1.0, (largest(joint) - kNoJoint) / (kWholeJoint - kNoJoint));
+  material.p = kJointP - c * (1 - joint.array());
+  material.stiffness = (-c * std::log(kSoftening) * joint.array()).exp();
   return material;
 }
 

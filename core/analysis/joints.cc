@@ -7,6 +7,7 @@
 
 #include "core/analysis/bending.h"
 #include "core/analysis/component_lengths.h"
+#include "core/analysis/enclosure.h"
 #include "core/analysis/face_geometry.h"
 #include "core/analysis/surface_smoother.h"
 #include "core/analysis/thickness.h"
@@ -18,12 +19,15 @@ constexpr double kAround = 4;  // times rho: what a place is compared with
 constexpr double kHalfCrease = std::numbers::pi / 9, kHalfNarrowing = 0.25;
 
 /// Integrals over the cells of 1/t, 1/t^2 and of 1 where t is known.
-Points slenderness(const RestShape& shape, const Workers& workers) {
-  const std::vector<double> thickness = thickness_behind_faces(shape, workers);
+Points slenderness(const RestShape& shape, const std::vector<double>& thickness,
+                   const std::vector<Enclosure>& components) {
   Points sums = Points::Zero(shape.vertex_count(), 3);
   for (Eigen::Index f = 0; f < shape.faces().rows(); ++f) {
     if (!std::isfinite(thickness[f])) continue;
-    const double thin = 1 / thickness[f], share = face_geometry(shape, f).area / 3;
+    const Enclosure& component = components[shape.components()[shape.faces()(f, 0)]];
+    // A few crumpled faces, with another side at once behind them, would outweigh all others in 1 / t^2.
+    const double thin = 1 / std::max(thickness[f], component.noise_length());
+    const double share = face_geometry(shape, f).area / 3;
     for (int corner = 0; corner < 3; ++corner)
       sums.row(shape.faces()(f, corner)) += share * Eigen::RowVector3d(thin, thin * thin, 1);
   }
@@ -51,14 +55,13 @@ double half_at(double value, double half) {
   return 1 / (1 + value * value / (half * half));
 }
 
-}  // namespace
-
-Joints find_joints(const RestShape& shape, const Workers& workers) {
+Joints joints_of(const RestShape& shape, const std::vector<double>& thickness) {
   const Eigen::Index n = shape.vertex_count();
   Joints joints{Field::Zero(n), Field::Zero(n), Field::Zero(n)};
   SurfaceSmoother smoother(shape);
   const std::vector<double> lengths = component_lengths(shape);
-  const Points thin = slenderness(shape, workers);
+  const std::vector<Enclosure> components = enclosures(shape, thickness);
+  const Points thin = slenderness(shape, thickness, components);
   if (!smoother.set_lengths(times(lengths, kAround))) return joints;
   const Points far = smoother.spread(thin);
   if (!smoother.set_lengths(lengths)) return joints;
@@ -70,7 +73,7 @@ Joints find_joints(const RestShape& shape, const Workers& workers) {
   for (Eigen::Index i = 0; i < n; ++i) {
     const std::int32_t c = shape.components()[i];
     if (c < 0) continue;
-    const double open = std::clamp(1 - near(i, 2), 0.0, 1.0);
+    const double open = std::max(0.0, 1 - 2 * components[c].share) * std::clamp(1 - near(i, 2), 0.0, 1.0);
     joints.crease_radians[i] = 2 * lengths[c] * sharpest_fold(bending.at(i), open);
     const double a = mean_slenderness(near, i), a_around = mean_slenderness(far, i);
     joints.narrowing[i] = a_around > 0 ? std::max(0.0, a / a_around - 1) : 0;
@@ -80,6 +83,15 @@ Joints find_joints(const RestShape& shape, const Workers& workers) {
   sharp.col(0).array() *= smoother.areas().array();
   joints.joint = smoother.spread(sharp).col(0).cwiseMax(0).cwiseMin(1);
   return joints;
+}
+
+}  // namespace
+
+Joints find_joints(const RestShape& shape, const Workers& workers) {
+  std::vector<double> thickness = thickness_behind_faces(shape, workers);
+  const auto smoothed = without_noise(shape, enclosures(shape, thickness));
+  if (!smoothed) return joints_of(shape, thickness);
+  return joints_of(*smoothed, thickness_behind_faces(*smoothed, workers));
 }
 
 }  // namespace lpdeform

@@ -157,6 +157,23 @@ class Files(OnShapes):
         self.assertEqual(report["p"]["min"], 2)  # of the geometry: a bar has no joints
         self.assertIn("No joints were found", done.stderr)
 
+    def test_noise_is_no_joint(self):
+        noise = random.Random(1)
+        points = [[x + noise.uniform(-0.1, 0.1) for x in point] for point in read_off(self.at("bar.off"))]  # 5 % of half a side
+        faces = read_off_faces(self.at("bar.off"))
+        lines = ["OFF", f"{len(points)} {len(faces)} 0", *(" ".join(map(str, x)) for x in points),
+                 *(" ".join(map(str, (3, *face))) for face in faces)]
+        mesh = self.write("noisy.off", "\n".join(lines) + "\n")
+
+        def deformed(p):
+            done = run("deform", mesh, "--handles", self.at("bar.json"), "--p", p, "--out", self.at("noisy_out.off"))
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual("No joints were found" in done.stderr, p == "auto")
+            return read_off(self.at("noisy_out.off"))
+
+        automatic, one, two = deformed("auto"), deformed("1"), deformed("2")
+        self.assertLess(max(map(math.dist, automatic, two)), 0.1 * max(map(math.dist, one, two)))
+
     def test_obj_groups_are_painted_and_an_unknown_one_is_named(self):
         lines = [f"v {x} {y} {z}" for x, y, z in read_off(self.at("bar.off"))]
         words = [line.split() for line in read_text(self.at("bar.off")).splitlines()]

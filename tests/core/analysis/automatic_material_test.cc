@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
+#include <string>
 
 #include "core/analysis/shape_features.h"
 #include "core/base/fault.h"
@@ -31,26 +33,27 @@ TEST(AutomaticMaterial, OfStrengthZeroIsTheSameEverywhere) {
   EXPECT_EQ(automatic_material(*shape, 0).value(), Material::uniform(2));
 }
 
-/// A tube of 24 faces around and `length` rings, open at both ends.
-TriangleMesh tube(int length) {
-  constexpr int kAround = 24;
-  TriangleMesh mesh{Points((length + 1) * kAround, 3), Faces(2 * length * kAround, 3)};
+/// A tube of `around` faces around and `length` rings, open at both ends, with the radius around / 6: its cells
+/// are about square.
+TriangleMesh tube(int around, int length) {
+  TriangleMesh mesh{Points((length + 1) * around, 3), Faces(2 * length * around, 3)};
+  const double radius = around / 6.0;
   Eigen::Index f = 0;
   for (int ring = 0; ring <= length; ++ring) {
-    for (int k = 0; k < kAround; ++k) {
-      const double angle = 2 * std::numbers::pi * k / kAround;
-      const int v = ring * kAround + k, beside = ring * kAround + (k + 1) % kAround;
-      mesh.vertices.row(v) << 4 * std::cos(angle), 4 * std::sin(angle), ring;
+    for (int k = 0; k < around; ++k) {
+      const double angle = 2 * std::numbers::pi * k / around;
+      const int v = ring * around + k, beside = ring * around + (k + 1) % around;
+      mesh.vertices.row(v) << radius * std::cos(angle), radius * std::sin(angle), ring;
       if (ring == length) continue;
-      mesh.faces.row(f++) << v, beside, v + kAround;
-      mesh.faces.row(f++) << beside, beside + kAround, v + kAround;
+      mesh.faces.row(f++) << v, beside, v + around;
+      mesh.faces.row(f++) << beside, beside + around, v + around;
     }
   }
   return mesh;
 }
 
 TEST(AutomaticMaterial, OfAShapeWithoutJointsIsTwoEverywhere) {
-  for (const TriangleMesh& mesh : {tube(40), box_surface(4, 4, 21), sphere(3)}) {
+  for (const TriangleMesh& mesh : {tube(24, 40), box_surface(4, 4, 21), sphere(3)}) {
     const auto shape = rest_shape(mesh);
     EXPECT_FALSE(has_joints(ShapeFeatures(shape).joint()));
     EXPECT_EQ(automatic_material(*shape, 1).value(), Material::uniform(2));
@@ -58,6 +61,71 @@ TEST(AutomaticMaterial, OfAShapeWithoutJointsIsTwoEverywhere) {
   const ShapeFeatures necked(rest_shape(necked_bar(8, 42, 4, 6)));
   EXPECT_TRUE(has_joints(necked.joint()));
   EXPECT_LT(automatic_material(necked.joint(), 1).value().p.minCoeff(), 1.1);
+}
+
+/// A shape of one part: its mesh and its radius, half of what it is thick.
+struct OnePart {
+  const char* name;
+  TriangleMesh (*make)();
+  double radius;
+};
+
+const OnePart kOneParts[] = {{"tube", [] { return tube(24, 40); }, 4},
+                             {"fine tube", [] { return tube(48, 80); }, 8},
+                             {"coarse tube", [] { return tube(16, 15); }, 8.0 / 3},
+                             {"bar", [] { return box_surface(4, 4, 21); }, 2},
+                             {"fine bar", [] { return box_surface(8, 8, 42); }, 4},
+                             {"sheet", [] { return box_surface(2, 30, 60); }, 1},
+                             {"sphere", [] { return sphere(3); }, 1}};
+
+TriangleMesh noisy(TriangleMesh mesh, double distance, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> move(-distance, distance);
+  for (double& coordinate : mesh.vertices.reshaped()) coordinate += move(random);
+  return mesh;
+}
+
+class NoisyShapes : public testing::TestWithParam<double> {};
+
+TEST_P(NoisyShapes, OfOnePartAreTwoEverywhere) {
+  for (const OnePart& part : kOneParts) {
+    for (const unsigned seed : {1, 2, 3}) {
+      const ShapeFeatures features(rest_shape(noisy(part.make(), GetParam() * part.radius, seed)));
+      EXPECT_FALSE(has_joints(features.joint())) << part.name << ", " << features.joint().maxCoeff();
+      EXPECT_EQ(automatic_material(features.joint(), 1).value(), Material::uniform(2)) << part.name;
+    }
+  }
+}
+
+TEST_P(NoisyShapes, KeepTheMaterialOfTheirJoints) {
+  const TriangleMesh meshes[] = {necked_bar(8, 42, 4, 6), creature(48), rocker_arm(48)};
+  const double radii[] = {4, 0.1, 0.15};  // of the creature's legs and of the arm
+  for (int k = 0; k < 3; ++k) {
+    const Material plain = automatic_material(*rest_shape(meshes[k]), 1).value();
+    const Material noise =
+        automatic_material(*rest_shape(noisy(meshes[k], GetParam() * radii[k], 1)), 1).value();
+    ASSERT_EQ(noise.p.size(), meshes[k].vertices.rows());
+    EXPECT_LT((noise.p - plain.p).cwiseAbs().maxCoeff(), 0.15) << k;
+    EXPECT_LT((noise.p - plain.p).cwiseAbs().mean(), 0.03) << k;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(AutomaticMaterial, NoisyShapes, testing::Values(0, 0.01, 0.02, 0.03, 0.05),
+                         [](const auto& info) {
+                           return std::to_string(static_cast<int>(100 * info.param + 0.5)) + "Percent";
+                         });
+
+TEST(AutomaticMaterial, ChangesContinuouslyWithTheLargestJoint) {
+  Field before;
+  for (double largest = 0; largest <= 1; largest += 0.001) {
+    const Material material = automatic_material(Field{{0, largest}}, 1).value();
+    const Field p = material.p.size() == 1 ? Field(Field::Constant(2, material.p[0])) : material.p;
+    if (before.size() > 0) {
+      EXPECT_LT((p - before).cwiseAbs().maxCoeff(), 0.01) << largest;
+    }
+    before = p;
+  }
+  EXPECT_NEAR(before[0], 1, 1e-12);
 }
 
 TEST(AutomaticMaterial, RefusesAStrengthOutOfRange) {
