@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,16 @@ def test_every_kind_of_handle_comes_back_and_is_there_after_kill_9(session: lpde
     after = session.settle(PATIENCE).positions  # made anew from this side's book
     assert np.abs(after - before).max() < 1e-2
     assert np.abs(after[[92, 93]] - [[8, 7, 1], [9, 7, 1]]).max() == 0
+
+
+def test_a_session_opens_at_once_after_a_restart_though_another_has_just_tried_in_vain(server: Server, shape: Grid) -> None:
+    for _ in range(3):
+        with lpdeform.open(shape.vertices, shape.faces, address=server.address):
+            server.kill()
+            time.sleep(0.5)  # its client tries again and again
+            server.start()
+            with lpdeform.open(shape.vertices, shape.faces, address=server.address) as other:
+                assert other.name
 
 
 @pytest.mark.parametrize("has_lost", [False, True])

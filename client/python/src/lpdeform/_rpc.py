@@ -23,6 +23,9 @@ _service = "/lpdeform.v1.DeformService/"
 _most_part_bytes = 1 << 20
 _most_inline_bytes = 1 << 20
 _channel_options = [
+    # Else all channels of a process to one address share a connection: a session that is opened after a server's restart would be told
+    # that none answers, as another one's attempt before it was.
+    ("grpc.use_local_subchannel_pool", 1),
     ("grpc.initial_reconnect_backoff_ms", 100),
     ("grpc.min_reconnect_backoff_ms", 1000),
     ("grpc.max_reconnect_backoff_ms", 1000),
