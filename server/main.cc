@@ -9,11 +9,11 @@
 #include <string>
 
 #include "core/base/fault.h"
-#include "server/health_probe.h"
-#include "server/machine_memory.h"
-#include "server/open_store.h"
+#include "server/admin/health_probe.h"
 #include "server/process_end.h"
+#include "server/runtime/machine_memory.h"
 #include "server/server.h"
+#include "server/store/open_store.h"
 
 namespace {
 

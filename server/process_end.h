@@ -6,7 +6,7 @@
 #include <mutex>
 #include <thread>
 
-#include "server/log.h"
+#include "server/runtime/log.h"
 
 namespace lpdeform {
 

@@ -14,20 +14,19 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "grpc/health/v1/health.pb.h"
-#include "server/admin.h"
-#include "server/backend.h"
-#include "server/certificates.h"
-#include "server/file_watch.h"
-#include "server/grpc_log.h"
-#include "server/health_probe.h"
-#include "server/listener.h"
-#include "server/machine_memory.h"
-#include "server/open_calls.h"
-#include "server/service.h"
-#include "server/tokens.h"
-#include "server/transport_security.h"
-#include "server/unread_calls.h"
-#include "server/vital_signs.h"
+#include "server/access/certificates.h"
+#include "server/access/listener.h"
+#include "server/access/tokens.h"
+#include "server/access/transport_security.h"
+#include "server/admin/admin.h"
+#include "server/admin/grpc_log.h"
+#include "server/admin/health_probe.h"
+#include "server/admin/vital_signs.h"
+#include "server/calls/backend.h"
+#include "server/calls/open_calls.h"
+#include "server/calls/service.h"
+#include "server/calls/unread_calls.h"
+#include "server/runtime/file_watch.h"
 
 namespace lpdeform {
 namespace {
@@ -301,17 +300,6 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& given
                        {"tokens", std::string(options.token_keys_file.empty() ? "off" : "on")}});
   warn_of_what_is_open(options, *server->impl_->listener, log);
   return server;
-}
-
-std::size_t default_max_bytes() {
-  return memory_of_process() / 4 * 3;
-}
-
-std::size_t caller_max_bytes(const ServerOptions& options) {
-  const ByteLimit& limit = options.max_bytes_per_caller;
-  if (limit.bytes) return *limit.bytes;
-  return std::max<std::size_t>(
-      1, static_cast<std::size_t>(static_cast<double>(options.max_bytes) * limit.percent / 100));
 }
 
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

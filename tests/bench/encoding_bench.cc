@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "server/frame.h"
+#include "server/session/frame.h"
 
 namespace lpdeform {
 namespace {

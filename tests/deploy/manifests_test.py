@@ -312,7 +312,7 @@ class Kubernetes(unittest.TestCase):
         (rule,) = load(KUBERNETES / "prometheus-adapter.yaml")["rules"]["custom"]
         self.assertEqual(metric["pods"]["metric"]["name"], rule["name"]["as"])
         series = re.match(r"(\w+)_bucket\{", rule["seriesQuery"]).group(1)
-        self.assertIn(f'"{series}"', (ROOT / "server/metrics.cc").read_text())
+        self.assertIn(f'"{series}"', (ROOT / "server/runtime/metrics.cc").read_text())
 
     def test_versions_of_images_are_the_projects(self):
         version = re.search(r"VERSION (\d+\.\d+\.\d+)", (ROOT / "CMakeLists.txt").read_text()).group(1)

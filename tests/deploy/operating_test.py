@@ -102,7 +102,7 @@ class Page(unittest.TestCase):
         self.assertEqual({event for event in warned if not re.search(rf"[Ll]og\s+`{event}`", self.text)}, set())
 
     def test_its_table_of_how_streams_end_is_the_servers(self):
-        names = re.findall(r'return "(\w+)";', (ROOT / "server/stream_end.cc").read_text())
+        names = re.findall(r'return "(\w+)";', (ROOT / "server/runtime/stream_ends.cc").read_text())
         table = re.findall(r"(?m)^\| `(\w+)` \|", self.found["frames-stop"])
         self.assertGreater(len(names), 8)
         self.assertEqual(sorted(table), sorted(names))
@@ -123,7 +123,7 @@ class Metrics(unittest.TestCase):
                 shown = set(re.findall(r"(?m)^# TYPE (\w+)", answer.read().decode()))
             server.terminate()
         # What was never counted is not shown yet: calls and refusals.
-        shown |= set(re.findall(r'"((?:lpdeform|grpc_server)_\w+)"', (ROOT / "server/metrics.cc").read_text()))
+        shown |= set(re.findall(r'"((?:lpdeform|grpc_server)_\w+)"', (ROOT / "server/runtime/metrics.cc").read_text()))
         named = set(re.findall(r"`((?:lpdeform|process|grpc_server)_[a-z_]+)`", Page.text))
         self.assertGreater(len(named), 25)
         self.assertEqual(named - shown, set())

@@ -13,10 +13,10 @@
 #include <google/protobuf/message.h>
 
 #include "core/base/check.h"
-#include "server/backend.h"
-#include "server/encode.h"
-#include "server/frame_slices.h"
-#include "server/snapshot.h"
+#include "server/calls/backend.h"
+#include "server/keeping/snapshot.h"
+#include "server/wire/encode.h"
+#include "server/wire/frame_slices.h"
 #include "tests/fuzz/proto_mutator.h"
 #include "tests/fuzz/schedule.pb.h"
 

@@ -30,9 +30,9 @@
 #include "client/cpp/wire.h"
 #include "core/base/fault.h"
 #include "lpdeform/v1/service.grpc.pb.h"
-#include "server/encode.h"
-#include "server/grpc_status.h"
 #include "server/server.h"
+#include "server/wire/encode.h"
+#include "server/wire/grpc_status.h"
 
 namespace lpdeform {
 namespace {

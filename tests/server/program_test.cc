@@ -16,7 +16,7 @@
 
 #include "lpdeform/v1/service.grpc.pb.h"
 #include "program.h"
-#include "server/health_probe.h"
+#include "server/admin/health_probe.h"
 
 namespace lpdeform {
 namespace {

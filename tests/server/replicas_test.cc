@@ -19,7 +19,7 @@
 #include "client/cpp/client.h"
 #include "program.h"
 #include "redis_server.h"
-#include "server/health_probe.h"
+#include "server/admin/health_probe.h"
 
 namespace lpdeform {
 namespace {

@@ -11,7 +11,7 @@
 #include "client/c/lpdeform.h"
 #include "server/server.h"
 #include "tests/client/c/session_fixture.h"
-#include "tests/server/token_maker.h"
+#include "tests/server/fixtures/token_maker.h"
 
 namespace lpdeform {
 namespace {

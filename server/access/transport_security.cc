@@ -1,0 +1,64 @@
+#include "server/access/transport_security.h"
+
+#include <grpc/grpc.h>
+#include <grpc/grpc_security.h>
+
+#include <string>
+#include <utility>
+
+#include "core/base/check.h"
+
+namespace lpdeform {
+namespace {
+
+/// gRPC asks for what is in force before each handshake. Its C++ interface has no way to give it but by files, which it does not
+/// check: where they are damaged it takes no connection.
+class FreshCredentials final : public grpc::ServerCredentials {
+ public:
+  explicit FreshCredentials(std::shared_ptr<Certificates> certificates)
+      : certificates_(std::move(certificates)),
+        credentials_(grpc_ssl_server_credentials_create_with_options(
+                         grpc_ssl_server_credentials_create_options_using_config_fetcher(
+                             certificates_->knows_clients()
+                                 ? GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY
+                                 : GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE,
+                             fetch, this)),
+                     grpc_server_credentials_release) {}
+
+  void SetAuthMetadataProcessor(const std::shared_ptr<grpc::AuthMetadataProcessor>&) override {
+    LPDEFORM_CHECK(!"calls are judged by Backend::identify");
+  }
+
+ private:
+  int AddPortToServer(const std::string& address, grpc_server* server) override {
+    return grpc_server_add_http2_port(server, address.c_str(), credentials_.get());
+  }
+
+  /// gRPC calls it for one connection after the other.
+  static grpc_ssl_certificate_config_reload_status fetch(void* self,
+                                                         grpc_ssl_server_certificate_config** config) {
+    auto& credentials = *static_cast<FreshCredentials*>(self);
+    const Certificates::Current now = credentials.certificates_->current();
+    if (now.number == credentials.given_) return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_UNCHANGED;
+    const grpc_ssl_pem_key_cert_pair pair{now.texts->key.c_str(), now.texts->chain.c_str()};
+    // gRPC insists on authorities. Where no client is asked for a certificate, none is held against them.
+    const std::string& authorities =
+        credentials.certificates_->knows_clients() ? now.texts->authorities : now.texts->chain;
+    *config = grpc_ssl_server_certificate_config_create(authorities.c_str(), &pair, 1);
+    credentials.given_ = now.number;
+    return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_NEW;
+  }
+
+  const std::shared_ptr<Certificates> certificates_;
+  std::uint64_t given_ = 0;
+  const std::unique_ptr<grpc_server_credentials, decltype(&grpc_server_credentials_release)> credentials_;
+};
+
+}  // namespace
+
+std::shared_ptr<grpc::ServerCredentials> make_credentials(const std::shared_ptr<Certificates>& certificates) {
+  if (certificates == nullptr) return grpc::InsecureServerCredentials();
+  return std::make_shared<FreshCredentials>(certificates);
+}
+
+}  // namespace lpdeform

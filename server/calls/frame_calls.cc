@@ -1,0 +1,252 @@
+#include "server/calls/frame_calls.h"
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/base/fault.h"
+#include "server/calls/write_pump.h"
+#include "server/wire/encode.h"
+
+namespace lpdeform {
+namespace {
+
+/// What calls with one stream of frames do with it.
+template <typename Reactor, typename Response>
+class FrameCall : public WritePump<Reactor, Response> {
+ public:
+  explicit FrameCall(Backend& backend) : backend_(backend) {}
+
+ protected:
+  using Pump = WritePump<Reactor, Response>;
+  using typename Pump::Made;
+
+  /// Opens the stream, on a thread of the pool, once its session is there. Ends the call where that fails.
+  void open(
+      const std::string& session_name, const std::string& token, const v1::FrameOptions& options,
+      const std::function<void()>& then = [] {}) {
+    backend_.when_here(this->context(), session_name,
+                       [self = std::static_pointer_cast<FrameCall>(this->shared_from_this()), session_name,
+                        token, options, then](const absl::Status& status) {
+                         if (!status.ok()) return self->refuse(status);
+                         const auto session =
+                             self->backend_.find(self->context(), Backend::Access::kRead, session_name);
+                         if (session.ok()) self->record().about(*session);
+                         self->open_here(session_name, token, options);
+                         then();
+                       });
+  }
+
+ private:
+  void open_here(const std::string& session_name, const std::string& token, const v1::FrameOptions& options) {
+    auto open =
+        backend_.open_stream(this->context(), session_name, token, options, [weak = this->weak_from_this()] {
+          if (const auto self = weak.lock()) self->pump();
+        });
+    const std::scoped_lock lock(this->mutex_);
+    if (!open.ok()) return this->refuse_locked(open.status());
+    if (this->is_over_locked()) return backend_.forget(this->context(), *open, this->how_ended_locked());
+    open_ = *std::move(open);
+    token_ = token;
+    this->pump_locked();
+  }
+
+ protected:
+  Made make(Response& response) final {
+    if (!open_.stream) return Made::kNothing;
+    const std::optional<Note> note = open_.stream->next();
+    if (!note) return Made::kNothing;
+    encode(*note, *open_.stream, open_.session->vertex_count(), response);
+    return std::holds_alternative<EndNote>(*note) ? Made::kLastMessage : Made::kMessage;
+  }
+
+  void let_go() final {
+    if (open_.stream && !std::exchange(is_forgotten_, true))
+      backend_.forget(this->context(), open_, this->how_ended_locked());
+  }
+
+  Backend& backend_;
+  Backend::OpenStream open_;
+  std::string token_;
+  bool is_forgotten_ = false;
+};
+
+class StreamFramesCall final : public FrameCall<StreamFramesReactor, Outgoing<v1::StreamFramesResponse>> {
+ public:
+  using FrameCall::FrameCall;
+
+  void begin(const v1::StreamFramesRequest& request) {
+    auto self = std::static_pointer_cast<StreamFramesCall>(shared_from_this());
+    const auto task = [self, request] { self->open(request.session(), "", request.options()); };
+    if (!backend_.pool.try_post(task)) refuse(server_busy(backend_.pool.expected_wait()));
+  }
+};
+
+class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResponse>> {
+ public:
+  using FrameCall::FrameCall;
+
+  void begin() { post(&DeformCall::let_in); }
+
+  void OnReadDone(bool ok) override {
+    bool is_open = true;
+    {
+      const std::scoped_lock lock(mutex_);
+      is_open = is_open_;
+      is_open_ = is_open_ || (ok && received_.is_whole && request_.has_open());
+    }
+    if (!ok) return end_of_input(is_open);
+    if (!received_.is_whole)
+      return break_off("A message cannot be parsed; a text that is not UTF-8, perhaps.");
+    record().received(request_.ByteSizeLong());
+    switch (request_.message_case()) {
+      case v1::DeformRequest::kOpen:
+        return is_open ? break_off("The stream was opened twice.") : post(&DeformCall::take_open);
+      case v1::DeformRequest::kUpdate:
+        return is_open ? post(&DeformCall::take_update) : break_off("The first message is not an open.");
+      case v1::DeformRequest::kAck:
+        return is_open ? take_ack() : break_off("The first message is not an open.");
+      default:
+        return break_off("A message is empty, or of a kind that the server does not know.");
+    }
+  }
+
+ private:
+  static constexpr std::size_t kMostAnswers = 64;
+  static constexpr std::chrono::seconds kOpenPatience{10};
+
+  /// The next message, unless too many answers wait for the client to read them.
+  void read() {
+    const std::scoped_lock lock(mutex_);
+    read_locked();
+  }
+
+  void read_locked() {
+    if (is_over_locked()) return;
+    is_read_due_ = open_.stream && open_.stream->answers_waiting() + unanswered_ >= kMostAnswers;
+    if (!is_read_due_) StartRead(&received_);
+  }
+
+  void on_made() override {
+    if (is_read_due_) read_locked();
+  }
+
+  /// A client that sends no more may go on reading; one that never opened has nothing to read.
+  void end_of_input(bool is_open) {
+    if (!is_open) break_off("The stream ended before it was opened.");
+  }
+
+  /// Who may not call is not read: gRPC holds what has come of a message, up to its 4 MiB.
+  void let_in() {
+    const auto caller = backend_.identify(context(), Backend::Access::kRead);
+    if (!caller.ok()) return refuse(caller.status());
+    read();
+    backend_.timers->at(backend_.timers->now() + kOpenPatience, [weak = weak_from_this()] {
+      if (const auto self = std::static_pointer_cast<DeformCall>(weak.lock())) self->give_up_unopened();
+    });
+  }
+
+  void give_up_unopened() {
+    const std::scoped_lock lock(mutex_);
+    if (is_open_) return;
+    refuse_locked(make_fault(absl::StatusCode::kUnavailable, {"STREAM_UNOPENED", "", ""},
+                             "The stream was not opened within 10 s."));
+  }
+
+  void post(void (DeformCall::*task)()) {
+    auto self = std::static_pointer_cast<DeformCall>(shared_from_this());
+    if (!backend_.pool.try_post([self, task] { (*self.*task)(); }))
+      refuse(server_busy(backend_.pool.expected_wait()));
+  }
+
+  void take_open() {
+    const v1::DeformOpen& open = request_.open();
+    this->open(open.session(), open.writer_token(), open.options(),
+               [self = std::static_pointer_cast<DeformCall>(shared_from_this())] { self->read(); });
+  }
+
+  void take_update() {
+    {
+      const std::scoped_lock lock(mutex_);
+      ++unanswered_;
+    }
+    backend_.when_decodable(
+        open_.session, token_, request_.update(),
+        [self = std::static_pointer_cast<DeformCall>(shared_from_this())](const absl::Status& status) {
+          self->give_update(status);
+          self->read();
+        });
+  }
+
+  void give_update(absl::Status status) {
+    const v1::Update& update = request_.update();
+    const auto answered = [self = std::static_pointer_cast<DeformCall>(shared_from_this()),
+                           input = refused_input(update)](const absl::StatusOr<UpdateResult>& result) {
+      self->answer(result, input);
+    };
+    if (!status.ok()) return answered(status);
+    const auto session = backend_.registry->find(open_.session->name(), open_.session->owner());
+    if (!session.ok()) return answered(session.status());
+    backend_.update(context(), **session, token_, update, answered);
+  }
+
+  /// Then the stream ends in a moment, and an update without an answer is sent again to where the session is; with one that refuses
+  /// it, it would be lost.
+  static bool goes_on_elsewhere(const absl::Status& status) {
+    const std::string reason = fault_of(status).reason;
+    return reason == "DRAINING" || reason == "SESSION_ELSEWHERE";
+  }
+
+  /// On any thread.
+  void answer(const absl::StatusOr<UpdateResult>& result, const RefusedInput& input) {
+    if (!result.ok()) record().refused(result.status(), input);
+    {
+      const std::scoped_lock lock(mutex_);
+      --unanswered_;
+    }
+    if (result.ok()) {
+      open_.stream->answer(*result);
+    } else if (!goes_on_elsewhere(result.status())) {
+      open_.stream->answer(FaultNote{result.status(), input.input_seq});
+    }
+  }
+
+  void take_ack() {
+    open_.session->touch();
+    const absl::Status status = open_.stream->acknowledge(request_.ack().frame_seq());
+    if (!status.ok()) return break_off(std::string(status.message()));
+    read();
+  }
+
+  /// The client does not keep to the contract: reads no more, and says so.
+  void break_off(const std::string& why) {
+    if (open_.stream) {
+      backend_.log().info("stream_misused", {{"session", abbreviated(open_.session->name())},
+                                             {"stream", abbreviated(open_.stream->id())},
+                                             {"text", why},
+                                             {"trace_id", context().trace_id}});
+      return open_.stream->end(EndReason::kProtocolError, why);
+    }
+    refuse(invalid_input({"STREAM_PROTOCOL", "", ""}, why));
+  }
+
+  Received<v1::DeformRequest> received_;
+  const v1::DeformRequest& request_ = received_.message;
+  bool is_open_ = false;  // an open has come
+  bool is_read_due_ = false;
+  std::size_t unanswered_ = 0;  // updates taken that are not in the store yet
+};
+
+}  // namespace
+
+StreamFramesReactor* stream_frames(Backend& backend, std::shared_ptr<CallRecord> record,
+                                   const v1::StreamFramesRequest& request) {
+  return begin_call<StreamFramesCall>(backend, std::move(record), request);
+}
+
+DeformReactor* deform(Backend& backend, std::shared_ptr<CallRecord> record) {
+  return begin_call<DeformCall>(backend, std::move(record));
+}
+
+}  // namespace lpdeform

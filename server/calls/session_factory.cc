@@ -1,0 +1,175 @@
+#include "server/calls/session_factory.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "core/base/workers.h"
+#include "server/runtime/random_name.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr std::uint32_t kFacesPerVertex = 3;
+
+/// What a session is taken to need until it is known: about what a triangulated surface needs, factored by
+/// CHOLMOD.
+constexpr std::size_t kBytesPerVertex = 2600, kBytesPerFace = 100;
+
+std::size_t estimate(const v1::Mesh& mesh) {
+  return kBytesPerVertex * mesh.vertex_count() + kBytesPerFace * mesh.face_count();
+}
+
+/// The shape and the mesh that it is drawn as.
+absl::Status make_mesh(const v1::CreateSessionRequest& request, Decoder& decoder, SessionParts& parts) {
+  const auto weights = decode_weights(request.weights());
+  if (!weights.ok()) return weights.status();
+  auto mesh = decoder.mesh(request.mesh());
+  if (!mesh.ok()) return mesh.status();
+  auto normals = decoder.normals(request.normals());
+  if (!normals.ok()) return normals.status();
+  const auto weld = decoder.weld(request.weld(), mesh->vertices);
+  if (!weld.ok()) return weld.status();
+
+  auto shape = RestShape::create(*weld ? welded(*mesh, **weld) : *mesh, *weights);
+  // What is wrong is said of the client's vertices where it can be.
+  if (!shape.ok() && *weld) {
+    if (absl::Status status = deformable(check_mesh(*mesh)); !status.ok()) return status;
+  }
+  if (!shape.ok()) return shape.status();
+  parts.shape = *std::move(shape);
+  parts.mesh =
+      std::make_shared<const DrawMesh>(parts.shape, *weld, std::move(mesh->faces), *std::move(normals));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+SessionFactory::SessionFactory(const ServerOptions& options, std::shared_ptr<Budget> budget,
+                               std::shared_ptr<Uploads> uploads, SessionServices services)
+    : options_(options),
+      budget_(std::move(budget)),
+      uploads_(std::move(uploads)),
+      services_(std::move(services)) {}
+
+int SessionFactory::threads() const {
+  return options_.threads == 0 ? available_cores() : options_.threads;
+}
+
+Decoder SessionFactory::decoder(const v1::CreateSessionRequest& request, const std::string& owner) const {
+  return {*uploads_, request.mesh().vertex_count(), nullptr, nullptr, owner};
+}
+
+/// All that comes of the request's mesh.
+absl::Status SessionFactory::make_shape(const v1::CreateSessionRequest& request, Decoder decoder,
+                                        SessionParts& parts) const {
+  const auto free_components = decode_free_components(request.free_components());
+  if (!free_components.ok()) return free_components.status();
+  auto memory = budget_->reserve(estimate(request.mesh()), parts.owner);
+  if (!memory.ok()) return memory.status();
+  parts.free_components = *free_components;
+  parts.memory = *std::move(memory);
+  if (absl::Status status = make_mesh(request, decoder, parts); !status.ok()) return status;
+  const std::size_t held = parts.shape->memory_bytes() + parts.mesh->memory_bytes();
+  auto deformer = Deformer::create(parts.shape, {.free_components = parts.free_components,
+                                                 .threads = threads(),
+                                                 .admit = [&parts, held](std::size_t bytes) {
+                                                   return parts.memory.grow_to(held + bytes);
+                                                 }});
+  if (!deformer.ok()) return deformer.status();
+  parts.deformer = *std::move(deformer);
+  parts.features = std::make_shared<const ShapeFeatures>(parts.shape, Workers(threads()));
+  return absl::OkStatus();
+}
+
+/// `surface`: the present state, of the client's vertices.
+absl::StatusOr<std::shared_ptr<Session>> SessionFactory::finish(SessionParts parts,
+                                                                const std::optional<Points>& surface) const {
+  if (surface) {
+    const auto positions = parts.mesh->solver_positions(*surface);
+    if (!positions.ok()) return positions.status();
+    if (absl::Status status = parts.deformer->set_positions(*positions); !status.ok()) return status;
+    parts.has_surface = true;
+  }
+  return Session::create(std::move(parts), services_);
+}
+
+absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make(const SessionMaker& maker,
+                                                              const v1::CreateSessionRequest& request) const {
+  Decoder mesh_decoder = decoder(request, maker.owner);
+  const std::uint32_t most_faces = kFacesPerVertex * options_.max_vertices;
+  absl::Status status = mesh_decoder.check_mesh_size(request.mesh(), {options_.max_vertices, most_faces});
+  if (!status.ok()) return status;
+  SessionParts parts;
+  parts.name = absl::StrCat("sessions/", random_hex_128());
+  parts.owner = maker.owner;
+  parts.route = maker.route;
+  status = make_shape(request, mesh_decoder, parts);
+  if (!status.ok()) return status;
+  Decoder inputs(*uploads_, request.mesh().vertex_count(), parts.features.get(), parts.mesh->weld().get(),
+                 maker.owner);
+  status = inputs.handles(request.handles(), parts.beginning);
+  if (!status.ok()) return status;
+  auto settings = inputs.settings(request.settings());
+  if (!settings.ok()) return settings.status();
+  parts.beginning.settings = *std::move(settings);
+  return finish(std::move(parts));
+}
+
+absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_from(const SessionMaker& maker,
+                                                                   const Snapshot& snapshot) const {
+  static const StoredBlobs no_blobs;
+  const v1::CreateSessionRequest& request = snapshot.request;
+  Decoder decoder = this->decoder(request, maker.owner).reading_stored(no_blobs);
+  const std::uint32_t most_faces = kFacesPerVertex * options_.max_vertices;
+  absl::Status status = decoder.check_mesh_size(request.mesh(), {options_.max_vertices, most_faces});
+  if (!status.ok()) return status;
+  std::optional<Points> surface;
+  if (snapshot.surface) {
+    auto positions = decoder.positions(*snapshot.surface);
+    if (!positions.ok()) return positions.status();
+    surface = *std::move(positions);
+  }
+  SessionParts parts;
+  parts.name = absl::StrCat("sessions/", random_hex_128());
+  parts.owner = maker.owner;
+  parts.route = maker.route;
+  status = take_state(maker.owner, snapshot, parts);
+  if (status.ok()) status = make_shape(request, decoder, parts);
+  return status.ok() ? finish(std::move(parts), surface) : status;
+}
+
+/// Its handles and settings, for a writer of its own.
+absl::Status SessionFactory::take_state(const std::string& owner, const Snapshot& snapshot,
+                                        SessionParts& parts) const {
+  StoredSession stored{.owner = owner, .epoch = 1, .parts = snapshot.parts};
+  stored.parts["writer"] = encode_writer(random_hex_128());
+  auto state = decode_state(stored, {snapshot.request, 0, 0}, *uploads_);
+  if (!state.ok()) return snapshot_damaged(std::string(state.status().message()));
+  parts.beginning = std::move(state->state);
+  parts.past = std::move(state->past);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_again(const std::string& name,
+                                                                    const StoredSession& stored,
+                                                                    const SessionHead& head,
+                                                                    const StoredBlobs& blobs) const {
+  auto state = decode_state(stored, head, *uploads_);
+  if (!state.ok()) return state.status();
+  SessionParts parts;
+  parts.name = name;
+  parts.owner = stored.owner;
+  parts.route = stored.route;
+  parts.beginning = std::move(state->state);
+  parts.past = std::move(state->past);
+  const Decoder mesh_decoder = decoder(head.request, stored.owner).reading_stored(blobs);
+  const absl::Status made = make_shape(head.request, mesh_decoder, parts);
+  auto session = made.ok() ? finish(std::move(parts)) : made;
+  // What was right once is right unless it was damaged.
+  if (absl::IsInvalidArgument(session.status()) || absl::IsFailedPrecondition(session.status()))
+    return session_damaged(session.status());
+  return session;
+}
+
+}  // namespace lpdeform

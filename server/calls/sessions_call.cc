@@ -1,0 +1,137 @@
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "server/calls/frame_calls.h"
+#include "server/calls/write_pump.h"
+#include "server/wire/encode.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr int kMostStreams = 16;
+
+absl::Status wrong_count(int count) {
+  return invalid_input({"STREAMS_COUNT", "streams", absl::StrCat("1 to ", kMostStreams)},
+                       absl::StrCat("A call asks for ", count, " streams, not for 1 to ", kMostStreams, "."));
+}
+
+/// Several sessions' streams in one call. They take turns, message by message, so that none waits for another's frames.
+class StreamSessionsCall final
+    : public WritePump<StreamSessionsReactor, Outgoing<v1::StreamSessionsResponse>> {
+ public:
+  explicit StreamSessionsCall(Backend& backend) : backend_(backend) {}
+
+  void begin(const v1::StreamSessionsRequest& request) {
+    if (request.streams_size() < 1 || request.streams_size() > kMostStreams) {
+      return refuse(wrong_count(request.streams_size()));
+    }
+    auto self = std::static_pointer_cast<StreamSessionsCall>(shared_from_this());
+    if (!backend_.pool.try_post([self, request] { self->fetch(request, 0); }))
+      refuse(server_busy(backend_.pool.expected_wait()));
+  }
+
+ private:
+  struct Lane {
+    Backend::OpenStream open;  // null where it could not be opened
+    absl::Status refusal;      // why; OK once that is said
+    bool is_over = false;
+  };
+
+  /// One session after the other from the store, where it is there alone. What fails shows when it is opened.
+  void fetch(const v1::StreamSessionsRequest& request, int from) {
+    if (from == request.streams_size()) return open_all(request);
+    auto self = std::static_pointer_cast<StreamSessionsCall>(shared_from_this());
+    backend_.when_here(context(), request.streams(from).session(),
+                       [self, request, from](const absl::Status& status) {
+                         if (!status.ok()) self->not_here_[from] = status;
+                         self->fetch(request, from + 1);
+                       });
+  }
+
+  void open_all(const v1::StreamSessionsRequest& request) {
+    std::vector<Lane> lanes;
+    for (const v1::StreamFramesRequest& one : request.streams()) {
+      const auto pump = [weak = weak_from_this()] {
+        if (const auto self = weak.lock()) self->pump();
+      };
+      const auto missing = not_here_.find(static_cast<int>(lanes.size()));
+      auto open = missing == not_here_.end()
+                      ? backend_.open_stream(context(), one.session(), "", one.options(), pump)
+                      : missing->second;
+      if (!open.ok()) record().refused(open.status(), {});
+      lanes.push_back({open.ok() ? *std::move(open) : Backend::OpenStream{}, open.status(), false});
+    }
+    const std::scoped_lock lock(mutex_);
+    lanes_ = std::move(lanes);
+    if (is_over_locked()) return forget_all();
+    pump_locked();
+  }
+
+  Made make(Outgoing<v1::StreamSessionsResponse>& response) override {
+    for (std::size_t tried = 0; tried < lanes_.size(); ++tried) {
+      const std::size_t turn = next_++ % lanes_.size();
+      response.message.set_stream(static_cast<std::uint32_t>(turn));
+      if (!make_of(lanes_[turn], response)) continue;
+      for (const Lane& lane : lanes_) {
+        if (!lane.is_over) return Made::kMessage;
+      }
+      return Made::kLastMessage;
+    }
+    return Made::kNothing;
+  }
+
+  static bool make_of(Lane& lane, Outgoing<v1::StreamSessionsResponse>& response) {
+    if (lane.is_over) return false;
+    if (lane.open.stream == nullptr) {
+      refuse_lane(lane, response.message);
+      return true;
+    }
+    const std::optional<Note> note = lane.open.stream->next();
+    if (!note) return false;
+    lane.is_over = std::holds_alternative<EndNote>(*note);
+    encode(*note, *lane.open.stream, lane.open.session->vertex_count(), response);
+    return true;
+  }
+
+  /// First the fault, then the end.
+  static void refuse_lane(Lane& lane, v1::StreamSessionsResponse& response) {
+    if (!lane.refusal.ok()) {
+      encode(FaultNote{std::exchange(lane.refusal, absl::OkStatus()), 0},
+             *response.mutable_event()->mutable_fault());
+      return;
+    }
+    v1::GoAway& go_away = *response.mutable_event()->mutable_go_away();
+    go_away.set_reason(v1::GO_AWAY_REASON_NOT_OPENED);
+    go_away.set_text("The stream could not be opened.");
+    lane.is_over = true;
+  }
+
+  void let_go() override { forget_all(); }
+
+  void forget_all() {
+    for (Lane& lane : lanes_) {
+      if (lane.open.stream) backend_.forget(context(), lane.open, how_ended_locked());
+    }
+    lanes_.clear();
+  }
+
+  Backend& backend_;
+  std::map<int, absl::Status> not_here_;  // why, by the number of the stream
+  std::vector<Lane> lanes_;
+  std::size_t next_ = 0;  // whose turn it is, and how often there was one
+};
+
+}  // namespace
+
+StreamSessionsReactor* stream_sessions(Backend& backend, std::shared_ptr<CallRecord> record,
+                                       const v1::StreamSessionsRequest& request) {
+  return begin_call<StreamSessionsCall>(backend, std::move(record), request);
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,169 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/energy/material.h"
+#include "core/energy/rest_shape.h"
+#include "core/mesh/weld.h"
+#include "server/runtime/timers.h"
+#include "server/session/history.h"
+#include "server/session/update.h"
+
+namespace lpdeform {
+
+/// The handles and settings in force: a value that nobody changes any more.
+struct Inputs {
+  std::uint64_t version = 0;    // rises with every update that is taken
+  std::uint64_t input_seq = 0;  // the newest that is in
+  std::uint64_t taken = 0;      // how many input_seqs have been the newest
+  std::shared_ptr<const HandleSet> handles;
+  std::shared_ptr<const Material> material;
+  SolveSettings solver;
+  // As the client gave them, in its vertices: the same objects where nothing is welded.
+  std::shared_ptr<const HandleSet> given_handles;
+  std::shared_ptr<const Material> given_material;
+};
+
+/// The input_seq of the newest value of each part. Handles let go of are remembered so that a late change
+/// does not bring them back; the oldest such memories are given up first, and all that is as old counts as
+/// stale from then on.
+struct InputAges {
+  std::map<std::string, std::uint64_t, std::less<>> handles;
+  std::uint64_t forgotten = 0;  // the newest of those given up
+  std::uint64_t p = 0, stiffness = 0, length_unit = 0, solver = 0, region = 0;
+};
+
+/// What a mailbox holds, and what of it has changed since a revision of it.
+struct InputChanges {
+  std::uint64_t revision = 0;  // now
+  Inputs inputs;
+  InputAges ages;
+  bool is_all = false;                 // everything is to be taken as changed
+  std::vector<std::string> regrouped;  // handles set, ascending
+  std::vector<std::string> moved;      // handles that go elsewhere, those set included
+  std::vector<std::string> removed;
+  bool has_p = false, has_stiffness = false, has_region = false;
+  HandleHistory::Extent history;
+  HandleHistory::Changes steps;           // of it
+  bool is_undo = false, is_redo = false;  // what the newest input is
+};
+
+/// Of a session that is made again: what could be taken back, and done again.
+struct InputHistory {
+  std::uint64_t first = 0;
+  std::size_t undo_steps = 0;
+  std::vector<std::vector<HandleChange>> steps;
+  bool is_undo = false, is_redo = false;  // what the newest input is
+};
+
+/// What one session may have of handles.
+struct InputLimits {
+  static constexpr std::size_t kMostHandles = 4096, kMostUndo = 100;  // where nothing else is said
+  std::size_t handles = kMostHandles;
+  std::size_t undo_steps = kMostUndo;
+};
+
+/// Where updates meet the solver: keeps the newest value of each handle and each setting by input_seq. Which
+/// value is newest is decided for each handle and each setting by itself, so a late update of one does not
+/// undo another. An update is checked against the values it would lead to and is taken whole or not at all.
+/// Nothing queues: the solver reads what is newest when it has time. Thread-safe.
+class Mailbox {
+ public:
+  /// `weld`: from the vertices that updates speak of to those of `shape`; null where they are the same.
+  /// `timers`: tells pauses between gestures; null: there are none.
+  explicit Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld = nullptr,
+                   InputLimits limits = {}, std::shared_ptr<Timers> timers = nullptr);
+
+  /// A part with the input_seq of the value that is there is a repetition: dropped, but not counted as stale.
+  /// Errors, INVALID_ARGUMENT: INPUT_SEQ_ZERO, HANDLE_CHANGED_TWICE (in this update), TOO_MANY_HANDLES,
+  /// HANDLE_TARGET_TOO_FAR, COPIES_DIFFER, and what check_solver, make_constraints, check_material and HandleSet have;
+  /// NOT_FOUND HANDLE_UNKNOWN. A component without a handle is no error here: handles may come one by one.
+  absl::StatusOr<UpdateResult> take(const Update& update);
+
+  /// What a session begins with: the same as an update that is older than all others.
+  absl::Status begin_with(const Update& update);
+
+  /// The same of a session that is made again: its whole state, and how old the parts of it are. Also INPUT_SEQ_TOO_HIGH, and
+  /// TOO_MANY_HANDLES where more are remembered than there can be.
+  absl::Status begin_again(const Update& state, InputAges ages, InputHistory history = {});
+
+  /// Takes the newest step of the handles back (see HandleHistory), or does again what was taken back last, as an update of this
+  /// input_seq, which must be higher than all before: ABORTED INPUT_SEQ_PASSED. The same as last time gives the same
+  /// answer. FAILED_PRECONDITION NOTHING_TO_UNDO, NOTHING_TO_REDO; otherwise as take().
+  absl::StatusOr<UndoResult> undo(std::uint64_t input_seq, bool redo);
+
+  /// How many steps can be taken back, and done again; what they take.
+  struct HistorySize {
+    std::size_t undo_steps = 0, redo_steps = 0, bytes = 0;
+  };
+  HistorySize history_size() const;
+
+  Inputs newest() const;
+
+  /// Rises with each update that changes something.
+  std::uint64_t revision() const;
+  /// What has changed since `revision`; since 0, all.
+  InputChanges changes_since(std::uint64_t revision) const;
+
+ private:
+  /// The revision at which something last changed.
+  struct Revisions {
+    struct OfHandle {
+      std::uint64_t set = 0, moved = 0, removed = 0;
+    };
+    std::uint64_t newest = 1;  // before anything has changed
+    std::map<std::string, OfHandle, std::less<>> handles;
+    std::uint64_t all = 0, p = 0, stiffness = 0, region = 0;
+  };
+  struct Candidate;
+
+  enum class Origin { kBeginning, kWriter, kHistory };
+  absl::StatusOr<UpdateResult> merge(const Update& update, Origin origin);
+  bool replaces(std::uint64_t age, const Update& update, Candidate& next) const;
+  bool replaces_handle(const std::string& name, const Update& update, Candidate& next) const;
+  absl::Status change_handles(const Update& update, Candidate& next) const;
+  void change_settings(const Update& update, Candidate& next) const;
+  absl::Status check(const Candidate& next, const Inputs& before) const;
+  absl::Status weld(Candidate& next) const;
+  absl::Status check_welded(const Candidate& next) const;
+  absl::Status check_targets(const std::string& name, const Handle& handle) const;
+  std::string place_of(const Handle& handle, std::size_t k) const;
+  std::int32_t vertex_count() const { return weld_ ? weld_->split_count() : shape_->vertex_count(); }
+
+  void note_ages(const Candidate& next, std::uint64_t seq);
+  void note_revisions(const Candidate& next);
+  void note_step(const Update& update, const Candidate& next, const Inputs& before);
+  void forget_oldest();
+  void remember_undo(bool redo);
+  void put_in_force(const Update& update, Candidate& next);
+
+  const std::shared_ptr<const RestShape> shape_;
+  const std::shared_ptr<const Weld> weld_;
+  const InputLimits limits_;
+  const std::shared_ptr<Timers> timers_;
+  mutable std::mutex merging_;  // one update at a time; guards what follows
+  InputAges ages_;
+  Revisions revisions_;
+  HandleHistory history_;
+  struct LastUndo {
+    std::uint64_t input_seq = 0;
+    bool redo = false;
+    UndoResult result;
+  };
+  std::optional<LastUndo> last_undo_;
+  mutable std::mutex mutex_;  // guards inputs_, for moments only
+  Inputs inputs_;
+};
+
+/// Whether the method can minimise for this material and these handles: INVALID_ARGUMENT METHOD_NEEDS_P
+/// (local_global: p = 2 everywhere; conic: p = 1), METHOD_NEEDS_EXACT_HANDLES (conic), TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE.
+absl::Status check_solver(const SolveSettings& settings, const Material& material, const HandleSet& handles);
+
+}  // namespace lpdeform

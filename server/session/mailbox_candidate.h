@@ -1,0 +1,49 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "server/session/mailbox.h"
+
+namespace lpdeform {
+
+// What the files of Mailbox share.
+
+/// What an update would lead to.
+struct Mailbox::Candidate {
+  bool is_beginning = false;
+  std::shared_ptr<HandleSet> handles;  // our copy; empty where the update has no handles
+  Material material;
+  SolveSettings solver;
+  // For the solver; empty where they did not change.
+  std::shared_ptr<const HandleSet> solver_handles;
+  std::shared_ptr<const Material> solver_material;
+  std::vector<std::string> named;  // handles that it changes
+  std::vector<std::string> moved;  // those of them that go somewhere
+  std::vector<std::string> regrouped, removed;
+  bool is_regrouped = false;  // vertices of handles, or the region, changed
+  bool has_p = false, has_stiffness = false, has_length_unit = false, has_solver = false, has_region = false;
+  std::uint32_t stale_parts = 0;
+
+  bool has_handles() const { return is_regrouped || !moved.empty(); }
+  bool changes_something() const {
+    return !named.empty() || has_p || has_stiffness || has_length_unit || has_solver || has_region;
+  }
+  bool has_material() const { return has_p || has_stiffness || has_length_unit; }
+};
+
+inline constexpr std::size_t kLongestName = 128;
+
+/// How errors name a handle.
+inline std::string element_of(std::string_view name) {
+  return absl::StrCat("handle \"", absl::string_view(name.data(), std::min(name.size(), kLongestName)), "\"");
+}
+
+absl::Status too_many_handles(std::size_t handles, std::size_t most);
+
+}  // namespace lpdeform

@@ -1,0 +1,326 @@
+#include "server/session/session.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "server/runtime/random_name.h"
+#include "server/runtime/refusals.h"
+
+namespace lpdeform {
+namespace {
+
+/// A slice of a larger mesh may take long: see Scheduler.
+constexpr std::int32_t kHeavyVertices = 20000;
+
+/// One step of a large mesh costs more than many of a small one: with equal shares of the time it would hardly move
+/// beside a crowd of small ones.
+double weight_of(std::int32_t vertices) {
+  constexpr double kPlain = 1000;
+  return std::sqrt(std::max(1.0, vertices / kPlain));
+}
+
+std::int64_t unix_ms_now() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::milliseconds>(now).count();
+}
+
+/// Takes as long for a token that is nearly right as for any other.
+bool is_same_token(const std::string& a, const std::string& b) {
+  if (a.size() != b.size()) return false;
+  unsigned char difference = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) difference |= static_cast<unsigned char>(a[k] ^ b[k]);
+  return difference == 0;
+}
+
+absl::Status gone(const std::string& name) {
+  return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", name, ""},
+                    absl::StrCat("There is no ", name, "."));
+}
+
+absl::Status too_many_streams(std::size_t most) {
+  return make_fault(
+      absl::StatusCode::kResourceExhausted, {"STREAMS_FULL", "streams", absl::StrCat("streams <= ", most)},
+      absl::StrCat("The session has all of its ", most, " streams in use; end one, or try again later."));
+}
+
+absl::Status ended_by(EndReason reason, const std::string& text) {
+  if (goes_on(reason)) return server_draining();
+  const char* const name = reason == EndReason::kSessionExpired ? "SESSION_EXPIRED" : "SESSION_DELETED";
+  return make_fault(absl::StatusCode::kAborted, {name, "", ""}, text);
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<Session>> Session::create(SessionParts parts, SessionServices services) {
+  const Update beginning = std::move(parts.beginning);
+  const std::optional<SessionPast> past = parts.past;
+  std::unique_ptr<Deformer> deformer = std::move(parts.deformer);
+  const std::shared_ptr<Session> session(new Session(std::move(parts), std::move(services)));
+  const absl::Status begun = past ? session->mailbox_.begin_again(beginning, past->ages, past->history)
+                                  : session->mailbox_.begin_with(beginning);
+  if (!begun.ok()) return begun;
+  LiveSolver::Alarm alarm{session->services_.timers, [weak = session->weak_from_this()] {
+                            if (const auto self = weak.lock()) self->services_.scheduler.wake(self);
+                          }};
+  session->solver_ =
+      std::make_unique<LiveSolver>(std::move(deformer), session->mailbox_, *session->publisher_,
+                                   session->mesh_, std::move(alarm), session->stop_.get_token());
+  return session;
+}
+
+Session::Session(SessionParts parts, SessionServices services)
+    : Runnable(parts.shape->vertex_count() > kHeavyVertices, weight_of(parts.shape->vertex_count())),
+      name_(std::move(parts.name)),
+      owner_(std::move(parts.owner)),
+      route_(std::move(parts.route)),
+      shape_(std::move(parts.shape)),
+      mesh_(parts.mesh ? std::move(parts.mesh) : std::make_shared<const DrawMesh>(shape_)),
+      features_(parts.features ? std::move(parts.features) : std::make_shared<ShapeFeatures>(shape_)),
+      free_components_(parts.free_components),
+      services_(std::move(services)),
+      created_unix_ms_(parts.past && parts.past->created_unix_ms != 0 ? parts.past->created_unix_ms
+                                                                      : unix_ms_now()),
+      has_surface_(parts.has_surface),
+      last_used_(services_.timers->now()),
+      mailbox_(shape_, mesh_->weld(), services_.limits.inputs, services_.timers),
+      publisher_(std::make_shared<Publisher>(services_.metrics)),
+      memory_(std::move(parts.memory)),
+      memory_bytes_(memory_.bytes()),
+      token_(parts.past ? parts.past->token : random_hex_128()),
+      epoch_(parts.past ? parts.past->epoch : 1) {
+  publisher_->begin_epoch(epoch_);
+}
+
+SessionInfo Session::info() const {
+  const Mailbox::HistorySize history = mailbox_.history_size();
+  return {name_,
+          route_,
+          lease().epoch,
+          shape_,
+          mesh_,
+          free_components_,
+          mailbox_.newest(),
+          created_unix_ms_,
+          last_used_.load(),
+          memory_bytes_.load(),
+          history.undo_steps,
+          history.redo_steps};
+}
+
+std::string Session::standing_fault() const {
+  const auto standing = publisher_->standing();
+  return standing ? fault_of(standing->fault.status).reason : "";
+}
+
+WriterLease Session::lease() const {
+  const std::scoped_lock lock(writing_);
+  return {token_, epoch_, mailbox_.newest().input_seq};
+}
+
+SessionChanges Session::changes_since(std::uint64_t revision) const {
+  const std::scoped_lock lock(writing_);
+  InputChanges inputs = mailbox_.changes_since(revision);
+  return {{token_, epoch_, inputs.inputs.input_seq}, std::move(inputs)};
+}
+
+absl::Status Session::check_writer(const std::string& token) const {
+  const std::scoped_lock lock(writing_);
+  return check_writer_locked(token);
+}
+
+absl::Status Session::check_writer_locked(const std::string& token) const {
+  if (token.empty()) {
+    return make_fault(absl::StatusCode::kUnauthenticated, {"WRITER_TOKEN_MISSING", "writer_token", ""},
+                      "Changing a session needs its writer token.");
+  }
+  if (is_same_token(token, token_)) return absl::OkStatus();
+  return make_fault(absl::StatusCode::kPermissionDenied, {"NOT_THE_WRITER", "writer_token", ""},
+                    "The writer token is not that of the session's present writer.");
+}
+
+WriterLease Session::acquire_writer() {
+  touch();
+  WriterLease lease;
+  std::vector<std::weak_ptr<FrameStream>> before;
+  std::shared_ptr<SolveJob> job_before;
+  {
+    const std::scoped_lock lock(writing_);
+    token_ = random_hex_128();
+    ++epoch_;
+    before.swap(writers_);
+    publisher_->begin_epoch(epoch_);
+    lease = {token_, epoch_, mailbox_.newest().input_seq};
+    job_before = take_job();
+  }
+  const std::string text = "Another writer took the session over.";
+  for (const auto& weak : before) {
+    if (const auto stream = weak.lock()) stream->end(EndReason::kWriterReplaced, text);
+  }
+  publisher_->wake_all();  // the others go on in the new epoch
+  if (job_before)
+    job_before->finish(make_fault(absl::StatusCode::kAborted, {"WRITER_REPLACED", "", ""}, text));
+  return lease;
+}
+
+absl::StatusOr<UpdateResult> Session::update(const std::string& token, const Update& update) {
+  touch();
+  const auto since = std::chrono::steady_clock::now();
+  absl::StatusOr<UpdateResult> result;
+  {
+    const std::scoped_lock lock(writing_);
+    if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
+    if (is_closed_) return closed();
+    result = mailbox_.take(update);
+    if (result.ok()) publisher_->took(update.input_seq, since);
+  }
+  if (result.ok()) services_.scheduler.wake(shared_from_this(), Urgency::kAnswer);
+  return result;
+}
+
+absl::StatusOr<UndoResult> Session::undo(const std::string& token, std::uint64_t input_seq, bool redo) {
+  touch();
+  const auto since = std::chrono::steady_clock::now();
+  absl::StatusOr<UndoResult> result;
+  {
+    const std::scoped_lock lock(writing_);
+    if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
+    if (is_closed_) return closed();
+    result = mailbox_.undo(input_seq, redo);
+    if (result.ok()) publisher_->took(input_seq, since);
+  }
+  if (result.ok()) services_.scheduler.wake(shared_from_this(), Urgency::kAnswer);
+  return result;
+}
+
+absl::Status Session::solve(const std::string& token, const std::optional<Update>& update,
+                            const std::shared_ptr<SolveJob>& job) {
+  touch();
+  std::shared_ptr<SolveJob> before;
+  {
+    const std::scoped_lock lock(writing_);
+    if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
+    if (update) {
+      if (absl::Status status = mailbox_.take(*update).status(); !status.ok()) return status;
+    }
+    const std::scoped_lock job_lock(mutex_);
+    if (is_closed_) return closed();
+    job->version = mailbox_.newest().version;
+    before = std::exchange(job_, job);
+  }
+  if (before) {
+    before->finish(make_fault(absl::StatusCode::kAborted, {"SUPERSEDED", "", ""},
+                              "Another solve of the session began before this one was finished."));
+  }
+  services_.scheduler.wake(shared_from_this());
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::shared_ptr<FrameStream>> Session::open_stream(const std::string& token,
+                                                                  const StreamOptions& options) {
+  touch();
+  std::shared_ptr<FrameStream> stream;
+  {
+    const std::scoped_lock lock(writing_);
+    if (!token.empty()) {
+      if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
+    }
+    stream = std::make_shared<FrameStream>(
+        options, publisher_, services_.timers, services_.heartbeat,
+        OpenedNote{epoch_, mailbox_.newest().input_seq},
+        [&scheduler = services_.scheduler] { return scheduler.is_overloaded(); });
+    if (publisher_->reader_count() >= services_.limits.streams)
+      return too_many_streams(services_.limits.streams);
+    if (!publisher_->add(stream)) return is_draining_ && !is_closed_ ? server_draining() : closed();
+    std::erase_if(writers_, [](const auto& weak) { return weak.expired(); });
+    if (!token.empty()) writers_.push_back(stream);
+  }
+  const std::shared_ptr<const Surface> newest = publisher_->newest()->surface;
+  newest->prepare(options.format_for(*newest), options.with_normals);
+  services_.scheduler.wake(shared_from_this());
+  return stream;
+}
+
+void Session::forget_stream(const FrameStream& stream) {
+  publisher_->remove(stream);
+}
+
+absl::Status Session::acknowledge(const std::string& stream_id, std::uint64_t frame_seq) {
+  touch();
+  const auto stream = publisher_->find(stream_id);
+  if (stream) return stream->acknowledge(frame_seq);
+  return make_fault(absl::StatusCode::kNotFound, {"STREAM_UNKNOWN", "stream_id", ""},
+                    "The session has no stream of this id; it may have ended.");
+}
+
+/// To who had it in hand already. One that goes on elsewhere is not gone: its client would make it anew.
+absl::Status Session::closed() const {
+  return goes_on(closed_by_) ? server_draining() : gone(name_);
+}
+
+void Session::drain(const std::string& text) {
+  is_draining_ = true;
+  publisher_->close(EndReason::kDraining, text);
+}
+
+void Session::close(EndReason reason, const std::string& text) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (is_closed_) return;
+    closed_by_ = reason;
+    is_closed_ = true;
+  }
+  stop_.request_stop();
+  end_job(ended_by(reason, text));
+  publisher_->close(reason, text);
+}
+
+void Session::touch() {
+  last_used_ = services_.timers->now();
+}
+
+Timers::TimePoint Session::last_used() const {
+  return job() ? services_.timers->now() : last_used_.load();
+}
+
+std::shared_ptr<SolveJob> Session::job() const {
+  const std::scoped_lock lock(mutex_);
+  return job_;
+}
+
+std::shared_ptr<SolveJob> Session::take_job() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(job_, nullptr);
+}
+
+void Session::end_job(const absl::Status& why) {
+  if (const auto job = take_job()) job->finish(why);
+}
+
+bool Session::run() {
+  const std::shared_ptr<SolveJob> job = this->job();
+  if (is_closed_) return false;
+  LiveSolver::Pace pace;
+  pace.is_sparing = services_.scheduler.is_overloaded();
+  if (services_.scheduler.is_answer_waiting()) {
+    pace.slice = pace.is_sparing ? LiveSolver::kOneStep : LiveSolver::kShortSlice;
+  }
+  bool has_more = solver_->run_slice(job.get(), pace);
+  if (job && job->is_done()) {
+    touch();
+    const std::scoped_lock lock(mutex_);
+    if (job_ == job) job_.reset();
+    has_more = true;  // the readers' solve may have to go on
+  }
+  if (solver_->has_solved()) {  // until then the estimate stands
+    memory_bytes_ = shape_->memory_bytes() + mesh_->memory_bytes() + solver_->memory_bytes() +
+                    mailbox_.history_size().bytes;
+    memory_.resize(memory_bytes_);
+  }
+  return has_more;
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,164 @@
+// Decoder: handles and the region of interest.
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "server/wire/decode.h"
+#include "server/wire/decode_parts.h"
+
+namespace lpdeform {
+namespace {
+
+Hold decode_hold(const v1::Handle& message) {
+  switch (message.hold_case()) {
+    case v1::Handle::kSoft:
+      return message.soft().has_weight() ? Soft{message.soft().weight()} : Soft{};
+    case v1::Handle::kOrientation:
+      return message.orientation().has_weight() ? Orientation{message.orientation().weight()} : Orientation{};
+    case v1::Handle::kAxisLock:
+      return AxisLock{decode_vector(message.axis_lock().axis())};
+    case v1::Handle::kPlaneLock:
+      return PlaneLock{decode_vector(message.plane_lock().normal())};
+    case v1::Handle::HOLD_NOT_SET:
+      break;
+  }
+  return Exactly{};
+}
+
+}  // namespace
+
+absl::Status Decoder::take_room(std::uint64_t& room, std::uint64_t count, std::string_view what) const {
+  if (count <= room) {
+    room -= count;
+    return absl::OkStatus();
+  }
+  return invalid_input(
+      {"HANDLE_TOO_MANY_VERTICES", std::string(what), absl::StrCat(vertex_count_, " in all")},
+      absl::StrCat("The update has more ", std::string(what), " than the mesh's ", vertex_count_,
+                   " vertices."));
+}
+
+absl::StatusOr<HandleMotion> Decoder::motion(const v1::Motion& message) {
+  if (message.has_fixed()) return Fixed{};
+  if (message.has_rigid()) {
+    const v1::RigidMotion& rigid = message.rigid();
+    return RigidMotion{decode_vector(rigid.axis()), rigid.angle_radians(), decode_vector(rigid.center()),
+                       decode_vector(rigid.translation())};
+  }
+  if (!message.has_targets()) {
+    return invalid_input({"MOTION_MISSING", "motion", ""},
+                         "A motion says neither fixed nor rigid nor targets.");
+  }
+  const auto targets = points(message.targets().scalar(), message.targets().positions(), "target positions");
+  if (!targets.ok()) return targets.status();
+  if (absl::Status status = take_room(room_for_targets_, targets->count, "target positions"); !status.ok())
+    return status;
+  return TargetPositions{targets->unpack()};
+}
+
+absl::StatusOr<std::vector<std::int32_t>> Decoder::indices(const v1::Buffer& buffer, std::string_view what,
+                                                           std::uint64_t& room,
+                                                           const OutOfRange& out_of_range) {
+  const auto data = bytes(buffer, what);
+  if (!data.ok()) return data.status();
+  if (data->view.size() % sizeof(std::uint32_t) != 0) {
+    return wrong_size(what, data->view.size(), "a multiple of 4");
+  }
+  const std::size_t count = data->view.size() / sizeof(std::uint32_t);
+  if (absl::Status status = take_room(room, count, what); !status.ok()) return status;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (packed_index(data->view, k) > kMostIndex) return out_of_range(packed_index(data->view, k));
+  }
+  std::vector<std::int32_t> result(count);
+  unpack_indices(data->view, count, result.data());
+  return result;
+}
+
+absl::StatusOr<std::vector<SurfacePoint>> Decoder::surface_points(const v1::SurfacePoints& message,
+                                                                  const std::string& name) {
+  const auto faces =
+      indices(message.faces(), "handle points", room_for_vertices_, [this, &name](std::uint32_t face) {
+        return handle_face_out_of_range(name, face, features_ ? features_->shape().face_count() : kMostIndex);
+      });
+  if (!faces.ok()) return faces.status();
+  const auto coordinates = points(message.scalar(), message.barycentric(), "barycentric coordinates");
+  if (!coordinates.ok()) return coordinates.status();
+  if (coordinates->count != faces->size()) {
+    return invalid_input({"HANDLE_POINT_COUNT", "barycentric", absl::StrCat(3 * faces->size(), " numbers")},
+                         absl::StrCat("There are ", 3 * coordinates->count, " barycentric coordinates for ",
+                                      faces->size(), " points; each takes three."));
+  }
+  const Points barycentric = coordinates->unpack();
+  std::vector<SurfacePoint> result(faces->size());
+  for (std::size_t k = 0; k < result.size(); ++k) {
+    result[k] = {(*faces)[k], barycentric.row(static_cast<Eigen::Index>(k)).transpose()};
+  }
+  return result;
+}
+
+absl::StatusOr<std::vector<std::int32_t>> Decoder::region(const v1::RegionOfInterest& message) {
+  if (!message.has_vertices()) return std::vector<std::int32_t>{};
+  auto vertices =
+      indices(message.vertices(), "region vertices", room_for_region_,
+              [this](std::uint32_t vertex) { return region_vertex_out_of_range(vertex, vertex_count_); });
+  if (!vertices.ok() || !vertices->empty()) return vertices;
+  return invalid_input({"REGION_EMPTY", "region", "at least 1 vertex"},
+                       "The region of interest has no vertex; nothing could move.");
+}
+
+absl::StatusOr<Handle> Decoder::group(const v1::Handle& message, const std::string& name) {
+  Handle handle;
+  if (message.has_vertices() || !message.has_points()) {
+    auto vertices = indices(message.vertices(), "handle vertices", room_for_vertices_,
+                            [this, &name](std::uint32_t vertex) {
+                              return handle_vertex_out_of_range(name, vertex, vertex_count_);
+                            });
+    if (!vertices.ok()) return vertices.status();
+    handle.vertices = *std::move(vertices);
+  }
+  if (message.has_points()) {
+    auto points = surface_points(message.points(), name);
+    if (!points.ok()) return points.status();
+    handle.points = *std::move(points);
+  }
+  if (message.has_motion()) {
+    auto moved = motion(message.motion());
+    if (!moved.ok()) return moved.status();
+    handle.motion = *std::move(moved);
+  }
+  handle.hold = decode_hold(message);
+  handle.footprint = message.footprint_radius();
+  return handle;
+}
+
+absl::StatusOr<HandleChange> Decoder::handle(const v1::HandleUpdate& message) {
+  HandleChange out{message.name(), Removal{}};
+  if (message.has_remove()) return out;
+  if (message.has_move()) {
+    auto moved = motion(message.move());
+    if (!moved.ok()) return moved.status();
+    out.change = *std::move(moved);
+    return out;
+  }
+  if (!message.has_set()) {
+    return invalid_input({"HANDLE_CHANGE_MISSING", "handles", ""},
+                         "A change of a handle says neither set nor move nor remove.");
+  }
+  auto handle = group(message.set(), message.name());
+  if (!handle.ok()) return handle.status();
+  out.change = *std::move(handle);
+  return out;
+}
+
+absl::Status Decoder::handles(const google::protobuf::RepeatedPtrField<v1::HandleUpdate>& messages,
+                              Update& out) {
+  for (const v1::HandleUpdate& message : messages) {
+    auto change = handle(message);
+    if (!change.ok()) return change.status();
+    out.handles.push_back(*std::move(change));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace lpdeform

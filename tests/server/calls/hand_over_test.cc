@@ -1,0 +1,124 @@
+// Two servers with one Redis: who comes by the session's way to the one that does not have it is given it, who comes by another is not.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "redis_server.h"
+#include "restart_fixture.h"
+#include "server/store/redis_store.h"
+
+namespace lpdeform {
+namespace {
+
+class HandOverCallsTest : public RestartTest {
+ protected:
+  void SetUp() override {
+    ServerOptions options = options_;
+    for (ServerOptions* const one : {&options_, &options}) {
+      auto store = open_redis_store({.host = "127.0.0.1", .port = redis_.port()});
+      ASSERT_TRUE(store.ok()) << store.status();
+      one->store = *std::move(store);
+    }
+    start();
+    auto server = Server::start(options);
+    ASSERT_TRUE(server.ok()) << server.status();
+    other_server_ = *std::move(server);
+    other_ = v1::DeformService::NewStub(
+        grpc::CreateChannel(other_server_->address(), grpc::InsecureChannelCredentials()));
+  }
+  ~HandOverCallsTest() override {  // while there is a Redis
+    other_server_.reset();
+    server_.reset();
+    options_.store.reset();
+  }
+
+  /// A way of "": without the header.
+  v1::CreateSessionResponse create_by(const std::string& way) {
+    grpc::ClientContext context;
+    if (!way.empty()) context.AddMetadata("lpdeform-session", way);
+    v1::CreateSessionResponse response;
+    v1::CreateSessionRequest request;
+    *request.mutable_mesh() = mesh_message(mesh_);
+    EXPECT_TRUE(stub_->CreateSession(&context, request, &response).ok());
+    return response;
+  }
+
+  static grpc::Status get_by(const std::string& way, v1::DeformService::Stub& stub, const std::string& name,
+                             v1::Session& session) {
+    grpc::ClientContext context;
+    if (!way.empty()) context.AddMetadata("lpdeform-session", way);
+    v1::GetSessionRequest request;
+    request.set_session(name);
+    v1::GetSessionResponse response;
+    const grpc::Status status = stub.GetSession(&context, request, &response);
+    session = response.session();
+    return status;
+  }
+
+  const TriangleMesh mesh_ = bar_mesh();
+  RedisServer redis_{folder_};
+  std::unique_ptr<Server> other_server_;
+  std::unique_ptr<v1::DeformService::Stub> other_;
+};
+
+TEST_F(HandOverCallsTest, InTheMiddleOfADragNoUpdateIsRefusedAndNoneThatWasKeptIsLost) {
+  const auto session = create_by("the way");
+  const std::string name = session.session().name();
+  ASSERT_TRUE(take(session, ends_message(mesh_.vertices, 1, 1)).kept());
+  DeformClient stream(*stub_, session);
+  std::thread dragging([&] {
+    for (std::uint64_t seq = 2; stream.send(tip_message(seq, 0.001 * static_cast<double>(seq % 1000)));
+         ++seq) {
+    }
+  });
+  v1::Session found;
+  grpc::Status given;
+  std::thread asking([&] {
+    const auto end = std::chrono::steady_clock::now() + kTestDeadline;
+    do given = get_by("the way", *other_, name, found);
+    while (given.error_code() == grpc::StatusCode::UNAVAILABLE && std::chrono::steady_clock::now() < end);
+  });
+  EXPECT_TRUE(stream.read_to_end().ok());
+  dragging.join();
+  asking.join();
+  ASSERT_TRUE(given.ok()) << given.error_message();
+  ASSERT_EQ(stream.history.ends.size(), 1u);
+  EXPECT_EQ(stream.history.ends[0].reason(), v1::GO_AWAY_REASON_DRAINING);
+  EXPECT_TRUE(stream.history.faults.empty());
+  std::uint64_t kept = 1;
+  for (const v1::UpdateResult& result : stream.history.results) {
+    if (result.kept()) kept = std::max(kept, result.input_seq());
+  }
+  EXPECT_GE(found.input_seq(), kept);
+  EXPECT_GT(found.epoch(), session.session().epoch());
+  v1::Session astray;
+  const grpc::Status elsewhere = get_by("another way", *stub_, name, astray);
+  EXPECT_EQ(details_of(elsewhere).info.reason(), "SESSION_ELSEWHERE");
+}
+
+/// Whose maker said a way, or none. Each look waits for longer than a session counts as in use after a call.
+class LookFromElsewhereTest : public HandOverCallsTest, public testing::WithParamInterface<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(MadeBy, LookFromElsewhereTest, testing::Values("the way", ""),
+                         [](const auto& info) { return *info.param == '\0' ? "NoWay" : "AWay"; });
+
+TEST_P(LookFromElsewhereTest, DoesNotEndADragThatRests) {
+  const auto session = create_by(GetParam());
+  DeformClient stream(*stub_, session);
+  ASSERT_TRUE(stream.send(ends_message(mesh_.vertices, 1, 1)));
+  ASSERT_TRUE(stream.settle(1).has_value());
+  for (int look = 0; look < 3; ++look) {
+    v1::Session found;
+    const ErrorDetails refusal = details_of(get_by("", *other_, session.session().name(), found));
+    EXPECT_EQ(refusal.info.reason(), "SESSION_ELSEWHERE");
+    EXPECT_TRUE(refusal.retry.has_value());
+  }
+  ASSERT_TRUE(stream.send(tip_message(2, 1.5)));
+  EXPECT_TRUE(stream.settle(2).has_value());
+  EXPECT_TRUE(stream.history.ends.empty());
+}
+
+}  // namespace
+}  // namespace lpdeform
