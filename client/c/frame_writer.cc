@@ -10,8 +10,8 @@
 #include "absl/strings/str_cat.h"
 #include "client/c/arguments.h"
 #include "client/c/vertex_source.h"
+#include "core/base/colour.h"
 #include "core/base/fault.h"
-#include "core/mesh/colour.h"
 
 namespace lpdeform::engine {
 namespace {

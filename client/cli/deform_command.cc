@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "client/cli/handle_file.h"
+#include "client/cli/files/handle_file.h"
+#include "client/cli/files/mesh_input.h"
+#include "client/cli/files/outputs.h"
+#include "client/cli/files/text_file.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/local_server.h"
-#include "client/cli/mesh_input.h"
-#include "client/cli/outputs.h"
 #include "client/cli/progress.h"
 #include "client/cli/report.h"
-#include "client/cli/text_file.h"
 #include "client/cpp/client.h"
 #include "core/base/fault.h"
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "client/cli/exit_status.h"
-#include "client/cli/material_input.h"
-#include "client/cli/outputs.h"
+#include "client/cli/files/material_input.h"
+#include "client/cli/files/outputs.h"
 #include "client/cli/server_access.h"
 #include "client/cpp/types.h"
 

@@ -6,10 +6,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "client/cli/core_motion.h"
+#include "client/cli/files/core_motion.h"
 #include "core/base/fault.h"
-#include "core/mesh/shapes.h"
-#include "core/solve/paper_poses.h"
+#include "core/shapes/paper_poses.h"
+#include "core/shapes/shapes.h"
 
 namespace lpdeform::cli {
 namespace {
@@ -34,7 +34,7 @@ void hold(GeneratedShape& shape, const char* name, const std::function<bool(cons
   shape.handles.push_back(std::move(handle));
 }
 
-/// The paper's poses, by what core/solve/paper_poses.h makes.
+/// The paper's poses, by what core/shapes/paper_poses.h makes.
 template <PaperPose (*make)(double size)>
 GeneratedShape paper_shape(int detail) {
   PaperPose pose = make(detail);

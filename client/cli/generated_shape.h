@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "client/cli/handle_file.h"
+#include "client/cli/files/handle_file.h"
 #include "core/mesh/mesh.h"
 
 namespace lpdeform::cli {

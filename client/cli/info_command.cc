@@ -2,7 +2,7 @@
 
 #include <cstdio>
 
-#include "client/cli/mesh_input.h"
+#include "client/cli/files/mesh_input.h"
 #include "client/cli/report.h"
 
 namespace lpdeform::cli {

@@ -13,10 +13,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "client/cli/files/text_file.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/load/lane.h"
 #include "client/cli/progress.h"
-#include "client/cli/text_file.h"
 
 namespace lpdeform::cli {
 namespace {

@@ -25,7 +25,7 @@
 #include "client/cli/shape_command.h"
 #include "client/cli/snapshot_command.h"
 #include "core/base/fault.h"
-#include "core/solve/paper_poses.h"
+#include "core/shapes/paper_poses.h"
 
 namespace lpdeform::cli {
 namespace {

@@ -12,16 +12,16 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "client/cli/core_motion.h"
-#include "client/cli/handle_file.h"
+#include "client/cli/files/core_motion.h"
+#include "client/cli/files/handle_file.h"
+#include "client/cli/files/mesh_input.h"
+#include "client/cli/files/text_file.h"
 #include "client/cli/interrupt.h"
-#include "client/cli/mesh_input.h"
 #include "client/cli/progress.h"
 #include "client/cli/reproduce/page.h"
-#include "client/cli/text_file.h"
 #include "core/base/fault.h"
 #include "core/base/workers.h"
-#include "core/mesh/whole_file.h"
+#include "core/io/whole_file.h"
 
 namespace lpdeform::cli {
 namespace {

@@ -10,17 +10,17 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "client/cli/files/mesh_input.h"
+#include "client/cli/files/outputs.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/local_server.h"
-#include "client/cli/mesh_input.h"
-#include "client/cli/outputs.h"
 #include "client/cli/progress.h"
 #include "client/cpp/client.h"
 #include "core/base/fault.h"
 #include "core/mesh/weld.h"
-#include "core/solve/resize.h"
-#include "core/solve/resize_extents.h"
-#include "core/solve/sparing.h"
+#include "core/resize/resize.h"
+#include "core/resize/resize_extents.h"
+#include "core/resize/sparing.h"
 
 namespace lpdeform::cli {
 namespace {

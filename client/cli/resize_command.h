@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "client/cli/exit_status.h"
-#include "client/cli/outputs.h"
+#include "client/cli/files/outputs.h"
 #include "client/cli/server_access.h"
 
 namespace lpdeform::cli {
@@ -24,7 +24,7 @@ struct ResizeOptions {
 };
 
 /// Content-aware resizing of a mesh to the extent of the scaled one along every axis: the least of the three factors by
-/// plain scaling, then, as core/solve/resize.h and resize_extents.h have it, one solve for each axis that
+/// plain scaling, then, as core/resize/resize.h and resize_extents.h have it, one solve for each axis that
 /// differs from it, each from the result before, blended with the plain scaling by sparing.h of the mesh as it is given. Prints
 /// one line a solve. The distortion written to a .ply or shown in a .png is that of the last solve.
 ExitStatus run_resize(const ResizeOptions& options);

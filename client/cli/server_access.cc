@@ -6,7 +6,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
-#include "client/cli/text_file.h"
+#include "client/cli/files/text_file.h"
 #include "core/base/fault.h"
 
 namespace lpdeform::cli {

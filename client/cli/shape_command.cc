@@ -3,9 +3,9 @@
 #include <array>
 #include <cstdio>
 
+#include "client/cli/files/outputs.h"
+#include "client/cli/files/text_file.h"
 #include "client/cli/generated_shape.h"
-#include "client/cli/outputs.h"
-#include "client/cli/text_file.h"
 
 namespace lpdeform::cli {
 namespace {

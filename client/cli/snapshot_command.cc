@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <string>
 
-#include "client/cli/text_file.h"
+#include "client/cli/files/text_file.h"
 #include "client/cpp/client.h"
 
 namespace lpdeform::cli {

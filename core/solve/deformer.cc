@@ -4,7 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
-#include "core/solve/check_settings.h"
+#include "core/problem/check_settings.h"
 #include "core/solve/deformer_impl.h"
 
 namespace lpdeform {

@@ -9,11 +9,11 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/base/workers.h"
+#include "core/constraints/constraints.h"
 #include "core/energy/material.h"
 #include "core/energy/rest_shape.h"
-#include "core/solve/constraints.h"
-#include "core/solve/handles.h"
-#include "core/solve/settings.h"
+#include "core/problem/handles.h"
+#include "core/problem/settings.h"
 #include "core/solve/summary.h"
 
 namespace lpdeform {

@@ -5,12 +5,12 @@
 #include <limits>
 #include <utility>
 
-#include "core/solve/conic.h"
-#include "core/solve/holds.h"
-#include "core/solve/line_search.h"
-#include "core/solve/local_global.h"
-#include "core/solve/multiresolution.h"
-#include "core/solve/two_attempts.h"
+#include "core/constraints/holds.h"
+#include "core/methods/conic.h"
+#include "core/methods/line_search.h"
+#include "core/methods/local_global.h"
+#include "core/methods/two_attempts.h"
+#include "core/multiresolution/multiresolution.h"
 
 namespace lpdeform {
 namespace {
@@ -27,6 +27,25 @@ constexpr double kSecondWork = 2e7;
 constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
+
+class DeformerOfLevel : public LevelSolver {
+ public:
+  explicit DeformerOfLevel(std::unique_ptr<Deformer> deformer) : deformer_(std::move(deformer)) {}
+
+  absl::Status set_material(const Material& material) override { return deformer_->set_material(material); }
+  absl::Status set_handles(const HandleSet& handles) override { return deformer_->set_handles(handles); }
+  absl::Status start(const SolveSettings& settings, std::stop_token stop) override {
+    return deformer_->start(settings, std::move(stop));
+  }
+  bool step() override { return deformer_->step(); }
+  void catch_up() override { deformer_->catch_up(); }
+  int iterations() const override { return deformer_->summary().iterations; }
+  const Points& positions() const override { return deformer_->positions(); }
+  std::size_t memory_bytes() const override { return deformer_->memory_bytes(); }
+
+ private:
+  std::unique_ptr<Deformer> deformer_;
+};
 
 }  // namespace
 
@@ -85,7 +104,12 @@ Problem Deformer::Impl::make_problem() {
 /// Makes the coarse level where there is none. False where the mesh cannot have one, or it has no vertices left for
 /// what the handles ask.
 bool Deformer::Impl::prepare_coarse() {
-  if (!coarse) coarse = CoarseLevel::create(*shape, workers().threads());
+  const auto make_solver = [this](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
+    const DeformerOptions of_level{.free_components = FreeComponents::kStay, .threads = workers().threads()};
+    auto deformer = Deformer::create(std::move(level), of_level);
+    return deformer.ok() ? std::make_unique<DeformerOfLevel>(*std::move(deformer)) : nullptr;
+  };
+  if (!coarse) coarse = CoarseLevel::create(*shape, make_solver);
   return coarse && coarse->take_over(*shape, handles, *constraints, effective_material()).ok();
 }
 

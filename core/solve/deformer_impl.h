@@ -5,11 +5,11 @@
 #include <optional>
 #include <utility>
 
-#include "core/solve/certificate.h"
-#include "core/solve/coarse_level.h"
+#include "core/certificate/certificate.h"
+#include "core/methods/minimiser.h"
+#include "core/methods/quasi_newton.h"
+#include "core/multiresolution/coarse_level.h"
 #include "core/solve/deformer.h"
-#include "core/solve/minimiser.h"
-#include "core/solve/quasi_newton.h"
 
 namespace lpdeform {
 

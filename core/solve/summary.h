@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/base/geometry.h"
-#include "core/solve/settings.h"
+#include "core/problem/settings.h"
 
 namespace lpdeform {
 

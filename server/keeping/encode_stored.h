@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/energy/material.h"
-#include "core/solve/handles.h"
+#include "core/problem/handles.h"
 #include "lpdeform/v1/service.pb.h"
 #include "server/session/session.h"
 

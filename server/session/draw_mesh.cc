@@ -8,7 +8,7 @@
 #include "absl/strings/strip.h"
 #include "core/base/check.h"
 #include "core/base/fault.h"
-#include "core/solve/welded_inputs.h"
+#include "core/problem/welded_inputs.h"
 
 namespace lpdeform {
 

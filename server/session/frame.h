@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/base/geometry.h"
-#include "core/solve/settings.h"
+#include "core/problem/settings.h"
 #include "server/session/draw_mesh.h"
 #include "server/session/quantize.h"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/solve/handles.h"
+#include "core/problem/handles.h"
 #include "server/runtime/timers.h"
 #include "server/session/update.h"
 

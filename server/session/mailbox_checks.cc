@@ -4,10 +4,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
-#include "core/solve/check_settings.h"
-#include "core/solve/constraints.h"
-#include "core/solve/holds.h"
-#include "core/solve/welded_inputs.h"
+#include "core/constraints/constraints.h"
+#include "core/constraints/holds.h"
+#include "core/problem/check_settings.h"
+#include "core/problem/welded_inputs.h"
 #include "server/session/mailbox_candidate.h"
 
 namespace lpdeform {

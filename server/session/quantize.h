@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "core/base/geometry.h"
-#include "core/solve/settings.h"
+#include "core/problem/settings.h"
 
 namespace lpdeform {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/base/geometry.h"
-#include "core/solve/handles.h"
-#include "core/solve/settings.h"
+#include "core/problem/handles.h"
+#include "core/problem/settings.h"
 
 namespace lpdeform {
 

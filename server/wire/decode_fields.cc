@@ -6,7 +6,7 @@
 #include "core/analysis/automatic_material.h"
 #include "core/base/check.h"
 #include "core/base/fault.h"
-#include "core/solve/resize.h"
+#include "core/resize/resize.h"
 #include "server/wire/decode.h"
 #include "server/wire/decode_parts.h"
 

@@ -5,9 +5,9 @@
 
 #include <random>
 
+#include "core/constraints/metric.h"
 #include "core/energy/cell_pass.h"
 #include "core/energy/rotation_fit.h"
-#include "core/solve/metric.h"
 #include "tests/core/poses.h"
 
 namespace lpdeform {

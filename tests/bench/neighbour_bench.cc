@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "client/cpp/client.h"
-#include "core/mesh/shapes.h"
+#include "core/shapes/shapes.h"
 #include "server/server.h"
 
 namespace lpdeform::client {

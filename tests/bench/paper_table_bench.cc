@@ -17,7 +17,7 @@
 #include <limits>
 #include <map>
 
-#include "core/solve/paper_poses.h"
+#include "core/shapes/paper_poses.h"
 #include "tests/core/poses.h"
 
 namespace lpdeform {

@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "client/cli/files/mesh_input.h"
 #include "client/cli/generated_shape.h"
-#include "client/cli/mesh_input.h"
 #include "client/cpp/client.h"
-#include "core/mesh/shapes.h"
+#include "core/shapes/shapes.h"
 #include "tests/client/in_process_server.h"
 
 namespace lpdeform::client {

@@ -5,9 +5,9 @@
 #include <random>
 
 #include "core/energy/rest_shape.h"
-#include "core/mesh/shapes.h"
+#include "core/problem/handles.h"
+#include "core/shapes/shapes.h"
 #include "core/solve/deformer.h"
-#include "core/solve/handles.h"
 
 namespace lpdeform {
 

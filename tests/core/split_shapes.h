@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "core/mesh/shapes.h"
+#include "core/shapes/shapes.h"
 
 namespace lpdeform {
 

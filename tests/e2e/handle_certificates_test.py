@@ -1,6 +1,6 @@
 """Certificates of every kind of handle against an independent solver: handle_certificates_test.py CLI [unittest arguments].
 
-As convex_step_test.py, with the terms of the handles as core/solve/soft_terms.h has them: soft ones add s l^(p-2) |x - t|^2 at
+As convex_step_test.py, with the terms of the handles as core/constraints/soft_terms.h has them: soft ones add s l^(p-2) |x - t|^2 at
 p <= 2, orientations the same of their edges; points and locks are linear equations. clarabel finds the optimum for the rotations
 of lpdeform's result; the certificate must be a bound of it, far from the optimum as well as near.
 """

@@ -5,7 +5,7 @@
 
 #include "core/base/check.h"
 #include "core/energy/rest_shape.h"
-#include "core/mesh/io.h"
+#include "core/io/mesh_io.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace lpdeform;

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <utility>
 
-#include "client/cli/mesh_input.h"
+#include "client/cli/files/mesh_input.h"
 #include "core/base/fault.h"
-#include "core/mesh/shapes.h"
+#include "core/shapes/shapes.h"
 
 namespace lpdeform::cli {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/mesh/colour.h"
+#include "core/base/colour.h"
 
 namespace lpdeform {
 

@@ -14,7 +14,7 @@
 #include "core/base/check.h"
 #include "core/base/fault.h"
 #include "core/base/workers.h"
-#include "core/mesh/whole_file.h"
+#include "core/io/whole_file.h"
 
 namespace lpdeform {
 namespace {

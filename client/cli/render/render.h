@@ -5,8 +5,8 @@
 
 #include "absl/status/status.h"
 #include "client/cli/render/image.h"
+#include "core/base/colour.h"
 #include "core/base/geometry.h"
-#include "core/mesh/colour.h"
 
 namespace lpdeform {
 

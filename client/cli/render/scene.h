@@ -4,8 +4,8 @@
 
 #include "client/cli/render/camera.h"
 #include "client/cli/render/raster.h"
+#include "core/base/colour.h"
 #include "core/base/geometry.h"
-#include "core/mesh/colour.h"
 
 namespace lpdeform {
 

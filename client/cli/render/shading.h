@@ -1,7 +1,7 @@
 #pragma once
 
+#include "core/base/colour.h"
 #include "core/base/geometry.h"
-#include "core/mesh/colour.h"
 
 namespace lpdeform {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "core/solve/certificate.h"
+#include "core/certificate/certificate.h"
 
 namespace lpdeform::reproduce {
 namespace {

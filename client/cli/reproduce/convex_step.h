@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "core/solve/paper_poses.h"
+#include "core/shapes/paper_poses.h"
 
 namespace lpdeform {
 class RestShape;

@@ -7,7 +7,7 @@
 #include "client/cli/reproduce/markup.h"
 #include "client/cli/reproduce/pictures.h"
 #include "client/cli/reproduce/statistics.h"
-#include "core/mesh/shapes.h"
+#include "core/shapes/shapes.h"
 
 namespace lpdeform::reproduce {
 namespace {

@@ -9,13 +9,13 @@
 
 #include "absl/status/statusor.h"
 #include "client/cli/reproduce/convex_step.h"
+#include "core/shapes/paper_poses.h"
 #include "core/solve/deformer.h"
-#include "core/solve/paper_poses.h"
 
 namespace lpdeform::reproduce {
 
 struct Settings {
-  double size = 1;                // of the generated shapes, see core/solve/paper_poses.h
+  double size = 1;                // of the generated shapes, see core/shapes/paper_poses.h
   int threads = 1;                // of a solve
   std::vector<PaperPose> others;  // beside the paper's
 };

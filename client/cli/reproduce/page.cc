@@ -7,7 +7,7 @@
 #include "absl/strings/str_join.h"
 #include "client/cli/reproduce/markup.h"
 #include "client/cli/reproduce/style.h"
-#include "core/mesh/colour.h"
+#include "core/base/colour.h"
 
 namespace lpdeform::reproduce {
 namespace {

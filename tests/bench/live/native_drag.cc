@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "client/cpp/client.h"
-#include "core/mesh/shapes.h"
+#include "core/shapes/shapes.h"
 
 namespace lpdeform::client {
 namespace {

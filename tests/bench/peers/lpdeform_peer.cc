@@ -16,10 +16,10 @@
 #include <string>
 #include <vector>
 
-#include "core/mesh/io.h"
-#include "core/mesh/shapes.h"
+#include "core/io/mesh_io.h"
+#include "core/shapes/paper_poses.h"
+#include "core/shapes/shapes.h"
 #include "core/solve/deformer.h"
-#include "core/solve/paper_poses.h"
 #include "tests/bench/creature_pose.h"
 
 namespace {

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "absl/strings/str_split.h"
-#include "core/mesh/io.h"
+#include "core/io/mesh_io.h"
 #include "tests/bench/creature_pose.h"
 
 namespace {

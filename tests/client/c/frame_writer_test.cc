@@ -8,8 +8,8 @@
 #include <cstring>
 #include <vector>
 
+#include "core/base/colour.h"
 #include "core/base/fault.h"
-#include "core/mesh/colour.h"
 
 namespace lpdeform::engine {
 namespace {

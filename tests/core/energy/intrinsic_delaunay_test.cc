@@ -8,7 +8,7 @@
 
 #include "core/energy/cell_pass.h"
 #include "core/energy/weights.h"
-#include "tests/core/mesh/support.h"
+#include "tests/core/mesh_support.h"
 #include "tests/core/poses.h"
 
 namespace lpdeform {

@@ -6,7 +6,7 @@
 
 #include "core/base/fault.h"
 #include "core/energy/material.h"
-#include "core/mesh/shapes.h"
+#include "core/shapes/shapes.h"
 
 namespace lpdeform {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "core/mesh/shapes.h"
+#include "core/shapes/shapes.h"
 
 namespace lpdeform {
 namespace {

@@ -1,6 +1,6 @@
 #include "core/mesh/carried_normals.h"
 
-#include "support.h"
+#include "tests/core/mesh_support.h"
 #include "tests/core/split_shapes.h"
 
 namespace lpdeform {

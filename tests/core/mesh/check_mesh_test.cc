@@ -2,9 +2,9 @@
 #include <limits>
 
 #include "core/mesh/report.h"
-#include "core/mesh/shapes.h"
 #include "core/mesh/weld.h"
-#include "tests/core/mesh/support.h"
+#include "core/shapes/shapes.h"
+#include "tests/core/mesh_support.h"
 #include "tests/core/split_shapes.h"
 
 namespace lpdeform {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "core/mesh/report.h"
-#include "core/mesh/shapes.h"
+#include "core/shapes/shapes.h"
 
 namespace lpdeform {
 namespace {

@@ -3,7 +3,7 @@
 #include <limits>
 #include <random>
 
-#include "support.h"
+#include "tests/core/mesh_support.h"
 #include "tests/core/split_shapes.h"
 
 namespace lpdeform {

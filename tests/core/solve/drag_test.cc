@@ -7,7 +7,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
-#include "core/solve/paper_poses.h"
+#include "core/shapes/paper_poses.h"
 #include "tests/core/poses.h"
 
 namespace lpdeform {

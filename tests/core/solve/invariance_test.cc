@@ -12,7 +12,7 @@
 #include <tuple>
 #include <vector>
 
-#include "core/solve/paper_poses.h"
+#include "core/shapes/paper_poses.h"
 #include "tests/core/poses.h"
 
 namespace lpdeform {

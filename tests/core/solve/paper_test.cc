@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "core/solve/conic_step.h"
+#include "core/methods/conic_step.h"
 #include "tests/core/poses.h"
 
 namespace lpdeform {

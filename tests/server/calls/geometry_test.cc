@@ -10,7 +10,7 @@
 
 #include "core/analysis/automatic_material.h"
 #include "core/mesh/weld.h"
-#include "core/solve/resize.h"
+#include "core/resize/resize.h"
 #include "service_fixture.h"
 #include "tests/core/split_shapes.h"
 

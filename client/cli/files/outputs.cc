@@ -1,0 +1,113 @@
+#include "client/cli/files/outputs.h"
+
+#include <algorithm>
+#include <cctype>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/files/mesh_input.h"
+#include "client/cli/files/text_file.h"
+#include "core/base/fault.h"
+#include "core/io/obj_normals.h"
+
+namespace lpdeform::cli {
+namespace {
+
+std::string ending_of(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending;
+}
+
+/// Also by different ways, as ./a and a. Streams such as /dev/stdout may be named as often as one likes.
+bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::error_code error;
+  if (std::filesystem::exists(a, error) && !std::filesystem::is_regular_file(a, error)) return false;
+  const auto whole = [&](const std::filesystem::path& path) {
+    std::filesystem::path found =
+        std::filesystem::weakly_canonical(std::filesystem::absolute(path, error), error);
+    return error ? path : found;
+  };
+  return whole(a) == whole(b);
+}
+
+}  // namespace
+
+absl::StatusOr<PictureStyle> picture_style(const PictureOptions& options) {
+  PictureStyle style;
+  if (options.size.size() == 2) style.width = options.size[0], style.height = options.size[1];
+  style.red = options.red;
+  if (!options.camera) return style;
+  const auto file = read_deformable(*options.camera);
+  if (!file.ok()) return said_of("--camera", file.status());
+  const Faces& faces = file->mesh.faces;
+  style.frame.resize(faces.size(), 3);
+  for (Eigen::Index k = 0; k < faces.size(); ++k)
+    style.frame.row(k) = file->mesh.vertices.row(faces.reshaped()[k]);
+  return style;
+}
+
+absl::Status check_outputs(std::span<const std::filesystem::path> paths) {
+  for (const std::filesystem::path& path : paths) {
+    const std::string ending = ending_of(path);
+    if (ending != ".ply" && ending != ".obj" && ending != ".off" && ending != ".png") {
+      return invalid_input(
+          {"OUT_FORMAT_UNKNOWN", path.string(), "ending = .ply, .obj, .off or .png"},
+          absl::StrCat("\"", path.string(), "\" ends in none of .ply, .obj, .off and .png."));
+    }
+    absl::Status folder = check_folder(path);
+    if (!folder.ok()) return folder;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status check_apart(std::span<const NamedFile> written, std::span<const NamedFile> read) {
+  std::vector<NamedFile> before(read.begin(), read.end());
+  for (const NamedFile& file : written) {
+    for (const NamedFile& other : before) {
+      if (!is_same_file(file.path, other.path)) continue;
+      return invalid_input({"OUT_TWICE", file.path.string(), "a file of its own"},
+                           absl::StrCat("\"", file.path.string(), "\" is given for ", other.option,
+                                        " and for ", file.option, "; it would be overwritten."));
+    }
+    before.push_back(file);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status check_normals_have_output(std::span<const std::filesystem::path> paths) {
+  const bool has_output = std::ranges::any_of(paths, [](const std::filesystem::path& path) {
+    return ending_of(path) == ".obj" || ending_of(path) == ".ply";
+  });
+  if (has_output) return absl::OkStatus();
+  return invalid_input({"OUT_WITHOUT_NORMALS", "--normals", "an output that ends in .obj or .ply"},
+                       "--normals is given, but no --out ends in .obj or .ply, which hold normals.");
+}
+
+absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
+                          const Field& distortion, std::optional<double> weld, const PictureStyle& style) {
+  const std::string ending = ending_of(path);
+  if (ending == ".png") {
+    PictureStyle with_colours = style;
+    with_colours.distortion = distortion;
+    return render_png(path, file.mesh.faces, positions, with_colours);
+  }
+  if (ending == ".obj" && has_obj_normals(file))
+    return write_text(path, obj_text_with_normals(file, positions, weld));
+  return write_mesh(path, file, positions, distortion);
+}
+
+absl::Status write_output_with_normals(const std::filesystem::path& path, const MeshFile& file,
+                                       const Points& positions, const Field& distortion,
+                                       const Points& normals, std::optional<double> weld,
+                                       const PictureStyle& style) {
+  const std::string ending = ending_of(path);
+  if (ending == ".obj") return write_text(path, obj_text_with_normals(file, positions, weld));
+  if (ending == ".ply") return write_mesh(path, file, positions, distortion, normals);
+  return write_output(path, file, positions, distortion, weld, style);
+}
+
+}  // namespace lpdeform::cli

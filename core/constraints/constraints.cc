@@ -1,0 +1,209 @@
+#include "core/constraints/constraints.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "core/constraints/holds.h"
+#include "core/energy/rotation_fit.h"
+#include "core/problem/footprint.h"
+
+namespace lpdeform {
+namespace {
+
+/// The handle's targets in scaled units.
+absl::StatusOr<Points> scaled_targets(const RestShape& shape, const std::string& name, const Handle& handle,
+                                      const Points& targets) {
+  const Points scaled = (targets.rowwise() - shape.centre()) / shape.mean_edge_length();
+  for (Eigen::Index k = 0; k < scaled.rows(); ++k) {
+    if (scaled.row(k).stableNorm() * shape.mean_edge_length() <= kFarthestTarget * shape.diagonal()) continue;
+    const std::string member =
+        handle.points.empty() ? absl::StrCat("vertex ", handle.vertices[k]) : absl::StrCat("point ", k);
+    return invalid_input(
+        {"HANDLE_TARGET_TOO_FAR", member, "1e9 diagonals of the mesh"},
+        absl::StrCat("handle \"", name, "\" sends ", member, " over 1e9 diagonals of the mesh away"));
+  }
+  return scaled;
+}
+
+absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Constraints& constraints,
+                          Holds& holds) {
+  for (const auto& [name, handle] : handles.handles()) {
+    const Points targets = target_positions(handle, shape.positions(), shape.faces());
+    const auto scaled = scaled_targets(shape, name, handle, targets);
+    if (!scaled.ok()) return scaled.status();
+    add_holds(shape, name, handle, *scaled, holds);
+    if (!std::holds_alternative<Exactly>(handle.hold)) continue;
+    for (std::size_t k = 0; k < handle.vertices.size(); ++k) {
+      const std::int32_t vertex = handle.vertices[k];
+      constraints.is_held[vertex] = true;
+      constraints.targets.row(vertex) = scaled->row(k);
+      constraints.exact.row(vertex) = targets.row(k);
+    }
+  }
+  return absl::OkStatus();
+}
+
+/// Holds everything outside the region where `outside` has it, and unreferenced vertices; rows that only such
+/// vertices would meet are void.
+void hold_outside(const RestShape& shape, const std::vector<std::int32_t>* region, const Points& outside,
+                  Constraints& constraints, Holds& holds) {
+  std::vector<char> may_move(shape.vertex_count(), region == nullptr);
+  if (region != nullptr) {
+    for (const std::int32_t vertex : *region) may_move[vertex] = true;
+  }
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    if (shape.components()[i] < 0) {
+      may_move[i] = false;
+      constraints.is_held[i] = true;
+    } else if (!may_move[i]) {
+      constraints.is_held[i] = true;
+      constraints.targets.row(i) = (outside.row(i) - shape.centre()) / shape.mean_edge_length();
+      constraints.exact.row(i) = outside.row(i);
+    }
+  }
+  std::erase_if(holds.rows, [&](const LinearRow& row) {
+    return std::none_of(row.point.vertices.begin(), row.point.vertices.begin() + row.point.count,
+                        [&](std::int32_t vertex) { return may_move[vertex]; });
+  });
+}
+
+bool is_lock(const Hold& hold) {
+  return std::holds_alternative<AxisLock>(hold) || std::holds_alternative<PlaneLock>(hold);
+}
+
+/// Components that something keeps from drifting off, locks left out or not.
+std::vector<char> tied_components(const RestShape& shape, const HandleSet& handles,
+                                  const Constraints& constraints, bool with_locks) {
+  std::vector<char> is_tied(shape.component_count(), false);
+  const auto tie = [&](std::int32_t vertex) {
+    if (shape.components()[vertex] >= 0) is_tied[shape.components()[vertex]] = true;
+  };
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    if (constraints.is_held[i]) tie(i);
+  }
+  for (const auto& [name, handle] : handles.handles()) {
+    if (!ties_component(handle) || (is_lock(handle.hold) && !with_locks)) continue;
+    for (std::size_t k = 0; k < handle.size(); ++k) tie(point_form(shape, handle, k).vertices[0]);
+  }
+  return is_tied;
+}
+
+absl::Status name_free_component(const RestShape& shape, std::int32_t component) {
+  const auto& components = shape.components();
+  const auto first = std::find(components.begin(), components.end(), component) - components.begin();
+  const auto size = std::count(components.begin(), components.end(), component);
+  return make_fault(
+      absl::StatusCode::kFailedPrecondition,
+      {"COMPONENT_WITHOUT_HANDLE", absl::StrCat("component ", component), "at least 1 handle a component"},
+      absl::StrCat("component ", component, " of the mesh (", size, " vertices, the first of them vertex ",
+                   first, ") has no handle"));
+}
+
+/// The rigid motion of the handle that has the vertex nearest to `point`, all at rest, in scaled units.
+RigidTransform nearest_handle_motion(const RestShape& shape, const HandleSet& handles,
+                                     const Eigen::RowVector3d& point) {
+  const Points& rest = shape.scaled_positions();
+  const Handle* nearest = nullptr;
+  double shortest = std::numeric_limits<double>::infinity();
+  for (const auto& [name, handle] : handles.handles()) {
+    const Points from = rest_positions(handle, rest, shape.faces());
+    const double distance = (from.rowwise() - point).rowwise().squaredNorm().minCoeff();
+    if (distance < shortest) shortest = distance, nearest = &handle;
+  }
+  const Points from = rest_positions(*nearest, rest, shape.faces());
+  Points to = target_positions(*nearest, shape.positions(), shape.faces());
+  to = (to.rowwise() - shape.centre()) / shape.mean_edge_length();
+  if (std::holds_alternative<TargetPositions>(nearest->motion)) return fit_rigid(from, to);
+  // Of one vertex, or several in a line, the places alone do not tell how it is turned.
+  RigidTransform motion;
+  motion.rotation = rotation_of(nearest->motion);
+  motion.translation = to.colwise().mean() - from.colwise().mean() * motion.rotation.transpose();
+  return motion;
+}
+
+Points component_centres(const RestShape& shape) {
+  Points sums = Points::Zero(shape.component_count(), 3);
+  std::vector<double> counts(shape.component_count(), 0.0);
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    const std::int32_t component = shape.components()[i];
+    if (component < 0) continue;
+    sums.row(component) += shape.scaled_positions().row(i);
+    ++counts[component];
+  }
+  for (std::int32_t c = 0; c < shape.component_count(); ++c) sums.row(c) /= counts[c];
+  return sums;
+}
+
+/// Holds every vertex of the components that no handle holds, moved as `free_components` says.
+void hold_free_components(const RestShape& shape, const HandleSet& handles, FreeComponents free_components,
+                          const std::vector<char>& has_handle, Constraints& constraints) {
+  std::vector<RigidTransform> motions(shape.component_count());
+  if (free_components == FreeComponents::kFollow) {
+    const Points centres = component_centres(shape);
+    for (std::int32_t c = 0; c < shape.component_count(); ++c) {
+      if (!has_handle[c]) motions[c] = nearest_handle_motion(shape, handles, centres.row(c));
+    }
+  }
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    const std::int32_t component = shape.components()[i];
+    if (component < 0 || has_handle[component]) continue;
+    constraints.is_held[i] = true;
+    constraints.targets.row(i) = motions[component](shape.scaled_positions().row(i));
+    if (free_components == FreeComponents::kStay) continue;
+    constraints.exact.row(i) = constraints.targets.row(i) * shape.mean_edge_length() + shape.centre();
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const HandleSet& handles,
+                                             FreeComponents free_components, const Points* outside) {
+  absl::Status status = check_handles(handles, shape.vertex_count(), shape.face_count());
+  if (!status.ok()) return status;
+  if (handles.handles().empty()) {
+    return make_fault(absl::StatusCode::kFailedPrecondition, {"NO_HANDLES", "", "at least 1 handle"},
+                      "there is no handle; a deformation needs at least one");
+  }
+  Constraints constraints{std::vector<char>(shape.vertex_count(), false),
+                          shape.scaled_positions(),
+                          shape.positions(),
+                          {},
+                          {},
+                          footprint_stiffness(shape, handles)};
+  Holds holds;
+  if (status = hold_handles(shape, handles, constraints, holds); !status.ok()) return status;
+  hold_outside(shape, handles.region(), outside ? *outside : shape.positions(), constraints, holds);
+  const std::vector<char> is_tied = tied_components(shape, handles, constraints, true);
+  const auto free = std::find(is_tied.begin(), is_tied.end(), false);
+  if (free != is_tied.end() && free_components == FreeComponents::kError) {
+    return name_free_component(shape, static_cast<std::int32_t>(free - is_tied.begin()));
+  }
+  if (free != is_tied.end()) hold_free_components(shape, handles, free_components, is_tied, constraints);
+  constraints.soft = std::move(holds.soft);
+  auto linear = LinearConstraints::create(std::move(holds.rows), constraints.is_held);
+  if (!linear.ok()) return linear.status();
+  constraints.linear = *std::move(linear);
+  if (tied_components(shape, handles, constraints, false) !=
+      std::vector<char>(shape.component_count(), true)) {
+    constraints.linear.tie_locks();
+  }
+  return constraints;
+}
+
+std::size_t Constraints::memory_bytes() const {
+  return is_held.capacity() + (targets.size() + exact.size() + footprint.size()) * sizeof(double) +
+         soft.rows().capacity() * sizeof(SoftRow) + linear.memory_bytes();
+}
+
+RigidTransform fit_rigid(const Points& from, const Points& to) {
+  const Eigen::RowVector3d from_mean = from.colwise().mean(), to_mean = to.colwise().mean();
+  const Eigen::Matrix3d b = (to.rowwise() - to_mean).transpose() * (from.rowwise() - from_mean);
+  RigidTransform result;
+  result.rotation = fit_rotation(b);
+  result.translation = to_mean - from_mean * result.rotation.transpose();
+  return result;
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/constraints/linear_constraints.h"
+#include "core/constraints/soft_terms.h"
+#include "core/energy/rest_shape.h"
+#include "core/problem/handles.h"
+
+namespace lpdeform {
+
+/// What becomes of a connected component that no handle holds.
+enum class FreeComponents {
+  kError,   // refused: the component is named
+  kStay,    // stays where the rest mesh has it
+  kFollow,  // moves rigidly with the handle that has the vertex nearest to its centre at rest
+};
+
+/// What handles and region of interest ask of positions. Held are the vertices that do not move: of handles that
+/// hold Exactly, outside the region, unreferenced ones, and, where asked for, whole components that nothing
+/// keeps from drifting off.
+struct Constraints {
+  std::vector<char> is_held;  // one a vertex
+  Points targets;             // scaled units; rows of free vertices are the rest positions
+  Points exact;               // the same in the caller's units, for held vertices as they were given
+  SoftTerms soft;             // soft and orientation handles; its length unit is not set
+  LinearConstraints linear;   // points inside faces and locks
+  Field footprint;            // factors of the cells' stiffness; empty where all are 1
+
+  std::size_t memory_bytes() const;
+};
+
+/// No position may be farther from the rest mesh's centre than this many of its diagonals.
+inline constexpr double kFarthestTarget = 1e9;
+
+/// Errors: as check_handles; INVALID_ARGUMENT: HANDLE_TARGET_TOO_FAR (over 1e9 diagonals from the rest mesh);
+/// FAILED_PRECONDITION: NO_HANDLES, COMPONENT_WITHOUT_HANDLE (the component and its lowest vertex; an orientation
+/// handle is none that keeps a component). Also as LinearConstraints::create. `outside`: where vertices outside
+/// the region of interest are held, in the caller's units; null takes the rest positions.
+absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const HandleSet& handles,
+                                             FreeComponents free_components, const Points* outside = nullptr);
+
+/// The rotation and translation that bring points `from` nearest to points `to`: to_k = R from_k + t. For one
+/// point, or points that coincide, a translation.
+struct RigidTransform {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::RowVector3d translation = Eigen::RowVector3d::Zero();
+
+  Eigen::RowVector3d operator()(const Eigen::RowVector3d& point) const {
+    return point * rotation.transpose() + translation;
+  }
+};
+RigidTransform fit_rigid(const Points& from, const Points& to);
+
+}  // namespace lpdeform

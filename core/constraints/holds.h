@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/constraints/linear_constraints.h"
+#include "core/constraints/soft_terms.h"
+#include "core/energy/rest_shape.h"
+#include "core/problem/handles.h"
+
+namespace lpdeform {
+
+/// What the kinds of handles other than Exactly ask of positions, and Exactly of points inside faces: Soft
+/// and Orientation as soft terms, points and locks as rows. All in scaled units.
+struct Holds {
+  SoftTerms soft;
+  std::vector<LinearRow> rows;
+};
+
+/// A handle's vertex or point as a function of positions.
+PointForm point_form(const RestShape& shape, const Handle& handle, std::size_t k);
+
+/// Adds what `handle` asks; nothing for vertices held Exactly, nor for a weight of 0. `targets` are
+/// target_positions in scaled units.
+void add_holds(const RestShape& shape, const std::string& name, const Handle& handle, const Points& targets,
+               Holds& holds);
+
+/// Whether some handle puts equations on positions: points held exactly, and locks.
+bool has_equations(const HandleSet& handles);
+
+/// Whether `handle` keeps its component from drifting off: all do but an orientation, and a weight of 0.
+bool ties_component(const Handle& handle);
+
+}  // namespace lpdeform

@@ -1,0 +1,218 @@
+#include "core/constraints/metric.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace lpdeform {
+namespace {
+
+constexpr std::size_t kChunk = 4096;  // vertices
+constexpr int kPasses = 12;
+constexpr double kRefined = 1e-12;          // the last correction's share of the result
+constexpr std::size_t kUsualBytes = 1000;   // of a factor, for each vertex of a surface
+constexpr std::size_t kBytesPerEntry = 40;  // of the matrix: itself and its places in the factor
+constexpr double kSlowest = 0.3;            // what a correction is of the one before, at most
+
+LowerMatrix lower_pattern(const RestShape& shape) {
+  LowerMatrix matrix;
+  const std::int32_t n = shape.vertex_count();
+  matrix.columns.reserve(n + 1);
+  matrix.columns.push_back(0);
+  for (std::int32_t i = 0; i < n; ++i) {
+    matrix.rows.push_back(i);
+    for (std::int32_t k = shape.offsets()[i]; k < shape.offsets()[i + 1]; ++k) {
+      if (shape.neighbours()[k] > i) matrix.rows.push_back(shape.neighbours()[k]);
+    }
+    matrix.columns.push_back(static_cast<std::int32_t>(matrix.rows.size()));
+  }
+  matrix.values.assign(matrix.rows.size(), 0.0);
+  return matrix;
+}
+
+}  // namespace
+
+absl::StatusOr<Metric> Metric::create(std::shared_ptr<const RestShape> shape, const Admission& admit) {
+  LowerMatrix matrix = lower_pattern(*shape);
+  const auto supernodes = analyse_supernodes(matrix);
+  if (!supernodes.ok()) return supernodes.status();
+  if (admit) {
+    const std::size_t factor = *supernodes ? entry_count(**supernodes) * sizeof(float)
+                                           : kUsualBytes * static_cast<std::size_t>(shape->vertex_count());
+    absl::Status status = admit(factor + kBytesPerEntry * matrix.rows.size());
+    if (!status.ok()) return status;
+  }
+  return Metric(std::move(shape), std::move(matrix), *supernodes);
+}
+
+Metric::Metric(std::shared_ptr<const RestShape> shape, LowerMatrix matrix,
+               const std::optional<SupernodePattern>& supernodes)
+    : shape_(std::move(shape)), matrix_(std::move(matrix)) {
+  if (supernodes) single_.emplace(matrix_, *supernodes);
+}
+
+bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held,
+                    const std::vector<MatrixEntry>& entries, const Workers& workers, Precision precision) {
+  const double largest = *std::max_element(cell_weights.begin(), cell_weights.end());
+  if (!(largest > 0) || !std::isfinite(largest)) return is_good_ = false;
+  std::vector<double> clipped(cell_weights.size());
+  std::transform(cell_weights.begin(), cell_weights.end(), clipped.begin(),
+                 [&](double weight) { return std::max(weight / largest, kLowestShare); });
+  std::vector<MatrixEntry> scaled = entries;
+  for (MatrixEntry& entry : scaled) entry.value /= largest;
+  scale_ = largest;
+  const bool is_same = is_good_ && is_held == is_held_ && clipped == cell_weights_ && scaled == entries_;
+  if (is_same && precision == precision_) return true;  // not a better one: the same result as anew
+  if (!is_same) {
+    cell_weights_ = std::move(clipped);
+    is_held_ = is_held;
+    entries_ = std::move(scaled);
+    fill_matrix(workers);
+  }
+  precision_ = precision;
+  is_single_current_ = is_double_current_ = false;
+  ++version_;
+  if (precision == Precision::kSingle && single_ && single_->factor(matrix_, workers)) {
+    double_.reset();  // several times the memory
+    copy_ = {};
+    return is_good_ = is_single_current_ = true;
+  }
+  return is_good_ = factor_double();
+}
+
+bool Metric::factor_double() const {
+  if (!double_ && single_)
+    double_.emplace(matrix_, single_->result().new_to_old());
+  else if (!double_)
+    double_.emplace(matrix_);
+  copy_.clear();
+  return is_double_current_ = double_->factor(matrix_);
+}
+
+void Metric::fill_matrix(const Workers& workers) {
+  const auto n = static_cast<std::size_t>(shape_->vertex_count());
+  workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (auto i = static_cast<std::int32_t>(begin); i < static_cast<std::int32_t>(end); ++i) {
+      double diagonal = 0;
+      std::int32_t entry = matrix_.columns[i];
+      for (std::int32_t k = shape_->offsets()[i]; k < shape_->offsets()[i + 1]; ++k) {
+        const std::int32_t j = shape_->neighbours()[k];
+        const double weight = edge_weight(i, k);
+        diagonal += weight;
+        if (j > i) matrix_.values[++entry] = is_held_[i] || is_held_[j] ? 0.0 : -weight;
+      }
+      matrix_.values[matrix_.columns[i]] = is_held_[i] ? 1.0 : diagonal;
+    }
+  });
+  for (const MatrixEntry& entry : entries_) add_entry(entry);
+}
+
+void Metric::add_entry(const MatrixEntry& entry) {
+  if (is_held_[entry.row] || is_held_[entry.column]) return;
+  const auto begin = matrix_.rows.begin() + matrix_.columns[entry.column];
+  const auto end = matrix_.rows.begin() + matrix_.columns[entry.column + 1];
+  const auto found = std::lower_bound(begin, end, entry.row);
+  if (found != end && *found == entry.row) {
+    matrix_.values[found - matrix_.rows.begin()] += entry.value;
+    return;
+  }
+  for (const std::int32_t i : {entry.row, entry.column})
+    matrix_.values[matrix_.columns[i]] += std::abs(entry.value);
+}
+
+void Metric::adopt(const std::vector<double>& cell_weights) {
+  const double present = std::accumulate(cell_weights_.begin(), cell_weights_.end(), 0.0);
+  const double wanted = std::accumulate(cell_weights.begin(), cell_weights.end(), 0.0);
+  if (wanted > 0 && std::isfinite(wanted)) scale_ = wanted / present;
+}
+
+void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
+                    const Points* forces) const {
+  Points b = Points::Zero(u.rows(), 3);
+  for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
+    if (is_held[i]) {
+      b.row(i) = u.row(i);
+      continue;
+    }
+    if (forces != nullptr) b.row(i) = forces->row(i) / scale_;
+    for (std::int32_t k = shape_->offsets()[i]; k < shape_->offsets()[i + 1]; ++k) {
+      const std::int32_t j = shape_->neighbours()[k];
+      if (is_held[j]) b.row(i) += edge_weight(i, k) * u.row(j);
+    }
+  }
+  solve_single(b, u, workers);
+  for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
+    if (is_held[i]) u.row(i) = b.row(i);
+  }
+}
+
+/// x = matrix_^-1 b, x not b, by refinement from single precision. False where that does not converge.
+bool Metric::refine(const Points& b, Points& x, const Workers& workers) const {
+  solve_single(b, x, workers);
+  Points rest, correction;
+  double before = x.norm();
+  const double enough = kRefined * before;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    rest = b;
+    subtract_product(x, rest);
+    solve_single(rest, correction, workers);
+    const double size = correction.norm();
+    if (!(size < kSlowest * before || size <= enough)) return false;
+    x += correction;
+    if (size <= enough) return true;
+    before = size;
+  }
+  return false;
+}
+
+void Metric::solve_scaled(const Points& b, Points& x, const Workers& workers) const {
+  if (!is_double_current_ && refine(b, x, workers)) return;
+  if (!is_double_current_ && !factor_double()) {
+    x.setConstant(b.rows(), 3, std::numeric_limits<double>::quiet_NaN());
+    return;
+  }
+  ++back_substitutions_;
+  double_->solve(b, x);
+}
+
+/// b -= matrix_ x.
+void Metric::subtract_product(const Points& x, Points& b) const {
+  for (std::int32_t j = 0; j < matrix_.size(); ++j) {
+    for (std::int32_t entry = matrix_.columns[j]; entry < matrix_.columns[j + 1]; ++entry) {
+      const std::int32_t i = matrix_.rows[entry];
+      b.row(i) -= matrix_.values[entry] * x.row(j);
+      if (i != j) b.row(j) -= matrix_.values[entry] * x.row(i);
+    }
+  }
+}
+
+void Metric::solve_single(const Points& b, Points& x, const Workers& workers, double factor) const {
+  ++back_substitutions_;
+  single().solve(b, x, workers, factor);
+}
+
+const SingleFactor& Metric::single() const {
+  if (is_single_current_) return single_->result();
+  if (copy_.empty()) double_->copy_to(copy_);
+  return copy_;
+}
+
+void Metric::solve(const Points& b, Points& x, const Workers& workers) const {
+  if (&b == &x) return solve(Points(b), x, workers);
+  solve_scaled(b, x, workers);
+  x /= scale_;
+}
+
+void Metric::precondition(const Points& b, Points& x, const Workers& workers) const {
+  solve_single(b, x, workers, 1 / scale_);
+}
+
+std::size_t Metric::memory_bytes() const {
+  return (single_ ? single_->memory_bytes() : 0) + (double_ ? double_->memory_bytes() : 0) +
+         copy_.memory_bytes() + cell_weights_.capacity() * sizeof(double) + is_held_.capacity() +
+         entries_.capacity() * sizeof(MatrixEntry) + matrix_.columns.capacity() * sizeof(std::int32_t) +
+         matrix_.rows.capacity() * (sizeof(std::int32_t) + sizeof(double));
+}
+
+}  // namespace lpdeform

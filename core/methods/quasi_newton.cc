@@ -1,0 +1,252 @@
+#include "core/methods/quasi_newton.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lpdeform {
+namespace {
+
+constexpr std::size_t kMemory = 6;
+constexpr std::size_t kChunk = 4096;  // vertices
+constexpr int kWindow = 20;
+constexpr int kRefresh = 40;
+constexpr int kSoonest = 2;         // iterations between refreshes, where one is asked for
+constexpr double kShortStep = 0.9;  // asks for one
+constexpr int kTrial = 10;          // iterations for which a live session keeps the metric that it finds
+constexpr double kSufficientDecrease = 1e-4;
+constexpr int kStageIterations = 60;
+constexpr double kStageTolerance = 30;  // times the tolerance ends a stage that is not the last
+constexpr double kSmoothingStep = 0.1;  // of eps^2, from stage to stage
+constexpr double kLargeP = 12;
+constexpr double kBias = 3e-4;
+constexpr double kLeastBias = 0.01;  // with kLeastSmoothing
+constexpr double kLiveBias = 0.1;    // of the mean cell's E^p
+// eps^2 over the squared diagonal:
+constexpr double kColdSmoothing = 1e-8, kPreparedSmoothing = 1e-9;
+constexpr double kLeastSmoothing = 1e-26;  // rounding
+
+}  // namespace
+
+QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
+    : problem_(std::move(problem)),
+      norm_(problem_.norm),
+      x_(std::move(x)),
+      memory_(problem_.objective.cells().workers(), kMemory) {
+  const double lowest = problem_.norm.lowest_p();
+  if (lowest < 2) eps2_ = first_smoothing(warmth, lowest);
+  // No way from p = 2 where all p_i > 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8 times
+  // the E^(1/p)).
+  for (const double p : {2.0, 1.6, 1.35, 1.2, 1.1, 1.05}) {
+    if (warmth == Warmth::kCold && p > lowest) shares_.push_back((2 - p) / (2 - lowest));
+  }
+  // By way of p = 4 where p is larger still: straight on, a bent grid at p = 24 ends at 1.9 times the E^(1/p).
+  const double highest = problem_.norm.highest_p();
+  if (warmth == Warmth::kCold && lowest >= 2 && highest > kLargeP) shares_.push_back((4 - 2) / (highest - 2));
+  begin_stage(warmth == Warmth::kWithMetric);
+  true_sum_ = problem_.objective.sum(problem_.norm);
+}
+
+/// The objective of stage_: p first, then eps. problem_.objective holds the evaluation at x_.
+void QuasiNewton::begin_stage(bool keeps_metric) {
+  const bool is_on_the_way = stage_ < static_cast<int>(shares_.size());
+  if (stage_ > static_cast<int>(shares_.size())) eps2_ *= kSmoothingStep;
+  norm_ = (is_on_the_way ? problem_.norm.nearer_two(shares_[stage_]) : problem_.norm).smoothed(eps2_);
+  is_true_norm_ = !is_on_the_way && eps2_ == 0;
+  objective_ = problem_.objective.reweigh(norm_);
+  is_last_stage_ = !is_on_the_way && is_smooth_enough();
+  smoothing_sum_ = is_last_stage_ && norm_.lowest_p() < norm_.highest_p() ? smoothing_sum() : 0;
+  history_.assign(1, objective_);
+  stage_iterations_ = 0;
+  find_gradient();
+  forget();
+  is_metric_good_ = keeps_metric ? adopt_metric() : refresh_metric();
+}
+
+double QuasiNewton::mean_energy() const {
+  double sum = 0;
+  for (const double e2 : problem_.objective.cells().squared_energies()) sum += std::sqrt(e2);
+  return sum / static_cast<double>(problem_.shape().cell_count());
+}
+
+/// eps^2. A live session's cells have energies to go by; a cold guess's are far too large.
+double QuasiNewton::first_smoothing(Warmth warmth, double lowest_p) const {
+  const double diagonal2 = problem_.diagonal * problem_.diagonal;
+  if (warmth == Warmth::kCold) return kColdSmoothing * diagonal2;
+  if (warmth == Warmth::kPrepared) return kPreparedSmoothing * diagonal2;
+  const double eps = std::pow(kLiveBias, 1 / lowest_p) * mean_energy();
+  return std::max(eps * eps, kLeastSmoothing * diagonal2);
+}
+
+/// What the cells with p_i < 2 add to the smoothed objective where they have no distortion.
+double QuasiNewton::smoothing_sum() const {
+  const auto& offsets = problem_.shape().offsets();
+  double sum = 0;
+  for (std::int32_t i = 0; i < problem_.shape().vertex_count(); ++i) {
+    if (problem_.norm.p(i) < 2 && offsets[i + 1] > offsets[i]) sum += problem_.norm.term(i, eps2_).value;
+  }
+  return sum;
+}
+
+/// Smoothing adds up to eps^p to a cell's E_i^p where p_i < 2: too little to matter beside the whole, or less would be lost
+/// in rounding.
+bool QuasiNewton::is_smooth_enough() const {
+  if (eps2_ <= kLeastSmoothing * problem_.diagonal * problem_.diagonal) return true;
+  return smoothing_sum() <= kBias * problem_.objective.sum(problem_.norm);
+}
+
+/// What the last stage has minimised is the true objective but for what smoothing may add.
+bool QuasiNewton::is_end_true() const {
+  const double sum = problem_.objective.sum(problem_.norm);
+  return is_true_norm_ || objective_ - sum <= kLeastBias * sum;
+}
+
+/// The cell weights c_i, those for p_i > 2 raised to their mean where they are below it.
+std::vector<double> QuasiNewton::metric_weights() const {
+  std::vector<double> weights = problem_.objective.cells().cell_weights();
+  if (norm_.highest_p() <= 2) return weights;
+  double sum = 0, count = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    if (norm_.p(static_cast<std::int32_t>(i)) > 2) sum += weights[i], ++count;
+  }
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    if (norm_.p(static_cast<std::int32_t>(i)) > 2) weights[i] = std::max(weights[i], sum / count);
+  }
+  return weights;
+}
+
+/// In a live session the metric of the state before serves at first: a factorisation takes as long as several
+/// iterations.
+bool QuasiNewton::adopt_metric() {
+  since_refresh_ = kRefresh - kTrial;
+  problem_.metric.adopt(metric_weights());
+  return true;
+}
+
+void QuasiNewton::find_gradient() {
+  problem_.objective.gradient(gradient_);
+  restrict_to_free(problem_.constraints, gradient_);
+}
+
+/// No pair is left, nor will the last step make one.
+void QuasiNewton::forget() {
+  memory_.clear();
+  step_length_ = 0;
+}
+
+/// For the present weights. The last step's pair is kept, in the new metric; all are where the metric is the same.
+bool QuasiNewton::refresh_metric() {
+  since_refresh_ = 0;
+  const auto version = problem_.metric.version();
+  const double scale = problem_.metric.scale();
+  if (!problem_.factor_metric(metric_weights(), Metric::Precision::kSingle)) return false;
+  if (problem_.metric.version() == version && problem_.metric.scale() == scale) return true;
+  memory_.clear();
+  if (step_length_ > 0) problem_.precondition(gradient_before_, preconditioned_);
+  return true;
+}
+
+/// d = -H g, H_0 = M^-1: unscaled, since M is the Hessian with rotations and weights held. Returns <g, d>.
+double QuasiNewton::direction() {
+  preconditioned_.swap(preconditioned_before_);
+  problem_.precondition(gradient_, preconditioned_);
+  const double slope = memory_.direction(gradient_, gradient_before_, preconditioned_, preconditioned_before_,
+                                         step_length_, direction_);
+  problem_.constraints.linear.restrict(direction_);  // pairs are kept in single precision
+  step_length_ = 0;
+  return slope;
+}
+
+/// trial_ = x + t * direction.
+void QuasiNewton::go_along(double t) {
+  trial_.resize(x_.rows(), 3);
+  problem_.workers().for_chunks(
+      static_cast<std::size_t>(x_.rows()), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+        const auto first = static_cast<Eigen::Index>(begin), count = static_cast<Eigen::Index>(end - begin);
+        trial_.middleRows(first, count) =
+            x_.middleRows(first, count) + t * direction_.middleRows(first, count);
+      });
+}
+
+/// The step length along direction_, 0 where none is found. problem_.objective holds the evaluation at trial_
+/// afterwards.
+double QuasiNewton::search(double slope) {
+  double t = 1;
+  for (int trial = 0; trial < 40 && !problem_.stop.stop_requested(); ++trial) {
+    go_along(t);
+    const double value = problem_.objective.evaluate(trial_, norm_);
+    if (value <= objective_ + kSufficientDecrease * t * slope) {
+      objective_ = value;
+      return t;
+    }
+    // The minimiser of the parabola through f(0), f'(0), f(t), kept within [t / 10, t / 2].
+    const double parabola =
+        std::isfinite(value) ? -0.5 * slope * t * t / (value - objective_ - slope * t) : 0;
+    t = std::clamp(parabola, 0.1 * t, 0.5 * t);
+  }
+  return 0;
+}
+
+bool QuasiNewton::is_stage_over() const {
+  if (history_.size() <= kWindow) return false;
+  const double tolerance = (is_last_stage_ ? 1 : kStageTolerance) * problem_.tolerance;
+  const double to_lower = std::max(0.0, history_.back() - smoothing_sum_);
+  return history_.front() - history_.back() <= tolerance * norm_.highest_p() * to_lower;
+}
+
+/// problem_.objective holds the evaluation at x_.
+StepResult QuasiNewton::result(Outcome outcome) {
+  true_sum_ = is_true_norm_ ? objective_ : problem_.objective.sum(problem_.norm);
+  return {outcome, objective_, stage_, true_sum_};
+}
+
+/// Where no step along d lowers the objective: a fresh metric without memory, the next stage, or the end.
+StepResult QuasiNewton::give_up(double slope) {
+  problem_.objective.evaluate(x_, norm_);
+  if (problem_.stop.stop_requested()) return result(Outcome::kProgress);
+  if (since_refresh_ > 0 || !memory_.is_empty()) {
+    forget();
+    is_metric_good_ = refresh_metric();
+    return result(Outcome::kProgress);
+  }
+  if (!is_last_stage_ || !is_smooth_enough()) {
+    ++stage_;
+    begin_stage();
+    return result(Outcome::kProgress);
+  }
+  const bool is_good =
+      slope <= 0 && -0.5 * slope <= problem_.tolerance * norm_.highest_p() * objective_ && is_end_true();
+  return result(is_good ? Outcome::kConverged : Outcome::kStalled);
+}
+
+void QuasiNewton::accept(double length) {
+  x_.swap(trial_);
+  gradient_.swap(gradient_before_);
+  find_gradient();
+  step_length_ = last_length_ = length;
+  ++stage_iterations_, ++since_refresh_;
+  history_.push_back(objective_);
+  if (history_.size() > kWindow + 1) history_.pop_front();
+}
+
+StepResult QuasiNewton::step() {
+  if (problem_.is_zero(true_sum_)) return result(Outcome::kConverged);
+  if (!is_last_stage_ && (stage_iterations_ >= kStageIterations || is_stage_over())) {
+    ++stage_;
+    begin_stage();
+  } else if (since_refresh_ >= kRefresh || (last_length_ < kShortStep && since_refresh_ >= kSoonest)) {
+    is_metric_good_ = refresh_metric();
+  }
+  if (!is_metric_good_ || !std::isfinite(objective_)) return result(Outcome::kBreakdown);
+
+  const double slope = direction();
+  const double length = slope < 0 ? search(slope) : 0;
+  if (length == 0) return give_up(slope);
+  accept(length);
+  if (is_last_stage_ && is_stage_over()) {
+    if (is_smooth_enough()) return result(is_end_true() ? Outcome::kConverged : Outcome::kStalled);
+    is_last_stage_ = false;  // the energies have fallen so far that it is not any more
+  }
+  return result(Outcome::kProgress);
+}
+
+}  // namespace lpdeform

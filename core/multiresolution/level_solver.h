@@ -1,0 +1,34 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <stop_token>
+
+#include "absl/status/status.h"
+#include "core/energy/material.h"
+#include "core/energy/rest_shape.h"
+#include "core/problem/handles.h"
+#include "core/problem/settings.h"
+
+namespace lpdeform {
+
+/// What solves a coarse level: a Deformer (core/solve/deformer.h), as far as a level needs one. It may have a coarse level of its
+/// own. Each function is the Deformer's of that name.
+class LevelSolver {
+ public:
+  virtual ~LevelSolver() = default;
+
+  virtual absl::Status set_material(const Material& material) = 0;
+  virtual absl::Status set_handles(const HandleSet& handles) = 0;
+  virtual absl::Status start(const SolveSettings& settings, std::stop_token stop) = 0;
+  virtual bool step() = 0;
+  virtual void catch_up() = 0;
+  virtual int iterations() const = 0;  // of the running or the last solve
+  virtual const Points& positions() const = 0;
+  virtual std::size_t memory_bytes() const = 0;
+};
+
+/// Makes the solver of a level of this shape, whose components without handles stay where they are. Null where that fails.
+using MakeLevelSolver = std::function<std::unique_ptr<LevelSolver>(std::shared_ptr<const RestShape> shape)>;
+
+}  // namespace lpdeform

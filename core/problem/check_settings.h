@@ -1,0 +1,18 @@
+#pragma once
+
+#include "absl/status/status.h"
+#include "core/energy/material.h"
+#include "core/problem/handles.h"
+#include "core/problem/settings.h"
+
+namespace lpdeform {
+
+/// INVALID_ARGUMENT: TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE; METHOD_NEEDS_P where the
+/// method is for one p and `material` has another.
+absl::Status check_settings(const SolveSettings& settings, const Material& material);
+
+/// METHOD_NEEDS_EXACT_HANDLES where the method is conic and a handle is held otherwise than exactly at vertices:
+/// names it.
+absl::Status check_method_takes(Method method, const HandleSet& handles);
+
+}  // namespace lpdeform

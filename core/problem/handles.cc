@@ -1,0 +1,149 @@
+#include "core/problem/handles.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <unordered_map>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/fault.h"
+#include "core/problem/check_handle.h"
+
+namespace lpdeform {
+namespace {
+
+absl::Status check_region(const std::vector<std::int32_t>& region, std::int32_t vertex_count) {
+  if (region.empty()) {
+    return invalid_input({"REGION_EMPTY", "region", "at least 1 vertex"},
+                         "the region of interest has no vertex; nothing could move");
+  }
+  if (region.front() >= 0 && region.back() < vertex_count) return absl::OkStatus();
+  const std::int32_t vertex = region.front() < 0 ? region.front() : region.back();
+  return region_vertex_out_of_range(vertex, vertex_count);
+}
+
+absl::Status check_faces(const std::string& name, const Handle& handle, std::int32_t face_count) {
+  for (const SurfacePoint& point : handle.points) {
+    if (point.face >= 0 && point.face < face_count) continue;
+    return handle_face_out_of_range(name, point.face, face_count);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+bool TargetPositions::operator==(const TargetPositions& other) const {
+  return positions.rows() == other.positions.rows() && positions == other.positions;
+}
+
+absl::Status HandleSet::set(std::string_view name, Handle handle) {
+  if (absl::Status status = check_handle(name, handle); !status.ok()) return status;
+  for (SurfacePoint& point : handle.points) point.barycentric /= point.barycentric.sum();
+  handles_.insert_or_assign(std::string(name), std::move(handle));
+  return absl::OkStatus();
+}
+
+absl::Status HandleSet::set_motion(std::string_view name, HandleMotion motion) {
+  const auto found = handles_.find(name);
+  if (found == handles_.end()) {
+    return make_fault(absl::StatusCode::kNotFound, {"HANDLE_UNKNOWN", handle_element(name), ""},
+                      absl::StrCat("there is no ", handle_element(name)));
+  }
+  if (absl::Status status = check_motion(name, found->second, motion); !status.ok()) return status;
+  found->second.motion = std::move(motion);
+  return absl::OkStatus();
+}
+
+bool HandleSet::remove(std::string_view name) {
+  const auto found = handles_.find(name);
+  if (found == handles_.end()) return false;
+  handles_.erase(found);
+  return true;
+}
+
+void HandleSet::set_region(std::vector<std::int32_t> vertices) {
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  region_ = std::make_shared<const std::vector<std::int32_t>>(std::move(vertices));
+}
+
+bool HandleSet::has_region_of(const HandleSet& other) const {
+  if (region_ == other.region_) return true;
+  return region_ && other.region_ && *region_ == *other.region_;
+}
+
+bool HandleSet::operator==(const HandleSet& other) const {
+  return handles_ == other.handles_ && has_region_of(other);
+}
+
+absl::Status check_handles(const HandleSet& handles, std::int32_t vertex_count, std::int32_t face_count) {
+  if (handles.region() != nullptr) {
+    if (absl::Status status = check_region(*handles.region(), vertex_count); !status.ok()) return status;
+  }
+  std::unordered_map<std::int32_t, std::string_view> owner;
+  for (const auto& [name, handle] : handles.handles()) {
+    if (absl::Status status = check_faces(name, handle, face_count); !status.ok()) return status;
+    for (const std::int32_t vertex : handle.vertices) {
+      if (vertex < 0 || vertex >= vertex_count) return handle_vertex_out_of_range(name, vertex, vertex_count);
+      const auto [entry, is_new] = owner.emplace(vertex, name);
+      if (is_new) continue;
+      const std::string where = entry->second == name ? absl::StrCat("twice in ", handle_element(name))
+                                                      : absl::StrCat("in ", handle_element(entry->second),
+                                                                     " and in ", handle_element(name));
+      return invalid_input({"HANDLE_VERTEX_TWICE", absl::StrCat("vertex ", vertex), "one handle a vertex"},
+                           absl::StrCat("vertex ", vertex, " is ", where));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status handle_vertex_out_of_range(std::string_view handle, std::int64_t vertex, std::int64_t count) {
+  return invalid_input(
+      {"HANDLE_VERTEX_OUT_OF_RANGE", absl::StrCat("vertex ", vertex), absl::StrCat("0 <= vertex < ", count)},
+      absl::StrCat(handle_element(handle), " holds vertex ", vertex, "; the mesh has ", count,
+                   " vertices, 0 to ", count - 1));
+}
+
+absl::Status handle_face_out_of_range(std::string_view handle, std::int64_t face, std::int64_t count) {
+  return invalid_input(
+      {"HANDLE_FACE_OUT_OF_RANGE", absl::StrCat("face ", face), absl::StrCat("0 <= face < ", count)},
+      absl::StrCat(handle_element(handle), " has a point in face ", face, "; the mesh has ", count,
+                   " faces"));
+}
+
+absl::Status region_vertex_out_of_range(std::int64_t vertex, std::int64_t count) {
+  return invalid_input(
+      {"REGION_VERTEX_OUT_OF_RANGE", absl::StrCat("vertex ", vertex), absl::StrCat("0 <= vertex < ", count)},
+      absl::StrCat("the region of interest has vertex ", vertex, "; the mesh has ", count, " vertices"));
+}
+
+Points rest_positions(const Handle& handle, const Points& rest, const Faces& faces) {
+  Points result(handle.size(), 3);
+  for (std::size_t k = 0; k < handle.vertices.size(); ++k) result.row(k) = rest.row(handle.vertices[k]);
+  for (std::size_t k = 0; k < handle.points.size(); ++k) {
+    const SurfacePoint& point = handle.points[k];
+    result.row(k).setZero();
+    for (int c = 0; c < 3; ++c) result.row(k) += point.barycentric[c] * rest.row(faces(point.face, c));
+  }
+  return result;
+}
+
+Eigen::Matrix3d rotation_of(const HandleMotion& motion) {
+  const auto* rigid = std::get_if<RigidMotion>(&motion);
+  if (rigid == nullptr || rigid->angle_radians == 0) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(rigid->angle_radians, rigid->axis.stableNormalized()).toRotationMatrix();
+}
+
+Points target_positions(const Handle& handle, const Points& rest, const Faces& faces) {
+  if (const auto* targets = std::get_if<TargetPositions>(&handle.motion)) return targets->positions;
+  Points result = rest_positions(handle, rest, faces);
+  if (const auto* rigid = std::get_if<RigidMotion>(&handle.motion)) {
+    if (rigid->angle_radians != 0) {
+      const Eigen::RowVector3d center = rigid->center.transpose();
+      result = ((result.rowwise() - center) * rotation_of(handle.motion).transpose()).rowwise() + center;
+    }
+    result.rowwise() += rigid->translation.transpose();
+  }
+  return result;
+}
+
+}  // namespace lpdeform

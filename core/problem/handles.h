@@ -1,0 +1,109 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "core/base/geometry.h"
+#include "core/problem/hold.h"
+
+namespace lpdeform {
+
+/// The handle stays where the rest mesh has it.
+struct Fixed {
+  bool operator==(const Fixed&) const = default;
+};
+
+/// x = R (p - center) + center + translation for every vertex of the handle: rotation about `center` first,
+/// then translation. `axis` need not have unit length; it may be 0 only where `angle_radians` is 0.
+struct RigidMotion {
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
+  double angle_radians = 0;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  bool operator==(const RigidMotion&) const = default;
+};
+
+/// One target position a vertex or point, in the order of the handle's.
+struct TargetPositions {
+  Points positions;
+
+  bool operator==(const TargetPositions&) const;
+};
+
+using HandleMotion = std::variant<Fixed, RigidMotion, TargetPositions>;
+
+/// A group of vertices, or of points inside faces, that the user holds.
+struct Handle {
+  std::vector<std::int32_t> vertices;
+  HandleMotion motion = Fixed{};
+  Hold hold = Exactly{};
+  /// In place of vertices. Exactly or Soft.
+  std::vector<SurfacePoint> points = {};
+  /// Radius of the surroundings that go along with the handle, in the caller's units: against the spike that a
+  /// handle of one or a few vertices makes; see footprint.h. The energy counts their stiffness. 0: none.
+  double footprint = 0;
+
+  /// How many vertices or points.
+  std::size_t size() const { return vertices.size() + points.size(); }
+
+  bool operator==(const Handle&) const = default;
+};
+
+/// All handles of a session, by name, and the region of interest. A plain value: change a copy, then give it to Deformer::set_handles.
+class HandleSet {
+ public:
+  /// Adds a handle or replaces the one of that name (regrouping). Errors: as check_handle. Whether vertices exist and belong to
+  /// one handle only is checked by check_handles, when the whole set is known.
+  absl::Status set(std::string_view name, Handle handle);
+
+  /// Moves a handle. NOT_FOUND (HANDLE_UNKNOWN); INVALID_ARGUMENT: as check_motion.
+  absl::Status set_motion(std::string_view name, HandleMotion motion);
+
+  /// False where there was none.
+  bool remove(std::string_view name);
+
+  const std::map<std::string, Handle, std::less<>>& handles() const { return handles_; }
+
+  /// Only these vertices may move: everything outside the region is held where it is when the region takes
+  /// effect, and so is what handles hold there. Its border is found by itself: the cells of the vertices next
+  /// to the region count in the energy.
+  void set_region(std::vector<std::int32_t> vertices);
+  /// Everything may move again.
+  void clear_region() { region_ = nullptr; }
+  /// Ascending, each once; null where there is none.
+  const std::vector<std::int32_t>* region() const { return region_.get(); }
+  bool has_region_of(const HandleSet& other) const;
+
+  bool operator==(const HandleSet& other) const;
+
+ private:
+  std::map<std::string, Handle, std::less<>> handles_;
+  std::shared_ptr<const std::vector<std::int32_t>> region_;
+};
+
+/// INVALID_ARGUMENT: HANDLE_VERTEX_OUT_OF_RANGE, HANDLE_VERTEX_TWICE (in one handle or in two: both are
+/// named), HANDLE_FACE_OUT_OF_RANGE, REGION_EMPTY, REGION_VERTEX_OUT_OF_RANGE.
+absl::Status check_handles(const HandleSet& handles, std::int32_t vertex_count, std::int32_t face_count = 0);
+
+/// These errors, for callers whose numbers may be no std::int32_t. `count`: of the mesh's vertices or faces.
+absl::Status handle_vertex_out_of_range(std::string_view handle, std::int64_t vertex, std::int64_t count);
+absl::Status handle_face_out_of_range(std::string_view handle, std::int64_t face, std::int64_t count);
+absl::Status region_vertex_out_of_range(std::int64_t vertex, std::int64_t count);
+
+/// Where a handle's vertices or points are at rest, and where its motion sends them: rows in their order.
+/// `faces` are needed for points only.
+Points rest_positions(const Handle& handle, const Points& rest, const Faces& faces = {});
+Points target_positions(const Handle& handle, const Points& rest, const Faces& faces = {});
+
+/// R of a rigid motion; the identity of any other.
+Eigen::Matrix3d rotation_of(const HandleMotion& motion);
+
+}  // namespace lpdeform

@@ -1,0 +1,128 @@
+#include "core/resize/resize.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "core/analysis/girth.h"
+#include "core/analysis/salience.h"
+#include "core/base/fault.h"
+#include "core/resize/resize_extents.h"
+#include "core/resize/sparing.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr double kStiffening = 100;
+constexpr double kNarrow = 0.75;         // of the mean girth
+constexpr double kLeastGirth = 1.0 / 6;  // of that
+constexpr double kNarrowing = 4;
+constexpr double kSmallestSine = 1e-6;
+constexpr double kMostlySpared = 0.5;  // of sparing: the nearer of the two
+
+/// Of components that are spared the ends along the stretched axes, of the others all vertices; ascending.
+std::vector<std::int32_t> held_vertices(const RestShape& shape, const Eigen::Matrix3d& axes,
+                                        const Eigen::Vector3d& shares, const std::vector<char>& is_spared) {
+  std::vector<char> is_held(static_cast<std::size_t>(shape.vertex_count()), 0);
+  for (const std::int32_t end : ends_along(shape, axes, shares.array() > 0)) is_held[end] = 1;
+  std::vector<std::int32_t> held;
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    const std::int32_t component = shape.components()[i];
+    if (component >= 0 && (is_spared[component] == 0 || is_held[i] != 0)) held.push_back(i);
+  }
+  return held;
+}
+
+/// Of the slices across each stretched axis, what makes narrow ones no easier to cut than others.
+Field narrowness(const RestShape& shape, const Eigen::Matrix3d& axes, const Eigen::Vector3d& shares) {
+  Field result = Field::Ones(shape.vertex_count());
+  for (int k = 0; k < 3; ++k) {
+    if (shares[k] == 0) continue;
+    const Field girth = girth_along(shape, axes.row(k));
+    result.array() *= (girth.array() / kNarrow).max(kLeastGirth).min(1).pow(-kNarrowing * shares[k]);
+  }
+  return result.array().min(std::pow(kLeastGirth, -kNarrowing));  // where several axes are narrow: as one
+}
+
+}  // namespace
+
+absl::Status check_scaling(const Scaling& scaling) {
+  for (int k = 0; k < 3; ++k) {
+    const double scale = scaling.scale[k];
+    if (scale >= Scaling::kLowest && scale <= Scaling::kHighest) continue;
+    return invalid_input(
+        {"RESIZE_SCALE_OUT_OF_RANGE", absl::StrCat("scale[", k, "]"), "0.01 <= scale <= 100"},
+        absl::StrCat("scale[", k, "] is ", scale, "; it must be from 0.01 to 100"));
+  }
+  if (scaling.origin.allFinite()) return absl::OkStatus();
+  return invalid_input({"RESIZE_ORIGIN_NOT_FINITE", "origin", "finite numbers"},
+                       "the origin of the resizing is not finite");
+}
+
+Points Scaling::operator()(const Points& points) const {
+  const Eigen::Matrix3d matrix = axes.transpose() * scale.asDiagonal() * axes;
+  return ((points.rowwise() - origin.transpose()) * matrix).rowwise() + origin.transpose();
+}
+
+absl::StatusOr<Eigen::Matrix3d> axes_of(const Eigen::Vector3d& x_axis, const Eigen::Vector3d& y_axis) {
+  const Eigen::Vector3d x = x_axis.stableNormalized(), y = y_axis.stableNormalized();
+  const Eigen::Vector3d across = y - y.dot(x) * x;
+  const bool is_finite = x_axis.allFinite() && y_axis.allFinite();
+  if (!is_finite || !(x.norm() > 0.5) || !(across.norm() > kSmallestSine)) {
+    return invalid_input({"RESIZE_AXES", "axes", "two directions that are not parallel"},
+                         "the axes of the resizing are not finite, of length 0, or parallel");
+  }
+  Eigen::Matrix3d axes;
+  axes.row(0) = x;
+  axes.row(1) = across.normalized();
+  axes.row(2) = axes.row(0).cross(axes.row(1));
+  return axes;
+}
+
+Eigen::Vector3d stretch_shares(const Eigen::Vector3d& scale) {
+  const Eigen::Vector3d stretch = scale.array().log().abs();
+  const double largest = stretch.maxCoeff();
+  return largest > 0 ? Eigen::Vector3d(stretch / largest) : Eigen::Vector3d(1, 0, 0);
+}
+
+absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling) {
+  if (absl::Status status = check_scaling(scaling); !status.ok()) return status;
+  std::vector<char> is_spared;
+  for (const double share : sparing(features, scaling)) is_spared.push_back(share >= kMostlySpared ? 1 : 0);
+  return resize_inputs(features, scaling, is_spared);
+}
+
+absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling,
+                                           const std::vector<char>& is_spared) {
+  if (absl::Status status = check_scaling(scaling); !status.ok()) return status;
+  const RestShape& shape = features.shape();
+  const Eigen::Vector3d shares = stretch_shares(scaling.scale);
+  ResizeInputs inputs;
+  inputs.handle.vertices = held_vertices(shape, scaling.axes, shares, is_spared);
+  const Points scaled = scaling(shape.positions());
+  Points targets(inputs.handle.vertices.size(), 3);
+  for (std::size_t k = 0; k < inputs.handle.vertices.size(); ++k)
+    targets.row(k) = scaled.row(inputs.handle.vertices[k]);
+  inputs.handle.motion = TargetPositions{std::move(targets)};
+  if (std::ranges::count(is_spared, 1) == 0) return inputs;
+  inputs.material = Material::uniform(1);
+  const Field stiff = salience(shape, features.bending(), scaling.axes, shares);
+  inputs.material.stiffness =
+      (std::log(kStiffening) * stiff.array()).exp() * narrowness(shape, scaling.axes, shares).array();
+  return inputs;
+}
+
+double shared_factor(const Eigen::Vector3d& scale) {
+  return scale.minCoeff();
+}
+
+Eigen::Vector3d box_middle(const RestShape& shape) {
+  Eigen::AlignedBox3d box;
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    if (shape.components()[i] >= 0) box.extend(shape.positions().row(i).transpose());
+  }
+  return box.min() + 0.5 * (box.max() - box.min());
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,181 @@
+#include "core/constraints/metric.h"
+
+#include <gtest/gtest.h>
+
+#include <string_view>
+
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+class MetricTest : public testing::Test {
+ protected:
+  MetricTest()
+      : shape(rest_shape(box_surface(2, 2, 3))),
+        metric(Metric::create(shape).value()),
+        is_held(shape->vertex_count(), false) {
+    is_held[0] = is_held[7] = is_held[20] = true;
+    for (std::int32_t i = 0; i < shape->vertex_count(); ++i) cell_weights.push_back(1 + i % 3);
+  }
+
+  /// M u by its definition.
+  Points apply(const Points& u) const {
+    Points result = Points::Zero(u.rows(), 3);
+    for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+      for (std::int32_t k = shape->offsets()[i]; k < shape->offsets()[i + 1]; ++k) {
+        const std::int32_t j = shape->neighbours()[k];
+        result.row(i) +=
+            2 * (cell_weights[i] + cell_weights[j]) * shape->weights()[k] * (u.row(i) - u.row(j));
+      }
+    }
+    return result;
+  }
+
+  void clear_held(Points& u) const {
+    for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+      if (is_held[i]) u.row(i).setZero();
+    }
+  }
+
+  std::shared_ptr<const RestShape> shape;
+  Metric metric;
+  std::vector<char> is_held;
+  std::vector<double> cell_weights;
+};
+
+TEST_F(MetricTest, InvertsTheReweightedLaplacian) {
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  Points u = Points::Random(shape->vertex_count(), 3);
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+    if (is_held[i]) u.row(i).setZero();
+  }
+  Points b = apply(u), x;
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+    if (is_held[i]) b.row(i).setZero();
+  }
+  metric.solve(b, x, Workers(1));
+  EXPECT_LT((x - u).norm(), 1e-12);
+}
+
+TEST_F(MetricTest, InvertsItWithEntriesAdded) {
+  const std::int32_t a = shape->faces()(9, 0), b = shape->faces()(9, 1);
+  const std::vector<MatrixEntry> entries = {{a, a, 3.0}, {std::max(a, b), std::min(a, b), -1.5}, {b, b, 2.0}};
+  ASSERT_FALSE(is_held[a] || is_held[b]);
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, entries, Workers(1)));
+  Points u = Points::Random(shape->vertex_count(), 3);
+  clear_held(u);
+  Points v = apply(u), x;
+  v.row(a) += 3.0 * u.row(a) - 1.5 * u.row(b);
+  v.row(b) += 2.0 * u.row(b) - 1.5 * u.row(a);
+  clear_held(v);
+  metric.solve(v, x, Workers(1));
+  EXPECT_LT((x - u).norm(), 1e-12);
+}
+
+TEST_F(MetricTest, PreconditionsLikeSolveAlsoAfterAnotherFactorAndAfterAdoptingWeights) {
+  Points b = Points::Random(shape->vertex_count(), 3), exact, x;
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+    if (is_held[i]) b.row(i).setZero();
+  }
+  for (int round = 0; round < 2; ++round) {
+    ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+    metric.solve(b, exact, Workers(1));
+    metric.precondition(b, x, Workers(1));
+    EXPECT_LT((x - exact).norm(), 1e-5 * exact.norm());
+    cell_weights[5] += 10;
+  }
+  cell_weights[5] -= 10;
+  for (double& weight : cell_weights) weight *= 3;
+  metric.adopt(cell_weights);
+  metric.precondition(b, x, Workers(1));
+  EXPECT_LT((3 * x - exact).norm(), 1e-5 * exact.norm());
+  for (const double useless : {0.0, std::nan(""), HUGE_VAL}) {
+    metric.adopt(std::vector<double>(cell_weights.size(), useless));
+    metric.precondition(b, x, Workers(1));
+    EXPECT_LT((3 * x - exact).norm(), 1e-5 * exact.norm());
+  }
+}
+
+TEST_F(MetricTest, ExtendsDisplacementsHarmonically) {
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  Points u = Points::Zero(shape->vertex_count(), 3);
+  u.row(0) << 1, 2, 3;
+  u.row(7) << -1, 0, 1;
+  metric.extend(is_held, u, Workers(1));
+  EXPECT_EQ(u.row(20), Eigen::RowVector3d(0, 0, 0));
+  EXPECT_EQ(u.row(0), Eigen::RowVector3d(1, 2, 3));
+  const Points residual = apply(u);
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+    EXPECT_TRUE(is_held[i] || residual.row(i).norm() < 1e-5) << i;
+  }
+}
+
+TEST_F(MetricTest, KnowsWhichHandlesItWasFactoredFor) {
+  EXPECT_FALSE(metric.is_factored_for(is_held));
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  EXPECT_TRUE(metric.is_factored_for(is_held));
+  is_held[1] = true;
+  EXPECT_FALSE(metric.is_factored_for(is_held));
+}
+
+TEST_F(MetricTest, SolvesWhereSinglePrecisionDoesNotCarryTheMatrix) {
+  // Held at one end alone, and between the ends cells of next to no weight.
+  std::fill(is_held.begin(), is_held.end(), false);
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+    const double z = shape->scaled_positions()(i, 2);
+    is_held[i] = z == shape->scaled_positions().col(2).minCoeff();
+    cell_weights[i] = z == shape->scaled_positions().col(2).maxCoeff() ? 1 : 1e-8;
+  }
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  Points b = Points::Random(shape->vertex_count(), 3), x, y;
+  clear_held(b);
+  metric.solve(b, x, Workers(1));
+  metric.precondition(b, y, Workers(1));
+  EXPECT_LT((x - y).norm(), 1e-5 * x.norm());
+  x = apply(x);
+  clear_held(x);
+  EXPECT_LT((x - b).norm(), 1e-6 * b.norm());
+}
+
+TEST_F(MetricTest, GivesTheDoubleFactorBackWhenItIsNotWanted) {
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  const bool has_single = std::string_view(cholesky_backend()).starts_with("CHOLMOD");
+  const std::size_t before = metric.memory_bytes();
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), Metric::Precision::kDouble));
+  EXPECT_EQ(metric.memory_bytes() > before, has_single);
+  Points b = Points::Random(shape->vertex_count(), 3), exact, refined, x;
+  clear_held(b);
+  metric.solve(b, exact, Workers(1));
+  metric.precondition(b, x, Workers(1));
+  EXPECT_LT((x - exact).norm(), 1e-5 * exact.norm());
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  EXPECT_EQ(metric.memory_bytes() == before, has_single);
+  metric.solve(b, refined, Workers(1));
+  EXPECT_LT((refined - exact).norm(), 1e-11 * exact.norm());
+}
+
+TEST_F(MetricTest, GivesNoNumberForWhatIsNone) {
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  for (const std::int32_t i : {1, 5, shape->vertex_count() - 1}) {
+    Points b = Points::Ones(shape->vertex_count(), 3), x;
+    b(i, 1) = std::nan("");
+    metric.precondition(b, x, Workers(1));
+    EXPECT_TRUE(x.array().isNaN().all()) << i;
+  }
+}
+
+TEST_F(MetricTest, FailsWithoutUsableWeights) {
+  EXPECT_FALSE(metric.factor(std::vector<double>(shape->vertex_count(), 0.0), is_held, {}, Workers(1)));
+  EXPECT_FALSE(
+      metric.factor(std::vector<double>(shape->vertex_count(), std::nan("")), is_held, {}, Workers(1)));
+}
+
+TEST_F(MetricTest, StaysPositiveDefiniteWhereCellsHaveNoWeight) {
+  for (std::size_t i = 0; i < cell_weights.size(); i += 2) cell_weights[i] = 0;
+  EXPECT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+}
+
+}  // namespace
+}  // namespace lpdeform

@@ -1,0 +1,189 @@
+#include "core/multiresolution/multiresolution.h"
+
+#include <gmock/gmock.h>
+
+#include <map>
+#include <set>
+
+#include "core/mesh/coarsen.h"
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+class MultiresolutionTest : public testing::Test {
+ protected:
+  static SolveSettings settings(Method method) {
+    SolveSettings result;
+    result.method = method;
+    result.initial = InitialGuess::kLaplacian;
+    result.keep_trace = true;
+    return result;
+  }
+
+  /// How much of the guess's excess of E^(1/2) over the minimum the coarse level has left.
+  static double beginning(const SolveSummary& summary) {
+    const auto begun =
+        std::find_if(summary.trace.begin(), summary.trace.end(),
+                     [&](const IterationRecord& record) { return record.energy < summary.initial_energy; });
+    if (begun == summary.trace.end()) return 1;
+    const double guess = std::sqrt(summary.initial_energy / summary.energy);
+    return (std::sqrt(begun->energy / summary.energy) - 1) / (guess - 1);
+  }
+  /// One of the top that the coarse level has not.
+  std::int32_t lost_vertex() const {
+    const CoarseMesh coarse = coarsen(mesh, shape->vertex_count() / CoarseLevel::kRatio);
+    for (const std::int32_t v : slice(mesh, 2, 40, 40)) {
+      if (coarse.fine_vertex[coarse.coarse_vertex[v]] != v) return v;
+    }
+    return -1;
+  }
+
+  const TriangleMesh mesh = box_surface(6, 6, 40);
+  const std::shared_ptr<const RestShape> shape = rest_shape(mesh);
+  HandleSet bend() const {
+    HandleSet handles;
+    (void)handles.set("bottom", {slice(mesh, 2, 0, 0), Fixed{}});
+    (void)handles.set("top", {slice(mesh, 2, 40, 40), turn(Eigen::Vector3d::UnitX(), 80, {3, 3, 20})});
+    return handles;
+  }
+};
+
+TEST_F(MultiresolutionTest, EndsWhereQuasiNewtonEndsOrLower) {
+  for (const double p : {1.0, 1.5, 2.0, 6.0}) {
+    auto alone = deformer(shape, bend(), Material::uniform(p));
+    auto nested = deformer(shape, bend(), Material::uniform(p));
+    const double expected = alone->solve(settings(Method::kQuasiNewton)).value().energy;
+    const SolveSummary summary = nested->solve(settings(Method::kMultiresolution)).value();
+    EXPECT_EQ(summary.method, Method::kMultiresolution);
+    EXPECT_EQ(summary.stop_reason, StopReason::kConverged);
+    EXPECT_LT(std::pow(summary.energy / expected, 1 / p), 1.005)
+        << "p = " << p;  // local minima differ a little
+  }
+}
+
+TEST_F(MultiresolutionTest, BeginsTheFineLevelNearItsMinimum) {
+  auto nested = deformer(shape, bend(), Material::uniform(2));
+  EXPECT_LT(beginning(nested->solve(settings(Method::kMultiresolution)).value()), 0.3);
+}
+
+TEST_F(MultiresolutionTest, KnowsEveryKindOfHandle) {
+  const auto top = slice(mesh, 2, 40, 40);
+  const RigidMotion motion = turn(Eigen::Vector3d::UnitX(), 80, {3, 3, 20});
+  std::vector<SurfacePoint> points;
+  std::set<std::int32_t> used;  // no vertex by two points: their equations would depend on each other
+  for (std::int32_t face = 0; face < shape->face_count(); ++face) {
+    const std::vector<std::int32_t> corners{mesh.faces(face, 0), mesh.faces(face, 1), mesh.faces(face, 2)};
+    const bool is_new =
+        std::none_of(corners.begin(), corners.end(), [&](auto v) { return used.contains(v); });
+    if (!is_new || rows_of(mesh.vertices, corners).col(2).minCoeff() < 40) continue;
+    used.insert(corners.begin(), corners.end());
+    points.push_back({face, {0.2, 0.3, 0.5}});
+  }
+  const std::int32_t lost = lost_vertex();
+  const std::map<std::string, Handle> kinds{
+      {"soft", {top, motion, Soft{10}}},
+      {"points", {{}, motion, Exactly{}, points}},
+      {"soft points", {{}, motion, Soft{100}, points}},
+      {"orientation", {top, motion, Orientation{}}},
+      {"axis", {top, motion, AxisLock{Eigen::Vector3d::UnitX()}}},
+      {"plane", {top, motion, PlaneLock{Eigen::Vector3d::UnitY()}}},
+      {"footprint", {{top[0]}, motion, Exactly{}, {}, 4.0}},
+      {"a soft vertex that is lost", {{lost}, motion, Soft{10}}},
+      {"a vertex that is lost", {{lost}, motion}},
+  };
+  for (const auto& [name, handle] : kinds) {
+    HandleSet handles;
+    (void)handles.set("bottom", {slice(mesh, 2, 0, 0), Fixed{}});
+    ASSERT_TRUE(handles.set("top", handle).ok()) << name;
+    auto alone = deformer(shape, handles, Material::uniform(2));
+    auto nested = deformer(shape, handles, Material::uniform(2));
+    const double expected = alone->solve(settings(Method::kQuasiNewton)).value().energy;
+    const SolveSummary summary = nested->solve(settings(Method::kMultiresolution)).value();
+    EXPECT_EQ(summary.method, Method::kMultiresolution) << name;
+    EXPECT_EQ(summary.stop_reason, StopReason::kConverged) << name;
+    EXPECT_LT(std::sqrt(summary.energy / expected), 1.005) << name;
+    EXPECT_LT(beginning(summary), 0.6) << name;
+  }
+}
+
+TEST_F(MultiresolutionTest, IsWhatAutoTakesForLargeMeshesAndColdStarts) {
+  const TriangleMesh large = grid(80, 80, 1.0);
+  HandleSet handles;
+  (void)handles.set("corner", {{0, 1, 81}, Fixed{}});
+  (void)handles.set("lifted", {{6560}, RigidMotion{.translation = {0, 0, 20}}});
+  auto solver = deformer(rest_shape(large), handles, Material::uniform(1.5));
+  EXPECT_EQ(solver->solve(settings(Method::kAuto)).value().method, Method::kMultiresolution);
+  (void)handles.set_motion("lifted", RigidMotion{.translation = {0, 0, 21}});
+  ASSERT_TRUE(solver->set_handles(handles).ok());
+  SolveSettings warm = settings(Method::kAuto);
+  warm.initial = InitialGuess::kCurrent;
+  EXPECT_EQ(solver->solve(warm).value().method, Method::kQuasiNewton);
+
+  auto small = deformer(shape, bend(), Material::uniform(1.5));
+  EXPECT_EQ(small->solve(settings(Method::kAuto)).value().method, Method::kQuasiNewton);
+}
+
+TEST_F(MultiresolutionTest, FallsBackWhereTheMeshCannotBeCoarsened) {
+  TriangleMesh triangle;
+  triangle.vertices.resize(3, 3);
+  triangle.vertices << 0, 0, 0, 1, 0, 0, 0, 1, 0;
+  triangle.faces.resize(1, 3);
+  triangle.faces << 0, 1, 2;
+  HandleSet handles;
+  (void)handles.set("a", {{0}, Fixed{}});
+  auto solver = deformer(rest_shape(triangle), handles, Material::uniform(2));
+  EXPECT_EQ(solver->solve(settings(Method::kMultiresolution)).value().method, Method::kQuasiNewton);
+}
+
+TEST_F(MultiresolutionTest, StoppedWithinTheCoarseLevelHasWhatThatHasFound) {
+  SolveSettings few = settings(Method::kMultiresolution);
+  double before = std::numeric_limits<double>::infinity();
+  for (const int iterations : {1, 10, 40}) {
+    auto nested = deformer(shape, bend(), Material::uniform(1));
+    few.max_iterations = iterations;
+    const SolveSummary summary = nested->solve(few).value();
+    EXPECT_EQ(summary.stop_reason, StopReason::kIterationLimit);
+    EXPECT_EQ(summary.trace.back().energy, summary.initial_energy) << "the fine level had begun";
+    EXPECT_LT(summary.energy, before) << iterations << " iterations";
+    EXPECT_NEAR(summary.energy, nested->cell_energies().sum(), 1e-10 * summary.energy);
+    EXPECT_TRUE(nested->positions().allFinite());
+    for (const std::int32_t v : slice(mesh, 2, 0, 0))
+      EXPECT_EQ(nested->positions().row(v), mesh.vertices.row(v));
+    before = summary.energy;
+  }
+}
+
+TEST_F(MultiresolutionTest, CatchesUpWithTheCoarseLevelWithoutChangingWhatFollows) {
+  for (const double p : {1.0, 2.0}) {
+    auto asked = deformer(shape, bend(), Material::uniform(p));
+    ASSERT_TRUE(asked->start(settings(Method::kMultiresolution)).ok());
+    std::vector<double> shown;
+    do {
+      asked->catch_up();
+      shown.push_back(asked->summary().energy);
+    } while (asked->step());
+    EXPECT_TRUE(std::is_sorted(shown.rbegin(), shown.rend())) << "no frame is worse than the one before";
+    const auto& trace = asked->summary().trace;
+    const auto fine = std::find_if(trace.begin(), trace.end(),
+                                   [](const IterationRecord& record) { return record.stage > 0; });
+    ASSERT_NE(fine, trace.end());
+    EXPECT_LT(shown[fine->iteration - 1], 0.7 * shown[0]) << "before the fine level began";
+
+    auto alone = deformer(shape, bend(), Material::uniform(p));
+    ASSERT_TRUE(alone->solve(settings(Method::kMultiresolution)).ok());
+    EXPECT_EQ(asked->positions(), alone->positions());
+    EXPECT_EQ(asked->summary().iterations, alone->summary().iterations);
+  }
+}
+
+TEST_F(MultiresolutionTest, GivesTheSameBitsOnAnyNumberOfThreads) {
+  auto one = deformer(shape, bend(), Material::uniform(1.5), {.threads = 1, .parallel_from = 0});
+  auto two = deformer(shape, bend(), Material::uniform(1.5), {.threads = 2, .parallel_from = 0});
+  (void)one->solve(settings(Method::kMultiresolution));
+  (void)two->solve(settings(Method::kMultiresolution));
+  EXPECT_EQ(one->positions(), two->positions());
+}
+
+}  // namespace
+}  // namespace lpdeform
