@@ -83,10 +83,17 @@ NumberedUpdate Ledger::send_next() {
 
 void Ledger::accept(std::uint64_t seq, bool is_kept) {
   const auto sent = std::ranges::find(in_flight_, seq, &NumberedUpdate::seq);
-  if (sent == in_flight_.end()) return;
+  if (sent == in_flight_.end()) {
+    if (is_kept && seq >= unkept_.seq) unkept_ = {};  // shown before it was answered
+    return;
+  }
   NumberedUpdate update = std::move(*sent);
   in_flight_.erase(sent);
   merge_accepted(std::move(update), is_kept);
+}
+
+void Ledger::show(std::uint64_t epoch, std::uint64_t seq) {
+  if (epoch == epoch_ && !in_flight_.empty() && in_flight_.front().seq == seq) accept(seq);
 }
 
 void Ledger::accept_change(NumberedUpdate change, bool is_kept) {

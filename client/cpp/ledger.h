@@ -46,6 +46,10 @@ class Ledger {
   /// all taken before it, survive the end of the server.
   void accept(std::uint64_t seq, bool is_kept = false);
   void refuse(std::uint64_t seq);
+  /// A frame shows the update of this number. If it is of the present epoch, the update is ours, so the server has taken it,
+  /// though its answer may still be on its way. Earlier updates without an answer may have been refused: then nothing changes
+  /// until they are answered.
+  void show(std::uint64_t epoch, std::uint64_t seq);
 
   /// A number for a change that the server makes by itself, and the change that it made.
   std::uint64_t take_number() { return next_seq_++; }

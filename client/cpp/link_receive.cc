@@ -109,6 +109,7 @@ absl::Status Link::take(const v1::FramePart& part) {
     const std::scoped_lock lock(mutex_);
     stream = stream_;
     rules_.frame_fitted();
+    ledger_.show((*frame)->epoch, (*frame)->input_seq);
   }
   const std::uint64_t frame_seq = (*frame)->frame_seq;
   if (box_.put(*std::move(*frame), stream)) return absl::OkStatus();

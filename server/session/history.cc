@@ -26,6 +26,18 @@ std::size_t bytes_of(const HandleChange& change) {
   return bytes;
 }
 
+/// Whether something is not as it was. An update that is sent again, under a higher number, may set handles to what they are.
+bool is_change(const HandleSet& before, const HandleSet& after, const HandleEffects& effects) {
+  const auto differs = [&](const std::string& name) {
+    const auto was = before.handles().find(name), is = after.handles().find(name);
+    if (was == before.handles().end() || is == after.handles().end()) return true;
+    return !(was->second == is->second);
+  };
+  return std::ranges::any_of(effects.moved, differs) ||
+         std::ranges::any_of(effects.removed,
+                             [&](const auto& name) { return before.handles().contains(name); });
+}
+
 }  // namespace
 
 std::vector<HandleChange> changes_back(const HandleSet& before, const HandleEffects& effects) {
@@ -49,8 +61,8 @@ std::vector<HandleChange> changes_back(const HandleSet& before, const HandleEffe
   return changes;
 }
 
-void HandleHistory::note(const HandleSet& before, const HandleEffects& effects, Timers::TimePoint now,
-                         std::uint64_t revision) {
+void HandleHistory::note(const HandleSet& before, const HandleSet& after, const HandleEffects& effects,
+                         Timers::TimePoint now, std::uint64_t revision) {
   if (most_steps_ == 0) return;
   std::vector<HandleChange> back = changes_back(before, effects);
   if (back.empty()) return;
@@ -59,8 +71,10 @@ void HandleHistory::note(const HandleSet& before, const HandleEffects& effects, 
   std::ranges::sort(names);
   const bool goes_on =
       !effects.begins_step && only_moves && names == gesture_ && now - last_ <= kPause && redo_steps() == 0;
-  last_ = now;
-  if (goes_on) return;
+  const bool is_step = !goes_on && is_change(before, after, effects);
+  if (goes_on || is_step) last_ = now;
+  if (!goes_on && effects.begins_step) gesture_.clear();
+  if (!is_step) return;
   while (redo_steps() > 0) drop_last(revision);
   put(steps_.size(), std::move(back), revision);
   ++undo_steps_;

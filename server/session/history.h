@@ -30,9 +30,10 @@ class HandleHistory {
  public:
   explicit HandleHistory(std::size_t most_steps) : most_steps_(most_steps) {}
 
-  /// An update was taken that did this to `before`. What was taken back is forgotten.
-  void note(const HandleSet& before, const HandleEffects& effects, Timers::TimePoint now,
-            std::uint64_t revision);
+  /// An update was taken that made `after` of `before`. What was taken back is forgotten, unless the update changed nothing: then
+  /// it is no step either.
+  void note(const HandleSet& before, const HandleSet& after, const HandleEffects& effects,
+            Timers::TimePoint now, std::uint64_t revision);
 
   /// The changes that take the newest step back, or do the last one that was taken back again; null where there is none.
   const std::vector<HandleChange>* next(bool redo) const;

@@ -291,8 +291,8 @@ void Mailbox::note_revisions(const Candidate& next) {
 
 void Mailbox::note_step(const Update& update, const Candidate& next, const Inputs& before) {
   const Timers::TimePoint now = timers_ ? timers_->now() : Timers::TimePoint();
-  history_.note(*before.given_handles, {next.regrouped, next.moved, next.removed, update.begins_step}, now,
-                revisions_.newest);
+  history_.note(*before.given_handles, *newest().given_handles,
+                {next.regrouped, next.moved, next.removed, update.begins_step}, now, revisions_.newest);
   if (history_.forget_dropped()) revisions_.all = revisions_.newest;
 }
 

@@ -102,6 +102,8 @@ class Replay:
             assert {name: said_of(change) for name, change in sent.items()} == step["handles"]
         elif what == "accept":
             ledger.accept(step["seq"], step["kept"])
+        elif what == "show":
+            ledger.show(step.get("epoch", 1), step["seq"])
         elif what == "refuse":
             ledger.refuse(step["seq"])
         elif what == "reopened":

@@ -122,6 +122,18 @@ class Ledger:
         for sent in [one for one in self._in_flight if one.seq == seq]:
             self.accept_change(sent, is_kept)
             self._in_flight.remove(sent)
+            return
+        if is_kept and seq >= self._unkept.seq:  # shown before it was answered
+            self._unkept = NumberedUpdate(0, Update())
+
+    def show(self, epoch: int, seq: int) -> None:
+        """A frame shows the update of this number.
+
+        If it is of the present epoch, the update is ours, so the server has taken it, though its answer may still be on its
+        way. Earlier updates without an answer may have been refused: then nothing changes until they are answered.
+        """
+        if epoch == self._epoch and self._in_flight and self._in_flight[0].seq == seq:
+            self.accept(seq)
 
     def take_number(self) -> int:
         """For a change that the server makes by itself, and accept_change() is then told of."""

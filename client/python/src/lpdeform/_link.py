@@ -342,6 +342,7 @@ class Link:
             if frame is not None:
                 with self.changed:
                     self._rules.frame_fitted()
+                    self.ledger.show(frame.epoch, frame.input_seq)
             if frame is not None and not self.box.put(frame, stream.number):
                 self._acknowledge(frame.frame_seq, stream.number)  # dropped, but its credit is owed
         elif kind == "fault":

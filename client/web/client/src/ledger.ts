@@ -132,7 +132,18 @@ export class Ledger {
    */
   accept(sent: NumberedUpdate, isKept = false): void {
     if (this.isInFlight(sent)) this.#answered.set(sent, isKept);
+    else if (isKept && sent.seq >= this.#unkept.seq) this.#unkept = { seq: 0, update: {} }; // shown before it was answered
     this.#takeAnswered();
+  }
+
+  /**
+   * A frame shows the update of this number. If it is of the present epoch, the update is ours, so the server has taken it,
+   * though its answer may still be on its way. Earlier updates without an answer may have been refused: then nothing changes
+   * until they are answered.
+   */
+  show(epoch: number, seq: number): void {
+    const [first] = this.#inFlight;
+    if (epoch === this.#epoch && first?.seq === seq) this.accept(first);
   }
 
   #takeAnswered(): void {

@@ -190,6 +190,7 @@ export class Link {
       part: (part) => {
         const frame = this.#assembly.add(part);
         if (frame) this.#rules.frameFitted();
+        if (frame) this.ledger.show(frame.epoch, frame.inputSeq);
         if (!frame || this.box.put(frame, lane.streamId)) return;
         lane.acknowledge(frame.frameSeq, lane.streamId); // dropped, but its credit is owed
       },
