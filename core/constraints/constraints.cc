@@ -1,6 +1,7 @@
 #include "core/constraints/constraints.h"
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 
 #include "absl/strings/str_cat.h"
@@ -27,8 +28,10 @@ absl::StatusOr<Points> scaled_targets(const RestShape& shape, const std::string&
   return scaled;
 }
 
-absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Constraints& constraints,
-                          Holds& holds) {
+/// `hold` is called with each vertex that is held exactly, its target in scaled units and in the caller's.
+template <typename HoldVertex>
+absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Holds& holds,
+                          const HoldVertex& hold) {
   for (const auto& [name, handle] : handles.handles()) {
     const Points targets = target_positions(handle, shape.positions(), shape.faces());
     const auto scaled = scaled_targets(shape, name, handle, targets);
@@ -36,37 +39,42 @@ absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Cons
     add_holds(shape, name, handle, *scaled, holds);
     if (!std::holds_alternative<Exactly>(handle.hold)) continue;
     for (std::size_t k = 0; k < handle.vertices.size(); ++k) {
-      const std::int32_t vertex = handle.vertices[k];
-      constraints.is_held[vertex] = true;
-      constraints.targets.row(vertex) = scaled->row(k);
-      constraints.exact.row(vertex) = targets.row(k);
+      hold(handle.vertices[k], scaled->row(k), targets.row(k));
     }
   }
   return absl::OkStatus();
 }
 
-/// Holds everything outside the region where `outside` has it, and unreferenced vertices; rows that only such
-/// vertices would meet are void.
-void hold_outside(const RestShape& shape, const std::vector<std::int32_t>* region, const Points& outside,
-                  Constraints& constraints, Holds& holds) {
+/// Those of the region of interest, unreferenced ones left out.
+std::vector<char> movable_vertices(const RestShape& shape, const std::vector<std::int32_t>* region) {
   std::vector<char> may_move(shape.vertex_count(), region == nullptr);
   if (region != nullptr) {
     for (const std::int32_t vertex : *region) may_move[vertex] = true;
   }
   for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
-    if (shape.components()[i] < 0) {
-      may_move[i] = false;
-      constraints.is_held[i] = true;
-    } else if (!may_move[i]) {
-      constraints.is_held[i] = true;
-      constraints.targets.row(i) = (outside.row(i) - shape.centre()) / shape.mean_edge_length();
-      constraints.exact.row(i) = outside.row(i);
-    }
+    if (shape.components()[i] < 0) may_move[i] = false;
   }
+  return may_move;
+}
+
+/// Rows are void that only vertices meet which do not move.
+void drop_void_rows(const std::vector<char>& may_move, Holds& holds) {
   std::erase_if(holds.rows, [&](const LinearRow& row) {
     return std::none_of(row.point.vertices.begin(), row.point.vertices.begin() + row.point.count,
                         [&](std::int32_t vertex) { return may_move[vertex]; });
   });
+}
+
+/// Holds everything outside the region where `outside` has it, and unreferenced vertices where handles have them.
+void hold_outside(const RestShape& shape, const std::vector<char>& may_move, const Points& outside,
+                  Constraints& constraints) {
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    if (may_move[i]) continue;
+    constraints.is_held[i] = true;
+    if (shape.components()[i] < 0) continue;
+    constraints.targets.row(i) = (outside.row(i) - shape.centre()) / shape.mean_edge_length();
+    constraints.exact.row(i) = outside.row(i);
+  }
 }
 
 bool is_lock(const Hold& hold) {
@@ -173,8 +181,15 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
                           {},
                           footprint_stiffness(shape, handles)};
   Holds holds;
-  if (status = hold_handles(shape, handles, constraints, holds); !status.ok()) return status;
-  hold_outside(shape, handles.region(), outside ? *outside : shape.positions(), constraints, holds);
+  const auto hold = [&](std::int32_t vertex, const auto& scaled, const auto& exact) {
+    constraints.is_held[vertex] = true;
+    constraints.targets.row(vertex) = scaled;
+    constraints.exact.row(vertex) = exact;
+  };
+  if (status = hold_handles(shape, handles, holds, hold); !status.ok()) return status;
+  const std::vector<char> may_move = movable_vertices(shape, handles.region());
+  hold_outside(shape, may_move, outside ? *outside : shape.positions(), constraints);
+  drop_void_rows(may_move, holds);
   const std::vector<char> is_tied = tied_components(shape, handles, constraints, true);
   const auto free = std::find(is_tied.begin(), is_tied.end(), false);
   if (free != is_tied.end() && free_components == FreeComponents::kError) {
@@ -190,6 +205,18 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
     constraints.linear.tie_locks();
   }
   return constraints;
+}
+
+absl::Status check_equations(const RestShape& shape, const HandleSet& handles) {
+  if (!has_equations(handles)) return absl::OkStatus();
+  const std::vector<char> may_move = movable_vertices(shape, handles.region());
+  std::vector<char> is_held(may_move.size());
+  std::transform(may_move.begin(), may_move.end(), is_held.begin(), std::logical_not<>());
+  Holds holds;
+  const auto hold = [&](std::int32_t vertex, const auto&...) { is_held[vertex] = true; };
+  if (absl::Status status = hold_handles(shape, handles, holds, hold); !status.ok()) return status;
+  drop_void_rows(may_move, holds);
+  return LinearConstraints::create(std::move(holds.rows), is_held).status();
 }
 
 std::size_t Constraints::memory_bytes() const {

@@ -41,6 +41,10 @@ inline constexpr double kFarthestTarget = 1e9;
 absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const HandleSet& handles,
                                              FreeComponents free_components, const Points* outside = nullptr);
 
+/// Whether points held exactly and locks can hold together: the errors of LinearConstraints::create, without making constraints.
+/// `handles` have passed check_handles and go no farther than kFarthestTarget.
+absl::Status check_equations(const RestShape& shape, const HandleSet& handles);
+
 /// The rotation and translation that bring points `from` nearest to points `to`: to_k = R from_k + t. For one
 /// point, or points that coincide, a translation.
 struct RigidTransform {

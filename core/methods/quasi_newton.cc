@@ -6,24 +6,42 @@
 namespace lpdeform {
 namespace {
 
+// f is the stage's objective, g its gradient, d the direction, t the step's length; f_k is f after k iterations of the stage.
+
+/// Pairs (s, y) that the direction is made of.
 constexpr std::size_t kMemory = 6;
 constexpr std::size_t kChunk = 4096;  // vertices
-constexpr int kWindow = 20;
-constexpr int kRefresh = 40;
-constexpr int kSoonest = 2;         // iterations between refreshes, where one is asked for
-constexpr double kShortStep = 0.9;  // asks for one
-constexpr int kTrial = 10;          // iterations for which a live session keeps the metric that it finds
+
+/// The search along d accepts t where f(x + t d) <= f(x) + kSufficientDecrease t <g, d> .
 constexpr double kSufficientDecrease = 1e-4;
+
+/// The last stage has converged where f_(k - kWindow) - f_k <= tolerance p f_k , p the largest p_i.
+constexpr int kWindow = 20;
+/// Any other stage ends where f_(k - kWindow) - f_k <= kStageTolerance tolerance p f_k , or k >= kStageIterations .
+constexpr double kStageTolerance = 30;
 constexpr int kStageIterations = 60;
-constexpr double kStageTolerance = 30;  // times the tolerance ends a stage that is not the last
-constexpr double kSmoothingStep = 0.1;  // of eps^2, from stage to stage
-constexpr double kLargeP = 12;
-constexpr double kBias = 3e-4;
-constexpr double kLeastBias = 0.01;  // with kLeastSmoothing
-constexpr double kLiveBias = 0.1;    // of the mean cell's E^p
-// eps^2 over the squared diagonal:
+
+/// The metric is refactored where r >= kRefresh , r the iterations since it was; or where t < kShortStep and r >= kSoonest .
+constexpr int kRefresh = 40, kSoonest = 2;
+constexpr double kShortStep = 0.9;
+/// A live session begins with r = kRefresh - kTrial : it keeps the metric that it finds for kTrial iterations.
+constexpr int kTrial = 10;
+
+/// From one stage of smoothing to the next, eps^2 becomes kSmoothingStep eps^2 .
+constexpr double kSmoothingStep = 0.1;
+/// eps^2 over the squared diagonal, of the first: after a plain guess, and after a coarse level.
 constexpr double kColdSmoothing = 1e-8, kPreparedSmoothing = 1e-9;
-constexpr double kLeastSmoothing = 1e-26;  // rounding
+/// A live session's first eps adds a tenth to the mean cell: eps^p = kLiveBias (mean E_i)^p , p the lowest p_i.
+constexpr double kLiveBias = 0.1;
+/// Smoothing has ended where eps^2 <= kLeastSmoothing diagonal^2 (rounding),
+constexpr double kLeastSmoothing = 1e-26;
+/// or where sum over p_i < 2 of eps^p_i <= kBias sum_i E_i^p_i .
+constexpr double kBias = 3e-4;
+/// What was minimised is the true objective F where f - F <= kLeastBias F . Else the solve has stalled, not converged.
+constexpr double kLeastBias = 0.01;
+
+/// A cold solve goes by way of p = 4 where the largest p_i > kLargeP and the lowest p_i >= 2 .
+constexpr double kLargeP = 12;
 
 }  // namespace
 

@@ -68,7 +68,7 @@ Points Deformer::Impl::initial_guess(InitialGuess guess) {
   Points result;
   if (guess == InitialGuess::kRest)
     result = constraints->targets;
-  else if (guess == InitialGuess::kCurrent && has_state)
+  else if (guess == InitialGuess::kCurrent && state != State::kUntouched)
     result = current_guess();
   else
     result = laplacian_guess();

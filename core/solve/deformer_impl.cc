@@ -136,7 +136,7 @@ Method Deformer::Impl::second_method(Method asked, bool is_warm) {
 std::unique_ptr<Minimiser> Deformer::Impl::with_second(std::unique_ptr<Minimiser> first,
                                                        const Points& guess) {
   const auto make = [this, guess] {
-    is_metric_live = false;
+    forget_weights();
     if (prepare_metric(true)) objective.evaluate(guess, *norm);
     return make_minimiser(second, guess, Warmth::kCold);
   };
@@ -250,16 +250,15 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   summary.threads = workers().threads();
   evaluations_before = objective.evaluations();
   back_substitutions_before = metric.back_substitutions();
-  const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state && !is_at_rest;
+  const bool is_warm = settings.initial == InitialGuess::kCurrent && state == State::kDeformed;
   if (!is_warm) x_before_move.resize(0, 3);
   const Method asked = settings.method;
   settings.method = summary.method = chosen_method(asked, is_warm);
   second = second_method(asked, is_warm);
   const bool keeps_metric =
-      is_warm && is_metric_live && is_metric_of_rows && metric.is_factored_for(constraints->is_held);
-  is_drag = keeps_metric;
-  const bool is_factored = prepare_metric(!is_warm || !is_metric_of_rows);
-  is_metric_of_rows = true;
+      is_warm && factor == Factor::kQuasiNewton && metric.is_factored_for(constraints->is_held);
+  warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
+  const bool is_factored = prepare_metric(!is_warm || factor == Factor::kOutdated);
   summary.setup_seconds = seconds();
 
   started = Clock::now();
@@ -276,10 +275,9 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   norm.emplace(effective_material(), shape->vertex_count(), unit(), reference);
   objective.reweigh(*norm);  // typical_energy has evaluated the guess
   best_sum = std::numeric_limits<double>::infinity();
-  const Warmth warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
   minimiser = make_minimiser(settings.method, guess, warmth);
   if (second != Method::kAuto) minimiser = with_second(std::move(minimiser), guess);
-  is_metric_live = settings.method == Method::kQuasiNewton;
+  factor = settings.method == Method::kQuasiNewton ? Factor::kQuasiNewton : Factor::kUsable;
   const double sum = objective.sum(*norm);
   keep_if_best(sum);
   summary.initial_energy = norm->true_energy(sum);
@@ -293,7 +291,7 @@ void Deformer::Impl::iterate() {
   double sum = result.true_sum ? *result.true_sum : objective.sum(*norm);
   keep_if_best(sum);
   const bool is_over = result.outcome == Outcome::kConverged || result.outcome == Outcome::kStalled;
-  if (is_over && is_drag && keep_rest_if_best()) sum = best_sum;
+  if (is_over && warmth == Warmth::kWithMetric && keep_rest_if_best()) sum = best_sum;
   record(result, sum);
   switch (result.outcome) {
     case Outcome::kProgress:
@@ -313,7 +311,7 @@ void Deformer::Impl::settle_methods() {
   if (!minimiser->outcome_before()) return;  // the first was at work to the end
   if (minimiser->is_best_present()) {
     settings.method = summary.method = second;
-    is_metric_live = second == Method::kQuasiNewton;
+    factor = second == Method::kQuasiNewton ? Factor::kQuasiNewton : Factor::kUsable;
   } else {
     objective.evaluate(x, *norm);  // the next solve reads off it where soft handles were
   }
@@ -328,11 +326,13 @@ void Deformer::Impl::end(StopReason reason) {
   settle_methods();
   const bool has_metric = !minimiser || minimiser->is_best_present();
   // Before its end the metric may still be that of the guess.
-  if (settings.method == Method::kMultiresolution) is_metric_live = reason == StopReason::kConverged;
-  is_metric_live = is_metric_live && has_metric;
+  if (settings.method == Method::kMultiresolution && reason == StopReason::kConverged)
+    factor = Factor::kQuasiNewton;
+  else if (settings.method == Method::kMultiresolution)
+    forget_weights();
+  if (!has_metric) forget_weights();
   minimiser.reset();
-  has_state = true;
-  is_at_rest = is_best_zero();
+  state = is_best_zero() ? State::kUndistorted : State::kDeformed;
   summary.stop_reason = reason;
   summary.solve_seconds = seconds();
   if (!settings.certify || reason == StopReason::kCancelled) return;
@@ -341,7 +341,7 @@ void Deformer::Impl::end(StopReason reason) {
 }
 
 void Deformer::Impl::begin_certificate(double max_seconds) {
-  is_metric_live = false;  // the certificate factors for itself
+  forget_weights();  // the certificate factors for itself
   objective.evaluate(x, *norm);
   certificate =
       std::make_unique<Certificate>(make_problem(), x, CertificateSettings{.max_seconds = max_seconds});
@@ -361,8 +361,8 @@ void Deformer::Impl::replace_constraints(Constraints next) {
         next.footprint.size() == constraints->footprint.size() && next.footprint == constraints->footprint;
     const bool has_rows_of_before =
         next.linear.reuse(constraints->linear) && next.soft.has_rows_of(constraints->soft);
-    if (!has_footprint_of_before) is_metric_live = false;
-    is_metric_of_rows = is_metric_of_rows && has_rows_of_before;
+    if (!has_footprint_of_before) forget_weights();
+    if (!has_rows_of_before) factor = Factor::kOutdated;
   }
   constraints = std::move(next);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -59,6 +60,8 @@ struct Deformer::Impl {
   bool certify();
   void replace_constraints(Constraints next);
   double seconds() const;  // since `started`
+  /// The factor's weights are not those that quasi_newton left any more.
+  void forget_weights() { factor = std::min(factor, Factor::kUsable); }
   void interrupt() {
     certificate.reset();
     if (minimiser) end(StopReason::kCancelled);
@@ -79,18 +82,27 @@ struct Deformer::Impl {
 
   // The state, in scaled units: the best of the last solve, or what was set.
   Points x;
+  enum class State {
+    kUntouched,    // nothing was solved or set: x are the rest positions
+    kUndistorted,  // the last solve ended with no distortion: the next one begins as the first
+    kDeformed,     // the next solve may go on from x
+  };
+  State state = State::kUntouched;
   Points x_before_move;  // when the last warm solve began; empty where there was none
-  bool has_state = false;
-  bool is_at_rest = false;        // the last solve ended with no distortion: there is nothing to go on from
-  bool is_drag = false;           // the running solve goes on from a state with the same vertices held
-  bool is_metric_of_rows = true;  // the last factor knows the present soft terms and linear rows
-  bool is_metric_live = false;    // the last factor is quasi_newton's, for this material
-  Field best_energies;            // E_i at x, the caller's units
-  Points positions;               // x in the caller's units, made when asked for
+  Field best_energies;   // E_i at x, the caller's units
+  Points positions;      // x in the caller's units, made when asked for
   bool is_positions_current = true;
+
+  enum class Factor {
+    kOutdated,  // made for other soft terms or linear rows than the present ones
+    kUsable,    // for the present ones, with any cell weights
+    kQuasiNewton,  // and with the weights that quasi_newton left, for this material: a warm solve goes on with it
+  };
+  Factor factor = Factor::kUsable;
 
   // The running solve.
   SolveSettings settings;
+  Warmth warmth = Warmth::kCold;
   Method second = Method::kAuto;  // what is tried after settings.method; kAuto: nothing
   std::stop_token stop;
   std::optional<LpNorm> norm;           // true norm, and the reference of the running solve

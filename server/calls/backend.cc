@@ -218,28 +218,30 @@ absl::Status Backend::delete_upload(const CallContext& call, const v1::DeleteUpl
 
 void Backend::get_session(const CallContext& call, const v1::GetSessionRequest& request,
                           v1::GetSessionResponse& response, Done done) {
-  const auto session = find(call, Access::kRead, request.session());
-  if (session.ok()) {
-    encode((*session)->info(), registry->idle(), timers->now(), *response.mutable_session());
-  }
-  done(session.status());
+  with_session(call, Access::kRead, request.session(),
+               [this, &response, done = std::move(done)](const auto& session) {
+                 if (session.ok())
+                   encode((*session)->info(), registry->idle(), timers->now(), *response.mutable_session());
+                 done(session.status());
+               });
 }
 
 void Backend::ack_frames(const CallContext& call, const v1::AckFramesRequest& request, v1::AckFramesResponse&,
                          Done done) {
-  const auto session = find(call, Access::kRead, request.session());
-  done(session.ok() ? (*session)->acknowledge(request.stream_id(), request.frame_seq()) : session.status());
+  with_session(call, Access::kRead, request.session(),
+               [&request, done = std::move(done)](const auto& session) {
+                 done(session.ok() ? (*session)->acknowledge(request.stream_id(), request.frame_seq())
+                                   : session.status());
+               });
 }
 
 absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call,
-                                                         const std::string& session_name,
+                                                         std::shared_ptr<Session> session,
                                                          const std::string& token,
                                                          const v1::FrameOptions& options,
                                                          std::function<void()> wake) {
   const auto caller = identify(call, token.empty() ? Access::kRead : Access::kChange);
   if (!caller.ok()) return caller.status();
-  auto session = registry->find(session_name, caller->subject);
-  if (!session.ok()) return session.status();
   auto decoded = decode_frame_options(options);
   if (!decoded.ok()) return decoded.status();
   decoded->max_bytes_per_second = options_.max_stream_bytes_per_second;
@@ -247,9 +249,12 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call
     double& asked = decoded->max_frames_per_second;  // 0: any number
     asked = asked > 0 ? std::min(asked, most) : most;
   }
-  auto place = caller_limits_->enter_stream((*session)->owner());
+  auto place = caller_limits_->enter_stream(session->owner());
   if (!place.ok()) return place.status();
-  auto stream = (*session)->open_stream(token, *decoded);
+  Change change{session, session->writer(token)};
+  if (!token.empty() && !change.writer.ok()) return change.writer.status();
+  const auto writer = change.writer.ok() ? std::make_optional(*change.writer) : std::nullopt;
+  auto stream = session->open_stream(writer, *decoded);
   if (!stream.ok()) return stream.status();
   (*stream)->start(std::move(wake));
   metrics->change(Level::kStreams, 1);
@@ -257,43 +262,41 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call
     const std::chrono::seconds left(caller->until + 1 - absl::ToUnixSeconds(absl::Now()));
     end_at(timers, *stream, timers->now() + std::min(left, kLongestStream));
   }
-  const WriterLease lease = (*session)->lease();
-  log().info("stream_opened", {{"session", abbreviated(session_name)},
+  const WriterLease lease = session->lease();
+  log().info("stream_opened", {{"session", abbreviated(session->name())},
                                {"stream", abbreviated((*stream)->id())},
                                {"role", std::string(token.empty() ? "reader" : "writer")},
                                {"epoch", lease.epoch},
                                {"input_seq", lease.input_seq},
                                {"trace_id", call.trace_id}});
-  return OpenStream{*std::move(session), *std::move(stream), *std::move(place)};
+  return OpenStream{std::move(change), *std::move(stream), *std::move(place)};
 }
 
 void Backend::forget(const CallContext& call, const OpenStream& open, CallEnd how) {
-  open.session->forget_stream(*open.stream);
+  open.session()->forget_stream(*open.stream);
   metrics->change(Level::kStreams, -1);
   how.is_past_deadline = is_reached(call.deadline);
   how.unread = std::max<std::chrono::duration<double>>(how.unread, open.stream->waited_for_credit());
   const std::string reason = stream_end_name(stream_end_of(open.stream->ended_by(), how));
   metrics->stream_ended(reason);
-  const WriterLease lease = open.session->lease();
-  log().info("stream_ended", {{"session", abbreviated(open.session->name())},
+  const WriterLease lease = open.session()->lease();
+  log().info("stream_ended", {{"session", abbreviated(open.session()->name())},
                               {"stream", abbreviated(open.stream->id())},
                               {"reason", reason},
                               {"epoch", lease.epoch},
                               {"input_seq", lease.input_seq},
                               {"frame_seq", open.stream->last_frame_seq()},
                               {"unread_seconds", where_known(how.unread.count())},
-                              {"fault", open.session->standing_fault()},
+                              {"fault", open.session()->standing_fault()},
                               {"trace_id", call.trace_id}});
 }
 
-absl::Status Backend::solve(const CallContext& call, const v1::SolveRequest& request,
+absl::Status Backend::solve(const CallContext& call, const Change& change, const v1::SolveRequest& request,
                             SolveJob::OnProgress on_progress, SolveJob::OnDone on_done,
                             std::shared_ptr<SolveJob>& job) {
-  const auto session = find(call, Access::kChange, request.session());
-  if (!session.ok()) return session.status();
-  if (absl::Status status = (*session)->check_writer(request.writer_token()); !status.ok()) return status;
-  Decoder decoder(*uploads_, (*session)->vertex_count(), &(*session)->features(),
-                  (*session)->mesh().weld().get(), (*session)->owner());
+  const std::shared_ptr<Session>& session = change.session;
+  Decoder decoder(*uploads_, session->vertex_count(), &session->features(), session->mesh().weld().get(),
+                  session->owner());
   std::optional<Update> update;
   if (request.has_update()) {
     auto decoded = decoder.update(request.update());
@@ -304,19 +307,19 @@ absl::Status Backend::solve(const CallContext& call, const v1::SolveRequest& req
   if (request.has_initial_positions()) {
     auto positions = decoder.positions(request.initial_positions());
     if (!positions.ok()) return positions.status();
-    auto welded = (*session)->mesh().solver_positions(*std::move(positions));
+    auto welded = session->mesh().solver_positions(*std::move(positions));
     if (!welded.ok()) return welded.status();
     options.initial_positions = *std::move(welded);
   }
-  const SolveJob::OnDone on_ended = [this, session = *session, trace_id = call.trace_id,
+  const SolveJob::OnDone on_ended = [this, session, trace_id = call.trace_id,
                                      on_done](absl::StatusOr<SolveResult> result) {
     if (result.ok()) log_solved(*session, *result, trace_id);
     // The result answers the update, so it comes when that is kept: as a rule long ago.
     when_kept(*session, session->revision(), [on_done, result](bool) { on_done(result); });
   };
   job = std::make_shared<SolveJob>(std::move(options), std::move(on_progress), on_ended);
-  const absl::Status status = (*session)->solve(request.writer_token(), update, job);
-  if (status.ok()) when_kept(**session, (*session)->revision(), [](bool) {});
+  const absl::Status status = session->solve(change.writer, update, job);
+  if (status.ok()) when_kept(*session, session->revision(), [](bool) {});
   return status;
 }
 

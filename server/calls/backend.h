@@ -76,21 +76,6 @@ class Backend {
   void undo_update(const CallContext& call, const v1::UndoUpdateRequest& request,
                    v1::UndoUpdateResponse& response, Done done);
 
-  /// Calls `then` with OK once find() finds the session of this name, or will not however long one waits: at once, or, where
-  /// only the store has it, on a thread of the pool when it has been made again. Errors: UNAVAILABLE STORE_FAILING;
-  /// NOT_FOUND SESSION_DAMAGED; RESOURCE_EXHAUSTED as CreateSession.
-  void when_here(const CallContext& call, const std::string& name, Done then);
-
-  /// Calls `then` with OK once an update of this session can be decoded without waiting for its geometry. Errors: as
-  /// Session::check_writer and GeometryQueue::when_found.
-  void when_decodable(const std::shared_ptr<Session>& session, const std::string& token,
-                      const v1::Update& update, Done then);
-
-  /// Ends the process's part in all sessions, as it shuts down, and waits until the store has what has changed, up to kFlushPatience.
-  /// Whether it has.
-  bool release_sessions(const std::string& text);
-  static constexpr std::chrono::seconds kFlushPatience{5};
-
   /// What a call is going to do.
   enum class Access { kRead, kChange };
   /// Who calls. UNAUTHENTICATED as Tokens::check, AUTHORIZATION_TWICE; PERMISSION_DENIED READ_ONLY, HOST_FOREIGN; INVALID_ARGUMENT
@@ -100,21 +85,41 @@ class Backend {
   absl::StatusOr<std::shared_ptr<Session>> find(const CallContext& call, Access access,
                                                 const std::string& name) const;
 
+  /// Calls `then` with the session of this name: at once, or, where only the store has it, on a thread of the pool when it has been
+  /// made again. Errors: as find; UNAVAILABLE STORE_FAILING; NOT_FOUND SESSION_DAMAGED; RESOURCE_EXHAUSTED as CreateSession.
+  using OnSession = std::function<void(absl::StatusOr<std::shared_ptr<Session>>)>;
+  void with_session(const CallContext& call, Access access, const std::string& name, OnSession then);
+
+  /// A change that a writer asks for: of which session, and by whom.
+  struct Change {
+    std::shared_ptr<Session> session;
+    absl::StatusOr<Session::Writer> writer;
+  };
+  /// Calls `then` with OK once an update of this session can be decoded without waiting for its geometry. Errors: that of the
+  /// writer; as GeometryQueue::when_found.
+  void when_decodable(const Change& change, const v1::Update& update, Done then);
+
+  /// Ends the process's part in all sessions, as it shuts down, and waits until the store has what has changed, up to kFlushPatience.
+  /// Whether it has.
+  bool release_sessions(const std::string& text);
+  static constexpr std::chrono::seconds kFlushPatience{5};
+
   /// A session's file, and the memory that it has been promised. For those who may change the session: it gives its mesh away.
   struct SnapshotFile {
     std::string bytes;
     Reservation memory;
   };
-  /// Errors: as find and encode_snapshot; RESOURCE_EXHAUSTED MEMORY_FULL, CALLER_MEMORY_FULL.
-  absl::StatusOr<SnapshotFile> snapshot(const CallContext& call, const std::string& session_name) const;
+  /// Errors: as encode_snapshot; RESOURCE_EXHAUSTED MEMORY_FULL, CALLER_MEMORY_FULL.
+  absl::StatusOr<SnapshotFile> snapshot(const CallContext& call, const Session& session) const;
 
-  /// A stream of a session, which is found by its name; with a token, the writer's. `wake` as FrameStream::start has it.
+  /// A stream of a session; with a token, the writer's. `wake` as FrameStream::start has it.
   struct OpenStream {
-    std::shared_ptr<Session> session;
+    Change change;  // what its updates are; of a reader, the writer is an error
     std::shared_ptr<FrameStream> stream;
     CallerLimits::Place place = nullptr;
+    const std::shared_ptr<Session>& session() const { return change.session; }
   };
-  absl::StatusOr<OpenStream> open_stream(const CallContext& call, const std::string& session_name,
+  absl::StatusOr<OpenStream> open_stream(const CallContext& call, std::shared_ptr<Session> session,
                                          const std::string& token, const v1::FrameOptions& options,
                                          std::function<void()> wake);
 
@@ -124,11 +129,11 @@ class Backend {
   /// Decodes an update for a session and gives it to it. `answered` is called with an error at once, else when the update
   /// is in the store, or when that takes too long.
   using OnUpdated = std::function<void(absl::StatusOr<UpdateResult>)>;
-  void update(const CallContext& call, Session& session, const std::string& token, const v1::Update& update,
+  void update(const CallContext& call, const Change& change, const v1::Update& update,
               const OnUpdated& answered);
 
   /// Decodes what a Solve call asks for and begins it.
-  absl::Status solve(const CallContext& call, const v1::SolveRequest& request,
+  absl::Status solve(const CallContext& call, const Change& change, const v1::SolveRequest& request,
                      SolveJob::OnProgress on_progress, SolveJob::OnDone on_done,
                      std::shared_ptr<SolveJob>& job);
 
@@ -151,8 +156,8 @@ class Backend {
  private:
   std::function<void(double)> observer(Span span) const;
   void log_solved(const Session& session, const SolveResult& result, const std::string& trace_id) const;
-  absl::StatusOr<UpdateResult> take_update(const CallContext& call, Session& session,
-                                           const std::string& token, const v1::Update& update);
+  absl::StatusOr<UpdateResult> take_update(const CallContext& call, const Change& change,
+                                           const v1::Update& update);
   /// A call that makes a session: the same request_id and fingerprint give the same one.
   struct Creation {
     CallContext call;
@@ -172,6 +177,11 @@ class Backend {
                                            const v1::RestoreSessionRequest& request,
                                            std::uint64_t fingerprint) const;
   void when_kept(const Session& session, std::uint64_t revision, Keeper::OnKept on_kept);
+  void fetch(const CallContext& call, const std::string& name, const std::string& owner, OnSession then);
+  void replace_writer(const CallContext& call, const std::shared_ptr<Session>& session,
+                      v1::AcquireWriterResponse& response, const Done& done);
+  void undo(Session& session, const v1::UndoUpdateRequest& request, v1::UndoUpdateResponse& response,
+            const Done& done);
   void list_kept(const std::string& owner, const std::string& after, std::size_t most,
                  v1::ListSessionsResponse& response, Done done);
   void make_again(const std::string& name, absl::StatusOr<Keeper::Found> found);

@@ -26,29 +26,27 @@ class FrameCall : public WritePump<Reactor, Response> {
   void open(
       const std::string& session_name, const std::string& token, const v1::FrameOptions& options,
       const std::function<void()>& then = [] {}) {
-    backend_.when_here(this->context(), session_name,
-                       [self = std::static_pointer_cast<FrameCall>(this->shared_from_this()), session_name,
-                        token, options, then](const absl::Status& status) {
-                         if (!status.ok()) return self->refuse(status);
-                         const auto session =
-                             self->backend_.find(self->context(), Backend::Access::kRead, session_name);
-                         if (session.ok()) self->record().about(*session);
-                         self->open_here(session_name, token, options);
-                         then();
-                       });
+    backend_.with_session(this->context(), Backend::Access::kRead, session_name,
+                          [self = std::static_pointer_cast<FrameCall>(this->shared_from_this()), token,
+                           options, then](const auto& session) {
+                            if (!session.ok()) return self->refuse(session.status());
+                            self->record().about(*session);
+                            self->open_here(*session, token, options);
+                            then();
+                          });
   }
 
  private:
-  void open_here(const std::string& session_name, const std::string& token, const v1::FrameOptions& options) {
+  void open_here(const std::shared_ptr<Session>& session, const std::string& token,
+                 const v1::FrameOptions& options) {
     auto open =
-        backend_.open_stream(this->context(), session_name, token, options, [weak = this->weak_from_this()] {
+        backend_.open_stream(this->context(), session, token, options, [weak = this->weak_from_this()] {
           if (const auto self = weak.lock()) self->pump();
         });
     const std::scoped_lock lock(this->mutex_);
     if (!open.ok()) return this->refuse_locked(open.status());
     if (this->is_over_locked()) return backend_.forget(this->context(), *open, this->how_ended_locked());
     open_ = *std::move(open);
-    token_ = token;
     this->pump_locked();
   }
 
@@ -57,7 +55,7 @@ class FrameCall : public WritePump<Reactor, Response> {
     if (!open_.stream) return Made::kNothing;
     const std::optional<Note> note = open_.stream->next();
     if (!note) return Made::kNothing;
-    encode(*note, *open_.stream, open_.session->vertex_count(), response);
+    encode(*note, *open_.stream, open_.session()->vertex_count(), response);
     return std::holds_alternative<EndNote>(*note) ? Made::kLastMessage : Made::kMessage;
   }
 
@@ -68,7 +66,6 @@ class FrameCall : public WritePump<Reactor, Response> {
 
   Backend& backend_;
   Backend::OpenStream open_;
-  std::string token_;
   bool is_forgotten_ = false;
 };
 
@@ -172,7 +169,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
       ++unanswered_;
     }
     backend_.when_decodable(
-        open_.session, token_, request_.update(),
+        open_.change, request_.update(),
         [self = std::static_pointer_cast<DeformCall>(shared_from_this())](const absl::Status& status) {
           self->give_update(status);
           self->read();
@@ -186,9 +183,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
       self->answer(result, input);
     };
     if (!status.ok()) return answered(status);
-    const auto session = backend_.registry->find(open_.session->name(), open_.session->owner());
-    if (!session.ok()) return answered(session.status());
-    backend_.update(context(), **session, token_, update, answered);
+    backend_.update(context(), open_.change, update, answered);
   }
 
   /// Then the stream ends in a moment, and an update without an answer is sent again to where the session is; with one that refuses
@@ -213,7 +208,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   }
 
   void take_ack() {
-    open_.session->touch();
+    open_.session()->touch();
     const absl::Status status = open_.stream->acknowledge(request_.ack().frame_seq());
     if (!status.ok()) return break_off(std::string(status.message()));
     read();
@@ -222,7 +217,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   /// The client does not keep to the contract: reads no more, and says so.
   void break_off(const std::string& why) {
     if (open_.stream) {
-      backend_.log().info("stream_misused", {{"session", abbreviated(open_.session->name())},
+      backend_.log().info("stream_misused", {{"session", abbreviated(open_.session()->name())},
                                              {"stream", abbreviated(open_.stream->id())},
                                              {"text", why},
                                              {"trace_id", context().trace_id}});

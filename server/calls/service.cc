@@ -123,12 +123,7 @@ grpc::ServerUnaryReactor* about_session(Backend& backend, grpc::CallbackServerCo
                      }
                      finish(status);
                    };
-                   const auto then = [&backend, record, handler, &request, &response,
-                                      tell](const absl::Status& status) {
-                     if (!status.ok()) return tell(status);
-                     (backend.*handler)(record->context(), request, response, tell);
-                   };
-                   backend.when_here(record->context(), request.session(), then);
+                   (backend.*handler)(record->context(), request, response, tell);
                  });
 }
 

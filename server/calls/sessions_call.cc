@@ -1,4 +1,3 @@
-#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -47,11 +46,11 @@ class StreamSessionsCall final
   void fetch(const v1::StreamSessionsRequest& request, int from) {
     if (from == request.streams_size()) return open_all(request);
     auto self = std::static_pointer_cast<StreamSessionsCall>(shared_from_this());
-    backend_.when_here(context(), request.streams(from).session(),
-                       [self, request, from](const absl::Status& status) {
-                         if (!status.ok()) self->not_here_[from] = status;
-                         self->fetch(request, from + 1);
-                       });
+    backend_.with_session(context(), Backend::Access::kRead, request.streams(from).session(),
+                          [self, request, from](const auto& session) {
+                            self->sessions_.push_back(session);
+                            self->fetch(request, from + 1);
+                          });
   }
 
   void open_all(const v1::StreamSessionsRequest& request) {
@@ -60,10 +59,9 @@ class StreamSessionsCall final
       const auto pump = [weak = weak_from_this()] {
         if (const auto self = weak.lock()) self->pump();
       };
-      const auto missing = not_here_.find(static_cast<int>(lanes.size()));
-      auto open = missing == not_here_.end()
-                      ? backend_.open_stream(context(), one.session(), "", one.options(), pump)
-                      : missing->second;
+      const auto& session = sessions_[lanes.size()];
+      auto open = session.ok() ? backend_.open_stream(context(), *session, "", one.options(), pump)
+                               : session.status();
       if (!open.ok()) record().refused(open.status(), {});
       lanes.push_back({open.ok() ? *std::move(open) : Backend::OpenStream{}, open.status(), false});
     }
@@ -95,7 +93,7 @@ class StreamSessionsCall final
     const std::optional<Note> note = lane.open.stream->next();
     if (!note) return false;
     lane.is_over = std::holds_alternative<EndNote>(*note);
-    encode(*note, *lane.open.stream, lane.open.session->vertex_count(), response);
+    encode(*note, *lane.open.stream, lane.open.session()->vertex_count(), response);
     return true;
   }
 
@@ -122,7 +120,7 @@ class StreamSessionsCall final
   }
 
   Backend& backend_;
-  std::map<int, absl::Status> not_here_;  // why, by the number of the stream
+  std::vector<absl::StatusOr<std::shared_ptr<Session>>> sessions_;  // of each stream, or why there is none
   std::vector<Lane> lanes_;
   std::size_t next_ = 0;  // whose turn it is, and how often there was one
 };

@@ -21,10 +21,10 @@ class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveRespons
     auto self = std::static_pointer_cast<SolveCall>(shared_from_this());
     // A copy, because gRPC's goes when the call is cancelled.
     const auto task = [self, request] {
-      self->backend_.when_here(self->context(), request.session(),
-                               [self, request](const absl::Status& status) {
-                                 status.ok() ? self->decode(request) : self->refuse(status);
-                               });
+      self->backend_.with_session(
+          self->context(), Backend::Access::kChange, request.session(), [self, request](const auto& session) {
+            session.ok() ? self->decode(*session, request) : self->refuse(session.status());
+          });
     };
     if (!backend_.pool.try_post(task)) refuse(server_busy(backend_.pool.expected_wait()));
   }
@@ -50,19 +50,17 @@ class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveRespons
     beat_at((is_beat_due_ ? now : last_sent_at_) + backend_.heartbeat());
   }
 
-  void decode(const v1::SolveRequest& request) {
+  void decode(const std::shared_ptr<Session>& session, const v1::SolveRequest& request) {
     auto self = std::static_pointer_cast<SolveCall>(shared_from_this());
-    const auto session = backend_.find(context(), Backend::Access::kChange, request.session());
-    if (!session.ok()) return refuse(session.status());
-    record().about(*session);
+    record().about(session);
+    const Backend::Change change{session, session->writer(request.writer_token())};
     if (request.has_update()) record().about(refused_input(request.update()));
-    backend_.when_decodable(*session, request.writer_token(), request.update(),
-                            [self, request](const absl::Status& status) {
-                              status.ok() ? self->start(request) : self->refuse(status);
-                            });
+    backend_.when_decodable(change, request.update(), [self, change, request](const absl::Status& status) {
+      status.ok() ? self->start(change, request) : self->refuse(status);
+    });
   }
 
-  void start(const v1::SolveRequest& request) {
+  void start(const Backend::Change& change, const v1::SolveRequest& request) {
     {
       const std::scoped_lock lock(mutex_);
       if (is_over_locked()) return;
@@ -80,7 +78,8 @@ class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveRespons
     };
     std::shared_ptr<SolveJob> job;
     absl::Status status = decode_scalar(request.scalar()).status();
-    if (status.ok()) status = backend_.solve(context(), request, std::move(on_progress), on_done, job);
+    if (status.ok())
+      status = backend_.solve(context(), change, request, std::move(on_progress), on_done, job);
     if (!status.ok()) return refuse(status);
     const std::scoped_lock lock(mutex_);
     job_ = std::move(job);

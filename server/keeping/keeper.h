@@ -77,7 +77,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   /// OK where a change of the session may be kept as things are: else STORE_FAILING, or STORE_FULL where the store has refused one of it.
   absl::Status may_keep(const Session& session) const;
 
-  /// It was, and the store may not know yet.
+  /// Whether the session was removed and the store may not know yet.
   bool is_being_removed(const std::string& name) const;
 
   /// The session leaves this process and stays in the store.

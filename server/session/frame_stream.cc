@@ -12,11 +12,12 @@
 namespace lpdeform {
 
 Format StreamOptions::format_for(const Surface& surface) const {
+  const auto is_too_fast = [&](Format chosen) {
+    const auto bytes = static_cast<double>(surface.size(chosen, with_distortion, with_normals));
+    return max_bytes_per_second > 0 && kLowestRate * bytes > max_bytes_per_second;
+  };
   Format chosen = format;
-  while (max_bytes_per_second > 0 &&
-         chosen<lowest_format&& static_cast<double>(surface.size(chosen, with_distortion, with_normals)) *
-                kLowestRate>
-             max_bytes_per_second) {
+  while ((chosen < lowest_format) && is_too_fast(chosen)) {
     chosen = static_cast<Format>(static_cast<int>(chosen) + 1);
   }
   return chosen;

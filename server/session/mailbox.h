@@ -83,7 +83,7 @@ class Mailbox {
 
   /// A part with the input_seq of the value that is there is a repetition: dropped, but not counted as stale.
   /// Errors, INVALID_ARGUMENT: INPUT_SEQ_ZERO, HANDLE_CHANGED_TWICE (in this update), TOO_MANY_HANDLES,
-  /// HANDLE_TARGET_TOO_FAR, COPIES_DIFFER, and what check_solver, make_constraints, check_material and HandleSet have;
+  /// HANDLE_TARGET_TOO_FAR, COPIES_DIFFER, and what check_settings, check_method_takes, check_equations, check_material and HandleSet have;
   /// NOT_FOUND HANDLE_UNKNOWN. A component without a handle is no error here: handles may come one by one.
   absl::StatusOr<UpdateResult> take(const Update& update);
 
@@ -161,9 +161,5 @@ class Mailbox {
   mutable std::mutex mutex_;  // guards inputs_, for moments only
   Inputs inputs_;
 };
-
-/// Whether the method can minimise for this material and these handles: INVALID_ARGUMENT METHOD_NEEDS_P
-/// (local_global: p = 2 everywhere; conic: p = 1), METHOD_NEEDS_EXACT_HANDLES (conic), TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE.
-absl::Status check_solver(const SolveSettings& settings, const Material& material, const HandleSet& handles);
 
 }  // namespace lpdeform

@@ -121,28 +121,33 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   /// Who writes, and what has changed since `revision`; since 0, all.
   SessionChanges changes_since(std::uint64_t revision) const;
 
+  /// Who has shown the writer token, in which epoch. It is asked for once a call or stream; until another writer takes over, it
+  /// stands for the token.
+  struct Writer {
+    std::uint64_t epoch = 0;
+  };
   /// UNAUTHENTICATED WRITER_TOKEN_MISSING, PERMISSION_DENIED NOT_THE_WRITER.
-  absl::Status check_writer(const std::string& token) const;
+  absl::StatusOr<Writer> writer(const std::string& token) const;
 
   /// A new token and a new epoch; the writer before is one no more, and its Solve and Deform calls end.
   WriterLease acquire_writer();
 
-  /// Errors: as check_writer and Mailbox::take; once closed NOT_FOUND SESSION_UNKNOWN, or UNAVAILABLE DRAINING where it goes on
-  /// elsewhere.
-  absl::StatusOr<UpdateResult> update(const std::string& token, const Update& update);
+  /// Errors: that of `writer`; NOT_THE_WRITER where another one has taken over since; those of Mailbox::take; once closed NOT_FOUND
+  /// SESSION_UNKNOWN, or UNAVAILABLE DRAINING where it goes on elsewhere.
+  absl::StatusOr<UpdateResult> update(const absl::StatusOr<Writer>& writer, const Update& update);
 
-  /// Takes the newest step of the handles back, or does again what was taken back last. Errors: as check_writer and
-  /// Mailbox::undo; once closed as update().
-  absl::StatusOr<UndoResult> undo(const std::string& token, std::uint64_t input_seq, bool redo);
+  /// Takes the newest step of the handles back, or does again what was taken back last. Errors: as update(), with
+  /// those of Mailbox::undo.
+  absl::StatusOr<UndoResult> undo(const absl::StatusOr<Writer>& writer, std::uint64_t input_seq, bool redo);
 
   /// Takes `update` in, if there is one, and runs `job`; an earlier job ends with ABORTED SUPERSEDED. Errors
   /// as update(); then the job does not begin.
-  absl::Status solve(const std::string& token, const std::optional<Update>& update,
+  absl::Status solve(const absl::StatusOr<Writer>& writer, const std::optional<Update>& update,
                      const std::shared_ptr<SolveJob>& job);
 
-  /// A new stream. With a token, it is the writer's, and ends when another takes over. Errors: as
-  /// check_writer where `token` is not empty; once closed as update(); UNAVAILABLE DRAINING; RESOURCE_EXHAUSTED STREAMS_FULL.
-  absl::StatusOr<std::shared_ptr<FrameStream>> open_stream(const std::string& token,
+  /// A new stream. With a writer, it is theirs, and ends when another takes over. Errors: NOT_THE_WRITER where one has taken over
+  /// since; once closed as update(); UNAVAILABLE DRAINING; RESOURCE_EXHAUSTED STREAMS_FULL.
+  absl::StatusOr<std::shared_ptr<FrameStream>> open_stream(const std::optional<Writer>& writer,
                                                            const StreamOptions& options);
   /// Somebody looks on, or may go on with a drag that rests, even where nobody has called for long.
   bool has_streams() const { return publisher_->reader_count() > 0; }
@@ -168,7 +173,9 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
 
  private:
   Session(SessionParts parts, SessionServices services);
-  absl::Status check_writer_locked(const std::string& token) const;
+  absl::Status check_still_writes_locked(const absl::StatusOr<Writer>& writer) const;
+  template <typename Change>
+  auto take_in(const absl::StatusOr<Writer>& writer, const Change& change);
   absl::Status closed() const;
   std::shared_ptr<SolveJob> take_job();
   void end_job(const absl::Status& why);
