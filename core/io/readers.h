@@ -11,9 +11,10 @@
 
 namespace lpdeform {
 
-// One reader a format, behind parse_mesh. All are our own: OpenMesh's keep coordinates as floats, share
-// mutable state between threads, and trust the counts in a file. Here a count is believed only as far as the
-// bytes that follow reach, so that memory and time are bounded by the size of the input.
+// One reader a format, behind parse_mesh. All are our own; CONTRIBUTING.md compares them with libraries, which
+// keep coordinates as floats, trust the counts in a file, or do not say where it is wrong. Here a count is
+// believed only as far as the bytes that follow reach, so that memory and time are bounded by the size of the
+// input.
 
 absl::StatusOr<TriangleMesh> parse_off(std::string_view text);
 absl::StatusOr<TriangleMesh> parse_obj(std::string_view text);
