@@ -13,6 +13,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "grpc/health/v1/health.pb.h"
 #include "server/access/certificates.h"
 #include "server/access/listener.h"
@@ -49,8 +50,8 @@ constexpr std::chrono::milliseconds kLeastIdle = std::chrono::seconds(1),
 constexpr std::chrono::milliseconds kLinger{100};
 
 absl::Status out_of_range(const std::string& name, const std::string& limit) {
-  return invalid_input({"OPTION_OUT_OF_RANGE", name, limit},
-                       absl::StrCat("Option ", name, " must be ", limit, "."));
+  return make_fault({Reason::kOptionOutOfRange, name, limit},
+                    absl::StrCat("Option ", name, " must be ", limit, "."));
 }
 
 absl::Status check(const ServerOptions& options) {
@@ -127,8 +128,8 @@ bool tells_callers_apart(const ServerOptions& options) {
 
 absl::Status check_anonymous(const ServerOptions& options, const Listener& listener) {
   if (tells_callers_apart(options) || options.allow_anonymous || listener.is_local()) return absl::OkStatus();
-  return invalid_input(
-      {"ANONYMOUS_ADDRESS", options.address, "loopback or unix"},
+  return make_fault(
+      {Reason::kAnonymousAddress, options.address, "loopback or unix"},
       absl::StrCat("Without authentication the server listens for this machine alone, not on ",
                    options.address,
                    "; give --token-keys or --tls-client-ca, or --allow-anonymous to let everybody in."));

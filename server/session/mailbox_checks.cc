@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/constraints/constraints.h"
 #include "core/constraints/holds.h"
 #include "core/problem/check_settings.h"
@@ -13,23 +14,23 @@
 namespace lpdeform {
 
 absl::Status too_many_handles(std::size_t handles, std::size_t most) {
-  return invalid_input({"TOO_MANY_HANDLES", "", absl::StrCat("handles <= ", most)},
-                       absl::StrCat("The session would have ", handles, " handles; it may have ", most,
-                                    ". Let go of some first."));
+  return make_fault({Reason::kTooManyHandles, "", absl::StrCat("handles <= ", most)},
+                    absl::StrCat("The session would have ", handles, " handles; it may have ", most,
+                                 ". Let go of some first."));
 }
 
 absl::Status check_solver(const SolveSettings& settings, const Material& material, const HandleSet& handles) {
   if (!(settings.tolerance >= 1e-14 && settings.tolerance <= 0.1)) {
-    return invalid_input({"TOLERANCE_OUT_OF_RANGE", "tolerance", "1e-14 <= tolerance <= 0.1"},
-                         absl::StrCat("The tolerance is ", settings.tolerance, ", not within 1e-14 to 0.1."));
+    return make_fault({Reason::kToleranceOutOfRange, "tolerance", "1e-14 <= tolerance <= 0.1"},
+                      absl::StrCat("The tolerance is ", settings.tolerance, ", not within 1e-14 to 0.1."));
   }
   if (settings.max_iterations < 0) {
-    return invalid_input({"ITERATIONS_OUT_OF_RANGE", "max_iterations", "0 <= max_iterations < 2^31"},
-                         "The number of iterations does not fit into 31 bits.");
+    return make_fault({Reason::kIterationsOutOfRange, "max_iterations", "0 <= max_iterations < 2^31"},
+                      "The number of iterations does not fit into 31 bits.");
   }
   if (!(settings.time_limit_seconds > 0)) {
-    return invalid_input(
-        {"TIME_LIMIT_OUT_OF_RANGE", "time_limit_seconds", "time_limit_seconds > 0"},
+    return make_fault(
+        {Reason::kTimeLimitOutOfRange, "time_limit_seconds", "time_limit_seconds > 0"},
         absl::StrCat("The time limit is ", settings.time_limit_seconds, " s, not more than 0."));
   }
   const double needed =
@@ -38,8 +39,8 @@ absl::Status check_solver(const SolveSettings& settings, const Material& materia
     return check_method_takes(settings.method, handles);
   }
   const std::string method(method_name(settings.method));
-  return invalid_input({"METHOD_NEEDS_P", method, absl::StrCat("p = ", needed)},
-                       absl::StrCat("Method ", method, " needs p = ", needed, " everywhere."));
+  return make_fault({Reason::kMethodNeedsP, method, absl::StrCat("p = ", needed)},
+                    absl::StrCat("Method ", method, " needs p = ", needed, " everywhere."));
 }
 
 absl::Status Mailbox::check(const Candidate& next, const Inputs& before) const {
@@ -99,8 +100,8 @@ absl::Status Mailbox::check_targets(const std::string& name, const Handle& handl
   for (Eigen::Index k = 0; k < targets.rows(); ++k) {
     const double distance = (targets.row(k) - shape_->centre()).stableNorm();
     if (distance <= farthest) continue;
-    return invalid_input(
-        {"HANDLE_TARGET_TOO_FAR", element_of(name), absl::StrCat("distance <= ", farthest)},
+    return make_fault(
+        {Reason::kHandleTargetTooFar, element_of(name), absl::StrCat("distance <= ", farthest)},
         absl::StrCat(place_of(handle, static_cast<std::size_t>(k)), " of ", element_of(name), " would be ",
                      distance, " from the mesh's centre, over ", kFarthestTarget, " of its diagonals."));
   }
