@@ -91,7 +91,9 @@ struct Read {
 };
 
 struct TypeName {
-  const char* operator()(const std::string*) const { return "TEXT"; }
+  const Flag& flag;
+
+  const char* operator()(const std::string*) const { return flag.type; }
   const char* operator()(const bool*) const { return ""; }
   const char* operator()(const double*) const { return "NUMBER"; }
   const char* operator()(const std::chrono::milliseconds*) const { return "SECONDS"; }
@@ -109,7 +111,7 @@ CLI::Option* add(CLI::App& app, const Flag& flag) {
   if (bool* const* const is_set = std::get_if<bool*>(&flag.value)) return app.add_flag(name, **is_set, help);
   const auto read = [flag](const std::string& text) { std::visit(Read{flag, text}, flag.value); };
   CLI::Option* const option = app.add_option_function<std::string>(name, read, help);
-  option->type_name(std::visit(TypeName(), flag.value))->default_str(value_of(flag));
+  option->type_name(std::visit(TypeName{flag}, flag.value))->default_str(value_of(flag));
   if (!flag.choices.empty()) option->check(CLI::IsMember(flag.choices));
   return option;
 }

@@ -76,7 +76,7 @@ void add_limits_of_connections(std::vector<Flag>& flags, ServerOptions& server) 
            kCountOrNone},
           {"connection-idle", kLimits, &server.connection_idle,
            "Time without a call after which a connection is closed; clients open another when they call. "
-           "Calls of the health service and of reflection, which need no token, last no longer (CANCELLED)",
+           "Calls of the health service and of reflection, which need no token, last no longer",
            kConnectionSeconds},
           {"max-calls-per-connection", kLimits, &server.max_calls_per_connection,
            "Calls on one connection at a time, streams included; more wait in the client", kCount},
@@ -151,8 +151,8 @@ void add_limits_of_rates(std::vector<Flag>& flags, ServerOptions& server) {
 void add_limits_of_time(std::vector<Flag>& flags, ServerOptions& server) {
   using enum FlagGroup;
   append(flags, {{"session-idle", kLimits, &server.session_idle,
-                  "Time without use after which a session goes", kSeconds, Reason::kSessionUnknown},
-                 {"upload-idle", kLimits, &server.upload_idle, "Time without use after which an upload goes",
+                  "Time without use after which a session expires", kSeconds, Reason::kSessionUnknown},
+                 {"upload-idle", kLimits, &server.upload_idle, "Time without use after which an upload expires",
                   kSeconds, Reason::kUploadUnknown},
                  {"heartbeat", kLimits, &server.heartbeat, "Silence after which a stream says something",
                   kSeconds}});
@@ -198,6 +198,7 @@ void add_program(std::vector<Flag>& flags, Arguments& arguments) {
            .value = &arguments.probed,
            .help = "Asks the server at this address for its health and exits: 0 where it serves, 1 where "
                    "not; http://HOST:PORT asks its admin port, which needs no certificate",
+           .type = "ADDRESS",
            .is_in_environment = false}});
 }
 

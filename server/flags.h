@@ -65,6 +65,7 @@ struct Flag {
   std::optional<Reason> refusal = {};     // what is told to those who pass this limit
   std::string needs = {};                 // a flag without which it makes no sense
   std::vector<std::string> choices = {};  // empty: any text
+  const char* type = "TEXT";              // of a text, in --help
   bool is_in_environment = true;
 };
 
