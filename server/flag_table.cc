@@ -152,8 +152,8 @@ void add_limits_of_time(std::vector<Flag>& flags, ServerOptions& server) {
   using enum FlagGroup;
   append(flags, {{"session-idle", kLimits, &server.session_idle,
                   "Time without use after which a session expires", kSeconds, Reason::kSessionUnknown},
-                 {"upload-idle", kLimits, &server.upload_idle, "Time without use after which an upload expires",
-                  kSeconds, Reason::kUploadUnknown},
+                 {"upload-idle", kLimits, &server.upload_idle,
+                  "Time without use after which an upload expires", kSeconds, Reason::kUploadUnknown},
                  {"heartbeat", kLimits, &server.heartbeat, "Silence after which a stream says something",
                   kSeconds}});
 }

@@ -54,7 +54,7 @@ struct FlagRange {
   bool or_zero = false;
 };
 
-/// One flag. Reading the command line and the environment, --help, checks of ranges and the table in server/README.md are made of
+/// One flag. Reading the command line and the environment, --help, checks of ranges and the table in server/flags.md are made of
 /// these.
 struct Flag {
   std::string name;  // "max-sessions" is --max-sessions and LPDEFORM_MAX_SESSIONS

@@ -12,7 +12,7 @@
 namespace {
 
 constexpr char kBegin[] =
-    "<!-- The table of limits is made by build/release/bin/write_limits server/README.md. -->\n";
+    "<!-- The table of limits is made by build/release/bin/write_limits server/flags.md. -->\n";
 constexpr char kEnd[] = "<!-- Its end. -->\n";
 
 int fail(const std::string& why) {
