@@ -5,7 +5,6 @@
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
-#include <cmath>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -13,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "grpc/health/v1/health.pb.h"
 #include "server/access/certificates.h"
 #include "server/access/listener.h"
@@ -26,6 +26,7 @@
 #include "server/calls/open_calls.h"
 #include "server/calls/service.h"
 #include "server/calls/unread_calls.h"
+#include "server/flags.h"
 #include "server/runtime/file_watch.h"
 
 namespace lpdeform {
@@ -41,69 +42,17 @@ constexpr int kMostHeaderBytes = 64 * 1024;
 constexpr int kHandshakeMs = 20'000;
 constexpr std::chrono::seconds kAcceptPatience{5};
 constexpr int kReflectionThreads = 16;
-/// gRPC counts milliseconds in an int.
-constexpr std::chrono::milliseconds kLeastIdle = std::chrono::seconds(1),
-                                    kMostIdle = std::chrono::hours(24 * 24);
 /// Between the last answer and the end of the connections: who writes to a connection that has ended loses what he
 /// has not read of it yet, the reason for its end among that.
 constexpr std::chrono::milliseconds kLinger{100};
 
-absl::Status out_of_range(const std::string& name, const std::string& limit) {
-  return invalid_input({"OPTION_OUT_OF_RANGE", name, limit},
-                       absl::StrCat("Option ", name, " must be ", limit, "."));
-}
-
-absl::Status check(const ServerOptions& options) {
-  if (options.threads < 0 || options.threads > 1024) return out_of_range("threads", "0 to 1024");
-  if (options.runner_threads < 0 || options.runner_threads == 1 || options.runner_threads > 1024) {
-    return out_of_range("runner_threads", "0 or 2 to 1024");
+absl::Status check(ServerOptions options) {
+  for (const Flag& flag : flags_of(options)) {
+    if (absl::Status in_range = check_range(flag); !in_range.ok()) return in_range;
   }
-  if (options.max_vertices == 0 || options.max_vertices > 100'000'000)
-    return out_of_range("max_vertices", "1 to 10^8");
-  if (!(options.max_stream_bytes_per_second >= 0) || std::isinf(options.max_stream_bytes_per_second)) {
-    return out_of_range("max_stream_bytes_per_second", "finite and >= 0");
-  }
-  if (!(options.max_stream_frames_per_second >= 0) || std::isinf(options.max_stream_frames_per_second)) {
-    return out_of_range("max_stream_frames_per_second", "finite and >= 0");
-  }
-  if (!(options.max_upload_bytes_per_second >= 0) || std::isinf(options.max_upload_bytes_per_second)) {
-    return out_of_range("max_upload_bytes_per_second", "finite and >= 0");
-  }
-  for (const auto& [name, value] :
-       {std::pair("max_sessions", options.max_sessions),
-        std::pair("max_streams_per_session", options.max_streams_per_session),
-        std::pair("max_handles", options.max_handles), std::pair("max_uploads", options.max_uploads),
-        std::pair("max_calls_waiting", options.max_calls_waiting),
-        std::pair("max_calls_per_connection", options.max_calls_per_connection)}) {
-    if (value == 0 || value > 1'000'000) return out_of_range(name, "1 to 10^6");
-  }
-  for (const auto& [name, value] : {std::pair("max_sessions_per_caller", options.max_sessions_per_caller),
-                                    std::pair("max_streams_per_caller", options.max_streams_per_caller),
-                                    std::pair("max_uploads_per_caller", options.max_uploads_per_caller)}) {
-    if (value > 1'000'000) return out_of_range(name, "0 to 10^6");  // also of what was below 0
-  }
-  if (options.max_upload_bytes == 0) return out_of_range("max_upload_bytes", "more than 0");
-  const ByteLimit& each = options.max_bytes_per_caller;
-  if (!each.bytes && !(each.percent >= 1 && each.percent <= 100))
-    return out_of_range("max_bytes_per_caller", "1% to 100%, or a size");
-  for (const auto& [name, value] : {std::pair("token_issuer", &options.token_issuer),
-                                    std::pair("token_audience", &options.token_audience)}) {
-    if (!value->empty() && options.token_keys_file.empty())
-      return out_of_range(name, "given with --token-keys");
-  }
-  if (options.max_undo > 10'000) return out_of_range("max_undo", "0 to 10^4");
-  if (options.max_connections_per_address > 1'000'000) {
-    return out_of_range("max_connections_per_address", "0 to 10^6");
-  }
-  if (options.max_connections == 0 || options.max_connections > 1'000'000) {
-    return out_of_range("max_connections", "1 to 10^6");
-  }
-  if (options.heartbeat.count() <= 0) return out_of_range("heartbeat", "more than 0");
-  if (options.session_idle.count() <= 0) return out_of_range("session_idle", "more than 0");
-  if (options.upload_idle.count() <= 0) return out_of_range("upload_idle", "more than 0");
-  if (options.connection_idle < kLeastIdle || options.connection_idle > kMostIdle) {
-    return out_of_range("connection_idle", "1 s to 24 days");
-  }
+  if (!options.token_keys_file.empty()) return absl::OkStatus();
+  if (!options.token_issuer.empty()) return must_be("token-issuer", "given with --token-keys");
+  if (!options.token_audience.empty()) return must_be("token-audience", "given with --token-keys");
   return absl::OkStatus();
 }
 
@@ -127,8 +76,8 @@ bool tells_callers_apart(const ServerOptions& options) {
 
 absl::Status check_anonymous(const ServerOptions& options, const Listener& listener) {
   if (tells_callers_apart(options) || options.allow_anonymous || listener.is_local()) return absl::OkStatus();
-  return invalid_input(
-      {"ANONYMOUS_ADDRESS", options.address, "loopback or unix"},
+  return make_fault(
+      {Reason::kAnonymousAddress, options.address, "loopback or unix"},
       absl::StrCat("Without authentication the server listens for this machine alone, not on ",
                    options.address,
                    "; give --token-keys or --tls-client-ca, or --allow-anonymous to let everybody in."));

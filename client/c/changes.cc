@@ -8,6 +8,7 @@
 #include "client/c/arguments.h"
 #include "client/c/structs.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::engine {
 namespace {
@@ -29,7 +30,8 @@ absl::StatusOr<Motion> read_rigid(const lpdeform_motion& motion, const Space& sp
   out.center = space.point_to_server(vector_of(motion.center));
   out.translation = space.point_to_server(vector_of(motion.translation));
   if (!std::all_of(q, q + 4, [](double number) { return std::isfinite(number); })) {
-    return invalid_input({"ROTATION_NOT_FINITE", "rotation", ""}, "A number of the rotation is not finite.");
+    return make_fault({Reason::kRotationNotFinite, "rotation", ""},
+                      "A number of the rotation is not finite.");
   }
   const double sine = std::hypot(q[0], q[1], q[2]);
   if (sine == 0) return out;
@@ -89,8 +91,8 @@ bool add(Update& update, const char* name, Update::Change change) {
 }
 
 absl::Status changed_twice(const char* name) {
-  return invalid_input({"HANDLE_CHANGED_TWICE", absl::StrCat("handle \"", name, "\""), ""},
-                       absl::StrCat("The update changes handle \"", name, "\" twice."));
+  return make_fault({Reason::kHandleChangedTwice, absl::StrCat("handle \"", name, "\""), ""},
+                    absl::StrCat("The update changes handle \"", name, "\" twice."));
 }
 
 absl::Status read_sets(const lpdeform_update& update, const Space& space, Update& out) {

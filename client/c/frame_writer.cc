@@ -12,6 +12,7 @@
 #include "client/c/vertex_source.h"
 #include "core/base/colour.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::engine {
 namespace {
@@ -38,17 +39,16 @@ absl::Status check(const std::string& name, const lpdeform_target& target, std::
   const absl::Status reserved = check_reserved(name, target.reserved);
   if (!reserved.ok()) return reserved;
   if (std::ranges::find(formats, target.format) == formats.end()) {
-    return invalid_input({"FORMAT_UNKNOWN", name, ""},
-                         absl::StrCat("Format ", target.format, " is not one of ", name, "."));
+    return make_fault({Reason::kFormatUnknown, name, ""},
+                      absl::StrCat("Format ", target.format, " is not one of ", name, "."));
   }
   return check_extent(name, target.bytes, target.offset, target.stride, bytes_of(target.format, components),
                       vertex_count);
 }
 
-absl::Status absent(const std::string& what, const char* reason, const std::string& option) {
-  return make_fault(
-      absl::StatusCode::kFailedPrecondition, {reason, what, option},
-      absl::StrCat("Frames of this session have no ", what, ": it was opened without (", option, ")."));
+absl::Status absent(const std::string& what, Reason reason, const std::string& option) {
+  return make_fault({reason, what, option}, absl::StrCat("Frames of this session have no ", what,
+                                                         ": it was opened without (", option, ")."));
 }
 
 /// Vertex i's value, made by `value_of(i)`, to its place.
@@ -216,13 +216,13 @@ lpdeform_frame facts_of(const client::Frame& frame) {
 absl::Status check_buffers(const lpdeform_buffers& buffers, std::uint32_t vertex_count,
                            const FrameContents& contents) {
   if (buffers.normals.data != nullptr && !contents.normals)
-    return absent("normals", "NO_NORMALS", "with_normals");
+    return absent("normals", Reason::kNoNormals, "with_normals");
   if ((buffers.colours.data != nullptr || buffers.distortion.data != nullptr) && !contents.distortion) {
-    return absent("distortion", "NO_DISTORTION", "without_distortion");
+    return absent("distortion", Reason::kNoDistortion, "without_distortion");
   }
   if (!std::isfinite(buffers.red_distortion) || buffers.red_distortion < 0) {
-    return invalid_input({"RED_OUT_OF_RANGE", "red_distortion", "0 <= red_distortion"},
-                         absl::StrCat("red_distortion is ", buffers.red_distortion, "."));
+    return make_fault({Reason::kRedOutOfRange, "red_distortion", "0 <= red_distortion"},
+                      absl::StrCat("red_distortion is ", buffers.red_distortion, "."));
   }
   absl::Status checked = check_reserved("buffers", buffers.reserved);
   checked.Update(check("positions", buffers.positions, 3,

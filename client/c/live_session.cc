@@ -10,7 +10,9 @@
 #include "client/cpp/ledger.h"
 #include "client/cpp/names.h"
 #include "client/cpp/recovery.h"
+#include "client/cpp/refusals.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::engine {
 namespace {
@@ -18,24 +20,18 @@ namespace {
 /// So often a wait for a result looks whether another thread has taken it.
 constexpr std::chrono::milliseconds kGlance{20};
 
-absl::Status session_closed() {
-  return make_fault(absl::StatusCode::kFailedPrecondition, {"SESSION_CLOSED", "", ""},
-                    "The session is closed.");
-}
-
 absl::Status not_there_yet() {
-  return make_fault(absl::StatusCode::kFailedPrecondition, {"NOT_CONNECTED", "", ""},
-                    "There is no session on the server yet.");
+  return make_fault({Reason::kNotConnected, "", ""}, "There is no session on the server yet.");
 }
 
 absl::Status no_result(const absl::Status& problem) {
   const std::string why = problem.ok() ? "" : absl::StrCat(" The connection is down: ", problem.message());
-  return make_fault(absl::StatusCode::kDeadlineExceeded, {"NO_FRAME", "", ""},
+  return make_fault({Reason::kNoFrame, "", ""},
                     absl::StrCat("The finished result did not come in time.", why));
 }
 
 absl::Status not_the_writer() {
-  return make_fault(absl::StatusCode::kFailedPrecondition, {"NOT_THE_WRITER", "", ""},
+  return make_fault(absl::StatusCode::kFailedPrecondition, {Reason::kNotTheWriter, "", ""},
                     "A reader cannot change the session.");
 }
 
@@ -143,7 +139,7 @@ absl::StatusOr<std::uint64_t> LiveSession::send(client::Update update) {
   const absl::Status checked = client::check_names(update);
   if (!checked.ok()) return checked;
   const std::scoped_lock lock(mutex_);
-  if (is_closing_) return session_closed();
+  if (is_closing_) return client::session_closed();
   if (!refused_.ok()) return refused_;
   if (facts_.is_reader) return not_the_writer();
   if (!session_) {
@@ -185,7 +181,7 @@ lpdeform_state LiveSession::state(absl::Status& why) const {
   const std::scoped_lock lock(mutex_);
   why = absl::OkStatus();
   if (is_closing_) {
-    why = session_closed();
+    why = client::session_closed();
     return LPDEFORM_STATE_REFUSED;
   }
   if (!refused_.ok()) {
@@ -222,7 +218,7 @@ std::string LiveSession::mesh_notice() const {
 
 absl::StatusOr<std::shared_ptr<client::Session>> LiveSession::session() const {
   const std::scoped_lock lock(mutex_);
-  if (is_closing_) return session_closed();
+  if (is_closing_) return client::session_closed();
   if (!refused_.ok()) return refused_;
   return session_;
 }
@@ -288,7 +284,7 @@ absl::StatusOr<std::shared_ptr<client::Session>> LiveSession::wait_for_session(C
     lock.unlock();
     return session();
   }
-  return make_fault(absl::StatusCode::kDeadlineExceeded, {"NO_FRAME", "", ""},
+  return make_fault({Reason::kNoFrame, "", ""},
                     absl::StrCat("There was no session in time. ", last_problem_.message()));
 }
 

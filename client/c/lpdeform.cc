@@ -22,10 +22,12 @@
 #include "client/cpp/guarded.h"
 #include "client/cpp/names.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace engine = lpdeform::engine;
 namespace client = lpdeform::client;
-using lpdeform::invalid_input;
+using lpdeform::make_fault;
+using lpdeform::Reason;
 using lpdeform::engine::argument_missing;
 using lpdeform::engine::check_enum;
 
@@ -291,8 +293,8 @@ lpdeform_code lpdeform_session_name(const lpdeform_session* session, char* name,
     const absl::StatusOr<std::string> said = session->live->name();
     if (!said.ok()) return said.status();
     if (said->size() >= bytes) {
-      return invalid_input({"BUFFER_TOO_SMALL", "name", absl::StrCat("bytes >= ", said->size() + 1)},
-                           absl::StrCat("The name needs ", said->size() + 1, " bytes, not ", bytes, "."));
+      return make_fault({Reason::kBufferTooSmall, "name", absl::StrCat("bytes >= ", said->size() + 1)},
+                        absl::StrCat("The name needs ", said->size() + 1, " bytes, not ", bytes, "."));
     }
     std::memcpy(name, said->c_str(), said->size() + 1);
     return absl::OkStatus();

@@ -89,7 +89,7 @@ enum {
 typedef struct lpdeform_error {
   uint32_t struct_size;
   lpdeform_code code;
-  char reason[48];   /* for programs: "MESH_INDEX_OUT_OF_RANGE"; see proto/errors.md. May be empty */
+  char reason[48];   /* for programs: one of lpdeform_reasons.h. May be empty */
   char element[128]; /* the first offending one: "face 3". May be empty */
   char limit[128];   /* the bound that was broken: "0 <= vertex < 42". May be empty */
   char message[512]; /* one sentence for people */

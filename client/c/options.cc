@@ -10,6 +10,7 @@
 #include "client/c/structs.h"
 #include "client/cpp/tls_texts.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::engine {
 namespace {
@@ -26,8 +27,8 @@ std::string text(const char* from) {
 
 absl::Status check_seconds(const char* name, double seconds) {
   if (std::isfinite(seconds) && seconds >= 0 && seconds <= 1e9) return absl::OkStatus();
-  return invalid_input({"SECONDS_OUT_OF_RANGE", name, absl::StrCat("0 <= ", name, " <= 1e9")},
-                       absl::StrCat(name, " is ", seconds, "."));
+  return make_fault({Reason::kSecondsOutOfRange, name, absl::StrCat("0 <= ", name, " <= 1e9")},
+                    absl::StrCat(name, " is ", seconds, "."));
 }
 
 absl::StatusOr<std::shared_ptr<Server>> make_server(const lpdeform_connection& given) {
@@ -41,7 +42,8 @@ absl::StatusOr<std::shared_ptr<Server>> make_server(const lpdeform_connection& g
   const bool has_texts =
       !tls.root_certificates.empty() || !tls.certificate_chain.empty() || !tls.private_key.empty();
   if (given.tls == 0 && has_texts) {
-    return invalid_input({"TLS_OFF", "connection.tls", "tls = 1"}, "There are certificates, but tls is 0.");
+    return make_fault({Reason::kTlsOff, "connection.tls", "tls = 1"},
+                      "There are certificates, but tls is 0.");
   }
   client::ClientOptions options;
   options.connect_timeout = milliseconds(given.connect_timeout_seconds, 5);

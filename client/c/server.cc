@@ -4,6 +4,7 @@
 
 #include "client/cpp/rpc.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::engine {
 
@@ -12,8 +13,8 @@ Server::Server(std::string address, client::ClientOptions options, double reconn
 
 absl::Status Server::set_token(std::string token) {
   if (!client::is_header_text(token)) {
-    return invalid_input(
-        {"TOKEN_CHARACTERS", "token", "printable ASCII"},
+    return make_fault(
+        {Reason::kTokenCharacters, "token", "printable ASCII"},
         "The token has a character that a header cannot carry; a line break at its end, perhaps.");
   }
   const std::scoped_lock lock(token_->mutex);

@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/c/arguments.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::engine {
 absl::StatusOr<Space> Space::of(const lpdeform_options& options) {
@@ -13,8 +14,8 @@ absl::StatusOr<Space> Space::of(const lpdeform_options& options) {
   checked.Update(check_enum("winding", options.winding, LPDEFORM_CLOCKWISE));
   if (!checked.ok()) return checked;
   if (!std::isfinite(options.units_per_metre) || options.units_per_metre < 0) {
-    return invalid_input({"UNITS_OUT_OF_RANGE", "units_per_metre", "0 <= units_per_metre"},
-                         absl::StrCat("units_per_metre is ", options.units_per_metre, "."));
+    return make_fault({Reason::kUnitsOutOfRange, "units_per_metre", "0 <= units_per_metre"},
+                      absl::StrCat("units_per_metre is ", options.units_per_metre, "."));
   }
   Space space;
   if (options.units_per_metre > 0) space.units_per_metre_ = options.units_per_metre;

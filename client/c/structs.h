@@ -11,6 +11,7 @@
 #include "client/c/arguments.h"
 #include "client/c/lpdeform.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 /// Structs that carry their size in their first field, `struct_size`: see "Versions" in lpdeform.h.
 namespace lpdeform::engine {
@@ -35,15 +36,14 @@ absl::StatusOr<Struct> read_struct(const Struct* given, const std::string& name)
   std::memcpy(&size, given, sizeof size);
   constexpr std::size_t least = kFirstSize<Struct>;
   if (size < least) {
-    return invalid_input(
-        {"STRUCT_SIZE", name, absl::StrCat("struct_size >= ", least)},
-        absl::StrCat("struct_size of ", name, " is ", size, " and not at least ", least, "."));
+    return make_fault({Reason::kStructSize, name, absl::StrCat("struct_size >= ", least)},
+                      absl::StrCat("struct_size of ", name, " is ", size, " and not at least ", least, "."));
   }
   const std::size_t known = std::min<std::size_t>(size, sizeof(Struct));
   const auto* const bytes = reinterpret_cast<const unsigned char*>(given);
   if (std::any_of(bytes + known, bytes + size, [](unsigned char byte) { return byte != 0; })) {
-    return invalid_input(
-        {"STRUCT_TOO_NEW", name, absl::StrCat("struct_size = ", sizeof(Struct))},
+    return make_fault(
+        {Reason::kStructTooNew, name, absl::StrCat("struct_size = ", sizeof(Struct))},
         absl::StrCat("A field of ", name, " is set that this library, which is older, does not know."));
   }
   Struct out{};

@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/c/arguments.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::engine {
 namespace {
@@ -28,8 +29,8 @@ absl::StatusOr<std::vector<double>> read_triples(const std::string& name, const 
   const absl::Status reserved = check_reserved(name, source.reserved);
   if (!reserved.ok()) return reserved;
   if (source.format != LPDEFORM_FLOAT32 && source.format != LPDEFORM_FLOAT64) {
-    return invalid_input(
-        {"FORMAT_UNKNOWN", name, "FLOAT32 or FLOAT64"},
+    return make_fault(
+        {Reason::kFormatUnknown, name, "FLOAT32 or FLOAT64"},
         absl::StrCat("The format of ", name, " is ", source.format, " and neither FLOAT32 nor FLOAT64."));
   }
   const bool is_double = source.format == LPDEFORM_FLOAT64;
@@ -54,12 +55,12 @@ std::vector<std::uint32_t> read_indices(const lpdeform_mesh& mesh, bool turns_tr
 absl::Status check_indices(const lpdeform_mesh& mesh) {
   if (mesh.indices == nullptr && mesh.index_count > 0) return argument_missing("mesh.indices");
   if (mesh.index_count % 3 != 0) {
-    return invalid_input({"INDEX_COUNT", "mesh.index_count", "index_count % 3 = 0"},
-                         absl::StrCat(mesh.index_count, " indices are not three a triangle."));
+    return make_fault({Reason::kIndexCount, "mesh.index_count", "index_count % 3 = 0"},
+                      absl::StrCat(mesh.index_count, " indices are not three a triangle."));
   }
   if (mesh.index_format != LPDEFORM_UINT32 && mesh.index_format != LPDEFORM_UINT16) {
-    return invalid_input(
-        {"FORMAT_UNKNOWN", "mesh.index_format", "UINT32 or UINT16"},
+    return make_fault(
+        {Reason::kFormatUnknown, "mesh.index_format", "UINT32 or UINT16"},
         absl::StrCat("The format of mesh.indices is ", mesh.index_format, " and neither UINT32 nor UINT16."));
   }
   return absl::OkStatus();
@@ -71,16 +72,16 @@ absl::Status check_extent(const std::string& name, std::size_t bytes, std::uint3
                           std::uint32_t stride, std::uint32_t size, std::uint32_t count) {
   const std::uint64_t step = stride == 0 ? size : stride;
   if (step < size) {
-    return invalid_input(
-        {"STRIDE_TOO_SMALL", name, absl::StrCat("stride >= ", size)},
+    return make_fault(
+        {Reason::kStrideTooSmall, name, absl::StrCat("stride >= ", size)},
         absl::StrCat("The stride of ", name, " is ", stride, " bytes, its elements have ", size, "."));
   }
   // Each is below 2^32, so that this fits where a size_t may not.
   const std::uint64_t needed = count == 0 ? 0 : offset + (count - 1) * step + size;
   if (needed <= bytes) return absl::OkStatus();
-  return invalid_input({"BUFFER_TOO_SMALL", name, absl::StrCat("bytes >= ", needed)},
-                       absl::StrCat("The buffer of ", name, " has ", bytes, " bytes; ", count,
-                                    " vertices need ", needed, "."));
+  return make_fault({Reason::kBufferTooSmall, name, absl::StrCat("bytes >= ", needed)},
+                    absl::StrCat("The buffer of ", name, " has ", bytes, " bytes; ", count, " vertices need ",
+                                 needed, "."));
 }
 
 absl::StatusOr<client::Mesh> read_mesh(const lpdeform_mesh& mesh, const Space& space) {

@@ -18,6 +18,7 @@
 #include "client/cli/report.h"
 #include "client/cpp/client.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::cli {
 namespace {
@@ -37,9 +38,9 @@ absl::Status read_initial(const DeformOptions& options, Inputs& inputs) {
   if (!initial.ok()) return initial.status();
   const Eigen::Index given = initial->mesh.vertices.rows(), wanted = inputs.file.mesh.vertices.rows();
   if (given != wanted) {
-    return invalid_input({"POSITIONS_SIZE", options.initial, absl::StrCat("vertices = ", wanted)},
-                         absl::StrCat("\"", options.initial, "\" has ", given, " vertices and the mesh ",
-                                      wanted, "; an initial guess has as many as the mesh."));
+    return make_fault({Reason::kPositionsSize, options.initial, absl::StrCat("vertices = ", wanted)},
+                      absl::StrCat("\"", options.initial, "\" has ", given, " vertices and the mesh ", wanted,
+                                   "; an initial guess has as many as the mesh."));
   }
   inputs.initial_positions = flat(initial->mesh.vertices);
   return absl::OkStatus();

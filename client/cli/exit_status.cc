@@ -4,11 +4,12 @@
 #include <string>
 
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::cli {
 
 ExitStatus exit_status_of(const absl::Status& error) {
-  if (fault_of(error).reason == "FILE_NOT_WRITTEN") return kBadInput;
+  if (fault_of(error).reason == Reason::kFileNotWritten) return kBadInput;
   switch (error.code()) {
     case absl::StatusCode::kInvalidArgument:
     case absl::StatusCode::kFailedPrecondition:

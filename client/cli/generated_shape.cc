@@ -8,6 +8,7 @@
 #include "absl/strings/str_join.h"
 #include "client/cli/files/core_motion.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/shapes/paper_poses.h"
 #include "core/shapes/shapes.h"
 
@@ -128,13 +129,13 @@ absl::StatusOr<GeneratedShape> generate_shape(std::string_view name, int detail)
     if (name != entry.name) continue;
     if (detail >= 1 && detail <= entry.most_detail) return entry.make(detail);
     const std::string limit = absl::StrCat("1 <= detail <= ", entry.most_detail);
-    return invalid_input(
-        {"SHAPE_DETAIL", "", limit},
+    return make_fault(
+        {Reason::kShapeDetail, "", limit},
         absl::StrCat("Detail ", detail, " is not in 1 to ", entry.most_detail, " of the ", entry.name, "."));
   }
-  return invalid_input({"SHAPE_UNKNOWN", std::string(name), ""},
-                       absl::StrCat("There is no shape \"", std::string(name), "\"; there are ",
-                                    absl::StrJoin(generated_shape_names(), ", "), "."));
+  return make_fault({Reason::kShapeUnknown, std::string(name), ""},
+                    absl::StrCat("There is no shape \"", std::string(name), "\"; there are ",
+                                 absl::StrJoin(generated_shape_names(), ", "), "."));
 }
 
 std::vector<std::string> generated_shape_names() {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/server.h"
 
 namespace lpdeform::cli {
@@ -31,8 +32,8 @@ absl::StatusOr<std::unique_ptr<LocalServer>> LocalServer::start(int threads) {
   std::error_code error;
   std::string name = (std::filesystem::temp_directory_path(error) / "lpdeform-XXXXXX").string();
   if (error || mkdtemp(name.data()) == nullptr) {
-    return invalid_input({"FILE_NOT_WRITTEN", name, ""},
-                         "The folder for temporary files (TMPDIR, or /tmp) cannot be written to.");
+    return make_fault({Reason::kFileNotWritten, name, ""},
+                      "The folder for temporary files (TMPDIR, or /tmp) cannot be written to.");
   }
   local->folder_ = name;
   absl::StatusOr<std::unique_ptr<Server>> server = Server::start(options_for(local->folder_, threads));

@@ -25,6 +25,7 @@
 #include "client/cli/shape_command.h"
 #include "client/cli/snapshot_command.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/shapes/paper_poses.h"
 
 namespace lpdeform::cli {
@@ -458,7 +459,7 @@ int run(int argc, char** argv) {
 int with_output_checked(int status) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
   const std::string why = std::strerror(errno);
-  return complain(make_fault(absl::StatusCode::kDataLoss, {"FILE_NOT_WRITTEN", "standard output", ""},
+  return complain(make_fault(absl::StatusCode::kDataLoss, {Reason::kFileNotWritten, "standard output", ""},
                              absl::StrCat("What was printed could not be written: ", why, ".")));
 }
 

@@ -20,6 +20,7 @@
 #include "client/cli/progress.h"
 #include "client/cli/reproduce/page.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/base/workers.h"
 #include "core/io/whole_file.h"
 
@@ -31,11 +32,6 @@ using reproduce::Figure;
 
 constexpr const char* kPage = "index.html";
 constexpr const char* kVerdicts = "reproduce.json";
-
-absl::Status not_written(const fs::path& path, std::string_view why) {
-  return invalid_input({"FILE_NOT_WRITTEN", path.string(), ""},
-                       absl::StrCat("\"", path.string(), "\" cannot be written: ", std::string(why), "."));
-}
 
 bool is_of_this_command(const fs::path& folder) {
   const absl::StatusOr<std::string> verdicts = read_text(folder / kVerdicts);
@@ -51,8 +47,8 @@ absl::Status prepare_folder(const fs::path& folder, bool is_forced) {
   if (error) return not_written(folder, error.message());
   if (access(folder.c_str(), W_OK | X_OK) != 0) return not_written(folder, std::strerror(errno));
   if (is_forced || fs::is_empty(folder, error) || is_of_this_command(folder)) return absl::OkStatus();
-  return invalid_input(
-      {"OUT_NOT_OURS", folder.string(), "empty, or made by lpdeform reproduce"},
+  return make_fault(
+      {Reason::kOutNotOurs, folder.string(), "empty, or made by lpdeform reproduce"},
       absl::StrCat("\"", folder.string(),
                    "\" holds files that are not of lpdeform reproduce; --force writes beside and over "
                    "them."));
@@ -73,10 +69,10 @@ std::string name_for(const fs::path& mesh, std::set<std::string>& taken) {
 /// The paper's methods know handles that hold vertices exactly, and nothing else.
 absl::Status check_plain(const HandleFile& file) {
   const auto refused = [](const std::string& element) {
-    return invalid_input({"HANDLE_FILE_VALUE", element, "handles that hold vertices exactly"},
-                         absl::StrCat(element,
-                                      " is not for the paper's methods, which know only handles that hold "
-                                      "vertices exactly."));
+    return make_fault({Reason::kHandleFileValue, element, "handles that hold vertices exactly"},
+                      absl::StrCat(element,
+                                   " is not for the paper's methods, which know only handles that hold "
+                                   "vertices exactly."));
   };
   for (const NamedHandle& named : file.handles) {
     const client::Handle& handle = named.handle;
@@ -105,10 +101,9 @@ absl::StatusOr<PaperPose> read_pose(const fs::path& mesh, const fs::path& handle
 
 absl::StatusOr<reproduce::Settings> read_settings(const ReproduceOptions& options) {
   if (options.meshes.size() != options.handles.size()) {
-    return invalid_input(
-        {"HANDLES_MISSING", "--handles", "one --handles for each --mesh"},
-        absl::StrCat("There are ", options.meshes.size(), " --mesh and ", options.handles.size(),
-                     " --handles; each mesh needs its handle file."));
+    return make_fault({Reason::kHandlesMissing, "--handles", "one --handles for each --mesh"},
+                      absl::StrCat("There are ", options.meshes.size(), " --mesh and ",
+                                   options.handles.size(), " --handles; each mesh needs its handle file."));
   }
   reproduce::Settings settings{options.size, options.threads > 0 ? options.threads : available_cores(), {}};
   std::set<std::string> taken{"sheet", "bar", "block", "creature", "arm"};

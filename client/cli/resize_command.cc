@@ -17,6 +17,7 @@
 #include "client/cli/progress.h"
 #include "client/cpp/client.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/mesh/weld.h"
 #include "core/resize/resize.h"
 #include "core/resize/resize_extents.h"
@@ -42,8 +43,8 @@ std::array<double, 3> array_of(const Eigen::Vector3d& vector) {
 
 absl::StatusOr<Scaling> read_scaling(const ResizeOptions& options, const TriangleMesh& mesh) {
   if (options.x_axis.empty() != options.y_axis.empty()) {
-    return invalid_input({"RESIZE_AXES", "axes", "both or none"},
-                         "One of --x-axis and --y-axis is given without the other.");
+    return make_fault({Reason::kResizeAxes, "axes", "both or none"},
+                      "One of --x-axis and --y-axis is given without the other.");
   }
   const auto shape = RestShape::create(mesh);
   if (!shape.ok()) return shape.status();
@@ -57,9 +58,9 @@ absl::StatusOr<Scaling> read_scaling(const ResizeOptions& options, const Triangl
   if (absl::Status status = check_scaling(scaling); !status.ok()) return status;
   const double stretch = scaling.scale.maxCoeff() / shared_factor(scaling.scale);
   if (stretch <= Scaling::kHighest) return scaling;
-  return invalid_input({"RESIZE_SCALE_OUT_OF_RANGE", "scale", "100 times the least of the three"},
-                       absl::StrCat("The largest factor is ", stretch,
-                                    " times the least; it must be at most 100 times the least."));
+  return make_fault({Reason::kResizeScaleOutOfRange, "scale", "100 times the least of the three"},
+                    absl::StrCat("The largest factor is ", stretch,
+                                 " times the least; it must be at most 100 times the least."));
 }
 
 /// By the vertices of the mesh that is not welded.

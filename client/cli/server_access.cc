@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/files/text_file.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::cli {
 namespace {
@@ -30,8 +31,8 @@ absl::StatusOr<std::string> read_token(const std::string& file) {
   const bool is_word =
       !token.empty() && std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c < 127; });
   if (is_word) return token;
-  return invalid_input({"TOKEN_FILE", file, "one word"},
-                       absl::StrCat("\"", file, "\" does not hold a token."));
+  return make_fault({Reason::kTokenFile, file, "one word"},
+                    absl::StrCat("\"", file, "\" does not hold a token."));
 }
 
 }  // namespace

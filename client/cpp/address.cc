@@ -8,6 +8,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::client {
 namespace {
@@ -37,8 +38,8 @@ absl::Status check_address(const std::string& address) {
   if (colon != std::string::npos && is_host(std::string_view(address).substr(0, colon)) &&
       is_port(std::string_view(address).substr(colon + 1)))
     return absl::OkStatus();
-  return invalid_input(
-      {"ADDRESS_INVALID", address, "HOST:PORT or unix:PATH, port = 1 to 65535"},
+  return make_fault(
+      {Reason::kAddressInvalid, address, "HOST:PORT or unix:PATH, port = 1 to 65535"},
       absl::StrCat("\"", address, "\" is no address of a server: that is HOST:PORT, with a port from 1 to ",
                    kMostPort, ", or unix:PATH."));
 }

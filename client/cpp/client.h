@@ -13,6 +13,7 @@
 #include "absl/status/statusor.h"
 #include "client/cpp/types.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 /// The C++ client of an lpdeform server.
 ///
@@ -22,8 +23,9 @@
 ///   session->set_handle("tip", {.vertices = tip, .motion = RigidMotion{.translation = {0, 0, 1}}}).value();
 ///   auto frame = session->settle(std::chrono::seconds(10));
 ///
-/// Errors are absl::Status. What the server says about one is kept: fault_of(status) gives the stable reason,
-/// the element and the limit (core/base/fault.h). UNAVAILABLE: no server, or it went away. Nothing throws.
+/// Errors are absl::Status. What the server says about one is kept: fault_of(status) gives the stable reason, to
+/// be compared with Reason::kSessionUnknown and the like, the element and the limit. UNAVAILABLE: no server, or it
+/// went away. Nothing throws.
 namespace lpdeform::client {
 
 class Rpc;

@@ -10,12 +10,13 @@
 #include "absl/strings/str_cat.h"
 #include "client/cpp/wire.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::client {
 namespace {
 
 absl::Status misfit(std::string_view text) {
-  return make_fault(absl::StatusCode::kDataLoss, {"FRAME_PARTS", "", ""}, text);
+  return make_fault({Reason::kFrameParts, "", ""}, text);
 }
 
 /// Appends little-endian numbers of type Wire to `out`.

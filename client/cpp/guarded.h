@@ -5,6 +5,7 @@
 
 #include "absl/status/status.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::client {
 
@@ -12,13 +13,11 @@ namespace lpdeform::client {
 /// threads and the border to C, which no exception may pass.
 template <typename Work>
 absl::Status guarded(Work work) {
-  const auto internal = [](const char* text) {
-    return make_fault(absl::StatusCode::kInternal, {"EXCEPTION", "", ""}, text);
-  };
+  const auto internal = [](const char* text) { return make_fault({Reason::kException, "", ""}, text); };
   try {
     return work();
   } catch (const std::bad_alloc&) {
-    return make_fault(absl::StatusCode::kResourceExhausted, {"OUT_OF_MEMORY", "", ""}, "Out of memory.");
+    return make_fault({Reason::kOutOfMemory, "", ""}, "Out of memory.");
   } catch (const std::exception& exception) {
     return internal(exception.what());
   } catch (...) {

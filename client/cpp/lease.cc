@@ -8,6 +8,7 @@
 #include "absl/strings/strip.h"
 #include "client/cpp/upload.h"
 #include "client/cpp/wire.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::client {
 
@@ -54,7 +55,7 @@ absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptio
 std::string route_of(const absl::Status& status) {
   const Fault fault = fault_of(status);
   absl::string_view route(fault.limit);
-  return fault.reason == "SESSION_ELSEWHERE" && absl::ConsumePrefix(&route, "lpdeform-session: ")
+  return fault.reason == Reason::kSessionElsewhere && absl::ConsumePrefix(&route, "lpdeform-session: ")
              ? std::string(route)
              : "";
 }
@@ -81,7 +82,7 @@ absl::StatusOr<Lease> join_session(Rpc& rpc, const std::string& session, Role ro
 absl::Status check_vertex_count(std::int64_t count, std::int64_t wanted) {
   if (count == wanted) return absl::OkStatus();
   return make_fault(
-      absl::StatusCode::kDataLoss, {"FRAME_VERTICES", "", absl::StrCat("vertices = ", wanted)},
+      {Reason::kFrameVertices, "", absl::StrCat("vertices = ", wanted)},
       absl::StrCat("The server speaks of ", count, " vertices of a mesh that has ", wanted, "."));
 }
 
@@ -93,7 +94,7 @@ bool is_undecided(const absl::Status& status) {
   const bool may_have_room = absl::IsResourceExhausted(status) && retry_after(status).count() > 0;
   return absl::IsUnavailable(status) || absl::IsCancelled(status) || absl::IsDeadlineExceeded(status) ||
          absl::IsUnknown(status) || may_have_room || is_session_lost(status) ||
-         fault_of(status).reason == "UPLOAD_UNKNOWN";
+         fault_of(status).reason == Reason::kUploadUnknown;
 }
 
 bool is_taken_all_the_same(const absl::Status& status) {

@@ -8,28 +8,21 @@
 #include "absl/strings/str_cat.h"
 #include "client/cpp/link.h"
 #include "client/cpp/names.h"
+#include "client/cpp/refusals.h"
 #include "client/cpp/snapshot.h"
 #include "client/cpp/solve_call.h"
 #include "client/cpp/upload.h"
 #include "client/cpp/wire.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::client {
-namespace {
-
-absl::Status session_closed() {
-  return make_fault(absl::StatusCode::kFailedPrecondition, {"SESSION_CLOSED", "", ""},
-                    "The session is closed.");
-}
-
-}  // namespace
-
 absl::StatusOr<std::uint64_t> Link::update(Update update) {
   const absl::Status checked = check_names(update);
   if (!checked.ok()) return checked;
   const std::scoped_lock lock(mutex_);
   if (is_closing_) return session_closed();
   if (lease_.writer_token.empty()) {
-    return make_fault(absl::StatusCode::kFailedPrecondition, {"NOT_THE_WRITER", "", ""},
+    return make_fault(absl::StatusCode::kFailedPrecondition, {Reason::kNotTheWriter, "", ""},
                       "A reader cannot change the session: take_over() first.");
   }
   const std::uint64_t seq = ledger_.add(std::move(update));
@@ -90,8 +83,7 @@ absl::Status Link::no_frame() const {
   const std::string problem = is_open_ || last_problem_.ok()
                                   ? ""
                                   : absl::StrCat(" The connection is down: ", last_problem_.message());
-  return make_fault(absl::StatusCode::kDeadlineExceeded, {"NO_FRAME", "", ""},
-                    absl::StrCat("No new frame came in time.", problem));
+  return make_fault({Reason::kNoFrame, "", ""}, absl::StrCat("No new frame came in time.", problem));
 }
 
 /// Here, so that what the server finds invalid can only be the update.
@@ -100,22 +92,22 @@ absl::Status Link::check_initial_positions(const SolveOptions& options) const {
   const std::vector<double>& numbers = *options.initial_positions;
   const std::size_t wanted = 3 * static_cast<std::size_t>(mesh_report().vertices);
   if (numbers.size() != wanted) {
-    return invalid_input(
-        {"POSITIONS_SIZE", "", absl::StrCat("numbers = ", wanted)},
+    return make_fault(
+        {Reason::kPositionsSize, "", absl::StrCat("numbers = ", wanted)},
         absl::StrCat("The initial positions are ", numbers.size(), " numbers and not ", wanted, "."));
   }
   const auto bad = std::ranges::find_if_not(numbers, [](double number) { return std::isfinite(number); });
   if (bad == numbers.end()) return absl::OkStatus();
   const std::string vertex = absl::StrCat("vertex ", (bad - numbers.begin()) / 3);
-  return invalid_input({"POSITIONS_NOT_FINITE", vertex, ""},
-                       absl::StrCat("The initial position of ", vertex, " is not finite."));
+  return make_fault({Reason::kPositionsNotFinite, vertex, ""},
+                    absl::StrCat("The initial position of ", vertex, " is not finite."));
 }
 
 /// Waits until nothing is under way, and lets nothing begin until is_solving_ is false again.
 absl::Status Link::begin_alone(std::unique_lock<std::mutex>& lock, Clock::time_point deadline) {
   const auto is_quiet = [this] { return is_closing_ || (!is_solving_ && !ledger_.has_in_flight()); };
   if (!changed_.wait_until(lock, deadline, is_quiet)) {
-    return make_fault(absl::StatusCode::kDeadlineExceeded, {"SOLVE_UNDER_WAY", "", ""},
+    return make_fault({Reason::kSolveUnderWay, "", ""},
                       "Another solve, or an update that the server has not answered, is under way.");
   }
   if (is_closing_) return session_closed();
@@ -183,7 +175,7 @@ absl::Status Link::check_steps(const v1::UndoUpdateRequest& undo, std::unique_lo
   lock.lock();
   if (!found.ok()) return found.status();
   if (found->session().undo_steps() > 1) return absl::OkStatus();
-  return make_fault(absl::StatusCode::kFailedPrecondition, {"NOTHING_TO_UNDO", "", ""},
+  return make_fault({Reason::kNothingToUndo, "", ""},
                     "The session was made anew, and knows no step from before.");
 }
 
@@ -235,8 +227,7 @@ absl::StatusOr<SolveResult> Link::solve_patiently(const SolveOptions& options, C
   if (options.deadline_seconds > 0) {
     left.deadline_seconds -= std::chrono::duration<double>(Clock::now() - start).count();
     if (left.deadline_seconds <= 0)
-      return make_fault(absl::StatusCode::kDeadlineExceeded, {"SOLVE_TIME_PASSED", "", ""},
-                        "The time for the solve has passed.");
+      return make_fault({Reason::kSolveTimePassed, "", ""}, "The time for the solve has passed.");
   }
   Backoff backoff;
   for (;;) {

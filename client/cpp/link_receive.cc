@@ -7,6 +7,7 @@
 #include "client/cpp/link.h"
 #include "client/cpp/wire.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::client {
 
@@ -97,8 +98,7 @@ absl::Status Link::take(const v1::StreamOpened& opened) {
 
 absl::Status Link::take(const v1::FramePart& part) {
   if (!assembly_) {
-    return make_fault(absl::StatusCode::kDataLoss, {"FRAME_PARTS", "", ""},
-                      "A frame came before the stream was open.");
+    return make_fault({Reason::kFrameParts, "", ""}, "A frame came before the stream was open.");
   }
   absl::StatusOr<std::optional<Frame>> frame = assembly_->add(part);
   if (!frame.ok()) return frame.status();
@@ -121,7 +121,7 @@ absl::Status Link::take(const v1::FramePart& part) {
 /// for a server that loses those as well will not do better. Under the lock.
 Answer Link::judge(std::uint64_t seq, const absl::Status& status) {
   const Answer answer = answer_of(status, seq == sent_again_);
-  if (fault_of(status).reason == "UPLOAD_UNKNOWN") sent_again_ = seq;
+  if (fault_of(status).reason == Reason::kUploadUnknown) sent_again_ = seq;
   return answer;
 }
 

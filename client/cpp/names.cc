@@ -5,6 +5,7 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::client {
 
@@ -13,8 +14,8 @@ absl::Status check_name(std::string_view what, std::string_view name) {
   if (google::protobuf::internal::IsStructurallyValidUTF8(name.data(), size)) return absl::OkStatus();
   const std::string kind(what);
   const std::string shown = absl::StrCat(kind, " \"", absl::CHexEscape(std::string(name)), "\"");
-  return invalid_input({"NAME_ENCODING", shown, "UTF-8"},
-                       absl::StrCat("The name of ", shown, " is not UTF-8."));
+  return make_fault({Reason::kNameEncoding, shown, "UTF-8"},
+                    absl::StrCat("The name of ", shown, " is not UTF-8."));
 }
 
 absl::Status check_names(const Update& update) {

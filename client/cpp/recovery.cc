@@ -7,11 +7,12 @@
 
 #include "client/cpp/lease.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::client {
 namespace {
 
-absl::Status ended_because(absl::StatusCode code, const char* reason, const v1::GoAway& go_away) {
+absl::Status ended_because(absl::StatusCode code, Reason reason, const v1::GoAway& go_away) {
   return make_fault(code, {reason, "", ""}, go_away.text());
 }
 
@@ -19,18 +20,20 @@ absl::Status ended_because(absl::StatusCode code, const char* reason, const v1::
 std::pair<NextStep, absl::Status> after_go_away(const v1::GoAway& go_away, bool has_copy) {
   switch (go_away.reason()) {
     case v1::GO_AWAY_REASON_SESSION_DELETED:
-      return {NextStep::kGiveUp, ended_because(absl::StatusCode::kNotFound, "SESSION_DELETED", go_away)};
+      return {NextStep::kGiveUp,
+              ended_because(absl::StatusCode::kNotFound, Reason::kSessionDeleted, go_away)};
     case v1::GO_AWAY_REASON_SESSION_EXPIRED:
       return {has_copy ? NextStep::kMakeAnew : NextStep::kGiveUp,
-              ended_because(absl::StatusCode::kNotFound, "SESSION_EXPIRED", go_away)};
+              ended_because(absl::StatusCode::kNotFound, Reason::kSessionExpired, go_away)};
     case v1::GO_AWAY_REASON_WRITER_REPLACED:
-      return {NextStep::kGiveUp, ended_because(absl::StatusCode::kAborted, "WRITER_REPLACED", go_away)};
+      return {NextStep::kGiveUp, ended_because(absl::StatusCode::kAborted, Reason::kWriterReplaced, go_away)};
     case v1::GO_AWAY_REASON_PROTOCOL_ERROR:
-      return {NextStep::kGiveUp, ended_because(absl::StatusCode::kInternal, "PROTOCOL_ERROR", go_away)};
+      return {NextStep::kGiveUp, ended_because(absl::StatusCode::kInternal, Reason::kProtocolError, go_away)};
     case v1::GO_AWAY_REASON_TOKEN_EXPIRED:
-      return {NextStep::kResume, ended_because(absl::StatusCode::kUnauthenticated, "TOKEN_EXPIRED", go_away)};
+      return {NextStep::kResume,
+              ended_because(absl::StatusCode::kUnauthenticated, Reason::kTokenExpired, go_away)};
     default:
-      return {NextStep::kResume, ended_because(absl::StatusCode::kUnavailable, "DRAINING", go_away)};
+      return {NextStep::kResume, ended_because(absl::StatusCode::kUnavailable, Reason::kDraining, go_away)};
   }
 }
 
@@ -53,12 +56,12 @@ std::pair<NextStep, absl::Status> after_status(const absl::Status& ended, bool h
   const std::string reason = fault_of(ended).reason;
   if (ended.ok()) return {NextStep::kResume, absl::UnavailableError("The server ended the stream.")};
   // It is another mesh; it would happen again.
-  if (reason == "FRAME_VERTICES" || reason == "EXCEPTION") return {NextStep::kGiveUp, ended};
+  if (reason == Reason::kFrameVertices || reason == Reason::kException) return {NextStep::kGiveUp, ended};
   if (is_session_lost(ended)) return {has_copy ? NextStep::kMakeAnew : NextStep::kGiveUp, ended};
   if (is_passing(ended.code()) || is_undecided(ended)) return {NextStep::kResume, ended};
-  if (reason == "NOT_THE_WRITER") {  // it happened while we were away
-    return {NextStep::kGiveUp, make_fault(absl::StatusCode::kAborted, {"WRITER_REPLACED", "", ""},
-                                          "Another writer took the session over.")};
+  if (reason == Reason::kNotTheWriter) {  // it happened while we were away
+    return {NextStep::kGiveUp,
+            make_fault({Reason::kWriterReplaced, "", ""}, "Another writer took the session over.")};
   }
   return {NextStep::kGiveUp, ended};
 }
@@ -92,7 +95,7 @@ Recovery RecoveryRules::after(const Ending& ending) {
   if (ending.stood >= Backoff::kMost) backoff_.reset();  // one that breaks at once is no success
   auto [next, why] =
       ending.go_away ? after_go_away(*ending.go_away, has_copy_) : after_status(ending.status, has_copy_);
-  const bool is_misfit = fault_of(why).reason == "FRAME_PARTS" && ++misfits_ >= kMostMisfits;
+  const bool is_misfit = fault_of(why).reason == Reason::kFrameParts && ++misfits_ >= kMostMisfits;
   if (is_misfit || ending.away > reconnect_for_) next = NextStep::kGiveUp;
   const auto asked = ending.go_away ? std::chrono::milliseconds(ending.go_away->reconnect_after_ms())
                                     : retry_after(ending.status);
@@ -107,7 +110,7 @@ Recovery RecoveryRules::after_failed_making(const absl::Status& failed) {
 Answer answer_of(const absl::Status& status, bool is_second) {
   if (is_session_lost(status)) return Answer::kMakeAnew;
   if (is_taken_all_the_same(status)) return Answer::kTaken;
-  const bool is_in_vain = is_second && fault_of(status).reason == "UPLOAD_UNKNOWN";
+  const bool is_in_vain = is_second && fault_of(status).reason == Reason::kUploadUnknown;
   return is_undecided(status) && !is_in_vain ? Answer::kAgain : Answer::kRefused;
 }
 

@@ -15,6 +15,7 @@
 #include "client/cpp/tls_texts.h"
 #include "client/cpp/upload.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "lpdeform/v1/service.grpc.pb.h"
 
 namespace lpdeform::client {
@@ -94,9 +95,8 @@ std::string problem_of(const std::shared_ptr<grpc::Channel>& channel) {
 }
 
 absl::Status no_server(const std::string& address, const std::string& problem) {
-  return make_fault(
-      absl::StatusCode::kUnavailable, {"NO_SERVER", address, ""},
-      absl::StrCat("No server answers at \"", address, "\"", problem.empty() ? "." : ": ", problem));
+  return make_fault({Reason::kNoServer, address, ""}, absl::StrCat("No server answers at \"", address, "\"",
+                                                                   problem.empty() ? "." : ": ", problem));
 }
 
 /// What every call says of its caller.

@@ -6,13 +6,13 @@
 #include "absl/strings/str_cat.h"
 #include "client/cpp/packer.h"
 #include "client/cpp/upload.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::client {
 namespace {
 
 absl::Status incomplete(std::uint64_t has, std::uint64_t should) {
-  return make_fault(absl::StatusCode::kDataLoss,
-                    {"SNAPSHOT_INCOMPLETE", "snapshot", absl::StrCat(should, " bytes")},
+  return make_fault({Reason::kSnapshotIncomplete, "snapshot", absl::StrCat(should, " bytes")},
                     absl::StrCat("The server sent ", has, " of the snapshot's ", should, " bytes."));
 }
 

@@ -6,6 +6,7 @@
 #include "client/cpp/frame_assembly.h"
 #include "client/cpp/upload.h"
 #include "client/cpp/wire.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::client {
 namespace {
@@ -57,8 +58,7 @@ class ResultBuilder {
 
   absl::StatusOr<SolveResult> finish() && {
     if (is_whole_) return std::move(result_);
-    return make_fault(absl::StatusCode::kDataLoss, {"FRAME_PARTS", "", ""},
-                      "The server's result came without positions.");
+    return make_fault({Reason::kFrameParts, "", ""}, "The server's result came without positions.");
   }
 
  private:

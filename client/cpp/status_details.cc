@@ -105,7 +105,7 @@ Details read_details(const std::string& details) {
 absl::Status with_details(absl::StatusCode code, std::string_view text, const std::string& details) {
   const auto [fault, pause] = read_details(details);
   return with_retry_after(
-      fault == Fault{} ? absl::Status(code, std::string(text)) : make_fault(code, fault, text), pause);
+      fault == Fault{} ? absl::Status(code, std::string(text)) : carry_fault(code, fault, text), pause);
 }
 
 absl::Status with_retry_after(absl::Status status, std::chrono::milliseconds pause) {

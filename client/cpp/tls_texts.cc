@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::client {
 namespace {
@@ -41,9 +42,9 @@ absl::StatusOr<Certificate> read_certificates(const char* name, const std::strin
       const bool is_end = ERR_GET_REASON(ERR_peek_last_error()) == PEM_R_NO_START_LINE;
       ERR_clear_error();
       if (is_end && count > 0) return first;
-      return invalid_input({"TLS_CERTIFICATES", name, "PEM"},
-                           absl::StrCat(name, " cannot be read: ", count, " certificates in PEM, then ",
-                                        is_end ? "none." : "one that is damaged."));
+      return make_fault({Reason::kTlsCertificates, name, "PEM"},
+                        absl::StrCat(name, " cannot be read: ", count, " certificates in PEM, then ",
+                                     is_end ? "none." : "one that is damaged."));
     }
     if (first == nullptr) first = std::move(one);
   }
@@ -53,14 +54,14 @@ absl::StatusOr<Key> read_key(const std::string& text) {
   Key key(PEM_read_bio_PrivateKey(reader_of(text).get(), nullptr, no_password, nullptr));
   ERR_clear_error();
   if (key != nullptr) return key;
-  return invalid_input({"TLS_PRIVATE_KEY", "private_key", "PEM, without a password"},
-                       "private_key cannot be read: it is no private key in PEM, or one with a password.");
+  return make_fault({Reason::kTlsPrivateKey, "private_key", "PEM, without a password"},
+                    "private_key cannot be read: it is no private key in PEM, or one with a password.");
 }
 
 absl::Status check_own(const Tls& tls) {
   if (tls.certificate_chain.empty() || tls.private_key.empty()) {
-    return invalid_input(
-        {"TLS_KEY_MISSING", tls.private_key.empty() ? "private_key" : "certificate_chain", ""},
+    return make_fault(
+        {Reason::kTlsKeyMissing, tls.private_key.empty() ? "private_key" : "certificate_chain", ""},
         "A certificate chain and a private key belong together; one of them is missing.");
   }
   const auto certificate = read_certificates("certificate_chain", tls.certificate_chain);
@@ -70,8 +71,8 @@ absl::Status check_own(const Tls& tls) {
   const bool fits = X509_check_private_key(certificate->get(), key->get()) == 1;
   ERR_clear_error();
   if (fits) return absl::OkStatus();
-  return invalid_input({"TLS_KEY_MISMATCH", "private_key", ""},
-                       "private_key is not that of the first certificate of certificate_chain.");
+  return make_fault({Reason::kTlsKeyMismatch, "private_key", ""},
+                    "private_key is not that of the first certificate of certificate_chain.");
 }
 
 }  // namespace

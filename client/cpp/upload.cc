@@ -11,6 +11,7 @@
 #include "client/cpp/recovery.h"
 #include "core/base/crc32c.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::client {
 namespace {
@@ -50,7 +51,7 @@ absl::StatusOr<std::string> Uploads::add(std::string_view bytes) {
     finished = sent->finished();
   }
   if (finished) return created->upload();
-  return make_fault(absl::StatusCode::kDataLoss, {"UPLOAD_INCOMPLETE", created->upload(), ""},
+  return make_fault({Reason::kUploadIncomplete, created->upload(), ""},
                     "The server misses parts of an upload that were all sent.");
 }
 

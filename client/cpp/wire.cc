@@ -302,8 +302,8 @@ void from_wire(const v1::SolveSummary& summary, SolveResult& out) {
 }
 
 absl::Status from_wire(const v1::Fault& fault) {
-  absl::Status status = make_fault(static_cast<absl::StatusCode>(fault.code()),
-                                   {fault.reason(), fault.element(), fault.limit()}, fault.text());
+  absl::Status status = carry_fault(static_cast<absl::StatusCode>(fault.code()),
+                                    {fault.reason(), fault.element(), fault.limit()}, fault.text());
   return with_retry_after(std::move(status), std::chrono::milliseconds(fault.retry_after_ms()));
 }
 

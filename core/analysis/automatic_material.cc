@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/analysis/joints.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
@@ -26,8 +27,8 @@ double largest(const Field& joint) {
 
 absl::Status check_strength(double strength) {
   if (strength >= 0 && strength <= 1) return absl::OkStatus();
-  return invalid_input({"STRENGTH_OUT_OF_RANGE", "strength", "0 <= strength <= 1"},
-                       absl::StrCat("the strength is ", strength, "; it must be from 0 to 1"));
+  return make_fault({Reason::kStrengthOutOfRange, "strength", "0 <= strength <= 1"},
+                    absl::StrCat("the strength is ", strength, "; it must be from 0 to 1"));
 }
 
 bool has_joints(const Field& joint) {

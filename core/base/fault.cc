@@ -6,6 +6,7 @@
 #include "absl/strings/cord.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
@@ -14,15 +15,14 @@ constexpr char kPayloadUrl[] = "lpdeform.fault";
 
 }  // namespace
 
-absl::Status make_fault(absl::StatusCode code, Fault fault, std::string_view text) {
-  absl::Status status(code, absl::string_view(text.data(), text.size()));
-  status.SetPayload(kPayloadUrl,
-                    absl::Cord(absl::StrCat(fault.reason, "\n", fault.element, "\n", fault.limit)));
-  return status;
+absl::Status make_fault(NewFault fault, std::string_view text) {
+  const absl::StatusCode code = code_of(fault.reason);
+  return make_fault(code, std::move(fault), text);
 }
 
-absl::Status invalid_input(Fault fault, std::string_view text) {
-  return make_fault(absl::StatusCode::kInvalidArgument, std::move(fault), text);
+absl::Status make_fault(absl::StatusCode code, NewFault fault, std::string_view text) {
+  return carry_fault(
+      code, {std::string(name_of(fault.reason)), std::move(fault.element), std::move(fault.limit)}, text);
 }
 
 Fault fault_of(const absl::Status& status) {
@@ -32,6 +32,17 @@ Fault fault_of(const absl::Status& status) {
   const std::vector<std::string> parts = absl::StrSplit(text, absl::MaxSplits('\n', 2));
   if (parts.size() != 3) return {};
   return {parts[0], parts[1], parts[2]};
+}
+
+bool operator==(std::string_view said, Reason reason) {
+  return said == name_of(reason);
+}
+
+absl::Status carry_fault(absl::StatusCode code, const Fault& fault, std::string_view text) {
+  absl::Status status(code, absl::string_view(text.data(), text.size()));
+  status.SetPayload(kPayloadUrl,
+                    absl::Cord(absl::StrCat(fault.reason, "\n", fault.element, "\n", fault.limit)));
+  return status;
 }
 
 }  // namespace lpdeform

@@ -7,26 +7,43 @@
 
 namespace lpdeform {
 
-/// What an error is about, for programs: travels inside an absl::Status and reaches clients unchanged.
-struct Fault {
-  /// Stable, upper case, never reworded: "MESH_NOT_FINITE", "HANDLE_VERTEX_TWICE".
-  std::string reason;
+/// core/base/reasons.h has them all.
+enum class Reason;
+
+/// Why we refuse something, for programs.
+struct NewFault {
+  Reason reason;
   /// The first offending element: "vertex 17", "face 3", "handle \"tip\"", "component 2", "p[5]". May be
   /// empty.
   std::string element;
   /// The bound that was broken: "vertices < 370", "1 <= p <= 64". May be empty.
   std::string limit;
+};
+
+/// An error for the caller, with the code of its reason. `text` is one plain sentence that names the value and the limit.
+absl::Status make_fault(NewFault fault, std::string_view text);
+
+/// The same with another code than the usual one: proto/reasons.toml says of which reasons (`other_code`).
+absl::Status make_fault(absl::StatusCode code, NewFault fault, std::string_view text);
+
+/// The same as others are told it: it travels inside an absl::Status and reaches clients unchanged. A newer server may
+/// say a reason that is none of ours.
+struct Fault {
+  /// Stable, upper case, never reworded: "MESH_NOT_FINITE", "HANDLE_VERTEX_TWICE".
+  std::string reason;
+  std::string element;
+  std::string limit;
 
   bool operator==(const Fault&) const = default;
 };
 
-/// An error for the caller. `text` is one plain sentence that names the value and the limit.
-absl::Status make_fault(absl::StatusCode code, Fault fault, std::string_view text);
-
-/// The same with code INVALID_ARGUMENT, the usual one.
-absl::Status invalid_input(Fault fault, std::string_view text);
-
 /// The fault inside `status`; all fields empty where it carries none.
 Fault fault_of(const absl::Status& status);
+
+/// fault.reason == Reason::kSessionUnknown
+bool operator==(std::string_view said, Reason reason);
+
+/// An error with a fault that was made before: told to us by another, or said again with another text.
+absl::Status carry_fault(absl::StatusCode code, const Fault& fault, std::string_view text);
 
 }  // namespace lpdeform

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/constraints/holds.h"
 #include "core/energy/rotation_fit.h"
 #include "core/problem/footprint.h"
@@ -21,8 +22,8 @@ absl::StatusOr<Points> scaled_targets(const RestShape& shape, const std::string&
     if (scaled.row(k).stableNorm() * shape.mean_edge_length() <= kFarthestTarget * shape.diagonal()) continue;
     const std::string member =
         handle.points.empty() ? absl::StrCat("vertex ", handle.vertices[k]) : absl::StrCat("point ", k);
-    return invalid_input(
-        {"HANDLE_TARGET_TOO_FAR", member, "1e9 diagonals of the mesh"},
+    return make_fault(
+        {Reason::kHandleTargetTooFar, member, "1e9 diagonals of the mesh"},
         absl::StrCat("handle \"", name, "\" sends ", member, " over 1e9 diagonals of the mesh away"));
   }
   return scaled;
@@ -102,11 +103,10 @@ absl::Status name_free_component(const RestShape& shape, std::int32_t component)
   const auto& components = shape.components();
   const auto first = std::find(components.begin(), components.end(), component) - components.begin();
   const auto size = std::count(components.begin(), components.end(), component);
-  return make_fault(
-      absl::StatusCode::kFailedPrecondition,
-      {"COMPONENT_WITHOUT_HANDLE", absl::StrCat("component ", component), "at least 1 handle a component"},
-      absl::StrCat("component ", component, " of the mesh (", size, " vertices, the first of them vertex ",
-                   first, ") has no handle"));
+  return make_fault({Reason::kComponentWithoutHandle, absl::StrCat("component ", component),
+                     "at least 1 handle a component"},
+                    absl::StrCat("component ", component, " of the mesh (", size,
+                                 " vertices, the first of them vertex ", first, ") has no handle"));
 }
 
 /// The rigid motion of the handle that has the vertex nearest to `point`, all at rest, in scaled units.
@@ -171,7 +171,7 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   absl::Status status = check_handles(handles, shape.vertex_count(), shape.face_count());
   if (!status.ok()) return status;
   if (handles.handles().empty()) {
-    return make_fault(absl::StatusCode::kFailedPrecondition, {"NO_HANDLES", "", "at least 1 handle"},
+    return make_fault({Reason::kNoHandles, "", "at least 1 handle"},
                       "there is no handle; a deformation needs at least one");
   }
   Constraints constraints{std::vector<char>(shape.vertex_count(), false),

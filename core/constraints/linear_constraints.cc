@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
@@ -23,10 +24,10 @@ absl::Status dependent(const std::string& owner, const std::string& other) {
   const std::string with = other.empty()    ? "vertices that other handles hold"
                            : other == owner ? "other points or locks of its own"
                                             : absl::StrCat("handle \"", other, "\"");
-  return invalid_input({"HANDLE_CONSTRAINTS_DEPENDENT", absl::StrCat("handle \"", owner, "\""),
-                        "independent points and locks"},
-                       absl::StrCat("a point or lock of handle \"", owner, "\" follows from ", with,
-                                    ", or contradicts it; hold one of the two"));
+  return make_fault({Reason::kHandleConstraintsDependent, absl::StrCat("handle \"", owner, "\""),
+                     "independent points and locks"},
+                    absl::StrCat("a point or lock of handle \"", owner, "\" follows from ", with,
+                                 ", or contradicts it; hold one of the two"));
 }
 
 }  // namespace
@@ -43,11 +44,11 @@ absl::StatusOr<LinearConstraints> LinearConstraints::create(std::vector<LinearRo
   LinearConstraints result;
   if (rows.empty()) return result;
   if (rows.size() > kMostRows) {
-    return invalid_input({"TOO_MANY_LOCKS", "", absl::StrCat("equations <= ", kMostRows)},
-                         absl::StrCat("points inside faces and locks make ", rows.size(),
-                                      " equations, 3 a point, 2 a vertex "
-                                      "locked to an axis, 1 a vertex locked to a plane; there may be ",
-                                      kMostRows));
+    return make_fault({Reason::kTooManyLocks, "", absl::StrCat("equations <= ", kMostRows)},
+                      absl::StrCat("points inside faces and locks make ", rows.size(),
+                                   " equations, 3 a point, 2 a vertex "
+                                   "locked to an axis, 1 a vertex locked to a plane; there may be ",
+                                   kMostRows));
   }
   result.rows_ = std::move(rows);
   result.is_held_ = is_held;

@@ -5,15 +5,16 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
 
 absl::Status check_field(const Field& field, std::int32_t vertex_count, const std::string& name,
-                         double lowest, double highest, std::string_view reason) {
+                         double lowest, double highest, Reason reason) {
   if (field.size() != 1 && field.size() != vertex_count) {
-    return invalid_input(
-        {"FIELD_SIZE", name, absl::StrCat("1 or ", vertex_count, " values")},
+    return make_fault(
+        {Reason::kFieldSize, name, absl::StrCat("1 or ", vertex_count, " values")},
         absl::StrCat(name, " has ", field.size(), " values; it takes one, or one for each of the ",
                      vertex_count, " vertices"));
   }
@@ -21,9 +22,8 @@ absl::Status check_field(const Field& field, std::int32_t vertex_count, const st
     if (field[i] >= lowest && field[i] <= highest) continue;
     const std::string element = field.size() == 1 ? name : absl::StrCat(name, "[", i, "]");
     const std::string limit = absl::StrCat(lowest, " <= ", name, " <= ", highest);
-    return invalid_input(
-        {std::string(reason), element, limit},
-        absl::StrCat(element, " is ", field[i], "; it must be from ", lowest, " to ", highest));
+    return make_fault({reason, element, limit},
+                      absl::StrCat(element, " is ", field[i], "; it must be from ", lowest, " to ", highest));
   }
   return absl::OkStatus();
 }
@@ -47,19 +47,19 @@ bool Material::operator==(const Material& other) const {
 
 absl::Status check_material(const Material& material, std::int32_t vertex_count) {
   if (auto status = check_field(material.p, vertex_count, "p", Material::kLowestP, Material::kHighestP,
-                                "P_OUT_OF_RANGE");
+                                Reason::kPOutOfRange);
       !status.ok()) {
     return status;
   }
   if (auto status = check_field(material.stiffness, vertex_count, "stiffness", Material::kLowestStiffness,
-                                Material::kHighestStiffness, "STIFFNESS_OUT_OF_RANGE");
+                                Material::kHighestStiffness, Reason::kStiffnessOutOfRange);
       !status.ok()) {
     return status;
   }
   if (!(material.length_unit >= 0) || !std::isfinite(material.length_unit)) {
-    return invalid_input({"LENGTH_UNIT_OUT_OF_RANGE", "length_unit", "0 <= length_unit < infinity"},
-                         absl::StrCat("length_unit is ", material.length_unit,
-                                      "; it must be 0 (the mean rest edge length) or a positive length"));
+    return make_fault({Reason::kLengthUnitOutOfRange, "length_unit", "0 <= length_unit < infinity"},
+                      absl::StrCat("length_unit is ", material.length_unit,
+                                   "; it must be 0 (the mean rest edge length) or a positive length"));
   }
   return absl::OkStatus();
 }

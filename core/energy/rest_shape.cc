@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/mesh/half_edges.h"
 
 namespace lpdeform {
@@ -59,13 +60,13 @@ Extent extent_of(const Points& positions, const std::vector<std::int32_t>& compo
 absl::Status check_scale(const Extent& extent) {
   const double largest = std::max(extent.low.cwiseAbs().maxCoeff(), extent.high.cwiseAbs().maxCoeff());
   if (largest > RestShape::kLargestCoordinate) {
-    return invalid_input({"MESH_SCALE", "", "|coordinate| <= 1e25"},
-                         absl::StrCat("The mesh's largest coordinate is ", largest, "; it may be 1e25."));
+    return make_fault({Reason::kMeshScale, "", "|coordinate| <= 1e25"},
+                      absl::StrCat("The mesh's largest coordinate is ", largest, "; it may be 1e25."));
   }
   const double diagonal = (extent.high - extent.low).norm();
   if (diagonal < RestShape::kSmallestDiagonal) {
-    return invalid_input({"MESH_SCALE", "", "diagonal >= 1e-25"},
-                         absl::StrCat("The mesh's diagonal is ", diagonal, "; it must be 1e-25 or more."));
+    return make_fault({Reason::kMeshScale, "", "diagonal >= 1e-25"},
+                      absl::StrCat("The mesh's diagonal is ", diagonal, "; it must be 1e-25 or more."));
   }
   return absl::OkStatus();
 }

@@ -2,6 +2,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/io/mesh_io.h"
 #include "core/io/readers.h"
 #include "core/io/whole_file.h"
@@ -32,9 +33,8 @@ absl::StatusOr<MeshFormat> mesh_format(const std::filesystem::path& path) {
   if (ending == ".obj") return MeshFormat::kObj;
   if (ending == ".ply") return MeshFormat::kPly;
   if (ending == ".stl") return MeshFormat::kStl;
-  return invalid_input(
-      {"MESH_FORMAT_UNKNOWN", path.string(), "one of .off, .obj, .ply, .stl"},
-      absl::StrCat("The name ", path.string(), " ends in none of .off, .obj, .ply and .stl."));
+  return make_fault({Reason::kMeshFormatUnknown, path.string(), "one of .off, .obj, .ply, .stl"},
+                    absl::StrCat("The name ", path.string(), " ends in none of .off, .obj, .ply and .stl."));
 }
 
 absl::StatusOr<MeshFile> parse_mesh(std::string_view bytes, MeshFormat format) {

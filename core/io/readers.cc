@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
@@ -21,8 +22,8 @@ absl::string_view view(std::string_view text) {
 }  // namespace
 
 absl::Status mesh_syntax(std::string_view where, std::string_view what) {
-  return invalid_input({"MESH_SYNTAX", std::string(where), ""},
-                       absl::StrCat(with_capital(where), ": ", view(what), "."));
+  return make_fault({Reason::kMeshSyntax, std::string(where), ""},
+                    absl::StrCat(with_capital(where), ": ", view(what), "."));
 }
 
 void MeshBuilder::reserve(std::int64_t vertices, std::int64_t faces, std::size_t bytes_left) {

@@ -12,12 +12,13 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
 
 absl::Status not_written(const std::filesystem::path& path, int error) {
-  return make_fault(absl::ErrnoToStatusCode(error), {"FILE_NOT_WRITTEN", path.string(), ""},
+  return make_fault(absl::ErrnoToStatusCode(error), {Reason::kFileNotWritten, path.string(), ""},
                     absl::StrCat("Cannot write ", path.string(), ": ", std::strerror(error), "."));
 }
 
@@ -87,7 +88,7 @@ absl::StatusOr<std::string> read_whole_file(const std::filesystem::path& path) {
   const bool is_file = std::filesystem::is_regular_file(path, error);
   if (!is_file && std::filesystem::exists(path, error)) {
     const bool is_folder = std::filesystem::is_directory(path, error);
-    return make_fault(absl::StatusCode::kNotFound, {"MESH_FILE_NOT_FOUND", path.string(), "a plain file"},
+    return make_fault({Reason::kMeshFileNotFound, path.string(), "a plain file"},
                       absl::StrCat(path.string(), " is a ", is_folder ? "folder" : "pipe or a device",
                                    "; a mesh is read from a plain file."));
   }
@@ -95,7 +96,7 @@ absl::StatusOr<std::string> read_whole_file(const std::filesystem::path& path) {
   const std::uintmax_t size = is_file ? std::filesystem::file_size(path, error) : 0;
   std::string bytes(error ? 0 : size, '\0');
   if (!is_file || error || !stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) {
-    return make_fault(absl::StatusCode::kNotFound, {"MESH_FILE_NOT_FOUND", path.string(), "a readable file"},
+    return make_fault({Reason::kMeshFileNotFound, path.string(), "a readable file"},
                       absl::StrCat("There is no file ", path.string(), " that can be read."));
   }
   return bytes;

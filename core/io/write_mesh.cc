@@ -4,6 +4,7 @@
 #include "core/base/check.h"
 #include "core/base/colour.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/io/byte_order.h"
 #include "core/io/mesh_io.h"
 #include "core/io/number_text.h"
@@ -97,9 +98,9 @@ std::string ply_bytes(const Faces& faces, const Points& positions, const Field& 
 }
 
 absl::Status cannot_write_stl(const std::filesystem::path& path) {
-  return invalid_input({"MESH_FORMAT_UNKNOWN", path.string(), "one of .off, .obj, .ply"},
-                       absl::StrCat("Cannot write ", path.string(),
-                                    ": an STL file keeps no vertex order; use .off, .obj or .ply."));
+  return make_fault({Reason::kMeshFormatUnknown, path.string(), "one of .off, .obj, .ply"},
+                    absl::StrCat("Cannot write ", path.string(),
+                                 ": an STL file keeps no vertex order; use .off, .obj or .ply."));
 }
 
 }  // namespace

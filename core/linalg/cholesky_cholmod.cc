@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/linalg/cholesky.h"
 
 namespace lpdeform {
@@ -167,8 +168,8 @@ absl::StatusOr<std::optional<SupernodePattern>> analyse_supernodes(const LowerMa
   cholmod.common.supernodal = CHOLMOD_SUPERNODAL;
   const bool is_counted = cholmod.analyse(pattern, nullptr);
   if (!is_counted || cholmod.factor->xsize > most) {
-    return invalid_input(
-        {"FACTOR_TOO_LARGE", "mesh", absl::StrCat("entries <= ", most)},
+    return make_fault(
+        {Reason::kFactorTooLarge, "mesh", absl::StrCat("entries <= ", most)},
         absl::StrCat("The factorisation of this mesh would have more than ", most,
                      " entries. Take one with fewer vertices, or whose faces lie beside one another as on a "
                      "surface in space."));

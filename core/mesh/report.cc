@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
@@ -37,9 +38,9 @@ const DefectEntry& entry(Defect defect) {
 }
 
 absl::Status empty_mesh(const MeshReport& report) {
-  return invalid_input({"MESH_EMPTY", "", "vertices >= 3, faces >= 1"},
-                       absl::StrCat("The mesh has ", report.vertices, " vertices and ", report.faces,
-                                    " faces; it needs at least 3 vertices and 1 face."));
+  return make_fault({Reason::kMeshEmpty, "", "vertices >= 3, faces >= 1"},
+                    absl::StrCat("The mesh has ", report.vertices, " vertices and ", report.faces,
+                                 " faces; it needs at least 3 vertices and 1 face."));
 }
 
 }  // namespace
@@ -69,21 +70,21 @@ absl::Status deformable(const MeshReport& report) {
   if (report.vertices == 0 || report.faces == 0) return empty_mesh(report);
   if (report.index_out_of_range.count > 0) {
     const std::int32_t face = report.index_out_of_range.first.front();
-    return invalid_input(
-        {"MESH_INDEX_OUT_OF_RANGE", absl::StrCat("face ", face),
+    return make_fault(
+        {Reason::kMeshIndexOutOfRange, absl::StrCat("face ", face),
          absl::StrCat("0 <= index < ", report.vertices)},
         absl::StrCat("Face ", face, " has the vertex index ", report.wrong_index, ", outside 0 to ",
                      report.vertices - 1, " (", report.index_out_of_range.count, " such faces)."));
   }
   if (report.not_finite.count > 0) {
     const std::int32_t vertex = report.not_finite.first.front();
-    return invalid_input({"MESH_NOT_FINITE", absl::StrCat("vertex ", vertex), "finite coordinates"},
-                         absl::StrCat("Vertex ", vertex, " has a NaN or infinite coordinate (",
-                                      report.not_finite.count, " such vertices); all must be finite."));
+    return make_fault({Reason::kMeshNotFinite, absl::StrCat("vertex ", vertex), "finite coordinates"},
+                      absl::StrCat("Vertex ", vertex, " has a NaN or infinite coordinate (",
+                                   report.not_finite.count, " such vertices); all must be finite."));
   }
   if (report.zero_area_faces.count == report.faces) {
-    return invalid_input(
-        {"MESH_NO_AREA", "face 0", "area > 0 on at least one face"},
+    return make_fault(
+        {Reason::kMeshNoArea, "face 0", "area > 0 on at least one face"},
         absl::StrCat("All ", report.faces, " faces have zero area; at least one must have some."));
   }
   return absl::OkStatus();

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/mesh/coincident.h"
 
 namespace lpdeform {
@@ -28,15 +29,14 @@ Weld from_lowest(const Points& positions, const std::vector<std::int32_t>& lowes
 
 absl::Status check_groups(std::int64_t vertices, std::span<const std::uint32_t> groups) {
   if (static_cast<std::int64_t>(groups.size()) != vertices) {
-    return invalid_input(
-        {"WELD_SIZE", "weld", absl::StrCat(vertices, " numbers")},
-        absl::StrCat("The weld has ", groups.size(), " numbers for ", vertices, " vertices."));
+    return make_fault({Reason::kWeldSize, "weld", absl::StrCat(vertices, " numbers")},
+                      absl::StrCat("The weld has ", groups.size(), " numbers for ", vertices, " vertices."));
   }
   const auto wrong = std::find_if(groups.begin(), groups.end(), [&](auto g) { return g >= vertices; });
   if (wrong == groups.end()) return absl::OkStatus();
   const auto vertex = wrong - groups.begin();
-  return invalid_input(
-      {"WELD_OUT_OF_RANGE", absl::StrCat("vertex ", vertex), absl::StrCat("number < ", vertices)},
+  return make_fault(
+      {Reason::kWeldOutOfRange, absl::StrCat("vertex ", vertex), absl::StrCat("number < ", vertices)},
       absl::StrCat("Vertex ", vertex, " is welded under number ", *wrong, "; the mesh has ", vertices,
                    " vertices."));
 }
@@ -48,8 +48,9 @@ absl::Status check_distances(const Points& positions, const std::vector<std::int
   for (std::size_t v = 0; v < lowest.size(); ++v) {
     const double distance = (positions.row(static_cast<Eigen::Index>(v)) - positions.row(lowest[v])).norm();
     if (!(distance > kFarthestCopy * diagonal)) continue;
-    return invalid_input(
-        {"WELD_TOO_FAR", absl::StrCat("vertex ", v), absl::StrCat("distance <= ", kFarthestCopy * diagonal)},
+    return make_fault(
+        {Reason::kWeldTooFar, absl::StrCat("vertex ", v),
+         absl::StrCat("distance <= ", kFarthestCopy * diagonal)},
         absl::StrCat("Vertex ", v, " is ", distance, " away from vertex ", lowest[v],
                      ", whose copy it is to be; at most ", kFarthestCopy, " of the mesh's diagonal is."));
   }
@@ -73,8 +74,8 @@ Weld no_weld(std::int32_t vertex_count) {
 
 absl::StatusOr<Weld> weld_by_position(const Points& positions, double tolerance) {
   if (!(tolerance >= 0 && tolerance <= kLargestTolerance)) {
-    return invalid_input(
-        {"WELD_TOLERANCE", "weld tolerance", absl::StrCat("0 <= tolerance <= ", kLargestTolerance)},
+    return make_fault(
+        {Reason::kWeldTolerance, "weld tolerance", absl::StrCat("0 <= tolerance <= ", kLargestTolerance)},
         absl::StrCat("The weld's tolerance is ", tolerance, " of the diagonal; it must be 0 to ",
                      kLargestTolerance, "."));
   }
@@ -83,9 +84,9 @@ absl::StatusOr<Weld> weld_by_position(const Points& positions, double tolerance)
   const double share = tolerance == 0 ? kSamePlace : tolerance;
   const Coincident found = coincident(positions, all, share);
   if (found.is_complete) return from_lowest(positions, found.lowest);
-  return invalid_input({"WELD_TOO_DENSE", "weld tolerance", absl::StrCat("tolerance < ", share)},
-                       absl::StrCat("Too many different vertices lie within ", share,
-                                    " of the diagonal of each other to be welded by position."));
+  return make_fault({Reason::kWeldTooDense, "weld tolerance", absl::StrCat("tolerance < ", share)},
+                    absl::StrCat("Too many different vertices lie within ", share,
+                                 " of the diagonal of each other to be welded by position."));
 }
 
 absl::StatusOr<Weld> weld_by_groups(const Points& positions, std::span<const std::uint32_t> groups) {

@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
@@ -12,8 +13,8 @@ constexpr std::size_t kLongestName = 128;
 constexpr double kBarycentricSlack = 1e-6;
 
 absl::Status not_finite(std::string_view name, const std::string& what) {
-  return invalid_input({"HANDLE_MOTION_NOT_FINITE", handle_element(name), "finite numbers"},
-                       absl::StrCat(what, " of ", handle_element(name), " is not finite"));
+  return make_fault({Reason::kHandleMotionNotFinite, handle_element(name), "finite numbers"},
+                    absl::StrCat(what, " of ", handle_element(name), " is not finite"));
 }
 
 absl::Status check_rigid(std::string_view name, const RigidMotion& motion) {
@@ -22,9 +23,9 @@ absl::Status check_rigid(std::string_view name, const RigidMotion& motion) {
   if (!motion.center.allFinite()) return not_finite(name, "the rotation centre");
   if (!motion.translation.allFinite()) return not_finite(name, "the translation");
   if (motion.angle_radians != 0 && !(motion.axis.stableNorm() > 0)) {
-    return invalid_input({"HANDLE_AXIS_ZERO", handle_element(name), "|axis| > 0"},
-                         absl::StrCat(handle_element(name), " turns by ", motion.angle_radians,
-                                      " radians about an axis of length 0"));
+    return make_fault({Reason::kHandleAxisZero, handle_element(name), "|axis| > 0"},
+                      absl::StrCat(handle_element(name), " turns by ", motion.angle_radians,
+                                   " radians about an axis of length 0"));
   }
   return absl::OkStatus();
 }
@@ -32,10 +33,10 @@ absl::Status check_rigid(std::string_view name, const RigidMotion& motion) {
 absl::Status check_targets(std::string_view name, const Handle& handle, const TargetPositions& targets) {
   const auto count = static_cast<Eigen::Index>(handle.size());
   if (targets.positions.rows() != count) {
-    return invalid_input({"HANDLE_TARGET_COUNT", handle_element(name), absl::StrCat(count, " positions")},
-                         absl::StrCat(handle_element(name), " has ", count,
-                                      handle.points.empty() ? " vertices and " : " points and ",
-                                      targets.positions.rows(), " target positions"));
+    return make_fault({Reason::kHandleTargetCount, handle_element(name), absl::StrCat(count, " positions")},
+                      absl::StrCat(handle_element(name), " has ", count,
+                                   handle.points.empty() ? " vertices and " : " points and ",
+                                   targets.positions.rows(), " target positions"));
   }
   for (Eigen::Index row = 0; row < count; ++row) {
     if (!targets.positions.row(row).allFinite())
@@ -46,16 +47,16 @@ absl::Status check_targets(std::string_view name, const Handle& handle, const Ta
 
 absl::Status check_weight(std::string_view name, double weight) {
   if (weight >= 0 && weight <= kHighestSoftWeight) return absl::OkStatus();
-  return invalid_input({"HANDLE_WEIGHT_OUT_OF_RANGE", handle_element(name), "0 <= weight <= 1e6"},
-                       absl::StrCat("the weight of ", handle_element(name), " is ", weight,
-                                    "; it must be from 0 to ", kHighestSoftWeight));
+  return make_fault({Reason::kHandleWeightOutOfRange, handle_element(name), "0 <= weight <= 1e6"},
+                    absl::StrCat("the weight of ", handle_element(name), " is ", weight,
+                                 "; it must be from 0 to ", kHighestSoftWeight));
 }
 
 absl::Status check_direction(std::string_view name, const Eigen::Vector3d& direction) {
   if (direction.allFinite() && direction.stableNorm() > 0) return absl::OkStatus();
-  return invalid_input({"HANDLE_LOCK_DIRECTION", handle_element(name), "finite, length > 0"},
-                       absl::StrCat("the axis or normal of ", handle_element(name),
-                                    " is not finite, or of length 0, and has no direction"));
+  return make_fault({Reason::kHandleLockDirection, handle_element(name), "finite, length > 0"},
+                    absl::StrCat("the axis or normal of ", handle_element(name),
+                                 " is not finite, or of length 0, and has no direction"));
 }
 
 absl::Status check_hold(std::string_view name, const Hold& hold) {
@@ -71,16 +72,16 @@ absl::Status check_points(std::string_view name, const Handle& handle) {
   const bool takes_points =
       std::holds_alternative<Exactly>(handle.hold) || std::holds_alternative<Soft>(handle.hold);
   if (!takes_points) {
-    return invalid_input({"HANDLE_KIND_NEEDS_VERTICES", handle_element(name), "vertices"},
-                         absl::StrCat(handle_element(name),
-                                      " is an orientation or a lock and has points "
-                                      "inside faces; it takes vertices"));
+    return make_fault({Reason::kHandleKindNeedsVertices, handle_element(name), "vertices"},
+                      absl::StrCat(handle_element(name),
+                                   " is an orientation or a lock and has points "
+                                   "inside faces; it takes vertices"));
   }
   for (std::size_t k = 0; k < handle.points.size(); ++k) {
     const Eigen::Vector3d& b = handle.points[k].barycentric;
     if (b.minCoeff() >= -kBarycentricSlack && std::abs(b.sum() - 1) <= kBarycentricSlack) continue;
-    return invalid_input(
-        {"HANDLE_BARYCENTRIC", absl::StrCat(handle_element(name), " point ", k),
+    return make_fault(
+        {Reason::kHandleBarycentric, absl::StrCat(handle_element(name), " point ", k),
          "each >= 0, sum = 1, to 1e-6"},
         absl::StrCat("the barycentric coordinates of point ", k, " of ", handle_element(name), " are ", b[0],
                      ", ", b[1], ", ", b[2], "; they must be 0 or more and add up to 1"));
@@ -90,22 +91,22 @@ absl::Status check_points(std::string_view name, const Handle& handle) {
 
 absl::Status check_members(std::string_view name, const Handle& handle) {
   if (handle.size() == 0) {
-    return invalid_input({"HANDLE_EMPTY", handle_element(name), "at least 1 vertex or point"},
-                         absl::StrCat(handle_element(name), " has no vertices; it needs at least one"));
+    return make_fault({Reason::kHandleEmpty, handle_element(name), "at least 1 vertex or point"},
+                      absl::StrCat(handle_element(name), " has no vertices; it needs at least one"));
   }
   if (!handle.vertices.empty() && !handle.points.empty()) {
-    return invalid_input({"HANDLE_POINTS_AND_VERTICES", handle_element(name), "vertices or points"},
-                         absl::StrCat(handle_element(name),
-                                      " has vertices and points inside faces; it takes "
-                                      "one of the two"));
+    return make_fault({Reason::kHandlePointsAndVertices, handle_element(name), "vertices or points"},
+                      absl::StrCat(handle_element(name),
+                                   " has vertices and points inside faces; it takes "
+                                   "one of the two"));
   }
   return handle.points.empty() ? absl::OkStatus() : check_points(name, handle);
 }
 
 absl::Status check_footprint(std::string_view name, double radius) {
   if (radius >= 0 && std::isfinite(radius)) return absl::OkStatus();
-  return invalid_input(
-      {"HANDLE_FOOTPRINT_OUT_OF_RANGE", handle_element(name), "0 <= footprint < infinity"},
+  return make_fault(
+      {Reason::kHandleFootprintOutOfRange, handle_element(name), "0 <= footprint < infinity"},
       absl::StrCat("the footprint of ", handle_element(name), " is ", radius, "; it must be 0 or a length"));
 }
 
@@ -117,8 +118,8 @@ std::string handle_element(std::string_view name) {
 
 absl::Status check_handle(std::string_view name, const Handle& handle) {
   if (name.empty() || name.size() > kLongestName) {
-    return invalid_input({"HANDLE_NAME", handle_element(name), "1 to 128 bytes"},
-                         absl::StrCat("a handle's name has ", name.size(), " bytes; it must have 1 to 128"));
+    return make_fault({Reason::kHandleName, handle_element(name), "1 to 128 bytes"},
+                      absl::StrCat("a handle's name has ", name.size(), " bytes; it must have 1 to 128"));
   }
   absl::Status status = check_members(name, handle);
   if (status.ok()) status = check_hold(name, handle.hold);
@@ -131,8 +132,8 @@ absl::Status check_motion(std::string_view name, const Handle& handle, const Han
   const auto* targets = std::get_if<TargetPositions>(&motion);
   if (targets == nullptr) return absl::OkStatus();
   if (std::holds_alternative<Orientation>(handle.hold)) {
-    return invalid_input({"HANDLE_KIND_NEEDS_ROTATION", handle_element(name), "fixed or rigid motion"},
-                         absl::StrCat(handle_element(name), " prescribes a rotation and takes no positions"));
+    return make_fault({Reason::kHandleKindNeedsRotation, handle_element(name), "fixed or rigid motion"},
+                      absl::StrCat(handle_element(name), " prescribes a rotation and takes no positions"));
   }
   return check_targets(name, handle, *targets);
 }

@@ -4,27 +4,27 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/problem/check_handle.h"
 
 namespace lpdeform {
 namespace {
 
-absl::Status out_of_range(const std::string& reason, const std::string& name, double value,
-                          const std::string& limit) {
-  return invalid_input({reason, name, limit}, absl::StrCat(name, " is ", value, "; it must satisfy ", limit));
+absl::Status out_of_range(Reason reason, const std::string& name, double value, const std::string& limit) {
+  return make_fault({reason, name, limit}, absl::StrCat(name, " is ", value, "; it must satisfy ", limit));
 }
 
 absl::Status check_limits(const SolveSettings& settings) {
   if (!(settings.tolerance >= 1e-14 && settings.tolerance <= 0.1)) {
-    return out_of_range("TOLERANCE_OUT_OF_RANGE", "tolerance", settings.tolerance,
+    return out_of_range(Reason::kToleranceOutOfRange, "tolerance", settings.tolerance,
                         "1e-14 <= tolerance <= 0.1");
   }
   if (settings.max_iterations < 0) {
-    return out_of_range("ITERATIONS_OUT_OF_RANGE", "max_iterations", settings.max_iterations,
+    return out_of_range(Reason::kIterationsOutOfRange, "max_iterations", settings.max_iterations,
                         "0 <= max_iterations");
   }
   if (!(settings.time_limit_seconds > 0)) {
-    return out_of_range("TIME_LIMIT_OUT_OF_RANGE", "time_limit_seconds", settings.time_limit_seconds,
+    return out_of_range(Reason::kTimeLimitOutOfRange, "time_limit_seconds", settings.time_limit_seconds,
                         "0 < time_limit_seconds");
   }
   return absl::OkStatus();
@@ -36,9 +36,9 @@ absl::Status check_method(Method method, const Material& material) {
   if (needed == 0 || (lowest == needed && highest == needed)) return absl::OkStatus();
   const std::string limit = absl::StrCat("p = ", needed);
   const std::string name(method_name(method));
-  return invalid_input({"METHOD_NEEDS_P", name, limit},
-                       absl::StrCat("method ", name, " needs ", limit, " everywhere; p is ", lowest,
-                                    lowest == highest ? "" : absl::StrCat(" to ", highest)));
+  return make_fault({Reason::kMethodNeedsP, name, limit},
+                    absl::StrCat("method ", name, " needs ", limit, " everywhere; p is ", lowest,
+                                 lowest == highest ? "" : absl::StrCat(" to ", highest)));
 }
 
 }  // namespace
@@ -48,9 +48,9 @@ absl::Status check_method_takes(Method method, const HandleSet& handles) {
   for (const auto& [name, handle] : handles.handles()) {
     if (handle.points.empty() && std::holds_alternative<Exactly>(handle.hold)) continue;
     const std::string limit = "handles that hold vertices exactly";
-    return invalid_input({"METHOD_NEEDS_EXACT_HANDLES", handle_element(name), limit},
-                         absl::StrCat("method ", std::string(method_name(method)), " takes ", limit, "; ",
-                                      handle_element(name), " is held in another way"));
+    return make_fault({Reason::kMethodNeedsExactHandles, handle_element(name), limit},
+                      absl::StrCat("method ", std::string(method_name(method)), " takes ", limit, "; ",
+                                   handle_element(name), " is held in another way"));
   }
   return absl::OkStatus();
 }

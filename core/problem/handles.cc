@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/problem/check_handle.h"
 
 namespace lpdeform {
@@ -13,8 +14,7 @@ namespace {
 
 absl::Status check_region(const std::vector<std::int32_t>& region, std::int32_t vertex_count) {
   if (region.empty()) {
-    return invalid_input({"REGION_EMPTY", "region", "at least 1 vertex"},
-                         "the region of interest has no vertex; nothing could move");
+    return region_empty();
   }
   if (region.front() >= 0 && region.back() < vertex_count) return absl::OkStatus();
   const std::int32_t vertex = region.front() < 0 ? region.front() : region.back();
@@ -45,7 +45,7 @@ absl::Status HandleSet::set(std::string_view name, Handle handle) {
 absl::Status HandleSet::set_motion(std::string_view name, HandleMotion motion) {
   const auto found = handles_.find(name);
   if (found == handles_.end()) {
-    return make_fault(absl::StatusCode::kNotFound, {"HANDLE_UNKNOWN", handle_element(name), ""},
+    return make_fault({Reason::kHandleUnknown, handle_element(name), ""},
                       absl::StrCat("there is no ", handle_element(name)));
   }
   if (absl::Status status = check_motion(name, found->second, motion); !status.ok()) return status;
@@ -89,30 +89,36 @@ absl::Status check_handles(const HandleSet& handles, std::int32_t vertex_count, 
       const std::string where = entry->second == name ? absl::StrCat("twice in ", handle_element(name))
                                                       : absl::StrCat("in ", handle_element(entry->second),
                                                                      " and in ", handle_element(name));
-      return invalid_input({"HANDLE_VERTEX_TWICE", absl::StrCat("vertex ", vertex), "one handle a vertex"},
-                           absl::StrCat("vertex ", vertex, " is ", where));
+      return make_fault({Reason::kHandleVertexTwice, absl::StrCat("vertex ", vertex), "one handle a vertex"},
+                        absl::StrCat("vertex ", vertex, " is ", where));
     }
   }
   return absl::OkStatus();
 }
 
 absl::Status handle_vertex_out_of_range(std::string_view handle, std::int64_t vertex, std::int64_t count) {
-  return invalid_input(
-      {"HANDLE_VERTEX_OUT_OF_RANGE", absl::StrCat("vertex ", vertex), absl::StrCat("0 <= vertex < ", count)},
-      absl::StrCat(handle_element(handle), " holds vertex ", vertex, "; the mesh has ", count,
-                   " vertices, 0 to ", count - 1));
+  return make_fault({Reason::kHandleVertexOutOfRange, absl::StrCat("vertex ", vertex),
+                     absl::StrCat("0 <= vertex < ", count)},
+                    absl::StrCat(handle_element(handle), " holds vertex ", vertex, "; the mesh has ", count,
+                                 " vertices, 0 to ", count - 1));
 }
 
 absl::Status handle_face_out_of_range(std::string_view handle, std::int64_t face, std::int64_t count) {
-  return invalid_input(
-      {"HANDLE_FACE_OUT_OF_RANGE", absl::StrCat("face ", face), absl::StrCat("0 <= face < ", count)},
+  return make_fault(
+      {Reason::kHandleFaceOutOfRange, absl::StrCat("face ", face), absl::StrCat("0 <= face < ", count)},
       absl::StrCat(handle_element(handle), " has a point in face ", face, "; the mesh has ", count,
                    " faces"));
 }
 
+absl::Status region_empty() {
+  return make_fault({Reason::kRegionEmpty, "region", "at least 1 vertex"},
+                    "the region of interest has no vertex; nothing could move");
+}
+
 absl::Status region_vertex_out_of_range(std::int64_t vertex, std::int64_t count) {
-  return invalid_input(
-      {"REGION_VERTEX_OUT_OF_RANGE", absl::StrCat("vertex ", vertex), absl::StrCat("0 <= vertex < ", count)},
+  return make_fault(
+      {Reason::kRegionVertexOutOfRange, absl::StrCat("vertex ", vertex),
+       absl::StrCat("0 <= vertex < ", count)},
       absl::StrCat("the region of interest has vertex ", vertex, "; the mesh has ", count, " vertices"));
 }
 

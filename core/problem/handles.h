@@ -96,6 +96,7 @@ absl::Status check_handles(const HandleSet& handles, std::int32_t vertex_count, 
 /// These errors, for callers whose numbers may be no std::int32_t. `count`: of the mesh's vertices or faces.
 absl::Status handle_vertex_out_of_range(std::string_view handle, std::int64_t vertex, std::int64_t count);
 absl::Status handle_face_out_of_range(std::string_view handle, std::int64_t face, std::int64_t count);
+absl::Status region_empty();
 absl::Status region_vertex_out_of_range(std::int64_t vertex, std::int64_t count);
 
 /// Where a handle's vertices or points are at rest, and where its motion sends them: rows in their order.

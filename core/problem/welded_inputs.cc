@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
@@ -15,8 +16,8 @@ std::string in_quotes(std::string_view name) {
 }
 
 absl::Status copies_differ(std::string_view what, std::int32_t first, std::int32_t second) {
-  return invalid_input(
-      {"COPIES_DIFFER", absl::StrCat("vertex ", second), "the same for all copies"},
+  return make_fault(
+      {Reason::kCopiesDiffer, absl::StrCat("vertex ", second), "the same for all copies"},
       absl::StrCat("The ", std::string(what), " of vertex ", second, " are not those of vertex ", first,
                    ", though both are copies of one vertex."));
 }
@@ -58,10 +59,9 @@ struct Holder {
 };
 
 absl::Status held_twice(const Holder& holder, std::string_view other, std::int32_t copy) {
-  return invalid_input(
-      {"HANDLE_VERTEX_TWICE", absl::StrCat("vertex ", copy), "one handle a vertex"},
-      absl::StrCat("vertex ", holder.copy, " is in ", in_quotes(holder.handle), " and vertex ", copy, " in ",
-                   in_quotes(other), ", and both are copies of one vertex"));
+  return make_fault({Reason::kHandleVertexTwice, absl::StrCat("vertex ", copy), "one handle a vertex"},
+                    absl::StrCat("vertex ", holder.copy, " is in ", in_quotes(holder.handle), " and vertex ",
+                                 copy, " in ", in_quotes(other), ", and both are copies of one vertex"));
 }
 
 absl::StatusOr<Handle> merged_handle(std::string_view name, const Handle& split, const Weld& weld,

@@ -8,6 +8,7 @@
 #include "core/analysis/girth.h"
 #include "core/analysis/salience.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/resize/resize_extents.h"
 #include "core/resize/sparing.h"
 
@@ -51,13 +52,13 @@ absl::Status check_scaling(const Scaling& scaling) {
   for (int k = 0; k < 3; ++k) {
     const double scale = scaling.scale[k];
     if (scale >= Scaling::kLowest && scale <= Scaling::kHighest) continue;
-    return invalid_input(
-        {"RESIZE_SCALE_OUT_OF_RANGE", absl::StrCat("scale[", k, "]"), "0.01 <= scale <= 100"},
+    return make_fault(
+        {Reason::kResizeScaleOutOfRange, absl::StrCat("scale[", k, "]"), "0.01 <= scale <= 100"},
         absl::StrCat("scale[", k, "] is ", scale, "; it must be from 0.01 to 100"));
   }
   if (scaling.origin.allFinite()) return absl::OkStatus();
-  return invalid_input({"RESIZE_ORIGIN_NOT_FINITE", "origin", "finite numbers"},
-                       "the origin of the resizing is not finite");
+  return make_fault({Reason::kResizeOriginNotFinite, "origin", "finite numbers"},
+                    "the origin of the resizing is not finite");
 }
 
 Points Scaling::operator()(const Points& points) const {
@@ -70,8 +71,8 @@ absl::StatusOr<Eigen::Matrix3d> axes_of(const Eigen::Vector3d& x_axis, const Eig
   const Eigen::Vector3d across = y - y.dot(x) * x;
   const bool is_finite = x_axis.allFinite() && y_axis.allFinite();
   if (!is_finite || !(x.norm() > 0.5) || !(across.norm() > kSmallestSine)) {
-    return invalid_input({"RESIZE_AXES", "axes", "two directions that are not parallel"},
-                         "the axes of the resizing are not finite, of length 0, or parallel");
+    return make_fault({Reason::kResizeAxes, "axes", "two directions that are not parallel"},
+                      "the axes of the resizing are not finite, of length 0, or parallel");
   }
   Eigen::Matrix3d axes;
   axes.row(0) = x;

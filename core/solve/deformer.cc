@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/problem/check_settings.h"
 #include "core/solve/deformer_impl.h"
 
@@ -20,10 +21,10 @@ Deformer::~Deformer() = default;
 
 absl::StatusOr<std::unique_ptr<Deformer>> Deformer::create(std::shared_ptr<const RestShape> shape,
                                                            DeformerOptions options) {
-  if (shape == nullptr) return invalid_input({"NO_SHAPE", "", ""}, "no rest shape was given");
+  if (shape == nullptr) return make_fault({Reason::kNoShape, "", ""}, "no rest shape was given");
   if (options.threads < 1 || options.threads > 1024) {
-    return invalid_input({"THREADS_OUT_OF_RANGE", "threads", "1 <= threads <= 1024"},
-                         absl::StrCat("threads is ", options.threads, "; it must be from 1 to 1024"));
+    return make_fault({Reason::kThreadsOutOfRange, "threads", "1 <= threads <= 1024"},
+                      absl::StrCat("threads is ", options.threads, "; it must be from 1 to 1024"));
   }
   const Metric::Admission admit = [&](std::size_t metric_bytes) {
     if (!options.admit) return absl::OkStatus();
@@ -81,14 +82,14 @@ absl::Status Deformer::set_material(const Material& material) {
 absl::Status Deformer::set_positions(const Points& positions) {
   const std::int32_t n = impl_->shape->vertex_count();
   if (positions.rows() != n) {
-    return invalid_input({"POSITIONS_SIZE", "positions", absl::StrCat(n, " positions")},
-                         absl::StrCat("there are ", positions.rows(), " positions for ", n, " vertices"));
+    return make_fault({Reason::kPositionsSize, "positions", absl::StrCat(n, " positions")},
+                      absl::StrCat("there are ", positions.rows(), " positions for ", n, " vertices"));
   }
   const double farthest = kFarthestTarget * impl_->shape->diagonal();
   for (Eigen::Index i = 0; i < n; ++i) {
     if ((positions.row(i) - impl_->shape->centre()).stableNorm() <= farthest) continue;
-    return invalid_input(
-        {"POSITIONS_NOT_FINITE", absl::StrCat("vertex ", i), "1e9 diagonals of the mesh"},
+    return make_fault(
+        {Reason::kPositionsNotFinite, absl::StrCat("vertex ", i), "1e9 diagonals of the mesh"},
         absl::StrCat("the position of vertex ", i, " is not finite, or over 1e9 diagonals of the mesh away"));
   }
   impl_->change_inputs();
@@ -104,7 +105,7 @@ absl::Status Deformer::start(const SolveSettings& settings, std::stop_token stop
   Impl& self = *impl_;
   if (absl::Status status = check_settings(settings, self.material); !status.ok()) return status;
   if (!self.constraints) {
-    return make_fault(absl::StatusCode::kFailedPrecondition, {"NO_HANDLES", "", "at least 1 handle"},
+    return make_fault({Reason::kNoHandles, "", "at least 1 handle"},
                       "there is no handle; a deformation needs at least one");
   }
   if (absl::Status status = check_method_takes(settings.method, self.handles); !status.ok()) return status;
@@ -136,7 +137,7 @@ absl::Status Deformer::start_certificate(std::stop_token stop, double max_second
   Impl& self = *impl_;
   self.interrupt();
   if (!self.norm) {
-    return make_fault(absl::StatusCode::kFailedPrecondition, {"NOT_SOLVED", "", ""},
+    return make_fault({Reason::kNotSolved, "", ""},
                       "there was no solve for the present inputs; a certificate is that of a result");
   }
   self.stop = std::move(stop);

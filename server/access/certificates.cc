@@ -12,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
@@ -21,7 +22,7 @@ using Key = std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)>;
 using Source = std::unique_ptr<BIO, decltype(&BIO_free)>;
 
 absl::Status bad_file(const std::string& file, const std::string& why) {
-  return invalid_input({"TLS_FILES", file, ""}, absl::StrCat("The TLS file \"", file, "\" ", why, "."));
+  return make_fault({Reason::kTlsFiles, file, ""}, absl::StrCat("The TLS file \"", file, "\" ", why, "."));
 }
 
 absl::StatusOr<std::string> read(const std::string& name) {
@@ -61,7 +62,7 @@ Key key_in(const std::string& text) {
 
 absl::StatusOr<Certificates::Texts> read_all(const TlsFiles& files) {
   if (files.certificate_chain.empty() || files.private_key.empty()) {
-    return invalid_input({"TLS_FILES", "", ""}, "TLS needs both a certificate chain and its private key.");
+    return make_fault({Reason::kTlsFiles, "", ""}, "TLS needs both a certificate chain and its private key.");
   }
   auto chain = read(files.certificate_chain), key = read(files.private_key);
   if (!chain.ok()) return chain.status();

@@ -23,6 +23,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
@@ -34,7 +35,7 @@ constexpr std::chrono::milliseconds kBetweenCounts{10};
 constexpr std::chrono::milliseconds kPause{50};
 
 absl::Status not_bound(const std::string& address, const std::string& why) {
-  return make_fault(absl::StatusCode::kUnavailable, {"ADDRESS_NOT_BOUND", address, ""},
+  return make_fault({Reason::kAddressNotBound, address, ""},
                     absl::StrCat("The server cannot listen on ", address, ": ", why, "."));
 }
 

@@ -20,6 +20,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
@@ -33,15 +34,16 @@ constexpr std::size_t kMostKnown = 4096;
 using Jwt = std::unique_ptr<jwt_t, decltype(&jwt_free)>;
 
 absl::Status bad_keys(const std::string& why) {
-  return invalid_input({"TOKEN_KEYS", "token keys", ""}, absl::StrCat("The file of token keys ", why, "."));
+  return make_fault({Reason::kTokenKeys, "token keys", ""},
+                    absl::StrCat("The file of token keys ", why, "."));
 }
 
-absl::Status bad_token(const char* reason, const std::string& text) {
-  return make_fault(absl::StatusCode::kUnauthenticated, {reason, "authorization", ""}, text);
+absl::Status bad_token(Reason reason, const std::string& text) {
+  return make_fault({reason, "authorization", ""}, text);
 }
 
 absl::Status invalid_token() {
-  return bad_token("TOKEN_INVALID", "The bearer token is not one that this server takes.");
+  return bad_token(Reason::kTokenInvalid, "The bearer token is not one that this server takes.");
 }
 
 /// Empty where the key is of a kind or size that is not taken.
@@ -177,7 +179,7 @@ absl::Status Tokens::refresh() {
 absl::StatusOr<Caller> Tokens::check(std::string_view authorization, std::int64_t now) const {
   constexpr std::string_view kScheme = "Bearer ";
   if (authorization.empty()) {
-    return bad_token("TOKEN_MISSING", "A call needs the header \"authorization: Bearer <token>\".");
+    return bad_token(Reason::kTokenMissing, "A call needs the header \"authorization: Bearer <token>\".");
   }
   const bool is_bearer = absl::StartsWithIgnoreCase({authorization.data(), authorization.size()}, "Bearer ");
   if (!is_bearer || authorization.size() > kScheme.size() + kLongestToken) return invalid_token();
@@ -213,7 +215,7 @@ absl::StatusOr<Tokens::Known> Tokens::verify(const TokenKeys& keys, const std::s
   const double expires = date_of(claims, "exp", nan), begins = date_of(claims, "nbf", 0);
   if (!(std::abs(expires) < kFarthestDate) || !(std::abs(begins) < kFarthestDate)) return invalid_token();
   if (static_cast<double>(now) > expires + kLeewaySeconds)
-    return bad_token("TOKEN_EXPIRED", "The bearer token has expired.");
+    return bad_token(Reason::kTokenExpired, "The bearer token has expired.");
   if (static_cast<double>(now) < begins - kLeewaySeconds) return invalid_token();
 
   const std::string subject = text_of(claims, "sub");

@@ -14,6 +14,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/access/listener.h"
 #include "server/access/local_host.h"
 #include "server/admin/http_exchange.h"
@@ -203,7 +204,7 @@ absl::StatusOr<std::unique_ptr<Admin>> Admin::start(const std::string& address,
   auto listener = Listener::bind(address);
   if (!listener.ok()) {
     return make_fault(
-        absl::StatusCode::kUnavailable, {"ADDRESS_NOT_BOUND", address, ""},
+        {Reason::kAddressNotBound, address, ""},
         absl::StrCat("The admin port does not open. ", absl::string_view(listener.status().message())));
   }
   auto impl = std::make_unique<Impl>();

@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/access/local_host.h"
 #include "server/runtime/file_watch.h"
 #include "server/runtime/heap_trim.h"
@@ -129,15 +130,14 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
 absl::StatusOr<Caller> Backend::identify(const CallContext& call, Access access) const {
   if (is_for_this_machine_ && !names_this_machine(call.authority)) {
     return make_fault(
-        absl::StatusCode::kPermissionDenied, {"HOST_FOREIGN", "host", "localhost"},
+        {Reason::kHostForeign, "host", "localhost"},
         absl::StrCat(
             "The server has no authentication, so it must be called localhost, 127.0.0.1 or [::1], and not '",
             absl::CHexEscape(call.authority), "'; --allow-anonymous lets everybody in."));
   }
   absl::StatusOr<Caller> caller = Caller{};
   if (tokens_ != nullptr && call.is_authorization_doubled) {
-    return make_fault(absl::StatusCode::kUnauthenticated,
-                      {"AUTHORIZATION_TWICE", "authorization", "one header"},
+    return make_fault({Reason::kAuthorizationTwice, "authorization", "one header"},
                       "The call has the header authorization more than once; send it once.");
   }
   if (tokens_ != nullptr) {
@@ -146,11 +146,11 @@ absl::StatusOr<Caller> Backend::identify(const CallContext& call, Access access)
     caller->subject = absl::StrCat("certificate:", call.peer_identity);
   }
   if (caller.ok() && call.is_route_doubled) {
-    return invalid_input({"ROUTE_TWICE", "lpdeform-session", "one header"},
-                         "The call has the header lpdeform-session more than once; send it once.");
+    return make_fault({Reason::kRouteTwice, "lpdeform-session", "one header"},
+                      "The call has the header lpdeform-session more than once; send it once.");
   }
   if (!caller.ok() || access == Access::kRead || !caller->is_viewer) return caller;
-  return make_fault(absl::StatusCode::kPermissionDenied, {"READ_ONLY", "authorization", ""},
+  return make_fault({Reason::kReadOnly, "authorization", ""},
                     "The bearer token lets its holder look on and change nothing.");
 }
 

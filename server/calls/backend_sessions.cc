@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/calls/backend.h"
 #include "server/keeping/encode_stored.h"
 #include "server/keeping/snapshot.h"
@@ -153,9 +154,9 @@ absl::StatusOr<Backend::SnapshotFile> Backend::snapshot(const CallContext& call,
 void Backend::list_sessions(const CallContext& call, const v1::ListSessionsRequest& request,
                             v1::ListSessionsResponse& response, Done done) {
   if (request.page_size() > kLargestPage) {
-    return done(invalid_input(
-        {"PAGE_SIZE", "page_size", absl::StrCat("page_size <= ", kLargestPage)},
-        absl::StrCat("A page of ", request.page_size(), " sessions is over ", kLargestPage, ".")));
+    return done(
+        make_fault({Reason::kPageSize, "page_size", absl::StrCat("page_size <= ", kLargestPage)},
+                   absl::StrCat("A page of ", request.page_size(), " sessions is over ", kLargestPage, ".")));
   }
   const auto caller = identify(call, Access::kRead);
   if (!caller.ok()) return done(caller.status());
@@ -384,7 +385,7 @@ void Backend::end_restoring(const std::string& name, const absl::Status& status)
     log().error("session_damaged", {{"session", abbreviated(name)}, {"text", damage}});
   }
   // What there is not, find() does not find either.
-  const bool is_unknown = fault_of(status).reason == "SESSION_UNKNOWN";
+  const bool is_unknown = fault_of(status).reason == Reason::kSessionUnknown;
   if (is_unknown) registry->forget_left(name);
   for (const Done& then : waiting) then(is_unknown ? absl::OkStatus() : status);
 }

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/session/session.h"
 
 namespace lpdeform {
@@ -16,7 +17,7 @@ bool is_servers_fault(absl::StatusCode code) {
 /// Bytes that are not those of their checksum are their sender's, or the network's, though the code is DATA_LOSS: who calls can have
 /// as many of these errors as it likes.
 bool is_servers_fault(const absl::Status& status, const std::string& reason) {
-  return is_servers_fault(status.code()) && reason != "UPLOAD_CHECKSUM";
+  return is_servers_fault(status.code()) && reason != Reason::kUploadChecksum;
 }
 
 /// Errors whose texts speak of the server or of the caller's rights, never of what was sent.
@@ -28,7 +29,7 @@ bool is_of_the_server(absl::StatusCode code) {
 
 /// A name that nobody has may be anything, also a token in the wrong place.
 std::string element_of(const Fault& fault) {
-  return fault.reason == "SESSION_UNKNOWN" ? abbreviated(fault.element) : in_quotes(fault.element);
+  return fault.reason == Reason::kSessionUnknown ? abbreviated(fault.element) : in_quotes(fault.element);
 }
 
 /// Of a distance it is made from the mesh, which is nobody's business.

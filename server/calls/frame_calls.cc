@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/calls/write_pump.h"
 #include "server/wire/encode.h"
 
@@ -147,8 +148,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   void give_up_unopened() {
     const std::scoped_lock lock(mutex_);
     if (is_open_) return;
-    refuse_locked(make_fault(absl::StatusCode::kUnavailable, {"STREAM_UNOPENED", "", ""},
-                             "The stream was not opened within 10 s."));
+    refuse_locked(make_fault({Reason::kStreamUnopened, "", ""}, "The stream was not opened within 10 s."));
   }
 
   void post(void (DeformCall::*task)()) {
@@ -190,7 +190,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   /// it, it would be lost.
   static bool goes_on_elsewhere(const absl::Status& status) {
     const std::string reason = fault_of(status).reason;
-    return reason == "DRAINING" || reason == "SESSION_ELSEWHERE";
+    return reason == Reason::kDraining || reason == Reason::kSessionElsewhere;
   }
 
   /// On any thread.
@@ -223,7 +223,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
                                              {"trace_id", context().trace_id}});
       return open_.stream->end(EndReason::kProtocolError, why);
     }
-    refuse(invalid_input({"STREAM_PROTOCOL", "", ""}, why));
+    refuse(make_fault({Reason::kStreamProtocol, "", ""}, why));
   }
 
   Received<v1::DeformRequest> received_;

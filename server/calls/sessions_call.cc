@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/calls/frame_calls.h"
 #include "server/calls/write_pump.h"
 #include "server/wire/encode.h"
@@ -16,8 +17,8 @@ namespace {
 constexpr int kMostStreams = 16;
 
 absl::Status wrong_count(int count) {
-  return invalid_input({"STREAMS_COUNT", "streams", absl::StrCat("1 to ", kMostStreams)},
-                       absl::StrCat("A call asks for ", count, " streams, not for 1 to ", kMostStreams, "."));
+  return make_fault({Reason::kStreamsCount, "streams", absl::StrCat("1 to ", kMostStreams)},
+                    absl::StrCat("A call asks for ", count, " streams, not for 1 to ", kMostStreams, "."));
 }
 
 /// Several sessions' streams in one call. They take turns, message by message, so that none waits for another's frames.

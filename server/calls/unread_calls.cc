@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "lpdeform/v1/service.grpc.pb.h"
 #include "server/wire/grpc_status.h"
 
@@ -19,8 +20,8 @@ using grpc::experimental::ServerInterceptorFactoryInterface;
 using grpc::experimental::ServerRpcInfo;
 
 absl::Status message_unreadable() {
-  return invalid_input(
-      {"MESSAGE_UNREADABLE", "", ""},
+  return make_fault(
+      {Reason::kMessageUnreadable, "", ""},
       "The message cannot be parsed as the request of this call; a text that is not UTF-8, perhaps.");
 }
 

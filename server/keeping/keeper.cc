@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/runtime/refusals.h"
 
 namespace lpdeform {
@@ -307,7 +308,7 @@ void Keeper::take_over_until(const std::string& name, const Asker& asker, Timers
     absl::StatusOr<Found> found = find(name, asker, since);
     const Timers::TimePoint now = services_.timers->now();
     const Fault fault = fault_of(found.status());
-    if (fault.reason != "SESSION_ELSEWHERE" || now >= end || leads_elsewhere(fault, asker.route))
+    if (fault.reason != Reason::kSessionElsewhere || now >= end || leads_elsewhere(fault, asker.route))
       return on_found(std::move(found));
     services_.timers->at(now + kBetweenLooks, [weak = weak_from_this(), name, asker, end, on_found] {
       if (const auto self = weak.lock()) self->take_over_until(name, asker, end, on_found);

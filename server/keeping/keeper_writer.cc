@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/keeping/keeper.h"
 
 namespace lpdeform {
@@ -282,7 +283,7 @@ void Keeper::note_full(const absl::Status& status) {
 
 /// Whether the store gives what it is asked for: anything but STORE_FAILING is an answer.
 void Keeper::note_read(const absl::Status& status, Clock::time_point begin) {
-  const bool is_failing = fault_of(status).reason == "STORE_FAILING";
+  const bool is_failing = fault_of(status).reason == Reason::kStoreFailing;
   if (is_failing) services_.metrics->add(Count::kStoreErrors);
   const std::scoped_lock lock(mutex_);
   if (!std::exchange(is_reading_failing_, is_failing) && is_failing) try_again_later();

@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/crc32c.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/keeping/encode_stored.h"
 #include "server/keeping/stored.pb.h"
 #include "server/wire/parsed_size.h"
@@ -30,25 +31,25 @@ struct Header {
 };
 static_assert(sizeof(Header) == kSnapshotHeaderBytes);
 
-absl::Status refused(const char* reason, const std::string& limit, std::string_view text) {
-  return invalid_input({reason, "snapshot", limit}, text);
+absl::Status refused(Reason reason, const std::string& limit, std::string_view text) {
+  return make_fault({reason, "snapshot", limit}, text);
 }
 
 absl::Status truncated(std::size_t has, const std::string& should) {
-  return refused("SNAPSHOT_TRUNCATED", absl::StrCat(should, " bytes"),
+  return refused(Reason::kSnapshotTruncated, absl::StrCat(should, " bytes"),
                  absl::StrCat("The snapshot has ", has, " bytes of ", should, "; its end is missing."));
 }
 
 /// What follows the header.
 absl::StatusOr<std::string_view> content_of(std::string_view file) {
   if (file.substr(0, kMagic.size()) != kMagic.substr(0, file.size()) || file.empty())
-    return refused("SNAPSHOT_FOREIGN", "",
+    return refused(Reason::kSnapshotForeign, "",
                    "The file is no snapshot of a session: it does not begin like one.");
   if (file.size() < sizeof(Header)) return truncated(file.size(), absl::StrCat("at least ", sizeof(Header)));
   Header header;
   std::memcpy(&header, file.data(), sizeof(Header));
   if (header.format > kSnapshotFormat) {
-    return refused("SNAPSHOT_NEWER", absl::StrCat("format <= ", kSnapshotFormat),
+    return refused(Reason::kSnapshotNewer, absl::StrCat("format <= ", kSnapshotFormat),
                    absl::StrCat("The snapshot's format is ", header.format, "; this server reads up to ",
                                 kSnapshotFormat, ". Use a later server."));
   }
@@ -91,7 +92,7 @@ std::size_t memory_for(std::string_view content) {
 }  // namespace
 
 absl::Status snapshot_damaged(std::string_view why) {
-  return refused("SNAPSHOT_DAMAGED", "",
+  return refused(Reason::kSnapshotDamaged, "",
                  absl::StrCat("The snapshot is damaged: ", absl::string_view(why.data(), why.size()), "."));
 }
 
@@ -118,8 +119,7 @@ absl::StatusOr<std::string> encode_snapshot(const Session& session, std::size_t 
     encode_positions(session.newest_frame()->surface->positions(), *snapshot.mutable_surface());
   if (const std::size_t bytes = snapshot.ByteSizeLong(); bytes > most_bytes) {
     return make_fault(
-        absl::StatusCode::kFailedPrecondition,
-        {"SNAPSHOT_TOO_LARGE", "snapshot", absl::StrCat("bytes <= ", most_bytes)},
+        {Reason::kSnapshotTooLarge, "snapshot", absl::StrCat("bytes <= ", most_bytes)},
         absl::StrCat("The session's file would have ", bytes, " bytes; it can have ", most_bytes, "."));
   }
   std::string file(sizeof(Header), '\0');

@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 
@@ -25,8 +26,7 @@ absl::Status Budget::check(std::size_t bytes, const std::string& owner) const {
 
 absl::Status Budget::check_locked(std::size_t bytes, const std::string& owner) const {
   if (bytes > most_ || used_ > most_ - bytes) {
-    return make_fault(absl::StatusCode::kResourceExhausted,
-                      {"MEMORY_FULL", "memory", absl::StrCat("bytes <= ", most_)},
+    return make_fault({Reason::kMemoryFull, "memory", absl::StrCat("bytes <= ", most_)},
                       absl::StrCat("This needs about ", bytes, " bytes; the server has ", used_, " of its ",
                                    most_, " in use. Try again later, or with a smaller mesh."));
   }
@@ -34,8 +34,7 @@ absl::Status Budget::check_locked(std::size_t bytes, const std::string& owner) c
   const std::size_t theirs = found == used_by_.end() ? 0 : found->second;
   if (!owner.empty() && most_each_ != 0 && (bytes > most_each_ || theirs > most_each_ - bytes)) {
     return make_fault(
-        absl::StatusCode::kResourceExhausted,
-        {"CALLER_MEMORY_FULL", "memory", absl::StrCat("bytes <= ", most_each_)},
+        {Reason::kCallerMemoryFull, "memory", absl::StrCat("bytes <= ", most_each_)},
         absl::StrCat("This needs about ", bytes, " bytes; the caller has ", theirs, " of the ", most_each_,
                      " that one caller may have in use. Delete a session or an upload first, or take a "
                      "smaller mesh."));

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/runtime/refusals.h"
 
 namespace lpdeform {
@@ -18,8 +19,7 @@ absl::StatusOr<CallerLimits::Place> CallerLimits::enter_stream(const std::string
   const std::scoped_lock lock(mutex_);
   std::size_t& streams = streams_[caller];
   if (streams >= limits_.streams) {
-    return make_fault(absl::StatusCode::kResourceExhausted,
-                      {"CALLER_STREAMS_FULL", "streams", absl::StrCat("streams <= ", limits_.streams)},
+    return make_fault({Reason::kCallerStreamsFull, "streams", absl::StrCat("streams <= ", limits_.streams)},
                       absl::StrCat("The caller has all of the ", limits_.streams,
                                    " streams that one caller may have; end one first."));
   }
@@ -61,8 +61,7 @@ absl::Status CallerLimits::take_upload_bytes(const std::string& caller, std::siz
   const std::chrono::duration<double> wait((wanted - bucket.bytes) / limits_.upload_bytes_per_second);
   const auto rate = static_cast<std::size_t>(limits_.upload_bytes_per_second);
   return retry_after(
-      make_fault(absl::StatusCode::kResourceExhausted,
-                 {"UPLOAD_RATE", "data", absl::StrCat("bytes a second <= ", rate)},
+      make_fault({Reason::kUploadRate, "data", absl::StrCat("bytes a second <= ", rate)},
                  absl::StrCat("The caller may upload ", rate, " bytes a second; send this part of ", bytes,
                               " bytes again after the time given.")),
       wait);

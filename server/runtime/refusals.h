@@ -10,6 +10,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 
@@ -36,18 +37,24 @@ inline std::uint32_t retry_after_ms(const absl::Status& error) {
 
 /// UNAVAILABLE DRAINING.
 inline absl::Status server_draining() {
-  return make_fault(absl::StatusCode::kUnavailable, {"DRAINING", "", ""}, "The server is shutting down.");
+  return make_fault({Reason::kDraining, "", ""}, "The server is shutting down.");
+}
+
+/// NOT_FOUND SESSION_UNKNOWN.
+inline absl::Status session_unknown() {
+  return make_fault({Reason::kSessionUnknown, "session", ""},
+                    "There is no such session; it may have expired or been deleted.");
 }
 
 /// UNAVAILABLE SESSION_ELSEWHERE, of a session that has just gone on elsewhere.
 inline absl::Status session_left() {
-  return make_fault(absl::StatusCode::kUnavailable, {"SESSION_ELSEWHERE", "session", ""},
+  return make_fault({Reason::kSessionElsewhere, "session", ""},
                     "The session goes on at another server; try again.");
 }
 
 /// RESOURCE_EXHAUSTED SERVER_BUSY. `wait`: until those that wait now have had their turn.
 inline absl::Status server_busy(std::chrono::duration<double> wait) {
-  return retry_after(make_fault(absl::StatusCode::kResourceExhausted, {"SERVER_BUSY", "calls", ""},
+  return retry_after(make_fault({Reason::kServerBusy, "calls", ""},
                                 "The server has too many calls waiting; try again after the time given."),
                      wait);
 }

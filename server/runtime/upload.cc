@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/crc32c.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/runtime/random_name.h"
 #include "server/runtime/refusals.h"
 
@@ -15,8 +16,8 @@ absl::Status check_request_id(const std::string& request_id) {
   if (request_id.empty() || (request_id.size() >= kLeastRequestId && request_id.size() <= kMostRequestId))
     return absl::OkStatus();
   const std::string limit = absl::StrCat(kLeastRequestId, " to ", kMostRequestId);
-  return invalid_input(
-      {"REQUEST_ID", "request_id", absl::StrCat("empty, or ", limit, " bytes")},
+  return make_fault(
+      {Reason::kRequestId, "request_id", absl::StrCat("empty, or ", limit, " bytes")},
       absl::StrCat("The request_id has ", request_id.size(), " bytes; it may be empty or have ", limit, "."));
 }
 
@@ -33,9 +34,9 @@ absl::StatusOr<UploadProgress> Upload::add(std::uint64_t offset, std::string_vie
   const std::scoped_lock lock(mutex_);
   if (is_finished_) return UploadProgress{size(), true};
   if (bytes_.runs() >= kMostRuns && !bytes_.joins_a_run(offset, offset + data.size())) {
-    return invalid_input({"UPLOAD_SCATTERED", name_, absl::StrCat("runs <= ", kMostRuns)},
-                         absl::StrCat("What is there is in ", kMostRuns,
-                                      " runs with gaps between them; send a part that joins one of them."));
+    return make_fault({Reason::kUploadScattered, name_, absl::StrCat("runs <= ", kMostRuns)},
+                      absl::StrCat("What is there is in ", kMostRuns,
+                                   " runs with gaps between them; send a part that joins one of them."));
   }
   if (absl::Status status = put(offset, data); !status.ok()) return status;
   if (bytes_.received() < size()) return UploadProgress{bytes_.received(), false};
@@ -44,14 +45,13 @@ absl::StatusOr<UploadProgress> Upload::add(std::uint64_t offset, std::string_vie
 
 absl::Status Upload::check_part(std::uint64_t offset, std::string_view data) const {
   if (data.empty() || data.size() > kMostPartBytes) {
-    return invalid_input(
-        {"UPLOAD_PART_SIZE", name_, absl::StrCat("1 to ", kMostPartBytes, " bytes")},
-        absl::StrCat("The part has ", data.size(), " bytes, not 1 to ", kMostPartBytes, "."));
+    return make_fault({Reason::kUploadPartSize, name_, absl::StrCat("1 to ", kMostPartBytes, " bytes")},
+                      absl::StrCat("The part has ", data.size(), " bytes, not 1 to ", kMostPartBytes, "."));
   }
   if (offset <= size() && data.size() <= size() - offset) return absl::OkStatus();
-  return invalid_input({"UPLOAD_PART_OUT_OF_RANGE", name_, absl::StrCat("offset + size <= ", size())},
-                       absl::StrCat("The part of ", data.size(), " bytes at ", offset,
-                                    " does not lie within the upload's ", size(), " bytes."));
+  return make_fault({Reason::kUploadPartOutOfRange, name_, absl::StrCat("offset + size <= ", size())},
+                    absl::StrCat("The part of ", data.size(), " bytes at ", offset,
+                                 " does not lie within the upload's ", size(), " bytes."));
 }
 
 absl::Status Upload::put(std::uint64_t offset, std::string_view data) {
@@ -62,7 +62,7 @@ absl::Status Upload::put(std::uint64_t offset, std::string_view data) {
   is_empty_ = bytes_.received() == 0;
   if (is_put) return absl::OkStatus();
   return make_fault(
-      absl::StatusCode::kResourceExhausted, {"MEMORY_FULL", name_, ""},
+      {Reason::kMemoryFull, name_, ""},
       absl::StrCat("The machine has no memory for an upload of ", size(), " bytes; try again later."));
 }
 
@@ -72,21 +72,20 @@ absl::StatusOr<UploadProgress> Upload::finish() {
   bytes_.clear();
   is_empty_ = true;
   memory_.resize(0);
-  return make_fault(absl::StatusCode::kDataLoss, {"UPLOAD_CHECKSUM", name_, ""},
+  return make_fault({Reason::kUploadChecksum, name_, ""},
                     "The bytes received do not have the announced checksum; send all of them again.");
 }
 
 absl::StatusOr<std::string_view> Upload::bytes() const {
   const std::scoped_lock lock(mutex_);
   if (is_finished_) return bytes_.whole();
-  return make_fault(absl::StatusCode::kFailedPrecondition,
-                    {"UPLOAD_UNFINISHED", name_, absl::StrCat(size(), " bytes")},
+  return make_fault({Reason::kUploadUnfinished, name_, absl::StrCat(size(), " bytes")},
                     absl::StrCat("The upload has ", bytes_.received(), " of its ", size(), " bytes."));
 }
 
 absl::Status request_id_reused() {
-  return invalid_input({"REQUEST_ID_REUSED", "request_id", ""},
-                       "The request_id was used before, with another request.");
+  return make_fault({Reason::kRequestIdReused, "request_id", ""},
+                    "The request_id was used before, with another request.");
 }
 
 Uploads::Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers, Limits limits)
@@ -97,9 +96,9 @@ absl::StatusOr<std::shared_ptr<Upload>> Uploads::create(const std::string& reque
                                                         const std::string& owner) {
   if (absl::Status status = check_request_id(request_id); !status.ok()) return status;
   if (size_bytes == 0 || size_bytes > limits_.most_bytes_each) {
-    return invalid_input({"UPLOAD_SIZE", "size_bytes", absl::StrCat("1 to ", limits_.most_bytes_each)},
-                         absl::StrCat("An upload of ", size_bytes, " bytes is not within 1 to ",
-                                      limits_.most_bytes_each, "."));
+    return make_fault({Reason::kUploadSize, "size_bytes", absl::StrCat("1 to ", limits_.most_bytes_each)},
+                      absl::StrCat("An upload of ", size_bytes, " bytes is not within 1 to ",
+                                   limits_.most_bytes_each, "."));
   }
   const std::scoped_lock lock(mutex_);
   if (const auto known = requested_.find({owner, request_id}); known != requested_.end()) {
@@ -127,8 +126,7 @@ absl::Status Uploads::check_share(const std::string& owner) const {
   if (owner.empty() || limits_.most_uploads_each == 0 || theirs < limits_.most_uploads_each)
     return absl::OkStatus();
   return make_fault(
-      absl::StatusCode::kResourceExhausted,
-      {"CALLER_UPLOADS_FULL", "uploads", absl::StrCat("uploads <= ", limits_.most_uploads_each)},
+      {Reason::kCallerUploadsFull, "uploads", absl::StrCat("uploads <= ", limits_.most_uploads_each)},
       absl::StrCat("The caller has all of the ", limits_.most_uploads_each,
                    " uploads that one caller may have; delete those that have served."));
 }
@@ -156,8 +154,7 @@ absl::Status Uploads::make_place() {
     }
   }
   return retry_after(
-      make_fault(absl::StatusCode::kResourceExhausted,
-                 {"UPLOADS_FULL", "uploads", absl::StrCat("uploads <= ", limits_.most_uploads)},
+      make_fault({Reason::kUploadsFull, "uploads", absl::StrCat("uploads <= ", limits_.most_uploads)},
                  absl::StrCat("The server has all of its ", limits_.most_uploads,
                               " uploads in use; delete those that have served, or try again later.")),
       no_place_before_ - now);
@@ -170,8 +167,7 @@ absl::StatusOr<std::shared_ptr<Upload>> Uploads::find(const std::string& name, c
     found->second.last_used = timers_->now();
     return found->second.upload;
   }
-  return make_fault(absl::StatusCode::kNotFound, {"UPLOAD_UNKNOWN", "upload", ""},
-                    "There is no such upload; it may have expired.");
+  return make_fault({Reason::kUploadUnknown, "upload", ""}, "There is no such upload; it may have expired.");
 }
 
 void Uploads::remove(const std::string& name, const std::string& owner) {

@@ -8,6 +8,7 @@
 #include "absl/strings/strip.h"
 #include "core/base/check.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/problem/welded_inputs.h"
 
 namespace lpdeform {
@@ -36,8 +37,8 @@ absl::StatusOr<Points> DrawMesh::solver_positions(Points positions) const {
   if (!weld_) return positions;
   for (Eigen::Index v = 0; v < positions.rows(); ++v) {
     if (positions.row(v).allFinite()) continue;
-    return invalid_input({"POSITIONS_NOT_FINITE", absl::StrCat("vertex ", v), "finite coordinates"},
-                         absl::StrCat("The position of vertex ", v, " has a NaN or infinite coordinate."));
+    return make_fault({Reason::kPositionsNotFinite, absl::StrCat("vertex ", v), "finite coordinates"},
+                      absl::StrCat("The position of vertex ", v, " has a NaN or infinite coordinate."));
   }
   return welded(positions, *weld_, "positions");
 }
@@ -45,13 +46,13 @@ absl::StatusOr<Points> DrawMesh::solver_positions(Points positions) const {
 absl::Status DrawMesh::for_client(const absl::Status& status) const {
   const Fault fault = fault_of(status);
   int component = 0;
-  if (!weld_ || fault.reason != "COMPONENT_WITHOUT_HANDLE" ||
+  if (!weld_ || fault.reason != Reason::kComponentWithoutHandle ||
       !absl::SimpleAtoi(absl::StripPrefix(fault.element, "component "), &component)) {
     return status;
   }
   const auto& components = shape_->components();
   const auto first = std::find(components.begin(), components.end(), component) - components.begin();
-  return make_fault(
+  return carry_fault(
       status.code(), fault,
       absl::StrCat("component ", component, " of the mesh (the first of its vertices is vertex ",
                    weld_->first_copy[static_cast<std::size_t>(first)], ") has no handle"));

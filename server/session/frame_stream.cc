@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/runtime/metrics.h"
 #include "server/runtime/random_name.h"
 #include "server/session/publisher.h"
@@ -158,8 +159,8 @@ absl::Status FrameStream::acknowledge(std::uint64_t frame_seq) {
     const std::scoped_lock lock(mutex_);
     const bool is_being_sent = cutter_.has_more() && frame_seq == last_seq_;
     if (frame_seq > last_seq_ || is_being_sent) {
-      return invalid_input(
-          {"ACK_NOT_SENT", absl::StrCat("frame ", frame_seq), absl::StrCat("frame_seq <= ", last_seq_)},
+      return make_fault(
+          {Reason::kAckNotSent, absl::StrCat("frame ", frame_seq), absl::StrCat("frame_seq <= ", last_seq_)},
           absl::StrCat("Frame ", frame_seq, " was acknowledged before it was sent; the last one sent is ",
                        last_seq_, "."));
     }

@@ -4,18 +4,19 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/runtime/metrics.h"
 
 namespace lpdeform {
 namespace {
 
 absl::Status superseded(std::uint64_t input_seq) {
-  return make_fault(absl::StatusCode::kAborted, {"SUPERSEDED", absl::StrCat("update ", input_seq), ""},
+  return make_fault({Reason::kSuperseded, absl::StrCat("update ", input_seq), ""},
                     absl::StrCat("Update ", input_seq, " came before the solve was finished."));
 }
 
 absl::Status no_handles() {
-  return make_fault(absl::StatusCode::kFailedPrecondition, {"NO_HANDLES", "", "handles >= 1"},
+  return make_fault({Reason::kNoHandles, "", "handles >= 1"},
                     "The session has no handle; a solve needs at least one.");
 }
 

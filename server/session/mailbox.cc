@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/session/mailbox_candidate.h"
 
 namespace lpdeform {
@@ -17,21 +18,20 @@ namespace {
 constexpr std::uint64_t kHighestInputSeq = std::numeric_limits<std::int64_t>::max();
 
 absl::Status too_high(std::uint64_t input_seq) {
-  return invalid_input({"INPUT_SEQ_TOO_HIGH", "input_seq", "input_seq < 2^63"},
-                       absl::StrCat("The update's input_seq is ", input_seq, "; it must be below 2^63."));
+  return make_fault({Reason::kInputSeqTooHigh, "input_seq", "input_seq < 2^63"},
+                    absl::StrCat("The update's input_seq is ", input_seq, "; it must be below 2^63."));
 }
 
 absl::Status passed(std::uint64_t input_seq, std::uint64_t newest) {
-  return make_fault(absl::StatusCode::kAborted,
-                    {"INPUT_SEQ_PASSED", "input_seq", absl::StrCat("input_seq > ", newest)},
+  return make_fault({Reason::kInputSeqPassed, "input_seq", absl::StrCat("input_seq > ", newest)},
                     absl::StrCat("The session has taken update ", newest, ", so ", input_seq,
                                  " cannot take a step back; look at what there is and ask again."));
 }
 
 absl::Status nothing_to(bool redo) {
-  return redo ? make_fault(absl::StatusCode::kFailedPrecondition, {"NOTHING_TO_REDO", "", ""},
+  return redo ? make_fault({Reason::kNothingToRedo, "", ""},
                            "No step of the handles was taken back since they were changed last.")
-              : make_fault(absl::StatusCode::kFailedPrecondition, {"NOTHING_TO_UNDO", "", ""},
+              : make_fault({Reason::kNothingToUndo, "", ""},
                            "The session remembers no step of its handles that could be taken back.");
 }
 
@@ -66,8 +66,8 @@ Inputs Mailbox::newest() const {
 absl::StatusOr<UpdateResult> Mailbox::take(const Update& update) {
   if (update.input_seq > kHighestInputSeq) return too_high(update.input_seq);
   if (update.input_seq == 0) {
-    return invalid_input({"INPUT_SEQ_ZERO", "input_seq", "input_seq >= 1"},
-                         "The update's input_seq is 0; numbers rise from 1.");
+    return make_fault({Reason::kInputSeqZero, "input_seq", "input_seq >= 1"},
+                      "The update's input_seq is 0; numbers rise from 1.");
   }
   const std::scoped_lock merging(merging_);
   return merge(update, Origin::kWriter);
@@ -220,12 +220,12 @@ absl::Status Mailbox::change_handles(const Update& update, Candidate& next) cons
   std::set<std::string_view> names;
   for (const HandleChange& change : update.handles) {
     if (!names.insert(change.name).second) {
-      return invalid_input({"HANDLE_CHANGED_TWICE", element_of(change.name), "one change a handle"},
-                           absl::StrCat("The update changes ", element_of(change.name), " twice."));
+      return make_fault({Reason::kHandleChangedTwice, element_of(change.name), "one change a handle"},
+                        absl::StrCat("The update changes ", element_of(change.name), " twice."));
     }
     if (change.name.empty() || change.name.size() > kLongestName) {
-      return invalid_input(
-          {"HANDLE_NAME", element_of(change.name), absl::StrCat("1 to ", kLongestName, " bytes")},
+      return make_fault(
+          {Reason::kHandleName, element_of(change.name), absl::StrCat("1 to ", kLongestName, " bytes")},
           absl::StrCat("A handle's name has ", change.name.size(), " bytes, not 1 to ", kLongestName, "."));
     }
     if (!replaces_handle(change.name, update, next)) continue;

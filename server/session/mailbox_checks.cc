@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/constraints/constraints.h"
 #include "core/problem/check_settings.h"
 #include "core/problem/welded_inputs.h"
@@ -12,9 +13,9 @@
 namespace lpdeform {
 
 absl::Status too_many_handles(std::size_t handles, std::size_t most) {
-  return invalid_input({"TOO_MANY_HANDLES", "", absl::StrCat("handles <= ", most)},
-                       absl::StrCat("The session would have ", handles, " handles; it may have ", most,
-                                    ". Let go of some first."));
+  return make_fault({Reason::kTooManyHandles, "", absl::StrCat("handles <= ", most)},
+                    absl::StrCat("The session would have ", handles, " handles; it may have ", most,
+                                 ". Let go of some first."));
 }
 
 absl::Status Mailbox::check(const Candidate& next, const Inputs& before) const {
@@ -73,8 +74,8 @@ absl::Status Mailbox::check_targets(const std::string& name, const Handle& handl
   for (Eigen::Index k = 0; k < targets.rows(); ++k) {
     const double distance = (targets.row(k) - shape_->centre()).stableNorm();
     if (distance <= farthest) continue;
-    return invalid_input(
-        {"HANDLE_TARGET_TOO_FAR", element_of(name), absl::StrCat("distance <= ", farthest)},
+    return make_fault(
+        {Reason::kHandleTargetTooFar, element_of(name), absl::StrCat("distance <= ", farthest)},
         absl::StrCat(place_of(handle, static_cast<std::size_t>(k)), " of ", element_of(name), " would be ",
                      distance, " from the mesh's centre, over ", kFarthestTarget, " of its diagonals."));
   }

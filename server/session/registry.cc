@@ -6,6 +6,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/runtime/refusals.h"
 #include "server/runtime/upload.h"
 
@@ -60,8 +61,7 @@ bool Registry::begin_creation(const std::string& request_id, OnCreated on_create
 absl::Status Registry::check_room(const std::string& owner) const {
   if (sessions_.size() + being_made_ >= limits_.most_sessions) {
     return retry_after(
-        make_fault(absl::StatusCode::kResourceExhausted,
-                   {"SESSIONS_FULL", "sessions", absl::StrCat("sessions <= ", limits_.most_sessions)},
+        make_fault({Reason::kSessionsFull, "sessions", absl::StrCat("sessions <= ", limits_.most_sessions)},
                    absl::StrCat("The server has all of its ", limits_.most_sessions,
                                 " sessions in use; try again after the time given.")),
         until_one_expires());
@@ -70,10 +70,10 @@ absl::Status Registry::check_room(const std::string& owner) const {
   if (owner.empty() || limits_.most_each == 0 || held == held_.end() || held->second < limits_.most_each) {
     return absl::OkStatus();
   }
-  return make_fault(absl::StatusCode::kResourceExhausted,
-                    {"CALLER_SESSIONS_FULL", "sessions", absl::StrCat("sessions <= ", limits_.most_each)},
-                    absl::StrCat("The caller has all of the ", limits_.most_each,
-                                 " sessions that one caller may have; delete one first."));
+  return make_fault(
+      {Reason::kCallerSessionsFull, "sessions", absl::StrCat("sessions <= ", limits_.most_each)},
+      absl::StrCat("The caller has all of the ", limits_.most_each,
+                   " sessions that one caller may have; delete one first."));
 }
 
 /// Until a session goes that nobody uses; somebody may delete one before: 5 s to a minute.
@@ -162,16 +162,15 @@ absl::StatusOr<std::shared_ptr<Session>> Registry::find(const std::string& name,
     if (left != left_.end() && left->second.owner == owner && timers_->now() < left->second.until)
       return session_left();
   }
-  return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""},
-                    "There is no such session; it may have expired or been deleted.");
+  return session_unknown();
 }
 
 absl::StatusOr<Registry::Page> Registry::list(std::size_t most, const std::string& page_token,
                                               const std::string& owner) const {
   std::uint64_t before = 0;
   if (!page_token.empty() && !absl::SimpleAtoi(page_token, &before)) {
-    return invalid_input({"PAGE_TOKEN", "page_token", ""},
-                         "The page token is none that this server gave out.");
+    return make_fault({Reason::kPageToken, "page_token", ""},
+                      "The page token is none that this server gave out.");
   }
   const std::scoped_lock lock(mutex_);
   Page page;

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/runtime/random_name.h"
 #include "server/runtime/refusals.h"
 
@@ -37,7 +38,7 @@ bool is_same_token(const std::string& a, const std::string& b) {
 }
 
 absl::Status not_the_writer() {
-  return make_fault(absl::StatusCode::kPermissionDenied, {"NOT_THE_WRITER", "writer_token", ""},
+  return make_fault({Reason::kNotTheWriter, "writer_token", ""},
                     "The writer token is not that of the session's present writer.");
 }
 
@@ -49,21 +50,16 @@ std::uint64_t input_seq_of(const UndoResult& result) {
   return result.update.input_seq;
 }
 
-absl::Status gone(const std::string& name) {
-  return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", name, ""},
-                    absl::StrCat("There is no ", name, "."));
-}
-
 absl::Status too_many_streams(std::size_t most) {
   return make_fault(
-      absl::StatusCode::kResourceExhausted, {"STREAMS_FULL", "streams", absl::StrCat("streams <= ", most)},
+      {Reason::kStreamsFull, "streams", absl::StrCat("streams <= ", most)},
       absl::StrCat("The session has all of its ", most, " streams in use; end one, or try again later."));
 }
 
 absl::Status ended_by(EndReason reason, const std::string& text) {
   if (goes_on(reason)) return server_draining();
-  const char* const name = reason == EndReason::kSessionExpired ? "SESSION_EXPIRED" : "SESSION_DELETED";
-  return make_fault(absl::StatusCode::kAborted, {name, "", ""}, text);
+  const Reason why = reason == EndReason::kSessionExpired ? Reason::kSessionExpired : Reason::kSessionDeleted;
+  return make_fault({why, "", ""}, text);
 }
 
 }  // namespace
@@ -142,7 +138,7 @@ SessionChanges Session::changes_since(std::uint64_t revision) const {
 
 absl::StatusOr<Session::Writer> Session::writer(const std::string& token) const {
   if (token.empty()) {
-    return make_fault(absl::StatusCode::kUnauthenticated, {"WRITER_TOKEN_MISSING", "writer_token", ""},
+    return make_fault({Reason::kWriterTokenMissing, "writer_token", ""},
                       "Changing a session needs its writer token.");
   }
   const std::scoped_lock lock(writing_);
@@ -174,8 +170,7 @@ WriterLease Session::acquire_writer() {
     if (const auto stream = weak.lock()) stream->end(EndReason::kWriterReplaced, text);
   }
   publisher_->wake_all();  // the others go on in the new epoch
-  if (job_before)
-    job_before->finish(make_fault(absl::StatusCode::kAborted, {"WRITER_REPLACED", "", ""}, text));
+  if (job_before) job_before->finish(make_fault({Reason::kWriterReplaced, "", ""}, text));
   return lease;
 }
 
@@ -222,7 +217,7 @@ absl::Status Session::solve(const absl::StatusOr<Writer>& writer, const std::opt
     before = std::exchange(job_, job);
   }
   if (before) {
-    before->finish(make_fault(absl::StatusCode::kAborted, {"SUPERSEDED", "", ""},
+    before->finish(make_fault({Reason::kSuperseded, "", ""},
                               "Another solve of the session began before this one was finished."));
   }
   services_.scheduler.wake(shared_from_this());
@@ -262,13 +257,13 @@ absl::Status Session::acknowledge(const std::string& stream_id, std::uint64_t fr
   touch();
   const auto stream = publisher_->find(stream_id);
   if (stream) return stream->acknowledge(frame_seq);
-  return make_fault(absl::StatusCode::kNotFound, {"STREAM_UNKNOWN", "stream_id", ""},
+  return make_fault({Reason::kStreamUnknown, "stream_id", ""},
                     "The session has no stream of this id; it may have ended.");
 }
 
 /// To who had it in hand already. One that goes on elsewhere is not gone: its client would make it anew.
 absl::Status Session::closed() const {
-  return goes_on(closed_by_) ? server_draining() : gone(name_);
+  return goes_on(closed_by_) ? server_draining() : session_unknown();
 }
 
 void Session::drain(const std::string& text) {

@@ -4,6 +4,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/store/redis_store.h"
 #include "server/store/sqlite_store.h"
 
@@ -12,12 +13,12 @@ namespace lpdeform {
 absl::StatusOr<std::shared_ptr<Store>> open_store(const std::string& name, const StoreOptions& options) {
   static const std::string kSqlite = "sqlite:", kRedis = "redis://";
   if (!options.login.password_file.empty() && !absl::StartsWith(name, "redis")) {
-    return invalid_input({"OPTION_OUT_OF_RANGE", "store_password_file", "--store redis://HOST:PORT"},
-                         "Option --store-password-file is for --store redis://HOST:PORT.");
+    return make_fault({Reason::kOptionOutOfRange, "store_password_file", "--store redis://HOST:PORT"},
+                      "Option --store-password-file is for --store redis://HOST:PORT.");
   }
   if (options.most_bytes != 0 && !absl::StartsWith(name, kSqlite)) {
-    return invalid_input(
-        {"OPTION_OUT_OF_RANGE", "max_store_bytes", "--store sqlite:DIR"},
+    return make_fault(
+        {Reason::kOptionOutOfRange, "max_store_bytes", "--store sqlite:DIR"},
         "Option --max-store-bytes is for --store sqlite:DIR; Redis has a maxmemory of its own.");
   }
   if (name == "none") return nullptr;
@@ -26,9 +27,9 @@ absl::StatusOr<std::shared_ptr<Store>> open_store(const std::string& name, const
   }
   // As other programs take a password: not to be repeated.
   if (absl::StartsWith(name, "redis") && absl::StrContains(name, '@')) {
-    return invalid_input({"OPTION_OUT_OF_RANGE", "store", "redis://HOST:PORT"},
-                         "Option --store takes no user and no password: give them as --store-user and "
-                         "--store-password-file.");
+    return make_fault({Reason::kOptionOutOfRange, "store", "redis://HOST:PORT"},
+                      "Option --store takes no user and no password: give them as --store-user and "
+                      "--store-password-file.");
   }
   std::uint32_t port = 0;
   const std::size_t colon = name.rfind(':');
@@ -38,8 +39,8 @@ absl::StatusOr<std::shared_ptr<Store>> open_store(const std::string& name, const
         {name.substr(kRedis.size(), colon - kRedis.size()), static_cast<int>(port), options.login});
   }
   const std::string known = "none, sqlite:DIR or redis://HOST:PORT";
-  return invalid_input({"OPTION_OUT_OF_RANGE", "store", known},
-                       absl::StrCat("Option --store must be ", known, ", not '", name, "'."));
+  return make_fault({Reason::kOptionOutOfRange, "store", known},
+                    absl::StrCat("Option --store must be ", known, ", not '", name, "'."));
 }
 
 }  // namespace lpdeform

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "server/runtime/random_name.h"
+#include "server/runtime/refusals.h"
 #include "server/store/redis_connection.h"
 #include "server/store/redis_figures.h"
 #include "server/store/redis_scripts.h"

@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "server/runtime/refusals.h"
 #include "server/store/blob_folder.h"
 #include "server/store/kept_blobs.h"
 #include "server/store/sealed_part.h"

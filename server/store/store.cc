@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
@@ -32,16 +33,15 @@ std::string blob_key(std::string_view bytes) {
 }
 
 absl::Status store_failing(std::string_view why, std::string_view where) {
-  return at(where, make_fault(absl::StatusCode::kUnavailable, {"STORE_FAILING", "store", ""},
+  return at(where, make_fault({Reason::kStoreFailing, "store", ""},
                               absl::StrCat("The server's store of sessions fails: ",
                                            absl::string_view(why.data(), why.size()), ".")));
 }
 
 absl::Status store_full(std::string_view why, std::string_view limit, std::string_view where) {
-  return at(where,
-            make_fault(absl::StatusCode::kResourceExhausted, {"STORE_FULL", "store", std::string(limit)},
-                       absl::StrCat("The server's store of sessions is full: ",
-                                    absl::string_view(why.data(), why.size()), kMakeRoom)));
+  return at(where, make_fault({Reason::kStoreFull, "store", std::string(limit)},
+                              absl::StrCat("The server's store of sessions is full: ",
+                                           absl::string_view(why.data(), why.size()), kMakeRoom)));
 }
 
 std::string text_for_operators(const absl::Status& status) {
@@ -56,13 +56,13 @@ absl::Status store_full_at_start(const absl::Status& full, const std::string& fo
   const std::string what = fault.limit.empty() ? absl::StrCat("Make 20 MiB of room on the disk of ", folder)
                                                : "Raise --max-store-bytes by 20 MiB";
   const auto where = full.GetPayload(kWhere);
-  return at(
-      where ? std::string(*where) : "",
-      make_fault(full.code(), fault, absl::StrCat(why, ". ", what, ": the server cannot start until then.")));
+  return at(where ? std::string(*where) : "",
+            carry_fault(full.code(), fault,
+                        absl::StrCat(why, ". ", what, ": the server cannot start until then.")));
 }
 
 bool is_full(const absl::Status& status) {
-  return fault_of(status).reason == "STORE_FULL";
+  return fault_of(status).reason == Reason::kStoreFull;
 }
 
 absl::Status store_away(std::string_view why, std::string_view where) {
@@ -77,7 +77,7 @@ bool is_away(const absl::Status& status) {
 
 absl::Status session_damaged(std::string_view why, std::string_view where) {
   const absl::string_view text(why.data(), why.size());
-  absl::Status status = make_fault(absl::StatusCode::kNotFound, {"SESSION_DAMAGED", "session", ""},
+  absl::Status status = make_fault({Reason::kSessionDamaged, "session", ""},
                                    absl::StrCat("What is stored of the session cannot be used: ", text, "."));
   status.SetPayload(
       kDamage,
@@ -110,13 +110,7 @@ absl::Status session_elsewhere(const std::string& route) {
                                  "header lpdeform-session, so none leads there."
                                : absl::StrCat("Another server has the session; call again with the header ",
                                               route_header(route), ".");
-  return make_fault(absl::StatusCode::kUnavailable,
-                    {"SESSION_ELSEWHERE", "session", route.empty() ? "" : route_header(route)}, text);
-}
-
-absl::Status session_unknown() {
-  return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""},
-                    "There is no such session; it may have expired or been deleted.");
+  return make_fault({Reason::kSessionElsewhere, "session", route.empty() ? "" : route_header(route)}, text);
 }
 
 }  // namespace lpdeform

@@ -182,7 +182,5 @@ std::string damage_of(const absl::Status& status);
 std::string route_header(const std::string& route);
 /// UNAVAILABLE SESSION_ELSEWHERE, its limit route_header(). `route`: of the session; may be empty.
 absl::Status session_elsewhere(const std::string& route = "");
-/// NOT_FOUND SESSION_UNKNOWN.
-absl::Status session_unknown();
 
 }  // namespace lpdeform

@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/wire/decode_parts.h"
 
 namespace lpdeform {
@@ -75,10 +76,10 @@ absl::StatusOr<SolveSettings> decode_solver(const v1::SolverSettings& message) {
   if (message.tolerance() != 0) settings.tolerance = message.tolerance();
   if (message.time_limit_seconds() != 0) settings.time_limit_seconds = message.time_limit_seconds();
   if (message.max_iterations() > kMostIterations) {
-    return invalid_input({"ITERATIONS_OUT_OF_RANGE", "max_iterations",
-                          absl::StrCat("0 <= max_iterations <= ", kMostIterations)},
-                         absl::StrCat("The number of iterations is ", message.max_iterations(), ", over ",
-                                      kMostIterations, "."));
+    return make_fault({Reason::kIterationsOutOfRange, "max_iterations",
+                       absl::StrCat("0 <= max_iterations <= ", kMostIterations)},
+                      absl::StrCat("The number of iterations is ", message.max_iterations(), ", over ",
+                                   kMostIterations, "."));
   }
   if (message.max_iterations() != 0) settings.max_iterations = static_cast<int>(message.max_iterations());
   return settings;
@@ -87,13 +88,13 @@ absl::StatusOr<SolveSettings> decode_solver(const v1::SolverSettings& message) {
 }  // namespace
 
 absl::Status unknown_enum(std::string_view what, int value) {
-  return invalid_input({"ENUM_UNKNOWN", std::string(what), ""},
-                       absl::StrCat("The server does not know ", std::string(what), " ", value, "."));
+  return make_fault({Reason::kEnumUnknown, std::string(what), ""},
+                    absl::StrCat("The server does not know ", std::string(what), " ", value, "."));
 }
 
 absl::Status wrong_size(std::string_view what, std::uint64_t is, const std::string& should) {
-  return invalid_input({"BUFFER_SIZE", std::string(what), should},
-                       absl::StrCat("The ", std::string(what), " have ", is, " bytes, not ", should, "."));
+  return make_fault({Reason::kBufferSize, std::string(what), should},
+                    absl::StrCat("The ", std::string(what), " have ", is, " bytes, not ", should, "."));
 }
 
 absl::StatusOr<Scalar> decode_scalar(v1::Scalar scalar) {
@@ -150,14 +151,14 @@ absl::StatusOr<StreamOptions> decode_frame_options(const v1::FrameOptions& messa
   options.with_normals = message.with_normals();
   options.with_certificate = message.certify();
   if (message.credit() > StreamOptions::kMostCredit) {
-    return invalid_input(
-        {"CREDIT_OUT_OF_RANGE", "credit", absl::StrCat("credit <= ", StreamOptions::kMostCredit)},
+    return make_fault(
+        {Reason::kCreditOutOfRange, "credit", absl::StrCat("credit <= ", StreamOptions::kMostCredit)},
         absl::StrCat("A credit of ", message.credit(), " is over ", StreamOptions::kMostCredit, "."));
   }
   if (message.credit() != 0) options.credit = message.credit();
   if (!(message.max_frames_per_second() >= 0) || std::isinf(message.max_frames_per_second())) {
-    return invalid_input(
-        {"FRAME_RATE_OUT_OF_RANGE", "max_frames_per_second", "finite and >= 0"},
+    return make_fault(
+        {Reason::kFrameRateOutOfRange, "max_frames_per_second", "finite and >= 0"},
         absl::StrCat("The frame rate is ", message.max_frames_per_second(), ", not finite and >= 0."));
   }
   options.max_frames_per_second = message.max_frames_per_second();
@@ -180,13 +181,13 @@ absl::StatusOr<Decoder::Bytes> Decoder::bytes(const v1::Buffer& buffer, std::str
   if (buffer.has_inline_()) {
     if (stored_ != nullptr || buffer.inline_().size() <= kMostInlineBytes)
       return Bytes{nullptr, buffer.inline_()};
-    return invalid_input({"INLINE_TOO_LARGE", std::string(what), absl::StrCat(kMostInlineBytes, " bytes")},
-                         absl::StrCat("The ", std::string(what), " have ", buffer.inline_().size(),
-                                      " bytes inline, over ", kMostInlineBytes, "; upload them."));
+    return make_fault({Reason::kInlineTooLarge, std::string(what), absl::StrCat(kMostInlineBytes, " bytes")},
+                      absl::StrCat("The ", std::string(what), " have ", buffer.inline_().size(),
+                                   " bytes inline, over ", kMostInlineBytes, "; upload them."));
   }
   if (!buffer.has_upload()) {
-    return invalid_input({"BUFFER_MISSING", std::string(what), ""},
-                         absl::StrCat("The ", std::string(what), " are missing."));
+    return make_fault({Reason::kBufferMissing, std::string(what), ""},
+                      absl::StrCat("The ", std::string(what), " are missing."));
   }
   if (stored_ != nullptr) {
     const auto blob = stored_->find(buffer.upload());

@@ -6,6 +6,7 @@
 #include "core/analysis/automatic_material.h"
 #include "core/base/check.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/resize/resize.h"
 #include "server/wire/decode.h"
 #include "server/wire/decode_parts.h"
@@ -23,15 +24,15 @@ absl::StatusOr<Field> Decoder::field(const v1::Field& message, std::string_view 
     const double strength = message.automatic().strength();
     if (absl::Status status = check_strength(strength); !status.ok()) return status;
     if (features_ == nullptr) {
-      return invalid_input({"FIELD_MISSING", std::string(what), ""},
-                           absl::StrCat("The stored ", std::string(what), " has no values."));
+      return make_fault({Reason::kFieldMissing, std::string(what), ""},
+                        absl::StrCat("The stored ", std::string(what), " has no values."));
     }
     const auto material = automatic_material(features_->joint(), strength);
     return for_client(*material.*part);
   }
   if (message.value_case() != v1::Field::kPerVertex) {
-    return invalid_input({"FIELD_MISSING", std::string(what), ""},
-                         absl::StrCat("The ", std::string(what), " has no value."));
+    return make_fault({Reason::kFieldMissing, std::string(what), ""},
+                      absl::StrCat("The ", std::string(what), " has no value."));
   }
   const auto scalar = decode_scalar(message.per_vertex().scalar());
   if (!scalar.ok()) return scalar.status();
@@ -42,9 +43,10 @@ absl::StatusOr<Field> Decoder::field(const v1::Field& message, std::string_view 
   }
   const std::size_t count = data->view.size() / bytes_of(*scalar);
   if (count != 1 && count != vertex_count_) {
-    return invalid_input({"FIELD_SIZE", std::string(what), absl::StrCat("1 or ", vertex_count_, " values")},
-                         absl::StrCat("The field ", std::string(what), " has ", count, " values for ",
-                                      vertex_count_, " vertices."));
+    return make_fault(
+        {Reason::kFieldSize, std::string(what), absl::StrCat("1 or ", vertex_count_, " values")},
+        absl::StrCat("The field ", std::string(what), " has ", count, " values for ", vertex_count_,
+                     " vertices."));
   }
   Field field(static_cast<Eigen::Index>(count));
   unpack(*scalar, data->view, field);

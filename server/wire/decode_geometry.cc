@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/wire/decode.h"
 #include "server/wire/decode_parts.h"
 
@@ -21,9 +22,9 @@ absl::Status Decoder::check_mesh_size(const v1::Mesh& message, const MeshLimits&
   if (message.vertex_count() > limits.most_vertices || message.face_count() > limits.most_faces) {
     const std::string limit =
         absl::StrCat("vertices <= ", limits.most_vertices, ", faces <= ", limits.most_faces);
-    return invalid_input({"MESH_TOO_LARGE", "mesh", limit},
-                         absl::StrCat("The mesh has ", message.vertex_count(), " vertices and ",
-                                      message.face_count(), " faces; allowed are ", limit, "."));
+    return make_fault({Reason::kMeshTooLarge, "mesh", limit},
+                      absl::StrCat("The mesh has ", message.vertex_count(), " vertices and ",
+                                   message.face_count(), " faces; allowed are ", limit, "."));
   }
   const auto scalar = decode_scalar(message.scalar());
   if (!scalar.ok()) return scalar.status();
@@ -77,8 +78,8 @@ absl::StatusOr<Points> Decoder::positions(const v1::Positions& message) {
   const auto packed = points(message.scalar(), message.data(), "positions");
   if (!packed.ok()) return packed.status();
   if (packed->count == vertex_count_) return packed->unpack();
-  return invalid_input(
-      {"POSITIONS_SIZE", "positions", absl::StrCat(vertex_count_, " positions")},
+  return make_fault(
+      {Reason::kPositionsSize, "positions", absl::StrCat(vertex_count_, " positions")},
       absl::StrCat("There are ", packed->count, " positions for ", vertex_count_, " vertices."));
 }
 
@@ -87,15 +88,15 @@ absl::StatusOr<Points> Decoder::normals(const v1::Normals& message) {
   const auto packed = points(message.scalar(), message.data(), "normals");
   if (!packed.ok()) return packed.status();
   if (packed->count != vertex_count_) {
-    return invalid_input(
-        {"NORMALS_SIZE", "normals", absl::StrCat(vertex_count_, " normals")},
+    return make_fault(
+        {Reason::kNormalsSize, "normals", absl::StrCat(vertex_count_, " normals")},
         absl::StrCat("There are ", packed->count, " normals for ", vertex_count_, " vertices."));
   }
   Points normals = packed->unpack();
   for (Eigen::Index v = 0; v < normals.rows(); ++v) {
     if (normals.row(v).allFinite()) continue;
-    return invalid_input({"NORMALS_NOT_FINITE", absl::StrCat("vertex ", v), "finite numbers"},
-                         absl::StrCat("The normal of vertex ", v, " has a NaN or infinite number."));
+    return make_fault({Reason::kNormalsNotFinite, absl::StrCat("vertex ", v), "finite numbers"},
+                      absl::StrCat("The normal of vertex ", v, " has a NaN or infinite number."));
   }
   return normals;
 }

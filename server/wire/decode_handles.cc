@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "server/wire/decode.h"
 #include "server/wire/decode_parts.h"
 
@@ -33,8 +34,8 @@ absl::Status Decoder::take_room(std::uint64_t& room, std::uint64_t count, std::s
     room -= count;
     return absl::OkStatus();
   }
-  return invalid_input(
-      {"HANDLE_TOO_MANY_VERTICES", std::string(what), absl::StrCat(vertex_count_, " in all")},
+  return make_fault(
+      {Reason::kHandleTooManyVertices, std::string(what), absl::StrCat(vertex_count_, " in all")},
       absl::StrCat("The update has more ", std::string(what), " than the mesh's ", vertex_count_,
                    " vertices."));
 }
@@ -47,8 +48,8 @@ absl::StatusOr<HandleMotion> Decoder::motion(const v1::Motion& message) {
                        decode_vector(rigid.translation())};
   }
   if (!message.has_targets()) {
-    return invalid_input({"MOTION_MISSING", "motion", ""},
-                         "A motion says neither fixed nor rigid nor targets.");
+    return make_fault({Reason::kMotionMissing, "motion", ""},
+                      "A motion says neither fixed nor rigid nor targets.");
   }
   const auto targets = points(message.targets().scalar(), message.targets().positions(), "target positions");
   if (!targets.ok()) return targets.status();
@@ -85,9 +86,9 @@ absl::StatusOr<std::vector<SurfacePoint>> Decoder::surface_points(const v1::Surf
   const auto coordinates = points(message.scalar(), message.barycentric(), "barycentric coordinates");
   if (!coordinates.ok()) return coordinates.status();
   if (coordinates->count != faces->size()) {
-    return invalid_input({"HANDLE_POINT_COUNT", "barycentric", absl::StrCat(3 * faces->size(), " numbers")},
-                         absl::StrCat("There are ", 3 * coordinates->count, " barycentric coordinates for ",
-                                      faces->size(), " points; each takes three."));
+    return make_fault({Reason::kHandlePointCount, "barycentric", absl::StrCat(3 * faces->size(), " numbers")},
+                      absl::StrCat("There are ", 3 * coordinates->count, " barycentric coordinates for ",
+                                   faces->size(), " points; each takes three."));
   }
   const Points barycentric = coordinates->unpack();
   std::vector<SurfacePoint> result(faces->size());
@@ -103,8 +104,7 @@ absl::StatusOr<std::vector<std::int32_t>> Decoder::region(const v1::RegionOfInte
       indices(message.vertices(), "region vertices", room_for_region_,
               [this](std::uint32_t vertex) { return region_vertex_out_of_range(vertex, vertex_count_); });
   if (!vertices.ok() || !vertices->empty()) return vertices;
-  return invalid_input({"REGION_EMPTY", "region", "at least 1 vertex"},
-                       "The region of interest has no vertex; nothing could move.");
+  return region_empty();
 }
 
 absl::StatusOr<Handle> Decoder::group(const v1::Handle& message, const std::string& name) {
@@ -142,8 +142,8 @@ absl::StatusOr<HandleChange> Decoder::handle(const v1::HandleUpdate& message) {
     return out;
   }
   if (!message.has_set()) {
-    return invalid_input({"HANDLE_CHANGE_MISSING", "handles", ""},
-                         "A change of a handle says neither set nor move nor remove.");
+    return make_fault({Reason::kHandleChangeMissing, "handles", ""},
+                      "A change of a handle says neither set nor move nor remove.");
   }
   auto handle = group(message.set(), message.name());
   if (!handle.ok()) return handle.status();

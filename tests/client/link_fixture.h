@@ -108,12 +108,13 @@ inline v1::DeformResponse fault(std::uint64_t input_seq, absl::StatusCode code, 
 
 /// No room, and when there will be.
 inline absl::Status full(const char* reason, std::chrono::milliseconds pause) {
-  return with_retry_after(make_fault(absl::StatusCode::kResourceExhausted, {reason, "", ""}, "Full."), pause);
+  return with_retry_after(carry_fault(absl::StatusCode::kResourceExhausted, {reason, "", ""}, "Full."),
+                          pause);
 }
 
 inline absl::Status session_unknown() {
-  return make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""},
-                    "There is no such session.");
+  return carry_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""},
+                     "There is no such session.");
 }
 
 inline v1::DeformResponse go_away(v1::GoAwayReason reason) {

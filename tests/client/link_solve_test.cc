@@ -25,7 +25,7 @@ TEST_F(LinkTest, SolveMakesALostSessionAnew) {
   link_->update(adding("tip")).value();
   ASSERT_TRUE(link_->solve({}).ok());
   rpc_->solve_ends.push_back(
-      make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "", ""}, "no such session"));
+      carry_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "", ""}, "no such session"));
   ASSERT_TRUE(link_->solve({}).ok());
   EXPECT_EQ(link_->name(), "sessions/2");
   ASSERT_EQ(rpc_->restored().size(), 1u);
@@ -46,10 +46,10 @@ TEST_F(LinkTest, SolveTriesAgainWhileTheServerIsAway) {
 TEST_F(LinkTest, SolveTriesAgainToMakeALostSessionAnew) {
   open();
   rpc_->solve_ends.push_back(
-      make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""}, "lost"));
+      carry_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""}, "lost"));
   rpc_->create_ends.push_back(absl::UnavailableError("refused"));
   rpc_->solve_ends.push_back(
-      make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""}, "lost"));
+      carry_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""}, "lost"));
   ASSERT_TRUE(link_->solve({}).ok());
   EXPECT_NE(rpc_->solved().back().session(), rpc_->solved().front().session());
 }
@@ -122,7 +122,7 @@ TEST_F(LinkTest, SolveKeepsAnUpdateThatWasTakenThoughItCouldNotBeSolvedFor) {
   rpc_->solve_ends.push_back(absl::FailedPreconditionError("component 1 has no handle"));
   EXPECT_TRUE(absl::IsFailedPrecondition(link_->solve({}).status()));
   rpc_->solve_ends.push_back(
-      make_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "", ""}, "no such session"));
+      carry_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "", ""}, "no such session"));
   ASSERT_TRUE(link_->solve({}).ok());
   ASSERT_EQ(rpc_->restored().size(), 1u);
 }

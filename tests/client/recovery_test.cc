@@ -51,7 +51,7 @@ absl::Status error_of(const Json& said) {
   const absl::StatusCode code = codes().at(said.at("code"));
   const std::string reason = said.value("reason", "");
   const absl::Status error =
-      reason.empty() ? absl::Status(code, "No.") : make_fault(code, {reason, "", ""}, "No.");
+      reason.empty() ? absl::Status(code, "No.") : carry_fault(code, {reason, "", ""}, "No.");
   return with_retry_after(error, std::chrono::milliseconds(said.value("retry_after_ms", 0)));
 }
 

@@ -308,16 +308,16 @@ struct Row {
   Fault fault;
   std::string text;
 
-  absl::Status status() const { return make_fault(code, fault, text); }
+  absl::Status status() const { return carry_fault(code, fault, text); }
 };
 
-/// Each row of the table in proto/errors.md, with an element, a limit and a text that are not alike, and not only ASCII.
+/// Each of the server's reasons in proto/errors.md, with an element, a limit and a text that are not alike, and not only ASCII.
 std::vector<Row> rows_of(const std::string& errors_md) {
   std::ifstream file(errors_md);
   std::vector<Row> out;
-  for (std::string line; std::getline(file, line);) {
+  for (std::string line; std::getline(file, line) && line != "## From the client libraries";) {
     const std::vector<std::string> cells = absl::StrSplit(line, " | ");
-    if (cells.size() != 3 || cells[0].rfind("| `", 0) != 0) continue;
+    if (cells.size() != 4 || cells[0].rfind("| `", 0) != 0) continue;
     const std::string reason = cells[0].substr(3, cells[0].size() - 4);
     absl::StatusCode code = absl::StatusCode::kOk;
     for (int k = 1; k <= 16; ++k) {
@@ -328,7 +328,7 @@ std::vector<Row> rows_of(const std::string& errors_md) {
     const std::string number = std::to_string(out.size());
     out.push_back({code,
                    {reason, "handle \"Größe " + number + "\"", "0 <= x < " + number},
-                   "No. " + number + ": " + cells[2].substr(0, cells[2].rfind(" |"))});
+                   "No. " + number + ": Größe."});
   }
   require(out.size() > 80, "proto/errors.md was not understood");
   return out;

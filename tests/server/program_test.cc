@@ -14,9 +14,11 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "lpdeform/v1/service.grpc.pb.h"
 #include "program.h"
 #include "server/admin/health_probe.h"
+#include "server/flags.h"
 
 namespace lpdeform {
 namespace {
@@ -186,37 +188,11 @@ TEST(Program, HelpNamesEveryOptionsVariable) {
   Program program({"--help"});
   const std::string help = program.rest();
   EXPECT_EQ(program.wait(), 0);
-  for (const char* const name : {"ADDRESS",
-                                 "THREADS",
-                                 "RUNNER_THREADS",
-                                 "MAX_SESSIONS",
-                                 "MAX_VERTICES",
-                                 "MAX_BYTES",
-                                 "MAX_UPLOAD_BYTES",
-                                 "SESSION_IDLE",
-                                 "UPLOAD_IDLE",
-                                 "HEARTBEAT",
-                                 "GRACE",
-                                 "LOG_LEVEL",
-                                 "ADMIN_ADDRESS",
-                                 "TLS_CERT",
-                                 "TLS_KEY",
-                                 "TLS_CLIENT_CA",
-                                 "TOKEN_KEYS",
-                                 "TOKEN_ISSUER",
-                                 "TOKEN_AUDIENCE",
-                                 "ALLOW_ANONYMOUS",
-                                 "MAX_CONNECTIONS",
-                                 "MAX_SESSIONS_PER_CALLER",
-                                 "MAX_STREAMS_PER_SESSION",
-                                 "MAX_HANDLES",
-                                 "MAX_UPLOADS",
-                                 "MAX_CALLS_WAITING",
-                                 "MAX_CALLS_PER_CONNECTION",
-                                 "MAX_STREAM_RATE",
-                                 "STORE",
-                                 "MAX_STORE_BYTES"}) {
-    EXPECT_NE(help.find(std::string("LPDEFORM_") + name), std::string::npos) << name;
+  Arguments arguments;
+  for (const Flag& flag : flags_of(arguments)) {
+    EXPECT_NE(help.find(absl::StrCat("  --", flag.name)), std::string::npos) << flag.name;
+    if (flag.is_in_environment)
+      EXPECT_NE(help.find(environment_variable(flag) + ")"), std::string::npos) << flag.name;
   }
 }
 

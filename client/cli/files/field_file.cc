@@ -8,6 +8,7 @@
 #include "absl/strings/strip.h"
 #include "client/cli/files/text_file.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::cli {
 
@@ -20,16 +21,16 @@ absl::StatusOr<std::vector<double>> parse_field(std::string_view text, std::int6
   if (!whole.empty()) {
     for (const absl::string_view line : absl::StrSplit(whole, '\n')) {
       if (!absl::SimpleAtod(line, &numbers.emplace_back())) {
-        return invalid_input({"FIELD_FILE_SYNTAX", absl::StrCat("line ", numbers.size()), ""},
-                             absl::StrCat("Line ", numbers.size(), " of \"", file, "\" is \"",
-                                          line.substr(0, 40), "\" and not one number."));
+        return make_fault({Reason::kFieldFileSyntax, absl::StrCat("line ", numbers.size()), ""},
+                          absl::StrCat("Line ", numbers.size(), " of \"", file, "\" is \"",
+                                       line.substr(0, 40), "\" and not one number."));
       }
     }
   }
   if (static_cast<std::int64_t>(numbers.size()) == vertex_count) return numbers;
-  return invalid_input({"FIELD_SIZE", file, absl::StrCat("lines = ", vertex_count)},
-                       absl::StrCat("\"", file, "\" has ", numbers.size(), " numbers for ", vertex_count,
-                                    " vertices; it takes one a vertex."));
+  return make_fault({Reason::kFieldSize, file, absl::StrCat("lines = ", vertex_count)},
+                    absl::StrCat("\"", file, "\" has ", numbers.size(), " numbers for ", vertex_count,
+                                 " vertices; it takes one a vertex."));
 }
 
 absl::StatusOr<std::vector<double>> read_field(const std::filesystem::path& path, std::int64_t vertex_count) {

@@ -13,6 +13,7 @@
 #include "client/cli/files/json_values.h"
 #include "client/cli/files/text_file.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::cli {
 namespace {
@@ -24,7 +25,7 @@ std::string name_of(const json& object, const char* list, std::size_t index) {
   if (!name.is_string()) refuse_value(key_of(place, "name"), "a text", name);
   std::string text = name.get<std::string>();
   if (text.empty() || text.size() > 128) {
-    refuse("HANDLE_NAME", place,
+    refuse(Reason::kHandleName, place,
            absl::StrCat("The name of ", place, " has ", text.size(), " bytes; it takes 1 to 128."),
            "1 <= bytes <= 128");
   }
@@ -36,8 +37,8 @@ std::vector<std::uint32_t> vertices_of(const json& object, const std::string& ow
   const json& list = required(object, owner, "vertices");
   const std::string place = key_of(owner, "vertices");
   if (!list.is_array()) refuse_value(place, "a list of vertex numbers", list);
-  if (list.empty()) refuse("HANDLE_EMPTY", owner, absl::StrCat(owner, " has no vertices."));
-  return index_list(list, owner, place, "vertex", "HANDLE_VERTEX_OUT_OF_RANGE", vertex_count);
+  if (list.empty()) refuse(Reason::kHandleEmpty, owner, absl::StrCat(owner, " has no vertices."));
+  return index_list(list, owner, place, "vertex", Reason::kHandleVertexOutOfRange, vertex_count);
 }
 
 /// The vertices that may move; none where the file does not say.
@@ -46,21 +47,22 @@ std::vector<std::uint32_t> region_of(const json& file, std::int64_t vertex_count
   const json& list = file["region"];
   if (!list.is_array()) refuse_value("\"region\"", "a list of vertex numbers", list);
   if (list.empty())
-    refuse("REGION_EMPTY", "region", "The region of interest has no vertex; nothing could move.");
-  return index_list(list, "the region", "\"region\"", "vertex", "REGION_VERTEX_OUT_OF_RANGE", vertex_count);
+    refuse(Reason::kRegionEmpty, "region", "The region of interest has no vertex; nothing could move.");
+  return index_list(list, "the region", "\"region\"", "vertex", Reason::kRegionVertexOutOfRange,
+                    vertex_count);
 }
 
 client::Motion targets_of(const json& object, const std::string& owner, std::size_t vertex_count) {
   const std::string place = key_of(owner, "positions");
   if (object.contains("translate") || object.contains("rotate")) {
-    refuse("HANDLE_MOTION_TWICE", owner,
+    refuse(Reason::kHandleMotionTwice, owner,
            absl::StrCat(
                owner, " has \"positions\" beside \"translate\" or \"rotate\"; it takes one kind of motion."));
   }
   const json& list = object["positions"];
   if (!list.is_array()) refuse_value(place, "a list of [x, y, z]", list);
   if (list.size() != vertex_count) {
-    refuse("HANDLE_TARGET_COUNT", owner,
+    refuse(Reason::kHandleTargetCount, owner,
            absl::StrCat(owner, " has ", list.size(), " positions for ", vertex_count, " vertices or points."),
            absl::StrCat("positions = ", vertex_count));
   }
@@ -88,7 +90,7 @@ client::Motion motion_of(const json& object, const std::string& owner, std::size
                         std::numbers::pi / 180;
   if (rotate.contains("center")) rigid.center = vector3(rotate["center"], key_of(place, "center"));
   if (rigid.axis == std::array<double, 3>{0, 0, 0}) {
-    refuse("HANDLE_AXIS_ZERO", owner,
+    refuse(Reason::kHandleAxisZero, owner,
            absl::StrCat(key_of(place, "axis"), " is [0, 0, 0] and has no direction."));
   }
   return rigid;
@@ -105,7 +107,7 @@ class Owners {
           place->second == handle.name
               ? absl::StrCat("twice in handle \"", handle.name, "\"")
               : absl::StrCat("in handles \"", place->second, "\" and \"", handle.name, "\"");
-      refuse("HANDLE_VERTEX_TWICE", absl::StrCat("vertex ", vertex),
+      refuse(Reason::kHandleVertexTwice, absl::StrCat("vertex ", vertex),
              absl::StrCat("Vertex ", vertex, " is ", where, "; it belongs to one handle, once."));
     }
   }
@@ -121,7 +123,7 @@ json parse_strictly(std::string_view text) {
     if (event == json::parse_event_t::object_start) keys.emplace_back();
     if (event == json::parse_event_t::object_end) keys.pop_back();
     if (event == json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second) {
-      refuse("HANDLE_FILE_KEY", parsed.get<std::string>(),
+      refuse(Reason::kHandleFileKey, parsed.get<std::string>(),
              absl::StrCat("The key ", shown(parsed), " stands twice in one object."));
     }
     return true;
@@ -131,7 +133,7 @@ json parse_strictly(std::string_view text) {
   } catch (const json::exception& error) {
     const std::string what = error.what();
     const std::size_t from = what.find("] ");
-    refuse("HANDLE_FILE_SYNTAX", "",
+    refuse(Reason::kHandleFileSyntax, "",
            absl::StrCat("The handle file is not JSON: ", what.substr(from + 2), "."));
   }
 }
@@ -140,7 +142,7 @@ std::vector<NamedHandle> handles_of(const json& file, std::int64_t vertex_count)
   const json& list = required(file, "the handle file", "handles");
   if (!list.is_array()) refuse_value("\"handles\"", "a list", list);
   if (list.empty())
-    refuse("HANDLE_FILE_EMPTY", "", "The handle file has no handles; a deformation needs at least one.");
+    refuse(Reason::kHandleFileEmpty, "", "The handle file has no handles; a deformation needs at least one.");
   std::vector<NamedHandle> handles;
   std::set<std::string> names;
   Owners owners;
@@ -149,7 +151,8 @@ std::vector<NamedHandle> handles_of(const json& file, std::int64_t vertex_count)
     const std::string name = name_of(object, "handles", index);
     const std::string owner = absl::StrCat("handle \"", name, "\"");
     if (!names.insert(name).second)
-      refuse("HANDLE_NAME_TWICE", owner, absl::StrCat("There are two handles of the name \"", name, "\"."));
+      refuse(Reason::kHandleNameTwice, owner,
+             absl::StrCat("There are two handles of the name \"", name, "\"."));
     check_keys(object, owner,
                {"name", "vertices", "points", "translate", "rotate", "positions", "soft", "orientation",
                 "axis_lock", "plane_lock", "footprint"});
@@ -177,7 +180,8 @@ std::vector<VertexGroup> groups_of(const json& file, std::int64_t vertex_count) 
     const std::string name = name_of(object, "groups", index);
     const std::string owner = absl::StrCat("group \"", name, "\"");
     if (!names.insert(name).second)
-      refuse("HANDLE_NAME_TWICE", owner, absl::StrCat("There are two groups of the name \"", name, "\"."));
+      refuse(Reason::kHandleNameTwice, owner,
+             absl::StrCat("There are two groups of the name \"", name, "\"."));
     check_keys(object, owner, {"name", "vertices", "p", "stiffness"});
     VertexGroup& group = groups.emplace_back(VertexGroup{name, vertices_of(object, owner, vertex_count)});
     if (object.contains("p")) group.p = number(object["p"], key_of(owner, "p"));

@@ -14,7 +14,7 @@ constexpr double kBarycentricSlack = 1e-6;
 double weight(const json& value, const std::string& owner, const char* key) {
   const double result = number(value, key_of(owner, key));
   if (!(result >= 0 && result <= kHighestWeight)) {
-    refuse("HANDLE_WEIGHT_OUT_OF_RANGE", owner,
+    refuse(Reason::kHandleWeightOutOfRange, owner,
            absl::StrCat(key_of(owner, key), " is ", result, "; it must be from 0 to 1e6."),
            "0 <= weight <= 1e6");
   }
@@ -24,7 +24,7 @@ double weight(const json& value, const std::string& owner, const char* key) {
 std::array<double, 3> direction(const json& value, const std::string& owner, const char* key) {
   const std::array<double, 3> result = vector3(value, key_of(owner, key));
   if (result == std::array<double, 3>{0, 0, 0}) {
-    refuse("HANDLE_LOCK_DIRECTION", owner,
+    refuse(Reason::kHandleLockDirection, owner,
            absl::StrCat(key_of(owner, key), " is [0, 0, 0] and has no direction."));
   }
   return result;
@@ -43,7 +43,7 @@ client::SurfacePoint point_of(const json& object, const std::string& owner, cons
     sum += coordinate, is_inside &= coordinate >= -kBarycentricSlack;
   if (!is_inside || !(std::abs(sum - 1) <= kBarycentricSlack)) {
     refuse(
-        "HANDLE_BARYCENTRIC", owner,
+        Reason::kHandleBarycentric, owner,
         absl::StrCat(key_of(place, "barycentric"), " must be three numbers from 0 on that add up to 1, not ",
                      shown(object["barycentric"]), "."),
         "each >= 0, sum = 1");
@@ -55,13 +55,13 @@ client::SurfacePoint point_of(const json& object, const std::string& owner, cons
 
 std::vector<client::SurfacePoint> points_of(const json& object, const std::string& owner) {
   if (object.contains("vertices")) {
-    refuse("HANDLE_POINTS_AND_VERTICES", owner,
+    refuse(Reason::kHandlePointsAndVertices, owner,
            absl::StrCat(owner, " has \"vertices\" and \"points\"; it takes one of the two."));
   }
   const json& list = object["points"];
   const std::string place = key_of(owner, "points");
   if (!list.is_array()) refuse_value(place, "a list of points", list);
-  if (list.empty()) refuse("HANDLE_EMPTY", owner, absl::StrCat(owner, " has no points."));
+  if (list.empty()) refuse(Reason::kHandleEmpty, owner, absl::StrCat(owner, " has no points."));
   std::vector<client::SurfacePoint> points;
   for (std::size_t k = 0; k < list.size(); ++k) {
     points.push_back(point_of(list[k], owner, absl::StrCat("point ", k, " of ", owner)));
@@ -75,7 +75,7 @@ void read_hold(const json& object, const std::string& owner, client::Handle& han
     if (object.contains(key)) ++holds;
   }
   if (holds > 1) {
-    refuse("HANDLE_HOLD_TWICE", owner,
+    refuse(Reason::kHandleHoldTwice, owner,
            absl::StrCat(owner,
                         " has more than one of \"soft\", \"orientation\", \"axis_lock\" and "
                         "\"plane_lock\"; it takes one at most."));
@@ -90,7 +90,7 @@ void read_hold(const json& object, const std::string& owner, client::Handle& han
   if (!object.contains("footprint")) return;
   handle.footprint = number(object["footprint"], key_of(owner, "footprint"));
   if (handle.footprint >= 0) return;
-  refuse("HANDLE_FOOTPRINT_OUT_OF_RANGE", owner,
+  refuse(Reason::kHandleFootprintOutOfRange, owner,
          absl::StrCat(key_of(owner, "footprint"), " is ", handle.footprint, "; it must be 0 or a length."));
 }
 

@@ -9,8 +9,8 @@
 
 namespace lpdeform::cli {
 
-void refuse(const char* reason, std::string element, std::string_view text, std::string limit) {
-  throw Refusal{invalid_input({reason, std::move(element), std::move(limit)}, text)};
+void refuse(Reason reason, std::string element, std::string_view text, std::string limit) {
+  throw Refusal{make_fault({reason, std::move(element), std::move(limit)}, text)};
 }
 
 std::string key_of(const std::string& owner, const char* key) {
@@ -27,14 +27,15 @@ std::string shown(const json& value) {
 }
 
 void refuse_value(const std::string& place, const char* wanted, const json& value) {
-  refuse("HANDLE_FILE_VALUE", place, absl::StrCat(place, " must be ", wanted, ", not ", shown(value), "."));
+  refuse(Reason::kHandleFileValue, place,
+         absl::StrCat(place, " must be ", wanted, ", not ", shown(value), "."));
 }
 
 void check_keys(const json& object, const std::string& owner, std::initializer_list<const char*> known) {
   if (!object.is_object()) refuse_value(owner, "an object", object);
   for (const auto& [key, value] : object.items()) {
     if (std::ranges::find(known, key) != known.end()) continue;
-    refuse("HANDLE_FILE_KEY", owner,
+    refuse(Reason::kHandleFileKey, owner,
            absl::StrCat(owner, " has the unknown key \"", key, "\"; known are ", absl::StrJoin(known, ", "),
                         "."));
   }
@@ -42,7 +43,7 @@ void check_keys(const json& object, const std::string& owner, std::initializer_l
 
 const json& required(const json& object, absl::string_view owner, const char* key) {
   if (!object.contains(key)) {
-    refuse("HANDLE_FILE_KEY", std::string(owner), absl::StrCat(owner, " has no \"", key, "\"."));
+    refuse(Reason::kHandleFileKey, std::string(owner), absl::StrCat(owner, " has no \"", key, "\"."));
   }
   return object[key];
 }
@@ -58,7 +59,7 @@ std::array<double, 3> vector3(const json& value, const std::string& place) {
 }
 
 std::vector<std::uint32_t> index_list(const json& list, const std::string& owner, const std::string& place,
-                                      const char* what, const char* reason, std::int64_t count) {
+                                      const char* what, Reason reason, std::int64_t count) {
   std::vector<std::uint32_t> indices;
   for (const json& index : list) {
     if (!index.is_number_integer()) refuse_value(place, "whole numbers from 0", index);

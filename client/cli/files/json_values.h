@@ -10,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform::cli {
 
@@ -22,8 +23,7 @@ struct Refusal {
   absl::Status status;
 };
 
-[[noreturn]] void refuse(const char* reason, std::string element, std::string_view text,
-                         std::string limit = "");
+[[noreturn]] void refuse(Reason reason, std::string element, std::string_view text, std::string limit = "");
 
 /// HANDLE_FILE_VALUE: `place` must be `wanted`.
 [[noreturn]] void refuse_value(const std::string& place, const char* wanted, const json& value);
@@ -46,6 +46,6 @@ std::array<double, 3> vector3(const json& value, const std::string& place);
 /// Whole numbers from 0 to `count` - 1, at least one: `what` for messages ("vertex"). `reason` where one is out of
 /// range.
 std::vector<std::uint32_t> index_list(const json& list, const std::string& owner, const std::string& place,
-                                      const char* what, const char* reason, std::int64_t count);
+                                      const char* what, Reason reason, std::int64_t count);
 
 }  // namespace lpdeform::cli

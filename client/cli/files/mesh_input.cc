@@ -12,7 +12,7 @@ namespace lpdeform::cli {
 
 absl::Status said_of(const std::string& what, const absl::Status& error) {
   if (absl::StrContains(error.message(), what)) return error;
-  return make_fault(error.code(), fault_of(error), absl::StrCat(what, ": ", error.message()));
+  return carry_fault(error.code(), fault_of(error), absl::StrCat(what, ": ", error.message()));
 }
 
 absl::StatusOr<MeshFile> read_mesh_file(const std::filesystem::path& path) {

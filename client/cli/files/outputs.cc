@@ -10,6 +10,7 @@
 #include "client/cli/files/mesh_input.h"
 #include "client/cli/files/text_file.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/io/obj_normals.h"
 
 namespace lpdeform::cli {
@@ -54,9 +55,8 @@ absl::Status check_outputs(std::span<const std::filesystem::path> paths) {
   for (const std::filesystem::path& path : paths) {
     const std::string ending = ending_of(path);
     if (ending != ".ply" && ending != ".obj" && ending != ".off" && ending != ".png") {
-      return invalid_input(
-          {"OUT_FORMAT_UNKNOWN", path.string(), "ending = .ply, .obj, .off or .png"},
-          absl::StrCat("\"", path.string(), "\" ends in none of .ply, .obj, .off and .png."));
+      return make_fault({Reason::kOutFormatUnknown, path.string(), "ending = .ply, .obj, .off or .png"},
+                        absl::StrCat("\"", path.string(), "\" ends in none of .ply, .obj, .off and .png."));
     }
     absl::Status folder = check_folder(path);
     if (!folder.ok()) return folder;
@@ -69,9 +69,9 @@ absl::Status check_apart(std::span<const NamedFile> written, std::span<const Nam
   for (const NamedFile& file : written) {
     for (const NamedFile& other : before) {
       if (!is_same_file(file.path, other.path)) continue;
-      return invalid_input({"OUT_TWICE", file.path.string(), "a file of its own"},
-                           absl::StrCat("\"", file.path.string(), "\" is given for ", other.option,
-                                        " and for ", file.option, "; it would be overwritten."));
+      return make_fault({Reason::kOutTwice, file.path.string(), "a file of its own"},
+                        absl::StrCat("\"", file.path.string(), "\" is given for ", other.option, " and for ",
+                                     file.option, "; it would be overwritten."));
     }
     before.push_back(file);
   }
@@ -83,8 +83,8 @@ absl::Status check_normals_have_output(std::span<const std::filesystem::path> pa
     return ending_of(path) == ".obj" || ending_of(path) == ".ply";
   });
   if (has_output) return absl::OkStatus();
-  return invalid_input({"OUT_WITHOUT_NORMALS", "--normals", "an output that ends in .obj or .ply"},
-                       "--normals is given, but no --out ends in .obj or .ply, which hold normals.");
+  return make_fault({Reason::kOutWithoutNormals, "--normals", "an output that ends in .obj or .ply"},
+                    "--normals is given, but no --out ends in .obj or .ply, which hold normals.");
 }
 
 absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/io/text_scanner.h"
 
 namespace lpdeform::cli {
@@ -50,7 +51,7 @@ absl::Status cover_named(const std::vector<VertexGroup>& groups, const Paint& pa
   std::vector<std::string> names;
   for (const VertexGroup& group : groups) names.push_back(group.name);
   const std::string known = names.empty() ? "none" : absl::StrJoin(names, ", ");
-  return make_fault(absl::StatusCode::kNotFound, {"GROUP_UNKNOWN", paint.group, ""},
+  return make_fault({Reason::kGroupUnknown, paint.group, ""},
                     absl::StrCat("There is no group \"", paint.group, "\"; there are: ", known, "."));
 }
 
@@ -62,8 +63,8 @@ absl::StatusOr<Paint> parse_paint(std::string_view text) {
   const bool is_whole = equals != std::string_view::npos && equals > 0 &&
                         absl::SimpleAtod(std::string(text.substr(equals + 1)), &paint.value);
   if (!is_whole) {
-    return invalid_input({"PAINT_SYNTAX", std::string(text), "NAME=VALUE"},
-                         absl::StrCat("\"", std::string(text), "\" is not NAME=VALUE."));
+    return make_fault({Reason::kPaintSyntax, std::string(text), "NAME=VALUE"},
+                      absl::StrCat("\"", std::string(text), "\" is not NAME=VALUE."));
   }
   paint.group = std::string(text.substr(0, equals));
   return paint;

@@ -10,23 +10,21 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/io/whole_file.h"
 
 namespace lpdeform::cli {
-namespace {
 
 absl::Status not_written(const std::filesystem::path& path, std::string_view why) {
-  return invalid_input({"FILE_NOT_WRITTEN", path.string(), ""},
-                       absl::StrCat("\"", path.string(), "\" cannot be written: ", std::string(why), "."));
+  return make_fault({Reason::kFileNotWritten, path.string(), ""},
+                    absl::StrCat("\"", path.string(), "\" cannot be written: ", std::string(why), "."));
 }
-
-}  // namespace
 
 absl::StatusOr<std::string> read_text(const std::filesystem::path& path) {
   std::error_code error;
   std::ifstream file(path, std::ios::binary);
   if (!file || std::filesystem::is_directory(path, error)) {
-    return make_fault(absl::StatusCode::kNotFound, {"FILE_NOT_FOUND", path.string(), ""},
+    return make_fault({Reason::kFileNotFound, path.string(), ""},
                       absl::StrCat("\"", path.string(), "\" cannot be read."));
   }
   return std::string(std::istreambuf_iterator<char>(file), {});

@@ -12,6 +12,9 @@ namespace lpdeform::cli {
 /// NOT_FOUND (FILE_NOT_FOUND) where it cannot be read.
 absl::StatusOr<std::string> read_text(const std::filesystem::path& path);
 
+/// INVALID_ARGUMENT FILE_NOT_WRITTEN: "PATH" cannot be written: WHY.
+absl::Status not_written(const std::filesystem::path& path, std::string_view why);
+
 /// As write_whole_file: all of it, or what was there before stays. FILE_NOT_WRITTEN.
 absl::Status write_text(const std::filesystem::path& path, std::string_view text);
 

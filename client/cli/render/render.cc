@@ -13,6 +13,7 @@
 #include "client/cli/render/shading.h"
 #include "core/base/check.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/base/workers.h"
 #include "core/io/whole_file.h"
 
@@ -138,9 +139,9 @@ absl::Status render_png(const std::filesystem::path& path, const Faces& faces, c
                         const PictureStyle& style) {
   const int width = style.width, height = style.height;
   if (width < 1 || width > kLargestSide || height < 1 || height > kLargestSide) {
-    return invalid_input({"IMAGE_SIZE", "", absl::StrCat("1 <= width, height <= ", kLargestSide)},
-                         absl::StrCat("A picture of ", width, " x ", height,
-                                      " pixels is out of range: each side is 1 to ", kLargestSide, "."));
+    return make_fault({Reason::kImageSize, "", absl::StrCat("1 <= width, height <= ", kLargestSide)},
+                      absl::StrCat("A picture of ", width, " x ", height,
+                                   " pixels is out of range: each side is 1 to ", kLargestSide, "."));
   }
   return write_whole_file(path, png_bytes(render(faces, positions, style)));
 }

@@ -15,7 +15,7 @@ namespace Lpdeform
     public sealed class LpdeformException : Exception
     {
         public ErrorCode Code { get; }
-        /// For programs: "MESH_INDEX_OUT_OF_RANGE"; see proto/errors.md. May be empty.
+        /// For programs: one of Reasons. May be empty.
         public string Reason { get; }
         /// The first offending one: "face 3". May be empty.
         public string Element { get; }

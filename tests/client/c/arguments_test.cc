@@ -71,7 +71,8 @@ TEST(Structs, AnEarlierCallersStructIsNotWrittenBeyond) {
 TEST(Errors, KeepReasonElementAndLimit) {
   lpdeform_error error{};
   error.struct_size = sizeof error;
-  const absl::Status status = invalid_input({"A_REASON", "vertex 3", "vertex < 2"}, "A text.");
+  const absl::Status status =
+      carry_fault(absl::StatusCode::kInvalidArgument, {"A_REASON", "vertex 3", "vertex < 2"}, "A text.");
   EXPECT_EQ(tell(status, &error), LPDEFORM_INVALID_ARGUMENT);
   EXPECT_STREQ(error.reason, "A_REASON");
   EXPECT_STREQ(error.element, "vertex 3");

@@ -29,7 +29,7 @@ lpdeform_state state_after(int calls, const Opening& opening, absl::Status& why)
 }
 
 absl::Status failure(absl::StatusCode code, const char* reason) {
-  return make_fault(code, {reason, "", ""}, "A text.");
+  return carry_fault(code, {reason, "", ""}, "A text.");
 }
 
 TEST(LiveSession, WhatMayPassIsTriedAgain) {

@@ -16,6 +16,7 @@ from lpdeform.aio import AsyncSession, join_async, open_async, restore_async
 from lpdeform.errors import Code, InvalidInput, LpdeformError, Timeout, Unavailable
 from lpdeform.frames import Frame, FrameAssembly, QuantizedSurface
 from lpdeform.opening import join, open, restore
+from lpdeform.reasons import Reason
 from lpdeform.session import Session
 from lpdeform.types import (
     Automatic,
@@ -63,6 +64,7 @@ __all__ = [
     "Orientation",
     "PlaneLock",
     "QuantizedSurface",
+    "Reason",
     "Removal",
     "Resize",
     "RigidMotion",

@@ -1,11 +1,12 @@
-"""What this package raises. proto/errors.md lists the server's reasons."""
+"""What this package raises. proto/errors.md lists the reasons."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum
-from typing import Any
+from typing import Any, cast
 
+from lpdeform.reasons import Reason
 from lpdeform.v1 import google_rpc_pb2, service_pb2
 
 
@@ -37,7 +38,7 @@ class LpdeformError(Exception):
     """Every error of this package. `str(error)` is one sentence for people; programs read the rest.
 
     code: the kind of error.
-    reason: stable, upper case: "HANDLE_VERTEX_TWICE"; empty where the server was not reached.
+    reason: one of reasons.py, stable; a newer server may say others. Empty where the server was not reached.
     element: what is wrong: "vertex 17"; may be empty.
     limit: the bound that was broken; may be empty.
     metadata: all that the server said of it (google.rpc.ErrorInfo.metadata), `element` and `limit` included.
@@ -46,7 +47,7 @@ class LpdeformError(Exception):
     """
 
     code: Code
-    reason: str
+    reason: Reason
     element: str
     limit: str
     metadata: Mapping[str, str]
@@ -57,7 +58,7 @@ class LpdeformError(Exception):
         self,
         code: Code,
         message: str,
-        reason: str = "",
+        reason: Reason = "",
         element: str = "",
         limit: str = "",
         *,
@@ -100,7 +101,7 @@ _classes: dict[Code, type[LpdeformError]] = {
 def make(
     code: Code,
     message: str,
-    reason: str = "",
+    reason: Reason = "",
     element: str = "",
     limit: str = "",
     *,
@@ -114,7 +115,7 @@ def make(
     )
 
 
-def invalid(message: str, reason: str, element: str = "", limit: str = "") -> LpdeformError:
+def invalid(message: str, reason: Reason, element: str = "", limit: str = "") -> LpdeformError:
     return make(Code.INVALID_ARGUMENT, message, reason, element, limit)
 
 
@@ -146,7 +147,7 @@ def from_fault(fault: service_pb2.Fault) -> LpdeformError:
     return make(
         _by_number.get(fault.code, Code.UNKNOWN),
         fault.text,
-        fault.reason,
+        cast(Reason, fault.reason),
         fault.element,
         fault.limit,
         metadata=metadata,
@@ -174,7 +175,7 @@ def from_call(error: Any, address: str) -> LpdeformError:
     return make(
         code,
         message,
-        info.reason,
+        cast(Reason, info.reason),
         metadata.get("element", ""),
         metadata.get("limit", ""),
         metadata=metadata,

@@ -1,6 +1,7 @@
 import { BinaryReader } from "@bufbuild/protobuf/wire";
 import { Code, ConnectError } from "@connectrpc/connect";
 import type { Fault } from "./gen/lpdeform/v1/service_pb.js";
+import type { Reason } from "./reasons.js";
 
 /** Of google.rpc.Code: "invalid_argument" and so on. */
 export type ErrorCode = keyof typeof names;
@@ -27,8 +28,8 @@ const names = {
 const codes = new Map<number, ErrorCode>(Object.entries(names).map(([name, code]) => [code, name as ErrorCode]));
 
 export interface ErrorDetails {
-  /** Stable, upper case: "HANDLE_VERTEX_TWICE" (proto/errors.md); empty where the server was not reached. */
-  reason?: string;
+  /** Stable (proto/errors.md); empty where the server was not reached. */
+  reason?: Reason;
   /** What is wrong: "vertex 17". May be empty. */
   element?: string;
   /** The bound that was broken. May be empty. */
@@ -42,7 +43,7 @@ export interface ErrorDetails {
 /** Every error that this library throws or reports. `message` is one sentence for people. */
 export class LpdeformError extends Error implements Required<ErrorDetails> {
   override readonly name = "LpdeformError";
-  readonly reason: string;
+  readonly reason: Reason;
   readonly element: string;
   readonly limit: string;
   readonly inputSeq: number;
@@ -65,7 +66,7 @@ export class LpdeformError extends Error implements Required<ErrorDetails> {
 
 export function fromFault(fault: Fault): LpdeformError {
   return new LpdeformError(codes.get(fault.code) ?? "unknown", fault.text, {
-    reason: fault.reason,
+    reason: fault.reason as Reason,
     element: fault.element,
     limit: fault.limit,
     inputSeq: Number(fault.inputSeq),
@@ -114,7 +115,7 @@ function forEachField(bytes: Uint8Array, visit: (field: number, reader: BinaryRe
 
 function readErrorInfo(bytes: Uint8Array, details: ErrorDetails): void {
   forEachField(bytes, (field, reader) => {
-    if (field === 1) details.reason = reader.string();
+    if (field === 1) details.reason = reader.string() as Reason;
     else if (field === 3) readMetadata(reader.bytes(), details);
     else return false;
     return true;

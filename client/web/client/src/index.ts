@@ -1,4 +1,5 @@
 export { type ErrorCode, type ErrorDetails, LpdeformError } from "./errors.js";
+export type { Reason } from "./reasons.js";
 export { Backoff } from "./recovery.js";
 export {
   joinSessionByName as joinSession,

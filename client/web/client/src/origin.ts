@@ -1,4 +1,4 @@
-import { cannotBeReached, LpdeformError } from "./errors.js";
+import { cannotBeReached, type ErrorDetails, LpdeformError } from "./errors.js";
 
 /** What the probes may take. */
 const probeMs = 3000;
@@ -23,6 +23,6 @@ export async function explained(error: LpdeformError, baseUrl: string): Promise<
   const text =
     `The proxy at ${proxy} does not take calls from pages of ${page}. Start it with --origin ${page}, as in ` +
     `"deploy/up --origin ${page}" or "deploy/web --origin ${page}".`;
-  const details = { reason: "ORIGIN_NOT_ALLOWED", element: page, limit: `--origin ${page}` };
+  const details: ErrorDetails = { reason: "ORIGIN_NOT_ALLOWED", element: page, limit: `--origin ${page}` };
   return new LpdeformError("permission_denied", text, details, error);
 }

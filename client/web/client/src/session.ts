@@ -12,6 +12,7 @@ import {
 } from "./keys.js";
 import { Link } from "./link.js";
 import { tell } from "./listeners.js";
+import type { Reason } from "./reasons.js";
 import { Backoff } from "./recovery.js";
 import { Rpc } from "./rpc.js";
 import { restoreSnapshot, takeSnapshot } from "./snapshot.js";
@@ -399,7 +400,7 @@ function timerMs(milliseconds: number): number {
 }
 
 /** `text` and `reasonOfLate`: of running out of time. */
-function abortReason({ reason }: AbortSignal, text: string, reasonOfLate = ""): LpdeformError {
+function abortReason({ reason }: AbortSignal, text: string, reasonOfLate: Reason = ""): LpdeformError {
   if (reason instanceof LpdeformError) return reason;
   const isLate = reason instanceof DOMException && reason.name === "TimeoutError";
   return isLate

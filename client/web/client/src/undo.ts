@@ -2,6 +2,7 @@ import { type ErrorCode, LpdeformError } from "./errors.js";
 import { changesFromWire } from "./fromwire.js";
 import type { UndoUpdateResponse } from "./gen/lpdeform/v1/service_pb.js";
 import type { Link } from "./link.js";
+import type { Reason } from "./reasons.js";
 import { Backoff } from "./recovery.js";
 import { pause } from "./waiting.js";
 
@@ -64,6 +65,6 @@ async function checkSteps({ rpc, lease }: Link, signal: AbortSignal): Promise<vo
   if ((session?.undoSteps ?? 0) <= 1) throw forgotten("failed_precondition", "NOTHING_TO_UNDO");
 }
 
-function forgotten(code: ErrorCode, reason: string): LpdeformError {
+function forgotten(code: ErrorCode, reason: Reason): LpdeformError {
   return new LpdeformError(code, "The session was made anew, and knows no step from before.", { reason });
 }

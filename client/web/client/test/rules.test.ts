@@ -4,6 +4,7 @@ import { describe, expect, test } from "vitest";
 import { type ErrorCode, LpdeformError } from "../src/errors.js";
 import { GoAwayReason, GoAwaySchema } from "../src/gen/lpdeform/v1/service_pb.js";
 import { Ledger, type NumberedUpdate } from "../src/ledger.js";
+import type { Reason } from "../src/reasons.js";
 import { answerOf, RecoveryRules } from "../src/recovery.js";
 import type { HandleChange, RigidMotion, Update } from "../src/types.js";
 
@@ -11,7 +12,7 @@ import type { HandleChange, RigidMotion, Update } from "../src/types.js";
 
 interface Said {
   code: ErrorCode | "ok";
-  reason?: string;
+  reason?: Reason;
   retry_after_ms?: number;
 }
 interface EndStep {

@@ -159,7 +159,7 @@ describe("words for", () => {
 });
 
 describe("words at the end", () => {
-  it.each(["FRAME_PARTS", "FRAME_VERTICES"])("of a session by %s tell what to do, and try nothing again", (reason) => {
+  it.each(["FRAME_PARTS", "FRAME_VERTICES"] as const)("of a session by %s tell what to do, and try nothing again", (reason) => {
     const status = statusAtEnd(new LpdeformError("data_loss", "4 of 3", { reason }));
     expect(isPassing(status)).toBe(false);
     expect(status.text).toMatch(/reload the page\. Your work is kept here/);

@@ -1,3 +1,4 @@
+import type { Reason } from "lpdeform-client";
 import type { App } from "../app/app.js";
 import { elementsIn, isPassing, sentence, type Status } from "../link/status.js";
 import { el, setText } from "./dom.js";
@@ -9,7 +10,7 @@ const noticeMs = 6000;
 const awayMs = 400;
 
 /** What a problem asks of the user; what only says that a newer change came asks nothing. */
-const quiet = new Set(["SUPERSEDED", "NO_HANDLES"]);
+const quiet = new Set<Reason>(["SUPERSEDED", "NO_HANDLES"]);
 
 /** The pill of the connection, the banner while something is wrong, and lines that come and go. */
 export function messages(app: App, beginAnew: () => void): HTMLElement {
