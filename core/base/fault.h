@@ -7,7 +7,7 @@
 
 namespace lpdeform {
 
-/// What an error is about, for programs: travels inside an absl::Status and reaches clients unchanged.
+/// What an error is about, in a form for programs. It travels inside an absl::Status and reaches clients unchanged.
 struct Fault {
   /// Stable, upper case, never reworded: "MESH_NOT_FINITE", "HANDLE_VERTEX_TWICE".
   std::string reason;
@@ -26,7 +26,7 @@ absl::Status make_fault(absl::StatusCode code, Fault fault, std::string_view tex
 /// The same with code INVALID_ARGUMENT, the usual one.
 absl::Status invalid_input(Fault fault, std::string_view text);
 
-/// The fault inside `status`; all fields empty where it carries none.
+/// The fault inside `status`; all fields are empty if it carries none.
 Fault fault_of(const absl::Status& status);
 
 }  // namespace lpdeform
