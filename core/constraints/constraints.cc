@@ -45,8 +45,8 @@ absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Cons
   return absl::OkStatus();
 }
 
-/// Holds everything outside the region where `outside` has it, and unreferenced vertices; rows that only such
-/// vertices would meet are void.
+/// Holds all vertices outside the region at their positions in `outside`, and unreferenced vertices. Rows that depend
+/// only on such vertices are removed.
 void hold_outside(const RestShape& shape, const std::vector<std::int32_t>* region, const Points& outside,
                   Constraints& constraints, Holds& holds) {
   std::vector<char> may_move(shape.vertex_count(), region == nullptr);
@@ -73,7 +73,7 @@ bool is_lock(const Hold& hold) {
   return std::holds_alternative<AxisLock>(hold) || std::holds_alternative<PlaneLock>(hold);
 }
 
-/// Components that something keeps from drifting off, locks left out or not.
+/// Which components something keeps from drifting off. Locks count only if `with_locks`.
 std::vector<char> tied_components(const RestShape& shape, const HandleSet& handles,
                                   const Constraints& constraints, bool with_locks) {
   std::vector<char> is_tied(shape.component_count(), false);
@@ -101,7 +101,7 @@ absl::Status name_free_component(const RestShape& shape, std::int32_t component)
                    first, ") has no handle"));
 }
 
-/// The rigid motion of the handle that has the vertex nearest to `point`, all at rest, in scaled units.
+/// The rigid motion, in scaled units, of the handle with the vertex that is nearest to `point` at rest.
 RigidTransform nearest_handle_motion(const RestShape& shape, const HandleSet& handles,
                                      const Eigen::RowVector3d& point) {
   const Points& rest = shape.scaled_positions();
@@ -116,7 +116,7 @@ RigidTransform nearest_handle_motion(const RestShape& shape, const HandleSet& ha
   Points to = target_positions(*nearest, shape.positions(), shape.faces());
   to = (to.rowwise() - shape.centre()) / shape.mean_edge_length();
   if (std::holds_alternative<TargetPositions>(nearest->motion)) return fit_rigid(from, to);
-  // Of one vertex, or several in a line, the places alone do not tell how it is turned.
+  // The positions of one vertex, or of several on a line, do not determine a rotation.
   RigidTransform motion;
   motion.rotation = rotation_of(nearest->motion);
   motion.translation = to.colwise().mean() - from.colwise().mean() * motion.rotation.transpose();
@@ -136,7 +136,7 @@ Points component_centres(const RestShape& shape) {
   return sums;
 }
 
-/// Holds every vertex of the components that no handle holds, moved as `free_components` says.
+/// Holds every vertex of the components that no handle holds, at rest or moved, as `free_components` says.
 void hold_free_components(const RestShape& shape, const HandleSet& handles, FreeComponents free_components,
                           const std::vector<char>& has_handle, Constraints& constraints) {
   std::vector<RigidTransform> motions(shape.component_count());
