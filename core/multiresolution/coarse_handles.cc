@@ -11,7 +11,7 @@
 namespace lpdeform {
 namespace {
 
-/// The point of a face that is nearest to `point`, or about that where its foot is outside.
+/// The point of a face that is nearest to `point`; only approximately if the projection of `point` is outside the face.
 SurfacePoint foot_on(const RestShape& shape, std::int32_t face, const Eigen::RowVector3d& point) {
   const auto corner = [&](int c) -> Eigen::RowVector3d {
     return shape.positions().row(shape.faces()(face, c));
@@ -27,7 +27,7 @@ SurfacePoint foot_on(const RestShape& shape, std::int32_t face, const Eigen::Row
   return result;
 }
 
-/// Collects what the handles become.
+/// Builds the coarse handles.
 class Coarsener {
  public:
   Coarsener(const LevelPair& levels, const Constraints& constraints)
@@ -47,7 +47,8 @@ class Coarsener {
 
  private:
   static void add(const std::string& name, Handle handle, HandleSet& handles) {
-    if (handle.size() > 0) (void)handles.set(name, std::move(handle));  // what cannot be held does not hold
+    if (handle.size() > 0)
+      (void)handles.set(name, std::move(handle));  // a handle that cannot be set is left out
   }
 
   bool stays(std::int32_t v) const { return levels_.fine_vertex[levels_.coarse_vertex[v]] == v; }
@@ -56,12 +57,12 @@ class Coarsener {
                        [&](std::int32_t v) { return stays(v); });
   }
   bool take(std::int32_t c) { return std::exchange(is_taken_[c], 1) == 0; }
-  /// How far the coarse vertex of v is from it, at rest.
+  /// The offset at rest from v to its coarse vertex.
   Eigen::RowVector3d offset(std::int32_t v) const {
     return levels_.coarse.positions().row(levels_.coarse_vertex[v]) - levels_.fine.positions().row(v);
   }
 
-  /// Everything that is held altogether, as one handle.
+  /// All held vertices, as one handle.
   Handle held(const HandleSet& fine) {
     std::vector<std::pair<std::int32_t, Eigen::RowVector3d>> targets;
     for (std::size_t c = 0; c < levels_.fine_vertex.size(); ++c) {
@@ -110,7 +111,7 @@ class Coarsener {
     return result;
   }
 
-  /// The coarse faces at any of these vertices.
+  /// The coarse faces that use any of these vertices.
   std::vector<std::int32_t> faces_around(const std::array<std::int32_t, 3>& corners) {
     if (faces_of_.empty()) {
       faces_of_.resize(levels_.fine_vertex.size());
@@ -124,7 +125,8 @@ class Coarsener {
     return result;
   }
 
-  /// On the coarse faces around those that the corners of the fine one went into.
+  /// The point nearest to `rest` on the coarse faces around the vertices that the corners of the fine face were
+  /// collapsed into.
   SurfacePoint nearest(const SurfacePoint& point, const Eigen::RowVector3d& rest) {
     std::array<std::int32_t, 3> corners{};
     for (int c = 0; c < 3; ++c) corners[c] = levels_.coarse_vertex[levels_.fine.faces()(point.face, c)];
