@@ -68,7 +68,7 @@ absl::StatusOr<Hold> read_hold(const lpdeform_handle& handle, const Space& space
   }
 }
 
-/// A turned triangle has its second and third corner in each other's places.
+/// If Space turns triangles, their second and third corners are exchanged.
 SurfacePoint read_point(const lpdeform_point& point, const Space& space) {
   SurfacePoint out{point.face, vector_of(point.barycentric)};
   if (space.turns_triangles()) std::swap(out.barycentric[1], out.barycentric[2]);
@@ -83,7 +83,7 @@ std::optional<FieldValue> read_field(double uniform, const double* per_vertex, s
   return std::nullopt;
 }
 
-/// False where it was there.
+/// False if the update already has a change of this handle.
 bool add(Update& update, const char* name, Update::Change change) {
   return update.handles.emplace(name, std::move(change)).second;
 }
@@ -99,7 +99,7 @@ absl::Status read_sets(const lpdeform_update& update, const Space& space, Update
     const auto* const given = reinterpret_cast<const lpdeform_handle*>(next);
     const auto handle = read_struct(given, "handle");
     if (!handle.ok()) return handle.status();
-    next += handle->struct_size;  // the caller's, which may be larger than ours
+    next += handle->struct_size;  // the caller's struct, which may be larger than ours
     auto read = read_handle(*handle, space);
     if (!read.ok()) return read.status();
     if (!add(out, handle->name, *std::move(read))) return changed_twice(handle->name);
@@ -180,7 +180,7 @@ absl::StatusOr<Settings> read_settings(const lpdeform_settings& settings, const 
   return out;
 }
 
-/// The engine's first axis becomes the server's first, by its direction there.
+/// The engine's first axis stays the first axis, converted to its direction in the server's coordinates.
 absl::StatusOr<Update> read_resizing(const lpdeform_resizing& resizing, const Space& space) {
   Resize resize;
   for (int k = 0; k < 3; ++k) resize.scale[k] = resizing.scale[k] == 0 ? 1 : resizing.scale[k];

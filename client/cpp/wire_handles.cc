@@ -1,4 +1,4 @@
-// Changes of handles that the server made, as our plain types.
+// Converts changes of handles that the server made to our plain types.
 
 #include <array>
 #include <cstring>
