@@ -77,15 +77,13 @@ void LiveSession::run() {
     changed_.wait(lock, [this] { return is_closing_; });
     session = session_;
   }
-  if (session)
-    client::guarded([&] {
-      return session->close();
-    }).IgnoreError();  // a session that cannot be deleted expires
+  // A session that cannot be deleted expires.
+  if (session) client::guarded([&] { return session->close(); }).IgnoreError();
   session.reset();
   const std::scoped_lock lock(mutex_);
   opening_ = nullptr;
-  session_
-      .reset();  // frees its threads and its copy of the mesh: this object may live until the client is disconnected
+  // Frees its threads and its copy of the mesh: this object may live until the client is disconnected.
+  session_.reset();
   is_closed_ = true;
   changed_.notify_all();
 }

@@ -211,7 +211,7 @@ enum {
 typedef int32_t lpdeform_winding;
 enum {
   LPDEFORM_WINDING_USUAL =
-      0, /* clockwise if left-handed with y up (Unity), otherwise counter-clockwise (Unreal) */
+      0, /* clockwise if left-handed with y up (Unity), else counter-clockwise (Unreal) */
   LPDEFORM_COUNTER_CLOCKWISE = 1,
   LPDEFORM_CLOCKWISE = 2 /* also Godot */
 };
@@ -219,9 +219,8 @@ enum {
 /* The encoding of frames on the network. The C interface gives the same formats for all encodings. */
 typedef int32_t lpdeform_encoding;
 enum {
-  LPDEFORM_ENCODING_RAW = 0, /* 12 bytes per vertex, 28 with distortion and normals */
-  LPDEFORM_ENCODING_QUANTIZED =
-      1, /* 8 bytes per vertex, including distortion; exact to 1/131070 of the extent */
+  LPDEFORM_ENCODING_RAW = 0,       /* 12 bytes per vertex, 28 with distortion and normals */
+  LPDEFORM_ENCODING_QUANTIZED = 1, /* 8 bytes per vertex, with distortion; exact to 1/131070 of the extent */
   LPDEFORM_ENCODING_COMPRESSED = 2 /* the same numbers in about 3 bytes per vertex */
 };
 
@@ -232,8 +231,8 @@ enum { LPDEFORM_COTANGENT = 0, LPDEFORM_UNIFORM = 1, LPDEFORM_INTRINSIC_DELAUNAY
 /* What happens to a connected component that no handle holds. */
 typedef int32_t lpdeform_free_components;
 enum {
-  LPDEFORM_FREE_COMPONENTS_ERROR =
-      0, /* lpdeform_poll returns COMPONENT_WITHOUT_HANDLE; the surface stays as it is */
+  /* lpdeform_poll returns COMPONENT_WITHOUT_HANDLE; the surface stays as it is */
+  LPDEFORM_FREE_COMPONENTS_ERROR = 0,
   LPDEFORM_FREE_COMPONENTS_STAY = 1,  /* stays where the rest mesh has it */
   LPDEFORM_FREE_COMPONENTS_FOLLOW = 2 /* moves rigidly with the nearest handle */
 };
@@ -247,8 +246,8 @@ typedef struct lpdeform_options {
   lpdeform_weights weights;
   lpdeform_free_components free_components;
   lpdeform_encoding encoding;
-  lpdeform_encoding
-      lowest_encoding; /* the least precise encoding to which a server with a limit of bytes per second may switch */
+  /* The least precise encoding to which a server with a limit of bytes per second may switch. */
+  lpdeform_encoding lowest_encoding;
   uint32_t with_normals;        /* 1: frames have normals */
   uint32_t without_distortion;  /* 1: distortion is not needed; raw frames then have none */
   uint32_t double_precision;    /* 1: raw frames are sent as float64 */
@@ -305,9 +304,8 @@ typedef int32_t lpdeform_state;
 enum {
   LPDEFORM_STATE_CONNECTING = 0, /* there is no session yet; `why` is the error of the last attempt */
   LPDEFORM_STATE_LIVE = 1,
-  LPDEFORM_STATE_RECONNECTING =
-      2, /* the server is unreachable: the last frame stays valid, and work continues afterwards */
-  LPDEFORM_STATE_REFUSED = 3 /* the session has ended; `why` says why */
+  LPDEFORM_STATE_RECONNECTING = 2, /* the server is unreachable for now; the last frame stays valid */
+  LPDEFORM_STATE_REFUSED = 3       /* the session has ended; `why` says why */
 };
 
 /* The state of the session. `why` may be NULL; its code is LPDEFORM_OK if there is no error. A NULL session is
@@ -321,8 +319,7 @@ enum {
   LPDEFORM_NOTICE_OVERLOADED = 1, /* the server is overloaded: frames come less often */
   LPDEFORM_NOTICE_RECOVERED = 2,  /* no longer overloaded */
   LPDEFORM_NOTICE_OTHER = 3,      /* a notice that only newer servers send */
-  LPDEFORM_NOTICE_MESH =
-      4 /* the mesh splits open at vertices that are not welded. Until there is another notice */
+  LPDEFORM_NOTICE_MESH = 4 /* the mesh splits open where it is not welded. Until there is another notice */
 };
 
 /* The last notice on the present connection, or about the mesh. NONE if there is none, and for a NULL session. Writes
@@ -351,8 +348,8 @@ enum {
 typedef struct lpdeform_motion {
   lpdeform_motion_kind kind;
   uint32_t position_count; /* as many as the handle has vertices or points */
-  double
-      rotation[4]; /* quaternion x, y, z, w in the engine's coordinates, of any length; all 0: no rotation */
+  /* Quaternion x, y, z, w in the engine's coordinates, of any length; all 0: no rotation. */
+  double rotation[4];
   double center[3];
   double translation[3];
   const double* positions; /* 3 position_count */
@@ -477,8 +474,8 @@ typedef struct lpdeform_resizing {
   double scale[3];     /* along the axes, relative to the mesh at rest: 0.01 to 100; 0 means 1 */
   double origin[3];
   double x_axis[3]; /* of any length but 0 */
-  double
-      y_axis[3]; /* only its part perpendicular to x_axis counts; the third axis is perpendicular to both */
+  /* Only its part perpendicular to x_axis counts. The third axis is perpendicular to both. */
+  double y_axis[3];
 } lpdeform_resizing;
 
 /* Scales the mesh: sets p and stiffness, and the handle "resize", which holds the ends of each component along the
@@ -534,8 +531,7 @@ typedef struct lpdeform_frame {
   uint64_t epoch;
   uint64_t skipped_inputs; /* changes since the previous frame for which there is no frame */
   uint32_t iteration;
-  uint32_t
-      is_final; /* 1: the final frame, however the solve ended; no further frame until there is a new change */
+  uint32_t is_final; /* 1: final, however the solve ended; no further frame until there is a new change */
   lpdeform_stop_reason stop_reason;
   uint32_t has_optimality_gap;
   double energy; /* lengths in metres */

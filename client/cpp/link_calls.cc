@@ -194,8 +194,7 @@ absl::StatusOr<v1::UndoUpdateResponse> Link::undo_patiently(const v1::UndoUpdate
                                                             std::unique_lock<std::mutex>& lock) {
   const Clock::time_point end = Clock::now() + client_options_.call_timeout;
   Backoff backoff;
-  bool is_checked =
-      false;  // checked once only: a call that took effect without an answer has already reduced the steps
+  bool is_checked = false;  // once only: a call that took effect unanswered has already reduced the steps
   absl::StatusOr<v1::UndoUpdateResponse> undone;
   for (absl::Status ready;; ready = catch_up(lock)) {
     if (ready.ok() && !is_checked) {

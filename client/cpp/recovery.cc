@@ -89,8 +89,7 @@ void RecoveryRules::begin() {
 }
 
 Recovery RecoveryRules::after(const Ending& ending) {
-  if (ending.stood >= Backoff::kMost)
-    backoff_.reset();  // a stream that breaks at once does not reset the backoff
+  if (ending.stood >= Backoff::kMost) backoff_.reset();  // not after a stream that broke at once
   auto [next, why] =
       ending.go_away ? after_go_away(*ending.go_away, has_copy_) : after_status(ending.status, has_copy_);
   const bool is_misfit = fault_of(why).reason == "FRAME_PARTS" && ++misfits_ >= kMostMisfits;

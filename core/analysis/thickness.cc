@@ -16,8 +16,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kThinnest = 0.5;        // scaled units
 constexpr double kOpposite = 0.5;        // cosine of 60 degrees
 constexpr double kEdgeTolerance = 1e-9;  // keeps rays from slipping through between two triangles
-constexpr double kRounding =
-    1e-9;  // relative to the diagonal; a doubled face lies at distance 0 up to rounding
+constexpr double kRounding = 1e-9;       // of the diagonal: a doubled face is at distance 0 up to rounding
 constexpr std::size_t kFacesAChunk = 256;
 
 /// A face that rays meet from behind.
@@ -90,8 +89,7 @@ std::vector<double> thickness_behind_faces(const RestShape& shape, const Workers
   const double rounding = kRounding * shape.diagonal() / shape.mean_edge_length();
   std::vector<double> thickness(shape.faces().rows(), kInfinity);
   workers.for_chunks(thickness.size(), kFacesAChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end;
-         ++k) {  // in the tree's order: neighbouring rays visit the same nodes
+    for (std::size_t k = begin; k < end; ++k) {  // in the tree's order: neighbouring rays are similar
       const Eigen::Index f = tree.order()[k];
       const FaceGeometry face = face_geometry(shape, f);
       if (face.area == 0) continue;

@@ -51,7 +51,7 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_
   rest_edge.resize(slot_count() * kLanes * 3);
   opposite.resize(slot_count() * kLanes);
   std::vector<std::uint32_t> place_of_entry(
-      shape.neighbours().size());  // index in `opposite` of the k-th directed edge i to j
+      shape.neighbours().size());  // of each directed edge in `opposite`
   for (std::size_t c = 0; c < cells.size(); ++c) {
     const std::size_t lane = c % kLanes, block = c / kLanes;
     const std::int32_t i = cells[c];

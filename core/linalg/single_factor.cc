@@ -112,8 +112,7 @@ void SingleFactor::cut_branches() {
   const auto count = static_cast<std::int32_t>(supernodes_.size());
   const std::vector<std::int32_t> parent = parents();
   std::vector<std::size_t> work(count), nodes(count, 1);  // of the subtree rooted at each supernode
-  std::vector<char> is_whole(
-      count, true);  // the supernodes of this subtree, and of each subtree in it, are consecutive
+  std::vector<char> is_whole(count, true);  // this subtree, and each in it, has consecutive supernodes
   std::vector<std::int32_t> first(count);
   for (std::int32_t k = 0; k < count; ++k) first[k] = k;
   for (std::int32_t k = 0; k < count; ++k) {

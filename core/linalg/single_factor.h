@@ -77,14 +77,13 @@ class SingleFactor {
   std::vector<std::int32_t> new_to_old_;
   std::vector<Supernode> supernodes_;
   std::vector<std::int32_t> rows_;
-  std::vector<float>
-      values_;  // per supernode: the triangle's rows at full width, then the rows below it, all
-                // row-major; diagonal entries are inverted
+  /// Per supernode: the triangle's rows at full width, then the rows below it, all row-major; diagonal entries are
+  /// inverted.
+  std::vector<float> values_;
   std::int32_t next_column_ = 0;
   std::vector<Branch> branches_;
   std::vector<std::pair<std::int32_t, std::int32_t>> trunk_;  // the supernodes that are in no branch
-  std::vector<std::int32_t>
-      forward_rows_;  // rows_, with rows of a branch's ancestors replaced by its places in work_
+  std::vector<std::int32_t> forward_rows_;  // rows_, but a branch's ancestor rows are its places in work_
   mutable std::vector<double> chunk_maxima_;
   mutable std::vector<Row> work_;  // one for each column, then one for each row owed by each branch
 };

@@ -47,8 +47,7 @@ CarriedNormals::CarriedNormals(Faces faces, const Points& rest, const Weld& weld
 }
 
 void CarriedNormals::find_groups(const Weld& weld, const Points& rest_normals) {
-  std::vector<std::vector<std::int32_t>> groups_at(
-      weld.welded_count());  // the groups of each vertex, each by its first member
+  std::vector<std::vector<std::int32_t>> groups_at(weld.welded_count());  // groups by their first members
   group_of_.resize(weld.to_welded.size());
   for (std::int32_t v = 0; v < weld.split_count(); ++v) {
     std::vector<std::int32_t>& here = groups_at[weld.to_welded[v]];

@@ -40,8 +40,7 @@ class PairMemory {
  private:
   struct Pair {
     std::vector<float> s, z;
-    std::vector<double> sy,
-        zy;  // <s_i, y>, <z_i, y> with this pair's y, for each older pair i and for this one
+    std::vector<double> sy, zy;  // <s_i, y>, <z_i, y> with this pair's y, for all older pairs i and this one
   };
   std::vector<KeptPair> kept() const;
   std::vector<double> products(const Points& gradient, const Points& gradient_before, const Points& h,

@@ -16,8 +16,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::ScalableTag<double>;
 using V = hn::Vec<D>;
 
-constexpr std::size_t kStretch =
-    512;  // numbers per stretch, which stay in the first-level cache while all pairs are processed
+constexpr std::size_t kStretch = 512;  // numbers; few enough to stay in the first-level cache for all pairs
 
 HWY_INLINE V load_floats(const float* at) {
   return hn::PromoteTo(D(), hn::LoadU(hn::Rebind<float, D>(), at));

@@ -47,8 +47,7 @@ class Coarsener {
 
  private:
   static void add(const std::string& name, Handle handle, HandleSet& handles) {
-    if (handle.size() > 0)
-      (void)handles.set(name, std::move(handle));  // a handle that cannot be set is left out
+    if (handle.size() > 0) (void)handles.set(name, std::move(handle));  // on an error it is left out
   }
 
   bool stays(std::int32_t v) const { return levels_.fine_vertex[levels_.coarse_vertex[v]] == v; }

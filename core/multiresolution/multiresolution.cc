@@ -6,8 +6,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kCoarseTolerance =
-    1e-4;  // relative, of E^(1/p): the difference between the levels is larger
+constexpr double kCoarseTolerance = 1e-4;  // relative, of E^(1/p); the levels differ by more than this
 
 }  // namespace
 

@@ -42,8 +42,7 @@ Field narrowness(const RestShape& shape, const Eigen::Matrix3d& axes, const Eige
     const Field girth = girth_along(shape, axes.row(k));
     result.array() *= (girth.array() / kNarrow).max(kLeastGirth).min(1).pow(-kNarrowing * shares[k]);
   }
-  return result.array().min(
-      std::pow(kLeastGirth, -kNarrowing));  // narrow along several axes: at most as for one
+  return result.array().min(std::pow(kLeastGirth, -kNarrowing));  // several narrow axes count as one
 }
 
 }  // namespace
