@@ -210,8 +210,8 @@ enum {
  * uses (C - A) x (B - A) in left-handed coordinates as the normal of A, B, C, is counter-clockwise. */
 typedef int32_t lpdeform_winding;
 enum {
-  LPDEFORM_WINDING_USUAL =
-      0, /* clockwise if left-handed with y up (Unity), else counter-clockwise (Unreal) */
+  /* Clockwise if left-handed with y up (Unity), otherwise counter-clockwise (Unreal). */
+  LPDEFORM_WINDING_USUAL = 0,
   LPDEFORM_COUNTER_CLOCKWISE = 1,
   LPDEFORM_CLOCKWISE = 2 /* also Godot */
 };

@@ -50,8 +50,7 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_
   weight.resize(slot_count() * kLanes);
   rest_edge.resize(slot_count() * kLanes * 3);
   opposite.resize(slot_count() * kLanes);
-  std::vector<std::uint32_t> place_of_entry(
-      shape.neighbours().size());  // of each directed edge in `opposite`
+  std::vector<std::uint32_t> place_of_entry(shape.neighbours().size());  // of directed edges in `opposite`
   for (std::size_t c = 0; c < cells.size(); ++c) {
     const std::size_t lane = c % kLanes, block = c / kLanes;
     const std::int32_t i = cells[c];
