@@ -346,7 +346,7 @@ typedef struct lpdeform_motion {
 
 /* How a handle is held. */
 typedef int32_t lpdeform_hold;
-enum {
+enum lpdeform_hold_values {
   LPDEFORM_EXACTLY = 0,
   LPDEFORM_SOFT = 1,        /* drawn to its target by `weight` */
   LPDEFORM_ORIENTATION = 2, /* turned by the motion's rotation, its position free; `weight` */
