@@ -101,7 +101,7 @@ PointForm point_form(const RestShape& shape, const Handle& handle, std::size_t k
 
 void add_holds(const RestShape& shape, const std::string& name, const Handle& handle, const Points& targets,
                Holds& holds) {
-  std::visit(HoldAdder{shape, name, handle, targets, holds}, handle.hold);
+  match(handle.hold, HoldAdder{shape, name, handle, targets, holds});
 }
 
 bool has_equations(const HandleSet& handles) {
