@@ -348,7 +348,7 @@ class Monitoring(unittest.TestCase):
         (service,) = [one for one in objects("Service") if one["metadata"]["name"] == "lpdeform-web"]
         self.assertEqual([port["targetPort"] for port in service["spec"]["ports"]], ["http"])
         (scrape,) = [one for one in load(ROOT / "deploy/monitoring/prometheus.yaml")["scrape_configs"] if one["job_name"] == "lpdeform-web"]
-        self.assertIn(f'--stats {scrape["static_configs"][0]["targets"][0]}`', (ROOT / "deploy/README.md").read_text())
+        self.assertIn(f'--stats {scrape["static_configs"][0]["targets"][0]}`', (ROOT / "deploy/monitoring/README.md").read_text())
 
 
 class Unit(unittest.TestCase):

@@ -53,7 +53,7 @@ def is_place_to_look(step):
     return re.search(r"[Ll]og `\w+`|`[a-z]+ ?[^`]*`|\]\(#|it says", step) is not None
 
 
-SOURCES = "\n".join(path.read_text() for path in sorted((ROOT / "server").glob("*.cc")))
+SOURCES = "\n".join(path.read_text() for path in sorted((ROOT / "server").rglob("*.cc")))
 # Of file_watch.cc, by the name of what is watched.
 WATCHED = {f"{name}_{end}" for name in re.findall(r'files_of\("(\w+)"', SOURCES) for end in ("not_read", "read_again")}
 

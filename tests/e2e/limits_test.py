@@ -1,4 +1,4 @@
-"""The table of limits in server/README.md is that of the server's flags."""
+"""The table of limits in server/flags.md is that of the server's flags."""
 
 import os
 import re
@@ -31,7 +31,7 @@ class Limits(unittest.TestCase):
         said = subprocess.run([programs.server(), "--help"], capture_output=True, text=True, timeout=programs.PATIENCE).stdout
         cls.flags = {name: (default, variable) for name, default, variable in FLAG.findall(said) if is_limit(name)}
         cls.rows = {flag: (default, what, refusal) for flag, default, what, refusal in
-                    ROW.findall(programs.read_text(os.path.join(ROOT, "server", "README.md")))}
+                    ROW.findall(programs.read_text(os.path.join(ROOT, "server", "flags.md")))}
 
     def test_every_limit_is_a_flag_and_every_such_flag_is_in_the_table(self):
         self.assertGreater(len(self.flags), 15)

@@ -9,10 +9,11 @@ namespace Lpdeform
     /// of one is thrown by TryGetFrame.
     public sealed class Handles
     {
-        readonly Session session;
+        readonly Func<IntPtr> session;
         readonly ConcurrentDictionary<string, byte[]> names = new ConcurrentDictionary<string, byte[]>();
 
-        internal Handles(Session session)
+        /// `session` gives the native session; it throws where that is closed.
+        internal Handles(Func<IntPtr> session)
         {
             this.session = session;
         }
@@ -57,7 +58,7 @@ namespace Lpdeform
                     Direction = how.Direction,
                     Footprint = how.Footprint
                 };
-                LpdeformException.Check(Native.lpdeform_set_handle(session.Pointer, ref handle, out inputSeq, error), error);
+                LpdeformException.Check(Native.lpdeform_set_handle(session(), ref handle, out inputSeq, error), error);
             }
             return inputSeq;
         }
@@ -71,7 +72,7 @@ namespace Lpdeform
             var error = moveError ?? (moveError = LpdeformException.NewError());
             var native = motion.ToNative();
             LpdeformException.Check(
-                Native.lpdeform_move_handle(session.Pointer, NameOf(name), ref native, out inputSeq, error), error);
+                Native.lpdeform_move_handle(session(), NameOf(name), ref native, out inputSeq, error), error);
             return inputSeq;
         }
 
@@ -88,7 +89,7 @@ namespace Lpdeform
                     StructSize = (uint)Marshal.SizeOf(typeof(Native.Update)), Moves = pinned.Array(new[] { move }), MoveCount = 1,
                     BeginsStep = 1
                 };
-                LpdeformException.Check(Native.lpdeform_send(session.Pointer, ref update, out inputSeq, error), error);
+                LpdeformException.Check(Native.lpdeform_send(session(), ref update, out inputSeq, error), error);
             }
             return inputSeq;
         }
@@ -106,7 +107,7 @@ namespace Lpdeform
                     Kind = 2, PositionCount = (uint)(positions.Length / 3), Positions = pinned.Array(positions)
                 };
                 LpdeformException.Check(
-                    Native.lpdeform_move_handle(session.Pointer, NameOf(name), ref native, out inputSeq, error), error);
+                    Native.lpdeform_move_handle(session(), NameOf(name), ref native, out inputSeq, error), error);
             }
             return inputSeq;
         }
@@ -116,7 +117,7 @@ namespace Lpdeform
         {
             ulong inputSeq;
             var error = LpdeformException.NewError();
-            LpdeformException.Check(Native.lpdeform_remove_handle(session.Pointer, NameOf(name), out inputSeq, error), error);
+            LpdeformException.Check(Native.lpdeform_remove_handle(session(), NameOf(name), out inputSeq, error), error);
             byte[] forgotten;
             names.TryRemove(name, out forgotten);
             return inputSeq;

@@ -13,7 +13,7 @@ namespace Lpdeform
         internal Session(IntPtr session)
         {
             this.session = session;
-            Handles = new Handles(this);
+            Handles = new Handles(() => Pointer);
         }
 
         /// What the user holds.

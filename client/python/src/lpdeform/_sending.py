@@ -2,63 +2,76 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from lpdeform import _wire
+from lpdeform._box import FrameBox
 from lpdeform._lease import Lease
-from lpdeform._ledger import NumberedUpdate
-from lpdeform._recovery import Answer
-from lpdeform._rpc import Packer
+from lpdeform._ledger import Ledger, NumberedUpdate
+from lpdeform._recovery import Answer, Judge
+from lpdeform._rpc import Packer, Rpc
 from lpdeform._stream import Stream
 from lpdeform.errors import LpdeformError, exception
-from lpdeform.v1 import service_pb2
-
-if TYPE_CHECKING:
-    from lpdeform._link import Link
+from lpdeform.v1 import frame_pb2, service_pb2
 
 
-def requests(link: Link, stream: Stream, lease: Lease) -> Iterator[bytes]:
+class Sender(Protocol):
+    """What sending needs of the session that it sends for."""
+
+    rpc: Rpc
+    options: frame_pb2.FrameOptions
+    changed: threading.Condition
+    """Guards the rest, and the stream; notified of every change to them."""
+    ledger: Ledger
+    judge: Judge
+    box: FrameBox
+    is_solving: bool
+    """Updates wait: another call needs the session to itself."""
+
+
+def requests(sender: Sender, stream: Stream, lease: Lease) -> Iterator[bytes]:
     """Messages as they travel. gRPC would take an exception here for a stream that broke, which is to be resumed."""
     try:
-        for request in _requests(link, stream, lease):
+        for request in _requests(sender, stream, lease):
             yield request.SerializeToString()
     except Exception as error:
-        with link.changed:
+        with sender.changed:
             stream.failure = exception(error)
         stream.cancel()
 
 
-def _requests(link: Link, stream: Stream, lease: Lease) -> Iterator[service_pb2.DeformRequest]:
-    opening = service_pb2.DeformOpen(session=lease.session, writer_token=lease.writer_token, options=link.options)
+def _requests(sender: Sender, stream: Stream, lease: Lease) -> Iterator[service_pb2.DeformRequest]:
+    opening = service_pb2.DeformOpen(session=lease.session, writer_token=lease.writer_token, options=sender.options)
     yield service_pb2.DeformRequest(open=opening)
     while True:
-        with link.changed:
-            if not _wait_for_work(link, stream):
+        with sender.changed:
+            if not _wait_for_work(sender, stream):
                 return
             ack, stream.ack_due = stream.ack_due, 0
             done, stream.done = stream.done, []
-            update = link.ledger.send_next() if _can_send(link) else None
+            update = sender.ledger.send_next() if _can_send(sender) else None
         if ack:
             yield service_pb2.DeformRequest(ack=service_pb2.FrameAck(frame_seq=ack))
         for packer in done:
             packer.discard()
         if update is not None:
-            message = _packed(link, stream, update)
+            message = _packed(sender, stream, update)
             if message is not None:
                 yield service_pb2.DeformRequest(update=message)
 
 
-def _can_send(link: Link) -> bool:
-    return not link.is_solving and link.ledger.can_send
+def _can_send(sender: Sender) -> bool:
+    return not sender.is_solving and sender.ledger.can_send
 
 
-def _wait_for_work(link: Link, stream: Stream) -> bool:
+def _wait_for_work(sender: Sender, stream: Stream) -> bool:
     """False where the stream is over. Ends one that has been silent for too long."""
 
     def has_work() -> bool:
-        is_due = bool(stream.ack_due or stream.done) or _can_send(link)
+        is_due = bool(stream.ack_due or stream.done) or _can_send(sender)
         return stream.is_over or (stream.is_open and is_due)
 
     while not stream.is_over:
@@ -66,26 +79,26 @@ def _wait_for_work(link: Link, stream: Stream) -> bool:
         if left <= 0:
             stream.cancel()
             return False
-        if link.changed.wait_for(has_work, left):
+        if sender.changed.wait_for(has_work, left):
             break
     return not stream.is_over
 
 
-def _packed(link: Link, stream: Stream, update: NumberedUpdate) -> service_pb2.Update | None:
-    packer = Packer(link.rpc, stream.stop)
+def _packed(sender: Sender, stream: Stream, update: NumberedUpdate) -> service_pb2.Update | None:
+    packer = Packer(sender.rpc, stream.stop)
     try:
         message = _wire.update_to_wire(update.update, update.seq, packer)
     except LpdeformError as error:
-        with link.changed:
-            if link.judge.answer_of(error, update.seq) not in (Answer.AGAIN, Answer.MAKE_ANEW):
-                link.ledger.refuse(update.seq)
-                link.box.put_problem(error)
+        with sender.changed:
+            if sender.judge.answer_of(error, update.seq) not in (Answer.AGAIN, Answer.MAKE_ANEW):
+                sender.ledger.refuse(update.seq)
+                sender.box.put_problem(error)
                 return None
             if not stream.stop.is_set:  # otherwise its own end says more
                 stream.failure = error  # what is in flight waits again for the next stream
         stream.cancel()
         return None
     if packer.uploads:
-        with link.changed:
+        with sender.changed:
             stream.uploads[update.seq] = packer
     return message

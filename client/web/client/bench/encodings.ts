@@ -12,8 +12,8 @@ import {
 } from "../src/gen/lpdeform/v1/service_pb.js";
 import { frameOptionsToWire } from "../src/towire.js";
 import type { Encoding } from "../src/types.js";
-import { Service } from "../test/real/service.js";
-import { grid } from "../test/real/shapes.js";
+import { Service } from "../test/support/service.js";
+import { grid } from "../test/support/shapes.js";
 
 const service = await Service.start();
 await loadDecompressor();

@@ -1,5 +1,5 @@
 import { joinSession, LpdeformError, openSession, type Session } from "../src/index.js";
-import { grid } from "../test/real/shapes.js";
+import { grid } from "../test/support/shapes.js";
 import { Histogram } from "./histogram.js";
 
 const movesACircle = 64;

@@ -5,7 +5,7 @@
 import { writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 import { parseArgs } from "node:util";
-import { Service } from "../test/real/service.js";
+import { Service } from "../test/support/service.js";
 import type { Histogram } from "./histogram.js";
 import { Lane, Tally } from "./lane.js";
 

@@ -4,10 +4,10 @@ import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { build } from "vite";
-import { BarePage } from "../test/real/bare_page.js";
-import { Memory } from "../test/real/memory.js";
+import { BarePage } from "../test/support/bare_page.js";
+import { Memory } from "../test/support/memory.js";
 import type {} from "../test/real/page/page.js";
-import { root, Service } from "../test/real/service.js";
+import { root, Service } from "../test/support/service.js";
 
 const seconds = Number(process.argv[2] ?? 600);
 const samples = 20;

@@ -1,7 +1,10 @@
 import type { MessageInitShape } from "@bufbuild/protobuf";
+import type { Client } from "@connectrpc/connect";
 import { fromCall, fromFault, LpdeformError, serverSilent } from "./errors.js";
 import type { FrameOptionsSchema, FramePart } from "./gen/lpdeform/v1/frame_pb.js";
 import {
+  type AckFramesRequestSchema,
+  type DeformService,
   type Fault,
   type GoAway,
   GoAwayReason,
@@ -10,8 +13,19 @@ import {
   type StreamOpened,
   type StreamSessionsRequestSchema,
 } from "./gen/lpdeform/v1/service_pb.js";
-import { isSessionLost } from "./lease.js";
-import type { Rpc } from "./rpc.js";
+import { isSessionLost } from "./verdict.js";
+
+/** What streams ask of the server. */
+export interface StreamCalls {
+  readonly client: Pick<Client<typeof DeformService>, "streamSessions">;
+  /** What is silent for longer is dead. A stream that opens says how long that is. */
+  longestSilenceMs: number;
+  call(
+    name: "ackFrames",
+    request: MessageInitShape<typeof AckFramesRequestSchema>,
+    signal: AbortSignal,
+  ): Promise<unknown>;
+}
 
 /** Takes what comes on a lane. `opened` comes again whenever the stream was opened anew; `ended` comes once, and last. */
 export interface LaneSink {
@@ -43,14 +57,14 @@ const restIntervalMs = 10_000;
 export class StreamHub {
   readonly #streams = new Set<SharedStream>();
 
-  constructor(readonly rpc: Rpc) {}
+  constructor(readonly calls: StreamCalls) {}
 
   subscribe(session: string, options: WireFrameOptions, sink: LaneSink): Lane {
     const withRoom = [...this.#streams].find((stream) => stream.lanes.size < mostLanes);
-    const stream = withRoom ?? new SharedStream(this.rpc, () => this.#streams.delete(stream));
+    const stream = withRoom ?? new SharedStream(this.calls, () => this.#streams.delete(stream));
     this.#streams.add(stream);
     const lane = new Lane(
-      this.rpc,
+      this.calls,
       session,
       options,
       sink,
@@ -72,7 +86,7 @@ export class Lane {
   #isAcking = false;
 
   constructor(
-    readonly rpc: Rpc,
+    readonly calls: StreamCalls,
     readonly session: string,
     readonly options: WireFrameOptions,
     readonly sink: LaneSink,
@@ -115,7 +129,7 @@ export class Lane {
       if (this.#ackDue === 0 || `${streamId} ${frameSeq}` === sent || this.#abort.signal.aborted) break;
       sent = `${streamId} ${frameSeq}`;
       try {
-        await this.rpc.call("ackFrames", { session, streamId, frameSeq }, this.#abort.signal);
+        await this.calls.call("ackFrames", { session, streamId, frameSeq }, this.#abort.signal);
       } catch (thrown) {
         // Without credit the stream would stay silent. One that was replaced meanwhile needs none.
         if (streamId === this.streamId && !this.#abort.signal.aborted) {
@@ -139,7 +153,7 @@ class SharedStream {
   #looking: ReturnType<typeof setInterval> | undefined;
 
   constructor(
-    readonly rpc: Rpc,
+    readonly calls: StreamCalls,
     readonly over: () => void,
   ) {
     globalThis.document?.addEventListener("visibilitychange", this.#lookWhileHidden);
@@ -210,7 +224,7 @@ class SharedStream {
     let error: LpdeformError | undefined;
     try {
       this.#heard(call);
-      for await (const { stream, event } of this.rpc.client.streamSessions(request, { signal: call.signal })) {
+      for await (const { stream, event } of this.calls.client.streamSessions(request, { signal: call.signal })) {
         if (this.#call !== call) return;
         const lane = lanes[stream];
         if (lane && event && this.lanes.has(lane)) this.#take(lane, event);
@@ -230,7 +244,7 @@ class SharedStream {
   #take(lane: Lane, { event }: StreamEvent): void {
     switch (event.case) {
       case "opened":
-        if (event.value.heartbeatIntervalMs > 0) this.rpc.longestSilenceMs = 3 * event.value.heartbeatIntervalMs;
+        if (event.value.heartbeatIntervalMs > 0) this.calls.longestSilenceMs = 3 * event.value.heartbeatIntervalMs;
         this.#fit(lane, () => lane.opened(event.value));
         break;
       case "frame":
@@ -264,6 +278,6 @@ class SharedStream {
 
   #heard(call: AbortController): void {
     clearTimeout(this.#silence);
-    this.#silence = setTimeout(() => call.abort(serverSilent()), this.rpc.longestSilenceMs);
+    this.#silence = setTimeout(() => call.abort(serverSilent()), this.calls.longestSilenceMs);
   }
 }

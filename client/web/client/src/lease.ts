@@ -6,6 +6,7 @@ import type { Rpc } from "./rpc.js";
 import { freeComponents, meshToWire, settingsToWire, weights, weldToWire } from "./towire.js";
 import type { Mesh, MeshReport, OpenOptions } from "./types.js";
 import { Uploads } from "./upload.js";
+import { isUndecided } from "./verdict.js";
 
 /** What a client holds of a session on the server. */
 export interface Lease {
@@ -113,21 +114,4 @@ export async function joinSession(
     epoch: Number(acquired.epoch),
     inputSeq: Number(acquired.inputSeq),
   };
-}
-
-/** The server has the session no more. */
-export function isSessionLost(error: LpdeformError): boolean {
-  return error.code === "not_found" && error.reason.startsWith("SESSION_");
-}
-
-/** Whether the server took the call is not known, or may change: it is to be tried again. */
-export function isUndecided(error: LpdeformError): boolean {
-  const passing = ["unavailable", "cancelled", "deadline_exceeded", "unknown"];
-  const mayHaveRoom = error.code === "resource_exhausted" && error.retryAfterMs > 0;
-  return passing.includes(error.code) || mayHaveRoom || isSessionLost(error) || error.reason === "UPLOAD_UNKNOWN";
-}
-
-/** The server took the update, and cannot solve for it yet. */
-export function isTakenAllTheSame(error: LpdeformError): boolean {
-  return error.code === "failed_precondition" || error.code === "aborted";
 }

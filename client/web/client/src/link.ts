@@ -6,14 +6,15 @@ import { Scalar } from "./gen/lpdeform/v1/data_pb.js";
 import { Holds } from "./holds.js";
 import type { GoAway } from "./gen/lpdeform/v1/service_pb.js";
 import type { Lane, WireFrameOptions } from "./hub.js";
-import { checkVertexCount, type Copy, isUndecided, joinSession, type Lease } from "./lease.js";
+import { checkVertexCount, type Copy, joinSession, type Lease } from "./lease.js";
 import { Ledger, type NumberedUpdate } from "./ledger.js";
 import type { Watcher } from "./listeners.js";
 import { type Answer, answerOf, Backoff, RecoveryRules, writerReplaced } from "./recovery.js";
 import type { Rpc } from "./rpc.js";
 import { sendUpdate } from "./sendupdate.js";
 import type { Connection, Frame, Notice, Update } from "./types.js";
-import { newRequestId } from "./upload.js";
+import { newRequestId } from "./requestid.js";
+import { isUndecided } from "./verdict.js";
 import { Pauses } from "./waiting.js";
 
 /**

@@ -1,6 +1,6 @@
 import { LpdeformError } from "./errors.js";
 import { type GoAway, GoAwayReason } from "./gen/lpdeform/v1/service_pb.js";
-import { isSessionLost, isTakenAllTheSame, isUndecided } from "./lease.js";
+import { isSessionLost, isTakenAllTheSame, isUndecided } from "./verdict.js";
 
 export type NextStep = "resume" | "makeAnew" | "giveUp";
 

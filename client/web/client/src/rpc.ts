@@ -7,7 +7,7 @@ import { StreamHub } from "./hub.js";
 import { explained } from "./origin.js";
 import { bearing } from "./token.js";
 import type { ConnectOptions } from "./types.js";
-import { newRequestId } from "./upload.js";
+import { newRequestId } from "./requestid.js";
 
 type Methods = typeof DeformService.method;
 type Unary = { [Name in keyof Methods]: Methods[Name]["methodKind"] extends "unary" ? Name : never }[keyof Methods];

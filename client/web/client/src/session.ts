@@ -1,16 +1,6 @@
 import { loadDecompressor } from "./decode.js";
 import { LpdeformError, sessionClosed } from "./errors.js";
-import {
-  checkVertexCount,
-  type Copy,
-  createSession,
-  isSessionLost,
-  isTakenAllTheSame,
-  isUndecided,
-  joinSession,
-  type Lease,
-  routeOf,
-} from "./lease.js";
+import { checkVertexCount, type Copy, createSession, joinSession, type Lease, routeOf } from "./lease.js";
 import {
   checkCallOptions,
   checkJoinOptions,
@@ -46,7 +36,8 @@ import type {
   Update,
 } from "./types.js";
 import { takeStep } from "./undo.js";
-import { newRequestId } from "./upload.js";
+import { newRequestId } from "./requestid.js";
+import { isSessionLost, isTakenAllTheSame, isUndecided } from "./verdict.js";
 import { pause, unlessAborted } from "./waiting.js";
 
 export interface SessionEvents {

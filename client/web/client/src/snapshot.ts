@@ -1,8 +1,9 @@
 import { fromCall, LpdeformError } from "./errors.js";
-import { isUndecided, type Lease, leaseOf } from "./lease.js";
+import { type Lease, leaseOf } from "./lease.js";
 import { Packer } from "./packer.js";
 import type { Rpc } from "./rpc.js";
 import { Uploads } from "./upload.js";
+import { isUndecided } from "./verdict.js";
 
 /** The session as a file. Rejects with DATA_LOSS where parts of it are missing. */
 export async function takeSnapshot(rpc: Rpc, session: string, signal: AbortSignal): Promise<Uint8Array<ArrayBuffer>> {

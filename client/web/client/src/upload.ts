@@ -2,16 +2,11 @@ import { crc32c } from "./crc32c.js";
 import { LpdeformError } from "./errors.js";
 import type { UploadPartResponse } from "./gen/lpdeform/v1/service_pb.js";
 import { Backoff } from "./recovery.js";
+import { newRequestId } from "./requestid.js";
 import type { Rpc } from "./rpc.js";
 import { pause } from "./waiting.js";
 
 const mostPartBytes = 1 << 20;
-
-/** 128 random bits, in hexadecimal digits. */
-export function newRequestId(): string {
-  const random = crypto.getRandomValues(new Uint8Array(16));
-  return Array.from(random, (byte) => byte.toString(16).padStart(2, "0")).join("");
-}
 
 /** Bytes sent ahead of a call, in parts with a checksum. */
 export class Uploads {

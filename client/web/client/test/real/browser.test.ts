@@ -6,8 +6,8 @@ import { build } from "vite";
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { openSession } from "../../src/index.js";
 import type { Watched } from "./page/page.js";
-import { Service } from "./service.js";
-import { grid } from "./shapes.js";
+import { Service } from "../support/service.js";
+import { grid } from "../support/shapes.js";
 
 let files: string;
 let service: Service;

@@ -1,7 +1,7 @@
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { type Frame, openSession } from "../../src/index.js";
-import { Service } from "./service.js";
-import { grid } from "./shapes.js";
+import { Service } from "../support/service.js";
+import { grid } from "../support/shapes.js";
 
 let service: Service;
 beforeAll(async () => {

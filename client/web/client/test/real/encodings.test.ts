@@ -7,8 +7,8 @@ import {
   openSession,
   type Session,
 } from "../../src/index.js";
-import { Service } from "./service.js";
-import { grid } from "./shapes.js";
+import { Service } from "../support/service.js";
+import { grid } from "../support/shapes.js";
 
 /** The finished frame as a reader with these options gets it. */
 async function read(service: Service, { name }: Session, options: FrameOptions): Promise<Frame> {

@@ -3,7 +3,7 @@ import { readFile, rm, writeFile } from "node:fs/promises";
 import { join } from "node:path";
 import { promisify } from "node:util";
 import { afterAll, beforeAll, expect, test } from "vitest";
-import { Service } from "./service.js";
+import { Service } from "../support/service.js";
 
 let service: Service;
 beforeAll(async () => {

@@ -3,8 +3,8 @@ import { join } from "node:path";
 import { createInterface } from "node:readline";
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { openSession } from "../../src/index.js";
-import { Service } from "./service.js";
-import { grid } from "./shapes.js";
+import { Service } from "../support/service.js";
+import { grid } from "../support/shapes.js";
 
 const pauseMs = 5000;
 

@@ -4,7 +4,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { runLoad } from "../../bench/load.js";
-import { root, Service } from "./service.js";
+import { root, Service } from "../support/service.js";
 
 let service: Service;
 const work = mkdtempSync(join(tmpdir(), "lpdeform-load-"));

@@ -4,8 +4,8 @@ import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { afterAll, beforeAll, describe, expect, test, vi } from "vitest";
 import { openSession, type Session } from "../../src/index.js";
-import { envoyProgram, root, Service } from "./service.js";
-import { grid } from "./shapes.js";
+import { envoyProgram, root, Service } from "../support/service.js";
+import { grid } from "../support/shapes.js";
 
 const configure = (...flags: string[]) =>
   execFileSync(join(root, "deploy/envoy-config"), flags, { encoding: "utf8", stdio: "pipe" });

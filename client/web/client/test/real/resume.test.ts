@@ -1,8 +1,8 @@
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { type Frame, openSession, type Session } from "../../src/index.js";
-import { resultMadeAnew } from "./made_anew.js";
-import { Service } from "./service.js";
-import { grid } from "./shapes.js";
+import { resultMadeAnew } from "../support/made_anew.js";
+import { Service } from "../support/service.js";
+import { grid } from "../support/shapes.js";
 
 let service: Service;
 beforeAll(async () => {

@@ -4,8 +4,8 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { joinSession, type LpdeformError, openSession } from "../../src/index.js";
-import { Service } from "./service.js";
-import { grid } from "./shapes.js";
+import { Service } from "../support/service.js";
+import { grid } from "../support/shapes.js";
 
 const work = mkdtempSync(join(tmpdir(), "lpdeform-tokens-"));
 let service: Service;

@@ -16,9 +16,10 @@ import { Pace } from "./pace.js";
 import { Editing } from "./editing.js";
 import type { Pane } from "./pane.js";
 import { Panes } from "./panes.js";
+import type { Workbench } from "./workbench.js";
 
 /** The page's one object: the work, how it is looked at, the panes; and the loop that draws them. */
-export class App {
+export class App implements Workbench {
   readonly view = new State<View>(firstView);
   readonly facts = new State<Facts>(firstFacts);
   readonly history = new History<Document>(emptyDocument, isAlike);

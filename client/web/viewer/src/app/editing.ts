@@ -16,25 +16,25 @@ import { add, type Pose, subtract } from "../model/pose.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../model/selection.js";
 import { vertexNormals } from "../stage/drawmesh.js";
 import { onPlane, type PointerAt, Pointing, type PointingTarget, type Stroke, viewProjection } from "../stage/pointing.js";
-import type { App } from "./app.js";
 import { KeyPointer } from "./key_pointer.js";
 import type { Pane } from "./pane.js";
+import type { Workbench } from "./workbench.js";
 
 /** The tools: what pointing at a pane does to the work. */
 export class Editing implements PointingTarget {
   readonly #pointing: Pointing;
 
   constructor(
-    readonly app: App,
+    readonly work: Workbench,
     readonly pane: Pane,
   ) {
     const { gizmo } = pane.stage;
     gizmo.onPose = (pose) => this.#pose(pose);
-    gizmo.onEnd = () => app.endGesture();
-    gizmo.onCancel = () => app.cancelGesture();
+    gizmo.onEnd = () => work.endGesture();
+    gizmo.onCancel = () => work.cancelGesture();
     this.#pointing = new Pointing(pane.stage, this);
     new KeyPointer(pane, {
-      hover: (event) => this.app.facts.set({ pointedOut: this.#underCross(event) }),
+      hover: (event) => this.work.facts.set({ pointedOut: this.#underCross(event) }),
       press: (event) => this.#workAt(this.#pointing.at(event)),
     });
     const setViewOnly = (event: KeyboardEvent, isDown: boolean) => {
@@ -53,12 +53,12 @@ export class Editing implements PointingTarget {
   /** As if the pointer were up: what it has moved is a step. What it has drawn is dropped. */
   letGo(): void {
     if (!this.pane.stage.gizmo.isDragging && !this.#pointing.isBusy) return;
-    this.app.endGesture();
+    this.work.endGesture();
     this.cancel();
   }
 
   press(at: PointerAt): Stroke | undefined {
-    switch (this.app.view.now.tool) {
+    switch (this.work.view.now.tool) {
       case "move":
         return this.#pressHandle(at);
       case "brush":
@@ -73,16 +73,16 @@ export class Editing implements PointingTarget {
 
   /** With the tool that moves: a new handle on the surface; beside it, nothing is selected any more. */
   click(at: PointerAt): void {
-    const { app } = this;
-    if (app.view.now.tool !== "move") return;
-    if (!at.hit) return app.view.set({ selected: undefined });
-    this.#select(this.#dabAt(at), at.shift ? "add" : app.view.now.mode);
+    const { work } = this;
+    if (work.view.now.tool !== "move") return;
+    if (!at.hit) return work.view.set({ selected: undefined });
+    this.#select(this.#dabAt(at), at.shift ? "add" : work.view.now.mode);
   }
 
   hover(at: PointerAt | undefined): void {
-    const { tool } = this.app.view.now;
+    const { tool } = this.work.view.now;
     if (tool !== "brush" && tool !== "paint") return;
-    this.app.facts.set({ pointedOut: at?.hit ? ofVertices(this.#dabAt(at)) : nothing });
+    this.work.facts.set({ pointedOut: at?.hit ? ofVertices(this.#dabAt(at)) : nothing });
   }
 
   #underCross(event: PointerEvent | undefined): PointedOut {
@@ -92,55 +92,55 @@ export class Editing implements PointingTarget {
 
   /** What a press by key does: the tool's work at one place. */
   #workAt(at: PointerAt): boolean {
-    const { app } = this;
+    const { work } = this;
     if (!at.hit) {
-      app.notify("There is no surface under the cross: arrow keys move it.");
+      work.notify("There is no surface under the cross: arrow keys move it.");
       return false;
     }
-    if (app.view.now.tool === "paint") {
+    if (work.view.now.tool === "paint") {
       this.#paint(this.#dabAt(at));
       return false;
     }
-    const mode = modeOf(at, app);
+    const mode = modeOf(at, work);
     const owner = mode === "new" ? this.#handleAt(at) : undefined;
-    if (owner) app.view.set({ selected: owner.name });
+    if (owner) work.view.set({ selected: owner.name });
     else this.#select(this.#dabAt(at), mode);
-    const handle = handleOf(app.document, app.view.now.selected);
+    const handle = handleOf(work.document, work.view.now.selected);
     if (handle) {
       const canMove = !handle.isLocked && !handle.targets;
-      app.notify(`“${handle.name}” holds ${handle.vertices.length} vertices${canMove ? "; arrow keys move it" : ""}.`);
+      work.notify(`“${handle.name}” holds ${handle.vertices.length} vertices${canMove ? "; arrow keys move it" : ""}.`);
     }
     return handle !== undefined && mode === "new";
   }
 
   #dabAt({ hit }: PointerAt): number[] {
-    const { app, pane } = this;
-    const radius = app.view.now.radius * app.diagonal;
-    const { seams, adjacency } = app;
+    const { work, pane } = this;
+    const radius = work.view.now.radius * work.diagonal;
+    const { seams, adjacency } = work;
     const seed = seams?.groups[hit!.vertex] ?? hit!.vertex;
     return this.#withCopies(dab(pane.stage.surface!.positions, adjacency, seed, hit!.point, radius));
   }
 
   /** What is said of a vertex is said of all that are one with it. */
   #withCopies(vertices: number[]): number[] {
-    return this.app.seams?.withCopies(vertices) ?? vertices;
+    return this.work.seams?.withCopies(vertices) ?? vertices;
   }
 
   #pressHandle(at: PointerAt): Stroke | undefined {
     const handle = this.#handleAt(at);
     if (!handle) return undefined;
-    this.app.view.set({ selected: handle.name });
-    return this.app.canShift(handle) ? this.#drag(handle, at) : undefined;
+    this.work.view.set({ selected: handle.name });
+    return this.work.canShift(handle) ? this.#drag(handle, at) : undefined;
   }
 
   /** The handle that holds something of the face that is pointed at, or near by on the screen, for fingers. */
   #handleAt(at: PointerAt): Handle | undefined {
-    const { app, pane } = this;
+    const { work, pane } = this;
     const { hit } = at;
-    const { handles } = app.document;
+    const { handles } = work.document;
     if (hit) {
-      const owners = ownersOf(app.document);
-      const face = app.mesh.faces.subarray(3 * hit.face, 3 * hit.face + 3);
+      const owners = ownersOf(work.document);
+      const face = work.mesh.faces.subarray(3 * hit.face, 3 * hit.face + 3);
       const owner =
         handles.find(({ points }) => points?.some((point) => point.face === hit.face)) ??
         owners.get(hit.vertex) ??
@@ -153,12 +153,12 @@ export class Editing implements PointingTarget {
     let least = at.isTouch ? 18 : 7;
     let nearest: Handle | undefined;
     for (const handle of handles) {
-      const places = follow(placesOf(handle.vertices, handle.points, app.mesh.faces), surface.positions);
+      const places = follow(placesOf(handle.vertices, handle.points, work.mesh.faces), surface.positions);
       const screen = project(places, matrix, width, height);
       for (let k = 0; 2 * k < screen.length; ++k) {
         const far = Math.hypot(screen[2 * k]! - at.x, screen[2 * k + 1]! - at.y);
         if (!(far < least)) continue;
-        if (hit && distanceTo(at, places, k) > hit.distance + 0.02 * app.diagonal) continue; // hidden
+        if (hit && distanceTo(at, places, k) > hit.distance + 0.02 * work.diagonal) continue; // hidden
         least = far;
         nearest = handle;
       }
@@ -168,55 +168,55 @@ export class Editing implements PointingTarget {
 
   /** In the plane that faces the eye. */
   #drag(handle: Handle, start: PointerAt): Stroke {
-    const { app, pane } = this;
+    const { work, pane } = this;
     const grip = start.hit?.point ?? add(handle.pose.center, handle.pose.translation);
     const from = onPlane(pane.stage, start.ray, grip) ?? grip;
     const { name } = handle;
     const show = (delta: Vector3, time: number) => {
-      app.during(changeHandle(app.document, name, shifted(handle, delta)), time);
+      work.during(changeHandle(work.document, name, shifted(handle, delta)), time);
     };
     return {
       move: (at) => {
         const to = onPlane(pane.stage, at.ray, grip);
         if (to) show(subtract(to, from), at.time);
       },
-      end: () => app.endGesture(),
-      cancel: () => app.cancelGesture(),
+      end: () => work.endGesture(),
+      cancel: () => work.cancelGesture(),
     };
   }
 
   #pose(pose: Pose): void {
-    const { app } = this;
-    const { selected } = app.view.now;
-    if (selected !== undefined) app.during(changeHandle(app.document, selected, { pose }), performance.now());
+    const { work } = this;
+    const { selected } = work.view.now;
+    if (selected !== undefined) work.during(changeHandle(work.document, selected, { pose }), performance.now());
   }
 
   #brushStroke(start: PointerAt): Stroke {
-    const { app } = this;
+    const { work } = this;
     const touched = new Set<number>();
     const touch = (at: PointerAt) => {
       if (!at.hit) return;
       for (const vertex of this.#dabAt(at)) touched.add(vertex);
-      app.facts.set({ pointedOut: ofVertices([...touched]) });
+      work.facts.set({ pointedOut: ofVertices([...touched]) });
     };
     touch(start);
     return {
       move: touch,
       end: () => {
-        app.facts.set({ pointedOut: nothing });
-        if (app.view.now.tool === "paint") this.#paint([...touched]);
-        else this.#select([...touched], modeOf(start, app));
+        work.facts.set({ pointedOut: nothing });
+        if (work.view.now.tool === "paint") this.#paint([...touched]);
+        else this.#select([...touched], modeOf(start, work));
       },
-      cancel: () => app.facts.set({ pointedOut: nothing }),
+      cancel: () => work.facts.set({ pointedOut: nothing }),
     };
   }
 
   #paint(vertices: number[]): void {
-    const { app } = this;
-    const { paintField, paintP, paintStiffness } = app.view.now;
+    const { work } = this;
+    const { paintField, paintP, paintStiffness } = work.view.now;
     const value = paintField === "p" ? paintP : paintStiffness;
-    app.change(paint(app.document, paintField, vertices, value, app.mesh.positions.length / 3));
-    app.view.set({ colourBy: paintField });
+    work.change(paint(work.document, paintField, vertices, value, work.mesh.positions.length / 3));
+    work.view.set({ colourBy: paintField });
   }
 
   #outlineStroke(start: PointerAt, toPolygon: (outline: number[]) => number[]): Stroke {
@@ -230,8 +230,8 @@ export class Editing implements PointingTarget {
       end: () => {
         pane.overlay.show([]);
         const vertices = this.#inside(toPolygon(outline));
-        if (vertices.length > 0) this.#select(vertices, modeOf(start, this.app));
-        else this.app.notify("No vertex lies inside: draw around a part of the surface.");
+        if (vertices.length > 0) this.#select(vertices, modeOf(start, this.work));
+        else this.work.notify("No vertex lies inside: draw around a part of the surface.");
       },
       cancel: () => pane.overlay.show([]),
     };
@@ -241,30 +241,30 @@ export class Editing implements PointingTarget {
     const { stage } = this.pane;
     const { positions, mesh } = stage.surface!;
     const inside = insidePolygon(project(positions, viewProjection(stage), stage.width, stage.height), polygon);
-    if (this.app.view.now.isThrough) return this.#withCopies(inside);
+    if (this.work.view.now.isThrough) return this.#withCopies(inside);
     const normals = vertexNormals(positions, mesh.faces);
     return this.#withCopies(facing(inside, positions, normals, stage.camera.position.toArray()));
   }
 
   #select(vertices: readonly number[], mode: "new" | "add" | "release"): void {
-    const { app } = this;
-    const rest = app.mesh.positions;
-    const before = app.document;
-    const { selected } = app.view.now;
-    if (mode === "release") return app.change(releaseVertices(before, vertices, rest));
-    if (mode === "add" && handleOf(before, selected)) return app.change(extendHandle(before, selected!, vertices, rest));
+    const { work } = this;
+    const rest = work.mesh.positions;
+    const before = work.document;
+    const { selected } = work.view.now;
+    if (mode === "release") return work.change(releaseVertices(before, vertices, rest));
+    if (mode === "add" && handleOf(before, selected)) return work.change(extendHandle(before, selected!, vertices, rest));
     const { positions } = this.pane.stage.surface!;
     const current = isAtRest(positions, rest, vertices) ? rest : positions; // what frames round away moves nothing
     const after = addHandle(before, vertices, rest, {}, current);
-    if (after === before) return app.notify("Another handle holds these vertices already.");
-    app.change(after);
-    app.view.set({ selected: after.handles.at(-1)!.name });
+    if (after === before) return work.notify("Another handle holds these vertices already.");
+    work.change(after);
+    work.view.set({ selected: after.handles.at(-1)!.name });
   }
 }
 
-function modeOf(at: PointerAt, app: App): "new" | "add" | "release" {
+function modeOf(at: PointerAt, work: Workbench): "new" | "add" | "release" {
   if (at.shift) return "add";
-  return at.alt ? "release" : app.view.now.mode;
+  return at.alt ? "release" : work.view.now.mode;
 }
 
 function distanceTo(at: PointerAt, positions: Float32Array, vertex: number): number {

@@ -4,8 +4,10 @@ import type { Mesh } from "../model/mesh.js";
 import type { View } from "../model/view.js";
 import type { App } from "./app.js";
 import type { Kept } from "./asides.js";
-import type { Answer } from "../ui/wants_back.js";
 import { claim, whileFree } from "./claim.js";
+
+/** What the user says of work at which the page stopped last time. */
+export type WhenToShow = "now" | "later" | "never";
 
 const key = "lpdeform-work";
 /**
@@ -37,7 +39,7 @@ export class Keeper {
   /** `wantsBack`: when the user wants work again at which the page stopped last time, by the name of its mesh. */
   constructor(
     readonly app: App,
-    readonly wantsBack: (name: string) => Promise<Answer>,
+    readonly wantsBack: (name: string) => Promise<WhenToShow>,
   ) {}
 
   /** True where there was work. Where the browser keeps nothing, all goes on without. */

@@ -1,3 +1,5 @@
+import * as three from "three";
+import { STLExporter } from "three/examples/jsm/exporters/STLExporter.js";
 import type { Mesh, WrittenMesh } from "../model/mesh.js";
 import { MeshBuilder } from "./builder.js";
 import { FileFault } from "./fault.js";
@@ -64,22 +66,9 @@ class Welder {
 
 /** Binary, in float32, as STL is. */
 export function writeStl({ positions, faces }: WrittenMesh): Uint8Array<ArrayBuffer> {
-  const bytes = new Uint8Array(84 + (50 * faces.length) / 3);
-  const view = new DataView(bytes.buffer);
-  view.setUint32(80, faces.length / 3, true);
-  for (let f = 0; f < faces.length; f += 3) {
-    const at = 84 + (50 * f) / 3;
-    const corners = [0, 1, 2].map((corner) => [...positions.subarray(3 * faces[f + corner]!, 3 * faces[f + corner]! + 3)]);
-    normalOf(corners).forEach((value, axis) => view.setFloat32(at + 4 * axis, value, true));
-    corners.forEach((corner, k) => corner.forEach((value, axis) => view.setFloat32(at + 12 + 12 * k + 4 * axis, value, true)));
-  }
-  return bytes;
-}
-
-function normalOf([a, b, c]: (readonly number[])[]): number[] {
-  const u = a!.map((value, axis) => b![axis]! - value);
-  const v = a!.map((value, axis) => c![axis]! - value);
-  const normal = [u[1]! * v[2]! - u[2]! * v[1]!, u[2]! * v[0]! - u[0]! * v[2]!, u[0]! * v[1]! - u[1]! * v[0]!];
-  const length = Math.hypot(...normal) || 1;
-  return normal.map((value) => value / length);
+  const geometry = new three.BufferGeometry();
+  geometry.setAttribute("position", new three.BufferAttribute(positions, 3));
+  geometry.setIndex(new three.BufferAttribute(faces, 1));
+  const { buffer } = new STLExporter().parse(new three.Mesh(geometry), { binary: true });
+  return new Uint8Array(buffer as ArrayBuffer);
 }

@@ -1,9 +1,8 @@
+import type { WhenToShow } from "../app/keeper.js";
 import { el } from "./dom.js";
 
-export type Answer = "now" | "later" | "never";
-
 /** Asks when work is to be shown again that the page perhaps could not bear; Escape puts it off. */
-export function wantsBack(name: string): Promise<Answer> {
+export function wantsBack(name: string): Promise<WhenToShow> {
   const yes = el("button", { type: "button", className: "plain", textContent: "Show it again", autofocus: true });
   const later = el("button", { type: "button", className: "plain", textContent: "Not now" });
   const no = el("button", { type: "button", className: "plain", textContent: "Discard it" });
@@ -16,7 +15,7 @@ export function wantsBack(name: string): Promise<Answer> {
   );
   document.body.append(sheet);
   sheet.showModal();
-  return new Promise<Answer>((resolve) => {
+  return new Promise<WhenToShow>((resolve) => {
     yes.addEventListener("click", () => resolve("now"));
     later.addEventListener("click", () => resolve("later"));
     no.addEventListener("click", () => resolve("never"));

@@ -7,7 +7,7 @@ import { join } from "node:path";
 import { promisify } from "node:util";
 import type { CDPSession } from "playwright-core";
 import { afterAll, beforeAll, expect, it } from "vitest";
-import { root, Service } from "../../../client/test/real/service.js";
+import { root, Service } from "../../../client/test/support/service.js";
 import { type MeterFacts, User } from "../real/user.js";
 
 const seconds = Number(process.env["SECONDS"] ?? 12);

@@ -3,7 +3,7 @@ import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { afterAll, beforeAll, it } from "vitest";
 import { openSession } from "../../../client/src/index.js";
-import { Service } from "../../../client/test/real/service.js";
+import { Service } from "../../../client/test/support/service.js";
 import { User } from "../real/user.js";
 
 const out = join(import.meta.dirname, "../../../../../build/viewer-pictures");

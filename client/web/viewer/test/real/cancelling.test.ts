@@ -1,6 +1,6 @@
 import { join } from "node:path";
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, it } from "vitest";
-import { Service } from "../../../client/test/real/service.js";
+import { Service } from "../../../client/test/support/service.js";
 import { User } from "./user.js";
 
 // Escape in the middle of a gesture: everything is as before it, here and on the server.

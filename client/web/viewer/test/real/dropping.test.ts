@@ -2,7 +2,7 @@ import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { afterAll, beforeAll, expect, it } from "vitest";
-import { Service } from "../../../client/test/real/service.js";
+import { Service } from "../../../client/test/support/service.js";
 import { writeObj } from "../../src/io/obj.js";
 import { writeOff } from "../../src/io/off.js";
 import { writePly } from "../../src/io/ply.js";

@@ -1,6 +1,6 @@
 import { join } from "node:path";
 import { afterAll, beforeAll, expect, it } from "vitest";
-import { Service } from "../../../client/test/real/service.js";
+import { Service } from "../../../client/test/support/service.js";
 import { decodePng, User } from "./user.js";
 
 let service: Service;

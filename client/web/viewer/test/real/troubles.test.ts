@@ -1,6 +1,6 @@
 import { join } from "node:path";
 import { afterEach, describe, expect, it } from "vitest";
-import { Service } from "../../../client/test/real/service.js";
+import { Service } from "../../../client/test/support/service.js";
 import { User } from "./user.js";
 
 const files = join(import.meta.dirname, "../../dist");

@@ -2,9 +2,9 @@
 // and fails where it grows.
 import { join } from "node:path";
 import { expect, it } from "vitest";
-import { BarePage } from "../../../client/test/real/bare_page.js";
-import { Memory } from "../../../client/test/real/memory.js";
-import { Service } from "../../../client/test/real/service.js";
+import { BarePage } from "../../../client/test/support/bare_page.js";
+import { Memory } from "../../../client/test/support/memory.js";
+import { Service } from "../../../client/test/support/service.js";
 import { launch } from "../real/user.js";
 
 const seconds = Number(process.env["SECONDS"] ?? 600);

@@ -1,5 +1,5 @@
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { resultIn } from "../../../client/test/real/grpc_web.js";
+import { resultIn } from "../../../client/test/support/grpc_web.js";
 import { readMesh } from "../../src/io/read.js";
 import { writeOff } from "../../src/io/off.js";
 import { blockSurface } from "../../src/model/block.js";

@@ -2,7 +2,7 @@ import { type ChildProcess, spawn } from "node:child_process";
 import { once } from "node:events";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
-import { cpuSecondsOf, root } from "../../../client/test/real/service.js";
+import { cpuSecondsOf, root } from "../../../client/test/support/service.js";
 
 const parts = { server: "lpdeform-server", envoy: "envoy" };
 

@@ -1,7 +1,7 @@
 // A page in split view: the same handles at two values of p. What it shows is in window.views; it can also watch a session of
 // somebody else's.
 import { type Frame, joinSession, LpdeformError, openSession } from "../../../src/index.js";
-import { grid } from "../shapes.js";
+import { grid } from "../../support/shapes.js";
 
 export interface View {
   frames: number;
