@@ -98,7 +98,9 @@ TEST(HandleFile, EveryKindOfHoldIsWrittenUnderItsKeyAndReadsBack) {
   std::size_t key = 0;
   for (const client::Hold& hold : one_of_each<client::Hold>()) {
     const std::string text = handle_file_text({{"tip", {.vertices = {1}, .hold = hold}}}, "", "");
-    if (hold.index() > 0) EXPECT_THAT(text, HasSubstr(hold_keys().at(key++)));
+    if (hold.index() > 0) {
+      EXPECT_THAT(text, HasSubstr(hold_keys().at(key++)));
+    }
     const auto file = parse_handles(text, kVertexCount);
     ASSERT_TRUE(file.ok()) << file.status();
     EXPECT_EQ(file->handles[0].handle.hold.index(), hold.index()) << text;
