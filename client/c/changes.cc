@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "client/c/arguments.h"
@@ -50,9 +51,14 @@ absl::StatusOr<Motion> read_positions(const lpdeform_motion& motion, const Space
   return out;
 }
 
+static_assert(std::variant_size_v<Hold> == LPDEFORM_PLANE_LOCK + 1, "lpdeform.h has every kind of hold");
+
 absl::StatusOr<Hold> read_hold(const lpdeform_handle& handle, const Space& space) {
+  if (absl::Status known = check_enum("hold", handle.hold, std::variant_size_v<Hold> - 1); !known.ok()) {
+    return known;
+  }
   const Vector direction = space.direction_to_server(vector_of(handle.direction));
-  switch (handle.hold) {
+  switch (static_cast<lpdeform_hold_values>(handle.hold)) {
     case LPDEFORM_EXACTLY:
       return Exactly{};
     case LPDEFORM_SOFT:
@@ -63,9 +69,8 @@ absl::StatusOr<Hold> read_hold(const lpdeform_handle& handle, const Space& space
       return AxisLock{direction};
     case LPDEFORM_PLANE_LOCK:
       return PlaneLock{direction};
-    default:
-      return check_enum("hold", handle.hold, LPDEFORM_PLANE_LOCK);
   }
+  return Exactly{};  // not reached
 }
 
 /// If Space turns triangles, their second and third corners are exchanged.

@@ -357,7 +357,7 @@ typedef struct lpdeform_motion {
 
 /* How a handle is held. */
 typedef int32_t lpdeform_hold;
-enum {
+enum lpdeform_hold_values {
   LPDEFORM_EXACTLY = 0,
   LPDEFORM_SOFT = 1,        /* pulled to its target with `weight` */
   LPDEFORM_ORIENTATION = 2, /* has the motion's rotation with `weight`; its position is free */

@@ -34,7 +34,7 @@ absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Cons
     const auto scaled = scaled_targets(shape, name, handle, targets);
     if (!scaled.ok()) return scaled.status();
     add_holds(shape, name, handle, *scaled, holds);
-    if (!std::holds_alternative<Exactly>(handle.hold)) continue;
+    if (!handle.fixes_vertices()) continue;
     for (std::size_t k = 0; k < handle.vertices.size(); ++k) {
       const std::int32_t vertex = handle.vertices[k];
       constraints.is_held[vertex] = true;
@@ -69,13 +69,9 @@ void hold_outside(const RestShape& shape, const std::vector<std::int32_t>* regio
   });
 }
 
-bool is_lock(const Hold& hold) {
-  return std::holds_alternative<AxisLock>(hold) || std::holds_alternative<PlaneLock>(hold);
-}
-
-/// Which components something keeps from drifting off. Locks count only if `with_locks`.
+/// Which components something ties, at least to the degree `least`.
 std::vector<char> tied_components(const RestShape& shape, const HandleSet& handles,
-                                  const Constraints& constraints, bool with_locks) {
+                                  const Constraints& constraints, Tie least) {
   std::vector<char> is_tied(shape.component_count(), false);
   const auto tie = [&](std::int32_t vertex) {
     if (shape.components()[vertex] >= 0) is_tied[shape.components()[vertex]] = true;
@@ -84,7 +80,7 @@ std::vector<char> tied_components(const RestShape& shape, const HandleSet& handl
     if (constraints.is_held[i]) tie(i);
   }
   for (const auto& [name, handle] : handles.handles()) {
-    if (!ties_component(handle) || (is_lock(handle.hold) && !with_locks)) continue;
+    if (tie_of(handle.hold) < least) continue;
     for (std::size_t k = 0; k < handle.size(); ++k) tie(point_form(shape, handle, k).vertices[0]);
   }
   return is_tied;
@@ -175,7 +171,7 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   Holds holds;
   if (status = hold_handles(shape, handles, constraints, holds); !status.ok()) return status;
   hold_outside(shape, handles.region(), outside ? *outside : shape.positions(), constraints, holds);
-  const std::vector<char> is_tied = tied_components(shape, handles, constraints, true);
+  const std::vector<char> is_tied = tied_components(shape, handles, constraints, Tie::kPartial);
   const auto free = std::find(is_tied.begin(), is_tied.end(), false);
   if (free != is_tied.end() && free_components == FreeComponents::kError) {
     return name_free_component(shape, static_cast<std::int32_t>(free - is_tied.begin()));
@@ -185,7 +181,7 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   auto linear = LinearConstraints::create(std::move(holds.rows), constraints.is_held);
   if (!linear.ok()) return linear.status();
   constraints.linear = *std::move(linear);
-  if (tied_components(shape, handles, constraints, false) !=
+  if (tied_components(shape, handles, constraints, Tie::kWhole) !=
       std::vector<char>(shape.component_count(), true)) {
     constraints.linear.tie_locks();
   }

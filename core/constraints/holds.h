@@ -28,7 +28,13 @@ void add_holds(const RestShape& shape, const std::string& name, const Handle& ha
 /// Whether some handle puts equations on positions: points held exactly, and locks.
 bool has_equations(const HandleSet& handles);
 
-/// Whether `handle` keeps its component from drifting off: all do but an orientation, and a weight of 0.
-bool ties_component(const Handle& handle);
+/// How far a hold keeps the component of its vertices from drifting off.
+enum class Tie {
+  kNone,     // not at all: an orientation, or a weight of 0
+  kPartial,  // across some directions only: a lock
+  kWhole,
+};
+
+Tie tie_of(const Hold& hold);
 
 }  // namespace lpdeform

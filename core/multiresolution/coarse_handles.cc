@@ -39,7 +39,7 @@ class Coarsener {
     for (const auto& [name, handle] : fine.handles()) {
       if (!handle.points.empty())
         add(absl::StrCat("as ", name), on_faces(handle), result);
-      else if (!std::holds_alternative<Exactly>(handle.hold))
+      else if (!handle.fixes_vertices())
         add(absl::StrCat("as ", name), on_vertices(handle), result);
     }
     return result;
@@ -70,7 +70,7 @@ class Coarsener {
         targets.emplace_back(static_cast<std::int32_t>(c), constraints_.exact.row(v));
     }
     for (const auto& [name, handle] : fine.handles()) {
-      if (!std::holds_alternative<Exactly>(handle.hold) || some_stay(handle)) continue;
+      if (!handle.fixes_vertices() || some_stay(handle)) continue;
       for (const std::int32_t v : handle.vertices) {
         const std::int32_t c = levels_.coarse_vertex[v];
         if (take(c)) targets.emplace_back(c, constraints_.exact.row(v) + offset(v));
@@ -88,13 +88,9 @@ class Coarsener {
       if ((has_coarse && !stays(v)) || !take(c)) continue;
       targets.emplace_back(c, fine_targets.row(static_cast<Eigen::Index>(k)) + offset(v));
     }
-    Handle result = with_targets(handle.hold, targets);
-    if (std::holds_alternative<Orientation>(handle.hold)) result.motion = handle.motion;
-    if (auto* soft = std::get_if<Soft>(&result.hold); soft && !targets.empty()) {
-      const double grown =
-          soft->weight * static_cast<double>(handle.vertices.size()) / static_cast<double>(targets.size());
-      soft->weight = std::min(grown, kHighestSoftWeight);
-    }
+    if (targets.empty()) return {};
+    Handle result = with_targets(hold_on_fewer(handle.hold, handle.vertices.size(), targets.size()), targets);
+    if (!takes_positions(handle.hold)) result.motion = handle.motion;
     return result;
   }
 

@@ -54,6 +54,9 @@ struct Handle {
   /// How many vertices or points.
   std::size_t size() const { return vertices.size() + points.size(); }
 
+  /// Whether its vertices are no unknowns: they are where its motion sends them.
+  bool fixes_vertices() const { return points.empty() && std::holds_alternative<Exactly>(hold); }
+
   bool operator==(const Handle&) const = default;
 };
 

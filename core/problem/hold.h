@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <string_view>
 #include <variant>
 
+#include "absl/status/status.h"
 #include "core/base/geometry.h"
 
 namespace lpdeform {
@@ -58,5 +61,19 @@ struct PlaneLock {
 using Hold = std::variant<Exactly, Soft, Orientation, AxisLock, PlaneLock>;
 
 inline constexpr double kHighestSoftWeight = 1e6;
+
+/// Whether this kind holds points inside faces, too, not vertices only.
+bool takes_points(const Hold& hold);
+
+/// Whether the handle's motion may be target positions. If not, the motion is fixed or rigid.
+bool takes_positions(const Hold& hold);
+
+/// The hold for `fewer` vertices that stand for `count`, as on a coarse level. A soft weight grows by
+/// count / fewer, up to kHighestSoftWeight; everything else stays.
+Hold hold_on_fewer(const Hold& hold, std::size_t count, std::size_t fewer);
+
+/// Checks the numbers of a hold; `name` is the handle's. INVALID_ARGUMENT: HANDLE_WEIGHT_OUT_OF_RANGE,
+/// HANDLE_LOCK_DIRECTION.
+absl::Status check_hold(std::string_view name, const Hold& hold);
 
 }  // namespace lpdeform
