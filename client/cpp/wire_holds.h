@@ -5,12 +5,13 @@
 
 namespace lpdeform::client {
 
-// How a handle is held, between plain types and messages.
+// Converts holds between plain types and messages.
 
-/// Nothing is set for Exactly.
+/// Sets nothing for Exactly.
 void to_wire(const Hold& hold, v1::Handle& out);
 
-/// Of a handle that the server made. Exactly where the hold is missing, or one of a newer server.
+/// The hold of a handle that the server made. Exactly if the hold is missing, or of a kind that only newer servers
+/// know.
 Hold hold_from_wire(const v1::Handle& message);
 
 }  // namespace lpdeform::client

@@ -24,8 +24,9 @@ template <typename Cases, typename Variant>
 concept HasCaseForEach = has_case_for_each<Cases, Variant>(
     std::make_index_sequence<std::variant_size_v<std::remove_cvref_t<Variant>>>());
 
-/// Calls the case for what `variant` holds. An alternative without a case does not compile, so that the compiler
-/// lists the places that a new one must reach: give each alternative a case of its own, never `const auto&`.
+/// Calls the case for the alternative that `variant` holds. An alternative without a case does not compile, so the
+/// compiler lists all places that need code for a new alternative. Give each alternative a case of its own; never use
+/// `const auto&`.
 template <typename Variant, typename... Cases>
 requires HasCaseForEach<Match<std::remove_cvref_t<Cases>...>, Variant>
 decltype(auto) match(Variant&& variant, Cases&&... cases) {

@@ -8,7 +8,7 @@
 namespace lpdeform {
 namespace {
 
-/// A vertex, for the stiffness and p of a term at this point: that of the largest coefficient.
+/// The vertex that gives a term at this point its stiffness and p: the one with the largest coefficient.
 std::int32_t anchor_of(const PointForm& point) {
   std::int32_t largest = 0;
   for (std::int32_t j = 1; j < point.count; ++j) {
@@ -17,7 +17,7 @@ std::int32_t anchor_of(const PointForm& point) {
   return point.vertices[largest];
 }
 
-/// The cell of a vertex with its rotation prescribed.
+/// Adds the term of a cell with a prescribed rotation.
 void add_turned_cell(const RestShape& shape, std::int32_t i, const Eigen::Matrix3d& rotation, double weight,
                      SoftTerms& terms) {
   const Points& rest = shape.scaled_positions();
@@ -35,7 +35,7 @@ void add_row(const std::string& name, const PointForm& point, const Eigen::Vecto
   rows.push_back({point, direction, target.dot(direction.transpose()), name});
 }
 
-/// Adds what each kind asks of the handle's vertices or points.
+/// Adds the terms and rows of each kind for the handle's vertices or points.
 struct HoldAdder {
   const RestShape& shape;
   const std::string& name;
@@ -92,7 +92,7 @@ PointForm point_form(const RestShape& shape, const Handle& handle, std::size_t k
   for (int c = 0; c < 3; ++c) {
     const std::int32_t vertex = shape.faces()(point.face, c);
     std::int32_t j = 0;
-    while (j < form.count && form.vertices[j] != vertex) ++j;  // a face may have a corner twice
+    while (j < form.count && form.vertices[j] != vertex) ++j;  // a face may have the same corner twice
     if (j == form.count) form.vertices[form.count++] = vertex;
     form.coefficients[j] += point.barycentric[c];
   }
