@@ -233,7 +233,7 @@ typedef int32_t lpdeform_free_components;
 enum {
   /* lpdeform_poll returns COMPONENT_WITHOUT_HANDLE; the surface stays as it is */
   LPDEFORM_FREE_COMPONENTS_ERROR = 0,
-  LPDEFORM_FREE_COMPONENTS_STAY = 1,  /* stays where the rest mesh has it */
+  LPDEFORM_FREE_COMPONENTS_STAY = 1,  /* stays at rest */
   LPDEFORM_FREE_COMPONENTS_FOLLOW = 2 /* moves rigidly with the nearest handle */
 };
 
@@ -340,7 +340,7 @@ LPDEFORM_API uint32_t lpdeform_vertex_count(const lpdeform_session* session);
 
 typedef int32_t lpdeform_motion_kind;
 enum {
-  LPDEFORM_FIXED = 0,    /* stays where the rest mesh has it */
+  LPDEFORM_FIXED = 0,    /* stays at its rest positions */
   LPDEFORM_RIGID = 1,    /* x = R (p - center) + center + translation, p at rest; motions do not accumulate */
   LPDEFORM_POSITIONS = 2 /* absolute positions, one for each vertex or point */
 };

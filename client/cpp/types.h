@@ -25,7 +25,7 @@ struct Mesh {
   std::size_t face_count() const { return faces.size() / 3; }
 };
 
-/// Stays where the rest mesh has it.
+/// Stays at its rest positions.
 struct Fixed {};
 
 /// x = R (p - center) + center + translation for every vertex of the handle; always relative to the rest
@@ -114,7 +114,7 @@ enum class WeightKind {
 /// What happens to a connected component that no handle holds.
 enum class FreeComponents {
   kError,   // an error that names the component; nothing is solved
-  kStay,    // stays where the rest mesh has it
+  kStay,    // stays at rest
   kFollow,  // moves rigidly with the nearest handle
 };
 

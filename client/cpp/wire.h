@@ -14,7 +14,7 @@ namespace lpdeform::client {
 // Conversions of our plain types to messages. They fail only if an upload of the packer fails.
 
 absl::Status to_wire(const Mesh& mesh, Packer& packer, v1::Mesh& out);
-/// Does nothing if nothing is to be welded.
+/// Does nothing if the weld is empty.
 absl::Status to_wire(const Weld& weld, Packer& packer, v1::CreateSessionRequest& out);
 absl::Status to_wire(const Settings& settings, Packer& packer, v1::SettingsUpdate& out);
 absl::Status to_wire(const Update& update, std::uint64_t seq, Packer& packer, v1::Update& out);

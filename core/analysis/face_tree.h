@@ -64,7 +64,7 @@ class FaceTree {
     double entry;
   };
 
-  /// Where the ray enters the grown box; infinite where it does not.
+  /// How far along the ray it enters the grown box; infinite if it does not.
   static double entry(const Node& node, const Eigen::Vector3d& origin, const Eigen::Array3d& inverse,
                       double margin) {
     double enter = 0, leave = kInfinity;

@@ -26,7 +26,7 @@ struct Triangle {
   double sign = 1;   // outward sign of its component
   double least = 0;  // the least sign * <normal, direction> at which a ray meets it
 
-  /// Where the ray meets it; infinite where it does not.
+  /// How far along the ray it meets the face; infinite if it does not.
   double distance(const Point& origin, const Point& direction, double rounding) const {
     const double facing = normal.dot(direction);
     if (!(sign * facing > least)) return kInfinity;

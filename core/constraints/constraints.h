@@ -13,7 +13,7 @@ namespace lpdeform {
 /// What happens to a connected component that no handle holds.
 enum class FreeComponents {
   kError,   // an error that names the component
-  kStay,    // stays where the rest mesh has it
+  kStay,    // stays at rest
   kFollow,  // moves rigidly with the handle that has the vertex nearest to its centre at rest
 };
 

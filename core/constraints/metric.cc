@@ -147,7 +147,7 @@ void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& 
   }
 }
 
-/// x = matrix_^-1 b, x not b, by refinement from single precision. False where that does not converge.
+/// x = matrix_^-1 b, x not b, by refinement from single precision. False if that does not converge.
 bool Metric::refine(const Points& b, Points& x, const Workers& workers) const {
   solve_single(b, x, workers);
   Points rest, correction;

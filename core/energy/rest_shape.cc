@@ -55,7 +55,8 @@ Extent extent_of(const Points& positions, const std::vector<std::int32_t>& compo
   return extent;
 }
 
-/// Within these limits no square leaves the range of a double, and no coordinate or energy that of a float.
+/// Within these limits, squares stay within the range of a double, and coordinates and energies within the range of a
+/// float.
 absl::Status check_scale(const Extent& extent) {
   const double largest = std::max(extent.low.cwiseAbs().maxCoeff(), extent.high.cwiseAbs().maxCoeff());
   if (largest > RestShape::kLargestCoordinate) {

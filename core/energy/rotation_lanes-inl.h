@@ -280,7 +280,7 @@ HWY_INLINE Scaled scaled(const Matrix& b, V bound, Quartic& quartic) {
   return result;
 }
 
-/// The rotation for the largest eigenvalue x. False in lanes where it is not certain.
+/// The rotation for the largest eigenvalue x. False in lanes with an uncertain result.
 HWY_INLINE M rotation_at(const Scaled& s, V x, Matrix& rotation) {
   const D d;
   Davenport k = s.k;
@@ -298,7 +298,7 @@ HWY_INLINE M rotation_at(const Scaled& s, V x, Matrix& rotation) {
 }
 
 /// The best rotations for B = sum_j w_ij (x_i - x_j) (p_i - p_j)^T; `bound` >= <R, B> for every rotation.
-/// False in lanes where it is not certain.
+/// False in lanes with an uncertain result.
 HWY_INLINE void fit(const Matrix (&b)[kVectors], const V (&bound)[kVectors], Matrix (&rotation)[kVectors],
                     M (&is_good)[kVectors]) {
   Scaled s[kVectors];

@@ -15,7 +15,7 @@
 
 namespace lpdeform {
 
-/// The handle stays where the rest mesh has it.
+/// The handle stays at its rest positions.
 struct Fixed {
   bool operator==(const Fixed&) const = default;
 };
