@@ -163,8 +163,8 @@ struct SolverSettings {
 };
 
 /// p or stiffness that the server computes from the shape's geometry: softer at joints (concave creases, and places
-/// narrower than their surroundings), stiffer on rigid parts. With joint_i in [0, 1), p_i = 2 - c (1 - joint_i) and s_i
-/// = 10^(-c joint_i), c = strength clamp((largest joint_i - 0.2) / 0.2, 0, 1). If no joint_i exceeds 0.2, p is 2 and
+/// narrower than their surroundings), stiffer on rigid parts. With joint_i in [0, 1), p_i = 2 - c (1 - joint_i) and
+/// s_i = 10^(-c joint_i), c = strength clamp((largest joint_i - 0.2) / 0.2, 0, 1). If no joint_i exceeds 0.2, p is 2 and
 /// the stiffness 1 everywhere.
 struct Automatic {
   double strength = 1;  // 0 to 1; 0 is p = 2 and stiffness 1 everywhere

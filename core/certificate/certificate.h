@@ -24,9 +24,9 @@ namespace lpdeform {
 ///   y - C A (A^T C A)^-1 A^T y,   C = diag of the cells' weights c_i,
 ///
 /// and is scaled so that D is largest. If that bound is loose, y is polished by ADMM on the convex problem. Each cell
-/// has a penalty of its own, chosen by its k_i, so that stiff and soft cells converge equally fast. The multipliers of
-/// ADMM are feasible by construction and cost one back-substitution per step. ADMM starts from the best of several
-/// smoothed gradients k_i p_i (|z_i|^2 + eps^2)^{p_i / 2 - 1} z_i.
+/// has a penalty proportional to its k_i, so that stiff and soft cells converge equally fast. The multipliers of ADMM
+/// are feasible by construction and cost one back-substitution per step. ADMM starts from the best of several smoothed
+/// gradients k_i p_i (|z_i|^2 + eps^2)^{p_i / 2 - 1} z_i.
 struct CertificateSettings {
   double good_enough = 1e-4;  // polishing stops when the relative gap is <= this
   int max_steps = 1500;

@@ -34,9 +34,9 @@ enum class Warmth {
 /// Converged when, in the last stage, the objective f has decreased over 20 iterations by at most tolerance * p * f, p
 /// the largest p_i (a relative decrease of E^(1/p) of at most the tolerance); or when no step decreases f and the
 /// decrease predicted by a fresh metric, -<gradient, direction> / 2, is at most that; or when E is 0 to rounding. If p
-/// is mixed, the f in tolerance * p * f of the first criterion excludes the part that smoothing adds to cells with p_i
-/// < 2, because next to a large p this part can exceed all other energy. Stalled if the distortions of cells with p_i <
-/// 2 are at the level of rounding, and smoothing still adds over a hundredth to the objective, as with p = 1 and p = 10
+/// is mixed, the f in tolerance * p * f of the first criterion excludes the part that smoothing adds to cells with
+/// p_i < 2, because next to a large p this part can exceed all other energy. Stalled if the distortions of cells with
+/// p_i < 2 are at the level of rounding, and smoothing still adds over a hundredth to the objective, as with p = 1 and p = 10
 /// side by side.
 class QuasiNewton : public Minimiser {
  public:

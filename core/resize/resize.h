@@ -38,8 +38,8 @@ struct ResizeInputs {
 };
 
 /// Content-aware resizing (future work in section 5 of the paper). The ends along scaled axes move to their positions
-/// in the scaled shape. Salient parts keep their shape and size as far as axes are stretched, through the energy of Eq.
-/// 3 against the rest shape.
+/// in the scaled shape. Salient parts keep their shape and size as far as axes are stretched, through the energy of
+/// Eq. 3 against the rest shape.
 ///
 /// The handle holds the ends of each component at their scaled positions. Ends are the vertices within 1 % of the
 /// component's extent from its lowest or highest coordinate along an axis whose scale is not 1; if all scales are 1,
@@ -58,8 +58,8 @@ struct ResizeInputs {
 ///
 /// If the sparing of a component (core/resize/sparing.h) is below one half, as for a ball or an ellipsoid, all its
 /// vertices are held at their positions under plain scaling. If no component is spared, the material is p = 2.
-/// Otherwise a ball would become a ball with two cones: its slices are cheapest at some distance from the ends, and p =
-/// 1 gathers the whole stretch there. A handle either holds a vertex or does not, so this is a hard switch; `lpdeform
+/// Otherwise a ball would become a ball with two cones: its slices are cheapest at some distance from the ends, and
+/// p = 1 gathers the whole stretch there. A handle either holds a vertex or does not, so this is a hard switch; `lpdeform
 /// resize` blends the two results.
 ///
 /// p = 1 is essential: it gathers the stretch in places of low resistance. These are straight along the stretch, so the

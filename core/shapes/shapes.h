@@ -13,21 +13,21 @@ TriangleMesh box_surface(int nx, int ny, int nz);
 /// that height.
 TriangleMesh grid(int nx, int ny, double bump = 0.0);
 
-/// A block of nx x ny x nz unit cells with three square tunnels cut through it along z (genus 3). nx >= 7, ny
-/// >= 3, nz >= 1.
+/// A block of nx x ny x nz unit cells with three square tunnels cut through it along z (genus 3). nx >= 7,
+/// ny >= 3, nz >= 1.
 TriangleMesh block_with_holes(int nx, int ny, int nz);
 
 /// A bar of side x side x length cells along z. Its middle `neck_length` slices are narrowed to neck_side x neck_side
-/// cells about the axis, which gives two rigid parts and a joint. side - neck_side must be even; 1 <= neck_side <=
-/// side, 0 <= neck_length < length.
+/// cells about the axis, which gives two rigid parts and a joint. side - neck_side must be even; 1 <=
+/// neck_side <= side, 0 <= neck_length < length.
 TriangleMesh necked_bar(int side, int length, int neck_side, int neck_length);
 
 /// Unit sphere from an icosahedron subdivided `levels` times: 10 * 4^levels + 2 vertices.
 TriangleMesh sphere(int levels);
 
 /// A creature-like blob: a closed surface with four legs, a neck and a tail, made from a field of blended
-/// capsules sampled on a grid of `resolution` cells along its length. Manifold, one component. resolution
-/// >= 24.
+/// capsules sampled on a grid of `resolution` cells along its length. Manifold, one component.
+/// resolution >= 24.
 TriangleMesh creature(int resolution);
 
 /// Measures of pierced_block.
