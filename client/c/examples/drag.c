@@ -1,5 +1,5 @@
-/* The loop of a game, without a game: a sheet is held at one edge, and its opposite edge is dragged for 10 seconds at 60 frames per
- * second.
+/* The loop of a game, without a game: a sheet is held at one edge, and its opposite edge is dragged for 10 seconds at
+ * 60 frames per second.
  *
  *   drag ADDRESS [CELLS [FRAMES]]     CELLS per side, default 100: 10,201 vertices
  *
