@@ -23,7 +23,7 @@ void merge_change(Update::Change& older, Update::Change&& newer) {
   }
 }
 
-/// Bounds what is remembered of handles that are there no more. Motions stay: of handles that the session was made with.
+/// Bounds the memory for removed handles. Motions stay, since they belong to handles that the session was created with.
 void forget_removals(Update& update) {
   const auto is_removal = [](const auto& entry) {
     return std::holds_alternative<Update::Removal>(entry.second);
@@ -33,7 +33,7 @@ void forget_removals(Update& update) {
   if (count > Ledger::kMostRemovals) std::erase_if(update.handles, is_removal);
 }
 
-/// Leaves in `state` what is there once its motions and removals have been carried out.
+/// Reduces `state` to the handles that exist after its motions and removals.
 void settle_changes(Update& state) {
   std::erase_if(state.handles,
                 [](const auto& entry) { return !std::holds_alternative<Handle>(entry.second); });

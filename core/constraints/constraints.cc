@@ -38,7 +38,7 @@ absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Hold
     const auto scaled = scaled_targets(shape, name, handle, targets);
     if (!scaled.ok()) return scaled.status();
     add_holds(shape, name, handle, *scaled, holds);
-    if (!std::holds_alternative<Exactly>(handle.hold)) continue;
+    if (!handle.fixes_vertices()) continue;
     for (std::size_t k = 0; k < handle.vertices.size(); ++k) {
       hold(handle.vertices[k], scaled->row(k), targets.row(k));
     }
@@ -46,7 +46,7 @@ absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Hold
   return absl::OkStatus();
 }
 
-/// Those of the region of interest, unreferenced ones left out.
+/// For each vertex, whether it may move: it is in the region of interest and some face has it.
 std::vector<char> movable_vertices(const RestShape& shape, const std::vector<std::int32_t>* region) {
   std::vector<char> may_move(shape.vertex_count(), region == nullptr);
   if (region != nullptr) {
@@ -66,7 +66,7 @@ void drop_void_rows(const std::vector<char>& may_move, Holds& holds) {
   });
 }
 
-/// Holds everything outside the region where `outside` has it, and unreferenced vertices where handles have them.
+/// Holds all vertices outside the region at their positions in `outside`, and unreferenced vertices where handles have them.
 void hold_outside(const RestShape& shape, const std::vector<char>& may_move, const Points& outside,
                   Constraints& constraints) {
   for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
@@ -78,13 +78,9 @@ void hold_outside(const RestShape& shape, const std::vector<char>& may_move, con
   }
 }
 
-bool is_lock(const Hold& hold) {
-  return std::holds_alternative<AxisLock>(hold) || std::holds_alternative<PlaneLock>(hold);
-}
-
-/// Components that something keeps from drifting off, locks left out or not.
+/// Which components something ties, at least to the degree `least`.
 std::vector<char> tied_components(const RestShape& shape, const HandleSet& handles,
-                                  const Constraints& constraints, bool with_locks) {
+                                  const Constraints& constraints, Tie least) {
   std::vector<char> is_tied(shape.component_count(), false);
   const auto tie = [&](std::int32_t vertex) {
     if (shape.components()[vertex] >= 0) is_tied[shape.components()[vertex]] = true;
@@ -93,7 +89,7 @@ std::vector<char> tied_components(const RestShape& shape, const HandleSet& handl
     if (constraints.is_held[i]) tie(i);
   }
   for (const auto& [name, handle] : handles.handles()) {
-    if (!ties_component(handle) || (is_lock(handle.hold) && !with_locks)) continue;
+    if (tie_of(handle.hold) < least) continue;
     for (std::size_t k = 0; k < handle.size(); ++k) tie(point_form(shape, handle, k).vertices[0]);
   }
   return is_tied;
@@ -109,7 +105,7 @@ absl::Status name_free_component(const RestShape& shape, std::int32_t component)
                                  " vertices, the first of them vertex ", first, ") has no handle"));
 }
 
-/// The rigid motion of the handle that has the vertex nearest to `point`, all at rest, in scaled units.
+/// The rigid motion, in scaled units, of the handle with the vertex that is nearest to `point` at rest.
 RigidTransform nearest_handle_motion(const RestShape& shape, const HandleSet& handles,
                                      const Eigen::RowVector3d& point) {
   const Points& rest = shape.scaled_positions();
@@ -124,7 +120,7 @@ RigidTransform nearest_handle_motion(const RestShape& shape, const HandleSet& ha
   Points to = target_positions(*nearest, shape.positions(), shape.faces());
   to = (to.rowwise() - shape.centre()) / shape.mean_edge_length();
   if (std::holds_alternative<TargetPositions>(nearest->motion)) return fit_rigid(from, to);
-  // Of one vertex, or several in a line, the places alone do not tell how it is turned.
+  // The positions of one vertex, or of several on a line, do not determine a rotation.
   RigidTransform motion;
   motion.rotation = rotation_of(nearest->motion);
   motion.translation = to.colwise().mean() - from.colwise().mean() * motion.rotation.transpose();
@@ -144,7 +140,7 @@ Points component_centres(const RestShape& shape) {
   return sums;
 }
 
-/// Holds every vertex of the components that no handle holds, moved as `free_components` says.
+/// Holds every vertex of the components that no handle holds, at rest or moved, as `free_components` says.
 void hold_free_components(const RestShape& shape, const HandleSet& handles, FreeComponents free_components,
                           const std::vector<char>& has_handle, Constraints& constraints) {
   std::vector<RigidTransform> motions(shape.component_count());
@@ -190,7 +186,7 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   const std::vector<char> may_move = movable_vertices(shape, handles.region());
   hold_outside(shape, may_move, outside ? *outside : shape.positions(), constraints);
   drop_void_rows(may_move, holds);
-  const std::vector<char> is_tied = tied_components(shape, handles, constraints, true);
+  const std::vector<char> is_tied = tied_components(shape, handles, constraints, Tie::kPartial);
   const auto free = std::find(is_tied.begin(), is_tied.end(), false);
   if (free != is_tied.end() && free_components == FreeComponents::kError) {
     return name_free_component(shape, static_cast<std::int32_t>(free - is_tied.begin()));
@@ -200,7 +196,7 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   auto linear = LinearConstraints::create(std::move(holds.rows), constraints.is_held);
   if (!linear.ok()) return linear.status();
   constraints.linear = *std::move(linear);
-  if (tied_components(shape, handles, constraints, false) !=
+  if (tied_components(shape, handles, constraints, Tie::kWhole) !=
       std::vector<char>(shape.component_count(), true)) {
     constraints.linear.tie_locks();
   }

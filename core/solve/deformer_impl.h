@@ -14,7 +14,8 @@
 
 namespace lpdeform {
 
-/// What a Deformer holds, and the loop of a solve. Its guesses are in deformer_guess.cc, the rest in deformer_impl.cc.
+/// The state of a Deformer, and the loop of a solve. Initial guesses are in deformer_guess.cc, everything else in
+/// deformer_impl.cc.
 struct Deformer::Impl {
   Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options, Metric first_metric)
       : shape(std::move(rest_shape)),
@@ -78,7 +79,7 @@ struct Deformer::Impl {
   HandleSet handles;
   Material material;
   std::optional<Constraints> constraints;
-  std::shared_ptr<const Points> outside;  // where the region's surroundings are held, the caller's units
+  std::shared_ptr<const Points> outside;  // where vertices outside the region are held, in the caller's units
 
   // The state, in scaled units: the best of the last solve, or what was set.
   Points x;
@@ -103,15 +104,15 @@ struct Deformer::Impl {
   // The running solve.
   SolveSettings settings;
   Warmth warmth = Warmth::kCold;
-  Method second = Method::kAuto;  // what is tried after settings.method; kAuto: nothing
+  Method second = Method::kAuto;  // tried after settings.method; kAuto: none
   std::stop_token stop;
   std::optional<LpNorm> norm;           // true norm, and the reference of the running solve
   std::unique_ptr<CoarseLevel> coarse;  // made when first needed
   std::unique_ptr<Minimiser> minimiser;
-  std::unique_ptr<Certificate> certificate;  // under way, after the minimiser's end
+  std::unique_ptr<Certificate> certificate;  // runs after the minimiser has ended
   std::chrono::steady_clock::time_point started;
   double best_sum = 0, best_soft_sum = 0;
-  int evaluations_before = 0, back_substitutions_before = 0;  // of this Deformer, when the solve began
+  int evaluations_before = 0, back_substitutions_before = 0;  // counts of this Deformer when the solve began
   SolveSummary summary;
 };
 

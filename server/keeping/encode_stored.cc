@@ -4,6 +4,7 @@
 #include <string>
 
 #include "server/wire/encode.h"
+#include "server/wire/holds.h"
 
 namespace lpdeform {
 namespace {
@@ -26,19 +27,6 @@ void encode_points(const std::vector<SurfacePoint>& points, v1::SurfacePoints& o
   out.set_scalar(v1::SCALAR_FLOAT64);
   pack(barycentric.data(), barycentric.size(), *out.mutable_barycentric());
 }
-
-struct HoldEncoder {
-  v1::Handle& out;
-  void operator()(const Exactly&) const {}
-  void operator()(const Soft& soft) const { out.mutable_soft()->set_weight(soft.weight); }
-  void operator()(const Orientation& hold) const { out.mutable_orientation()->set_weight(hold.weight); }
-  void operator()(const AxisLock& lock) const {
-    encode_vector(lock.axis, *out.mutable_axis_lock()->mutable_axis());
-  }
-  void operator()(const PlaneLock& lock) const {
-    encode_vector(lock.normal, *out.mutable_plane_lock()->mutable_normal());
-  }
-};
 
 struct MotionEncoder {
   v1::Motion& out;
@@ -118,7 +106,7 @@ void encode_group(const Handle& handle, v1::Handle& out) {
   } else {
     encode_points(handle.points, *out.mutable_points());
   }
-  std::visit(HoldEncoder{out}, handle.hold);
+  encode_hold(handle.hold, out);
   out.set_footprint_radius(handle.footprint);
 }
 

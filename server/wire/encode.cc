@@ -7,17 +7,12 @@
 #include <variant>
 
 #include "core/base/fault.h"
+#include "core/base/match.h"
 #include "server/runtime/refusals.h"
+#include "server/wire/holds.h"
 
 namespace lpdeform {
 namespace {
-
-template <typename... Cases>
-struct Match : Cases... {
-  using Cases::operator()...;
-};
-template <typename... Cases>
-Match(Cases...) -> Match<Cases...>;  // clang 14 does not find it by itself
 
 v1::StopReason encode_stop(StopReason reason) {
   switch (reason) {
@@ -67,15 +62,6 @@ v1::InitialGuess encode_initial(InitialGuess guess) {
       return v1::INITIAL_GUESS_REST;
   }
   return v1::INITIAL_GUESS_UNSPECIFIED;
-}
-
-v1::HandleKind encode_kind(const Hold& hold) {
-  const Match kind{[](const Exactly&) { return v1::HANDLE_KIND_EXACT; },
-                   [](const Soft&) { return v1::HANDLE_KIND_SOFT; },
-                   [](const Orientation&) { return v1::HANDLE_KIND_ORIENTATION; },
-                   [](const AxisLock&) { return v1::HANDLE_KIND_AXIS_LOCK; },
-                   [](const PlaneLock&) { return v1::HANDLE_KIND_PLANE_LOCK; }};
-  return std::visit(kind, hold);
 }
 
 v1::GoAwayReason encode_reason(EndReason reason) {
@@ -280,7 +266,7 @@ void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint no
     message.set_name(name);
     message.set_vertex_count(static_cast<std::uint32_t>(handle.vertices.size()));
     message.set_point_count(static_cast<std::uint32_t>(handle.points.size()));
-    message.set_kind(encode_kind(handle.hold));
+    message.set_kind(kind_of(handle.hold));
   }
   if (const auto* const region = info.inputs.handles->region()) {
     out.set_region_vertex_count(static_cast<std::uint32_t>(region->size()));

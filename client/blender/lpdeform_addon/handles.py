@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from . import surface
+from . import holds, surface
 from .client import lpdeform
 
 _rigid_tolerance = 1e-5  # of the lengths and angles of a matrix that float32 has gone through
@@ -87,15 +87,7 @@ def hold(empty):
     handle = empty.lpdeform_handle
     axis = rest_matrix(empty).to_3x3().col[2].normalized()
     direction = (axis.x, axis.y, axis.z) if axis.length > 0 else (0.0, 0.0, 1.0)
-    if handle.kind == "SOFT":
-        return lpdeform.Soft(handle.weight)
-    if handle.kind == "ORIENTATION":
-        return lpdeform.Orientation(handle.weight)
-    if handle.kind == "AXIS":
-        return lpdeform.AxisLock(direction)
-    if handle.kind == "PLANE":
-        return lpdeform.PlaneLock(direction)
-    return lpdeform.Exact()
+    return holds.KINDS[handle.kind].make(handle.weight, direction)
 
 
 def motion(matrix: Matrix, points: np.ndarray, is_turned_only: bool):

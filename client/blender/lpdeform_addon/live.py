@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from . import handles, surface
+from . import handles, holds, surface
 from .client import NotReady, access, address, lpdeform, require
 from .told import Told
 
@@ -214,7 +214,7 @@ class LiveMesh:
             return lpdeform.Removal()
         settings = present.empty.lpdeform_handle
         held = present.held
-        motion = handles.motion(present.matrix, held.places, settings.kind == "ORIENTATION")
+        motion = handles.motion(present.matrix, held.places, holds.KINDS[settings.kind].is_turned_only)
         last = self._told.last(key)
         if last is not None and last.value[0] == present.value[0]:
             return motion

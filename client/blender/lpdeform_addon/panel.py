@@ -4,7 +4,7 @@ import textwrap
 
 import bpy
 
-from . import live
+from . import holds, live
 from .client import address
 from .operators import mesh_of
 
@@ -108,7 +108,7 @@ class HandlePanel(_Below, bpy.types.Panel):
         handle, layout = context.object.lpdeform_handle, self.layout
         layout.use_property_split = True
         layout.prop(handle, "kind")
-        if handle.kind in ("SOFT", "ORIENTATION"):
+        if holds.KINDS[handle.kind].has_weight:
             layout.prop(handle, "weight")
         layout.prop(handle, "footprint")
         row = layout.row(align=True)

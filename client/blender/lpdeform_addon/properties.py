@@ -3,13 +3,7 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty
 
-KINDS = (
-    ("EXACT", "Exact", "The vertices go exactly where the empty takes them"),
-    ("SOFT", "Soft", "The vertices are drawn to where the empty takes them"),
-    ("ORIENTATION", "Orientation", "The surface is turned as the empty is; its position is free"),
-    ("AXIS", "Axis", "The vertices slide along the empty's Z axis as it was at rest"),
-    ("PLANE", "Plane", "The vertices slide across the empty's Z axis as it was at rest"),
-)
+from . import holds
 
 
 class MeshSettings(bpy.types.PropertyGroup):
@@ -70,7 +64,7 @@ class HandleSettings(bpy.types.PropertyGroup):
     mesh: PointerProperty(type=bpy.types.Object, name="Mesh")
     number: IntProperty(name="Number", description="Of its vertices in the mesh's attribute lpdeform_handle; 0: holds none")
     rest: FloatVectorProperty(name="Rest", size=16, description="Its matrix at rest in the mesh's own space, by rows")
-    kind: EnumProperty(name="Hold", items=KINDS, default="EXACT")
+    kind: EnumProperty(name="Hold", items=holds.ITEMS, default="EXACT")
     weight: FloatProperty(
         name="Weight", default=1.0, min=0.0, max=1e6, soft_max=100.0, description="Of soft and orientation handles"
     )

@@ -31,7 +31,7 @@ void refuse_value(const std::string& place, const char* wanted, const json& valu
          absl::StrCat(place, " must be ", wanted, ", not ", shown(value), "."));
 }
 
-void check_keys(const json& object, const std::string& owner, std::initializer_list<const char*> known) {
+void check_keys(const json& object, const std::string& owner, const std::vector<const char*>& known) {
   if (!object.is_object()) refuse_value(owner, "an object", object);
   for (const auto& [key, value] : object.items()) {
     if (std::ranges::find(known, key) != known.end()) continue;

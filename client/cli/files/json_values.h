@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdint>
-#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -35,7 +34,7 @@ std::string key_of(const std::string& owner, const char* key);
 std::string shown(const json& value);
 
 /// HANDLE_FILE_KEY where `object` has another key than the known; HANDLE_FILE_VALUE where it is no object.
-void check_keys(const json& object, const std::string& owner, std::initializer_list<const char*> known);
+void check_keys(const json& object, const std::string& owner, const std::vector<const char*>& known);
 
 /// HANDLE_FILE_KEY where there is none.
 const json& required(const json& object, absl::string_view owner, const char* key);

@@ -1,5 +1,5 @@
 import { LpdeformError } from "./errors.js";
-import { type Buffer, Scalar, type Vector3 as WireVector } from "./gen/lpdeform/v1/data_pb.js";
+import { type Buffer, Scalar } from "./gen/lpdeform/v1/data_pb.js";
 import { StopReason } from "./gen/lpdeform/v1/frame_pb.js";
 import {
   type Handle as WireHandle,
@@ -10,6 +10,7 @@ import {
 } from "./gen/lpdeform/v1/handle_pb.js";
 import type { MeshReport as WireMeshReport } from "./gen/lpdeform/v1/report_pb.js";
 import { NoticeReason, type Notice as WireNotice } from "./gen/lpdeform/v1/service_pb.js";
+import { holdFromWire, vectorOf } from "./hold_kinds.js";
 import type * as api from "./types.js";
 
 // From messages of the contract to the values of this library.
@@ -83,20 +84,6 @@ function handleFromWire({ vertices, points, motion, hold, footprintRadius }: Wir
   };
 }
 
-function holdFromWire(hold: WireHandle["hold"]): api.Hold {
-  switch (hold.case) {
-    case "soft":
-    case "orientation":
-      return { kind: hold.case, ...(hold.value.weight !== undefined && { weight: hold.value.weight }) };
-    case "axisLock":
-      return { kind: "axisLock", axis: vectorOf(hold.value.axis) };
-    case "planeLock":
-      return { kind: "planeLock", normal: vectorOf(hold.value.normal) };
-    default:
-      return { kind: "exact" };
-  }
-}
-
 function motionFromWire({ kind }: WireMotion): api.Motion {
   if (kind.case === "rigid") {
     const { axis, angleRadians, center, translation } = kind.value;
@@ -117,10 +104,6 @@ function pointsFromWire({ faces, scalar, barycentric }: SurfacePoints): api.Surf
     face,
     barycentric: [numbers[3 * k]!, numbers[3 * k + 1]!, numbers[3 * k + 2]!],
   }));
-}
-
-function vectorOf(vector: WireVector | undefined): api.Vector3 {
-  return [vector?.x ?? 0, vector?.y ?? 0, vector?.z ?? 0];
 }
 
 /** Of their own: messages are views of what came. */

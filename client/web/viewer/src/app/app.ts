@@ -3,6 +3,7 @@ import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import { isAlike } from "../model/alike.js";
 import { History } from "../model/history.js";
+import { kindOf } from "../model/hold_kinds.js";
 import { boundsOf, type Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
 import { type Seams, seamsOf } from "../model/seams.js";
@@ -261,7 +262,7 @@ export class App implements Workbench {
   /** Whether the handle can be dragged to another place; where not, the user is told why. */
   canShift({ name, isLocked, hold }: Handle): boolean {
     if (isLocked) this.notify(`“${name}” is locked: its padlock in the list lets it move.`);
-    else if (hold.kind === "orientation") {
+    else if (kindOf(hold).isTurnedOnly) {
       this.notify(`“${name}” is held by its direction alone: turn it by its rings or with arrow keys.`);
       this.view.set({ gizmo: "rotate" });
     } else return true;
@@ -345,7 +346,7 @@ export class App implements Workbench {
     const pose = tool === "move" && handle && !handle.isLocked && !handle.targets ? handle.pose : undefined;
     for (const pane of this.panes) {
       pane.mark(document, this.view.now, pointedOut, colour);
-      pane.stage.gizmo.show(pose, handle?.hold.kind === "orientation" ? "rotate" : gizmo);
+      pane.stage.gizmo.show(pose, handle && kindOf(handle.hold).isTurnedOnly ? "rotate" : gizmo);
     }
   }
 
