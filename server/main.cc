@@ -19,13 +19,14 @@ namespace {
 
 using lpdeform::ServerOptions;
 
-/// The statuses that it exits with, beside 0.
+/// The exit statuses other than 0.
 constexpr int kRefused = 1, kNotKept = 2;
 
-/// What it has to end by itself after the store was waited for: less where that hangs, and nothing is to be saved any more.
+/// How long the process may take to end by itself after it has waited for the store. It is less if the store
+/// hangs, because nothing can be saved any more.
 constexpr std::chrono::seconds kToEnd{10}, kToEndWithout{2};
 
-/// Clocks count no further.
+/// The range that clocks can count.
 constexpr double kMostSeconds = 1e9, kLeastSeconds = 1e-3;
 
 struct Arguments {
@@ -43,7 +44,7 @@ std::chrono::milliseconds milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<std::int64_t>(seconds * 1000));
 }
 
-/// "4GiB" or "4096". CLI11's own takes -1 for the largest size.
+/// Accepts "4GiB" or "4096". CLI11's own validator takes -1 for the largest size.
 CLI::Validator size_in_bytes() {
   return {[](std::string& text) -> std::string {
             if (text.find('-') != std::string::npos) return "must not be negative";
@@ -52,7 +53,7 @@ CLI::Validator size_in_bytes() {
           "SIZE"};
 }
 
-/// The number before "%"; empty where that is none from 1 to 100.
+/// The number before "%"; empty unless that is a number from 1 to 100.
 std::optional<double> percent_of(const std::string& text) {
   double percent = 0;
   if (text.empty() || text.back() != '%') return std::nullopt;
@@ -60,7 +61,7 @@ std::optional<double> percent_of(const std::string& text) {
   return is_number && percent >= 1 && percent <= 100 ? std::optional(percent) : std::nullopt;
 }
 
-/// Also "25%", which stays as it is.
+/// Accepts also "25%", which stays as it is.
 CLI::Validator size_or_percent() {
   return {[](std::string& text) -> std::string {
             if (text.empty() || text.back() != '%') return size_in_bytes()(text);
@@ -69,7 +70,7 @@ CLI::Validator size_or_percent() {
           "SIZE"};
 }
 
-/// Also "25%", of what the machine or its control group has.
+/// Accepts also "25%": a share of the memory of the machine or its control group.
 CLI::Validator size_or_share() {
   return {[](std::string& text) -> std::string {
             if (std::string why = size_or_percent()(text); !why.empty()) return why;
@@ -82,7 +83,7 @@ CLI::Validator size_or_share() {
           "SIZE"};
 }
 
-/// Also refuses what is not a number.
+/// Refuses also what is not a number.
 CLI::Validator seconds_from(double least) {
   return {[least](std::string& text) -> std::string {
             double seconds = 0;
@@ -285,7 +286,7 @@ void describe(CLI::App& app, Arguments& arguments) {
       ->type_name("ADDRESS");
 }
 
-/// What an option of the service is called on the command line.
+/// The name of an option of the service on the command line.
 std::string flag_of(std::string name) {
   static const std::map<std::string, std::string> kOthers{{"max_stream_bytes_per_second", "max_stream_rate"},
                                                           {"max_stream_frames_per_second", "max_frame_rate"},
@@ -304,14 +305,14 @@ int refuse(const absl::Status& why) {
   return kRefused;
 }
 
-/// Help is asked for; anything else is an error.
+/// A request for help ends with status 0; anything else is an error.
 int end_of_parse(const CLI::App& app, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) return app.exit(error);
   std::fprintf(stderr, "lpdeform-server: %s (see lpdeform-server --help)\n", error.what());
   return kRefused;
 }
 
-/// Of text that size_or_percent() has let through.
+/// Parses text that size_or_percent() has accepted.
 lpdeform::ByteLimit byte_limit(const std::string& text) {
   if (const auto percent = percent_of(text)) return {.percent = *percent};
   return {.bytes = std::stoull(text)};
@@ -349,8 +350,8 @@ void pass_to_main_thread(int signal) {
   pthread_kill(main_thread, signal);
 }
 
-// Leaves SIGTERM and SIGINT to sigwait() in the main thread. Threads made from now on block them; those that
-// a library (OpenBLAS) made while it was loaded do not, and pass them on.
+// Leaves SIGTERM and SIGINT to sigwait() in the main thread. Threads made from now on block both signals.
+// Threads that a library (OpenBLAS) made while it was loaded do not, and they pass the signals on.
 sigset_t signals_for_sigwait() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -368,7 +369,8 @@ sigset_t signals_for_sigwait() {
 
 int main(int argc, char** argv) {
   const sigset_t signals = signals_for_sigwait();
-  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of the write to it
+  signal(SIGXFSZ,
+         SIG_IGN);  // without this, writing beyond a limit on file size ends the process instead of failing
 
   lpdeform::ProcessEnd end;  // outlives the store
   Arguments arguments;
