@@ -178,7 +178,7 @@ struct Server::Impl {
                        return is_plain ? is_serving(listener->address()) : takes_connection(*listener);
                      },
                      [this] { return listener->refused(); }, [this] { return backend.gate.is_closed(); },
-                     backend.scheduler, backend.pool}) {}
+                     backend.scheduler(), backend.pool()}) {}
 
   absl::Status start_grpc(const ServerOptions& options, std::shared_ptr<Certificates> shown);
   void start_listening(const ServerOptions& options);

@@ -82,8 +82,8 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
     std::uint64_t most_bytes_each;
     Timers::Duration idle;
     std::size_t most_uploads = kMostUploads;
-    std::size_t most_uploads_each =
-        0;  // per owner; 0: without limit. Does not apply to the owner "", which stands for all anonymous callers.
+    /// Per owner; 0: without limit. Does not apply to the owner "", which stands for all anonymous callers.
+    std::size_t most_uploads_each = 0;
   };
 
   Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers, Limits limits);

@@ -31,8 +31,8 @@ class Registry : public std::enable_shared_from_this<Registry> {
   struct Limits {
     std::size_t most_sessions;
     Timers::Duration idle;
-    std::size_t most_each =
-        0;  // per owner; 0: without limit. Not for the owner "", which is all anonymous callers
+    /// Per owner; 0: without limit. Does not apply to the owner "", which stands for all anonymous callers.
+    std::size_t most_each = 0;
   };
 
   Registry(std::shared_ptr<Timers> timers, Limits limits);
