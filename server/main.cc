@@ -369,8 +369,8 @@ sigset_t signals_for_sigwait() {
 
 int main(int argc, char** argv) {
   const sigset_t signals = signals_for_sigwait();
-  signal(SIGXFSZ,
-         SIG_IGN);  // without this, writing beyond a limit on file size ends the process instead of failing
+  // Writing beyond a limit on file size then fails, instead of ending the process.
+  signal(SIGXFSZ, SIG_IGN);
 
   lpdeform::ProcessEnd end;  // outlives the store
   Arguments arguments;
