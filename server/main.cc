@@ -333,7 +333,7 @@ int serve(Arguments& arguments, const sigset_t& signals, lpdeform::ProcessEnd& e
   if (!server.ok()) return refuse(server.status());
   std::printf("lpdeform-server listens on %s\n", (*server)->address().c_str());
   if (!(*server)->admin_address().empty()) {
-    std::printf("lpdeform-server shows itself on http://%s\n", (*server)->admin_address().c_str());
+    std::printf("lpdeform-server serves its admin pages on http://%s\n", (*server)->admin_address().c_str());
   }
   std::fflush(stdout);
   int signal = 0;
