@@ -50,8 +50,8 @@ class GeometryQueue {
   TaskPool& pool_;
   const std::shared_ptr<Budget> budget_;
   std::mutex mutex_;
-  std::map<std::shared_ptr<const Session>, std::vector<Waiting>>
-      waiting_;  // for each session whose geometry is being found
+  /// For each session whose geometry is being found.
+  std::map<std::shared_ptr<const Session>, std::vector<Waiting>> waiting_;
 };
 
 }  // namespace lpdeform

@@ -45,8 +45,8 @@ class KeptBlobs {
 
  private:
   const BlobFolder& folder_;
-  std::map<std::string, std::set<std::string>>
-      pinned_;  // sessions that are being made, by the keys of their blobs
+  /// Sessions that are being made, by the keys of their blobs.
+  std::map<std::string, std::set<std::string>> pinned_;
   std::set<std::string> loose_;
   std::optional<std::uint64_t> bytes_;
 };

@@ -15,9 +15,8 @@ namespace lpdeform::cli {
 
 /// How .png outputs are drawn. Pictures that are to be compared need the same camera and colours.
 struct PictureOptions {
-  std::vector<int> size;  // width and height in pixels; empty: PictureStyle's
-  std::optional<std::filesystem::path>
-      camera;      // a mesh: the camera stands where it would for a picture of it
+  std::vector<int> size;                        // width and height in pixels; empty: PictureStyle's
+  std::optional<std::filesystem::path> camera;  // a mesh: pictures are framed as for this mesh
   double red = 0;  // the distortion shown in full red; 0: each picture's own largest
 };
 

@@ -172,8 +172,8 @@ void Lane::reconnect() {
   }
   auto joined = join();
   if (!joined.ok()) note(joined.status());
-  std::shared_ptr<client::Session>
-      before;  // destroyed after the lock is released, because it sends a farewell to the server
+  // Destroyed after the lock is released, because it sends a farewell to the server.
+  std::shared_ptr<client::Session> before;
   const std::scoped_lock lock(mutex_);
   is_reconnecting_ = false;
   if (!joined.ok()) return;

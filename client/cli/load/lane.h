@@ -76,8 +76,8 @@ class Lane {
 
   const Connect connect_;
   const int vertices_;
-  std::optional<client::Session>
-      owner_;  // makes the session and does nothing more, so that the session outlives reconnects
+  /// Makes the session and does nothing more, so that the session outlives reconnects.
+  std::optional<client::Session> owner_;
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;

@@ -219,13 +219,13 @@ def _wrong_size(part: frame_pb2.FramePart) -> LpdeformError:
 
 
 def stop_reason_name(reason: int) -> str:
-    """"converged" and so on; "running" where it has none."""
+    """"converged" and so on; "running" if there is none."""
     known = frame_pb2.StopReason.items()
     names = {number: name.removeprefix("STOP_REASON_").lower() for name, number in known}
     return "running" if reason == frame_pb2.STOP_REASON_UNSPECIFIED else names.get(reason, "running")
 
 
 def method_name(method: int) -> str:
-    """"quasi_newton" and so on; empty where none runs."""
+    """"quasi_newton" and so on; empty if no method runs."""
     names = {number: name.removeprefix("METHOD_").lower() for name, number in handle_pb2.Method.items()}
     return "" if method == handle_pb2.METHOD_UNSPECIFIED else names.get(method, "")
