@@ -24,10 +24,11 @@ std::shared_ptr<Timers> or_system(std::shared_ptr<Timers> timers) {
   return timers ? std::move(timers) : std::make_shared<SystemTimers>();
 }
 
-/// Of a token that is good for longer, as one whose date is in milliseconds by mistake. A clock does not count much further.
+/// The longest life of a stream, for tokens that are valid for longer, for example because their date is in
+/// milliseconds by mistake. A clock cannot count much further.
 constexpr std::chrono::seconds kLongestStream = std::chrono::hours(24 * 365);
 
-/// Between looks whether a stream whose token will expire is still there.
+/// How often to check whether a stream whose token will expire still exists.
 constexpr std::chrono::minutes kBetweenLooks{1};
 
 void end_at(const std::shared_ptr<Timers>& timers, const std::weak_ptr<FrameStream>& weak,
@@ -42,13 +43,13 @@ void end_at(const std::shared_ptr<Timers>& timers, const std::weak_ptr<FrameStre
   timers->at(std::min(when, timers->now() + kBetweenLooks), look);
 }
 
-/// Whether nobody but this machine's own programs is meant to be let in, and nothing else keeps others out.
+/// Whether only programs on this machine may call, and nothing else keeps others out.
 bool is_for_this_machine(const ServerOptions& options) {
   return options.token_keys_file.empty() && !options.tls.knows_clients() && !options.allow_anonymous &&
          !absl::StartsWith(options.address, "unix:");
 }
 
-/// Clients count from an earlier moment than the server, and gRPC rounds what it is told to about a hundredth.
+/// Clients start to count earlier than the server does, and gRPC rounds the deadline to about a hundredth.
 bool is_reached(const CallContext::Deadline& deadline) {
   const auto slack = std::chrono::milliseconds(50) + deadline.given / 50;
   return deadline.when - slack <= std::chrono::system_clock::now();
@@ -60,7 +61,7 @@ std::string ended_because(EndReason reason) {
   return reason == EndReason::kDraining ? "draining" : "deleted";
 }
 
-/// Where a flood is followed by nothing, nothing else would.
+/// Sums the log up periodically, because after a flood there may be no line that would do so.
 void sum_up_later(const std::weak_ptr<Timers>& weak_timers, const std::weak_ptr<const Log>& weak_log) {
   const auto timers = weak_timers.lock();
   if (!timers) return;
@@ -94,14 +95,14 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
       caller_limits_(std::make_shared<CallerLimits>(
           timers, CallerLimits::Limits{options.max_streams_per_caller, options.max_upload_bytes_per_second})),
       factory_(options, budget_, uploads_,
-               {scheduler,
+               {scheduler_,
                 timers,
                 options.heartbeat,
                 metrics,
                 {options.max_streams_per_session, {options.max_handles, options.max_undo}}}),
-      scheduler(options.runner_threads == 0 ? Scheduler::default_threads() : options.runner_threads,
-                observer(Span::kSchedulerQueue)),
-      pool(kPoolThreads, options.max_calls_waiting, observer(Span::kCallQueue)) {
+      scheduler_(options.runner_threads == 0 ? Scheduler::default_threads() : options.runner_threads,
+                 observer(Span::kSchedulerQueue)),
+      pool_(kPoolThreads, options.max_calls_waiting, observer(Span::kCallQueue)) {
   if (options.store) {
     keeper_ = Keeper::create(options.store, {timers, metrics, log_, options.session_idle});
     keeper_->on_lost = [registry = std::weak_ptr(registry)](const Session& session) {
@@ -169,7 +170,7 @@ std::string Backend::metrics_text() {
   metrics->set(Level::kSessions, static_cast<double>(registry->size()));
   metrics->set(Level::kUploads, static_cast<double>(uploads_->size()));
   metrics->set(Level::kMemoryBytes, static_cast<double>(budget_->used()));
-  metrics->set(Level::kOverloaded, scheduler.is_overloaded() ? 1 : 0);
+  metrics->set(Level::kOverloaded, scheduler_.is_overloaded() ? 1 : 0);
   metrics->set(Level::kDraining, gate.is_closed() ? 1 : 0);
   return metrics->text();
 }
@@ -246,7 +247,7 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call
   if (!decoded.ok()) return decoded.status();
   decoded->max_bytes_per_second = options_.max_stream_bytes_per_second;
   if (const double most = options_.max_stream_frames_per_second; most > 0) {
-    double& asked = decoded->max_frames_per_second;  // 0: any number
+    double& asked = decoded->max_frames_per_second;  // 0: without limit
     asked = asked > 0 ? std::min(asked, most) : most;
   }
   auto place = caller_limits_->enter_stream(session->owner());
@@ -314,7 +315,8 @@ absl::Status Backend::solve(const CallContext& call, const Change& change, const
   const SolveJob::OnDone on_ended = [this, session, trace_id = call.trace_id,
                                      on_done](absl::StatusOr<SolveResult> result) {
     if (result.ok()) log_solved(*session, *result, trace_id);
-    // The result answers the update, so it comes when that is kept: as a rule long ago.
+    // The result answers the update, so it is sent when the update is stored, which usually has happened long
+    // before.
     when_kept(*session, session->revision(), [on_done, result](bool) { on_done(result); });
   };
   job = std::make_shared<SolveJob>(std::move(options), std::move(on_progress), on_ended);

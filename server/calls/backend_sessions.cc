@@ -1,4 +1,4 @@
-// Backend: sessions begin, change and end, and what the store has to do with that.
+// Backend: sessions begin, change and end, and what that means for the store.
 
 #include <algorithm>
 #include <chrono>
@@ -19,7 +19,7 @@ namespace lpdeform {
 namespace {
 
 constexpr std::uint32_t kDefaultPage = 100, kLargestPage = 1000;
-/// Of page tokens that go on with what only the store has.
+/// The prefix of page tokens that continue with sessions that only the store has.
 constexpr std::string_view kKeptOnly = "kept:";
 
 }  // namespace
@@ -67,7 +67,7 @@ void Backend::restore_session(const CallContext& call, const v1::RestoreSessionR
 
 void Backend::create_once(const Creation& creation) {
   if (keeper_ == nullptr || creation.request_id.empty()) return make_session(creation);
-  // A server that was restarted may have made it before.
+  // The server may have created the session before a restart.
   keeper_->find_request(
       creation.owner, creation.request_id, [this, creation](const absl::StatusOr<std::string>& name) {
         if (!name.ok()) return creation.on_created(name.status());
@@ -83,7 +83,7 @@ void Backend::make_session(const Creation& creation) {
   if (!registry->begin_creation(creation.request_id, creation.on_created, creation.fingerprint,
                                 creation.owner))
     return;
-  scheduler.run_once([this, creation] {
+  scheduler_.run_once([this, creation] {
     const auto finish = [this, creation](absl::StatusOr<std::shared_ptr<Session>> made) {
       if (made.ok()) {
         metrics->add(Count::kSessionsCreated);
@@ -130,7 +130,8 @@ absl::StatusOr<NewSession> Backend::make_restored(const SessionMaker& maker,
   if (keeper_ == nullptr) return made;
   static const StoredBlobs no_blobs;
   Decoder decoder = factory_.decoder(snapshot->request, maker.owner).reading_stored(no_blobs);
-  // A snapshot does not say by which request it was restored; the store has to, for a server that was restarted.
+  // A snapshot does not name the request that restores it. The store must know it, for a server that was
+  // restarted.
   v1::CreateSessionRequest kept = snapshot->request;
   kept.set_request_id(request.request_id());
   auto head = encode_head(kept, decoder, fingerprint, made.session->created_unix_ms());
@@ -177,7 +178,8 @@ void Backend::list_sessions(const CallContext& call, const v1::ListSessionsReque
   list_kept(caller->subject, "", most - page->sessions.size(), response, std::move(done));
 }
 
-/// Adds those that only the store has. Without room for any it says that there may be some.
+/// Adds the sessions that only the store has. If the page has no room for any, its token says that there may
+/// be some.
 void Backend::list_kept(const std::string& owner, const std::string& after, std::size_t most,
                         v1::ListSessionsResponse& response, Done done) {
   const auto is_elsewhere = [this](const std::string& name) { return !registry->has(name); };
@@ -324,18 +326,18 @@ void Backend::with_session(const CallContext& call, Access access, const std::st
   fetch(call, name, caller->subject, std::move(then));
 }
 
-/// From the store, where it is there alone.
+/// Restores a session from the store if it is not here.
 void Backend::fetch(const CallContext& call, const std::string& name, const std::string& owner,
                     OnSession then) {
   const Done in_pool = [this, name, owner, then = std::move(then)](const absl::Status& status) {
     const auto tell = [this, name, owner, then, status] {
       status.ok() ? then(registry->find(name, owner)) : then(status);
     };
-    if (!pool.try_post(tell)) then(server_busy(pool.expected_wait()));
+    if (!pool_.try_post(tell)) then(server_busy(pool_.expected_wait()));
   };
   {
     const std::scoped_lock lock(restoring_mutex_);
-    if (registry->has(name)) return in_pool(absl::OkStatus());  // since a moment ago
+    if (registry->has(name)) return in_pool(absl::OkStatus());  // it has just been restored
     const auto [restoring, is_new] = restoring_.try_emplace(name, Restoring{owner, {}});
     if (!is_new && restoring->second.owner != owner) return in_pool(absl::OkStatus());
     restoring->second.waiting.push_back(in_pool);
@@ -343,7 +345,7 @@ void Backend::fetch(const CallContext& call, const std::string& name, const std:
   }
   keeper_->take_over(name, {owner, call.route}, [this, name](absl::StatusOr<Keeper::Found> found) {
     if (!found.ok()) return end_restoring(name, found.status());
-    scheduler.run_once([this, name, found = std::move(found)] { make_again(name, found); });
+    scheduler_.run_once([this, name, found = std::move(found)] { make_again(name, found); });
   });
 }
 
@@ -352,7 +354,7 @@ void Backend::when_decodable(const Change& change, const v1::Update& update, Don
   geometry_.when_found(change.session, update, std::move(then));
 }
 
-/// On a thread of the scheduler.
+/// Called on a thread of the scheduler.
 void Backend::make_again(const std::string& name, absl::StatusOr<Keeper::Found> found) {
   const auto give_up = [&](const absl::Status& status) {
     keeper_->give_up(name);
@@ -384,7 +386,7 @@ void Backend::end_restoring(const std::string& name, const absl::Status& status)
     metrics->add(Count::kSessionsDamaged);
     log().error("session_damaged", {{"session", abbreviated(name)}, {"text", damage}});
   }
-  // What there is not, find() does not find either.
+  // find() will answer for a session that does not exist.
   const bool is_unknown = fault_of(status).reason == Reason::kSessionUnknown;
   if (is_unknown) registry->forget_left(name);
   for (const Done& then : waiting) then(is_unknown ? absl::OkStatus() : status);

@@ -13,7 +13,7 @@
 namespace lpdeform {
 namespace {
 
-/// What calls with one stream of frames do with it.
+/// What calls with one stream of frames have in common.
 template <typename Reactor, typename Response>
 class FrameCall : public WritePump<Reactor, Response> {
  public:
@@ -23,7 +23,7 @@ class FrameCall : public WritePump<Reactor, Response> {
   using Pump = WritePump<Reactor, Response>;
   using typename Pump::Made;
 
-  /// Opens the stream, on a thread of the pool, once its session is there. Ends the call where that fails.
+  /// Opens the stream, on a thread of the pool, once its session is there. Ends the call if that fails.
   void open(
       const std::string& session_name, const std::string& token, const v1::FrameOptions& options,
       const std::function<void()>& then = [] {}) {
@@ -77,7 +77,7 @@ class StreamFramesCall final : public FrameCall<StreamFramesReactor, Outgoing<v1
   void begin(const v1::StreamFramesRequest& request) {
     auto self = std::static_pointer_cast<StreamFramesCall>(shared_from_this());
     const auto task = [self, request] { self->open(request.session(), "", request.options()); };
-    if (!backend_.pool.try_post(task)) refuse(server_busy(backend_.pool.expected_wait()));
+    if (!backend_.pool().try_post(task)) refuse(server_busy(backend_.pool().expected_wait()));
   }
 };
 
@@ -114,7 +114,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   static constexpr std::size_t kMostAnswers = 64;
   static constexpr std::chrono::seconds kOpenPatience{10};
 
-  /// The next message, unless too many answers wait for the client to read them.
+  /// Reads the next message, unless too many answers wait for the client to read them.
   void read() {
     const std::scoped_lock lock(mutex_);
     read_locked();
@@ -130,12 +130,12 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
     if (is_read_due_) read_locked();
   }
 
-  /// A client that sends no more may go on reading; one that never opened has nothing to read.
+  /// A client that sends no more may still read. A client that never opened a stream has nothing to read.
   void end_of_input(bool is_open) {
     if (!is_open) break_off("The stream ended before it was opened.");
   }
 
-  /// Who may not call is not read: gRPC holds what has come of a message, up to its 4 MiB.
+  /// Checks the caller before the first read, because gRPC holds what has come of a message, up to its 4 MiB.
   void let_in() {
     const auto caller = backend_.identify(context(), Backend::Access::kRead);
     if (!caller.ok()) return refuse(caller.status());
@@ -153,8 +153,8 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
 
   void post(void (DeformCall::*task)()) {
     auto self = std::static_pointer_cast<DeformCall>(shared_from_this());
-    if (!backend_.pool.try_post([self, task] { (*self.*task)(); }))
-      refuse(server_busy(backend_.pool.expected_wait()));
+    if (!backend_.pool().try_post([self, task] { (*self.*task)(); }))
+      refuse(server_busy(backend_.pool().expected_wait()));
   }
 
   void take_open() {
@@ -186,14 +186,14 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
     backend_.update(context(), open_.change, update, answered);
   }
 
-  /// Then the stream ends in a moment, and an update without an answer is sent again to where the session is; with one that refuses
-  /// it, it would be lost.
+  /// In this case no answer is sent: the stream ends in a moment, and the client sends an unanswered update
+  /// again, to the server that has the session. After a refusal it would not, and the update would be lost.
   static bool goes_on_elsewhere(const absl::Status& status) {
     const std::string reason = fault_of(status).reason;
     return reason == Reason::kDraining || reason == Reason::kSessionElsewhere;
   }
 
-  /// On any thread.
+  /// Called on any thread.
   void answer(const absl::StatusOr<UpdateResult>& result, const RefusedInput& input) {
     if (!result.ok()) record().refused(result.status(), input);
     {
@@ -214,7 +214,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
     read();
   }
 
-  /// The client does not keep to the contract: reads no more, and says so.
+  /// The client violates the protocol: reads no more, and tells the client why.
   void break_off(const std::string& why) {
     if (open_.stream) {
       backend_.log().info("stream_misused", {{"session", abbreviated(open_.session()->name())},
@@ -228,9 +228,9 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
 
   Received<v1::DeformRequest> received_;
   const v1::DeformRequest& request_ = received_.message;
-  bool is_open_ = false;  // an open has come
+  bool is_open_ = false;  // the open message has come
   bool is_read_due_ = false;
-  std::size_t unanswered_ = 0;  // updates taken that are not in the store yet
+  std::size_t unanswered_ = 0;  // updates accepted that are not stored yet
 };
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace lpdeform {
 namespace {
 
-/// The file, made once, then part by part as fast as the client takes them.
+/// Makes the file once, then sends it part by part as fast as the client takes the parts.
 class SnapshotCall final
     : public WritePump<grpc::ServerWriteReactor<v1::SnapshotSessionResponse>, v1::SnapshotSessionResponse> {
  public:
@@ -22,7 +22,7 @@ class SnapshotCall final
                                     session.ok() ? self->start(**session) : self->refuse(session.status());
                                   });
     };
-    if (!backend_.pool.try_post(task)) refuse(server_busy(backend_.pool.expected_wait()));
+    if (!backend_.pool().try_post(task)) refuse(server_busy(backend_.pool().expected_wait()));
   }
 
  private:

@@ -49,7 +49,7 @@ void append(const void* numbers, std::size_t bytes, std::string& out) {
   out.append(static_cast<const char*>(numbers), bytes);
 }
 
-/// Each vertex by its lowest copy.
+/// Encodes each vertex as its lowest copy.
 void encode_weld(const Weld& weld, v1::Weld& out) {
   std::vector<std::int32_t> lowest;
   for (const std::int32_t welded : weld.to_welded) lowest.push_back(weld.first_copy[welded]);

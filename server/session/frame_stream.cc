@@ -92,7 +92,7 @@ std::optional<Note> FrameStream::next_locked(Timers::TimePoint now) {
   return std::nullopt;
 }
 
-/// Takes the publisher's newest frame on, if it is new and may be sent now.
+/// Begins to send the publisher's newest frame, if it is new and may be sent now.
 void FrameStream::begin_frame(Timers::TimePoint now) {
   std::shared_ptr<const Frame> newest = publisher_->newest();
   if (!newest || newest->frame_seq <= last_seq_) return;
@@ -140,7 +140,7 @@ Timers::TimePoint FrameStream::next_frame_at() const {
   return last_frame_at_ + std::chrono::duration_cast<Timers::Duration>(pause);
 }
 
-/// Sees to it that somebody asks next() again at `when`.
+/// Sets a timer that makes the sender call next() at `when`.
 void FrameStream::arm(bool& is_armed, Timers::TimePoint when) {
   if (std::exchange(is_armed, true)) return;
   timers_->at(when, [weak = weak_from_this(), &is_armed] {

@@ -7,7 +7,7 @@
 namespace lpdeform {
 namespace {
 
-/// Steps that went and are remembered for the store.
+/// Limit of dropped steps that are remembered for the store.
 constexpr std::size_t kMostDropped = 4096;
 
 std::size_t bytes_of(const HandleMotion& motion) {
@@ -94,7 +94,7 @@ void HandleHistory::moved(bool redo, std::vector<HandleChange> inverse, std::uin
   keep_limits(revision);
 }
 
-/// In place of the step that is there, or after the last.
+/// Puts a step in place of an existing one, or after the last one.
 void HandleHistory::put(std::size_t place, std::vector<HandleChange> changes, std::uint64_t revision) {
   Step step{std::move(changes), 0, revision};
   for (const HandleChange& change : step.changes) step.bytes += bytes_of(change);
@@ -122,7 +122,7 @@ void HandleHistory::drop_first(std::uint64_t revision) {
   if (undo_steps_ > 0) --undo_steps_;
 }
 
-/// What is too large cannot be stepped over: all on its far side go with it, and it.
+/// A step that is too large cannot be kept, nor can the steps beyond it: they are dropped together.
 void HandleHistory::keep_limits(std::uint64_t revision) {
   const auto is_too_large = [](const Step& step) { return step.bytes > kMostBytesAStep; };
   while (std::any_of(steps_.begin(), steps_.begin() + static_cast<std::ptrdiff_t>(undo_steps_), is_too_large))

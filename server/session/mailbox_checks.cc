@@ -1,4 +1,4 @@
-// Mailbox: whether what an update would lead to can be solved for.
+// Mailbox: whether the state that an update would lead to can be solved for.
 
 #include <utility>
 
@@ -33,7 +33,7 @@ absl::Status Mailbox::check(const Candidate& next, const Inputs& before) const {
   return status;
 }
 
-/// Puts the client's vertices into the solver's.
+/// Converts the client's vertices to the solver's.
 absl::Status Mailbox::weld(Candidate& next) const {
   if (!weld_) return absl::OkStatus();
   if (next.has_handles()) {
@@ -49,7 +49,7 @@ absl::Status Mailbox::weld(Candidate& next) const {
   return absl::OkStatus();
 }
 
-/// Whether handles go no farther than they may, and whether locks and points can hold together.
+/// Whether handles stay within their range, and whether locks and points are compatible.
 absl::Status Mailbox::check_welded(const Candidate& next) const {
   if (!next.has_handles()) return absl::OkStatus();
   const HandleSet& handles = next.solver_handles ? *next.solver_handles : *next.handles;
@@ -61,7 +61,7 @@ absl::Status Mailbox::check_welded(const Candidate& next) const {
   return status;
 }
 
-/// "Vertex 17" as the client counts, "Point 2" of a handle of points.
+/// "Vertex 17" as the client counts, or "Point 2" of a handle of points.
 std::string Mailbox::place_of(const Handle& handle, std::size_t k) const {
   if (!handle.points.empty()) return absl::StrCat("Point ", k);
   const std::int32_t vertex = handle.vertices[k];

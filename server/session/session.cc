@@ -17,8 +17,8 @@ namespace {
 /// A slice of a larger mesh may take long: see Scheduler.
 constexpr std::int32_t kHeavyVertices = 20000;
 
-/// One step of a large mesh costs more than many of a small one: with equal shares of the time it would hardly move
-/// beside a crowd of small ones.
+/// One step of a large mesh costs more than many steps of a small one. With equal shares of the time a large
+/// mesh would make next to no progress beside many small ones.
 double weight_of(std::int32_t vertices) {
   constexpr double kPlain = 1000;
   return std::sqrt(std::max(1.0, vertices / kPlain));
@@ -29,7 +29,7 @@ std::int64_t unix_ms_now() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(now).count();
 }
 
-/// Takes as long for a token that is nearly right as for any other.
+/// Takes the same time for a token that is nearly right as for any other.
 bool is_same_token(const std::string& a, const std::string& b) {
   if (a.size() != b.size()) return false;
   unsigned char difference = 0;
@@ -169,12 +169,13 @@ WriterLease Session::acquire_writer() {
   for (const auto& weak : before) {
     if (const auto stream = weak.lock()) stream->end(EndReason::kWriterReplaced, text);
   }
-  publisher_->wake_all();  // the others go on in the new epoch
+  publisher_->wake_all();  // readers learn of the new epoch
   if (job_before) job_before->finish(make_fault({Reason::kWriterReplaced, "", ""}, text));
   return lease;
 }
 
-/// What a writer changes: `change` is made of the mailbox, and its input_seq is answered by a frame.
+/// The common part of all changes by a writer: applies `change` to the mailbox, and makes sure that a frame
+/// will answer its input_seq.
 template <typename Change>
 auto Session::take_in(const absl::StatusOr<Writer>& writer, const Change& change) {
   touch();
@@ -261,7 +262,8 @@ absl::Status Session::acknowledge(const std::string& stream_id, std::uint64_t fr
                     "The session has no stream of this id; it may have ended.");
 }
 
-/// To who had it in hand already. One that goes on elsewhere is not gone: its client would make it anew.
+/// The error for callers that still hold the closed session. If the session goes on elsewhere, the error must
+/// not say that it is gone, or its client would create a new one.
 absl::Status Session::closed() const {
   return goes_on(closed_by_) ? server_draining() : session_unknown();
 }

@@ -152,7 +152,7 @@ void encode_header(const FramePiece& piece, v1::FrameHeader& out) {
   }
 }
 
-/// All but the numbers: see Outgoing.
+/// Everything but the numbers: see Outgoing.
 void encode_piece(const FramePiece& piece, v1::FramePart& out) {
   if (piece.first == 0) encode_header(piece, *out.mutable_header());
   out.set_frame_seq(piece.frame->frame_seq);
@@ -163,10 +163,9 @@ void encode_piece(const FramePiece& piece, v1::FramePart& out) {
 
 void encode_notice(const LoadNote& load, v1::Notice& out) {
   out.set_reason(load.is_overloaded ? v1::NOTICE_REASON_OVERLOADED : v1::NOTICE_REASON_RECOVERED);
-  out.set_text(
-      load.is_overloaded
-          ? "The server has more to solve than it can: frames come less often, and refined ones later."
-          : "The server keeps up with its work again.");
+  out.set_text(load.is_overloaded
+                   ? "The server is overloaded: frames come less often, and refined ones later."
+                   : "The server is no longer overloaded.");
 }
 
 void encode_event(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
@@ -191,7 +190,7 @@ void encode_event(const Note& note, const FrameStream& stream, std::uint32_t ver
                     granted.set_max_frames_per_second(options.max_frames_per_second);
                   },
                   [&](const FramePiece& piece) { encode_piece(piece, *out.mutable_frame()); },
-                  [&](const UpdateResult&) {},  // no event: see encode() of a DeformResponse
+                  [&](const UpdateResult&) {},  // not an event: see encode() of a DeformResponse
                   [&](const FaultNote& fault) { encode(fault, *out.mutable_fault()); },
                   [&](const LoadNote& load) { encode_notice(load, *out.mutable_notice()); },
                   [&](const HeartbeatNote&) { out.mutable_heartbeat(); },

@@ -1,4 +1,4 @@
-// The book of updates in tests/golden/recovery.json, which the clients in all languages replay.
+// The ledger of updates in tests/golden/recovery.json, which the clients in all languages replay.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// The same as enumerations in run and as layout.c, of the assembly's own structs: their fields in their order, by the names that C has.
+// Like layout.c and the enumerations in run, for the assembly's own structs: their fields in order, by their names in C.
 
 using System;
 using System.Linq;

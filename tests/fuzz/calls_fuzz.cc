@@ -1,5 +1,6 @@
-// libFuzzer: a schedule of calls (schedule.proto) by two callers to a server's backend, from the decoding of messages to running
-// sessions. All is there but gRPC. What is one caller's the other does not find, see or change. A call that does not end in half a minute counts as hanging.
+// libFuzzer: a schedule of calls (schedule.proto) by two callers to a server's backend, from the decoding of messages to
+// running sessions; everything except gRPC. A caller must not find, see or change anything of the other. A call that does not
+// end in half a minute counts as hanging.
 
 #include <chrono>
 #include <cstdint>

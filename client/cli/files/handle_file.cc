@@ -42,7 +42,7 @@ std::vector<std::uint32_t> vertices_of(const json& object, const std::string& ow
   return index_list(list, owner, place, "vertex", Reason::kHandleVertexOutOfRange, vertex_count);
 }
 
-/// The vertices that may move; none where the file does not say.
+/// The vertices that may move; empty if the file does not say.
 std::vector<std::uint32_t> region_of(const json& file, std::int64_t vertex_count) {
   if (!file.contains("region")) return {};
   const json& list = file["region"];
@@ -97,7 +97,7 @@ client::Motion motion_of(const json& object, const std::string& owner, std::size
   return rigid;
 }
 
-/// A vertex belongs to one handle, and once.
+/// Checks that a vertex is in one handle only, and only once.
 class Owners {
  public:
   void claim(const NamedHandle& handle) {
@@ -117,7 +117,7 @@ class Owners {
   std::map<std::uint32_t, std::string> owner_;
 };
 
-/// Parses, and refuses a key that stands twice in one object: the library would silently keep the later one.
+/// Parses, and refuses an object with a repeated key. The library would silently keep the later value.
 json parse_strictly(std::string_view text) {
   std::vector<std::set<std::string>> keys;
   const auto watch = [&keys](int, json::parse_event_t event, json& parsed) {

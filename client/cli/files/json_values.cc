@@ -17,7 +17,7 @@ std::string key_of(const std::string& owner, const char* key) {
   return absl::StrCat("\"", key, "\" of ", owner);
 }
 
-// Not dumped where it is nested: that would recurse as deep as a hostile file likes.
+// A nested value is not printed: that would recurse as deep as a hostile file likes.
 std::string shown(const json& value) {
   const bool is_nested =
       std::ranges::any_of(value, [](const json& inner) { return inner.is_structured() && !inner.empty(); });

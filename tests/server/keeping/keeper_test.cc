@@ -1,5 +1,5 @@
-// What the keeper asks of a store as sessions come, go on elsewhere and come back: never two of one name for one, and what is not
-// written is not called kept.
+// What the keeper asks of a store as sessions come, move elsewhere and return. It never has two sessions of one name, and never
+// reports as stored what is not written.
 
 #include "server/keeping/keeper.h"
 

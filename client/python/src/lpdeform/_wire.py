@@ -1,4 +1,5 @@
-"""From what is given to messages of the contract, in two steps: checked and copied at once, packed when it is sent."""
+"""Converts values to messages of the contract in two steps: they are checked and copied at once, and packed when they are
+sent."""
 
 from __future__ import annotations
 
@@ -57,11 +58,11 @@ def named(table: Mapping[Any, T], name: object, what: str) -> T:
     return table[name]
 
 
-# Checked and copied.
+# Check and copy.
 
 
 def checked_update(update: types.Update, vertices: int, faces: int) -> types.Update:
-    """Of a mesh of so many vertices and faces."""
+    """For a mesh with this many vertices and faces."""
     handles = {
         _checked_name(name): _checked_change(str(name), change, vertices, faces) for name, change in update.handles.items()
     }
@@ -71,7 +72,7 @@ def checked_update(update: types.Update, vertices: int, faces: int) -> types.Upd
 
 
 def _checked_name(name: object) -> str:
-    """Half a character, "\\ud800", cannot travel: nobody could parse the message that has it."""
+    """Raises an error for half a surrogate pair, "\\ud800": a message with it could not be parsed."""
     text = str(name)
     try:
         text.encode()
@@ -118,7 +119,7 @@ def _checked_motion(motion: types.Motion, what: str) -> types.Motion:
 
 
 def checked_settings(settings: types.Settings, vertices: int) -> types.Settings:
-    """Of a mesh of so many vertices."""
+    """For a mesh with this many vertices."""
     if settings.solver is not None:
         named(_methods, settings.solver.method, "method")
         named(_guesses, settings.solver.initial, "initial guess")
@@ -147,7 +148,7 @@ def _checked_field(value: types.Field | None, what: str, vertices: int) -> types
     return array
 
 
-# Packed.
+# Pack.
 
 
 def scalar_of(array: Copied) -> data_pb2.Scalar:
@@ -168,7 +169,7 @@ def mesh_to_wire(vertices: Copied, faces: Copied, packer: Packer) -> data_pb2.Me
 
 
 def weld_to_wire(weld: Copied | float, packer: Packer) -> data_pb2.Weld:
-    """`weld`: one number a vertex, or the tolerance of a weld by position."""
+    """`weld`: one number per vertex, or the tolerance of a weld by position."""
     if isinstance(weld, float):
         return data_pb2.Weld(position=data_pb2.WeldByPosition(tolerance=weld))
     return data_pb2.Weld(groups=_packed(weld, packer))
@@ -321,7 +322,7 @@ def report_from_wire(report: report_pb2.MeshReport) -> types.MeshReport:
 
 
 def _mesh_notices(defects: Iterable[types.Defect]) -> tuple[str, ...]:
-    """The same as in client/cpp/mesh_notices.h."""
+    """The same texts as in client/cpp/mesh_notices.h."""
     return tuple(
         f"The mesh comes apart where it is split: {defect.count} vertices at its borders lie in the same place as others "
         f"(vertices {', '.join(map(str, defect.first))}{', ...' if defect.count > len(defect.first) else ''}). "
@@ -332,7 +333,7 @@ def _mesh_notices(defects: Iterable[types.Defect]) -> tuple[str, ...]:
 
 
 def changes_from_wire(changes: Iterable[handle_pb2.HandleUpdate]) -> types.Update:
-    """Of handles, as the server made them."""
+    """Converts changes of handles that the server made."""
     handles: dict[str, types.Change] = {}
     for message in changes:
         kind = message.WhichOneof("change")

@@ -34,7 +34,7 @@ export function noticeFromWire({ reason, text }: WireNotice): api.Notice {
   return { reason: reason === NoticeReason.RECOVERED ? "recovered" : "other", text };
 }
 
-/** As in reports: "quasi_newton". Empty where none runs. */
+/** As in reports: "quasi_newton". Empty if no method runs. */
 export function methodName(method: Method): string {
   return method === Method.UNSPECIFIED ? "" : (Method[method]?.toLowerCase() ?? "");
 }
@@ -106,7 +106,7 @@ function pointsFromWire({ faces, scalar, barycentric }: SurfacePoints): api.Surf
   }));
 }
 
-/** Of their own: messages are views of what came. */
+/** A copy of the bytes, because messages are views of the received data. */
 function bytesOf(buffer: Buffer | undefined, width: number): ArrayBuffer {
   const bytes = buffer?.source.case === "inline" ? buffer.source.value : new Uint8Array();
   if (bytes.byteLength % width === 0) return bytes.slice().buffer as ArrayBuffer;

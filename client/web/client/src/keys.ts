@@ -3,8 +3,8 @@ import { checkHold } from "./hold_kinds.js";
 import { checkKeys, checkVector, checkVectors, checkWord, isNumbers, mistyped, refused } from "./key_checks.js";
 import type * as api from "./types.js";
 
-// What callers hand over, key by key: one that is not known is refused by name, since ignoring it would do something else than was
-// meant. The compiler sees to it that no key of types.ts is missing here.
+// The keys of what callers pass in. An unknown key is refused by name, because ignoring it would not do what the caller meant. The
+// compiler makes sure that no key of types.ts is missing here.
 
 type Keys<Bag> = Readonly<Record<Bag extends unknown ? keyof Bag : never, true>>;
 
@@ -111,7 +111,7 @@ export function checkSolveOptions(given: api.SolveOptions | api.DoubleSolveOptio
   if ("scalar" in given) checkWord(given.scalar, { float64: true }, "scalar");
 }
 
-/** Of calls that take few: `known` by name. */
+/** For calls with few options, whose names are `known`. */
 export function checkCallOptions(given: object, ...known: string[]): void {
   checkKeys(given, Object.fromEntries(known.map((key) => [key, true])), "options");
 }

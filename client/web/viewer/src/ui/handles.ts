@@ -10,7 +10,7 @@ import { icon } from "./icons.js";
 import { slider } from "./controls.js";
 import { type HandleRow, handleRow } from "./handle_row.js";
 
-/** The handles with their names and colours, and what the selected one can be told. */
+/** The handles with their names and colours, and the settings of the selected handle. */
 export function handlesPanel(app: App): HTMLElement {
   const list = el("ul", { className: "handles" });
   const none = el("li", { className: "empty" }, "None yet: click the surface.");
@@ -57,7 +57,7 @@ export function handlesPanel(app: App): HTMLElement {
   return el("div", {}, list, details);
 }
 
-/** The focus goes to what is called as it was. */
+/** Moves the focus to the control with the same name. */
 function renew(details: HTMLElement, parts: readonly Node[]): void {
   const { activeElement } = document;
   const label = details.contains(activeElement) ? activeElement!.getAttribute("aria-label") : undefined;
@@ -141,7 +141,7 @@ function directionChoice(
   return el("label", { className: "pair" }, el("span", {}, label), select);
 }
 
-/** In mean edges of the mesh. */
+/** In mean edge lengths of the mesh. */
 function footprint(app: App, { name, footprint: radius }: Handle): HTMLElement {
   const edges = radius / app.edge;
   const text = (value: number) => (value === 0 ? "none" : `${short(value)} edges`);
@@ -157,6 +157,6 @@ function footprint(app: App, { name, footprint: radius }: Handle): HTMLElement {
     () => app.endGesture(),
   );
   show(edges, text(Number(edges.toPrecision(2))));
-  element.title = "The surroundings go along nearly rigidly: against spikes of handles of few vertices";
+  element.title = "The surroundings move along nearly rigidly: against spikes at handles with few vertices";
   return element;
 }
