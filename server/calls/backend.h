@@ -94,7 +94,7 @@ class Backend {
   /// Which session a writer wants to change, and the writer.
   struct Change {
     std::shared_ptr<Session> session;
-    absl::StatusOr<Session::Writer> writer;
+    absl::StatusOr<Session::Writer> writer{};
   };
   /// Calls `then` with OK once an update of this session can be decoded without waiting for its geometry.
   /// Errors: that of `writer`; as GeometryQueue::when_found.
