@@ -1,5 +1,5 @@
-// node deploy/envoy-ready.mjs HOST:PORT prints where Envoy, whose own page is there, listens for browsers. Exits with 1 while
-// it does not, or does not reach the server.
+// node deploy/envoy-ready.mjs HOST:PORT, the address of Envoy's own page, prints where Envoy listens for browsers. Exits with 1
+// while Envoy does not listen or does not reach the server.
 const admin = `http://${process.argv[2]}`;
 const { listener_statuses: listeners } = await (await fetch(`${admin}/listeners?format=json`)).json();
 const { cluster_statuses: clusters } = await (await fetch(`${admin}/clusters?format=json`)).json();

@@ -17,10 +17,11 @@ namespace {
 using lpdeform::Arguments;
 using lpdeform::ServerOptions;
 
-/// The statuses that it exits with, beside 0.
+/// The exit statuses other than 0.
 constexpr int kRefused = 1, kNotKept = 2;
 
-/// What it has to end by itself after the store was waited for: less where that hangs, and nothing is to be saved any more.
+/// How long the process may take to end by itself after it has waited for the store. It is less if the store
+/// hangs, because nothing can be saved any more.
 constexpr std::chrono::seconds kToEnd{10}, kToEndWithout{2};
 
 constexpr char kDescription[] =
@@ -35,7 +36,7 @@ int refuse(const absl::Status& why) {
   return kRefused;
 }
 
-/// Help is asked for; anything else is an error.
+/// A request for help ends with status 0; anything else is an error.
 int end_of_parse(const CLI::App& app, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) return app.exit(error);
   std::fprintf(stderr, "lpdeform-server: %s (see lpdeform-server --help)\n", error.what());
@@ -52,7 +53,7 @@ int serve(Arguments& arguments, const sigset_t& signals, lpdeform::ProcessEnd& e
   if (!server.ok()) return refuse(server.status());
   std::printf("lpdeform-server listens on %s\n", (*server)->address().c_str());
   if (!(*server)->admin_address().empty()) {
-    std::printf("lpdeform-server shows itself on http://%s\n", (*server)->admin_address().c_str());
+    std::printf("lpdeform-server serves its admin pages on http://%s\n", (*server)->admin_address().c_str());
   }
   std::fflush(stdout);
   int signal = 0;
@@ -69,8 +70,8 @@ void pass_to_main_thread(int signal) {
   pthread_kill(main_thread, signal);
 }
 
-// Leaves SIGTERM and SIGINT to sigwait() in the main thread. Threads made from now on block them; those that
-// a library (OpenBLAS) made while it was loaded do not, and pass them on.
+// Leaves SIGTERM and SIGINT to sigwait() in the main thread. Threads made from now on block both signals.
+// Threads that a library (OpenBLAS) made while it was loaded do not, and they pass the signals on.
 sigset_t signals_for_sigwait() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -88,7 +89,8 @@ sigset_t signals_for_sigwait() {
 
 int main(int argc, char** argv) {
   const sigset_t signals = signals_for_sigwait();
-  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of the write to it
+  // Writing beyond a limit on file size then fails, instead of ending the process.
+  signal(SIGXFSZ, SIG_IGN);
 
   lpdeform::ProcessEnd end;  // outlives the store
   Arguments arguments;

@@ -8,13 +8,15 @@
 namespace lpdeform {
 namespace {
 
-/// On a thread of its own: whoever reads the log may hang, too.
+/// Logs on a thread of its own, because the reader of the log may hang, too.
 [[noreturn]] void end_with(int status, const std::weak_ptr<const Log>& to) {
   if (const std::shared_ptr<const Log> log = to.lock()) {
     const auto written = std::make_shared<std::promise<void>>();
     std::thread([log, written] {
-      log->warning("end_forced",
-                   {{"text", "Not all ends, as where a disk does not answer; the process ends without it."}});
+      log->warning(
+          "end_forced",
+          {{"text",
+            "Something did not end in time, for example a disk does not answer; the process ends anyway."}});
       log->end();
       written->set_value();
     }).detach();

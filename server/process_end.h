@@ -10,17 +10,18 @@
 
 namespace lpdeform {
 
-/// Ends the process where it does not end by itself: nobody can stop a thread that waits for a disk. Not thread-safe.
+/// Ends the process if it does not end by itself, for example because a thread waits for a disk: such a
+/// thread cannot be stopped. Not thread-safe.
 class ProcessEnd {
  public:
   ProcessEnd() = default;
-  /// It ends by itself.
+  /// Cancels within(): the process ends by itself.
   ~ProcessEnd();
   ProcessEnd(const ProcessEnd&) = delete;
   ProcessEnd& operator=(const ProcessEnd&) = delete;
 
-  /// The process ends after this time, with this status, unless this object goes before. The log then says so ("end_forced"), and has
-  /// kForLog to write what waits. To be called once.
+  /// Ends the process with `status` after `patience`, unless this object is destroyed before. The log then
+  /// says so ("end_forced") and has kForLog to write its queue. Call it once.
   void within(std::chrono::milliseconds patience, int status, std::weak_ptr<const Log> log);
   static constexpr std::chrono::milliseconds kForLog{500};
 

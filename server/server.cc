@@ -33,17 +33,19 @@ namespace lpdeform {
 namespace {
 
 constexpr int kKeepaliveMs = 30'000;
-/// Who pings more often is sent away. A proxy pings each connection three times a second, to see a hung server.
+/// gRPC closes a connection that pings more often. A proxy pings each connection three times a second to
+/// notice a hung server.
 constexpr int kLeastBetweenPingsMs = 200;
-/// Of the headers of one call, 32 for each header among that. Beyond it gRPC 1.51 ends the connection, and all calls on it: more than a
-/// proxy lets through (max_request_headers_kb in deploy/envoy.yaml.in). A bearer token may have 8 KiB.
+/// Limit of the headers of one call, counting 32 bytes extra per header. Beyond it gRPC 1.51 ends the
+/// connection and all calls on it. The limit is above what a proxy lets through (max_request_headers_kb in
+/// deploy/envoy.yaml.in). A bearer token may have 8 KiB.
 constexpr int kMostHeaderBytes = 64 * 1024;
-/// Until a new connection has to have spoken HTTP/2, TLS included.
+/// How long a new connection may take until it has spoken HTTP/2, TLS included.
 constexpr int kHandshakeMs = 20'000;
 constexpr std::chrono::seconds kAcceptPatience{5};
 constexpr int kReflectionThreads = 16;
-/// Between the last answer and the end of the connections: who writes to a connection that has ended loses what he
-/// has not read of it yet, the reason for its end among that.
+/// Between the last answer and the end of the connections. A client that writes to a closed connection loses
+/// what it has not yet read from it, including the reason for its end.
 constexpr std::chrono::milliseconds kLinger{100};
 
 absl::Status check(ServerOptions options) {
@@ -56,16 +58,16 @@ absl::Status check(ServerOptions options) {
   return absl::OkStatus();
 }
 
-/// Process-wide settings of gRPC, made before the first server is.
+/// Sets process-wide options of gRPC; called before the first server is made.
 void prepare_grpc() {
   static std::once_flag once;
   std::call_once(once, [] {
-    // Keeps gRPC up until the process ends. Taking it down with its last server can take 10 s: it waits for a poller
-    // of its own that nothing wakes.
+    // Keeps gRPC up until the process ends. Shutting it down with its last server can take 10 s: it waits for
+    // a poller of its own that nothing wakes.
     grpc_init();
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-    // Reflection lists the health service and can describe only what a program has linked in.
+    // Reflection lists the health service, but can describe only what is linked into the program.
     grpc::health::v1::HealthCheckRequest::descriptor();
   });
 }
@@ -83,7 +85,7 @@ absl::Status check_anonymous(const ServerOptions& options, const Listener& liste
                    "; give --token-keys or --tls-client-ca, or --allow-anonymous to let everybody in."));
 }
 
-/// Empty where callers need no token.
+/// Null if callers need no token.
 absl::StatusOr<std::unique_ptr<Tokens>> make_tokens(const ServerOptions& options) {
   if (options.token_keys_file.empty()) return nullptr;
   return Tokens::create({options.token_keys_file, options.token_issuer, options.token_audience});
@@ -93,7 +95,7 @@ void warn_of_what_is_open(const ServerOptions& options, const Listener& listener
   if (!tells_callers_apart(options)) {
     log.warning("no_authentication",
                 {{"address", listener.address()},
-                 {"text", listener.is_local() ? "Whoever is on this machine is let in."
+                 {"text", listener.is_local() ? "Every program on this machine is let in."
                                               : "Whoever reaches the address is let in."}});
   } else if (!options.tls.is_on() && !listener.is_local()) {
     log.warning("no_encryption", {{"address", listener.address()},
@@ -101,8 +103,8 @@ void warn_of_what_is_open(const ServerOptions& options, const Listener& listener
   }
 }
 
-/// Whether the listener takes a connection made now. That gRPC then answers is not tried: with TLS that would need
-/// certificates of a client.
+/// Whether the listener takes a connection made now. Does not test whether gRPC then answers: with TLS that
+/// would need a client's certificate.
 bool takes_connection(const Listener& listener) {
   const std::uint64_t before = listener.accepted();
   const auto channel = grpc::CreateChannel(listener.address(), grpc::InsecureChannelCredentials());
@@ -125,7 +127,7 @@ struct Server::Impl {
                        return is_plain ? is_serving(listener->address()) : takes_connection(*listener);
                      },
                      [this] { return listener->refused(); }, [this] { return backend.gate.is_closed(); },
-                     backend.scheduler, backend.pool}) {}
+                     backend.scheduler(), backend.pool()}) {}
 
   absl::Status start_grpc(const ServerOptions& options, std::shared_ptr<Certificates> shown);
   void start_listening(const ServerOptions& options);
@@ -182,17 +184,17 @@ absl::Status Server::Impl::start_grpc(const ServerOptions& options, std::shared_
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS,
                              static_cast<int>(options.connection_idle.count()));
-  // Of reflection, a thread a call; all others have theirs.
+  // Reflection uses a thread per call; all other calls use threads of this project.
   builder.SetResourceQuota(grpc::ResourceQuota("lpdeform").SetMaxThreads(kReflectionThreads));
   std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
   interceptors.push_back(end_open_calls(backend.timers, options.connection_idle));
   interceptors.push_back(tell_of_unread_calls(backend));
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
-  // gRPC unpacks a message before it looks at the size that it has then: 4 MiB on the way can be 4 GiB.
+  // gRPC decompresses a message before it checks the decompressed size: 4 MiB received can become 4 GiB.
   builder.AddChannelArgument(GRPC_ARG_ENABLE_PER_MESSAGE_DECOMPRESSION, 0);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
-  // Probing grows windows until seconds of frames hide in them, behind the credits' back.
+  // Probing grows the flow-control windows until they hold seconds of frames, which the credits do not count.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   grpc_server = builder.BuildAndStart();
   if (grpc_server == nullptr) return absl::InternalError("gRPC did not start.");
@@ -211,8 +213,9 @@ void Server::Impl::start_listening(const ServerOptions& options) {
   };
   events.on_refused = [this] {
     backend.metrics->add(Count::kConnectionsRefused);
-    backend.log().warning("connection_refused",
-                          {{"text", "There are as many as the flags or descriptors allow."}});
+    backend.log().warning(
+        "connection_refused",
+        {{"text", "The limit of connections, from flags or file descriptors, is reached."}});
   };
   const std::size_t most =
       listener->start({options.max_connections, options.max_connections_per_address}, std::move(events));
@@ -279,7 +282,8 @@ bool Server::drain(std::chrono::milliseconds grace, const OnFlushed& on_flushed)
   impl_->is_all_kept = backend.release_sessions(text);
   if (on_flushed) on_flushed(impl_->is_all_kept);
   impl_->listener->stop();
-  impl_->grpc_server->Shutdown(std::chrono::system_clock::now());  // cancels what is still under way
+  impl_->grpc_server->Shutdown(
+      std::chrono::system_clock::now());  // cancels the calls that are still under way
   impl_->grpc_server->Wait();
   backend.gate.wait_until_empty(std::chrono::steady_clock::time_point::max());
   backend.log().info("stopped", {});

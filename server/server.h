@@ -10,26 +10,28 @@
 
 namespace lpdeform {
 
-/// The service, running: from start() until drain() or the destructor. Thread-safe.
+/// A running service: from start() until drain() or the destructor. Thread-safe.
 class Server {
  public:
   /// Errors: INVALID_ARGUMENT OPTION_OUT_OF_RANGE, ANONYMOUS_ADDRESS, TLS_FILES, TOKEN_KEYS; UNAVAILABLE
   /// ADDRESS_NOT_BOUND.
   static absl::StatusOr<std::unique_ptr<Server>> start(const ServerOptions& given);
 
-  /// Drains, waiting for nobody.
+  /// Drains without a grace period.
   ~Server();
 
-  /// For clients: as in the options, with the port that was found.
+  /// The address for clients: the one in the options, with the port that was bound.
   const std::string& address() const;
-  /// Of the admin port; empty where there is none.
+  /// The address of the admin port; empty if there is none.
   std::string admin_address() const;
 
-  /// Stops: health says NOT_SERVING, new calls are refused as UNAVAILABLE, streams get a go-away, Solve calls
-  /// may go on until `grace` has passed and are ended then; then a store that fails has 5 s more to take what has changed. Returns when
-  /// nothing runs any more: true where the store has all that was answered; else the log has a line for each session ("session_not_kept").
-  /// Again: the same, at once. `on_flushed`: called, with what is to be returned, once the store is waited for no more. What comes after
-  /// may still need it to answer: calls that read, and the destructor.
+  /// Stops the service. Health reports NOT_SERVING, new calls are refused as UNAVAILABLE, and streams get a
+  /// go-away. Solve calls may run until `grace` has passed and are then ended. After that a failing store has
+  /// 5 s more to take the changes. Returns when nothing runs any more: true if the store has everything that
+  /// was answered. Otherwise the log has a line for each session ("session_not_kept"). A second call returns
+  /// the same result at once.
+  /// `on_flushed` is called with the result once the service waits for the store no longer. Calls that read
+  /// and the destructor may still need an answer from the store after that.
   using OnFlushed = std::function<void(bool is_all_kept)>;
   bool drain(std::chrono::milliseconds grace, const OnFlushed& on_flushed = nullptr);
 

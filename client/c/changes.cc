@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "client/c/arguments.h"
@@ -52,9 +53,14 @@ absl::StatusOr<Motion> read_positions(const lpdeform_motion& motion, const Space
   return out;
 }
 
+static_assert(std::variant_size_v<Hold> == LPDEFORM_PLANE_LOCK + 1, "lpdeform.h has every kind of hold");
+
 absl::StatusOr<Hold> read_hold(const lpdeform_handle& handle, const Space& space) {
+  if (absl::Status known = check_enum("hold", handle.hold, std::variant_size_v<Hold> - 1); !known.ok()) {
+    return known;
+  }
   const Vector direction = space.direction_to_server(vector_of(handle.direction));
-  switch (handle.hold) {
+  switch (static_cast<lpdeform_hold_values>(handle.hold)) {
     case LPDEFORM_EXACTLY:
       return Exactly{};
     case LPDEFORM_SOFT:
@@ -65,12 +71,11 @@ absl::StatusOr<Hold> read_hold(const lpdeform_handle& handle, const Space& space
       return AxisLock{direction};
     case LPDEFORM_PLANE_LOCK:
       return PlaneLock{direction};
-    default:
-      return check_enum("hold", handle.hold, LPDEFORM_PLANE_LOCK);
   }
+  return Exactly{};  // not reached
 }
 
-/// A turned triangle has its second and third corner in each other's places.
+/// If Space turns triangles, their second and third corners are exchanged.
 SurfacePoint read_point(const lpdeform_point& point, const Space& space) {
   SurfacePoint out{point.face, vector_of(point.barycentric)};
   if (space.turns_triangles()) std::swap(out.barycentric[1], out.barycentric[2]);
@@ -85,7 +90,7 @@ std::optional<FieldValue> read_field(double uniform, const double* per_vertex, s
   return std::nullopt;
 }
 
-/// False where it was there.
+/// False if the update already has a change of this handle.
 bool add(Update& update, const char* name, Update::Change change) {
   return update.handles.emplace(name, std::move(change)).second;
 }
@@ -101,7 +106,7 @@ absl::Status read_sets(const lpdeform_update& update, const Space& space, Update
     const auto* const given = reinterpret_cast<const lpdeform_handle*>(next);
     const auto handle = read_struct(given, "handle");
     if (!handle.ok()) return handle.status();
-    next += handle->struct_size;  // the caller's, which may be larger than ours
+    next += handle->struct_size;  // the caller's struct, which may be larger than ours
     auto read = read_handle(*handle, space);
     if (!read.ok()) return read.status();
     if (!add(out, handle->name, *std::move(read))) return changed_twice(handle->name);
@@ -182,7 +187,7 @@ absl::StatusOr<Settings> read_settings(const lpdeform_settings& settings, const 
   return out;
 }
 
-/// The engine's first axis becomes the server's first, by its direction there.
+/// The engine's first axis stays the first axis, converted to its direction in the server's coordinates.
 absl::StatusOr<Update> read_resizing(const lpdeform_resizing& resizing, const Space& space) {
   Resize resize;
   for (int k = 0; k < 3; ++k) resize.scale[k] = resizing.scale[k] == 0 ? 1 : resizing.scale[k];

@@ -9,8 +9,8 @@
 
 namespace lpdeform::engine {
 
-// Structs of the C interface as changes in the server's coordinates. Errors: ARGUMENT_MISSING, ENUM_UNKNOWN, ROTATION_NOT_FINITE,
-// HANDLE_CHANGED_TWICE; all else is the server's to check.
+// Converts structs of the C interface to changes in the server's coordinates. Errors: ARGUMENT_MISSING, ENUM_UNKNOWN,
+// ROTATION_NOT_FINITE, HANDLE_CHANGED_TWICE; the server checks everything else.
 
 absl::StatusOr<client::Update> read_update(const lpdeform_update& update, const Space& space);
 absl::StatusOr<client::Update> read_resizing(const lpdeform_resizing& resizing, const Space& space);

@@ -5,10 +5,11 @@
 
 namespace lpdeform::engine {
 
-/// Says `status` in the caller's struct, which may be NULL; returns its code.
+/// Writes `status` to the caller's struct, which may be NULL; returns its code.
 lpdeform_code tell(const absl::Status& status, lpdeform_error* error);
 
-/// As much of `text` as there is room for, never half a UTF-8 character; what is cut ends in "...". `size`: bytes of `into`.
+/// Copies as much of `text` as there is room for, never half a UTF-8 character. A cut text ends in "...". `size`: bytes
+/// of `into`.
 void copy_text(std::string_view text, char* into, std::size_t size);
 
 }  // namespace lpdeform::engine

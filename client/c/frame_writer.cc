@@ -51,7 +51,7 @@ absl::Status absent(const std::string& what, Reason reason, const std::string& o
                                                          ": it was opened without (", option, ")."));
 }
 
-/// Vertex i's value, made by `value_of(i)`, to its place.
+/// Writes value_of(i) to the place of vertex i, for all vertices.
 template <typename ValueOf>
 void write_all(const lpdeform_target& target, std::size_t count, ValueOf value_of) {
   using Value = decltype(value_of(std::size_t{0}));
@@ -63,8 +63,8 @@ void write_all(const lpdeform_target& target, std::size_t count, ValueOf value_o
   }
 }
 
-/// Triples of the server's as triples of the engine's: component k of the engine is factor[k] times server
-/// component from[k].
+/// Converts triples of the server to triples of the engine: component k of the engine is factor[k] times component
+/// from[k] of the server.
 struct Turned {
   Turned(const std::vector<double>& numbers, const Space& space, double scale) : numbers(numbers.data()) {
     for (int k = 0; k < 3; ++k) {
@@ -87,7 +87,7 @@ void write_triples(const Turned& triples, const lpdeform_target& target, std::si
   });
 }
 
-/// Fills in the frame's origin and extent: its bounding box.
+/// Sets the frame's origin and extent: its bounding box.
 void measure(const Turned& positions, std::size_t count, lpdeform_frame& out) {
   for (int k = 0; k < 3; ++k) {
     double least = count == 0 ? 0 : positions(0, k), most = least;

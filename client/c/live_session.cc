@@ -17,7 +17,7 @@
 namespace lpdeform::engine {
 namespace {
 
-/// So often a wait for a result looks whether another thread has taken it.
+/// How often a wait for a result checks whether another thread has taken it.
 constexpr std::chrono::milliseconds kGlance{20};
 
 absl::Status not_there_yet() {
@@ -73,13 +73,13 @@ void LiveSession::run() {
     changed_.wait(lock, [this] { return is_closing_; });
     session = session_;
   }
-  if (session)
-    client::guarded([&] { return session->close(); }).IgnoreError();  // what was not deleted expires
+  // A session that cannot be deleted expires.
+  if (session) client::guarded([&] { return session->close(); }).IgnoreError();
   session.reset();
   const std::scoped_lock lock(mutex_);
   opening_ = nullptr;
-  session_
-      .reset();  // with its threads and its copy of the mesh: this may be kept until the client is disconnected
+  // Frees its threads and its copy of the mesh: this object may live until the client is disconnected.
+  session_.reset();
   is_closed_ = true;
   changed_.notify_all();
 }
@@ -94,7 +94,7 @@ void LiveSession::open_patiently() {
     }
     absl::StatusOr<client::Session> opened = opening_(stop_.get_token());
     if (opened.ok()) {
-      opening_ = nullptr;  // and with it its copy of the mesh
+      opening_ = nullptr;  // frees its copy of the mesh
       return hand_over(*std::move(opened));
     }
     if (is_past_help(opened.status(), start)) return refuse(opened.status());
@@ -118,7 +118,7 @@ void LiveSession::refuse(absl::Status why) {
   changed_.notify_all();
 }
 
-/// The changes made so far become one of the session's; the frames begin.
+/// Sends the changes made so far as one change of the session, and starts the frames.
 void LiveSession::hand_over(client::Session opened) {
   const auto session = std::make_shared<client::Session>(std::move(opened));
   const std::scoped_lock lock(mutex_);
@@ -171,7 +171,7 @@ absl::StatusOr<std::string> LiveSession::snapshot() {
   return (*live)->snapshot();
 }
 
-/// Our number of the session's change `seq`. Callers have seen session_, and seq_offset_ does not change after.
+/// Our number for the session's change `seq`. Callers have seen session_; seq_offset_ does not change after it is set.
 std::uint64_t LiveSession::ours(std::uint64_t seq) const {
   if (seq < first_seq_) return 0;
   return static_cast<std::uint64_t>(std::max<std::int64_t>(0, static_cast<std::int64_t>(seq) + seq_offset_));
@@ -246,7 +246,7 @@ lpdeform_frame LiveSession::write(const client::Frame& frame, const lpdeform_buf
   return out;
 }
 
-/// The frame has as many vertices as the mesh that the buffers were measured for: client::Session sees to that.
+/// client::Session ensures that the frame has as many vertices as the mesh for which the buffers were checked.
 absl::StatusOr<bool> LiveSession::take_newest(client::Session& live) {
   absl::StatusOr<std::optional<client::Frame>> frame = live.poll();
   if (!frame.ok()) return frame.status();

@@ -21,25 +21,25 @@
 
 namespace lpdeform::engine {
 
-/// Makes a session of the C++ client; waits, until it is asked to stop. Called again, on one thread, where it fails in a way that
-/// may pass (client::is_undecided).
+/// Creates a session of the C++ client. Waits; ends early if asked to stop. Called again, on the same thread, after an
+/// error that may be temporary (client::is_undecided).
 using Opening = std::function<absl::StatusOr<client::Session>(const std::stop_token&)>;
 
-/// A session of the C interface: one that may not be there yet. A thread of its own opens it, gives it what was
-/// changed meanwhile, and closes it in the end; callers never wait for that thread. Functions may be called
-/// from any thread.
+/// A session of the C interface, which may not exist on the server yet. A thread of its own opens it, sends the changes
+/// that were made meanwhile, and closes it in the end. Callers never wait for that thread, except in functions that say
+/// so. Thread-safe.
 class LiveSession {
  public:
   struct Facts {
     Space space;
     FrameContents contents;
-    std::uint32_t vertex_count = 0;  // 0: the server knows
+    std::uint32_t vertex_count = 0;  // 0: only the server knows it
     bool is_reader = false;
-    double reconnect_seconds = 0;  // 0: for ever
+    double reconnect_seconds = 0;  // 0: without limit
   };
 
   LiveSession(Opening opening, Facts facts);
-  /// Waits as wait_until_closed().
+  /// Waits like wait_until_closed().
   ~LiveSession();
 
   const Space& space() const { return facts_.space; }
@@ -50,25 +50,25 @@ class LiveSession {
   /// As lpdeform_take_snapshot. Waits.
   absl::StatusOr<std::string> snapshot();
   lpdeform_state state(absl::Status& why) const;
-  /// Empty where there is none.
+  /// Empty if there is none.
   std::optional<client::Notice> notice() const;
-  /// What the server has to say of the mesh; empty where that is nothing.
+  /// The server's warning about the mesh; empty if there is none.
   std::string mesh_notice() const;
   absl::StatusOr<std::string> name() const;
   std::uint32_t vertex_count() const;
 
-  // As lpdeform_poll, lpdeform_repeat and lpdeform_settle; empty is LPDEFORM_NO_FRAME.
+  // As lpdeform_poll, lpdeform_repeat and lpdeform_settle; empty means LPDEFORM_NO_FRAME.
   absl::StatusOr<std::optional<lpdeform_frame>> poll(const lpdeform_buffers& buffers);
   absl::StatusOr<std::optional<lpdeform_frame>> repeat(const lpdeform_buffers& buffers);
   absl::StatusOr<std::optional<lpdeform_frame>> settle(double timeout_seconds,
                                                        const lpdeform_buffers& buffers);
-  /// As lpdeform_solve; `timeout_seconds` 0 is without limit.
+  /// As lpdeform_solve; `timeout_seconds` 0 means no limit.
   absl::StatusOr<std::optional<lpdeform_frame>> solve(double timeout_seconds, bool certify,
                                                       const lpdeform_buffers& buffers);
 
-  /// The session is over; the thread closes it, once it is open where that was begun.
+  /// Ends the session for the caller. The thread closes it; if it is still being opened, after that.
   void close();
-  /// The same, and what is being opened is given up.
+  /// The same, but aborts an opening that is under way.
   void stop();
   bool is_closed() const;
   void wait_until_closed();
@@ -85,30 +85,31 @@ class LiveSession {
   absl::Status check(const lpdeform_buffers& buffers) const;
   absl::StatusOr<std::shared_ptr<client::Session>> session() const;
   absl::StatusOr<std::shared_ptr<client::Session>> wait_for_session(Clock::time_point deadline);
-  /// False where there is none. Under frame_mutex_, so that of several threads none puts an older frame over a newer one.
+  /// False if there is no new frame. Called under frame_mutex_, so that no thread replaces a newer frame by an older
+  /// one.
   absl::StatusOr<bool> take_newest(client::Session& live);
-  /// Numbers of changes become the caller's.
+  /// Writes the frame; converts numbers of changes to the caller's.
   lpdeform_frame write(const client::Frame& frame, const lpdeform_buffers& buffers) const;
 
-  Opening opening_;  // of the thread; empty once it is of no more use
+  Opening opening_;  // used by the thread; empty when no longer needed
   std::stop_source stop_;
   const Facts facts_;
 
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
-  std::shared_ptr<client::Session> session_;  // once there is one, until it is closed
-  std::optional<client::Update> pending_;     // what was changed before
-  std::uint64_t pending_count_ = 0;           // so many changes
-  std::int64_t seq_offset_ = 0;               // of our numbers over the session's
+  std::shared_ptr<client::Session> session_;  // null before it is open and after it is closed
+  std::optional<client::Update> pending_;     // changes made before there was a session, merged
+  std::uint64_t pending_count_ = 0;           // the number of these changes
+  std::int64_t seq_offset_ = 0;               // our numbers minus the session's
   std::uint64_t first_seq_ =
-      0;  // of the session's, that the changes made before it became; earlier ones are not ours
+      0;  // the session's number for the changes made before it was open; lower numbers are not ours
   absl::Status last_problem_;
   absl::Status refused_;
-  mutable std::atomic<bool> was_live_ = false;  // seen so, or a frame came
+  mutable std::atomic<bool> was_live_ = false;  // was seen live, or a frame arrived
   bool is_closing_ = false;
   bool is_closed_ = false;
 
-  std::mutex frame_mutex_;                   // after mutex_, where both are held
+  std::mutex frame_mutex_;                   // locked after mutex_ if both are held
   std::optional<client::Frame> last_frame_;  // as the session gave it
 
   std::thread thread_;

@@ -1,4 +1,4 @@
-// The border: what C callers see. Each function checks its arguments, calls, and says what came of it; no exception
+// The functions of the C interface. Each checks its arguments, makes the call, and reports the result. No exception
 // leaves it.
 
 #include "client/c/lpdeform.h"
@@ -45,13 +45,13 @@ struct lpdeform_snapshot {
 
 namespace {
 
-/// Calls `work`, which returns a Status, and says what came of it.
+/// Calls `work`, which returns a Status, and reports the result.
 template <typename Work>
 lpdeform_code guarded(lpdeform_error* error, Work work) {
   const absl::Status done = client::guarded(work);
   try {
     return engine::tell(done, error);
-  } catch (...) {  // no memory for the text
+  } catch (...) {  // out of memory for the error text
     return static_cast<lpdeform_code>(done.code());
   }
 }
@@ -109,7 +109,7 @@ absl::Status give(absl::StatusOr<std::shared_ptr<engine::LiveSession>> made, lpd
   return absl::OkStatus();
 }
 
-/// Sends what `read` makes of the caller's structs.
+/// Sends the update that `read` makes from the caller's structs.
 template <typename Read>
 lpdeform_code send(lpdeform_session* session, std::uint64_t* input_seq, lpdeform_error* error, Read read) {
   return guarded(error, [&]() -> absl::Status {
@@ -134,7 +134,7 @@ lpdeform_code take_back(lpdeform_session* session, bool redo, std::uint64_t* inp
   });
 }
 
-/// Calls `frame_of` with the caller's buffers, where they are right, and hands out what is to be known of the frame.
+/// Checks the caller's buffers, calls `frame_of` with them, and returns the description of the frame.
 template <typename FrameOf>
 lpdeform_code write(lpdeform_session* session, const lpdeform_buffers* buffers, lpdeform_frame* frame,
                     lpdeform_error* error, FrameOf frame_of) {

@@ -3,7 +3,7 @@
  *   lpdeform_client* client;
  *   lpdeform_connect(&(lpdeform_connection){.struct_size = sizeof(lpdeform_connection), .address = "localhost:50051"},
  *                    &client, &error);
- *   lpdeform_open(client, &mesh, NULL, &session, &error);        does not wait; loading goes on
+ *   lpdeform_open(client, &mesh, NULL, &session, &error);        does not wait; the upload runs in the background
  *   lpdeform_set_handle(session, &base, NULL, &error);           does not wait: sent when there is a connection
  *   each frame of the game:
  *     lpdeform_move_handle(session, "tip", &motion, NULL, &error);
@@ -12,27 +12,28 @@
  *
  * Rules that hold throughout.
  *
- * Time. A function does not wait for the network, unless its comment begins with WAITS. Those that do not wait copy
- * their arguments, and take locks that nobody holds for longer than it takes to copy a frame or an update.
+ * Time. A function whose comment begins with WAITS waits for the network. All other functions only copy their
+ * arguments, and take locks that no thread holds longer than it takes to copy a frame or an update.
  *
- * Threads. Every function may be called from any thread at any time, and several at once, except that nothing may use a
- * session any more when lpdeform_close is called on it, nor a client when lpdeform_disconnect is. The library makes
- * threads of its own, three a session, and calls nothing back.
+ * Threads. All functions are thread-safe, with one exception: when lpdeform_close is called on a session, or
+ * lpdeform_disconnect on a client, no other thread may use it any more. The library starts threads of its own, three
+ * per session, and makes no callbacks.
  *
- * Memory. What a caller passes in is copied before the function returns and stays the caller's; nothing that
- * the library returns is to be freed but clients, sessions and snapshots.
+ * Memory. Arguments are copied before a function returns, and stay the caller's. Of what the library returns, the
+ * caller must free only clients, sessions and snapshots.
  *
  * Errors. Functions return a code (LPDEFORM_OK is 0) and fill in `error`, which may be NULL. A function that
  * returns an error has changed nothing. No exception leaves the library.
  *
- * Versions. A struct that is passed by itself begins with its size in bytes as the caller was compiled, so that it may
- * grow at its end: `lpdeform_mesh mesh = {.struct_size = sizeof mesh};`. Those that lie within others have none, and stay as they are
- * for as long as LPDEFORM_ABI does: lpdeform_source, _target, _motion, _point and _move. Fields are zero unless set, and
- * zero is the default everywhere; reserved ones must be (RESERVED_SET). A library that is older than its caller refuses
- * fields that it does not know, if they are set (STRUCT_TOO_NEW), rather than leave them out.
+ * Versions. A struct that is passed by itself begins with its size in bytes at the time when the caller was compiled,
+ * so that later versions can add fields at its end: `lpdeform_mesh mesh = {.struct_size = sizeof mesh};`. Structs
+ * inside other structs have no size, and do not change as long as LPDEFORM_ABI does not: lpdeform_source, _target,
+ * _motion, _point and _move. Initialise all fields to zero, which is the default everywhere. Reserved fields must be
+ * zero (RESERVED_SET). If a caller sets a field that an older library does not know, the library returns an error
+ * (STRUCT_TOO_NEW) instead of ignoring the field.
  *
- * Texts are UTF-8, ending in a zero byte. Vertex and face indices begin with 0; vertex order is never changed by
- * anybody, so what goes in from a vertex buffer comes out in its order.
+ * Texts are UTF-8 and end with a zero byte. Vertex and face indices begin with 0. The vertex order never changes:
+ * results have the order of the vertex buffer that was passed in.
  */
 #ifndef LPDEFORM_H_
 #define LPDEFORM_H_
@@ -52,45 +53,45 @@
 extern "C" {
 #endif
 
-/* Rises when a program compiled with an older header could not work with the library. */
+/* Increases when programs compiled with an older header no longer work with the library. */
 #define LPDEFORM_ABI 1
 
-/* The LPDEFORM_ABI of the library that runs. Cannot fail. */
+/* The LPDEFORM_ABI of the loaded library. Cannot fail. */
 LPDEFORM_API uint32_t lpdeform_abi(void);
-/* Its release, "0.1.0". Cannot fail. */
+/* The version of the loaded library, "0.1.0". Cannot fail. */
 LPDEFORM_API const char* lpdeform_version(void);
 
 /* ---- errors ---- */
 
-/* Those of gRPC, and one more. */
+/* The status codes of gRPC, and one more. */
 typedef int32_t lpdeform_code;
 enum {
   LPDEFORM_OK = 0,
   LPDEFORM_CANCELLED = 1,
   LPDEFORM_UNKNOWN = 2,
-  LPDEFORM_INVALID_ARGUMENT = 3, /* what was passed is wrong: `element` and `limit` say where */
+  LPDEFORM_INVALID_ARGUMENT = 3, /* an argument is wrong: see `element` and `limit` */
   LPDEFORM_DEADLINE_EXCEEDED = 4,
   LPDEFORM_NOT_FOUND = 5,
   LPDEFORM_ALREADY_EXISTS = 6,
   LPDEFORM_PERMISSION_DENIED = 7,
-  LPDEFORM_RESOURCE_EXHAUSTED = 8, /* the server is full, or memory is */
+  LPDEFORM_RESOURCE_EXHAUSTED = 8, /* the server is full, or out of memory */
   LPDEFORM_FAILED_PRECONDITION = 9,
   LPDEFORM_ABORTED = 10, /* another writer took over */
   LPDEFORM_OUT_OF_RANGE = 11,
   LPDEFORM_UNIMPLEMENTED = 12,
   LPDEFORM_INTERNAL = 13,
-  LPDEFORM_UNAVAILABLE = 14, /* no server, or it went away */
+  LPDEFORM_UNAVAILABLE = 14, /* no server, or the connection broke */
   LPDEFORM_DATA_LOSS = 15,
   LPDEFORM_UNAUTHENTICATED = 16,
-  LPDEFORM_NO_FRAME = 100 /* no error: there is no newer frame, and nothing was written */
+  LPDEFORM_NO_FRAME = 100 /* not an error: there is no newer frame; nothing was written */
 };
 
-/* What is too long for its place ends in "...". */
+/* Texts that are too long are cut and end in "...". */
 typedef struct lpdeform_error {
   uint32_t struct_size;
   lpdeform_code code;
   char reason[48];   /* for programs: one of lpdeform_reasons.h. May be empty */
-  char element[128]; /* the first offending one: "face 3". May be empty */
+  char element[128]; /* the first offending element: "face 3". May be empty */
   char limit[128];   /* the bound that was broken: "0 <= vertex < 42". May be empty */
   char message[512]; /* one sentence for people */
 } lpdeform_error;
@@ -102,64 +103,65 @@ typedef struct lpdeform_session lpdeform_session;
 
 typedef struct lpdeform_connection {
   uint32_t struct_size;
-  uint32_t tls;                   /* 1: TLS; 0: plain text, which the texts below must then be NULL for */
+  uint32_t tls;                   /* 1: TLS; 0: plain text; the PEM texts below must then be NULL */
   const char* address;            /* "host:port", "unix:/path", "dns:///name:port" */
-  const char* root_certificates;  /* PEM: whom to trust; NULL: whom the system trusts */
-  const char* certificate_chain;  /* PEM: our own, where the server asks for one */
+  const char* root_certificates;  /* PEM: trusted roots; NULL: those that the system trusts */
+  const char* certificate_chain;  /* PEM: of this client, if the server requires one (mutual TLS) */
   const char* private_key;        /* PEM */
   const char* token;              /* bearer token of each call; see lpdeform_set_token. May be NULL */
-  double connect_timeout_seconds; /* of one attempt; 0 takes 5 */
-  double call_timeout_seconds;    /* of one call; 0 takes 30 */
-  /* For how long a session tries to reach a server that is away, before it is over; 0 is for ever. */
+  double connect_timeout_seconds; /* of one attempt; 0 means 5 */
+  double call_timeout_seconds;    /* of one call; 0 means 30 */
+  /* How long a session retries while its server is unreachable before it ends; 0 means without limit. */
   double reconnect_seconds;
 } lpdeform_connection;
 
-/* Makes a client of the server at that address; connecting goes on by itself. Errors: INVALID_ARGUMENT, also where a
- * certificate or key cannot be read, or they do not belong together (TLS_CERTIFICATES, TLS_PRIVATE_KEY, TLS_KEY_MISSING,
- * TLS_KEY_MISMATCH). */
+/* Creates a client of the server at that address; connects in the background. Errors: INVALID_ARGUMENT, also if a
+ * certificate or key cannot be read, or if they do not belong together (TLS_CERTIFICATES, TLS_PRIVATE_KEY,
+ * TLS_KEY_MISSING, TLS_KEY_MISMATCH). */
 LPDEFORM_API lpdeform_code lpdeform_connect(const lpdeform_connection* connection, lpdeform_client** client,
                                             lpdeform_error* error);
 
-/* The bearer token of calls from now on; NULL or "": none. */
+/* Sets the bearer token of all calls from now on; NULL or "": none. */
 LPDEFORM_API lpdeform_code lpdeform_set_token(lpdeform_client* client, const char* token,
                                               lpdeform_error* error);
 
-/* WAITS until every session of the client is closed, those too that lpdeform_close was not called for (they
- * then are over, and still to be given to lpdeform_close): usually milliseconds, at most about two seconds where the server
- * hangs, however many there are. What is being opened is given up. To be called before the process ends. NULL is fine. */
+/* WAITS until every session of the client is closed: usually milliseconds, at most about two seconds if the server
+ * hangs, however many sessions there are. Sessions for which lpdeform_close was not called end as well, but must
+ * still be passed to lpdeform_close. Sessions that are being opened are aborted. Call this before the process ends.
+ * `client` may be NULL. */
 LPDEFORM_API void lpdeform_disconnect(lpdeform_client* client);
 
 /* ---- vertex buffers ---- */
 
-/* How a number or several lie in a buffer. */
+/* How the value of an attribute is stored in a buffer. */
 typedef int32_t lpdeform_format;
 enum {
   LPDEFORM_FLOAT32 = 0, /* positions and normals: 3, colours: 4 (r, g, b, 1), distortion: 1 */
-  LPDEFORM_FLOAT64 = 1, /* the same in double precision; not of colours */
+  LPDEFORM_FLOAT64 = 1, /* the same in double precision; not for colours */
   /* Frames' positions: x, y, z and 65535 as 4 uint16, position = frame.origin + q / 65535 frame.extent. */
   LPDEFORM_UNORM16 = 2,
   LPDEFORM_SNORM16 = 3, /* frames' normals: x, y, z times 32767 and 0 as 4 int16 */
   LPDEFORM_SNORM8 = 4,  /* frames' normals: x, y, z times 127 and 0 as 4 int8 */
   LPDEFORM_RGBA8 = 5,   /* frames' colours: 4 uint8, a is 255 */
-  LPDEFORM_BGRA8 = 6    /* the same in Unreal's order */
+  LPDEFORM_BGRA8 = 6    /* the same in Unreal's channel order */
 };
 
-/* One attribute of vertices to be read: at data + offset + i stride for vertex i. */
+/* A vertex attribute to read: at data + offset + i stride for vertex i. */
 typedef struct lpdeform_source {
   const void* data; /* NULL: there is none */
-  size_t bytes;     /* of the whole buffer: never read beyond */
-  uint32_t offset;  /* of the first vertex's, in bytes */
+  size_t bytes;     /* size of the whole buffer; nothing beyond is read */
+  uint32_t offset;  /* of the first vertex, in bytes */
   uint32_t stride;  /* from vertex to vertex, in bytes; 0: without gaps */
   lpdeform_format format;
   uint32_t reserved; /* 0 */
 } lpdeform_source;
 
-/* One attribute of vertices to be written, at data + offset + i stride; bytes between are left alone. No
- * alignment is needed. */
+/* A vertex attribute to write, at data + offset + i stride for vertex i. Bytes between are not changed. No alignment
+ * is needed. */
 typedef struct lpdeform_target {
   void* data;      /* NULL: not wanted */
-  size_t bytes;    /* of the whole buffer: never written beyond */
-  uint32_t offset; /* of the first vertex's, in bytes */
+  size_t bytes;    /* size of the whole buffer; nothing beyond is written */
+  uint32_t offset; /* of the first vertex, in bytes */
   uint32_t stride; /* from vertex to vertex, in bytes; 0: without gaps */
   lpdeform_format format;
   uint32_t reserved; /* 0 */
@@ -170,66 +172,68 @@ typedef struct lpdeform_target {
 typedef int32_t lpdeform_index_format;
 enum { LPDEFORM_UINT32 = 0, LPDEFORM_UINT16 = 1 };
 
-/* A triangle mesh as an engine has it. */
+/* A triangle mesh in an engine's format. */
 typedef struct lpdeform_mesh {
   uint32_t struct_size;
   uint32_t vertex_count;
   lpdeform_source positions; /* FLOAT32 or FLOAT64 */
-  /* FLOAT32 or FLOAT64, as drawn at rest: frames with normals then carry them along (hard edges stay hard, seams
-   * do not show). Without: smooth ones. */
+  /* FLOAT32 or FLOAT64, as drawn at rest. In frames with normals, these follow the surface: hard edges stay hard,
+   * and seams are invisible. Without them, frames have smooth normals. */
   lpdeform_source normals;
-  const void* indices;  /* three a triangle */
+  const void* indices;  /* three per triangle */
   uint32_t index_count; /* a multiple of 3 */
   lpdeform_index_format index_format;
-  /* Engines have several vertices where texture coordinates or normals change along a seam. 1: those in the same
-   * place are one, deform as one, and get the same positions to the last bit. See weld_tolerance. */
+  /* Engines have several copies of a vertex along seams of texture coordinates or normals. 1: vertices in the same
+   * place are welded: they deform as one vertex and get the same positions to the last bit. See weld_tolerance. */
   uint32_t weld_by_position;
   uint32_t reserved; /* 0 */
-  /* In place of that, one number a vertex: those with the same number are one. May be NULL. */
+  /* Instead of weld_by_position: one number per vertex; vertices with the same number are welded. May be NULL. */
   const uint32_t* weld_groups;
-  /* With weld_by_position: how far apart vertices of one place may be, as a share of the bounding box's diagonal, 0 to
-   * 0.001; 0 is the server's, 1e-6. */
+  /* With weld_by_position: the largest distance of vertices to weld, as a share of the bounding box's diagonal, 0
+   * to 0.001; 0 means the server's default, 1e-6. */
   double weld_tolerance;
 } lpdeform_mesh;
 
-/* The engine's coordinates. The server's are right-handed, with y up, in metres, and triangles are
- * counter-clockwise seen from outside, as in glTF. */
+/* The engine's coordinate system. The server's is that of glTF: right-handed, y up, metres, triangles
+ * counter-clockwise seen from outside. */
 typedef int32_t lpdeform_handedness;
 enum {
   LPDEFORM_RIGHT_HANDED = 0,
-  LPDEFORM_LEFT_HANDED = 1 /* Unity, Unreal. With y up x changes its sign, with z up y and z are swapped */
+  LPDEFORM_LEFT_HANDED = 1 /* Unity, Unreal. With y up, x changes its sign; with z up, y and z are swapped */
 };
 typedef int32_t lpdeform_up;
 enum {
   LPDEFORM_Y_UP = 0, /* Unity, Godot */
   LPDEFORM_Z_UP = 1  /* Unreal, Blender */
 };
-/* Of triangles seen from outside, by a person: mirrored coordinates do not change it. Unreal, which takes
- * (C - A) x (B - A) in left-handed coordinates for the normal of A, B, C, is counter-clockwise. */
+/* The winding of triangles as a person sees them from outside; mirrored coordinates do not change it. Unreal, which
+ * uses (C - A) x (B - A) in left-handed coordinates as the normal of A, B, C, is counter-clockwise. */
 typedef int32_t lpdeform_winding;
 enum {
-  LPDEFORM_WINDING_USUAL = 0, /* clockwise where left-handed with y up (Unity), otherwise not (Unreal) */
+  /* Clockwise if left-handed with y up (Unity), otherwise counter-clockwise (Unreal). */
+  LPDEFORM_WINDING_USUAL = 0,
   LPDEFORM_COUNTER_CLOCKWISE = 1,
-  LPDEFORM_CLOCKWISE = 2 /* Godot, too */
+  LPDEFORM_CLOCKWISE = 2 /* also Godot */
 };
 
-/* How frames travel; the C interface gives the same formats for all of them. */
+/* The encoding of frames on the network. The C interface gives the same formats for all encodings. */
 typedef int32_t lpdeform_encoding;
 enum {
-  LPDEFORM_ENCODING_RAW = 0,       /* 12 bytes a vertex, 28 with distortion and normals */
-  LPDEFORM_ENCODING_QUANTIZED = 1, /* 8 bytes, with distortion; exact to 1/131070 of the extent */
-  LPDEFORM_ENCODING_COMPRESSED = 2 /* the same numbers in about 3 bytes */
+  LPDEFORM_ENCODING_RAW = 0,       /* 12 bytes per vertex, 28 with distortion and normals */
+  LPDEFORM_ENCODING_QUANTIZED = 1, /* 8 bytes per vertex, with distortion; exact to 1/131070 of the extent */
+  LPDEFORM_ENCODING_COMPRESSED = 2 /* the same numbers in about 3 bytes per vertex */
 };
 
-/* Of a cell's edges in the energy; see WeightKind of client/cpp/types.h. */
+/* The weights of a cell's edges in the energy; see WeightKind in client/cpp/types.h. */
 typedef int32_t lpdeform_weights;
 enum { LPDEFORM_COTANGENT = 0, LPDEFORM_UNIFORM = 1, LPDEFORM_INTRINSIC_DELAUNAY = 2 };
 
-/* What becomes of a connected component that no handle holds. */
+/* What happens to a connected component that no handle holds. */
 typedef int32_t lpdeform_free_components;
 enum {
-  LPDEFORM_FREE_COMPONENTS_ERROR = 0, /* poll says COMPONENT_WITHOUT_HANDLE, and the surface stays as it is */
-  LPDEFORM_FREE_COMPONENTS_STAY = 1,
+  /* lpdeform_poll returns COMPONENT_WITHOUT_HANDLE; the surface stays as it is */
+  LPDEFORM_FREE_COMPONENTS_ERROR = 0,
+  LPDEFORM_FREE_COMPONENTS_STAY = 1,  /* stays at rest */
   LPDEFORM_FREE_COMPONENTS_FOLLOW = 2 /* moves rigidly with the nearest handle */
 };
 
@@ -238,107 +242,114 @@ typedef struct lpdeform_options {
   lpdeform_handedness handedness;
   lpdeform_up up;
   lpdeform_winding winding;
-  double units_per_metre; /* 100 where the engine's unit is the centimetre (Unreal); 0 takes 1 */
+  double units_per_metre; /* 100 if the engine's unit is the centimetre (Unreal); 0 means 1 */
   lpdeform_weights weights;
   lpdeform_free_components free_components;
   lpdeform_encoding encoding;
-  lpdeform_encoding lowest_encoding; /* what a server with a limit of bytes a second may go down to */
-  uint32_t with_normals;             /* 1: frames have normals */
-  uint32_t without_distortion;       /* 1: frames need no distortion, and have none where they are raw */
-  uint32_t double_precision;         /* 1: raw frames travel as float64 */
-  uint32_t certify;                  /* 1: a result that stands comes again with its optimality_gap */
-  uint32_t credit;                   /* frames under way and not taken yet, 1 to 8; 0 takes 2 */
-  uint32_t reserved;                 /* 0 */
-  double max_frames_per_second;      /* 0 is without limit; the last frame of an update always comes */
+  /* The least precise encoding to which a server with a limit of bytes per second may switch. */
+  lpdeform_encoding lowest_encoding;
+  uint32_t with_normals;        /* 1: frames have normals */
+  uint32_t without_distortion;  /* 1: distortion is not needed; raw frames then have none */
+  uint32_t double_precision;    /* 1: raw frames are sent as float64 */
+  uint32_t certify;             /* 1: results are sent a second time with their optimality_gap */
+  uint32_t credit;              /* frames that may be under way and not taken yet, 1 to 8; 0 means 2 */
+  uint32_t reserved;            /* 0 */
+  double max_frames_per_second; /* 0 means no limit; the last frame of an update is always sent */
 } lpdeform_options;
 
-/* Begins to make a session of the mesh on the server; `options` may be NULL. Handles may be set at once: they
- * are sent as soon as there is a session. Copies the mesh, which takes about a millisecond for 10,000
- * vertices. The session is the caller's to lpdeform_close. Errors: INVALID_ARGUMENT where a buffer is too small or an
- * enum unknown. What the server says of the mesh comes later, as LPDEFORM_STATE_REFUSED. */
+/* Starts to create a session of the mesh on the server; `options` may be NULL. Handles may be set at once: they are
+ * sent as soon as there is a session. Copies the mesh, which takes about a millisecond for 10,000 vertices. The
+ * caller must pass the session to lpdeform_close. Errors: INVALID_ARGUMENT if a buffer is too small or an enum
+ * unknown. If the server refuses the mesh, the state of the session becomes LPDEFORM_STATE_REFUSED later. */
 LPDEFORM_API lpdeform_code lpdeform_open(lpdeform_client* client, const lpdeform_mesh* mesh,
                                          const lpdeform_options* options, lpdeform_session** session,
                                          lpdeform_error* error);
 
 typedef int32_t lpdeform_role;
-enum { LPDEFORM_READER = 0, LPDEFORM_WRITER = 1 /* in place of whoever is */ };
+enum { LPDEFORM_READER = 0, LPDEFORM_WRITER = 1 /* replaces the present writer */ };
 
-/* The same with a session that somebody else made and goes on when this one is closed; `name` as
- * lpdeform_session_name tells. Of `options`, the mesh's (weights, free_components) are not used. */
+/* The same for a session that somebody else created, and which continues when this one is closed. `name` is that of
+ * lpdeform_session_name. Ignores the `options` that belong to the mesh (weights, free_components). */
 LPDEFORM_API lpdeform_code lpdeform_join(lpdeform_client* client, const char* name, lpdeform_role role,
                                          const lpdeform_options* options, lpdeform_session** session,
                                          lpdeform_error* error);
 
-/* A session as a file: mesh, handles, settings, what can be undone and the surface as it is. */
+/* A session as a file: mesh, handles, settings, undo steps and the current surface. */
 typedef struct lpdeform_snapshot lpdeform_snapshot;
 
-/* WAITS for the session as a file, with every change before it; frames go on, and changes made meanwhile are sent after it.
- * The snapshot is the caller's to lpdeform_free_snapshot. Errors: FAILED_PRECONDITION NOT_CONNECTED while there is no session
- * on the server yet; DEADLINE_EXCEEDED after call_timeout_seconds; what the server says of it or of a change before it. */
+/* WAITS for the session as a file, including every earlier change. Frames continue; changes made meanwhile are sent
+ * after it. The caller must pass the snapshot to lpdeform_free_snapshot. Errors: FAILED_PRECONDITION NOT_CONNECTED
+ * while there is no session on the server yet; DEADLINE_EXCEEDED after call_timeout_seconds; the server's error about
+ * the snapshot or about an earlier change. */
 LPDEFORM_API lpdeform_code lpdeform_take_snapshot(lpdeform_session* session, lpdeform_snapshot** snapshot,
                                                   lpdeform_error* error);
-/* What is to be written to a file, until the snapshot is freed. NULL, and 0 bytes, of NULL. Cannot fail. */
+/* The bytes of the file, valid until the snapshot is freed. For a NULL snapshot: NULL and 0 bytes. Cannot fail. */
 LPDEFORM_API const void* lpdeform_snapshot_data(const lpdeform_snapshot* snapshot, size_t* bytes);
-/* NULL is fine. */
+/* Frees a snapshot, which may be NULL. */
 LPDEFORM_API void lpdeform_free_snapshot(lpdeform_snapshot* snapshot);
 
-/* As lpdeform_open, of such a file, on any server of the same version or a later one; the surface is the same to the last bit,
- * in the coordinates that `options` says. What the file says of the mesh (weights, free_components) is not asked of `options`.
- * A file that is none, is damaged or of a newer version comes as LPDEFORM_STATE_REFUSED (SNAPSHOT_FOREIGN and so on). */
+/* As lpdeform_open, but from such a file, on any server of the same version or a later one. The surface is the same
+ * to the last bit, in the coordinate system of `options`. Ignores the `options` that the file determines (weights,
+ * free_components). If the file is not a snapshot, is damaged or of a newer version, the state becomes
+ * LPDEFORM_STATE_REFUSED (SNAPSHOT_FOREIGN and so on). */
 LPDEFORM_API lpdeform_code lpdeform_restore(lpdeform_client* client, const void* data, size_t bytes,
                                             const lpdeform_options* options, lpdeform_session** session,
                                             lpdeform_error* error);
 
-/* The session is no more for the caller; its end on the server goes on by itself. NULL is fine. */
+/* Ends the session; the caller must not use it any more. It is closed on the server in the background. `session` may
+ * be NULL. */
 LPDEFORM_API void lpdeform_close(lpdeform_session* session);
 
 typedef int32_t lpdeform_state;
 enum {
-  LPDEFORM_STATE_CONNECTING = 0, /* not yet there; `why` says what the last attempt met with */
+  LPDEFORM_STATE_CONNECTING = 0, /* there is no session yet; `why` is the error of the last attempt */
   LPDEFORM_STATE_LIVE = 1,
-  LPDEFORM_STATE_RECONNECTING = 2, /* the server is away: the last frame stands, work goes on after */
-  LPDEFORM_STATE_REFUSED = 3       /* over for good; `why` says why */
+  LPDEFORM_STATE_RECONNECTING = 2, /* the server is unreachable for now; the last frame stays valid */
+  LPDEFORM_STATE_REFUSED = 3       /* the session has ended; `why` says why */
 };
 
-/* How the session is. `why` may be NULL; its code is LPDEFORM_OK where there is nothing to say. NULL is REFUSED. */
+/* The state of the session. `why` may be NULL; its code is LPDEFORM_OK if there is no error. A NULL session is
+ * REFUSED. */
 LPDEFORM_API lpdeform_state lpdeform_session_state(const lpdeform_session* session, lpdeform_error* why);
 
-/* What a server says about itself, or about the mesh; nothing failed. */
+/* Messages about the condition of the server or about the mesh; nothing failed. */
 typedef int32_t lpdeform_notice;
 enum {
   LPDEFORM_NOTICE_NONE = 0,
-  LPDEFORM_NOTICE_OVERLOADED = 1, /* it has more to solve than it can: frames come less often */
-  LPDEFORM_NOTICE_RECOVERED = 2,  /* no more */
-  LPDEFORM_NOTICE_OTHER = 3,      /* what only a newer server says */
-  LPDEFORM_NOTICE_MESH = 4 /* of the mesh: where it is split and comes apart. Until something else is said */
+  LPDEFORM_NOTICE_OVERLOADED = 1, /* the server is overloaded: frames come less often */
+  LPDEFORM_NOTICE_RECOVERED = 2,  /* no longer overloaded */
+  LPDEFORM_NOTICE_OTHER = 3,      /* a notice that only newer servers send */
+  LPDEFORM_NOTICE_MESH = 4 /* the mesh splits open where it is not welded. Until there is another notice */
 };
 
-/* What the server said last on the connection that there is, or of the mesh; NONE where it said nothing, and of NULL.
- * `text`, of `bytes` bytes, becomes one sentence for people, cut as those of errors; it may be NULL. For a line in a log when it changes. */
+/* The last notice on the present connection, or about the mesh. NONE if there is none, and for a NULL session. Writes
+ * one sentence for people to `text`, which has `bytes` bytes and may be NULL; it is cut like the texts of errors. Log
+ * it when it changes. */
 LPDEFORM_API lpdeform_notice lpdeform_session_notice(const lpdeform_session* session, char* text,
                                                      size_t bytes);
 
-/* "sessions/<32 hexadecimal digits>", for lpdeform_join; another one after the server lost it. FAILED_PRECONDITION while
- * there is none. INVALID_ARGUMENT where `bytes` are too few: 64 are enough. */
+/* The name "sessions/<32 hexadecimal digits>", for lpdeform_join. It changes if the server loses the session.
+ * FAILED_PRECONDITION while there is no session. INVALID_ARGUMENT if `bytes` is too small; 64 is enough. */
 LPDEFORM_API lpdeform_code lpdeform_session_name(const lpdeform_session* session, char* name, size_t bytes,
                                                  lpdeform_error* error);
 
-/* Of its mesh; 0 while a session that was joined or restored is not there yet. */
+/* The number of vertices of the mesh; 0 while a joined or restored session is not open yet. */
 LPDEFORM_API uint32_t lpdeform_vertex_count(const lpdeform_session* session);
 
 /* ---- handles ---- */
 
 typedef int32_t lpdeform_motion_kind;
 enum {
-  LPDEFORM_FIXED = 0,    /* stays where the rest mesh has it */
-  LPDEFORM_RIGID = 1,    /* x = R (p - center) + center + translation, p at rest: never added up */
-  LPDEFORM_POSITIONS = 2 /* absolute ones, one for each vertex or point */
+  LPDEFORM_FIXED = 0,    /* stays at its rest positions */
+  LPDEFORM_RIGID = 1,    /* x = R (p - center) + center + translation, p at rest; motions do not accumulate */
+  LPDEFORM_POSITIONS = 2 /* absolute positions, one for each vertex or point */
 };
 
 typedef struct lpdeform_motion {
   lpdeform_motion_kind kind;
   uint32_t position_count; /* as many as the handle has vertices or points */
-  double rotation[4];      /* quaternion x, y, z, w as the engine has it, of any length; all 0: none */
+  /* Quaternion x, y, z, w in the engine's coordinates, of any length; all 0: no rotation. */
+  double rotation[4];
   double center[3];
   double translation[3];
   const double* positions; /* 3 position_count */
@@ -346,15 +357,15 @@ typedef struct lpdeform_motion {
 
 /* How a handle is held. */
 typedef int32_t lpdeform_hold;
-enum {
+enum lpdeform_hold_values {
   LPDEFORM_EXACTLY = 0,
-  LPDEFORM_SOFT = 1,        /* drawn to its target by `weight` */
-  LPDEFORM_ORIENTATION = 2, /* turned by the motion's rotation, its position free; `weight` */
-  LPDEFORM_AXIS_LOCK = 3,   /* free along the line through its target in `direction` */
-  LPDEFORM_PLANE_LOCK = 4   /* free in the plane through its target across `direction` */
+  LPDEFORM_SOFT = 1,        /* pulled to its target with `weight` */
+  LPDEFORM_ORIENTATION = 2, /* has the motion's rotation with `weight`; its position is free */
+  LPDEFORM_AXIS_LOCK = 3,   /* free to move along the line through its target in `direction` */
+  LPDEFORM_PLANE_LOCK = 4   /* free to move in the plane through its target perpendicular to `direction` */
 };
 
-/* A point inside a face: barycentric coordinates times the face's corners in their order. */
+/* A point inside a face: the sum of barycentric coordinates times the face's corners, in their order. */
 typedef struct lpdeform_point {
   uint32_t face;
   uint32_t reserved; /* 0 */
@@ -365,14 +376,14 @@ typedef struct lpdeform_handle {
   uint32_t struct_size;
   lpdeform_hold hold;
   const char* name;
-  const uint32_t* vertices;     /* either these, each held by one handle at most; */
-  const lpdeform_point* points; /* or these, exactly or soft */
+  const uint32_t* vertices;     /* either vertices, each held by at most one handle; */
+  const lpdeform_point* points; /* or points, held exactly or softly */
   uint32_t vertex_count;
   uint32_t point_count;
   lpdeform_motion motion;
-  double weight;       /* up to 1e6; 0 takes 1 (SOFT) or 100 (ORIENTATION) */
+  double weight;       /* up to 1e6; 0 means 1 (SOFT) or 100 (ORIENTATION) */
   double direction[3]; /* of any length but 0 */
-  double footprint;    /* radius of the surroundings that go along nearly rigidly; 0: none */
+  double footprint;    /* radius of the surroundings that move almost rigidly with the handle; 0: none */
 } lpdeform_handle;
 
 typedef int32_t lpdeform_method;
@@ -385,108 +396,110 @@ enum {
   LPDEFORM_METHOD_MULTIRESOLUTION = 5
 };
 
-/* What is 0 or NULL keeps its value. */
+/* Settings that are 0 or NULL keep their values. */
 typedef struct lpdeform_settings {
   uint32_t struct_size;
-  uint32_t p_count;           /* of p_per_vertex: one a vertex */
+  uint32_t p_count;           /* of p_per_vertex: the number of vertices */
   double p;                   /* 1 to 64, everywhere; */
-  const double* p_per_vertex; /* or one a vertex; */
-  double p_automatic;         /* or from the geometry, with this strength, up to 1 */
+  const double* p_per_vertex; /* or one per vertex; */
+  double p_automatic;         /* or computed from the geometry with this strength, up to 1 */
   double stiffness;           /* 1e-6 to 1e6, everywhere; */
   const double* stiffness_per_vertex;
   double stiffness_automatic;
   uint32_t stiffness_count;
   uint32_t reserved;  /* 0 */
-  double length_unit; /* of mixed norms; negative takes the mean edge length back */
-  /* 1: the next four replace the server's, whole. */
+  double length_unit; /* of mixed norms; negative: back to the mean edge length */
+  /* 1: the next four fields together replace the server's. */
   uint32_t set_solver;
   lpdeform_method method;
   double tolerance;
   double time_limit_seconds;
   uint32_t max_iterations;
-  /* 1: only the vertices of the region may move from now on; with none, everything may. */
+  /* 1: from now on only the vertices of the region may move; with an empty region, all may. */
   uint32_t set_region;
   const uint32_t* region;
   uint32_t region_count;
   uint32_t reserved_too; /* 0 */
 } lpdeform_settings;
 
-/* A motion for a handle that is there. */
+/* A motion for an existing handle. */
 typedef struct lpdeform_move {
   const char* name;
   lpdeform_motion motion;
 } lpdeform_move;
 
-/* A change of handles and settings, which the server takes whole or not at all. */
+/* A change of handles and settings. It is atomic: the server accepts all of it or nothing. */
 typedef struct lpdeform_update {
   uint32_t struct_size;
   uint32_t set_count;
-  const lpdeform_handle* sets; /* added, or replaced */
+  const lpdeform_handle* sets; /* handles to add or replace */
   const lpdeform_move* moves;
   const char* const* removals;
   uint32_t move_count;
   uint32_t removal_count;
   const lpdeform_settings* settings; /* may be NULL */
-  /* 1: what it does to handles is a step of its own for lpdeform_undo; to be set when a drag begins. */
+  /* 1: the changes of handles begin a new step for lpdeform_undo. Set this when a drag begins. */
   uint32_t begins_step;
   uint32_t reserved; /* 0 */
 } lpdeform_update;
 
-/* Sends a change. Changes made faster than the connection takes them are merged, the newest of each handle and
- * each setting winning. `input_seq`, where not NULL, becomes the change's number: a frame whose input_seq is at
- * least that takes it into account. Errors: INVALID_ARGUMENT where the change makes no sense by itself, NAME_ENCODING where
- * a name is not UTF-8; what the server says of it comes out of lpdeform_poll, once. For a reader FAILED_PRECONDITION
- * NOT_THE_WRITER. Once the session is over, why: what lpdeform_session_state says. */
+/* Sends a change. Changes made faster than the connection can send them are merged: the newest value of each handle
+ * and each setting wins. If `input_seq` is not NULL, it receives the number of the change: frames with at least this
+ * input_seq include it. Errors: INVALID_ARGUMENT if the change is wrong by itself, NAME_ENCODING if a name is not
+ * UTF-8. If the server refuses the change, lpdeform_poll returns the error once. For a reader: FAILED_PRECONDITION
+ * NOT_THE_WRITER. When the session has ended: the error of lpdeform_session_state. */
 LPDEFORM_API lpdeform_code lpdeform_send(lpdeform_session* session, const lpdeform_update* update,
                                          uint64_t* input_seq, lpdeform_error* error);
 
-/* Adds the handle, or replaces the one of its name. As lpdeform_send. */
+/* Adds the handle, or replaces the handle of the same name. As lpdeform_send. */
 LPDEFORM_API lpdeform_code lpdeform_set_handle(lpdeform_session* session, const lpdeform_handle* handle,
                                                uint64_t* input_seq, lpdeform_error* error);
 /* Moves a handle. As lpdeform_send. */
 LPDEFORM_API lpdeform_code lpdeform_move_handle(lpdeform_session* session, const char* name,
                                                 const lpdeform_motion* motion, uint64_t* input_seq,
                                                 lpdeform_error* error);
-/* Lets go of a handle. As lpdeform_send. */
+/* Removes a handle. As lpdeform_send. */
 LPDEFORM_API lpdeform_code lpdeform_remove_handle(lpdeform_session* session, const char* name,
                                                   uint64_t* input_seq, lpdeform_error* error);
 /* Changes p, stiffness and so on. As lpdeform_send. */
 LPDEFORM_API lpdeform_code lpdeform_set(lpdeform_session* session, const lpdeform_settings* settings,
                                         uint64_t* input_seq, lpdeform_error* error);
 
-/* A scaling by different factors along three axes, in which what is salient keeps its shape and size. */
+/* A scaling by different factors along three axes in which salient parts keep their shape and size. */
 typedef struct lpdeform_resizing {
   uint32_t struct_size;
-  uint32_t set_origin; /* 1: `origin` stays where it is; 0: the middle of the mesh's bounding box does */
+  uint32_t set_origin; /* 1: `origin` does not move; 0: the middle of the mesh's bounding box does not */
   uint32_t set_axes;   /* 1: the axes below; 0: the engine's x, y and z */
   uint32_t reserved;   /* 0 */
-  double scale[3];     /* along the axes, relative to the mesh at rest: 0.01 to 100; 0 takes 1 */
+  double scale[3];     /* along the axes, relative to the mesh at rest: 0.01 to 100; 0 means 1 */
   double origin[3];
   double x_axis[3]; /* of any length but 0 */
-  double y_axis[3]; /* what of it is across x_axis counts; the third axis is across both */
+  /* Only its part perpendicular to x_axis counts. The third axis is perpendicular to both. */
+  double y_axis[3];
 } lpdeform_resizing;
 
-/* Scales the mesh: sets the handle "resize", which holds the ends of each component along the scaled axes, and p and
- * stiffness. Along other axes the extent changes, unless plane locks hold ends there. To end it, remove that handle and
- * set p and stiffness. As lpdeform_send. */
+/* Scales the mesh: sets p and stiffness, and the handle "resize", which holds the ends of each component along the
+ * scaled axes. Along other axes the extent changes unless plane locks hold the ends there. To end the resizing,
+ * remove that handle and set p and stiffness. As lpdeform_send. */
 LPDEFORM_API lpdeform_code lpdeform_resize(lpdeform_session* session, const lpdeform_resizing* resizing,
                                            uint64_t* input_seq, lpdeform_error* error);
 
-/* WAITS until the server has taken the newest step of the handles back, as lpdeform_send sends a change: frames follow. A
- * step is what a person sees as one change: changes that move the same handles, none of them over a second after the one
- * before, or each other change of handles; lpdeform_update.begins_step begins one in any case. Settings are no part of it.
- * Errors: FAILED_PRECONDITION (NOTHING_TO_UNDO, also of what came before the server lost the session; NOT_CONNECTED while
- * there is none on the server yet; NOT_THE_WRITER), DEADLINE_EXCEEDED after call_timeout_seconds, what the server says of a
- * change before it. */
+/* WAITS until the server has undone the newest step of the handles. This is a change as in lpdeform_send: frames
+ * follow. A step is what a person sees as one change. Consecutive changes that move the same handles, each at most a
+ * second after the previous one, are one step; every other change of handles is a step of its own.
+ * lpdeform_update.begins_step always begins a new step. Settings are not part of steps. Errors: FAILED_PRECONDITION
+ * (NOTHING_TO_UNDO, also for steps from before the server lost the session; NOT_CONNECTED while there is no session
+ * on the server yet; NOT_THE_WRITER), DEADLINE_EXCEEDED after call_timeout_seconds, and the server's error about an
+ * earlier change. */
 LPDEFORM_API lpdeform_code lpdeform_undo(lpdeform_session* session, uint64_t* input_seq,
                                          lpdeform_error* error);
-/* Does again what was taken back last. As lpdeform_undo; NOTHING_TO_REDO. */
+/* Redoes the step that was undone last. As lpdeform_undo; NOTHING_TO_REDO. */
 LPDEFORM_API lpdeform_code lpdeform_redo(lpdeform_session* session, uint64_t* input_seq,
                                          lpdeform_error* error);
 
 /* ---- frames ---- */
 
-/* Where a frame is to be written, in the engine's coordinates. */
+/* Where to write a frame, in the engine's coordinates. */
 typedef struct lpdeform_buffers {
   uint32_t struct_size;
   uint32_t reserved;          /* 0 */
@@ -494,7 +507,7 @@ typedef struct lpdeform_buffers {
   lpdeform_target normals;    /* FLOAT32, FLOAT64, SNORM16 or SNORM8; needs with_normals */
   lpdeform_target colours;    /* FLOAT32, RGBA8 or BGRA8: distortion from blue (none) to red */
   lpdeform_target distortion; /* FLOAT32 or FLOAT64: E_i of each vertex, lengths in metres */
-  /* The distortion that is shown as full red. 0: the frame's 95th percentile. */
+  /* The distortion that is shown in full red. 0: the frame's 95th percentile. */
   double red_distortion;
 } lpdeform_buffers;
 
@@ -509,58 +522,60 @@ enum {
   LPDEFORM_NUMERICAL_BREAKDOWN = 6
 };
 
-/* What is to be known of a frame. */
+/* The description of a frame. */
 typedef struct lpdeform_frame {
   uint32_t struct_size;
   uint32_t vertex_count;
-  uint64_t input_seq; /* the newest change that it answers */
+  uint64_t input_seq; /* the newest change that the frame includes */
   uint64_t frame_seq;
   uint64_t epoch;
-  uint64_t skipped_inputs; /* changes since the frame before that no frame answers */
+  uint64_t skipped_inputs; /* changes since the previous frame for which there is no frame */
   uint32_t iteration;
-  uint32_t is_final; /* 1: the result, however it ended; no further frame until there is a new change */
+  uint32_t is_final; /* 1: final, however the solve ended; no further frame until there is a new change */
   lpdeform_stop_reason stop_reason;
   uint32_t has_optimality_gap;
   double energy; /* lengths in metres */
   double soft_energy;
   double solve_seconds;
-  double optimality_gap; /* where has_optimality_gap; see OpenOptions::certify of client/cpp/client.h */
-  double red_distortion; /* that the colours were made with; 0 without colours */
-  double origin[3];      /* of UNORM16 positions, in the engine's coordinates; 0 without */
+  double optimality_gap; /* valid if has_optimality_gap; see OpenOptions::certify in client/cpp/client.h */
+  double red_distortion; /* used for the colours; 0 without colours */
+  double origin[3];      /* for UNORM16 positions, in the engine's coordinates; otherwise 0 */
   double extent[3];
 } lpdeform_frame;
 
-/* Takes the newest frame that was not taken yet, and writes it. LPDEFORM_NO_FRAME where there is none:
- * then, as with errors, nothing was written, and what the buffers had from the frame before still stands.
- * `frame` may be NULL. Errors: what the server had to say about a change (once; the session goes on); once the session is over,
- * why; INVALID_ARGUMENT where a buffer is too small or a format not one of its attribute's, FAILED_PRECONDITION
- * where normals or distortion are wanted that the session was opened without: then the frame waits on. */
+/* Takes the newest frame that was not taken yet, and writes it. LPDEFORM_NO_FRAME if there is none. In this case, and
+ * with all errors, nothing is written, and the buffers keep their content. `frame` may be NULL. Errors: the server's
+ * error about a change (once; the session continues); when the session has ended, the reason; INVALID_ARGUMENT if a
+ * buffer is too small or its attribute cannot have that format; FAILED_PRECONDITION if the buffers ask for normals or
+ * distortion but the session was opened without. After the last two errors, the frame can still be taken. */
 LPDEFORM_API lpdeform_code lpdeform_poll(lpdeform_session* session, const lpdeform_buffers* buffers,
                                          lpdeform_frame* frame, lpdeform_error* error);
 
-/* Writes the frame taken last, by whichever thread, once more, for engines whose buffers do not keep what was written; also
- * while the server is away and after the session is over. LPDEFORM_NO_FRAME where none was taken. */
+/* Writes the frame that was taken last (by any thread) again, for engines whose buffers do not keep their content.
+ * Works also while the server is unreachable and after the session has ended. LPDEFORM_NO_FRAME if no frame was taken
+ * yet. */
 LPDEFORM_API lpdeform_code lpdeform_repeat(lpdeform_session* session, const lpdeform_buffers* buffers,
                                            lpdeform_frame* frame, lpdeform_error* error);
 
-/* WAITS until the finished result of the newest change has come, and writes it; for tools and loading screens. At once
- * where it was taken before. Takes frames meanwhile. DEADLINE_EXCEEDED where none came; other errors as lpdeform_poll. */
+/* WAITS for the final result of the newest change, and writes it; for tools and loading screens. Takes frames
+ * meanwhile. Returns at once if that result was taken before. DEADLINE_EXCEEDED on timeout; other errors as
+ * lpdeform_poll. */
 LPDEFORM_API lpdeform_code lpdeform_settle(lpdeform_session* session, double timeout_seconds,
                                            const lpdeform_buffers* buffers, lpdeform_frame* frame,
                                            lpdeform_error* error);
 
 typedef struct lpdeform_solve_options {
   uint32_t struct_size;
-  uint32_t certify;       /* 1: find frame.optimality_gap */
-  double timeout_seconds; /* of the whole call, waiting for another included; 0 is without limit */
+  uint32_t certify;       /* 1: compute frame.optimality_gap */
+  double timeout_seconds; /* of the whole call, including the wait for another solve; 0 means no limit */
 } lpdeform_solve_options;
 
-/* WAITS for a solve of its own to the end, for the present handles and settings, and writes the result in full precision;
- * for tools. Takes no frames: frame_seq and epoch are 0. Normals need no with_normals. `options` may be NULL. One at a
- * time; while one runs no change is sent: those made meanwhile are sent after it, and frames do not follow them until then.
- * Errors: what the server refuses; DEADLINE_EXCEEDED; UNAVAILABLE where it stayed away for reconnect_seconds; by
- * lpdeform_disconnect CANCELLED, or FAILED_PRECONDITION SESSION_CLOSED where it had not begun. A solve that stopped short
- * is no error: frame.stop_reason says so. */
+/* WAITS for a complete solve for the current handles and settings, and writes the result in full precision; for
+ * tools. Takes no frames: frame_seq and epoch are 0. Normals do not require with_normals. `options` may be NULL. Only
+ * one solve runs at a time. Changes made meanwhile are sent after it, and frames show them only then. Errors: what
+ * the server refuses; DEADLINE_EXCEEDED; UNAVAILABLE if the server was unreachable for reconnect_seconds; after
+ * lpdeform_disconnect CANCELLED or, if the solve had not begun, FAILED_PRECONDITION SESSION_CLOSED. It is not an
+ * error if the solve stopped before it converged: see frame.stop_reason. */
 LPDEFORM_API lpdeform_code lpdeform_solve(lpdeform_session* session, const lpdeform_solve_options* options,
                                           const lpdeform_buffers* buffers, lpdeform_frame* frame,
                                           lpdeform_error* error);

@@ -1,6 +1,7 @@
-/* What the archives that the library is linked from take from a newer C library than it has to need. The linker prefers these, and
- * exports.map hides them. libstdc++'s std::random_device takes arc4random, c-ares arc4random_buf (of glibc 2.36). What was compiled as
- * C++ with the headers of glibc 2.38 or newer takes the functions of C23 that read numbers, which take "0b1" as well. */
+/* Replacements for C library functions that the linked archives use but older C libraries do not have. The linker
+ * prefers these definitions, and exports.map hides them. libstdc++'s std::random_device uses arc4random, and c-ares
+ * uses arc4random_buf (both from glibc 2.36). C++ code compiled with the headers of glibc 2.38 or newer uses the C23
+ * functions that parse numbers, which also accept "0b1". */
 #include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>

@@ -11,19 +11,19 @@
 
 namespace lpdeform::engine {
 
-/// INVALID_ARGUMENT SECONDS_OUT_OF_RANGE where `seconds` is not within 0 to 1e9.
+/// INVALID_ARGUMENT SECONDS_OUT_OF_RANGE if `seconds` is not in [0, 1e9].
 absl::Status check_seconds(const char* name, double seconds);
 
-/// The server that `connection` names, not connected to yet. ARGUMENT_MISSING, SECONDS_OUT_OF_RANGE; TLS_OFF where there are
-/// certificates and no TLS.
+/// The server that `connection` names; does not connect yet. ARGUMENT_MISSING, SECONDS_OUT_OF_RANGE; TLS_OFF if there
+/// are certificates but no TLS.
 absl::StatusOr<std::shared_ptr<Server>> make_server(const lpdeform_connection& connection);
 
 struct ReadOptions {
   client::OpenOptions open;
-  LiveSession::Facts facts;  // but for the number of vertices
+  LiveSession::Facts facts;  // without the number of vertices
 };
 
-/// NULL is all defaults. ENUM_UNKNOWN, UNITS_OUT_OF_RANGE, and what read_struct says.
+/// NULL means all defaults. Errors: ENUM_UNKNOWN, UNITS_OUT_OF_RANGE, and those of read_struct.
 absl::StatusOr<ReadOptions> read_options(const lpdeform_options* options);
 
 }  // namespace lpdeform::engine

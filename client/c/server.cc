@@ -52,7 +52,7 @@ std::shared_ptr<LiveSession> Server::start(Open open, LiveSession::Facts facts) 
   return session;
 }
 
-/// Their threads have ended, so that nobody waits here.
+/// Removes closed sessions. Their threads have ended, so this does not wait.
 void Server::forget_closed() {
   const std::scoped_lock lock(mutex_);
   std::erase_if(sessions_, [](const auto& session) { return session->is_closed(); });

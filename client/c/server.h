@@ -14,23 +14,23 @@
 
 namespace lpdeform::engine {
 
-/// A server as the C interface knows it: connected to when it is first needed, by the threads of its sessions,
-/// which share the connection. Functions may be called from any thread.
+/// A server of the C interface. The threads of its sessions connect to it when it is first needed, and share the
+/// connection. Thread-safe.
 class Server : public std::enable_shared_from_this<Server> {
  public:
-  /// Makes a session with a client that is connected; waits.
+  /// Creates a session with a connected client; waits.
   using Open = std::function<absl::StatusOr<client::Session>(client::Client&, const std::stop_token&)>;
 
-  /// `options.token` is not used: see set_token.
+  /// `options.token` is ignored: see set_token.
   Server(std::string address, client::ClientOptions options, double reconnect_seconds);
 
-  /// INVALID_ARGUMENT TOKEN_CHARACTERS; the token in force stays then.
+  /// INVALID_ARGUMENT TOKEN_CHARACTERS; the previous token then stays in force.
   absl::Status set_token(std::string token);
 
   std::shared_ptr<LiveSession> start(Open open, LiveSession::Facts facts);
 
-  /// Closes every session, gives up those that are being opened, and waits for the ends of their threads: as long as one call
-  /// may take at most.
+  /// Closes every session, aborts openings that are under way, and waits until all their threads have ended: at most as
+  /// long as one call may take.
   void close();
 
  private:
@@ -47,11 +47,11 @@ class Server : public std::enable_shared_from_this<Server> {
   const double reconnect_seconds_;
   const std::shared_ptr<Token> token_ = std::make_shared<Token>();
 
-  std::mutex connecting_;  // one thread at a time connects, the others wait for what it finds
+  std::mutex connecting_;  // one thread at a time connects, the others wait for its result
   std::optional<client::Client> client_;
 
   std::mutex mutex_;
-  std::vector<std::shared_ptr<LiveSession>> sessions_;  // all that have a thread
+  std::vector<std::shared_ptr<LiveSession>> sessions_;  // all sessions that have a thread
 };
 
 }  // namespace lpdeform::engine

@@ -21,12 +21,12 @@ absl::StatusOr<Space> Space::of(const lpdeform_options& options) {
   if (options.units_per_metre > 0) space.units_per_metre_ = options.units_per_metre;
   space.mirrors_ = options.handedness == LPDEFORM_LEFT_HANDED;
   if (options.up == LPDEFORM_Z_UP) {
-    space.axis_ = {0, 2, 1};  // alone, this swap of two axes changes the handedness
+    space.axis_ = {0, 2, 1};  // by itself, this swap of two axes changes the handedness
     if (!space.mirrors_) space.sign_[2] = -1;
   } else if (space.mirrors_) {
     space.sign_[0] = -1;
   }
-  // Other coordinates of the same thing: what is clockwise to see stays so.
+  // Both coordinate systems describe the same object: a triangle that looks clockwise still does.
   const bool is_unity = space.mirrors_ && options.up == LPDEFORM_Y_UP;
   space.turns_triangles_ =
       options.winding == LPDEFORM_WINDING_USUAL ? is_unity : options.winding == LPDEFORM_CLOCKWISE;

@@ -10,22 +10,22 @@ namespace lpdeform::engine {
 
 using Vector = std::array<double, 3>;
 
-/// Between the coordinates of an engine and the server's: right-handed, y up, metres, counter-clockwise. Each of the
-/// server's axes is one of the engine's, perhaps the other way round, so that nothing is rounded but by the
-/// unit of length.
+/// Converts between the coordinates of an engine and the server's: right-handed, y up, metres, counter-clockwise. Each
+/// of the server's axes is one of the engine's axes, with the same or the opposite sign, so only the unit of length
+/// causes rounding.
 class Space {
  public:
-  /// ENUM_UNKNOWN; UNITS_OUT_OF_RANGE where units_per_metre is negative or not finite.
+  /// ENUM_UNKNOWN; UNITS_OUT_OF_RANGE if units_per_metre is negative or not finite.
   static absl::StatusOr<Space> of(const lpdeform_options& options);
 
   Vector point_to_server(const Vector& point) const;
   Vector point_to_engine(const Vector& point) const;
   Vector direction_to_server(const Vector& direction) const;
   Vector direction_to_engine(const Vector& direction) const;
-  /// The axis of a rotation: turns the other way round where left and right change places.
+  /// Converts the axis of a rotation. Its sign changes if the handedness differs.
   Vector rotation_axis_to_server(const Vector& axis) const;
   double length_to_server(double length) const { return length / units_per_metre_; }
-  /// The corners of each triangle change their order, so that it is seen from the same side.
+  /// Whether the corners of each triangle are reordered, so that its outside stays the same.
   bool turns_triangles() const { return turns_triangles_; }
 
   // For loops over vertices: engine[axis[k]] = factor[k] * server[k].

@@ -1,5 +1,5 @@
-/* Some of the archives that the library is linked from name the C library's variable stderr directly, as only executables may. The
- * linker gives them this one in its place (--wrap=stderr), which is the same stream. */
+/* Some of the linked archives refer directly to the C library's variable stderr, which only executables may do. The
+ * linker replaces it by the variable below (--wrap=stderr), which is the same stream. */
 #include <stdio.h>
 
 extern FILE* __real_stderr;

@@ -16,7 +16,7 @@
 /// Structs that carry their size in their first field, `struct_size`: see "Versions" in lpdeform.h.
 namespace lpdeform::engine {
 
-/// What a struct had in the first version: only what grew since is not sizeof(Struct).
+/// The size of a struct in the first version. Only structs that have grown since have a size other than sizeof(Struct).
 template <typename Struct>
 inline constexpr std::size_t kFirstSize = sizeof(Struct);
 template <>
@@ -24,9 +24,9 @@ inline constexpr std::size_t kFirstSize<lpdeform_update> = offsetof(lpdeform_upd
 template <>
 inline constexpr std::size_t kFirstSize<lpdeform_mesh> = offsetof(lpdeform_mesh, weld_tolerance);
 
-/// What `given` says, in a struct of this library's own size. `name` is for errors: INVALID_ARGUMENT
-/// ARGUMENT_MISSING where it is NULL, STRUCT_SIZE where it is smaller than in the first version, STRUCT_TOO_NEW where bytes
-/// that we do not know are not 0. What its caller does not know yet is 0.
+/// Copies `given` to a struct of this library's size. Fields that the caller does not know yet are 0. `name` is for
+/// errors: INVALID_ARGUMENT ARGUMENT_MISSING if `given` is NULL, STRUCT_SIZE if it is smaller than in the first
+/// version, STRUCT_TOO_NEW if bytes that this library does not know are not 0.
 template <typename Struct>
 absl::StatusOr<Struct> read_struct(const Struct* given, const std::string& name) {
   if (given == nullptr) {
@@ -51,7 +51,7 @@ absl::StatusOr<Struct> read_struct(const Struct* given, const std::string& name)
   return out;
 }
 
-/// Fills in what the caller's struct has room for; its struct_size stays. `out` may be NULL.
+/// Writes as much of `from` as the caller's struct has room for; its struct_size does not change. `out` may be NULL.
 template <typename Struct>
 void write_struct(const Struct& from, Struct* out) {
   if (out == nullptr) return;

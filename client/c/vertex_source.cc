@@ -76,7 +76,7 @@ absl::Status check_extent(const std::string& name, std::size_t bytes, std::uint3
         {Reason::kStrideTooSmall, name, absl::StrCat("stride >= ", size)},
         absl::StrCat("The stride of ", name, " is ", stride, " bytes, its elements have ", size, "."));
   }
-  // Each is below 2^32, so that this fits where a size_t may not.
+  // Each factor is below 2^32, so the result fits into 64 bits, but perhaps not into a size_t.
   const std::uint64_t needed = count == 0 ? 0 : offset + (count - 1) * step + size;
   if (needed <= bytes) return absl::OkStatus();
   return make_fault({Reason::kBufferTooSmall, name, absl::StrCat("bytes >= ", needed)},

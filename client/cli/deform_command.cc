@@ -23,7 +23,7 @@
 namespace lpdeform::cli {
 namespace {
 
-/// All that the command reads, read and looked through before any work is done.
+/// All inputs of the command, read and checked before any work is done.
 struct Inputs {
   MeshFile file;
   client::Update update;
@@ -55,7 +55,7 @@ client::SolverSettings solver_settings(const DeformOptions& options) {
       .initial = options.initial == "rest" ? client::InitialGuess::kRest : client::InitialGuess::kLaplacian};
 }
 
-/// The mesh may be overwritten by the result, what else is read may not, and no output by another.
+/// The result may overwrite the mesh. No output may overwrite another input or another output.
 absl::Status check_files_apart(const DeformOptions& options) {
   std::vector<NamedFile> written, read{{"--handles", options.handles}};
   for (const auto& [option, file] : {std::pair("--p-field", options.material.p_field),

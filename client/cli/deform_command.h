@@ -26,9 +26,9 @@ struct DeformOptions {
   std::optional<std::uint32_t> max_iterations;
   double tolerance = 0;  // 0: the server's default
   std::optional<double> time_limit_seconds;
-  int threads = 0;             // of the server in this process; 0: all cores
-  std::optional<double> weld;  // its tolerance, 0: the default; none: vertices stay as they are
-  bool normals = false;        // in .obj and .ply
+  int threads = 0;             // for a server in this process; 0: all cores
+  std::optional<double> weld;  // tolerance, 0: the default; not set: no weld
+  bool normals = false;        // write normals to .obj and .ply
   bool certify = false;        // print the optimality gap
   std::vector<std::filesystem::path> out;
   PictureOptions picture;
@@ -36,8 +36,7 @@ struct DeformOptions {
   ServerAccess server;
 };
 
-/// Deforms a mesh once and writes what was asked for. Prints one line about how the solve went and one for
-/// each file.
+/// Deforms a mesh once and writes the outputs. Prints one line about the solve and one for each file.
 ExitStatus run_deform(const DeformOptions& options);
 
 }  // namespace lpdeform::cli

@@ -24,7 +24,7 @@ double radians(double degrees) {
   return degrees * std::numbers::pi / 180;
 }
 
-/// Adds a handle of the vertices that `is_held` picks.
+/// Adds a handle of the vertices for which `is_held` is true.
 void hold(GeneratedShape& shape, const char* name, const std::function<bool(const Point&)>& is_held,
           client::Motion motion = client::Fixed{}) {
   NamedHandle handle{name, {{}, std::move(motion)}};
@@ -35,7 +35,7 @@ void hold(GeneratedShape& shape, const char* name, const std::function<bool(cons
   shape.handles.push_back(std::move(handle));
 }
 
-/// The paper's poses, by what core/shapes/paper_poses.h makes.
+/// Makes one of the paper's poses with a function of core/shapes/paper_poses.h.
 template <PaperPose (*make)(double size)>
 GeneratedShape paper_shape(int detail) {
   PaperPose pose = make(detail);

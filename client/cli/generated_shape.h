@@ -10,15 +10,15 @@
 
 namespace lpdeform::cli {
 
-/// A shape to try things on, and handles that deform it.
+/// A shape to try things on, with handles that deform it.
 struct GeneratedShape {
   TriangleMesh mesh;
   std::vector<NamedHandle> handles;
   std::string note;  // what the handles do
 };
 
-/// `detail` >= 1 multiplies the cells along each side. INVALID_ARGUMENT: SHAPE_UNKNOWN names the ones there
-/// are, SHAPE_DETAIL.
+/// `detail` >= 1 multiplies the cells along each side. INVALID_ARGUMENT: SHAPE_UNKNOWN lists the shapes that
+/// exist, SHAPE_DETAIL.
 absl::StatusOr<GeneratedShape> generate_shape(std::string_view name, int detail);
 
 std::vector<std::string> generated_shape_names();

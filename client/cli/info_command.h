@@ -11,8 +11,8 @@ struct InfoOptions {
   bool is_json = false;
 };
 
-/// Prints what a mesh is made of and what is wrong with it. Also where it cannot be deformed: then one line
-/// on stderr says why, and the status is kBadInput.
+/// Prints what a mesh consists of and its defects. If the mesh cannot be deformed, a line on stderr says why,
+/// and the status is kBadInput.
 ExitStatus run_info(const InfoOptions& options);
 
 }  // namespace lpdeform::cli

@@ -13,12 +13,12 @@
 namespace lpdeform::cli {
 namespace {
 
-// What is written to the event tells who wrote.
+// The value written to the event tells who wrote it.
 constexpr std::uint64_t kSignal = 1;
 constexpr std::uint64_t kEnough = std::uint64_t{1} << 32;
 
-/// Of the one Interrupt that lives. A handler and no blocked mask: libraries start threads before main, and a
-/// signal goes to any thread that does not block it.
+/// The event of the one Interrupt that exists. It uses a handler and no blocked mask: libraries start threads
+/// before main, and a signal goes to any thread that does not block it.
 std::atomic<int> event = -1;
 
 void post(std::uint64_t what) {

@@ -7,18 +7,18 @@
 
 namespace lpdeform::cli {
 
-/// Turns the first Ctrl-C (SIGINT) or SIGTERM into a call, for as long as it lives; a second one ends the
-/// program as ever. One at a time.
+/// While it lives, turns the first Ctrl-C (SIGINT) or SIGTERM into a call. A second one ends the program as
+/// usual. Only one object at a time.
 class Interrupt {
  public:
   Interrupt();
   ~Interrupt();
 
-  /// What to do, on another thread, or at once on this one where the signal has come before. It may wait.
-  /// Replaces the action before, after that has ended where it runs; empty does nothing.
+  /// Sets the action. It runs on another thread, or at once on this one if the signal has come before. It may
+  /// wait. The previous action is replaced, after it has ended if it is running. An empty action does nothing.
   void set_action(std::function<void()> action);
 
-  /// The signal has come.
+  /// Whether the signal has come.
   bool happened() const { return happened_; }
 
  private:

@@ -25,7 +25,7 @@ using Clock = Lane::Clock;
 using Lanes = std::vector<std::unique_ptr<Lane>>;
 using Seconds = std::chrono::duration<double>;
 
-/// After the last update, for the frames that are still owed.
+/// How long to wait, after the last update, for outstanding frames.
 constexpr std::chrono::seconds kLastPatience{10};
 constexpr std::chrono::milliseconds kBetweenLooks{20};
 
@@ -49,7 +49,8 @@ absl::StatusOr<Lanes> open_lanes(const LoadOptions& options, const Lane::Connect
   return lanes;
 }
 
-/// Drops the lanes' connections in turn, each once a period, on a thread of its own: it waits for the server.
+/// Drops the lanes' connections in turn, each once per period, on a thread of its own because it waits for
+/// the server.
 class Reconnector {
  public:
   Reconnector(Lanes& lanes, double period_seconds) {
@@ -85,8 +86,8 @@ class Reconnector {
   std::thread thread_;
 };
 
-/// Sends each lane's updates when they are due, the lanes' moments spread over a period. Returns by how much the latest
-/// of them was late: where that is much, it was this machine that could not keep up.
+/// Sends each lane's updates when they are due, with the lanes spread over a period. Returns by how much the
+/// latest update was late: if that is much, this machine could not keep up.
 Clock::duration drive(const LoadOptions& options, Lanes& lanes, const Interrupt& interrupt,
                       Progress& progress) {
   const auto each = static_cast<std::uint64_t>(std::llround(options.rate * options.seconds));

@@ -10,20 +10,20 @@
 namespace lpdeform::cli {
 
 struct LoadOptions {
-  ServerAccess server;  // its address is needed
+  ServerAccess server;  // its address is required
   int sessions = 10;
   std::vector<int> vertices = {1000};  // of the sessions' meshes, in turn
-  double rate = 10;                    // updates a second, of each session
+  double rate = 10;                    // updates per second and session
   double seconds = 10;
   double p = 2;
-  int slow_readers = 0;           // sessions with one
-  double slow_pause_seconds = 1;  // between two frames that a slow reader takes
-  double reconnect_seconds = 0;   // between two reconnects of each session; 0: none
+  int slow_readers = 0;           // how many sessions have one
+  double slow_pause_seconds = 1;  // between two frames of a slow reader
+  double reconnect_seconds = 0;   // between two reconnects of a session; 0: none
   std::optional<std::filesystem::path> report;
 };
 
-/// Sends updates to sessions of its own at fixed times and measures when frames that answer them come. kDone where every
-/// update was answered and nothing failed, kShortOfTolerance where not.
+/// Sends updates to its own sessions at fixed times, and measures when the frames that answer them come.
+/// Returns kDone if every update was answered and nothing failed, otherwise kShortOfTolerance.
 ExitStatus run_load(const LoadOptions& options);
 
 }  // namespace lpdeform::cli

@@ -14,7 +14,7 @@
 namespace lpdeform::cli {
 namespace {
 
-/// Only the machine limits one's own command.
+/// A server for the user's own command: only the machine limits it.
 ServerOptions options_for(const std::filesystem::path& folder, int threads) {
   ServerOptions options;
   options.address = "unix:" + (folder / "socket").string();

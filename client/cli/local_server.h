@@ -12,11 +12,11 @@ class Server;
 
 namespace lpdeform::cli {
 
-/// The service in this process, on a socket in a folder that nobody else can enter and that goes when it
-/// goes.
+/// The service in this process, on a socket in a folder that no other user can enter. The folder is removed
+/// with this object.
 class LocalServer {
  public:
-  /// `threads` as the server's own option; 0 takes all cores.
+  /// `threads`: as the server's own option; 0 takes all cores.
   static absl::StatusOr<std::unique_ptr<LocalServer>> start(int threads);
   ~LocalServer();
 

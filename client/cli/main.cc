@@ -1,4 +1,4 @@
-// The program `lpdeform`: what it takes on the command line.
+// The command line of the program `lpdeform`.
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
@@ -34,7 +34,7 @@ namespace {
 template <typename T>
 using Choices = std::vector<std::pair<std::string, T>>;
 
-/// An option that takes one of some names and stores what the name stands for.
+/// An option that takes one of several names and stores the value that the name stands for.
 template <typename T>
 void add_choice(CLI::App& app, const std::string& flag, T& target, const Choices<T>& choices,
                 const std::string& help) {
@@ -50,7 +50,7 @@ void add_choice(CLI::App& app, const std::string& flag, T& target, const Choices
       ->option_text(absl::StrJoin(names, "|"));
 }
 
-/// A number within [lowest, highest], with a message that can be read.
+/// A number within [lowest, highest], with a readable message.
 CLI::Validator within(double lowest, double highest) {
   const std::string range = absl::StrCat(lowest, " to ", highest);
   return CLI::Validator(
@@ -63,7 +63,7 @@ CLI::Validator within(double lowest, double highest) {
       range);
 }
 
-/// A number above 0, not infinite.
+/// A finite number above 0.
 CLI::Validator positive() {
   return CLI::Validator(
       [](std::string& text) {
@@ -75,7 +75,7 @@ CLI::Validator positive() {
       "> 0");
 }
 
-/// What parse_p takes.
+/// Accepts what parse_p accepts.
 CLI::Validator norm() {
   return CLI::Validator(
       [](std::string& text) {
@@ -92,28 +92,29 @@ void add_material_options(CLI::App& app, DeformOptions& options) {
   CLI::Option* const p =
       app.add_option_function<std::string>(
              "--p", [&material](const std::string& text) { parse_p(text, material); },
-             "The norm, 1 to 64: small concentrates distortion, large spreads it (2). Or from the geometry, "
-             "p and "
-             "stiffness: joints soft, parts rigid, with a strength of 0 to 1 (auto is auto:1)")
+             "The norm p, 1 to 64: a small p concentrates distortion, a large p spreads it (2). auto finds "
+             "p and stiffness from the geometry: joints are soft and parts rigid, with a strength of 0 to 1 "
+             "(auto is auto:1)")
           ->check(norm())
           ->option_text("P|auto[:STRENGTH]");
-  app.add_option("--p-field", material.p_field, "A p for each vertex: a file with one number a line")
+  app.add_option("--p-field", material.p_field, "A p for each vertex: a file with one number per line")
       ->excludes(p)
       ->option_text("FILE");
   app.add_option("--stiffness-field", material.stiffness_field,
-                 "A stiffness for each vertex, 1e-6 to 1e6: a file with one number a line (1 everywhere)")
+                 "A stiffness for each vertex, 1e-6 to 1e6: a file with one number per line (1 everywhere)")
       ->option_text("FILE");
   app.add_option(
          "--p-group", material.p_groups,
-         "A p for the vertices of a group, of the handle file or of an OBJ mesh; may be given several times")
+         "A p for the vertices of a group of the handle file or of an OBJ mesh; may be given several times")
       ->allow_extra_args(false)
       ->option_text("NAME=P");
   app.add_option("--stiffness-group", material.stiffness_groups,
-                 "A stiffness for the vertices of a group, likewise")
+                 "A stiffness for the vertices of a group; may be given several times")
       ->allow_extra_args(false)
       ->option_text("NAME=S");
-  app.add_option("--length-unit", options.length_unit,
-                 "The length that different p are mixed in, in the mesh's unit (the mean edge length)")
+  app.add_option(
+         "--length-unit", options.length_unit,
+         "The unit of length for energies with different p, in the mesh's unit (the mean edge length)")
       ->check(positive())
       ->option_text("L");
   add_choice<client::WeightKind>(
@@ -121,13 +122,13 @@ void add_material_options(CLI::App& app, DeformOptions& options) {
       {{"cotangent", client::WeightKind::kCotangent},
        {"uniform", client::WeightKind::kUniform},
        {"intrinsic_delaunay", client::WeightKind::kIntrinsicDelaunay}},
-      "Weights of the edges; intrinsic_delaunay needs no clamping where triangles are thin (cotangent)");
+      "Weights of the edges; intrinsic_delaunay needs no clamping for thin triangles (cotangent)");
   add_choice<client::FreeComponents>(
       app, "--free-components", options.free_components,
       {{"error", client::FreeComponents::kError},
        {"stay", client::FreeComponents::kStay},
        {"follow", client::FreeComponents::kFollow}},
-      "What a part of the mesh that no handle holds does: is an error, stays where it is, "
+      "What happens to a part of the mesh that no handle holds: it is an error, it stays in place, or it "
       "follows the nearest handle (error)");
 }
 
@@ -140,21 +141,20 @@ void add_solver_options(CLI::App& app, DeformOptions& options) {
        {"line_search", client::Method::kLineSearch},
        {"local_global", client::Method::kLocalGlobal},
        {"conic", client::Method::kConic}},
-      "The algorithm; local_global needs p = 2, conic p = 1 and stops as the paper does, "
-      "some percent above the minimum; auto takes quasi_newton, or multiresolution on large meshes, and "
-      "where "
-      "p is 1.2 or less somewhere, from 300 up to 15,000 vertices, tries both and keeps the better (auto)");
+      "The algorithm. local_global needs p = 2. conic needs p = 1 and stops like the paper, some percent "
+      "above the minimum. auto takes quasi_newton, or multiresolution on large meshes; with 300 to 15,000 "
+      "vertices and p of 1.2 or less somewhere it tries both and keeps the better result (auto)");
   app.add_option("--initial", options.initial,
-                 "Where to start; a mesh has as many vertices as MESH (laplacian)")
+                 "The initial guess; a mesh must have as many vertices as MESH (laplacian)")
       ->option_text("laplacian|rest|MESH");
-  app.add_option("--max-iterations", options.max_iterations, "Stop after so many")
+  app.add_option("--max-iterations", options.max_iterations, "Stop after this many iterations")
       ->check(positive())
       ->option_text("N");
   app.add_option("--tolerance", options.tolerance,
-                 "Stop when so little is left to gain, relative, 1e-14 to 0.1 (1e-5)")
+                 "Stop when the relative gain still possible is below this, 1e-14 to 0.1 (1e-5)")
       ->check(within(1e-14, 0.1))
       ->option_text("T");
-  app.add_option("--time-limit", options.time_limit_seconds, "Stop after so many seconds of solving")
+  app.add_option("--time-limit", options.time_limit_seconds, "Stop after this many seconds of solving")
       ->check(positive())
       ->option_text("SECONDS");
 }
@@ -166,12 +166,13 @@ void add_picture_options(CLI::App& app, PictureOptions& picture) {
       ->expected(2)
       ->check(CLI::Range(1, 16384))
       ->option_text("W,H");
-  app.add_option("--camera", picture.camera,
-                 "A mesh that pictures are framed by, so that several can be compared: the camera stands "
-                 "where it would "
-                 "for that mesh (each picture's own)")
+  app.add_option(
+         "--camera", picture.camera,
+         "A mesh for the camera: pictures are framed as if they showed this mesh, so that several can be "
+         "compared (each picture's own mesh)")
       ->option_text("MESH");
-  app.add_option("--red", picture.red, "The distortion that pictures show in full red (each picture's own)")
+  app.add_option("--red", picture.red,
+                 "The distortion that pictures show in full red (each picture's own largest)")
       ->check(positive())
       ->option_text("E");
 }
@@ -179,14 +180,14 @@ void add_picture_options(CLI::App& app, PictureOptions& picture) {
 void add_weld(CLI::App& app, std::optional<double>& weld) {
   app.add_option(
          "--weld", weld,
-         "Vertices in the same place are one: for meshes split along seams of texture or normals. They "
-         "may be apart by a share of the bounding box's diagonal, 0 to 0.001 (1e-9)")
+         "Weld vertices in the same place, for meshes split along seams of texture or normals. TOLERANCE is "
+         "their largest distance as a share of the bounding box's diagonal, 0 to 0.001 (1e-9)")
       ->check(within(0, 1e-3))
       ->option_text("[TOLERANCE]");
 }
 
-/// A number after --weld is its tolerance; without one it is the default, and what follows is no part of it. Only of the commands
-/// that weld.
+/// A number after --weld is its tolerance. Without a number the tolerance is the default, and the next
+/// argument does not belong to --weld. Only for the commands that weld.
 std::vector<std::string> with_weld_told(int argc, char** argv) {
   std::vector<std::string> told;
   const std::string command = argc > 1 ? argv[1] : "";
@@ -201,33 +202,35 @@ std::vector<std::string> with_weld_told(int argc, char** argv) {
 }
 
 void add_access_options(CLI::App& app, ServerAccess& access, CLI::Option* server) {
-  app.add_flag("--tls", access.tls, "Connect with TLS, trusting whom the system trusts")->needs(server);
-  app.add_option("--tls-ca", access.tls_ca, "Connect with TLS, trusting these certificates, in PEM")
+  app.add_flag("--tls", access.tls, "Connect with TLS and trust the system's certificates")->needs(server);
+  app.add_option("--tls-ca", access.tls_ca, "Connect with TLS and trust these certificates, in PEM")
       ->needs(server)
       ->option_text("FILE");
   CLI::Option* const cert = app.add_option("--tls-cert", access.tls_cert,
-                                           "Our own certificate, in PEM, where the server asks for one")
+                                           "The client's certificate, in PEM, if the server asks for one")
                                 ->needs(server)
                                 ->option_text("FILE");
-  CLI::Option* const key = app.add_option("--tls-key", access.tls_key, "Its private key, in PEM")
-                               ->needs(cert)
-                               ->option_text("FILE");
+  CLI::Option* const key =
+      app.add_option("--tls-key", access.tls_key, "The client certificate's private key, in PEM")
+          ->needs(cert)
+          ->option_text("FILE");
   cert->needs(key);
   app.add_option("--token-file", access.token_file,
-                 "Where the bearer token is, where the server asks for one")
+                 "A file with the bearer token, if the server asks for one")
       ->envname("LPDEFORM_TOKEN_FILE")
       ->option_text("FILE");
 }
 
 void add_server_options(CLI::App& app, ServerAccess& access, CLI::Option* excluded) {
-  CLI::Option* const server = app.add_option("--server", access.address,
-                                             "HOST:PORT or unix:PATH of a server (solves in this process)")
-                                  ->excludes(excluded)
-                                  ->option_text("ADDRESS");
+  CLI::Option* const server =
+      app.add_option("--server", access.address,
+                     "HOST:PORT or unix:PATH of a server (none: solves in this process)")
+          ->excludes(excluded)
+          ->option_text("ADDRESS");
   add_access_options(app, access, server);
 }
 
-/// Of commands that need a server.
+/// Adds the options of commands that need a server.
 void add_needed_server(CLI::App& app, ServerAccess& access) {
   CLI::Option* const server =
       app.add_option("--server", access.address, "HOST:PORT or unix:PATH of the server")
@@ -240,54 +243,55 @@ void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand("deform", "Deform a mesh by its handles and write the result");
   const auto options = std::make_shared<DeformOptions>();
   app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required()->option_text(" ");
-  app.add_option("--handles", options->handles, "What is held and where it goes: JSON, see below; required")
+  app.add_option("--handles", options->handles,
+                 "The handle file: which vertices are held and where they move; JSON, see below; required")
       ->required()
       ->option_text("FILE");
   add_material_options(app, *options);
   add_solver_options(app, *options);
-  app.add_option("--out", options->out,
-                 "Where the result goes; may be given several times. By its ending: .ply with distortion and "
-                 "colours, .obj, "
-                 ".off, or a picture as .png")
+  app.add_option(
+         "--out", options->out,
+         "Where to write the result; may be given several times. The ending decides: .ply with distortion "
+         "and colours, .obj, .off, or a picture as .png")
       ->allow_extra_args(false)
       ->option_text("FILE");
   add_picture_options(app, options->picture);
   add_weld(app, options->weld);
-  app.add_flag("--normals", options->normals,
-               "Write normals to .obj and .ply, one of which must be among the outputs; those of an OBJ "
-               "input are carried along, so that its hard edges "
-               "stay hard");
-  app.add_flag("--certify", options->certify,
-               "Print how far the result can be from the best one for its rotations (a report has it, too)");
-  app.add_option("--report", options->report, "Where to write what was measured, as JSON")
+  app.add_flag(
+      "--normals", options->normals,
+      "Write normals to .obj and .ply, one of which must be among the outputs. Normals of an OBJ input "
+      "are turned with the surface, so its hard edges stay hard");
+  app.add_flag(
+      "--certify", options->certify,
+      "Print a bound on how far the result is from the best one for its rotations (also in a report)");
+  app.add_option("--report", options->report, "Where to write a report of the solve, as JSON")
       ->option_text("FILE");
-  CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")
-                                   ->check(CLI::Range(1, 1024))
-                                   ->option_text("N");
+  CLI::Option* const threads =
+      app.add_option("--threads", options->threads, "The number of cores to use at most (all)")
+          ->check(CLI::Range(1, 1024))
+          ->option_text("N");
   add_server_options(app, options->server, threads);
   app.callback([&command, options] { command = [options] { return run_deform(*options); }; });
   app.footer(
-      "In brackets: what holds where an option is left out.\n\n"
-      "A handle file holds groups of vertices where they are, or moves them: rotated first, then "
-      "translated.\n"
+      "Defaults are in brackets.\n\n"
+      "A handle holds vertices in place, or moves them: it rotates them first, then translates them.\n"
       "  {\"handles\": [{\"name\": \"base\", \"vertices\": [0, 1, 2]},\n"
       "               {\"name\": \"tip\", \"vertices\": [7, 8], \"translate\": [0, 0, 1],\n"
       "                \"rotate\": {\"axis\": [0, 0, 1], \"angle_degrees\": 30, \"center\": [0, 0, 0]}},\n"
       "               {\"name\": \"free\", \"vertices\": [9], \"positions\": [[1, 2, 3]]}]}\n\n"
-      "Exit status: 0 converged, or ended by a limit that was set here; 1 broke down or stalled short of "
-      "the\n"
-      "tolerance; 2 bad input; 3 server unreachable or refusing.");
+      "Exit status: 0 converged, or ended by a limit that was set here; 1 broke down or stalled short of\n"
+      "the tolerance; 2 bad input; 3 server unreachable or refusing.");
 }
 
 void add_info(CLI::App& program, std::function<ExitStatus()>& command) {
-  CLI::App& app = *program.add_subcommand("info", "Print what a mesh is made of and what is wrong with it");
+  CLI::App& app = *program.add_subcommand("info", "Print what a mesh consists of and its defects");
   const auto options = std::make_shared<InfoOptions>();
   app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required()->option_text(" ");
-  app.add_flag("--json", options->is_json, "Print the object that a report calls \"mesh\"");
+  app.add_flag("--json", options->is_json, "Print the object \"mesh\" of a report");
   app.callback([&command, options] { command = [options] { return run_info(*options); }; });
 }
 
-/// Three numbers with commas between them.
+/// Three numbers separated by commas.
 CLI::Option* add_vector(CLI::App& app, const std::string& flag, std::vector<double>& target,
                         const std::string& help) {
   return app.add_option(flag, target, help)->delimiter(',')->expected(3)->option_text("X,Y,Z");
@@ -295,23 +299,25 @@ CLI::Option* add_vector(CLI::App& app, const std::string& flag, std::vector<doub
 
 void add_resize(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand(
-      "resize", "Scale a mesh by different factors along its axes; what is salient keeps its shape");
+      "resize", "Scale a mesh by different factors along its axes; salient parts keep their shape");
   const auto options = std::make_shared<ResizeOptions>();
   app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required()->option_text(" ");
-  app.add_option("OUT", options->out, "Where the result goes: .ply, .obj, .off, or a picture as .png")
+  app.add_option("OUT", options->out, "Where to write the result: .ply, .obj, .off, or a picture as .png")
       ->required()
       ->option_text(" ");
   add_vector(app, "--scale", options->scale, "Factors along the three axes, each 0.01 to 100; required")
       ->check(within(0.01, 100))
       ->required();
-  add_vector(app, "--origin", options->origin, "What stays where it is (the middle of the bounding box)");
+  add_vector(app, "--origin", options->origin,
+             "The point that stays in place (the middle of the bounding box)");
   add_vector(app, "--x-axis", options->x_axis, "The direction of the first factor (1,0,0)");
   add_vector(app, "--y-axis", options->y_axis, "The direction of the second factor (0,1,0)");
   add_picture_options(app, options->picture);
   add_weld(app, options->weld);
-  CLI::Option* const threads = app.add_option("--threads", options->threads, "Cores to use at most (all)")
-                                   ->check(CLI::Range(1, 1024))
-                                   ->option_text("N");
+  CLI::Option* const threads =
+      app.add_option("--threads", options->threads, "The number of cores to use at most (all)")
+          ->check(CLI::Range(1, 1024))
+          ->option_text("N");
   add_server_options(app, options->server, threads);
   app.callback([&command, options] { command = [options] { return run_resize(*options); }; });
 }
@@ -319,49 +325,48 @@ void add_resize(CLI::App& program, std::function<ExitStatus()>& command) {
 void add_load(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand(
       "load",
-      "Load a server: updates at fixed times, whatever it does, and the time to the frames that answer them");
+      "Load a server: send updates at fixed times and measure the time to the frames that answer them");
   const auto options = std::make_shared<LoadOptions>();
   add_needed_server(app, options->server);
-  app.add_option("--sessions", options->sessions, "Sessions at a time (10)")
+  app.add_option("--sessions", options->sessions, "Number of sessions (10)")
       ->check(CLI::Range(1, 10000))
       ->option_text("N");
-  app.add_option("--vertices", options->vertices,
-                 "Vertices of each; several sizes, with commas, are taken in turn (1000)")
+  app.add_option(
+         "--vertices", options->vertices,
+         "Vertices of each session's mesh; several sizes, separated by commas, are used in turn (1000)")
       ->delimiter(',')
       ->check(CLI::Range(4, 2000000))
       ->option_text("V[,V]...");
-  app.add_option("--rate", options->rate, "Updates a second of each (10)")
+  app.add_option("--rate", options->rate, "Updates per second of each session (10)")
       ->check(within(0.01, 1000))
       ->option_text("R");
-  app.add_option("--seconds", options->seconds, "For so long (10)")
+  app.add_option("--seconds", options->seconds, "Duration in seconds (10)")
       ->check(within(0.1, 1e6))
       ->option_text("T");
-  app.add_option("--p", options->p, "p of each, 1 to 64 (2)")->check(within(1, 64))->option_text("P");
+  app.add_option("--p", options->p, "p of each session, 1 to 64 (2)")->check(within(1, 64))->option_text("P");
   app.add_option("--slow-readers", options->slow_readers,
-                 "So many sessions have a second reader, a slow one (0)")
+                 "Number of sessions that have a second, slow reader (0)")
       ->check(CLI::Range(0, 10000))
       ->option_text("N");
-  app.add_option("--slow-pause", options->slow_pause_seconds, "Seconds between two frames that it takes (1)")
+  app.add_option("--slow-pause", options->slow_pause_seconds,
+                 "Seconds between two frames of a slow reader (1)")
       ->check(within(0.001, 3600))
       ->option_text("S");
-  app.add_option("--reconnect", options->reconnect_seconds,
-                 "Each session changes its connection every S seconds (never)")
+  app.add_option("--reconnect", options->reconnect_seconds, "Each session reconnects every S seconds (never)")
       ->check(within(0.1, 1e6))
       ->option_text("S");
-  app.add_option("--report", options->report, "Where to write what was measured, as JSON")
+  app.add_option("--report", options->report, "Where to write the measurements, as JSON")
       ->option_text("FILE");
   app.callback([&command, options] { command = [options] { return run_load(*options); }; });
   app.footer(
-      "Input to frame: from when an update was due to when the first frame that answers it was there. "
-      "Updates are due at\n"
-      "fixed times, so a server that falls behind shows. Exit status: 0 every update was answered and "
-      "nothing failed;\n"
-      "1 not so; 2 bad input; 3 server unreachable or refusing.");
+      "Input to frame: from when an update was due until the first frame that answers it arrived. Updates\n"
+      "are due at fixed times, so it shows if a server falls behind. Exit status: 0 every update was\n"
+      "answered and nothing failed; 1 otherwise; 2 bad input; 3 server unreachable or refusing.");
 }
 
 void add_shape(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app =
-      *program.add_subcommand("shape", "Write a generated mesh to try things on, and handles for it");
+      *program.add_subcommand("shape", "Write a generated mesh for experiments, and handles for it");
   const auto options = std::make_shared<ShapeOptions>();
   const std::vector<std::string> names = generated_shape_names();
   app.add_option("NAME", options->name, absl::StrJoin(names, ", "))
@@ -370,36 +375,37 @@ void add_shape(CLI::App& program, std::function<ExitStatus()>& command) {
       ->option_text(" ");
   app.add_option("--detail", options->detail, "Multiplies the cells along each side (1)")->option_text("N");
   app.add_option("--out", options->out,
-                 "Where the mesh goes: .off, .obj, .ply, or a picture as .png; required")
+                 "Where to write the mesh: .off, .obj, .ply, or a picture as .png; required")
       ->required()
       ->option_text("FILE");
-  app.add_option("--handles", options->handles, "Where to write a handle file for it")->option_text("FILE");
+  app.add_option("--handles", options->handles, "Where to write a handle file for the mesh")
+      ->option_text("FILE");
   app.callback([&command, options] { command = [options] { return run_shape(*options); }; });
 }
 
 void add_snapshot(CLI::App& program, std::function<ExitStatus()>& command) {
-  CLI::App& app = *program.add_subcommand("snapshot", "Write a session of a server into a file");
+  CLI::App& app = *program.add_subcommand("snapshot", "Write a session of a server to a file");
   const auto options = std::make_shared<SnapshotOptions>();
   app.add_option("SESSION", options->session, "Its name: sessions/ and 32 digits")
       ->required()
       ->option_text(" ");
-  app.add_option("FILE", options->file, "Where it goes")->required()->option_text(" ");
+  app.add_option("FILE", options->file, "The file to write")->required()->option_text(" ");
   add_needed_server(app, options->server);
   app.callback([&command, options] { command = [options] { return run_snapshot(*options); }; });
 }
 
 void add_restore(CLI::App& program, std::function<ExitStatus()>& command) {
-  CLI::App& app =
-      *program.add_subcommand("restore", "Make a session on a server from such a file and print its name");
+  CLI::App& app = *program.add_subcommand(
+      "restore", "Make a session on a server from the file of a snapshot and print its name");
   const auto options = std::make_shared<RestoreOptions>();
-  app.add_option("FILE", options->file, "What snapshot has written")->required()->option_text(" ");
+  app.add_option("FILE", options->file, "A file that snapshot wrote")->required()->option_text(" ");
   add_needed_server(app, options->server);
   app.callback([&command, options] { command = [options] { return run_restore(*options); }; });
 }
 
 void add_reproduce(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand(
-      "reproduce", "Make the paper's table and figures again, as a page with a verdict on each claim");
+      "reproduce", "Reproduce the paper's table and figures as a page with a verdict on each claim");
   const auto options = std::make_shared<ReproduceOptions>();
   app.add_option("--out", options->out, "The folder for index.html, pictures and reproduce.json; required")
       ->required()
@@ -410,18 +416,18 @@ void add_reproduce(CLI::App& program, std::function<ExitStatus()>& command) {
   app.add_option("--mesh", options->meshes, "Another mesh to solve for each p; may be given several times")
       ->allow_extra_args(false)
       ->option_text("FILE");
-  app.add_option("--handles", options->handles, "The handle file of the --mesh at the same place")
+  app.add_option("--handles", options->handles, "The handle file for each --mesh, in the same order")
       ->allow_extra_args(false)
       ->option_text("FILE");
-  app.add_option("--threads", options->threads, "Cores to use at most (all)")
+  app.add_option("--threads", options->threads, "The number of cores to use at most (all)")
       ->check(CLI::Range(1, 1024))
       ->option_text("N");
-  app.add_flag("--force", options->is_forced, "Write into a folder that holds other files, too");
+  app.add_flag("--force", options->is_forced, "Write also into a folder that holds other files");
   app.callback([&command, options] { command = [options] { return run_reproduce(*options); }; });
 }
 
 int run(int argc, char** argv) {
-  CLI::App program("Deforms surfaces by handles, with distortion in the L_p norm of one's choice.",
+  CLI::App program("Deforms surfaces by handles, with distortion measured in an L_p norm of your choice.",
                    "lpdeform");
   program.set_version_flag("--version", "lpdeform " LPDEFORM_VERSION);
   program.require_subcommand(1);
@@ -455,7 +461,7 @@ int run(int argc, char** argv) {
   return command();
 }
 
-/// A script that reads what is printed is told where that was lost, as on a full disk.
+/// Reports output that could not be written, as on a full disk, so that a script notices.
 int with_output_checked(int status) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
   const std::string why = std::strerror(errno);
@@ -467,6 +473,7 @@ int with_output_checked(int status) {
 }  // namespace lpdeform::cli
 
 int main(int argc, char** argv) {
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of the write to it
+  // Writing beyond a limit on file size then fails, instead of ending the process.
+  std::signal(SIGXFSZ, SIG_IGN);
   return lpdeform::cli::with_output_checked(lpdeform::cli::run(argc, argv));
 }

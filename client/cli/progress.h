@@ -6,7 +6,7 @@
 
 namespace lpdeform::cli {
 
-/// One line on stderr that is written over while work goes on. Silent where stderr is no terminal.
+/// One line on stderr that is updated while work goes on. Silent if stderr is not a terminal.
 class Progress {
  public:
   Progress();

@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// Edges come as two vertices each.
+/// Whether a kind of defect consists of edges, which are given as two vertices each.
 bool is_of_edges(const std::string& kind) {
   return kind.ends_with("edges") || kind == "inconsistent_orientation";
 }

@@ -38,7 +38,7 @@ bool is_of_this_command(const fs::path& folder) {
   return verdicts.ok() && verdicts->find(reproduce::kMadeBy) != std::string::npos;
 }
 
-/// Makes the folder where there is none. Asked before long work, not after it.
+/// Makes the folder if it does not exist. Called before long work, not after it.
 absl::Status prepare_folder(const fs::path& folder, bool is_forced) {
   std::error_code error;
   if (fs::exists(folder, error) && !fs::is_directory(folder, error))
@@ -54,7 +54,7 @@ absl::Status prepare_folder(const fs::path& folder, bool is_forced) {
                    "them."));
 }
 
-/// A name for files and headings, different from all in `taken`.
+/// A name for files and headings that is not in `taken`.
 std::string name_for(const fs::path& mesh, std::set<std::string>& taken) {
   std::string stem;
   for (const char character : mesh.stem().string()) {
@@ -66,7 +66,7 @@ std::string name_for(const fs::path& mesh, std::set<std::string>& taken) {
   return name;
 }
 
-/// The paper's methods know handles that hold vertices exactly, and nothing else.
+/// The paper's methods support only handles that hold vertices exactly.
 absl::Status check_plain(const HandleFile& file) {
   const auto refused = [](const std::string& element) {
     return make_fault({Reason::kHandleFileValue, element, "handles that hold vertices exactly"},
@@ -132,7 +132,7 @@ absl::StatusOr<std::vector<Figure>> make_figures(const reproduce::Settings& sett
   return figures;
 }
 
-/// Takes the pictures of an earlier page away that are not of this one.
+/// Removes the pictures of an earlier page that this page does not have.
 void remove_stale(const fs::path& folder, const std::vector<Figure>& figures) {
   const absl::StatusOr<std::string> before = read_text(folder / kVerdicts);
   std::set<std::string> stale;
@@ -140,11 +140,11 @@ void remove_stale(const fs::path& folder, const std::vector<Figure>& figures) {
   for (const Figure& figure : figures) {
     for (const reproduce::Picture& picture : figure.pictures) stale.erase(picture.file);
   }
-  std::error_code ignored;  // what cannot be removed hurts nobody
+  std::error_code ignored;  // a file that cannot be removed does no harm
   for (const std::string& file : stale) fs::remove(folder / file, ignored);
 }
 
-/// The verdicts last: they say that the folder is whole.
+/// Writes the verdicts last: they show that the folder is complete.
 absl::Status write_all(const fs::path& folder, const std::vector<Figure>& figures,
                        const reproduce::Settings& settings) {
   for (const Figure& figure : figures) {

@@ -26,7 +26,7 @@
 namespace lpdeform::cli {
 namespace {
 
-/// The mesh on its way, and what the last solve said.
+/// The mesh as resized so far, and the result of the last solve.
 struct Resized {
   MeshFile file;
   Field distortion;
@@ -63,7 +63,7 @@ absl::StatusOr<Scaling> read_scaling(const ResizeOptions& options, const Triangl
                                  " times the least; it must be at most 100 times the least."));
 }
 
-/// By the vertices of the mesh that is not welded.
+/// For each welded vertex its first copy, in the mesh that is not welded.
 std::vector<std::uint32_t> first_copies(const std::vector<std::int32_t>& vertices, const Weld& weld) {
   std::vector<std::uint32_t> copies;
   for (const std::int32_t vertex : vertices)
@@ -77,8 +77,8 @@ client::FieldValue field_value(const Field& field, const Weld& weld) {
   return std::vector<double>(split.begin(), split.end());
 }
 
-/// What makes a server stretch the shape along one axis: of components that are spared its ends there, and its sides in their
-/// planes.
+/// The update that makes a server stretch the shape along one axis. It holds the ends of spared components
+/// along that axis, and their sides in their planes.
 absl::StatusOr<client::Update> update_for(const std::shared_ptr<const RestShape>& shape, const Weld& weld,
                                           const Scaling& plain, int axis,
                                           const std::vector<char>& is_spared) {
@@ -118,8 +118,8 @@ absl::StatusOr<client::SolveResult> solve_on(client::Client& server, const Trian
   return result;
 }
 
-/// One solve along one axis, blended with the plain scaling; `shares` is sparing(), which is that of the mesh as it is in its
-/// file.
+/// One solve along one axis, blended with the plain scaling. `shares`: the result of sparing() for the mesh
+/// as it is in its file.
 absl::Status stretch(client::Client& server, const Scaling& plain, std::optional<double> welding,
                      const Weld& weld, int axis, const std::vector<double>& shares, Interrupt& interrupt,
                      Resized& resized) {

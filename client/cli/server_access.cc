@@ -13,7 +13,7 @@
 namespace lpdeform::cli {
 namespace {
 
-/// A year, which every clock can count.
+/// A year: practically no limit, but still a time that every clock can count.
 constexpr std::chrono::hours kPatience{24 * 365};
 
 absl::Status read_into(const std::string& file, std::string& out) {
@@ -40,7 +40,7 @@ absl::StatusOr<std::string> read_token(const std::string& file) {
 absl::StatusOr<client::ClientOptions> client_options(const ServerAccess& access) {
   client::ClientOptions options;
   if (!access.address) {
-    options.call_timeout = kPatience;  // the work is this process's own, however long it takes
+    options.call_timeout = kPatience;  // this process does the work itself, so the call may take any time
     return options;
   }
   if (access.tls || !access.tls_ca.empty() || !access.tls_cert.empty() || !access.tls_key.empty()) {
@@ -53,7 +53,8 @@ absl::StatusOr<client::ClientOptions> client_options(const ServerAccess& access)
   }
   if (!access.token_file.empty()) {
     if (auto token = read_token(access.token_file); !token.ok()) return token.status();
-    // A file that is just being replaced gives no token; the server says so, and the call is tried again or fails.
+    // A file that is just being replaced gives no token. The server then refuses the call, which is retried
+    // or fails.
     options.token = [file = access.token_file] { return read_token(file).value_or(""); };
   }
   return options;

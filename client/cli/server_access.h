@@ -8,17 +8,17 @@
 
 namespace lpdeform::cli {
 
-/// Where the server is, and how to be let in.
+/// The server's address, and what is needed to be admitted.
 struct ServerAccess {
-  std::optional<std::string> address;  // a server in this process where there is none
+  std::optional<std::string> address;  // not set: a server in this process
   bool tls = false;
-  std::string tls_ca, tls_cert, tls_key;  // files in PEM; any of them switches TLS on
+  std::string tls_ca, tls_cert, tls_key;  // files in PEM; each of them switches TLS on
   std::string token_file;
 };
 
-/// Reads the files; that of the token again for each call, so that it may be renewed. No call of the server in this process runs
-/// out of time: what it is asked for it does, and Ctrl-C ends it. NOT_FOUND FILE_NOT_FOUND;
-/// INVALID_ARGUMENT TOKEN_FILE where it is not one line of text.
+/// Reads the files. The token is read again for each call, so it may be renewed. Calls to a server in this
+/// process have no deadline; Ctrl-C ends them. NOT_FOUND FILE_NOT_FOUND; INVALID_ARGUMENT TOKEN_FILE if that
+/// file is not one line of text.
 absl::StatusOr<client::ClientOptions> client_options(const ServerAccess& access);
 
 }  // namespace lpdeform::cli

@@ -16,7 +16,7 @@ struct ShapeOptions {
   std::optional<std::filesystem::path> handles;
 };
 
-/// Writes a generated shape and, where asked for, a handle file that goes with it.
+/// Writes a generated shape and, if requested, a handle file for it.
 ExitStatus run_shape(const ShapeOptions& options);
 
 }  // namespace lpdeform::cli

@@ -14,7 +14,7 @@ struct SnapshotOptions {
   ServerAccess server;
 };
 
-/// Writes a session of a server's into a file, whole or not at all.
+/// Writes a session of a server to a file, completely or not at all.
 ExitStatus run_snapshot(const SnapshotOptions& options);
 
 struct RestoreOptions {
@@ -22,7 +22,7 @@ struct RestoreOptions {
   ServerAccess server;
 };
 
-/// Makes a session from such a file and prints its name.
+/// Makes a session from the file of a snapshot and prints its name.
 ExitStatus run_restore(const RestoreOptions& options);
 
 }  // namespace lpdeform::cli

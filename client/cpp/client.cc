@@ -122,8 +122,9 @@ namespace {
 
 constexpr int kMostWays = 5;
 
-/// What `call` returns by the way that `rpc` goes, or by that which the answer names; `rpc` goes there then. While sessions move
-/// from server to server, that way may lead elsewhere for a moment, too: a few times, with pauses of at most 0.4 s.
+/// Makes `call` with the route of `rpc`. If the answer names another route (SESSION_ELSEWHERE), retries with that one,
+/// and `rpc` keeps it. While sessions move between servers, the new route may briefly be wrong as well, so this retries
+/// a few times, with pauses of at most 0.4 s.
 template <typename Call>
 auto by_its_way(std::shared_ptr<Rpc>& rpc, const Call& call) {
   Backoff backoff;
@@ -175,7 +176,7 @@ absl::StatusOr<Session> Client::join(std::string_view session, Role role, OpenOp
   std::shared_ptr<Rpc> rpc = rpc_;
   auto lease = by_its_way(rpc, [&](Rpc& way) { return join_session(way, std::string(session), role, stop); });
   if (lease.ok() && !lease->route.empty() && lease->route != rpc->route())
-    rpc = rpc->going_by(lease->route);  // come as those do who have it
+    rpc = rpc->going_by(lease->route);  // use the same route as the session's other clients
   if (!lease.ok()) return lease.status();
   return Session(
       std::make_unique<Link>(std::move(rpc), options_, std::move(options), Copy(), *std::move(lease)));

@@ -30,7 +30,7 @@ void append_numbers(const std::string& bytes, std::vector<T>& out) {
   }
 }
 
-/// Four 16-bit integers for each of `count` vertices; empty where `bytes` are not that.
+/// Four 16-bit integers for each of `count` vertices; empty if `bytes` has another size or cannot be decoded.
 template <typename Integer>
 std::vector<std::array<Integer, 4>> quantized(const std::string& bytes, std::size_t count,
                                               bool is_compressed) {

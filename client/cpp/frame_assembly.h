@@ -9,14 +9,15 @@
 
 namespace lpdeform::client {
 
-/// Puts the parts of frames together. Not thread-safe.
+/// Assembles frames from their parts. Not thread-safe.
 class FrameAssembly {
  public:
-  /// Of the mesh: a frame has as many, so that a server cannot make us take memory at will.
+  /// `vertex_count`: of the mesh. Every frame must have this many, so that a server cannot make the client allocate
+  /// arbitrary memory.
   explicit FrameAssembly(std::uint32_t vertex_count) : vertex_count_(vertex_count) {}
 
-  /// The frame that `part` completes; empty while parts are missing. DATA_LOSS (FRAME_PARTS) where the parts
-  /// do not fit together; the frame begun is dropped then.
+  /// The frame that `part` completes; empty while parts are missing. DATA_LOSS (FRAME_PARTS) if the parts do not fit
+  /// together; the incomplete frame is then dropped.
   absl::StatusOr<std::optional<Frame>> add(const v1::FramePart& part);
 
  private:

@@ -54,7 +54,7 @@ void FrameBox::resume() {
 
 absl::StatusOr<std::optional<FrameBox::Taken>> FrameBox::take(Clock::time_point deadline) {
   std::unique_lock lock(mutex_);
-  // To wait for a time that has passed would still take the system's shortest sleep.
+  // Waiting for a time in the past would still take the system's shortest sleep.
   if (Clock::now() < deadline) changed_.wait_until(lock, deadline, [this] { return has_something(); });
   if (!problems_.empty()) {
     absl::Status problem = std::move(problems_.front());

@@ -13,7 +13,7 @@
 
 namespace lpdeform::client {
 
-/// Where frames wait for the caller: the newest one only, and at most kMostProblems errors. Thread-safe.
+/// Holds the newest frame, and at most kMostProblems errors, until the caller takes them. Thread-safe.
 class FrameBox {
  public:
   using Clock = std::chrono::steady_clock;
@@ -24,35 +24,35 @@ class FrameBox {
     std::uint64_t stream = 0;
   };
 
-  /// Takes in a frame that came on stream number `stream`. False, and dropped, where its epoch is over or it
-  /// answers an older update than one that was in the box before.
+  /// Stores a frame from stream number `stream`, replacing an older one. Drops the frame and returns false if its epoch
+  /// is over, or if it is for an older update than an earlier frame.
   bool put(Frame frame, std::uint64_t stream);
 
-  /// An error that the next take() hands out; the oldest is dropped where there are too many.
+  /// Stores an error for take() to return. If there are too many, the oldest is dropped.
   void put_problem(absl::Status problem);
 
-  /// Frames of earlier epochs are void from now on, one that waits in the box too.
+  /// From now on, frames of earlier epochs are void, including one that waits in the box.
   void begin_epoch(std::uint64_t epoch);
-  /// A session made anew counts its epochs from anywhere.
+  /// Begins a new session, whose epochs may start at any number.
   void begin_session();
 
-  /// Nothing more comes; once the box is empty, take() says why.
+  /// No more frames arrive. When the box is empty, take() returns `why`.
   void finish(absl::Status why);
-  /// Why nothing more comes; OK while something may.
+  /// The error of finish(); OK if it was not called.
   absl::Status end() const;
-  /// Undoes finish(). What was taken before is forgotten: another writer may have been there since.
+  /// Undoes finish(). Forgets the last final frame, because there may have been another writer since.
   void resume();
 
-  /// Waits until `deadline` for an error, a frame or the end. Empty where none came.
+  /// Waits until `deadline` for an error, a frame or the end. Empty on timeout.
   absl::StatusOr<std::optional<Taken>> take(Clock::time_point deadline);
-  /// The same without taking anything. False where there was nothing.
+  /// Waits in the same way without taking anything. False on timeout.
   bool wait(Clock::time_point deadline);
-  /// The same, and ends with true as soon as take() has handed out more than `takes` frames and errors.
+  /// The same, but also returns true as soon as takes() exceeds `takes`.
   bool wait(Clock::time_point deadline, std::uint64_t takes);
 
-  /// How many frames and errors take() has handed out.
+  /// The number of frames and errors that take() has returned.
   std::uint64_t takes() const;
-  /// The frame that take() handed out last, where that one was final.
+  /// The frame that take() returned last, if it was final.
   std::optional<Frame> last_final() const;
 
  private:

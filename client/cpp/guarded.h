@@ -9,8 +9,8 @@
 
 namespace lpdeform::client {
 
-/// What `work` returns, or as an error what it throws: RESOURCE_EXHAUSTED OUT_OF_MEMORY, INTERNAL EXCEPTION. For the ends of
-/// threads and the border to C, which no exception may pass.
+/// Returns the result of `work`, or its exception as an error: RESOURCE_EXHAUSTED OUT_OF_MEMORY, INTERNAL EXCEPTION.
+/// For thread functions and the C interface, which no exception may leave.
 template <typename Work>
 absl::Status guarded(Work work) {
   const auto internal = [](const char* text) { return make_fault({Reason::kException, "", ""}, text); };

@@ -31,7 +31,7 @@ absl::StatusOr<Lease> create_session(Rpc& rpc, const Mesh& mesh, const OpenOptio
   request.set_request_id(request_id);
   request.set_weights(to_wire(options.weights));
   request.set_free_components(to_wire(options.free_components));
-  Uploads uploads(rpc, stop, request_id);  // so that a second try is the same request to the last bit
+  Uploads uploads(rpc, stop, request_id);  // a retry must be the same request to the last bit
   Packer packer([&](std::string_view bytes) { return uploads.add(bytes); });
   absl::Status packed = to_wire(mesh, packer, *request.mutable_mesh());
   if (!mesh.normals.empty()) {

@@ -23,7 +23,7 @@ void merge_change(Update::Change& older, Update::Change&& newer) {
   }
 }
 
-/// Bounds what is remembered of handles that are there no more. Motions stay: of handles that the session was made with.
+/// Bounds the memory for removed handles. Motions stay, since they belong to handles that the session was created with.
 void forget_removals(Update& update) {
   const auto is_removal = [](const auto& entry) {
     return std::holds_alternative<Update::Removal>(entry.second);
@@ -33,7 +33,7 @@ void forget_removals(Update& update) {
   if (count > Ledger::kMostRemovals) std::erase_if(update.handles, is_removal);
 }
 
-/// Leaves in `state` what is there once its motions and removals have been carried out.
+/// Reduces `state` to the handles that exist after its motions and removals.
 void settle_changes(Update& state) {
   std::erase_if(state.handles,
                 [](const auto& entry) { return !std::holds_alternative<Handle>(entry.second); });
@@ -83,10 +83,17 @@ NumberedUpdate Ledger::send_next() {
 
 void Ledger::accept(std::uint64_t seq, bool is_kept) {
   const auto sent = std::ranges::find(in_flight_, seq, &NumberedUpdate::seq);
-  if (sent == in_flight_.end()) return;
+  if (sent == in_flight_.end()) {
+    if (is_kept && seq >= unkept_.seq) unkept_ = {};  // shown before it was answered
+    return;
+  }
   NumberedUpdate update = std::move(*sent);
   in_flight_.erase(sent);
   merge_accepted(std::move(update), is_kept);
+}
+
+void Ledger::show(std::uint64_t epoch, std::uint64_t seq) {
+  if (epoch == epoch_ && !in_flight_.empty() && in_flight_.front().seq == seq) accept(seq);
 }
 
 void Ledger::accept_change(NumberedUpdate change, bool is_kept) {

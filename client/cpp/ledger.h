@@ -8,8 +8,8 @@
 
 namespace lpdeform::client {
 
-/// Puts `newer` on top of `older`: the newest value of each handle and each setting wins; a motion for a
-/// handle that `older` adds moves the added one.
+/// Merges `newer` into `older`: the newest value of each handle and each setting wins. If `older` adds a handle and
+/// `newer` moves it, the added handle gets the motion.
 void merge(Update& older, Update newer);
 
 /// An update and its number, which the server knows as input_seq.
@@ -18,63 +18,68 @@ struct NumberedUpdate {
   Update update;
 };
 
-/// The writer's book of updates: what the server has accepted (all that is needed to make the session anew),
-/// what is on its way (at most kWindow), and what waits (merged into one). Bounded by the size of the handles
-/// and settings themselves. Not thread-safe.
+/// The writer's record of updates: accepted ones (merged; all that is needed to create the session again), those in
+/// flight (at most kWindow), and those that wait (merged into one). Its size is bounded by that of the handles and
+/// settings themselves. Not thread-safe.
 class Ledger {
  public:
   static constexpr std::size_t kWindow = 4;
-  /// Handles of which it is remembered that they were let go of; of more than that, none.
+  /// The most removed handles that are remembered. If there are more, all are forgotten.
   static constexpr std::size_t kMostRemovals = 8192;
 
-  /// `begins_bare`: a session made anew has no handles but those of this book, otherwise also those that it is made with.
+  /// `begins_bare`: a session that is created again has only the handles of this ledger. Otherwise it also has the
+  /// handles that it is created with.
   explicit Ledger(bool begins_bare = true) : begins_bare_(begins_bare) {}
 
-  /// Takes an update on; returns its number.
+  /// Adds an update; returns its number.
   std::uint64_t add(Update update);
 
   bool can_send() const { return (restore_ || waiting_) && in_flight_.size() < kWindow; }
   bool has_waiting() const { return restore_ || waiting_; }
-  /// What send_next() gives is the state that a lost session had.
+  /// Whether send_next() returns the state of a lost session.
   bool has_restore() const { return restore_.has_value(); }
   bool has_in_flight() const { return !in_flight_.empty(); }
 
-  /// What is to be sent next, now on its way. Needs has_waiting().
+  /// The next update to send; it then counts as in flight. Requires has_waiting().
   NumberedUpdate send_next();
 
-  /// The server has taken the update of this number, or refused it. Unknown numbers are nothing to us. `is_kept`: it, and
-  /// all taken before it, survive the end of the server.
+  /// The server has accepted, or refused, the update with this number. Unknown numbers are ignored. `is_kept`: this
+  /// update and all accepted before it survive the end of the server.
   void accept(std::uint64_t seq, bool is_kept = false);
   void refuse(std::uint64_t seq);
+  /// A frame shows the update of this number. If it is of the present epoch, the update is ours, so the server has taken it,
+  /// though its answer may still be on its way. Earlier updates without an answer may have been refused: then nothing changes
+  /// until they are answered.
+  void show(std::uint64_t epoch, std::uint64_t seq);
 
-  /// A number for a change that the server makes by itself, and the change that it made.
+  /// For a change that the server makes itself (undo): its number, and later the change.
   std::uint64_t take_number() { return next_seq_++; }
   void accept_change(NumberedUpdate change, bool is_kept);
 
-  /// The session goes on, and the newest update that it has is `seq`: what it took after that and did not keep is to be sent
-  /// first, on its own.
+  /// The session continues, and its newest update is `seq`. Updates that it accepted after that but did not keep are
+  /// sent again first, as an update of their own.
   void resumed_at(std::uint64_t seq);
-  /// The same of a session that is at `epoch`. In a newer one than before another server has it, and its newest update says
-  /// nothing of those before that: a call may have brought it there. So all that was not kept is sent; of what the server has
-  /// that changes nothing.
+  /// The same for a session in `epoch`. If the epoch has risen, another server has loaded the session. Its newest
+  /// update then says nothing about earlier ones, because a call may have brought it there. So all updates that were
+  /// not kept are sent again; those that the server has change nothing.
   void reopened(std::uint64_t epoch, std::uint64_t seq);
-  /// Of a session just made, joined or taken over.
+  /// The epoch of a session that was just created, joined or taken over.
   void begin_epoch(std::uint64_t epoch) { epoch_ = epoch; }
 
-  /// The connection is gone: what was on its way waits again. Sending it twice does no harm, it is the same
-  /// value.
+  /// The connection is lost: updates in flight wait again. Updates are idempotent, so sending one twice does no harm.
   void connection_lost();
-  /// The server has lost the session: what it had accepted is to be sent first, on its own.
+  /// The server has lost the session: all accepted updates are sent again first, as an update of their own.
   void session_lost();
-  /// Another writer took over: what it has not taken is void, and so is what it took and may have lost.
+  /// Another writer took over: updates that the server has not accepted are void, and so are updates that it accepted
+  /// but may have lost.
   void drop_unaccepted();
 
-  /// Numbers that follow are higher than `seq`, the newest that the server knows.
+  /// Makes all following numbers higher than `seq`, the newest that the server knows.
   void count_from(std::uint64_t seq);
 
   std::uint64_t newest_accepted() const { return accepted_.seq; }
 
-  /// The newest update that was not refused; 0 where there is none.
+  /// The newest update that was not refused; 0 if there is none.
   std::uint64_t newest() const;
 
  private:
@@ -83,8 +88,8 @@ class Ledger {
   const bool begins_bare_;
   std::uint64_t next_seq_ = 1;
   std::uint64_t epoch_ = 0;
-  NumberedUpdate accepted_;  // where it begins bare, handles only as Handle, never as Motion or Removal
-  NumberedUpdate unkept_;    // what was accepted since the server last kept something, as it came
+  NumberedUpdate accepted_;  // if begins_bare_, handles only as Handle, never as Motion or Removal
+  NumberedUpdate unkept_;    // accepted since the server last kept an update; changes as they were sent
   std::optional<NumberedUpdate> restore_;
   std::deque<NumberedUpdate> in_flight_;
   std::optional<NumberedUpdate> waiting_;

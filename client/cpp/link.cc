@@ -85,7 +85,7 @@ absl::Status Link::one_stream() {
     ++stream_;
     is_open_ = is_over_ = is_to_reopen_ = false;
     ack_due_.reset();
-    uploads_in_use_.clear();  // these will expire
+    uploads_in_use_.clear();  // the server's copies expire
     uploads_done_.clear();
     go_away_.reset();
     notice_.reset();
@@ -122,7 +122,7 @@ void Link::pump(DeformCall& call) {
   }
 }
 
-/// Sends what is due; false where nothing is. `lock` is open meanwhile.
+/// Sends one message if any is due; false if none is. `lock` is released meanwhile.
 bool Link::send_one(DeformCall& call, std::unique_lock<std::mutex>& lock) {
   if (ack_due_) {
     v1::DeformRequest request;
@@ -160,8 +160,8 @@ void Link::send_update(DeformCall& call, const NumberedUpdate& update, std::uniq
   if (packed.ok()) return;
   const Answer answer = judge(update.seq, packed);
   if (answer == Answer::kAgain || answer == Answer::kMakeAnew) {
-    if (!is_over_) unsent_ = packed;  // otherwise the stream's own end says more
-    call.cancel();                    // what is in flight waits again for the next stream
+    if (!is_over_) unsent_ = packed;  // otherwise the error of the stream says more
+    call.cancel();                    // updates in flight then wait for the next stream
     changed_.wait(lock, [this] { return is_over_; });
     return;
   }
@@ -169,7 +169,7 @@ void Link::send_update(DeformCall& call, const NumberedUpdate& update, std::uniq
   box_.put_problem(packed);
 }
 
-/// After a stream has ended: pauses, makes the session anew where it is lost. False where it is all over.
+/// After a stream has ended: pauses, and creates the session again if it is lost. False if the session has ended.
 bool Link::recover(const absl::Status& ended) {
   std::unique_lock lock(mutex_);
   const Clock::time_point now = Clock::now();
@@ -206,8 +206,9 @@ bool Link::recover(const absl::Status& ended) {
   return false;
 }
 
-/// As soon as there is a connection where there was none, but for what the server asks; at once where the session was taken over.
-/// False when the session is to be closed.
+/// Waits before the next attempt, for recovery.pause. If the server was unreachable and a connection comes back
+/// meanwhile, waits only for recovery.asked. Returns at once if the session was taken over. False if the session is to
+/// be closed.
 bool Link::wait_to_try_again(const Recovery& recovery, std::unique_lock<std::mutex>& lock) {
   const auto is_woken = [this] { return is_closing_ || is_to_reopen_; };
   if (is_woken()) return !is_closing_;

@@ -25,16 +25,16 @@
 
 namespace lpdeform::client {
 
-/// A Session from within: the lease on the server's session, the ledger of updates, the box of frames, and
-/// the thread that keeps a Deform stream alive between them. That thread sends; a second one, which lives as
-/// long as a stream, reads. Calls of the Session come in on any thread. One mutex guards all state; no call
-/// to the server and no callback is made under it.
+/// The implementation of a Session: the lease on the server's session, the ledger of updates, the box of frames, and
+/// the thread that keeps a Deform stream open between them. That thread sends. A second thread, which lives as long as
+/// a stream, receives. Calls of the Session arrive on any thread. One mutex guards all state; no call to the server and
+/// no callback is made under it.
 class Link {
  public:
   Link(std::shared_ptr<Rpc> rpc, ClientOptions client_options, OpenOptions options, Copy copy, Lease lease);
   ~Link();
 
-  // As Session has them.
+  // As in Session.
   absl::StatusOr<std::uint64_t> update(Update update);
   absl::StatusOr<Frame> next_frame(FrameBox::Clock::time_point deadline);
   absl::StatusOr<std::optional<Frame>> poll();
@@ -106,40 +106,40 @@ class Link {
   std::stop_source stop_;  // ends every call that is not a stream
   FrameBox box_;
 
-  std::mutex renewing_;  // one thread at a time makes the session anew
+  std::mutex renewing_;  // one thread at a time creates the session again
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   Lease lease_;
   Ledger ledger_;
   RecoveryRules rules_;
-  std::string request_id_;     // of the session to be made next
-  bool is_made_anew_ = false;  // all its handles were sent in one update, after it was lost
+  std::string request_id_;     // of the next session to be created
+  bool is_made_anew_ = false;  // the session was created again, and all its handles were sent in one update
   bool is_closing_ = false;
   bool is_solving_ = false;
   bool is_taking_over_ = false;
 
   std::thread thread_;
   bool is_running_ = false;     // thread_ has work to do
-  DeformCall* call_ = nullptr;  // the stream that there is, for cancel()
+  DeformCall* call_ = nullptr;  // the present stream, for cancel()
   std::uint64_t stream_ = 0;    // counts streams
   bool is_open_ = false;        // StreamOpened came
-  bool is_over_ = false;        // nothing more comes
-  bool is_to_reopen_ = false;   // ended by us, to begin again with another token
-  std::stop_source trying_;     // ends the uploads of the stream that there is, or the wait for the next one
+  bool is_over_ = false;        // nothing more arrives on the stream
+  bool is_to_reopen_ = false;   // ended by us, to reopen with another token
+  std::stop_source trying_;     // ends the uploads of the present stream, or the wait for the next stream
   std::optional<std::uint64_t> ack_due_;
   std::map<std::uint64_t, Uploads> uploads_in_use_;  // by the updates that name them
   std::vector<Uploads> uploads_done_;                // to be deleted
   std::optional<v1::GoAway> go_away_;
   std::optional<Notice> notice_;
-  absl::Status broken_;  // why we gave the stream up
-  absl::Status unsent_;  // what kept an update from being sent on it
+  absl::Status broken_;  // why we ended the stream
+  absl::Status unsent_;  // why an update could not be sent on the stream
   std::optional<FrameAssembly> assembly_;
   Clock::time_point last_heard_;
-  /// After so long without a word the connection is dead: three of the heartbeats that the server announces.
+  /// After this much silence the connection counts as dead: three of the server's heartbeat intervals.
   std::chrono::milliseconds longest_silence_ = std::chrono::seconds(45);
   Clock::time_point opened_;
-  std::uint64_t sent_again_ = 0;  // the last update whose uploads the server knew no more
+  std::uint64_t sent_again_ = 0;  // the last update whose uploads the server no longer had
   Clock::time_point last_open_;
   absl::Status last_problem_;
 };

@@ -1,4 +1,4 @@
-// What callers ask of a Link, on their own threads.
+// The functions of Link that callers call on their own threads.
 
 #include <algorithm>
 #include <cmath>
@@ -62,7 +62,7 @@ absl::StatusOr<Frame> Link::next_frame(Clock::time_point deadline) {
   return *std::move(*frame);
 }
 
-/// Another thread may take the result meanwhile: it is ours as well.
+/// Another thread may take the result meanwhile; this call returns it as well.
 absl::StatusOr<Frame> Link::settle(Clock::time_point deadline) {
   for (;;) {
     const std::uint64_t takes = box_.takes();
@@ -86,7 +86,7 @@ absl::Status Link::no_frame() const {
   return make_fault({Reason::kNoFrame, "", ""}, absl::StrCat("No new frame came in time.", problem));
 }
 
-/// Here, so that what the server finds invalid can only be the update.
+/// Checked in the client, so that an INVALID_ARGUMENT of the server can only be about the update.
 absl::Status Link::check_initial_positions(const SolveOptions& options) const {
   if (!options.initial_positions) return absl::OkStatus();
   const std::vector<double>& numbers = *options.initial_positions;
@@ -103,7 +103,8 @@ absl::Status Link::check_initial_positions(const SolveOptions& options) const {
                     absl::StrCat("The initial position of ", vertex, " is not finite."));
 }
 
-/// Waits until nothing is under way, and lets nothing begin until is_solving_ is false again.
+/// Waits until no update is in flight and no solve runs, and sets is_solving_, which keeps others from starting until
+/// it is false again.
 absl::Status Link::begin_alone(std::unique_lock<std::mutex>& lock, Clock::time_point deadline) {
   const auto is_quiet = [this] { return is_closing_ || (!is_solving_ && !ledger_.has_in_flight()); };
   if (!changed_.wait_until(lock, deadline, is_quiet)) {
@@ -152,7 +153,7 @@ absl::StatusOr<std::string> Link::snapshot() {
   return take_snapshot(*rpc_, session, stop_.get_token());
 }
 
-/// Sends what the server has no more, and only that: it would be a step to it.
+/// Sends again what the server has lost, and nothing else, because the server would count an update as an undo step.
 absl::Status Link::catch_up(std::unique_lock<std::mutex>& lock) {
   v1::GetSessionRequest request;
   request.set_session(lease_.session);
@@ -164,8 +165,8 @@ absl::Status Link::catch_up(std::unique_lock<std::mutex>& lock) {
   return send_restore(lock);
 }
 
-/// All the handles of a session that was made anew are a step to the server, and none to anybody else. FAILED_PRECONDITION
-/// NOTHING_TO_UNDO where that one is the newest.
+/// When a session is created again, the server counts the update with all its handles as an undo step; users do not.
+/// FAILED_PRECONDITION NOTHING_TO_UNDO if that step is the newest.
 absl::Status Link::check_steps(const v1::UndoUpdateRequest& undo, std::unique_lock<std::mutex>& lock) {
   if (undo.redo() || !is_made_anew_) return absl::OkStatus();
   v1::GetSessionRequest request;
@@ -179,13 +180,13 @@ absl::Status Link::check_steps(const v1::UndoUpdateRequest& undo, std::unique_lo
                     "The session was made anew, and knows no step from before.");
 }
 
-/// The same call again does no harm, so a server that went away may be asked again: after what it has lost. `lock` is held before
-/// and after.
+/// An undo is idempotent, so it is retried if the server becomes unreachable, after the updates that the server has
+/// lost. `lock` is held before and after.
 absl::StatusOr<v1::UndoUpdateResponse> Link::undo_patiently(const v1::UndoUpdateRequest& request,
                                                             std::unique_lock<std::mutex>& lock) {
   const Clock::time_point end = Clock::now() + client_options_.call_timeout;
   Backoff backoff;
-  bool is_checked = false;  // once, since a call that was taken and not answered has made the steps fewer
+  bool is_checked = false;  // once only: a call that took effect unanswered has already reduced the steps
   absl::StatusOr<v1::UndoUpdateResponse> undone;
   for (absl::Status ready;; ready = catch_up(lock)) {
     if (ready.ok() && !is_checked) {
@@ -220,7 +221,8 @@ absl::StatusOr<SolveResult> Link::solve(const SolveOptions& options) {
   return solve_patiently(options, start);
 }
 
-/// Tries again while the server is away, for as long as the stream would. The deadline of `options` counts from `start`.
+/// Retries while the server is unreachable, for as long as the stream would. The deadline of `options` counts from
+/// `start`.
 absl::StatusOr<SolveResult> Link::solve_patiently(const SolveOptions& options, Clock::time_point start) {
   std::optional<Clock::time_point> latest;
   SolveOptions left = options;
@@ -272,14 +274,14 @@ absl::StatusOr<SolveResult> Link::solve_once(const SolveOptions& options) {
   lock.lock();
   if (update) note_answer(update->seq, result.status());
   if (absl::IsUnavailable(result.status()))
-    ledger_.resumed_at(0);  // it may have gone back: once more does no harm
+    ledger_.resumed_at(0);  // the server may have lost updates; sending them again does no harm
   if (!result.ok() || result->input_seq >= ledger_.newest_accepted()) return result;
   ledger_.resumed_at(result->input_seq);
   if (!ledger_.has_restore()) return result;
   return absl::UnavailableError("The server went back to an earlier state.");
 }
 
-/// What became of an update that a call was made with. Under the lock.
+/// Records the outcome of the update in a call. Called with the lock held.
 void Link::note_answer(std::uint64_t seq, const absl::Status& status) {
   const Answer answer = status.ok() ? Answer::kTaken : answer_of(status);
   if (answer == Answer::kTaken) ledger_.accept(seq);
@@ -287,8 +289,8 @@ void Link::note_answer(std::uint64_t seq, const absl::Status& status) {
   if (answer == Answer::kAgain || answer == Answer::kMakeAnew) ledger_.connection_lost();
 }
 
-/// Gives a session made anew what the lost one had, on its own: it was accepted once and must not fall with
-/// an update that is not.
+/// Sends the state of the lost session to the new session, as an update of its own: it was accepted before, and must
+/// not be refused together with an update that was not.
 absl::Status Link::send_restore(std::unique_lock<std::mutex>& lock) {
   while (ledger_.has_restore()) {
     if (absl::Status sent = send_by_call(lock); !sent.ok()) return sent;
@@ -296,7 +298,7 @@ absl::Status Link::send_restore(std::unique_lock<std::mutex>& lock) {
   return absl::OkStatus();
 }
 
-/// All updates that there are, by calls of their own.
+/// Sends all waiting updates, each by a unary call.
 absl::Status Link::send_waiting(std::unique_lock<std::mutex>& lock) {
   while (ledger_.has_waiting()) {
     if (absl::Status sent = send_by_call(lock); !sent.ok()) return sent;
@@ -304,7 +306,7 @@ absl::Status Link::send_waiting(std::unique_lock<std::mutex>& lock) {
   return absl::OkStatus();
 }
 
-/// The next update, by a call of its own and not on the stream.
+/// Sends the next update by a unary call, not on the stream.
 absl::Status Link::send_by_call(std::unique_lock<std::mutex>& lock) {
   const NumberedUpdate next = ledger_.send_next();
   v1::UpdateHandlesRequest request;
@@ -337,7 +339,7 @@ absl::Status Link::make_anew(const std::string& lost) {
   std::string request_id;
   {
     const std::scoped_lock lock(mutex_);
-    if (lease_.session != lost) return absl::OkStatus();  // another thread was faster
+    if (lease_.session != lost) return absl::OkStatus();  // another thread has created it already
     request_id = request_id_;
   }
   absl::StatusOr<Lease> made = copy_.make(*rpc_, request_id, stop_.get_token());

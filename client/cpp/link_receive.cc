@@ -1,4 +1,4 @@
-// What comes from the server on a Deform stream: the reading thread of a Link.
+// Receives the messages of a Deform stream: the reading thread of a Link.
 
 #include <utility>
 
@@ -17,7 +17,7 @@ void Link::listen(DeformCall& call) {
     v1::DeformResponse response;
     while (call.read(response)) {
       if (broken.ok()) broken = guarded([&] { return take(response); });
-      if (!broken.ok()) call.cancel();  // what is left is read and dropped
+      if (!broken.ok()) call.cancel();  // the remaining messages are read and dropped
     }
     return absl::OkStatus();
   });
@@ -26,7 +26,7 @@ void Link::listen(DeformCall& call) {
   const std::scoped_lock lock(mutex_);
   broken_ = std::move(broken);
   is_over_ = true;
-  trying_.request_stop();  // what is uploaded for this stream would be sent anew for the next
+  trying_.request_stop();  // the next stream uploads its bytes again
   changed_.notify_all();
 }
 
@@ -43,7 +43,7 @@ absl::Status Link::take(const v1::DeformResponse& response) {
   return response.has_event() ? take(response.event()) : absl::OkStatus();
 }
 
-/// The uploads of this update are not needed any more. Under the lock.
+/// The uploads of this update are no longer needed. Called with the lock held.
 void Link::note_answered(std::uint64_t input_seq) {
   const auto used = uploads_in_use_.find(input_seq);
   if (used == uploads_in_use_.end()) return;
@@ -70,7 +70,7 @@ absl::Status Link::take(const v1::StreamEvent& event) {
       break;
     }
     default:
-      break;  // a heartbeat, or what a newer server says
+      break;  // a heartbeat, or an event that only newer servers send
   }
   return absl::OkStatus();
 }
@@ -109,23 +109,25 @@ absl::Status Link::take(const v1::FramePart& part) {
     const std::scoped_lock lock(mutex_);
     stream = stream_;
     rules_.frame_fitted();
+    ledger_.show((*frame)->epoch, (*frame)->input_seq);
   }
   const std::uint64_t frame_seq = (*frame)->frame_seq;
   if (box_.put(*std::move(*frame), stream)) return absl::OkStatus();
-  acknowledge(frame_seq, stream);  // dropped, but its credit is owed
+  acknowledge(frame_seq, stream);  // dropped, but its credit must be given back
   return absl::OkStatus();
 }
 
-/// What an error says of an update of ours. Uploads went with a server that has ended, or to another one, and are sent anew; once,
-/// for a server that loses those as well will not do better. Under the lock.
+/// What an error means for our update. If its uploads are lost, because a server ended or the session moved to another
+/// one, the update is sent again once. A server that loses the new uploads as well would not do better the next time.
+/// Called with the lock held.
 Answer Link::judge(std::uint64_t seq, const absl::Status& status) {
   const Answer answer = answer_of(status, seq == sent_again_);
   if (fault_of(status).reason == Reason::kUploadUnknown) sent_again_ = seq;
   return answer;
 }
 
-/// An error ends the stream: the next one sends the update again, after the pause that the error asks for. One that
-/// only says why a solve for it failed is nothing to the caller once a newer update is there.
+/// If the update must be sent again, the fault ends the stream; the next stream sends it after the pause that the fault
+/// asks for. A fault that only says why a solve for the update failed is not reported once there is a newer update.
 absl::Status Link::take(const v1::Fault& fault) {
   const absl::Status status = from_wire(fault);
   const std::uint64_t seq = fault.input_seq();

@@ -7,8 +7,9 @@
 
 namespace lpdeform::client {
 
-/// MeshReport::notices, from the defects: vertices at borders that lie in the same place ("split_border_vertices") come
-/// apart unless they are welded. client/python/src/lpdeform/_wire.py and client/web/client/src/fromwire.ts say the same.
+/// Makes MeshReport::notices from the defects: at border vertices in the same place ("split_border_vertices") the
+/// surface splits open unless they are welded. client/python/src/lpdeform/_wire.py and
+/// client/web/client/src/fromwire.ts have the same text.
 std::vector<std::string> mesh_notices(const std::vector<Defect>& defects);
 
 }  // namespace lpdeform::client

@@ -7,11 +7,11 @@
 
 namespace lpdeform::client {
 
-/// INVALID_ARGUMENT NAME_ENCODING where a text that is to travel is not UTF-8: nobody could parse the message that has it.
-/// `what` is for the error: "handle".
+/// INVALID_ARGUMENT NAME_ENCODING if `name` is not UTF-8: no receiver could parse a message that contains it. `what`
+/// names the kind of text in the error: "handle".
 absl::Status check_name(std::string_view what, std::string_view name);
 
-/// The same of the handles of an update.
+/// The same for the handles of an update.
 absl::Status check_names(const Update& update);
 
 }  // namespace lpdeform::client

@@ -12,14 +12,13 @@
 
 namespace lpdeform::client {
 
-/// Puts runs of numbers into the buffers of one message: inline while all of them together stay within
-/// kInlineBytes, otherwise by an upload, so that no message outgrows the limits that every server and client
-/// has.
+/// Puts arrays of numbers into the buffers of one message: inline as long as all of them together stay within
+/// kInlineBytes, otherwise by an upload. So no message exceeds the limits of servers and clients.
 class Packer {
  public:
   static constexpr std::size_t kInlineBytes = std::size_t{1} << 20;
 
-  /// Sends bytes ahead and returns the name by which a buffer refers to them.
+  /// Uploads bytes before the message; returns the name by which a buffer refers to them.
   using Upload = std::function<absl::StatusOr<std::string>(std::string_view bytes)>;
 
   explicit Packer(Upload upload) : upload_(std::move(upload)) {}

@@ -16,7 +16,7 @@ absl::Status ended_because(absl::StatusCode code, Reason reason, const v1::GoAwa
   return make_fault(code, {reason, "", ""}, go_away.text());
 }
 
-/// What the server meant to end, and why.
+/// What to do after a GoAway, and why the stream ended.
 std::pair<NextStep, absl::Status> after_go_away(const v1::GoAway& go_away, bool has_copy) {
   switch (go_away.reason()) {
     case v1::GO_AWAY_REASON_SESSION_DELETED:
@@ -55,11 +55,11 @@ bool is_passing(absl::StatusCode code) {
 std::pair<NextStep, absl::Status> after_status(const absl::Status& ended, bool has_copy) {
   const std::string reason = fault_of(ended).reason;
   if (ended.ok()) return {NextStep::kResume, absl::UnavailableError("The server ended the stream.")};
-  // It is another mesh; it would happen again.
+  // The server has another mesh, or an exception occurred: a retry would fail again.
   if (reason == Reason::kFrameVertices || reason == Reason::kException) return {NextStep::kGiveUp, ended};
   if (is_session_lost(ended)) return {has_copy ? NextStep::kMakeAnew : NextStep::kGiveUp, ended};
   if (is_passing(ended.code()) || is_undecided(ended)) return {NextStep::kResume, ended};
-  if (reason == Reason::kNotTheWriter) {  // it happened while we were away
+  if (reason == Reason::kNotTheWriter) {  // another writer took over while we were disconnected
     return {NextStep::kGiveUp,
             make_fault({Reason::kWriterReplaced, "", ""}, "Another writer took the session over.")};
   }
@@ -92,7 +92,7 @@ void RecoveryRules::begin() {
 }
 
 Recovery RecoveryRules::after(const Ending& ending) {
-  if (ending.stood >= Backoff::kMost) backoff_.reset();  // one that breaks at once is no success
+  if (ending.stood >= Backoff::kMost) backoff_.reset();  // not after a stream that broke at once
   auto [next, why] =
       ending.go_away ? after_go_away(*ending.go_away, has_copy_) : after_status(ending.status, has_copy_);
   const bool is_misfit = fault_of(why).reason == Reason::kFrameParts && ++misfits_ >= kMostMisfits;

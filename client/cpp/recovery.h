@@ -13,32 +13,33 @@ namespace lpdeform::client {
 /// What to do when a stream has ended.
 enum class NextStep {
   kResume,    // open a stream to the same session
-  kMakeAnew,  // the session is gone: make it from our copy, then open a stream
+  kMakeAnew,  // the session is lost: create it from our copy, then open a stream
   kGiveUp,
 };
 
 struct Recovery {
   NextStep next = NextStep::kGiveUp;
-  /// Why the stream ended: what the caller is told where we give up.
+  /// Why the stream ended; returned to the caller if we give up.
   absl::Status why;
-  /// Not to be tried before this has passed: what the server asks for.
+  /// The pause that the server asks for; no attempt before it has passed.
   std::chrono::milliseconds asked{0};
-  /// To be waited for: that, and a growing pause of ours.
+  /// The time to wait: `asked` plus our own growing pause.
   std::chrono::milliseconds pause{0};
 };
 
-/// Growing pauses between attempts: 50 ms doubled up to 2 s, each between half and the whole of that by
-/// chance, so that clients of a restarted server do not all come at once.
+/// Exponential backoff with jitter between attempts. The longest pause starts at 50 ms and doubles up to 2 s; each
+/// pause is a random share, from half to all, of it, so that the clients of a restarted server do not all reconnect at
+/// once.
 class Backoff {
  public:
-  using Chance = std::function<double()>;  // from 0 to 1
+  using Chance = std::function<double()>;  // a random number from 0 to 1
   static constexpr std::chrono::milliseconds kMost{2000};
   /// The longest pause that a server may ask for.
   static constexpr std::chrono::milliseconds kMostAsked{60'000};
 
   explicit Backoff(Chance chance = {}) : chance_(std::move(chance)) {}
 
-  /// On top of `asked`, what the server asks for.
+  /// The next pause, in addition to `asked`, the pause that the server asks for (at most kMostAsked).
   std::chrono::milliseconds next(std::chrono::milliseconds asked = {});
   void reset() { longest_ = kFirst; }
 
@@ -51,28 +52,29 @@ class Backoff {
 /// How a stream ended.
 struct Ending {
   absl::Status status;
-  std::optional<v1::GoAway> go_away;   // the server's reason, where it gave one; goes before `status`
-  std::chrono::milliseconds stood{0};  // for which the stream was open
-  std::chrono::milliseconds away{0};   // since a stream was open last
+  std::optional<v1::GoAway> go_away;   // the server's reason, if it gave one; takes precedence over `status`
+  std::chrono::milliseconds stood{0};  // how long the stream was open
+  std::chrono::milliseconds away{0};   // time since a stream was last open
 };
 
-/// What a session does after each of its streams. tests/golden/recovery.json has the rules as a table, which the clients in all
-/// languages replay. Not thread-safe.
+/// Decides what a session does after each of its streams. tests/golden/recovery.json has the rules as a table; the
+/// clients in all languages are tested with it. Not thread-safe.
 class RecoveryRules {
  public:
-  /// Streams in a row that may end by something that does not fit, before it is taken to be of another version.
+  /// How many streams in a row may end because of malformed frames before we conclude that the server has an
+  /// incompatible version.
   static constexpr int kMostMisfits = 5;
 
-  /// `has_copy`: the session can be made anew. Gives up after `reconnect_for` without an open stream.
+  /// `has_copy`: the session can be created again. Gives up after `reconnect_for` without an open stream.
   RecoveryRules(bool has_copy, std::chrono::milliseconds reconnect_for, Backoff backoff = Backoff())
       : has_copy_(has_copy), reconnect_for_(reconnect_for), backoff_(std::move(backoff)) {}
 
   Recovery after(const Ending& ending);
-  /// After the session could not be made anew.
+  /// What to do after the session could not be created again.
   Recovery after_failed_making(const absl::Status& failed);
-  /// A whole frame came.
+  /// A complete frame arrived.
   void frame_fitted() { misfits_ = 0; }
-  /// Another try is meant: what went wrong before does not count.
+  /// Starts again: earlier failures no longer count.
   void begin();
 
  private:
@@ -84,11 +86,11 @@ class RecoveryRules {
   int misfits_ = 0;
 };
 
-/// What an error says of the update that it answers, or that a call was made with.
+/// What an error means for the update that it answers, or for the update in a call.
 enum class Answer {
-  kAgain,     // it is to be sent again, not before retry_after()
-  kMakeAnew,  // it waits for the session made anew
-  kTaken,     // the server has it and cannot solve for it yet
+  kAgain,     // send it again, after retry_after()
+  kMakeAnew,  // it waits until the session is created again
+  kTaken,     // the server has accepted it but cannot solve for it yet
   kRefused,
 };
 

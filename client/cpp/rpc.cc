@@ -29,23 +29,25 @@ using Stub = v1::DeformService::Stub;
 
 constexpr int kFirstReconnectMs = 50;
 constexpr int kLongestReconnectMs = 2000;
-/// What one attempt to connect may take, its first exchange included: a busy server is not an absent one.
+/// Time limit of one connection attempt, including the first exchange of messages. It is long enough for a busy server.
 constexpr int kAttemptMs = 5000;
-/// A part of a frame may be under way at once. More would only hide frames from the server's credit.
+/// Flow-control window of a stream: one part of a frame. A larger one would only buffer frames that the server's credit
+/// does not count.
 constexpr int kStreamWindowBytes = 1 << 20;
-/// Switches on the time limit for unacknowledged bytes of TCP, so that a write never waits on a dead
-/// connection. Pings come rarely enough for every server.
+/// Keepalive also enables TCP's time limit for unacknowledged bytes, so that a write never waits on a dead connection.
+/// Pings are rare enough for every server.
 constexpr int kKeepaliveMs = 6 * 60 * 1000;
 constexpr int kUnacknowledgedMs = 20 * 1000;
-/// So often a wait for a connection sees whether it is to stop.
+/// How often a wait for a connection checks for a request to stop.
 constexpr std::chrono::milliseconds kGlance{50};
-/// For DeleteSession, as somebody waits for a window to close; a session that is not deleted expires.
+/// Deadline of DeleteSession. It is short, because a user may be waiting for a window to close; a session that is not
+/// deleted expires.
 constexpr std::chrono::milliseconds kLongestClosing{2000};
 
 grpc::ChannelArguments channel_arguments() {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
-  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);  // not one connection for all of a process
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);  // clients do not share one connection
   arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kStreamWindowBytes);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS,
@@ -56,8 +58,8 @@ grpc::ChannelArguments channel_arguments() {
   return arguments;
 }
 
-/// Keeps gRPC up until the process ends. Taking it down with its last channel, as it does otherwise, can take 10 s: it waits
-/// for a poller of its own that nothing wakes.
+/// Keeps gRPC initialised until the process ends. Otherwise gRPC shuts down with its last channel, which can take 10 s:
+/// it waits for its own poller, which nothing wakes.
 void keep_grpc() {
   static std::once_flag once;
   std::call_once(once, grpc_init);
@@ -69,7 +71,7 @@ absl::Status status_of(const grpc::Status& status) {
                       status.error_details());
 }
 
-/// False as soon as every address has refused: waiting would only hide that nobody is there.
+/// False as soon as every address has refused: waiting longer would only delay the error.
 bool answers(grpc::Channel& channel, std::chrono::system_clock::time_point deadline,
              const std::stop_token& stop) {
   while (!stop.stop_requested()) {
@@ -83,7 +85,7 @@ bool answers(grpc::Channel& channel, std::chrono::system_clock::time_point deadl
   return false;
 }
 
-/// Why there is no connection, which gRPC tells a call alone; empty where it does not know yet.
+/// Why there is no connection; empty if gRPC does not know yet. gRPC reports this only through a call.
 std::string problem_of(const std::shared_ptr<grpc::Channel>& channel) {
   if (channel->GetState(false) != GRPC_CHANNEL_TRANSIENT_FAILURE) return "";
   grpc::ClientContext context;
@@ -99,13 +101,14 @@ absl::Status no_server(const std::string& address, const std::string& problem) {
                                                                    problem.empty() ? "." : ": ", problem));
 }
 
-/// What every call says of its caller.
+/// What every call sends about its caller.
 struct Caller {
   std::function<std::string()> token;
   std::string route = new_request_id();
 };
 
-/// A token that no header can carry is left out: the server says that it has none.
+/// Adds token and route to a call. A token that cannot be a header is left out; the server then reports that there is
+/// none.
 void introduce(const Caller& caller, grpc::ClientContext& context) {
   const std::string text = caller.token ? caller.token() : "";
   if (!text.empty() && is_header_text(text)) context.AddMetadata("authorization", "Bearer " + text);

@@ -14,24 +14,25 @@
 
 namespace lpdeform::client {
 
-/// Printable ASCII: what a header may be. gRPC ends the process over any other.
+/// Whether `text` is printable ASCII, as headers must be. gRPC aborts the process on any other header.
 bool is_header_text(std::string_view text);
 
-/// One Deform call. read() on one thread, write() on one other; cancel() on any, as often as one likes.
+/// One Deform call. Call read() on one thread and write() on one other thread; cancel() on any thread, any number of
+/// times.
 class DeformCall {
  public:
   virtual ~DeformCall() = default;
-  /// Waits until gRPC has taken the message. False once the call is over.
+  /// Waits until gRPC has accepted the message. False when the call has ended.
   virtual bool write(const v1::DeformRequest& request) = 0;
-  /// Waits for a message. False once the call is over.
+  /// Waits for a message. False when the call has ended.
   virtual bool read(v1::DeformResponse& response) = 0;
   virtual void cancel() = 0;
-  /// How it ended. Once, when nobody reads or writes any more.
+  /// The final status of the call. Call it once, when no thread reads or writes any more.
   virtual absl::Status finish() = 0;
 };
 
-/// The server's calls over one channel, gRPC hidden behind it. Thread-safe. Each waits, for at most the call
-/// timeout (and DeleteSession two seconds) where nothing else is said, and ends with CANCELLED when `stop` is requested.
+/// The server's calls over one channel; hides gRPC. Thread-safe. Each call waits, unless its comment says otherwise for
+/// at most the call timeout (DeleteSession: two seconds), and ends with CANCELLED when `stop` is requested.
 class Rpc {
  public:
   /// `address` as in Client::connect. Waits until the server answers or the address refuses:
@@ -41,12 +42,12 @@ class Rpc {
                                                       const std::stop_token& stop);
   virtual ~Rpc() = default;
 
-  /// The value of the header lpdeform-session, which every call has: where a proxy stands before several servers, all calls
-  /// with the same one come to the same server.
+  /// The value of the header lpdeform-session, which every call has. A proxy in front of several servers sends all
+  /// calls with the same value to the same server.
   virtual std::string route() const = 0;
-  /// What a call may take where nothing else is said.
+  /// The default deadline of a call.
   virtual std::chrono::milliseconds call_timeout() const = 0;
-  /// The same channel by another way.
+  /// The same channel with another route.
   virtual std::shared_ptr<Rpc> going_by(const std::string& route) const = 0;
 
   virtual absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
@@ -85,8 +86,8 @@ class Rpc {
   virtual std::unique_ptr<DeformCall> deform() = 0;
 
   enum class Connected { kWas, kCame, kIsNot };
-  /// Waits for a connection where there is none, `longest` at most. To be called in place of a mere pause: gRPC makes
-  /// progress with a connection only while somebody waits in a call, or every five seconds.
+  /// Waits until there is a connection, for at most `longest`. Use this instead of a plain pause: gRPC works on a
+  /// connection only while a thread waits in a call, or every five seconds.
   virtual Connected wait_for_connection(std::chrono::milliseconds longest, const std::stop_token& stop) = 0;
 };
 

@@ -31,7 +31,7 @@ absl::Status fill_request(const Lease& lease, const std::optional<NumberedUpdate
   return packed;
 }
 
-/// Takes in the messages of a Solve call.
+/// Assembles the result from the messages of a Solve call.
 class ResultBuilder {
  public:
   ResultBuilder(std::uint32_t vertex_count, const SolveOptions& options)
@@ -51,7 +51,7 @@ class ResultBuilder {
       case v1::SolveResponse::kFrame:
         return take_part(response.frame());
       default:
-        break;  // a newer server may say more
+        break;  // a heartbeat, or a message that only newer servers send
     }
     return absl::OkStatus();
   }

@@ -10,7 +10,7 @@
 
 namespace lpdeform::client {
 
-/// One Solve call: sends `update` where there is one, passes progress on, puts the result together. Waits.
+/// Makes one Solve call: sends `update` if there is one, reports progress, and assembles the result. Waits.
 absl::StatusOr<SolveResult> run_solve(Rpc& rpc, const Lease& lease,
                                       const std::optional<NumberedUpdate>& update,
                                       const SolveOptions& options, const std::stop_token& stop);

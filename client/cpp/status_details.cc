@@ -19,8 +19,8 @@ namespace {
 using google::protobuf::UnknownField;
 using google::protobuf::UnknownFieldSet;
 
-// Field numbers of google/rpc/status.proto, google/rpc/error_details.proto and google/protobuf/any.proto.
-// They never change, and reading them by number spares every user of this library Google's common protos.
+// Field numbers of google/rpc/status.proto, google/rpc/error_details.proto and google/protobuf/any.proto. They never
+// change. Reading them by number means that users of this library do not need Google's common protos.
 constexpr int kStatusDetails = 3;
 constexpr int kAnyTypeUrl = 1, kAnyValue = 2;
 constexpr int kErrorInfoReason = 1, kErrorInfoMetadata = 3;
@@ -28,10 +28,10 @@ constexpr int kEntryKey = 1, kEntryValue = 2;
 constexpr int kRetryDelay = 1, kDurationSeconds = 1, kDurationNanos = 2;
 
 constexpr char kRetryPayload[] = "lpdeform/retry_after_ms";
-/// A day: what is longer is as good as never, and would not fit a clock.
+/// One day. Longer pauses are as good as for ever, and would overflow a clock.
 constexpr std::uint64_t kMostSeconds = 24 * 60 * 60;
 
-/// Calls `visit` for each length-delimited field of a serialised message. Reads nothing where it is not one.
+/// Calls `visit` for each length-delimited field of a serialised message. Does nothing if `message` is malformed.
 void for_each_field(const std::string& message,
                     const std::function<void(int number, const std::string& bytes)>& visit) {
   UnknownFieldSet fields;

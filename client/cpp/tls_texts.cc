@@ -27,12 +27,12 @@ Bio reader_of(const std::string& text) {
   return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
 }
 
-/// In place of asking on the terminal.
+/// A password callback that fails, instead of prompting on the terminal.
 int no_password(char*, int, int, void*) {
   return -1;
 }
 
-/// The first certificate of the text; every one has to be readable.
+/// Returns the first certificate of the text; all must be readable.
 absl::StatusOr<Certificate> read_certificates(const char* name, const std::string& text) {
   const Bio reader = reader_of(text);
   Certificate first;

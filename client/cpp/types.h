@@ -11,21 +11,21 @@
 
 namespace lpdeform::client {
 
-/// A triangle mesh as flat arrays. Vertex order is never changed by anybody.
+/// A triangle mesh as flat arrays. Neither client nor server changes the vertex order.
 struct Mesh {
   /// x, y, z of each vertex, in the caller's unit of length.
   std::vector<double> vertices = {};
-  /// Three 0-based vertex indices a triangle, counter-clockwise seen from outside.
+  /// Three 0-based vertex indices per triangle, counter-clockwise seen from outside.
   std::vector<std::uint32_t> faces = {};
-  /// x, y, z of a normal for each vertex as it is drawn, of any length; 0 asks for the smooth one. For frames
-  /// with normals, see OpenOptions::with_normals; may be empty.
+  /// x, y, z of the normal with which each vertex is drawn at rest, of any length; 0 asks for the smooth normal. For
+  /// frames with normals, see OpenOptions::with_normals; may be empty.
   std::vector<double> normals = {};
 
   std::size_t vertex_count() const { return vertices.size() / 3; }
   std::size_t face_count() const { return faces.size() / 3; }
 };
 
-/// Stays where the rest mesh has it.
+/// Stays at its rest positions.
 struct Fixed {};
 
 /// x = R (p - center) + center + translation for every vertex of the handle; always relative to the rest
@@ -51,28 +51,28 @@ struct SurfacePoint {
   std::array<double, 3> barycentric = {1.0 / 3, 1.0 / 3, 1.0 / 3};
 };
 
-// How a handle is held; a target is where its motion sends a vertex or point.
+// How a handle is held. A target is the place to which the handle's motion moves a vertex or point.
 
-/// Exactly at its target.
+/// Held exactly at its target.
 struct Exactly {};
 
-/// Drawn to its target: 0 lets go, 1 is about as strong as one edge of the surface. 0 to 1e6.
+/// Pulled to its target: weight 0 releases the handle, 1 is about as strong as one edge of the surface. 0 to 1e6.
 struct Soft {
   double weight = 1;
 };
 
-/// Turned by the rotation of the handle's motion, its position free. Vertices only, no target positions. 0 to
-/// 1e6.
+/// Has the rotation of the handle's motion; its position is free. For vertices only, without target positions. Weight 0
+/// to 1e6.
 struct Orientation {
   double weight = 100;
 };
 
-/// Free along a line through its target. Vertices only.
+/// Free to move along a line through its target. For vertices only.
 struct AxisLock {
   std::array<double, 3> axis = {0, 0, 1};  // of any length but 0
 };
 
-/// Free within a plane through its target. Vertices only.
+/// Free to move within a plane through its target. For vertices only.
 struct PlaneLock {
   std::array<double, 3> normal = {0, 0, 1};  // of any length but 0
 };
@@ -84,13 +84,13 @@ struct Handle {
   std::vector<std::uint32_t> vertices = {};
   Motion motion = Fixed{};
   Hold hold = Exactly{};
-  std::vector<SurfacePoint> points = {};  // in place of vertices; exactly or soft
-  /// Radius, along the surface, of the surroundings that go along with the handle nearly rigidly: against the
-  /// spike that a handle of one or a few vertices makes. 0: none.
+  std::vector<SurfacePoint> points = {};  // instead of vertices; held exactly or softly
+  /// Radius, along the surface, of the surroundings that move with the handle almost rigidly. Prevents the spike that a
+  /// handle of one or a few vertices makes. 0: no footprint.
   double footprint = 0;
 };
 
-/// The vertices that may move; everything outside is held where it is when the region takes effect. Empty:
+/// The vertices that may move. All others are held at their positions at the time when the region takes effect. Empty:
 /// everything may move again.
 struct RegionOfInterest {
   std::vector<std::uint32_t> vertices = {};
@@ -99,43 +99,44 @@ struct RegionOfInterest {
 enum class Method { kAuto, kQuasiNewton, kLineSearch, kLocalGlobal, kConic, kMultiresolution };
 
 enum class InitialGuess {
-  kCurrent,    // the session's present state; a new session's is kLaplacian
+  kCurrent,    // the session's current state (warm start); for a new session, kLaplacian
   kLaplacian,  // the naive Laplacian deformation, no rotations
   kRest,       // the rest mesh with the handles at their targets
 };
 
-/// Of a cell's edges in the energy.
+/// The weights of a cell's edges in the energy.
 enum class WeightKind {
   kCotangent,          // max(0, (cot a + cot b) / 2), a and b the angles opposite the edge
   kUniform,            // 1 on every edge
   kIntrinsicDelaunay,  // cotangents of the intrinsic Delaunay triangulation: never clamped, on any mesh
 };
 
-/// What becomes of a connected component that no handle holds.
+/// What happens to a connected component that no handle holds.
 enum class FreeComponents {
-  kError,   // the solve is refused: the component is named
-  kStay,    // stays where the rest mesh has it
+  kError,   // an error that names the component; nothing is solved
+  kStay,    // stays at rest
   kFollow,  // moves rigidly with the nearest handle
 };
 
-/// How positions, distortion and normals travel in frames, from the most precise to the smallest.
+/// How positions, distortion and normals are encoded in frames, from the most precise encoding to the smallest.
 enum class Encoding {
   kRaw,  // float32, or float64 with OpenOptions::double_precision
-  /// 16-bit integers: off by at most half of 1/65535 of the frame's extent along each axis, of its largest distortion, and
-  /// half of 1/32767 of a normal. Always with distortion.
+  /// 16-bit integers. The largest errors are half of 1/65535 of the frame's extent along each axis, half of 1/65535 of
+  /// its largest distortion, and half of 1/32767 for a component of a normal. Always includes the distortion.
   kQuantized,
-  kCompressed,  // the same numbers, by meshoptimizer's vertex codec
+  kCompressed,  // the same numbers, compressed by meshoptimizer's vertex codec
 };
 
-/// Which vertices of the mesh are copies of one, as engines split them along seams of texture and normals.
-/// They are deformed as one and get the same positions to the last bit. Handles, fields and positions go on
-/// speaking of the mesh's own vertices; what is said of copies must be the same (COPIES_DIFFER).
+/// Which vertices of the mesh are copies of the same vertex: engines split vertices along seams of texture coordinates
+/// and normals. Copies are deformed as one vertex and get the same positions to the last bit. Handles, fields and
+/// positions still refer to the mesh's own vertices; values given for copies must be equal (COPIES_DIFFER).
 struct Weld {
-  bool by_position = false;  // vertices in the same place are one
-  /// How far apart such vertices may be, as a share of the bounding box's diagonal, 0 to 1e-3; 0 is the server's, 1e-6. All
-  /// copies get the position of the lowest, at rest, too.
+  bool by_position = false;  // vertices in the same place are copies
+  /// The largest distance of such vertices, as a share of the bounding box's diagonal, 0 to 1e-3; 0 means the server's
+  /// default, 1e-6. All copies get the position of the copy with the lowest index, also at rest.
   double tolerance = 0;
-  /// Otherwise one number a vertex: those with the same number are one. Empty: nothing is welded.
+  /// If by_position is false: one number per vertex; vertices with the same number are copies. Empty: nothing is
+  /// welded.
   std::vector<std::uint32_t> groups = {};
 };
 
@@ -145,78 +146,80 @@ enum class StopReason {
   kIterationLimit,
   kTimeLimit,
   kCancelled,
-  kStalled,             // no step lowers the energy, short of the tolerance
-  kNumericalBreakdown,  // the best state seen is kept
+  kStalled,             // no step decreases the energy, but the tolerance is not met
+  kNumericalBreakdown,  // the result is the best state so far
 };
 
 /// "iteration_limit" and so on, as in reports.
 std::string stop_reason_name(StopReason reason);
 
-/// How a solve is made and when it stops. One setting: it is replaced whole.
+/// The method of a solve and when it stops. This is one setting: a new value replaces all fields.
 struct SolverSettings {
   Method method = Method::kAuto;
-  double tolerance = 0;              // 1e-14 to 0.1; 0 takes the server's default
-  std::uint32_t max_iterations = 0;  // 0 takes the server's default
-  double time_limit_seconds = 0;     // 0 is without limit
+  double tolerance = 0;              // 1e-14 to 0.1; 0 means the server's default
+  std::uint32_t max_iterations = 0;  // 0 means the server's default
+  double time_limit_seconds = 0;     // 0 means no limit
   InitialGuess initial = InitialGuess::kCurrent;
 };
 
-/// p or stiffness from the shape's geometry, found by the server: softer at joints (concave creases, and places
-/// narrower than what is around them), stiffer on rigid parts. With joint_i in [0, 1),
-/// p_i = 2 - c (1 - joint_i) and s_i = 10^(-c joint_i), c = strength clamp((largest joint_i - 0.2) / 0.2, 0, 1):
-/// p = 2 and stiffness 1 everywhere where no joint_i exceeds 0.2.
+/// p or stiffness that the server computes from the shape's geometry: softer at joints (concave creases, and places
+/// narrower than their surroundings), stiffer on rigid parts. With joint_i in [0, 1), p_i = 2 - c (1 - joint_i) and
+/// s_i = 10^(-c joint_i), c = strength clamp((largest joint_i - 0.2) / 0.2, 0, 1). If no joint_i exceeds 0.2, p is 2 and
+/// the stiffness 1 everywhere.
 struct Automatic {
   double strength = 1;  // 0 to 1; 0 is p = 2 and stiffness 1 everywhere
 };
 
-/// The same number everywhere, one a vertex, or from the geometry.
+/// The same number everywhere, one number per vertex, or computed from the geometry.
 using FieldValue = std::variant<double, std::vector<double>, Automatic>;
 
-/// What is left out keeps its value.
+/// A setting that is left out keeps its value.
 struct Settings {
   std::optional<FieldValue> p = {};          // 1 <= p <= 64
   std::optional<FieldValue> stiffness = {};  // 1e-6 <= s <= 1e6
-  /// Of mixed norms, in the mesh's unit; 0 takes the mean rest edge length.
+  /// The length unit of mixed norms, in the mesh's unit; 0 means the mean rest edge length.
   std::optional<double> length_unit = {};
   std::optional<SolverSettings> solver = {};
   std::optional<RegionOfInterest> region = {};
 };
 
-/// A scaling by different factors along three axes in which salient parts keep their shape and size. The server makes the
-/// handle "resize" of it, which holds the ends of the mesh along the scaled axes (along others the extent changes: hold ends there with plane
-/// locks), and sets p and stiffness, where the same update does not. To end it, remove that handle and set p and stiffness.
+/// A scaling by different factors along three axes in which salient parts keep their shape and size. The server turns
+/// it into the handle "resize", which holds the ends of each component along the scaled axes, and sets p and stiffness
+/// unless the same update sets them. Along other axes the extent changes; hold the ends there with plane locks. To end
+/// the resizing, remove that handle and set p and stiffness.
 struct Resize {
-  /// Along the axes, relative to the rest mesh; each 0.01 to 100. A factor that all share is better given to the mesh.
+  /// The factors along the axes, relative to the rest mesh; each 0.01 to 100. Apply a factor that all axes share to the
+  /// mesh itself instead.
   std::array<double, 3> scale = {1, 1, 1};
-  /// Stays where it is; the middle of the mesh's bounding box where left out.
+  /// The point that does not move; default: the middle of the mesh's bounding box.
   std::optional<std::array<double, 3>> origin = {};
-  /// The directions of the first and the second axis, of any length; x and y of the mesh where left out. Of the
-  /// second, the part across the first counts; the third is across both.
+  /// The directions of the first and the second axis, of any length but 0; default: x and y of the mesh. Only the part
+  /// of the second that is perpendicular to the first counts. The third axis is perpendicular to both.
   std::optional<std::array<std::array<double, 3>, 2>> axes = {};
 };
 
-/// A change of handles and settings; the server takes it whole or not at all.
+/// A change of handles and settings. It is atomic: the server accepts all of it or nothing.
 struct Update {
-  /// Lets go of the handle.
+  /// Removes the handle.
   struct Removal {};
-  /// A Handle adds or replaces, a Motion moves the handle of that name.
+  /// A Handle adds or replaces the handle of that name; a Motion moves it.
   using Change = std::variant<Handle, Motion, Removal>;
 
   std::map<std::string, Change> handles = {};
   Settings settings = {};
   std::optional<Resize> resize = {};
-  /// What it does to handles is a step of its own, which Session::undo takes back: to be set when a drag begins. Otherwise updates
-  /// that move the same handles, none of them over a second after the one before, are one step, and each other update
-  /// that changes handles is one. Settings are no part of steps.
+  /// The changes of handles in this update begin a new step for Session::undo. Set this when a drag begins. Otherwise,
+  /// consecutive updates that move the same handles, each at most a second after the previous one, are one step; every
+  /// other update that changes handles is a step of its own. Settings are not part of steps.
   bool begins_step = false;
 };
 
-/// What a server says about itself; nothing failed.
+/// A message about the server's condition; nothing failed.
 struct Notice {
   enum class Reason {
-    kOther,       // what only a newer server says
-    kOverloaded,  // it has more to solve than it can: frames come less often, and the last one of an update later
-    kRecovered,  // no more
+    kOther,       // a reason that only newer servers send
+    kOverloaded,  // frames come less often, and the final frame of an update later
+    kRecovered,   // no longer overloaded
   };
   Reason reason = Reason::kOther;
   std::string text = {};  // one sentence for people
@@ -236,34 +239,34 @@ struct MeshReport {
   std::int64_t components = 0;
   std::int64_t boundary_loops = 0;
   std::vector<Defect> defects = {};  // every kind, also those with count 0
-  std::int64_t welded_vertices = 0;  // copies of a vertex before them
-  /// What is to be known before the mesh is deformed, one sentence for people each: that it comes apart where it is split.
+  std::int64_t welded_vertices = 0;  // vertices that are copies of one with a lower index
+  /// Warnings about the mesh, one sentence for people each: that the surface splits open where vertices are not welded.
   std::vector<std::string> notices = {};
 };
 
 /// A state of the surface on its way to the optimum.
 struct Frame {
   std::vector<double> positions = {};  // x, y, z of each vertex
-  /// E_i of each vertex, in the mesh's unit of length; empty where it was not asked for.
+  /// E_i of each vertex, in the mesh's unit of length; empty if it was not requested.
   std::vector<double> distortion = {};
-  /// x, y, z of a normal of length 1 for each vertex; empty where it was not asked for. Carried from
-  /// Mesh::normals where those were given (hard edges stay hard, seams do not show), otherwise smooth.
+  /// x, y, z of a normal of length 1 for each vertex; empty if not requested. If Mesh::normals were given, these follow
+  /// the surface (hard edges stay hard, seams are invisible); otherwise the normals are smooth.
   std::vector<double> normals = {};
-  std::uint64_t input_seq = 0;  // the newest update it answers: see Session::update; never falls
+  std::uint64_t input_seq = 0;  // the newest update that it includes: see Session::update; never decreases
   std::uint64_t frame_seq = 0;  // rises within an epoch
   std::uint64_t epoch = 0;
-  std::uint64_t skipped_inputs = 0;  // updates since the frame before that no frame answers
+  std::uint64_t skipped_inputs = 0;  // updates since the previous frame for which there is no frame
   std::uint32_t iteration = 0;
   double energy = 0;       // E of the positions, Eq. 3 of the paper, in the mesh's unit, with soft terms
-  double soft_energy = 0;  // the part of it that soft and orientation handles have
-  /// The result for input_seq, however its solve ended (stop_reason): no further frame until there is a new update, but for the
-  /// same one with its gap.
+  double soft_energy = 0;  // the part of `energy` from soft and orientation handles
+  /// The final frame for input_seq, however its solve ended (stop_reason). No further frame follows until there is a
+  /// new update, except the same result with its optimality_gap.
   bool is_final = false;
   StopReason stop_reason = StopReason::kRunning;
   double solve_seconds = 0;
   std::string method = {};
-  /// (E - lower bound) / E of the convex problem with its rotations held. In results alone, where asked for: see
-  /// OpenOptions::certify.
+  /// The relative duality gap (E - lower bound) / E of the convex problem in which the rotations are held fixed. Only
+  /// in results, and if requested: see OpenOptions::certify.
   std::optional<double> optimality_gap = {};
 };
 
@@ -286,11 +289,12 @@ struct SolveOptions {
   bool keep_trace = false;       // fill SolveResult::trace
   bool double_precision = true;  // positions, distortion and normals travel as float64
   bool with_normals = false;     // fill SolveResult::normals
-  /// x, y, z of each vertex, in place of the initial guess.
+  /// x, y, z of each vertex; replaces the initial guess.
   std::optional<std::vector<double>> initial_positions = {};
-  /// Called at most ten times a second, on the thread that called solve(). May be empty.
+  /// Called at most ten times per second, on the thread that called solve(). May be empty.
   std::function<void(const SolveProgress&)> on_progress = {};
-  /// Of the whole call, waiting for another one included; 0 is without limit. When it has passed, the server stops as well.
+  /// The deadline of the whole call, including the wait for another solve; 0 means no limit. At the deadline the server
+  /// stops as well.
   double deadline_seconds = 0;
 };
 
@@ -298,13 +302,13 @@ struct SolveResult {
   std::vector<double> positions = {};
   std::vector<double> distortion = {};
   std::vector<double> normals = {};  // as Frame::normals
-  std::string method = {};           // that ran
+  std::string method = {};           // the method that ran
   StopReason stop_reason = StopReason::kRunning;
   std::uint32_t iterations = 0;
   double initial_energy = 0;
-  double energy = 0;       // with soft terms
-  double soft_energy = 0;  // their part
-  /// (E - lower bound) / E of the convex problem with its rotations held.
+  double energy = 0;       // including soft terms
+  double soft_energy = 0;  // the part of the soft terms
+  /// The relative duality gap (E - lower bound) / E of the convex problem in which the rotations are held fixed.
   std::optional<double> optimality_gap = {};
   double setup_seconds = 0;
   double solve_seconds = 0;

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::uint32_t kMostPartBytes = 1u << 20;
 
-/// Ends early where `stop` is requested.
+/// Sleeps for `pause`; ends early if `stop` is requested.
 void sleep_for(std::chrono::milliseconds pause, const std::stop_token& stop) {
   std::mutex mutex;
   std::unique_lock lock(mutex);
@@ -55,8 +55,8 @@ absl::StatusOr<std::string> Uploads::add(std::string_view bytes) {
                     "The server misses parts of an upload that were all sent.");
 }
 
-/// A part that the server has no room for yet goes again after the pause that it asks for, within the time of a call; the upload
-/// is as it was. Not so where the server says of no pause.
+/// If the server has no room for a part yet, retries after the pause that it asks for, within the call timeout; the
+/// upload has not changed. Without a pause in the error, there is no retry.
 absl::StatusOr<v1::UploadPartResponse> Uploads::send(const v1::UploadPartRequest& part) {
   const auto end = std::chrono::steady_clock::now() + rpc_->call_timeout();
   Backoff backoff;

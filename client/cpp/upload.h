@@ -10,22 +10,23 @@
 
 namespace lpdeform::client {
 
-/// 32 hexadecimal digits from the system's source of randomness: an id for a call that creates.
+/// 32 random hexadecimal digits from the system's source of randomness: a request_id that makes a creating call
+/// idempotent.
 std::string new_request_id();
 
-/// The uploads that one message needs, sent ahead of it. `rpc` outlives it. Not thread-safe.
+/// The uploads of one message, sent before it. `rpc` must outlive this object. Not thread-safe.
 class Uploads {
  public:
-  /// The same bytes in the same order with the same `id` are the same uploads.
+  /// Idempotent: the same bytes in the same order with the same `id` give the same uploads.
   Uploads(Rpc& rpc, std::stop_token stop, std::string id = new_request_id());
 
-  /// Sends `bytes` in parts of at most 1 MiB with a checksum; returns the upload's name. Waits, also for as long as a server asks
-  /// for that limits the bytes a second of its callers.
+  /// Sends `bytes` in parts of at most 1 MiB with a checksum; returns the upload's name. Waits, including the pauses
+  /// that a server asks for if it limits its callers' bytes per second.
   absl::StatusOr<std::string> add(std::string_view bytes);
 
   bool empty() const { return names_.empty(); }
 
-  /// The message has been answered: gives the server's memory back. Without it they expire. Waits.
+  /// Deletes the uploads on the server, when the message has been answered. Without this call they expire. Waits.
   void discard();
 
  private:

@@ -1,6 +1,5 @@
 #include "client/cpp/wire.h"
 
-#include <array>
 #include <span>
 #include <string>
 #include <utility>
@@ -8,23 +7,13 @@
 
 #include "client/cpp/mesh_notices.h"
 #include "client/cpp/status_details.h"
+#include "client/cpp/wire_holds.h"
+#include "client/cpp/wire_vectors.h"
 #include "core/base/fault.h"
+#include "core/base/match.h"
 
 namespace lpdeform::client {
 namespace {
-
-template <typename... Cases>
-struct Match : Cases... {
-  using Cases::operator()...;
-};
-template <typename... Cases>
-Match(Cases...) -> Match<Cases...>;  // clang 14 does not find it by itself
-
-void put(const std::array<double, 3>& from, v1::Vector3* to) {
-  to->set_x(from[0]);
-  to->set_y(from[1]);
-  to->set_z(from[2]);
-}
 
 v1::Method to_wire(Method method) {
   switch (method) {
@@ -110,15 +99,6 @@ absl::Status to_wire(const std::vector<SurfacePoint>& points, Packer& packer, v1
   absl::Status packed = packer.pack(bytes_of(faces), *out.mutable_faces());
   packed.Update(packer.pack(bytes_of(barycentric), *out.mutable_barycentric()));
   return packed;
-}
-
-void to_wire(const Hold& hold, v1::Handle& out) {
-  const Match put_hold{
-      [](const Exactly&) {}, [&](const Soft& soft) { out.mutable_soft()->set_weight(soft.weight); },
-      [&](const Orientation& orientation) { out.mutable_orientation()->set_weight(orientation.weight); },
-      [&](const AxisLock& lock) { put(lock.axis, out.mutable_axis_lock()->mutable_axis()); },
-      [&](const PlaneLock& lock) { put(lock.normal, out.mutable_plane_lock()->mutable_normal()); }};
-  std::visit(put_hold, hold);
 }
 
 absl::Status to_wire(const Handle& handle, Packer& packer, v1::Handle& out) {

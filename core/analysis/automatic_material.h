@@ -7,34 +7,33 @@
 
 namespace lpdeform {
 
-/// p and stiffness from the geometry: softer at joints, stiffer on rigid parts (section 5 of the paper names
-/// this as future work). With joint_i of core/analysis/joints.h, and c in [0, 1], which is the strength where
-/// there are joints:
+/// p and stiffness from the geometry: softer at joints, stiffer on rigid parts (section 5 of the paper names this as
+/// future work). joint_i is that of core/analysis/joints.h. c in [0, 1] equals the strength where the shape has joints:
 ///
-///   p_i = 2 - c (1 - joint_i)          2 at joints; on rigid parts 2 - c
-///   s_i = 10^(-c joint_i)              1 on rigid parts; at joints down to 1/10
+///   p_i = 2 - c (1 - joint_i)          from 2 - c on rigid parts to 2 at joints
+///   s_i = 10^(-c joint_i)              from 1 on rigid parts to 10^-c at joints
 ///
-/// Low p belongs on the rigid parts, not at the joints: with p = 1 the smallest distortion of a cell costs
-/// s_i l E_i, so distortion is sparse there and a rigid part moves as one, while with p = 2 small distortions
-/// are nearly free, so the joints take all of them and share them evenly. The other way round joints are
-/// stiffer than with the same p everywhere. Strength 0 is p = 2 and stiffness 1 everywhere.
+/// Low p belongs on the rigid parts, not at the joints: with p = 1 the smallest distortion of a cell costs s_i l E_i,
+/// so distortion is sparse there and a rigid part moves as one. With p = 2 small distortions are nearly free, so the
+/// joints take all of them and share them evenly. With low p at the joints instead, joints would be stiffer than with
+/// the same p everywhere. Strength 0 gives p = 2 and stiffness 1 everywhere.
 ///
-/// Without joints there are no parts to be kept rigid, and p = 1 everywhere would kink a tube somewhere. So the
-/// effect fades with J, the largest joint_i: c is the strength times clamp((J - 0.2) / 0.2, 0, 1). From J = 0.4
-/// on it is the whole strength. Up to J = 0.2 it is nothing: p = 2 and stiffness 1 everywhere (has_joints).
-/// Between, the material changes continuously with J.
+/// A shape without joints has no parts to keep rigid, and p = 1 everywhere would kink a tube somewhere. So the effect
+/// fades out with J, the largest joint_i: c is the strength times clamp((J - 0.2) / 0.2, 0, 1). For J >= 0.4, c is the
+/// strength. For J <= 0.2, c is 0: p = 2 and stiffness 1 everywhere (has_joints). Between the two, the material changes
+/// continuously with J.
 ///
-/// The length unit is left at its default. INVALID_ARGUMENT: STRENGTH_OUT_OF_RANGE.
+/// The length unit keeps its default. INVALID_ARGUMENT: STRENGTH_OUT_OF_RANGE.
 absl::StatusOr<Material> automatic_material(const RestShape& shape, double strength,
                                             const Workers& workers = Workers(1));
 
-/// Whether joint_i exceeds 0.2 anywhere: where not, the material is p = 2 and stiffness 1 everywhere.
+/// Whether joint_i exceeds 0.2 anywhere. If it does not, the material is p = 2 and stiffness 1 everywhere.
 bool has_joints(const Field& joint);
 
-/// The same where the joints are known: one value of `joint` a vertex.
+/// The same for known joints: `joint` has one value per vertex.
 absl::StatusOr<Material> automatic_material(const Field& joint, double strength);
 
-/// INVALID_ARGUMENT (STRENGTH_OUT_OF_RANGE) where `strength` is not within 0 to 1.
+/// INVALID_ARGUMENT (STRENGTH_OUT_OF_RANGE) if `strength` is not in [0, 1].
 absl::Status check_strength(double strength);
 
 }  // namespace lpdeform

@@ -29,7 +29,8 @@ Bend bend_of(const RestShape& shape, std::int32_t left, std::int32_t right) {
   const double length = edge.norm();
   const Eigen::RowVector3d direction = edge / length;
   const double angle = std::atan2(direction.dot(a.normal.cross(b.normal)), a.normal.dot(b.normal));
-  // Seen from either face the tangent that leaves it: their mean is across the edge, also where it is sharp.
+  // Each face has a tangent that leaves it across the edge. Their mean is the tangent across the edge, even if the edge
+  // is sharp.
   const Eigen::RowVector3d across = (a.normal - b.normal).norm() < 1e-6
                                         ? Eigen::RowVector3d(a.normal.cross(direction))
                                         : Eigen::RowVector3d((a.normal + b.normal).cross(direction));

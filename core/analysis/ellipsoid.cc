@@ -11,17 +11,18 @@
 namespace lpdeform {
 namespace {
 
-// Of the least pivot to the largest. That of an ellipsoid 1000 times as long as it is thick is about this small. Below it
-// rounding decides: on flat shapes, and where several quadrics fit the vertices.
+// The smallest permitted ratio of the least pivot to the largest. An ellipsoid 1000 times as long as it is thick has
+// about this ratio. Below it the result is rounding error: on flat shapes, and where several quadrics fit the vertices.
 constexpr double kLeastPivot = 1e-12;
-// Squared: of the least axis to the largest. What is longer is a tube, whose length no quadric tells.
+// The square of the smallest permitted ratio of the least axis to the largest. A longer shape is a tube, whose length
+// no quadric determines.
 constexpr double kLeastThickness = 1e-6;
 
 using Quadric = Eigen::Matrix<double, 9, 1>;
 
 struct Ellipsoid {
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();  // of radius 1
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();  // the ellipsoid's surface has radius_at() 1
 
   double radius_at(const Eigen::Vector3d& x) const {
     const Eigen::Vector3d from_middle = x - middle;
@@ -36,7 +37,7 @@ Quadric terms_at(const Eigen::Vector3d& x) {
   return terms;
 }
 
-/// Nothing where it is no ellipsoid.
+/// Empty if the quadric is not an ellipsoid.
 std::optional<Ellipsoid> ellipsoid_of(const Quadric& q) {
   Eigen::Matrix3d matrix;
   matrix << q[0], q[3], q[4],  //
@@ -49,7 +50,8 @@ std::optional<Ellipsoid> ellipsoid_of(const Quadric& q) {
   return Ellipsoid{middle, matrix / (1 + middle.dot(matrix * middle))};
 }
 
-/// Of one component, in coordinates from its centroid over its root mean square distance from there.
+/// The fit of one component. Coordinates are relative to its centroid and divided by the root mean square distance from
+/// it.
 struct Fit {
   double area = 0, size = 0;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();

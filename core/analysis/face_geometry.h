@@ -7,7 +7,7 @@ namespace lpdeform {
 /// A face of a rest shape in scaled units.
 struct FaceGeometry {
   Eigen::RowVector3d centre;
-  Eigen::RowVector3d normal;  // unit, outwards where the mesh is oriented so; 0 for a zero-area face
+  Eigen::RowVector3d normal;  // unit length; outwards if the mesh is oriented so; 0 for a zero-area face
   double area = 0;            // 0 for a zero-area face (core/mesh/topology.h)
 };
 

@@ -16,7 +16,7 @@ FaceTree::FaceTree(const Points& positions, const Faces& faces) : order_(faces.r
   fill(0, 0, static_cast<std::int32_t>(order_.size()), positions, faces, centres);
 }
 
-/// Makes the node of order_[begin, end), and all below it.
+/// Fills the node of order_[begin, end) and the subtree below it.
 void FaceTree::fill(std::int32_t node, std::int32_t begin, std::int32_t end, const Points& positions,
                     const Faces& faces, const Points& centres) {
   Eigen::Array3d low = Eigen::Array3d::Constant(kInfinity), high = -low;

@@ -9,20 +9,20 @@
 
 namespace lpdeform {
 
-/// A tree of boxes around triangles, to find the first of them along a ray: halved at the median of the centres along the
-/// longest side until kLeaf are left. Immutable; thread-safe.
+/// A tree of bounding boxes around triangles, to find the first triangle along a ray. Each node is split at the median
+/// of the centres along its longest side until at most kLeaf triangles are left. Immutable; thread-safe.
 class FaceTree {
  public:
   static constexpr std::int32_t kLeaf = 4;
 
   FaceTree(const Points& positions, const Faces& faces);
 
-  /// The faces in the tree's order: what lies together stands together.
+  /// The faces in the tree's order: faces that are close in space are close in this order.
   const std::vector<std::int32_t>& order() const { return order_; }
 
-  /// The least of distance(k) over all faces order()[k] whose box, grown by `margin` > 0, the ray meets; infinite where there is
-  /// none. `distance` returns where along the ray it meets the face, >= 0 and within the grown box, or infinity: boxes
-  /// that begin farther away than the least so far are left out.
+  /// The least of distance(k) over all faces order()[k] whose box, grown by `margin` > 0, the ray meets; infinite if
+  /// there is none. `distance` returns how far along the ray the face is, >= 0 and within the grown box, or infinity.
+  /// Boxes that begin farther away than the least distance so far are skipped.
   template <typename Distance>
   double nearest(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double margin,
                  Distance distance) const {
@@ -52,24 +52,25 @@ class FaceTree {
  private:
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
   static constexpr int kDeepest =
-      64;  // of a tree over at most 2^31 faces: each halving is even, and leaves one waiting
+      64;  // enough for a tree of at most 2^31 faces: every split is even, and leaves one node waiting
 
   struct Node {
     Eigen::Array3d low, high;
-    std::int32_t first = 0;  // of its faces in order_, or of its two children
-    std::int32_t count = 0;  // of its faces; 0: it has children
+    std::int32_t first = 0;  // the first of its faces in order_, or of its two children
+    std::int32_t count = 0;  // the number of its faces; 0 if it has children
   };
   struct Waiting {
     std::int32_t node;
     double entry;
   };
 
-  /// Where the ray enters the grown box; infinite where it does not.
+  /// How far along the ray it enters the grown box; infinite if it does not.
   static double entry(const Node& node, const Eigen::Vector3d& origin, const Eigen::Array3d& inverse,
                       double margin) {
     double enter = 0, leave = kInfinity;
     for (int axis = 0; axis < 3; ++axis) {
-      // Along an axis that the ray stands across these are infinite: of one sign, and the ray passes by, or of both.
+      // Along an axis perpendicular to the ray both are infinite: of the same sign if the ray passes the box by, else
+      // of opposite signs.
       const double a = (node.low[axis] - margin - origin[axis]) * inverse[axis];
       const double b = (node.high[axis] + margin - origin[axis]) * inverse[axis];
       enter = std::max(enter, std::min(a, b));
@@ -82,7 +83,7 @@ class FaceTree {
             const Faces& faces, const Points& centres);
 
   std::vector<Node> nodes_;
-  std::vector<std::int32_t> order_;  // of faces
+  std::vector<std::int32_t> order_;  // face indices
 };
 
 }  // namespace lpdeform

@@ -9,8 +9,8 @@
 namespace lpdeform {
 namespace {
 
-constexpr int kSlabs = 50;  // of a component's extent
-constexpr int kReach = 2;   // slabs on either side that a mean takes in
+constexpr int kSlabs = 50;  // per component extent
+constexpr int kReach = 2;   // slabs on either side that a mean includes
 
 /// One component's outline, slab by slab.
 struct Outline {
@@ -18,7 +18,7 @@ struct Outline {
   std::vector<double> lengths = std::vector<double>(kSlabs, 0.0);
 
   bool has_extent() const { return high > low; }
-  /// In slabs, from 0 to kSlabs.
+  /// The height in slabs, from 0 to kSlabs.
   double place(double height) const { return (height - low) / (high - low) * kSlabs; }
 
   /// Adds `area`, spread evenly over the heights from `begin` to `end`.
@@ -30,7 +30,7 @@ struct Outline {
           area * std::max(0.0, std::min(slab + 1.0, end) - std::max(1.0 * slab, begin)) / (end - begin);
   }
 
-  /// Means over neighbouring slabs, over the mean of all.
+  /// Replaces each slab by the mean of its neighbourhood, divided by the mean of all slabs.
   void normalise() {
     double all = 0;
     for (const double length : lengths) all += length / kSlabs;
@@ -43,7 +43,7 @@ struct Outline {
     }
   }
 
-  /// Linear between the slabs' middles.
+  /// Interpolates linearly between the slabs' middles.
   double at(double height) const {
     const double middle = std::clamp(place(height) - 0.5, 0.0, kSlabs - 1.0);
     const int slab = std::min(static_cast<int>(middle), kSlabs - 2);
@@ -67,7 +67,7 @@ Field girth_along(const RestShape& shape, const Eigen::Vector3d& direction) {
     Outline& outline = outlines[shape.components()[face[0]]];
     if (!outline.has_extent()) continue;
     const Eigen::Vector3d a = x.row(face[0]), b = x.row(face[1]), c = x.row(face[2]);
-    // Of a face's area the part that slices cut: all of it where it stands upright, none where it lies flat.
+    // The part of a face's area that slices cut: all of an upright face, nothing of a flat one.
     const double area = 0.5 * (b - a).cross(c - a).cross(direction).norm();
     const auto [low, high] = std::minmax({heights[face[0]], heights[face[1]], heights[face[2]]});
     outline.add(area, outline.place(low), outline.place(high));

@@ -4,13 +4,14 @@
 
 namespace lpdeform {
 
-/// How much surface a slice of the shape across `direction`, of length 1, cuts at each vertex:
+/// How long the outline of a slice of the shape across `direction` is at each vertex; `direction` has length 1:
 ///
 ///   girth_i = L(h_i) / mean of L over the component's heights,    h_i = x_i . direction
 ///
-/// with L(h) the length of the component's outline at height h, a mean over a tenth of its extent: 1 everywhere on a
-/// cylinder along the direction, small where the shape has its tips. Does not depend on the unit of length. 1 for components
-/// without extent along the direction and for unreferenced vertices; >= 0 and finite. O(n + m).
+/// L(h) is the length of the component's outline at height h, averaged over a tenth of its extent. girth_i is 1
+/// everywhere on a cylinder along the direction, and small near the tips of the shape. It does not depend on the unit
+/// of length. It is 1 for components without extent along the direction and for unreferenced vertices; always >= 0 and
+/// finite. O(n + m).
 Field girth_along(const RestShape& shape, const Eigen::Vector3d& direction);
 
 }  // namespace lpdeform

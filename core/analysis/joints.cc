@@ -15,7 +15,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kAround = 4;  // times rho: what a place is compared with
+constexpr double kAround = 4;  // times rho: the size of the surroundings that a place is compared with
 constexpr double kHalfCrease = std::numbers::pi / 9, kHalfNarrowing = 0.25;
 
 /// Integrals over the cells of 1/t, 1/t^2 and of 1 where t is known.
@@ -25,7 +25,7 @@ Points slenderness(const RestShape& shape, const std::vector<double>& thickness,
   for (Eigen::Index f = 0; f < shape.faces().rows(); ++f) {
     if (!std::isfinite(thickness[f])) continue;
     const Enclosure& component = components[shape.components()[shape.faces()(f, 0)]];
-    // A few crumpled faces, with another side at once behind them, would outweigh all others in 1 / t^2.
+    // Without this limit, a few crumpled faces whose other side is very near would outweigh all others in 1 / t^2.
     const double thin = 1 / std::max(thickness[f], component.noise_length());
     const double share = face_geometry(shape, f).area / 3;
     for (int corner = 0; corner < 3; ++corner)
@@ -34,12 +34,12 @@ Points slenderness(const RestShape& shape, const std::vector<double>& thickness,
   return sums;
 }
 
-/// The mean of 1/t weighted with itself; 0 where nothing is known.
+/// The mean of 1/t, weighted by 1/t; 0 where no thickness is known.
 double mean_slenderness(const Points& smoothed, Eigen::Index i) {
   return smoothed(i, 0) > 0 ? std::max(smoothed(i, 1), 0.0) / smoothed(i, 0) : 0;
 }
 
-/// The largest concave curvature; of a surface that encloses nothing (open = 1) the largest of either sign.
+/// The largest concave curvature. For a surface that encloses nothing (open = 1), the largest curvature of either sign.
 double sharpest_fold(const Eigen::Matrix3d& bending, double open) {
   const Eigen::Vector3d curvatures =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(bending, Eigen::EigenvaluesOnly).eigenvalues();

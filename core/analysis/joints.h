@@ -5,41 +5,41 @@
 
 namespace lpdeform {
 
-/// Where a shape would bend if it were made of parts that are rigid: at concave creases, where parts meet,
-/// and at places narrower than what is around them, thin ends among them. From the geometry alone.
+/// Where a shape would bend if it were made of rigid parts: at concave creases, where parts meet, and at places that
+/// are narrower than their surroundings, including thin ends. Computed from the geometry alone.
 ///
-/// Noise at the scale of edges is no joint: all is measured on the shape that without_noise() of
-/// core/analysis/enclosure.h gives.
+/// Noise at the scale of edges does not count as a joint: everything is measured on the result of without_noise()
+/// (core/analysis/enclosure.h).
 ///
-/// All is measured at the distance rho of core/analysis/component_lengths.h; S_r is the smoothing of
-/// SurfaceSmoother with length r.
+/// The distance of measurement is rho (core/analysis/component_lengths.h). S_r is the smoothing of SurfaceSmoother with
+/// length r.
 ///
 ///   B         = S_rho[bending measure of core/analysis/bending.h],  a curvature
-///   theta_i   = 2 rho max(0, -lowest eigenvalue of B_i)             the angle of the crease, in radians: of
-///               a straight concave crease alone in a plane, at its edge, the angle itself
+///   theta_i   = 2 rho max(0, -lowest eigenvalue of B_i)             the angle of the crease, in radians. At the
+///               edge of a single straight concave crease in a plane, this is the crease's angle
 ///   a_r       = S_r[1 / t^2] / S_r[1 / t],  t the thickness behind a face (core/analysis/thickness.h),
 ///               at least Enclosure::noise_length()
-///   n_i       = max(0, a_rho / a_{4 rho} - 1)                       how much narrower than around
+///   n_i       = max(0, a_rho / a_{4 rho} - 1)                       how much narrower than the surroundings
 ///   joint     = S_rho[1 - 1 / (1 + (theta / 20 degrees)^2) / (1 + (n / 0.25)^2)]
 ///
-/// A surface that encloses nothing has no inside, and either way of folding is a crease. With
-/// h = S_rho[1 where a ray meets another side, 0 elsewhere] and H the component's share of such area,
+/// A surface that encloses nothing has no inside, so a fold in either direction is a crease. With h = S_rho[1 where a
+/// ray meets another side, 0 elsewhere] and H the share of the component's area where a ray does,
 ///
 ///   o_i       = (1 - h_i) max(0, 1 - 2 H)
 ///   theta_i   = 2 rho max(0, -lowest, o_i highest)
 ///
-/// H keeps the convex edges of a solid from being creases: rays from faces that noise has turned leave the
-/// solid beside its edges, so that h alone takes those places for open.
+/// H keeps the convex edges of a solid from counting as creases. Rays from faces that noise has tilted leave the solid
+/// near its edges, so h alone would classify those places as open.
 struct Joints {
   Field crease_radians;  // theta_i >= 0
   Field narrowing;       // n_i >= 0
   Field joint;           // in [0, 1]: 0 on rigid parts
 };
 
-/// Smooth over the surface; does not depend on the unit of length, on where the mesh lies and how it is
-/// turned, nor on the order of vertices and faces, but for rounding. Always finite, also for meshes with
-/// zero-area faces, boundaries, non-manifold edges and several components; 0 for vertices that no face uses.
-/// O(n log n) but for three sparse factorisations.
+/// The fields are smooth over the surface. Except for rounding, they do not depend on the unit of length, on position
+/// and rotation of the mesh, or on the order of vertices and faces. They are always finite, also for meshes with
+/// zero-area faces, boundaries, non-manifold edges and several components, and 0 for vertices that no face uses. O(n
+/// log n) plus three sparse factorisations.
 Joints find_joints(const RestShape& shape, const Workers& workers);
 
 }  // namespace lpdeform

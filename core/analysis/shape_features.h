@@ -11,8 +11,8 @@
 
 namespace lpdeform {
 
-/// What is known of a shape's geometry: worked out when it is first asked for, and kept. Thread-safe; who asks
-/// while another is at work waits for it. Copies nothing of the shape.
+/// Results about a shape's geometry, each computed when it is first asked for and then kept. Thread-safe: a caller that
+/// asks for a result while another thread computes it waits for that thread. Shares the shape; copies nothing of it.
 class ShapeFeatures {
  public:
   explicit ShapeFeatures(std::shared_ptr<const RestShape> shape, Workers workers = Workers(1))
@@ -23,7 +23,7 @@ class ShapeFeatures {
   const Field& joint() const;
   /// smoothed_bending of core/analysis/salience.h.
   const BendingMeasure& bending() const;
-  /// Whether joint() or bending() has been found, so that it is there at once. Does not wait.
+  /// Whether joint() or bending() has been computed already, so that it returns at once. Does not wait.
   bool knows_joint() const { return knows_joint_; }
   bool knows_bending() const { return knows_bending_; }
 

@@ -5,14 +5,14 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kSmallestArea = 1e-9;  // of the mean: a vertex of zero-area faces alone
+constexpr double kSmallestArea = 1e-9;  // relative to the mean; for vertices with only zero-area faces
 
 Field cell_areas(const RestShape& shape) {
   const Field areas = vertex_areas(shape);
   return areas.cwiseMax(kSmallestArea * areas.mean());
 }
 
-/// The pattern of M + L: edges come sorted with the lower vertex first, as its columns want them.
+/// The pattern of M + L. The edges are sorted with the lower vertex first, which is the order that the columns need.
 LowerMatrix pattern_of(std::int32_t vertex_count, const EdgeWeights& edges) {
   LowerMatrix matrix;
   matrix.columns.push_back(0);

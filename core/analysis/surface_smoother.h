@@ -12,22 +12,20 @@ namespace lpdeform {
 ///
 ///   u - rho^2 Laplace(u) = f :    (M + rho^2 L) u = b
 ///
-/// with M the cells' areas and L the cotangent Laplacian (weights clamped to >= 0, so where b >= 0, u >= 0).
-/// A peak spreads to a distance of about rho, and the integral of u is that of f, on each component by
-/// itself. Lengths are in scaled units (RestShape::scaled_positions). Does not depend on the order of
-/// vertices but for rounding.
+/// M holds the cells' areas, and L is the cotangent Laplacian. Its weights are clamped to >= 0, so b >= 0 gives u >= 0.
+/// A peak spreads to a distance of about rho. On each component, u and f have the same integral. Lengths are in scaled
+/// units (RestShape::scaled_positions). Except for rounding, the result does not depend on the order of vertices.
 class SurfaceSmoother {
  public:
   explicit SurfaceSmoother(const RestShape& shape);
 
-  /// Factors for other lengths: one a component, > 0. False where that fails; then spread() must not be
-  /// called.
+  /// Factors the matrix for new lengths, one per component, > 0. False if that fails; then spread() must not be called.
   [[nodiscard]] bool set_lengths(const std::vector<double>& lengths);
 
-  /// u for three quantities at once: b is n x 3, one quantity a column.
+  /// u for three quantities at once: b is n x 3, one quantity per column.
   Points spread(const Points& b) const;
 
-  /// M: a third of the area of each vertex's faces, at least 1e-9 of the mean.
+  /// M: a third of the area of each vertex's faces, but at least 1e-9 of the mean.
   const Field& areas() const { return areas_; }
 
  private:

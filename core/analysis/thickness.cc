@@ -15,18 +15,18 @@ using Point = Eigen::Vector3d;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kThinnest = 0.5;        // scaled units
 constexpr double kOpposite = 0.5;        // cosine of 60 degrees
-constexpr double kEdgeTolerance = 1e-9;  // so that no ray slips through between two triangles
-constexpr double kRounding = 1e-9;       // of the diagonal: a doubled face lies at 0, to rounding
+constexpr double kEdgeTolerance = 1e-9;  // keeps rays from slipping through between two triangles
+constexpr double kRounding = 1e-9;       // of the diagonal: a doubled face is at distance 0 up to rounding
 constexpr std::size_t kFacesAChunk = 256;
 
-/// A face as rays meet it from behind.
+/// A face that rays meet from behind.
 struct Triangle {
   Point a, ab, ac;
-  Point normal;      // twice the area long
-  double sign = 1;   // of its component
-  double least = 0;  // of sign * <normal, direction>
+  Point normal;      // its length is twice the area
+  double sign = 1;   // outward sign of its component
+  double least = 0;  // the least sign * <normal, direction> at which a ray meets it
 
-  /// Where the ray meets it; infinite where it does not.
+  /// How far along the ray it meets the face; infinite if it does not.
   double distance(const Point& origin, const Point& direction, double rounding) const {
     const double facing = normal.dot(direction);
     if (!(sign * facing > least)) return kInfinity;
@@ -40,7 +40,7 @@ struct Triangle {
   }
 };
 
-/// In the tree's order.
+/// The faces as triangles, in the tree's order.
 std::vector<Triangle> triangles_of(const RestShape& shape, const FaceTree& tree,
                                    const std::vector<double>& signs) {
   std::vector<Triangle> triangles;
@@ -74,7 +74,8 @@ std::vector<double> outward_signs(const RestShape& shape) {
   }
   std::vector<double> signs(volumes.size(), 1.0);
   for (std::size_t c = 0; c < volumes.size(); ++c) {
-    // About the component's own centre, so that where the mesh lies does not count, even with holes in it.
+    // The volume is taken about the component's own centre, so the position of the mesh does not matter, even if it has
+    // holes.
     const double volume = areas[c] > 0 ? volumes[c] - moments[c].dot(vector_areas[c]) / areas[c] / 3 : 0;
     if (volume < 0) signs[c] = -1;
   }
@@ -88,7 +89,7 @@ std::vector<double> thickness_behind_faces(const RestShape& shape, const Workers
   const double rounding = kRounding * shape.diagonal() / shape.mean_edge_length();
   std::vector<double> thickness(shape.faces().rows(), kInfinity);
   workers.for_chunks(thickness.size(), kFacesAChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {  // in the tree's order: rays of one place go the same way
+    for (std::size_t k = begin; k < end; ++k) {  // in the tree's order: neighbouring rays are similar
       const Eigen::Index f = tree.order()[k];
       const FaceGeometry face = face_geometry(shape, f);
       if (face.area == 0) continue;

@@ -3,8 +3,8 @@
 #include <cstdio>
 #include <cstdlib>
 
-/// Stops the program where one of our own invariants is broken: on in every build. Never for a caller's
-/// mistake, which is an absl::Status, and never for how a solve ended, which is a StopReason.
+/// Stops the program if one of our own invariants is broken. Active in every build. Never use it for a caller's
+/// mistake, which is an absl::Status, or for how a solve ended, which is a StopReason.
 #define LPDEFORM_CHECK(condition)                                                            \
   do {                                                                                       \
     if (!(condition)) {                                                                      \

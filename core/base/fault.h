@@ -7,10 +7,10 @@
 
 namespace lpdeform {
 
-/// core/base/reasons.h has them all.
+/// core/base/reasons.h declares them all.
 enum class Reason;
 
-/// Why we refuse something, for programs.
+/// What an error is about, in a form for programs.
 struct NewFault {
   Reason reason;
   /// The first offending element: "vertex 17", "face 3", "handle \"tip\"", "component 2", "p[5]". May be
@@ -37,7 +37,7 @@ struct Fault {
   bool operator==(const Fault&) const = default;
 };
 
-/// The fault inside `status`; all fields empty where it carries none.
+/// The fault inside `status`; all fields are empty if it carries none.
 Fault fault_of(const absl::Status& status);
 
 /// fault.reason == Reason::kSessionUnknown

@@ -30,9 +30,9 @@ void happens_before(const void*) {}
 void happens_after(const void*) {}
 #endif
 
-// A loop over chunks, as oneTBB calls it. oneTBB orders the caller, the chunks and what follows the loop;
-// Debian's library is not built for ThreadSanitizer, so each step says so before it reads any member. Says
-// nothing in other builds.
+// A loop over chunks in the form that oneTBB calls. oneTBB orders the caller, the chunks and the code after the loop,
+// but ThreadSanitizer cannot see this because Debian's library is not built for it. So each step announces the order to
+// ThreadSanitizer before it reads any member. In other builds this does nothing.
 class ChunkLoop {
  public:
   ChunkLoop(std::size_t chunks, const std::function<void(std::size_t)>& run) : run_(run), chunks_(chunks) {}
@@ -63,7 +63,7 @@ class ChunkLoop {
 
 struct Workers::Arena {
   explicit Arena(int threads) : arena(threads) {
-    // Without this oneTBB never starts more threads than there are cores, whatever an arena asks for.
+    // Without this, oneTBB never starts more threads than there are cores, however many an arena asks for.
     if (threads > available_cores()) {
       control.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
     }

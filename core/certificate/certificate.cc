@@ -27,7 +27,7 @@ double conjugate_point(double y, double k, double p) {
 double shrink(double v, double k, double p, double rho) {
   if (p == 1) return std::max(0.0, v - k / rho);
   if (p == 2) return v / (1 + 2 * k / rho);
-  // g(t) = t + a t^{p - 1} - v rises; Newton from the side on which it cannot overshoot.
+  // g(t) = t + a t^{p - 1} - v increases in t. Newton's method starts on the side from which it cannot overshoot.
   const double a = k * p / rho;
   double t = p > 2 ? v : std::min(0.5 * v, std::pow(0.5 * v / a, 1 / (p - 1)));
   if (p < 2) t = std::max(t, v - a * std::pow(v, p - 1));  // t^{p - 1} <= v^{p - 1}
@@ -75,7 +75,7 @@ class DualBound {
   double k(std::int32_t i) const { return step_.coefficient(i); }
 
  private:
-  // f_i*(theta y_i) = (1 - 1/p_i) theta^{p_i / (p_i - 1)} |y_i| t_i, t_i the conjugate point of |y_i|.
+  // f_i*(theta y_i) = (1 - 1/p_i) theta^{p_i / (p_i - 1)} |y_i| t_i, where t_i is the conjugate point of |y_i|.
   double slope(double theta) const {
     double sum = inner_, power = 0, of_p = 0;
     for (std::int32_t i = 0; i < step_.count(); ++i) {
@@ -100,7 +100,7 @@ class DualBound {
   double inner_ = 0;
 };
 
-/// Solves (A^T C A) u = A^T y, C the weights that the metric is factored with: the metric is 2 A^T C A.
+/// Solves (A^T C A) u = A^T y, where C holds the weights that the metric is factored with. The metric is 2 A^T C A.
 Points least_squares(const Problem& problem, const ConvexRows& step, const EdgeVectors& y) {
   Points u;
   step.apply_transposed(y, u);
@@ -204,10 +204,11 @@ class Certificate::Search {
     if (take(dual_.scaled_bound(project(problem_, rows_, gradient)))) y_ = std::move(gradient);
   }
 
-  /// False where there is nothing to begin with.
+  /// False if there is nothing to start from.
   bool begin_polishing() {
-    // A penalty of each cell's own treats primal and dual alike at that energy, however stiff the cell is: one for all of them
-    // would leave the multipliers of stiff cells, or the residuals of soft ones, where they began.
+    // Each cell has a penalty of its own, which balances its primal and dual progress at this energy, however stiff the
+    // cell is. A single penalty for all cells would leave either the multipliers of stiff cells or the residuals of
+    // soft ones at their initial values.
     const double energy = high_energy(problem_);
     rho_.resize(rows_.count());
     for (std::int32_t i = 0; i < rows_.count(); ++i)
@@ -217,7 +218,7 @@ class Certificate::Search {
     return is_polishing_;
   }
 
-  /// One step of ADMM; its present residuals are r_, its multipliers y_.
+  /// One step of ADMM. Its current residuals are r_ and its multipliers y_.
   void polish() {
     EdgeVectors dual = y_;  // rho (r - z) + y
     for (std::int32_t i = 0; i < rows_.count(); ++i) {
@@ -228,7 +229,8 @@ class Certificate::Search {
       y = rho_[i] * (1 - factor) * v;
       rows_.rows(dual, i) = rho_[i] * (rows_.rows(r_, i) - factor * v) + y;
     }
-    // x minimises sum_i rho_i |r_i - z_i + y_i / rho_i|^2; what remains of rho (r - z) + y has A^T (.) = 0: a dual point.
+    // x minimises sum_i rho_i |r_i - z_i + y_i / rho_i|^2. The remainder of rho (r - z) + y then satisfies A^T (.) = 0,
+    // so it is a dual feasible point.
     rows_.apply(least_squares(problem_, rows_, dual), image_);
     r_ -= image_;
     if (++polished_ % kBetweenBounds != 0) return;
@@ -246,11 +248,11 @@ class Certificate::Search {
   DualBound dual_;
   double best_ = -kInfinity;
   bool is_over_ = false;
-  std::size_t share_ = 0;  // the next of kShares
+  std::size_t share_ = 0;  // the next index into kShares
   double mean_energy_ = 0;
   bool is_polishing_ = false;
   int polished_ = 0;
-  std::vector<double> rho_;  // of each cell and term
+  std::vector<double> rho_;  // one per cell and soft term
   EdgeVectors y_, r_, image_;
 };
 

@@ -4,7 +4,7 @@
 
 namespace lpdeform {
 
-/// Also of one past the last.
+/// Valid for i = count() as well.
 Eigen::Index ConvexRows::begin(std::int32_t i) const {
   const std::int32_t n = shape_.vertex_count();
   return i <= n ? shape_.offsets()[i] : edges() + soft_.offsets()[i - n];

@@ -5,23 +5,24 @@
 
 namespace lpdeform {
 
-/// The convex step of the whole objective, rotations held: with cells i and soft terms k one after the other,
+/// The convex problem for the whole objective with rotations held fixed. The index i runs over the cells and then over
+/// the soft terms:
 ///
 ///   minimise sum_i coefficient_i |z_i|^{exponent_i},     z = A x - b,
 ///
-/// where z_i are a cell's stacked residuals (residuals.h) and those of a soft term sqrt(w_r) (point_r(x) - t_r),
-/// over the x that the constraints allow. Refers to `problem`, whose objective holds the evaluation at x.
+/// over the x that the constraints allow. z_i holds a cell's stacked residuals (residuals.h), or a soft term's
+/// residuals sqrt(w_r) (point_r(x) - t_r). Refers to `problem`, whose objective holds the evaluation at x.
 class ConvexRows {
  public:
   explicit ConvexRows(const Problem& problem)
       : problem_(problem), shape_(problem.shape()), soft_(problem.objective.soft_terms()) {}
 
-  /// Cells and soft terms.
+  /// The number of cells and soft terms.
   std::int32_t count() const { return shape_.vertex_count() + static_cast<std::int32_t>(soft_.size()); }
   double exponent(std::int32_t i) const;
   double coefficient(std::int32_t i) const;
 
-  /// Rows of cell or term i.
+  /// The rows of `values` that belong to cell or term i.
   auto rows(EdgeVectors& values, std::int32_t i) const {
     return values.middleRows(begin(i), end(i) - begin(i));
   }
@@ -33,11 +34,11 @@ class ConvexRows {
   void residuals(const Points& x, EdgeVectors& z) const;
   /// A u.
   void apply(const Points& u, EdgeVectors& result) const;
-  /// A^T y, what constraints forbid projected out.
+  /// A^T y, with the directions that constraints forbid projected out.
   void apply_transposed(const EdgeVectors& y, Points& result) const;
 
-  /// Factors the metric for C, the weights of the objective's last evaluation, or those given, one for each of count();
-  /// M = 2 A^T C A along what the constraints allow. False where that fails.
+  /// Factors the metric M = 2 A^T C A along the directions that the constraints allow. C holds the weights of the
+  /// objective's last evaluation, or the given ones, count() of them. False if that fails.
   [[nodiscard]] bool factor();
   [[nodiscard]] bool factor(const std::vector<double>& weights);
   /// C of cell or term i, as last factored.

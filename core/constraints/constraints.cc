@@ -1,6 +1,7 @@
 #include "core/constraints/constraints.h"
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 
 #include "absl/strings/str_cat.h"
@@ -28,55 +29,58 @@ absl::StatusOr<Points> scaled_targets(const RestShape& shape, const std::string&
   return scaled;
 }
 
-absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Constraints& constraints,
-                          Holds& holds) {
+/// `hold` is called with each vertex that is held exactly, its target in scaled units and in the caller's.
+template <typename HoldVertex>
+absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Holds& holds,
+                          const HoldVertex& hold) {
   for (const auto& [name, handle] : handles.handles()) {
     const Points targets = target_positions(handle, shape.positions(), shape.faces());
     const auto scaled = scaled_targets(shape, name, handle, targets);
     if (!scaled.ok()) return scaled.status();
     add_holds(shape, name, handle, *scaled, holds);
-    if (!std::holds_alternative<Exactly>(handle.hold)) continue;
+    if (!handle.fixes_vertices()) continue;
     for (std::size_t k = 0; k < handle.vertices.size(); ++k) {
-      const std::int32_t vertex = handle.vertices[k];
-      constraints.is_held[vertex] = true;
-      constraints.targets.row(vertex) = scaled->row(k);
-      constraints.exact.row(vertex) = targets.row(k);
+      hold(handle.vertices[k], scaled->row(k), targets.row(k));
     }
   }
   return absl::OkStatus();
 }
 
-/// Holds everything outside the region where `outside` has it, and unreferenced vertices; rows that only such
-/// vertices would meet are void.
-void hold_outside(const RestShape& shape, const std::vector<std::int32_t>* region, const Points& outside,
-                  Constraints& constraints, Holds& holds) {
+/// For each vertex, whether it may move: it is in the region of interest and some face has it.
+std::vector<char> movable_vertices(const RestShape& shape, const std::vector<std::int32_t>* region) {
   std::vector<char> may_move(shape.vertex_count(), region == nullptr);
   if (region != nullptr) {
     for (const std::int32_t vertex : *region) may_move[vertex] = true;
   }
   for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
-    if (shape.components()[i] < 0) {
-      may_move[i] = false;
-      constraints.is_held[i] = true;
-    } else if (!may_move[i]) {
-      constraints.is_held[i] = true;
-      constraints.targets.row(i) = (outside.row(i) - shape.centre()) / shape.mean_edge_length();
-      constraints.exact.row(i) = outside.row(i);
-    }
+    if (shape.components()[i] < 0) may_move[i] = false;
   }
+  return may_move;
+}
+
+/// Rows are void that only vertices meet which do not move.
+void drop_void_rows(const std::vector<char>& may_move, Holds& holds) {
   std::erase_if(holds.rows, [&](const LinearRow& row) {
     return std::none_of(row.point.vertices.begin(), row.point.vertices.begin() + row.point.count,
                         [&](std::int32_t vertex) { return may_move[vertex]; });
   });
 }
 
-bool is_lock(const Hold& hold) {
-  return std::holds_alternative<AxisLock>(hold) || std::holds_alternative<PlaneLock>(hold);
+/// Holds all vertices outside the region at their positions in `outside`, and unreferenced vertices where handles have them.
+void hold_outside(const RestShape& shape, const std::vector<char>& may_move, const Points& outside,
+                  Constraints& constraints) {
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    if (may_move[i]) continue;
+    constraints.is_held[i] = true;
+    if (shape.components()[i] < 0) continue;
+    constraints.targets.row(i) = (outside.row(i) - shape.centre()) / shape.mean_edge_length();
+    constraints.exact.row(i) = outside.row(i);
+  }
 }
 
-/// Components that something keeps from drifting off, locks left out or not.
+/// Which components something ties, at least to the degree `least`.
 std::vector<char> tied_components(const RestShape& shape, const HandleSet& handles,
-                                  const Constraints& constraints, bool with_locks) {
+                                  const Constraints& constraints, Tie least) {
   std::vector<char> is_tied(shape.component_count(), false);
   const auto tie = [&](std::int32_t vertex) {
     if (shape.components()[vertex] >= 0) is_tied[shape.components()[vertex]] = true;
@@ -85,7 +89,7 @@ std::vector<char> tied_components(const RestShape& shape, const HandleSet& handl
     if (constraints.is_held[i]) tie(i);
   }
   for (const auto& [name, handle] : handles.handles()) {
-    if (!ties_component(handle) || (is_lock(handle.hold) && !with_locks)) continue;
+    if (tie_of(handle.hold) < least) continue;
     for (std::size_t k = 0; k < handle.size(); ++k) tie(point_form(shape, handle, k).vertices[0]);
   }
   return is_tied;
@@ -101,7 +105,7 @@ absl::Status name_free_component(const RestShape& shape, std::int32_t component)
                                  " vertices, the first of them vertex ", first, ") has no handle"));
 }
 
-/// The rigid motion of the handle that has the vertex nearest to `point`, all at rest, in scaled units.
+/// The rigid motion, in scaled units, of the handle with the vertex that is nearest to `point` at rest.
 RigidTransform nearest_handle_motion(const RestShape& shape, const HandleSet& handles,
                                      const Eigen::RowVector3d& point) {
   const Points& rest = shape.scaled_positions();
@@ -116,7 +120,7 @@ RigidTransform nearest_handle_motion(const RestShape& shape, const HandleSet& ha
   Points to = target_positions(*nearest, shape.positions(), shape.faces());
   to = (to.rowwise() - shape.centre()) / shape.mean_edge_length();
   if (std::holds_alternative<TargetPositions>(nearest->motion)) return fit_rigid(from, to);
-  // Of one vertex, or several in a line, the places alone do not tell how it is turned.
+  // The positions of one vertex, or of several on a line, do not determine a rotation.
   RigidTransform motion;
   motion.rotation = rotation_of(nearest->motion);
   motion.translation = to.colwise().mean() - from.colwise().mean() * motion.rotation.transpose();
@@ -136,7 +140,7 @@ Points component_centres(const RestShape& shape) {
   return sums;
 }
 
-/// Holds every vertex of the components that no handle holds, moved as `free_components` says.
+/// Holds every vertex of the components that no handle holds, at rest or moved, as `free_components` says.
 void hold_free_components(const RestShape& shape, const HandleSet& handles, FreeComponents free_components,
                           const std::vector<char>& has_handle, Constraints& constraints) {
   std::vector<RigidTransform> motions(shape.component_count());
@@ -173,9 +177,16 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
                           {},
                           footprint_stiffness(shape, handles)};
   Holds holds;
-  if (status = hold_handles(shape, handles, constraints, holds); !status.ok()) return status;
-  hold_outside(shape, handles.region(), outside ? *outside : shape.positions(), constraints, holds);
-  const std::vector<char> is_tied = tied_components(shape, handles, constraints, true);
+  const auto hold = [&](std::int32_t vertex, const auto& scaled, const auto& exact) {
+    constraints.is_held[vertex] = true;
+    constraints.targets.row(vertex) = scaled;
+    constraints.exact.row(vertex) = exact;
+  };
+  if (status = hold_handles(shape, handles, holds, hold); !status.ok()) return status;
+  const std::vector<char> may_move = movable_vertices(shape, handles.region());
+  hold_outside(shape, may_move, outside ? *outside : shape.positions(), constraints);
+  drop_void_rows(may_move, holds);
+  const std::vector<char> is_tied = tied_components(shape, handles, constraints, Tie::kPartial);
   const auto free = std::find(is_tied.begin(), is_tied.end(), false);
   if (free != is_tied.end() && free_components == FreeComponents::kError) {
     return name_free_component(shape, static_cast<std::int32_t>(free - is_tied.begin()));
@@ -185,11 +196,23 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   auto linear = LinearConstraints::create(std::move(holds.rows), constraints.is_held);
   if (!linear.ok()) return linear.status();
   constraints.linear = *std::move(linear);
-  if (tied_components(shape, handles, constraints, false) !=
+  if (tied_components(shape, handles, constraints, Tie::kWhole) !=
       std::vector<char>(shape.component_count(), true)) {
     constraints.linear.tie_locks();
   }
   return constraints;
+}
+
+absl::Status check_equations(const RestShape& shape, const HandleSet& handles) {
+  if (!has_equations(handles)) return absl::OkStatus();
+  const std::vector<char> may_move = movable_vertices(shape, handles.region());
+  std::vector<char> is_held(may_move.size());
+  std::transform(may_move.begin(), may_move.end(), is_held.begin(), std::logical_not<>());
+  Holds holds;
+  const auto hold = [&](std::int32_t vertex, const auto&...) { is_held[vertex] = true; };
+  if (absl::Status status = hold_handles(shape, handles, holds, hold); !status.ok()) return status;
+  drop_void_rows(may_move, holds);
+  return LinearConstraints::create(std::move(holds.rows), is_held).status();
 }
 
 std::size_t Constraints::memory_bytes() const {

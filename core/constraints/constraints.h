@@ -10,23 +10,23 @@
 
 namespace lpdeform {
 
-/// What becomes of a connected component that no handle holds.
+/// What happens to a connected component that no handle holds.
 enum class FreeComponents {
-  kError,   // refused: the component is named
-  kStay,    // stays where the rest mesh has it
+  kError,   // an error that names the component
+  kStay,    // stays at rest
   kFollow,  // moves rigidly with the handle that has the vertex nearest to its centre at rest
 };
 
-/// What handles and region of interest ask of positions. Held are the vertices that do not move: of handles that
-/// hold Exactly, outside the region, unreferenced ones, and, where asked for, whole components that nothing
-/// keeps from drifting off.
+/// The constraints that handles and the region of interest put on positions. Held vertices do not move in a solve. They
+/// are the vertices of handles that hold Exactly, vertices outside the region of interest, unreferenced vertices and,
+/// if asked for (FreeComponents), all vertices of components that nothing keeps from drifting off.
 struct Constraints {
-  std::vector<char> is_held;  // one a vertex
+  std::vector<char> is_held;  // one per vertex
   Points targets;             // scaled units; rows of free vertices are the rest positions
-  Points exact;               // the same in the caller's units, for held vertices as they were given
-  SoftTerms soft;             // soft and orientation handles; its length unit is not set
+  Points exact;               // the targets in the caller's units; for held vertices exactly as given
+  SoftTerms soft;             // terms of soft and orientation handles; the length unit is not set
   LinearConstraints linear;   // points inside faces and locks
-  Field footprint;            // factors of the cells' stiffness; empty where all are 1
+  Field footprint;            // factors of the cells' stiffness; empty if all are 1
 
   std::size_t memory_bytes() const;
 };
@@ -34,15 +34,20 @@ struct Constraints {
 /// No position may be farther from the rest mesh's centre than this many of its diagonals.
 inline constexpr double kFarthestTarget = 1e9;
 
-/// Errors: as check_handles; INVALID_ARGUMENT: HANDLE_TARGET_TOO_FAR (over 1e9 diagonals from the rest mesh);
-/// FAILED_PRECONDITION: NO_HANDLES, COMPONENT_WITHOUT_HANDLE (the component and its lowest vertex; an orientation
-/// handle is none that keeps a component). Also as LinearConstraints::create. `outside`: where vertices outside
-/// the region of interest are held, in the caller's units; null takes the rest positions.
+/// Makes the constraints. Errors: those of check_handles and LinearConstraints::create; INVALID_ARGUMENT:
+/// HANDLE_TARGET_TOO_FAR (over 1e9 diagonals from the rest mesh); FAILED_PRECONDITION: NO_HANDLES,
+/// COMPONENT_WITHOUT_HANDLE (names the component and its lowest vertex; an orientation handle does not hold its
+/// component). `outside`: positions at which vertices outside the region of interest are held, in the caller's units;
+/// null means the rest positions.
 absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const HandleSet& handles,
                                              FreeComponents free_components, const Points* outside = nullptr);
 
-/// The rotation and translation that bring points `from` nearest to points `to`: to_k = R from_k + t. For one
-/// point, or points that coincide, a translation.
+/// Whether points held exactly and locks can hold together: the errors of LinearConstraints::create, without making
+/// constraints. `handles` have passed check_handles, and their targets are no farther than kFarthestTarget.
+absl::Status check_equations(const RestShape& shape, const HandleSet& handles);
+
+/// The rotation and translation that bring points `from` nearest to points `to`: to_k = R from_k + t. For a single
+/// point, or points that coincide, this is a translation.
 struct RigidTransform {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::RowVector3d translation = Eigen::RowVector3d::Zero();

@@ -10,17 +10,17 @@
 
 namespace lpdeform {
 
-/// What the kinds of handles other than Exactly ask of positions, and Exactly of points inside faces: Soft
-/// and Orientation as soft terms, points and locks as rows. All in scaled units.
+/// What handles require of the positions of vertices that are not held: Soft and Orientation as soft terms; locks, and
+/// Exactly for points inside faces, as rows. All in scaled units.
 struct Holds {
   SoftTerms soft;
   std::vector<LinearRow> rows;
 };
 
-/// A handle's vertex or point as a function of positions.
+/// Vertex or point k of a handle as a function of positions.
 PointForm point_form(const RestShape& shape, const Handle& handle, std::size_t k);
 
-/// Adds what `handle` asks; nothing for vertices held Exactly, nor for a weight of 0. `targets` are
+/// Adds the terms and rows of `handle`; none for vertices held Exactly or for a weight of 0. `targets` are
 /// target_positions in scaled units.
 void add_holds(const RestShape& shape, const std::string& name, const Handle& handle, const Points& targets,
                Holds& holds);
@@ -28,7 +28,13 @@ void add_holds(const RestShape& shape, const std::string& name, const Handle& ha
 /// Whether some handle puts equations on positions: points held exactly, and locks.
 bool has_equations(const HandleSet& handles);
 
-/// Whether `handle` keeps its component from drifting off: all do but an orientation, and a weight of 0.
-bool ties_component(const Handle& handle);
+/// How far a hold keeps the component of its vertices from drifting off.
+enum class Tie {
+  kNone,     // not at all: an orientation, or a soft weight of 0
+  kPartial,  // in some directions only: a lock
+  kWhole,    // in all directions
+};
+
+Tie tie_of(const Hold& hold);
 
 }  // namespace lpdeform

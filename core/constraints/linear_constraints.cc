@@ -15,8 +15,8 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double>;
 using SparseFactor = Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::NaturalOrdering<int>>;
 
-/// The squared distance of a row of unit length from the span of those before it, below which it is taken to
-/// follow from them.
+/// A row of unit length counts as dependent on the rows before it if its squared distance from their span is below
+/// this.
 constexpr double kDependent = 1e-8;
 constexpr double kShift = 1e-14;  // keeps the factorisation going past a dependent row
 
@@ -33,9 +33,9 @@ absl::Status dependent(const std::string& owner, const std::string& other) {
 }  // namespace
 
 struct LinearConstraints::Factors {
-  Sparse c;                           // m x 3n, free vertices alone
+  Sparse c;                           // m x 3n, free vertices only
   SparseFactor gram;                  // C C^T
-  std::uint64_t metric_version = 0;   // of `schur`; 0: none yet
+  std::uint64_t metric_version = 0;   // the version that `schur` was made for; 0: none yet
   Eigen::LLT<Eigen::MatrixXd> schur;  // C M^-1 C^T * scale
 };
 
@@ -56,7 +56,7 @@ absl::StatusOr<LinearConstraints> LinearConstraints::create(std::vector<LinearRo
   return result;
 }
 
-/// C and C C^T; a row that depends on those before it shows as a pivot of 0.
+/// Computes C and C C^T. A row that depends on the rows before it has a pivot of 0.
 absl::Status LinearConstraints::factor() {
   factors_ = std::make_shared<Factors>();
   const auto m = static_cast<Eigen::Index>(rows_.size());
@@ -110,12 +110,12 @@ void LinearConstraints::restrict(Points& v) const {
 
 void LinearConstraints::satisfy(Points& x) const {
   if (empty()) return;
-  for (int round = 0; round < 2; ++round) {  // the second takes away what the first rounded to
+  for (int round = 0; round < 2; ++round) {  // the second removes the rounding error of the first
     x += transposed(factors_->gram.solve(residual(x)));
   }
 }
 
-/// t - C x, of the whole x, held vertices included.
+/// t - C x for all of x, including held vertices.
 Eigen::VectorXd LinearConstraints::residual(const Points& x) const {
   Eigen::VectorXd result(rows_.size());
   for (std::size_t r = 0; r < rows_.size(); ++r) {
@@ -139,7 +139,7 @@ Points LinearConstraints::forces_against(const Metric& metric, const Points& v,
   return transposed(metric.scale() * factors_->schur.solve(image(v)));
 }
 
-/// C M^-1 C^T from the columns of M^-1 for the distinct points, three at a time.
+/// Computes C M^-1 C^T from the columns of M^-1 for the distinct points, three at a time.
 void LinearConstraints::prepare_schur(const Metric& metric, const Workers& workers) const {
   if (factors_->metric_version == metric.version()) return;
   std::vector<PointForm> points;

@@ -18,35 +18,35 @@ struct LinearRow {
   std::string owner;  // the handle's name
 };
 
-/// Equations C x = t that points inside faces and locks put on the positions of vertices that are not held
-/// altogether. Exact: a state that satisfies them keeps to them along every direction that restrict() leaves,
-/// and the metric's inverse on those directions,
+/// Equations C x = t that points inside faces and locks put on the positions of vertices that are not held. They are
+/// satisfied exactly: a state that satisfies them still does after a move along any direction that restrict() permits.
+/// The metric's inverse on those directions,
 ///
 ///   P = M^-1 - M^-1 C^T (C M^-1 C^T)^-1 C M^-1 ,
 ///
-/// takes the place of M^-1 (project). C M^-1 C^T is small and dense; it is made once for each factor of the metric, by
-/// one back-substitution for each three points, and a solve costs two instead of one. Without rows everything
-/// here costs nothing. One caller at a time.
+/// replaces M^-1 (project). C M^-1 C^T is small and dense. It is computed once per factorisation of the metric, by one
+/// back-substitution for every three points. A solve then costs two back-substitutions instead of one. Without rows,
+/// nothing here costs anything. One caller at a time.
 class LinearConstraints {
  public:
   LinearConstraints() = default;
 
-  /// Errors, INVALID_ARGUMENT: TOO_MANY_LOCKS (over kMostRows rows); HANDLE_CONSTRAINTS_DEPENDENT where a row
-  /// follows from other rows and held vertices, or contradicts them: names both handles.
+  /// Errors, INVALID_ARGUMENT: TOO_MANY_LOCKS (over kMostRows rows); HANDLE_CONSTRAINTS_DEPENDENT if a row follows from
+  /// other rows and held vertices, or contradicts them; names both handles.
   static absl::StatusOr<LinearConstraints> create(std::vector<LinearRow> rows,
                                                   const std::vector<char>& is_held);
 
   bool empty() const { return rows_.empty(); }
   const std::vector<LinearRow>& rows() const { return rows_; }
 
-  /// Subtracts from v, zero at held vertices, the least that makes C v = 0.
+  /// Subtracts from v, which is zero at held vertices, the smallest change (least squares) that makes C v = 0.
   void restrict(Points& v) const;
-  /// Moves x, its free vertices alone, by the least that makes C x = t.
+  /// Moves the free vertices of x by the smallest change (least squares) that makes C x = t.
   void satisfy(Points& x) const;
-  /// The same by the least in the metric: a lock's or point's move spreads over the surface.
+  /// The same with the smallest change in the metric, so that the move of a point or lock spreads over the surface.
   void satisfy_within(const Metric& metric, Points& x, const Workers& workers) const;
 
-  /// Makes P b of v = M^-1 b, given a function that makes M^-1 v of v.
+  /// Turns v = M^-1 b into P b. `solve` replaces its argument v by M^-1 v.
   template <typename Solve>
   void project(const Metric& metric, const Solve& solve, Points& v, const Workers& workers) const {
     if (empty()) return;
@@ -56,14 +56,14 @@ class LinearConstraints {
     restrict(v);
   }
 
-  /// Entries that tie points to where they are, `stiffness` each: they make the metric definite where points
-  /// alone hold a component, and change nothing along directions that the rows allow. Locked vertices are tied
-  /// only after tie_locks(), where they alone hold a component: there the metric is stiffer than it should be.
+  /// Adds matrix entries that tie points to their positions with this stiffness. They make the metric definite if only
+  /// points hold a component, and change nothing along directions that the rows allow. Locked vertices are tied only
+  /// after tie_locks(), which is for components that only locks hold; the metric is then stiffer than the true Hessian.
   void add_ties(double stiffness, std::vector<MatrixEntry>& entries) const;
   void tie_locks() { has_tied_locks_ = true; }
   bool has_tied_locks() const { return has_tied_locks_; }
 
-  /// Takes over the factorisations of `before` where its rows differ in their targets alone; false elsewhere.
+  /// Takes over the factorisations of `before` if its rows differ only in their targets; otherwise false.
   bool reuse(const LinearConstraints& before);
 
   std::size_t memory_bytes() const;

@@ -10,10 +10,10 @@ namespace {
 
 constexpr std::size_t kChunk = 4096;  // vertices
 constexpr int kPasses = 12;
-constexpr double kRefined = 1e-12;          // the last correction's share of the result
-constexpr std::size_t kUsualBytes = 1000;   // of a factor, for each vertex of a surface
-constexpr std::size_t kBytesPerEntry = 40;  // of the matrix: itself and its places in the factor
-constexpr double kSlowest = 0.3;            // what a correction is of the one before, at most
+constexpr double kRefined = 1e-12;  // refinement ends when the correction's share of the result is <= this
+constexpr std::size_t kUsualBytes = 1000;   // of a factor, per vertex of a surface
+constexpr std::size_t kBytesPerEntry = 40;  // per matrix entry: the value and its places in the factor
+constexpr double kSlowest = 0.3;            // the largest ratio of a correction to the previous one
 
 LowerMatrix lower_pattern(const RestShape& shape) {
   LowerMatrix matrix;
@@ -63,7 +63,7 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
   for (MatrixEntry& entry : scaled) entry.value /= largest;
   scale_ = largest;
   const bool is_same = is_good_ && is_held == is_held_ && clipped == cell_weights_ && scaled == entries_;
-  if (is_same && precision == precision_) return true;  // not a better one: the same result as anew
+  if (is_same && precision == precision_) return true;  // a new factorisation would give the same
   if (!is_same) {
     cell_weights_ = std::move(clipped);
     is_held_ = is_held;
@@ -74,7 +74,7 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
   is_single_current_ = is_double_current_ = false;
   ++version_;
   if (precision == Precision::kSingle && single_ && single_->factor(matrix_, workers)) {
-    double_.reset();  // several times the memory
+    double_.reset();  // takes several times the memory
     copy_ = {};
     return is_good_ = is_single_current_ = true;
   }
@@ -147,7 +147,7 @@ void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& 
   }
 }
 
-/// x = matrix_^-1 b, x not b, by refinement from single precision. False where that does not converge.
+/// x = matrix_^-1 b, x not b, by refinement from single precision. False if that does not converge.
 bool Metric::refine(const Points& b, Points& x, const Workers& workers) const {
   solve_single(b, x, workers);
   Points rest, correction;

@@ -13,7 +13,7 @@
 
 namespace lpdeform {
 
-/// A number to be added to a symmetric matrix at (row, column) and (column, row); row >= column.
+/// A number to add to a symmetric matrix at (row, column) and (column, row); row >= column.
 struct MatrixEntry {
   std::int32_t row, column;
   double value;
@@ -21,57 +21,59 @@ struct MatrixEntry {
   bool operator==(const MatrixEntry&) const = default;
 };
 
-/// The Hessian of the objective with its rotations and cell weights c held, on the free vertices:
+/// The Hessian of the objective with rotations and cell weights c held fixed, on the free vertices: a reweighted
+/// Laplacian
 ///
 ///   M = 2 * Laplacian with edge weights (c_i + c_j) w_ij + entries,     held vertices are identity rows
 ///
-/// with the entries that soft terms add (SoftTerms::matrix_entries): one scalar matrix for all three coordinates.
-/// For p = 2 it is exact (the matrix of local_global); for other p it is what iteratively reweighted least squares
-/// would use. Ordering and symbolic analysis are made once,
-/// by the constructor; factor() is numeric alone.
+/// `entries` are those that soft terms add (SoftTerms::matrix_entries). One scalar matrix serves all three coordinates.
+/// For p = 2 it is exact (the matrix of local_global); for other p it is the matrix of iteratively reweighted least
+/// squares. create() does ordering and symbolic analysis once; factor() is the numeric phase only.
 class Metric {
  public:
   static constexpr double kLowestShare = 1e-8;
 
   /// What a factorisation is for.
   enum class Precision {
-    kSingle,  // precondition() above all: several times as fast, half the memory
-    kDouble,  // solve() above all
+    kSingle,  // mainly for precondition(): several times as fast, half the memory
+    kDouble,  // mainly for solve()
   };
 
-  /// Asked with the bytes that something is about to take, before it does; an error keeps it from doing so.
+  /// Admission control: called with the number of bytes before they are allocated. If it returns an error, they are
+  /// not.
   using Admission = std::function<absl::Status(std::size_t bytes)>;
 
-  /// Errors: FACTOR_TOO_LARGE (analyse_supernodes), and those of `admit`, which is asked with about what memory_bytes() will be
-  /// in single precision. Without supernodes it is asked with what a triangulated surface needs.
+  /// Errors: FACTOR_TOO_LARGE (analyse_supernodes), and those of `admit`, which is called with an estimate of
+  /// memory_bytes() in single precision. If the backend has no supernodes, the estimate is what a typical triangulated
+  /// surface needs.
   static absl::StatusOr<Metric> create(std::shared_ptr<const RestShape> shape, const Admission& admit = {});
 
-  /// `is_held` has one entry a vertex. Cell weights are clipped from below at 1e-8 of the largest used, so
-  /// that the factorisation stays healthy where cells have no weight. False where the factorisation fails. A
-  /// factor for the same held vertices, cell weights and entries, up to a common factor, is kept. `entries`
-  /// form a positive semidefinite matrix; those of vertices that no edge joins go to the diagonal. Where
-  /// single precision does not carry the matrix, double is used. The same bits on any number of threads.
+  /// `is_held` has one entry per vertex. Cell weights are clipped from below at 1e-8 of the largest, so that the
+  /// factorisation stays well conditioned if some cells have no weight. False if the factorisation fails. The present
+  /// factor is kept if held vertices, precision and, up to a common factor, cell weights and entries are the same.
+  /// `entries` form a positive semidefinite matrix; entries of vertex pairs without an edge go to the diagonal. If the
+  /// matrix cannot be factored in single precision, double is used. The same bits on any number of threads.
   [[nodiscard]] bool factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held,
                             const std::vector<MatrixEntry>& entries, const Workers& workers,
                             Precision precision = Precision::kSingle);
 
-  /// Keeps the last factor for these cell weights as well, scaled to them on the whole: for a metric that need
-  /// not be exact. After is_factored_for().
+  /// Keeps using the last factor for these cell weights, scaled so that the sums of the weights agree. For a metric
+  /// that need not be exact. Requires is_factored_for().
   void adopt(const std::vector<double>& cell_weights);
 
-  /// The last factor() was for these held vertices and succeeded.
+  /// Whether the last factor() was for these held vertices and succeeded.
   bool is_factored_for(const std::vector<char>& is_held) const { return is_good_ && is_held == is_held_; }
 
-  /// x = M^-1 b to about 1e-12; b is zero at held vertices. From a factor in single precision by refinement. Not
-  /// a number where no factor has these digits.
+  /// x = M^-1 b to a relative error of about 1e-12; b is zero at held vertices. With a factor in single precision, by
+  /// iterative refinement. If no factor reaches this accuracy, x is NaN.
   void solve(const Points& b, Points& x, const Workers& workers) const;
 
-  /// x = M^-1 b as well as single precision has it, always the same matrix for a version() and scale().
+  /// x = M^-1 b to single precision. The matrix is always the same for the same version() and scale().
   void precondition(const Points& b, Points& x, const Workers& workers) const;
 
-  /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of
-  /// sum over edges of (c_i + c_j) w_ij |u_i - u_j|^2, as well as single precision has it. Rows of free vertices are overwritten. `forces`, where not null, pull
-  /// at the free vertices besides: the entries count as well, and <forces, u> is subtracted.
+  /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of the sum over edges
+  /// of (c_i + c_j) w_ij |u_i - u_j|^2, to single precision. Rows of free vertices are overwritten. If `forces` is not
+  /// null, it also pulls at the free vertices: the entries count as well, and <forces, u> is subtracted from the sum.
   void extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
               const Points* forces = nullptr) const;
 
@@ -111,12 +113,12 @@ class Metric {
   bool is_good_ = false;
   std::uint64_t version_ = 0;
   LowerMatrix matrix_;
-  std::optional<SingleCholesky> single_;      // none where the backend has no supernodes
-  Precision precision_ = Precision::kSingle;  // that was asked for
+  std::optional<SingleCholesky> single_;      // empty if the backend has no supernodes
+  Precision precision_ = Precision::kSingle;  // the requested one
   bool is_single_current_ = false;
   mutable std::optional<SparseCholesky> double_;  // made when first needed
   mutable bool is_double_current_ = false;
-  mutable SingleFactor copy_;  // of double_, made when first needed, empty until then
+  mutable SingleFactor copy_;  // of double_; empty until first needed
   mutable int back_substitutions_ = 0;
 };
 

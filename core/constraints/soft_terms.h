@@ -24,26 +24,26 @@ struct PointForm {
   bool operator==(const PointForm&) const = default;
 };
 
-/// The entries of factor * b b^T, b the coefficients.
+/// Appends the entries of factor * b b^T, where b holds the coefficients.
 void add_square(const PointForm& point, double factor, std::vector<MatrixEntry>& entries);
 
-/// One wish of a soft term: that the point be at `target` (scaled units).
+/// One row of a soft term: it pulls the point to `target` (scaled units).
 struct SoftRow {
   PointForm point;
   Eigen::RowVector3d target;
   double weight = 1;
 };
 
-/// What is wished for beside the cells' rigidity, each term k a few rows r:
+/// The terms of soft and orientation handles, which are added to the cells' energy. Each term k has a few rows r:
 ///
 ///   D_k^2       = sum_r w_r |point_r(x) - t_r|^2
-///   soft_k      = s_a l^p (D_k / l)^{max(p, 2)}          p = p_a and s_a those of its anchor, a vertex
+///   soft_k      = s_a l^p (D_k / l)^{max(p, 2)}          p = p_a and s_a are those of its anchor vertex a
 ///
-/// in the units of the energy (Eq. 3): for p >= 2 a term is a cell like any other, with D_k for E_i, so that
-/// how far surface and wishes give way to each other does not depend on how far things move; for p < 2 it is
-/// a spring, since a power below 2 would either hold or let go, with nothing between. l is the length unit of
-/// the material. Neither the unit of length nor a common factor of all stiffness matters. Serial: the same
-/// bits on any number of threads.
+/// in the units of the energy (Eq. 3). For p >= 2 a term is like a cell's, with D_k in place of E_i, so the balance
+/// between surface and soft handles does not depend on how far things move. For p < 2 the term is a spring (power 2),
+/// since a power below 2 would either hold the point or not pull it at all. l is the length unit of the material. The
+/// result does not depend on the unit of length or on a common factor of all stiffness values. Serial: the same bits on
+/// any number of threads.
 class SoftTerms {
  public:
   SoftTerms() = default;
@@ -51,7 +51,7 @@ class SoftTerms {
   explicit SoftTerms(double length_unit) : length_unit_(length_unit) {}
   void set_length_unit(double length_unit) { length_unit_ = length_unit; }
 
-  /// Rows of weight >= 0, at least one.
+  /// Adds a term. `rows`: at least one, with weights >= 0.
   void add(std::int32_t anchor, const std::vector<SoftRow>& rows);
 
   bool empty() const { return anchors_.empty(); }
@@ -59,29 +59,29 @@ class SoftTerms {
 
   /// sum_k soft_k at x, in the units of the norm's sum.
   double evaluate(const Points& x, const LpNorm& norm);
-  /// The same for another norm at the x of the last evaluation; gradient() and matrix_entries() follow it.
+  /// The same for another norm at the x of the last evaluation; add_gradient() and matrix_entries() then use that norm.
   double reweigh(const LpNorm& norm);
   /// The same; changes nothing.
   double sum(const LpNorm& norm) const;
   /// Adds the gradient at the x and norm of the last evaluation.
   void add_gradient(Points& result) const;
 
-  /// What the terms add to the Hessian with c_k = d soft_k / d D_k^2 held: 2 c_k w_r b_i b_j.
+  /// The terms' contribution to the Hessian, with c_k = d soft_k / d D_k^2 held fixed: 2 c_k w_r b_i b_j.
   std::vector<MatrixEntry> matrix_entries() const { return matrix_entries(c_); }
   /// The same for given c_k.
   std::vector<MatrixEntry> matrix_entries(const std::vector<double>& weights) const;
 
-  /// Whether `other` differs in its targets alone.
+  /// Whether `other` differs only in its targets.
   bool has_rows_of(const SoftTerms& other) const;
-  /// Adds what these targets pull more than those of `before`, which has the same rows, in its weights c_k:
-  /// 2 c_k w_r b_j (t - t_before).
+  /// Adds the change of pull from the targets of `before` to these targets, 2 c_k w_r b_j (t - t_before). `before` has
+  /// the same rows; c_k are its weights.
   void add_pull(const SoftTerms& before, Points& forces) const;
 
   // Of the last evaluation.
   const std::vector<double>& squared_distances() const { return d2_; }  // D_k^2
   const std::vector<double>& weights() const { return c_; }             // c_k
 
-  // Rows offsets[k] to offsets[k + 1] belong to term k.
+  // Rows offsets[k] to offsets[k + 1] - 1 belong to term k.
   const std::vector<SoftRow>& rows() const { return rows_; }
   const std::vector<std::int32_t>& offsets() const { return offsets_; }
   std::int32_t anchor(std::size_t k) const { return anchors_[k]; }

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kLanes = CellBlocks::kLanes;
 
-/// Vertices chunk by chunk, within each by valence; each chunk filled up with -1 to whole blocks.
+/// Vertices chunk by chunk, sorted by valence within each chunk. Each chunk is padded with -1 to whole blocks.
 std::vector<std::int32_t> cells_by_valence(const RestShape& shape, std::size_t chunk) {
   const auto n = static_cast<std::size_t>(shape.vertex_count());
   const auto valence = [&](std::int32_t i) { return shape.offsets()[i + 1] - shape.offsets()[i]; };
@@ -50,7 +50,7 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_
   weight.resize(slot_count() * kLanes);
   rest_edge.resize(slot_count() * kLanes * 3);
   opposite.resize(slot_count() * kLanes);
-  std::vector<std::uint32_t> place_of_entry(shape.neighbours().size());  // of the k-th directed edge i to j
+  std::vector<std::uint32_t> place_of_entry(shape.neighbours().size());  // of directed edges in `opposite`
   for (std::size_t c = 0; c < cells.size(); ++c) {
     const std::size_t lane = c % kLanes, block = c / kLanes;
     const std::int32_t i = cells[c];
@@ -62,7 +62,7 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_
       const bool is_there = k < end;
       const std::int32_t j = is_there ? shape.neighbours()[k] : std::max(i, 0);
       neighbour[at] = j;
-      opposite[at] = static_cast<std::uint32_t>(at);  // itself; mended below
+      opposite[at] = static_cast<std::uint32_t>(at);  // itself; corrected below if the slot is in use
       if (!is_there) continue;
       place_of_entry[k] = opposite[at];
       weight[at] = shape.weights()[k];

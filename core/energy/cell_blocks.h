@@ -8,11 +8,11 @@
 
 namespace lpdeform {
 
-/// The one-rings of a shape laid out for vector instructions: eight cells abreast, a block. Blocks lie within
-/// chunks of consecutive vertices; in a chunk the cells are sorted by valence, so that those of a block have
-/// about as many neighbours. A block has as many slots as its largest cell has neighbours; a slot holds one
-/// neighbour of each of the eight. Lanes and slots that stand for no cell or neighbour have weight 0 and the
-/// cell itself for a neighbour: they add nothing. Immutable.
+/// The one-rings of a shape, laid out for vector instructions. A block holds eight cells, one per lane. Blocks lie
+/// within chunks of consecutive vertices. In a chunk the cells are sorted by valence, so that the cells of a block have
+/// about the same number of neighbours. A block has as many slots as its largest cell has neighbours; a slot holds one
+/// neighbour of each of the eight cells. Unused lanes and slots have weight 0 and the cell itself as neighbour, so they
+/// add nothing. Immutable.
 struct CellBlocks {
   static constexpr std::size_t kLanes = 8;
 
@@ -23,8 +23,8 @@ struct CellBlocks {
   std::size_t slot_count() const { return first_slot.back(); }
   std::size_t memory_bytes() const;
 
-  std::vector<std::uint32_t> first_slot;  // of each block, and the end
-  std::size_t most_slots = 0;             // of a block
+  std::vector<std::uint32_t> first_slot;  // of each block; the last entry is the end
+  std::size_t most_slots = 0;             // the most slots that a block has
   std::vector<std::int32_t> cells;        // [block][lane]: vertex; -1 in lanes without a cell
   std::vector<std::int32_t> centre;       // [block][lane]: vertex; 0 in lanes without a cell
   std::vector<double> rest_size;          // [block][lane]: sum_j w_ij |p_i - p_j|^2
@@ -32,7 +32,7 @@ struct CellBlocks {
   std::vector<std::int32_t> neighbour;  // [slot][lane]: vertex; 0 in lanes without a cell
   std::vector<double> weight;           // [slot][lane]: w_ij
   std::vector<double> rest_edge;        // [slot][axis][lane]: p_i - p_j in scaled units
-  std::vector<std::uint32_t> opposite;  // [slot][lane]: the [slot][lane] of the edge from j to i
+  std::vector<std::uint32_t> opposite;  // [slot][lane]: index of the reverse edge, from j to i
 };
 
 }  // namespace lpdeform

@@ -2,7 +2,7 @@
 
 #include "core/energy/rotation_fit.h"
 
-// Compiled once for each of these instruction sets; which runs is decided when it is first called.
+// This file is compiled once for each instruction set. The first call decides which version runs.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #define HWY_TARGET_INCLUDE "core/energy/cell_kernel.cc"
 #include <hwy/foreach_target.h>
@@ -14,7 +14,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace lpdeform::HWY_NAMESPACE {
 
-/// The fit of one lane by itself, from and to memory.
+/// Fits a single lane by fit_rotation; reads and writes memory.
 void fit_lane(const double* b, double* rotation, std::size_t lane) {
   Eigen::Matrix3d matrix;
   for (std::size_t e = 0; e < 9; ++e) matrix(e / 3, e % 3) = b[e * kLanes + lane];
@@ -48,7 +48,8 @@ struct FitSums {
   V moved_size;  // sum_j w_ij |x_i - x_j|^2
 };
 
-/// Edges x_i - x_j of the lanes from `lane` on, kept in `edges` as [slot][axis][lane]; what the fit needs of them.
+/// Writes the edges x_i - x_j of the lanes from `lane` on to `edges`, as [slot][axis][lane], and returns the sums that
+/// the fit needs.
 HWY_INLINE FitSums gather_edges(const CellBlocks& blocks, std::size_t block, std::size_t lane,
                                 const double* rows, double* edges) {
   const D d;
@@ -76,7 +77,7 @@ HWY_INLINE FitSums gather_edges(const CellBlocks& blocks, std::size_t block, std
   return sums;
 }
 
-/// The residuals, E_i^2 as a sum of squares: no cancellation where it is small.
+/// Computes the residuals, and E_i^2 as a sum of squares, which has no cancellation where it is small.
 HWY_INLINE void subtract_rotated(const CellBlocks& blocks, std::size_t block, std::size_t lane,
                                  const double* edges, BlockState& state) {
   const D d;

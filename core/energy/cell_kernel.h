@@ -7,28 +7,29 @@
 
 namespace lpdeform {
 
-inline constexpr std::size_t kRow = 4;  // numbers of a vector in memory: one load
+inline constexpr std::size_t kRow = 4;  // numbers stored per vector: x, y, z and a filler, one load
 
-/// What the kernels leave for each block, in its lanes.
+/// The results of the kernels for each block, lane by lane.
 struct BlockState {
   explicit BlockState(const CellBlocks& blocks);
   std::size_t memory_bytes() const;
 
-  std::vector<double> rotations;      // [block][entry, row-major][lane]: R_i; the identity to begin with
+  std::vector<double> rotations;      // [block][entry, row-major][lane]: R_i; initially the identity
   std::vector<double> squared;        // [block][lane]: E_i^2
   std::vector<double> residual_sums;  // [block][lane][axis, filler]: sum_j r_ij
   std::vector<float> residuals;  // [slot][lane][axis, filler]: r_ij = w_ij ((x_i - x_j) - R_i (p_i - p_j));
-      // single: an error relative to its size does no harm, and memory is the limit
+      // single precision: a small relative error is harmless, and memory bandwidth is the bottleneck
 };
 
-/// Rotation fit (Eq. 2, as fit_rotation has it), squared energies and residuals of blocks first to last - 1 at
-/// positions x, in scaled units: `rows` has x, y, z and a filler for each vertex. With `fit` false the rotations in `state` are held. In vector
-/// instructions, the widest that the processor has; lanes whose fit is uncertain go through fit_rotation.
-/// Different blocks may be computed at the same time.
+/// Computes rotations (Eq. 2, as fit_rotation does), squared energies and residuals of blocks first to last - 1 at
+/// positions x, in scaled units. `rows` has x, y, z and a filler for each vertex. If `fit` is false, the rotations in
+/// `state` are kept. Uses the widest vector instructions that the processor has; lanes whose fit is uncertain go
+/// through fit_rotation. Different blocks may be computed at the same time.
 void evaluate_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const double* rows,
                      bool fit, BlockState& state);
 
-/// The gradient rows of the cells of these blocks, from the state of all blocks and the weights c_i by vertex:
+/// Computes the gradient rows of the cells of these blocks from the state of all blocks and the weights c_i of the
+/// vertices:
 ///
 ///   df/dx_i = 2 (c_i sum_j r_ij - sum_j c_j r_ji)
 void gradient_of_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last,

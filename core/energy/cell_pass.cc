@@ -28,7 +28,7 @@ double CellPass::evaluate_held(const Points& x, const LpNorm& norm) {
   return evaluate_cells(x, norm, false);
 }
 
-/// Adds up body(begin, end), the sum over a chunk of cells.
+/// Adds up body(begin, end) over all chunks; body returns the sum over its cells.
 template <typename Body>
 double CellPass::sum_of_chunks(const Body& body) const {
   workers_.for_chunks(e2_.size(), kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
@@ -54,7 +54,7 @@ double CellPass::evaluate_cells(const Points& x, const LpNorm& norm, bool fit) {
   });
 }
 
-/// The terms of a chunk, added up; their weights.
+/// Returns the sum of the terms of cells begin to end - 1 and stores their weights c_i.
 double CellPass::weigh(const LpNorm& norm, std::size_t begin, std::size_t end) {
   double sum = 0;
   for (std::size_t i = begin; i < end; ++i) {

@@ -18,9 +18,9 @@ namespace lpdeform {
 ///   df/dx_k  = sum_{j in N(k)} 2 w_kj [(c_k + c_j)(x_k - x_j) - (c_k R_k + c_j R_j)(p_k - p_j)]
 ///   c_i      = weight_i(E_i^2)
 ///
-/// The gradient is that of f with its rotations fitted: they are optimal for every p, so their own change
-/// adds nothing (envelope theorem). Runs in parallel in chunks of a fixed size, sums in chunk order: the same
-/// bits on any number of threads. One caller at a time.
+/// The gradient is that of f with fitted rotations: they are optimal for every p, so their own change adds nothing
+/// (envelope theorem). Runs in parallel in chunks of a fixed size and sums in chunk order, which gives the same bits on
+/// any number of threads. One caller at a time.
 class CellPass {
  public:
   CellPass(std::shared_ptr<const RestShape> shape, Workers workers);

@@ -9,27 +9,27 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kSlack = 1e-5;           // of the mean edge length: see step 2
+constexpr double kSlack = 1e-5;           // relative to the mean edge length: see step 2
 constexpr double kRounding = 1e-9;        // a cotangent sum above -kRounding is not negative
 constexpr double kSmallestHeight = 1e-8;  // of a triangle, relative to its longest side
-constexpr std::size_t kMostFlips = 20;    // a side
+constexpr std::size_t kMostFlips = 20;    // per side
 
 constexpr std::int32_t kNone = -1;
 
-/// A side of a triangle of the cover. Those of triangle f have the ids 3 f to 3 f + 2, in order.
+/// A side of a triangle of the cover. The sides of triangle f have the ids 3 f to 3 f + 2, in order.
 struct Side {
   std::int32_t tail = kNone;    // the vertex that it starts from
   std::int32_t twin = kNone;    // the same edge, seen from the other triangle
-  std::int32_t origin = kNone;  // the edge of the mesh that it is
-  double length = 0;            // mean edge length = 1
+  std::int32_t origin = kNone;  // the edge of the mesh that it comes from
+  double length = 0;            // in units of the mean edge length
 };
 
 bool is_sound(const Faces& faces, Eigen::Index f) {
   return faces(f, 0) != faces(f, 1) && faces(f, 1) != faces(f, 2) && faces(f, 2) != faces(f, 0);
 }
 
-/// The cover's side for the side `id` of the mesh: triangle f is 2 f in front and 2 f + 1, turned round, at
-/// the back.
+/// The cover's side for the side `id` of the mesh. Triangle f of the mesh is triangle 2 f in front and, with reversed
+/// orientation, 2 f + 1 at the back.
 std::int32_t cover_side(std::int32_t id, bool is_back) {
   const std::int32_t face = id / 3, k = id % 3;
   return is_back ? 6 * face + 5 - k : 6 * face + k;
@@ -72,7 +72,7 @@ class Cover {
   double total_length_ = 0;
 };
 
-/// Joins the faces around an edge in a ring: the face of one to the next, each by the side that looks there.
+/// Joins the triangles around an edge in a ring: each face is glued to the next by the copies that face each other.
 void Cover::glue(const TriangleMesh& mesh, std::int32_t low, std::int32_t high,
                  std::span<const HalfEdge> sides) {
   const double length = (mesh.vertices.row(low) - mesh.vertices.row(high)).norm();
@@ -110,13 +110,13 @@ double Cover::cotangent_sum(std::int32_t side) const {
   return opposite_cotangent(side) + opposite_cotangent(sides_[side].twin);
 }
 
-/// The triangles i j k and j i m become k m j and m k i.
+/// Replaces the triangles i j k and j i m by k m j and m k i.
 void Cover::flip(std::int32_t ij) {
   const std::int32_t jk = next_corner(ij), ki = next_corner(jk);
   const std::int32_t ji = sides_[ij].twin, im = next_corner(ji), mj = next_corner(im);
   const double l = sides_[ij].length, l_ki = sides_[ki].length, l_jk = sides_[jk].length,
                l_im = sides_[im].length, l_mj = sides_[mj].length;
-  // i lies in the origin and j at (l, 0), k above and m below.
+  // i is at the origin and j at (l, 0); k is above and m below.
   const double k_x = (l * l + (l_ki - l_jk) * (l_ki + l_jk)) / (2 * l),
                m_x = (l * l + (l_im - l_mj) * (l_im + l_mj)) / (2 * l),
                height = (four_areas(l, l_jk, l_ki) + four_areas(l, l_im, l_mj)) / (2 * l);
@@ -147,8 +147,8 @@ void Cover::make_delaunay() {
   for (std::size_t flips = 0; !waiting.empty() && flips < most;) {
     const std::int32_t side = waiting.back(), twin = sides_[side].twin;
     waiting.pop_back();
-    // An edge that has one triangle on both sides cannot be flipped, and need not: the two angles are equal
-    // and acute.
+    // An edge with the same triangle on both sides cannot be flipped. It need not be: its two angles are equal and
+    // acute.
     if (side / 3 == twin / 3 || cotangent_sum(side) >= -kRounding) continue;
     flip(side);
     ++flips;

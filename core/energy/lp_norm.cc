@@ -15,8 +15,7 @@ LpNorm::LpNorm(const Material& material, std::int32_t vertex_count, double scale
     return field.size() == 1 ? field[0] : field[i];
   };
 
-  // Where p is uniform the energy is sum E_i^p in the caller's units; where it is mixed, lengths are in units
-  // of l.
+  // If p is uniform, the energy is sum E_i^p in the caller's units. If p is mixed, lengths are in units of l.
   const bool is_mixed = !material.has_uniform_p();
   const double length = !is_mixed ? 1.0 : material.length_unit > 0 ? material.length_unit : scaled_unit;
   const double log_ratio = std::log(reference) + std::log(scaled_unit) - std::log(length);

@@ -8,20 +8,21 @@
 
 namespace lpdeform {
 
-/// What a cell adds to the objective, as a function of its squared energy e2 = E_i^2 in scaled units (see
+/// A cell's term of the objective, as a function of its squared energy e2 = E_i^2 in scaled units (see
 /// RestShape::scaled_positions):
 ///
 ///   term_i(e2) = s_i ((e2 + eps2) / r^2)^{p_i / 2} f_i ,     weight_i(e2) = d term_i / d e2
 ///
-/// eps2 smooths the kink of p < 2 at 0. The reference r and the factors
+/// eps2 smooths the kink that p < 2 has at 0. The reference r and the factors
 ///
 ///   f_i = (r / l)^{p_i} / max_j (r / l)^{p_j}
 ///
-/// keep the sum near the size of s, whatever p is: the true energy of Eq. 3 is a constant times the sum
+/// keep the sum near the magnitude of s, whatever p is. The true energy of Eq. 3 is a constant times the sum
 /// (true_energy).
 class LpNorm {
  public:
-  /// `reference` > 0: a typical E_i, in scaled units. `scaled_unit`: the caller's length of one scaled unit.
+  /// `reference` > 0: a typical E_i, in scaled units. `scaled_unit`: the length of one scaled unit, in the caller's
+  /// units.
   LpNorm(const Material& material, std::int32_t vertex_count, double scaled_unit, double reference);
 
   /// The same norm with another smoothing, eps2 >= 0 in scaled units.
@@ -49,8 +50,8 @@ class LpNorm {
   double lowest_p() const { return lowest_p_; }
   double highest_p() const { return highest_p_; }
 
-  /// Eq. 3 in the caller's units for a sum of unsmoothed terms: with the length unit l where p is mixed.
-  /// Where it would overflow, the largest double.
+  /// Eq. 3 in the caller's units, for a sum of unsmoothed terms. If p is mixed, this uses the length unit l. On
+  /// overflow, the largest double.
   double true_energy(double sum) const;
 
  private:
@@ -65,7 +66,7 @@ class LpNorm {
   }
 
   std::vector<double> half_p_, scale_;
-  bool is_uniform_ = true;  // one p, one stiffness: the arrays have one entry
+  bool is_uniform_ = true;  // one p and one stiffness for all: the arrays have one entry
   double r2_ = 1, eps2_ = 0, lowest_p_ = 2, highest_p_ = 2;
   double log_unit_ = 0;  // true energy = exp(log_unit_) * sum
 };

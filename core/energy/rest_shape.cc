@@ -17,7 +17,7 @@ std::size_t bytes_of(const std::vector<T>& values) {
   return values.capacity() * sizeof(T);
 }
 
-/// Both directions of every edge, row by row.
+/// Stores both directions of every edge, row by row.
 void make_rows(std::int32_t vertex_count, const EdgeWeights& edges, std::vector<std::int32_t>& offsets,
                std::vector<std::int32_t>& neighbours, std::vector<double>& weights) {
   offsets.assign(vertex_count + 1, 0);
@@ -37,7 +37,7 @@ void make_rows(std::int32_t vertex_count, const EdgeWeights& edges, std::vector<
     append(edges.edges[e][0], edges.edges[e][1], edges.weights[e]);
 }
 
-/// The box and the mean of the vertices that faces use: others may lie anywhere.
+/// The bounding box and the mean of the vertices that faces use. Other vertices may lie anywhere.
 struct Extent {
   Eigen::RowVector3d low = Eigen::RowVector3d::Constant(std::numeric_limits<double>::infinity());
   Eigen::RowVector3d high = -low;
@@ -56,7 +56,8 @@ Extent extent_of(const Points& positions, const std::vector<std::int32_t>& compo
   return extent;
 }
 
-/// Within these limits no square leaves the range of a double, and no coordinate or energy that of a float.
+/// Within these limits, squares stay within the range of a double, and coordinates and energies within the range of a
+/// float.
 absl::Status check_scale(const Extent& extent) {
   const double largest = std::max(extent.low.cwiseAbs().maxCoeff(), extent.high.cwiseAbs().maxCoeff());
   if (largest > RestShape::kLargestCoordinate) {
@@ -71,7 +72,7 @@ absl::Status check_scale(const Extent& extent) {
   return absl::OkStatus();
 }
 
-/// Of the mesh's own edges, whatever the weights' are.
+/// The mean length of the mesh's own edges, even if the weights have other edges.
 double mean_length(const TriangleMesh& mesh, const EdgeWeights& weights) {
   double total = 0, count = 0;
   const auto add = [&](std::int32_t low, std::int32_t high) {

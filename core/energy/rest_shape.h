@@ -11,11 +11,11 @@
 
 namespace lpdeform {
 
-/// The undeformed mesh, ready for computing: neighbours, weights and rest edges in flat arrays. Immutable,
-/// shared between sessions and threads.
+/// The undeformed mesh, prepared for the solver: neighbours, weights and rest edges in flat arrays. Immutable; shared
+/// between sessions and threads.
 class RestShape {
  public:
-  /// INVALID_ARGUMENT as deformable() has it, with the element named, and MESH_SCALE. O(n log n).
+  /// Errors: INVALID_ARGUMENT with the reasons of deformable(), or MESH_SCALE; names the element. O(n log n).
   static absl::StatusOr<std::shared_ptr<const RestShape>> create(const TriangleMesh& mesh,
                                                                  WeightKind kind = WeightKind::kCotangent);
 
@@ -23,7 +23,7 @@ class RestShape {
 
   std::int32_t vertex_count() const { return static_cast<std::int32_t>(positions_.rows()); }
 
-  /// Vertices that faces use: the others' cells are empty.
+  /// The number of vertices that faces use. The cells of all other vertices are empty.
   std::int32_t cell_count() const {
     return vertex_count() - static_cast<std::int32_t>(report_.unreferenced_vertices.count);
   }
@@ -35,7 +35,7 @@ class RestShape {
   const MeshReport& report() const { return report_; }
   WeightKind weight_kind() const { return kind_; }
 
-  /// Component of each vertex, from 0; -1 where no face uses the vertex.
+  /// Component of each vertex, from 0; -1 if no face uses the vertex.
   const std::vector<std::int32_t>& components() const { return components_; }
   std::int32_t component_count() const { return component_count_; }
 
@@ -44,19 +44,20 @@ class RestShape {
   /// Length of the diagonal of the bounding box of the vertices that faces use. > 0.
   double diagonal() const { return diagonal_; }
 
-  /// What the solver computes with: (positions - centre) / mean_edge_length, so that nothing depends on the
-  /// unit of length or on the distance from the origin. 0 for vertices that no face uses.
+  /// The rest positions that the solver computes with, "scaled units": (positions - centre) / mean_edge_length. With
+  /// them, no result depends on the unit of length or on the distance from the origin. 0 for vertices that no face
+  /// uses.
   const Points& scaled_positions() const { return scaled_positions_; }
-  /// Mean of the rest positions that faces use, in the caller's units.
+  /// Mean of the rest positions of the vertices that faces use, in the caller's units.
   const Eigen::RowVector3d& centre() const { return centre_; }
 
-  // Cell of vertex i, its one-ring (of the intrinsic triangulation with kIntrinsicDelaunay): entries offsets[i]
-  // to offsets[i + 1] of neighbours (ascending) and weights. Symmetric.
+  // The cell of vertex i is its one-ring (in the intrinsic triangulation if kIntrinsicDelaunay): entries offsets[i] to
+  // offsets[i + 1] - 1 of neighbours (ascending) and weights. Symmetric.
   const std::vector<std::int32_t>& offsets() const { return offsets_; }
   const std::vector<std::int32_t>& neighbours() const { return neighbours_; }
   const std::vector<double>& weights() const { return weights_; }
 
-  /// Bytes held, for admission.
+  /// Bytes held, for admission control.
   std::size_t memory_bytes() const;
 
  private:

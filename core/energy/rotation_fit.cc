@@ -32,8 +32,8 @@ double determinant(const Eigen::Matrix3d& m) {
          m(0, 2) * (m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0));
 }
 
-/// Largest root of x^4 - 2 |B|^2 x^2 - 8 det(B) x + det(K), by Newton from the upper bound sqrt(3) |B|, from
-/// which it descends monotonically.
+/// The largest root of x^4 - 2 |B|^2 x^2 - 8 det(B) x + det(K), by Newton's method from the upper bound sqrt(3) |B|,
+/// from which it descends monotonically.
 double largest_eigenvalue(const Eigen::Matrix3d& b, const Eigen::Matrix4d& k) {
   const double c2 = -2 * b.squaredNorm(), c1 = -8 * determinant(b), c0 = k.determinant();
   double x = std::sqrt(3.0) * b.norm();
@@ -73,14 +73,14 @@ Eigen::Vector4d null_vector(const Eigen::Matrix4d& m) {
   return best;
 }
 
-/// One Newton step for <R exp([w]x), B> at R. False where R is not near the maximum, so that SVD must decide.
+/// One Newton step for <R exp([w]x), B> at R. False if R is not near the maximum; then the SVD must decide.
 bool polish(const Eigen::Matrix3d& b, Eigen::Matrix3d& r) {
   const Eigen::Matrix3d m = r.transpose() * b;
   const Eigen::Vector3d slope(m(2, 1) - m(1, 2), m(0, 2) - m(2, 0), m(1, 0) - m(0, 1));
   Eigen::Matrix3d curvature = -0.5 * (m + m.transpose());
   curvature.diagonal().array() += m.trace();
-  // At the maximum the eigenvalues are the sums of two (signed) singular values: positive where the rotation
-  // is unique.
+  // At the maximum, each eigenvalue is the sum of two (signed) singular values. All are positive if the rotation is
+  // unique.
   const double a = curvature(0, 0), minor = a * curvature(1, 1) - curvature(0, 1) * curvature(0, 1);
   const double det = determinant(curvature), scale = m.trace();
   if (!(a > 0 && minor > 0 && det > 1e-8 * scale * scale * scale)) return false;
@@ -112,7 +112,7 @@ Eigen::Matrix3d fit_rotation_svd(const Eigen::Matrix3d& b) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(b, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d u = svd.matrixU();
   if ((u * svd.matrixV().transpose()).determinant() < 0)
-    u.col(2) *= -1;  // singular values are sorted: the smallest
+    u.col(2) *= -1;  // the column of the smallest singular value: they are sorted
   return u * svd.matrixV().transpose();
 }
 

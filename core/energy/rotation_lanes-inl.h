@@ -1,5 +1,5 @@
-// Rotations of many cells at a time, one a lane: what rotation_fit.cc does, in vector instructions. Included by
-// cell_kernel.cc once for each instruction set (Highway's way, hence this guard).
+// Fits the rotations of many cells at a time, one per lane: the method of rotation_fit.cc in vector instructions.
+// cell_kernel.cc includes this file once for each instruction set, as Highway requires; hence this include guard.
 #if defined(LPDEFORM_ROTATION_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LPDEFORM_ROTATION_LANES_INL_H
 #undef LPDEFORM_ROTATION_LANES_INL_H
@@ -21,7 +21,7 @@ using D = hn::CappedTag<double, kLanes>;
 using V = hn::Vec<D>;
 using M = hn::Mask<D>;
 
-constexpr std::size_t kVectors = kLanes / hn::MaxLanes(D());  // of a block
+constexpr std::size_t kVectors = kLanes / hn::MaxLanes(D());  // vectors per block
 
 struct Vector {
   V x, y, z;
@@ -44,7 +44,7 @@ HWY_INLINE Vector times(const Matrix& a, const Vector& v) {
   return {row(0), row(1), row(2)};
 }
 
-/// Three vectors of lanes that lie one after the other.
+/// Loads three vectors of lanes that are consecutive in memory.
 HWY_INLINE Vector load(const double* at) {
   const D d;
   return {hn::LoadU(d, at), hn::LoadU(d, at + kLanes), hn::LoadU(d, at + 2 * kLanes)};
@@ -57,7 +57,7 @@ HWY_INLINE void store(const Vector& v, double* at) {
   hn::StoreU(v.z, d, at + 2 * kLanes);
 }
 
-/// The rows of these vertices, kRow numbers each.
+/// Gathers the rows of these vertices, kRow numbers each.
 HWY_INLINE Vector gather(const double* rows, const std::int32_t* indices) {
   const D d;
 #if HWY_TARGET == HWY_AVX2
@@ -77,7 +77,7 @@ HWY_INLINE Vector gather(const double* rows, const std::int32_t* indices) {
 #endif
 }
 
-/// Rows of kRow numbers one after the other, one a lane.
+/// Stores consecutive rows of kRow numbers, one row per lane.
 HWY_INLINE void store_rows(const Vector& v, double* at) {
   const D d;
   hn::StoreInterleaved4(v.x, v.y, v.z, hn::Zero(d), d, at);
@@ -151,13 +151,13 @@ HWY_INLINE V determinant(const Minors& m) {
   return hn::NegMulAdd(m.s1, m.c4, hn::NegMulAdd(m.s4, m.c1, plus));
 }
 
-/// x^4 - 2 |B|^2 x^2 - 8 det(B) x + det(K), of which the largest root is wanted, and a bound above it.
+/// x^4 - 2 |B|^2 x^2 - 8 det(B) x + det(K), and an upper bound of its largest root.
 struct Quartic {
   V c2, c1, c0, bound;
 };
 
-/// The largest roots, by Newton from above: it descends monotonically. All at once, since each waits for its own
-/// divisions.
+/// The largest roots, by Newton's method from above, which descends monotonically. All vectors are iterated together,
+/// because each one waits for its own divisions.
 HWY_INLINE void largest_roots(const Quartic (&q)[kVectors], V (&x)[kVectors]) {
   const D d;
   const V four = hn::Set(d, 4.0), enough = hn::Set(d, 1e-6);
@@ -214,7 +214,7 @@ HWY_INLINE Quaternion null_vector(const Davenport& k) {
   return q;
 }
 
-/// One Newton step for <R exp([w]x), B> at R = R(q). False where R is not near the maximum.
+/// One Newton step for <R exp([w]x), B> at R = R(q). False if R is not near the maximum.
 HWY_INLINE M polish(const Matrix& b, Quaternion& q) {
   const D d;
   const Matrix r = rotation_of(q);
@@ -251,8 +251,8 @@ HWY_INLINE M polish(const Matrix& b, Quaternion& q) {
   return is_good;
 }
 
-/// B over its largest entry, its Davenport matrix and the quartic of its eigenvalues. `bound` >= <R, B> for every
-/// rotation.
+/// B divided by its largest entry, its Davenport matrix, and the quartic of the eigenvalues. `bound` >= <R, B> for
+/// every rotation.
 struct Scaled {
   Matrix b;
   Davenport k;
@@ -280,7 +280,7 @@ HWY_INLINE Scaled scaled(const Matrix& b, V bound, Quartic& quartic) {
   return result;
 }
 
-/// The rotation for the largest eigenvalue x. False in lanes where it is not certain.
+/// The rotation for the largest eigenvalue x. False in lanes with an uncertain result.
 HWY_INLINE M rotation_at(const Scaled& s, V x, Matrix& rotation) {
   const D d;
   Davenport k = s.k;
@@ -298,7 +298,7 @@ HWY_INLINE M rotation_at(const Scaled& s, V x, Matrix& rotation) {
 }
 
 /// The best rotations for B = sum_j w_ij (x_i - x_j) (p_i - p_j)^T; `bound` >= <R, B> for every rotation.
-/// False in lanes where it is not certain.
+/// False in lanes with an uncertain result.
 HWY_INLINE void fit(const Matrix (&b)[kVectors], const V (&bound)[kVectors], Matrix (&rotation)[kVectors],
                     M (&is_good)[kVectors]) {
   Scaled s[kVectors];

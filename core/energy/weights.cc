@@ -10,7 +10,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kFloor = 1e-6;  // of the mean weight
+constexpr double kFloor = 1e-6;  // relative to the mean weight
 constexpr double kSliver = 1e3;  // times the median weight
 
 std::array<double, 3> half_cotangents(const Points& vertices, const Eigen::Matrix<std::int32_t, 1, 3>& face) {
@@ -21,14 +21,14 @@ std::array<double, 3> half_cotangents(const Points& vertices, const Eigen::Matri
           (a - c).dot(b - c) / twice_area / 2};
 }
 
-/// Appends an edge, its weight clamped.
+/// Appends an edge and clamps its weight.
 void add_edge(std::array<std::int32_t, 2> edge, double weight, EdgeWeights& result) {
   if (weight < 0) result.clamped_edges.push_back(static_cast<std::int32_t>(result.edges.size()));
   result.edges.push_back(edge);
   result.weights.push_back(std::max(0.0, weight));
 }
 
-/// Each edge once, by its two vertices: the sum of half the cotangents of the angles opposite it, clamped.
+/// Each edge once: half the sum of the cotangents of the angles opposite it, clamped.
 EdgeWeights cotangent_weights(const TriangleMesh& mesh) {
   std::vector<double> opposite(3 * mesh.faces.rows());  // of each half-edge
   for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
@@ -45,7 +45,7 @@ EdgeWeights cotangent_weights(const TriangleMesh& mesh) {
   return result;
 }
 
-/// The mean weight, slivers left out: those over 1000 times the median would decide it alone.
+/// The mean weight without slivers: weights over 1000 times the median would dominate the mean.
 double typical_weight(std::vector<double> weights) {
   const auto middle = weights.begin() + static_cast<std::ptrdiff_t>(weights.size() / 2);
   std::nth_element(weights.begin(), middle, weights.end());
@@ -57,8 +57,8 @@ double typical_weight(std::vector<double> weights) {
   return std::accumulate(weights.begin(), end, 0.0) / static_cast<double>(end - weights.begin());
 }
 
-/// Raises the edges that tie a cut-off part of the surface (mostly a single vertex) to the rest. Of the two
-/// parts that an edge joins, the vertex in the smaller one counts as floored.
+/// Raises the weights of edges that tie a nearly detached part of the surface (usually a single vertex) to the rest.
+/// Such an edge joins two parts; its vertex in the smaller part counts as floored.
 void apply_floor(std::int32_t vertex_count, EdgeWeights& result) {
   if (result.edges.empty()) return;
   const double floor = kFloor * typical_weight(result.weights);
@@ -79,7 +79,7 @@ void apply_floor(std::int32_t vertex_count, EdgeWeights& result) {
   floored.erase(std::unique(floored.begin(), floored.end()), floored.end());
 }
 
-/// Each edge once: the sum of what `all`, sorted, has for it, clamped.
+/// Each edge once: the sum of its weights in `all`, which is sorted, clamped.
 EdgeWeights summed(const std::vector<WeightedEdge>& all) {
   EdgeWeights result;
   for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {

@@ -18,16 +18,16 @@ namespace {
 
 constexpr std::int64_t kNone = -1;
 
-/// The corners of an OBJ's faces. A draw vertex is a pair of a vertex and a normal that stand together.
+/// The corners of an OBJ's faces. A draw vertex is a pair of a vertex and a normal that occur together in a corner.
 struct Drawn {
   std::vector<std::int32_t> corners;   // the draw vertex of each corner of each f line, in the file's order
   std::vector<std::int32_t> vertices;  // of each draw vertex
-  Points normals;                      // of each draw vertex, at rest; 0 where none stands with it
-  std::vector<std::array<std::int32_t, 3>> faces;  // of draw vertices
+  Points normals;                      // of each draw vertex, at rest; 0 if it has no normal
+  std::vector<std::array<std::int32_t, 3>> faces;  // triangles of draw vertices
   bool has_normals = false;
 };
 
-/// From a number as OBJ counts, from 1 or back from the newest, to an index; kNone where there is none.
+/// Converts an OBJ number, which counts from 1 or backwards from the newest, to an index; kNone if there is none.
 std::int64_t index_of(std::string_view word, std::int64_t newest) {
   const std::optional<std::int32_t> number = to_index(word);
   if (!number || *number == 0) return kNone;
@@ -94,7 +94,7 @@ Points rows_of(const Points& points, const std::vector<std::int32_t>& rows) {
   return points(rows, Eigen::all);
 }
 
-/// Draw vertices of one vertex are copies of one; with `weld`, so are those at one position.
+/// Draw vertices of the same vertex are copies; with `weld`, so are draw vertices at the same position.
 Weld weld_of(const Drawn& drawn, const Points& rest, std::optional<double> weld) {
   if (weld) return weld_by_position(rest, *weld).value();
   std::map<std::int32_t, std::uint32_t> first;
@@ -116,7 +116,8 @@ Points normals_at(const Drawn& drawn, const Points& rest, const Points& position
   return carried.at(rows_of(positions, drawn.vertices));
 }
 
-/// Copies the source line by line, with new v lines, its vn lines left out, and new ones before its first f.
+/// Copies the source line by line, with new coordinates in its v lines. Its vn lines are left out; new vn lines go
+/// before the first f line.
 class Writer {
  public:
   Writer(std::string_view source, const Points& positions, const Drawn& drawn, const Points& normals)

@@ -7,18 +7,18 @@
 
 namespace lpdeform {
 
-/// The text of an OBJ file at `positions`, one a vertex of `file.mesh`, with normals that are ready to draw: vn
-/// lines of its own, a normal for each pair of a vertex and a normal that stand together in an f line of the
-/// source, carried along as CarriedNormals has it. So the source's hard edges, where a vertex stands with
-/// several normals, stay hard, and what shared a normal goes on sharing one. Corners without a normal get the
-/// smooth one. Texture coordinates, groups and materials stay; the source's own vn lines, which are out of
-/// date, go. A source of another format than OBJ gets smooth normals.
+/// The text of an OBJ file at `positions`, one per vertex of `file.mesh`, with normals that are ready to draw. It has
+/// new vn lines: one normal for each pair of a vertex and a normal that occurs in an f line of the source, deformed by
+/// CarriedNormals. Hard edges of the source, where a vertex occurs with several normals, therefore stay hard, and
+/// corners that shared a normal still share one. Corners without a normal get the smooth one. Texture coordinates,
+/// groups and materials stay; the source's own vn lines, which are out of date, are dropped. A source in another format
+/// than OBJ gets smooth normals.
 ///
-/// `weld`: the tolerance where vertices are welded by position, as in a session that does so and that took it.
-/// `file` is one that deformable() accepts.
+/// `weld`: the tolerance if vertices are welded by position, the same that the session uses; it must be one that
+/// weld_by_position() accepts for this mesh. deformable() must accept the mesh of `file`.
 std::string obj_text_with_normals(const MeshFile& file, const Points& positions, std::optional<double> weld);
 
-/// The source is an OBJ with vn lines.
+/// Whether the source is an OBJ file with vn lines.
 bool has_obj_normals(const MeshFile& file);
 
 }  // namespace lpdeform

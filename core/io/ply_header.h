@@ -18,8 +18,8 @@ int size_of(PlyType type);
 
 struct PlyProperty {
   std::string name;
-  PlyType type = PlyType::kFloat32;  // of the value, or of a list's items
-  std::optional<PlyType> length;     // of a list's length; only lists have it
+  PlyType type = PlyType::kFloat32;  // type of the value, or of a list's items
+  std::optional<PlyType> length;     // type of a list's length; set for lists only
 };
 
 struct PlyElement {
@@ -28,14 +28,14 @@ struct PlyElement {
   std::vector<PlyProperty> properties;
 };
 
-/// What a PLY file says about itself before its data.
+/// The header of a PLY file.
 struct PlyHeader {
   PlyFormat format = PlyFormat::kAscii;
   std::vector<PlyElement> elements;  // in the order of their data
   std::size_t data_begin = 0;        // the byte after the line "end_header"
 };
 
-/// MESH_SYNTAX with the line where the header is not one.
+/// Parses the header. INVALID_ARGUMENT (MESH_SYNTAX) names the line if the header is malformed.
 absl::StatusOr<PlyHeader> parse_ply_header(std::string_view bytes);
 
 }  // namespace lpdeform

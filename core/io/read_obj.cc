@@ -14,7 +14,7 @@ absl::Status read_vertex(TextScanner& scanner, MeshBuilder& builder) {
   return absl::OkStatus();
 }
 
-/// From the file's count, which starts at 1 or goes back from the newest vertex, to an index from 0.
+/// Converts a vertex number of the file, which counts from 1 or backwards from the newest vertex, to an index from 0.
 std::int32_t to_zero_based(std::int32_t number, std::int64_t vertices) {
   if (number >= 0) return number - 1;
   const std::int64_t index = vertices + number;

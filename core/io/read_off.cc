@@ -12,8 +12,7 @@ struct Counts {
   std::int32_t faces = 0;
 };
 
-/// "OFF", "COFF", "NOFF", "STOFF", "STCNOFF": each letter announces numbers after x, y and z, which are not
-/// needed.
+/// "OFF", "COFF", "NOFF", "STOFF", "STCNOFF": each prefix announces numbers after x, y and z, which are ignored.
 bool is_known_keyword(std::string_view word) {
   if (!word.ends_with("OFF")) return false;
   word.remove_suffix(3);
@@ -23,7 +22,7 @@ bool is_known_keyword(std::string_view word) {
   return word.empty();
 }
 
-/// The keyword may be missing, and the counts may follow it on its line; the number of edges is not needed.
+/// The keyword may be missing, and the counts may follow it on the same line. The number of edges is ignored.
 absl::StatusOr<Counts> read_head(TextScanner& scanner) {
   std::string_view word = scanner.next();
   if (is_known_keyword(word)) {

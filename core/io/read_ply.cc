@@ -68,7 +68,7 @@ class BinaryNumbers {
   std::endian order_;
 };
 
-/// An index that is no whole number becomes -1, one that does not fit the nearest that does: both out of
+/// An index that is not an integer becomes -1; one that does not fit becomes the nearest that does. Both are out of
 /// range.
 std::int32_t to_index(double number) {
   using Limits = std::numeric_limits<std::int32_t>;
@@ -76,7 +76,7 @@ std::int32_t to_index(double number) {
   return static_cast<std::int32_t>(std::clamp<double>(number, Limits::min(), Limits::max()));
 }
 
-/// Where each of x, y, z stands among the properties of the vertices, or -1.
+/// The position of each of x, y, z among the properties of the vertices, or -1.
 std::array<int, 3> coordinate_places(const PlyElement& element) {
   std::array<int, 3> places{-1, -1, -1};
   for (std::size_t k = 0; k < element.properties.size(); ++k) {
@@ -119,7 +119,7 @@ class PlyData {
   MeshBuilder& builder() { return builder_; }
 
  private:
-  /// Appends one value to values_, for a list its length; its items go to items_.
+  /// Appends one value to values_. For a list, this is its length; its items go to items_.
   bool read_property(const PlyProperty& property) {
     const auto value = numbers_.next(property.length.value_or(property.type));
     if (!value) return false;

@@ -79,7 +79,7 @@ std::string lower_case(std::string_view word) {
   return result;
 }
 
-/// From behind "outer loop" to behind "endloop".
+/// Reads from after "outer loop" to after "endloop".
 absl::Status read_loop(TextScanner& scanner, Welder& welder) {
   std::array<Corner, 3> corners;
   for (Corner& corner : corners) {
@@ -96,7 +96,7 @@ absl::Status read_loop(TextScanner& scanner, Welder& welder) {
   return absl::OkStatus();
 }
 
-/// From behind "facet" to behind "endfacet"; its normal is not needed.
+/// Reads from after "facet" to after "endfacet"; the normal is ignored.
 absl::Status read_facet(TextScanner& scanner, Welder& welder) {
   scanner.skip_line();
   if (lower_case(scanner.next()) != "outer" || lower_case(scanner.next()) != "loop") {
@@ -127,7 +127,7 @@ absl::StatusOr<TriangleMesh> parse_ascii(std::string_view text) {
 
 }  // namespace
 
-/// Binary files may start with "solid", too; their size gives them away.
+/// Binary files may start with "solid" as well; they are recognised by their size.
 absl::StatusOr<TriangleMesh> parse_stl(std::string_view bytes) {
   const bool is_exact = bytes.size() >= kHeadBytes && bytes.size() == claimed_size(bytes);
   return is_exact || !starts_with_solid(bytes) ? parse_binary(bytes) : parse_ascii(bytes);

@@ -22,7 +22,7 @@ std::string_view without_plus(std::string_view word) {
   return word;
 }
 
-/// A number that std::from_chars left alone as too large or too small: infinite or 0.
+/// The value of a number that std::from_chars rejects as too large or too small: infinite or 0.
 double beyond_double(std::string_view word) {
   double nearest = 0;
   absl::from_chars(word.data(), word.data() + word.size(), nearest);
@@ -37,7 +37,7 @@ TextScanner::TextScanner(std::string_view text, LineEnds line_ends)
   if (text.starts_with(kByteOrderMark)) at_ = kByteOrderMark.size();
 }
 
-/// The length of the joint of two lines at `at`; 0 where there is none.
+/// The length of the line continuation (a backslash and the line end) at `at`; 0 if there is none.
 std::size_t TextScanner::continuation_at(std::size_t at) const {
   if (!is_continued_ || text_[at] != '\\') return 0;
   const std::string_view rest = text_.substr(at + 1);

@@ -9,7 +9,7 @@
 
 namespace lpdeform {
 
-/// Words of a text, one after the other. Blanks separate them, '#' starts a comment that ends with its line.
+/// Reads a text word by word. Blanks separate words; '#' starts a comment that ends with the line.
 class TextScanner {
  public:
   enum class LineEnds {
@@ -19,10 +19,10 @@ class TextScanner {
 
   explicit TextScanner(std::string_view text, LineEnds line_ends = LineEnds::kPlain);
 
-  /// The next word of this line; empty where the line has no more.
+  /// The next word of this line; empty if the line has no more.
   std::string_view next_on_line();
 
-  /// The next word, also of a later line; empty at the end of the text.
+  /// The next word of this line or a later one; empty at the end of the text.
   std::string_view next();
 
   /// Goes to the start of the next line; false at the end of the text.
@@ -44,11 +44,11 @@ class TextScanner {
   bool is_continued_;
 };
 
-/// A number in decimal, also "nan", "inf" and a leading '+'; too large becomes infinite. Independent of the
-/// locale.
+/// A decimal number, also "nan", "inf" and with a leading '+'. A number that is too large becomes infinite. Empty if
+/// `word` is not a number. Independent of the locale.
 std::optional<double> to_number(std::string_view word);
 
-/// An integer; one that does not fit becomes the nearest that does.
+/// An integer; if it does not fit, the nearest that does. Empty if `word` is not an integer.
 std::optional<std::int32_t> to_index(std::string_view word);
 
 }  // namespace lpdeform

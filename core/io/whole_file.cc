@@ -33,7 +33,7 @@ int write_all(int file, std::string_view bytes) {
   return 0;
 }
 
-/// Different for each call in each process.
+/// A name that is different for each call in each process.
 std::filesystem::path name_beside(const std::filesystem::path& path) {
   static std::atomic<std::uint64_t> calls{0};
   std::filesystem::path name = path;
@@ -41,13 +41,13 @@ std::filesystem::path name_beside(const std::filesystem::path& path) {
   return name;
 }
 
-/// The status of what is there; nothing where there is nothing.
+/// The status of the file at `path`; empty if there is none.
 std::optional<struct stat> status_of(const std::filesystem::path& path) {
   struct stat found = {};
   return ::stat(path.c_str(), &found) == 0 ? std::optional(found) : std::nullopt;
 }
 
-/// What another program has open, or a device: it is written to, not replaced.
+/// Whether `path` is a device or something that another program has open. It is then written to, not replaced.
 bool is_stream(const std::filesystem::path& path, const std::optional<struct stat>& there) {
   const std::string name = path.lexically_normal().string();
   return (there && !S_ISREG(there->st_mode)) || name.starts_with("/dev/") || name.starts_with("/proc/");
@@ -69,7 +69,8 @@ int replace(const std::filesystem::path& path, const std::optional<struct stat>&
   if (file < 0) return errno;
   int error = write_all(file, bytes);
   if (there) {
-    // Somebody else's file may be replaced by whoever may write to its folder, and then is theirs.
+    // A process that may write to the folder may replace a file of another user; the new file then belongs to this
+    // process's user.
     if (::fchown(file, there->st_uid, there->st_gid) != 0)
       static_cast<void>(::fchown(file, -1, there->st_gid));
     static_cast<void>(::fchmod(file, there->st_mode & 0777));
@@ -84,7 +85,7 @@ int replace(const std::filesystem::path& path, const std::optional<struct stat>&
 
 absl::StatusOr<std::string> read_whole_file(const std::filesystem::path& path) {
   std::error_code error;
-  // Asked first: to open a pipe would wait for whoever writes to it.
+  // This check comes first, because opening a pipe would wait for a writer.
   const bool is_file = std::filesystem::is_regular_file(path, error);
   if (!is_file && std::filesystem::exists(path, error)) {
     const bool is_folder = std::filesystem::is_directory(path, error);

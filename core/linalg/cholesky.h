@@ -13,8 +13,8 @@
 
 namespace lpdeform {
 
-/// The lower triangle, diagonal included, of a symmetric matrix by compressed columns; rows ascend within a
-/// column and begin with the diagonal.
+/// The lower triangle of a symmetric matrix, including the diagonal, in compressed-column form. Row indices ascend
+/// within a column and begin with the diagonal.
 struct LowerMatrix {
   std::vector<std::int32_t> columns;  // n + 1 offsets
   std::vector<std::int32_t> rows;
@@ -23,8 +23,9 @@ struct LowerMatrix {
   std::int32_t size() const { return static_cast<std::int32_t>(columns.size()) - 1; }
 };
 
-/// Where a factor's entries lie. Supernode k is columns first_columns[k] to first_columns[k + 1] - 1: a full
-/// triangle, and below it rows[first_rows[k]] to rows[first_rows[k + 1] - 1], ascending. Counted in the new order.
+/// The pattern of a factor's entries. Supernode k is columns first_columns[k] to first_columns[k + 1] - 1: a full
+/// triangle and, below it, the rows rows[first_rows[k]] to rows[first_rows[k + 1] - 1], ascending. All indices are in
+/// the new order.
 struct SupernodePattern {
   std::vector<std::int32_t> new_to_old;
   std::vector<std::int32_t> first_columns;
@@ -32,32 +33,31 @@ struct SupernodePattern {
   std::vector<std::int32_t> rows;
 };
 
-/// A fill-reducing order and the factor's pattern in it, by the backend. None where it does not work with
-/// supernodes (Eigen). INVALID_ARGUMENT (FACTOR_TOO_LARGE) where the factor has more than `most` entries, which is as far as
-/// the backend counts: a triangulated surface of millions of vertices has fewer, one that is glued together at random
-/// has that many with 300,000.
+/// A fill-reducing ordering and the factor's pattern in that order, found by the backend. Empty if the backend has no
+/// supernodes (Eigen). INVALID_ARGUMENT (FACTOR_TOO_LARGE) if the factor has more than `most` entries; the default is
+/// the backend's limit. A triangulated surface of millions of vertices stays below it; a surface that is glued together
+/// at random reaches it with 300,000 vertices.
 absl::StatusOr<std::optional<SupernodePattern>> analyse_supernodes(
     const LowerMatrix& pattern, std::size_t most = std::numeric_limits<std::int32_t>::max());
 
-/// What the supernodes hold, explicit zeros included.
+/// The number of entries that the supernodes hold, including explicit zeros.
 std::size_t entry_count(const SupernodePattern& supernodes);
 
-/// Sparse Cholesky factorisation of symmetric positive definite matrices of one pattern. The constructor
-/// orders and analyses; factor() is the numeric phase alone and may be repeated; then solve as often as you
-/// like. Behind it stands CHOLMOD or Eigen, by the build. Fill-reducing permutations stay inside. One caller
-/// at a time; different objects are independent.
+/// Sparse Cholesky factorisation of symmetric positive definite matrices with the same pattern. The constructor does
+/// ordering and symbolic analysis. factor() is the numeric phase and may be repeated; after it, solve() may be called
+/// any number of times. The backend is CHOLMOD or Eigen, chosen by the build. Fill-reducing permutations stay internal.
+/// One caller at a time; different objects are independent.
 class SparseCholesky {
  public:
-  /// Values are not looked at. O(n) memory besides the analysis.
+  /// Ignores the values. O(n) memory besides the analysis.
   explicit SparseCholesky(const LowerMatrix& pattern);
-  /// In an order that analyse_supernodes() found: the analysis without its longest part.
+  /// Uses an ordering that analyse_supernodes() found, which skips the longest part of the analysis.
   SparseCholesky(const LowerMatrix& pattern, const std::vector<std::int32_t>& new_to_old);
   ~SparseCholesky();
   SparseCholesky(SparseCholesky&&) noexcept;
   SparseCholesky& operator=(SparseCholesky&&) noexcept;
 
-  /// False where the matrix is not positive definite to rounding, or not finite; solve() must not be called
-  /// then.
+  /// False if the matrix is not positive definite to rounding, or not finite; then solve() must not be called.
   [[nodiscard]] bool factor(const LowerMatrix& matrix);
 
   /// x = A^-1 b, three right-hand sides at once. x may be b.

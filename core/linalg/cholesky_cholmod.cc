@@ -14,12 +14,13 @@
 namespace lpdeform {
 namespace {
 
-// Floating-point operations per entry of the factor from which on dense kernels win over columns one by one:
+// From this many floating-point operations per entry of the factor on, dense kernels are faster than single columns:
 // meshes of about 40,000 vertices.
 constexpr double kSupernodalSwitch = 110;
 
-/// Dense kernels in the supernodal factorisation must not start threads of their own: the same bits on any
-/// machine load, and sessions do not compete. Only OpenBLAS has such threads among Debian's BLAS packages.
+/// Keeps the dense kernels of the supernodal factorisation from starting threads of their own. This gives the same bits
+/// at any machine load, and sessions do not compete for cores. Among Debian's BLAS packages, only OpenBLAS has such
+/// threads.
 void pin_blas_to_one_thread() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -28,8 +29,8 @@ void pin_blas_to_one_thread() {
   });
 }
 
-/// CHOLMOD's own loops ask OpenMP for four threads, whatever ours are. While this lives they run on the calling
-/// thread alone, which is nearly as fast.
+/// CHOLMOD's own loops ask OpenMP for four threads, however many threads we use. While an object of this class exists,
+/// they run on the calling thread alone, which is nearly as fast.
 class WithoutOpenMp {
  public:
   WithoutOpenMp() {
@@ -75,8 +76,8 @@ cholmod_sparse view_of(const LowerMatrix& matrix) {
   return view;
 }
 
-/// An L D L^T factor, which CHOLMOD also makes of an indefinite matrix, holds D where L has its ones. L L^T
-/// is checked by CHOLMOD.
+/// CHOLMOD also makes an L D L^T factor of an indefinite matrix. Such a factor holds D in place of the unit diagonal of
+/// L. CHOLMOD itself checks L L^T factors.
 bool has_positive_diagonal(const cholmod_factor& factor) {
   if (factor.is_ll || factor.is_super) return true;
   const auto* columns = static_cast<const std::int32_t*>(factor.p);
@@ -84,7 +85,7 @@ bool has_positive_diagonal(const cholmod_factor& factor) {
   return std::all_of(columns, columns + factor.n, [&](std::int32_t begin) { return values[begin] > 0; });
 }
 
-/// Supernodes in CHOLMOD's own layout: column-major blocks that begin with their triangle.
+/// Copies a supernodal factor. CHOLMOD stores supernodes as column-major blocks that begin with their triangle.
 void copy_supernodal(const cholmod_factor& factor, SingleFactor& out) {
   const auto* const first_columns = static_cast<const std::int32_t*>(factor.super);
   const auto* const first_rows = static_cast<const std::int32_t*>(factor.pi);
@@ -101,8 +102,8 @@ void copy_supernodal(const cholmod_factor& factor, SingleFactor& out) {
   }
 }
 
-/// Columns of L D L^T or L L^T, each beginning with its diagonal, rows ascending. Neighbours with the same
-/// pattern become one supernode.
+/// Copies a simplicial factor, L D L^T or L L^T. Each column begins with its diagonal entry, rows ascending. Adjacent
+/// columns with the same pattern become one supernode.
 void copy_simplicial(const cholmod_factor& factor, SingleFactor& out) {
   const auto* const begins = static_cast<const std::int32_t*>(factor.p);
   const auto* const counts = static_cast<const std::int32_t*>(factor.nz);
@@ -131,7 +132,7 @@ struct Cholmod {
     cholmod_start(&common);
     common.print = 0;
     common.error_handler = nullptr;
-    common.nmethods = 1;  // one ordering: METIS tries cost more than they save below a million vertices
+    common.nmethods = 1;  // one ordering: below a million vertices, trying METIS costs more than it saves
     common.method[0].ordering = CHOLMOD_AMD;
     common.postorder = 1;
     common.supernodal_switch = kSupernodalSwitch;
@@ -143,7 +144,8 @@ struct Cholmod {
   Cholmod(const Cholmod&) = delete;
   Cholmod& operator=(const Cholmod&) = delete;
 
-  /// In the order given, or one that it finds. False where the factor is too large to be counted or kept.
+  /// Analyses in the given order or, if null, one that CHOLMOD finds. False if the factor is too large to be counted or
+  /// stored.
   [[nodiscard]] bool analyse(const LowerMatrix& pattern, const std::int32_t* new_to_old) {
     cholmod_sparse view = view_of(pattern);
     view.xtype = CHOLMOD_PATTERN;

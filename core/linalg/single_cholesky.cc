@@ -8,10 +8,10 @@
 namespace lpdeform {
 namespace {
 
-constexpr std::int32_t kWidest = 64;     // columns of a supernode: more become several, one after the other
-constexpr float kLowestPivot = 1e-6f;    // of the matrix's diagonal entry
+constexpr std::int32_t kWidest = 64;     // most columns of a supernode; wider ones are split
+constexpr float kLowestPivot = 1e-6f;    // relative to the matrix's diagonal entry
 constexpr std::size_t kTile = 64;        // rows of a supernode that one task computes
-constexpr double kWorthTasks = 200'000;  // multiplications
+constexpr double kWorthTasks = 200'000;  // multiplications from which on separate tasks pay off
 
 }  // namespace
 
@@ -49,7 +49,7 @@ SingleCholesky::SingleCholesky(const LowerMatrix& pattern, const SupernodePatter
   find_entries(pattern);
 }
 
-/// Which supernodes change which, ascending for each.
+/// Finds which supernodes update which; ascending for each.
 void SingleCholesky::find_updates() {
   const std::size_t count = factor_.supernodes_.size();
   const std::vector<std::int32_t> node_of = factor_.node_of_columns();
@@ -81,7 +81,7 @@ void SingleCholesky::find_updates() {
   });
 }
 
-/// Where the matrix's entries go.
+/// Finds the place of each matrix entry in the factor.
 void SingleCholesky::find_entries(const LowerMatrix& pattern) {
   const std::vector<std::int32_t> node_of = factor_.node_of_columns();
   const auto for_entries = [&](const auto& body) {
@@ -117,7 +117,7 @@ SingleCholesky::Scratch& SingleCholesky::scratch_of_thread() {
   return result;
 }
 
-/// The matrix's entries, and what finding places in the block needs.
+/// Loads the matrix's entries into the block, and fills the table of places in the block.
 void SingleCholesky::load(std::size_t node, const LowerMatrix& matrix, Scratch& own) {
   const SingleFactor::Supernode& at = factor_.supernodes_[node];
   const auto columns = static_cast<std::size_t>(at.columns);
@@ -133,7 +133,7 @@ void SingleCholesky::load(std::size_t node, const LowerMatrix& matrix, Scratch& 
   for (std::size_t r = 0; r < at.row_count; ++r) own.place[rows[r]] = static_cast<std::int32_t>(columns + r);
 }
 
-/// Takes out of rows begin to end - 1 of a supernode what those eliminated before it owe.
+/// Subtracts the updates by previously eliminated supernodes from rows begin to end - 1 of a supernode.
 void SingleCholesky::update_rows(std::size_t node, std::size_t begin, std::size_t end,
                                  const std::vector<std::int32_t>& place) {
   const SingleFactor::Supernode& at = factor_.supernodes_[node];

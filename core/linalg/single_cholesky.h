@@ -10,17 +10,17 @@
 
 namespace lpdeform {
 
-/// Cholesky factorisation in single precision of symmetric positive definite matrices of one pattern, by
-/// several threads: about seven digits, a quarter of the double factorisation's time and half its memory. For
-/// metrics, not for answers. Left-looking over supernodes; what different subtrees of the elimination tree
-/// compute is independent, and above them the rows of a supernode are. The same bits on any number of threads.
+/// Multithreaded Cholesky factorisation in single precision of symmetric positive definite matrices with the same
+/// pattern: about seven digits, a quarter of the time and half the memory of the double factorisation. Use it for
+/// metrics (preconditioners), not for final results. Left-looking over supernodes. Threads work on different subtrees
+/// of the elimination tree and, above these, on different rows of a supernode. The same bits on any number of threads.
 class SingleCholesky {
  public:
-  /// `pattern` and what analyse_supernodes() found for it.
+  /// `supernodes` is the result of analyse_supernodes() for `pattern`.
   SingleCholesky(const LowerMatrix& pattern, const SupernodePattern& supernodes);
 
-  /// False where a pivot is not above 1e-6 of its diagonal entry: nothing of the pivot's value would be left.
-  /// result() must not be used then.
+  /// False if a pivot is not above 1e-6 of its diagonal entry, because no correct digit of the pivot would be left.
+  /// Then result() must not be used.
   [[nodiscard]] bool factor(const LowerMatrix& matrix, const Workers& workers);
 
   const SingleFactor& result() const { return factor_; }
@@ -28,7 +28,8 @@ class SingleCholesky {
   std::size_t memory_bytes() const;
 
  private:
-  /// Rows `begin` on of an eliminated supernode change a later one: `count` of them are its columns.
+  /// An update of a later supernode by the rows of an eliminated one, `from`, starting at row `begin`; the first
+  /// `count` of these rows are columns of the later supernode.
   struct Update {
     std::int32_t from, begin, count;
   };
@@ -37,9 +38,9 @@ class SingleCholesky {
     std::int32_t source;
     std::uint32_t target;  // counted from the supernode's first value
   };
-  /// What one thread needs, kept from call to call.
+  /// The workspace of one thread, kept between calls.
   struct Scratch {
-    std::vector<std::int32_t> place;  // of a row of the matrix in the present block
+    std::vector<std::int32_t> place;  // position of each row of the matrix in the current block
     std::vector<float> packed, lowest;
     SolvingTriangle triangle;
   };
@@ -54,11 +55,11 @@ class SingleCholesky {
   SingleFactor factor_;
   std::vector<std::int32_t> old_to_new_;
   std::vector<Update> updates_;
-  std::vector<std::size_t> first_update_;  // of each supernode, and the end
+  std::vector<std::size_t> first_update_;  // of each supernode; the last entry is the end
   std::vector<double> update_work_;        // of each supernode: multiplications
   std::vector<Entry> entries_;
   std::vector<std::size_t> first_entry_;
-  Scratch trunk_;  // not a thread's: one that waits for others may take up another factorisation
+  Scratch trunk_;  // not shared with scratch_of_thread(): a waiting thread may start on another factorisation
 };
 
 }  // namespace lpdeform

@@ -10,10 +10,10 @@ namespace {
 using Row = SingleFactor::Row;
 
 constexpr std::size_t kBranches = 16;
-constexpr std::size_t kSmallestBranch = 1 << 14;  // entries; less is not worth a task
+constexpr std::size_t kSmallestBranch = 1 << 14;  // entries; a smaller one is not worth a task
 constexpr std::size_t kChunk = 4096;              // rows
 
-/// x = L^-1 b for a supernode's own rows: a triangle, row-major, its diagonal inverted.
+/// x = L^-1 b for a supernode's own rows. `values` is a row-major triangle with inverted diagonal entries.
 void solve_triangle(const float* values, std::int32_t columns, Row* own) {
   for (std::int32_t r = 0; r < columns; ++r, values += columns) {
     Row sum = own[r];
@@ -30,7 +30,7 @@ void solve_transposed_triangle(const float* values, std::int32_t columns, Row* o
   }
 }
 
-/// below[rows[r]] -= sum_c values[r][c] own[c]; four rows at a time, so that sums do not wait for one another.
+/// below[rows[r]] -= sum_c values[r][c] own[c]; Four rows at a time, so that the sums are independent of each other.
 void add_below(const float* values, std::int32_t columns, const std::int32_t* rows, std::size_t row_count,
                const Row* own, Row* below) {
   std::size_t r = 0;
@@ -84,7 +84,7 @@ float* SingleFactor::new_supernode(std::int32_t columns, const std::int32_t* row
   return values_.data() + supernodes_.back().first_value;
 }
 
-/// The supernode that each column is in.
+/// The supernode of each column.
 std::vector<std::int32_t> SingleFactor::node_of_columns() const {
   std::vector<std::int32_t> result(new_to_old_.size());
   for (std::size_t k = 0; k < supernodes_.size(); ++k) {
@@ -94,7 +94,8 @@ std::vector<std::int32_t> SingleFactor::node_of_columns() const {
   return result;
 }
 
-/// The supernode that has the first row below each, which is its parent in the elimination tree; -1 for roots.
+/// The parent of each supernode in the elimination tree: the supernode that contains its first row below the triangle;
+/// -1 for roots.
 std::vector<std::int32_t> SingleFactor::parents() const {
   const std::vector<std::int32_t> node_of = node_of_columns();
   std::vector<std::int32_t> result(supernodes_.size(), -1);
@@ -104,14 +105,14 @@ std::vector<std::int32_t> SingleFactor::parents() const {
   return result;
 }
 
-/// Cuts the tree where the subtrees become small enough, and bundles them into branches of about one size.
+/// Cuts the tree where the subtrees become small enough, and groups these into branches of about equal size.
 void SingleFactor::cut_branches() {
   branches_.clear();
   trunk_.clear();
   const auto count = static_cast<std::int32_t>(supernodes_.size());
   const std::vector<std::int32_t> parent = parents();
-  std::vector<std::size_t> work(count), nodes(count, 1);  // of the subtree below and with each
-  std::vector<char> is_whole(count, true);  // its supernodes lie together, and so do those of each below it
+  std::vector<std::size_t> work(count), nodes(count, 1);  // of the subtree rooted at each supernode
+  std::vector<char> is_whole(count, true);  // this subtree, and each in it, has consecutive supernodes
   std::vector<std::int32_t> first(count);
   for (std::int32_t k = 0; k < count; ++k) first[k] = k;
   for (std::int32_t k = 0; k < count; ++k) {
@@ -130,7 +131,7 @@ void SingleFactor::cut_branches() {
   const auto is_branch = [&](std::int32_t k) { return is_worth_it && work[k] <= most && is_whole[k]; };
   std::size_t bundled = most;
   for (std::int32_t k = 0; k < count; ++k) {
-    if (is_branch(k) && parent[k] >= 0 && is_branch(parent[k])) continue;  // its parent's
+    if (is_branch(k) && parent[k] >= 0 && is_branch(parent[k])) continue;  // part of its parent's branch
     if (!is_branch(k)) {
       trunk_.emplace_back(k, k);
       continue;
@@ -141,7 +142,7 @@ void SingleFactor::cut_branches() {
   }
 }
 
-/// Gives the branch places of its own for what it adds to its ancestors.
+/// Gives the branch places of its own in work_ for its contributions to its ancestors.
 void SingleFactor::send_elsewhere(Branch& branch) {
   std::vector<std::int32_t> place(new_to_old_.size(), -1);
   for (const auto& [first, last] : branch.subtrees) {
@@ -207,7 +208,7 @@ double SingleFactor::largest_entry(const Points& b, const Workers& workers) cons
 }
 
 void SingleFactor::solve(const Points& b, Points& x, const Workers& workers, double factor) const {
-  // Over the largest entry, so that no size of b leaves the range of single precision.
+  // b is divided by its largest entry, so that no magnitude of b leaves the range of single precision.
   const double largest = largest_entry(b, workers), scale = 1 / largest;
   x.resize(b.rows(), 3);
   if (!std::isfinite(largest)) return void(x.setConstant(std::numeric_limits<double>::quiet_NaN()));

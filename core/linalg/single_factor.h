@@ -10,22 +10,22 @@
 
 namespace lpdeform {
 
-/// A Cholesky factor L of a permuted matrix, P A P^T = L L^T, in single precision: half the bytes of the
-/// double one, three right-hand sides at once in vector instructions. Good to about seven digits: for
-/// metrics, not for answers. Columns with the same pattern below lie together, as supernodes.
+/// A Cholesky factor L of a permuted matrix, P A P^T = L L^T, in single precision. It takes half the memory of a double
+/// factor and solves three right-hand sides at once with vector instructions. Accurate to about seven digits: use it
+/// for metrics (preconditioners), not for final results. Columns with the same pattern are grouped as supernodes.
 ///
-/// Large factors are solved by several threads: what different subtrees of the elimination tree eliminate does
-/// not meet before their common ancestors. Each subtree adds what it owes to those to a place of its own, and
-/// these are added up in a fixed order: the same bits on any number of threads.
+/// Several threads solve with large factors: different subtrees of the elimination tree are independent below their
+/// common ancestors. Each subtree accumulates its contributions to these ancestors in memory of its own, and these
+/// contributions are added up in a fixed order, which gives the same bits on any number of threads.
 class SingleFactor {
  public:
-  // How a backend fills it in: begin(), its supernodes in ascending order, finish().
+  // A backend fills it by begin(), add_supernode() in ascending order, and finish().
 
-  /// For a matrix of this size; its factor will have about `value_count` entries.
+  /// Starts a factor of a matrix of this size, with about `value_count` entries.
   void begin(const std::int32_t* new_to_old, std::size_t size, std::size_t value_count);
 
-  /// The next `columns` columns, whose pattern is a full triangle and, below it, `rows`.
-  /// `value(r, c)` is their entry in row r, counted from the triangle's first and on through `rows`.
+  /// Adds the next `columns` columns; their pattern is a full triangle and, below it, `rows`. `value(r, c)` is the
+  /// entry in row r and column c. r counts the rows of the triangle first, then `rows`.
   template <typename Value>
   void add_supernode(std::int32_t columns, const std::int32_t* rows, std::size_t row_count,
                      const Value& value) {
@@ -40,7 +40,7 @@ class SingleFactor {
   void finish();
 
   bool empty() const { return new_to_old_.empty(); }
-  /// Memory is kept.
+  /// Makes the factor empty; keeps the memory.
   void clear() { new_to_old_.clear(); }
 
   /// x = factor * A^-1 b. x may be b. One caller at a time.
@@ -50,20 +50,20 @@ class SingleFactor {
 
   std::size_t memory_bytes() const;
 
-  /// x, y, z and padding: a register of vector instructions.
+  /// x, y, z and padding: one vector register.
   using Row = float __attribute__((vector_size(16)));
 
  private:
   friend class SingleCholesky;  // computes the values in place
   struct Supernode {
     std::int32_t first_column, columns;
-    std::size_t first_row, row_count;  // of all rows
-    std::size_t first_value;           // of all values
+    std::size_t first_row, row_count;  // in rows_
+    std::size_t first_value;           // in values_
   };
-  /// Supernodes that one thread solves: whole subtrees, which lie together.
+  /// Supernodes that one thread solves: complete subtrees, each of consecutive supernodes.
   struct Branch {
     std::vector<std::pair<std::int32_t, std::int32_t>> subtrees;  // first and last supernode
-    std::vector<std::int32_t> owed;                               // rows of ancestors that it adds to
+    std::vector<std::int32_t> owed;                               // rows of ancestors that the branch adds to
   };
   double largest_entry(const Points& b, const Workers& workers) const;
   std::vector<std::int32_t> node_of_columns() const;
@@ -77,13 +77,13 @@ class SingleFactor {
   std::vector<std::int32_t> new_to_old_;
   std::vector<Supernode> supernodes_;
   std::vector<std::int32_t> rows_;
-  std::vector<float> values_;  // of each supernode: its triangle's rows at full length, then those below, all
-                               // row-major; the diagonal inverted
+  /// Per supernode: the triangle's rows at full width, then the rows below it, all row-major; diagonal entries are
+  /// inverted.
+  std::vector<float> values_;
   std::int32_t next_column_ = 0;
   std::vector<Branch> branches_;
   std::vector<std::pair<std::int32_t, std::int32_t>> trunk_;  // the supernodes that are in no branch
-  std::vector<std::int32_t>
-      forward_rows_;  // rows_, but those of ancestors of a branch are its places in work_
+  std::vector<std::int32_t> forward_rows_;  // rows_, but a branch's ancestor rows are its places in work_
   mutable std::vector<double> chunk_maxima_;
   mutable std::vector<Row> work_;  // one for each column, then one for each row owed by each branch
 };

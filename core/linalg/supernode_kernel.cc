@@ -1,6 +1,6 @@
 #include "core/linalg/supernode_kernel.h"
 
-// Compiled once for each of these instruction sets; which runs is decided when it is first called.
+// This file is compiled once for each instruction set. The first call decides which version runs.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #define HWY_TARGET_INCLUDE "core/linalg/supernode_kernel.cc"
 #include <hwy/foreach_target.h>
@@ -18,7 +18,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<float, 8>;
 using V = hn::Vec<D>;
 
-/// Where the columns of an update go.
+/// The target columns of an update in the block.
 struct Targets {
   const std::int32_t* rows;
   std::size_t count;
@@ -103,7 +103,8 @@ void SubtractUpdate(const EliminatedRows& from, std::size_t target_count, std::s
   if (column < width) multiply_rows<1>(from, begin, end, packed, width, column, to, place, block, stride);
 }
 
-/// kRows rows of `stride` numbers: x(c) found, and taken out of those to its right, column by column.
+/// Solves kRows rows of `stride` numbers column by column: computes x(c), then subtracts its contribution from the
+/// columns to its right.
 template <std::size_t kRows>
 HWY_INLINE void substitute(float* rows, std::size_t columns, std::size_t stride, const float* transposed,
                            const float* inverse_diagonal) {

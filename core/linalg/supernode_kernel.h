@@ -6,30 +6,30 @@
 
 namespace lpdeform {
 
-/// Rows of an eliminated supernode, row-major with `columns` numbers each, and where they lie in the matrix.
+/// Rows of an eliminated supernode, row-major with `columns` numbers each, and their row indices in the matrix.
 struct EliminatedRows {
   const float* values;
   const std::int32_t* rows;  // ascending
   std::size_t columns;
 };
 
-/// block -= A B^T where A are rows begin to end - 1 of `from` and B its first `target_count` rows, which are
-/// columns of the block: row r of the matrix is row place[r] of the block, column c its column c - first_column.
-/// Above the block's diagonal the result is without meaning. In vector instructions, the widest that the
-/// processor has. `scratch` is grown as needed.
+/// block -= A B^T. A is rows begin to end - 1 of `from`. B is its first `target_count` rows, which are columns of the
+/// block. Row r of the matrix is row place[r] of the block, and column c of the matrix is column c - first_column of
+/// the block. Above the block's diagonal the result is undefined. Uses the widest vector instructions that the
+/// processor has. `scratch` grows as needed.
 void subtract_update(const EliminatedRows& from, std::size_t target_count, std::size_t begin, std::size_t end,
                      const std::int32_t* place, std::int32_t first_column, float* block, std::size_t stride,
                      std::vector<float>& scratch);
 
-/// A lower triangle in the form that rows below it are solved with.
+/// A lower triangle, stored in the form that is needed to solve the rows below it.
 class SolvingTriangle {
  public:
-  /// Replaces the symmetric matrix whose lower triangle is in `triangle`, row-major, by its Cholesky factor with
-  /// the diagonal inverted. False where a pivot is not above `lowest[c]`, or not a number.
+  /// Replaces the symmetric matrix whose lower triangle is in `triangle`, row-major, by its Cholesky factor with the
+  /// diagonal inverted. False if a pivot is not above `lowest[c]` or is NaN.
   [[nodiscard]] bool factor(float* triangle, std::size_t columns, const float* lowest);
 
-  /// Replaces each of `row_count` rows b of as many columns by the x with L x = b, after factor(). `scratch` is
-  /// grown as needed.
+  /// Replaces each of `row_count` rows b, of as many columns as the triangle, by the x with L x = b. Call factor()
+  /// first. `scratch` grows as needed.
   void solve_rows(float* rows, std::size_t row_count, std::vector<float>& scratch) const;
 
  private:

@@ -10,10 +10,10 @@ namespace lpdeform {
 namespace {
 
 constexpr double kSameNormal = 0.99984769515639;  // cosine of 1 degree
-// Copies are compared with so many groups of their vertex: what has more is no surface.
+// The most groups per vertex that a copy is compared with. No real surface has more.
 constexpr std::size_t kMostCompared = 32;
 
-/// Length 1, or 0 where there is no direction.
+/// The vector scaled to length 1, or 0 if it has no direction.
 Eigen::RowVector3d unit(const Eigen::RowVector3d& vector) {
   const double length = vector.stableNorm();
   return length > 0 && std::isfinite(length) ? Eigen::RowVector3d(vector / length)
@@ -47,7 +47,7 @@ CarriedNormals::CarriedNormals(Faces faces, const Points& rest, const Weld& weld
 }
 
 void CarriedNormals::find_groups(const Weld& weld, const Points& rest_normals) {
-  std::vector<std::vector<std::int32_t>> groups_at(weld.welded_count());  // each by its first member
+  std::vector<std::vector<std::int32_t>> groups_at(weld.welded_count());  // groups by their first members
   group_of_.resize(weld.to_welded.size());
   for (std::int32_t v = 0; v < weld.split_count(); ++v) {
     std::vector<std::int32_t>& here = groups_at[weld.to_welded[v]];
@@ -60,7 +60,7 @@ void CarriedNormals::find_groups(const Weld& weld, const Points& rest_normals) {
   }
 }
 
-/// For each group the edge that is longest across its normal.
+/// Finds for each group the edge that is longest when projected across its normal.
 void CarriedNormals::find_references(const Points& rest, const Points& normals) {
   from_.assign(group_count_, -1);
   to_.assign(group_count_, -1);
@@ -99,7 +99,8 @@ Points CarriedNormals::group_normals(const Points& positions) const {
   return sums;
 }
 
-/// Columns: along the group's edge, across it, the normal. The identity where there is no such frame.
+/// Columns: the direction along the group's edge, the direction across it, and the normal. The identity if there is no
+/// such frame.
 Eigen::Matrix3d CarriedNormals::frame(std::int32_t group, const Eigen::RowVector3d& normal,
                                       const Points& positions) const {
   if (to_[group] < 0 || normal.isZero(0)) return Eigen::Matrix3d::Identity();

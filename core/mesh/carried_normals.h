@@ -8,31 +8,31 @@
 
 namespace lpdeform {
 
-/// Normals of a mesh's vertices while it is deformed.
+/// Vertex normals of a mesh while it is deformed.
 ///
-/// Copies of a vertex that share a normal at rest, to within 1 degree, are a group: one smooth piece of
-/// surface there. The faces around a group that use one of its copies give it the normal
+/// A group is the set of copies of a vertex whose rest normals agree to within 1 degree: one smooth piece of the
+/// surface. The faces that use one of the group's copies determine its normal,
 ///
 ///   N = sum over these faces of (angle at the vertex) x (unit normal), scaled to length 1
 ///
-/// (Thuermer & Wuethrich 1998), which does not depend on how the surface is cut into triangles.
+/// (Thuermer & Wuethrich 1998). It does not depend on how the surface is triangulated.
 ///
-/// Without rest normals all copies of a vertex are one group and take N: smooth everywhere, seams do not
-/// show. With them, each vertex keeps its own as it was drawn: the rest normal is held in the frame of N, the
-/// direction of one edge of the group across N, and the two's cross product, and comes back in the frame that
-/// the deformed surface has there. So at rest the normals are those given (scaled to length 1), a rigid
-/// motion turns them as it turns the surface, a hard edge, whose copies have normals of their own, stays
-/// hard, each side following its own faces, and a texture seam, whose copies share one, stays invisible.
+/// Without rest normals, all copies of a vertex form one group and have normal N: the surface is smooth everywhere, and
+/// seams are invisible. With rest normals, each vertex keeps its own. The rest normal is stored in a local frame: N,
+/// the direction of one edge of the group projected across N, and their cross product. It is then restored in the same
+/// frame of the deformed surface. So at rest the normals are the given ones (scaled to length 1), and a rigid motion
+/// rotates them with the surface. A hard edge, whose copies have different normals, stays hard: each side follows its
+/// own faces. A texture seam, whose copies share a normal, stays invisible.
 ///
-/// Immutable; any thread.
+/// Immutable; thread-safe.
 class CarriedNormals {
  public:
-  /// `faces` with indices in range and `rest` of the split mesh, finite. `rest_normals` has a row a split
-  /// vertex, finite, of any length; 0 asks for N. Or it has no rows: N everywhere.
+  /// `faces` (indices in range) and `rest` (finite) are those of the split mesh. `rest_normals` has one row per split
+  /// vertex, finite, of any length, where 0 asks for N; or it has no rows, which gives N everywhere.
   CarriedNormals(Faces faces, const Points& rest, const Weld& weld, const Points& rest_normals);
 
-  /// One normal a split vertex, of length 1. Where no face at the vertex has area, the rest normal as given,
-  /// or 0 where there was none. Copies with the same rest normal get the same bits. O(n + m).
+  /// One normal of length 1 per split vertex. If no face at the vertex has area, the rest normal as given, or 0 if
+  /// there was none. Copies with the same rest normal get the same bits. O(n + m).
   Points at(const Points& positions) const;
 
   std::size_t memory_bytes() const;
@@ -47,9 +47,9 @@ class CarriedNormals {
   std::vector<std::int32_t> group_of_;  // of each split vertex
   std::int32_t group_count_ = 0;
   // Only with rest normals.
-  std::vector<std::int32_t> from_, to_;  // the ends of each group's edge; -1 where it has none
+  std::vector<std::int32_t> from_, to_;  // the ends of each group's edge; -1 if it has none
   Points local_;                         // the rest normals in their groups' frames
-  Points kept_;                          // the same as given
+  Points kept_;                          // the rest normals as given
 };
 
 }  // namespace lpdeform

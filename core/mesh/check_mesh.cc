@@ -18,11 +18,11 @@ void count(DefectCount& defect, Index... index) {
     (defect.first.push_back(static_cast<std::int32_t>(index)), ...);
 }
 
-/// What later checks may rely on, face by face.
+/// What later checks may assume about each face.
 enum class FaceState : std::uint8_t {
   kSound,           // three different vertices in range
-  kRepeatedVertex,  // in range, but without an inside: takes no part in the checks of edges and fans
-  kOutOfRange,      // takes no part in anything
+  kRepeatedVertex,  // in range, but degenerate: skipped by the checks of edges and fans
+  kOutOfRange,      // skipped by all later checks
 };
 
 FaceState state_of(const Faces& faces, Eigen::Index f, Eigen::Index vertices) {
@@ -31,7 +31,7 @@ FaceState state_of(const Faces& faces, Eigen::Index f, Eigen::Index vertices) {
   return a == b || b == c || c == a ? FaceState::kRepeatedVertex : FaceState::kSound;
 }
 
-/// The first index of the face that no vertex has; there is one.
+/// The first index of the face that is out of range; there must be one.
 std::int32_t wrong_index(const TriangleMesh& mesh, Eigen::Index f) {
   int corner = 0;
   while (mesh.faces(f, corner) >= 0 && mesh.faces(f, corner) < mesh.vertices.rows()) ++corner;
@@ -119,8 +119,8 @@ std::array<std::int32_t, 2> end_corners(const Faces& faces, HalfEdge half_edge) 
   return runs_upwards(faces, half_edge) ? std::array{from, to} : std::array{to, from};
 }
 
-/// Counts bad edges and unites the corners, at each vertex, of faces that share an edge there: a fan is one
-/// set.
+/// Counts bad edges. Also unites, at each vertex, the corners of faces that share an edge there, so that each fan is
+/// one set.
 DisjointSets check_edges(const TriangleMesh& mesh, const EdgeTable& table, std::vector<bool>& is_not_manifold,
                          MeshReport& report) {
   DisjointSets fans(3 * mesh.faces.rows());
@@ -159,7 +159,7 @@ void check_fans(const TriangleMesh& mesh, const std::vector<FaceState>& states, 
   }
 }
 
-/// A boundary edge joins the fans at its two ends; what hangs together so is one loop.
+/// A boundary edge joins the fans at its two ends. Each connected set of fans is one loop.
 std::int64_t count_boundary_loops(const TriangleMesh& mesh, const EdgeTable& table, DisjointSets& fans) {
   std::vector<std::int32_t> boundary;
   table.for_edges([&](std::int32_t, std::int32_t, std::span<const HalfEdge> sides) {
@@ -173,7 +173,7 @@ std::int64_t count_boundary_loops(const TriangleMesh& mesh, const EdgeTable& tab
   return std::unique(boundary.begin(), boundary.end()) - boundary.begin();
 }
 
-/// Vertices of boundary edges that coincide with others of them.
+/// Finds vertices of boundary edges that coincide with other such vertices.
 void check_borders(const TriangleMesh& mesh, const EdgeTable& table, MeshReport& report) {
   std::vector<bool> is_at_border(mesh.vertices.rows());
   table.for_edges([&](std::int32_t low, std::int32_t high, std::span<const HalfEdge> sides) {

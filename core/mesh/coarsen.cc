@@ -13,7 +13,7 @@ using HalfEdgeMesh = CollapsibleMesh;
 using HalfEdge = OpenMesh::SmartHalfedgeHandle;
 using OpenMesh::Vec3d;
 
-constexpr double kGrowth = 1.2;  // of the longest edge collapsed, from round to round
+constexpr double kGrowth = 1.2;  // factor from round to round of the longest edge to collapse
 constexpr unsigned kLargestValence = 10;
 constexpr double kLargestTurn = 0.5;  // the cosine
 

@@ -11,7 +11,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr std::int64_t kMostDistances = 1000;  // a point
+constexpr std::int64_t kMostDistances = 1000;  // per point
 
 struct Box {
   Eigen::RowVector3d low = Eigen::RowVector3d::Zero(), high = Eigen::RowVector3d::Zero();
@@ -29,7 +29,7 @@ Box box_of_finite(const Points& points) {
   return box;
 }
 
-/// The points seen so far by the cubes of a grid. Works in shares of the box's largest extent, so that neither
+/// The points added so far, in the cubes of a grid. Lengths are relative to the box's largest extent, so that neither
 /// very large nor very small coordinates leave the range of a double.
 class Grid {
  public:
@@ -40,14 +40,14 @@ class Grid {
     if (half_extent_ == 0) half_extent_ = 1;
     const double diagonal = ((box.high / 2 - low_) / half_extent_).norm();
     nearest_ = share * diagonal;
-    // Cells hold few points of a surface, and are so large that a ball meets at most eight of them.
+    // Cells are small enough to hold few points of a surface, and large enough that a ball meets at most eight of them.
     const double spacing = diagonal / (2 * std::sqrt(static_cast<double>(count) + 1));
     side_ = std::max({std::clamp(spacing, 2 * nearest_, 64 * nearest_), 1e-12});
     heads_.reserve(count);
   }
 
-  /// Calls `meets(other)` for the points before that `point` coincides with; takes it up where it is in a place
-  /// of its own. Returns the number of distances that it took.
+  /// Calls `meets(other)` for earlier points that `point` coincides with; adds `point` if it is at a new place. Returns
+  /// the number of distances computed.
   template <typename Meets>
   std::int64_t add(std::int32_t point, const Meets& meets) {
     const Eigen::RowVector3d at = (points_.row(point) / 2 - low_) / half_extent_;
@@ -84,10 +84,10 @@ class Grid {
   }
 
   const Points& points_;
-  Eigen::RowVector3d low_;  // halved, as all extents here: whole ones may be infinite
+  Eigen::RowVector3d low_;  // halved, like all extents here: full ones may overflow
   double half_extent_ = 1, nearest_ = 0, side_ = 1;
-  absl::flat_hash_map<Cell, std::int32_t> heads_;  // the last point of each cell,
-  std::vector<std::int32_t> next_;                 // and the one before each
+  absl::flat_hash_map<Cell, std::int32_t> heads_;  // the last point of each cell
+  std::vector<std::int32_t> next_;                 // the previous point in the cell of each point
 };
 
 }  // namespace

@@ -34,7 +34,7 @@ bool keeps_orientation(const CollapsibleMesh& mesh, OpenMesh::SmartHalfedgeHandl
     const OpenMesh::Vec3d from = mesh.point(out.from());
     const OpenMesh::Vec3d before = (mesh.point(b) - from).cross(mesh.point(c) - from);
     const OpenMesh::Vec3d after = (mesh.point(b) - target).cross(mesh.point(c) - target);
-    // Slivers have no direction to keep, but nothing may become one.
+    // A sliver may turn, since it has no direction to keep, but no face may become one.
     if (!(after.sqrnorm() > 0) || before.dot(after) < cosine * before.norm() * after.norm()) return false;
   }
   return true;

@@ -6,7 +6,7 @@
 
 namespace lpdeform {
 
-/// OpenMesh's half-edges with double coordinates and what collapses need to know of deleted elements.
+/// OpenMesh's half-edge mesh with double coordinates and the status attributes that edge collapses need.
 struct CollapsibleTraits : OpenMesh::DefaultTraits {
   using Point = OpenMesh::Vec3d;
   using Normal = OpenMesh::Vec3d;
@@ -16,10 +16,11 @@ struct CollapsibleTraits : OpenMesh::DefaultTraits {
 };
 using CollapsibleMesh = OpenMesh::TriMesh_ArrayKernelT<CollapsibleTraits>;
 
-/// Faces at which the mesh is not a manifold are left out; vertices keep their numbers.
+/// Converts a mesh. Faces at which it is not a manifold are left out; vertices keep their numbers.
 CollapsibleMesh to_collapsible(const TriangleMesh& mesh);
 
-/// Whether the faces that stay when `half_edge` collapses into its target turn by no more than this cosine says.
+/// Whether, when `half_edge` collapses into its target, the remaining faces turn by no more than the angle with this
+/// cosine.
 bool keeps_orientation(const CollapsibleMesh& mesh, OpenMesh::SmartHalfedgeHandle half_edge, double cosine);
 
 }  // namespace lpdeform

@@ -16,7 +16,7 @@ void for_sides(const Faces& faces, const std::function<bool(Eigen::Index)>& take
   }
 }
 
-/// By (high, id); ids ascend before.
+/// Sorts by (high, id). The ids must be ascending before.
 void sort_by_high(std::vector<HalfEdge>& half_edges, std::int32_t first, std::int32_t last) {
   constexpr std::int32_t kFew = 32;
   const auto begin = half_edges.begin() + first, end = half_edges.begin() + last;

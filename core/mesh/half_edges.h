@@ -10,7 +10,7 @@
 
 namespace lpdeform {
 
-/// Sets of integers 0 to n - 1, united step by step.
+/// Disjoint sets of the integers 0 to n - 1 (union-find).
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
@@ -21,7 +21,7 @@ class DisjointSets {
     return item;
   }
 
-  /// False where both were in one set already.
+  /// False if both were already in the same set.
   bool unite(std::int32_t a, std::int32_t b) {
     a = find(a), b = find(b);
     if (a == b) return false;
@@ -46,12 +46,11 @@ inline std::int32_t next_corner(std::int32_t id) {
   return id % 3 == 2 ? id - 2 : id + 1;
 }
 
-/// The undirected edges of a triangle list that may be non-manifold: half-edges grouped by their two
-/// vertices.
+/// The undirected edges of a triangle list, which may be non-manifold: half-edges grouped by their two vertices.
 class EdgeTable {
  public:
-  /// Takes the faces for which `takes(f)`; their indices must lie in [0, vertices). Sides from a vertex to
-  /// itself are left out. O(n + m log k), k the most half-edges at one vertex.
+  /// Includes the faces for which `takes(f)` is true; their indices must be in [0, vertices). Sides from a vertex to
+  /// itself are left out. O(n + m log k), where k is the largest number of half-edges at one vertex.
   EdgeTable(std::int64_t vertices, const Faces& faces, const std::function<bool(Eigen::Index)>& takes);
 
   /// Calls `visit(low, high, half_edges)` for each edge, in ascending order of (low, high).
@@ -59,7 +58,7 @@ class EdgeTable {
       const std::function<void(std::int32_t low, std::int32_t high, std::span<const HalfEdge>)>& visit) const;
 
  private:
-  std::vector<std::int32_t> start_;  // of each lower vertex in half_edges_
+  std::vector<std::int32_t> start_;  // the first half-edge of each lower vertex in half_edges_
   std::vector<HalfEdge> half_edges_;
 };
 

@@ -4,8 +4,7 @@
 
 namespace lpdeform {
 
-/// A triangle mesh as its owner sees it: vertex order is never changed. Not necessarily a sound one: see
-/// check_mesh.
+/// A triangle mesh in its owner's vertex order, which is never changed. The mesh may have defects: see check_mesh.
 struct TriangleMesh {
   Points vertices;
   Faces faces;

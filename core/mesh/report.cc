@@ -15,7 +15,7 @@ struct DefectEntry {
   DefectCount MeshReport::*count;
 };
 
-/// In the order of the enum.
+/// In the order of Defect.
 constexpr std::array<DefectEntry, 12> kDefects{{
     {"not_finite", &MeshReport::not_finite},
     {"index_out_of_range", &MeshReport::index_out_of_range},

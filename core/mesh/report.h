@@ -21,16 +21,16 @@ enum class Defect {
   kNonManifoldEdge,          // edge: more than two faces
   kNonManifoldVertex,        // vertex: its faces do not form one fan
   kInconsistentOrientation,  // edge: its two faces run along it in the same direction
-  kSplitBorderVertex,  // vertex: at a border, where another vertex at a border is. Comes apart unless welded.
+  kSplitBorderVertex,  // vertex: at a border, coincides with another at a border. Splits open unless welded.
   kClampedEdge,        // edge: negative cotangent weight, clamped to 0
-  kFlooredVertex,      // vertex: kept attached by the floor on its edges' weights
-  kFlippedEdge,        // edge: not Delaunay; gave way to another with intrinsic Delaunay weights
+  kFlooredVertex,      // vertex: kept attached by the floor on edge weights
+  kFlippedEdge,        // edge: not Delaunay; replaced by another edge with intrinsic Delaunay weights
 };
 
 /// The name in reports and on the wire: "zero_area_faces".
 std::string_view defect_name(Defect defect);
 
-/// How many there are, and the first few of them by index (edges as pairs: 2 entries an edge, lower index
+/// The number of defects of one kind, and the first few by index (edges as pairs: 2 entries per edge, lower index
 /// first).
 struct DefectCount {
   std::int64_t count = 0;
@@ -39,7 +39,7 @@ struct DefectCount {
   static constexpr int kFirstShown = 10;
 };
 
-/// What is to be known of a mesh before it is deformed.
+/// What a caller should know about a mesh before deforming it.
 struct MeshReport {
   std::int64_t vertices = 0;
   std::int64_t faces = 0;
@@ -49,8 +49,8 @@ struct MeshReport {
 
   DefectCount not_finite, index_out_of_range, unreferenced_vertices, duplicate_faces, zero_area_faces,
       non_manifold_edges, non_manifold_vertices, inconsistent_orientation, split_border_vertices;
-  std::int32_t wrong_index = 0;  // of the first face of index_out_of_range
-  /// Known once weights are chosen (count_weight_defects in core/energy/weights.h); 0 before.
+  std::int32_t wrong_index = 0;  // the wrong index of the first face in index_out_of_range
+  /// Set when weights are computed (count_weight_defects in core/energy/weights.h); 0 before.
   DefectCount clamped_edges, floored_vertices, flipped_edges;
 
   const DefectCount& of(Defect defect) const;
@@ -60,15 +60,15 @@ struct MeshReport {
 /// Every kind of defect, in the order of the enum.
 const std::vector<Defect>& all_defects();
 
-/// Examines `mesh`; never fails, also where the mesh cannot be deformed. O(n + m log m).
+/// Examines `mesh`. Never fails, even if the mesh cannot be deformed. O(n + m log m).
 MeshReport check_mesh(const TriangleMesh& mesh);
 
-/// INVALID_ARGUMENT with the first offending element where the mesh cannot be deformed: reasons MESH_EMPTY,
+/// INVALID_ARGUMENT with the first offending element if the mesh cannot be deformed. Reasons: MESH_EMPTY,
 /// MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, MESH_NO_AREA (every face has zero area).
 absl::Status deformable(const MeshReport& report);
 
-/// The connected component of each vertex, numbered from 0 by lowest vertex; -1 for unreferenced vertices.
-/// Needs faces with indices in range.
+/// The connected component of each vertex, numbered from 0 by lowest vertex; -1 for unreferenced vertices. Requires
+/// faces with indices in range.
 std::vector<std::int32_t> connected_components(const TriangleMesh& mesh);
 
 }  // namespace lpdeform

@@ -7,10 +7,10 @@
 
 namespace lpdeform {
 
-/// Whether the triangle a b c has no area to rounding. With L its longest edge and M its largest coordinate:
+/// Whether the triangle a b c has area 0 to rounding. With L its longest edge and M its largest coordinate:
 ///     twice its area <= (1e-12 L + 8 u M) L,   u = 2^-52.
-/// The second term is what moving the triangle far from the origin costs its corners. Does not depend on the
-/// unit of length. One rule for the mesh report and for the weights.
+/// The second term covers the rounding of corners far from the origin. Does not depend on the unit of length.
+/// The mesh report and the weights use this same rule.
 inline bool is_zero_area(const Eigen::RowVector3d& a, const Eigen::RowVector3d& b,
                          const Eigen::RowVector3d& c) {
   const double largest =

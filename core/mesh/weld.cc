@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kFarthestCopy = 1e-6, kLargestTolerance = 1e-3;  // of the diagonal
 
-/// From the lowest copy of each vertex.
+/// Makes a Weld from the lowest copy of each vertex.
 Weld from_lowest(const Points& positions, const std::vector<std::int32_t>& lowest) {
   Weld weld;
   weld.same_place = kSamePlace * diagonal_of(positions);
@@ -41,7 +41,7 @@ absl::Status check_groups(std::int64_t vertices, std::span<const std::uint32_t> 
                    " vertices."));
 }
 
-/// Copies that are not finite are left to the check of the mesh.
+/// Skips copies that are not finite: check_mesh reports them.
 absl::Status check_distances(const Points& positions, const std::vector<std::int32_t>& lowest) {
   if (lowest.empty()) return absl::OkStatus();
   const double diagonal = (positions.colwise().maxCoeff() - positions.colwise().minCoeff()).norm();

@@ -9,7 +9,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kStepShare = 0.99;  // of the way to the border of the cones
+constexpr double kStepShare = 0.99;  // the share of the way to the boundary of the cones
 
 /// u^2 - |v|^2, without cancellation where it is small.
 double squared_distance(double head, double tail_norm) {
@@ -73,7 +73,7 @@ void ConicStep::update_bounds() {
   lower_bound_ = std::max(lower_bound_, constant_ + (bound - constant_) / scale);
 }
 
-/// The scaling points w bar, eta of each cone, and lambda.
+/// Computes w bar and eta, the scaling of each cone, and lambda.
 void ConicStep::scale_cones() {
   for (const std::int32_t i : cells_) {
     const auto z = rows(s_.tail, i), w = rows(w_.tail, i);
@@ -82,7 +82,7 @@ void ConicStep::scale_cones() {
     const double inner = (s_.head[i] * w_.head[i] + z.cwiseProduct(w).sum()) / (s_size * w_size);
     const double gamma = std::sqrt(0.5 * (1 + inner));
     rows(v_, i) = (z / s_size - w / w_size) / (2 * gamma);
-    // u^2 = 1 + |v|^2 holds exactly this way.
+    // Computed this way, u^2 = 1 + |v|^2 holds exactly.
     scaling_[i].u = std::sqrt(1 + rows(v_, i).squaredNorm());
     scaling_[i].eta = std::sqrt(s_size / w_size);
     const auto v = rows(v_, i);
@@ -92,7 +92,7 @@ void ConicStep::scale_cones() {
   }
 }
 
-/// sum_i eta_i^-2 A_i^T (I - kappa_i v_i v_i^T) A_i, kappa = 2 / (2 u^2 - 1): T_i eliminated.
+/// Assembles sum_i eta_i^-2 A_i^T (I - kappa_i v_i v_i^T) A_i, kappa = 2 / (2 u^2 - 1): the system with T_i eliminated.
 void ConicStep::assemble() {
   std::fill(matrix_.values.begin(), matrix_.values.end(), 0.0);
   std::vector<std::int32_t> members;
@@ -125,7 +125,7 @@ void ConicStep::assemble() {
   }
 }
 
-/// The matrix of assemble() without assembling.
+/// Multiplies by the matrix of assemble() without assembling it.
 Points ConicStep::apply_schur(const Points& dx) const {
   EdgeVectors dz;
   apply_edges(shape(), dx, dz);
@@ -164,8 +164,7 @@ void ConicStep::correct(const Cones& ds, const Cones& dw, double centre, Cones& 
   }
 }
 
-/// Newton's direction for W dw + W^-1 ds = -lambda \ target with ds = (dT, A dx), dw = (0, dw), A^T (w + dw)
-/// = 0.
+/// The Newton direction of W dw + W^-1 ds = -lambda \ target with ds = (dT, A dx), dw = (0, dw), A^T (w + dw) = 0.
 bool ConicStep::direction(const Cones& target, Points& dx, Cones& ds, Cones& dw) {
   Cones g{std::vector<double>(s_.head.size(), 0.0),
           EdgeVectors::Zero(v_.rows(), 3)};  // W^-1 (lambda \ target)
@@ -214,7 +213,7 @@ bool ConicStep::direction(const Cones& target, Points& dx, Cones& ds, Cones& dw)
   return true;
 }
 
-/// The largest step, 1 at most, with point + step * direction still in the cones.
+/// The largest step, at most 1, for which point + step * direction is still in the cones.
 double ConicStep::step_length(const Cones& point, const Cones& direction) const {
   double step = 1 / kStepShare;
   for (const std::int32_t i : cells_) {
@@ -226,7 +225,7 @@ double ConicStep::step_length(const Cones& point, const Cones& direction) const 
     if (direction.head[i] < 0) step = std::min(step, -point.head[i] / direction.head[i]);
     const double root = b * b - a * c;
     if (root < 0) continue;
-    // The smallest positive root, by the form that does not cancel.
+    // The smallest positive root, by the formula without cancellation.
     const double denominator = b < 0 ? -b + std::sqrt(root) : -b - std::sqrt(root);
     if (b < 0)
       step = std::min(step, c / denominator);

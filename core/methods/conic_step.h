@@ -9,35 +9,35 @@
 
 namespace lpdeform {
 
-/// The convex step of p = 1 as a second-order cone program (Eq. 11, the root of w_ij over the whole
+/// The convex step of p = 1 as a second-order cone program (Eq. 11, with the root of w_ij applied to the whole
 /// difference):
 ///
 ///   minimise sum_i k_i T_i   subject to   T_i >= |z_i|,  z = A x - b
 ///
-/// with the rotations held and k_i the norm's coefficients, by a primal-dual interior-point method with Nesterov-Todd scaling and Mehrotra's predictor-corrector (as
-/// in Vandenberghe, "The CVXOPT linear and quadratic cone program solvers", 2010). The dual cone variables
-/// are (k_i, w_i) with A^T w = 0. It starts strictly feasible on both sides (T_i > |z_i| and w = 0) and stays
-/// so: each iterate has a primal value and a lower bound. A 3n x 3n system on the two-ring pattern is
-/// factored in each iteration, with the T_i eliminated.
+/// with rotations held fixed; k_i are the norm's coefficients. It is solved by a primal-dual interior-point method with
+/// Nesterov-Todd scaling and Mehrotra's predictor-corrector (as in Vandenberghe, "The CVXOPT linear and quadratic cone
+/// program solvers", 2010). The dual cone variables are (k_i, w_i) with A^T w = 0. The method starts strictly feasible,
+/// both primal (T_i > |z_i|) and dual (w = 0), and stays so: each iterate has a primal value and a lower bound. Each
+/// iteration eliminates the T_i and factors a 3n x 3n system on the two-ring pattern.
 class ConicStep {
  public:
-  /// `rotations` are held; `x` is the initial guess.
+  /// `rotations` are held fixed; `x` is the initial guess.
   ConicStep(const Problem& problem, std::vector<Eigen::Matrix3d> rotations, const Points& x);
 
-  /// One iteration. False where none is possible any more: the factorisation failed or the step vanished.
+  /// Makes one iteration. False if no further iteration is possible: the factorisation failed or the step vanished.
   bool iterate();
 
   const Points& x() const { return x_; }
   double primal() const { return primal_; }            // sum_i k_i |z_i(x)|
-  double lower_bound() const { return lower_bound_; }  // best dual value so far: no x has a smaller sum
-  /// (primal - lower bound) / primal; 0 where primal is 0 to rounding.
+  double lower_bound() const { return lower_bound_; }  // the best dual value so far; no x has a smaller sum
+  /// The relative duality gap (primal - lower bound) / primal; 0 if primal is 0 to rounding.
   double relative_gap() const;
 
  private:
   /// A point of the product of cones, or a direction in it.
   struct Cones {
-    std::vector<double> head;  // one a cell
-    EdgeVectors tail;          // z_i or w_i by rows of the cell
+    std::vector<double> head;  // one per cell
+    EdgeVectors tail;          // z_i or w_i in the rows of the cell
   };
   /// Nesterov-Todd scaling of one cone, with (u, v) = w bar and u^2 - |v|^2 = 1:
   ///   W = eta [u, v^T; v, I + v v^T / (1 + u)].
@@ -64,8 +64,8 @@ class ConicStep {
 
   Problem problem_;
   std::vector<Eigen::Matrix3d> rotations_;
-  std::vector<std::int32_t> cells_;  // those with a free vertex; the others are constant
-  std::vector<std::int32_t> free_;   // vertex -> index among the free ones, -1 where held
+  std::vector<std::int32_t> cells_;  // cells with a free vertex; all others are constant
+  std::vector<std::int32_t> free_;   // index of each vertex among the free ones; -1 if held
   Points x_;
   Cones s_, w_;  // (T, z) and (k, w)
   std::vector<Scaling> scaling_;

@@ -8,7 +8,7 @@ namespace lpdeform {
 
 namespace {
 
-constexpr double kRounding = 1e-15;  // of a sum
+constexpr double kRounding = 1e-15;  // relative, of a sum
 
 }  // namespace
 
@@ -21,8 +21,7 @@ StepResult LineSearch::step() {
   if (problem_.is_zero(objective_)) return {Outcome::kConverged, objective_, 0};
   problem_.objective.gradient(gradient_);
   restrict_to_free(problem_.constraints, gradient_);
-  // The gradient with respect to positions in units of l, X = x / l, is l times the one at hand; a step in X
-  // is worth l in x.
+  // For positions in units of l, X = x / l, the gradient is l times gradient_, and a step in X is l times as long in x.
   const double squared_unit = problem_.length_unit * problem_.length_unit;
   const double squared_slope = squared_unit * gradient_.squaredNorm();
   if (squared_slope == 0) return {Outcome::kConverged, objective_, 0};
@@ -36,10 +35,10 @@ StepResult LineSearch::step() {
     if (value <= objective_ - kAlpha * t * squared_slope) break;
     if (t * std::sqrt(squared_slope) < 1e-15) return {Outcome::kStalled, objective_, 0};
   }
-  if (!(value <= objective_)) return {Outcome::kProgress, objective_, 0};  // stopped in mid-search
+  if (!(value <= objective_)) return {Outcome::kProgress, objective_, 0};  // stopped during the search
   const double full_step = std::sqrt(squared_slope / static_cast<double>(x_.rows()));
   const double threshold = kDisplacement * problem_.tolerance / SolveSettings::kDefaultTolerance;
-  // A step so short that rounding hides its decrease says nothing of the distance to the minimum.
+  // If rounding hides the decrease, the short step says nothing about the distance to the minimum.
   const bool is_hidden = objective_ - value <= kRounding * objective_ && full_step >= threshold;
   x_.swap(trial_);
   objective_ = value;

@@ -4,8 +4,8 @@
 
 namespace lpdeform {
 
-/// The paper's section 3.2: gradient descent (Eq. 10) with backtracking, alpha = 0.3, beta = 0.5, t from 1,
-/// in units of the length l, in which that first step is taken. Rotations are fitted in every evaluation.
+/// The paper's section 3.2: gradient descent (Eq. 10) with a backtracking line search, alpha = 0.3, beta = 0.5. The
+/// search starts at t = 1, for positions in units of the length l. Rotations are fitted in every evaluation.
 ///
 /// Converged when the root-mean-square displacement of an iteration, sqrt(sum_i |dx_i|^2 / n), is below
 /// 5e-5 l * tolerance / SolveSettings::kDefaultTolerance (the paper's epsilon_L at the default), or

@@ -4,14 +4,14 @@
 
 namespace lpdeform {
 
-/// As-rigid-as-possible surface modeling (Sorkine & Alexa 2007), p = 2: rotations fitted for given positions,
-/// then positions solved for given rotations, which is one Newton step x - M^-1 grad with the constant matrix
-/// M (see Metric).
+/// The local/global method of as-rigid-as-possible surface modeling (Sorkine & Alexa 2007), p = 2. The local step fits
+/// rotations for given positions. The global step solves for positions with given rotations, which is one Newton step x
+/// - M^-1 grad with the constant, prefactored matrix M (see Metric).
 ///
-/// Converged when the decrease of the last three iterations is at most 3 * tolerance * E.
+/// Converged when each of three consecutive iterations has decreased E by at most tolerance * E, or when E is 0.
 class LocalGlobal : public Minimiser {
  public:
-  /// Needs p = 2 everywhere. `x` is the initial guess.
+  /// Requires p = 2 everywhere. `x` is the initial guess.
   LocalGlobal(Problem problem, Points x);
 
   StepResult step() override;

@@ -8,7 +8,7 @@ namespace lpdeform {
 namespace {
 
 constexpr std::size_t kChunk = 12288;      // numbers
-constexpr double kLeastCurvature = 1e-12;  // <s, y> over |s| |y|
+constexpr double kLeastCurvature = 1e-12;  // the least <s, y> / (|s| |y|)
 constexpr double kLeastGamma = 0.05, kMostGamma = 4;
 
 }  // namespace
@@ -19,7 +19,7 @@ std::vector<KeptPair> PairMemory::kept() const {
   return result;
 }
 
-/// What sweep_products adds up, over all chunks in their order.
+/// The sums of sweep_products over all chunks, added in chunk order.
 std::vector<double> PairMemory::products(const Points& gradient, const Points& gradient_before,
                                          const Points& h, const Points& h_before, double length,
                                          const Points& d) {
@@ -39,7 +39,7 @@ std::vector<double> PairMemory::products(const Points& gradient, const Points& g
   return sums;
 }
 
-/// Keeps the candidate; forgets the oldest pair where there are too many.
+/// Stores the candidate; drops the oldest pair if there are too many.
 void PairMemory::take_in(const std::vector<double>& sums) {
   Pair pair = std::move(candidate_);
   pair.sy.clear();

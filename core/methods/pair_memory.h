@@ -13,14 +13,15 @@ namespace lpdeform {
 ///
 ///   H g = gamma h + S R^-T ((D + gamma W) a - gamma Z^T g) - gamma Z a,   a = R^-1 S^T g,   h = M^-1 g
 ///
-/// with M the metric, columns s = x' - x and z = M^-1 y = h' - h of S and Z, y = g' - g, R the upper triangle of
-/// S^T Y, D its diagonal, W = Z^T Y. H_0 = gamma M^-1 with gamma = <s, y> / <z, y> of the newest pair (Nocedal &
-/// Wright, 7.20), between 0.05 and 4: for p > 2 the metric lacks the curvature along the residuals, (p - 1) times as
-/// much, and full steps would be too long; where rotations follow a step, it has more than there is, and full steps
-/// would be about half as long as they should. It outlives clear().
+/// M is the metric. S and Z have columns s = x' - x and z = M^-1 y = h' - h, where y = g' - g. R is the upper triangle
+/// of S^T Y, D its diagonal, W = Z^T Y. H_0 = gamma M^-1 with gamma = <s, y> / <z, y> of the newest pair (Nocedal &
+/// Wright, 7.20), clamped to [0.05, 4]. gamma corrects two errors of the metric. For p > 2 it lacks the curvature along
+/// the residuals, which is (p - 1) times as large, so full steps would be too long. Where rotations follow a step, it
+/// overestimates the curvature, so full steps would be about half as long as they should be. clear() keeps gamma.
 ///
-/// All vectors are swept over twice an iteration and no more. Pairs are kept in single precision: they only steer.
-/// Runs in parallel in fixed chunks: the same bits on any number of threads. One caller at a time.
+/// Each iteration makes only two passes over all vectors. Pairs are stored in single precision, since they only affect
+/// the search direction. Runs in parallel in fixed chunks, which gives the same bits on any number of threads. One
+/// caller at a time.
 class PairMemory {
  public:
   PairMemory(Workers workers, std::size_t most_pairs)
@@ -30,16 +31,16 @@ class PairMemory {
   void clear() { pairs_.clear(); }
   bool is_empty() const { return pairs_.empty(); }
 
-  /// d = -H g; returns <g, d>. `length` > 0 says that the step length * d has been made since the last call, when
-  /// gradient and h were those before: the pair is taken in, unless <s, y> is not positive to rounding. 0 where
-  /// there was none, or clear() came between.
+  /// d = -H g; returns <g, d>. `length` > 0 means that the step length * d was made since the last call, at which
+  /// gradient and h were gradient_before and h_before. Its pair is then stored, unless <s, y> is not positive to
+  /// rounding. Pass 0 if no step was made, or after clear(); then d = -gamma h.
   double direction(const Points& gradient, const Points& gradient_before, const Points& h,
                    const Points& h_before, double length, Points& d);
 
  private:
   struct Pair {
     std::vector<float> s, z;
-    std::vector<double> sy, zy;  // <s_i, y>, <z_i, y> with this pair's y, for each older pair i and this one
+    std::vector<double> sy, zy;  // <s_i, y>, <z_i, y> with this pair's y, for all older pairs i and this one
   };
   std::vector<KeptPair> kept() const;
   std::vector<double> products(const Points& gradient, const Points& gradient_before, const Points& h,
@@ -49,7 +50,7 @@ class PairMemory {
   Workers workers_;
   const std::size_t most_pairs_;
   std::vector<Pair> pairs_;  // oldest first
-  Pair candidate_;           // where the next is swept into
+  Pair candidate_;           // buffer for the next pair
   std::vector<double> chunk_sums_;
   double gamma_ = 1;
 };

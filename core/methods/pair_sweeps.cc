@@ -1,6 +1,6 @@
 #include "core/methods/pair_sweeps.h"
 
-// Compiled once for each of these instruction sets; which runs is decided when it is first called.
+// This file is compiled once for each instruction set. The first call decides which version runs.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #define HWY_TARGET_INCLUDE "core/methods/pair_sweeps.cc"
 #include <hwy/foreach_target.h>
@@ -16,7 +16,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::ScalableTag<double>;
 using V = hn::Vec<D>;
 
-constexpr std::size_t kStretch = 512;  // numbers that stay in the first-level cache between the pairs
+constexpr std::size_t kStretch = 512;  // numbers; few enough to stay in the first-level cache for all pairs
 
 HWY_INLINE V load_floats(const float* at) {
   return hn::PromoteTo(D(), hn::LoadU(hn::Rebind<float, D>(), at));

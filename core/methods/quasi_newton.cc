@@ -6,24 +6,42 @@
 namespace lpdeform {
 namespace {
 
+// f is the stage's objective, g its gradient, d the direction, t the step's length; f_k is f after k iterations of the stage.
+
+/// Pairs (s, y) that the direction is made of.
 constexpr std::size_t kMemory = 6;
 constexpr std::size_t kChunk = 4096;  // vertices
-constexpr int kWindow = 20;
-constexpr int kRefresh = 40;
-constexpr int kSoonest = 2;         // iterations between refreshes, where one is asked for
-constexpr double kShortStep = 0.9;  // asks for one
-constexpr int kTrial = 10;          // iterations for which a live session keeps the metric that it finds
+
+/// The search along d accepts t where f(x + t d) <= f(x) + kSufficientDecrease t <g, d> .
 constexpr double kSufficientDecrease = 1e-4;
+
+/// The last stage has converged where f_(k - kWindow) - f_k <= tolerance p f_k , p the largest p_i.
+constexpr int kWindow = 20;
+/// Any other stage ends where f_(k - kWindow) - f_k <= kStageTolerance tolerance p f_k , or k >= kStageIterations .
+constexpr double kStageTolerance = 30;
 constexpr int kStageIterations = 60;
-constexpr double kStageTolerance = 30;  // times the tolerance ends a stage that is not the last
-constexpr double kSmoothingStep = 0.1;  // of eps^2, from stage to stage
-constexpr double kLargeP = 12;
-constexpr double kBias = 3e-4;
-constexpr double kLeastBias = 0.01;  // with kLeastSmoothing
-constexpr double kLiveBias = 0.1;    // of the mean cell's E^p
-// eps^2 over the squared diagonal:
+
+/// The metric is refactored where r >= kRefresh , r the iterations since it was; or where t < kShortStep and r >= kSoonest .
+constexpr int kRefresh = 40, kSoonest = 2;
+constexpr double kShortStep = 0.9;
+/// A live session begins with r = kRefresh - kTrial : it keeps the metric that it finds for kTrial iterations.
+constexpr int kTrial = 10;
+
+/// From one stage of smoothing to the next, eps^2 becomes kSmoothingStep eps^2 .
+constexpr double kSmoothingStep = 0.1;
+/// eps^2 over the squared diagonal, of the first: after a plain guess, and after a coarse level.
 constexpr double kColdSmoothing = 1e-8, kPreparedSmoothing = 1e-9;
-constexpr double kLeastSmoothing = 1e-26;  // rounding
+/// A live session's first eps adds a tenth to the mean cell: eps^p = kLiveBias (mean E_i)^p , p the lowest p_i.
+constexpr double kLiveBias = 0.1;
+/// Smoothing has ended where eps^2 <= kLeastSmoothing diagonal^2 (rounding),
+constexpr double kLeastSmoothing = 1e-26;
+/// or where sum over p_i < 2 of eps^p_i <= kBias sum_i E_i^p_i .
+constexpr double kBias = 3e-4;
+/// What was minimised is the true objective F where f - F <= kLeastBias F . Else the solve has stalled, not converged.
+constexpr double kLeastBias = 0.01;
+
+/// A cold solve goes by way of p = 4 where the largest p_i > kLargeP and the lowest p_i >= 2 .
+constexpr double kLargeP = 12;
 
 }  // namespace
 
@@ -34,19 +52,21 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
       memory_(problem_.objective.cells().workers(), kMemory) {
   const double lowest = problem_.norm.lowest_p();
   if (lowest < 2) eps2_ = first_smoothing(warmth, lowest);
-  // No way from p = 2 where all p_i > 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8 times
-  // the E^(1/p)).
+  // If all p_i > 2, there is no continuation from p = 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8
+  // times the E^(1/p)).
   for (const double p : {2.0, 1.6, 1.35, 1.2, 1.1, 1.05}) {
     if (warmth == Warmth::kCold && p > lowest) shares_.push_back((2 - p) / (2 - lowest));
   }
-  // By way of p = 4 where p is larger still: straight on, a bent grid at p = 24 ends at 1.9 times the E^(1/p).
+  // If p is larger still, the solve goes through p = 4 first: without this stage, a bent grid at p = 24 ends at 1.9
+  // times the E^(1/p).
   const double highest = problem_.norm.highest_p();
   if (warmth == Warmth::kCold && lowest >= 2 && highest > kLargeP) shares_.push_back((4 - 2) / (highest - 2));
   begin_stage(warmth == Warmth::kWithMetric);
   true_sum_ = problem_.objective.sum(problem_.norm);
 }
 
-/// The objective of stage_: p first, then eps. problem_.objective holds the evaluation at x_.
+/// Sets up the objective of stage_: early stages change p, later ones eps. problem_.objective holds the evaluation at
+/// x_.
 void QuasiNewton::begin_stage(bool keeps_metric) {
   const bool is_on_the_way = stage_ < static_cast<int>(shares_.size());
   if (stage_ > static_cast<int>(shares_.size())) eps2_ *= kSmoothingStep;
@@ -68,7 +88,8 @@ double QuasiNewton::mean_energy() const {
   return sum / static_cast<double>(problem_.shape().cell_count());
 }
 
-/// eps^2. A live session's cells have energies to go by; a cold guess's are far too large.
+/// The first eps^2. In a live session it follows from the cells' energies. After a cold guess these are far too large,
+/// so the diagonal decides.
 double QuasiNewton::first_smoothing(Warmth warmth, double lowest_p) const {
   const double diagonal2 = problem_.diagonal * problem_.diagonal;
   if (warmth == Warmth::kCold) return kColdSmoothing * diagonal2;
@@ -77,7 +98,8 @@ double QuasiNewton::first_smoothing(Warmth warmth, double lowest_p) const {
   return std::max(eps * eps, kLeastSmoothing * diagonal2);
 }
 
-/// What the cells with p_i < 2 add to the smoothed objective where they have no distortion.
+/// The sum that smoothing gives to undistorted cells with p_i < 2: an upper bound of what smoothing adds to the
+/// objective.
 double QuasiNewton::smoothing_sum() const {
   const auto& offsets = problem_.shape().offsets();
   double sum = 0;
@@ -87,20 +109,20 @@ double QuasiNewton::smoothing_sum() const {
   return sum;
 }
 
-/// Smoothing adds up to eps^p to a cell's E_i^p where p_i < 2: too little to matter beside the whole, or less would be lost
-/// in rounding.
+/// Whether eps is small enough: smoothing adds at most eps^p to E_i^p of a cell with p_i < 2, and this is negligible
+/// compared with the sum, or a smaller eps would be lost in rounding.
 bool QuasiNewton::is_smooth_enough() const {
   if (eps2_ <= kLeastSmoothing * problem_.diagonal * problem_.diagonal) return true;
   return smoothing_sum() <= kBias * problem_.objective.sum(problem_.norm);
 }
 
-/// What the last stage has minimised is the true objective but for what smoothing may add.
+/// Whether the last stage has minimised the true objective, except for a small share that smoothing adds.
 bool QuasiNewton::is_end_true() const {
   const double sum = problem_.objective.sum(problem_.norm);
   return is_true_norm_ || objective_ - sum <= kLeastBias * sum;
 }
 
-/// The cell weights c_i, those for p_i > 2 raised to their mean where they are below it.
+/// The cell weights c_i. Weights of cells with p_i > 2 are raised to the mean of such cells if they are below it.
 std::vector<double> QuasiNewton::metric_weights() const {
   std::vector<double> weights = problem_.objective.cells().cell_weights();
   if (norm_.highest_p() <= 2) return weights;
@@ -114,8 +136,7 @@ std::vector<double> QuasiNewton::metric_weights() const {
   return weights;
 }
 
-/// In a live session the metric of the state before serves at first: a factorisation takes as long as several
-/// iterations.
+/// In a live session the previous metric is used at first, because a factorisation takes as long as several iterations.
 bool QuasiNewton::adopt_metric() {
   since_refresh_ = kRefresh - kTrial;
   problem_.metric.adopt(metric_weights());
@@ -127,13 +148,14 @@ void QuasiNewton::find_gradient() {
   restrict_to_free(problem_.constraints, gradient_);
 }
 
-/// No pair is left, nor will the last step make one.
+/// Drops all pairs, including the pending pair of the last step.
 void QuasiNewton::forget() {
   memory_.clear();
   step_length_ = 0;
 }
 
-/// For the present weights. The last step's pair is kept, in the new metric; all are where the metric is the same.
+/// Refactors the metric for the current weights. The last step's pair is kept, in the new metric. If the metric has not
+/// changed, all pairs are kept.
 bool QuasiNewton::refresh_metric() {
   since_refresh_ = 0;
   const auto version = problem_.metric.version();
@@ -145,7 +167,7 @@ bool QuasiNewton::refresh_metric() {
   return true;
 }
 
-/// d = -H g, H_0 = M^-1: unscaled, since M is the Hessian with rotations and weights held. Returns <g, d>.
+/// d = -H g with the H_0 of PairMemory. Returns <g, d>.
 double QuasiNewton::direction() {
   preconditioned_.swap(preconditioned_before_);
   problem_.precondition(gradient_, preconditioned_);
@@ -167,8 +189,7 @@ void QuasiNewton::go_along(double t) {
       });
 }
 
-/// The step length along direction_, 0 where none is found. problem_.objective holds the evaluation at trial_
-/// afterwards.
+/// The step length along direction_; 0 if none is found. Afterwards problem_.objective holds the evaluation at trial_.
 double QuasiNewton::search(double slope) {
   double t = 1;
   for (int trial = 0; trial < 40 && !problem_.stop.stop_requested(); ++trial) {
@@ -178,7 +199,7 @@ double QuasiNewton::search(double slope) {
       objective_ = value;
       return t;
     }
-    // The minimiser of the parabola through f(0), f'(0), f(t), kept within [t / 10, t / 2].
+    // The minimiser of the parabola through f(0), f'(0), f(t), clamped to [t / 10, t / 2].
     const double parabola =
         std::isfinite(value) ? -0.5 * slope * t * t / (value - objective_ - slope * t) : 0;
     t = std::clamp(parabola, 0.1 * t, 0.5 * t);
@@ -199,7 +220,8 @@ StepResult QuasiNewton::result(Outcome outcome) {
   return {outcome, objective_, stage_, true_sum_};
 }
 
-/// Where no step along d lowers the objective: a fresh metric without memory, the next stage, or the end.
+/// Called when no step along d decreases the objective: continues with a fresh metric without memory, with the next
+/// stage, or ends.
 StepResult QuasiNewton::give_up(double slope) {
   problem_.objective.evaluate(x_, norm_);
   if (problem_.stop.stop_requested()) return result(Outcome::kProgress);
@@ -244,7 +266,7 @@ StepResult QuasiNewton::step() {
   accept(length);
   if (is_last_stage_ && is_stage_over()) {
     if (is_smooth_enough()) return result(is_end_true() ? Outcome::kConverged : Outcome::kStalled);
-    is_last_stage_ = false;  // the energies have fallen so far that it is not any more
+    is_last_stage_ = false;  // the energies have decreased so much that eps matters again
   }
   return result(Outcome::kProgress);
 }

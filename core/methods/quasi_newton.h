@@ -8,34 +8,36 @@
 
 namespace lpdeform {
 
-/// What a solve finds at its beginning.
+/// What a solve starts from.
 enum class Warmth {
-  kCold,
-  kPrepared,    // what a coarse level found
-  kWarm,        // the state of the solve before, in a live session
-  kWithMetric,  // and the metric that it ended with
+  kCold,        // an initial guess
+  kPrepared,    // the result of a coarse level
+  kWarm,        // warm start: the state of the previous solve, in a live session
+  kWithMetric,  // a warm start that also keeps the previous solve's metric
 };
 
-/// Limited-memory BFGS (Nocedal & Wright, algorithm 7.4) on E(x) with the reweighted Laplacian as its initial
-/// metric (after Liu et al. 2017), t = 1 first, backtracking by interpolation. The default for every p. Where p_i > 2,
-/// a cell counts in the metric at least as much as such cells do on the average: with c_i ~ E_i^(p_i - 2) alone a
-/// cell that is at rest hardly counts, each step throws its energy up, and the search makes the step short.
+/// Limited-memory BFGS (Nocedal & Wright, algorithm 7.4) on E(x) with the reweighted Laplacian as initial metric (after
+/// Liu et al. 2017). The line search starts at t = 1 and backtracks by interpolation. The default for every p. In the
+/// metric, the weight of a cell with p_i > 2 is at least the mean weight of such cells. With c_i ~ E_i^(p_i - 2) alone,
+/// a cell at rest would have almost no weight, each step would increase its energy greatly, and the line search would
+/// shorten the step.
 ///
-/// Where some p_i < 2 it runs through stages: p from 2 towards p_i, then cell energies smoothed with an eps
-/// that falls until it does not matter. Each stage begins with a metric refactored for the present cell
-/// weights and an empty memory. Every 40th iteration refactors too, and one after a shortened step, which says
-/// that the weights have changed. The last step is remembered then, in the new metric: without it p > 2 and shallow
-/// valleys take two to three times the iterations. Where no weight has changed (p = 2), all are. In a live session
-/// it starts at p_i with an eps that adds at most a tenth to the mean cell's E^p, and for its first ten iterations
-/// keeps the metric that it finds. Where the largest p_i is over 12 and none below 2, a cold solve has one stage near p = 4
-/// first: it takes fewer iterations in all, and straight on a bent grid folds.
+/// If some p_i < 2, the method runs in stages (continuation): p goes from 2 towards p_i, then cell energies are
+/// smoothed with an eps that falls until it does not matter. Each stage begins with a metric refactored for the current
+/// cell weights and an empty memory. The metric is also refactored every 40th iteration, and after a shortened step,
+/// which shows that the weights have changed. The memory then keeps the last pair, in the new metric; without it, p > 2
+/// and shallow valleys take two to three times as many iterations. If no weight has changed (p = 2), all pairs are
+/// kept. In a live session the method starts at p_i with an eps that adds at most a tenth to the mean cell's E^p, and
+/// keeps the previous metric for its first ten iterations. If the largest p_i is over 12 and none is below 2, a cold
+/// solve first has one stage near p = 4. This takes fewer iterations in total; without it, a bent grid folds.
 ///
-/// Converged when, in the last stage, the objective f fell over 20 iterations by at most tolerance * p * f, p
-/// the largest p_i (a relative decrease of E^(1/p) of at most the tolerance); or when no step lowers f and
-/// the decrease that the fresh metric promises, -<gradient, direction> / 2, is at most that; or when E is 0
-/// to rounding. Where p is mixed, f is meant without what smoothing adds to cells of p_i < 2: beside large p that can be more
-/// than all the energy there is. Stalled where cells of p_i < 2 are at rounding and what this leaves of them is over a hundredth of the
-/// rest, as with p = 1 and 10 side by side.
+/// Converged when, in the last stage, the objective f has decreased over 20 iterations by at most tolerance * p * f, p
+/// the largest p_i (a relative decrease of E^(1/p) of at most the tolerance); or when no step decreases f and the
+/// decrease predicted by a fresh metric, -<gradient, direction> / 2, is at most that; or when E is 0 to rounding. If p
+/// is mixed, the f in tolerance * p * f of the first criterion excludes the part that smoothing adds to cells with
+/// p_i < 2, because next to a large p this part can exceed all other energy. Stalled if the distortions of cells with
+/// p_i < 2 are at the level of rounding, and smoothing still adds over a hundredth to the objective, as with p = 1 and p = 10
+/// side by side.
 class QuasiNewton : public Minimiser {
  public:
   QuasiNewton(Problem problem, Points x, Warmth warmth);
@@ -64,20 +66,20 @@ class QuasiNewton : public Minimiser {
   StepResult result(Outcome outcome);
 
   Problem problem_;
-  std::vector<double> shares_;  // of the way from 2 to p_i, for the first stages
+  std::vector<double> shares_;  // shares of the way from 2 to p_i, one per early stage
   double eps2_ = 0;             // smoothing
   int stage_ = 0;
   bool is_last_stage_ = false;
-  LpNorm norm_;  // of the stage
+  LpNorm norm_;  // the stage's norm
   bool is_true_norm_ = false;
   Points x_, trial_, direction_;
   Points gradient_, gradient_before_;              // before the last step
-  Points preconditioned_, preconditioned_before_;  // M^-1 times them
-  double last_length_ = 1;                         // of a step
-  double step_length_ = 0;                         // of the last step along direction_, not yet remembered
+  Points preconditioned_, preconditioned_before_;  // M^-1 times the gradients
+  double last_length_ = 1;                         // the last step's length
+  double step_length_ = 0;  // of the last step along direction_, while its pair is not stored yet
   double objective_ = 0;
-  double smoothing_sum_ = 0;  // in objective_, where p is mixed and the stage the last
-  double true_sum_ = 0;       // of problem_.norm at x_
+  double smoothing_sum_ = 0;  // part of objective_; if p is mixed, in the last stage
+  double true_sum_ = 0;       // the sum of problem_.norm at x_
   PairMemory memory_;
   std::deque<double> history_;  // objectives of the stage's last 21 iterations
   int stage_iterations_ = 0, since_refresh_ = 0;

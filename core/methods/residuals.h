@@ -6,11 +6,11 @@
 
 namespace lpdeform {
 
-/// One vector for each entry k = (i, j) of RestShape's rows: the stacked residuals z_i of a cell are the rows
-/// offsets[i] to offsets[i + 1].
+/// One vector for each entry k = (i, j) of RestShape's rows. The stacked residuals z_i of a cell are the rows
+/// offsets[i] to offsets[i + 1] - 1.
 using EdgeVectors = Points;
 
-/// The affine map of the convex step, rotations held, in scaled units:
+/// The affine map of the convex step, with rotations held fixed, in scaled units:
 ///
 ///   z = A x - b,   z_k = sqrt(w_ij) ((x_i - x_j) - R_i (p_i - p_j)),   so that E_i = |z_i|.
 void residuals(const RestShape& shape, const Points& x, const std::vector<Eigen::Matrix3d>& rotations,

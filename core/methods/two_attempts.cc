@@ -7,7 +7,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kComesNearer = 0.1;  // of what is left to the lowest
+constexpr double kComesNearer = 0.1;  // the least share of the difference to the lowest sum
 
 }  // namespace
 
@@ -48,7 +48,7 @@ StepResult TwoAttempts::step() {
   StepResult result = present_->step();
   result.stage += first_stage_;
   const double sum = result.true_sum.value_or(std::numeric_limits<double>::infinity());
-  if (sums_.empty() || sum != sums_.back()) {  // while a coarse level runs it is that of the guess
+  if (sums_.empty() || sum != sums_.back()) {  // while a coarse level runs, the sum is that of the guess
     ++iterations_;
     sums_.push_back(sum);
   }

@@ -10,16 +10,18 @@
 
 namespace lpdeform {
 
-/// Two methods from the same guess, one after the other: at p near 1 there are many minima, and which of them a method ends in
-/// is not known before. The caller's loop keeps the best state of both; the true sums of steps are the lowest so far, and the
-/// stages of the second follow those of the first. Outcome: that of the better one.
+/// Runs two methods from the same guess, one after the other. At p near 1 there are many minima, and it is not known in
+/// advance in which of them a method ends. The caller's loop keeps the best state of both. The true sum of a step is
+/// the lowest so far. The stages of the second method are numbered after those of the first. The outcome is that of the
+/// better method.
 ///
-/// Unless it is the better one, the second is given up after `most_iterations`, and where in 60 iterations its true sum has come nearer to the lowest by
-/// less than a tenth of what is left. Iterations of a coarse level, in which it does not change, do not count.
+/// As long as the second method is not the better one, it is abandoned after `most_iterations`, or if in 60 iterations
+/// its true sum has approached the lowest sum by less than a tenth of the remaining difference. Iterations in which its
+/// true sum does not change, as while a coarse level runs, do not count.
 class TwoAttempts : public Minimiser {
  public:
-  /// `make_second` is called once the first has ended, unless its true sum is at most `zero_sum`: then there is nothing to
-  /// gain. It leaves the evaluation at the guess in problem.objective.
+  /// `make_second` is called when the first method has ended, unless that method's true sum is at most `zero_sum`,
+  /// which leaves nothing to improve. It must leave the evaluation at the guess in problem.objective.
   TwoAttempts(std::unique_ptr<Minimiser> first, std::function<std::unique_ptr<Minimiser>()> make_second,
               int most_iterations, double zero_sum);
 
@@ -38,10 +40,10 @@ class TwoAttempts : public Minimiser {
 
   std::unique_ptr<Minimiser> present_;
   std::function<std::unique_ptr<Minimiser>()> make_second_;
-  double lowest_ = std::numeric_limits<double>::infinity();  // true sum
+  double lowest_ = std::numeric_limits<double>::infinity();  // lowest true sum
   const int most_iterations_;                                // of the second
   const double zero_sum_;
-  std::optional<Outcome> best_outcome_;  // none while the first runs
+  std::optional<Outcome> best_outcome_;  // empty while the first runs
   bool is_second_ = false, is_second_best_ = false;
   int first_stage_ = 0;  // of the second
   int iterations_ = 0;

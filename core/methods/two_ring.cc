@@ -12,7 +12,7 @@ LowerMatrix two_ring_pattern(const RestShape& shape, const std::vector<std::int3
     const std::int32_t column = free[vertex];
     if (column < 0) continue;
     ring.assign(1, column);
-    // The cells of `vertex` are its own and its neighbours'.
+    // The cells that contain `vertex` are its own and those of its neighbours.
     for (std::int32_t k = shape.offsets()[vertex]; k < shape.offsets()[vertex + 1]; ++k) {
       const std::int32_t cell = shape.neighbours()[k];
       if (free[cell] > column) ring.push_back(free[cell]);

@@ -11,7 +11,7 @@
 namespace lpdeform {
 namespace {
 
-/// The point of a face that is nearest to `point`, or about that where its foot is outside.
+/// The point of a face that is nearest to `point`; only approximately if the projection of `point` is outside the face.
 SurfacePoint foot_on(const RestShape& shape, std::int32_t face, const Eigen::RowVector3d& point) {
   const auto corner = [&](int c) -> Eigen::RowVector3d {
     return shape.positions().row(shape.faces()(face, c));
@@ -27,7 +27,7 @@ SurfacePoint foot_on(const RestShape& shape, std::int32_t face, const Eigen::Row
   return result;
 }
 
-/// Collects what the handles become.
+/// Builds the coarse handles.
 class Coarsener {
  public:
   Coarsener(const LevelPair& levels, const Constraints& constraints)
@@ -39,7 +39,7 @@ class Coarsener {
     for (const auto& [name, handle] : fine.handles()) {
       if (!handle.points.empty())
         add(absl::StrCat("as ", name), on_faces(handle), result);
-      else if (!std::holds_alternative<Exactly>(handle.hold))
+      else if (!handle.fixes_vertices())
         add(absl::StrCat("as ", name), on_vertices(handle), result);
     }
     return result;
@@ -47,7 +47,7 @@ class Coarsener {
 
  private:
   static void add(const std::string& name, Handle handle, HandleSet& handles) {
-    if (handle.size() > 0) (void)handles.set(name, std::move(handle));  // what cannot be held does not hold
+    if (handle.size() > 0) (void)handles.set(name, std::move(handle));  // on an error it is left out
   }
 
   bool stays(std::int32_t v) const { return levels_.fine_vertex[levels_.coarse_vertex[v]] == v; }
@@ -56,12 +56,12 @@ class Coarsener {
                        [&](std::int32_t v) { return stays(v); });
   }
   bool take(std::int32_t c) { return std::exchange(is_taken_[c], 1) == 0; }
-  /// How far the coarse vertex of v is from it, at rest.
+  /// The offset at rest from v to its coarse vertex.
   Eigen::RowVector3d offset(std::int32_t v) const {
     return levels_.coarse.positions().row(levels_.coarse_vertex[v]) - levels_.fine.positions().row(v);
   }
 
-  /// Everything that is held altogether, as one handle.
+  /// All held vertices, as one handle.
   Handle held(const HandleSet& fine) {
     std::vector<std::pair<std::int32_t, Eigen::RowVector3d>> targets;
     for (std::size_t c = 0; c < levels_.fine_vertex.size(); ++c) {
@@ -70,7 +70,7 @@ class Coarsener {
         targets.emplace_back(static_cast<std::int32_t>(c), constraints_.exact.row(v));
     }
     for (const auto& [name, handle] : fine.handles()) {
-      if (!std::holds_alternative<Exactly>(handle.hold) || some_stay(handle)) continue;
+      if (!handle.fixes_vertices() || some_stay(handle)) continue;
       for (const std::int32_t v : handle.vertices) {
         const std::int32_t c = levels_.coarse_vertex[v];
         if (take(c)) targets.emplace_back(c, constraints_.exact.row(v) + offset(v));
@@ -88,13 +88,9 @@ class Coarsener {
       if ((has_coarse && !stays(v)) || !take(c)) continue;
       targets.emplace_back(c, fine_targets.row(static_cast<Eigen::Index>(k)) + offset(v));
     }
-    Handle result = with_targets(handle.hold, targets);
-    if (std::holds_alternative<Orientation>(handle.hold)) result.motion = handle.motion;
-    if (auto* soft = std::get_if<Soft>(&result.hold); soft && !targets.empty()) {
-      const double grown =
-          soft->weight * static_cast<double>(handle.vertices.size()) / static_cast<double>(targets.size());
-      soft->weight = std::min(grown, kHighestSoftWeight);
-    }
+    if (targets.empty()) return {};
+    Handle result = with_targets(hold_on_fewer(handle.hold, handle.vertices.size(), targets.size()), targets);
+    if (!takes_positions(handle.hold)) result.motion = handle.motion;
     return result;
   }
 
@@ -110,7 +106,7 @@ class Coarsener {
     return result;
   }
 
-  /// The coarse faces at any of these vertices.
+  /// The coarse faces that use any of these vertices.
   std::vector<std::int32_t> faces_around(const std::array<std::int32_t, 3>& corners) {
     if (faces_of_.empty()) {
       faces_of_.resize(levels_.fine_vertex.size());
@@ -124,7 +120,8 @@ class Coarsener {
     return result;
   }
 
-  /// On the coarse faces around those that the corners of the fine one went into.
+  /// The point nearest to `rest` on the coarse faces around the vertices that the corners of the fine face were
+  /// collapsed into.
   SurfacePoint nearest(const SurfacePoint& point, const Eigen::RowVector3d& rest) {
     std::array<std::int32_t, 3> corners{};
     for (int c = 0; c < 3; ++c) corners[c] = levels_.coarse_vertex[levels_.fine.faces()(point.face, c)];

@@ -9,18 +9,19 @@
 
 namespace lpdeform {
 
-/// A fine shape and a coarse one made of some of its vertices.
+/// A fine shape, and a coarse shape whose vertices are a subset of its vertices.
 struct LevelPair {
   const RestShape& fine;
   const RestShape& coarse;
   const std::vector<std::int32_t>& fine_vertex;    // of each coarse vertex
-  const std::vector<std::int32_t>& coarse_vertex;  // of each fine vertex: the one that it went into
+  const std::vector<std::int32_t>& coarse_vertex;  // of each fine vertex: the one that it was collapsed into
 };
 
-/// Handles that ask of the coarse shape what `handles` ask of the fine one. Every coarse vertex that the fine level holds
-/// is held where it is there; every other handle keeps its kind, on those of its vertices that are coarse ones,
-/// or, where none is, on those that its own went into, and on the coarse faces nearest to its points. Soft weights
-/// grow as vertices get fewer. Where two handles come to the same vertex, the first has it.
+/// Restricts `handles` from the fine shape to the coarse one. Every coarse vertex that is held in the fine level is
+/// held at the same place. All other handles keep their kind. Such a handle acts on those of its vertices that are
+/// coarse vertices; if there is none, on the coarse vertices that its vertices were collapsed into. Its points move to
+/// the nearest coarse faces. Soft weights grow in proportion as the number of vertices falls. If two handles want the
+/// same coarse vertex, the first gets it.
 HandleSet coarse_handles(const LevelPair& levels, const HandleSet& handles, const Constraints& constraints);
 
 }  // namespace lpdeform

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kChunk = 4096;  // vertices
 
-/// One value for all, or those of the coarse vertices.
+/// The field at the coarse vertices; a single value stays a single value.
 Field restricted(const Field& field, const std::vector<std::int32_t>& fine_vertex) {
   if (field.size() == 1) return field;
   Field result(static_cast<Eigen::Index>(fine_vertex.size()));
@@ -46,8 +46,8 @@ std::unique_ptr<CoarseLevel> CoarseLevel::create(const RestShape& fine, const Ma
   return level;
 }
 
-/// The coarse vertex that each fine one went into and those around it; the nearest kGuides of them, weighted so
-/// that the weight of the next one would be 0.
+/// Finds the guides of each fine vertex: of the coarse vertex that it was collapsed into and that vertex's neighbours,
+/// the nearest kGuides. They are weighted so that the weight of the next nearest would be 0.
 void CoarseLevel::find_guides(const RestShape& fine) {
   const double unit = shape_->mean_edge_length() / fine.mean_edge_length();
   const double least = 1e-3 * unit;

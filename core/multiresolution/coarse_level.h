@@ -11,25 +11,26 @@
 
 namespace lpdeform {
 
-/// A shape with a sixth of the vertices, all of them vertices of the fine one, its own solver, and the way
-/// between the two: the "subspace technique" of the paper's future work. What it finds is a guess for the fine
-/// level, never an answer. One caller at a time.
+/// A coarse level: a shape with a sixth of the fine shape's vertices, a solver of its own, and the restriction and
+/// prolongation between the two levels. This is the "subspace technique" of the paper's future work. Its result is only
+/// an initial guess for the fine level, never a final result. One caller at a time.
 class CoarseLevel {
  public:
   static constexpr std::int32_t kRatio = 6;
 
-  /// Null where the mesh cannot be coarsened to half its vertices, or the coarse one has no solver.
+  /// Null if the mesh cannot be coarsened to half its vertices, or if no solver can be made for the coarse shape.
   static std::unique_ptr<CoarseLevel> create(const RestShape& fine, const MakeLevelSolver& make_solver);
 
-  /// Gives the solver what the fine level has: coarse_handles, and `material`. Where p_i is not 2, a coarse cell
-  /// stands for m fine ones with E_i^2 a sum over them, so s_i is multiplied by m^(1 - p_i / 2).
+  /// Restricts the inputs of the fine level to the coarse solver: coarse_handles, and `material`. A coarse cell stands
+  /// for m fine cells, and its E_i^2 is a sum over them. If p_i is not 2, s_i is therefore multiplied by (m /
+  /// kRatio)^(1 - p_i / 2) and clamped to the permitted range.
   absl::Status take_over(const RestShape& fine, const HandleSet& handles, const Constraints& constraints,
                          const Material& material);
 
   LevelSolver& solver() { return *solver_; }
 
-  /// The fine shape moved with the coarse one, in scaled units of the fine: each vertex follows the fitted rigid
-  /// motions of the nearest of the coarse vertices around it, blended by distance.
+  /// Prolongation: the fine shape moved with the coarse one, in scaled units of the fine shape. Each vertex follows the
+  /// fitted rigid motions of the nearest coarse vertices around it, blended by distance.
   Points prolong(const RestShape& fine, const Workers& workers) const;
 
   std::size_t memory_bytes() const;
@@ -41,10 +42,10 @@ class CoarseLevel {
   static constexpr std::size_t kGuides = 4;
   struct Guides {
     std::array<std::int32_t, kGuides> vertex;  // coarse
-    std::array<double, kGuides> weight;        // add up to 1
+    std::array<double, kGuides> weight;        // weights add up to 1
   };
   std::vector<std::int32_t> fine_vertex_, coarse_vertex_;  // see CoarseMesh
-  std::vector<double> share_;                              // fine vertices for each coarse one
+  std::vector<double> share_;                              // the number of fine vertices of each coarse one
   std::vector<Guides> guides_;                             // of each fine vertex
   std::shared_ptr<const RestShape> shape_;
   std::unique_ptr<LevelSolver> solver_;

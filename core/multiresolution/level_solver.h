@@ -12,8 +12,8 @@
 
 namespace lpdeform {
 
-/// What solves a coarse level: a Deformer (core/solve/deformer.h), as far as a level needs one. It may have a coarse level of its
-/// own. Each function is the Deformer's of that name.
+/// The solver of a coarse level: the part of the interface of Deformer (core/solve/deformer.h) that a level needs. It
+/// may have a coarse level of its own. Each function does what the function of that name in Deformer does.
 class LevelSolver {
  public:
   virtual ~LevelSolver() = default;
@@ -28,7 +28,7 @@ class LevelSolver {
   virtual std::size_t memory_bytes() const = 0;
 };
 
-/// Makes the solver of a level of this shape, whose components without handles stay where they are. Null where that fails.
+/// Makes the solver for a level with this shape. Components without handles stay where they are. Null if that fails.
 using MakeLevelSolver = std::function<std::unique_ptr<LevelSolver>(std::shared_ptr<const RestShape> shape)>;
 
 }  // namespace lpdeform

@@ -6,7 +6,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kCoarseTolerance = 1e-4;  // of E^(1/p): the levels differ by more
+constexpr double kCoarseTolerance = 1e-4;  // relative, of E^(1/p); the levels differ by more than this
 
 }  // namespace
 
@@ -20,7 +20,7 @@ Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level)
     fine_ = std::make_unique<QuasiNewton>(problem_, x_, Warmth::kCold);
 }
 
-/// What the coarse level has found, within the constraints. Not always finite.
+/// The prolonged result of the coarse level, moved to satisfy the constraints. Not always finite.
 Points Multiresolution::prolonged() {
   Points found = level_.prolong(problem_.shape(), problem_.workers());
   for (Eigen::Index i = 0; i < found.rows(); ++i) {
@@ -32,8 +32,8 @@ Points Multiresolution::prolonged() {
   return found;
 }
 
-/// Blending rigid motions leaves kinks between them: one step of local_global at p = 2 spreads them, by the metric of equal
-/// weights that the guess was made with.
+/// Blended rigid motions leave kinks. One local/global step at p = 2 smooths them, with the metric of equal weights
+/// that the guess was made with.
 void Multiresolution::even_out(Points& found) const {
   const LpNorm even(Material::uniform(2), problem_.shape().vertex_count(), 1, 1);
   Points step;
@@ -55,7 +55,7 @@ std::optional<Points> Multiresolution::in_hand() {
   return found;
 }
 
-/// From the better of the guess and what the coarse level has found.
+/// Starts QuasiNewton from the better of the guess and the result of the coarse level.
 void Multiresolution::begin_fine() {
   Points found = prolonged();
   const bool is_better = found.allFinite() && problem_.objective.evaluate(found, problem_.norm) < objective_;
@@ -71,7 +71,7 @@ void Multiresolution::begin_fine() {
 StepResult Multiresolution::step() {
   if (fine_) {
     StepResult result = fine_->step();
-    ++result.stage;  // 0 is the coarse level's
+    ++result.stage;  // stage 0 is the coarse level
     return result;
   }
   if (level_.solver().step()) return {Outcome::kProgress, objective_, 0, objective_};

@@ -9,18 +9,19 @@
 
 namespace lpdeform {
 
-/// The coarse level first, by any method that suits it (a level below it included), then QuasiNewton from what it
-/// prolongs to. One iteration of the coarse level counts as one here; the state is the guess until it has ended.
-/// Where it finds nothing better than the guess, this is QuasiNewton from there. Converged as that.
+/// Solves the coarse level first, by any method that suits it (which may include a level below it), then runs
+/// QuasiNewton from the prolonged result. One iteration of the coarse level counts as one iteration here. Until the
+/// coarse level has ended, the state is the initial guess. If the prolonged result is not better than the initial
+/// guess, QuasiNewton starts from the guess. The convergence criterion is that of QuasiNewton.
 class Multiresolution : public Minimiser {
  public:
-  /// `level` has taken the handles and the material over and outlives this.
+  /// `level` must already have the handles and the material (take_over), and must outlive this object.
   Multiresolution(Problem problem, Points x, CoarseLevel& level);
 
   StepResult step() override;
   const Points& x() const override { return fine_ ? fine_->x() : x_; }
-  /// The coarse level's state prolonged: about two iterations' work, so only where that has taken twice the iterations
-  /// of the time before.
+  /// The prolonged state of the coarse level. This costs about as much as two iterations, so there is a new one only
+  /// when the coarse level has made twice as many iterations as at the previous one.
   std::optional<Points> in_hand() override;
 
  private:
@@ -34,8 +35,8 @@ class Multiresolution : public Minimiser {
   Points x_;
   double objective_ = 0;
   CoarseLevel& level_;
-  int next_look_ = kFirstLook;         // of the coarse level's iterations
-  std::unique_ptr<QuasiNewton> fine_;  // none while the coarse level runs
+  int next_look_ = kFirstLook;         // iterations of the coarse level at the next prolongation
+  std::unique_ptr<QuasiNewton> fine_;  // null while the coarse level runs
 };
 
 }  // namespace lpdeform

@@ -45,33 +45,8 @@ absl::Status check_targets(std::string_view name, const Handle& handle, const Ta
   return absl::OkStatus();
 }
 
-absl::Status check_weight(std::string_view name, double weight) {
-  if (weight >= 0 && weight <= kHighestSoftWeight) return absl::OkStatus();
-  return make_fault({Reason::kHandleWeightOutOfRange, handle_element(name), "0 <= weight <= 1e6"},
-                    absl::StrCat("the weight of ", handle_element(name), " is ", weight,
-                                 "; it must be from 0 to ", kHighestSoftWeight));
-}
-
-absl::Status check_direction(std::string_view name, const Eigen::Vector3d& direction) {
-  if (direction.allFinite() && direction.stableNorm() > 0) return absl::OkStatus();
-  return make_fault({Reason::kHandleLockDirection, handle_element(name), "finite, length > 0"},
-                    absl::StrCat("the axis or normal of ", handle_element(name),
-                                 " is not finite, or of length 0, and has no direction"));
-}
-
-absl::Status check_hold(std::string_view name, const Hold& hold) {
-  if (const auto* soft = std::get_if<Soft>(&hold)) return check_weight(name, soft->weight);
-  if (const auto* orientation = std::get_if<Orientation>(&hold))
-    return check_weight(name, orientation->weight);
-  if (const auto* lock = std::get_if<AxisLock>(&hold)) return check_direction(name, lock->axis);
-  if (const auto* lock = std::get_if<PlaneLock>(&hold)) return check_direction(name, lock->normal);
-  return absl::OkStatus();
-}
-
 absl::Status check_points(std::string_view name, const Handle& handle) {
-  const bool takes_points =
-      std::holds_alternative<Exactly>(handle.hold) || std::holds_alternative<Soft>(handle.hold);
-  if (!takes_points) {
+  if (!takes_points(handle.hold)) {
     return make_fault({Reason::kHandleKindNeedsVertices, handle_element(name), "vertices"},
                       absl::StrCat(handle_element(name),
                                    " is an orientation or a lock and has points "
@@ -131,7 +106,7 @@ absl::Status check_motion(std::string_view name, const Handle& handle, const Han
   if (const auto* rigid = std::get_if<RigidMotion>(&motion)) return check_rigid(name, *rigid);
   const auto* targets = std::get_if<TargetPositions>(&motion);
   if (targets == nullptr) return absl::OkStatus();
-  if (std::holds_alternative<Orientation>(handle.hold)) {
+  if (!takes_positions(handle.hold)) {
     return make_fault({Reason::kHandleKindNeedsRotation, handle_element(name), "fixed or rigid motion"},
                       absl::StrCat(handle_element(name), " prescribes a rotation and takes no positions"));
   }

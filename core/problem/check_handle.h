@@ -8,16 +8,16 @@
 
 namespace lpdeform {
 
-/// `handle "tip"`, for messages; of a long name the first 128 bytes.
+/// `handle "tip"`, for messages. A long name is cut to its first 128 bytes.
 std::string handle_element(std::string_view name);
 
-/// Whether a handle makes sense by itself. INVALID_ARGUMENT: HANDLE_NAME, HANDLE_EMPTY, HANDLE_POINTS_AND_VERTICES,
+/// Checks a handle by itself. INVALID_ARGUMENT: HANDLE_NAME, HANDLE_EMPTY, HANDLE_POINTS_AND_VERTICES,
 /// HANDLE_KIND_NEEDS_VERTICES, HANDLE_BARYCENTRIC, HANDLE_WEIGHT_OUT_OF_RANGE, HANDLE_LOCK_DIRECTION,
-/// HANDLE_FOOTPRINT_OUT_OF_RANGE, and what check_motion has.
+/// HANDLE_FOOTPRINT_OUT_OF_RANGE, and the reasons of check_motion.
 absl::Status check_handle(std::string_view name, const Handle& handle);
 
-/// Whether `motion` is one for this handle: HANDLE_MOTION_NOT_FINITE, HANDLE_AXIS_ZERO, HANDLE_TARGET_COUNT,
-/// HANDLE_KIND_NEEDS_ROTATION (an orientation handle takes no positions).
+/// Checks that this handle may have this motion. INVALID_ARGUMENT: HANDLE_MOTION_NOT_FINITE, HANDLE_AXIS_ZERO,
+/// HANDLE_TARGET_COUNT, HANDLE_KIND_NEEDS_ROTATION (an orientation handle takes no positions).
 absl::Status check_motion(std::string_view name, const Handle& handle, const HandleMotion& motion);
 
 }  // namespace lpdeform

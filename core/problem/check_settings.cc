@@ -46,7 +46,7 @@ absl::Status check_method(Method method, const Material& material) {
 absl::Status check_method_takes(Method method, const HandleSet& handles) {
   if (method != Method::kConic) return absl::OkStatus();
   for (const auto& [name, handle] : handles.handles()) {
-    if (handle.points.empty() && std::holds_alternative<Exactly>(handle.hold)) continue;
+    if (handle.fixes_vertices()) continue;
     const std::string limit = "handles that hold vertices exactly";
     return make_fault({Reason::kMethodNeedsExactHandles, handle_element(name), limit},
                       absl::StrCat("method ", std::string(method_name(method)), " takes ", limit, "; ",

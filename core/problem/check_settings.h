@@ -7,12 +7,12 @@
 
 namespace lpdeform {
 
-/// INVALID_ARGUMENT: TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE; METHOD_NEEDS_P where the
-/// method is for one p and `material` has another.
+/// INVALID_ARGUMENT: TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE; METHOD_NEEDS_P if the
+/// method works for one p only and `material` has another.
 absl::Status check_settings(const SolveSettings& settings, const Material& material);
 
-/// METHOD_NEEDS_EXACT_HANDLES where the method is conic and a handle is held otherwise than exactly at vertices:
-/// names it.
+/// INVALID_ARGUMENT: METHOD_NEEDS_EXACT_HANDLES if the method is conic and a handle does not hold vertices exactly;
+/// names the handle.
 absl::Status check_method_takes(Method method, const HandleSet& handles);
 
 }  // namespace lpdeform

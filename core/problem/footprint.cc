@@ -10,7 +10,7 @@
 namespace lpdeform {
 namespace {
 
-/// Dijkstra's shortest ways from a handle, as far as its radius.
+/// The shortest distances from a handle up to its radius, by Dijkstra's algorithm.
 std::unordered_map<std::int32_t, double> distances(const RestShape& shape, const Handle& handle) {
   using Place = std::pair<double, std::int32_t>;
   const Points& rest = shape.positions();

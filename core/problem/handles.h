@@ -15,13 +15,13 @@
 
 namespace lpdeform {
 
-/// The handle stays where the rest mesh has it.
+/// The handle stays at its rest positions.
 struct Fixed {
   bool operator==(const Fixed&) const = default;
 };
 
-/// x = R (p - center) + center + translation for every vertex of the handle: rotation about `center` first,
-/// then translation. `axis` need not have unit length; it may be 0 only where `angle_radians` is 0.
+/// x = R (p - center) + center + translation for every vertex of the handle: rotation about `center` first, then
+/// translation. `axis` need not have unit length; it may be 0 only if `angle_radians` is 0.
 struct RigidMotion {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
   double angle_radians = 0;
@@ -31,7 +31,7 @@ struct RigidMotion {
   bool operator==(const RigidMotion&) const = default;
 };
 
-/// One target position a vertex or point, in the order of the handle's.
+/// One target position per vertex or point, in the handle's order.
 struct TargetPositions {
   Points positions;
 
@@ -45,40 +45,44 @@ struct Handle {
   std::vector<std::int32_t> vertices;
   HandleMotion motion = Fixed{};
   Hold hold = Exactly{};
-  /// In place of vertices. Exactly or Soft.
+  /// Instead of vertices. Held Exactly or Soft.
   std::vector<SurfacePoint> points = {};
-  /// Radius of the surroundings that go along with the handle, in the caller's units: against the spike that a
-  /// handle of one or a few vertices makes; see footprint.h. The energy counts their stiffness. 0: none.
+  /// Radius of the surroundings that move with the handle, in the caller's units; prevents the spike that a handle of
+  /// one or a few vertices makes (footprint.h). Their additional stiffness counts in the energy. 0: no footprint.
   double footprint = 0;
 
-  /// How many vertices or points.
+  /// The number of vertices or points.
   std::size_t size() const { return vertices.size() + points.size(); }
+
+  /// Whether the handle fixes its vertices: they are at their targets, not unknowns.
+  bool fixes_vertices() const { return points.empty() && std::holds_alternative<Exactly>(hold); }
 
   bool operator==(const Handle&) const = default;
 };
 
-/// All handles of a session, by name, and the region of interest. A plain value: change a copy, then give it to Deformer::set_handles.
+/// All handles of a session, by name, and the region of interest. A plain value: change a copy, then pass it to
+/// Deformer::set_handles.
 class HandleSet {
  public:
-  /// Adds a handle or replaces the one of that name (regrouping). Errors: as check_handle. Whether vertices exist and belong to
-  /// one handle only is checked by check_handles, when the whole set is known.
+  /// Adds a handle or replaces the handle of that name. Errors: as check_handle. check_handles checks later, when the
+  /// whole set is known, that vertices exist and belong to only one handle.
   absl::Status set(std::string_view name, Handle handle);
 
   /// Moves a handle. NOT_FOUND (HANDLE_UNKNOWN); INVALID_ARGUMENT: as check_motion.
   absl::Status set_motion(std::string_view name, HandleMotion motion);
 
-  /// False where there was none.
+  /// False if there was none.
   bool remove(std::string_view name);
 
   const std::map<std::string, Handle, std::less<>>& handles() const { return handles_; }
 
-  /// Only these vertices may move: everything outside the region is held where it is when the region takes
-  /// effect, and so is what handles hold there. Its border is found by itself: the cells of the vertices next
-  /// to the region count in the energy.
+  /// Only these vertices may move. Vertices outside the region are held at their positions at the time when the region
+  /// takes effect, even if handles hold them elsewhere. The border needs no special treatment: the cells of the
+  /// vertices next to the region count in the energy.
   void set_region(std::vector<std::int32_t> vertices);
   /// Everything may move again.
   void clear_region() { region_ = nullptr; }
-  /// Ascending, each once; null where there is none.
+  /// Ascending, each once; null if there is no region.
   const std::vector<std::int32_t>* region() const { return region_.get(); }
   bool has_region_of(const HandleSet& other) const;
 
@@ -89,22 +93,23 @@ class HandleSet {
   std::shared_ptr<const std::vector<std::int32_t>> region_;
 };
 
-/// INVALID_ARGUMENT: HANDLE_VERTEX_OUT_OF_RANGE, HANDLE_VERTEX_TWICE (in one handle or in two: both are
-/// named), HANDLE_FACE_OUT_OF_RANGE, REGION_EMPTY, REGION_VERTEX_OUT_OF_RANGE.
+/// INVALID_ARGUMENT: HANDLE_VERTEX_OUT_OF_RANGE, HANDLE_VERTEX_TWICE (in one handle or in two; names both),
+/// HANDLE_FACE_OUT_OF_RANGE, REGION_EMPTY, REGION_VERTEX_OUT_OF_RANGE.
 absl::Status check_handles(const HandleSet& handles, std::int32_t vertex_count, std::int32_t face_count = 0);
 
-/// These errors, for callers whose numbers may be no std::int32_t. `count`: of the mesh's vertices or faces.
+/// The same errors, for callers whose numbers may not fit a std::int32_t. `count`: the number of the mesh's vertices or
+/// faces.
 absl::Status handle_vertex_out_of_range(std::string_view handle, std::int64_t vertex, std::int64_t count);
 absl::Status handle_face_out_of_range(std::string_view handle, std::int64_t face, std::int64_t count);
 absl::Status region_empty();
 absl::Status region_vertex_out_of_range(std::int64_t vertex, std::int64_t count);
 
-/// Where a handle's vertices or points are at rest, and where its motion sends them: rows in their order.
-/// `faces` are needed for points only.
+/// The rest positions and the target positions of a handle's vertices or points, one row each in their order. `faces`
+/// are needed for points only.
 Points rest_positions(const Handle& handle, const Points& rest, const Faces& faces = {});
 Points target_positions(const Handle& handle, const Points& rest, const Faces& faces = {});
 
-/// R of a rigid motion; the identity of any other.
+/// R of a rigid motion; the identity for any other motion.
 Eigen::Matrix3d rotation_of(const HandleMotion& motion);
 
 }  // namespace lpdeform

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <string_view>
 #include <variant>
 
+#include "absl/status/status.h"
 #include "core/base/geometry.h"
 
 namespace lpdeform {
@@ -16,39 +19,41 @@ struct SurfacePoint {
   bool operator==(const SurfacePoint&) const = default;
 };
 
-// How a handle holds its vertices or points. A target is where the handle's motion sends one.
+// How a handle holds its vertices or points. The target of a vertex or point is the place to which the handle's motion
+// moves it.
 
-/// Exactly at its target.
+/// Held exactly at its target.
 struct Exactly {
   bool operator==(const Exactly&) const = default;
 };
 
-/// Drawn to its target: each vertex or point adds a soft term (SoftTerms) with D^2 = weight |x - target|^2.
-/// 0 lets go of it, 1 is about as strong as one edge of the surface; in [0, 1e6].
+/// Pulled to its target: each vertex or point adds a soft term (SoftTerms) with D^2 = weight |x - target|^2. Weight 0
+/// releases it, 1 is about as strong as one edge of the surface; in [0, 1e6].
 struct Soft {
   double weight = 1;
 
   bool operator==(const Soft&) const = default;
 };
 
-/// Turned, its position free: the rotation R of the handle's motion is prescribed to the cells of the
-/// handle's vertices. Each adds a soft term with D^2 = weight sum_j w_ij |(x_i - x_j) - R (p_i - p_j)|^2. In
-/// [0, 1e6]. Vertices only.
+/// Prescribes a rotation and leaves the position free: the cells of the handle's vertices should have the rotation R of
+/// its motion. Each vertex adds a soft term with D^2 = weight sum_j w_ij |(x_i - x_j) - R (p_i - p_j)|^2. Weight in [0,
+/// 1e6]. For vertices only.
 struct Orientation {
   double weight = 100;
 
   bool operator==(const Orientation&) const = default;
 };
 
-/// Free along `axis`, of any length but 0, on the line through its target; exact across it. Vertices only.
+/// Free to move along the line through its target in direction `axis` (any length but 0); held exactly across it. For
+/// vertices only.
 struct AxisLock {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
 
   bool operator==(const AxisLock&) const = default;
 };
 
-/// Free within the plane through its target that `normal`, of any length but 0, stands on; exact along the
-/// normal. Vertices only.
+/// Free to move in the plane through its target with normal `normal` (any length but 0); held exactly along the normal.
+/// For vertices only.
 struct PlaneLock {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
 
@@ -58,5 +63,19 @@ struct PlaneLock {
 using Hold = std::variant<Exactly, Soft, Orientation, AxisLock, PlaneLock>;
 
 inline constexpr double kHighestSoftWeight = 1e6;
+
+/// Whether this kind can hold points inside faces as well as vertices.
+bool takes_points(const Hold& hold);
+
+/// Whether the handle's motion may be target positions. If not, the motion is fixed or rigid.
+bool takes_positions(const Hold& hold);
+
+/// The hold for `fewer` vertices that represent `count` vertices, as on a coarse level. A soft weight is multiplied by
+/// count / fewer, up to kHighestSoftWeight; everything else stays the same.
+Hold hold_on_fewer(const Hold& hold, std::size_t count, std::size_t fewer);
+
+/// Checks the numbers of a hold; `name` is the handle's. INVALID_ARGUMENT: HANDLE_WEIGHT_OUT_OF_RANGE,
+/// HANDLE_LOCK_DIRECTION.
+absl::Status check_hold(std::string_view name, const Hold& hold);
 
 }  // namespace lpdeform

@@ -22,20 +22,20 @@ absl::Status copies_differ(std::string_view what, std::int32_t first, std::int32
                    ", though both are copies of one vertex."));
 }
 
-/// Any bits that compare equal are the same; there is no NaN here.
+/// Values that compare equal are the same; there is no NaN here.
 template <typename One, typename Other>
 bool is_same(const One& a, const Other& b) {
   return (a.array() == b.array()).all();
 }
 
-/// Whether positions are the same up to their rounding, so that a mesh whose copies are 1e-16 apart can be moved
-/// as it is.
+/// Whether positions are equal up to rounding. So a mesh whose copies are 1e-16 apart can be moved without changes.
 template <typename One, typename Other>
 bool is_same_place(const One& a, const Other& b, const Weld& weld) {
   return is_same(a, b) || (a - b).norm() <= weld.same_place;
 }
 
-/// Rows for welded vertices from rows for split ones; where `same(copy, first copy)`, those of the first.
+/// Converts rows of split vertices to rows of welded vertices: takes the row of the first copy, and requires
+/// `same(copy, first copy)` for all others.
 template <typename Matrix, typename Same>
 absl::StatusOr<Matrix> merged(const Matrix& split, const Weld& weld, std::string_view what,
                               const Same& same) {
@@ -51,7 +51,8 @@ absl::StatusOr<Matrix> merged(const Matrix& split, const Weld& weld, std::string
   return result;
 }
 
-/// Which handle holds a welded vertex, by which of its copies, and as which of the handle's vertices.
+/// The handle that holds a welded vertex, the copy that it names, and the index of that copy among the handle's
+/// vertices.
 struct Holder {
   std::string_view handle;
   std::int32_t copy;
@@ -66,7 +67,7 @@ absl::Status held_twice(const Holder& holder, std::string_view other, std::int32
 
 absl::StatusOr<Handle> merged_handle(std::string_view name, const Handle& split, const Weld& weld,
                                      std::unordered_map<std::int32_t, Holder>& holders) {
-  if (!split.points.empty()) return split;  // in faces, which are the same
+  if (!split.points.empty()) return split;  // points refer to faces, which do not change
   const auto* const targets = std::get_if<TargetPositions>(&split.motion);
   Handle handle = split;
   handle.vertices.clear();

@@ -16,13 +16,13 @@ namespace lpdeform {
 namespace {
 
 constexpr double kStiffening = 100;
-constexpr double kNarrow = 0.75;         // of the mean girth
-constexpr double kLeastGirth = 1.0 / 6;  // of that
+constexpr double kNarrow = 0.75;         // relative to the mean girth
+constexpr double kLeastGirth = 1.0 / 6;  // relative to kNarrow
 constexpr double kNarrowing = 4;
 constexpr double kSmallestSine = 1e-6;
-constexpr double kMostlySpared = 0.5;  // of sparing: the nearer of the two
+constexpr double kMostlySpared = 0.5;  // sparing from which on a component counts as spared
 
-/// Of components that are spared the ends along the stretched axes, of the others all vertices; ascending.
+/// For spared components the ends along the stretched axes, for all others all vertices; ascending.
 std::vector<std::int32_t> held_vertices(const RestShape& shape, const Eigen::Matrix3d& axes,
                                         const Eigen::Vector3d& shares, const std::vector<char>& is_spared) {
   std::vector<char> is_held(static_cast<std::size_t>(shape.vertex_count()), 0);
@@ -35,7 +35,7 @@ std::vector<std::int32_t> held_vertices(const RestShape& shape, const Eigen::Mat
   return held;
 }
 
-/// Of the slices across each stretched axis, what makes narrow ones no easier to cut than others.
+/// The stiffness factor that makes narrow slices across stretched axes no cheaper to stretch than others.
 Field narrowness(const RestShape& shape, const Eigen::Matrix3d& axes, const Eigen::Vector3d& shares) {
   Field result = Field::Ones(shape.vertex_count());
   for (int k = 0; k < 3; ++k) {
@@ -43,7 +43,7 @@ Field narrowness(const RestShape& shape, const Eigen::Matrix3d& axes, const Eige
     const Field girth = girth_along(shape, axes.row(k));
     result.array() *= (girth.array() / kNarrow).max(kLeastGirth).min(1).pow(-kNarrowing * shares[k]);
   }
-  return result.array().min(std::pow(kLeastGirth, -kNarrowing));  // where several axes are narrow: as one
+  return result.array().min(std::pow(kLeastGirth, -kNarrowing));  // several narrow axes count as one
 }
 
 }  // namespace

@@ -23,63 +23,66 @@ struct Scaling {
   static constexpr double kLowest = 0.01, kHighest = 100;
 };
 
-/// The axes from two directions of any length: the first, the part of the second across it, and what is
-/// across both. INVALID_ARGUMENT: RESIZE_AXES where they are not finite or too nearly parallel (a sine below
-/// 1e-6).
+/// Orthonormal axes from two directions of any length: the first direction, the part of the second that is
+/// perpendicular to it, and their cross product. INVALID_ARGUMENT: RESIZE_AXES if they are not finite, have length 0,
+/// or are too nearly parallel (a sine of at most 1e-6).
 absl::StatusOr<Eigen::Matrix3d> axes_of(const Eigen::Vector3d& x_axis, const Eigen::Vector3d& y_axis);
 
 /// INVALID_ARGUMENT: RESIZE_SCALE_OUT_OF_RANGE, RESIZE_ORIGIN_NOT_FINITE.
 absl::Status check_scaling(const Scaling& scaling);
 
-/// What makes a Deformer resize: held places and a material.
+/// The inputs that make a Deformer resize: a handle and a material.
 struct ResizeInputs {
   Handle handle;
   Material material;
 };
 
-/// Content-aware resizing (section 5 of the paper names it): the ends along scaled axes go where the scaled shape has them, and
-/// what is salient keeps its shape and size as far as axes are stretched, by the energy of Eq. 3 against the rest shape.
+/// Content-aware resizing (future work in section 5 of the paper). The ends along scaled axes move to their positions
+/// in the scaled shape. Salient parts keep their shape and size as far as axes are stretched, through the energy of
+/// Eq. 3 against the rest shape.
 ///
-/// The handle holds the ends of each component, the vertices within 1 % of its extent from its lowest and
-/// highest along each axis whose scale is not 1, at their scaled positions; where all are 1, the ends along
-/// the first axis. Nothing holds the shape across these axes, where its extent changes by up to a fifth when
-/// others are doubled. For the extent of the scaled shape along all three, as `lpdeform resize` gives it: one solve for each
-/// axis, from the result before it, with the handles of side_locks added, and with_extents of what comes out
-/// (resize_extents.h).
+/// The handle holds the ends of each component at their scaled positions. Ends are the vertices within 1 % of the
+/// component's extent from its lowest or highest coordinate along an axis whose scale is not 1; if all scales are 1,
+/// along the first axis. Nothing holds the shape along the other axes; its extent there changes by up to a fifth when
+/// other axes are doubled. To get the extents of the scaled shape along all three axes, as `lpdeform resize` does: make
+/// one solve per axis, each from the previous result and with the handles of side_locks added, and apply with_extents
+/// to the result (resize_extents.h).
 ///
 /// The material is p = 1 and the stiffness
 ///
 ///   s_i = 100^salience_i min(6^4, prod_k clamp(girth_ik / 0.75, 1/6, 1)^(-4 a_k)),    a_k = |log scale_k| / max_j |log scale_j|
 ///
-/// with the salience of core/analysis/salience.h for the axes, weighted a_k, and the girth of core/analysis/girth.h
-/// along axis k. A stretch goes where a cut costs least: without the second factor that is close to the ends, where
-/// slices are small, and a tip is drawn out into a spike.
+/// salience_i is that of core/analysis/salience.h for the axes, weighted by a_k; girth_ik is that of
+/// core/analysis/girth.h along axis k. A stretch concentrates where a slice through the shape costs least. Without the
+/// second factor this is close to the ends, where slices are small, and a tip would be drawn out into a spike.
 ///
-/// A component of which less than half is spared (core/resize/sparing.h), as a ball or an ellipsoid, is held whole: all its
-/// vertices where the plain scaling has them; where none is spared, the material is p = 2. With the above a ball became a
-/// ball with two cones: its slices are cheapest some way from the ends, and p = 1 gathers the whole stretch there. A handle
-/// holds a vertex or does not, so this is a switch; `lpdeform resize` blends the two results.
+/// If the sparing of a component (core/resize/sparing.h) is below one half, as for a ball or an ellipsoid, all its
+/// vertices are held at their positions under plain scaling. If no component is spared, the material is p = 2.
+/// Otherwise a ball would become a ball with two cones: its slices are cheapest at some distance from the ends, and
+/// p = 1 gathers the whole stretch there. A handle either holds a vertex or does not, so this is a hard switch; `lpdeform
+/// resize` blends the two results.
 ///
-/// p = 1 matters: it gathers the stretch in places where little resists, which are straight along the
-/// stretch, so that it does not show there. p = 2 spreads it over salient places too, however stiff they are.
-/// A factor that all axes share is no change of shape: scale the mesh by the least of them first (shared_factor), so
-/// that what is left only stretches. What is salient then keeps its shape, and has the size that this factor gives it.
+/// p = 1 is essential: it gathers the stretch in places of low resistance. These are straight along the stretch, so the
+/// stretch is not visible there. p = 2 would spread the stretch over salient places as well, however stiff they are. A
+/// factor that all axes have in common does not change the shape. Scale the mesh by the smallest of the three factors
+/// first (shared_factor); the remaining factors then only stretch. Salient parts then keep their shape, at the size
+/// that this common factor gives them.
 ///
 /// INVALID_ARGUMENT: RESIZE_SCALE_OUT_OF_RANGE, RESIZE_ORIGIN_NOT_FINITE. `axes` must be orthonormal.
 absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling);
 
-/// With components chosen by the caller: not 0 where one is spared.
+/// The same with components chosen by the caller: `is_spared` has one entry per component, not 0 if it is spared.
 absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling,
                                            const std::vector<char>& is_spared);
 
-/// a_k above; (1, 0, 0) where all scales are 1.
+/// a_k above; (1, 0, 0) if all scales are 1.
 Eigen::Vector3d stretch_shares(const Eigen::Vector3d& scale);
 
-/// The least of the three factors. Over it, all three are stretches: by a factor below 1 an axis would be pushed, and a
-/// thin surface that is pushed buckles.
+/// The smallest of the three factors. Divided by it, all three factors are at least 1, so every axis is stretched or
+/// unchanged. A factor below 1 would compress an axis, and a thin surface buckles under compression.
 double shared_factor(const Eigen::Vector3d& scale);
 
-/// The middle of the bounding box of the vertices that faces use: the origin where none is given.
+/// The middle of the bounding box of the vertices that faces use. It is the default origin of a resizing.
 Eigen::Vector3d box_middle(const RestShape& shape);
 
 }  // namespace lpdeform

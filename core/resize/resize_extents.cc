@@ -8,7 +8,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kEnd = 0.01;  // of the extent
+constexpr double kEnd = 0.01;  // relative to the extent
 constexpr int kMostAtOneEnd = 32;
 constexpr int kMostLocks = 480;
 
@@ -35,7 +35,8 @@ Points coordinates(const RestShape& shape, const Eigen::Matrix3d& axes, const Po
   return (positions.rowwise() - shape.centre()) * axes.transpose();
 }
 
-/// `count` of the vertices, each the farthest from those before it; the first is the first.
+/// Farthest-point sampling: up to `count` of the vertices, beginning with the first; each next one is the farthest from
+/// those chosen before it.
 std::vector<std::int32_t> farthest_apart(const Points& positions, const std::vector<std::int32_t>& vertices,
                                          int count) {
   std::vector<double> distance(vertices.size(), std::numeric_limits<double>::infinity());
@@ -52,13 +53,13 @@ std::vector<std::int32_t> farthest_apart(const Points& positions, const std::vec
   return chosen;
 }
 
-/// Some ends along `axis` of those that are not taken.
+/// End vertices along `axis`, spread out, from those that are not taken.
 std::vector<std::int32_t> spread_ends(const RestShape& shape, const Eigen::Matrix3d& axes, int axis,
                                       const std::vector<char>& is_taken) {
   const int at_one_end = std::min(kMostAtOneEnd, kMostLocks / (2 * shape.component_count()));
   const Points along = coordinates(shape, axes, shape.positions());
   const Extents extents = extents_of(shape, along);
-  // Of each component the low end and the high one; of one that is flat all are in the first.
+  // The low and the high end of each component. All vertices of a flat component are in its low end.
   std::vector<std::array<std::vector<std::int32_t>, 2>> ends(
       static_cast<std::size_t>(shape.component_count()));
   for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {

@@ -9,16 +9,18 @@
 namespace lpdeform {
 namespace {
 
-// Of a component's area. On a ball it is a spot of a fifth of the radius. What is smaller is hardly seen.
+// The share of a component's area at which share(c) reaches 1. On a ball this is a spot with a fifth of the ball's
+// radius; smaller spots are hardly visible.
 constexpr double kWhole = 0.01;
 
-// Of salience. At 0.5, where the surface turns by 30 degrees in 2 rho, a place is 10 times as stiff as a flat one
-// (100^0.5), and keeps its shape. At 0.4 it turns by 24 degrees. A ball, whose parts do not stand out, turns by 16 everywhere.
+// The ramp of salience. At 0.5 the surface turns by 30 degrees within 2 rho; the place is 10 times as stiff as a flat
+// one (100^0.5) and keeps its shape. At 0.4 it turns by 24 degrees. A ball, no part of which stands out, turns by 16
+// degrees everywhere.
 constexpr double kLeastSalience = 0.4, kFullSalience = 0.5;
 
-// Of the radius. With noise of 1 % the worst of some thousand vertices is 4 % away. An egg, or a capsule twice as long as
-// thick, is up to 9 % away, and is as round to the eye as an ellipsoid. A hundredth of the area of the paper's bar is over
-// 26 % away, and more of shapes with limbs or holes.
+// The ramp of the distance, relative to the radius. With noise of 1 %, the worst of several thousand vertices is 4 %
+// away. An egg, or a capsule twice as long as thick, is up to 9 % away and looks as round as an ellipsoid. One
+// hundredth of the area of the paper's bar is over 26 % away; for shapes with limbs or holes it is farther.
 constexpr double kLeastDistance = 0.1, kFullDistance = 0.25;
 
 double ramp(double x, double low, double high) {
@@ -26,7 +28,7 @@ double ramp(double x, double low, double high) {
   return t * t * (3 - 2 * t);
 }
 
-/// Of each component.
+/// share() of each component.
 std::vector<double> shares(const RestShape& shape, const Field& areas, const Field& amounts, double low,
                            double high) {
   const auto count = static_cast<std::size_t>(shape.component_count());

@@ -9,7 +9,7 @@ namespace {
 
 using Point = Eigen::RowVector3d;
 
-/// x looks forward, y to the left, z up; the feet stand near z = 0.
+/// x points forward, y to the left, z up; the feet are near z = 0.
 std::vector<Capsule> creature_parts() {
   std::vector<Capsule> parts{
       {{-0.24, 0, 0.44}, {0.22, 0, 0.46}, 0.145, 0.135},  // trunk

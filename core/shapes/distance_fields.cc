@@ -11,8 +11,8 @@ namespace {
 
 using Point = Eigen::RowVector3d;
 
-/// From how far a point is beyond each pair of faces: outside the length of what is positive, inside the
-/// largest; of a solid that is smaller by `rounding` and then grown by it.
+/// The signed distance, from how far a point is beyond each pair of faces: outside, the length of the positive
+/// components; inside, the largest component. The solid is shrunk by `rounding` and then grown by it.
 template <typename Vector>
 double distance_beyond(const Vector& faces, double rounding) {
   const Vector beyond = faces.array() + rounding;

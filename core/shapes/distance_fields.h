@@ -8,8 +8,7 @@
 
 namespace lpdeform {
 
-/// Signed distances to simple solids, negative inside, and their blends: what the generated shapes are made
-/// of.
+/// Signed distances to simple solids, negative inside, and blends of them. The generated shapes are made of these.
 
 /// A segment from a to b with a radius at each end; a and b differ.
 struct Capsule {
@@ -18,8 +17,8 @@ struct Capsule {
 };
 double distance_to(const Capsule& capsule, const Eigen::RowVector3d& point);
 
-/// A solid cylinder along axis 0, 1 or 2 through `centre`, its edges rounded off to a radius of `rounding`, less
-/// than the others.
+/// A solid cylinder along axis 0, 1 or 2 through `centre`, with edges rounded off with radius `rounding`, which must be
+/// less than `radius` and `half_length`.
 struct Cylinder {
   Eigen::RowVector3d centre;
   int axis;
@@ -28,23 +27,23 @@ struct Cylinder {
 };
 double distance_to(const Cylinder& cylinder, const Eigen::RowVector3d& point);
 
-/// A box with its faces across the axes, its edges rounded off likewise.
+/// An axis-aligned box with edges rounded off in the same way.
 struct Box {
   Eigen::RowVector3d centre, half_sides;
   double rounding = 0;
 };
 double distance_to(const Box& box, const Eigen::RowVector3d& point);
 
-/// A soft minimum of distances, -w log(sum of exp(-d / w)): the solids' union, its inner edges rounded over
-/// about w. -infinity to infinity; infinity where there is none.
+/// The soft minimum of distances, -w log(sum of exp(-d / w)), w = `width`: the union of the solids, with inner edges
+/// rounded over about w. The result ranges from -infinity to infinity; infinity if there are no distances.
 double blended_union(std::span<const double> distances, double width);
 
-/// What of `solid` lies outside `hole`, edges rounded over about `width`.
+/// The part of `solid` outside `hole`, with edges rounded over about `width`.
 double blended_difference(double solid, double hole, double width);
 
-/// The surface of `field` within [low, high] from cubes of which `resolution` lie along the longest side, its
-/// triangles made well shaped. The field must be positive on the border and have a gradient of about unit
-/// length near 0.
+/// The surface field = 0 within [low, high], sampled on cubes, `resolution` of them along the longest side, and
+/// remeshed to well-shaped triangles. The field must be positive on the border and have a gradient of about unit length
+/// near 0.
 TriangleMesh field_surface(const ImplicitField& field, const Eigen::RowVector3d& low,
                            const Eigen::RowVector3d& high, int resolution);
 

@@ -8,10 +8,10 @@
 
 namespace lpdeform {
 
-/// A deformation of the paper's section 4 on a generated shape, its handles like those of its figure.
+/// A deformation of the paper's section 4 on a generated shape, with handles like those of the figure.
 ///
-/// `size` multiplies the number of cells along each side and is at least kSmallestPoseSize; at 1 the meshes have
-/// the paper's number of vertices, or about as many. Unit and place of each shape stand in core/shapes/shapes.h.
+/// `size` multiplies the number of cells along each side and must be at least kSmallestPoseSize. At 1 the meshes have
+/// the paper's number of vertices, exactly or approximately. Unit and position of each shape: core/shapes/shapes.h.
 struct PaperPose {
   std::string name;
   TriangleMesh mesh;

@@ -53,7 +53,7 @@ double angle_at(const HalfEdgeMesh& mesh, OpenMesh::VertexHandle tip, OpenMesh::
   return std::atan2(u.cross(v).norm(), u.dot(v));
 }
 
-/// Flips where the angles opposite an edge add up to more than a half turn and the surface stays unfolded.
+/// Flips an edge if the angles opposite it add up to more than 180 degrees and the surface does not fold.
 void flip_towards_delaunay(HalfEdgeMesh& mesh) {
   for (const auto edge : mesh.edges()) {
     const auto a = edge.h0().from(), b = edge.h0().to();

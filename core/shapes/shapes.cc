@@ -39,8 +39,7 @@ struct Lattice {
 
 using Quad = std::array<std::int64_t, 4>;
 
-/// The side of cell (x, y, z) that looks along `axis`, to the far or the near end, counter-clockwise from
-/// outside.
+/// The side of cell (x, y, z) that faces the far or the near end of `axis`, counter-clockwise seen from outside.
 Quad cell_side(const Lattice& lattice, std::array<std::int64_t, 3> cell, int axis, bool far) {
   const int first = (axis + 1) % 3, second = (axis + 2) % 3;
   if (far) ++cell[axis];
@@ -55,7 +54,7 @@ Quad cell_side(const Lattice& lattice, std::array<std::int64_t, 3> cell, int axi
   return quad;
 }
 
-/// Vertices in lattice order (x fastest), only those that a side uses.
+/// Makes a mesh of the quads. Its vertices are the lattice corners that a quad uses, in lattice order (x fastest).
 TriangleMesh from_quads(const Lattice& lattice, const std::vector<Quad>& quads) {
   std::vector<std::int64_t> corners;
   corners.reserve(4 * quads.size());
@@ -78,7 +77,7 @@ TriangleMesh from_quads(const Lattice& lattice, const std::vector<Quad>& quads) 
   return mesh;
 }
 
-/// The boundary of the cells for which `is_solid(x, y, z)`; it is asked about cells outside the lattice, too.
+/// The boundary of the cells for which `is_solid(x, y, z)` is true. It is also called for cells outside the lattice.
 template <typename Solid>
 TriangleMesh solid_surface(const Lattice& lattice, const Solid& is_solid) {
   std::vector<Quad> quads;
@@ -113,7 +112,7 @@ TriangleMesh icosahedron() {
   return mesh;
 }
 
-/// Each face becomes four, the new vertices pushed out to the sphere.
+/// Splits each face into four and projects the new vertices onto the sphere.
 TriangleMesh subdivided(const TriangleMesh& mesh) {
   std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> middles;
   const auto old_count = static_cast<std::int32_t>(mesh.vertices.rows());

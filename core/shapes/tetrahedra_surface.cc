@@ -13,7 +13,7 @@ namespace {
 
 using Triangle = std::array<std::int32_t, 3>;
 
-/// The corners of a cube are numbered by bits: 1 for x, 2 for y, 4 for z. Each tetrahedron climbs from 0
+/// The corners of a cube are numbered by bits: 1 for x, 2 for y, 4 for z. The corners of each tetrahedron lead from 0
 /// to 7.
 constexpr std::array<std::array<int, 4>, 6> kTetrahedra{
     {{0, 1, 3, 7}, {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7}, {0, 4, 6, 7}}};
@@ -86,8 +86,8 @@ class Marcher {
 
   using Edge = std::pair<std::int64_t, std::int64_t>;  // inside, outside
 
-  /// Turned so that it looks outwards. The middles of the edges decide: the cuts themselves may lie on one
-  /// line.
+  /// Adds a triangle, oriented outwards. The midpoints of the edges decide the orientation, because the cuts themselves
+  /// may be collinear.
   void add_triangle(const std::array<Edge, 3>& edges) {
     std::array<Eigen::RowVector3d, 3> middles;
     for (int k = 0; k < 3; ++k) middles[k] = (position(edges[k].first) + position(edges[k].second)) / 2;
@@ -98,7 +98,7 @@ class Marcher {
     triangles_.push_back(triangle);
   }
 
-  /// The vertex where the surface cuts an edge.
+  /// The vertex at which the surface cuts an edge.
   std::int32_t cut(const Edge& edge) {
     const auto [entry, is_new] = cuts_.try_emplace(edge, static_cast<std::int32_t>(points_.size()));
     if (is_new) {

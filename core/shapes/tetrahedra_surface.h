@@ -7,7 +7,7 @@
 
 namespace lpdeform {
 
-/// A value for each point of space, negative inside.
+/// A scalar field in space, negative inside the solid.
 using ImplicitField = std::function<double(const Eigen::RowVector3d&)>;
 
 /// The cubes of a regular grid: its lowest corner, the side of a cube, and their number along each axis.
@@ -17,9 +17,9 @@ struct SampleGrid {
   std::array<int, 3> cells{1, 1, 1};
 };
 
-/// The surface field = 0 by marching tetrahedra, six to a cube (Freudenthal's division, whose tetrahedra meet
-/// face to face). Closed, manifold and oriented outwards where the field is positive on the border of the
-/// grid; a sample of exactly 0 counts as outside. Its triangles can be slivers.
+/// The surface field = 0 by marching tetrahedra, six per cube (Freudenthal's subdivision, whose tetrahedra meet face to
+/// face). If the field is positive on the border of the grid, the surface is closed, manifold and oriented outwards. A
+/// sample of exactly 0 counts as outside. Triangles may be slivers.
 TriangleMesh tetrahedra_surface(const ImplicitField& field, const SampleGrid& grid);
 
 }  // namespace lpdeform

@@ -75,7 +75,7 @@ absl::Status Deformer::set_material(const Material& material) {
     return status;
   impl_->change_inputs();
   impl_->material = material;
-  impl_->is_metric_live = false;
+  impl_->forget_weights();
   return absl::OkStatus();
 }
 
@@ -97,8 +97,7 @@ absl::Status Deformer::set_positions(const Points& positions) {
   impl_->x = (positions.rowwise() - impl_->shape->centre()) / impl_->unit();
   impl_->positions = positions;
   impl_->is_positions_current = true;
-  impl_->has_state = true;
-  impl_->is_at_rest = false;
+  impl_->state = Impl::State::kDeformed;
   return absl::OkStatus();
 }
 

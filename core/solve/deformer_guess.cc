@@ -6,14 +6,14 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kFarthestGuess = 2;  // of the last move, how much more of it is guessed at most
-constexpr double kSameWay = 0.5;      // the squared cosine between two moves, from which on they are one drag
-// The square of how far the surface may have moved, in handles' moves, in such a drag.
+constexpr double kFarthestGuess = 2;  // the guess continues the last move by less than this factor
+constexpr double kSameWay = 0.5;      // two moves count as one drag above this squared cosine between them
+// In such a drag, the squared ratio of the surface's largest move to the handles' largest move is below this.
 constexpr double kSteady = 9;
 
 }  // namespace
 
-/// The soft terms as springs beside cells of weight 1 (p = 2), at the rest shape with held vertices at their
+/// The soft terms as springs (p = 2, for cells of weight 1), evaluated at the rest shape with held vertices at their
 /// targets.
 SoftTerms Deformer::Impl::guess_springs() const {
   SoftTerms springs = constraints->soft;
@@ -21,8 +21,8 @@ SoftTerms Deformer::Impl::guess_springs() const {
   return springs;
 }
 
-/// x = rest + u with u the harmonic extension of the handles' displacements: the solution of the naive
-/// Laplacian system L x = L p with the handles' positions given; soft terms as springs in it.
+/// x = rest + u, where u is the harmonic extension of the handles' displacements: the solution of the naive Laplacian
+/// system L x = L p with given handle positions and with soft terms as springs.
 Points Deformer::Impl::laplacian_guess() {
   Points u = constraints->targets - shape->scaled_positions();
   Points forces = Points::Zero(u.rows(), 3);
@@ -32,8 +32,8 @@ Points Deformer::Impl::laplacian_guess() {
   return shape->scaled_positions() + u;
 }
 
-/// A drag goes on as it went: where the handles move about as they did the last time, by `share` of it, the
-/// surface does too. What is left of the handles' move, and that of soft targets, is extended harmonically.
+/// Extrapolates a drag: if the handles move in about the same way as the last time, by the factor `share` of that move,
+/// the surface does the same. The remaining displacement of handles and soft targets is extended harmonically.
 Points Deformer::Impl::current_guess() {
   Points last = std::exchange(x_before_move, x);
   last = last.rows() == x.rows() ? Points(x - last) : Points(Points::Zero(x.rows(), 3));
@@ -54,7 +54,7 @@ Points Deformer::Impl::current_guess() {
   const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left &&
                        last.rowwise().squaredNorm().maxCoeff() < kSteady * longest;
   if (goes_on) {
-    forces.setZero();  // what is soft goes along
+    forces.setZero();  // soft targets move with the drag
     for (Eigen::Index i = 0; i < x.rows(); ++i) {
       if (constraints->is_held[i]) u.row(i) -= share * last.row(i);
     }
@@ -68,11 +68,11 @@ Points Deformer::Impl::initial_guess(InitialGuess guess) {
   Points result;
   if (guess == InitialGuess::kRest)
     result = constraints->targets;
-  else if (guess == InitialGuess::kCurrent && has_state)
+  else if (guess == InitialGuess::kCurrent && state != State::kUntouched)
     result = current_guess();
   else
     result = laplacian_guess();
-  // Held vertices are at their targets exactly, whatever the solve rounded to.
+  // Sets held vertices exactly to their targets, which removes the solve's rounding.
   for (Eigen::Index i = 0; i < result.rows(); ++i) {
     if (constraints->is_held[i]) result.row(i) = constraints->targets.row(i);
   }

@@ -15,16 +15,16 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kCertificateSeconds = 1;    // it gets, whatever is left of the time limit
+constexpr double kCertificateSeconds = 1;    // it may take this long, even beyond the time limit
 constexpr std::size_t kCopyChunk = 4096;     // vertices
-constexpr std::int32_t kLargeMesh = 5000;    // vertices, from which on a coarse level pays
-constexpr std::int32_t kLargeAtTwo = 60000;  // the same where every p is 2: there is less to gain
-// Where some p is at most kManyMinima, cold solves of kAuto try both methods: in meshes of so many vertices, the second for so
-// many iterations times vertices.
+constexpr std::int32_t kLargeMesh = 5000;    // vertices from which on a coarse level pays off
+constexpr std::int32_t kLargeAtTwo = 60000;  // the same if every p is 2, where the gain is smaller
+// If some p is at most kManyMinima, cold solves with kAuto try both methods on meshes with kFewestForTwo to kMostForTwo
+// vertices. kSecondWork limits iterations times vertices of the second method.
 constexpr double kManyMinima = 1.2;
 constexpr std::int32_t kFewestForTwo = 300, kMostForTwo = 15000;
 constexpr double kSecondWork = 2e7;
-constexpr double kRounding = 1e-13;  // of the largest coordinate, in scaled units
+constexpr double kRounding = 1e-13;  // relative to the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
 
@@ -53,7 +53,7 @@ double Deformer::Impl::seconds() const {
   return std::chrono::duration<double>(Clock::now() - started).count();
 }
 
-/// The largest E_i or D_k at the guess: the reference length that keeps terms of any p in range.
+/// The largest E_i or D_k at the guess. As the reference length, it keeps terms of any p in range.
 double Deformer::Impl::typical_energy(const Points& guess) {
   objective.evaluate(guess, LpNorm(Material::uniform(2), shape->vertex_count(), unit(), 1));
   const auto& e2 = objective.cells().squared_energies();
@@ -64,12 +64,12 @@ double Deformer::Impl::typical_energy(const Points& guess) {
   return largest > 1e-12 ? largest : 1.0;
 }
 
-/// What rounding leaves of a length.
+/// The rounding error of a length.
 double Deformer::Impl::rounding() const {
   return kRounding * (1 + constraints->targets.cwiseAbs().maxCoeff());
 }
 
-/// The objective where every E_i is what rounding leaves of it.
+/// The objective if every E_i is only rounding error.
 double Deformer::Impl::zero_objective() const {
   const double e2 = rounding() * rounding();
   double sum = 0;
@@ -81,7 +81,7 @@ double Deformer::Impl::zero_squares() const {
   return shape->vertex_count() * rounding() * rounding();
 }
 
-/// What is kept has no distortion but rounding's: see Problem::is_zero.
+/// Whether the kept state has no distortion except rounding: see Problem::is_zero.
 bool Deformer::Impl::is_best_zero() const {
   if (best_sum > zero_objective()) return false;
   return norm->lowest_p() == norm->highest_p() ||
@@ -101,8 +101,8 @@ Problem Deformer::Impl::make_problem() {
           stop};
 }
 
-/// Makes the coarse level where there is none. False where the mesh cannot have one, or it has no vertices left for
-/// what the handles ask.
+/// Makes the coarse level if there is none, and restricts the inputs to it. False if the mesh cannot be coarsened, or
+/// if the coarse level has no vertices for the handles.
 bool Deformer::Impl::prepare_coarse() {
   const auto make_solver = [this](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
     const DeformerOptions of_level{.free_components = FreeComponents::kStay, .threads = workers().threads()};
@@ -122,7 +122,7 @@ Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {
   return Method::kQuasiNewton;
 }
 
-/// What to try after settings.method, which kAuto has chosen; kAuto where that is nothing.
+/// The method to try after settings.method, which kAuto has chosen; kAuto if there is none.
 Method Deformer::Impl::second_method(Method asked, bool is_warm) {
   const std::int32_t n = shape->vertex_count();
   const bool tries = asked == Method::kAuto && !is_warm && n >= kFewestForTwo && n <= kMostForTwo &&
@@ -132,11 +132,11 @@ Method Deformer::Impl::second_method(Method asked, bool is_warm) {
   return prepare_coarse() ? Method::kMultiresolution : Method::kAuto;
 }
 
-/// `first`, then the other method from the same guess with a metric of equal weights, as if it were alone.
+/// Runs `first`, then the second method from the same guess with a metric of equal weights, as if it ran alone.
 std::unique_ptr<Minimiser> Deformer::Impl::with_second(std::unique_ptr<Minimiser> first,
                                                        const Points& guess) {
   const auto make = [this, guess] {
-    is_metric_live = false;
+    forget_weights();
     if (prepare_metric(true)) objective.evaluate(guess, *norm);
     return make_minimiser(second, guess, Warmth::kCold);
   };
@@ -162,7 +162,7 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points 
   return std::make_unique<QuasiNewton>(std::move(problem), std::move(guess), warmth);
 }
 
-/// Factors for the present handles with equal cell weights, unless a usable factor is there. False where that
+/// Factors the metric for the current handles with equal cell weights, unless there is a usable factor. False if that
 /// fails.
 bool Deformer::Impl::prepare_metric(bool needs_plain_weights) {
   if (metric.is_factored_for(constraints->is_held) && !needs_plain_weights) return true;
@@ -174,7 +174,7 @@ bool Deformer::Impl::prepare_metric(bool needs_plain_weights) {
                        workers(), precision);
 }
 
-/// With the footprints of handles.
+/// The material including the footprints of handles.
 Material Deformer::Impl::effective_material() const {
   const Field& factors = constraints->footprint;
   if (factors.size() == 0) return material;
@@ -186,8 +186,8 @@ Material Deformer::Impl::effective_material() const {
   return result;
 }
 
-/// A drag back to where it began: a thin shape that was pushed can be left in a dimple, a minimum of its own, where the
-/// rest shape has no distortion at all. Then the rest shape is what is kept.
+/// For a drag back to the start: a thin shape that was compressed can stay in a dimple, which is a local minimum,
+/// although the rest shape has no distortion at all. In this case keeps the rest shape.
 bool Deformer::Impl::keep_rest_if_best() {
   if ((constraints->targets - shape->scaled_positions()).cwiseAbs().maxCoeff() > rounding()) return false;
   if (is_best_zero()) return false;
@@ -197,11 +197,11 @@ bool Deformer::Impl::keep_rest_if_best() {
     keep(rest, sum);
     return true;
   }
-  objective.evaluate(x, *norm);  // the next solve reads off it where soft handles were
+  objective.evaluate(x, *norm);  // the next solve reads the previous soft targets from it
   return false;
 }
 
-/// Called with the evaluation of minimiser->x() in `objective`, and its true sum.
+/// Keeps minimiser->x() if it is the best state so far. `objective` holds its evaluation; `sum` is its true sum.
 void Deformer::Impl::keep_if_best(double sum) {
   const bool is_first = summary.iterations == 0;
   if (is_first || sum < best_sum) keep(minimiser->x(), sum);
@@ -250,16 +250,15 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   summary.threads = workers().threads();
   evaluations_before = objective.evaluations();
   back_substitutions_before = metric.back_substitutions();
-  const bool is_warm = settings.initial == InitialGuess::kCurrent && has_state && !is_at_rest;
+  const bool is_warm = settings.initial == InitialGuess::kCurrent && state == State::kDeformed;
   if (!is_warm) x_before_move.resize(0, 3);
   const Method asked = settings.method;
   settings.method = summary.method = chosen_method(asked, is_warm);
   second = second_method(asked, is_warm);
   const bool keeps_metric =
-      is_warm && is_metric_live && is_metric_of_rows && metric.is_factored_for(constraints->is_held);
-  is_drag = keeps_metric;
-  const bool is_factored = prepare_metric(!is_warm || !is_metric_of_rows);
-  is_metric_of_rows = true;
+      is_warm && factor == Factor::kQuasiNewton && metric.is_factored_for(constraints->is_held);
+  warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
+  const bool is_factored = prepare_metric(!is_warm || factor == Factor::kOutdated);
   summary.setup_seconds = seconds();
 
   started = Clock::now();
@@ -276,10 +275,9 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   norm.emplace(effective_material(), shape->vertex_count(), unit(), reference);
   objective.reweigh(*norm);  // typical_energy has evaluated the guess
   best_sum = std::numeric_limits<double>::infinity();
-  const Warmth warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
   minimiser = make_minimiser(settings.method, guess, warmth);
   if (second != Method::kAuto) minimiser = with_second(std::move(minimiser), guess);
-  is_metric_live = settings.method == Method::kQuasiNewton;
+  factor = settings.method == Method::kQuasiNewton ? Factor::kQuasiNewton : Factor::kUsable;
   const double sum = objective.sum(*norm);
   keep_if_best(sum);
   summary.initial_energy = norm->true_energy(sum);
@@ -293,7 +291,7 @@ void Deformer::Impl::iterate() {
   double sum = result.true_sum ? *result.true_sum : objective.sum(*norm);
   keep_if_best(sum);
   const bool is_over = result.outcome == Outcome::kConverged || result.outcome == Outcome::kStalled;
-  if (is_over && is_drag && keep_rest_if_best()) sum = best_sum;
+  if (is_over && warmth == Warmth::kWithMetric && keep_rest_if_best()) sum = best_sum;
   record(result, sum);
   switch (result.outcome) {
     case Outcome::kProgress:
@@ -307,15 +305,15 @@ void Deformer::Impl::iterate() {
   }
 }
 
-/// Of two methods that were tried: which of them the result is of, and what goes with it.
+/// After two methods were tried: records which of them the result is from, and restores what belongs to it.
 void Deformer::Impl::settle_methods() {
   if (!minimiser || second == Method::kAuto) return;
-  if (!minimiser->outcome_before()) return;  // the first was at work to the end
+  if (!minimiser->outcome_before()) return;  // only the first method ran
   if (minimiser->is_best_present()) {
     settings.method = summary.method = second;
-    is_metric_live = second == Method::kQuasiNewton;
+    factor = second == Method::kQuasiNewton ? Factor::kQuasiNewton : Factor::kUsable;
   } else {
-    objective.evaluate(x, *norm);  // the next solve reads off it where soft handles were
+    objective.evaluate(x, *norm);  // the next solve reads the previous soft targets from it
   }
 }
 
@@ -327,12 +325,14 @@ void Deformer::Impl::end(StopReason reason) {
     reason = StopReason::kConverged;
   settle_methods();
   const bool has_metric = !minimiser || minimiser->is_best_present();
-  // Before its end the metric may still be that of the guess.
-  if (settings.method == Method::kMultiresolution) is_metric_live = reason == StopReason::kConverged;
-  is_metric_live = is_metric_live && has_metric;
+  // Before convergence the metric may still be that of the guess.
+  if (settings.method == Method::kMultiresolution && reason == StopReason::kConverged)
+    factor = Factor::kQuasiNewton;
+  else if (settings.method == Method::kMultiresolution)
+    forget_weights();
+  if (!has_metric) forget_weights();
   minimiser.reset();
-  has_state = true;
-  is_at_rest = is_best_zero();
+  state = is_best_zero() ? State::kUndistorted : State::kDeformed;
   summary.stop_reason = reason;
   summary.solve_seconds = seconds();
   if (!settings.certify || reason == StopReason::kCancelled) return;
@@ -341,7 +341,7 @@ void Deformer::Impl::end(StopReason reason) {
 }
 
 void Deformer::Impl::begin_certificate(double max_seconds) {
-  is_metric_live = false;  // the certificate factors for itself
+  forget_weights();  // the certificate factors for itself
   objective.evaluate(x, *norm);
   certificate =
       std::make_unique<Certificate>(make_problem(), x, CertificateSettings{.max_seconds = max_seconds});
@@ -354,15 +354,15 @@ bool Deformer::Impl::certify() {
   return false;
 }
 
-/// Keeps what is factored where only targets changed.
+/// Replaces the constraints. Keeps factorisations if only targets have changed.
 void Deformer::Impl::replace_constraints(Constraints next) {
   if (constraints) {
     const bool has_footprint_of_before =
         next.footprint.size() == constraints->footprint.size() && next.footprint == constraints->footprint;
     const bool has_rows_of_before =
         next.linear.reuse(constraints->linear) && next.soft.has_rows_of(constraints->soft);
-    if (!has_footprint_of_before) is_metric_live = false;
-    is_metric_of_rows = is_metric_of_rows && has_rows_of_before;
+    if (!has_footprint_of_before) forget_weights();
+    if (!has_rows_of_before) factor = Factor::kOutdated;
   }
   constraints = std::move(next);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -13,7 +14,8 @@
 
 namespace lpdeform {
 
-/// What a Deformer holds, and the loop of a solve. Its guesses are in deformer_guess.cc, the rest in deformer_impl.cc.
+/// The state of a Deformer, and the loop of a solve. Initial guesses are in deformer_guess.cc, everything else in
+/// deformer_impl.cc.
 struct Deformer::Impl {
   Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options, Metric first_metric)
       : shape(std::move(rest_shape)),
@@ -59,6 +61,8 @@ struct Deformer::Impl {
   bool certify();
   void replace_constraints(Constraints next);
   double seconds() const;  // since `started`
+  /// The factor's weights are not those that quasi_newton left any more.
+  void forget_weights() { factor = std::min(factor, Factor::kUsable); }
   void interrupt() {
     certificate.reset();
     if (minimiser) end(StopReason::kCancelled);
@@ -75,31 +79,40 @@ struct Deformer::Impl {
   HandleSet handles;
   Material material;
   std::optional<Constraints> constraints;
-  std::shared_ptr<const Points> outside;  // where the region's surroundings are held, the caller's units
+  std::shared_ptr<const Points> outside;  // where vertices outside the region are held, in the caller's units
 
   // The state, in scaled units: the best of the last solve, or what was set.
   Points x;
+  enum class State {
+    kUntouched,    // nothing was solved or set: x are the rest positions
+    kUndistorted,  // the last solve ended with no distortion: the next one begins as the first
+    kDeformed,     // the next solve may go on from x
+  };
+  State state = State::kUntouched;
   Points x_before_move;  // when the last warm solve began; empty where there was none
-  bool has_state = false;
-  bool is_at_rest = false;        // the last solve ended with no distortion: there is nothing to go on from
-  bool is_drag = false;           // the running solve goes on from a state with the same vertices held
-  bool is_metric_of_rows = true;  // the last factor knows the present soft terms and linear rows
-  bool is_metric_live = false;    // the last factor is quasi_newton's, for this material
-  Field best_energies;            // E_i at x, the caller's units
-  Points positions;               // x in the caller's units, made when asked for
+  Field best_energies;   // E_i at x, the caller's units
+  Points positions;      // x in the caller's units, made when asked for
   bool is_positions_current = true;
+
+  enum class Factor {
+    kOutdated,  // made for other soft terms or linear rows than the present ones
+    kUsable,    // for the present ones, with any cell weights
+    kQuasiNewton,  // and with the weights that quasi_newton left, for this material: a warm solve goes on with it
+  };
+  Factor factor = Factor::kUsable;
 
   // The running solve.
   SolveSettings settings;
-  Method second = Method::kAuto;  // what is tried after settings.method; kAuto: nothing
+  Warmth warmth = Warmth::kCold;
+  Method second = Method::kAuto;  // tried after settings.method; kAuto: none
   std::stop_token stop;
   std::optional<LpNorm> norm;           // true norm, and the reference of the running solve
   std::unique_ptr<CoarseLevel> coarse;  // made when first needed
   std::unique_ptr<Minimiser> minimiser;
-  std::unique_ptr<Certificate> certificate;  // under way, after the minimiser's end
+  std::unique_ptr<Certificate> certificate;  // runs after the minimiser has ended
   std::chrono::steady_clock::time_point started;
   double best_sum = 0, best_soft_sum = 0;
-  int evaluations_before = 0, back_substitutions_before = 0;  // of this Deformer, when the solve began
+  int evaluations_before = 0, back_substitutions_before = 0;  // counts of this Deformer when the solve began
   SolveSummary summary;
 };
 

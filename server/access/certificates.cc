@@ -37,7 +37,7 @@ Source source(const std::string& text) {
   return {BIO_new_mem_buf(text.data(), static_cast<int>(text.size())), BIO_free};
 }
 
-/// All, in their order; empty where there is none, or one is damaged.
+/// All certificates in order; empty if there is none, or if one is damaged.
 std::vector<Certificate> certificates_in(const std::string& text) {
   const Source from = source(text);
   std::vector<Certificate> all;
@@ -73,7 +73,7 @@ absl::StatusOr<Certificates::Texts> read_all(const TlsFiles& files) {
   return Certificates::Texts{*std::move(chain), *std::move(key), *std::move(authorities)};
 }
 
-/// gRPC would refuse every connection, and say nothing that helps.
+/// Checks the files, because with bad ones gRPC would refuse every connection without a useful message.
 absl::Status check(const Certificates::Texts& texts, const TlsFiles& files) {
   const std::vector<Certificate> chain = certificates_in(texts.chain);
   if (chain.empty()) return bad_file(files.certificate_chain, "has no certificate that can be read");

@@ -10,22 +10,24 @@
 
 namespace lpdeform {
 
-/// What a server shows of itself over TLS, and whom it takes clients' certificates from: what files held when they were last
-/// found good. Thread-safe.
+/// The server's certificate for TLS, and the authorities that it accepts clients' certificates from, as last
+/// read from valid files. Thread-safe.
 class Certificates {
  public:
   struct Texts {
-    std::string chain, key, authorities;  // in PEM; `authorities` empty where clients need show none
+    std::string chain, key, authorities;  // in PEM; `authorities` is empty if clients need no certificate
     bool operator==(const Texts&) const = default;
   };
 
-  /// INVALID_ARGUMENT TLS_FILES where a file is missing, has a block that cannot be read, or chain and key are not of each other.
+  /// INVALID_ARGUMENT TLS_FILES if a file is missing, has a block that cannot be read, or if the private key
+  /// does not fit the chain.
   static absl::StatusOr<std::shared_ptr<Certificates>> create(TlsFiles files);
 
-  /// Reads the files again. Where they cannot be used, what was good before stays in force; errors as create's.
+  /// Reads the files again. If they cannot be used, the last valid contents stay in force. Errors: as
+  /// create().
   absl::Status refresh();
 
-  /// What is in force, and which of all that were, from 1 on.
+  /// The contents in force, and their version number, from 1 on.
   struct Current {
     std::shared_ptr<const Texts> texts;
     std::uint64_t number = 0;

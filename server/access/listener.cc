@@ -29,9 +29,9 @@ namespace lpdeform {
 namespace {
 
 constexpr int kUnacknowledgedMs = 20'000;
-/// Who is still there is counted no more often.
+/// How often ended connections are counted, at most.
 constexpr std::chrono::milliseconds kBetweenCounts{10};
-/// Between two tries to take a connection while there are no descriptors.
+/// The pause between two tries to accept a connection while there are no file descriptors.
 constexpr std::chrono::milliseconds kPause{50};
 
 absl::Status not_bound(const std::string& address, const std::string& why) {
@@ -53,14 +53,14 @@ bool is_loopback(const sockaddr& address) {
   return IN6_IS_ADDR_LOOPBACK(&v6.sin6_addr) != 0;
 }
 
-/// Different for each socket of the system; 0 for a descriptor that is closed.
+/// Different for each socket of the system; 0 for a closed descriptor.
 std::uint64_t inode_of(int fd) {
   struct stat about {};
   return fstat(fd, &about) == 0 ? about.st_ino : 0;
 }
 
-/// Whose a connection is: the bytes of a host's address, or of an IPv6 network of 64 bits, within which hosts choose theirs.
-/// Empty for Unix sockets.
+/// Identifies a connection's peer: the bytes of a host's address, or of its IPv6 network of 64 bits, because
+/// hosts choose their addresses within it. Empty for Unix sockets.
 std::string peer_of(const sockaddr_storage& from) {
   if (from.ss_family == AF_INET) {
     const auto& v4 = reinterpret_cast<const sockaddr_in&>(from);
@@ -80,7 +80,7 @@ int port_of(int socket) {
                                           : reinterpret_cast<sockaddr_in6&>(bound).sin6_port);
 }
 
-/// The limit of descriptors, raised to `wanted` where that is allowed.
+/// Raises the limit of file descriptors to `wanted` if that is allowed, and returns the limit.
 int raise_descriptor_limit(int wanted) {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return 1024;
@@ -155,7 +155,7 @@ absl::Status Listener::bind_host(const std::string& host, const std::string& por
   return absl::OkStatus();
 }
 
-/// `port` != 0 takes the place of a port 0.
+/// `port`, if it is not 0, replaces port 0 of the address.
 absl::Status Listener::add_socket(const addrinfo& info, int port) {
   sockaddr_storage where{};
   std::memcpy(&where, info.ai_addr, info.ai_addrlen);
@@ -163,7 +163,7 @@ absl::Status Listener::add_socket(const addrinfo& info, int port) {
                                                 : reinterpret_cast<sockaddr_in6&>(where).sin6_port;
   if (wanted == 0) wanted = htons(static_cast<in_port_t>(port));
   const int socket = ::socket(info.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  // A machine without IPv6 has names for its addresses all the same.
+  // A machine without IPv6 may still have names for IPv6 addresses.
   if (socket < 0) return errno == EAFNOSUPPORT ? absl::OkStatus() : not_bound_now(address_);
   const int yes = 1;
   setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
@@ -182,7 +182,7 @@ absl::Status Listener::add_socket(const addrinfo& info, int port) {
 
 std::size_t Listener::start(const Limits& limits, Events events) {
   events_ = std::move(events);
-  const int first = dup(wake_);  // the lowest that is free
+  const int first = dup(wake_);  // the lowest free descriptor
   if (first >= 0) close(first);
   limits_ = limits;
   limits_.connections = std::min<std::size_t>(limits.connections, 1 << 20);
@@ -193,7 +193,8 @@ std::size_t Listener::start(const Limits& limits, Events events) {
   return std::min(limits_.connections, static_cast<std::size_t>(std::max(last_descriptor_ - first, 0)));
 }
 
-/// gRPC does not say when a connection has ended: then its descriptor is closed, or another file's.
+/// gRPC does not report when a connection has ended. But then its descriptor is closed, or belongs to another
+/// file.
 bool Listener::has_room(const std::string& peer) {
   if (has_room_now(peer)) return true;
   const auto now = std::chrono::steady_clock::now();
@@ -229,7 +230,7 @@ void Listener::run() {
   }
 }
 
-/// A process gets its lowest free descriptor: a high one says that all below are taken.
+/// A new descriptor is the lowest free one, so a high one means that all below are taken.
 void Listener::accept_from(int listening) {
   sockaddr_storage from{};
   socklen_t size = sizeof(from);
@@ -249,7 +250,7 @@ void Listener::accept_from(int listening) {
   const int yes = 1, patience = kUnacknowledgedMs;
   setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof(yes));
   setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &patience, sizeof(patience));
-  // A descriptor that comes again was another connection's, which has ended.
+  // If a descriptor comes again, the connection that had it before has ended.
   if (const auto before = given_.find(fd); before != given_.end()) --from_[before->second.peer];
   given_[fd] = {inode_of(fd), peer};
   ++from_[peer];

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kLongestName = 253;
 
-/// The name or address without the port; empty where that is no number.
+/// The name or address without the port; empty if the port is not a number.
 std::string host_of(std::string_view authority) {
   const std::size_t colon = authority.rfind(':'), bracket = authority.rfind(']');
   const bool has_port =

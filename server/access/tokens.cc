@@ -27,8 +27,9 @@ namespace {
 
 constexpr int kLeastRsaBits = 2048;
 constexpr std::size_t kLongestSubject = 256;
-constexpr double kFarthestDate = 1e15;  // in seconds; doubles count so far
-/// Tokens remembered as good; with more, all are checked anew.
+constexpr double kFarthestDate = 1e15;  // in seconds; a double is exact up to this
+/// How many valid tokens are cached. When there are more, the cache is cleared, and tokens are verified
+/// again.
 constexpr std::size_t kMostKnown = 4096;
 
 using Jwt = std::unique_ptr<jwt_t, decltype(&jwt_free)>;
@@ -46,7 +47,7 @@ absl::Status invalid_token() {
   return bad_token(Reason::kTokenInvalid, "The bearer token is not one that this server takes.");
 }
 
-/// Empty where the key is of a kind or size that is not taken.
+/// Empty if the key's kind or size is not accepted.
 std::vector<std::string> algorithms_of(const EVP_PKEY& key) {
   const int bits = EVP_PKEY_bits(&key);
   if (EVP_PKEY_base_id(&key) == EVP_PKEY_RSA && bits >= kLeastRsaBits) return {"RS256", "RS384", "RS512"};
@@ -60,7 +61,7 @@ std::vector<std::string> algorithms_of(const EVP_PKEY& key) {
   return {};
 }
 
-/// All claims; not an object where they cannot be read.
+/// All claims; not an object if they cannot be read.
 nlohmann::json claims_of(jwt_t* token) {
   char* const text = jwt_get_grants_json(token, nullptr);
   const auto claims = nlohmann::json::parse(text == nullptr ? "" : text, nullptr, false);
@@ -68,20 +69,20 @@ nlohmann::json claims_of(jwt_t* token) {
   return claims;
 }
 
-/// A claim of text; empty where it is not there or not text.
+/// A claim that is a text; empty if it is absent or of another type.
 std::string text_of(const nlohmann::json& claims, const char* claim) {
   const auto found = claims.find(claim);
   return found != claims.end() && found->is_string() ? found->get<std::string>() : "";
 }
 
-/// A claim that is a date; a NaN where it is something else.
+/// A claim that is a date; NaN if it is of another type.
 double date_of(const nlohmann::json& claims, const char* claim, double left_out) {
   const auto found = claims.find(claim);
   if (found == claims.end()) return left_out;
   return found->is_number() ? found->get<double>() : std::nan("");
 }
 
-/// "aud" is a text or a list of them.
+/// "aud" is a text or a list of texts.
 bool is_for(const nlohmann::json& claims, const std::string& audience) {
   const auto found = claims.find("aud");
   if (found == claims.end()) return false;
@@ -89,15 +90,16 @@ bool is_for(const nlohmann::json& claims, const std::string& audience) {
   return found->is_string() && *found == audience;
 }
 
-/// Dots and the alphabet of base64url; the library would skip other characters.
+/// Whether the token has only dots and characters of base64url; the library would skip others.
 bool is_word(std::string_view token) {
   return std::all_of(token.begin(), token.end(), [](char c) {
     return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' || c == '.';
   });
 }
 
-/// The token, if this key signed it. The library takes the algorithm from the token, so that one "signed" with the
-/// public key as a shared secret would pass: what counts is what the key is for.
+/// The token, if this key signed it. The library takes the algorithm from the token, so it would accept a
+/// token "signed" with the public key as a shared secret. Therefore the algorithm must be one that the key is
+/// for.
 Jwt open_with(const TokenKeys::Key& key, const std::string& token) {
   jwt_t* opened = nullptr;
   const int error = jwt_decode(&opened, token.c_str(), reinterpret_cast<const unsigned char*>(key.pem.data()),
@@ -172,7 +174,7 @@ absl::Status Tokens::refresh() {
   const std::scoped_lock lock(mutex_);
   keys_ = std::make_shared<const TokenKeys>(*std::move(keys));
   stamp_ = now;
-  known_.clear();  // a key that was taken away has signed nothing any more
+  known_.clear();  // tokens of a removed key are not valid any more
   return absl::OkStatus();
 }
 

@@ -12,17 +12,17 @@
 
 namespace lpdeform {
 
-/// Who calls.
+/// An identified caller.
 struct Caller {
-  /// Whose sessions and uploads they are; empty where callers are not told apart.
+  /// The owner of the caller's sessions and uploads; empty if callers are not identified.
   std::string subject;
-  /// May look at the subject's sessions and change nothing.
+  /// The caller may read the subject's sessions, but not change them.
   bool is_viewer = false;
-  /// Until when the caller is let in, in seconds since 1970; 0: for as long as there is a call.
+  /// When the caller's token expires, in seconds since 1970; 0: never during a call.
   std::int64_t until = 0;
 };
 
-/// Public keys and the algorithms that each is for.
+/// Public keys, and the algorithms that each is for.
 class TokenKeys {
  public:
   /// `pem`: one or more "PUBLIC KEY" blocks, RSA of at least 2048 bits (RS256, RS384, RS512) or EC on P-256 (ES256),
@@ -39,21 +39,23 @@ class TokenKeys {
   std::vector<Key> keys_;
 };
 
-/// Checks bearer tokens: JSON Web Tokens (RFC 7519) signed with one of the keys in a file, which is read again when it
-/// changes. A token needs "sub", of 1 to 256 bytes, and "exp"; "nbf" is kept to, "iss" and "aud" where they are
-/// expected. "lpdeform_role" may be "viewer" or "editor", and is "editor" where it is left out. Thread-safe.
+/// Checks bearer tokens: JSON Web Tokens (RFC 7519) signed with one of the keys in a file. The file is read
+/// again when it changes. A token needs "sub", of 1 to 256 bytes, and "exp". "nbf" is respected; "iss" and
+/// "aud" are checked if a value is expected. "lpdeform_role" may be "viewer" or "editor"; the default is
+/// "editor". Thread-safe.
 class Tokens {
  public:
   struct Rules {
     std::string keys_file;
-    std::string issuer;    // that "iss" must be; empty: not looked at
-    std::string audience;  // that must be in "aud"; empty: not looked at
+    std::string issuer;    // required value of "iss"; empty: not checked
+    std::string audience;  // required entry of "aud"; empty: not checked
   };
   /// INVALID_ARGUMENT TOKEN_KEYS.
   static absl::StatusOr<std::unique_ptr<Tokens>> create(Rules rules);
 
   /// `authorization`: the value of the header, "Bearer <token>". `now`: seconds since 1970. UNAUTHENTICATED
-  /// TOKEN_MISSING, TOKEN_INVALID, TOKEN_EXPIRED; no text says more than the token's sender may know.
+  /// TOKEN_MISSING, TOKEN_INVALID, TOKEN_EXPIRED. The texts reveal nothing that the token's sender must not
+  /// know.
   absl::StatusOr<Caller> check(std::string_view authorization, std::int64_t now) const;
 
   /// Reads the file again if it has changed. An error leaves the keys as they are.
@@ -67,7 +69,7 @@ class Tokens {
     Caller caller;
     std::int64_t expires = 0;
   };
-  /// What tells one state of the file from another.
+  /// Tells whether the file has changed.
   struct Stamp {
     std::int64_t modified_ns = 0;
     std::int64_t size = -1;
@@ -82,7 +84,7 @@ class Tokens {
   mutable std::mutex mutex_;
   std::shared_ptr<const TokenKeys> keys_;
   Stamp stamp_;
-  mutable std::map<std::string, Known> known_;  // by the tokens' digests: those that were found good before
+  mutable std::map<std::string, Known> known_;  // valid tokens seen before, by their digests
 };
 
 }  // namespace lpdeform

@@ -11,8 +11,8 @@
 namespace lpdeform {
 namespace {
 
-/// gRPC asks for what is in force before each handshake. Its C++ interface has no way to give it but by files, which it does not
-/// check: where they are damaged it takes no connection.
+/// gRPC asks for the contents in force before each handshake. Its C++ interface offers this only for files,
+/// which it does not check: if they are damaged, it accepts no connection.
 class FreshCredentials final : public grpc::ServerCredentials {
  public:
   explicit FreshCredentials(std::shared_ptr<Certificates> certificates)
@@ -34,14 +34,14 @@ class FreshCredentials final : public grpc::ServerCredentials {
     return grpc_server_add_http2_port(server, address.c_str(), credentials_.get());
   }
 
-  /// gRPC calls it for one connection after the other.
+  /// gRPC calls this for one connection at a time.
   static grpc_ssl_certificate_config_reload_status fetch(void* self,
                                                          grpc_ssl_server_certificate_config** config) {
     auto& credentials = *static_cast<FreshCredentials*>(self);
     const Certificates::Current now = credentials.certificates_->current();
     if (now.number == credentials.given_) return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_UNCHANGED;
     const grpc_ssl_pem_key_cert_pair pair{now.texts->key.c_str(), now.texts->chain.c_str()};
-    // gRPC insists on authorities. Where no client is asked for a certificate, none is held against them.
+    // gRPC requires authorities. If no client is asked for a certificate, they are not used.
     const std::string& authorities =
         credentials.certificates_->knows_clients() ? now.texts->authorities : now.texts->chain;
     *config = grpc_ssl_server_certificate_config_create(authorities.c_str(), &pair, 1);

@@ -8,7 +8,7 @@
 
 namespace lpdeform {
 
-/// How connections are secured: each new one by what is in force of `certificates` then. Null: plain text.
+/// Secures each new connection with the contents of `certificates` in force at that time. Null: plain text.
 std::shared_ptr<grpc::ServerCredentials> make_credentials(const std::shared_ptr<Certificates>& certificates);
 
 }  // namespace lpdeform

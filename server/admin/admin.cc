@@ -22,15 +22,15 @@
 namespace lpdeform {
 namespace {
 
-/// Also of those that wait for a page. More are closed at once.
+/// Limit of connections, those that wait for a page included. More are closed at once.
 constexpr std::size_t kMostConnections = 1024;
-/// It has to answer where gRPC's connections have taken all that they may have.
+/// Reserved so that the admin port answers even when gRPC's connections have taken all their descriptors.
 constexpr int kSpareDescriptors = 16;
 
 using Asked = std::vector<std::uint64_t>;  // numbers of exchanges
 using OnMade = std::function<void(const Asked&, const Admin::Answer&)>;
 
-/// Makes one page, for all who have asked for it since it was begun the last time.
+/// Makes one page. Requests that come while it is being made are answered together by the next run.
 class PageMaker {
  public:
   PageMaker(Admin::Page page, OnMade on_made)
@@ -72,7 +72,7 @@ class PageMaker {
   std::condition_variable changed_;
   Asked asked_;
   bool is_stopping_ = false;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // last, because it uses the other members
 };
 
 }  // namespace
@@ -99,7 +99,7 @@ struct Admin::Impl {
 
   void wake() const {
     const std::uint64_t one = 1;
-    if (write(wake_fd, &one, sizeof(one)) < 0) return;  // it is awake already
+    if (write(wake_fd, &one, sizeof(one)) < 0) return;  // a failure means that the thread is awake already
   }
   void run();
   void wait();
@@ -112,10 +112,10 @@ struct Admin::Impl {
   const int wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   std::unique_ptr<Listener> listener;
   std::mutex mutex;
-  std::vector<int> come;   // connections
-  std::vector<Made> made;  // pages
+  std::vector<int> come;   // new connections
+  std::vector<Made> made;  // finished pages
   bool is_stopping = false;
-  // The thread's alone:
+  // Used by the thread only:
   Exchanges exchanges;
   std::uint64_t numbers = 0;
   std::thread thread;
@@ -133,7 +133,7 @@ void Admin::Impl::run() {
   }
 }
 
-/// Connections that have come, and pages that were made. False once it is to end.
+/// Takes new connections and finished pages. Returns false when the thread must end.
 bool Admin::Impl::take_news() {
   std::vector<int> connections;
   std::vector<Made> pages;
@@ -165,7 +165,7 @@ void Admin::Impl::ask(std::uint64_t number, HttpExchange& exchange) {
   maker->second->ask(number);
 }
 
-/// Those that are over, those whose time is, and the oldest of too many.
+/// Ends exchanges that are over, those whose time is up, and the oldest ones if there are too many.
 void Admin::Impl::end_slow_ones() {
   const auto now = HttpExchange::Clock::now();
   std::erase_if(exchanges, [&](const auto& one) {
@@ -195,7 +195,7 @@ void Admin::Impl::wait() {
   }
   poll(waited_for.data(), waited_for.size(), timeout_ms);
   std::uint64_t news = 0;
-  if (read(wake_fd, &news, sizeof(news)) < 0) return;  // nobody woke it
+  if (read(wake_fd, &news, sizeof(news)) < 0) return;  // nothing woke the thread
 }
 
 absl::StatusOr<std::unique_ptr<Admin>> Admin::start(const std::string& address,

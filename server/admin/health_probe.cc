@@ -15,7 +15,8 @@
 namespace lpdeform {
 namespace {
 
-/// grpc.health.v1.HealthCheckResponse with status SERVING: field 1 is the varint 1. Written by hand, because Debian's gRPC does not carry the generated message.
+/// grpc.health.v1.HealthCheckResponse with status SERVING: field 1 is the varint 1. Written by hand because
+/// Debian's gRPC does not include the generated message.
 constexpr char kServing[] = {0x08, 0x01};
 
 std::string bytes_of(const grpc::ByteBuffer& buffer) {

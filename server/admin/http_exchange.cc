@@ -27,7 +27,7 @@ const char* phrase_of(int status) {
   return "Service Unavailable";
 }
 
-/// -1 where there is nothing at the moment, 0 where there never is any more.
+/// -1 if there is nothing at the moment; 0 at the end of the input.
 ssize_t received(int fd, std::array<char, 4096>& buffer) {
   const ssize_t got = recv(fd, buffer.data(), buffer.size(), 0);
   const bool is_later = got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR);
@@ -98,7 +98,7 @@ void HttpExchange::answer(int status, const std::string& content_type, const std
   until_ = Clock::now() + patience_;
 }
 
-/// Who closes before all is read that came takes the answer away again, so the peer closes first.
+/// Closing a socket with unread input would discard the answer, so the peer closes first.
 void HttpExchange::write() {
   while (written_ < out_.size()) {
     const ssize_t put = send(fd_, out_.data() + written_, out_.size() - written_, MSG_NOSIGNAL);

@@ -7,9 +7,10 @@
 
 namespace lpdeform {
 
-/// One request in plain HTTP/1.1 and its answer, on a connection that ends with them. It waits for nobody: each step takes what
-/// is there, and a peer that is slow has a fixed time for its whole request, and again for the whole answer, whatever it
-/// trickles meanwhile. Of the request only the first line and the host count. For one thread.
+/// One request in plain HTTP/1.1 and its answer, on a connection that then ends. It never blocks: each step
+/// handles the bytes that are there. A peer has a fixed time for its whole request, and the same time for the
+/// whole answer, even if it sends a few bytes now and then. Only the first line and the host of the request
+/// matter. For one thread.
 class HttpExchange {
  public:
   using Clock = std::chrono::steady_clock;
@@ -17,11 +18,12 @@ class HttpExchange {
     kReading,
     kAsked,    // path() is known
     kWaiting,  // for answer()
-    kWriting,  // and then reading on until the peer has seen the end
+    kWriting,  // writing, then reading until the peer has closed
     kOver,
   };
 
-  /// `fd`: a connection that does not block, which it closes. `patience`: for the request, and for the answer.
+  /// `fd`: a non-blocking connection, which this object closes. `patience`: for the request, and again for
+  /// the answer.
   HttpExchange(int fd, Clock::duration patience);
   ~HttpExchange();
   HttpExchange(const HttpExchange&) = delete;
@@ -29,19 +31,19 @@ class HttpExchange {
 
   State state() const { return state_; }
   int fd() const { return fd_; }
-  /// For poll(): what go_on() waits for.
+  /// The events for poll() that go_on() waits for.
   short events() const;
-  /// By then the peer has to have done its part. Never, while it is the one that waits.
+  /// The deadline of the peer. While the peer waits for the answer, it is never.
   Clock::time_point until() const { return until_; }
 
   /// Reads or writes what can be read or written now.
   void go_on();
 
-  /// Of a GET or HEAD, without what follows a question mark; empty for any other request.
+  /// The path of a GET or HEAD, without what follows a question mark; empty for any other request.
   const std::string& path() const { return path_; }
-  /// The header "Host"; empty where there is more than one.
+  /// The header "Host"; empty if there is more than one.
   const std::optional<std::string>& host() const { return host_; }
-  /// Somebody is to answer it later.
+  /// The answer will come later, by answer().
   void wait() { state_ = State::kWaiting; }
   bool is_waited_for() const { return state_ == State::kReading || state_ == State::kWriting; }
   void answer(int status, const std::string& content_type, const std::string& body);

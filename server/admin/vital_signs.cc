@@ -16,7 +16,7 @@ bool rings(const Bell& bell) {
   return bell->get_future().wait_for(patience) == std::future_status::ready;
 }
 
-/// A slice as light as a small session's.
+/// A slice as light as that of a small session.
 class Probe final : public Runnable {
  public:
   explicit Probe(Bell bell) : Runnable(false), bell_(std::move(bell)) {}

@@ -9,13 +9,13 @@
 
 namespace lpdeform {
 
-/// Whether a server still does what it is there for: each part is tried, not asked. `accepts` opens a new connection to
+/// Liveness and readiness of a server. Each part is tested, not asked. `accepts` opens a new connection to
 /// the server's own address, because a listener can die while old connections live on.
 class VitalSigns {
  public:
   struct Parts {
     std::function<bool()> accepts;
-    std::function<std::uint64_t()> refused;  // connections closed for want of room so far
+    std::function<std::uint64_t()> refused;  // connections closed so far because a limit was reached
     std::function<bool()> is_draining;
     Scheduler& scheduler;
     TaskPool& pool;
@@ -24,12 +24,12 @@ class VitalSigns {
 
   struct Finding {
     bool is_draining = false;
-    bool takes_connections = false;  // not tried while draining
-    bool is_full = false;            // the connection was refused for want of room: there are too many
+    bool takes_connections = false;  // not tested while draining
+    bool is_full = false;            // the connection was refused because there are too many
     bool takes_calls = false;        // the task pool ran a task within kPatienceSeconds
     bool runs_sessions = false;      // the scheduler ran a slice within kPatienceSeconds
 
-    /// Also where it is full: to start it again would end what fills it, and what was there before.
+    /// True also if the server is full: a restart would end the connections that fill it, and all others.
     bool is_alive() const {
       return (is_draining || takes_connections || is_full) && takes_calls && runs_sessions;
     }
@@ -38,7 +38,7 @@ class VitalSigns {
     std::string json() const;
   };
 
-  /// Takes up to about 2 kPatienceSeconds; on any thread but those of the parts.
+  /// Takes up to about 2 kPatienceSeconds. Call it on any thread but those of the parts.
   Finding examine() const;
 
   static constexpr int kPatienceSeconds = 5;

@@ -24,10 +24,11 @@ std::shared_ptr<Timers> or_system(std::shared_ptr<Timers> timers) {
   return timers ? std::move(timers) : std::make_shared<SystemTimers>();
 }
 
-/// Of a token that is good for longer, as one whose date is in milliseconds by mistake. A clock does not count much further.
+/// The longest life of a stream, for tokens that are valid for longer, for example because their date is in
+/// milliseconds by mistake. A clock cannot count much further.
 constexpr std::chrono::seconds kLongestStream = std::chrono::hours(24 * 365);
 
-/// Between looks whether a stream whose token will expire is still there.
+/// How often to check whether a stream whose token will expire still exists.
 constexpr std::chrono::minutes kBetweenLooks{1};
 
 void end_at(const std::shared_ptr<Timers>& timers, const std::weak_ptr<FrameStream>& weak,
@@ -42,13 +43,13 @@ void end_at(const std::shared_ptr<Timers>& timers, const std::weak_ptr<FrameStre
   timers->at(std::min(when, timers->now() + kBetweenLooks), look);
 }
 
-/// Whether nobody but this machine's own programs is meant to be let in, and nothing else keeps others out.
+/// Whether only programs on this machine may call, and nothing else keeps others out.
 bool is_for_this_machine(const ServerOptions& options) {
   return options.token_keys_file.empty() && !options.tls.knows_clients() && !options.allow_anonymous &&
          !absl::StartsWith(options.address, "unix:");
 }
 
-/// Clients count from an earlier moment than the server, and gRPC rounds what it is told to about a hundredth.
+/// Clients start to count earlier than the server does, and gRPC rounds the deadline to about a hundredth.
 bool is_reached(const CallContext::Deadline& deadline) {
   const auto slack = std::chrono::milliseconds(50) + deadline.given / 50;
   return deadline.when - slack <= std::chrono::system_clock::now();
@@ -60,7 +61,7 @@ std::string ended_because(EndReason reason) {
   return reason == EndReason::kDraining ? "draining" : "deleted";
 }
 
-/// Where a flood is followed by nothing, nothing else would.
+/// Sums the log up periodically, because after a flood there may be no line that would do so.
 void sum_up_later(const std::weak_ptr<Timers>& weak_timers, const std::weak_ptr<const Log>& weak_log) {
   const auto timers = weak_timers.lock();
   if (!timers) return;
@@ -94,14 +95,14 @@ Backend::Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens)
       caller_limits_(std::make_shared<CallerLimits>(
           timers, CallerLimits::Limits{options.max_streams_per_caller, options.max_upload_bytes_per_second})),
       factory_(options, budget_, uploads_,
-               {scheduler,
+               {scheduler_,
                 timers,
                 options.heartbeat,
                 metrics,
                 {options.max_streams_per_session, {options.max_handles, options.max_undo}}}),
-      scheduler(options.runner_threads == 0 ? Scheduler::default_threads() : options.runner_threads,
-                observer(Span::kSchedulerQueue)),
-      pool(kPoolThreads, options.max_calls_waiting, observer(Span::kCallQueue)) {
+      scheduler_(options.runner_threads == 0 ? Scheduler::default_threads() : options.runner_threads,
+                 observer(Span::kSchedulerQueue)),
+      pool_(kPoolThreads, options.max_calls_waiting, observer(Span::kCallQueue)) {
   if (options.store) {
     keeper_ = Keeper::create(options.store, {timers, metrics, log_, options.session_idle});
     keeper_->on_lost = [registry = std::weak_ptr(registry)](const Session& session) {
@@ -169,7 +170,7 @@ std::string Backend::metrics_text() {
   metrics->set(Level::kSessions, static_cast<double>(registry->size()));
   metrics->set(Level::kUploads, static_cast<double>(uploads_->size()));
   metrics->set(Level::kMemoryBytes, static_cast<double>(budget_->used()));
-  metrics->set(Level::kOverloaded, scheduler.is_overloaded() ? 1 : 0);
+  metrics->set(Level::kOverloaded, scheduler_.is_overloaded() ? 1 : 0);
   metrics->set(Level::kDraining, gate.is_closed() ? 1 : 0);
   return metrics->text();
 }
@@ -218,38 +219,43 @@ absl::Status Backend::delete_upload(const CallContext& call, const v1::DeleteUpl
 
 void Backend::get_session(const CallContext& call, const v1::GetSessionRequest& request,
                           v1::GetSessionResponse& response, Done done) {
-  const auto session = find(call, Access::kRead, request.session());
-  if (session.ok()) {
-    encode((*session)->info(), registry->idle(), timers->now(), *response.mutable_session());
-  }
-  done(session.status());
+  with_session(call, Access::kRead, request.session(),
+               [this, &response, done = std::move(done)](const auto& session) {
+                 if (session.ok())
+                   encode((*session)->info(), registry->idle(), timers->now(), *response.mutable_session());
+                 done(session.status());
+               });
 }
 
 void Backend::ack_frames(const CallContext& call, const v1::AckFramesRequest& request, v1::AckFramesResponse&,
                          Done done) {
-  const auto session = find(call, Access::kRead, request.session());
-  done(session.ok() ? (*session)->acknowledge(request.stream_id(), request.frame_seq()) : session.status());
+  with_session(call, Access::kRead, request.session(),
+               [&request, done = std::move(done)](const auto& session) {
+                 done(session.ok() ? (*session)->acknowledge(request.stream_id(), request.frame_seq())
+                                   : session.status());
+               });
 }
 
 absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call,
-                                                         const std::string& session_name,
+                                                         std::shared_ptr<Session> session,
                                                          const std::string& token,
                                                          const v1::FrameOptions& options,
                                                          std::function<void()> wake) {
   const auto caller = identify(call, token.empty() ? Access::kRead : Access::kChange);
   if (!caller.ok()) return caller.status();
-  auto session = registry->find(session_name, caller->subject);
-  if (!session.ok()) return session.status();
   auto decoded = decode_frame_options(options);
   if (!decoded.ok()) return decoded.status();
   decoded->max_bytes_per_second = options_.max_stream_bytes_per_second;
   if (const double most = options_.max_stream_frames_per_second; most > 0) {
-    double& asked = decoded->max_frames_per_second;  // 0: any number
+    double& asked = decoded->max_frames_per_second;  // 0: without limit
     asked = asked > 0 ? std::min(asked, most) : most;
   }
-  auto place = caller_limits_->enter_stream((*session)->owner());
+  auto place = caller_limits_->enter_stream(session->owner());
   if (!place.ok()) return place.status();
-  auto stream = (*session)->open_stream(token, *decoded);
+  Change change{session, session->writer(token)};
+  if (!token.empty() && !change.writer.ok()) return change.writer.status();
+  const auto writer = change.writer.ok() ? std::make_optional(*change.writer) : std::nullopt;
+  auto stream = session->open_stream(writer, *decoded);
   if (!stream.ok()) return stream.status();
   (*stream)->start(std::move(wake));
   metrics->change(Level::kStreams, 1);
@@ -257,43 +263,41 @@ absl::StatusOr<Backend::OpenStream> Backend::open_stream(const CallContext& call
     const std::chrono::seconds left(caller->until + 1 - absl::ToUnixSeconds(absl::Now()));
     end_at(timers, *stream, timers->now() + std::min(left, kLongestStream));
   }
-  const WriterLease lease = (*session)->lease();
-  log().info("stream_opened", {{"session", abbreviated(session_name)},
+  const WriterLease lease = session->lease();
+  log().info("stream_opened", {{"session", abbreviated(session->name())},
                                {"stream", abbreviated((*stream)->id())},
                                {"role", std::string(token.empty() ? "reader" : "writer")},
                                {"epoch", lease.epoch},
                                {"input_seq", lease.input_seq},
                                {"trace_id", call.trace_id}});
-  return OpenStream{*std::move(session), *std::move(stream), *std::move(place)};
+  return OpenStream{std::move(change), *std::move(stream), *std::move(place)};
 }
 
 void Backend::forget(const CallContext& call, const OpenStream& open, CallEnd how) {
-  open.session->forget_stream(*open.stream);
+  open.session()->forget_stream(*open.stream);
   metrics->change(Level::kStreams, -1);
   how.is_past_deadline = is_reached(call.deadline);
   how.unread = std::max<std::chrono::duration<double>>(how.unread, open.stream->waited_for_credit());
   const std::string reason = stream_end_name(stream_end_of(open.stream->ended_by(), how));
   metrics->stream_ended(reason);
-  const WriterLease lease = open.session->lease();
-  log().info("stream_ended", {{"session", abbreviated(open.session->name())},
+  const WriterLease lease = open.session()->lease();
+  log().info("stream_ended", {{"session", abbreviated(open.session()->name())},
                               {"stream", abbreviated(open.stream->id())},
                               {"reason", reason},
                               {"epoch", lease.epoch},
                               {"input_seq", lease.input_seq},
                               {"frame_seq", open.stream->last_frame_seq()},
                               {"unread_seconds", where_known(how.unread.count())},
-                              {"fault", open.session->standing_fault()},
+                              {"fault", open.session()->standing_fault()},
                               {"trace_id", call.trace_id}});
 }
 
-absl::Status Backend::solve(const CallContext& call, const v1::SolveRequest& request,
+absl::Status Backend::solve(const CallContext& call, const Change& change, const v1::SolveRequest& request,
                             SolveJob::OnProgress on_progress, SolveJob::OnDone on_done,
                             std::shared_ptr<SolveJob>& job) {
-  const auto session = find(call, Access::kChange, request.session());
-  if (!session.ok()) return session.status();
-  if (absl::Status status = (*session)->check_writer(request.writer_token()); !status.ok()) return status;
-  Decoder decoder(*uploads_, (*session)->vertex_count(), &(*session)->features(),
-                  (*session)->mesh().weld().get(), (*session)->owner());
+  const std::shared_ptr<Session>& session = change.session;
+  Decoder decoder(*uploads_, session->vertex_count(), &session->features(), session->mesh().weld().get(),
+                  session->owner());
   std::optional<Update> update;
   if (request.has_update()) {
     auto decoded = decoder.update(request.update());
@@ -304,19 +308,20 @@ absl::Status Backend::solve(const CallContext& call, const v1::SolveRequest& req
   if (request.has_initial_positions()) {
     auto positions = decoder.positions(request.initial_positions());
     if (!positions.ok()) return positions.status();
-    auto welded = (*session)->mesh().solver_positions(*std::move(positions));
+    auto welded = session->mesh().solver_positions(*std::move(positions));
     if (!welded.ok()) return welded.status();
     options.initial_positions = *std::move(welded);
   }
-  const SolveJob::OnDone on_ended = [this, session = *session, trace_id = call.trace_id,
+  const SolveJob::OnDone on_ended = [this, session, trace_id = call.trace_id,
                                      on_done](absl::StatusOr<SolveResult> result) {
     if (result.ok()) log_solved(*session, *result, trace_id);
-    // The result answers the update, so it comes when that is kept: as a rule long ago.
+    // The result answers the update, so it is sent when the update is stored, which usually has happened long
+    // before.
     when_kept(*session, session->revision(), [on_done, result](bool) { on_done(result); });
   };
   job = std::make_shared<SolveJob>(std::move(options), std::move(on_progress), on_ended);
-  const absl::Status status = (*session)->solve(request.writer_token(), update, job);
-  if (status.ok()) when_kept(**session, (*session)->revision(), [](bool) {});
+  const absl::Status status = session->solve(change.writer, update, job);
+  if (status.ok()) when_kept(*session, session->revision(), [](bool) {});
   return status;
 }
 

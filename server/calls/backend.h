@@ -32,20 +32,20 @@
 
 namespace lpdeform {
 
-/// A session that was just made, and what a store is to keep of it from the beginning.
+/// A session that was just made, and the part of it that a store keeps from the beginning.
 struct NewSession {
   std::shared_ptr<Session> session;
   StoredHead head;  // empty without a store
 };
 
-/// What the log says of an update that is refused.
+/// What the log says of a refused update.
 RefusedInput refused_input(const v1::Update& update);
 
-/// All that the calls of a server share, and what they do, without gRPC: each function takes a request to its
-/// response. Called from the task pool and the scheduler, never from gRPC's threads. Thread-safe.
+/// Everything that the calls of a server share, and what they do, without gRPC: each function turns a request
+/// into its response. Called from the task pool and the scheduler, never from gRPC's threads. Thread-safe.
 class Backend {
  public:
-  /// `tokens`: null where callers need none.
+  /// `tokens`: null if callers need none.
   explicit Backend(const ServerOptions& options, std::unique_ptr<Tokens> tokens = nullptr);
 
   absl::Status create_upload(const CallContext& call, const v1::CreateUploadRequest& request,
@@ -54,8 +54,8 @@ class Backend {
                            v1::UploadPartResponse& response);
   absl::Status delete_upload(const CallContext& call, const v1::DeleteUploadRequest& request,
                              v1::DeleteUploadResponse& response);
-  // These do not wait, for the session to be made or for the store: `done` is called when all is done, on another thread, or
-  // at once. `request` and `response` must live until then.
+  // These calls do not wait for a session to be made, or for the store. `done` is called when everything is
+  // done: at once, or on another thread. `request` and `response` must live until then.
   using Done = std::function<void(absl::Status)>;
   void create_session(const CallContext& call, const v1::CreateSessionRequest& request,
                       v1::CreateSessionResponse& response, Done done);
@@ -76,59 +76,66 @@ class Backend {
   void undo_update(const CallContext& call, const v1::UndoUpdateRequest& request,
                    v1::UndoUpdateResponse& response, Done done);
 
-  /// Calls `then` with OK once find() finds the session of this name, or will not however long one waits: at once, or, where
-  /// only the store has it, on a thread of the pool when it has been made again. Errors: UNAVAILABLE STORE_FAILING;
-  /// NOT_FOUND SESSION_DAMAGED; RESOURCE_EXHAUSTED as CreateSession.
-  void when_here(const CallContext& call, const std::string& name, Done then);
-
-  /// Calls `then` with OK once an update of this session can be decoded without waiting for its geometry. Errors: as
-  /// Session::check_writer and GeometryQueue::when_found.
-  void when_decodable(const std::shared_ptr<Session>& session, const std::string& token,
-                      const v1::Update& update, Done then);
-
-  /// Ends the process's part in all sessions, as it shuts down, and waits until the store has what has changed, up to kFlushPatience.
-  /// Whether it has.
-  bool release_sessions(const std::string& text);
-  static constexpr std::chrono::seconds kFlushPatience{5};
-
-  /// What a call is going to do.
+  /// What a call intends to do.
   enum class Access { kRead, kChange };
-  /// Who calls. UNAUTHENTICATED as Tokens::check, AUTHORIZATION_TWICE; PERMISSION_DENIED READ_ONLY, HOST_FOREIGN; INVALID_ARGUMENT
-  /// ROUTE_TWICE.
+  /// Identifies the caller. Errors: UNAUTHENTICATED as Tokens::check, AUTHORIZATION_TWICE; PERMISSION_DENIED
+  /// READ_ONLY, HOST_FOREIGN; INVALID_ARGUMENT ROUTE_TWICE.
   absl::StatusOr<Caller> identify(const CallContext& call, Access access) const;
-  /// A session of the caller's. Errors: as identify; NOT_FOUND SESSION_UNKNOWN.
+  /// One of the caller's sessions. Errors: as identify(); NOT_FOUND SESSION_UNKNOWN.
   absl::StatusOr<std::shared_ptr<Session>> find(const CallContext& call, Access access,
                                                 const std::string& name) const;
 
-  /// A session's file, and the memory that it has been promised. For those who may change the session: it gives its mesh away.
+  /// Calls `then` with the session of this name. If the session is here, that is at once; if only the store
+  /// has it, later on a thread of the pool, when it has been restored. Errors: as find(); UNAVAILABLE
+  /// STORE_FAILING; NOT_FOUND SESSION_DAMAGED; RESOURCE_EXHAUSTED as CreateSession.
+  using OnSession = std::function<void(absl::StatusOr<std::shared_ptr<Session>>)>;
+  void with_session(const CallContext& call, Access access, const std::string& name, OnSession then);
+
+  /// Which session a writer wants to change, and the writer.
+  struct Change {
+    std::shared_ptr<Session> session;
+    absl::StatusOr<Session::Writer> writer;
+  };
+  /// Calls `then` with OK once an update of this session can be decoded without waiting for its geometry.
+  /// Errors: that of `writer`; as GeometryQueue::when_found.
+  void when_decodable(const Change& change, const v1::Update& update, Done then);
+
+  /// Releases all sessions as the process shuts down, and waits until the store has their changes, up to
+  /// kFlushPatience. Returns whether it has.
+  bool release_sessions(const std::string& text);
+  static constexpr std::chrono::seconds kFlushPatience{5};
+
+  /// A session's file, and the memory reserved for it. Only for callers who may change the session, because
+  /// the file reveals its mesh.
   struct SnapshotFile {
     std::string bytes;
     Reservation memory;
   };
-  /// Errors: as find and encode_snapshot; RESOURCE_EXHAUSTED MEMORY_FULL, CALLER_MEMORY_FULL.
-  absl::StatusOr<SnapshotFile> snapshot(const CallContext& call, const std::string& session_name) const;
+  /// Errors: as encode_snapshot; RESOURCE_EXHAUSTED MEMORY_FULL, CALLER_MEMORY_FULL.
+  absl::StatusOr<SnapshotFile> snapshot(const CallContext& call, const Session& session) const;
 
-  /// A stream of a session, which is found by its name; with a token, the writer's. `wake` as FrameStream::start has it.
+  /// A stream of a session; with a token it belongs to the writer. `wake`: see FrameStream::start.
   struct OpenStream {
-    std::shared_ptr<Session> session;
+    Change change;  // what its updates change; for a reader the writer is an error
     std::shared_ptr<FrameStream> stream;
     CallerLimits::Place place = nullptr;
+    const std::shared_ptr<Session>& session() const { return change.session; }
   };
-  absl::StatusOr<OpenStream> open_stream(const CallContext& call, const std::string& session_name,
+  absl::StatusOr<OpenStream> open_stream(const CallContext& call, std::shared_ptr<Session> session,
                                          const std::string& token, const v1::FrameOptions& options,
                                          std::function<void()> wake);
 
-  /// Lets go of a stream that is over, and says why it is.
+  /// Forgets a stream that has ended, and logs why.
   void forget(const CallContext& call, const OpenStream& open, CallEnd how);
 
-  /// Decodes an update for a session and gives it to it. `answered` is called with an error at once, else when the update
-  /// is in the store, or when that takes too long.
+  /// Decodes an update and applies it to its session. `answered` is called with an error at once, otherwise
+  /// when the update is stored or when that takes too long.
   using OnUpdated = std::function<void(absl::StatusOr<UpdateResult>)>;
-  void update(const CallContext& call, Session& session, const std::string& token, const v1::Update& update,
+  void update(const CallContext& call, const Change& change, const v1::Update& update,
               const OnUpdated& answered);
 
-  /// Decodes what a Solve call asks for and begins it.
-  absl::Status solve(const CallContext& call, const v1::SolveRequest& request,
+  /// Decodes a Solve call and begins it.
+  absl::Status solve(const CallContext& call, const Change& change, const v1::SolveRequest& request,
                      SolveJob::OnProgress on_progress, SolveJob::OnDone on_done,
                      std::shared_ptr<SolveJob>& job);
 
@@ -137,23 +144,25 @@ class Backend {
   /// All metrics in Prometheus's text format.
   std::string metrics_text();
 
-  /// A new record of a call, for its edge.
+  /// A new record of a call, for the code that receives it.
   std::shared_ptr<CallRecord> begin_record(std::string method, CallContext context);
 
-  /// The longest silence of a stream.
+  /// The longest time without a message on a stream.
   Timers::Duration heartbeat() const { return options_.heartbeat; }
 
   const std::shared_ptr<Timers> timers;
   const std::shared_ptr<Metrics> metrics = std::make_shared<Metrics>();
   const std::shared_ptr<Registry> registry;
   CallGate gate;
+  Scheduler& scheduler() { return scheduler_; }
+  TaskPool& pool() { return pool_; }
 
  private:
   std::function<void(double)> observer(Span span) const;
   void log_solved(const Session& session, const SolveResult& result, const std::string& trace_id) const;
-  absl::StatusOr<UpdateResult> take_update(const CallContext& call, Session& session,
-                                           const std::string& token, const v1::Update& update);
-  /// A call that makes a session: the same request_id and fingerprint give the same one.
+  absl::StatusOr<UpdateResult> take_update(const CallContext& call, const Change& change,
+                                           const v1::Update& update);
+  /// A call that creates a session. The same request_id and fingerprint give the same session.
   struct Creation {
     CallContext call;
     std::string request_id, owner;
@@ -172,6 +181,11 @@ class Backend {
                                            const v1::RestoreSessionRequest& request,
                                            std::uint64_t fingerprint) const;
   void when_kept(const Session& session, std::uint64_t revision, Keeper::OnKept on_kept);
+  void fetch(const CallContext& call, const std::string& name, const std::string& owner, OnSession then);
+  void replace_writer(const CallContext& call, const std::shared_ptr<Session>& session,
+                      v1::AcquireWriterResponse& response, const Done& done);
+  void undo(Session& session, const v1::UndoUpdateRequest& request, v1::UndoUpdateResponse& response,
+            const Done& done);
   void list_kept(const std::string& owner, const std::string& after, std::size_t most,
                  v1::ListSessionsResponse& response, Done done);
   void make_again(const std::string& name, absl::StatusOr<Keeper::Found> found);
@@ -193,13 +207,12 @@ class Backend {
     std::vector<Done> waiting;
   };
   std::mutex restoring_mutex_;
-  std::map<std::string, Restoring> restoring_;  // by the sessions' names
-  GeometryQueue geometry_{scheduler, pool, budget_};
+  std::map<std::string, Restoring> restoring_;  // by session name
+  GeometryQueue geometry_{scheduler_, pool_, budget_};
 
- public:
   // Last, so that their threads end first.
-  Scheduler scheduler;
-  TaskPool pool;
+  Scheduler scheduler_;
+  TaskPool pool_;
 };
 
 }  // namespace lpdeform

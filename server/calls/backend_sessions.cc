@@ -1,4 +1,4 @@
-// Backend: sessions begin, change and end, and what the store has to do with that.
+// Backend: sessions begin, change and end, and what that means for the store.
 
 #include <algorithm>
 #include <chrono>
@@ -19,10 +19,8 @@ namespace lpdeform {
 namespace {
 
 constexpr std::uint32_t kDefaultPage = 100, kLargestPage = 1000;
-/// Of page tokens that go on with what only the store has.
+/// The prefix of page tokens that continue with sessions that only the store has.
 constexpr std::string_view kKeptOnly = "kept:";
-
-/// That a server which shuts down gives its store.
 
 }  // namespace
 
@@ -69,23 +67,23 @@ void Backend::restore_session(const CallContext& call, const v1::RestoreSessionR
 
 void Backend::create_once(const Creation& creation) {
   if (keeper_ == nullptr || creation.request_id.empty()) return make_session(creation);
-  // A server that was restarted may have made it before.
-  keeper_->find_request(creation.owner, creation.request_id,
-                        [this, creation](const absl::StatusOr<std::string>& name) {
-                          if (!name.ok()) return creation.on_created(name.status());
-                          if (name->empty()) return make_session(creation);
-                          when_here(creation.call, *name, [this, creation](const absl::Status& status) {
-                            if (status.ok() || absl::IsNotFound(status)) return make_session(creation);
-                            creation.on_created(status);
-                          });
-                        });
+  // The server may have created the session before a restart.
+  keeper_->find_request(
+      creation.owner, creation.request_id, [this, creation](const absl::StatusOr<std::string>& name) {
+        if (!name.ok()) return creation.on_created(name.status());
+        if (name->empty()) return make_session(creation);
+        with_session(creation.call, Access::kChange, *name, [this, creation](const auto& found) {
+          if (found.ok() || absl::IsNotFound(found.status())) return make_session(creation);
+          creation.on_created(found.status());
+        });
+      });
 }
 
 void Backend::make_session(const Creation& creation) {
   if (!registry->begin_creation(creation.request_id, creation.on_created, creation.fingerprint,
                                 creation.owner))
     return;
-  scheduler.run_once([this, creation] {
+  scheduler_.run_once([this, creation] {
     const auto finish = [this, creation](absl::StatusOr<std::shared_ptr<Session>> made) {
       if (made.ok()) {
         metrics->add(Count::kSessionsCreated);
@@ -132,7 +130,8 @@ absl::StatusOr<NewSession> Backend::make_restored(const SessionMaker& maker,
   if (keeper_ == nullptr) return made;
   static const StoredBlobs no_blobs;
   Decoder decoder = factory_.decoder(snapshot->request, maker.owner).reading_stored(no_blobs);
-  // A snapshot does not say by which request it was restored; the store has to, for a server that was restarted.
+  // A snapshot does not name the request that restores it. The store must know it, for a server that was
+  // restarted.
   v1::CreateSessionRequest kept = snapshot->request;
   kept.set_request_id(request.request_id());
   auto head = encode_head(kept, decoder, fingerprint, made.session->created_unix_ms());
@@ -142,16 +141,14 @@ absl::StatusOr<NewSession> Backend::make_restored(const SessionMaker& maker,
 }
 
 absl::StatusOr<Backend::SnapshotFile> Backend::snapshot(const CallContext& call,
-                                                        const std::string& session_name) const {
-  const auto session = find(call, Access::kChange, session_name);
-  if (!session.ok()) return session.status();
-  auto memory = budget_->reserve(snapshot_bytes(**session), (*session)->owner());
+                                                        const Session& session) const {
+  auto memory = budget_->reserve(snapshot_bytes(session), session.owner());
   if (!memory.ok()) return memory.status();
-  auto bytes = encode_snapshot(**session);
+  auto bytes = encode_snapshot(session);
   if (!bytes.ok()) return bytes.status();
   SnapshotFile file{*std::move(bytes), *std::move(memory)};
   file.memory.resize(file.bytes.size());
-  log_session("snapshot_made", **session, call.trace_id);
+  log_session("snapshot_made", session, call.trace_id);
   return file;
 }
 
@@ -181,7 +178,8 @@ void Backend::list_sessions(const CallContext& call, const v1::ListSessionsReque
   list_kept(caller->subject, "", most - page->sessions.size(), response, std::move(done));
 }
 
-/// Adds those that only the store has. Without room for any it says that there may be some.
+/// Adds the sessions that only the store has. If the page has no room for any, its token says that there may
+/// be some.
 void Backend::list_kept(const std::string& owner, const std::string& after, std::size_t most,
                         v1::ListSessionsResponse& response, Done done) {
   const auto is_elsewhere = [this](const std::string& name) { return !registry->has(name); };
@@ -202,95 +200,112 @@ void Backend::list_kept(const std::string& owner, const std::string& after, std:
 
 void Backend::delete_session(const CallContext& call, const v1::DeleteSessionRequest& request,
                              v1::DeleteSessionResponse&, Done done) {
-  const auto session = find(call, Access::kChange, request.session());
-  if (absl::IsNotFound(session.status())) {
-    const bool is_on_its_way = keeper_ != nullptr && keeper_->is_being_removed(request.session());
-    return is_on_its_way ? keeper_->remove(request.session(), std::move(done)) : done(absl::OkStatus());
-  }
-  if (!session.ok()) return done(session.status());
-  if (registry->remove(request.session(), EndReason::kSessionDeleted, "The session was deleted.")) {
-    log().info("session_deleted", {{"session", abbreviated(request.session())}, {"trace_id", call.trace_id}});
-  }
-  if (keeper_ == nullptr) return done(absl::OkStatus());
-  keeper_->remove(request.session(), std::move(done));
+  with_session(
+      call, Access::kChange, request.session(),
+      [this, call, name = request.session(), done = std::move(done)](const auto& session) mutable {
+        if (absl::IsNotFound(session.status())) {
+          const bool is_on_its_way = keeper_ != nullptr && keeper_->is_being_removed(name);
+          return is_on_its_way ? keeper_->remove(name, std::move(done)) : done(absl::OkStatus());
+        }
+        if (!session.ok()) return done(session.status());
+        if (registry->remove(name, EndReason::kSessionDeleted, "The session was deleted."))
+          log().info("session_deleted", {{"session", abbreviated(name)}, {"trace_id", call.trace_id}});
+        if (keeper_ == nullptr) return done(absl::OkStatus());
+        keeper_->remove(name, std::move(done));
+      });
 }
 
 void Backend::acquire_writer(const CallContext& call, const v1::AcquireWriterRequest& request,
                              v1::AcquireWriterResponse& response, Done done) {
-  const auto session = find(call, Access::kChange, request.session());
-  if (!session.ok()) return done(session.status());
-  if (absl::Status status = keeper_ ? keeper_->may_keep(**session) : absl::OkStatus(); !status.ok())
+  with_session(call, Access::kChange, request.session(),
+               [this, call, &response, done = std::move(done)](const auto& session) {
+                 if (!session.ok()) return done(session.status());
+                 replace_writer(call, *session, response, done);
+               });
+}
+
+void Backend::replace_writer(const CallContext& call, const std::shared_ptr<Session>& session,
+                             v1::AcquireWriterResponse& response, const Done& done) {
+  if (absl::Status status = keeper_ ? keeper_->may_keep(*session) : absl::OkStatus(); !status.ok())
     return done(status);
-  const WriterLease lease = (*session)->acquire_writer();
+  const WriterLease lease = session->acquire_writer();
   response.set_writer_token(lease.token);
   response.set_epoch(lease.epoch);
   response.set_input_seq(lease.input_seq);
-  log().info("writer_replaced", {{"session", abbreviated(request.session())},
+  log().info("writer_replaced", {{"session", abbreviated(session->name())},
                                  {"epoch", lease.epoch},
                                  {"input_seq", lease.input_seq},
                                  {"trace_id", call.trace_id}});
   if (keeper_ == nullptr) return done(absl::OkStatus());
-  keeper_->changed(
-      **session, 0, lease.epoch, [this, session = *session, done = std::move(done)](bool is_kept) {
-        if (is_kept) return done(absl::OkStatus());
-        const absl::Status why = keeper_->may_keep(*session);
-        done(is_full(why) ? why : store_failing("the new writer could not be kept; take over again"));
-      });
+  keeper_->changed(*session, 0, lease.epoch, [this, session, done](bool is_kept) {
+    if (is_kept) return done(absl::OkStatus());
+    const absl::Status why = keeper_->may_keep(*session);
+    done(is_full(why) ? why : store_failing("the new writer could not be kept; take over again"));
+  });
 }
 
 void Backend::update_handles(const CallContext& call, const v1::UpdateHandlesRequest& request,
                              v1::UpdateHandlesResponse& response, Done done) {
-  const auto session = find(call, Access::kChange, request.session());
-  if (!session.ok()) return done(session.status());
-  const auto then = [this, &call, &request, &response, session = *session,
-                     done = std::move(done)](const absl::Status& status) {
-    if (!status.ok()) return done(status);
-    update(call, *session, request.writer_token(), request.update(),
-           [&response, done](const absl::StatusOr<UpdateResult>& result) {
-             if (result.ok()) encode(*result, *response.mutable_result());
-             done(result.status());
-           });
+  const auto answered = [&response, done](const absl::StatusOr<UpdateResult>& result) {
+    if (result.ok()) encode(*result, *response.mutable_result());
+    done(result.status());
   };
-  when_decodable(*session, request.writer_token(), request.update(), then);
+  with_session(
+      call, Access::kChange, request.session(), [this, &call, &request, answered](const auto& session) {
+        if (!session.ok()) return answered(session.status());
+        const Change change{*session, (*session)->writer(request.writer_token())};
+        when_decodable(change, request.update(),
+                       [this, &call, &request, change, answered](const absl::Status& status) {
+                         status.ok() ? update(call, change, request.update(), answered) : answered(status);
+                       });
+      });
 }
 
 void Backend::undo_update(const CallContext& call, const v1::UndoUpdateRequest& request,
                           v1::UndoUpdateResponse& response, Done done) {
-  const auto session = find(call, Access::kChange, request.session());
-  if (!session.ok()) return done(session.status());
-  const auto result = (*session)->undo(request.writer_token(), request.input_seq(), request.redo());
+  with_session(call, Access::kChange, request.session(),
+               [this, &request, &response, done = std::move(done)](const auto& session) {
+                 if (!session.ok()) return done(session.status());
+                 undo(**session, request, response, done);
+               });
+}
+
+void Backend::undo(Session& session, const v1::UndoUpdateRequest& request, v1::UndoUpdateResponse& response,
+                   const Done& done) {
+  const auto result =
+      session.undo(session.writer(request.writer_token()), request.input_seq(), request.redo());
   if (!result.ok()) return done(result.status());
   encode(result->update, *response.mutable_result());
   for (const HandleChange& change : result->changes) encode_change(change, *response.add_changes());
   response.set_undo_steps(static_cast<std::uint32_t>(result->undo_steps));
   response.set_redo_steps(static_cast<std::uint32_t>(result->redo_steps));
-  when_kept(**session, result->update.revision, [&response, done = std::move(done)](bool is_kept) {
+  when_kept(session, result->update.revision, [&response, done](bool is_kept) {
     response.mutable_result()->set_kept(is_kept);
     done(absl::OkStatus());
   });
 }
 
-void Backend::update(const CallContext& call, Session& session, const std::string& token,
-                     const v1::Update& update, const OnUpdated& answered) {
-  const auto result = take_update(call, session, token, update);
+void Backend::update(const CallContext& call, const Change& change, const v1::Update& update,
+                     const OnUpdated& answered) {
+  const auto result = take_update(call, change, update);
   if (!result.ok()) return answered(result);
-  when_kept(session, result->revision, [result = *result, answered](bool is_kept) mutable {
+  when_kept(*change.session, result->revision, [result = *result, answered](bool is_kept) mutable {
     result.is_kept = is_kept;
     answered(result);
   });
 }
 
-absl::StatusOr<UpdateResult> Backend::take_update(const CallContext& call, Session& session,
-                                                  const std::string& token, const v1::Update& update) {
-  if (absl::Status status = session.check_writer(token); !status.ok()) return status;
+absl::StatusOr<UpdateResult> Backend::take_update(const CallContext& call, const Change& change,
+                                                  const v1::Update& update) {
+  Session& session = *change.session;
   const auto decoded = Decoder(*uploads_, session.vertex_count(), &session.features(),
                                session.mesh().weld().get(), session.owner())
                            .update(update);
   if (!decoded.ok()) return decoded.status();
-  const auto result = session.update(token, *decoded);
+  const auto result = session.update(change.writer, *decoded);
   if (result.ok()) {
     log().debug("update", {{"session", abbreviated(session.name())},
-                           {"epoch", session.lease().epoch},
+                           {"epoch", change.writer->epoch},
                            {"input_seq", result->input_seq},
                            {"stale_parts", std::uint64_t{result->stale_parts}},
                            {"trace_id", call.trace_id}});
@@ -303,36 +318,43 @@ void Backend::when_kept(const Session& session, std::uint64_t revision, Keeper::
   keeper_->changed(session, revision, 0, std::move(on_kept));
 }
 
-void Backend::when_here(const CallContext& call, const std::string& name, Done then) {
-  const auto caller = identify(call, Access::kRead);
-  // What is wrong with the caller, find() says.
-  if (keeper_ == nullptr || !caller.ok() || !is_session_name(name) || registry->has(name)) {
-    return then(absl::OkStatus());
-  }
-  const Done in_pool = [this, then = std::move(then)](const absl::Status& status) {
-    if (!pool.try_post([then, status] { then(status); })) then(server_busy(pool.expected_wait()));
+void Backend::with_session(const CallContext& call, Access access, const std::string& name, OnSession then) {
+  const auto caller = identify(call, access);
+  if (!caller.ok()) return then(caller.status());
+  auto here = registry->find(name, caller->subject);
+  if (here.ok() || keeper_ == nullptr || !is_session_name(name) || registry->has(name)) return then(here);
+  fetch(call, name, caller->subject, std::move(then));
+}
+
+/// Restores a session from the store if it is not here.
+void Backend::fetch(const CallContext& call, const std::string& name, const std::string& owner,
+                    OnSession then) {
+  const Done in_pool = [this, name, owner, then = std::move(then)](const absl::Status& status) {
+    const auto tell = [this, name, owner, then, status] {
+      status.ok() ? then(registry->find(name, owner)) : then(status);
+    };
+    if (!pool_.try_post(tell)) then(server_busy(pool_.expected_wait()));
   };
   {
     const std::scoped_lock lock(restoring_mutex_);
-    if (registry->has(name)) return in_pool(absl::OkStatus());  // since a moment ago
-    const auto [restoring, is_new] = restoring_.try_emplace(name, Restoring{caller->subject, {}});
-    if (!is_new && restoring->second.owner != caller->subject) return in_pool(absl::OkStatus());
+    if (registry->has(name)) return in_pool(absl::OkStatus());  // it has just been restored
+    const auto [restoring, is_new] = restoring_.try_emplace(name, Restoring{owner, {}});
+    if (!is_new && restoring->second.owner != owner) return in_pool(absl::OkStatus());
     restoring->second.waiting.push_back(in_pool);
     if (!is_new) return;
   }
-  keeper_->take_over(name, {caller->subject, call.route}, [this, name](absl::StatusOr<Keeper::Found> found) {
+  keeper_->take_over(name, {owner, call.route}, [this, name](absl::StatusOr<Keeper::Found> found) {
     if (!found.ok()) return end_restoring(name, found.status());
-    scheduler.run_once([this, name, found = std::move(found)] { make_again(name, found); });
+    scheduler_.run_once([this, name, found = std::move(found)] { make_again(name, found); });
   });
 }
 
-void Backend::when_decodable(const std::shared_ptr<Session>& session, const std::string& token,
-                             const v1::Update& update, Done then) {
-  if (absl::Status status = session->check_writer(token); !status.ok()) return then(status);
-  geometry_.when_found(session, update, std::move(then));
+void Backend::when_decodable(const Change& change, const v1::Update& update, Done then) {
+  if (!change.writer.ok()) return then(change.writer.status());
+  geometry_.when_found(change.session, update, std::move(then));
 }
 
-/// On a thread of the scheduler.
+/// Called on a thread of the scheduler.
 void Backend::make_again(const std::string& name, absl::StatusOr<Keeper::Found> found) {
   const auto give_up = [&](const absl::Status& status) {
     keeper_->give_up(name);
@@ -364,7 +386,7 @@ void Backend::end_restoring(const std::string& name, const absl::Status& status)
     metrics->add(Count::kSessionsDamaged);
     log().error("session_damaged", {{"session", abbreviated(name)}, {"text", damage}});
   }
-  // What there is not, find() does not find either.
+  // find() will answer for a session that does not exist.
   const bool is_unknown = fault_of(status).reason == Reason::kSessionUnknown;
   if (is_unknown) registry->forget_left(name);
   for (const Done& then : waiting) then(is_unknown ? absl::OkStatus() : status);

@@ -5,21 +5,22 @@
 
 namespace lpdeform {
 
-/// What a call brings along beside its request.
+/// What comes with a call besides its request.
 struct CallContext {
-  /// Of the caller's traceparent header; empty where there is none.
+  /// From the caller's traceparent header; empty if there is none.
   std::string trace_id = {};
   /// The header "authorization". Never logged.
   std::string authorization = {};
-  /// Whom the client's certificate names; empty where none was asked for.
+  /// The subject of the client's certificate; empty if none was required.
   std::string peer_identity = {};
-  /// Whom the caller thinks it speaks to: HTTP's Host.
+  /// The host that the caller means to reach: HTTP's Host.
   std::string authority = {};
-  /// The header "lpdeform-session", by which a proxy chose this server; empty where there is none.
+  /// The header "lpdeform-session", by which a proxy chose this server; empty if there is none.
   std::string route = {};
-  /// Whether one of these two came more than once: which was meant is not known, and it is empty above.
+  /// Whether one of these two headers came more than once. Then its value is ambiguous, and empty above.
   bool is_authorization_doubled = false, is_route_doubled = false;
-  /// By when the client wants the call to be over, and how long that was when it came; long from now where it did not say.
+  /// When the client wants the call to end, and how long it allowed when the call came. Far in the future if
+  /// it set no deadline.
   struct Deadline {
     std::chrono::system_clock::time_point when = std::chrono::system_clock::time_point::max();
     std::chrono::system_clock::duration given{0};

@@ -8,20 +8,20 @@
 
 namespace lpdeform {
 
-/// Counts the calls under way, so that a server that drains can refuse new ones and wait for the rest.
+/// Counts the calls under way, so that a draining server can refuse new calls and wait for the others.
 /// Thread-safe.
 class CallGate {
  public:
   /// Held for as long as a call lasts.
   using Permit = std::shared_ptr<void>;
 
-  /// Null once closed. Permits must not outlive the gate.
+  /// Null once the gate is closed. Permits must not outlive the gate.
   Permit enter();
 
   void close();
   bool is_closed() const;
 
-  /// Waits until no permit is held; false where `deadline` comes first.
+  /// Waits until no permit is held; false if `deadline` comes first.
   bool wait_until_empty(std::chrono::steady_clock::time_point deadline);
 
  private:

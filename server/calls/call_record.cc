@@ -14,25 +14,25 @@ bool is_servers_fault(absl::StatusCode code) {
          code == absl::StatusCode::kDataLoss;
 }
 
-/// Bytes that are not those of their checksum are their sender's, or the network's, though the code is DATA_LOSS: who calls can have
-/// as many of these errors as it likes.
+/// Data with a wrong checksum is the fault of its sender or of the network, although the code is DATA_LOSS. A
+/// caller can cause any number of these errors.
 bool is_servers_fault(const absl::Status& status, const std::string& reason) {
   return is_servers_fault(status.code()) && reason != Reason::kUploadChecksum;
 }
 
-/// Errors whose texts speak of the server or of the caller's rights, never of what was sent.
+/// Errors whose texts are about the server or the caller's rights, never about the caller's input.
 bool is_of_the_server(absl::StatusCode code) {
   return code == absl::StatusCode::kUnavailable || code == absl::StatusCode::kResourceExhausted ||
          code == absl::StatusCode::kUnauthenticated || code == absl::StatusCode::kPermissionDenied ||
          is_servers_fault(code);
 }
 
-/// A name that nobody has may be anything, also a token in the wrong place.
+/// An unknown name may be anything, also a token in the wrong place, so only the start of it is logged.
 std::string element_of(const Fault& fault) {
   return fault.reason == Reason::kSessionUnknown ? abbreviated(fault.element) : in_quotes(fault.element);
 }
 
-/// Of a distance it is made from the mesh, which is nobody's business.
+/// The limit of a distance is computed from the mesh, which must not be logged.
 std::string limit_of(const Fault& fault) {
   return fault.reason.ends_with("_TOO_FAR") ? "" : in_quotes(fault.limit);
 }
@@ -78,7 +78,7 @@ void CallRecord::about(RefusedInput input) {
 void CallRecord::refused(const absl::Status& status, const RefusedInput& input) const {
   std::string reason = fault_of(status).reason;
   if (reason.empty()) {
-    if (!is_servers_fault(status.code())) return;  // the client's own doing
+    if (!is_servers_fault(status.code())) return;  // the client's own fault
     reason = absl::StatusCodeToString(status.code());
   }
   metrics_->rejected(reason);

@@ -18,13 +18,13 @@ namespace lpdeform {
 
 class Session;
 
-/// What was refused, where that is known.
+/// What was refused, if that is known.
 struct RefusedInput {
   std::uint64_t input_seq = 0;  // of the update
-  std::string handle = {};      // the only one that it is about
+  std::string handle = {};      // the only handle that it concerns
 };
 
-/// One call, from its arrival to its end: lets it through the gate, measures it, and says why it was refused.
+/// One call from its arrival to its end: lets it through the gate, measures it, and logs why it was refused.
 /// Thread-safe.
 class CallRecord {
  public:
@@ -36,24 +36,25 @@ class CallRecord {
 
   /// `method`: "lpdeform.v1.DeformService/Solve".
   CallRecord(const Services& services, std::string method, CallContext context);
-  /// The call is over. Without ended() it counts as cancelled.
+  /// The call is over. If ended() was not called, it counts as cancelled.
   ~CallRecord();
 
-  /// False where the server drains.
+  /// False if the server drains.
   bool is_let_in() const { return permit_ != nullptr; }
   const CallContext& context() const { return context_; }
 
   void received(std::size_t bytes) { received_ += bytes; }
   void sent(std::size_t bytes) { sent_ += bytes; }
 
-  /// What the call is about, once that is known and is the caller's.
+  /// Sets the session of the call, once it is known to be the caller's.
   void about(const std::shared_ptr<const Session>& session);
   void about(RefusedInput input);
 
-  /// How it ended; once.
+  /// Sets how the call ended; call it once.
   void ended(const absl::Status& status);
-  /// Something in it was refused, and it goes on. The log gets the text of what the server says of itself alone: what is said
-  /// of a caller's input may quote its coordinates. Of that it gets the element and the limit.
+  /// Something in the call was refused, and the call goes on. The log gets the error's text only if it is
+  /// about the server: a text about the caller's input may quote its coordinates. In that case the log has
+  /// only the element and the limit.
   void refused(const absl::Status& status, const RefusedInput& input) const;
 
  private:

@@ -13,7 +13,7 @@
 namespace lpdeform {
 namespace {
 
-/// What calls with one stream of frames do with it.
+/// What calls with one stream of frames have in common.
 template <typename Reactor, typename Response>
 class FrameCall : public WritePump<Reactor, Response> {
  public:
@@ -23,33 +23,31 @@ class FrameCall : public WritePump<Reactor, Response> {
   using Pump = WritePump<Reactor, Response>;
   using typename Pump::Made;
 
-  /// Opens the stream, on a thread of the pool, once its session is there. Ends the call where that fails.
+  /// Opens the stream, on a thread of the pool, once its session is there. Ends the call if that fails.
   void open(
       const std::string& session_name, const std::string& token, const v1::FrameOptions& options,
       const std::function<void()>& then = [] {}) {
-    backend_.when_here(this->context(), session_name,
-                       [self = std::static_pointer_cast<FrameCall>(this->shared_from_this()), session_name,
-                        token, options, then](const absl::Status& status) {
-                         if (!status.ok()) return self->refuse(status);
-                         const auto session =
-                             self->backend_.find(self->context(), Backend::Access::kRead, session_name);
-                         if (session.ok()) self->record().about(*session);
-                         self->open_here(session_name, token, options);
-                         then();
-                       });
+    backend_.with_session(this->context(), Backend::Access::kRead, session_name,
+                          [self = std::static_pointer_cast<FrameCall>(this->shared_from_this()), token,
+                           options, then](const auto& session) {
+                            if (!session.ok()) return self->refuse(session.status());
+                            self->record().about(*session);
+                            self->open_here(*session, token, options);
+                            then();
+                          });
   }
 
  private:
-  void open_here(const std::string& session_name, const std::string& token, const v1::FrameOptions& options) {
+  void open_here(const std::shared_ptr<Session>& session, const std::string& token,
+                 const v1::FrameOptions& options) {
     auto open =
-        backend_.open_stream(this->context(), session_name, token, options, [weak = this->weak_from_this()] {
+        backend_.open_stream(this->context(), session, token, options, [weak = this->weak_from_this()] {
           if (const auto self = weak.lock()) self->pump();
         });
     const std::scoped_lock lock(this->mutex_);
     if (!open.ok()) return this->refuse_locked(open.status());
     if (this->is_over_locked()) return backend_.forget(this->context(), *open, this->how_ended_locked());
     open_ = *std::move(open);
-    token_ = token;
     this->pump_locked();
   }
 
@@ -58,7 +56,7 @@ class FrameCall : public WritePump<Reactor, Response> {
     if (!open_.stream) return Made::kNothing;
     const std::optional<Note> note = open_.stream->next();
     if (!note) return Made::kNothing;
-    encode(*note, *open_.stream, open_.session->vertex_count(), response);
+    encode(*note, *open_.stream, open_.session()->vertex_count(), response);
     return std::holds_alternative<EndNote>(*note) ? Made::kLastMessage : Made::kMessage;
   }
 
@@ -69,7 +67,6 @@ class FrameCall : public WritePump<Reactor, Response> {
 
   Backend& backend_;
   Backend::OpenStream open_;
-  std::string token_;
   bool is_forgotten_ = false;
 };
 
@@ -80,7 +77,7 @@ class StreamFramesCall final : public FrameCall<StreamFramesReactor, Outgoing<v1
   void begin(const v1::StreamFramesRequest& request) {
     auto self = std::static_pointer_cast<StreamFramesCall>(shared_from_this());
     const auto task = [self, request] { self->open(request.session(), "", request.options()); };
-    if (!backend_.pool.try_post(task)) refuse(server_busy(backend_.pool.expected_wait()));
+    if (!backend_.pool().try_post(task)) refuse(server_busy(backend_.pool().expected_wait()));
   }
 };
 
@@ -117,7 +114,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   static constexpr std::size_t kMostAnswers = 64;
   static constexpr std::chrono::seconds kOpenPatience{10};
 
-  /// The next message, unless too many answers wait for the client to read them.
+  /// Reads the next message, unless too many answers wait for the client to read them.
   void read() {
     const std::scoped_lock lock(mutex_);
     read_locked();
@@ -133,12 +130,12 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
     if (is_read_due_) read_locked();
   }
 
-  /// A client that sends no more may go on reading; one that never opened has nothing to read.
+  /// A client that sends no more may still read. A client that never opened a stream has nothing to read.
   void end_of_input(bool is_open) {
     if (!is_open) break_off("The stream ended before it was opened.");
   }
 
-  /// Who may not call is not read: gRPC holds what has come of a message, up to its 4 MiB.
+  /// Checks the caller before the first read, because gRPC holds what has come of a message, up to its 4 MiB.
   void let_in() {
     const auto caller = backend_.identify(context(), Backend::Access::kRead);
     if (!caller.ok()) return refuse(caller.status());
@@ -156,8 +153,8 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
 
   void post(void (DeformCall::*task)()) {
     auto self = std::static_pointer_cast<DeformCall>(shared_from_this());
-    if (!backend_.pool.try_post([self, task] { (*self.*task)(); }))
-      refuse(server_busy(backend_.pool.expected_wait()));
+    if (!backend_.pool().try_post([self, task] { (*self.*task)(); }))
+      refuse(server_busy(backend_.pool().expected_wait()));
   }
 
   void take_open() {
@@ -172,7 +169,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
       ++unanswered_;
     }
     backend_.when_decodable(
-        open_.session, token_, request_.update(),
+        open_.change, request_.update(),
         [self = std::static_pointer_cast<DeformCall>(shared_from_this())](const absl::Status& status) {
           self->give_update(status);
           self->read();
@@ -186,19 +183,17 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
       self->answer(result, input);
     };
     if (!status.ok()) return answered(status);
-    const auto session = backend_.registry->find(open_.session->name(), open_.session->owner());
-    if (!session.ok()) return answered(session.status());
-    backend_.update(context(), **session, token_, update, answered);
+    backend_.update(context(), open_.change, update, answered);
   }
 
-  /// Then the stream ends in a moment, and an update without an answer is sent again to where the session is; with one that refuses
-  /// it, it would be lost.
+  /// In this case no answer is sent: the stream ends in a moment, and the client sends an unanswered update
+  /// again, to the server that has the session. After a refusal it would not, and the update would be lost.
   static bool goes_on_elsewhere(const absl::Status& status) {
     const std::string reason = fault_of(status).reason;
     return reason == Reason::kDraining || reason == Reason::kSessionElsewhere;
   }
 
-  /// On any thread.
+  /// Called on any thread.
   void answer(const absl::StatusOr<UpdateResult>& result, const RefusedInput& input) {
     if (!result.ok()) record().refused(result.status(), input);
     {
@@ -213,16 +208,16 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
   }
 
   void take_ack() {
-    open_.session->touch();
+    open_.session()->touch();
     const absl::Status status = open_.stream->acknowledge(request_.ack().frame_seq());
     if (!status.ok()) return break_off(std::string(status.message()));
     read();
   }
 
-  /// The client does not keep to the contract: reads no more, and says so.
+  /// The client violates the protocol: reads no more, and tells the client why.
   void break_off(const std::string& why) {
     if (open_.stream) {
-      backend_.log().info("stream_misused", {{"session", abbreviated(open_.session->name())},
+      backend_.log().info("stream_misused", {{"session", abbreviated(open_.session()->name())},
                                              {"stream", abbreviated(open_.stream->id())},
                                              {"text", why},
                                              {"trace_id", context().trace_id}});
@@ -233,9 +228,9 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
 
   Received<v1::DeformRequest> received_;
   const v1::DeformRequest& request_ = received_.message;
-  bool is_open_ = false;  // an open has come
+  bool is_open_ = false;  // the open message has come
   bool is_read_due_ = false;
-  std::size_t unanswered_ = 0;  // updates taken that are not in the store yet
+  std::size_t unanswered_ = 0;  // updates accepted that are not stored yet
 };
 
 }  // namespace

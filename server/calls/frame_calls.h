@@ -7,7 +7,7 @@
 
 namespace lpdeform {
 
-// The calls that carry frames. They belong to gRPC once made; `backend` outlives them.
+// The calls that carry frames. They belong to gRPC once they are made; `backend` outlives them.
 
 using StreamFramesReactor = grpc::ServerWriteReactor<Outgoing<v1::StreamFramesResponse>>;
 StreamFramesReactor* stream_frames(Backend& backend, std::shared_ptr<CallRecord> record,

@@ -37,8 +37,8 @@ void GeometryQueue::wait(const std::shared_ptr<const Session>& session, Waiting 
   waiting.then(server_busy(pool_.expected_wait()));
 }
 
-/// On a thread of the scheduler. One part at a time, so that a session takes one thread: who needs the other as well, or came
-/// for that, waits again.
+/// Called on a thread of the scheduler. It finds one part at a time, so that a session takes one thread.
+/// Callers that need the other part wait again.
 void GeometryQueue::find(const std::shared_ptr<const Session>& session, Part part) {
   const ShapeFeatures& features = session->features();
   part == Part::kJoint ? static_cast<void>(features.joint()) : static_cast<void>(features.bending());

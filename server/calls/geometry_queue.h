@@ -16,8 +16,9 @@
 
 namespace lpdeform {
 
-/// Finds what updates leave to a mesh's geometry (AutomaticField, Resize) before they are decoded, because it takes seconds of
-/// a large mesh: on the scheduler's threads, once a session. Whoever asks meanwhile waits without a thread. Thread-safe.
+/// Some updates leave values for the server to find in a mesh's geometry (AutomaticField, Resize). This takes
+/// seconds for a large mesh. The queue does it before such updates are decoded, on the scheduler's threads
+/// and once per session. Callers that wait for it hold no thread. Thread-safe.
 class GeometryQueue {
  public:
   using Then = std::function<void(absl::Status)>;
@@ -25,12 +26,13 @@ class GeometryQueue {
   GeometryQueue(Scheduler& scheduler, TaskPool& pool, std::shared_ptr<Budget> budget)
       : scheduler_(scheduler), pool_(pool), budget_(std::move(budget)) {}
 
-  /// Calls `then` with OK once decoding `update` for this session does not wait for its geometry: at once where it asks for
-  /// nothing that is not known, else on a thread of the pool. What waits is memory of the session's owner. RESOURCE_EXHAUSTED
-  /// SERVER_BUSY where kMostWaiting wait for the session, or too many for the pool; MEMORY_FULL, CALLER_MEMORY_FULL.
+  /// Calls `then` with OK once `update` can be decoded without waiting for the session's geometry: at once if
+  /// it needs nothing new, otherwise on a thread of the pool. While an update waits, its memory is charged to
+  /// the session's owner. Errors: RESOURCE_EXHAUSTED SERVER_BUSY if kMostWaiting calls wait for the session,
+  /// or too many for the pool; MEMORY_FULL, CALLER_MEMORY_FULL.
   void when_found(const std::shared_ptr<const Session>& session, const v1::Update& update, Then then);
 
-  /// Calls that wait for one session's geometry; each holds its message.
+  /// How many calls may wait for one session's geometry; each holds its message.
   static constexpr std::size_t kMostWaiting = 64;
 
  private:
@@ -38,7 +40,7 @@ class GeometryQueue {
   struct Waiting {
     bool needs_joint, needs_bending;
     Then then;
-    Reservation memory = {};  // of its message
+    Reservation memory = {};  // for its message
     Part missing(const ShapeFeatures& features) const;
   };
   void wait(const std::shared_ptr<const Session>& session, Waiting waiting);
@@ -48,8 +50,8 @@ class GeometryQueue {
   TaskPool& pool_;
   const std::shared_ptr<Budget> budget_;
   std::mutex mutex_;
-  std::map<std::shared_ptr<const Session>, std::vector<Waiting>>
-      waiting_;  // of each session that is looked at
+  /// For each session whose geometry is being found.
+  std::map<std::shared_ptr<const Session>, std::vector<Waiting>> waiting_;
 };
 
 }  // namespace lpdeform

@@ -27,7 +27,7 @@ class OpenCalls {
     const std::scoped_lock lock(mutex_);
     calls_.erase(of);
   }
-  /// Those that began by then. gRPC tells of their ends on threads of its own.
+  /// Cancels the calls that began by then. gRPC reports their ends on threads of its own.
   void cancel_begun_by(Timers::TimePoint then) {
     const std::scoped_lock lock(mutex_);
     for (const auto& [of, call] : calls_) {
@@ -58,7 +58,7 @@ class Watcher final : public Interceptor {
   const std::shared_ptr<OpenCalls> calls_;
 };
 
-/// Looks a few times within what calls may last.
+/// Checks the calls four times within the limit of their duration.
 void look_later(const std::weak_ptr<Timers>& weak_timers, const std::weak_ptr<OpenCalls>& weak_calls,
                 Timers::Duration after) {
   const auto timers = weak_timers.lock();

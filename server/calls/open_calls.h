@@ -8,9 +8,10 @@
 
 namespace lpdeform {
 
-/// Ends calls that anybody may make, of the health service and of reflection, as CANCELLED once they have lasted so long:
-/// `Health/Watch` and reflection are streams without end, and would keep their connection for ever. Other calls are not looked
-/// at. They end within a quarter more than that. For ServerBuilder's experimental().SetInterceptorCreators().
+/// Ends long calls that need no authentication, those of the health service and of reflection, as CANCELLED
+/// once they have lasted for `after`, or at most a quarter longer. `Health/Watch` and reflection are streams
+/// without end, which would otherwise keep their connections open for ever. Other calls are not affected. For
+/// ServerBuilder's experimental().SetInterceptorCreators().
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> end_open_calls(
     const std::shared_ptr<Timers>& timers, Timers::Duration after);
 

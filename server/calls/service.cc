@@ -21,10 +21,10 @@ namespace {
 
 constexpr std::size_t kLongestTraceParent = 256;
 constexpr std::size_t kLongestRoute = 128;
-constexpr std::size_t kLongestAuthority =
-    512;  // what is cut off of a longer one does not make it this machine's name
+/// What is cut off of a longer name cannot make it a name of this machine.
+constexpr std::size_t kLongestAuthority = 512;
 
-/// A header's value; empty where it is not there, or more than once: then `is_doubled`.
+/// A header's value; empty if the header is absent or comes more than once (then `is_doubled` is set).
 std::string text_of(const grpc::CallbackServerContext& context, const char* header, bool& is_doubled) {
   const auto [first, last] = context.client_metadata().equal_range(header);
   is_doubled = first != last && std::next(first) != last;
@@ -35,7 +35,7 @@ std::string text_of(const grpc::CallbackServerContext& context, const char* head
 std::shared_ptr<CallRecord> begin_record(Backend& backend, const grpc::CallbackServerContext& context,
                                          std::string_view method) {
   CallContext call;
-  bool is_parent_doubled = false;  // then there is none: W3C Trace Context, 3.2
+  bool is_parent_doubled = false;  // then there is no trace id: W3C Trace Context, 3.2
   const std::string trace_parent = text_of(context, "traceparent", is_parent_doubled);
   if (trace_parent.size() <= kLongestTraceParent) call.trace_id = trace_id_of(trace_parent);
   call.authorization = text_of(context, "authorization", call.is_authorization_doubled);
@@ -56,7 +56,7 @@ std::shared_ptr<CallRecord> begin_record(Backend& backend, const grpc::CallbackS
                               std::move(call));
 }
 
-/// Runs `task` on the pool; the call ends when `task` calls what it is given.
+/// Runs `task` on the pool. The call ends when `task` calls the function that it is given.
 using Finish = std::function<void(const absl::Status&)>;
 grpc::ServerUnaryReactor* in_pool(Backend& backend, grpc::CallbackServerContext& context,
                                   const std::shared_ptr<CallRecord>& record,
@@ -70,8 +70,8 @@ grpc::ServerUnaryReactor* in_pool(Backend& backend, grpc::CallbackServerContext&
   };
   if (!record->is_let_in()) {
     finish(server_draining());
-  } else if (!backend.pool.try_post([task = std::move(task), finish] { task(finish); })) {
-    finish(server_busy(backend.pool.expected_wait()));
+  } else if (!backend.pool().try_post([task = std::move(task), finish] { task(finish); })) {
+    finish(server_busy(backend.pool().expected_wait()));
   }
   return reactor;
 }
@@ -95,7 +95,7 @@ void note_session(const Backend& backend, CallRecord& record, const std::string&
   if (session.ok()) record.about(*session);
 }
 
-/// Of a call that brings an update or takes one back, which.
+/// The input_seq and handle of a call that carries an update or an undo.
 template <typename Request>
 void note_input(CallRecord& record, const Request& request) {
   if constexpr (std::is_same_v<Request, v1::UpdateHandlesRequest>)
@@ -104,7 +104,7 @@ void note_input(CallRecord& record, const Request& request) {
     record.about(RefusedInput{request.input_seq()});
 }
 
-/// A call about a session, which may have to be made again from the store first.
+/// A call about a session, which may first have to be restored from the store.
 template <typename Request, typename Response>
 grpc::ServerUnaryReactor* about_session(Backend& backend, grpc::CallbackServerContext& context,
                                         std::string_view method,
@@ -115,7 +115,7 @@ grpc::ServerUnaryReactor* about_session(Backend& backend, grpc::CallbackServerCo
   record->received(request.ByteSizeLong());
   return in_pool(backend, context, record, response,
                  [&backend, record, handler, &request, &response](const Finish& finish) {
-                   // Only a refusal is told of, so only then is it asked which session it is about.
+                   // Only a refusal is logged, so the session is looked up only then.
                    const auto tell = [&backend, record, &request, finish](const absl::Status& status) {
                      if (!status.ok()) {
                        note_session(backend, *record, request.session());
@@ -123,12 +123,7 @@ grpc::ServerUnaryReactor* about_session(Backend& backend, grpc::CallbackServerCo
                      }
                      finish(status);
                    };
-                   const auto then = [&backend, record, handler, &request, &response,
-                                      tell](const absl::Status& status) {
-                     if (!status.ok()) return tell(status);
-                     (backend.*handler)(record->context(), request, response, tell);
-                   };
-                   backend.when_here(record->context(), request.session(), then);
+                   (backend.*handler)(record->context(), request, response, tell);
                  });
 }
 
@@ -137,7 +132,7 @@ int index_of(const char* method) {
   return calls->FindMethodByName(method)->index();
 }
 
-/// A call that is answered later, when the store has answered.
+/// A call that is answered when the store has answered.
 template <typename Request, typename Response>
 grpc::ServerUnaryReactor* answered_later(Backend& backend, grpc::CallbackServerContext& context,
                                          std::string_view method,
@@ -154,8 +149,8 @@ grpc::ServerUnaryReactor* answered_later(Backend& backend, grpc::CallbackServerC
 
 }  // namespace
 
-/// In place of the handlers of generated code: Deform takes messages as they come (received.h), and frames are sent from where
-/// they are (outgoing.h).
+/// Replaces the handlers of the generated code: Deform takes messages as they come (received.h), and the
+/// numbers of frames are sent without a copy (outgoing.h).
 Service::Service(Backend& backend) : backend_(backend) {
   MarkMethodCallback(
       index_of("Deform"),

@@ -5,8 +5,8 @@
 
 namespace lpdeform {
 
-/// The contract's calls as gRPC has them: each goes to the backend on a thread of the pool, and its status
-/// back through to_grpc(). `backend` outlives it.
+/// The contract's calls as gRPC sees them. Each call goes to the backend on a thread of the pool, and its
+/// status comes back through to_grpc(). `backend` outlives it.
 class Service final : public v1::DeformService::CallbackService {
  public:
   explicit Service(Backend& backend);

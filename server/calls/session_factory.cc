@@ -12,15 +12,15 @@ namespace {
 
 constexpr std::uint32_t kFacesPerVertex = 3;
 
-/// What a session is taken to need until it is known: about what a triangulated surface needs, factored by
-/// CHOLMOD.
+/// The estimate of a session's memory until the true value is known: about what a triangulated surface needs,
+/// factored by CHOLMOD.
 constexpr std::size_t kBytesPerVertex = 2600, kBytesPerFace = 100;
 
 std::size_t estimate(const v1::Mesh& mesh) {
   return kBytesPerVertex * mesh.vertex_count() + kBytesPerFace * mesh.face_count();
 }
 
-/// The shape and the mesh that it is drawn as.
+/// Makes the shape, and the mesh that clients draw.
 absl::Status make_mesh(const v1::CreateSessionRequest& request, Decoder& decoder, SessionParts& parts) {
   const auto weights = decode_weights(request.weights());
   if (!weights.ok()) return weights.status();
@@ -32,7 +32,7 @@ absl::Status make_mesh(const v1::CreateSessionRequest& request, Decoder& decoder
   if (!weld.ok()) return weld.status();
 
   auto shape = RestShape::create(*weld ? welded(*mesh, **weld) : *mesh, *weights);
-  // What is wrong is said of the client's vertices where it can be.
+  // If possible, an error names the client's vertices.
   if (!shape.ok() && *weld) {
     if (absl::Status status = deformable(check_mesh(*mesh)); !status.ok()) return status;
   }
@@ -60,7 +60,7 @@ Decoder SessionFactory::decoder(const v1::CreateSessionRequest& request, const s
   return {*uploads_, request.mesh().vertex_count(), nullptr, nullptr, owner};
 }
 
-/// All that comes of the request's mesh.
+/// Makes everything that depends on the request's mesh.
 absl::Status SessionFactory::make_shape(const v1::CreateSessionRequest& request, Decoder decoder,
                                         SessionParts& parts) const {
   const auto free_components = decode_free_components(request.free_components());
@@ -82,7 +82,7 @@ absl::Status SessionFactory::make_shape(const v1::CreateSessionRequest& request,
   return absl::OkStatus();
 }
 
-/// `surface`: the present state, of the client's vertices.
+/// `surface`: the present positions of the client's vertices.
 absl::StatusOr<std::shared_ptr<Session>> SessionFactory::finish(SessionParts parts,
                                                                 const std::optional<Points>& surface) const {
   if (surface) {
@@ -139,7 +139,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_from(const Session
   return status.ok() ? finish(std::move(parts), surface) : status;
 }
 
-/// Its handles and settings, for a writer of its own.
+/// Takes the snapshot's handles and settings, with a new writer.
 absl::Status SessionFactory::take_state(const std::string& owner, const Snapshot& snapshot,
                                         SessionParts& parts) const {
   StoredSession stored{.owner = owner, .epoch = 1, .parts = snapshot.parts};
@@ -166,7 +166,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_again(const std::s
   const Decoder mesh_decoder = decoder(head.request, stored.owner).reading_stored(blobs);
   const absl::Status made = make_shape(head.request, mesh_decoder, parts);
   auto session = made.ok() ? finish(std::move(parts)) : made;
-  // What was right once is right unless it was damaged.
+  // The state was valid when it was saved, so an error here means damage.
   if (absl::IsInvalidArgument(session.status()) || absl::IsFailedPrecondition(session.status()))
     return session_damaged(session.status());
   return session;

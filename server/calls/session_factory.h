@@ -16,34 +16,34 @@
 
 namespace lpdeform {
 
-/// Whose session it is to be, and the way by which they came: see Session::route.
+/// The owner of a new session, and the route by which the owner came: see Session::route.
 struct SessionMaker {
   std::string owner, route = {};
 };
 
-/// Makes sessions: from a call, or again from what a store has of one. Takes as long as setting a mesh up does: for the
-/// scheduler's threads. Thread-safe.
+/// Makes sessions: from a call, or from what a store has. Takes as long as setting up the mesh does, so call
+/// it on the scheduler's threads. Thread-safe.
 class SessionFactory {
  public:
   SessionFactory(const ServerOptions& options, std::shared_ptr<Budget> budget,
                  std::shared_ptr<Uploads> uploads, SessionServices services);
 
-  /// Errors: what CreateSession has.
+  /// Errors: those of CreateSession.
   absl::StatusOr<std::shared_ptr<Session>> make(const SessionMaker& maker,
                                                 const v1::CreateSessionRequest& request) const;
 
-  /// The session of this name, with all that it had, in the epoch of `stored`. `blobs`: those of `head`. Errors: NOT_FOUND
-  /// SESSION_DAMAGED, RESOURCE_EXHAUSTED MEMORY_FULL.
+  /// Restores the session of this name completely, in the epoch of `stored`. `blobs`: those of `head`.
+  /// Errors: NOT_FOUND SESSION_DAMAGED, RESOURCE_EXHAUSTED MEMORY_FULL.
   absl::StatusOr<std::shared_ptr<Session>> make_again(const std::string& name, const StoredSession& stored,
                                                       const SessionHead& head,
                                                       const StoredBlobs& blobs) const;
 
-  /// A new session of the maker's, as the snapshot has it; for the same server the same to the last bit. Errors: INVALID_ARGUMENT
-  /// SNAPSHOT_DAMAGED; what CreateSession has.
+  /// A new session of the maker from a snapshot. On the same server it is exact to the last bit. Errors:
+  /// INVALID_ARGUMENT SNAPSHOT_DAMAGED; those of CreateSession.
   absl::StatusOr<std::shared_ptr<Session>> make_from(const SessionMaker& maker,
                                                      const Snapshot& snapshot) const;
 
-  /// For one message of a caller's.
+  /// A decoder for one message of a caller.
   Decoder decoder(const v1::CreateSessionRequest& request, const std::string& owner) const;
 
  private:

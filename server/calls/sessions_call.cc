@@ -1,4 +1,3 @@
-#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -22,7 +21,8 @@ absl::Status wrong_count(int count) {
                     absl::StrCat("A call asks for ", count, " streams, not for 1 to ", kMostStreams, "."));
 }
 
-/// Several sessions' streams in one call. They take turns, message by message, so that none waits for another's frames.
+/// Streams of several sessions in one call. The streams take turns message by message, so that none waits for
+/// another's frames.
 class StreamSessionsCall final
     : public WritePump<StreamSessionsReactor, Outgoing<v1::StreamSessionsResponse>> {
  public:
@@ -33,26 +33,26 @@ class StreamSessionsCall final
       return refuse(wrong_count(request.streams_size()));
     }
     auto self = std::static_pointer_cast<StreamSessionsCall>(shared_from_this());
-    if (!backend_.pool.try_post([self, request] { self->fetch(request, 0); }))
-      refuse(server_busy(backend_.pool.expected_wait()));
+    if (!backend_.pool().try_post([self, request] { self->fetch(request, 0); }))
+      refuse(server_busy(backend_.pool().expected_wait()));
   }
 
  private:
   struct Lane {
-    Backend::OpenStream open;  // null where it could not be opened
-    absl::Status refusal;      // why; OK once that is said
+    Backend::OpenStream open;  // its stream is null if it could not be opened
+    absl::Status refusal;      // why it could not be opened; OK once the client was told
     bool is_over = false;
   };
 
-  /// One session after the other from the store, where it is there alone. What fails shows when it is opened.
+  /// Restores the sessions from the store one after another. A failure is reported when the stream is opened.
   void fetch(const v1::StreamSessionsRequest& request, int from) {
     if (from == request.streams_size()) return open_all(request);
     auto self = std::static_pointer_cast<StreamSessionsCall>(shared_from_this());
-    backend_.when_here(context(), request.streams(from).session(),
-                       [self, request, from](const absl::Status& status) {
-                         if (!status.ok()) self->not_here_[from] = status;
-                         self->fetch(request, from + 1);
-                       });
+    backend_.with_session(context(), Backend::Access::kRead, request.streams(from).session(),
+                          [self, request, from](const auto& session) {
+                            self->sessions_.push_back(session);
+                            self->fetch(request, from + 1);
+                          });
   }
 
   void open_all(const v1::StreamSessionsRequest& request) {
@@ -61,10 +61,9 @@ class StreamSessionsCall final
       const auto pump = [weak = weak_from_this()] {
         if (const auto self = weak.lock()) self->pump();
       };
-      const auto missing = not_here_.find(static_cast<int>(lanes.size()));
-      auto open = missing == not_here_.end()
-                      ? backend_.open_stream(context(), one.session(), "", one.options(), pump)
-                      : missing->second;
+      const auto& session = sessions_[lanes.size()];
+      auto open = session.ok() ? backend_.open_stream(context(), *session, "", one.options(), pump)
+                               : session.status();
       if (!open.ok()) record().refused(open.status(), {});
       lanes.push_back({open.ok() ? *std::move(open) : Backend::OpenStream{}, open.status(), false});
     }
@@ -96,11 +95,11 @@ class StreamSessionsCall final
     const std::optional<Note> note = lane.open.stream->next();
     if (!note) return false;
     lane.is_over = std::holds_alternative<EndNote>(*note);
-    encode(*note, *lane.open.stream, lane.open.session->vertex_count(), response);
+    encode(*note, *lane.open.stream, lane.open.session()->vertex_count(), response);
     return true;
   }
 
-  /// First the fault, then the end.
+  /// Sends the fault first, then the end.
   static void refuse_lane(Lane& lane, v1::StreamSessionsResponse& response) {
     if (!lane.refusal.ok()) {
       encode(FaultNote{std::exchange(lane.refusal, absl::OkStatus()), 0},
@@ -123,9 +122,9 @@ class StreamSessionsCall final
   }
 
   Backend& backend_;
-  std::map<int, absl::Status> not_here_;  // why, by the number of the stream
+  std::vector<absl::StatusOr<std::shared_ptr<Session>>> sessions_;  // one per stream, or an error
   std::vector<Lane> lanes_;
-  std::size_t next_ = 0;  // whose turn it is, and how often there was one
+  std::size_t next_ = 0;  // counts turns; modulo the lanes it gives the next lane
 };
 
 }  // namespace

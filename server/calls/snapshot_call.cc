@@ -8,7 +8,7 @@
 namespace lpdeform {
 namespace {
 
-/// The file, made once, then part by part as fast as the client takes them.
+/// Makes the file once, then sends it part by part as fast as the client takes the parts.
 class SnapshotCall final
     : public WritePump<grpc::ServerWriteReactor<v1::SnapshotSessionResponse>, v1::SnapshotSessionResponse> {
  public:
@@ -17,18 +17,19 @@ class SnapshotCall final
   void begin(const v1::SnapshotSessionRequest& request) {
     auto self = std::static_pointer_cast<SnapshotCall>(shared_from_this());
     const auto task = [self, name = request.session()] {
-      self->backend_.when_here(self->context(), name, [self, name](const absl::Status& status) {
-        status.ok() ? self->start(name) : self->refuse(status);
-      });
+      self->backend_.with_session(self->context(), Backend::Access::kChange, name,
+                                  [self](const auto& session) {
+                                    session.ok() ? self->start(**session) : self->refuse(session.status());
+                                  });
     };
-    if (!backend_.pool.try_post(task)) refuse(server_busy(backend_.pool.expected_wait()));
+    if (!backend_.pool().try_post(task)) refuse(server_busy(backend_.pool().expected_wait()));
   }
 
  private:
   static constexpr std::size_t kPartBytes = 1u << 20;
 
-  void start(const std::string& name) {
-    auto file = backend_.snapshot(context(), name);
+  void start(const Session& session) {
+    auto file = backend_.snapshot(context(), session);
     if (!file.ok()) return refuse(file.status());
     const std::scoped_lock lock(mutex_);
     if (is_over_locked()) return;

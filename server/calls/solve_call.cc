@@ -10,8 +10,8 @@
 namespace lpdeform {
 namespace {
 
-/// Progress while the solver runs, the newest only; then the summary, the trace, the result. Heartbeats wherever there is
-/// nothing else to say, from the beginning of the call.
+/// Sends the newest progress while the solver runs; then the summary, the trace and the result. From the
+/// beginning of the call it sends heartbeats whenever nothing else is sent.
 class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveResponse>> {
  public:
   explicit SolveCall(Backend& backend) : backend_(backend), last_sent_at_(backend.timers->now()) {}
@@ -19,18 +19,18 @@ class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveRespons
   void begin(const v1::SolveRequest& request) {
     beat_at(last_sent_at_ + backend_.heartbeat());
     auto self = std::static_pointer_cast<SolveCall>(shared_from_this());
-    // A copy, because gRPC's goes when the call is cancelled.
+    // A copy, because gRPC destroys its own when the call is cancelled.
     const auto task = [self, request] {
-      self->backend_.when_here(self->context(), request.session(),
-                               [self, request](const absl::Status& status) {
-                                 status.ok() ? self->decode(request) : self->refuse(status);
-                               });
+      self->backend_.with_session(
+          self->context(), Backend::Access::kChange, request.session(), [self, request](const auto& session) {
+            session.ok() ? self->decode(*session, request) : self->refuse(session.status());
+          });
     };
-    if (!backend_.pool.try_post(task)) refuse(server_busy(backend_.pool.expected_wait()));
+    if (!backend_.pool().try_post(task)) refuse(server_busy(backend_.pool().expected_wait()));
   }
 
  private:
-  static constexpr std::size_t kRecordsAMessage = 1000;  // of about 40 bytes
+  static constexpr std::size_t kRecordsAMessage = 1000;  // of about 40 bytes each
 
   std::weak_ptr<SolveCall> weak() { return std::static_pointer_cast<SolveCall>(shared_from_this()); }
 
@@ -46,23 +46,21 @@ class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveRespons
     const Timers::TimePoint now = backend_.timers->now();
     is_beat_due_ = now - last_sent_at_ >= backend_.heartbeat();
     pump_locked();
-    // Still due where a write is under way: its reader has something to read.
+    // If a write is under way, the heartbeat is still due, but the reader has something to read.
     beat_at((is_beat_due_ ? now : last_sent_at_) + backend_.heartbeat());
   }
 
-  void decode(const v1::SolveRequest& request) {
+  void decode(const std::shared_ptr<Session>& session, const v1::SolveRequest& request) {
     auto self = std::static_pointer_cast<SolveCall>(shared_from_this());
-    const auto session = backend_.find(context(), Backend::Access::kChange, request.session());
-    if (!session.ok()) return refuse(session.status());
-    record().about(*session);
+    record().about(session);
+    const Backend::Change change{session, session->writer(request.writer_token())};
     if (request.has_update()) record().about(refused_input(request.update()));
-    backend_.when_decodable(*session, request.writer_token(), request.update(),
-                            [self, request](const absl::Status& status) {
-                              status.ok() ? self->start(request) : self->refuse(status);
-                            });
+    backend_.when_decodable(change, request.update(), [self, change, request](const absl::Status& status) {
+      status.ok() ? self->start(change, request) : self->refuse(status);
+    });
   }
 
-  void start(const v1::SolveRequest& request) {
+  void start(const Backend::Change& change, const v1::SolveRequest& request) {
     {
       const std::scoped_lock lock(mutex_);
       if (is_over_locked()) return;
@@ -80,7 +78,8 @@ class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveRespons
     };
     std::shared_ptr<SolveJob> job;
     absl::Status status = decode_scalar(request.scalar()).status();
-    if (status.ok()) status = backend_.solve(context(), request, std::move(on_progress), on_done, job);
+    if (status.ok())
+      status = backend_.solve(context(), change, request, std::move(on_progress), on_done, job);
     if (!status.ok()) return refuse(status);
     const std::scoped_lock lock(mutex_);
     job_ = std::move(job);
@@ -140,7 +139,7 @@ class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveRespons
   }
 
   Backend& backend_;
-  Timers::TimePoint last_sent_at_;  // or begun
+  Timers::TimePoint last_sent_at_;  // when the last write was begun
   bool is_beat_due_ = false;
   Format format_ = Format::kFloat32;
   bool with_normals_ = false;

@@ -6,7 +6,7 @@
 
 namespace lpdeform {
 
-/// A Solve call; belongs to gRPC once made. `backend` outlives it.
+/// A Solve call; it belongs to gRPC once it is made. `backend` outlives it.
 using SolveReactor = grpc::ServerWriteReactor<Outgoing<v1::SolveResponse>>;
 SolveReactor* solve(Backend& backend, std::shared_ptr<CallRecord> record, const v1::SolveRequest& request);
 

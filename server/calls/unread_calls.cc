@@ -32,7 +32,7 @@ class Teller final : public Interceptor {
   void Intercept(InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
       const grpc::Status status = methods->GetSendStatus();
-      // gRPC's own, in place of a handler's: ours have details.
+      // This status is gRPC's own; those of this server have details.
       if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED && status.error_details().empty()) {
         const absl::Status why = message_unreadable();
         backend_.begin_record(method_, {})->ended(why);

@@ -14,27 +14,26 @@
 
 namespace lpdeform {
 
-/// The writing side of a streaming call: one message under way at a time, the next made when there is one, an
-/// end after the last. `Reactor` is gRPC's. Keeps itself alive until gRPC is done with it.
-///
+/// The writing side of a streaming call. One message is under way at a time; the next is made when the
+/// previous one is written. `Reactor` is gRPC's. The object keeps itself alive until gRPC is done with it.
 /// Operations are started under the lock, so that none follows Finish(). That is safe: gRPC delivers their
-/// outcomes from its own threads' base or by its executor, never inside of the call that starts them.
+/// results from its own threads or its executor, never inside the call that starts them.
 template <typename Reactor, typename Response>
 class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<Reactor, Response>> {
  public:
-  /// To be called once, right after construction.
+  /// Call it once, right after construction.
   void keep(std::shared_ptr<WritePump> self, std::shared_ptr<CallRecord> record) {
     self_ = std::move(self);
     record_ = std::move(record);
   }
 
-  /// Writes what there is to write, unless a write is under way. On any thread.
+  /// Writes the next message, unless a write is under way. On any thread.
   void pump() {
     const std::scoped_lock lock(mutex_);
     pump_locked();
   }
 
-  /// Ends the call with an error, as soon as no write is under way. On any thread.
+  /// Ends the call with an error as soon as no write is under way. On any thread.
   void refuse(const absl::Status& status) {
     const std::scoped_lock lock(mutex_);
     refuse_locked(status);
@@ -48,7 +47,7 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
   }
 
   void OnCancel() final {
-    // Held until the lock is released. gRPC keeps that order as well, but where ThreadSanitizer cannot see it.
+    // Held until the lock is released. gRPC guarantees that order as well, but ThreadSanitizer cannot see it.
     const auto self = this->shared_from_this();
     const std::scoped_lock lock(mutex_);
     is_cancelled_ = true;
@@ -57,19 +56,19 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
   }
 
   void OnDone() final {
-    self_.reset();  // may destroy this; not before tasks that still need the record are over
+    self_.reset();  // may destroy this object, but not before tasks that need the record are over
   }
 
  protected:
   enum class Made { kNothing, kMessage, kLastMessage };
 
-  /// Makes the next message. Under the lock.
+  /// Makes the next message. Called with the lock held.
   virtual Made make(Response& response) = 0;
 
-  /// The call is over: let go of what it holds. Under the lock, at least once.
+  /// The call is over: release what it holds. Called with the lock held, at least once.
   virtual void let_go() = 0;
 
-  /// A message has been made, so there may be room for more. Under the lock.
+  /// A message has been made, so there may be room for more. Called with the lock held.
   virtual void on_made() {}
 
   void refuse_locked(const absl::Status& status) {
@@ -120,14 +119,14 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
   Response response_;
   absl::Status refusal_;
   bool is_writing_ = false;
-  bool was_cut_ = false;  // the call, in the middle of a write
+  bool was_cut_ = false;  // the call was cut in the middle of a write
   std::chrono::steady_clock::time_point write_began_;
   bool is_last_written_ = false;
   bool is_cancelled_ = false;
   bool is_finished_ = false;
 };
 
-/// Makes a call and begins it with `arguments`, or refuses it where the server drains. It belongs to gRPC.
+/// Makes a call and begins it with `arguments`, or refuses it if the server drains. The call belongs to gRPC.
 template <typename Call, typename... Arguments>
 Call* begin_call(Backend& backend, std::shared_ptr<CallRecord> record, const Arguments&... arguments) {
   const auto call = std::make_shared<Call>(backend);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "server/wire/encode.h"
+#include "server/wire/holds.h"
 
 namespace lpdeform {
 namespace {
@@ -27,19 +28,6 @@ void encode_points(const std::vector<SurfacePoint>& points, v1::SurfacePoints& o
   pack(barycentric.data(), barycentric.size(), *out.mutable_barycentric());
 }
 
-struct HoldEncoder {
-  v1::Handle& out;
-  void operator()(const Exactly&) const {}
-  void operator()(const Soft& soft) const { out.mutable_soft()->set_weight(soft.weight); }
-  void operator()(const Orientation& hold) const { out.mutable_orientation()->set_weight(hold.weight); }
-  void operator()(const AxisLock& lock) const {
-    encode_vector(lock.axis, *out.mutable_axis_lock()->mutable_axis());
-  }
-  void operator()(const PlaneLock& lock) const {
-    encode_vector(lock.normal, *out.mutable_plane_lock()->mutable_normal());
-  }
-};
-
 struct MotionEncoder {
   v1::Motion& out;
   void operator()(const Fixed&) const { out.mutable_fixed(); }
@@ -61,7 +49,7 @@ void append(const void* numbers, std::size_t bytes, std::string& out) {
   out.append(static_cast<const char*>(numbers), bytes);
 }
 
-/// Each vertex by its lowest copy.
+/// Encodes each vertex as its lowest copy.
 void encode_weld(const Weld& weld, v1::Weld& out) {
   std::vector<std::int32_t> lowest;
   for (const std::int32_t welded : weld.to_welded) lowest.push_back(weld.first_copy[welded]);
@@ -118,7 +106,7 @@ void encode_group(const Handle& handle, v1::Handle& out) {
   } else {
     encode_points(handle.points, *out.mutable_points());
   }
-  std::visit(HoldEncoder{out}, handle.hold);
+  encode_hold(handle.hold, out);
   out.set_footprint_radius(handle.footprint);
 }
 

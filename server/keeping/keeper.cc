@@ -13,12 +13,13 @@ namespace lpdeform {
 namespace {
 
 constexpr std::size_t kLongestQueue = 4096;
-/// Between looks whether another process has let go of a session.
+/// How often to check whether another process has released a session.
 constexpr std::chrono::milliseconds kBetweenLooks{50};
-/// Of a mesh that is read, for which the store has its time: nobody knows its size beforehand.
+/// The size assumed for a mesh that is read, because it is not known beforehand; it sets how long the store
+/// may take.
 constexpr std::size_t kLargeBlob = std::size_t{32} << 20;
 
-/// By another way they come to where it is: here they would wait in vain.
+/// Whether the session has another route than the caller. Then waiting here does not help.
 bool leads_elsewhere(const Fault& fault, const std::string& route) {
   return !fault.limit.empty() && fault.limit != route_header(route);
 }
@@ -47,14 +48,16 @@ Keeper::~Keeper() {
   writer_.join();
 }
 
-/// OK, or why the store is not even asked: it does not answer at the moment, or whoever asks has waited for too long.
+/// OK, or the reason not to ask the store: it does not answer at the moment, or the caller has waited for too
+/// long.
 absl::Status Keeper::asked_in_vain(Clock::time_point since) const {
   if (Clock::now() - since > kPatienceForNew) return store_failing("it is too slow");
   const std::scoped_lock lock(mutex_);
   return is_hanging_ || is_stuck_ ? store_away("it does not answer") : absl::OkStatus();
 }
 
-/// What the store says, on the reader's thread; `since`: when somebody began to wait for that. `bytes`: how much it may be.
+/// Asks the store, on the reader's thread. `since`: when the caller began to wait. `bytes`: the size of the
+/// answer, at most.
 template <typename Ask>
 std::invoke_result_t<Ask> Keeper::ask(Clock::time_point since, const Ask& what, std::size_t bytes) {
   if (absl::Status status = asked_in_vain(since); !status.ok()) return status;
@@ -67,7 +70,7 @@ std::invoke_result_t<Ask> Keeper::ask(Clock::time_point since, const Ask& what, 
   return answer;
 }
 
-/// Under the lock.
+/// Called with the lock held.
 void Keeper::due(const std::string& name) {
   due_.insert(name);
   const auto found = entries_.find(name);
@@ -87,7 +90,7 @@ void Keeper::add(std::shared_ptr<Session> session, StoredHead head, const std::s
   const WaitingCallers::Id caller = callers_.add(on_done);
   const OnDone on_added = [this, name, caller, on_done = std::move(on_done)](const absl::Status& status) {
     if (callers_.take(caller)) return on_done(status);
-    if (status.ok()) remove(name);  // its caller was told meanwhile that it is not there
+    if (status.ok()) remove(name);  // its caller was told meanwhile that there is no session
   };
   entry.on_added = on_added;
   const bool is_posted = reader_.try_post(
@@ -95,17 +98,18 @@ void Keeper::add(std::shared_ptr<Session> session, StoredHead head, const std::s
         absl::Status status;
         for (const auto& [key, bytes] : blobs) {
           if (status.ok()) status = keep_blob(since, name, key, bytes);
-          since = Clock::now();  // a large one may take its time
+          since = Clock::now();  // a large one may take longer
         }
         if (status.ok()) return enter_new(name, std::move(entry));
         const OnDone refused = std::move(entry.on_added);
-        remove(name);  // lets go of the blobs
+        remove(name);  // releases the blobs
         refused(status);
       });
   if (!is_posted) on_added(server_busy(reader_.expected_wait()));
 }
 
-/// One that refuses a blob, as it is full, answers; that it takes no changes then shows with these.
+/// A store that is too full for a blob still answers, so it is not failing. Whether it takes changes is found
+/// out when changes are written.
 absl::Status Keeper::keep_blob(Clock::time_point since, const std::string& name, const std::string& key,
                                const std::string& bytes) {
   if (absl::Status status = asked_in_vain(since); !status.ok()) return status;
@@ -124,7 +128,7 @@ absl::Status Keeper::keep_blob(Clock::time_point since, const std::string& name,
   return status;
 }
 
-/// Its blobs are kept.
+/// Enters a session whose blobs are stored.
 void Keeper::enter_new(const std::string& name, Entry entry) {
   std::unique_lock lock(mutex_);
   if (is_over_) {
@@ -146,7 +150,7 @@ void Keeper::give_up_new(const std::string& name) {
     if (entry == entries_.end() || !entry->second.on_added) return;
     on_done = std::exchange(entry->second.on_added, nullptr);
     entry->second.is_refused = false;
-    entry->second.session.reset();  // it may be in the store already
+    entry->second.session.reset();  // the store may have the session already
     due(name);
   }
   on_done(store_failing("it is too slow"));
@@ -157,8 +161,8 @@ void Keeper::adopt(std::shared_ptr<Session> session, const StoredSession& stored
   {
     const std::scoped_lock lock(mutex_);
     being_made_.erase(session->name());
-    Entry& entry = entries_[session->name()];  // perhaps of one that is leaving: it comes back
-    answer_all(entry, calls);                  // the numbers of its updates mean nothing to the new one
+    Entry& entry = entries_[session->name()];  // may be the entry of a session that is leaving; it comes back
+    answer_all(entry, calls);                  // revisions of the old session mean nothing to the new one
     entry.is_leaving = entry.is_lost = entry.is_refused = false;
     entry.head = stored.parts.at("head");
     entry.epoch = stored.epoch;
@@ -179,7 +183,7 @@ void Keeper::give_up(const std::string& name) {
     epoch = found->second;
     being_made_.erase(found);
   }
-  // Where this is not done, it is free once the lease has ended.
+  // If this is not done, the session is free when the lease ends.
   static_cast<void>(reader_.try_post([this, name, epoch] { store_->let_go({{name, epoch}}).IgnoreError(); }));
 }
 
@@ -212,7 +216,7 @@ void Keeper::watch(const std::string& name, Timers::TimePoint when) {
   });
 }
 
-/// Answers those that have waited for long enough.
+/// Answers the updates that have waited for too long.
 void Keeper::give_up_waiting(const std::string& name) {
   std::vector<Waiting> late;
   {
@@ -267,7 +271,8 @@ void Keeper::release(const Session& session) {
   due(session.name());
 }
 
-/// What it has changed is about to be written. Where the store fails, it says so itself.
+/// Whether the session is leaving this process and its changes are about to be written. If the store fails,
+/// its own error says more.
 bool Keeper::is_leaving(const std::string& name) const {
   const std::scoped_lock lock(mutex_);
   const auto found = entries_.find(name);
@@ -297,7 +302,7 @@ void Keeper::take_over(const std::string& name, const Asker& asker, OnFound on_f
   const WaitingCallers::Id caller = callers_.add(on_found);
   const OnFound once = [this, name, caller, on_found = std::move(on_found)](absl::StatusOr<Found> found) {
     if (callers_.take(caller)) return on_found(std::move(found));
-    if (found.ok()) give_up(name);  // its caller was told meanwhile that nothing came
+    if (found.ok()) give_up(name);  // its caller was told meanwhile that the store does not answer
   };
   take_over_until(name, asker, services_.timers->now() + kPatienceForOthers, once);
 }
@@ -351,7 +356,7 @@ absl::StatusOr<Keeper::Found> Keeper::read(const std::string& name, const Asker&
   return status;
 }
 
-/// Where the store does not answer, the caller has another answer already.
+/// Calls `on_answer` unless the caller was answered already because the store did not answer.
 template <typename Answer>
 std::function<void(Answer)> Keeper::answered_once(std::function<void(Answer)> on_answer) {
   const WaitingCallers::Id caller = callers_.add(on_answer);

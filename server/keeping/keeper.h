@@ -26,102 +26,110 @@
 
 namespace lpdeform {
 
-/// Keeps sessions in a store while they live. Nobody who calls it waits for the store: one thread writes whatever has
-/// changed since it last did, of all sessions at once, however many updates that were; so the queue is at most one entry a
-/// session. Another thread reads, and writes blobs; a third tells the store which sessions are here.
+/// Keeps sessions in a store while they live. No caller waits for the store. One thread writes the latest
+/// changes of all sessions at once; updates coalesce, so the queue has at most one entry per session. A
+/// second thread reads, and writes blobs. A third tells the store which sessions this process has.
 ///
-/// While the store fails or is slower than kPatience, updates are answered as taken and not kept, new sessions are refused
-/// and the rest goes on; what has changed is kept as soon as the store works again. Of one that is full the same holds for what it has no
-/// room for, and for that alone: it is tried again now and then, and what goes or needs no more room is written at once. Where it does not answer, whoever needs an answer is
-/// refused at once: the first has waited for it, or everybody until a call of it has been under way for too long (StoreCalls). Thread-safe. Held by a shared pointer.
+/// While the store fails or is slower than kPatience, updates are answered as accepted but not kept, and new
+/// sessions are refused. Everything else goes on, and the changes are written as soon as the store works
+/// again. The same holds for a full store, but only for changes that it has no room for: they are retried now
+/// and then, while removals and changes that need no more room are written at once. If the store does not
+/// answer, callers that need an answer are refused at once. The keeper knows this after one caller has waited
+/// in vain, or after a call of the store has been under way for too long (StoreCalls). Thread-safe. Held by a
+/// shared pointer.
 class Keeper : public std::enable_shared_from_this<Keeper> {
  public:
   struct Services {
     std::shared_ptr<Timers> timers;
     std::shared_ptr<Metrics> metrics;
     std::shared_ptr<const Log> log;
-    Timers::Duration idle;  // after which sessions that nobody uses go
+    Timers::Duration idle;  // after this time without use sessions are removed
   };
 
   static std::shared_ptr<Keeper> create(std::shared_ptr<Store> store, Services services);
-  /// Writes what is left, if it can be written before the moment that flush() was given.
+  /// Writes the remaining changes, if that is possible before the deadline that flush() was given.
   ~Keeper();
 
   using OnDone = std::function<void(absl::Status)>;
   using OnKept = std::function<void(bool is_kept)>;
 
-  /// Called, on a thread of the keeper's, with a session that another server has taken over, or wants. To be set before anything
-  /// else is called.
+  /// Called, on a thread of the keeper, with a session that another server has taken over or wants. Set it
+  /// before any other call.
   std::function<void(const Session&)> on_lost;
 
-  /// A new session. `on_done`: OK once it is kept; else UNAVAILABLE STORE_FAILING or RESOURCE_EXHAUSTED STORE_FULL, and it is not kept
-  /// at all.
+  /// Adds a new session. `on_done`: OK once the session is stored. Otherwise UNAVAILABLE STORE_FAILING or
+  /// RESOURCE_EXHAUSTED STORE_FULL, and nothing of it is stored.
   void add(std::shared_ptr<Session> session, StoredHead head, const std::string& request_id, OnDone on_done);
 
-  /// A session made again from what take_over() gave.
+  /// Adds a session that was restored from the result of take_over().
   void adopt(std::shared_ptr<Session> session, const StoredSession& stored);
 
-  /// The session's inputs have come to `revision`, in `epoch`. `on_kept` is called once: true when they are kept, false
-  /// where that takes too long.
+  /// The session's inputs have reached `revision`, in `epoch`. `on_kept` is called once: with true when they
+  /// are stored, with false if that takes too long.
   void changed(const Session& session, std::uint64_t revision, std::uint64_t epoch, OnKept on_kept);
 
-  /// The session goes from the store, too, whoever has it. From now on take_over() does not find it.
+  /// Removes the session from the store, too, whoever holds it. take_over() does not find it any more.
   void remove(const std::string& name, OnDone on_done = nullptr);
 
-  /// Nobody has used it here for so long that it goes; not from the store where somebody else has it meanwhile.
+  /// Removes a session that has not been used here for too long, unless another process holds it meanwhile.
   void expire(const Session& session);
 
-  /// The store did not take the last change, or did not give what it was last asked for: what has to be kept before it is answered
-  /// is better not begun. One that is full does not fail.
+  /// Whether the store refused the last change, or failed the last time it was asked. Then nothing should be
+  /// begun that must be stored before it is answered. A full store does not count as failing.
   bool is_failing() const;
-  /// OK where a change of the session may be kept as things are: else STORE_FAILING, or STORE_FULL where the store has refused one of it.
+  /// OK if a change of the session can be stored as far as is known. Otherwise STORE_FAILING, or STORE_FULL
+  /// if the store has refused a change of this session.
   absl::Status may_keep(const Session& session) const;
 
-  /// It was, and the store may not know yet.
+  /// Whether the session was removed here and the store may not know it yet.
   bool is_being_removed(const std::string& name) const;
 
-  /// The session leaves this process and stays in the store.
+  /// Releases the session: it leaves this process and stays in the store.
   void release(const Session& session);
 
-  /// What Store::take_over finds, with its blobs. Where another process has the session in use, waits for kPatienceForOthers
-  /// whether it lets go: as long as the lease of one that was cut off; the same while it leaves this one. Not where the asker should
-  /// come by another way. What was found is held until adopt() or give_up().
+  /// Takes a session over: the result of Store::take_over, with the session's blobs. If another process has
+  /// the session in use, or if it is just leaving this one, the call waits for up to kPatienceForOthers,
+  /// which is as long as the lease of a server that was cut off. It does not wait if the caller should use
+  /// another route. The session is held until adopt() or give_up().
   struct Found {
     StoredSession session;
     StoredBlobs blobs;
   };
   using OnFound = std::function<void(absl::StatusOr<Found>)>;
-  /// Who asks, and the way by which they came.
+  /// A caller, and the route by which it came.
   struct Asker {
     std::string owner, route;
   };
   void take_over(const std::string& name, const Asker& asker, OnFound on_found);
 
-  /// What take_over() found is not made again after all: another may have it.
+  /// The session from take_over() is not restored after all: another process may have it.
   void give_up(const std::string& name);
 
   using OnName = std::function<void(absl::StatusOr<std::string>)>;
   void find_request(const std::string& owner, const std::string& request_id, OnName on_name);
 
-  /// Names of the owner's sessions that only the store has, by name after `after`: as far as `is_wanted`, at most `most`.
+  /// Names of the owner's sessions that only the store has, in order and after `after`: those for which
+  /// `is_wanted` is true, at most `most`.
   using OnNames = std::function<void(absl::StatusOr<std::vector<std::string>>)>;
   void list(const std::string& owner, const std::string& after, std::size_t most,
             std::function<bool(const std::string&)> is_wanted, OnNames on_names);
 
-  /// What of a session the store has not taken when the process ends.
+  /// A session of which the store lacks something when the process ends.
   struct Unkept {
     std::string name;
-    std::uint64_t updates = 0;                  // how many
-    std::uint64_t input_seq = 0, kept_seq = 0;  // the newest one, and the newest that is kept
-    bool is_removal = false;                    // it was deleted, and comes back
+    std::uint64_t updates = 0;                  // how many are missing
+    std::uint64_t input_seq = 0, kept_seq = 0;  // the newest update, and the newest that is stored
+    bool is_removal = false;                    // the session was deleted, and will come back
   };
 
-  /// Before the process ends: waits until all is kept, and tries again and again where the store fails, until this moment. After it the
-  /// store is neither asked nor waited for any more, and whoever waits for it, or comes later, is told STORE_FAILING, or that an update is
-  /// not kept. What is not kept, with a line in the log for each session.
+  /// Waits, before the process ends, until everything is stored, and retries while the store fails, until
+  /// `end`. After `end` the store is neither asked nor waited for. Callers who wait for it, or come later,
+  /// are told STORE_FAILING, or that their update is not kept. Returns what is not stored. The log has a line
+  /// for each such session.
   std::vector<Unkept> flush(std::chrono::steady_clock::time_point end);
 
-  /// A session that was used so long ago is still in use, and so is one with a stream: a drag may rest.
+  /// A session counts as in use for this long after its last use, and as long as it has a stream, because a
+  /// drag may rest.
   static constexpr std::chrono::milliseconds kInUse{1000};
   static constexpr std::chrono::milliseconds kPatience{250};
   static constexpr std::chrono::milliseconds kPatienceForNew{10'000};
@@ -130,10 +138,10 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
  private:
   Keeper(std::shared_ptr<Store> store, Services services);
   using Clock = std::chrono::steady_clock;
-  /// To be done without the lock.
+  /// Calls to make after the lock is released.
   struct Calls {
     std::vector<std::function<void()>> all;
-    std::vector<HeldSession> to_let_go;  // by the store, in one journey
+    std::vector<HeldSession> to_let_go;  // released in the store with one round trip
 
     void add(std::function<void()> call) { all.push_back(std::move(call)); }
   };
@@ -145,30 +153,30 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
     OnKept on_kept;
   };
   struct Entry {
-    std::shared_ptr<Session> session;  // null: it goes
-    std::string head;                  // its part of that name
+    std::shared_ptr<Session> session;  // null: the session is being removed
+    std::string head;                  // its part "head"
     std::vector<std::string> blobs;
     std::string request_id;
-    std::uint64_t revision = 0, epoch = 0;  // kept
-    std::uint64_t input_seq = 0;            // the same
+    std::uint64_t revision = 0, epoch = 0;  // what is stored
+    std::uint64_t input_seq = 0;            // what is stored
     std::vector<Waiting> waiting;
-    OnDone on_added;  // until it is kept for the first time
+    OnDone on_added;  // set until the session is first stored
     std::vector<OnDone> on_removed;
-    bool is_leaving = false;  // forgotten once it is kept
-    bool is_expired = false;  // of one that goes: see StoredChange
-    bool is_lost = false;     // by the store, and to be written anew
-    bool is_refused = false;  // by the store, which has no room for it
+    bool is_leaving = false;  // removed from the entries once it is stored
+    bool is_expired = false;  // for a removal: see StoredChange::is_expiry
+    bool is_lost = false;     // lost by the store, and must be written again
+    bool is_refused = false;  // refused by the store, which has no room for it
   };
-  /// What one entry has for the store.
+  /// What one entry must write to the store.
   struct Work {
     std::string name;
     std::shared_ptr<Session> session;  // null: a removal
     std::string head;
-    std::uint64_t revision = 0;  // kept so far, then: once `change` is
+    std::uint64_t revision = 0;  // the stored revision before; later the one after `change`
     StoredChange change;
-    std::uint64_t input_seq = 0;                    // of it
-    absl::Status status = {};                       // why it cannot be written
-    std::map<std::string, std::string> blobs = {};  // where it is written anew
+    std::uint64_t input_seq = 0;                    // of the change
+    absl::Status status = {};                       // why the change cannot be written
+    std::map<std::string, std::string> blobs = {};  // for a lost session that is written again
   };
 
   static constexpr char kEnds[] = "the server ends";
@@ -237,27 +245,27 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::string, Entry> entries_;
-  std::map<std::string, std::uint64_t> being_made_;  // epochs of those that take_over() found
+  std::map<std::string, std::uint64_t> being_made_;  // epochs of sessions from take_over()
   std::set<std::string> due_;
   bool is_writing_ = false;
   bool is_writing_failing_ = false, is_reading_failing_ = false;
-  bool is_full_ = false;      // it has no room for something that is due
-  bool was_full_ = false;     // as the log and the metrics know it
-  bool has_fresh_ = false;    // something is due that it has not refused
+  bool is_full_ = false;      // the store has no room for a change that is due
+  bool was_full_ = false;     // as last reported to the log and the metrics
+  bool has_fresh_ = false;    // a change is due that the store has not refused
   bool is_ending_ = false;    // flush() waits
-  bool is_over_ = false;      // it has waited for long enough
-  bool was_failing_ = false;  // as the log and the metrics know it
+  bool is_over_ = false;      // flush() waits no longer
+  bool was_failing_ = false;  // as last reported to the log and the metrics
   bool is_trying_again_ = false;
-  bool is_hanging_ = false;  // what it was last asked for took long, and came to nothing
+  bool is_hanging_ = false;  // the last call of the store took long and failed
   bool is_stuck_ = false;    // a call has been under way for too long
   StoreCalls calls_;
   WaitingCallers callers_;
-  Clock::time_point next_word_;  // of its being slow
+  Clock::time_point next_word_;  // when the log may next say that the store is slow
   Clock::time_point retry_at_;
   Clock::duration pause_{};
   bool is_stopping_ = false;
   Timers::TimePoint next_sweep_;
-  Timers::TimePoint next_figures_;  // the toucher's thread alone
+  Timers::TimePoint next_figures_;  // used by the toucher's thread only
   TaskPool reader_, toucher_;
   std::thread writer_;
 };

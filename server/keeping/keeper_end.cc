@@ -1,4 +1,4 @@
-// Keeper: the end of the process, and what the store has not taken by then.
+// Keeper: the end of the process, and what the store has not stored by then.
 
 #include <algorithm>
 #include <optional>
@@ -17,7 +17,7 @@ std::vector<Keeper::Unkept> Keeper::flush(Clock::time_point end) {
   {
     std::unique_lock lock(mutex_);
     is_ending_ = true;
-    retry_at_ = Clock::now();  // it may have begun to work again
+    retry_at_ = Clock::now();  // the store may work again
     changed_.notify_all();
     is_over_ = !changed_.wait_until(lock, end, [this] { return due_.empty() && !is_writing_; });
     is_cut_off = is_over_;
@@ -31,12 +31,12 @@ std::vector<Keeper::Unkept> Keeper::flush(Clock::time_point end) {
   return left;
 }
 
-/// Under the lock. A store that hangs may answer one day; nobody tells those who wait for it then.
+/// Called with the lock held. A hanging store may answer one day, but then nobody would tell its callers.
 void Keeper::answer_everybody(Calls& calls) {
   for (auto& [name, entry] : entries_) answer_failed(entry, store_failing(kEnds), calls);
 }
 
-/// Under the lock. In the order of their names.
+/// Called with the lock held. In the order of the names.
 std::vector<Keeper::Unkept> Keeper::unkept() const {
   std::vector<Unkept> all;
   for (const auto& [name, entry] : entries_) {
@@ -45,8 +45,8 @@ std::vector<Keeper::Unkept> Keeper::unkept() const {
   return all;
 }
 
-/// Nothing where the store has it all, nobody was told that it has more, or it will come to it by itself: what nobody uses goes the next
-/// time, too.
+/// nullopt if the store has everything, if no client was told that it has more, or if the state will correct
+/// itself: an unused session will be removed the next time, too.
 std::optional<Keeper::Unkept> Keeper::unkept_of(const std::string& name, const Entry& entry) {
   if (entry.session == nullptr) {
     const bool is_known = entry.epoch != 0 && !entry.is_expired;
@@ -76,7 +76,7 @@ void Keeper::tell_of(const std::vector<Unkept>& unkept) const {
   if (!unkept.empty())
     services_.log->error("not_kept", {{"sessions", std::uint64_t{unkept.size()}},
                                       {"updates", updates},
-                                      {"text", "The server ends, and the store has not taken this."}});
+                                      {"text", "The server ends, and the store lacks this data."}});
 }
 
 }  // namespace lpdeform

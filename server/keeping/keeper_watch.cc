@@ -1,4 +1,5 @@
-// Keeper: tells the store which sessions this process has, and learns which of them others have or want, and what nobody uses.
+// Keeper: tells the store which sessions this process has, learns which of them other processes have or want,
+// and removes unused sessions.
 
 #include <utility>
 
@@ -7,11 +8,11 @@
 namespace lpdeform {
 namespace {
 
-/// How often those are looked for that nobody uses, in their time without use.
+/// How often unused sessions are looked for within the idle time.
 constexpr int kSweepsPerIdle = 8;
-/// Of a store that does not give what it is asked for.
+/// How often to retry a store that fails to answer reads.
 constexpr Timers::Duration kBetweenTries = std::chrono::seconds(1);
-/// Between looks at what a store says of itself.
+/// How often to ask a store for its figures.
 constexpr Timers::Duration kBetweenFigures = std::chrono::seconds(5);
 
 }  // namespace
@@ -25,7 +26,8 @@ void Keeper::watch_unused() {
   });
 }
 
-/// Under the lock. Until the store gives again what it is asked for: where nobody calls, nobody else would find out.
+/// Called with the lock held. Retries until the store answers reads again: without callers nothing else would
+/// notice.
 void Keeper::try_again_later() {
   if (std::exchange(is_trying_again_, true)) return;
   services_.timers->at(services_.timers->now() + kBetweenTries, [weak = weak_from_this()] {
@@ -37,20 +39,20 @@ void Keeper::try_again_later() {
       if (!self->is_reading_failing_) return;
       self->try_again_later();
     }
-    // Where one is under way, that will show it.
+    // If a touch is under way already, it serves the same purpose.
     static_cast<void>(self->toucher_.try_post([keeper = self.get()] { keeper->touch_all(); }));
   });
 }
 
 void Keeper::sweep() {
-  const auto touched = [this] {  // its thread ends before this does
+  const auto touched = [this] {  // the toucher's thread ends before this object does
     touch_all();
     watch_unused();
   };
   if (!toucher_.try_post(touched)) watch_unused();
 }
 
-/// On the toucher's thread.
+/// Called on the toucher's thread.
 void Keeper::touch_all() {
   std::vector<TouchedSession> sessions;
   Sessions touched_ones;
@@ -89,7 +91,7 @@ void Keeper::touch_all() {
   }
 }
 
-/// Where it may not be asked, it keeps sessions all the same.
+/// A user who may not ask Redis for figures can still store sessions, so an error is ignored.
 void Keeper::show_figures(Timers::TimePoint now) {
   next_figures_ = now + kBetweenFigures;
   const auto told = store_->figures();
@@ -107,7 +109,7 @@ void Keeper::show_figures(Timers::TimePoint now) {
     services_.metrics->set(level, value);
 }
 
-/// On the toucher's thread, again and again.
+/// Checks the store's room periodically, on the toucher's thread.
 void Keeper::watch_room() {
   services_.timers->at(services_.timers->now() + kBetweenFigures, [weak = weak_from_this()] {
     const auto self = weak.lock();
@@ -126,7 +128,7 @@ void Keeper::show_room() {
   const std::scoped_lock lock(mutex_);
   if (is_full_ || (room && room->is_full) || !std::exchange(was_full_, false)) return;
   services_.metrics->set(Level::kStoreFull, 0);
-  services_.log->info("store_has_room", {{"text", "What it had no room for may come again."}});
+  services_.log->info("store_has_room", {{"text", "The store has room again for new data."}});
 }
 
 void Keeper::watch_calls() {
@@ -138,7 +140,7 @@ void Keeper::watch_calls() {
   });
 }
 
-/// Whoever waits for a call that does not return is answered; the call itself goes on.
+/// Answers the callers who wait for a call that does not return. The call itself goes on.
 void Keeper::look_at_calls() {
   const bool is_late = calls_.is_any_late(Clock::now());
   const absl::Status away = store_away("it does not answer");
@@ -150,7 +152,8 @@ void Keeper::look_at_calls() {
   if (is_late) callers_.refuse_all(away);
 }
 
-/// Under the lock. Null where the session that was touched has gone, or come back as another, meanwhile.
+/// Called with the lock held. Null if the touched session has left meanwhile, or was replaced by another of
+/// its name.
 Keeper::Entry* Keeper::same_entry(const std::string& name, const Sessions& touched) {
   const auto found = entries_.find(name);
   const auto before = touched.find(name);
@@ -169,7 +172,7 @@ void Keeper::write_again(const TouchResult& result, const Sessions& touched) {
   }
 }
 
-/// Their callers come by another process now, where one of them waits already.
+/// Releases sessions that another process wants, because a caller with their route waits there.
 void Keeper::hand_over(const std::vector<std::string>& names, const Sessions& touched) {
   Calls calls;
   {
@@ -181,10 +184,10 @@ void Keeper::hand_over(const std::vector<std::string>& names, const Sessions& to
       calls.add([this, session = entry->session] { on_lost(*session); });
     }
   }
-  make(calls);  // whoever has them releases them
+  make(calls);  // the callback releases the sessions
 }
 
-/// Sessions that another process has now.
+/// Drops sessions that another process has taken over.
 void Keeper::drop(const std::vector<std::string>& lost, const Sessions& touched) {
   Calls calls;
   {

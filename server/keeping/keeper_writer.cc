@@ -1,4 +1,4 @@
-// Keeper: one thread writes what has changed in all sessions.
+// Keeper: one thread writes the changes of all sessions.
 
 #include <algorithm>
 #include <utility>
@@ -11,7 +11,7 @@ namespace lpdeform {
 namespace {
 
 constexpr std::chrono::milliseconds kFirstPause{50}, kLongestPause{2000};
-/// Where the process is about to end.
+/// The longest pause between retries while the process ends.
 constexpr std::chrono::milliseconds kLastPause{200};
 constexpr std::chrono::minutes kBetweenWords{1};
 
@@ -19,7 +19,7 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-/// What is wrong with the store counts by the worst of what it says.
+/// How serious an error of the store is. The worst one decides the store's state.
 int gravity(const absl::Status& status) {
   if (status.ok()) return 0;
   if (is_full(status)) return 1;
@@ -31,12 +31,13 @@ int gravity(const absl::Status& status) {
 void Keeper::run() {
   std::unique_lock lock(mutex_);
   for (bool is_last_try = false;;) {
-    // What a full store has not refused need not wait.
+    // Changes that a full store has not refused need not wait.
     const auto is_time = [this] {
       return is_last() || (!is_writing_failing_ && has_fresh_) || Clock::now() >= retry_at_;
     };
     if (is_pausing()) changed_.wait_until(lock, retry_at_, is_time);
-    // Where nothing is left that it did not take, nothing at all shows whether it works again.
+    // While the store fails or is full, the thread wakes for a retry even if nothing is due: only a try can
+    // show whether the store works again.
     changed_.wait(lock, [this] { return is_last() || !due_.empty() || is_pausing(); });
     if ((is_stopping_ && due_.empty()) || is_last_try || is_over_) return;
     is_last_try = is_stopping_;
@@ -50,7 +51,7 @@ void Keeper::run() {
   }
 }
 
-/// Everything that is due, as it is now; without `is_all`, but for what a full store has refused.
+/// The present state of everything that is due; without `is_all`, except what a full store has refused.
 std::vector<Keeper::Work> Keeper::take_work(bool is_all) {
   std::vector<Work> works;
   {
@@ -76,7 +77,7 @@ std::vector<Keeper::Work> Keeper::take_work(bool is_all) {
       works.push_back(std::move(work));
     }
   }
-  for (Work& work : works) fill_in(work);  // looks into sessions, which may be busy with an update
+  for (Work& work : works) fill_in(work);  // outside the lock, because a session may be busy with an update
   return works;
 }
 
@@ -97,7 +98,7 @@ void Keeper::fill_in(Work& work) {
   if (change.replaces_all) change.parts["head"] = work.head;
 }
 
-/// Its blobs, too.
+/// Also fills in the session's blobs.
 void Keeper::fill_in_anew(Work& work) {
   auto head = encode_head_again(*work.session, work.head);
   work.status = head.status();
@@ -109,8 +110,8 @@ void Keeper::fill_in_anew(Work& work) {
     work.change.request_id = read->request.request_id();
 }
 
-/// All at once; where that fails, each by itself, so that one that cannot be kept does not hold up the others. Not where the store does
-/// not answer: each would wait for that.
+/// Writes all changes at once. If that fails, writes them one by one, so that one bad change does not block
+/// the others. If the store does not answer, it does not try again: each change would wait for the timeout.
 void Keeper::write(std::vector<Work> works, bool is_all) {
   Calls calls;
   auto outcomes = commit(works);
@@ -135,7 +136,7 @@ void Keeper::write(std::vector<Work> works, bool is_all) {
   make(calls);
 }
 
-/// What is on its way to the store with them.
+/// The number of bytes that these changes send to the store.
 std::size_t Keeper::bytes_of(std::span<const Work> works) {
   std::size_t bytes = 0;
   for (const Work& work : works) {
@@ -161,13 +162,13 @@ absl::StatusOr<std::vector<ChangeOutcome>> Keeper::commit(std::span<const Work> 
   return outcomes;
 }
 
-/// Under the lock; what is to be called afterwards goes into `calls`.
+/// Called with the lock held. Callbacks to make afterwards are added to `calls`.
 void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
   const auto found = entries_.find(work.name);
   if (found == entries_.end()) return;
   Entry& entry = found->second;
   if (entry.session != nullptr && work.session != nullptr && entry.session != work.session)
-    return;  // it left and came back meanwhile: what was written is of an epoch before
+    return;  // it left and came back meanwhile: this write was of an earlier epoch
   if (work.change.is_removal || outcome == ChangeOutcome::kFenced) {
     for (OnDone& on_removed : entry.on_removed)
       calls.add([on_removed = std::move(on_removed)] { on_removed(absl::OkStatus()); });
@@ -196,21 +197,22 @@ void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
   }
 }
 
-/// Under the lock. The store lost what it had called kept, and this process has it yet.
+/// Called with the lock held. The store lost changes that it had confirmed, and this process still has them.
 void Keeper::write_all(Entry& entry, const std::string& name) {
   entry.revision = entry.input_seq = 0;
   due(name);
-  services_.log->warning("store_went_back", {{"session", abbreviated(name)},
-                                             {"text", "The session is written again, in whole."}});
+  services_.log->warning("store_went_back",
+                         {{"session", abbreviated(name)}, {"text", "The whole session is written again."}});
 }
 
-/// Under the lock. The store lost all that there was of it.
+/// Called with the lock held. The store lost the whole session.
 void Keeper::write_anew(Entry& entry, const std::string& name) {
   entry.is_lost = true;
   write_all(entry, name);
 }
 
-/// Under the lock. What has changed stays due; a new session is given up, and is removed where the store has it all the same.
+/// Called with the lock held. The changes stay due. A new session is given up, and removed in case the store
+/// has it all the same.
 void Keeper::note_failed(const Work& work, const absl::Status& why, Calls& calls) {
   const auto found = entries_.find(work.name);
   if (found == entries_.end()) return;
@@ -224,7 +226,7 @@ void Keeper::note_failed(const Work& work, const absl::Status& why, Calls& calls
   due(work.name);
 }
 
-/// Under the lock. All who wait for something of the entry.
+/// Called with the lock held. Answers everyone who waits for something of this entry.
 void Keeper::answer_failed(Entry& entry, const absl::Status& why, Calls& calls) {
   if (entry.on_added) calls.add([on_added = std::exchange(entry.on_added, nullptr), why] { on_added(why); });
   for (OnDone& on_removed : std::exchange(entry.on_removed, {}))
@@ -234,7 +236,7 @@ void Keeper::answer_failed(Entry& entry, const absl::Status& why, Calls& calls) 
   answer_all(entry, calls);
 }
 
-/// Those whose updates are kept.
+/// Answers the updates that are stored.
 void Keeper::answer_kept(Entry& entry, Calls& calls) {
   std::erase_if(entry.waiting, [&](Waiting& one) {
     const bool is_kept = one.revision <= entry.revision && one.epoch <= entry.epoch;
@@ -252,7 +254,7 @@ void Keeper::answer_all(Entry& entry, Calls& calls) {
 
 void Keeper::make(const Calls& calls) {
   for (const auto& call : calls.all) call();
-  // Where this is not done, they are free once the lease has ended.
+  // If this is not done, the sessions are free when the lease ends.
   if (!calls.to_let_go.empty()) store_->let_go(calls.to_let_go).IgnoreError();
 }
 
@@ -260,7 +262,7 @@ void Keeper::note_waited(const Waiting& one) {
   services_.metrics->observe(Span::kInputToKept, seconds_since(one.since));
 }
 
-/// Under the lock. Without `is_all`, what the store had refused before was not tried.
+/// Called with the lock held. Without `is_all`, changes that the store had refused before were not tried.
 void Keeper::note_written(const absl::Status& status, bool is_all) {
   const bool was_pausing = is_pausing();
   is_writing_failing_ = gravity(status) > 1;
@@ -274,14 +276,14 @@ void Keeper::note_written(const absl::Status& status, bool is_all) {
   note_health(status);
 }
 
-/// Under the lock. That there is room again, show_room() finds out.
+/// Called with the lock held. show_room() finds out when there is room again.
 void Keeper::note_full(const absl::Status& status) {
   if (!is_full(status) || std::exchange(was_full_, true)) return;
   services_.metrics->set(Level::kStoreFull, 1);
   services_.log->warning("store_full", {{"text", text_for_operators(status)}});
 }
 
-/// Whether the store gives what it is asked for: anything but STORE_FAILING is an answer.
+/// Notes whether the store answers. Anything but STORE_FAILING is an answer.
 void Keeper::note_read(const absl::Status& status, Clock::time_point begin) {
   const bool is_failing = fault_of(status).reason == Reason::kStoreFailing;
   if (is_failing) services_.metrics->add(Count::kStoreErrors);
@@ -291,7 +293,7 @@ void Keeper::note_read(const absl::Status& status, Clock::time_point begin) {
   note_health(status);
 }
 
-/// Under the lock, after either of both has changed.
+/// Called with the lock held, after one of the flags has changed.
 void Keeper::note_health(const absl::Status& status) {
   const bool is_failing = is_writing_failing_ || is_reading_failing_ || is_stuck_;
   if (std::exchange(was_failing_, is_failing) == is_failing) return;
@@ -299,11 +301,12 @@ void Keeper::note_health(const absl::Status& status) {
   if (is_failing) {
     services_.log->warning("store_failing", {{"text", text_for_operators(status)}});
   } else {
-    services_.log->info("store_works", {{"text", "What was not kept is now."}});
+    services_.log->info("store_works", {{"text", "The store has everything that it had missed."}});
   }
 }
 
-/// Updates were answered before they were kept, as the store took too long. A word in a minute is enough.
+/// Updates were answered before they were stored, because the store took too long. One line per minute is
+/// enough.
 void Keeper::note_slow(std::size_t updates) {
   services_.metrics->add(Count::kUpdatesNotKept, static_cast<double>(updates));
   const Clock::time_point now = Clock::now();

@@ -40,7 +40,7 @@ absl::Status truncated(std::size_t has, const std::string& should) {
                  absl::StrCat("The snapshot has ", has, " bytes of ", should, "; its end is missing."));
 }
 
-/// What follows the header.
+/// The content after the header.
 absl::StatusOr<std::string_view> content_of(std::string_view file) {
   if (file.substr(0, kMagic.size()) != kMagic.substr(0, file.size()) || file.empty())
     return refused(Reason::kSnapshotForeign, "",
@@ -66,7 +66,7 @@ absl::StatusOr<std::string_view> content_of(std::string_view file) {
   return content;
 }
 
-/// Of the parts of a snapshot, which are bytes in it: what each is, by its name.
+/// The type of a snapshot's part, which is stored as bytes, by the part's name.
 const google::protobuf::Descriptor* part_in(const google::protobuf::Descriptor& type,
                                             std::string_view entry) {
   static const auto* const parts = stored::Snapshot::descriptor()->FindFieldByName("parts")->message_type();
@@ -84,7 +84,7 @@ const google::protobuf::Descriptor* part_in(const google::protobuf::Descriptor& 
   return part_type(name);
 }
 
-/// Parsed, its parts copied and parsed in turn, and their values.
+/// Memory for the parsed content: its parts are copied and parsed in turn, and their values are made.
 std::size_t memory_for(std::string_view content) {
   return 2 * parsed_size(*stored::Snapshot::descriptor(), content, part_in);
 }
@@ -103,7 +103,7 @@ std::string snapshot_header(std::string_view content) {
 }
 
 std::size_t snapshot_bytes(const Session& session) {
-  // Positions, normals and surface; p and stiffness; the weld. A handle's part is that of its vertices.
+  // Positions, normals and surface; p and stiffness; the weld. A handle's vertices are counted with its part.
   constexpr std::size_t kBytesAVertex = 3 * 24 + 2 * 8 + 4 + 32;
   return 2 * (kBytesAVertex * session.vertex_count() +
               12 * static_cast<std::size_t>(session.mesh().faces().rows()));

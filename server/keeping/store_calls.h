@@ -12,16 +12,16 @@
 
 namespace lpdeform {
 
-/// Calls of a store that are under way, each with the moment after which the store counts as one that hangs. A disk that does not answer
-/// never returns a call, so nothing else would show it. Thread-safe.
+/// Calls of a store that are under way, each with the moment after which the store counts as hanging. A disk
+/// that does not answer never returns from a call, so nothing else would show it. Thread-safe.
 class StoreCalls {
  public:
   using Clock = std::chrono::steady_clock;
-  /// Of a call that carries no bytes; one that does has a millisecond more for each kBytesPerMillisecond.
+  /// For a call without bytes. A call with bytes has a millisecond more for each kBytesPerMillisecond.
   static constexpr std::chrono::milliseconds kPatience{2000};
   static constexpr std::size_t kBytesPerMillisecond = 1024;
 
-  /// While it lives, a call is under way that carries so many bytes.
+  /// A call of this many bytes is under way while this object lives.
   class UnderWay {
    public:
     UnderWay(StoreCalls& calls, Clock::time_point now, std::size_t bytes = 0);
@@ -41,16 +41,17 @@ class StoreCalls {
   std::multiset<Clock::time_point> ends_;
 };
 
-/// Callers who wait for a store, so that they can be answered where it does not. Each is answered once. Thread-safe.
+/// Callers who wait for a store. They can be answered even if the store does not answer. Each is answered
+/// once. Thread-safe.
 class WaitingCallers {
  public:
   using Id = std::uint64_t;
   using Refuse = std::function<void(const absl::Status&)>;
 
   Id add(Refuse refuse);
-  /// Whether the caller had no answer yet; from now on refuse_all() gives it none.
+  /// Returns whether the caller had no answer yet. After that refuse_all() does not answer it.
   bool take(Id id);
-  /// Answers all who wait now.
+  /// Answers all callers who wait now.
   void refuse_all(const absl::Status& why);
 
  private:

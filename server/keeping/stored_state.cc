@@ -21,7 +21,7 @@ constexpr const char* kStep = "s:";
 constexpr std::uint64_t kMostSteps = 10'000;  // more than a flag allows
 constexpr std::string_view kBlob = "blobs/";
 
-/// The same bytes for the same message.
+/// Deterministic: the same message gives the same bytes.
 std::string bytes_of(const google::protobuf::Message& message) {
   std::string bytes;
   google::protobuf::io::StringOutputStream stream(&bytes);
@@ -115,7 +115,7 @@ InputAges read_ages(const stored::Inputs& inputs) {
   return ages;
 }
 
-/// What could be taken back, and done again.
+/// Reads the steps that can be undone and redone.
 absl::Status read_history(const std::map<std::string, std::string>& parts, const stored::Inputs& inputs,
                           const Decoder& decoder, InputHistory& out) {
   if (inputs.history_steps() > kMostSteps) return session_damaged("its history is too long");
@@ -134,7 +134,7 @@ absl::Status read_history(const std::map<std::string, std::string>& parts, const
   return absl::OkStatus();
 }
 
-/// One handle, and how old it is.
+/// Reads one handle and its age.
 absl::Status read_handle(const std::map<std::string, std::string>& parts, const std::string& name,
                          Decoder decoder, SessionState& out) {
   const auto group = read_part<stored::Group>(parts, kGroup + name);
@@ -228,7 +228,7 @@ StoredParts encode_changes(const SessionChanges& changes) {
     for (const HandleChange& change : step) encode_change(change, *message.add_changes());
     parts[absl::StrCat(kStep, number)] = bytes_of(message);
   }
-  // A handle that is set may have been let go of before.
+  // A handle that is set may have been removed before.
   if (inputs.is_all || !inputs.removed.empty() || !inputs.regrouped.empty())
     parts["removed"] = encode_removals(inputs);
   return parts;

@@ -14,33 +14,34 @@
 
 namespace lpdeform {
 
-// From a session to the parts that a store has of it (server/keeping/stored.proto), and back. The parts: "head", what never
-// changes; "writer"; "inputs", what is small; "p", "stiffness", "region"; "removed", handles let go of; for each handle
-// "g:NAME", what it holds, and "m:NAME", where it goes; "s:NUMBER", a step of its history. So a drag writes "inputs" and one "m:".
+// Converts a session to the parts that a store keeps (server/keeping/stored.proto), and back. The parts are:
+// "head", which never changes; "writer"; "inputs", small values; "p", "stiffness", "region"; "removed",
+// removed handles; for each handle "g:NAME", its vertices and kind, and "m:NAME", its motion; "s:NUMBER", a
+// step of its history. So a drag writes only "inputs" and one "m:".
 
 using StoredParts = std::map<std::string, std::optional<std::string>>;
 
-/// What never changes, with its mesh, weld and normals apart.
+/// The part that never changes. Mesh, weld and normals are stored as blobs.
 struct StoredHead {
   std::string part;                          // "head"
   std::map<std::string, std::string> blobs;  // by key
 };
 
-/// `request`: as it came. `decoder`: knows the uploads that it names.
+/// `request`: as received. `decoder`: knows the uploads that the request names.
 absl::StatusOr<StoredHead> encode_head(const v1::CreateSessionRequest& request, Decoder& decoder,
                                        std::uint64_t fingerprint, std::int64_t created_unix_ms);
 
-/// The same for a session that lives and whose blobs the store has lost: its mesh to the last bit, whatever it came as. `part`: its
-/// "head" as it was. NOT_FOUND SESSION_DAMAGED.
+/// The same for a live session whose blobs the store has lost: its mesh exact to the last bit, however it was
+/// first sent. `part`: the session's previous "head". NOT_FOUND SESSION_DAMAGED.
 absl::StatusOr<StoredHead> encode_head_again(const Session& session, const std::string& part);
 
-/// What to write for these changes.
+/// The parts to write for these changes.
 StoredParts encode_changes(const SessionChanges& changes);
 
 /// The part "writer".
 std::string encode_writer(const std::string& token);
 
-/// The head, read.
+/// A decoded head.
 struct SessionHead {
   v1::CreateSessionRequest request;  // its large buffers name blobs
   std::uint64_t fingerprint = 0;
@@ -49,13 +50,13 @@ struct SessionHead {
 /// NOT_FOUND SESSION_DAMAGED.
 absl::StatusOr<SessionHead> decode_head(const std::map<std::string, std::string>& parts);
 
-/// What the bytes of a part are; null where there is no part of this name, or nobody reads it.
+/// The message type of a part; null if there is no part of this name, or if nothing reads it.
 const google::protobuf::Descriptor* part_type(std::string_view name);
 
-/// The names of the blobs of a head's request.
+/// The names of the blobs that a head's request uses.
 std::vector<std::string> blobs_of(const v1::CreateSessionRequest& head);
 
-/// Handles and settings, read.
+/// Decoded handles and settings.
 struct SessionState {
   Update state;
   SessionPast past;
@@ -64,7 +65,7 @@ struct SessionState {
 absl::StatusOr<SessionState> decode_state(const StoredSession& stored, const SessionHead& head,
                                           Uploads& uploads);
 
-/// A number for a request, the same for the same one in every process.
+/// A number that identifies a request's content. It is the same in every process.
 std::uint64_t fingerprint_of(const google::protobuf::Message& request);
 
 }  // namespace lpdeform

@@ -8,19 +8,20 @@
 
 namespace lpdeform {
 
-/// How long updates wait for the first frame that answers them. Each update counts, also one that a newer one
-/// overtook: it waits for the frame that answers both. Not thread-safe.
+/// Measures how long updates wait for the first frame that answers them. Every update counts. An update that
+/// a newer one superseded waits for the frame that answers both. Not thread-safe.
 class AnswerClock {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  /// An update was taken. One that came late is answered by frames for newer ones, and does not count.
+  /// An update was taken. An update that came late is answered by frames for newer ones and does not count.
   void took(std::uint64_t input_seq, TimePoint now) {
     const bool is_late = !waiting_.empty() && input_seq <= waiting_.back().input_seq;
     if (!is_late && waiting_.size() < kMostWaiting) waiting_.push_back({input_seq, now});
   }
 
-  /// A frame answers this update and all before it. `on_waited` is given the seconds that each waited.
+  /// A frame answers this update and all before it. Calls `on_waited` with the seconds that each of them
+  /// waited.
   void answered(std::uint64_t input_seq, TimePoint now, const std::function<void(double)>& on_waited) {
     while (!waiting_.empty() && waiting_.front().input_seq <= input_seq) {
       on_waited(std::chrono::duration<double>(now - waiting_.front().since).count());
@@ -28,10 +29,10 @@ class AnswerClock {
     }
   }
 
-  /// Nobody waits any more.
+  /// Forgets all waiting updates.
   void forget() { waiting_.clear(); }
 
-  /// While so many wait, later ones are not counted.
+  /// While this many updates wait, later ones are not counted.
   static constexpr std::size_t kMostWaiting = 1024;
 
  private:

@@ -13,19 +13,21 @@ namespace lpdeform {
 
 class Reservation;
 
-/// Bytes that may be held, counted by us because nothing else does: asked for by estimate before they are
-/// used, corrected when it is known. Thread-safe. Held by shared pointers.
+/// A limit on bytes held. The server counts them itself: a caller reserves an estimate before it uses the
+/// memory and corrects the amount once it is known. Thread-safe. Held by shared pointers.
 class Budget : public std::enable_shared_from_this<Budget> {
  public:
-  /// `most_bytes_each`: of one owner; 0: without limit. Not for the owner "", who is everybody.
+  /// `most_bytes_each`: limit per owner; 0: without limit. It does not apply to the owner "", which stands
+  /// for all anonymous callers.
   explicit Budget(std::size_t most_bytes, std::size_t most_bytes_each = 0)
       : most_(most_bytes), most_each_(most_bytes_each) {}
 
-  /// RESOURCE_EXHAUSTED MEMORY_FULL where there is no room for so many more, CALLER_MEMORY_FULL where the owner has none.
+  /// RESOURCE_EXHAUSTED MEMORY_FULL if the budget has no room for this many bytes more, CALLER_MEMORY_FULL if
+  /// the owner has none.
   absl::StatusOr<Reservation> reserve(std::size_t bytes, const std::string& owner = "");
-  /// A share of no bytes, which grows.
+  /// A reservation of no bytes, which can grow.
   Reservation nothing_yet(const std::string& owner = "");
-  /// Whether so many could be reserved now. Errors: as reserve.
+  /// Whether this many bytes could be reserved now. Errors: as reserve().
   absl::Status check(std::size_t bytes, const std::string& owner = "") const;
 
   std::size_t most() const { return most_; }
@@ -40,10 +42,10 @@ class Budget : public std::enable_shared_from_this<Budget> {
   const std::size_t most_, most_each_;
   mutable std::mutex mutex_;
   std::size_t used_ = 0;
-  std::map<std::string, std::size_t> used_by_;  // the owners that have any
+  std::map<std::string, std::size_t> used_by_;  // only owners that hold some
 };
 
-/// A share of a budget, given back when it goes.
+/// A share of a budget, given back when this object is destroyed.
 class Reservation {
  public:
   Reservation() = default;
@@ -51,9 +53,10 @@ class Reservation {
   Reservation& operator=(Reservation&& other) noexcept;
   ~Reservation() { resize(0); }
 
-  /// Errors: as Budget::reserve, for what is more than now; nothing where that is enough.
+  /// Grows to `bytes`; does nothing if the reservation is as large already. Errors: as Budget::reserve(), for
+  /// the difference.
   absl::Status grow_to(std::size_t bytes);
-  /// Corrects it, also beyond the limit: what is there is there.
+  /// Corrects the amount, also beyond the limit: memory that is in use already must count.
   void resize(std::size_t bytes);
   std::size_t bytes() const { return bytes_; }
 

@@ -11,11 +11,12 @@
 
 namespace lpdeform {
 
-/// What one caller may take beside sessions (Registry) and memory (Budget): streams at a time, and bytes of uploads a
-/// second. Not for the caller "", who is everybody. Thread-safe. Held by a shared pointer.
+/// Quotas of one caller besides sessions (Registry) and memory (Budget): streams at a time, and upload bytes
+/// per second. They do not apply to the caller "", which stands for all anonymous callers. Thread-safe. Held
+/// by a shared pointer.
 class CallerLimits : public std::enable_shared_from_this<CallerLimits> {
  public:
-  /// 0 is without limit.
+  /// 0 means without limit.
   struct Limits {
     std::size_t streams = 0;
     double upload_bytes_per_second = 0;
@@ -23,16 +24,18 @@ class CallerLimits : public std::enable_shared_from_this<CallerLimits> {
 
   CallerLimits(std::shared_ptr<Timers> timers, Limits limits);
 
-  /// A place for a stream, given back when it goes; null where none are counted. RESOURCE_EXHAUSTED CALLER_STREAMS_FULL.
+  /// A place for a stream, given back when it is destroyed; null if streams are not counted.
+  /// RESOURCE_EXHAUSTED CALLER_STREAMS_FULL.
   using Place = std::shared_ptr<void>;
   absl::StatusOr<Place> enter_stream(const std::string& caller);
 
-  /// So many bytes are about to be taken, at most kBurstBytes. RESOURCE_EXHAUSTED UPLOAD_RATE, with when there will be room
-  /// for them: a bucket of one second's bytes, kBurstBytes at least, is refilled at the rate.
+  /// Takes this many bytes, at most kBurstBytes, from the caller's token bucket. The bucket refills at the
+  /// rate and holds one second's bytes, but at least kBurstBytes. RESOURCE_EXHAUSTED UPLOAD_RATE, with the
+  /// time when the bucket will have enough.
   absl::Status take_upload_bytes(const std::string& caller, std::size_t bytes);
 
   static constexpr double kBurstBytes = 4 << 20;
-  /// Callers whose bucket may have run full are forgotten when there are so many.
+  /// When there are this many buckets, those that may be full again are forgotten.
   static constexpr std::size_t kMostBuckets = 1024;
 
  private:

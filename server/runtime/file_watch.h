@@ -11,19 +11,19 @@
 
 namespace lpdeform {
 
-/// What is read from files that an operator may replace while the server runs.
+/// Files that an operator may replace while the server runs.
 struct WatchedFiles {
   std::string name;  // "keys": events are keys_not_read and keys_read_again
-  /// Reads them again where they have changed; an error leaves what was read before in force. Nothing where they are of no more
-  /// interest: then they are not looked at again.
+  /// Reads the files again if they have changed. After an error, what was read before stays in force. Returns
+  /// nullopt when the files are no longer needed: then they are not checked again.
   std::function<std::optional<absl::Status>()> refresh;
 };
 
-/// Looks at `files` every other second. What is wrong with them is logged when it begins, and that it is mended.
+/// Checks `files` every two seconds. Logs once when a problem begins and once when it is over.
 void watch_files(const std::shared_ptr<Timers>& timers, WatchedFiles files,
                  const std::shared_ptr<const Log>& log);
 
-/// Of something that has refresh(), for as long as it lives.
+/// Watches the files of an object that has refresh(), for as long as the object lives.
 template <typename Owner>
 WatchedFiles files_of(std::string name, const std::shared_ptr<Owner>& owner) {
   return {std::move(name), [weak = std::weak_ptr(owner)]() -> std::optional<absl::Status> {

@@ -8,17 +8,18 @@
 
 namespace lpdeform {
 
-/// Gives memory that was freed back to the system some time after sessions have ended. The allocator keeps it for
-/// threads that may never ask again: without this a server holds on to what its busiest hour took. Thread-safe.
+/// Gives freed memory back to the system some time after sessions have ended. The allocator keeps it for
+/// threads that may never allocate again, so without this a server would hold the memory of its busiest hour
+/// forever. Thread-safe.
 class HeapTrim {
  public:
-  /// `trim` is called on a thread of its own, at most once in `pause`: by default malloc_trim(0), which may take tens of
-  /// milliseconds.
+  /// `trim` is called on a thread of its own, at most once per `pause`. The default is malloc_trim(0), which
+  /// may take tens of milliseconds.
   explicit HeapTrim(std::chrono::milliseconds pause, std::function<void()> trim = release_free_memory);
   /// Does not wait for the pause to end.
   ~HeapTrim();
 
-  /// Something was freed, or will be in less than the pause.
+  /// Something was freed, or will be freed within the pause.
   void after_release();
 
  private:

@@ -4,9 +4,9 @@
 
 namespace lpdeform {
 
-/// Whether there is more work than the machine can do, told from how long work waits: a running mean of the last waits.
-/// Overload begins when the mean passes kBegins and ends below kEnds, or when nothing has waited for kForgets, but lasts
-/// for kShortest at least, so that it does not flicker. Not thread-safe.
+/// Tells overload from how long work waits, by a running mean of the last waits. Overload begins when the
+/// mean passes kBegins. It ends when the mean falls below kEnds, or when nothing has waited for kForgets. It
+/// lasts for kShortest at least, so that it does not flicker. Not thread-safe.
 class LoadGauge {
  public:
   using Clock = std::chrono::steady_clock;
@@ -25,7 +25,7 @@ class LoadGauge {
     return is_overloaded_;
   }
 
-  static constexpr double kWaits = 16;  // that the mean is about
+  static constexpr double kWaits = 16;  // about this many waits make the mean
   static constexpr std::chrono::milliseconds kBegins{100}, kEnds{25};
   static constexpr std::chrono::seconds kForgets{2}, kShortest{2};
 

@@ -25,7 +25,7 @@ std::string text_of(const LogField& field) {
   return number == nullptr ? "" : absl::StrCat(*number);
 }
 
-/// A line of gRPC's own has a place in its source for a reason.
+/// A line from gRPC itself has its place in gRPC's source as the reason.
 LogBound::Kind kind_of(int level, std::string_view event, Log::Fields fields) {
   LogBound::Kind kind{level, std::string(event), "", ""};
   for (const LogField& field : fields) {
@@ -59,7 +59,7 @@ void Log::end() const {
   if (thread_ == nullptr) return;
   end_window(Clock::now());
   logger_->set_level(spdlog::level::off);
-  thread_.reset();  // writes what waits, and ends before the logger that it writes to
+  thread_.reset();  // writes the queue, and ends before the logger that it writes to
 }
 
 void Log::debug(std::string_view event, Fields fields) const {
@@ -83,13 +83,14 @@ void Log::error_each(std::string_view event, Fields fields) const {
   if (thread_ != nullptr) write_line(spdlog::level::err, event, fields);
 }
 
-/// In the queue, which others fill, too.
+/// Whether the queue has room; other threads fill it, too.
 bool Log::has_room() const {
   const std::scoped_lock lock(mutex_);
   return thread_ == nullptr || thread_->queue_size() < kLongestQueue / 2;
 }
 
-/// Once in vain is enough: of a queue that is stuck the oldest lines go.
+/// Waits the full time only once: if the queue is still stuck, the next call does not wait, and the oldest
+/// lines are dropped.
 void Log::wait_for_room() const {
   const Clock::time_point end = Clock::now() + (is_stuck_ ? std::chrono::seconds(0) : kStall);
   while (!has_room()) {
@@ -118,7 +119,7 @@ void Log::sum_up() const {
   if (const Clock::time_point now = Clock::now(); now - window_began_ >= kWindow) end_window(now);
 }
 
-/// Under the lock.
+/// Called with the lock held.
 void Log::end_window(Clock::time_point now) const {
   const double seconds = std::chrono::duration<double>(now - window_began_).count();
   for (const auto& [kind, count] : bound_.take()) {
@@ -135,7 +136,7 @@ void Log::end_window(Clock::time_point now) const {
   if (const std::size_t lost = thread_->overrun_counter(); lost != lines_lost_) {
     write_line(
         spdlog::level::warn, "lines_lost",
-        {{"count", std::uint64_t{lost - lines_lost_}}, {"text", "Whoever reads the log is too slow."}});
+        {{"count", std::uint64_t{lost - lines_lost_}}, {"text", "The reader of the log is too slow."}});
     lines_lost_ = lost;
   }
 }
@@ -161,7 +162,7 @@ std::string abbreviated(std::string_view name) {
 
 std::string in_quotes(std::string_view text) {
   std::string out;
-  std::size_t digits = 0;  // in this run
+  std::size_t digits = 0;  // in the current run
   for (const char c : text.substr(0, kLongestQuote)) {
     digits = std::isxdigit(static_cast<unsigned char>(c)) != 0 ? digits + 1 : 0;
     if (digits <= kDigitsShown) out.push_back(c);

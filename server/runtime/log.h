@@ -22,29 +22,30 @@ class thread_pool;
 
 namespace lpdeform {
 
-/// A fact of an event. Never a token, never coordinates. Left out where its text is empty.
+/// A field of an event. Never holds a token or coordinates. Left out if its text is empty.
 struct LogField {
   using Value = std::variant<std::string, std::uint64_t, double>;
   std::string_view name;
   Value value;
 };
 
-/// A number that is left out where it is 0, because then nobody knows it.
+/// A number whose field is left out if it is 0, which stands for unknown.
 template <typename Number>
 LogField::Value where_known(Number number) {
   return number == 0 ? LogField::Value("") : LogField::Value(number);
 }
 
-/// Structured log: one JSON object a line on stderr, written by a thread of its own; where that cannot keep
-/// up, the oldest lines go, and a line "lines_lost" says how many. Calls never wait for the disk.
-///
-/// Of one event, reason and session it takes LogBound::kOfASession lines in kWindow; what comes beyond is summed up in a line
-/// "left_out", so that lines and counts together are all there was. Lines of level debug and of error_each() have no bound. Thread-safe.
+/// Structured log: one JSON object per line on stderr, written by a thread of its own. If that thread cannot
+/// keep up, the oldest lines are dropped and a line "lines_lost" gives their number. Calls never wait for the
+/// disk.
+/// The log takes at most LogBound::kOfASession lines per event, reason and session in kWindow. It counts
+/// further ones in a line "left_out", so lines and counts together cover everything. Lines of level debug and
+/// of error_each() have no bound. Thread-safe.
 class Log {
  public:
   static constexpr std::chrono::seconds kWindow{10};
 
-  /// `level`: "debug", "info", "warning", "error" or "off"; anything else is "info".
+  /// `level`: "debug", "info", "warning", "error" or "off"; anything else means "info".
   explicit Log(std::string_view level);
   ~Log();
 
@@ -54,15 +55,16 @@ class Log {
   void warning(std::string_view event, Fields fields) const;
   void error(std::string_view event, Fields fields) const;
 
-  /// Of lines that come once, one for each of many things that nobody else names: they have no bound, and wait for room in the queue, up
-  /// to kStall of one that is stuck. To be called by threads that may wait.
+  /// Logs one line for each of many things that no other line names. These lines have no bound. They wait for
+  /// room in the queue, up to kStall if it is stuck. Call it only from threads that may wait.
   void error_each(std::string_view event, Fields fields) const;
   static constexpr std::chrono::seconds kStall{1};
 
-  /// Says what was left out, where kWindow is over. Called now and then: after a flood there may be no next line to do so.
+  /// Logs how many lines were left out, once kWindow is over. Call it now and then: after a flood there may
+  /// be no next line that would do so.
   void sum_up() const;
 
-  /// Writes what waits; lines from now on are none. May wait for whoever reads the log.
+  /// Writes the queue; later lines are dropped. May wait for the reader of the log.
   void end() const;
 
  private:
@@ -83,11 +85,11 @@ class Log {
   mutable std::atomic<bool> is_stuck_ = false;
 };
 
-/// The first digits of a session's or stream's name: enough to tell them apart, too few to use them.
+/// The first digits of a session's or stream's name: enough to tell names apart, too few to use them.
 std::string abbreviated(std::string_view name);
 
-/// What a caller sent or is told, for the log: the first kLongestQuote bytes, and of what may be a name or a token, any long run of
-/// hexadecimal digits, the first ones.
+/// Quotes for the log what a caller sent or was told: the first kLongestQuote bytes. Of each long run of
+/// hexadecimal digits, which may be a name or a token, only the first digits stay.
 std::string in_quotes(std::string_view text);
 inline constexpr std::size_t kLongestQuote = 80;
 

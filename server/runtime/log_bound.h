@@ -9,27 +9,27 @@
 
 namespace lpdeform {
 
-/// How many lines a log takes of one kind, whoever causes them, until it is summed up: so nobody can fill a disk by it, or push
-/// what matters out of sight. What is left out is counted. Not thread-safe.
+/// Limits how many lines of one kind the log takes before it sums them up. So no caller can fill a disk with
+/// log lines or bury important ones. Lines left out are counted. Not thread-safe.
 class LogBound {
  public:
-  /// Lines of one event, reason and session; lines of one event and reason over all sessions.
+  /// Limits: lines per event, reason and session; lines per event and reason over all sessions.
   static constexpr std::size_t kOfASession = 10, kOfAReason = 200;
 
-  /// What a line is told from others by. Events and reasons are closed sets; sessions may be any number.
+  /// What tells lines apart. Events and reasons are closed sets; there may be any number of sessions.
   struct Kind {
     int level = 0;
     std::string event, reason, session;
   };
   struct LeftOut {
-    Kind kind;  // without a session: of all those that are not listed by themselves
+    Kind kind;  // without a session: the sum of all sessions that are not listed separately
     std::uint64_t count = 0;
   };
 
-  /// Whether a line of this kind may be written. It counts as one, either way.
+  /// Whether a line of this kind may be written. Counts the line in either case.
   bool admits(const Kind& kind);
 
-  /// What has been left out since the last time, and begins anew.
+  /// Returns what was left out since the last call, and resets the counts.
   std::vector<LeftOut> take();
 
  private:

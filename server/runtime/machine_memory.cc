@@ -17,10 +17,10 @@ constexpr std::uint64_t kNoLimit = std::numeric_limits<std::uint64_t>::max();
 
 std::uint64_t limit_in(const std::string& path) {
   std::uint64_t limit = 0;
-  return std::ifstream(path) >> limit && limit > 0 ? limit : kNoLimit;  // "max" is no number
+  return std::ifstream(path) >> limit && limit > 0 ? limit : kNoLimit;  // "max" is not a number
 }
 
-/// Of the group at `path` ("/a/b") and of those above it, up to the root.
+/// The least limit of the group at `path` ("/a/b") and of all groups above it, up to the root.
 std::uint64_t least_limit_from(const std::string& root, std::string path, const char* file) {
   while (!path.empty() && path.back() == '/') path.pop_back();
   std::uint64_t least = limit_in(absl::StrCat(root, path, "/", file));

@@ -29,64 +29,64 @@ struct Entry {
 // In the order of the enums.
 constexpr std::array kCounts{
     Entry{"lpdeform_updates_total", "Updates taken."},
-    Entry{"lpdeform_updates_coalesced_total", "Updates overtaken by a newer one before the solver saw them."},
+    Entry{"lpdeform_updates_coalesced_total",
+          "Updates superseded by a newer one before the solver saw them."},
     Entry{"lpdeform_frames_published_total", "Frames that solvers published."},
-    Entry{"lpdeform_frames_sent_total", "Frames begun to be sent, to each reader."},
+    Entry{"lpdeform_frames_sent_total", "Frames that the server began to send, counted per reader."},
     Entry{"lpdeform_frames_superseded_total",
           "Frames never sent to a reader because a newer one came first."},
     Entry{"lpdeform_frame_bytes_total", "Bytes of positions, distortion and normals in frames sent."},
-    Entry{"lpdeform_credit_stalls_total", "Times that a frame had to wait for a reader's credit."},
+    Entry{"lpdeform_credit_stalls_total", "How often a frame had to wait for a reader's credit."},
     Entry{"lpdeform_sessions_created_total", "Sessions made."},
     Entry{"lpdeform_connections_total", "Connections taken."},
-    Entry{"lpdeform_connections_refused_total",
-          "Connections closed at once for want of room (--max-connections)."},
-    Entry{"lpdeform_sessions_restored_total", "Sessions made again from the store."},
+    Entry{"lpdeform_connections_refused_total", "Connections closed at once because of --max-connections."},
+    Entry{"lpdeform_sessions_restored_total", "Sessions restored from the store."},
     Entry{"lpdeform_sessions_damaged_total",
-          "Sessions not made again, because what is stored of them cannot be used; once each try."},
+          "Failed tries to restore a session because its stored data cannot be used."},
     Entry{"lpdeform_updates_not_kept_total",
-          "Updates answered before they were in the store, which failed or was slow."},
+          "Updates answered before they were stored, because the store failed or was slow."},
     Entry{"lpdeform_store_errors_total", "Operations of the store that failed."},
 };
 constexpr std::array kLevels{
     Entry{"lpdeform_sessions", "Sessions held."},
     Entry{"lpdeform_sessions_limit", "Sessions that may be held (--max-sessions)."},
-    Entry{"lpdeform_streams", "Streams of frames open."},
+    Entry{"lpdeform_streams", "Open streams of frames."},
     Entry{"lpdeform_uploads", "Uploads held."},
     Entry{"lpdeform_memory_bytes", "Memory of sessions and uploads by the server's own count."},
-    Entry{"lpdeform_memory_limit_bytes", "Memory that they may have (--max-bytes)."},
+    Entry{"lpdeform_memory_limit_bytes", "Memory that sessions and uploads may use (--max-bytes)."},
     Entry{"lpdeform_draining", "1 while the server shuts down."},
-    Entry{"lpdeform_overloaded",
-          "1 while sessions wait for a thread for too long and frames come less often."},
-    Entry{"lpdeform_store_failing", "1 while the store does not take what has changed."},
-    Entry{"lpdeform_store_full", "1 while the store refuses what is new for want of room; it still removes."},
+    Entry{"lpdeform_overloaded", "1 while sessions wait too long for a thread and frames come less often."},
+    Entry{"lpdeform_store_failing", "1 while the store does not take changes."},
+    Entry{"lpdeform_store_full", "1 while the store has no room for new data; it still removes."},
     Entry{"lpdeform_store_free_bytes",
-          "What --store sqlite:DIR has left, of its disk or of --max-store-bytes."},
-    Entry{"lpdeform_store_limit_bytes", "All of that, whoever has it; 0 with another store."},
-    Entry{"lpdeform_redis_memory_bytes", "Of Redis, by its own word; so all of lpdeform_redis_*."},
-    Entry{"lpdeform_redis_memory_limit_bytes", "Its maxmemory; 0: none."},
-    Entry{"lpdeform_redis_evicted_keys", "Keys that it threw away for want of memory, since it was started."},
-    Entry{"lpdeform_redis_clients", "Its connections."},
-    Entry{"lpdeform_redis_clients_refused", "Connections that it refused, since it was started."},
-    Entry{"lpdeform_redis_replicas", "Of it that follow it."},
+          "Bytes left for --store sqlite:DIR, on its disk or of --max-store-bytes."},
+    Entry{"lpdeform_store_limit_bytes",
+          "All bytes of that disk or limit, free or used; 0 with another store."},
+    Entry{"lpdeform_redis_memory_bytes", "Memory of Redis. All lpdeform_redis_* are as Redis reports them."},
+    Entry{"lpdeform_redis_memory_limit_bytes", "The maxmemory of Redis; 0: none."},
+    Entry{"lpdeform_redis_evicted_keys", "Keys that Redis evicted since it was started."},
+    Entry{"lpdeform_redis_clients", "Connections of Redis."},
+    Entry{"lpdeform_redis_clients_refused", "Connections that Redis refused since it was started."},
+    Entry{"lpdeform_redis_replicas", "Replicas connected to Redis."},
     Entry{"lpdeform_redis_syncs_delayed",
-          "Writes to its disk that waited for over 2 s, since it was started."},
-    Entry{"lpdeform_redis_in_memory_alone", "1 where it keeps nothing on a disk (appendonly no)."},
-    Entry{"lpdeform_redis_persistence_failing", "1 while its log on the disk fails."},
+          "Writes of Redis to its disk that waited for over 2 s, since it was started."},
+    Entry{"lpdeform_redis_in_memory_alone", "1 if Redis keeps nothing on a disk (appendonly no)."},
+    Entry{"lpdeform_redis_persistence_failing", "1 while the append-only log of Redis fails."},
 };
 constexpr std::array kSpans{
     Entry{"lpdeform_input_to_frame_seconds",
-          "From the taking of an update to the first frame that answers it, where somebody looks on."},
-    Entry{"lpdeform_solve_seconds", "Of finished solves."},
-    Entry{"lpdeform_setup_seconds", "The part of finished solves that factors."},
-    Entry{"lpdeform_scheduler_queue_seconds", "From a session's being ready to run to its running."},
-    Entry{"lpdeform_call_queue_seconds", "From a call's arrival to its being worked on."},
+          "From taking an update to the first frame that answers it, if a stream is open."},
+    Entry{"lpdeform_solve_seconds", "Duration of finished solves."},
+    Entry{"lpdeform_setup_seconds", "Time that finished solves spent factoring."},
+    Entry{"lpdeform_scheduler_queue_seconds", "From when a session is ready to run until it runs."},
+    Entry{"lpdeform_call_queue_seconds", "From a call's arrival until a thread works on it."},
     Entry{"lpdeform_input_to_kept_seconds",
-          "From the taking of an update to its being in the store, or to its answer where that came first."},
-    Entry{"lpdeform_store_write_seconds", "Of commits to the store, each of all that has changed."},
-    Entry{"lpdeform_store_read_seconds", "Of reading a session from the store."},
+          "From taking an update until it is stored, or until its answer if that came first."},
+    Entry{"lpdeform_store_write_seconds", "Duration of commits to the store."},
+    Entry{"lpdeform_store_read_seconds", "Duration of reading a session from the store."},
 };
 
-/// Those of gRFC A66.
+/// The buckets of gRFC A66.
 const Buckets& call_seconds() {
   static const Buckets buckets{
       0,    0.00001, 0.00005, 0.0001, 0.0003, 0.0006, 0.0008, 0.001, 0.002, 0.003, 0.004, 0.005, 0.006, 0.008,
@@ -101,7 +101,7 @@ const Buckets& call_bytes() {
   return buckets;
 }
 
-/// From a fifth of a frame at 60 Hz to what nobody waits for.
+/// From a fifth of a frame at 60 Hz up to waits that nobody would accept.
 const Buckets& our_seconds() {
   static const Buckets buckets{0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.05, 0.075, 0.1,
                                0.15,   0.25,  0.5,   1,     2,     5,     10,    30,   60,    300};
@@ -139,19 +139,19 @@ struct Metrics::Impl {
   Family<Counter>& started =
       family<Counter>(registry, "grpc_server_call_started_total", "Calls started, finished or not.");
   Family<Histogram>& duration = family<Histogram>(registry, "grpc_server_call_duration_seconds",
-                                                  "Of calls, from their arrival to their status.");
+                                                  "Duration of calls, from their arrival to their status.");
   Family<Histogram>& sent =
       family<Histogram>(registry, "grpc_server_call_sent_total_compressed_message_size_bytes",
-                        "Bytes of messages sent, by call; nothing is compressed by gRPC.");
+                        "Bytes of messages sent, by call; gRPC compresses nothing.");
   Family<Histogram>& received =
       family<Histogram>(registry, "grpc_server_call_rcvd_total_compressed_message_size_bytes",
-                        "Bytes of messages received, by call; nothing is compressed by gRPC.");
+                        "Bytes of messages received, by call; gRPC compresses nothing.");
   Family<Counter>& rejections = family<Counter>(
       registry, "lpdeform_rejections_total", "Calls and updates refused, by the reason of proto/errors.md.");
   Family<Counter>& sessions_ended =
-      family<Counter>(registry, "lpdeform_sessions_ended_total", "Sessions ended, by why.");
+      family<Counter>(registry, "lpdeform_sessions_ended_total", "Sessions ended, by reason.");
   Family<Counter>& streams_ended =
-      family<Counter>(registry, "lpdeform_streams_ended_total", "Streams of frames ended, by why.");
+      family<Counter>(registry, "lpdeform_streams_ended_total", "Streams of frames ended, by reason.");
 };
 
 Metrics::Metrics() : impl_(std::make_unique<Impl>()) {}

@@ -7,25 +7,25 @@
 
 namespace lpdeform {
 
-/// What only ever rises.
+/// Counters: values that only rise.
 enum class Count {
   kUpdates,           // taken
-  kUpdatesCoalesced,  // taken, and overtaken by a newer one before the solver saw them
+  kUpdatesCoalesced,  // superseded by a newer one before the solver saw them
   kFramesPublished,
   kFramesSent,
-  kFramesSuperseded,  // published, and never sent to a reader because a newer one came first; once a reader
-  kFrameBytes,        // of the numbers in frames sent
-  kCreditStalls,      // a reader had to give credit back before it could be sent the frame that waits
+  kFramesSuperseded,  // published, but not sent to a reader because a newer one came first; counted per reader
+  kFrameBytes,        // bytes of the numbers in frames sent
+  kCreditStalls,      // a frame had to wait until its reader gave credit back
   kSessionsCreated,
   kConnections,         // taken
-  kConnectionsRefused,  // for want of room
-  kSessionsRestored,    // made again from the store
-  kSessionsDamaged,     // not made again, because what is stored of them cannot be used
-  kUpdatesNotKept,      // answered before they were in the store, which failed or was slow
+  kConnectionsRefused,  // closed because the limit was reached
+  kSessionsRestored,    // restored from the store
+  kSessionsDamaged,     // not restored, because their stored data cannot be used
+  kUpdatesNotKept,      // answered before they were stored, because the store failed or was slow
   kStoreErrors,
 };
 
-/// What has a value at each moment.
+/// Gauges: values at this moment.
 enum class Level {
   kSessions,
   kSessionsMost,
@@ -37,9 +37,9 @@ enum class Level {
   kOverloaded,
   kStoreFailing,
   kStoreFull,
-  kStoreFree,   // bytes that a store on this machine's disk has left; 0 with another
-  kStoreLimit,  // of which
-  // What Redis says of itself; 0 with another store.
+  kStoreFree,   // bytes left for a store on this machine's disk; 0 with another store
+  kStoreLimit,  // of how many bytes in all
+  // As Redis reports them; 0 with another store.
   kRedisMemory,
   kRedisMemoryMost,
   kRedisEvicted,
@@ -51,21 +51,21 @@ enum class Level {
   kRedisPersistenceFailing
 };
 
-/// What takes time, in seconds.
+/// Durations in seconds.
 enum class Span {
-  kInputToFrame,    // from the taking of an update to the first frame that answers it
+  kInputToFrame,    // from taking an update to the first frame that answers it
   kSolve,           // of one solve, from its beginning to its result
-  kSetup,           // of one solve: the part that factors
-  kSchedulerQueue,  // from being ready to run to running, of a session's slice
-  kCallQueue,       // the same of a call's task
-  kInputToKept,     // from the taking of an update to its being in the store, or to its earlier answer
+  kSetup,           // the part of one solve that factors
+  kSchedulerQueue,  // how long a session's slice waits for a thread
+  kCallQueue,       // how long a call's task waits for a thread
+  kInputToKept,     // from taking an update until it is stored, or until it is answered if that is earlier
   kStoreWrite,      // of one commit to the store
   kStoreRead,       // of one session out of the store
 };
 
-/// What the service counts and measures, for Prometheus. The calls have the names of gRFC A66 with the labels
-/// grpc_method ("lpdeform.v1.DeformService/Solve") and grpc_status ("OK"); ours begin with lpdeform_. No label has a
-/// value that comes from a client. Thread-safe.
+/// The service's counters and measurements for Prometheus. Metrics of calls have the names of gRFC A66, with
+/// the labels grpc_method ("lpdeform.v1.DeformService/Solve") and grpc_status ("OK"). Metrics of this project
+/// begin with lpdeform_. No label value comes from a client. Thread-safe.
 class Metrics {
  public:
   Metrics();
@@ -86,14 +86,15 @@ class Metrics {
   void call_started(const std::string& method);
   void call_ended(const Call& call);
 
-  /// `reason` as in proto/errors.md.
+  /// `reason`: as in proto/errors.md.
   void rejected(const std::string& reason);
-  /// "deleted", "expired", "draining", "elsewhere".
+  /// `reason`: "deleted", "expired", "draining" or "elsewhere".
   void session_ended(const std::string& reason);
   /// `reason`: stream_end_name().
   void stream_ended(const std::string& reason);
 
-  /// All of it and the process's own (process_open_fds and so on), in Prometheus's text format 0.0.4.
+  /// All of these metrics and those of the process (process_open_fds and so on), in Prometheus's text format
+  /// 0.0.4.
   std::string text() const;
 
  private:

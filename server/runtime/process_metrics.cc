@@ -46,7 +46,7 @@ double cpu_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-/// The second number of /proc/self/statm, in pages.
+/// Reads the second number of /proc/self/statm, which counts pages.
 double resident_bytes() {
   std::ifstream file("/proc/self/statm");
   double size = 0, resident = 0;
@@ -58,7 +58,7 @@ double unix_seconds_now() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-/// When this program was loaded: near enough to when it was started.
+/// When this program was loaded; that is close enough to when it was started.
 const double start_seconds = unix_seconds_now();
 
 }  // namespace

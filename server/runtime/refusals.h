@@ -16,14 +16,14 @@ namespace lpdeform {
 
 inline constexpr char kRetryPayload[] = "lpdeform/retry_after_ms";
 
-/// The same error, saying when to try again: 1 ms to an hour from now.
+/// The same error with a time to retry after: 1 ms to an hour from now.
 inline absl::Status retry_after(absl::Status error, std::chrono::duration<double> wait) {
   const double ms = std::clamp(std::ceil(1e3 * wait.count()), 1.0, 3.6e6);
   error.SetPayload(kRetryPayload, absl::Cord(absl::StrCat(static_cast<std::uint32_t>(ms))));
   return error;
 }
 
-/// How long a caller had better wait before it tries again, in milliseconds; 0 where trying again does not help.
+/// After how many milliseconds a caller should retry; 0 if a retry does not help.
 inline std::uint32_t retry_after_ms(const absl::Status& error) {
   std::uint32_t ms = 0;
   if (const auto payload = error.GetPayload(kRetryPayload);
@@ -46,13 +46,13 @@ inline absl::Status session_unknown() {
                     "There is no such session; it may have expired or been deleted.");
 }
 
-/// UNAVAILABLE SESSION_ELSEWHERE, of a session that has just gone on elsewhere.
+/// UNAVAILABLE SESSION_ELSEWHERE: the session has just moved to another server.
 inline absl::Status session_left() {
   return make_fault({Reason::kSessionElsewhere, "session", ""},
                     "The session goes on at another server; try again.");
 }
 
-/// RESOURCE_EXHAUSTED SERVER_BUSY. `wait`: until those that wait now have had their turn.
+/// RESOURCE_EXHAUSTED SERVER_BUSY. `wait`: until the calls that wait now have had their turn.
 inline absl::Status server_busy(std::chrono::duration<double> wait) {
   return retry_after(make_fault({Reason::kServerBusy, "calls", ""},
                                 "The server has too many calls waiting; try again after the time given."),

@@ -10,7 +10,8 @@
 namespace lpdeform {
 namespace {
 
-/// Of each second of answers, while ordinary slices wait, these get so much: a quarter of all.
+/// While ordinary slices wait, they are owed this many seconds for each second of answers: a quarter of all
+/// time.
 constexpr double kOwed = 1.0 / 3;
 constexpr double kMostOwed = 0.1;
 
@@ -37,7 +38,7 @@ bool Scheduler::LessUsed::operator()(const std::shared_ptr<Runnable>& a,
 
 Scheduler::Scheduler(int threads, std::function<void(double)> on_waited) : on_waited_(std::move(on_waited)) {
   LPDEFORM_CHECK(threads >= 2);
-  const std::scoped_lock lock(mutex_);  // the first threads ask already how many there are
+  const std::scoped_lock lock(mutex_);  // the first threads ask for the number of threads at once
   for (int k = 0; k < threads; ++k) threads_.emplace_back([this] { run(); });
 }
 
@@ -92,7 +93,7 @@ void Scheduler::enqueue(std::shared_ptr<Runnable> runnable) {
   answers_waiting_ = static_cast<int>(answers_.size());
 }
 
-/// One that waits in the ordinary queue is to answer now. That it was put off until then counts.
+/// A Runnable in the ordinary queue must answer now. The time that it has waited there counts as a wait.
 void Scheduler::hasten(const std::shared_ptr<Runnable>& runnable) {
   const TimePoint now = std::chrono::steady_clock::now();
   ordinary_gauge_.waited(now - runnable->ready_since_, now);
@@ -101,7 +102,7 @@ void Scheduler::hasten(const std::shared_ptr<Runnable>& runnable) {
   enqueue(runnable);
 }
 
-/// Who of them may run now and used the least; the end where nobody may.
+/// The Runnable in `queue` that may run now and has used the least time; end() if none may run.
 Scheduler::Queue::const_iterator Scheduler::first(const Queue& queue) const {
   const bool may_be_heavy = heavy_running_ < std::max(1, threads() / 2);
   return std::find_if(queue.begin(), queue.end(),
@@ -141,7 +142,7 @@ void Scheduler::run() {
     lock.lock();
     finish_slice(runnable, spent.count(), urgency, has_more);
 
-    // The last reference may be ours, and its destructor must not run under the lock.
+    // The last reference may be this one, and the destructor must not run under the lock.
     lock.unlock();
     runnable.reset();
     lock.lock();
@@ -156,7 +157,8 @@ void Scheduler::finish_slice(std::shared_ptr<Runnable> runnable, double seconds,
   owed_seconds_ = std::clamp(owed_seconds_, -kMostOwed, ordinary_.empty() ? 0 : kMostOwed);
   const bool was_woken = runnable->state_ == Runnable::State::kWokenWhileRunning;
   runnable->state_ = Runnable::State::kAsleep;
-  // Nobody has to be woken: this thread is free now, for this one or for a heavy one that had to wait.
+  // No other thread needs to be woken: this thread is free now, for this Runnable or for a heavy one that had
+  // to wait.
   if (has_more || was_woken) enqueue(std::move(runnable));
 }
 

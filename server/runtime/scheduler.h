@@ -15,22 +15,23 @@
 
 namespace lpdeform {
 
-/// Who goes first.
+/// The two kinds of slices; answers go first.
 enum class Urgency {
-  kOrdinary,  // what is there gets better, or is made ready
-  kAnswer,    // somebody has sent something and has seen nothing of it yet
+  kOrdinary,  // improves a result that was sent already, or prepares something
+  kAnswer,    // a client has sent an update and has not seen any result of it yet
 };
 
-/// Work that is done in short slices: a session. The scheduler never runs two slices of one Runnable at a
-/// time.
+/// Work that is done in short slices, such as a session. The scheduler never runs two slices of one Runnable
+/// at the same time.
 class Runnable {
  public:
-  /// `is_heavy`: a slice may take long (factoring a large mesh). `weight` > 0: its share beside others; work that
-  /// costs more than others' needs more than they to come as far.
+  /// `is_heavy`: a slice may take long (factoring a large mesh). `weight` > 0: its share of the time relative
+  /// to other Runnables. Work that costs more per step needs a larger share for the same progress.
   explicit Runnable(bool is_heavy, double weight = 1) : is_heavy_(is_heavy), weight_(weight) {}
   virtual ~Runnable() = default;
 
-  /// One slice; must not throw. True where there is more to do; false until the next wake().
+  /// Runs one slice; must not throw. Returns true if there is more to do, false if there is nothing until the
+  /// next wake().
   virtual bool run() = 0;
 
  private:
@@ -41,37 +42,38 @@ class Runnable {
   const bool is_heavy_;
   const double weight_;
   State state_ = State::kAsleep;
-  Urgency urgency_ = Urgency::kOrdinary;  // of the slice that waits, or comes after the one that runs
+  Urgency urgency_ = Urgency::kOrdinary;  // of the slice that waits, or of the next one while a slice runs
   double used_seconds_ = 0;               // divided by the weight
   std::chrono::steady_clock::time_point ready_since_;
   std::uint64_t ticket_ = 0;
 };
 
-/// Shares a pool of threads between sessions. Slices that answer somebody go before ordinary ones, which keep a quarter
-/// of the time; within each kind, whoever has used the least time, by its weight, goes next. So where there is too much to
-/// do, what suffers first is how soon and how often answers are refined, not how soon they come. One that slept is put
-/// level with the least of those awake, so sleeping earns no credit. There are more threads than cores, and heavy
-/// Runnables never take more than half of them, so that the operating system shares the cores between a long
-/// factorisation and everybody else. Thread-safe.
+/// Shares a pool of threads between sessions. Slices that answer an update go before ordinary ones, but
+/// ordinary slices keep a quarter of the time. Within each kind, the Runnable that has used the least time,
+/// divided by its weight, goes next. Under overload, therefore, answers are refined later and less often
+/// before they come later. A Runnable that slept gets the least used time of those awake, so sleeping earns
+/// no credit. There are more threads than cores, and heavy Runnables never take more than half of them, so
+/// that the operating system shares the cores between a long factorisation and all other sessions.
+/// Thread-safe.
 class Scheduler {
  public:
-  /// `threads` >= 2. `on_waited` is given the seconds that each slice waited for its thread, on that thread and under
-  /// no lock; may be empty.
+  /// `threads` >= 2. `on_waited` may be empty. Otherwise it is called with the seconds that each slice waited
+  /// for its thread, on that thread and under no lock.
   explicit Scheduler(int threads, std::function<void(double)> on_waited = {});
-  /// Waits for the slices that run; the others are dropped.
+  /// Waits for the slices that run; drops the others.
   ~Scheduler();
 
-  /// Makes `runnable` run at least once from now on. Does not wait. Where it is to answer, the next slice is urgent, and
-  /// those after it are ordinary again.
+  /// Makes `runnable` run at least once from now on. Does not wait. With Urgency::kAnswer the next slice is
+  /// urgent, and those after it are ordinary again.
   void wake(std::shared_ptr<Runnable> runnable, Urgency urgency = Urgency::kOrdinary);
 
   /// Runs `job` once, as a heavy Runnable of its own. Does not wait.
   void run_once(std::function<void()> job);
 
-  /// Whether somebody waits for an answer: slices had better be short.
+  /// Whether a client waits for an answer. Slices should then be short.
   bool is_answer_waiting() const { return answers_waiting_ > 0; }
 
-  /// Whether slices of either kind wait for too long: see LoadGauge.
+  /// Whether slices of either kind wait too long: see LoadGauge.
   bool is_overloaded();
 
   int threads() const { return static_cast<int>(threads_.size()); }
@@ -104,8 +106,8 @@ class Scheduler {
   Queue answers_, ordinary_;              // those that wait
   std::atomic<int> answers_waiting_ = 0;  // answers_.size()
   LoadGauge answer_gauge_, ordinary_gauge_;
-  double owed_seconds_ = 0;  // to the ordinary ones, of their share
-  double level_ = 0;         // the least time used by anyone awake, as last seen
+  double owed_seconds_ = 0;  // what the ordinary slices have not had of their share
+  double level_ = 0;         // the least time used by any Runnable awake, as last seen
   int heavy_running_ = 0;
   std::uint64_t tickets_ = 0;
   bool is_stopping_ = false;

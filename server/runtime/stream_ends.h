@@ -4,21 +4,21 @@
 
 namespace lpdeform {
 
-/// Why a stream of frames is over. Closed: these are all the reasons of `stream_ended` in the log and of
+/// Why a stream of frames ended. The set is closed: these are all reasons of `stream_ended` in the log and of
 /// lpdeform_streams_ended_total. deploy/operating.md says what each means for an operator.
 enum class StreamEnd {
-  // The server ended it, and told the client (GoAway).
+  // The server ended the stream and told the client (GoAway).
   kSessionDeleted,
   kSessionExpired,
   kSessionElsewhere,  // another server has the session now
   kDraining,          // this server shuts down
   kWriterReplaced,
-  kMisuse,  // the client does not keep to the contract
+  kMisuse,  // the client violates the protocol
   kTokenExpired,
-  kRefused,  // with an error: the line `refused` before says why
-  // It ended from outside. gRPC does not say whether the client took its call back or is gone.
-  kDeadline,     // the client's own
-  kReaderStuck,  // and for kStuckAfter before that the reader had taken nothing of what waited for it
+  kRefused,  // with an error, which the line `refused` before gives
+  // The stream ended from outside. gRPC does not say whether the client cancelled the call or is gone.
+  kDeadline,     // the client's deadline passed
+  kReaderStuck,  // the same, and the reader had taken nothing of what waited for it for kStuckAfter
   kCancelled
 };
 
@@ -28,7 +28,7 @@ inline constexpr std::array kStreamEnds{
     StreamEnd::kTokenExpired,   StreamEnd::kRefused,        StreamEnd::kDeadline,
     StreamEnd::kReaderStuck,    StreamEnd::kCancelled};
 
-/// "session_deleted", ..., as the log and the metrics have it.
+/// "session_deleted" and so on, as in the log and the metrics.
 const char* stream_end_name(StreamEnd end);
 
 }  // namespace lpdeform

@@ -6,7 +6,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kMeanTasks = 64;  // that the mean time is about
+constexpr double kMeanTasks = 64;  // about this many tasks make the mean time
 
 }  // namespace
 

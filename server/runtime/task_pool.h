@@ -11,23 +11,23 @@
 
 namespace lpdeform {
 
-/// A few threads that take calls off gRPC's: decoding, checks, copies. First come, first served, so nothing
-/// that factors or solves belongs here (that is the Scheduler's). Thread-safe.
+/// A few threads that take calls off gRPC's threads: decoding, checks, copies. Tasks run first come, first
+/// served, so nothing that factors or solves belongs here; the Scheduler does that. Thread-safe.
 class TaskPool {
  public:
   using Task = std::function<void()>;
 
-  /// `threads` >= 1; at most `longest_queue` tasks wait. `on_waited` is given the seconds that each waited, on the
-  /// thread that runs it; may be empty.
+  /// `threads` >= 1; at most `longest_queue` tasks wait. `on_waited` may be empty. Otherwise it is called
+  /// with the seconds that each task waited, on the thread that runs the task.
   TaskPool(int threads, std::size_t longest_queue, std::function<void(double)> on_waited = {});
-  /// Finishes what was taken on.
+  /// Finishes the tasks that were accepted.
   ~TaskPool();
 
-  /// False, and nothing happens, where too many wait already.
+  /// Returns false and does nothing if too many tasks wait already.
   [[nodiscard]] bool try_post(Task task);
 
-  /// How long a task that came now would wait, by those that wait and what tasks took of late; 50 ms at least, because
-  /// who asks was refused.
+  /// How long a task that came now would wait, from the length of the queue and the mean time of recent
+  /// tasks. At least 50 ms, because the caller that asks was refused.
   std::chrono::duration<double> expected_wait() const;
 
  private:
@@ -42,7 +42,7 @@ class TaskPool {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Waiting> tasks_;
-  double mean_seconds_ = 0;  // of a task, over the last ones
+  double mean_seconds_ = 0;  // of the recent tasks
   bool is_stopping_ = false;
   std::vector<std::thread> threads_;
 };

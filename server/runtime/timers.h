@@ -10,8 +10,8 @@
 
 namespace lpdeform {
 
-/// The clock of heartbeats, frame rates and expiry, and a way to be called at a time of it. Tests put their
-/// own in place, so that 15 seconds of silence take none. Thread-safe.
+/// The clock of heartbeats, frame rates and expiry, and a way to be called at a given time. Tests replace it,
+/// so that they need not wait for 15 seconds of silence. Thread-safe.
 class Timers {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -22,13 +22,13 @@ class Timers {
 
   virtual TimePoint now() const = 0;
 
-  /// Calls `action` once, at or soon after `when`, on the timers' own thread: it must be short. There is no
-  /// way to take it back: actions hold what they are about weakly.
+  /// Calls `action` once, at or soon after `when`, on the timers' own thread, so it must be short. An action
+  /// cannot be cancelled; it should hold its objects weakly.
   virtual void at(TimePoint when, Action action) = 0;
 };
 
-/// The machine's steady clock and one thread. The destructor drops what is not yet due; it may run in an
-/// action.
+/// The machine's steady clock and one thread. The destructor drops actions that are not yet due. It may run
+/// in an action.
 class SystemTimers final : public Timers {
  public:
   SystemTimers();

@@ -107,7 +107,8 @@ absl::StatusOr<std::shared_ptr<Upload>> Uploads::create(const std::string& reque
     return request_id_reused();
   }
   if (absl::Status status = check_share(owner); !status.ok()) return status;
-  if (absl::Status status = budget_->check(size_bytes, owner); !status.ok()) return status;  // if it came now
+  if (absl::Status status = budget_->check(size_bytes, owner); !status.ok())
+    return status;  // as if all its bytes came now
   if (absl::Status status = make_place(); !status.ok()) return status;
   auto upload = std::make_shared<Upload>(absl::StrCat("uploads/", random_hex_128()), size_bytes, crc32c,
                                          budget_->nothing_yet(owner), owner);
@@ -131,7 +132,8 @@ absl::Status Uploads::check_share(const std::string& owner) const {
                    " uploads that one caller may have; delete those that have served."));
 }
 
-/// Where there is no place for one more, forgets an empty one. A flood of calls looks through all of them only when that may help.
+/// If no place is free, forgets an upload without bytes. Searches all uploads only when that may help, so
+/// that a flood of calls stays cheap.
 absl::Status Uploads::make_place() {
   if (uploads_.size() < limits_.most_uploads) return absl::OkStatus();
   const Timers::TimePoint now = timers_->now();
@@ -188,7 +190,7 @@ void Uploads::forget(std::map<std::string, Entry>::iterator entry) {
   uploads_.erase(entry);
 }
 
-/// One alarm for all, however many come and go.
+/// Sets one alarm for all uploads, however many there are.
 void Uploads::watch(Timers::TimePoint when) {
   if (std::exchange(is_watching_, true)) return;
   timers_->at(when, [weak = weak_from_this()] {
@@ -196,7 +198,7 @@ void Uploads::watch(Timers::TimePoint when) {
   });
 }
 
-/// Forgets the uploads that have been idle for long enough; looks again when the next one may have been.
+/// Forgets the uploads that have been idle for too long, and sets the alarm for the next one.
 void Uploads::expire() {
   const std::scoped_lock lock(mutex_);
   is_watching_ = false;

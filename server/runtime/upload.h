@@ -17,7 +17,7 @@
 
 namespace lpdeform {
 
-/// How much of an upload is there.
+/// How much of an upload has arrived.
 struct UploadProgress {
   std::uint64_t received_bytes = 0;
   bool is_finished = false;
@@ -26,7 +26,7 @@ struct UploadProgress {
 /// Bytes that come in parts, in any order. Thread-safe.
 class Upload {
  public:
-  /// `memory`: empty, of the owner's; it grows with what comes (UploadBytes).
+  /// `memory`: empty and charged to the owner; it grows as bytes arrive (UploadBytes).
   Upload(std::string name, std::uint64_t size_bytes, std::uint32_t crc32c, Reservation memory,
          std::string owner = "");
 
@@ -35,20 +35,22 @@ class Upload {
   const std::string& owner() const { return owner_; }
   std::uint64_t size() const { return bytes_.size(); }
   std::uint32_t crc32c() const { return crc32c_; }
-  /// Whether nothing of it is there: nothing has come, or it had a wrong checksum. Waits for nobody.
+  /// Whether the upload holds no bytes: none have arrived, or their checksum was wrong. Does not wait.
   bool is_empty() const { return is_empty_; }
 
-  /// The last missing part finishes it; later ones are ignored. Errors: INVALID_ARGUMENT UPLOAD_PART_SIZE
-  /// (empty, or over 1 MiB), UPLOAD_PART_OUT_OF_RANGE, UPLOAD_SCATTERED (it would begin one run too many); RESOURCE_EXHAUSTED
-  /// MEMORY_FULL, CALLER_MEMORY_FULL: the upload stays as it is, and the part may be sent again; DATA_LOSS
-  /// UPLOAD_CHECKSUM (all of it has to be sent again; its memory is given back until then).
+  /// Adds a part. The last missing part finishes the upload; later ones are ignored. Errors: INVALID_ARGUMENT
+  /// UPLOAD_PART_SIZE (empty, or over 1 MiB), UPLOAD_PART_OUT_OF_RANGE, UPLOAD_SCATTERED (the part would
+  /// begin one run too many); RESOURCE_EXHAUSTED MEMORY_FULL, CALLER_MEMORY_FULL: the upload stays as it is,
+  /// and the part may be sent again; DATA_LOSS UPLOAD_CHECKSUM (all parts have to be sent again; the memory
+  /// is given back until then).
   absl::StatusOr<UploadProgress> add(std::uint64_t offset, std::string_view data);
 
-  /// The whole, for as long as the upload lives. FAILED_PRECONDITION UPLOAD_UNFINISHED.
+  /// All bytes, valid for as long as the upload lives. FAILED_PRECONDITION UPLOAD_UNFINISHED.
   absl::StatusOr<std::string_view> bytes() const;
 
   static constexpr std::uint32_t kMostPartBytes = 1u << 20;
-  /// Of bytes that are there, with gaps between them: an upload cut into at most twice as many parts may come in any order.
+  /// Limit of the runs of bytes that are there, with gaps between them. The parts of an upload may come in
+  /// any order if there are at most twice as many.
   static constexpr std::size_t kMostRuns = 1024;
 
  private:
@@ -66,35 +68,39 @@ class Upload {
   std::atomic<bool> is_empty_ = true;
 };
 
-/// All uploads of a server. They go when nobody has touched them for a while. One that was announced takes no memory before its
-/// bytes come, and its place only as long as nobody else needs it. Thread-safe. Held by a shared pointer.
+/// All uploads of a server. An upload expires when it has not been used for some time. An announced upload
+/// takes no memory before its bytes come, and keeps its place only as long as no other upload needs it.
+/// Thread-safe. Held by a shared pointer.
 class Uploads : public std::enable_shared_from_this<Uploads> {
  public:
-  static constexpr std::size_t kMostUploads = 4096;  // small ones cost more than their bytes
-  /// For so long the place of an upload is its own though nothing has come: a client sends the first part at once. Where all places
-  /// are taken, an older one without a byte makes room.
+  static constexpr std::size_t kMostUploads = 4096;  // because a small upload costs more than its bytes
+  /// For this long an upload without bytes keeps its place: a client sends the first part at once. If all
+  /// places are taken, an older upload without bytes is evicted.
   static constexpr std::chrono::seconds kEmptyPatience{10};
 
   struct Limits {
     std::uint64_t most_bytes_each;
     Timers::Duration idle;
     std::size_t most_uploads = kMostUploads;
-    std::size_t most_uploads_each =
-        0;  // of one owner; 0: without limit. Not for the owner "", who is everybody.
+    /// Per owner; 0: without limit. Does not apply to the owner "", which stands for all anonymous callers.
+    std::size_t most_uploads_each = 0;
   };
 
   Uploads(std::shared_ptr<Budget> budget, std::shared_ptr<Timers> timers, Limits limits);
 
-  /// Where all places are taken, the upload goes that nobody has touched for longest, of those that have nothing and are older than
-  /// kEmptyPatience. Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED UPLOADS_FULL (there is
-  /// none such; it says when there may be), CALLER_UPLOADS_FULL; MEMORY_FULL, CALLER_MEMORY_FULL where there is no room for all of it now: that there is promises nothing.
+  /// If all places are taken, evicts the least recently used upload that has no bytes and is older than
+  /// kEmptyPatience. Errors: INVALID_ARGUMENT UPLOAD_SIZE, REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED
+  /// UPLOADS_FULL (no upload can be evicted; the error says when one may be), CALLER_UPLOADS_FULL;
+  /// MEMORY_FULL, CALLER_MEMORY_FULL if there is no room for all bytes now. Room now does not promise room
+  /// later.
   absl::StatusOr<std::shared_ptr<Upload>> create(const std::string& request_id, std::uint64_t size_bytes,
                                                  std::uint32_t crc32c, const std::string& owner = "");
 
-  /// NOT_FOUND UPLOAD_UNKNOWN, also where it is somebody else's.
+  /// NOT_FOUND UPLOAD_UNKNOWN, also if the upload belongs to another owner.
   absl::StatusOr<std::shared_ptr<Upload>> find(const std::string& name, const std::string& owner = "");
 
-  /// Forgets the upload; whoever has it keeps it. Nothing where there is none, or it is somebody else's.
+  /// Forgets the upload; holders of a pointer keep it. Does nothing if there is no such upload or it belongs
+  /// to another owner.
   void remove(const std::string& name, const std::string& owner = "");
 
   std::size_t size() const;
@@ -117,14 +123,14 @@ class Uploads : public std::enable_shared_from_this<Uploads> {
   mutable std::mutex mutex_;
   std::map<std::string, Entry> uploads_;                                  // by name
   std::map<std::pair<std::string, std::string>, std::string> requested_;  // names, by owner and request_id
-  std::map<std::string, std::size_t> owned_;                              // how many each owner has
-  Timers::TimePoint no_place_before_{};                                   // no empty one is old enough before
-  bool is_watching_ = false;                                              // an alarm is set, one for all
+  std::map<std::string, std::size_t> owned_;                              // number of uploads per owner
+  Timers::TimePoint no_place_before_{};  // before this, no empty upload is old enough to evict
+  bool is_watching_ = false;             // whether an alarm is set
 };
 
 inline constexpr std::size_t kLeastRequestId = 8, kMostRequestId = 64;  // bytes
 
-/// INVALID_ARGUMENT REQUEST_ID where it is neither empty nor so long.
+/// INVALID_ARGUMENT REQUEST_ID unless the text is empty or has a length in this range.
 absl::Status check_request_id(const std::string& request_id);
 
 /// INVALID_ARGUMENT REQUEST_ID_REUSED.

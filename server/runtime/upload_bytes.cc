@@ -9,16 +9,17 @@
 namespace lpdeform {
 namespace {
 
-/// Addresses without memory behind them; null where the system has none. Pages of 2 MiB would take more than is counted.
+/// Reserves addresses without memory behind them; null if the system has none. Huge pages are off: a page of
+/// 2 MiB would take more than is counted.
 char* map_without_memory(std::uint64_t size) {
   void* const data =
       mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (data == MAP_FAILED) return nullptr;
-  madvise(data, size, MADV_NOHUGEPAGE);  // a kernel without them refuses this
+  madvise(data, size, MADV_NOHUGEPAGE);  // a kernel without huge pages refuses this
   return static_cast<char*>(data);
 }
 
-/// The bytes of the pages that so many are in: no more than a step.
+/// The size of the pages that hold so many bytes (at most a step).
 std::uint64_t in_pages(std::uint64_t bytes) {
   return (bytes + UploadBytes::kPage - 1) / UploadBytes::kPage * UploadBytes::kPage;
 }

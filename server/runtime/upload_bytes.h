@@ -8,38 +8,41 @@
 
 namespace lpdeform {
 
-/// Bytes of a size that is known, which come in parts, in any order. Only what has come takes memory, by steps, however large the
-/// size is: it comes from the system, page by page as it is written, and goes back to it at once. One thread at a time.
+/// A buffer of known size whose bytes come in parts, in any order. Only the steps that have received bytes
+/// take memory, however large the size is. The memory comes from the system page by page as it is written,
+/// and goes back to it at once. For one thread at a time.
 class UploadBytes {
  public:
-  /// Bytes whose memory is counted together; the last step may be shorter, by whole pages.
+  /// Bytes whose memory is counted together. The last step may be shorter, by whole pages.
   static constexpr std::uint64_t kStep = 64u << 10;
-  /// The least that the system gives.
+  /// The smallest piece of memory that the system gives.
   static constexpr std::uint64_t kPage = 4096;
-  /// What is taken to know where a run lies. Counted for each run but the first.
+  /// Memory for the bounds of a run, counted for each run but the first.
   static constexpr std::size_t kRunBytes = 64;
 
   explicit UploadBytes(std::uint64_t size) : size_(size), data_(nullptr, Unmap{size}) {}
 
   std::uint64_t size() const { return size_; }
-  /// How many have come.
+  /// How many bytes have come.
   std::uint64_t received() const { return received_; }
-  /// Stretches without gaps in which they lie.
+  /// The number of stretches without gaps in which they lie.
   std::size_t runs() const { return runs_.size(); }
-  /// Whether bytes are there that those from `begin` to `end` touch or overlap, so that no new run begins.
+  /// Whether the bytes from `begin` to `end` touch or overlap bytes that are there, so that no new run
+  /// begins.
   bool joins_a_run(std::uint64_t begin, std::uint64_t end) const { return runs_joined(begin, end) != 0; }
 
-  /// Bytes of memory that are taken: less again where runs become one.
+  /// Bytes of memory in use; falls when two runs become one.
   std::size_t memory() const { return memory_of(steps_memory_, runs_.size()); }
-  /// The same once `count` bytes from `begin` on have come, too: 1 or more, within the size.
+  /// memory() as it would be after `count` more bytes from `begin` on: 1 or more, within the size.
   std::size_t memory_with(std::uint64_t begin, std::uint64_t count) const;
 
-  /// `part` lies within the size, and is not empty. False, and nothing changes, where the system has no memory for it.
+  /// Adds a part, which must lie within the size and must not be empty. Returns false and changes nothing if
+  /// the system has no memory for it.
   bool put(std::uint64_t begin, std::string_view part);
-  /// From the first to the last; zero where nothing has come. After the first part, until clear().
+  /// All bytes, with zeros where none have come. Valid after the first part, until clear().
   std::string_view whole() const { return {data_.get(), size_}; }
 
-  /// As if nothing had come.
+  /// Forgets all bytes.
   void clear();
 
  private:
@@ -57,7 +60,7 @@ class UploadBytes {
 
   const std::uint64_t size_;
   std::unique_ptr<char, Unmap> data_;  // null before the first part
-  // Begin to end of what is there; they neither touch nor overlap.
+  // Begin and end of each run; runs neither touch nor overlap.
   std::map<std::uint64_t, std::uint64_t> runs_;
   std::uint64_t received_ = 0;
   std::size_t steps_memory_ = 0;

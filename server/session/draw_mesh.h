@@ -12,26 +12,26 @@
 namespace lpdeform {
 
 /// A session's mesh as its client draws it. The contract speaks of the client's vertices, in the client's
-/// order; the solver knows the welded ones. Here is the way from the one to the other. Without a weld they
-/// are the same. Thread-safe.
+/// order. The solver knows the welded vertices. This class converts between them; without a weld they are the
+/// same. Thread-safe.
 class DrawMesh {
  public:
-  /// Nothing welded, normals smooth.
+  /// No weld, and smooth normals.
   explicit DrawMesh(std::shared_ptr<const RestShape> shape);
 
-  /// `shape`: of the welded mesh. `weld`: null where nothing is welded. `faces`: the client's.
-  /// `rest_normals`: one a vertex of the client, or no rows.
+  /// `shape`: of the welded mesh. `weld`: null if nothing is welded. `faces`: the client's. `rest_normals`:
+  /// one per vertex of the client, or no rows.
   DrawMesh(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld, Faces faces,
            Points rest_normals);
 
   std::uint32_t vertex_count() const;
-  /// Null where nothing is welded.
+  /// Null if nothing is welded.
   const std::shared_ptr<const Weld>& weld() const { return weld_; }
-  /// The client's.
+  /// The client's faces.
   const Faces& faces() const { return weld_ ? faces_ : shape_->faces(); }
-  /// As they were given: one a vertex of the client, or no rows.
+  /// As they were given: one per vertex of the client, or no rows.
   const Points& rest_normals() const { return rest_normals_; }
-  /// How many vertices are copies of one before them.
+  /// How many vertices are copies of an earlier one.
   std::uint32_t copy_count() const {
     return vertex_count() - static_cast<std::uint32_t>(shape_->vertex_count());
   }
@@ -40,13 +40,14 @@ class DrawMesh {
   Points positions(const Points& solved) const { return weld_ ? scattered(solved, *weld_) : solved; }
   Field distortion(const Field& solved) const { return weld_ ? scattered(solved, *weld_) : solved; }
 
-  /// Where to start from, for the solver. Errors: COPIES_DIFFER, POSITIONS_NOT_FINITE.
+  /// Initial positions for the solver, from positions of the client's vertices. Errors: COPIES_DIFFER,
+  /// POSITIONS_NOT_FINITE.
   absl::StatusOr<Points> solver_positions(Points positions) const;
 
-  /// An error of the solver, naming the client's vertices.
+  /// Rewrites an error of the solver so that it names the client's vertices.
   absl::Status for_client(const absl::Status& status) const;
 
-  /// Normals at positions of the client's vertices, one each. See CarriedNormals.
+  /// Normals at the given positions, one per vertex of the client. See CarriedNormals.
   Points normals(const Points& positions) const;
 
   std::size_t memory_bytes() const;
@@ -54,10 +55,10 @@ class DrawMesh {
  private:
   const std::shared_ptr<const RestShape> shape_;
   const std::shared_ptr<const Weld> weld_;
-  const Faces faces_;  // empty where nothing is welded
+  const Faces faces_;  // empty if nothing is welded
   const Points rest_normals_;
   mutable std::once_flag once_;
-  mutable std::unique_ptr<const CarriedNormals> carried_;  // made when first asked for
+  mutable std::unique_ptr<const CarriedNormals> carried_;  // made when first used
 };
 
 }  // namespace lpdeform

@@ -13,16 +13,17 @@ Eigen::VectorXf float32_of(const Matrix& values) {
   return Eigen::Map<const Eigen::VectorXd>(values.data(), values.size()).template cast<float>();
 }
 
-/// In the order that they lie in memory.
+/// The numbers in the order in which they lie in memory.
 template <typename Matrix>
 std::string_view bytes_of_all(const Matrix& values) {
   return {reinterpret_cast<const char*>(values.data()),
           static_cast<std::size_t>(values.size()) * sizeof(*values.data())};
 }
 
-constexpr std::size_t kMostBytes = (1u << 20) - 1024;  // of a message's numbers; the rest is for headers
+constexpr std::size_t kMostBytes = (1u << 20) - 1024;  // of the numbers in a message; the rest is for headers
 
-/// Of quantized formats, and so that a part stays below kMostBytes where it does not compress at all.
+/// Vertices in a part of a quantized format. A part stays below kMostBytes even if it does not compress at
+/// all.
 constexpr std::uint32_t kQuantizedPart = 56u << 10;
 
 std::size_t vertex_bytes(Format format, bool with_distortion, bool with_normals) {

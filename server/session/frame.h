@@ -22,35 +22,36 @@ enum class Scalar { kFloat32, kFloat64 };
 
 std::size_t bytes_of(Scalar scalar);
 
-/// How positions, distortion and normals travel, from the most precise to the smallest.
+/// The formats of positions, distortion and normals, from the most precise to the smallest.
 enum class Format { kFloat64, kFloat32, kQuantized, kCompressed };
 
 Format format_of(Scalar scalar);
 
-/// The large part of a frame: shared by every stream that sends it, and by frames that differ in their
-/// numbers alone. Immutable; every form but float64 is made once, when first asked for. Thread-safe.
+/// The large part of a frame. It is shared by all streams that send it, and by frames that differ only in
+/// their scalars. Immutable. Every form but float64 is made once, when it is first used. Thread-safe.
 class Surface {
  public:
-  /// One row each a vertex of the client's. `mesh` knows the normals; null where nobody will ask for them.
+  /// One row per vertex of the client. `mesh` computes the normals; null if no normals will be needed.
   Surface(Points positions, Field cell_energies, std::shared_ptr<const DrawMesh> mesh = nullptr);
 
   std::uint32_t vertex_count() const { return static_cast<std::uint32_t>(positions_.rows()); }
 
-  /// Bytes of vertices first to first + count - 1, as frame.proto has them.
+  /// Bytes of the vertices `first` to `first + count - 1`, laid out as in frame.proto.
   struct Bytes {
     std::string_view positions, distortion, normals;
     std::size_t size() const { return positions.size() + distortion.size() + normals.size(); }
   };
-  /// The range must begin at a multiple of vertices_a_part() and be as long, or reach to the end. Normals need a mesh.
+  /// `first` must be a multiple of vertices_a_part(). `count` must be vertices_a_part(), or reach to the last
+  /// vertex. Normals need a mesh.
   Bytes bytes(Format format, std::uint32_t first, std::uint32_t count, bool with_distortion,
               bool with_normals) const;
-  /// So many vertices fit into a message.
+  /// How many vertices fit into a message.
   static std::uint32_t vertices_a_part(Format format, bool with_distortion, bool with_normals);
-  /// Of the whole in this format; of kCompressed what it is before that.
+  /// Size of the whole surface in this format; for kCompressed the size before compression.
   std::size_t size(Format format, bool with_distortion, bool with_normals) const;
-  /// Needs a quantized format.
+  /// Only for a quantized format.
   const Quantization& quantization() const;
-  /// Makes what bytes() will be asked for, now and on this thread.
+  /// Makes the form that bytes() will need, now and on this thread.
   void prepare(Format format, bool with_normals) const;
 
   const Points& positions() const { return positions_; }
@@ -64,9 +65,9 @@ class Surface {
     Quantization quantization;
     std::string vertices;
   };
-  using Parts = std::vector<std::string>;  // a block for each part
+  using Parts = std::vector<std::string>;  // one block per part
 
-  /// A form of the surface: made by the first who asks, counted once it is there.
+  /// One form of the surface. The first caller of get() makes it; later calls only read it.
   template <typename Value>
   class Form {
    public:
@@ -107,25 +108,25 @@ class Surface {
   Form<Parts> compressed_normals_;
 };
 
-/// One state of a session on its way to its readers. Meanings as in frame.proto.
+/// One state of a session on its way to its readers. The fields mean the same as in frame.proto.
 struct Frame {
   std::uint64_t frame_seq = 0;
   std::uint64_t input_seq = 0;
   std::uint64_t epoch = 0;
-  std::uint64_t taken = 0;  // inputs that this frame and those before it answer
+  std::uint64_t taken = 0;  // how many inputs this frame and all before it answer
   std::uint32_t iteration = 0;
   double energy = 0;
-  double soft_energy = 0;  // the part of it that soft and orientation handles have
+  double soft_energy = 0;  // the part of the energy that soft and orientation handles have
   bool is_final = false;
   StopReason stop_reason = StopReason::kRunning;
   double solve_seconds = 0;
   Method method = Method::kAuto;
-  std::optional<double> optimality_gap;  // of a result, once it is known
-  std::uint64_t repeats = 0;             // the frame_seq of the same state without its gap; 0: none
+  std::optional<double> optimality_gap;  // of a final state, once it is known
+  std::uint64_t repeats = 0;             // frame_seq of the same state before its gap was known; 0: none
   std::shared_ptr<const Surface> surface;
 };
 
-/// A piece of a frame that fits into a message: vertices first to first + count - 1.
+/// A piece of a frame that fits into a message: the vertices `first` to `first + count - 1`.
 struct FramePiece {
   std::shared_ptr<const Frame> frame;
   std::uint32_t first = 0;
@@ -142,7 +143,7 @@ struct FramePiece {
   }
 };
 
-/// Cuts a frame into pieces of at most 1 MiB with everything around them.
+/// Cuts a frame into pieces that stay within 1 MiB, headers included.
 class FrameCutter {
  public:
   FrameCutter() = default;
@@ -150,7 +151,7 @@ class FrameCutter {
               std::uint64_t skipped_inputs, bool with_certificate = false);
 
   bool has_more() const { return frame_ != nullptr; }
-  /// Needs has_more(). Lets go of the frame with its last piece.
+  /// The next piece. Call it only if has_more(). The cutter releases the frame with its last piece.
   FramePiece next();
 
  private:

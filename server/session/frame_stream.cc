@@ -13,11 +13,12 @@
 namespace lpdeform {
 
 Format StreamOptions::format_for(const Surface& surface) const {
+  const auto is_too_fast = [&](Format chosen) {
+    const auto bytes = static_cast<double>(surface.size(chosen, with_distortion, with_normals));
+    return max_bytes_per_second > 0 && kLowestRate * bytes > max_bytes_per_second;
+  };
   Format chosen = format;
-  while (max_bytes_per_second > 0 &&
-         chosen<lowest_format&& static_cast<double>(surface.size(chosen, with_distortion, with_normals)) *
-                kLowestRate>
-             max_bytes_per_second) {
+  while ((chosen < lowest_format) && is_too_fast(chosen)) {
     chosen = static_cast<Format>(static_cast<int>(chosen) + 1);
   }
   return chosen;
@@ -91,7 +92,7 @@ std::optional<Note> FrameStream::next_locked(Timers::TimePoint now) {
   return std::nullopt;
 }
 
-/// Takes the publisher's newest frame on, if it is new and may be sent now.
+/// Begins to send the publisher's newest frame, if it is new and may be sent now.
 void FrameStream::begin_frame(Timers::TimePoint now) {
   std::shared_ptr<const Frame> newest = publisher_->newest();
   if (!newest || newest->frame_seq <= last_seq_) return;
@@ -139,7 +140,7 @@ Timers::TimePoint FrameStream::next_frame_at() const {
   return last_frame_at_ + std::chrono::duration_cast<Timers::Duration>(pause);
 }
 
-/// Sees to it that somebody asks next() again at `when`.
+/// Sets a timer that makes the sender call next() at `when`.
 void FrameStream::arm(bool& is_armed, Timers::TimePoint when) {
   if (std::exchange(is_armed, true)) return;
   timers_->at(when, [weak = weak_from_this(), &is_armed] {

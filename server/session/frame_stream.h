@@ -18,24 +18,24 @@ namespace lpdeform {
 
 class Publisher;
 
-/// What a reader asked for; meanings as in frame.proto.
+/// What a reader asked for. The fields mean the same as in frame.proto.
 struct StreamOptions {
   std::uint32_t credit = 2;
   Format format = Format::kFloat32;
-  /// What the server may go down to where max_bytes_per_second asks for it.
+  /// The least precise format that the server may use to keep within max_bytes_per_second.
   Format lowest_format = Format::kFloat32;
   bool with_distortion = true;
   bool with_normals = false;
   bool with_certificate = false;
   double max_frames_per_second = 0;
-  /// The server's; 0 is without limit. Lowers the frame rate first, to kLowestRate, then the precision, then the rate
-  /// again.
+  /// The server's limit; 0: without limit. To keep it, the stream first lowers the frame rate down to
+  /// kLowestRate, then the precision, then the frame rate again.
   double max_bytes_per_second = 0;
 
   static constexpr std::uint32_t kMostCredit = 8;
   static constexpr double kLowestRate = 10;
 
-  /// How a frame of this surface is to travel.
+  /// The format in which a frame of this surface is sent.
   Format format_for(const Surface& surface) const;
 };
 
@@ -43,24 +43,24 @@ enum class EndReason {
   kSessionDeleted,
   kSessionExpired,
   kDraining,   // the server shuts down
-  kElsewhere,  // another server has the session; clients are told the same
+  kElsewhere,  // another server has the session; clients are told that this one drains
   kWriterReplaced,
   kProtocolError,
   kTokenExpired
 };
 
-/// The session is not gone: its clients find it at another server, or at this one once it runs again.
+/// Whether the session still exists: clients find it at another server, or at this one after a restart.
 inline bool goes_on(EndReason reason) {
   return reason == EndReason::kDraining || reason == EndReason::kElsewhere;
 }
 
-// What a stream may have to send.
+// The messages that a stream may have to send.
 struct OpenedNote {
   std::uint64_t epoch = 0;
   std::uint64_t input_seq = 0;
 };
 struct HeartbeatNote {};
-/// The server has more to do than it can, or has no more.
+/// The server became overloaded, or is no longer.
 struct LoadNote {
   bool is_overloaded = false;
 };
@@ -74,12 +74,13 @@ struct EndNote {
 };
 using Note = std::variant<OpenedNote, FramePiece, UpdateResult, FaultNote, LoadNote, HeartbeatNote, EndNote>;
 
-/// One reader of a session: decides what to send to it, and when. It holds at most one frame, the one that is
-/// being cut into pieces; what waits is the publisher's newest. A frame is begun only when fewer than
-/// `credit` frames are sent and not acknowledged. Thread-safe; calls no one under its lock but the publisher.
+/// One reader of a session: decides what to send to it and when. It holds at most one frame, the one that is
+/// being cut into pieces. The next frame is the publisher's newest at that time. Backpressure: a frame is
+/// begun only while fewer than `credit` frames are sent and not acknowledged. Thread-safe. Under its lock it
+/// calls only the publisher.
 class FrameStream : public std::enable_shared_from_this<FrameStream> {
  public:
-  /// Whether the server is overloaded now; must not wait. Empty where nobody knows.
+  /// Whether the server is overloaded now; must not wait. Empty if that is unknown.
   using IsOverloaded = std::function<bool()>;
 
   FrameStream(StreamOptions options, std::shared_ptr<Publisher> publisher, std::shared_ptr<Timers> timers,
@@ -89,36 +90,36 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   const StreamOptions& options() const { return options_; }
   Timers::Duration heartbeat() const { return heartbeat_; }
 
-  /// `waker` is called, on any thread and under no lock, when next() may have something new. Once, before the
-  /// first next().
+  /// `waker` is called, on any thread and under no lock, when next() may have something new. Call start()
+  /// once, before the first next().
   void start(std::function<void()> waker);
 
-  /// What to send now; empty where there is nothing. The caller sends it. An EndNote is the last.
+  /// What the caller should send now; empty if there is nothing. An EndNote is the last message.
   std::optional<Note> next();
 
-  /// This frame and all before it have been received. INVALID_ARGUMENT ACK_NOT_SENT where it was not sent
-  /// yet.
+  /// The reader has received this frame and all before it. INVALID_ARGUMENT ACK_NOT_SENT if the frame was not
+  /// sent yet.
   absl::Status acknowledge(std::uint64_t frame_seq);
 
-  /// The answer to an update that came on this stream. The caller bounds how many wait.
+  /// Queues the answer to an update that came on this stream. The caller limits how many answers wait.
   void answer(UpdateResult result);
   void answer(FaultNote fault);
 
   std::size_t answers_waiting() const;
 
-  /// Why the server ended it; empty where it did not.
+  /// Why the server ended the stream; empty if it did not.
   std::optional<EndReason> ended_by() const;
 
-  /// How long a frame has waited for its reader to acknowledge those before it; 0 where none does.
+  /// How long a frame has waited for its reader to acknowledge earlier frames; 0 if none waits.
   Timers::Duration waited_for_credit() const;
 
-  /// Of the last frame that was begun; 0 where there was none.
+  /// frame_seq of the last frame that was begun; 0 if there was none.
   std::uint64_t last_frame_seq() const;
 
-  /// The stream is to end; the first reason counts.
+  /// Ends the stream. If it is called again, the first reason counts.
   void end(EndReason reason, std::string text);
 
-  /// Says that next() may have something new.
+  /// Tells the sender that next() may have something new.
   void wake();
 
   /// Whether a frame published now could be sent at once.
@@ -144,11 +145,11 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   bool is_opened_ = false;
   bool is_ended_ = false;
   std::deque<Note> answers_;
-  bool was_answer_ = false;  // answers go first, but take turns with the pieces of a frame
+  bool was_answer_ = false;  // answers go first, but alternate with the pieces of a frame
   std::optional<EndNote> end_;
   std::optional<EndReason> ended_by_;
   FrameCutter cutter_;
-  std::deque<std::uint64_t> in_flight_;  // frame_seqs begun and not acknowledged, ascending
+  std::deque<std::uint64_t> in_flight_;  // frame_seqs of frames begun and not acknowledged, ascending
   std::uint64_t last_seq_ = 0;           // of the last frame begun
   std::uint64_t last_taken_ = 0;
   bool has_sent_frame_ = false;
@@ -156,10 +157,10 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   Timers::TimePoint stalled_since_;
   bool has_said_overloaded_ = false;
   std::uint64_t last_fault_ = 0;
-  std::size_t last_bytes_ = 0;  // of the last frame's numbers
+  std::size_t last_bytes_ = 0;  // the numbers of the last frame
   Timers::TimePoint last_frame_at_;
   Timers::TimePoint last_sent_at_;
-  bool is_heartbeat_armed_ = false;  // a timer is set; one of each kind at a time
+  bool is_heartbeat_armed_ = false;  // a timer is set; at most one of each kind
   bool is_pace_armed_ = false;
 };
 

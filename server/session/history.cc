@@ -7,7 +7,7 @@
 namespace lpdeform {
 namespace {
 
-/// Steps that went and are remembered for the store.
+/// Limit of dropped steps that are remembered for the store.
 constexpr std::size_t kMostDropped = 4096;
 
 std::size_t bytes_of(const HandleMotion& motion) {
@@ -24,6 +24,18 @@ std::size_t bytes_of(const HandleChange& change) {
              handle->points.size() * sizeof(SurfacePoint);
   }
   return bytes;
+}
+
+/// Whether something is not as it was. An update that is sent again, under a higher number, may set handles to what they are.
+bool is_change(const HandleSet& before, const HandleSet& after, const HandleEffects& effects) {
+  const auto differs = [&](const std::string& name) {
+    const auto was = before.handles().find(name), is = after.handles().find(name);
+    if (was == before.handles().end() || is == after.handles().end()) return true;
+    return !(was->second == is->second);
+  };
+  return std::ranges::any_of(effects.moved, differs) ||
+         std::ranges::any_of(effects.removed,
+                             [&](const auto& name) { return before.handles().contains(name); });
 }
 
 }  // namespace
@@ -49,8 +61,8 @@ std::vector<HandleChange> changes_back(const HandleSet& before, const HandleEffe
   return changes;
 }
 
-void HandleHistory::note(const HandleSet& before, const HandleEffects& effects, Timers::TimePoint now,
-                         std::uint64_t revision) {
+void HandleHistory::note(const HandleSet& before, const HandleSet& after, const HandleEffects& effects,
+                         Timers::TimePoint now, std::uint64_t revision) {
   if (most_steps_ == 0) return;
   std::vector<HandleChange> back = changes_back(before, effects);
   if (back.empty()) return;
@@ -59,8 +71,10 @@ void HandleHistory::note(const HandleSet& before, const HandleEffects& effects, 
   std::ranges::sort(names);
   const bool goes_on =
       !effects.begins_step && only_moves && names == gesture_ && now - last_ <= kPause && redo_steps() == 0;
-  last_ = now;
-  if (goes_on) return;
+  const bool is_step = !goes_on && is_change(before, after, effects);
+  if (goes_on || is_step) last_ = now;
+  if (!goes_on && effects.begins_step) gesture_.clear();
+  if (!is_step) return;
   while (redo_steps() > 0) drop_last(revision);
   put(steps_.size(), std::move(back), revision);
   ++undo_steps_;
@@ -80,7 +94,7 @@ void HandleHistory::moved(bool redo, std::vector<HandleChange> inverse, std::uin
   keep_limits(revision);
 }
 
-/// In place of the step that is there, or after the last.
+/// Puts a step in place of an existing one, or after the last one.
 void HandleHistory::put(std::size_t place, std::vector<HandleChange> changes, std::uint64_t revision) {
   Step step{std::move(changes), 0, revision};
   for (const HandleChange& change : step.changes) step.bytes += bytes_of(change);
@@ -108,7 +122,7 @@ void HandleHistory::drop_first(std::uint64_t revision) {
   if (undo_steps_ > 0) --undo_steps_;
 }
 
-/// What is too large cannot be stepped over: all on its far side go with it, and it.
+/// A step that is too large cannot be kept, nor can the steps beyond it: they are dropped together.
 void HandleHistory::keep_limits(std::uint64_t revision) {
   const auto is_too_large = [](const Step& step) { return step.bytes > kMostBytesAStep; };
   while (std::any_of(steps_.begin(), steps_.begin() + static_cast<std::ptrdiff_t>(undo_steps_), is_too_large))

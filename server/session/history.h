@@ -16,56 +16,59 @@ namespace lpdeform {
 
 /// What an update did to handles, by their names.
 struct HandleEffects {
-  std::vector<std::string> regrouped, moved, removed;  // those set are also moved
+  std::vector<std::string> regrouped, moved, removed;  // handles that were set are in `moved`, too
   bool begins_step = false;
 };
 
-/// The steps of a session's handles that can be taken back, and after them those that were, which can be done again. A step
-/// is kept as the changes that lead over it: so a drag keeps one motion, however many updates it had. Bounded by the number
-/// of steps and by bytes; the oldest go first. Not thread-safe.
+/// The steps of a session's handles that can be undone, followed by the undone steps that can be redone. A
+/// step is stored as the changes that lead over it, so a drag takes one motion, however many updates it had.
+/// The number of steps and their bytes are bounded; the oldest steps are dropped first. Not thread-safe.
 ///
-/// Updates that move the same handles, none of them over kPause after the one before, are one step, unless they say
-/// that they begin one; each other update that changes handles is one by itself.
+/// Updates that move the same handles form one step if each comes within kPause of the one before and does
+/// not ask to begin a new step. Any other update that changes handles is a step by itself.
 class HandleHistory {
  public:
   explicit HandleHistory(std::size_t most_steps) : most_steps_(most_steps) {}
 
-  /// An update was taken that did this to `before`. What was taken back is forgotten.
-  void note(const HandleSet& before, const HandleEffects& effects, Timers::TimePoint now,
-            std::uint64_t revision);
+  /// Records an update that changed `before` to `after` with these effects. Steps that can be redone are dropped. An update that
+  /// changed nothing records no step and drops none.
+  void note(const HandleSet& before, const HandleSet& after, const HandleEffects& effects,
+            Timers::TimePoint now, std::uint64_t revision);
 
-  /// The changes that take the newest step back, or do the last one that was taken back again; null where there is none.
+  /// The changes that undo the newest step, or redo the step that was undone last; null if there is none.
   const std::vector<HandleChange>* next(bool redo) const;
 
-  /// They were made: `inverse` leads the other way. `revision`: of the inputs since then.
+  /// The changes of next() were made. `inverse`: the changes in the other direction. `revision`: of the
+  /// inputs after the changes.
   void moved(bool redo, std::vector<HandleChange> inverse, std::uint64_t revision);
 
   std::size_t undo_steps() const { return undo_steps_; }
   std::size_t redo_steps() const { return steps_.size() - undo_steps_; }
   std::size_t bytes() const { return bytes_; }
 
-  /// As it is kept: steps `first` and on, of which so many can be taken back.
+  /// What is stored: steps from number `first` on, of which `undo_steps` can be undone.
   struct Extent {
     std::uint64_t first = 0;
     std::size_t undo_steps = 0, steps = 0;
   };
   Extent extent() const { return {first_, undo_steps_, steps_.size()}; }
 
-  /// Steps that are another since `revision`, by number, and those that are no more.
+  /// Steps that changed after `revision`, by number, and the numbers of steps that were dropped after it.
   struct Changes {
     std::map<std::uint64_t, std::vector<HandleChange>> steps;
     std::vector<std::uint64_t> dropped;
   };
   Changes changes_since(std::uint64_t revision) const;
 
-  /// Whether changes_since() knows no more of steps that went longer ago; from then on it does again.
+  /// Whether the list of dropped steps grew too long and was cleared. Then changes_since() does not know
+  /// older drops any more.
   bool forget_dropped();
 
-  /// What another process had. What is over the limits goes.
+  /// Continues with the steps that another process had. Steps beyond the limits are dropped.
   void begin_again(std::uint64_t first, std::size_t undo_steps, std::vector<std::vector<HandleChange>> steps);
 
   static constexpr std::chrono::milliseconds kPause{1000};
-  /// A step that is larger cannot be taken back, nor can those before it.
+  /// A larger step cannot be undone, nor can those before it.
   static constexpr std::size_t kMostBytesAStep = 1u << 20;
   static constexpr std::size_t kMostBytes = 8u << 20;
 
@@ -83,14 +86,15 @@ class HandleHistory {
   const std::size_t most_steps_;
   std::deque<Step> steps_;
   std::uint64_t first_ = 0;     // the number of steps_[0]
-  std::size_t undo_steps_ = 0;  // the first so many of them
+  std::size_t undo_steps_ = 0;  // how many steps from the first on can be undone
   std::size_t bytes_ = 0;
-  std::map<std::uint64_t, std::uint64_t> dropped_;  // since which revision, by number
-  std::vector<std::string> gesture_;                // what the newest step moves; empty where it is over
-  Timers::TimePoint last_;                          // when it was moved
+  std::map<std::uint64_t, std::uint64_t>
+      dropped_;                       // the revision at which a step was dropped, by the step's number
+  std::vector<std::string> gesture_;  // the handles that the newest step moves; empty if it is finished
+  Timers::TimePoint last_;            // when the newest step was last extended
 };
 
-/// The changes that lead from where `effects` led to back to `before`.
+/// The changes that lead back to `before` from the state after `effects`.
 std::vector<HandleChange> changes_back(const HandleSet& before, const HandleEffects& effects);
 
 }  // namespace lpdeform

@@ -54,7 +54,7 @@ bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
     was_begun_ = true;
   }
   run_steps(job, pace);
-  return phase_ != Phase::kDone;  // where the solve was cancelled, somebody else may wait
+  return phase_ != Phase::kDone;  // after a cancelled solve another job or reader may wait
 }
 
 void LiveSolver::take_over(const Inputs& inputs) {
@@ -77,9 +77,10 @@ void LiveSolver::take_over(const Inputs& inputs) {
   if (!has_handles) publish(true);
 }
 
-/// False where the job has ended.
+/// Returns false if the job has ended.
 bool LiveSolver::begin_job(SolveJob& job) {
-  if (phase_ == Phase::kCertifying) phase_ = Phase::kAnswered;  // where this fails, it is looked for anew
+  if (phase_ == Phase::kCertifying)
+    phase_ = Phase::kAnswered;  // if begin_job() fails, the search begins again later
   absl::Status status = blocked_;
   if (inputs_.handles == nullptr) status = no_handles();
   SolveSettings settings = inputs_.solver;
@@ -94,7 +95,7 @@ bool LiveSolver::begin_job(SolveJob& job) {
   return status.ok();
 }
 
-/// False where there is nothing to solve for.
+/// Returns false if there is nothing to solve for.
 bool LiveSolver::begin_live() {
   if (phase_ != Phase::kWaiting) return false;
   SolveSettings settings = inputs_.solver;
@@ -121,7 +122,7 @@ void LiveSolver::run_steps(SolveJob* job, const Pace& pace) {
   if (is_frame_due(pace)) publish(false);
 }
 
-/// Somebody may be sent one at once, or will get what waits when they have taken what was sent to them.
+/// A frame is due if it can be sent to a reader at once, or if the frame that waits for slow readers is old.
 bool LiveSolver::is_frame_due(const Pace& pace) const {
   if (deformer_->is_certifying()) return false;  // the positions are those of the result
   const bool is_refinement = shown_version_ == inputs_.version;
@@ -144,7 +145,7 @@ void LiveSolver::end_solve(SolveJob* job) {
   if (job != nullptr) job->finish(SolveResult{deformer_->summary(), frame});
 }
 
-/// For the readers. True while there is more to do.
+/// Searches for a certificate for the readers. Returns true while there is more to do.
 bool LiveSolver::look_for_certificate() {
   if (!publisher_.is_certificate_wanted()) return false;
   if (phase_ == Phase::kAnswered && !begin_certificate()) return false;
@@ -157,7 +158,7 @@ bool LiveSolver::look_for_certificate() {
   return false;
 }
 
-/// False where it is too early: then the alarm is set.
+/// Returns false if it is too early; then the alarm is set.
 bool LiveSolver::begin_certificate() {
   if (alarm_.timers->now() < answered_at_ + kQuiet) {
     set_alarm();

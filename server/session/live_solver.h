@@ -14,25 +14,27 @@
 
 namespace lpdeform {
 
-/// What a session does with its deformer, slice by slice: takes the newest inputs over, begins a solve where
-/// there is something new, steps, and publishes frames on the way. It works while somebody looks on or a
-/// Solve call waits, rests otherwise, and goes on from where it was. One thread at a time.
+/// What a session does with its deformer, slice by slice. It takes over the newest inputs, begins a solve if
+/// they changed, steps, and publishes frames on the way. It works while a stream is open or a Solve call
+/// waits. Otherwise it rests, and later continues from where it stopped. For one thread at a time.
 ///
-/// Inputs with no handle at all leave the surface as it is: its present state is their result. Where a
-/// component lacks a handle, no frame answers the inputs; a standing fault says so until newer inputs are
-/// better.
+/// Inputs without any handle leave the surface as it is: its present state is their result. If a component of
+/// the mesh lacks a handle, no frame answers the inputs. A standing fault then says so until newer inputs can
+/// be solved for.
 ///
-/// Where a reader asked for certificates and a result has stood for kQuiet, it looks for the result's and publishes
-/// the frame again with it, after kCertificateSeconds with what it has; a newer input or a Solve call ends the search.
+/// If a reader asked for certificates and a result has stood for kQuiet, the solver searches for the
+/// certificate of that result. It publishes the frame again with the certificate, after kCertificateSeconds
+/// with the bound found so far. A newer input or a Solve call ends the search.
 class LiveSolver {
  public:
-  /// How it asks to be run again later: `ring` is called on the timers' thread, and may outlive the solver.
+  /// How the solver asks to be run again later. `ring` is called on the timers' thread and may outlive the
+  /// solver.
   struct Alarm {
     std::shared_ptr<Timers> timers;
     std::function<void()> ring;
   };
 
-  /// Publishes the present state, in the vertices of `mesh`. Ends its solves when `stop` is requested.
+  /// Publishes the present state, in the vertices of `mesh`. When `stop` is requested, its solves end.
   LiveSolver(std::unique_ptr<Deformer> deformer, const Mailbox& mailbox, Publisher& publisher,
              std::shared_ptr<const DrawMesh> mesh, Alarm alarm, std::stop_token stop);
 
@@ -41,37 +43,38 @@ class LiveSolver {
   static constexpr std::chrono::milliseconds kShortSlice{1}, kOneStep{0};
   static constexpr std::chrono::milliseconds kBetweenRefinements{250};
   static constexpr std::chrono::milliseconds kBetweenReports{100};
-  /// While it runs for readers, none of whom may be sent a frame just now, the one that waits for them is not older.
+  /// While it runs for readers who cannot be sent a frame just now, the frame that waits for them is at most
+  /// this old.
   static constexpr std::chrono::milliseconds kOldestWaiting{100};
   static constexpr std::chrono::milliseconds kQuiet{100};
   static constexpr double kCertificateSeconds = 10;
 
-  /// How it goes about a slice.
+  /// How a slice is run.
   struct Pace {
     std::chrono::milliseconds slice = kSlice;
-    /// Frames that only refine what was shown for the same inputs come every kBetweenRefinements.
+    /// Frames that only refine the result of inputs already shown come once per kBetweenRefinements.
     bool is_sparing = false;
   };
 
-  /// At most about pace.slice, or one step where that takes longer. `job` may be null. True where there is more
-  /// to do.
+  /// Runs for about pace.slice, or for one step if that takes longer. `job` may be null. Returns true if
+  /// there is more to do.
   bool run_slice(SolveJob* job, const Pace& pace);
   bool run_slice(SolveJob* job) { return run_slice(job, Pace()); }
 
-  /// Whether a solve was ever begun: from then on memory_bytes() includes the factors.
+  /// Whether a solve was ever begun. From then on memory_bytes() includes the factors.
   bool has_solved() const { return deformer_->summary().method != Method::kAuto; }
 
-  /// Bytes held, the shared rest shape left out.
+  /// Bytes held, without the shared rest shape.
   std::size_t memory_bytes() const;
 
  private:
   using Clock = std::chrono::steady_clock;
   enum class Phase {
     kDone,     // the inputs are answered, or cannot be
-    kWaiting,  // they are not yet, and no solve runs
+    kWaiting,  // the inputs are not answered yet, and no solve runs
     kRunning,
-    kAnswered,    // done but for a certificate
-    kCertifying,  // it is being looked for
+    kAnswered,    // done except for a certificate
+    kCertifying,  // searching for a certificate
   };
 
   void take_over(const Inputs& inputs);
@@ -94,18 +97,18 @@ class LiveSolver {
   const Alarm alarm_;
   const std::stop_token stop_;
 
-  Inputs inputs_;                          // taken over, or tried
-  std::shared_ptr<const HandleSet> held_;  // what the deformer has of them
-  absl::Status blocked_;                   // why they cannot be solved for
+  Inputs inputs_;                          // taken over, or tried and refused
+  std::shared_ptr<const HandleSet> held_;  // the handles that the deformer has
+  absl::Status blocked_;                   // why the inputs cannot be solved for
   Phase phase_ = Phase::kDone;
-  bool was_begun_ = false;  // a solve for them, so the next one goes on from its state
+  bool was_begun_ = false;  // a solve for these inputs was begun, so the next one continues from its state
   static constexpr std::uint64_t kNobody = 0, kReaders = 1;
   std::uint64_t running_for_ = kNobody;  // the number of a job, or kReaders
   Clock::time_point last_report_;
   Clock::time_point last_published_;
-  std::uint64_t shown_version_ = 0;  // of the inputs that the last frame is for
+  std::uint64_t shown_version_ = 0;  // of the inputs in the last frame
   Timers::TimePoint answered_at_;    // while kAnswered
-  bool is_alarm_set_ = false;        // since then
+  bool is_alarm_set_ = false;        // set since answered_at_
 };
 
 }  // namespace lpdeform

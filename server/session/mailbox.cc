@@ -14,7 +14,7 @@
 namespace lpdeform {
 namespace {
 
-/// Room for a new writer to count on, and for languages whose integers are signed.
+/// Leaves numbers for a new writer to continue with, and fits signed 64-bit integers.
 constexpr std::uint64_t kHighestInputSeq = std::numeric_limits<std::int64_t>::max();
 
 absl::Status too_high(std::uint64_t input_seq) {
@@ -35,7 +35,7 @@ absl::Status nothing_to(bool redo) {
                            "The session remembers no step of its handles that could be taken back.");
 }
 
-/// Those of changes that are all made.
+/// The effects of changes that are all made.
 HandleEffects effects_of(const std::vector<HandleChange>& changes) {
   HandleEffects effects;
   for (const HandleChange& change : changes) {
@@ -90,11 +90,12 @@ absl::Status Mailbox::begin_again(const Update& state, InputAges ages, InputHist
   return absl::OkStatus();
 }
 
-/// The answer to the newest input, for a caller whom it did not reach before the session was made again: what it changed is
-/// what there is now of all that leads back.
+/// Rebuilds the answer to the newest input if that was an undo or a redo. Its caller may not have received
+/// the answer before the session was restored. The changes of that input are the present values of all
+/// handles that the step in the other direction changes.
 void Mailbox::remember_undo(bool redo) {
   const std::vector<HandleChange>* const back = history_.next(!redo);
-  if (back == nullptr) return;  // too large to be remembered
+  if (back == nullptr) return;  // the step was too large to be kept
   const Inputs now = newest();
   const UpdateResult result{now.input_seq, 0, revisions_.newest};
   last_undo_ = {now.input_seq,
@@ -157,7 +158,7 @@ InputChanges Mailbox::changes_since(std::uint64_t revision) const {
   return changes;
 }
 
-/// Under the lock.
+/// Called with the lock held.
 absl::StatusOr<UpdateResult> Mailbox::merge(const Update& update, Origin origin) {
   const Inputs before = newest();
   Candidate next;
@@ -201,7 +202,8 @@ void Mailbox::put_in_force(const Update& update, Candidate& next) {
   inputs_.solver = next.solver;
 }
 
-/// Whether the update's part replaces a value of this age.
+/// Whether this part of the update is newer than the value of this age. Counts the part as stale if it is
+/// older.
 bool Mailbox::replaces(std::uint64_t age, const Update& update, Candidate& next) const {
   if (next.is_beginning) return true;
   if (update.input_seq < age) ++next.stale_parts;
@@ -274,11 +276,11 @@ void Mailbox::note_ages(const Candidate& next, std::uint64_t seq) {
   if (next.has_length_unit) ages_.length_unit = seq;
   if (next.has_solver) ages_.solver = seq;
   if (next.has_region) ages_.region = seq;
-  // Of all handles, and of as many that were let go of.
+  // Ages are kept for the handles in force and for as many that were removed.
   if (ages_.handles.size() > 2 * limits_.handles) forget_oldest();
 }
 
-/// After what is in force was changed.
+/// Called after the values in force were changed.
 void Mailbox::note_revisions(const Candidate& next) {
   const std::uint64_t now = ++revisions_.newest;
   for (const std::string& name : next.regrouped) revisions_.handles[name].set = now;
@@ -291,12 +293,12 @@ void Mailbox::note_revisions(const Candidate& next) {
 
 void Mailbox::note_step(const Update& update, const Candidate& next, const Inputs& before) {
   const Timers::TimePoint now = timers_ ? timers_->now() : Timers::TimePoint();
-  history_.note(*before.given_handles, {next.regrouped, next.moved, next.removed, update.begins_step}, now,
-                revisions_.newest);
+  history_.note(*before.given_handles, *newest().given_handles,
+                {next.regrouped, next.moved, next.removed, update.begins_step}, now, revisions_.newest);
   if (history_.forget_dropped()) revisions_.all = revisions_.newest;
 }
 
-/// Gives up the ages of the older half of the handles that were let go of.
+/// Forgets the ages of the older half of the removed handles.
 void Mailbox::forget_oldest() {
   const Inputs inputs = newest();
   const auto is_gone = [&](const std::string& name) { return !inputs.handles->handles().contains(name); };
@@ -311,7 +313,7 @@ void Mailbox::forget_oldest() {
   std::erase_if(ages_.handles,
                 [&](const auto& entry) { return entry.second <= *middle && is_gone(entry.first); });
   std::erase_if(revisions_.handles, [&](const auto& entry) { return !ages_.handles.contains(entry.first); });
-  revisions_.all = revisions_.newest + 1;  // noted by the revision that this is a part of
+  revisions_.all = revisions_.newest + 1;  // the caller is about to note this very revision
 }
 
 }  // namespace lpdeform

@@ -18,44 +18,44 @@
 
 namespace lpdeform {
 
-/// The handles and settings in force: a value that nobody changes any more.
+/// The handles and settings in force: an immutable value.
 struct Inputs {
-  std::uint64_t version = 0;    // rises with every update that is taken
-  std::uint64_t input_seq = 0;  // the newest that is in
-  std::uint64_t taken = 0;      // how many input_seqs have been the newest
+  std::uint64_t version = 0;    // rises with every update that is accepted
+  std::uint64_t input_seq = 0;  // of the newest update included
+  std::uint64_t taken = 0;      // how many input_seqs have been the newest so far
   std::shared_ptr<const HandleSet> handles;
   std::shared_ptr<const Material> material;
   SolveSettings solver;
-  // As the client gave them, in its vertices: the same objects where nothing is welded.
+  // The same values in the client's vertices, as the client gave them; the same objects if nothing is welded.
   std::shared_ptr<const HandleSet> given_handles;
   std::shared_ptr<const Material> given_material;
 };
 
-/// The input_seq of the newest value of each part. Handles let go of are remembered so that a late change
-/// does not bring them back; the oldest such memories are given up first, and all that is as old counts as
-/// stale from then on.
+/// The input_seq of the newest value of each part. Removed handles are remembered so that a late update does
+/// not bring them back. The oldest of these memories are dropped first. From then on, an update of an unknown
+/// handle that is as old as they were counts as stale.
 struct InputAges {
   std::map<std::string, std::uint64_t, std::less<>> handles;
-  std::uint64_t forgotten = 0;  // the newest of those given up
+  std::uint64_t forgotten = 0;  // the newest age that was dropped
   std::uint64_t p = 0, stiffness = 0, length_unit = 0, solver = 0, region = 0;
 };
 
-/// What a mailbox holds, and what of it has changed since a revision of it.
+/// What a mailbox holds, and which parts have changed since a given revision.
 struct InputChanges {
-  std::uint64_t revision = 0;  // now
+  std::uint64_t revision = 0;  // the present revision
   Inputs inputs;
   InputAges ages;
-  bool is_all = false;                 // everything is to be taken as changed
+  bool is_all = false;                 // treat everything as changed
   std::vector<std::string> regrouped;  // handles set, ascending
-  std::vector<std::string> moved;      // handles that go elsewhere, those set included
+  std::vector<std::string> moved;      // handles with a new target, those set included
   std::vector<std::string> removed;
   bool has_p = false, has_stiffness = false, has_region = false;
   HandleHistory::Extent history;
-  HandleHistory::Changes steps;           // of it
+  HandleHistory::Changes steps;           // of the history
   bool is_undo = false, is_redo = false;  // what the newest input is
 };
 
-/// Of a session that is made again: what could be taken back, and done again.
+/// History of a session that is restored: its steps for undo and redo.
 struct InputHistory {
   std::uint64_t first = 0;
   std::size_t undo_steps = 0;
@@ -63,43 +63,45 @@ struct InputHistory {
   bool is_undo = false, is_redo = false;  // what the newest input is
 };
 
-/// What one session may have of handles.
+/// Limits on the handles of one session.
 struct InputLimits {
-  static constexpr std::size_t kMostHandles = 4096, kMostUndo = 100;  // where nothing else is said
+  static constexpr std::size_t kMostHandles = 4096, kMostUndo = 100;  // the defaults
   std::size_t handles = kMostHandles;
   std::size_t undo_steps = kMostUndo;
 };
 
-/// Where updates meet the solver: keeps the newest value of each handle and each setting by input_seq. Which
-/// value is newest is decided for each handle and each setting by itself, so a late update of one does not
-/// undo another. An update is checked against the values it would lead to and is taken whole or not at all.
-/// Nothing queues: the solver reads what is newest when it has time. Thread-safe.
+/// Where updates meet the solver. It keeps the newest value, by input_seq, of each handle and each setting.
+/// Each of these is decided separately, so a late update of one does not undo another. An update is checked
+/// against the state that it would lead to, and is accepted as a whole or not at all. Updates coalesce
+/// instead of queueing: the solver reads the newest values when it has time. Thread-safe.
 class Mailbox {
  public:
-  /// `weld`: from the vertices that updates speak of to those of `shape`; null where they are the same.
-  /// `timers`: tells pauses between gestures; null: there are none.
+  /// `weld`: from the vertices of updates to those of `shape`; null if they are the same. `timers`: tells
+  /// pauses between gestures; null: there are no pauses.
   explicit Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld = nullptr,
                    InputLimits limits = {}, std::shared_ptr<Timers> timers = nullptr);
 
-  /// A part with the input_seq of the value that is there is a repetition: dropped, but not counted as stale.
-  /// Errors, INVALID_ARGUMENT: INPUT_SEQ_ZERO, HANDLE_CHANGED_TWICE (in this update), TOO_MANY_HANDLES,
-  /// HANDLE_TARGET_TOO_FAR, COPIES_DIFFER, and what check_solver, make_constraints, check_material and HandleSet have;
-  /// NOT_FOUND HANDLE_UNKNOWN. A component without a handle is no error here: handles may come one by one.
+  /// Takes an update. A part whose input_seq equals that of the present value is a repetition: it is dropped,
+  /// but does not count as stale. Errors, INVALID_ARGUMENT: INPUT_SEQ_ZERO, HANDLE_CHANGED_TWICE (in this
+  /// update), TOO_MANY_HANDLES, HANDLE_TARGET_TOO_FAR, COPIES_DIFFER, and those of check_settings,
+  /// check_method_takes, check_equations, check_material and HandleSet; NOT_FOUND HANDLE_UNKNOWN. A component
+  /// without a handle is no error here: handles may come one by one.
   absl::StatusOr<UpdateResult> take(const Update& update);
 
-  /// What a session begins with: the same as an update that is older than all others.
+  /// Sets what a session begins with, as an update that is older than all others.
   absl::Status begin_with(const Update& update);
 
-  /// The same of a session that is made again: its whole state, and how old the parts of it are. Also INPUT_SEQ_TOO_HIGH, and
-  /// TOO_MANY_HANDLES where more are remembered than there can be.
+  /// The same for a session that is restored: its whole state, and the ages of its parts. More errors:
+  /// INPUT_SEQ_TOO_HIGH, and TOO_MANY_HANDLES if more handles are remembered than there can be.
   absl::Status begin_again(const Update& state, InputAges ages, InputHistory history = {});
 
-  /// Takes the newest step of the handles back (see HandleHistory), or does again what was taken back last, as an update of this
-  /// input_seq, which must be higher than all before: ABORTED INPUT_SEQ_PASSED. The same as last time gives the same
-  /// answer. FAILED_PRECONDITION NOTHING_TO_UNDO, NOTHING_TO_REDO; otherwise as take().
+  /// Undoes the newest step of the handles (see HandleHistory), or redoes the step that was undone last, as
+  /// an update with this input_seq. The input_seq must be higher than all before: ABORTED INPUT_SEQ_PASSED.
+  /// It is idempotent: a repetition of the last call gives the same answer. FAILED_PRECONDITION
+  /// NOTHING_TO_UNDO, NOTHING_TO_REDO; otherwise as take().
   absl::StatusOr<UndoResult> undo(std::uint64_t input_seq, bool redo);
 
-  /// How many steps can be taken back, and done again; what they take.
+  /// How many steps can be undone and redone, and how many bytes the history takes.
   struct HistorySize {
     std::size_t undo_steps = 0, redo_steps = 0, bytes = 0;
   };
@@ -109,11 +111,11 @@ class Mailbox {
 
   /// Rises with each update that changes something.
   std::uint64_t revision() const;
-  /// What has changed since `revision`; since 0, all.
+  /// What has changed since `revision`; everything if that is 0.
   InputChanges changes_since(std::uint64_t revision) const;
 
  private:
-  /// The revision at which something last changed.
+  /// The revision at which each part last changed.
   struct Revisions {
     struct OfHandle {
       std::uint64_t set = 0, moved = 0, removed = 0;
@@ -158,12 +160,8 @@ class Mailbox {
     UndoResult result;
   };
   std::optional<LastUndo> last_undo_;
-  mutable std::mutex mutex_;  // guards inputs_, for moments only
+  mutable std::mutex mutex_;  // guards inputs_; held only briefly
   Inputs inputs_;
 };
-
-/// Whether the method can minimise for this material and these handles: INVALID_ARGUMENT METHOD_NEEDS_P
-/// (local_global: p = 2 everywhere; conic: p = 1), METHOD_NEEDS_EXACT_HANDLES (conic), TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE.
-absl::Status check_solver(const SolveSettings& settings, const Material& material, const HandleSet& handles);
 
 }  // namespace lpdeform

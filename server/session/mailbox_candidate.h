@@ -12,19 +12,19 @@
 
 namespace lpdeform {
 
-// What the files of Mailbox share.
+// Declarations that the source files of Mailbox share.
 
-/// What an update would lead to.
+/// The state that an update would lead to.
 struct Mailbox::Candidate {
   bool is_beginning = false;
-  std::shared_ptr<HandleSet> handles;  // our copy; empty where the update has no handles
+  std::shared_ptr<HandleSet> handles;  // a copy that may be changed; empty if the update has no handles
   Material material;
   SolveSettings solver;
-  // For the solver; empty where they did not change.
+  // For the solver; empty if they did not change.
   std::shared_ptr<const HandleSet> solver_handles;
   std::shared_ptr<const Material> solver_material;
-  std::vector<std::string> named;  // handles that it changes
-  std::vector<std::string> moved;  // those of them that go somewhere
+  std::vector<std::string> named;  // handles that the update changes
+  std::vector<std::string> moved;  // those of them that get a new target
   std::vector<std::string> regrouped, removed;
   bool is_regrouped = false;  // vertices of handles, or the region, changed
   bool has_p = false, has_stiffness = false, has_length_unit = false, has_solver = false, has_region = false;

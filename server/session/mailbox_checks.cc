@@ -1,4 +1,4 @@
-// Mailbox: whether what an update would lead to can be solved for.
+// Mailbox: whether the state that an update would lead to can be solved for.
 
 #include <utility>
 
@@ -6,7 +6,6 @@
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
 #include "core/constraints/constraints.h"
-#include "core/constraints/holds.h"
 #include "core/problem/check_settings.h"
 #include "core/problem/welded_inputs.h"
 #include "server/session/mailbox_candidate.h"
@@ -19,30 +18,6 @@ absl::Status too_many_handles(std::size_t handles, std::size_t most) {
                                  ". Let go of some first."));
 }
 
-absl::Status check_solver(const SolveSettings& settings, const Material& material, const HandleSet& handles) {
-  if (!(settings.tolerance >= 1e-14 && settings.tolerance <= 0.1)) {
-    return make_fault({Reason::kToleranceOutOfRange, "tolerance", "1e-14 <= tolerance <= 0.1"},
-                      absl::StrCat("The tolerance is ", settings.tolerance, ", not within 1e-14 to 0.1."));
-  }
-  if (settings.max_iterations < 0) {
-    return make_fault({Reason::kIterationsOutOfRange, "max_iterations", "0 <= max_iterations < 2^31"},
-                      "The number of iterations does not fit into 31 bits.");
-  }
-  if (!(settings.time_limit_seconds > 0)) {
-    return make_fault(
-        {Reason::kTimeLimitOutOfRange, "time_limit_seconds", "time_limit_seconds > 0"},
-        absl::StrCat("The time limit is ", settings.time_limit_seconds, " s, not more than 0."));
-  }
-  const double needed =
-      settings.method == Method::kLocalGlobal ? 2.0 : (settings.method == Method::kConic ? 1.0 : 0.0);
-  if (needed == 0.0 || (material.p.array() == needed).all()) {
-    return check_method_takes(settings.method, handles);
-  }
-  const std::string method(method_name(settings.method));
-  return make_fault({Reason::kMethodNeedsP, method, absl::StrCat("p = ", needed)},
-                    absl::StrCat("Method ", method, " needs p = ", needed, " everywhere."));
-}
-
 absl::Status Mailbox::check(const Candidate& next, const Inputs& before) const {
   if (next.handles && next.handles->handles().size() > limits_.handles) {
     return too_many_handles(next.handles->handles().size(), limits_.handles);
@@ -51,12 +26,14 @@ absl::Status Mailbox::check(const Candidate& next, const Inputs& before) const {
   if (next.is_regrouped) status = check_handles(*next.handles, vertex_count(), shape_->face_count());
   if (next.has_material() && status.ok()) status = check_material(next.material, vertex_count());
   if (status.ok() && (next.has_material() || next.has_solver || next.is_regrouped)) {
-    status = check_solver(next.solver, next.material, next.handles ? *next.handles : *before.given_handles);
+    status = check_settings(next.solver, next.material);
+    const HandleSet& handles = next.handles ? *next.handles : *before.given_handles;
+    if (status.ok()) status = check_method_takes(next.solver.method, handles);
   }
   return status;
 }
 
-/// Puts the client's vertices into the solver's.
+/// Converts the client's vertices to the solver's.
 absl::Status Mailbox::weld(Candidate& next) const {
   if (!weld_) return absl::OkStatus();
   if (next.has_handles()) {
@@ -72,22 +49,19 @@ absl::Status Mailbox::weld(Candidate& next) const {
   return absl::OkStatus();
 }
 
-/// Whether the groups can be held together: where locks and points must agree, they are put together to see. And
-/// whether they go no farther than they may.
+/// Whether handles stay within their range, and whether locks and points are compatible.
 absl::Status Mailbox::check_welded(const Candidate& next) const {
   if (!next.has_handles()) return absl::OkStatus();
   const HandleSet& handles = next.solver_handles ? *next.solver_handles : *next.handles;
   absl::Status status;
-  if (next.is_regrouped && has_equations(handles)) {
-    status = make_constraints(*shape_, handles, FreeComponents::kStay).status();
-  }
   for (const std::string& name : next.moved) {
     if (status.ok()) status = check_targets(name, handles.handles().find(name)->second);
   }
+  if (status.ok() && next.is_regrouped) status = check_equations(*shape_, handles);
   return status;
 }
 
-/// "Vertex 17" as the client counts, "Point 2" of a handle of points.
+/// "Vertex 17" as the client counts, or "Point 2" of a handle of points.
 std::string Mailbox::place_of(const Handle& handle, std::size_t k) const {
   if (!handle.points.empty()) return absl::StrCat("Point ", k);
   const std::int32_t vertex = handle.vertices[k];

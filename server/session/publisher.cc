@@ -8,7 +8,8 @@ namespace lpdeform {
 Publisher::Publisher(std::shared_ptr<Metrics> metrics) : metrics_(std::move(metrics)) {}
 
 std::shared_ptr<const Frame> Publisher::publish(Frame frame) {
-  // Encoded here, on the solver's thread, in every form that is asked for, so that no reader's thread has to.
+  // Frames are encoded here, on the solver's thread, in every format that readers use, so that no reader's
+  // thread has to encode.
   for (const auto& stream : readers()) {
     const StreamOptions& options = stream->options();
     frame.surface->prepare(options.format_for(*frame.surface), options.with_normals);
@@ -60,7 +61,7 @@ void Publisher::set_standing(std::optional<FaultNote> fault) {
     const std::scoped_lock lock(mutex_);
     if (!fault && !standing_) return;
     standing_.reset();
-    if (fault) waiting_.forget();  // no frame will answer
+    if (fault) waiting_.forget();  // no frame will answer them
     if (fault) standing_ = Standing{++faults_, *std::move(fault)};
   }
   wake_all();
@@ -72,7 +73,7 @@ void Publisher::took(std::uint64_t input_seq, AnswerClock::TimePoint since) {
   if (streams_.empty()) return;
   waiting_.took(input_seq, since);
   if (newest_ && newest_->input_seq >= input_seq)
-    measure_answer();  // the solver was quicker than we are here
+    measure_answer();  // the frame was published before this call
 }
 
 std::shared_ptr<const Frame> Publisher::newest() const {

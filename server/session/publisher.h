@@ -12,14 +12,14 @@
 
 namespace lpdeform {
 
-/// Where a session's frames meet its readers: one slot with the newest frame, one with the fault that stands.
-/// Readers that are slow miss frames; the newest, and so the final one of the last input, always waits for
-/// them. Thread-safe.
+/// Where a session's frames meet its readers: one slot for the newest frame, and one for the standing fault.
+/// Slow readers miss frames. The newest frame, which includes the final frame of the last input, always waits
+/// for them. Thread-safe.
 class Publisher {
  public:
   explicit Publisher(std::shared_ptr<Metrics> metrics = std::make_shared<Metrics>());
 
-  /// A fault that concerns every reader until the cause is gone. `number` rises with each.
+  /// A fault that concerns every reader until its cause is gone. `number` rises with each fault.
   struct Standing {
     std::uint64_t number = 0;
     FaultNote fault;
@@ -28,30 +28,31 @@ class Publisher {
   /// Numbers the frame within its epoch, puts it into the slot and wakes the readers.
   std::shared_ptr<const Frame> publish(Frame frame);
 
-  /// Publishes the newest frame again, now with its certificate: for the readers that asked for it, and for those
-  /// that it has not been sent to. After a publish().
+  /// Publishes the newest frame again, now with its certificate, for readers that asked for certificates and
+  /// for readers to which the frame has not been sent. Only after a publish().
   void certify_newest(double optimality_gap);
 
-  /// Frames sent from now on are of this epoch, the one in the slot too. The readers hear of it with wake_all(), because
-  /// whoever begins an epoch holds a lock as a rule, and a reader's waker may want it.
+  /// Frames sent from now on belong to this epoch, including the one in the slot. Call wake_all() afterwards
+  /// to tell the readers. The two are separate because the caller usually holds a lock that a reader's waker
+  /// may need.
   void begin_epoch(std::uint64_t epoch);
 
-  /// Wakes every reader. To be called under no lock.
+  /// Wakes every reader. Call it under no lock.
   void wake_all() const;
 
-  /// Puts up a fault, or takes it down.
+  /// Sets the standing fault, or clears it.
   void set_standing(std::optional<FaultNote> fault);
 
-  /// An update was taken: measures how long readers wait for the first frame that answers it.
+  /// An update was taken. Starts to measure how long readers wait for the first frame that answers it.
   void took(std::uint64_t input_seq, AnswerClock::TimePoint since);
 
   std::shared_ptr<const Frame> newest() const;
   std::optional<Standing> standing() const;
 
-  /// False, and nothing happens, once closed. Whoever made the stream owns it.
+  /// Adds a stream, which its creator owns. Returns false and does nothing once the publisher is closed.
   bool add(const std::shared_ptr<FrameStream>& stream);
   void remove(const FrameStream& stream);
-  /// The stream of this id; null where there is none.
+  /// The stream with this id; null if there is none.
   std::shared_ptr<FrameStream> find(const std::string& id) const;
 
   std::size_t reader_count() const;
@@ -60,7 +61,7 @@ class Publisher {
   /// Whether any reader asked for certificates.
   bool is_certificate_wanted() const;
 
-  /// Ends every stream and takes no more.
+  /// Ends every stream and accepts no more.
   void close(EndReason reason, const std::string& text);
 
   Metrics& metrics() const { return *metrics_; }

@@ -13,7 +13,7 @@ static_assert(std::endian::native == std::endian::little, "numbers travel as the
 
 constexpr double kMostUnsigned = 65535, kMostSigned = 32767;
 
-/// Steps a unit of length; 0 where there is no length, or one that is next to nothing.
+/// Steps per unit of length; 0 if the length is 0 or tiny.
 double steps(double extent) {
   const double steps = kMostUnsigned / extent;
   return std::isfinite(steps) ? steps : 0;

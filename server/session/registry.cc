@@ -76,7 +76,7 @@ absl::Status Registry::check_room(const std::string& owner) const {
                    " sessions that one caller may have; delete one first."));
 }
 
-/// Until a session goes that nobody uses; somebody may delete one before: 5 s to a minute.
+/// Time until the next unused session expires, within 5 s to a minute. A session may be deleted before.
 std::chrono::duration<double> Registry::until_one_expires() const {
   Timers::Duration soonest = kLongestAdvice;
   for (const auto& [name, entry] : sessions_)
@@ -115,7 +115,7 @@ void Registry::finish_creation(const std::string& request_id, absl::StatusOr<std
   for (const OnCreated& one : waiting) one(created);
 }
 
-/// Under the lock.
+/// Called with the lock held.
 void Registry::enter(const std::shared_ptr<Session>& session, const std::string& request_id) {
   const std::string& name = session->name();
   left_.erase(name);
@@ -175,7 +175,7 @@ absl::StatusOr<Registry::Page> Registry::list(std::size_t most, const std::strin
   const std::scoped_lock lock(mutex_);
   Page page;
   auto entry = page_token.empty() ? by_age_.end() : by_age_.lower_bound(before);
-  std::uint64_t last = 0;  // the number of the page's last
+  std::uint64_t last = 0;  // the number of the last session on the page
   while (entry != by_age_.begin()) {
     --entry;
     const std::shared_ptr<Session>& session = sessions_.at(entry->second).session;
@@ -198,7 +198,7 @@ bool Registry::remove(const Session& session, EndReason reason, const std::strin
   return remove_one(session.name(), &session, reason, text);
 }
 
-/// Under the lock.
+/// Called with the lock held.
 void Registry::note_left(const Session& session) {
   const Timers::TimePoint now = timers_->now();
   std::erase_if(left_, [now](const auto& left) { return left.second.until <= now; });
@@ -267,7 +267,7 @@ void Registry::watch(const std::string& name, Timers::TimePoint when) {
   });
 }
 
-/// Closes the session when it has been idle for long enough; looks again later where it has not.
+/// Closes the session if it has been idle for long enough; otherwise sets the next alarm.
 void Registry::expire(const std::string& name) {
   std::shared_ptr<Session> session;
   {

@@ -16,14 +16,14 @@
 
 namespace lpdeform {
 
-/// A session just made, for its maker: made again by the same request_id, it is the same.
+/// A session as CreateSession returns it. The same request_id gives the same session again.
 struct CreatedSession {
   std::shared_ptr<Session> session;
   std::string writer_token;
 };
 
-/// All sessions of a server, by name. Those that nobody uses for a while are closed. Thread-safe. Held by a
-/// shared pointer.
+/// All sessions of a server, by name. Sessions that nobody uses for some time are closed. Thread-safe. Held
+/// by a shared pointer.
 class Registry : public std::enable_shared_from_this<Registry> {
  public:
   using OnCreated = std::function<void(absl::StatusOr<CreatedSession>)>;
@@ -31,39 +31,45 @@ class Registry : public std::enable_shared_from_this<Registry> {
   struct Limits {
     std::size_t most_sessions;
     Timers::Duration idle;
-    std::size_t most_each = 0;  // of one owner; 0: without limit. Not for the owner "", who is everybody
+    /// Per owner; 0: without limit. Does not apply to the owner "", which stands for all anonymous callers.
+    std::size_t most_each = 0;
   };
 
   Registry(std::shared_ptr<Timers> timers, Limits limits);
 
-  /// Claims a place for a session to be made. True where the caller is to make it and then call
-  /// finish_creation() with the same request_id; `on_created` hears how that went. False where `on_created`
-  /// is or will be called without the caller's doing: the session exists, another caller is making it, or an
-  /// error (INVALID_ARGUMENT REQUEST_ID, REQUEST_ID_REUSED; RESOURCE_EXHAUSTED SESSIONS_FULL, CALLER_SESSIONS_FULL). `fingerprint`
-  /// differs for requests that differ: the same request_id with another one is refused.
+  /// Claims a place for a session to be made. Returns true if the caller must make it and then call
+  /// finish_creation() with the same request_id; `on_created` is then told the result. Returns false if the
+  /// caller has nothing to do because `on_created` is or will be called anyway: the session exists, another
+  /// caller is making it, or there is an error (INVALID_ARGUMENT REQUEST_ID, REQUEST_ID_REUSED;
+  /// RESOURCE_EXHAUSTED SESSIONS_FULL, CALLER_SESSIONS_FULL). `fingerprint` differs for requests that differ:
+  /// the same request_id with another fingerprint is refused.
   bool begin_creation(const std::string& request_id, OnCreated on_created, std::size_t fingerprint = 0,
                       const std::string& owner = "");
 
-  /// Enters the session, or gives its place up. With an empty request_id, tells `on_created` alone.
+  /// Enters the session, or frees its place after an error. With an empty request_id only `on_created` is
+  /// told.
   void finish_creation(const std::string& request_id, absl::StatusOr<std::shared_ptr<Session>> made,
                        const OnCreated& on_created, const std::string& owner = "");
 
-  /// Claims a place for a session that is made again from a store. RESOURCE_EXHAUSTED SESSIONS_FULL, CALLER_SESSIONS_FULL.
+  /// Claims a place for a session that is restored from a store. RESOURCE_EXHAUSTED SESSIONS_FULL,
+  /// CALLER_SESSIONS_FULL.
   absl::Status begin_restoring(const std::string& owner);
 
-  /// Enters it, made by this request_id with this fingerprint, or gives its place up.
+  /// Enters the restored session, which was created with this request_id and fingerprint, or frees its place
+  /// after an error.
   void finish_restoring(const std::string& owner, const absl::StatusOr<std::shared_ptr<Session>>& made,
                         const std::string& request_id, std::size_t fingerprint);
 
-  /// Whether there is a session of this name, whosever it is.
+  /// Whether there is a session of this name, of any owner.
   bool has(const std::string& name) const;
 
-  /// NOT_FOUND SESSION_UNKNOWN, also where it is somebody else's; UNAVAILABLE SESSION_ELSEWHERE where it has just left to go on
-  /// elsewhere (kDraining), for kLeaving or until it is known to be nowhere. Counts as use.
+  /// NOT_FOUND SESSION_UNKNOWN, also if the session belongs to another owner. UNAVAILABLE SESSION_ELSEWHERE
+  /// if the session has just moved to another server (kDraining), for kLeaving or until it is known to be
+  /// nowhere. Counts as use.
   absl::StatusOr<std::shared_ptr<Session>> find(const std::string& name, const std::string& owner = "") const;
 
-  /// The owner's, newest first, at most `most`, those after `page_token` (empty: from the beginning), with the token of
-  /// the next page (empty: there is none). INVALID_ARGUMENT PAGE_TOKEN.
+  /// A page of the owner's sessions, newest first: at most `most` of those after `page_token` (empty: from
+  /// the beginning), with the token of the next page (empty: there is none). INVALID_ARGUMENT PAGE_TOKEN.
   struct Page {
     std::vector<std::shared_ptr<Session>> sessions;
     std::string next_page_token;
@@ -71,24 +77,24 @@ class Registry : public std::enable_shared_from_this<Registry> {
   absl::StatusOr<Page> list(std::size_t most, const std::string& page_token,
                             const std::string& owner = "") const;
 
-  /// Closes and forgets the session; false where there is none. Of a Session itself: not another one of its name, which came
-  /// after it.
+  /// Closes and forgets the session; false if there is none. The overload that takes a Session removes only
+  /// that one, not a later session of the same name.
   bool remove(const std::string& name, EndReason reason, const std::string& text);
   bool remove(const Session& session, EndReason reason, const std::string& text);
 
-  /// A session that left is not elsewhere either.
+  /// The session that left is not at another server either: find() answers SESSION_UNKNOWN from now on.
   void forget_left(const std::string& name);
 
-  /// Ends all streams, now and from now on; Solve calls go on.
+  /// Ends all streams and accepts no more of them. Solve calls go on.
   void drain(const std::string& text);
 
-  /// Closes and forgets all.
+  /// Closes and forgets all sessions.
   void clear(EndReason reason, const std::string& text);
 
-  /// Called with each session that is closed, under no lock. To be set before anything else is called.
+  /// Called with each session that is closed, under no lock. Set it before any other call.
   std::function<void(const Session&, EndReason)> on_ended;
 
-  /// Longer than any call needs that has found a session here to ask for it again.
+  /// A call that found the session here and asks for it again needs less time than this.
   static constexpr std::chrono::seconds kLeaving{10};
 
   Timers::Duration idle() const { return limits_.idle; }
@@ -125,7 +131,7 @@ class Registry : public std::enable_shared_from_this<Registry> {
   std::map<std::string, Entry> sessions_;
   std::map<std::uint64_t, std::string> by_age_;                      // names, by their numbers
   std::map<std::pair<std::string, std::string>, Request> requests_;  // by owner and request_id
-  std::map<std::string, std::size_t> held_;  // sessions of each owner, those being made included
+  std::map<std::string, std::size_t> held_;  // number of sessions per owner, including those being made
   std::map<std::string, Left> left_;         // by name
   std::size_t being_made_ = 0;
   std::uint64_t numbers_ = 0;

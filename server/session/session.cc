@@ -17,8 +17,8 @@ namespace {
 /// A slice of a larger mesh may take long: see Scheduler.
 constexpr std::int32_t kHeavyVertices = 20000;
 
-/// One step of a large mesh costs more than many of a small one: with equal shares of the time it would hardly move
-/// beside a crowd of small ones.
+/// One step of a large mesh costs more than many steps of a small one. With equal shares of the time a large
+/// mesh would make next to no progress beside many small ones.
 double weight_of(std::int32_t vertices) {
   constexpr double kPlain = 1000;
   return std::sqrt(std::max(1.0, vertices / kPlain));
@@ -29,12 +29,25 @@ std::int64_t unix_ms_now() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(now).count();
 }
 
-/// Takes as long for a token that is nearly right as for any other.
+/// Takes the same time for a token that is nearly right as for any other.
 bool is_same_token(const std::string& a, const std::string& b) {
   if (a.size() != b.size()) return false;
   unsigned char difference = 0;
   for (std::size_t k = 0; k < a.size(); ++k) difference |= static_cast<unsigned char>(a[k] ^ b[k]);
   return difference == 0;
+}
+
+absl::Status not_the_writer() {
+  return make_fault({Reason::kNotTheWriter, "writer_token", ""},
+                    "The writer token is not that of the session's present writer.");
+}
+
+std::uint64_t input_seq_of(const UpdateResult& result) {
+  return result.input_seq;
+}
+
+std::uint64_t input_seq_of(const UndoResult& result) {
+  return result.update.input_seq;
 }
 
 absl::Status too_many_streams(std::size_t most) {
@@ -123,19 +136,19 @@ SessionChanges Session::changes_since(std::uint64_t revision) const {
   return {{token_, epoch_, inputs.inputs.input_seq}, std::move(inputs)};
 }
 
-absl::Status Session::check_writer(const std::string& token) const {
-  const std::scoped_lock lock(writing_);
-  return check_writer_locked(token);
-}
-
-absl::Status Session::check_writer_locked(const std::string& token) const {
+absl::StatusOr<Session::Writer> Session::writer(const std::string& token) const {
   if (token.empty()) {
     return make_fault({Reason::kWriterTokenMissing, "writer_token", ""},
                       "Changing a session needs its writer token.");
   }
-  if (is_same_token(token, token_)) return absl::OkStatus();
-  return make_fault({Reason::kNotTheWriter, "writer_token", ""},
-                    "The writer token is not that of the session's present writer.");
+  const std::scoped_lock lock(writing_);
+  if (is_same_token(token, token_)) return Writer{epoch_};
+  return not_the_writer();
+}
+
+absl::Status Session::check_still_writes_locked(const absl::StatusOr<Writer>& writer) const {
+  if (!writer.ok()) return writer.status();
+  return writer->epoch == epoch_ ? absl::OkStatus() : not_the_writer();
 }
 
 WriterLease Session::acquire_writer() {
@@ -156,48 +169,46 @@ WriterLease Session::acquire_writer() {
   for (const auto& weak : before) {
     if (const auto stream = weak.lock()) stream->end(EndReason::kWriterReplaced, text);
   }
-  publisher_->wake_all();  // the others go on in the new epoch
+  publisher_->wake_all();  // readers learn of the new epoch
   if (job_before) job_before->finish(make_fault({Reason::kWriterReplaced, "", ""}, text));
   return lease;
 }
 
-absl::StatusOr<UpdateResult> Session::update(const std::string& token, const Update& update) {
+/// The common part of all changes by a writer: applies `change` to the mailbox, and makes sure that a frame
+/// will answer its input_seq.
+template <typename Change>
+auto Session::take_in(const absl::StatusOr<Writer>& writer, const Change& change) {
   touch();
   const auto since = std::chrono::steady_clock::now();
-  absl::StatusOr<UpdateResult> result;
+  decltype(change(mailbox_)) result;
   {
     const std::scoped_lock lock(writing_);
-    if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
-    if (is_closed_) return closed();
-    result = mailbox_.take(update);
-    if (result.ok()) publisher_->took(update.input_seq, since);
+    absl::Status status = check_still_writes_locked(writer);
+    if (status.ok() && is_closed_) status = closed();
+    if (!status.ok()) return result = status;
+    result = change(mailbox_);
+    if (result.ok()) publisher_->took(input_seq_of(*result), since);
   }
   if (result.ok()) services_.scheduler.wake(shared_from_this(), Urgency::kAnswer);
   return result;
 }
 
-absl::StatusOr<UndoResult> Session::undo(const std::string& token, std::uint64_t input_seq, bool redo) {
-  touch();
-  const auto since = std::chrono::steady_clock::now();
-  absl::StatusOr<UndoResult> result;
-  {
-    const std::scoped_lock lock(writing_);
-    if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
-    if (is_closed_) return closed();
-    result = mailbox_.undo(input_seq, redo);
-    if (result.ok()) publisher_->took(input_seq, since);
-  }
-  if (result.ok()) services_.scheduler.wake(shared_from_this(), Urgency::kAnswer);
-  return result;
+absl::StatusOr<UpdateResult> Session::update(const absl::StatusOr<Writer>& writer, const Update& update) {
+  return take_in(writer, [&](Mailbox& mailbox) { return mailbox.take(update); });
 }
 
-absl::Status Session::solve(const std::string& token, const std::optional<Update>& update,
+absl::StatusOr<UndoResult> Session::undo(const absl::StatusOr<Writer>& writer, std::uint64_t input_seq,
+                                         bool redo) {
+  return take_in(writer, [&](Mailbox& mailbox) { return mailbox.undo(input_seq, redo); });
+}
+
+absl::Status Session::solve(const absl::StatusOr<Writer>& writer, const std::optional<Update>& update,
                             const std::shared_ptr<SolveJob>& job) {
   touch();
   std::shared_ptr<SolveJob> before;
   {
     const std::scoped_lock lock(writing_);
-    if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
+    if (absl::Status status = check_still_writes_locked(writer); !status.ok()) return status;
     if (update) {
       if (absl::Status status = mailbox_.take(*update).status(); !status.ok()) return status;
     }
@@ -214,14 +225,14 @@ absl::Status Session::solve(const std::string& token, const std::optional<Update
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::shared_ptr<FrameStream>> Session::open_stream(const std::string& token,
+absl::StatusOr<std::shared_ptr<FrameStream>> Session::open_stream(const std::optional<Writer>& writer,
                                                                   const StreamOptions& options) {
   touch();
   std::shared_ptr<FrameStream> stream;
   {
     const std::scoped_lock lock(writing_);
-    if (!token.empty()) {
-      if (absl::Status status = check_writer_locked(token); !status.ok()) return status;
+    if (writer) {
+      if (absl::Status status = check_still_writes_locked(*writer); !status.ok()) return status;
     }
     stream = std::make_shared<FrameStream>(
         options, publisher_, services_.timers, services_.heartbeat,
@@ -231,7 +242,7 @@ absl::StatusOr<std::shared_ptr<FrameStream>> Session::open_stream(const std::str
       return too_many_streams(services_.limits.streams);
     if (!publisher_->add(stream)) return is_draining_ && !is_closed_ ? server_draining() : closed();
     std::erase_if(writers_, [](const auto& weak) { return weak.expired(); });
-    if (!token.empty()) writers_.push_back(stream);
+    if (writer) writers_.push_back(stream);
   }
   const std::shared_ptr<const Surface> newest = publisher_->newest()->surface;
   newest->prepare(options.format_for(*newest), options.with_normals);
@@ -251,7 +262,8 @@ absl::Status Session::acknowledge(const std::string& stream_id, std::uint64_t fr
                     "The session has no stream of this id; it may have ended.");
 }
 
-/// To who had it in hand already. One that goes on elsewhere is not gone: its client would make it anew.
+/// The error for callers that still hold the closed session. If the session goes on elsewhere, the error must
+/// not say that it is gone, or its client would create a new one.
 absl::Status Session::closed() const {
   return goes_on(closed_by_) ? server_draining() : session_unknown();
 }

@@ -23,38 +23,38 @@
 
 namespace lpdeform {
 
-/// What a session that is made again, from a store or a file, goes on from.
+/// What a session that is restored from a store or a file continues from.
 struct SessionPast {
-  std::string token;                 // of its writer
-  std::uint64_t epoch = 1;           // above those it had
+  std::string token;                 // of the session's writer
+  std::uint64_t epoch = 1;           // higher than any epoch before
   std::int64_t created_unix_ms = 0;  // 0: now
   InputAges ages = {};
   InputHistory history = {};
 };
 
-/// What a session is made of.
+/// The parts to make a session of.
 struct SessionParts {
   std::string name;
-  std::string owner = {};  // the subject of the caller that made it
+  std::string owner = {};  // the subject of the caller that created it
   std::string route = {};  // see Session::route
   std::shared_ptr<const RestShape> shape;
-  std::shared_ptr<const ShapeFeatures> features = nullptr;  // of `shape`; made where left out
+  std::shared_ptr<const ShapeFeatures> features = nullptr;  // of `shape`; computed if null
   std::unique_ptr<Deformer> deformer;
   std::shared_ptr<const DrawMesh> mesh = nullptr;  // null: the shape's own vertices
   FreeComponents free_components = FreeComponents::kError;
   Update beginning;                      // settings and handles to begin with
-  std::optional<SessionPast> past = {};  // of one that is made again: then `beginning` is its state
+  std::optional<SessionPast> past = {};  // set for a restored session: then `beginning` is its state
   bool has_surface = false;              // `deformer` begins with the state of another session
-  Reservation memory;                    // the estimate that it was admitted with
+  Reservation memory;                    // the estimate that was reserved when the session was admitted
 };
 
-/// What one session may have.
+/// Limits of one session.
 struct SessionLimits {
   std::size_t streams = 256;
   InputLimits inputs = {};
 };
 
-/// What everybody's sessions share.
+/// What all sessions share.
 struct SessionServices {
   Scheduler& scheduler;
   std::shared_ptr<Timers> timers;
@@ -63,7 +63,7 @@ struct SessionServices {
   SessionLimits limits = {};
 };
 
-/// What GetSession tells.
+/// What GetSession returns.
 struct SessionInfo {
   std::string name, route;
   std::uint64_t epoch = 0;
@@ -77,98 +77,108 @@ struct SessionInfo {
   std::size_t undo_steps = 0, redo_steps = 0;
 };
 
-/// Who may change a session, and since when.
+/// The writer of a session: its token and its fencing epoch.
 struct WriterLease {
   std::string token;
   std::uint64_t epoch = 0;
   std::uint64_t input_seq = 0;
 };
 
-/// What a store is to be told of a session.
+/// The changes that a store must save.
 struct SessionChanges {
   WriterLease lease;
   InputChanges inputs;
 };
 
-/// A mesh being deformed for one writer and any number of readers: a mailbox that updates go into, a live
-/// solver that a scheduler's threads run, a publisher that frames come out of. Every function but run() may
-/// be called from any thread and takes no longer than looking at its arguments.
+/// A mesh that is deformed for one writer and any number of readers. Updates go into a mailbox, a scheduler's
+/// threads run a live solver, and a publisher sends frames. Every function but run() may be called from any
+/// thread, and takes no longer than it needs to check its arguments.
 class Session final : public Runnable, public std::enable_shared_from_this<Session> {
  public:
-  /// Errors: what Mailbox::take has to say about the beginning.
+  /// Errors: those of Mailbox::take for the beginning.
   static absl::StatusOr<std::shared_ptr<Session>> create(SessionParts parts, SessionServices services);
 
   const std::string& name() const { return name_; }
   const std::string& owner() const { return owner_; }
-  /// What the header lpdeform-session of the call that made it said: a proxy that chooses a server by it sends all calls that say
-  /// the same to one. Empty where there was none.
+  /// The header lpdeform-session of the call that created the session; empty if there was none. A proxy that
+  /// routes by this header sends all calls with the same value to one server.
   const std::string& route() const { return route_; }
-  /// The client's.
+  /// Of the client's mesh.
   std::uint32_t vertex_count() const { return mesh_->vertex_count(); }
   const DrawMesh& mesh() const { return *mesh_; }
   const ShapeFeatures& features() const { return *features_; }
   SessionInfo info() const;
-  /// The newest frame, of this epoch or of one before; and whether its surface comes from a solve, here or in the session that
-  /// this one was made from.
+  /// The newest frame, of this epoch or an earlier one. has_surface(): whether its surface comes from a
+  /// solve, here or in the session that this one was made from.
   std::shared_ptr<const Frame> newest_frame() const { return publisher_->newest(); }
-  /// The reason of the fault for which there are no frames of the newest inputs; empty where there is none.
+  /// The reason of the fault that keeps the newest inputs from having frames; empty if there is none.
   std::string standing_fault() const;
   bool has_surface() const { return has_surface_ || newest_frame()->method != Method::kAuto; }
   WriterLease lease() const;
   std::int64_t created_unix_ms() const { return created_unix_ms_; }
-  /// Of the inputs: rises with each change that is to be kept.
+  /// Of the inputs: rises with each change that must be stored.
   std::uint64_t revision() const { return mailbox_.revision(); }
-  /// Who writes, and what has changed since `revision`; since 0, all.
+  /// The writer, and what has changed since `revision`; everything if that is 0.
   SessionChanges changes_since(std::uint64_t revision) const;
 
+  /// Proof that a caller has shown the writer token, and in which epoch. The token is checked once per call
+  /// or stream. After that this object stands for it, until another writer takes over.
+  struct Writer {
+    std::uint64_t epoch = 0;
+  };
   /// UNAUTHENTICATED WRITER_TOKEN_MISSING, PERMISSION_DENIED NOT_THE_WRITER.
-  absl::Status check_writer(const std::string& token) const;
+  absl::StatusOr<Writer> writer(const std::string& token) const;
 
-  /// A new token and a new epoch; the writer before is one no more, and its Solve and Deform calls end.
+  /// Makes a new token and a new epoch. The previous writer loses its rights, and its Solve and Deform calls
+  /// end.
   WriterLease acquire_writer();
 
-  /// Errors: as check_writer and Mailbox::take; once closed NOT_FOUND SESSION_UNKNOWN, or UNAVAILABLE DRAINING where it goes on
-  /// elsewhere.
-  absl::StatusOr<UpdateResult> update(const std::string& token, const Update& update);
+  /// Errors: that of `writer`; NOT_THE_WRITER if another writer has taken over since; those of Mailbox::take.
+  /// Once closed: NOT_FOUND SESSION_UNKNOWN, or UNAVAILABLE DRAINING if the session goes on elsewhere.
+  absl::StatusOr<UpdateResult> update(const absl::StatusOr<Writer>& writer, const Update& update);
 
-  /// Takes the newest step of the handles back, or does again what was taken back last. Errors: as check_writer and
-  /// Mailbox::undo; once closed as update().
-  absl::StatusOr<UndoResult> undo(const std::string& token, std::uint64_t input_seq, bool redo);
+  /// Undoes the newest step of the handles, or redoes the step that was undone last. Errors: as update(), and
+  /// those of Mailbox::undo.
+  absl::StatusOr<UndoResult> undo(const absl::StatusOr<Writer>& writer, std::uint64_t input_seq, bool redo);
 
-  /// Takes `update` in, if there is one, and runs `job`; an earlier job ends with ABORTED SUPERSEDED. Errors
-  /// as update(); then the job does not begin.
-  absl::Status solve(const std::string& token, const std::optional<Update>& update,
+  /// Takes `update`, if there is one, and runs `job`. An earlier job ends with ABORTED SUPERSEDED. Errors: as
+  /// update(); then the job does not begin.
+  absl::Status solve(const absl::StatusOr<Writer>& writer, const std::optional<Update>& update,
                      const std::shared_ptr<SolveJob>& job);
 
-  /// A new stream. With a token, it is the writer's, and ends when another takes over. Errors: as
-  /// check_writer where `token` is not empty; once closed as update(); UNAVAILABLE DRAINING; RESOURCE_EXHAUSTED STREAMS_FULL.
-  absl::StatusOr<std::shared_ptr<FrameStream>> open_stream(const std::string& token,
+  /// Opens a stream. A stream with a writer belongs to that writer and ends when another takes over. Errors:
+  /// NOT_THE_WRITER if another writer has taken over since; once closed as update(); UNAVAILABLE DRAINING;
+  /// RESOURCE_EXHAUSTED STREAMS_FULL.
+  absl::StatusOr<std::shared_ptr<FrameStream>> open_stream(const std::optional<Writer>& writer,
                                                            const StreamOptions& options);
-  /// Somebody looks on, or may go on with a drag that rests, even where nobody has called for long.
+  /// Whether a stream is open. Then the session is in use, even if no call has come for long: a reader
+  /// watches, or a drag rests.
   bool has_streams() const { return publisher_->reader_count() > 0; }
-  /// The stream has ended and is forgotten; with the last one, live solving rests.
+  /// Forgets a stream that has ended. When no stream is left, live solving pauses.
   void forget_stream(const FrameStream& stream);
 
-  /// NOT_FOUND STREAM_UNKNOWN, and as FrameStream::acknowledge.
+  /// Errors: NOT_FOUND STREAM_UNKNOWN, and those of FrameStream::acknowledge.
   absl::Status acknowledge(const std::string& stream_id, std::uint64_t frame_seq);
 
-  /// Ends every stream, as the server shuts down, and takes no more. A Solve call goes on.
+  /// Ends every stream because the server shuts down, and accepts no more. A Solve call goes on.
   void drain(const std::string& text);
 
-  /// Ends every stream and the solver. Again: nothing.
+  /// Ends every stream and the solver. A second call does nothing.
   void close(EndReason reason, const std::string& text);
   bool is_closed() const { return is_closed_; }
 
-  /// Somebody uses the session.
+  /// Notes that the session is in use.
   void touch();
-  /// The last time that anybody did; now where a Solve call runs.
+  /// When the session was last used; now if a Solve call runs.
   Timers::TimePoint last_used() const;
 
   bool run() override;
 
  private:
   Session(SessionParts parts, SessionServices services);
-  absl::Status check_writer_locked(const std::string& token) const;
+  absl::Status check_still_writes_locked(const absl::StatusOr<Writer>& writer) const;
+  template <typename Change>
+  auto take_in(const absl::StatusOr<Writer>& writer, const Change& change);
   absl::Status closed() const;
   std::shared_ptr<SolveJob> take_job();
   void end_job(const absl::Status& why);
@@ -191,11 +201,11 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   std::stop_source stop_;
   Mailbox mailbox_;
   const std::shared_ptr<Publisher> publisher_;
-  Reservation memory_;  // the scheduler's threads alone
+  Reservation memory_;  // used by the scheduler's threads only
   std::atomic<std::size_t> memory_bytes_;
-  std::unique_ptr<LiveSolver> solver_;  // the scheduler's threads alone
+  std::unique_ptr<LiveSolver> solver_;  // used by the scheduler's threads only
 
-  mutable std::mutex writing_;  // an update of an old writer never comes after a new one's first
+  mutable std::mutex writing_;  // no update of the old writer comes after the first of a new one
   std::string token_;
   std::uint64_t epoch_;
   std::vector<std::weak_ptr<FrameStream>> writers_;

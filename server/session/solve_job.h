@@ -14,7 +14,7 @@
 
 namespace lpdeform {
 
-/// What a Solve call asks for beside the session's handles and settings.
+/// What a Solve call asks for besides the session's handles and settings.
 struct SolveOptions {
   bool certify = false;
   bool keep_trace = false;
@@ -32,17 +32,19 @@ struct SolveResult {
   std::shared_ptr<const Frame> frame;
 };
 
-/// A Solve call on its way. Whoever ends it first decides how it ended; ending it stops the solver.
+/// A running Solve call. The first caller of finish() or abandon() decides how it ended. Both stop the
+/// solver.
 class SolveJob {
  public:
   using OnProgress = std::function<void(const SolveProgress&)>;
   using OnDone = std::function<void(absl::StatusOr<SolveResult>)>;
 
-  /// Both are called from any thread, under no lock; `on_done` once. `on_progress` may be empty.
+  /// Both callbacks are called from any thread and under no lock; `on_done` is called once. `on_progress` may
+  /// be empty.
   SolveJob(SolveOptions options, OnProgress on_progress, OnDone on_done)
       : options_(std::move(options)), on_progress_(std::move(on_progress)), on_done_(std::move(on_done)) {}
 
-  /// Different for every job of the process; over 1.
+  /// Unique within the process; over 1.
   std::uint64_t number() const { return number_; }
   const SolveOptions& options() const { return options_; }
   std::stop_token stop_token() const { return stop_.get_token(); }
@@ -58,13 +60,13 @@ class SolveJob {
     on_done_(std::move(result));
   }
 
-  /// Nobody waits for it any more: ends it without a word.
+  /// Ends the job without a call of `on_done`, because its caller waits no longer.
   void abandon() {
     is_done_ = true;
     stop_.request_stop();
   }
 
-  /// The inputs that it is for: a newer version supersedes it.
+  /// The inputs that the job is for. A newer version supersedes the job.
   std::uint64_t version = 0;
 
  private:

@@ -10,14 +10,15 @@ namespace lpdeform {
 
 inline constexpr std::chrono::seconds kStuckAfter{10};
 
-/// How the call ended that carried the stream.
+/// How the call that carried the stream ended.
 struct CallEnd {
   bool is_refused = false;
   bool is_past_deadline = false;
-  std::chrono::duration<double> unread{0};  // how long its reader has taken nothing of what waited for it
+  std::chrono::duration<double> unread{0};  // how long the reader has taken nothing of what waited for it
 };
 
-/// `by_server`: what the stream was ended with first, where it was. That counts even if the call was cut before it could be said.
+/// `by_server`: the first reason for which the server ended the stream, if it did. It counts even if the call
+/// was cut before the client could be told.
 StreamEnd stream_end_of(const std::optional<EndReason>& by_server, const CallEnd& call);
 
 }  // namespace lpdeform

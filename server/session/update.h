@@ -12,22 +12,22 @@
 
 namespace lpdeform {
 
-/// Lets go of a handle.
+/// Removes a handle.
 struct Removal {};
 
-/// A change of one handle: adds or replaces it, moves it, or lets go of it.
+/// A change of one handle: sets it (adds or replaces), moves it, or removes it.
 struct HandleChange {
   std::string name;
   std::variant<Handle, HandleMotion, Removal> change;
 };
 
-/// What is left out keeps its value.
+/// Settings that are absent keep their values.
 struct SettingsChange {
   std::optional<Field> p;
   std::optional<Field> stiffness;
   std::optional<double> length_unit;
   std::optional<SolveSettings> solver;
-  /// Vertices of the region of interest; none: everything may move.
+  /// Vertices of the region of interest; an empty list: everything may move.
   std::optional<std::vector<std::int32_t>> region;
 };
 
@@ -36,22 +36,22 @@ struct Update {
   std::uint64_t input_seq = 0;
   std::vector<HandleChange> handles;
   SettingsChange settings;
-  bool begins_step = false;  // of the history of handles
+  bool begins_step = false;  // a new step of the history of handles begins
 };
 
-/// How an update was taken.
+/// The result of an update.
 struct UpdateResult {
   std::uint64_t input_seq = 0;
   std::uint32_t stale_parts = 0;
-  std::uint64_t revision = 0;  // of the session's inputs, from which on the update is in them
-  bool is_kept = false;        // it is in the server's store
+  std::uint64_t revision = 0;  // of the session's inputs, once the update is in them
+  bool is_kept = false;        // whether the server's store has it
 };
 
-/// How a step was taken back, or done again.
+/// The result of an undo or a redo.
 struct UndoResult {
   UpdateResult update;
-  std::vector<HandleChange> changes;           // that were made
-  std::size_t undo_steps = 0, redo_steps = 0;  // that there are now
+  std::vector<HandleChange> changes;           // the changes that were made
+  std::size_t undo_steps = 0, redo_steps = 0;  // after the undo or redo
 };
 
 }  // namespace lpdeform

@@ -38,7 +38,7 @@ absl::Status write_all(int fd, std::string_view bytes, const std::string& path) 
   return fsync(fd) == 0 ? absl::OkStatus() : failed(path, errno);
 }
 
-/// So that a file's name is on the disk, too.
+/// Syncs the folder, so that a file's name is on the disk, too.
 absl::Status sync_folder(const std::string& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0) return failed(path, errno);
@@ -67,7 +67,7 @@ absl::Status make_private_folder(const std::string& path) {
 
 absl::StatusOr<BlobFolder> BlobFolder::open(const std::string& path) {
   if (absl::Status status = make_private_folder(path); !status.ok()) return status;
-  // One of a server before this one's time may be open to all. Where the disk knows no modes, it stays so.
+  // A folder made by an older server may be open to all users. On a disk without modes it stays so.
   static_cast<void>(chmod(path.c_str(), S_IRWXU));
   std::error_code error;
   for (auto file = std::filesystem::directory_iterator(path, error); !error && file != end(file);

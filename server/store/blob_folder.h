@@ -11,28 +11,30 @@
 
 namespace lpdeform {
 
-/// Makes a folder that only its user may look into, and the folders above it where there are none; leaves one that is there as it is.
-/// UNAVAILABLE STORE_FAILING, RESOURCE_EXHAUSTED STORE_FULL.
+/// Makes a folder that only its user may read, and the folders above it if they do not exist. An existing
+/// folder stays as it is. UNAVAILABLE STORE_FAILING, RESOURCE_EXHAUSTED STORE_FULL.
 absl::Status make_private_folder(const std::string& path);
 
-/// Blobs as files of a folder, each named by its key: a file that has its name is whole and on the disk. Thread-safe,
-/// but for remove() of a blob that is being written.
+/// Blobs as files of a folder, each named by its key. A file under its final name is complete and on the
+/// disk. Thread-safe, except for remove() of a blob that is being written.
 class BlobFolder {
  public:
-  /// Makes the folder where there is none, and clears away what an interrupted write left. UNAVAILABLE STORE_FAILING,
-  /// RESOURCE_EXHAUSTED STORE_FULL.
+  /// Makes the folder if it does not exist, and removes what an interrupted write left. UNAVAILABLE
+  /// STORE_FAILING, RESOURCE_EXHAUSTED STORE_FULL.
   static absl::StatusOr<BlobFolder> open(const std::string& path);
 
-  /// Nothing where it is there already. UNAVAILABLE STORE_FAILING, RESOURCE_EXHAUSTED STORE_FULL: nothing is kept.
+  /// Does nothing if the blob exists. UNAVAILABLE STORE_FAILING, RESOURCE_EXHAUSTED STORE_FULL: nothing is
+  /// stored.
   absl::Status write(const std::string& key, std::string_view bytes) const;
 
-  /// NOT_FOUND SESSION_DAMAGED where it is not there or is not what it was; UNAVAILABLE STORE_FAILING.
+  /// NOT_FOUND SESSION_DAMAGED if the blob is missing or its contents have changed; UNAVAILABLE
+  /// STORE_FAILING.
   absl::StatusOr<std::string> read(const std::string& key) const;
 
   void remove(const std::string& key) const;
 
   absl::StatusOr<std::set<std::string>> keys() const;
-  /// Of all blobs.
+  /// Total size of all blobs.
   absl::StatusOr<std::uint64_t> bytes() const;
 
  private:

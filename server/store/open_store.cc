@@ -25,7 +25,7 @@ absl::StatusOr<std::shared_ptr<Store>> open_store(const std::string& name, const
   if (absl::StartsWith(name, kSqlite) && name.size() > kSqlite.size()) {
     return open_sqlite_store({name.substr(kSqlite.size()), options.most_bytes});
   }
-  // As other programs take a password: not to be repeated.
+  // A password in the address, as other programs take it, must not appear in the error.
   if (absl::StartsWith(name, "redis") && absl::StrContains(name, '@')) {
     return make_fault({Reason::kOptionOutOfRange, "store", "redis://HOST:PORT"},
                       "Option --store takes no user and no password: give them as --store-user and "

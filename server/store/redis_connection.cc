@@ -55,7 +55,7 @@ absl::Status RedisConnection::no_answer(const std::string& what) {
   return store_away(what, place());
 }
 
-/// For one answer. Not above 0 once there is none left.
+/// For one answer. It is 0 or negative when no time is left.
 std::chrono::milliseconds RedisConnection::time_left() const {
   const auto end = end_.load();
   if (end == std::chrono::steady_clock::time_point::max()) return patience_;
@@ -121,7 +121,7 @@ absl::StatusOr<std::vector<RedisReply>> RedisConnection::send(const std::vector<
     replies.push_back(read(*reply));
   }
   if (refused.empty()) return replies;
-  // Its word for: over maxmemory.
+  // "OOM" is how Redis says that it is over maxmemory.
   if (absl::StartsWith(refused, "OOM")) return store_full(refused, "", place());
   return failure(refused);
 }

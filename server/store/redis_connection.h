@@ -14,7 +14,7 @@ struct redisContext;
 
 namespace lpdeform {
 
-/// What Redis answers.
+/// An answer of Redis.
 struct RedisReply {
   bool is_nothing = false;  // nil
   std::int64_t number = 0;
@@ -22,15 +22,16 @@ struct RedisReply {
   std::vector<RedisReply> elements;
 };
 
-/// Who one is to a Redis that asks.
+/// The user name and password for Redis.
 struct RedisLogin {
-  std::string user = {};           // empty: the one of a Redis that knows a password alone
-  std::string password_file = {};  // its first line; empty: it does not ask
+  std::string user = {};           // empty: Redis's default user
+  std::string password_file = {};  // the password is its first line; empty: Redis needs none
 };
 
-/// A connection to a Redis server, made anew after a failure, when it is next needed. For one thread at a time. Errors are
-/// UNAVAILABLE STORE_FAILING, store_away() where nothing answers; whether the commands were carried out is not known then. The password is read again with each
-/// connection, and in no text.
+/// A connection to a Redis server. After a failure it is opened again when it is next needed. For one thread
+/// at a time. Errors are UNAVAILABLE STORE_FAILING, and store_away() if nothing answers; in both cases the
+/// commands may or may not have been carried out. The password is read again for each connection and appears
+/// in no text.
 class RedisConnection {
  public:
   RedisConnection(std::string host, int port, std::chrono::milliseconds patience, RedisLogin login = {});
@@ -39,10 +40,11 @@ class RedisConnection {
   using Command = std::vector<std::string>;
 
   absl::StatusOr<RedisReply> run(const Command& command);
-  /// Sends all, then reads the answers: one journey.
+  /// Sends all commands, then reads the answers: one round trip.
   absl::StatusOr<std::vector<RedisReply>> run(const std::vector<Command>& commands);
 
-  /// After this moment nothing is waited for any more; by another thread, too, which then need not wait for this one.
+  /// Sets a deadline: after `end` the connection waits for nothing any more. May be called by another thread,
+  /// which then need not wait for this one.
   void end_by(std::chrono::steady_clock::time_point end) { end_ = end; }
 
  private:

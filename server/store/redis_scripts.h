@@ -3,23 +3,26 @@
 #include <cstdint>
 #include <string>
 
-/// What RedisStore has Redis do, in Lua, each of it at once or not at all, and what it answers. The keys: redis_store.h.
+/// The Lua scripts that RedisStore runs in Redis, and their answers. Each script is atomic. redis_store.h
+/// lists the keys.
 namespace lpdeform::redis_scripts {
 
 inline const std::string kSession = "lpdeform:s:", kBlob = "lpdeform:b:";
 inline const std::string kPart = "p:";
 
-/// What needs next to no memory, or frees it, is done where Redis is full, too.
+/// For scripts that need next to no memory, or free it: they run when Redis is full, too.
 inline const std::string kAlways = "#!lua flags=allow-oom\n";
 
-// Of all scripts, KEYS[1] is the session's hash and ARGV[1] the holder, where nothing else is said.
+// In all scripts KEYS[1] is the session's hash and ARGV[1] the holder, unless the comment says otherwise.
 inline const std::string kNow =
     "local t = redis.call('TIME'); local now = t[1] * 1000 + math.floor(t[2] / 1000); ";
 
-/// `ran`: for how long servers have run so far and reached Redis, in milliseconds: what use is dated by.
+/// `ran`: for how long servers have run so far and reached Redis, in milliseconds. The last use of a session
+/// is dated by it.
 inline const std::string kRan = "local ran = tonumber(redis.call('HGET', 'lpdeform:time', 'ran') or '0'); ";
 
-/// No keys. ARGV: the longest time between two of these that counts: a longer one passed without servers, or without Redis. `ran`.
+/// Advances `ran` and returns it. No keys. ARGV: the longest time between two calls that counts; during a
+/// longer one no server ran, or none reached Redis.
 inline const std::string kTick =
     kAlways + kNow + kRan +
     "local step = now - tonumber(redis.call('HGET', 'lpdeform:time', 'at') or now); "
@@ -28,15 +31,16 @@ inline const std::string kTick =
 
 inline const std::string kUsed = kRan + "redis.call('ZADD', 'lpdeform:used', ran, KEYS[1]); ";
 
-/// A function: this blob is no more one of the session's.
+/// A function: takes this blob away from the session.
 inline const std::string kLetGoOf =
     "local function let_go_of(blob, name) "
     "  redis.call('SREM', 'lpdeform:u:' .. blob, name); "
     "  if redis.call('SCARD', 'lpdeform:u:' .. blob) == 0 then redis.call('DEL', 'lpdeform:b:' .. blob) end "
     "end ";
 
-/// A function: all that there is of a session goes. What is left says that it did, and from which epoch on it may be written again, if
-/// at all (false: as it was). Of the `most` that went last; `forgot`: when the last one went of which that is no longer known.
+/// A function: removes everything of a session. It remembers that the session was removed, and the epoch from
+/// which on the session may be written again: 'never', a given epoch, or (false) the epoch that it had. The
+/// newest `most` removals are remembered. `forgot` is the `ran` of the newest removal that no longer is.
 inline const std::string kForget =
     kLetGoOf +
     "local function forget(key, epoch, most) "
@@ -59,8 +63,9 @@ inline const std::string kForget =
     "  end "
     "end ";
 
-/// A function of what HMGET has of holder and epoch, the epoch that the holder knows as kept, and `ran` when it was last told of its
-/// sessions: whether the store has lost the session, or gone back to before that epoch, and nobody has removed it since, nor can have.
+/// A function: whether the store has lost the session, or has gone back to before the given epoch, while
+/// nobody can have removed the session. Arguments: HMGET of holder and epoch; the epoch that the holder knows
+/// as stored; `ran` when the holder last heard of its sessions.
 inline const std::string kIsLost =
     "local function is_lost(has, epoch, told) "
     "  if has[1] then return tonumber(has[2]) < tonumber(epoch) end "
@@ -73,7 +78,8 @@ inline const std::string kIsLost =
     "  return not (forgot and tonumber(told) <= tonumber(forgot)) "
     "end ";
 
-/// No keys. ARGV: owner, the key of the session before the first, how many. Those that have expired go from the set.
+/// Lists an owner's sessions. No keys. ARGV: owner, the key after which the list begins, how many. Removes
+/// entries of sessions that no longer exist.
 inline const std::string kList =
     "local all, from, most = 'lpdeform:o:' .. redis.sha1hex(ARGV[1]), '(' .. ARGV[2], tonumber(ARGV[3]); "
     "local found = {}; "
@@ -88,10 +94,12 @@ inline const std::string kList =
     "end "
     "return found";
 
-/// ARGV: holder, epoch before, epoch, lease, replaces all ("0", "1", or "2" where it is written anew), revision before, revision,
-/// `ran` when told, then names and values of hash fields in turn, "=" before a value that is set and "-" for one that goes. 1: done; 0: fenced;
-/// 2: behind, which it is not where it has more than that (the answer to the change before was lost), nor where nothing was
-/// changed since it was taken over; 4: lost.
+/// Writes a change. ARGV: holder, epoch before, epoch, lease, mode ("0": change some parts, "1": replace all
+/// parts, "2": write a lost session again), revision before, revision, `ran` when the holder last heard of
+/// its sessions. Then names and values of hash fields in turn, with "=" before a value to set and "-" for a
+/// field to delete. Answers: 1: done; 0: fenced; 2: behind; 4: lost. It is not behind if the store has a
+/// higher revision (the answer to the change before was lost), nor if nothing was changed since the session
+/// was taken over.
 inline const std::string kCommit =
     kNow + kIsLost + kLetGoOf +
     "local name = string.sub(KEYS[1], 12); "
@@ -129,10 +137,12 @@ inline const std::string kCommit =
     "end " +
     kUsed + "return 1";
 
-/// Of holders whose presence Redis sees: as long as they listen on a channel of their name. Their connections end with them.
+/// The prefix of holders whose presence Redis can see. Each listens on a channel of its name, as long as its
+/// connection lives.
 inline const std::string kShown = "shown:", kPresence = "lpdeform:h:";
 
-/// A function: whether this holder has ended. One that is cut off or stopped has not, as far as Redis knows.
+/// A function: whether this holder's process has ended. A server that is cut off or stopped has not ended as
+/// far as Redis knows.
 inline const std::string kIsGone =
     "local function is_gone(holder) "
     "  if string.sub(holder or '', 1, 6) ~= 'shown:' then return false end "
@@ -140,11 +150,14 @@ inline const std::string kIsGone =
     "  return not listening.err and listening[2] == 0 "
     "end ";
 
-/// That somebody wants a session is remembered for so many milliseconds.
+/// For how many milliseconds Redis remembers that a server wants a session.
 inline const std::string kWanted = "1000";
 
-/// ARGV: holder, owner, lease, route, stays, by how much the epoch rises. -1: none; -2 and its route: held by another, or for another; else the hash, in
-/// the new epoch. `until`: it is in use; `alive`: its holder lives; `since`: it came; `stays`: for so long at least.
+/// Takes a session over. ARGV: holder, owner, lease, route, stays, by how much the epoch rises. Answers: -1:
+/// no such session; -2 and the session's route: another holder has it, or another one is to get it; else the
+/// hash, in the new epoch. Fields of the hash: `until`: end of the lease while it is in use; `alive`: end of
+/// the lease while its holder lives; `since`: when it was taken over; `stays`: for how long at least it stays
+/// with its holder.
 inline const std::string kTakeOver =
     kAlways + kNow + kIsGone +
     "local has = redis.call('HMGET', KEYS[1], 'holder', 'owner', 'route', 'wanter'); "
@@ -174,8 +187,10 @@ inline const std::string kTakeOver =
     "redis.call('HDEL', KEYS[1], 'revision', 'wanted', 'wanter'); " +
     kUsed + "return redis.call('HGETALL', KEYS[1])";
 
-/// ARGV: holder, epoch, lease, 1 where it is in use and 2 where it is being made, revision, `ran` when told. 0: another has it, or it was
-/// removed; 2: it is behind; 3: another wants it; 4: it, or one of its blobs, is lost.
+/// Renews a lease. ARGV: holder, epoch, lease, use (0: unused, 1: in use, 2: being made), revision, `ran`
+/// when the holder last heard of its sessions. Answers: 1: done; 0: another holder has the session, or it was
+/// removed; 2: the store is behind; 3: another server wants the session; 4: the store lost the session or one
+/// of its blobs.
 inline const std::string kTouch =
     kAlways + kNow + kIsLost +
     "local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch', 'blobs', 'revision', 'wanted'); "
@@ -192,7 +207,8 @@ inline const std::string kTouch =
     "if has[5] and now - tonumber(has[5]) < " +
     kWanted + " then return 3 end return 1";
 
-/// ARGV: holder, 1 where it goes only if the holder has it in this epoch or one before, epoch, `most_gone`. 0: it has it no more.
+/// Removes a session. ARGV: holder; 1 if only a session that the holder has in this epoch or an earlier one
+/// may be removed; epoch; `most_gone`. Answers: 1: removed; 0: the holder does not have it any more.
 inline const std::string kRemove =
     kAlways + kForget +
     "if ARGV[2] == '0' then forget(KEYS[1], 'never', tonumber(ARGV[4])) return 1 end "
@@ -200,22 +216,24 @@ inline const std::string kRemove =
     "if has[1] and (has[1] ~= ARGV[1] or tonumber(has[2]) > tonumber(ARGV[3])) then return 0 end "
     "forget(KEYS[1], ARGV[3], tonumber(ARGV[4])); return 1";
 
-/// No keys. ARGV: idle, at most how many, `most_gone`. How many went.
+/// Removes unused sessions. No keys. ARGV: for how long unused, how many at most, `most_gone`. Answer: how
+/// many were removed.
 inline const std::string kRemoveUnused =
     kAlways + kForget + kRan +
     "local keys = redis.call('ZRANGEBYSCORE', 'lpdeform:used', '-inf', ran - ARGV[1], 'LIMIT', 0, ARGV[2]); "
     "for _, key in ipairs(keys) do forget(key, false, tonumber(ARGV[3])) end "
     "return #keys";
 
-/// ARGV: the blob's key. The session's use of it, which begins before the session is there. 1: the blob is there.
+/// Notes that the session uses a blob, also before the session exists. ARGV: the blob's key. Answer: 1: the
+/// blob exists.
 inline const std::string kUseBlob =
     kUsed +
     "local name = string.sub(KEYS[1], 12); "
     "redis.call('SADD', 'lpdeform:m:' .. name, ARGV[1]); redis.call('SADD', 'lpdeform:u:' .. ARGV[1], name); "
     "return redis.call('EXISTS', 'lpdeform:b:' .. ARGV[1])";
 
-/// ARGV: holder, epoch. Not where the same holder has taken it over again meanwhile. Nobody holds it then: a touch that was under way
-/// does not renew the lease.
+/// Releases a session, unless the same holder has taken it over again meanwhile. ARGV: holder, epoch.
+/// Afterwards the session has no holder, so a touch that was under way does not renew the lease.
 inline const std::string kLetGo = kAlways +
                                   "local has = redis.call('HMGET', KEYS[1], 'holder', 'epoch'); "
                                   "if has[1] == ARGV[1] and has[2] == ARGV[2] then "
@@ -224,6 +242,6 @@ inline const std::string kLetGo = kAlways +
                                   "return 1";
 
 inline constexpr std::int64_t kIsFenced = 0, kDone = 1, kIsBehind = 2, kIsWanted = 3, kHasLostIt = 4,
-                              kIsHeld = -2;  // as scripts answer
+                              kIsHeld = -2;  // answers of the scripts
 
 }  // namespace lpdeform::redis_scripts

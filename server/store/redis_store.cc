@@ -44,13 +44,13 @@ class RedisStore final : public Store {
         presence_(options.host, options.port, options.patience, options.login),
         teller_(options.host, options.port, options.patience, options.login) {}
 
-  /// To be called once, before all else.
+  /// Called once, before any other function.
   absl::Status begin() {
     const std::scoped_lock lock(touching_);
     holder_ = kShown + holder_;
     is_shown_ = show().ok();
     if (!is_shown_)
-      holder_ = random_hex_128();  // a user who may not listen: others wait for the lease to end
+      holder_ = random_hex_128();  // this user may not SUBSCRIBE, so others wait for the lease to end
     const auto ran = toucher_.run({"HGET", "lpdeform:time", "ran"});
     if (!ran.ok()) return ran.status();
     if (!ran->is_nothing && !absl::SimpleAtoi(ran->text, &ran_))
@@ -86,18 +86,20 @@ class RedisStore final : public Store {
   std::string lease() const { return absl::StrCat(options_.lease.count()); }
   std::string most_gone() const { return absl::StrCat(options_.most_gone); }
   std::string told() const { return absl::StrCat(told_.load()); }
-  /// Also where it is shown already. Finds out whether the connection is there.
+  /// Shows the holder's presence; may be called again. Fails if the connection is gone.
   absl::Status show() { return presence_.run({"SUBSCRIBE", kPresence + holder_}).status(); }
 
   const RedisStoreOptions options_;
-  std::string holder_ = random_hex_128();  // from begin() on the same
-  bool is_shown_ = false;                  // likewise
-  /// What Redis had of `ran` at the last touch, and at the last one whose answers were all heeded: before the next one began.
+  std::string holder_ = random_hex_128();  // constant after begin()
+  bool is_shown_ = false;                  // constant after begin()
+  /// ran_: `ran` in Redis at the last touch. told_: `ran` at the last touch whose answers have all been
+  /// handled.
   std::int64_t ran_ = 0;
   std::atomic<std::int64_t> told_{0};
   std::mutex writing_, reading_, touching_;
-  // The third one, so that leases are renewed while a large mesh is on its way; the fourth goes with it. The last one asks what a
-  // user may not be allowed to ask, which ends a connection.
+  // The toucher has a connection of its own, so that leases are renewed while a large mesh is being sent.
+  // Presence needs one because it is subscribed. The last connection asks for figures: a user without
+  // permission for that loses the connection.
   RedisConnection writer_, reader_, toucher_, presence_, teller_;
 };
 
@@ -227,7 +229,7 @@ absl::StatusOr<TouchResult> RedisStore::touch(std::span<const TouchedSession> se
 }
 
 absl::StatusOr<std::size_t> RedisStore::remove_unused(std::int64_t idle_ms) {
-  constexpr std::int64_t kAtOnce = 100;  // others wait meanwhile
+  constexpr std::int64_t kAtOnce = 100;  // limited, because other callers wait meanwhile
   const std::scoped_lock lock(touching_);
   for (std::size_t removed = 0;;) {
     const auto went =

@@ -16,37 +16,45 @@ struct RedisStoreOptions {
   int port = 6379;
   RedisLogin login = {};
   std::chrono::milliseconds lease = std::chrono::milliseconds(900);
-  std::chrono::milliseconds stays = std::chrono::seconds(1);     // at least, with whom it has just come to
+  std::chrono::milliseconds stays = std::chrono::seconds(
+      1);  // a session stays this long at least with a server that has just taken it over
   std::chrono::milliseconds patience = std::chrono::seconds(2);  // for one answer
-  std::int64_t most_gone = 100'000;                              // names of sessions that were removed
+  std::int64_t most_gone = 100'000;                              // how many removed sessions are remembered
 };
 
-/// A store in Redis that several servers share. A session is a hash with its parts, its epoch, who holds it and until when,
-/// by Redis's clock: each change is a script that first looks whether the holder and the epoch are the right ones, so a
-/// server that was stopped, cut off or slow changes nothing once another has taken over. What is durable is as durable as
-/// Redis is set to make it (appendonly yes, appendfsync always).
+/// A store in Redis that several servers share. A session is a hash with its parts, its epoch, its holder,
+/// and the end of the holder's lease by Redis's clock. Each change is a script that first checks the holder
+/// and the epoch (fencing). So a server that was stopped, cut off or slow changes nothing once another has
+/// taken the session over. Data is as durable as Redis is configured to make it (appendonly yes, appendfsync
+/// always).
 ///
-/// A holder listens on a channel of its name. Where nobody does any more, its process has ended, and its sessions are free at once;
-/// where a server is stopped or cut off, and Redis does not know, they are once the lease has. Who is taken for gone and is not, as its
-/// connection broke, is fenced off as any other. A user of Redis who may not SUBSCRIBE is held by the lease alone.
+/// A holder listens on a channel of its name. If nobody listens there any more, the holder's process has
+/// ended, and its sessions are free at once. If a server is stopped or cut off without Redis knowing, its
+/// sessions are free when the lease ends. A server that lost only its connection may be taken for ended; it
+/// is then fenced like any other. A user of Redis who may not SUBSCRIBE holds sessions by the lease alone.
 ///
-/// A session that is wanted by the way of its callers is kept for who wants it first. Where two servers want it from each other
-/// in turn, as behind proxies that know different sets of them, it stays twice as long each time, up to 32 times `stays`.
+/// If several servers want a session for callers of its route, the first of them gets it. If two servers want
+/// it from each other in turn, as behind proxies that know different sets of servers, it stays twice as long
+/// each time, up to 32 times `stays`.
 ///
-/// Nothing expires by Redis's clock, which goes on while Redis is away and while no server runs: use is dated by the time that
-/// servers have run and reached Redis, and remove_unused() goes by it. A session that Redis has lost, or whose epoch is less than
-/// its holder knows as kept, is told from one that was removed (kLost): the holder writes it anew, with its blobs. One that
-/// was removed leaves behind that it was, and one that was removed as unused the epoch from which on it may be
-/// written anew: by a holder that was cut off and has it in use, where nobody else had it since. The last `most_gone` are remembered,
-/// some 200 bytes each; what a holder does not find that was last in touch before one that is forgotten counts as removed.
+/// Nothing expires by Redis's clock, because that clock goes on while Redis is away or no server runs. The
+/// last use of a session is dated by the time that servers have run and reached Redis, and remove_unused()
+/// compares with that. A session that Redis has lost, or whose epoch is lower than its holder knows as
+/// stored, differs from a removed one (kLost): the holder writes it again, with its blobs. Of a removed
+/// session Redis remembers the removal. If it was removed as unused, Redis also remembers the epoch from
+/// which on it may be written again: by a holder that was cut off and has it in use, if no other server has
+/// had it since. Redis remembers the last `most_gone` removals, about 200 bytes each. If a holder last heard
+/// of its sessions before a removal that is forgotten, a session that it does not find counts as removed.
 ///
-/// Keys: lpdeform:s:SESSION, a hash; lpdeform:b:KEY, a blob; lpdeform:u:KEY, the set of sessions that have it; lpdeform:m:SESSION,
-/// of one that is being made, the set of its blobs' keys; lpdeform:r:OWNER:REQUEST, a session's name; lpdeform:o:OWNER, the sorted
-/// set of an owner's sessions; lpdeform:used, that of all, by their last use; lpdeform:time, its clock; lpdeform:gone, the
-/// sorted set of those that are gone, by when; lpdeform:gone:epochs, a hash of those that may be written anew. A
-/// channel: lpdeform:h:HOLDER. Redis 7.0 or later.
+/// Keys: lpdeform:s:SESSION, a hash; lpdeform:b:KEY, a blob; lpdeform:u:KEY, the set of sessions that use the
+/// blob; lpdeform:m:SESSION, for a session that is being made, the set of its blobs' keys;
+/// lpdeform:r:OWNER:REQUEST, a session's name; lpdeform:o:OWNER, the sorted set of an owner's sessions;
+/// lpdeform:used, the sorted set of all sessions by their last use; lpdeform:time, the clock of servers'
+/// running time; lpdeform:gone, the sorted set of removed sessions, by when they were removed;
+/// lpdeform:gone:epochs, a hash of those that may be written again. Channel: lpdeform:h:HOLDER. Redis 7.0 or
+/// later.
 ///
-/// UNAVAILABLE STORE_FAILING where Redis does not answer; later on the store finds it again by itself.
+/// UNAVAILABLE STORE_FAILING if Redis does not answer. If Redis fails later, the store reconnects by itself.
 absl::StatusOr<std::shared_ptr<Store>> open_redis_store(const RedisStoreOptions& options);
 
 }  // namespace lpdeform

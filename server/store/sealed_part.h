@@ -6,10 +6,11 @@
 
 namespace lpdeform {
 
-/// The value with a checksum (CRC-32C) before it: over the value and where it belongs, so that one cannot stand in for another.
+/// The value with a checksum (CRC-32C) before it. The checksum covers the value, the session and the part's
+/// name, so that one part cannot be taken for another.
 std::string sealed(const std::string& session, const std::string& part, const std::string& value);
 
-/// The value again. NOT_FOUND SESSION_DAMAGED.
+/// The value without its checksum. NOT_FOUND SESSION_DAMAGED.
 absl::StatusOr<std::string> unsealed(const std::string& session, const std::string& part, std::string bytes);
 
 }  // namespace lpdeform

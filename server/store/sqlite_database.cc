@@ -17,16 +17,17 @@
 namespace lpdeform {
 namespace {
 
-/// Of a log. Without it, whatever comes after it is none.
+/// Size of the log's header. Without a valid header SQLite ignores the rest of the log.
 constexpr std::size_t kLogHeaderBytes = 32;
 
-/// Makes an empty file for its user alone, which SQLite's own files take after; one that is there becomes so. Never closes one that is
-/// there: that would let go of the locks that this process has on it.
+/// Makes an empty file that only its user may read; SQLite gives its own files the same mode. An existing
+/// file gets this mode, too. This function never closes an existing file: that would release the locks that
+/// this process has on it.
 void keep_private(const std::string& path) {
   const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
   if (fd >= 0) close(fd);
   for (const char* const suffix : {"", "-wal", "-shm"}) {
-    // Where the disk knows no modes, or the file is somebody else's, it stays as it is.
+    // If the disk knows no modes, or the file belongs to another user, the mode stays as it is.
     static_cast<void>(chmod(absl::StrCat(path, suffix).c_str(), S_IRUSR | S_IWUSR));
   }
 }
@@ -73,8 +74,9 @@ absl::StatusOr<std::unique_ptr<SqliteDatabase>> SqliteDatabase::open(const std::
   int chunk = kChunkBytes, is_log_kept = 1;
   sqlite3_file_control(opened, "main", SQLITE_FCNTL_CHUNK_SIZE, &chunk);
   sqlite3_file_control(opened, "main", SQLITE_FCNTL_PERSIST_WAL, &is_log_kept);
-  // Alone in the file from its first look on, so no memory is shared with other processes, which would be another file; every commit is on the disk when it returns. Debian's SQLite
-  // overwrites all that is deleted: a deletion would take as much of the log as what it deletes.
+  // The file is locked exclusively from its first use, so there is no shared memory with other processes,
+  // which would be another file. Every commit is on the disk when it returns. Debian's SQLite overwrites
+  // deleted data, so a deletion would take as much of the log as the data.
   const absl::Status set = database->run(
       absl::StrCat("PRAGMA locking_mode=EXCLUSIVE; PRAGMA auto_vacuum=INCREMENTAL; PRAGMA journal_mode=WAL;"
                    "PRAGMA synchronous=FULL; PRAGMA secure_delete=FAST; PRAGMA journal_size_limit=",
@@ -85,7 +87,8 @@ absl::StatusOr<std::unique_ptr<SqliteDatabase>> SqliteDatabase::open(const std::
   return database;
 }
 
-/// SQLite reads a log up to what is none, and writes it from the beginning again and again.
+/// Reserves the log's blocks once. SQLite reads a log up to the first invalid frame, and overwrites it from
+/// the beginning again and again.
 absl::Status SqliteDatabase::reserve_log() {
   if (has_log_) return absl::OkStatus();
   const std::string log = path_ + "-wal";
@@ -108,14 +111,15 @@ absl::Status SqliteDatabase::grow_to(std::int64_t bytes) {
   return store_full(absl::StrCat("its file cannot grow (SQLite ", result, ")"), "", path_);
 }
 
-/// All of it into the database. Its header goes while nobody else can have the database: so what is left of it is never taken for a
-/// part of another database that is put into this one's place. False where that is not to be had.
+/// Copies the whole log into the database, and clears the log's header while no other process can open the
+/// database. So the rest of the log is never taken for a part of another database that is put in this one's
+/// place. Returns false if that fails.
 bool SqliteDatabase::empty_log() {
   int frames = 0, copied = 0;
   const int result =
       sqlite3_wal_checkpoint_v2(database_.get(), "main", SQLITE_CHECKPOINT_PASSIVE, &frames, &copied);
   if (result != SQLITE_OK || frames != copied) return false;
-  // With a limit, SQLite would cut it off as it closes.
+  // With a limit, SQLite would truncate the log when it closes it.
   if (!run("PRAGMA journal_size_limit = -1").ok()) return false;
   const int fd = ::open((path_ + "-wal").c_str(), O_WRONLY | O_CLOEXEC);
   if (fd < 0) return false;
@@ -214,7 +218,7 @@ SqliteTransaction::SqliteTransaction(SqliteTransaction&& other) noexcept
     : database_(std::exchange(other.database_, nullptr)) {}
 
 SqliteTransaction::~SqliteTransaction() {
-  // SQLite undoes some failures by itself; then there is nothing left to undo.
+  // SQLite rolls some failures back by itself; then there is nothing to roll back, and the error is ignored.
   if (database_ != nullptr) database_->run("ROLLBACK").IgnoreError();
 }
 

@@ -12,12 +12,13 @@
 namespace lpdeform {
 namespace {
 
-/// Free pages that are kept for what comes next, and how many are given back at a time: each moves another one into its place.
+/// Free pages that are kept for later changes, and how many pages are given back at a time; each one moves
+/// another page into its place.
 constexpr std::int64_t kKeptPages = 512, kGivenPages = 256;
-/// That a change may need beside its rows: inner nodes of trees, which split.
+/// Pages that a change may need besides its rows: inner nodes of trees, which may split.
 constexpr std::int64_t kInnerPages = 16;
 
-/// What a row takes beside its value, and from which size on a value has pages of its own.
+/// Bytes of a row besides its value, and the size from which on a value has pages of its own.
 constexpr std::size_t kRowBytes = 64, kLargeValue = 2000;
 
 }  // namespace
@@ -53,14 +54,14 @@ absl::StatusOr<SqliteRoom::Pages> SqliteRoom::pages() {
   return pages;
 }
 
-/// SQLite never takes pages away that are in use.
+/// SQLite never removes pages that are in use.
 absl::Status SqliteRoom::limit_to(std::int64_t pages) {
   return database_.run(absl::StrCat("PRAGMA max_page_count = ", std::max<std::int64_t>(1, pages)).c_str());
 }
 
 absl::Status SqliteRoom::prepare(const ChangeSize& size, std::uint64_t blob_bytes) {
   if (size.is_removal) return prepare_removal();
-  // Where the log has no room either, the change itself will say so.
+  // If the log has no room either, the change itself will fail.
   static_cast<void>(database_.reserve_log());
   auto before = pages();
   if (!before.ok()) return before.status();
@@ -73,11 +74,12 @@ absl::Status SqliteRoom::prepare(const ChangeSize& size, std::uint64_t blob_byte
     if (static_cast<std::int64_t>(size.bytes) / before->size > left) return over_limit();
   }
   if (const std::int64_t missing = need - before->free; missing > before->on_disk - before->used) {
-    // What it cannot have, the change may do without.
+    // The change may succeed without the pages that the file cannot get.
     const std::int64_t wanted =
         std::min(before->used + missing, std::max(most + kSparePages, before->used + kSparePages));
     if (!database_.grow_to(wanted * before->size).ok())
-      database_.grow_to(before->on_disk * before->size + 1).IgnoreError();  // the least that it can grow by
+      database_.grow_to(before->on_disk * before->size + 1)
+          .IgnoreError();  // the smallest step by which it can grow
     before = pages();
     if (!before.ok()) return before.status();
   }

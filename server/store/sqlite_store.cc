@@ -24,7 +24,7 @@ std::int64_t unix_ms_now() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(now).count();
 }
 
-/// Of those that nobody uses, at once.
+/// How many unused sessions are removed at once.
 constexpr std::size_t kRemovalsAtOnce = 16;
 
 class SqliteStore final : public Store {
@@ -65,17 +65,18 @@ class SqliteStore final : public Store {
   absl::StatusOr<std::vector<ChangeOutcome>> make(std::span<const StoredChange> changes);
   void drop_unused_blobs();
 
-  std::mutex mutex_;  // guards all
+  std::mutex mutex_;  // guards all members
   const std::unique_ptr<SqliteDatabase> database_;
-  const BlobFolder folder_;  // on any thread
+  const BlobFolder folder_;  // thread-safe by itself
   KeptBlobs blobs_{folder_};
   SqliteRoom room_;
   const std::int64_t opened_ms_ = unix_ms_now();
   SqliteStatements statements_;
-  std::set<std::string> removed_;  // sessions that have parts left, and nothing else
+  std::set<std::string> removed_;  // sessions of which only parts are left
 };
 
-/// Statements, and what an earlier process left half done: blobs that no session has, and parts.
+/// Prepares the statements, and removes what an earlier process left unfinished: blobs and parts of no
+/// session.
 absl::Status SqliteStore::prepare() {
   auto statements = prepare_statements(*database_);
   if (!statements.ok()) return statements.status();
@@ -109,7 +110,7 @@ absl::StatusOr<std::vector<ChangeOutcome>> SqliteStore::commit(std::span<const S
     blobs_.finish(one.session);
     if (one.is_removal) removed_.insert(one.session);
     if (!one.is_removal && one.epoch_before == 0)
-      removed_.erase(one.session);  // begin() has removed all of it
+      removed_.erase(one.session);  // begin() has removed all its parts
   }
   drop_unused_blobs();
   finish_removals();
@@ -148,7 +149,7 @@ absl::StatusOr<ChangeOutcome> SqliteStore::change(const StoredChange& change) {
   return ChangeOutcome::kKept;
 }
 
-/// A commit whose outcome was not known may have made it already.
+/// A commit whose outcome was not known may have created the session already.
 absl::Status SqliteStore::begin(const StoredChange& change) {
   if (absl::Status status = remove(change.session); !status.ok()) return status;
   if (absl::Status status = remove_all_parts(change.session); !status.ok()) return status;
@@ -193,7 +194,8 @@ absl::Status SqliteStore::write_parts(const StoredChange& change) {
   return status;
 }
 
-/// What makes it a session. Its parts go in transactions of their own, which fit into the log however many they are.
+/// Removes the row that makes it a session. Its parts are removed in separate transactions, so that each fits
+/// into the log, however many parts there are.
 absl::Status SqliteStore::remove(const std::string& session) {
   SqliteStatement& blobs = sql(Sql::kBlobsOf);
   blobs.bind(1, session);
@@ -208,7 +210,7 @@ absl::Status SqliteStore::remove(const std::string& session) {
   return absl::OkStatus();
 }
 
-/// Whether there may be more.
+/// Returns whether there may be more.
 absl::StatusOr<bool> SqliteStore::remove_some_parts(const std::string& session) {
   SqliteStatement& remove = sql(Sql::kRemoveSomeParts);
   remove.bind(1, session);
@@ -225,7 +227,7 @@ absl::Status SqliteStore::remove_all_parts(const std::string& session) {
   }
 }
 
-/// What fails is tried again with the next change, and by the next process.
+/// A removal that fails is tried again with the next change, and by the next process.
 void SqliteStore::finish_removals() {
   const bool has_removed = !removed_.empty();
   while (!removed_.empty()) {
@@ -268,7 +270,7 @@ absl::StatusOr<std::map<std::string, std::string>> SqliteStore::parts(const std:
   }
 }
 
-/// There is no other process, and so no route.
+/// There is no other process, so `route` has no meaning.
 absl::StatusOr<StoredSession> SqliteStore::take_over(const std::string& session, const std::string& owner,
                                                      const std::string&) {
   const std::scoped_lock lock(mutex_);
@@ -343,7 +345,7 @@ std::optional<StoreRoom> SqliteStore::room() {
   return left.ok() ? std::optional(*left) : std::nullopt;
 }
 
-/// The folder is this process's own, so nobody else has taken any of them.
+/// The folder belongs to this process alone, so no other process has taken any session.
 absl::StatusOr<TouchResult> SqliteStore::touch(std::span<const TouchedSession> sessions) {
   const std::scoped_lock lock(mutex_);
   if (absl::Status status = room_.prepare_removal(); !status.ok()) return status;
@@ -379,10 +381,10 @@ absl::StatusOr<std::size_t> SqliteStore::remove_unused(std::int64_t idle_ms) {
 absl::StatusOr<std::shared_ptr<Store>> open(const SqliteStoreOptions& options) {
   if (absl::Status status = make_private_folder(options.folder); !status.ok()) return status;
   auto database =
-      SqliteDatabase::open(options.folder + "/sessions.db");  // first: it is the lock of the whole folder
+      SqliteDatabase::open(options.folder + "/sessions.db");  // first, because it locks the whole folder
   if (!database.ok()) return database.status();
   if (absl::Status status = make_tables(**database); !status.ok()) return status;
-  // Of a disk that is full it is taken as soon as there is room.
+  // On a full disk the log is reserved as soon as there is room.
   (*database)->reserve_log().IgnoreError();
   auto blobs = BlobFolder::open(options.folder + "/blobs");
   if (!blobs.ok()) return blobs.status();

@@ -9,7 +9,7 @@
 
 namespace lpdeform {
 
-/// What the SQLite store asks its database.
+/// The statements of the SQLite store.
 enum class Sql {
   kInsertSession,
   kAdvanceSession,
@@ -31,15 +31,16 @@ enum class Sql {
   kCount
 };
 
-/// Parts that are removed at once: few enough that a transaction of it fits into the log, wherever in the file they are.
+/// Parts that one transaction removes: few enough that it fits into the log, wherever in the file the parts
+/// are.
 inline constexpr int kPartsAtOnce = 256;
 
-/// Makes the tables of a new database; looks through one that was there. STORE_FAILING where it is damaged or of another version,
-/// STORE_FULL.
+/// Creates the tables of a new database, or checks those of an existing one. STORE_FAILING if the database is
+/// damaged or of another version; STORE_FULL.
 absl::Status make_tables(SqliteDatabase& database);
 
 using SqliteStatements = std::array<std::unique_ptr<SqliteStatement>, static_cast<std::size_t>(Sql::kCount)>;
-/// All of them, of a database that has the tables.
+/// Prepares all statements, for a database that has the tables.
 absl::StatusOr<SqliteStatements> prepare_statements(const SqliteDatabase& database);
 
 }  // namespace lpdeform

@@ -15,9 +15,9 @@ namespace lpdeform {
 namespace {
 
 constexpr char kMakeRoom[] = ". Delete sessions, or make room; then try again.";
-constexpr char kDamage[] = "lpdeform/damage";      // likewise: for the log
-constexpr char kAway[] = "lpdeform/store-away";    // stays in this process
-constexpr char kWhere[] = "lpdeform/store-where";  // the same
+constexpr char kDamage[] = "lpdeform/damage";      // a payload: what is damaged; stays in this process
+constexpr char kAway[] = "lpdeform/store-away";    // a payload: nothing answers; stays in this process
+constexpr char kWhere[] = "lpdeform/store-where";  // a payload: a file or an address; stays in this process
 
 absl::Status at(std::string_view where, absl::Status status) {
   if (!where.empty()) status.SetPayload(kWhere, absl::Cord(std::string(where)));

@@ -20,27 +20,28 @@
 
 namespace lpdeform {
 
-/// What buffers of a stored session name: bytes by "blobs/KEY".
+/// The bytes that buffers of a stored session name, by "blobs/KEY".
 using StoredBlobs = std::map<std::string, std::string>;
 
-/// Turns messages of the contract into the values of core and session. Numbers from outside are hostile:
-/// every size is checked before memory is taken for it, every enum for values that we do not know; however
-/// often a message names an upload, no more numbers come out than the mesh has room for. What a value means
-/// is checked where it is used. Errors are INVALID_ARGUMENT: INLINE_TOO_LARGE, BUFFER_MISSING, BUFFER_SIZE,
-/// ENUM_UNKNOWN, FIELD_MISSING, FIELD_SIZE, POSITIONS_SIZE, HANDLE_CHANGE_MISSING, HANDLE_TOO_MANY_VERTICES,
-/// HANDLE_POINT_COUNT, REGION_EMPTY, MOTION_MISSING, NORMALS_SIZE, NORMALS_NOT_FINITE; of numbers over 2^31 - 1, which nothing
-/// behind could name, HANDLE_VERTEX_OUT_OF_RANGE, HANDLE_FACE_OUT_OF_RANGE, REGION_VERTEX_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE; of
-/// uploads what Uploads::find and Upload::bytes have. For one message, one thread.
+/// Converts messages of the contract to values of core and session. Input is untrusted: every size is checked
+/// before memory is allocated for it, and every enum for unknown values. However often a message names an
+/// upload, it yields no more numbers than the mesh has room for. What a value means is checked where it is
+/// used. Errors are INVALID_ARGUMENT: INLINE_TOO_LARGE, BUFFER_MISSING, BUFFER_SIZE, ENUM_UNKNOWN,
+/// FIELD_MISSING, FIELD_SIZE, POSITIONS_SIZE, HANDLE_CHANGE_MISSING, HANDLE_TOO_MANY_VERTICES,
+/// HANDLE_POINT_COUNT, REGION_EMPTY, MOTION_MISSING, NORMALS_SIZE, NORMALS_NOT_FINITE; for indices over 2^31
+/// - 1, which later code cannot represent, HANDLE_VERTEX_OUT_OF_RANGE, HANDLE_FACE_OUT_OF_RANGE,
+/// REGION_VERTEX_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE; for uploads those of Uploads::find and Upload::bytes.
+/// For one message and one thread.
 ///
-/// What a message leaves to the server to find in the geometry (AutomaticField, Resize) becomes plain fields and
-/// handles here, in the client's vertices like all others, so that nothing behind knows of it; also
-/// STRENGTH_OUT_OF_RANGE, RESIZE_SCALE_OUT_OF_RANGE, RESIZE_ORIGIN_NOT_FINITE, RESIZE_AXES. The first such
-/// message of a session waits for ShapeFeatures.
+/// Some fields leave values for the server to find in the geometry (AutomaticField, Resize). Here they become
+/// plain fields and handles, in the client's vertices like all others, so later code does not know of them.
+/// More errors: STRENGTH_OUT_OF_RANGE, RESIZE_SCALE_OUT_OF_RANGE, RESIZE_ORIGIN_NOT_FINITE, RESIZE_AXES. The
+/// first such message of a session waits for ShapeFeatures.
 class Decoder {
  public:
-  /// `vertex_count`: of the client's mesh that the message is about; `features`: its geometry, needed by
-  /// handles(), settings() and update(); `owner`: whose uploads it may name; `weld`: from the client's vertices to those of `features`, null where
-  /// they are the same.
+  /// `vertex_count`: of the client's mesh. `features`: its geometry, needed by handles(), settings() and
+  /// update(). `owner`: whose uploads the message may name. `weld`: from the client's vertices to those of
+  /// `features`; null if they are the same.
   Decoder(Uploads& uploads, std::uint32_t vertex_count, const ShapeFeatures* features = nullptr,
           const Weld* weld = nullptr, std::string owner = "")
       : uploads_(uploads),
@@ -52,20 +53,22 @@ class Decoder {
         room_for_targets_(vertex_count),
         room_for_region_(vertex_count) {}
 
-  /// The same for messages that were stored: inline bytes of any size, blobs in place of uploads. `blobs` must outlive it.
+  /// A decoder for stored messages: inline bytes of any size, and blobs instead of uploads. `blobs` must
+  /// outlive it.
   Decoder reading_stored(const StoredBlobs& blobs) const;
 
-  /// The bytes of a buffer, where they are: as long as the message, what is returned, and what is stored live.
+  /// The bytes of a buffer, without a copy. Valid as long as the message, this value and the stored blobs
+  /// live.
   struct Bytes {
-    std::shared_ptr<const Upload> owner;  // of an upload, so that it does not expire meanwhile
+    std::shared_ptr<const Upload> owner;  // keeps an upload from expiring meanwhile
     std::string_view view;
   };
   absl::StatusOr<Bytes> bytes(const v1::Buffer& buffer, std::string_view what);
-  /// A copy of them.
+  /// A copy of the bytes of a buffer.
   absl::StatusOr<std::string> raw(const v1::Buffer& buffer, std::string_view what);
 
-  /// Also MESH_TOO_LARGE. Does not look at coordinates and indices; a vertex index of a face over 2^31 - 1 becomes
-  /// that, and errors name the face.
+  /// More errors: MESH_TOO_LARGE. Does not check coordinates and indices. A vertex index of a face over 2^31
+  /// - 1 becomes 2^31 - 1; errors name the face.
   struct MeshLimits {
     std::uint32_t most_vertices;
     std::uint32_t most_faces;
@@ -77,9 +80,9 @@ class Decoder {
   absl::Status handles(const google::protobuf::RepeatedPtrField<v1::HandleUpdate>& messages, Update& out);
   absl::StatusOr<SettingsChange> settings(const v1::SettingsUpdate& message);
   absl::StatusOr<Points> positions(const v1::Positions& message);
-  /// No rows where the message is empty.
+  /// No rows if the message is empty.
   absl::StatusOr<Points> normals(const v1::Normals& message);
-  /// Null where the message is empty. Also WELD_SIZE, WELD_OUT_OF_RANGE, WELD_TOO_FAR, WELD_TOLERANCE,
+  /// Null if the message is empty. More errors: WELD_SIZE, WELD_OUT_OF_RANGE, WELD_TOO_FAR, WELD_TOLERANCE,
   /// WELD_TOO_DENSE.
   absl::StatusOr<std::shared_ptr<const Weld>> weld(const v1::Weld& message, const Points& positions);
 
@@ -111,7 +114,7 @@ class Decoder {
   const ShapeFeatures* const features_;
   const Weld* const weld_;
   const std::string owner_;
-  const StoredBlobs* stored_ = nullptr;  // where the messages are stored ones
+  const StoredBlobs* stored_ = nullptr;  // set for stored messages
   std::uint64_t room_for_vertices_;
   std::uint64_t room_for_targets_;
   std::uint64_t room_for_region_;

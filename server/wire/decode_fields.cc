@@ -1,4 +1,4 @@
-// Decoder: p and stiffness, and what is found in the geometry.
+// Decoder: p and stiffness, and fields that are found in the geometry.
 
 #include <utility>
 
@@ -13,7 +13,7 @@
 
 namespace lpdeform {
 
-/// A field found on the welded shape, by the client's vertices.
+/// Converts a field found on the welded shape to the client's vertices.
 Field Decoder::for_client(Field found) const {
   return weld_ == nullptr || found.size() == 1 ? std::move(found) : scattered(found, *weld_);
 }

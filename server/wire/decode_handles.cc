@@ -7,27 +7,9 @@
 #include "core/base/reasons.h"
 #include "server/wire/decode.h"
 #include "server/wire/decode_parts.h"
+#include "server/wire/holds.h"
 
 namespace lpdeform {
-namespace {
-
-Hold decode_hold(const v1::Handle& message) {
-  switch (message.hold_case()) {
-    case v1::Handle::kSoft:
-      return message.soft().has_weight() ? Soft{message.soft().weight()} : Soft{};
-    case v1::Handle::kOrientation:
-      return message.orientation().has_weight() ? Orientation{message.orientation().weight()} : Orientation{};
-    case v1::Handle::kAxisLock:
-      return AxisLock{decode_vector(message.axis_lock().axis())};
-    case v1::Handle::kPlaneLock:
-      return PlaneLock{decode_vector(message.plane_lock().normal())};
-    case v1::Handle::HOLD_NOT_SET:
-      break;
-  }
-  return Exactly{};
-}
-
-}  // namespace
 
 absl::Status Decoder::take_room(std::uint64_t& room, std::uint64_t count, std::string_view what) const {
   if (count <= room) {

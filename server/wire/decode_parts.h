@@ -14,12 +14,12 @@
 
 namespace lpdeform {
 
-// What the parts of Decoder share.
+// Functions that the source files of Decoder share.
 
 absl::Status unknown_enum(std::string_view what, int value);
 absl::Status wrong_size(std::string_view what, std::uint64_t is, const std::string& should);
 
-/// Numbers of type Wire, packed, as a row-major matrix of doubles with `columns` columns.
+/// Packed numbers of type Wire as a row-major matrix of doubles with `columns` columns.
 template <typename Wire, typename Result>
 void unpack(std::string_view bytes, Result& out) {
   for (Eigen::Index k = 0; k < out.size(); ++k) {
@@ -40,15 +40,15 @@ void unpack(Scalar scalar, std::string_view bytes, Result& out) {
 
 inline constexpr std::uint32_t kMostIndex = std::numeric_limits<std::int32_t>::max();
 
-/// Index number k of those that are packed there.
+/// The packed index number k.
 inline std::uint32_t packed_index(std::string_view bytes, std::size_t k) {
   std::uint32_t index;
   std::memcpy(&index, bytes.data() + k * sizeof(index), sizeof(index));
   return index;
 }
 
-/// Indices of vertices or faces; what is over kMostIndex becomes that, which no mesh has. Who names them in an error looks for such
-/// first, so as to name what was sent.
+/// Indices of vertices or faces. An index over kMostIndex becomes kMostIndex, which no mesh has. Code that
+/// names an index in an error must look for such values first, so that it names the number that was sent.
 inline void unpack_indices(std::string_view bytes, std::size_t count, std::int32_t* out) {
   for (std::size_t k = 0; k < count; ++k)
     out[k] = static_cast<std::int32_t>(std::min(packed_index(bytes, k), kMostIndex));

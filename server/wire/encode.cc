@@ -7,17 +7,12 @@
 #include <variant>
 
 #include "core/base/fault.h"
+#include "core/base/match.h"
 #include "server/runtime/refusals.h"
+#include "server/wire/holds.h"
 
 namespace lpdeform {
 namespace {
-
-template <typename... Cases>
-struct Match : Cases... {
-  using Cases::operator()...;
-};
-template <typename... Cases>
-Match(Cases...) -> Match<Cases...>;  // clang 14 does not find it by itself
 
 v1::StopReason encode_stop(StopReason reason) {
   switch (reason) {
@@ -67,15 +62,6 @@ v1::InitialGuess encode_initial(InitialGuess guess) {
       return v1::INITIAL_GUESS_REST;
   }
   return v1::INITIAL_GUESS_UNSPECIFIED;
-}
-
-v1::HandleKind encode_kind(const Hold& hold) {
-  const Match kind{[](const Exactly&) { return v1::HANDLE_KIND_EXACT; },
-                   [](const Soft&) { return v1::HANDLE_KIND_SOFT; },
-                   [](const Orientation&) { return v1::HANDLE_KIND_ORIENTATION; },
-                   [](const AxisLock&) { return v1::HANDLE_KIND_AXIS_LOCK; },
-                   [](const PlaneLock&) { return v1::HANDLE_KIND_PLANE_LOCK; }};
-  return std::visit(kind, hold);
 }
 
 v1::GoAwayReason encode_reason(EndReason reason) {
@@ -166,7 +152,7 @@ void encode_header(const FramePiece& piece, v1::FrameHeader& out) {
   }
 }
 
-/// All but the numbers: see Outgoing.
+/// Everything but the numbers: see Outgoing.
 void encode_piece(const FramePiece& piece, v1::FramePart& out) {
   if (piece.first == 0) encode_header(piece, *out.mutable_header());
   out.set_frame_seq(piece.frame->frame_seq);
@@ -177,10 +163,9 @@ void encode_piece(const FramePiece& piece, v1::FramePart& out) {
 
 void encode_notice(const LoadNote& load, v1::Notice& out) {
   out.set_reason(load.is_overloaded ? v1::NOTICE_REASON_OVERLOADED : v1::NOTICE_REASON_RECOVERED);
-  out.set_text(
-      load.is_overloaded
-          ? "The server has more to solve than it can: frames come less often, and refined ones later."
-          : "The server keeps up with its work again.");
+  out.set_text(load.is_overloaded
+                   ? "The server is overloaded: frames come less often, and refined ones later."
+                   : "The server is no longer overloaded.");
 }
 
 void encode_event(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
@@ -205,7 +190,7 @@ void encode_event(const Note& note, const FrameStream& stream, std::uint32_t ver
                     granted.set_max_frames_per_second(options.max_frames_per_second);
                   },
                   [&](const FramePiece& piece) { encode_piece(piece, *out.mutable_frame()); },
-                  [&](const UpdateResult&) {},  // no event: see encode() of a DeformResponse
+                  [&](const UpdateResult&) {},  // not an event: see encode() of a DeformResponse
                   [&](const FaultNote& fault) { encode(fault, *out.mutable_fault()); },
                   [&](const LoadNote& load) { encode_notice(load, *out.mutable_notice()); },
                   [&](const HeartbeatNote&) { out.mutable_heartbeat(); },
@@ -280,7 +265,7 @@ void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint no
     message.set_name(name);
     message.set_vertex_count(static_cast<std::uint32_t>(handle.vertices.size()));
     message.set_point_count(static_cast<std::uint32_t>(handle.points.size()));
-    message.set_kind(encode_kind(handle.hold));
+    message.set_kind(kind_of(handle.hold));
   }
   if (const auto* const region = info.inputs.handles->region()) {
     out.set_region_vertex_count(static_cast<std::uint32_t>(region->size()));

@@ -11,7 +11,7 @@
 
 namespace lpdeform {
 
-// From the values of core and session to messages of the contract.
+// Converts values of core and session to messages of the contract.
 
 /// `idle`: how long a session lives without use.
 void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint now, v1::Session& out);
@@ -19,10 +19,10 @@ void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint no
 v1::WeightKind encode_weights(WeightKind weights);
 v1::FreeComponents encode_free_components(FreeComponents free_components);
 void encode_vector(const Eigen::Vector3d& vector, v1::Vector3& out);
-/// Of settings as Decoder makes them: max_iterations is not 0.
+/// For settings as Decoder makes them: max_iterations is not 0.
 void encode_solver(const SolveSettings& settings, v1::SolverSettings& out);
 
-/// The error inside a stream.
+/// An error inside a stream.
 void encode(const FaultNote& fault, v1::Fault& out);
 
 void encode(const SolveResult& result, v1::SolveSummary& out);
@@ -35,14 +35,14 @@ void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_co
 /// The same for a stream that takes no updates.
 void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
             Outgoing<v1::StreamFramesResponse>& out);
-/// The same for one of several on a stream; its number is the caller's to set.
+/// The same for one of several sessions on a stream; the caller sets its number.
 void encode(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
             Outgoing<v1::StreamSessionsResponse>& out);
 
 /// A piece of a solve's result.
 void encode(const FramePiece& piece, Outgoing<v1::SolveResponse>& out);
 
-/// Records [begin, end) of a trace.
+/// The records [begin, end) of a trace.
 void encode_trace(const std::vector<IterationRecord>& trace, std::size_t begin, std::size_t end,
                   v1::SolveTrace& out);
 

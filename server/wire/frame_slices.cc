@@ -18,7 +18,7 @@ std::uint32_t tag_of(int field) {
   return static_cast<std::uint32_t>(field) << 3 | kLengthDelimited;
 }
 
-/// Of tag and length.
+/// Size of tag and length.
 std::size_t head_size(int field, std::size_t size) {
   return CodedOutputStream::VarintSize32(tag_of(field)) + CodedOutputStream::VarintSize64(size);
 }
@@ -30,7 +30,7 @@ void append_head(int field, std::size_t size, std::string& out) {
   out.append(reinterpret_cast<const char*>(head), static_cast<std::size_t>(end - head));
 }
 
-/// 0 where it is empty, as then it is left out.
+/// Size of the field; 0 if it is empty, because an empty field is omitted.
 std::size_t field_size(int field, std::size_t size) {
   return size == 0 ? 0 : head_size(field, size) + size;
 }
@@ -58,7 +58,7 @@ std::size_t size_of(const std::vector<Numbers>& all) {
   return sum;
 }
 
-/// The lengths of the fields around the part and of the part itself, with `more` bytes in each.
+/// The lengths of the fields around the part and of the part itself, if each has `more` bytes in addition.
 std::vector<std::size_t> lengths_with(const PartInMessage& part, std::size_t more) {
   std::vector<std::size_t> lengths(part.path.size());
   std::size_t growth = more;
@@ -70,7 +70,7 @@ std::vector<std::size_t> lengths_with(const PartInMessage& part, std::size_t mor
   return lengths;
 }
 
-/// What stands before the numbers.
+/// Size of everything before the numbers.
 std::size_t size_before(const PartInMessage& part, const std::vector<std::size_t>& lengths) {
   std::size_t size = part.message.ByteSizeLong();
   for (std::size_t k = 0; k < part.path.size(); ++k) {
@@ -80,7 +80,8 @@ std::size_t size_before(const PartInMessage& part, const std::vector<std::size_t
   return size;
 }
 
-/// Chooses the paddings. They are part of the lengths before them, whose own length may rise with them.
+/// Chooses the paddings. Each padding counts in the lengths before it, and these may become longer
+/// themselves.
 std::vector<Numbers> aligned(const PartInMessage& part, const FramePiece& piece) {
   const std::size_t unit = piece.format == Format::kFloat64 ? 8 : 4;
   std::vector<Numbers> all = numbers_of(piece);
@@ -88,7 +89,7 @@ std::vector<Numbers> aligned(const PartInMessage& part, const FramePiece& piece)
     const std::size_t head = head_size(numbers.field, numbers.bytes.size());
     return (before + field_size(numbers.padding_field, numbers.padding) + head) % unit == 0;
   };
-  std::size_t after_first = all[0].bytes.size();  // which begins well itself
+  std::size_t after_first = all[0].bytes.size();  // the first field gets its own padding below
   for (std::size_t k = 1; k < all.size(); ++k) {
     if (all[k].bytes.empty()) continue;
     while (!begins_well(after_first, all[k])) ++all[k].padding;
@@ -100,7 +101,7 @@ std::vector<Numbers> aligned(const PartInMessage& part, const FramePiece& piece)
   return all;
 }
 
-/// Bytes of `surface` that live as long as the slice does.
+/// A slice of the bytes of `surface`. It keeps the surface alive.
 grpc::Slice slice_of(std::shared_ptr<const Surface> surface, std::string_view bytes) {
   const auto let_go = [](void* held) { delete static_cast<std::shared_ptr<const Surface>*>(held); };
   return {const_cast<char*>(bytes.data()), bytes.size(), let_go,

@@ -12,12 +12,12 @@
 
 namespace lpdeform {
 
-/// A part of a frame in a message, without its numbers: the lengths around it do not count them yet.
+/// A part of a frame in a message, without its numbers. The lengths around it do not include the numbers yet.
 struct PartInMessage {
   const google::protobuf::MessageLite& message;
   struct Field {
     int number;
-    std::size_t size;  // of what is in it
+    std::size_t size;  // of its contents
   };
   std::vector<Field> path;  // from the message to the part, each the last field of the one before
 };
@@ -25,7 +25,7 @@ struct PartInMessage {
 inline PartInMessage part_in(const v1::SolveResponse& message) {
   return {message, {{v1::SolveResponse::kFrameFieldNumber, message.frame().ByteSizeLong()}}};
 }
-/// Of a message with an event.
+/// For a message with an event.
 template <typename Message>
 PartInMessage part_in(const Message& message) {
   return {message,
@@ -33,11 +33,11 @@ PartInMessage part_in(const Message& message) {
            {v1::StreamEvent::kFrameFieldNumber, message.event().frame().ByteSizeLong()}}};
 }
 
-/// How long the message is with the numbers of `piece`.
+/// Size of the message with the numbers of `piece`.
 std::size_t size_with(const PartInMessage& part, const FramePiece& piece);
 
-/// Its bytes. The numbers are where the piece's surface has them, which lives as long as the slices do; they begin at multiples of
-/// 4 bytes in the message (8 for float64).
+/// Bytes of the message. The numbers stay in the piece's surface, which the slices keep alive. They begin at
+/// multiples of 4 bytes in the message (8 for float64).
 std::vector<grpc::Slice> slices_with(const PartInMessage& part, const FramePiece& piece);
 
 template <typename Message>

@@ -43,7 +43,7 @@ void add_quota_failure(const absl::Status& status, const Fault& fault, google::r
   out.add_details()->PackFrom(quota);
 }
 
-/// What is not found, by the beginning of the reason.
+/// The type of the resource that was not found, by the beginning of the reason.
 constexpr std::pair<std::string_view, const char*> kResourceTypes[] = {
     {"SESSION_", "lpdeform.v1.Session"},
     {"UPLOAD_", "lpdeform.v1.Upload"},

@@ -6,10 +6,10 @@
 
 namespace lpdeform {
 
-/// The one place where our errors become gRPC's: the same code and text, with google.rpc.Status details.
-/// ErrorInfo always (domain "lpdeform", the fault's stable reason, metadata "element" and "limit" where
-/// known); BadRequest for INVALID_ARGUMENT, RetryInfo where trying again helps, QuotaFailure for
-/// RESOURCE_EXHAUSTED, ResourceInfo for NOT_FOUND.
+/// Converts the project's errors to those of gRPC; nothing else does. The code and text stay the same.
+/// Details (google.rpc.Status): always ErrorInfo (domain "lpdeform", the fault's stable reason, metadata
+/// "element" and "limit" if known); BadRequest for INVALID_ARGUMENT; RetryInfo if a retry helps; QuotaFailure
+/// for RESOURCE_EXHAUSTED; ResourceInfo for NOT_FOUND.
 grpc::Status to_grpc(const absl::Status& status);
 
 }  // namespace lpdeform

@@ -12,11 +12,11 @@ using google::protobuf::Descriptor;
 using google::protobuf::FieldDescriptor;
 using google::protobuf::internal::WireFormatLite;
 
-/// Of a field: its place in an object or a list that grows by doubling, its text's header.
+/// Memory per field: its place in an object or in a list that grows by doubling, and the header of its text.
 constexpr std::size_t kField = 64;
-/// Of a packed number: one byte may become eight.
+/// Memory per byte of packed numbers: one byte may become eight.
 constexpr std::size_t kPackedNumber = 8;
-/// The parser goes no deeper.
+/// The parser's limit of nesting.
 constexpr int kDeepest = 100;
 
 class Walk {
@@ -33,7 +33,7 @@ class Walk {
         int size = 0;
         const bool is_whole = in.ReadVarintSizeAsInt(&size) && size >= 0;
         const auto at = static_cast<std::size_t>(in.CurrentPosition());
-        if (!is_whole || !in.Skip(size)) return sum;  // the parser ends here, too
+        if (!is_whole || !in.Skip(size)) return sum;  // the parser stops here, too
         sum += field(type, bytes, WireFormatLite::GetTagFieldNumber(tag),
                      bytes.substr(at, static_cast<std::size_t>(size)), depth);
       } else if (!skip_number(in, tag)) {
@@ -54,7 +54,7 @@ class Walk {
       case WireFormatLite::WIRETYPE_FIXED32:
         return in.Skip(4);
       default:
-        return true;  // a group: its fields come as if they were ours
+        return true;  // a group: its fields are counted as fields of this message
     }
   }
 

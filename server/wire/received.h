@@ -6,12 +6,12 @@
 
 namespace lpdeform {
 
-/// A message of a stream as it came. Of one that cannot be parsed (a text that is not UTF-8, say) gRPC says no more than of the
-/// end of the stream; this way it is told apart, and its sender can be told.
+/// A received message of a stream. If a message cannot be parsed (a text that is not UTF-8, for example),
+/// gRPC reports it like the end of the stream. With this type the two differ, and the sender can be told.
 template <typename Message>
 struct Received {
   Message message;
-  bool is_whole = false;  // it could be parsed
+  bool is_whole = false;  // whether it could be parsed
 };
 
 }  // namespace lpdeform

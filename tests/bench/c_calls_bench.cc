@@ -1,6 +1,6 @@
-// What the calls of the C interface cost the thread that makes them, a game's, while a mesh of 10,201 vertices is dragged: 60 frames
-// a second, 10 s each, the server in this process. "On the clock" is what a game waits, with what other threads of a busy machine take
-// from it; "computing" is the thread's own time.
+// What calls of the C interface cost the calling thread, such as a game's, while a mesh of 10,201 vertices is dragged: 60
+// frames per second, 10 s each, with the server in this process. "On the clock" is how long a game waits, including the time
+// that other threads of a busy machine take. "Computing" is the thread's own time.
 
 #include <time.h>
 

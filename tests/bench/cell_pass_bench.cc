@@ -1,5 +1,4 @@
-// What an iteration is made of: the rotation fit beside plain SVD, the cell pass on one and two threads, the
-// metric.
+// The parts of an iteration: the rotation fit compared with plain SVD, the cell pass on one and two threads, and the metric.
 
 #include <benchmark/benchmark.h>
 

@@ -14,7 +14,7 @@ inline TriangleMesh creature_of(double vertices) {
   return creature(static_cast<int>(24 * std::sqrt(vertices / sample)));
 }
 
-/// Its feet stay, the far end of its body is turned.
+/// Holds the feet and turns the far end of the body.
 inline HandleSet creature_turn(const TriangleMesh& mesh) {
   const Eigen::RowVector3d low = mesh.vertices.colwise().minCoeff();
   const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - low;
@@ -29,7 +29,7 @@ inline HandleSet creature_turn(const TriangleMesh& mesh) {
   return handles;
 }
 
-/// What else may be held: the vertices within a twentieth of the body's length of a point on it.
+/// Vertices to hold in addition: those within a twentieth of the body's length of a point on it.
 inline std::vector<std::int32_t> creature_patch(const TriangleMesh& mesh, double share_of_length) {
   const Eigen::RowVector3d low = mesh.vertices.colwise().minCoeff();
   const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - low;

@@ -1,6 +1,7 @@
-// A drag in a live session: how long a handle move takes to its first useful state, E^(1/p) within 5 % of the
-// converged one, from the state that the move before had reached by then. 30 moves that bend a bumpy sheet; the
-// converged energies come from a second solver that goes along, to its end or for 10 s a move. Percentiles in milliseconds; set-up is apart.
+// A drag in a live session: how long a handle's move takes to its first useful state, with E^(1/p) within 5 % of the converged
+// one. It starts from the state that the previous move had reached by then. 30 moves bend a bumpy sheet. A second solver
+// computes the converged energies, for at most 10 s per move. Prints percentiles in milliseconds; set-up is reported
+// separately.
 
 #include <benchmark/benchmark.h>
 

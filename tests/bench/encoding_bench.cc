@@ -1,4 +1,4 @@
-// What encoding a frame costs the server, and how large it is then, by format.
+// What it costs the server to encode a frame, and the frame's size, by format.
 
 #include <benchmark/benchmark.h>
 

@@ -1,11 +1,12 @@
-// What a change of the held vertices costs: one patch more is held on a mesh that is factored already. Three ways:
+// The cost of a change of the held vertices: one more patch is held on a mesh that is factored already. Three ways are
+// compared with the whole set-up:
 //
 //   refactor     numeric factorisation on the kept pattern, as Metric does it
 //   rows         CHOLMOD's row updates of a simplicial factor, a row deleted for each vertex of the patch
-//   subtrees     numeric factorisation of the columns that the patch reaches in the elimination tree, all others kept: not
-//                built; the share of the operations that it would repeat is what the counter says
+//   subtrees     numeric factorisation of only those columns that the patch reaches in the elimination tree. It is not
+//                implemented; the counter gives the share of the operations that it would repeat
 //
-// beside the whole set-up. The patch has the same share of the body whatever the mesh's size.
+// The patch has the same share of the body for every mesh size.
 
 #include <benchmark/benchmark.h>
 #include <cholmod.h>

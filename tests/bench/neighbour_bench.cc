@@ -1,6 +1,6 @@
-// The rate of a small session beside a large one: how long the small bar's updates take to their converged
-// frames alone, and while a 100k session is made to factor and solve all the time. Percentiles in
-// milliseconds and the ratio of the medians; both halves run in one process, one after the other.
+// The rate of a small session next to a large one: how long the small bar's updates take to their converged frames, alone and
+// while a session of 100k vertices factors and solves all the time. Prints percentiles in milliseconds and the ratio of the
+// medians. Both parts run in one process, one after the other.
 
 #include <benchmark/benchmark.h>
 

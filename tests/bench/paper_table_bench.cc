@@ -1,7 +1,7 @@
-// The paper's Table 1 again: time to each method's own stop, beside the paper's (2 x quad 2.27 GHz, 2011:
-// another machine, shown for scale) and beside its section 3.2, our line_search on the same cell pass: time
-// to the energy at which line_search meets its own stop, or that it has reached after 60 s (then `ratio` is a
-// bound from below, `bound` is 1).
+// The paper's Table 1: time to each method's own stop. It is compared with the paper's times (2 x quad 2.27 GHz, 2011: another
+// machine, only for scale) and with our implementation of its section 3.2, line_search on the same cell pass. For the latter
+// the bench measures the time until a method reaches the energy at which line_search stops by itself, or has after 60 s; in the
+// second case `ratio` is a lower bound and `bound` is 1.
 //
 //   paper_s        Table 1, where it has an entry
 //   iterations     to the method's stop

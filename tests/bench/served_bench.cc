@@ -1,5 +1,5 @@
-// What the service adds to a move's solve: from the move to its result, by the C++ client over a socket of this machine and in
-// this process, in turns, the same moves of the same sheet. Medians in milliseconds, and their ratio.
+// What the service adds to a move's solve: the time from a move to its result, by the C++ client over a socket of this machine
+// and in this process. Both get the same moves of the same sheet, in turns. Prints medians in milliseconds, and their ratio.
 
 #include <benchmark/benchmark.h>
 

@@ -1,5 +1,5 @@
-// Memory of a session, a vertex: what the core counts (what admission uses), and the growth of the process's
-// peak while a session is made and solves. Linux: /proc/self/clear_refs resets the peak.
+// Memory of a session per vertex: what the core counts (which admission uses), and how much the peak of the process grows while
+// a session is made and solves. Linux only: /proc/self/clear_refs resets the peak.
 
 #include <benchmark/benchmark.h>
 

@@ -1,7 +1,6 @@
-// Clamped cotangents beside intrinsic Delaunay ones on meshes with many obtuse triangles: time to prepare the
-// rest shape, what was clamped and flipped, iterations and time to converge, E^(1/p), and, for the plate, how
-// far the result is from that of the same vertices triangulated well: root-mean-square distance over the
-// diagonal.
+// Clamped cotangent weights compared with intrinsic Delaunay weights on meshes with many obtuse triangles: time to prepare the
+// rest shape, clamped and flipped edges, iterations and time to converge, and E^(1/p). For the plate also the distance from the
+// result of the same vertices with a good triangulation: root-mean-square distance over the diagonal.
 
 #include <benchmark/benchmark.h>
 

@@ -5,6 +5,7 @@ import signal
 import sys
 import tempfile
 import time
+import typing
 import unittest
 from unittest import mock
 
@@ -17,7 +18,7 @@ sys.path.insert(0, os.path.dirname(__file__))
 import stage  # noqa: E402
 
 PREFERENCES = stage.install()
-from lpdeform_addon import client, live, panel, surface  # noqa: E402
+from lpdeform_addon import client, holds, live, panel, surface  # noqa: E402
 
 
 class AddOn(unittest.TestCase):
@@ -305,6 +306,10 @@ class AddOn(unittest.TestCase):
             self.assertEqual(" ".join(found).replace(" ", ""), said.replace(" ", ""))
             self.assertLessEqual(max(map(len, found)), max(12, width / 7.5))
         self.assertEqual(panel.lines(said, 1000), [said])
+
+    def test_there_is_a_kind_for_each_hold_of_the_package(self):
+        made = [type(kind.make(1.0, (0.0, 0.0, 1.0))) for kind in holds.KINDS.values()]
+        self.assertEqual(made, list(typing.get_args(client.lpdeform.types.Hold)))
 
     def test_kinds_of_handles_hold_as_they_say(self):
         _, tip = self.held()

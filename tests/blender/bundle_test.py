@@ -1,4 +1,4 @@
-"""The add-on that brings grpcio and protobuf along: they come from the add-on where it is looked at first, and work."""
+"""The add-on packed with grpcio and protobuf: Blender finds them in the add-on, and they work."""
 
 import os
 import sys

@@ -1,4 +1,5 @@
-"""Three tubes live at once, the same handles at p = 1, 2 and 6, rendered by Cycles with their distortion as colours."""
+"""Three tubes live at the same time with the same handles at p = 1, 2 and 6, rendered by Cycles with their distortion as
+colours."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""A tube that is split around its middle, as meshes of engines are along seams."""
+"""A tube that is split around its middle, like meshes of game engines along seams."""
 
 import os
 import sys

@@ -1,5 +1,5 @@
-"""What the tests in Blender share: the add-on installed from its zip, a server, shapes, and the turning of Blender's timers, which
-do not run by themselves without a window.
+"""Shared by the tests in Blender: the add-on installed from its zip, a server, shapes, and a function that runs Blender's timers,
+which do not run by themselves without a window.
 
 Run as: blender ... --python TEST.py -- ADD_ON.zip SERVER PICTURES
 """

@@ -1,4 +1,4 @@
-"""What the add-on tells the server and does not forget, without Blender and without a server: told_test.py FOLDER_OF_THE_ADD_ON."""
+"""What the add-on tells the server and remembers, without Blender and without a server: told_test.py FOLDER_OF_THE_ADD_ON."""
 
 import sys
 import unittest

@@ -1,9 +1,10 @@
-"""Drives the real server through faults on a schedule that a seed decides, records what happens, and judges it.
+"""Drives the real server through faults on a schedule that a seed determines, records what happens, and judges it.
 
     python chaos.py [--runs N] [--seed S] [--seconds T] [--keep FOLDER] [--mode sqlite|redis]
 
 Runs seeds S, S+1, ...; each run has its own server (or two behind Envoy with a store in Redis), sessions, writers, a slow reader,
-and a reader of the client library. A run that fails leaves its history in FOLDER and says how to make it again. The judge alone:
+and a reader of the client library. A run that fails leaves its history in FOLDER and says how to repeat it. To judge a history only:
+
     python chaos.py --check HISTORY.jsonl
 """
 

@@ -1,4 +1,4 @@
-"""Who uses a session in chaos.py: its writer, a slow reader, and a caller of the client library."""
+"""The users of a session in chaos.py: its writer, a slow reader, and a caller of the client library."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The judge of chaos.py: a good history passes, and one that breaks an invariant fails for that one."""
+"""The judge of chaos.py: a good history passes, and one that violates an invariant fails for that invariant."""
 
 import unittest
 

@@ -1,4 +1,4 @@
-"""What chaos.py breaks: the programs it runs, and the way between its clients and them."""
+"""What chaos.py breaks: the programs it runs, and the network between its clients and them."""
 
 from __future__ import annotations
 

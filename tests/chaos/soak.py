@@ -1,4 +1,4 @@
-"""Whether a server stays as large as it is: memory, descriptors and threads while sessions come and go.
+"""Whether a server keeps its size: memory, descriptors and threads while sessions come and go.
 
     tests/chaos/soak cycles [--count 10000] [--picture FILE.svg]   sessions created, streamed and deleted, four at a time
     tests/chaos/soak load [--minutes 30] [--picture FILE.svg]      sessions under `lpdeform load`, with slow readers and
@@ -6,9 +6,10 @@
 
 Either with --store none, sqlite or redis.
 
-Prints a line for each sample, and exits with 1 where what the server or its store holds at the end is more than at the beginning: of memory and of the store,
-the median of the last quarter over that of the second quarter by 5 % and 4 MiB; of descriptors and sessions, any, once idle; of threads, any over the most of the second quarter: gRPC's pool grows as the load
-first does. Also where a load falls short: an update that was not answered, or a call that failed.
+Prints a line for each sample. Exits with 1 if the server or its store holds more at the end than before. For memory and the
+store: the median of the last quarter is more than 5 % and 4 MiB above that of the second quarter. For descriptors and sessions:
+any increase, once idle. For threads: any increase over the largest number in the second quarter, because gRPC's pool grows with
+the first load. Exits with 1 also if a load falls short: an update was not answered, or a call failed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Calls and streams of the service as chaos.py makes them, every step noted in a book; and the messages they carry."""
+"""Calls and streams of the service as chaos.py makes them, every step recorded in a book; and the messages that they carry."""
 
 from __future__ import annotations
 

@@ -15,10 +15,10 @@
 
 namespace lpdeform::client {
 
-/// How long a test waits for what must come. Never reached where all is well.
+/// How long a test waits for an event that must come. Never reached if all is well.
 constexpr std::chrono::seconds kPatience{20};
 
-/// Both ends of a Deform call: the client's behind FakeCall, the server's in the test's hands.
+/// Both ends of a Deform call: the client's behind FakeCall, the server's controlled by the test.
 class Stream {
  public:
   // The server's end.
@@ -43,7 +43,7 @@ class Stream {
     changed_.notify_all();
   }
 
-  /// The client's next message; empty where none comes.
+  /// The client's next message; empty if none comes.
   std::optional<v1::DeformRequest> hear() {
     std::unique_lock lock(mutex_);
     if (!changed_.wait_for(lock, kPatience, [this] { return !to_server_.empty(); })) return std::nullopt;
@@ -52,7 +52,7 @@ class Stream {
     return request;
   }
 
-  /// Messages of the client that nobody has heard yet.
+  /// How many messages of the client were not heard yet.
   std::size_t unheard() {
     const std::scoped_lock lock(mutex_);
     return to_server_.size();
@@ -104,8 +104,7 @@ class FakeCall final : public DeformCall {
   std::shared_ptr<Stream> stream_;
 };
 
-/// A server without a network: sessions are names, every unary call succeeds, streams are in the test's
-/// hands.
+/// A server without a network: sessions are only names, every unary call succeeds, and the test controls the streams.
 class FakeRpc final : public Rpc {
  public:
   explicit FakeRpc(std::uint32_t vertex_count) : vertex_count_(vertex_count) {}
@@ -115,7 +114,7 @@ class FakeRpc final : public Rpc {
 
   std::chrono::milliseconds call_timeout() const override { return longest_call; }
 
-  /// The next stream that the client opens; null where it opens none.
+  /// The next stream that the client opens; null if it opens none.
   std::shared_ptr<Stream> next_stream() {
     std::unique_lock lock(mutex_);
     if (!changed_.wait_for(lock, kPatience, [this] { return !streams_.empty(); })) return nullptr;
@@ -146,32 +145,32 @@ class FakeRpc final : public Rpc {
     return restored_;
   }
 
-  /// The uploads deleted, once there are so many.
+  /// The uploads deleted, once there are `count` of them.
   std::vector<std::string> uploads_deleted(std::size_t count) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, kPatience, [&] { return uploads_deleted_.size() >= count; });
     return uploads_deleted_;
   }
 
-  /// The offset of each part that came, also where it was refused.
+  /// The offset of each part that came, including refused ones.
   std::vector<std::uint64_t> parts() {
     const std::scoped_lock lock(mutex_);
     return parts_;
   }
 
   std::chrono::milliseconds longest_call = std::chrono::seconds(30);
-  /// There is no connection, for as long as anybody waits for one.
+  /// There is no connection while anyone waits for one.
   bool is_unreachable = false;
-  /// What CreateUpload and UploadPart calls end with, in turn; OK once they are used up.
+  /// The results of CreateUpload and UploadPart calls, in turn; OK once they are used up.
   std::deque<absl::Status> upload_ends;
   std::deque<absl::Status> part_ends;
-  /// What CreateSession calls fail with, in turn; they succeed once these are used up.
+  /// The errors of CreateSession calls, in turn; the calls succeed once they are used up.
   std::deque<absl::Status> create_ends;
-  /// What Solve calls end with, in turn; OK once they are used up.
+  /// The results of Solve calls, in turn; OK once they are used up.
   std::deque<absl::Status> solve_ends;
-  /// The newest updates that the results of Solve calls say they know, in turn; all there are once they are used up.
+  /// The newest input_seq in the results of Solve calls, in turn; the true one once they are used up.
   std::deque<std::uint64_t> solve_inputs;
-  /// Opening a stream throws.
+  /// Whether opening a stream throws.
   bool deform_throws = false;
 
   absl::StatusOr<v1::CreateUploadResponse> call(const v1::CreateUploadRequest& request,
@@ -273,8 +272,8 @@ class FakeRpc final : public Rpc {
     return response;
   }
   std::vector<v1::HandleUpdate> undo_changes;
-  std::size_t undos_away = 0;    // so many are taken and not answered first
-  std::uint32_t undo_steps = 0;  // that GetSession says there are; an undo makes them fewer
+  std::size_t undos_away = 0;    // how many undos are carried out without an answer first
+  std::uint32_t undo_steps = 0;  // as GetSession reports; an undo reduces it
   std::vector<v1::UndoUpdateRequest> undone() {
     const std::scoped_lock lock(mutex_);
     return undone_;

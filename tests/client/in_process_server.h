@@ -12,7 +12,7 @@
 
 namespace lpdeform::client {
 
-/// A server on a socket in a folder of its own, which can be stopped and started again at the same address.
+/// A server on a socket in its own folder. It can be stopped and restarted at the same address.
 class InProcessServer {
  public:
   InProcessServer() {

@@ -1,4 +1,4 @@
-// The book of updates in tests/golden/recovery.json, which the clients in all languages replay.
+// The ledger of updates in tests/golden/recovery.json, which the clients in all languages replay.
 
 #include <gtest/gtest.h>
 
@@ -87,6 +87,7 @@ class Replay {
       {"sends", [this](const Json& step) { count_sent(step); }},
       {"remove_many", [this](const Json& step) { remove_many(step); }},
       {"accept", [this](const Json& step) { ledger_.accept(step.at("seq"), step.at("kept")); }},
+      {"show", [this](const Json& step) { ledger_.show(step.value("epoch", 1), step.at("seq")); }},
       {"refuse", [this](const Json& step) { ledger_.refuse(step.at("seq")); }},
       {"connection_lost", [this](const Json&) { ledger_.connection_lost(); }},
       {"session_lost", [this](const Json&) { ledger_.session_lost(); }},

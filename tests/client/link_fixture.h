@@ -14,7 +14,7 @@
 
 namespace lpdeform::client {
 
-// What tests of a session against a server whose every word they choose share.
+// Shared by tests of a session against a server whose every message they choose.
 
 inline constexpr std::uint32_t kVertexCount = 2;
 

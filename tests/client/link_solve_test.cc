@@ -1,4 +1,4 @@
-// Session::solve against a server whose every word the test chooses.
+// Session::solve against a server whose every message the test chooses.
 
 #include <cmath>
 #include <future>

@@ -1,4 +1,4 @@
-// What becomes of earlier trouble where a session is taken over.
+// What happens to earlier errors when a session is taken over.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// How a session keeps itself alive, against a server whose every word the test chooses.
+// How a session recovers, against a server whose every message the test chooses.
 
 #include <future>
 

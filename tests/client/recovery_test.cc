@@ -1,4 +1,4 @@
-// The table of what clients do after a stream, an answer or a loss: tests/golden/recovery.json, which all of them replay.
+// The rules of what clients do after a stream, an answer or a loss: tests/golden/recovery.json, which all clients replay.
 
 #include "client/cpp/recovery.h"
 

@@ -19,7 +19,7 @@ namespace lpdeform::client {
 
 inline constexpr std::chrono::seconds kPatience{60};
 
-/// The paper's bar, both ends held, the middle twisted by `degrees`.
+/// The paper's bar with both ends held and the middle twisted by `degrees`.
 class SessionTest : public testing::Test {
  protected:
   static Motion twist(double degrees) {
@@ -54,7 +54,7 @@ class SessionTest : public testing::Test {
   InProcessServer server_;
 };
 
-/// How far two results are apart at most, in one coordinate.
+/// The largest difference of two results in a coordinate.
 inline double distance(const std::vector<double>& a, const std::vector<double>& b) {
   double most = a.size() == b.size() ? 0 : INFINITY;
   for (std::size_t k = 0; k < std::min(a.size(), b.size()); ++k) most = std::max(most, std::abs(a[k] - b[k]));

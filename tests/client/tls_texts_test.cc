@@ -1,4 +1,4 @@
-// Certificates and keys that cannot be used are said to be so before anything is tried with them.
+// Certificates and keys that cannot be used are reported before any connection is tried.
 
 #include "client/cpp/tls_texts.h"
 

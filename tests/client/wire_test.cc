@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "client/cpp/status_details.h"
+#include "client/cpp/wire_holds.h"
 #include "core/base/crc32c.h"
 #include "core/base/fault.h"
+#include "tests/support/one_of_each.h"
 
 namespace lpdeform::client {
 namespace {
@@ -120,6 +124,21 @@ TEST(Crc32c, AgreesWithPublishedValuesAndContinuesOverParts) {
   EXPECT_EQ(crc32c(std::string(32, '\0')), 0x8a9136aau);
   EXPECT_EQ(crc32c("456789", crc32c("123")), 0xe3069283u);
   EXPECT_EQ(crc32c(""), 0u);
+}
+
+TEST(Wire, EveryKindOfHoldHasAFieldOfItsOwnAndComesBack) {
+  std::set<int> fields;
+  for (const Hold& hold : one_of_each<Hold>()) {
+    v1::Handle message, again;
+    to_wire(hold, message);
+    EXPECT_TRUE(fields.insert(message.hold_case()).second) << hold.index();
+    const Hold back = hold_from_wire(message);
+    EXPECT_EQ(back.index(), hold.index());
+    to_wire(back, again);
+    EXPECT_EQ(again.SerializeAsString(), message.SerializeAsString()) << hold.index();
+  }
+  const auto* const known = v1::Handle::descriptor()->FindOneofByName("hold");
+  EXPECT_EQ(fields.size(), static_cast<std::size_t>(known->field_count()) + 1);  // Exactly has no field
 }
 
 TEST(Wire, ChangesOfHandlesComeBackAsTheyWereSent) {

@@ -10,7 +10,7 @@
 
 namespace lpdeform {
 
-/// Those that this processor has, the best first, for hwy::SetSupportedTargetsForTest.
+/// The sets that this processor has, the best first, for hwy::SetSupportedTargetsForTest.
 inline std::vector<std::int64_t> instruction_sets() {
   std::vector<std::int64_t> result;
   for (std::int64_t rest = hwy::SupportedTargets(); rest != 0; rest &= rest - 1)
@@ -18,7 +18,7 @@ inline std::vector<std::int64_t> instruction_sets() {
   return result;
 }
 
-/// Of the x86 and Arm sets whose vectors have a fixed width; 0 of others, which are as wide as the processor says.
+/// For x86 and Arm sets whose vectors have a fixed width; 0 for others, whose width depends on the processor.
 inline int vector_bits(std::int64_t set) {
   const std::string name = hwy::TargetName(set);
   if (name.starts_with("AVX3") || name.starts_with("AVX10")) return 512;

@@ -1,6 +1,7 @@
-// Writes for CTest a test per vector width of this processor but the widest, which the tests run with anyway:
-// list_vector_widths PROGRAM PREFIX FILE. PROGRAM runs its tests with the instruction set that LPDEFORM_INSTRUCTION_SET
-// names, but for those that go through all sets by themselves.
+// Writes a CTest test for each vector width of this processor except the widest, which the tests use anyway:
+//   list_vector_widths PROGRAM PREFIX FILE
+// PROGRAM runs its tests with the instruction set that LPDEFORM_INSTRUCTION_SET names, except tests that go through all sets
+// by themselves.
 
 #include <fstream>
 

@@ -27,7 +27,7 @@ inline TriangleMesh make_mesh(const std::vector<std::array<double, 3>>& vertices
   return mesh;
 }
 
-/// The same numbers to the last bit, so that NaN equals itself and 0 does not equal -0.
+/// Equal to the last bit, so that NaN equals itself and 0 does not equal -0.
 inline bool same_bits(const Points& a, const Points& b) {
   return a.rows() == b.rows() && std::memcmp(a.data(), b.data(), sizeof(double) * a.size()) == 0;
 }
@@ -36,14 +36,14 @@ inline bool same_faces(const Faces& a, const Faces& b) {
   return a.rows() == b.rows() && a == b;
 }
 
-/// The mesh that `text` describes; fails the test where it is not accepted.
+/// The mesh that `text` describes; fails the test if it is not accepted.
 inline TriangleMesh parsed(std::string_view text, MeshFormat format) {
   const absl::StatusOr<MeshFile> file = parse_mesh(text, format);
   EXPECT_TRUE(file.ok()) << file.status();
   return file.ok() ? file->mesh : TriangleMesh{};
 }
 
-/// Where `text` is refused with MESH_SYNTAX ("line 3"); "accepted" or the other reason where it is not.
+/// Where `text` is refused with MESH_SYNTAX ("line 3"); otherwise "accepted" or the other reason.
 inline std::string refused_at(std::string_view text, MeshFormat format) {
   const absl::StatusOr<MeshFile> file = parse_mesh(text, format);
   if (file.ok()) return "accepted";

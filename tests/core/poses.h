@@ -41,7 +41,7 @@ inline RigidMotion turn(const Eigen::Vector3d& axis, double degrees, const Eigen
   return {axis, degrees * std::numbers::pi / 180, center, translation};
 }
 
-/// Fig. 4: both ends of the bar stay, its middle is twisted.
+/// Fig. 4: both ends of the bar are fixed, its middle is twisted.
 inline HandleSet bar_twist(const TriangleMesh& bar, double degrees = 90, double scale = 1,
                            const Eigen::Vector3d& offset = Eigen::Vector3d::Zero()) {
   const double low = bar.vertices.col(2).minCoeff(), length = bar.vertices.col(2).maxCoeff() - low;
@@ -55,7 +55,7 @@ inline HandleSet bar_twist(const TriangleMesh& bar, double degrees = 90, double 
   return handles;
 }
 
-/// One end stays, the other is bent over.
+/// One end is fixed, the other is bent over.
 inline HandleSet bar_bend(const TriangleMesh& bar, double degrees = 60) {
   HandleSet handles;
   (void)handles.set("bottom", {slice(bar, 2, 0, 0), Fixed{}});
@@ -70,8 +70,8 @@ inline std::unique_ptr<Deformer> deformer(std::shared_ptr<const RestShape> shape
   return result;
 }
 
-/// The vertices of grid(side, side) triangulated by slivers: between two rows, each side of the one makes a
-/// triangle with the vertex `shift` places further on in the other. shift < side.
+/// The vertices of grid(side, side) triangulated by slivers: between two rows, each edge of one row makes a triangle with the
+/// vertex `shift` places further on in the other row. shift < side.
 inline TriangleMesh slanted_plate(int side, int shift) {
   TriangleMesh mesh = grid(side, side);
   Eigen::Index face = 0;
@@ -93,7 +93,7 @@ inline TriangleMesh slanted_plate(int side, int shift) {
   return mesh;
 }
 
-/// The mesh with every vertex moved by up to `amount`, always the same way.
+/// The mesh with every vertex moved by up to `amount`; deterministic.
 inline Points shaken(const Points& points, double amount) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> move(-amount, amount);

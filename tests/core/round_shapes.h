@@ -8,7 +8,7 @@
 
 namespace lpdeform {
 
-/// Unit sphere of poles on the z axis and `rows` bands of `around` faces or pairs of faces. around >= 3, rows >= 2.
+/// A unit sphere with poles on the z axis and `rows` bands of `around` faces or pairs of faces. around >= 3, rows >= 2.
 inline TriangleMesh ball_with_poles(int around, int rows) {
   const int last = around * (rows - 1) + 1;
   TriangleMesh mesh{Points(last + 1, 3), Faces(2 * around * (rows - 1), 3)};
@@ -32,7 +32,7 @@ inline TriangleMesh ball_with_poles(int around, int rows) {
   return mesh;
 }
 
-/// The points with each distance from the origin off by `share` of it, a standard deviation; always the same way.
+/// The points with random distances from the origin, with a standard deviation of `share`; deterministic.
 inline Points with_noisy_radii(const Points& points, double share) {
   std::mt19937 random(11);
   std::normal_distribution<double> factor(1, share);

@@ -9,7 +9,7 @@
 
 namespace lpdeform {
 
-/// Every corner of every face gets a vertex of its own, as a mesh with flat faces is drawn.
+/// Every corner of every face gets its own vertex, like a mesh that is drawn with flat faces.
 inline TriangleMesh split_at_every_corner(const TriangleMesh& mesh) {
   TriangleMesh split{Points(3 * mesh.faces.rows(), 3), Faces(mesh.faces.rows(), 3)};
   for (Eigen::Index corner = 0; corner < 3 * mesh.faces.rows(); ++corner) {
@@ -19,8 +19,8 @@ inline TriangleMesh split_at_every_corner(const TriangleMesh& mesh) {
   return split;
 }
 
-/// The seam of a texture: faces on the side y > 0 of the plane y = 0 get vertices of their own along it. The
-/// copies come after all vertices of `mesh`.
+/// A texture seam: faces on the side y > 0 of the plane y = 0 get their own vertices along it. The copies come after all
+/// vertices of `mesh`.
 inline TriangleMesh split_along_seam(const TriangleMesh& mesh) {
   TriangleMesh split = mesh;
   std::map<std::int32_t, std::int32_t> copies;
@@ -40,9 +40,9 @@ inline TriangleMesh split_along_seam(const TriangleMesh& mesh) {
   return split;
 }
 
-/// A sphere of radius 1 as modellers make it for textures: (rings + 1) x (segments + 1) vertices in a grid of
-/// latitudes and longitudes. The last column lies on the first up to rounding; each pole is segments + 1 vertices, and
-/// every second face there has no inside. Number: the precision in which it is computed.
+/// A sphere of radius 1 as modelling programs make it for textures: (rings + 1) x (segments + 1) vertices in a grid of
+/// latitudes and longitudes. The last column coincides with the first up to rounding. Each pole is segments + 1 vertices, and
+/// every second face there is degenerate. Number: the precision of the computation.
 template <typename Number = double>
 TriangleMesh uv_sphere(int rings, int segments) {
   const int columns = segments + 1;
@@ -75,7 +75,7 @@ inline Points flat_normals(const TriangleMesh& split) {
   return normals;
 }
 
-/// Bends space about the x axis, as z grows.
+/// Bends space about the x axis, more with growing z.
 inline Points bent_along_z(const Points& points, double radians_per_unit) {
   Points result = points;
   for (auto point : result.rowwise()) {

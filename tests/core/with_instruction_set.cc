@@ -1,4 +1,5 @@
-// Linked into test programs of the core: the instruction set that LPDEFORM_INSTRUCTION_SET names, in place of the processor's best.
+// Linked into test programs of the core: selects the instruction set that LPDEFORM_INSTRUCTION_SET names, instead of the
+// processor's best.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// The same as layout.c, of the assembly's own structs: their fields in their order, by the names that C has.
+// Like layout.c and the enumerations in run, for the assembly's own structs: their fields in order, by their names in C.
 
 using System;
 using System.Linq;
@@ -23,8 +23,23 @@ static class Layout
         return Regex.Replace(name, "(?<!^)([A-Z])", "_$1").ToLowerInvariant();
     }
 
+    /// As `enumerations` in run tells those of the header.
+    static void TellNumbers(string name, Type type)
+    {
+        foreach (var value in Enum.GetValues(type))
+            Console.WriteLine("{0} {1} {2}", name, Snake(value.ToString()).ToUpperInvariant(), (int)value);
+    }
+
     static void Main()
     {
+        TellNumbers("encoding", typeof(FrameEncoding));
+        TellNumbers("weights", typeof(Weights));
+        TellNumbers("free_components", typeof(FreeComponents));
+        TellNumbers("state", typeof(SessionState));
+        TellNumbers("notice", typeof(NoticeReason));
+        TellNumbers("hold", typeof(Hold));
+        TellNumbers("method", typeof(Method));
+        TellNumbers("stop_reason", typeof(StopReason));
         Tell("Connection", typeof(Native.Connection));
         Tell("Attribute", typeof(Native.Attribute));
         Tell("Attribute", typeof(Native.Attribute));

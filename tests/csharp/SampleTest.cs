@@ -1,4 +1,4 @@
-// The sample for Unity against a real server, its messages called as Unity calls them: SampleTest.exe SERVER.
+// The sample for Unity against a real server, with its messages called as Unity does: SampleTest.exe SERVER.
 
 using System;
 using System.Diagnostics;

@@ -1,4 +1,5 @@
-// The C# client against a real server, which it starts, kills and starts again: SessionTest.exe SERVER. Ends with 1 where a test fails.
+// The C# client against a real server, which the test starts, kills and restarts: SessionTest.exe SERVER. Ends with 1 if a test
+// fails.
 
 using System;
 using System.Diagnostics;

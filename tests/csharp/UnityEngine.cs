@@ -1,5 +1,5 @@
-// A little of UnityEngine, so that the sample can be compiled and run without Unity: what it uses, and no more of it than that. Matrices
-// only shift.
+// A small replacement of UnityEngine, so that the sample can be compiled and run without Unity. It has only what the sample
+// uses. Matrices only translate.
 
 using System;
 using System.Collections.Generic;

@@ -1,4 +1,4 @@
-/* How the structs of lpdeform.h lie in memory, for Layout.cs: a name and the size, then each field and its place. */
+/* The memory layout of the structs of lpdeform.h, for Layout.cs: a name and the size, then each field and its offset. */
 #include <lpdeform.h>
 #include <stdio.h>
 

@@ -1,5 +1,5 @@
-"""The Kubernetes manifests, the compose file and the workflow: against the schemas of their makers, and against each other and
-the programs that they start. `manifests_test.py PROGRAM [TEST...]` with lpdeform-server's path."""
+"""The Kubernetes manifests, the compose file and the workflow, checked against their official schemas, against each other, and
+against the programs that they start. `manifests_test.py PROGRAM [TEST...]` with lpdeform-server's path."""
 
 import copy
 import importlib.util

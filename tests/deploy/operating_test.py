@@ -1,5 +1,5 @@
-"""The operator's page, deploy/operating.md: every alert leads to a section of it, every section says what to look at in which order,
-and what it names exists in the server. `operating_test.py PROGRAM [TEST...]` with lpdeform-server's path."""
+"""The operator's page, deploy/operating.md: every alert leads to a section of it, every section says what to check in which
+order, and everything that it names exists in the server. `operating_test.py PROGRAM [TEST...]` with lpdeform-server's path."""
 
 import pathlib
 import re

@@ -1,8 +1,8 @@
 """Certificates against an independent solver: convex_step_test.py CLI [unittest arguments].
 
-At a result of lpdeform the rotations are held, which leaves a convex problem: minimise over x the sum of the E_i^p with
-E_i^2 = sum_j w_ij |(x_i - x_j) - R_i (p_i - p_j)|^2, handles where they are. clarabel finds its optimum to nine digits, from
-weights, rotations and energies that are computed here, from nothing but the two meshes. The certificate promises
+At a result of lpdeform the rotations are held, which leaves a convex problem: minimise over x the sum of the E_i^p with E_i^2 =
+sum_j w_ij |(x_i - x_j) - R_i (p_i - p_j)|^2, with handles at their targets. clarabel finds its optimum to nine digits. Weights,
+rotations and energies are computed here from the two meshes alone. The certificate promises
 
     energy (1 - gap)  <=  optimum  <=  energy
 """

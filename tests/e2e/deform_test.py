@@ -1,4 +1,4 @@
-"""lpdeform deform and lpdeform-server as users run them: solving, refusing, ending."""
+"""lpdeform deform and lpdeform-server as users run them: solves, refusals and ends."""
 
 import json
 import math

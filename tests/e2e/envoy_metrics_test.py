@@ -1,4 +1,4 @@
-"""What Envoy shows Prometheus (deploy/web --stats), and that dashboard, alerts and the operator's page ask for what is there."""
+"""Envoy's metrics for Prometheus (deploy/web --stats): dashboard, alerts and the operator's page use only metrics that exist."""
 
 import contextlib
 import http.client

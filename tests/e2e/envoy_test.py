@@ -1,4 +1,4 @@
-"""Envoy as deploy/web starts it: TLS of its clients and its servers, and whom it lets in where many come."""
+"""Envoy as deploy/web starts it: TLS with clients and servers, and which clients it admits under load."""
 
 import contextlib
 import json

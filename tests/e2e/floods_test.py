@@ -1,4 +1,4 @@
-"""Hostile HTTP/2: what one client that keeps to no contract can make the server hold, alone and behind Envoy."""
+"""Hostile HTTP/2: how much one client that violates every protocol can make the server hold, directly and behind Envoy."""
 
 import contextlib
 import os

@@ -1,6 +1,7 @@
-"""lpdeform-server whose store has no room, or does not answer: it still removes, it takes again without a restart, and when it is
-stopped it waits, says what was not kept, and exits with 2. The disk is a small tmpfs in a mount namespace of this test's own; where
-that cannot be had, the test fails. By the Python client's messages, so it runs in the environment of deploy/install python."""
+"""lpdeform-server whose store is full or does not answer: it still removes, it accepts changes again without a restart, and
+when it is stopped it waits, reports what was not stored, and exits with 2. The disk is a small tmpfs in a mount namespace of
+this test; if that is not possible, the test fails. It uses the Python client's messages, so it runs in the environment of
+deploy/install python."""
 
 import contextlib
 import json

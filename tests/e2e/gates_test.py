@@ -1,4 +1,4 @@
-"""Ratios of two loads in one run, which say the same on a busy machine: other work only adds time, so one quiet round is enough."""
+"""Ratios of two loads in one run, which hold on a busy machine, too: other work only adds time, so one quiet round is enough."""
 
 import json
 import unittest

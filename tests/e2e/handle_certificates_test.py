@@ -1,8 +1,8 @@
 """Certificates of every kind of handle against an independent solver: handle_certificates_test.py CLI [unittest arguments].
 
-As convex_step_test.py, with the terms of the handles as core/constraints/soft_terms.h has them: soft ones add s l^(p-2) |x - t|^2 at
-p <= 2, orientations the same of their edges; points and locks are linear equations. clarabel finds the optimum for the rotations
-of lpdeform's result; the certificate must be a bound of it, far from the optimum as well as near.
+Like convex_step_test.py, with the terms of handles in core/constraints/soft_terms.h: soft handles add s l^(p-2) |x - t|^2 at p <=
+2, orientations add the same for their edges; points and locks are linear equations. clarabel finds the optimum for the rotations
+of lpdeform's result. The certificate must be a bound of it, far from the optimum as well as near it.
 """
 
 import json

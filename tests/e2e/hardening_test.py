@@ -1,4 +1,4 @@
-"""The programs are built against what hostile bytes could do: CMakeLists.txt says with what."""
+"""The programs are compiled with hardening against hostile input; CMakeLists.txt lists the options."""
 
 import re
 import subprocess

@@ -1,4 +1,5 @@
-"""A server that hangs while drags are open on it: they go on at another, by native clients and pages, through Envoy and with a Redis.
+"""A server that hangs while drags are open on it: they continue at another server, for native clients and pages, through Envoy
+and with a Redis.
 
 Run as: FILE SERVER CLI [unittest arguments], by the Python that has the client (build/python).
 """

@@ -1,4 +1,4 @@
-"""The table of limits in server/flags.md is that of the server's flags."""
+"""The table of limits in server/flags.md agrees with the server's flags."""
 
 import os
 import re

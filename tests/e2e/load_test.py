@@ -1,4 +1,4 @@
-"""lpdeform load, against a real server: what it counts adds up, and it says what went wrong."""
+"""lpdeform load against a real server: its counts add up, and it reports errors."""
 
 import json
 import re

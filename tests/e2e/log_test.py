@@ -1,5 +1,5 @@
-"""What lpdeform-server's log tells an operator: why a stream ended, which update was refused, and no more of it than one can read.
-By the Python client's messages, so it runs in the environment of deploy/install python."""
+"""What lpdeform-server's log tells an operator: why a stream ended, which update was refused, and no more lines than can be
+read. It uses the Python client's messages, so it runs in the environment of deploy/install python."""
 
 import concurrent.futures
 import contextlib

@@ -1,5 +1,5 @@
-"""The admin port of lpdeform-server, and that the dashboard and the alerts of deploy/monitoring ask for what it shows. What they ask
-of Envoy: operations_test.py."""
+"""The admin port of lpdeform-server. The dashboard and the alerts of deploy/monitoring use only metrics that it has;
+envoy_metrics_test.py checks those of Envoy."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What tests of the programs share: running them, reading what they write, shapes to begin with.
+"""Shared by tests of the programs: running them, reading their output, and simple shapes.
 
 Each test file is run as: FILE SERVER CLI [unittest arguments].
 """

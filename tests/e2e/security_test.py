@@ -1,4 +1,4 @@
-"""TLS, mutual TLS, bearer tokens and file descriptors, as an operator sets them up: with files that openssl makes."""
+"""TLS, mutual TLS, bearer tokens and file descriptors as an operator sets them up, with files made by openssl."""
 
 import base64
 import json

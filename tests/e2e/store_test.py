@@ -1,4 +1,4 @@
-"""lpdeform-server --store: a disk that takes nothing more, in the middle of drags, and folders that it cannot use."""
+"""lpdeform-server --store: a disk that accepts nothing more in the middle of drags, and folders that the server cannot use."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Requests of strangers, one by one, through Envoy beside a token holder's streams; and names that only other sites have.
+"""Hostile requests, one by one, through Envoy while a token holder's streams are open; and names that only other sites have.
 
 Run as: FILE SERVER CLI [unittest arguments], by the Python that has the client (build/python). Many more: tests/fuzz/requests.
 """

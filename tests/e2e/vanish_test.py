@@ -1,4 +1,4 @@
-"""Clients that vanish leave nothing behind: streams go with their connections, sessions and uploads when nobody used them for long."""
+"""Clients that vanish leave nothing behind: streams end with their connections, sessions and uploads after their idle time."""
 
 import re
 import signal

@@ -1,5 +1,6 @@
-// libFuzzer: a schedule of calls (schedule.proto) by two callers to a server's backend, from the decoding of messages to running
-// sessions. All is there but gRPC. What is one caller's the other does not find, see or change. A call that does not end in half a minute counts as hanging.
+// libFuzzer: a schedule of calls (schedule.proto) by two callers to a server's backend, from the decoding of messages to
+// running sessions; everything except gRPC. A caller must not find, see or change anything of the other. A call that does not
+// end in half a minute counts as hanging.
 
 #include <chrono>
 #include <cstdint>
@@ -156,6 +157,17 @@ class Schedule {
     return backend().find(callers_[owner], Backend::Access::kRead, session).ok();
   }
 
+  /// What a call about a session begins with. Somebody else's is not found.
+  absl::StatusOr<std::shared_ptr<Session>> found(Backend::Access access, const std::string& name) const {
+    const auto waiting = std::make_shared<std::promise<absl::StatusOr<std::shared_ptr<Session>>>>();
+    backend().with_session(context(), access, name, [waiting](auto session) { waiting->set_value(session); });
+    auto ended = waiting->get_future();
+    LPDEFORM_CHECK(ended.wait_for(kPatience) == std::future_status::ready);
+    auto session = ended.get();
+    if (is_others(name)) LPDEFORM_CHECK(!session.ok());
+    return session;
+  }
+
   template <typename Request, typename Response>
   absl::Status later(void (Backend::*call)(const CallContext&, const Request&, Response&, Backend::Done),
                      const Request& request, Response& response) {
@@ -234,9 +246,9 @@ class Schedule {
       case fuzz::Call::kOpenStream: {
         const v1::DeformOpen& open = call.open_stream();
         if (streams_.size() >= kMostStreams) return;
-        auto stream =
-            backend().open_stream(context(), open.session(), open.writer_token(), open.options(), [] {});
-        if (is_others(open.session())) LPDEFORM_CHECK(!stream.ok());
+        const auto session = found(Backend::Access::kRead, open.session());
+        if (!session.ok()) return;
+        auto stream = backend().open_stream(context(), *session, open.writer_token(), open.options(), [] {});
         if (!stream.ok()) return;
         streams_.push_back(*std::move(stream));
         streams_by_.push_back(by_);
@@ -249,8 +261,9 @@ class Schedule {
       case fuzz::Call::kRestore:
         return restore(call.restore());
       case fuzz::Call::kSnapshot: {
-        const auto file = backend().snapshot(context(), call.snapshot().session());
-        if (is_others(call.snapshot().session())) LPDEFORM_CHECK(!file.ok());
+        const auto session = found(Backend::Access::kChange, call.snapshot().session());
+        if (!session.ok()) return;
+        const auto file = backend().snapshot(context(), **session);
         if (!file.ok() || file->bytes.size() > (1u << 20)) return;
         LPDEFORM_CHECK(restore_file(file->bytes).ok());  // what the server wrote it reads
         return;
@@ -290,16 +303,18 @@ class Schedule {
   void solve(v1::SolveRequest request) {
     auto& solver = *request.mutable_update()->mutable_settings()->mutable_solver();
     if (solver.max_iterations() == 0 || solver.max_iterations() > 20) solver.set_max_iterations(20);
+    const auto session = found(Backend::Access::kChange, request.session());
+    if (!session.ok()) return;
     const Ending ending;
     std::shared_ptr<SolveJob> job;
     const absl::Status status = backend().solve(
-        context(), request, [](const SolveProgress&) {},
+        context(), {*session, (*session)->writer(request.writer_token())}, request,
+        [](const SolveProgress&) {},
         [done = ending.done()](const absl::StatusOr<SolveResult>& result) {
           if (result.ok()) LPDEFORM_CHECK(result->frame->surface->positions().allFinite());
           done(result.status());
         },
         job);
-    if (is_others(request.session())) LPDEFORM_CHECK(!status.ok());
     if (status.ok()) (void)ending.wait();
   }
 

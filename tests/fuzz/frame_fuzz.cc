@@ -1,5 +1,5 @@
-// libFuzzer: what a client makes of parts of frames, in every encoding. The input is one DeformResponse after the other, each with
-// two bytes of its length before it.
+// libFuzzer: how a client handles parts of frames, in every encoding. The input is a sequence of DeformResponses, each preceded
+// by its length in two bytes.
 
 #include <algorithm>
 #include <cstdint>

@@ -1,4 +1,4 @@
-// libFuzzer: the readers of meshes, and what is made of a mesh that they take. The first byte is the format.
+// libFuzzer: the readers of meshes, and the processing of meshes that they accept. The first byte is the format.
 
 #include <cstdint>
 #include <string_view>

@@ -1,5 +1,5 @@
-"""What a stranger may send: cases that a seed decides. A case is a way ("h1" or "h2") and a list of pieces that can be left out one by
-one: ["headers", stream, flags, [[name, value], ...]], ["frame", kind, flags, stream, payload], ["bytes", what]."""
+"""Hostile input: cases that a seed determines. A case is a protocol ("h1" or "h2") and a list of pieces that can be left out
+one by one: ["headers", stream, flags, [[name, value], ...]], ["frame", kind, flags, stream, payload], ["bytes", what]."""
 
 import base64
 import random

@@ -1,4 +1,4 @@
-"""Frames of HTTP/2 and lists of headers (HPACK, without Huffman's code), right or wrong as they are asked for."""
+"""Frames of HTTP/2 and header lists (HPACK, without Huffman coding), valid or invalid as requested."""
 
 import struct
 

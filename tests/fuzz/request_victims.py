@@ -1,4 +1,5 @@
-"""Who must not notice: a native caller with an open Deform stream, and a page with a gRPC-Web StreamFrames beside it, on one session."""
+"""The callers who must not be affected: a native caller with an open Deform stream, and a page with a gRPC-Web StreamFrames,
+on one session."""
 
 from __future__ import annotations
 

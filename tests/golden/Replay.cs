@@ -1,4 +1,4 @@
-// What the C# client makes of the golden recordings: see replay.py.   Replay.exe ADDRESS NUMBER_OF_ERRORS
+// How the C# client reads the golden recordings: see replay.py.   Replay.exe ADDRESS NUMBER_OF_ERRORS
 
 using System;
 using System.IO;

@@ -1,11 +1,11 @@
 // Golden recordings of the wire, from a real server in this process:
 //   record FOLDER ERRORS_MD            writes them
-//   record --check FOLDER ERRORS_MD    1 where the server, asked the same, no longer answers so
+//   record --check FOLDER ERRORS_MD    1 if the server answers the same requests differently
 //
-// frames.json: a session and, for each encoding, what is sent and what comes on a Deform stream until the result of one update,
-// with the word of a server that is overloaded; a step that is undone; a session as a file, and made from it; messages
-// serialised, in base64. errors.json: each reason of proto/errors.md as the details of a call's status and as the fault
-// of a stream. expected.txt: what every client has to make of them, one thing a line; numbers by their bits.
+// frames.json: a session and, for each encoding, what is sent and received on a Deform stream until the result of one update,
+// with the notice of an overloaded server; a step that is undone; a session as a file, and one restored from it. Messages
+// are serialised, in base64. errors.json: each reason of proto/errors.md as the details of a call's status and as the fault
+// of a stream. expected.txt: what every client must make of them, one fact per line; numbers are given by their bits.
 
 #include <grpcpp/grpcpp.h>
 

@@ -1,4 +1,4 @@
-/* What the C interface makes of the golden recordings: see replay.py.   replay_c ADDRESS NUMBER_OF_ERRORS */
+/* How the C interface reads the golden recordings: see replay.py.   replay_c ADDRESS NUMBER_OF_ERRORS */
 #define _POSIX_C_SOURCE 200809L
 
 #include <inttypes.h>

@@ -1,4 +1,4 @@
-// What the C++ client makes of the golden recordings: see replay.py.   replay_cpp ADDRESS NUMBER_OF_ERRORS
+// How the C++ client reads the golden recordings: see replay.py.   replay_cpp ADDRESS NUMBER_OF_ERRORS
 
 #include <bit>
 #include <cstdio>

@@ -1,4 +1,4 @@
-"""What the Python client makes of the golden recordings: see replay.py.   replay_python.py ADDRESS NUMBER_OF_ERRORS"""
+"""How the Python client reads the golden recordings: see replay.py.   replay_python.py ADDRESS NUMBER_OF_ERRORS"""
 
 import struct
 import sys

@@ -1,5 +1,5 @@
-// The program with a store, killed at random moments of a random schedule and started again: what it has said to be kept
-// is there, and all of it can be solved for. LPDEFORM_KILLS and LPDEFORM_SEED choose how often, and which schedule.
+// The program with a store, killed at random moments of a random schedule and restarted: everything that it reported as stored
+// is there and can be solved. LPDEFORM_KILLS and LPDEFORM_SEED choose how often, and which schedule.
 
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>

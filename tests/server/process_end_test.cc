@@ -1,4 +1,4 @@
-// A process whose store hangs ends all the same, and its log is written.
+// A process whose store hangs still ends, and its log is written.
 
 #include "server/process_end.h"
 

@@ -1,5 +1,5 @@
-// Several servers that share a store in Redis, behind Envoy: one that dies or drains hands over, and the C++ client goes on
-// by itself. LPDEFORM_VERTICES makes a mesh of about so many vertices: the time of a failover is printed.
+// Several servers that share a store in Redis, behind Envoy: a server that dies or drains hands over, and the C++ client
+// continues by itself. LPDEFORM_VERTICES chooses a mesh of about that many vertices; then the time of a failover is printed.
 
 #include <gtest/gtest.h>
 

@@ -10,9 +10,9 @@
 
 namespace lpdeform {
 
-/// A manifold with boundary that lies nowhere near a plane: patches of 4 x 4 squares whose right and upper edges are
-/// glued to the left and lower ones of others, at random. 16 vertices a patch; any factorisation of it fills up, n^2 / 20
-/// entries or so.
+/// A manifold with boundary that is not near any plane: patches of 4 x 4 squares whose right and upper edges are glued at random to
+/// the left and lower edges of others. It has 16 vertices per patch. Every factorisation of it fills in, with about n^2 / 20
+/// entries.
 inline TriangleMesh glued_at_random(std::int32_t patches) {
   constexpr std::int32_t kSide = 4;
   std::mt19937 random(3);

@@ -1,10 +1,8 @@
-// Tells ThreadSanitizer of the order that gRPC keeps between threads. Linked into every program of preset
-// tsan, and into nothing else.
-//
-// Debian's gRPC and abseil are not built for ThreadSanitizer: their locks and queues are invisible to it, and
-// each call would look like dozens of races. The functions below take the place of the libraries' own, which
-// they call: a lock, the two ends of an operation on a completion queue, which the tag connects, and the end of
-// a call on the server. Nothing else is ordered by them, so a race in our own code is seen as before; seeded_callback_race.cc shows it.
+// Tells ThreadSanitizer in which order gRPC runs its threads. Linked into every program of preset tsan, and into nothing else.
+// Debian's gRPC and abseil are not built for ThreadSanitizer: it does not see their locks and queues, and each call would look like
+// dozens of races. The functions below replace the libraries' own, which they call: a lock, the two ends of an operation on a
+// completion queue, which the tag connects, and the end of a call on the server. They order nothing else, so races in this
+// project's code are still found; seeded_callback_race.cc shows it.
 
 #include <absl/synchronization/mutex.h>
 #include <dlfcn.h>
@@ -17,7 +15,7 @@
 
 namespace {
 
-// The library's own function of that name.
+// The library's own function of this name.
 template <typename Function>
 Function* original(const char* symbol) {
   void* const found = dlsym(RTLD_NEXT, symbol);
@@ -87,9 +85,9 @@ ABSL_NAMESPACE_END
 
 namespace grpc::internal {
 
-// How many reactions of a call are outstanding is counted in part by the library's own code. Whoever counts
-// down to 0 ends the call, and has to be told of what the others did before they counted. The count is a
-// call's third member, after its virtual table and another count.
+// The library's own code counts a part of a call's outstanding reactions. The thread that counts down to 0 ends the call, and must
+// be ordered after what the others did before they counted. The count is the call's third member, after its virtual table and
+// another count.
 void ServerCallbackCall::ScheduleOnDone(bool is_inline) {
   static const auto schedule =
       original<void(ServerCallbackCall*, bool)>("_ZN4grpc8internal18ServerCallbackCall14ScheduleOnDoneEb");

@@ -1,7 +1,7 @@
-"""What each source file takes in of ours, by paths from the root: includes of C++, imports of Python and TypeScript.
+"""The imports of each source file from this project, as paths from the root: includes of C++, imports of Python and TypeScript.
 
-An import counts wherever it stands: also inside a function, under TYPE_CHECKING, or for types alone. What is generated or comes from
-elsewhere is left out. So is __init__.py where only another module of its package is named: Python loads it with every module.
+Every import counts, also inside a function, under TYPE_CHECKING, or for types only. Generated and external files are left out. So
+is __init__.py if an import names only another module of its package, because Python loads it with every module.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ bl_info = {
     "category": "Mesh",
 }
 
-# What comes along with the add-on; what Blender's Python has by itself goes first.
+# Packages that are packed with the add-on. Those of Blender's own Python take precedence.
 _modules = str(Path(__file__).parent / "modules")
 if _modules not in sys.path:
     sys.path.append(_modules)

@@ -1,4 +1,4 @@
-"""The package lpdeform, where it can be imported, and where the server is."""
+"""The package lpdeform, if it can be imported, and the server's address."""
 
 import os
 
@@ -12,7 +12,7 @@ except ImportError as missing:
 
 
 class NotReady(Exception):
-    """What a person has to do first, in one sentence."""
+    """What the user has to do first, in one sentence."""
 
 
 def require() -> None:
@@ -33,9 +33,9 @@ def address() -> str:
 
 
 def access() -> dict:
-    """How lpdeform.open() is let in: the token and TLS of the preferences. Raises OSError where a file cannot be read."""
-    path = _path("token_file")  # here: bpy is for this thread alone
-    token = (lambda: _text(path).strip()) if path else None  # read again for each call, so that it may be renewed
+    """The token and TLS settings of the preferences, for lpdeform.open(). Raises OSError if a file cannot be read."""
+    path = _path("token_file")  # read here, because bpy is for this thread only
+    token = (lambda: _text(path).strip()) if path else None  # read for each call, so that the token may be renewed
     if token is not None:
         token()
     if not _preference("use_tls"):
@@ -46,7 +46,7 @@ def access() -> dict:
 
 
 def _path(name: str) -> str:
-    """Of a file in the preferences; empty where none is given."""
+    """The contents of a file that the preferences name; empty if none is named."""
     given = _preference(name)
     return bpy.path.abspath(given) if given else ""
 

@@ -4,14 +4,14 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from . import surface
+from . import holds, surface
 from .client import lpdeform
 
-_rigid_tolerance = 1e-5  # of the lengths and angles of a matrix that float32 has gone through
+_rigid_tolerance = 1e-5  # of the lengths and angles of a matrix, after rounding to float32
 
 
 def of(ob) -> list:
-    """The empties of a mesh object that are in the scene, each number once."""
+    """The empties of a mesh object in the scene, one for each number."""
     found = {}
     for one in bpy.context.scene.objects:
         handle = one.lpdeform_handle
@@ -21,13 +21,13 @@ def of(ob) -> list:
 
 
 def rest_matrix(empty) -> Matrix:
-    """Of an empty, in its mesh's own space."""
+    """The rest matrix of an empty, in its mesh's own space."""
     flat = empty.lpdeform_handle.rest
     return Matrix([flat[4 * k : 4 * k + 4] for k in range(4)])
 
 
 def add(ob, vertices: np.ndarray, rest: np.ndarray):
-    """An empty at the middle of the vertices, which lets other handles go of them. `rest`: positions of the mesh at rest."""
+    """Adds an empty at the middle of the vertices; other handles release them. `rest`: positions of the mesh at rest."""
     number, numbers = _next_number(ob), surface.held(ob)
     numbers[vertices] = number
     surface.set_held(ob, numbers)
@@ -35,7 +35,7 @@ def add(ob, vertices: np.ndarray, rest: np.ndarray):
 
 
 def add_in_faces(ob, faces: np.ndarray, rest: np.ndarray):
-    """The same with the middles of faces, which other handles let go of."""
+    """The same for the middles of faces; other handles release them."""
     number, numbers = _next_number(ob), surface.held_faces(ob)
     numbers[faces] = number
     surface.set_held_faces(ob, numbers)
@@ -63,12 +63,12 @@ def _add_empty(ob, number: int, middle: np.ndarray, rest: np.ndarray):
 
 
 def put_back(empty) -> None:
-    """To where it holds its vertices at rest."""
+    """Puts the empty back to where it holds its vertices at rest."""
     empty.matrix_world = empty.lpdeform_handle.mesh.matrix_world @ rest_matrix(empty)
 
 
 def remove(empty) -> None:
-    """Lets go of its vertices."""
+    """Releases the empty's vertices."""
     handle = empty.lpdeform_handle
     if handle.mesh is not None:
         for read, write in ((surface.held, surface.set_held), (surface.held_faces, surface.set_held_faces)):
@@ -79,7 +79,7 @@ def remove(empty) -> None:
 
 
 def motion_matrix(ob, empty) -> Matrix:
-    """Where it takes points at rest, in the mesh's own space."""
+    """The matrix that moves points from rest to where the empty takes them, in the mesh's own space."""
     return ob.matrix_world.inverted_safe() @ empty.matrix_world @ rest_matrix(empty).inverted_safe()
 
 
@@ -87,19 +87,11 @@ def hold(empty):
     handle = empty.lpdeform_handle
     axis = rest_matrix(empty).to_3x3().col[2].normalized()
     direction = (axis.x, axis.y, axis.z) if axis.length > 0 else (0.0, 0.0, 1.0)
-    if handle.kind == "SOFT":
-        return lpdeform.Soft(handle.weight)
-    if handle.kind == "ORIENTATION":
-        return lpdeform.Orientation(handle.weight)
-    if handle.kind == "AXIS":
-        return lpdeform.AxisLock(direction)
-    if handle.kind == "PLANE":
-        return lpdeform.PlaneLock(direction)
-    return lpdeform.Exact()
+    return holds.KINDS[handle.kind].make(handle.weight, direction)
 
 
 def motion(matrix: Matrix, points: np.ndarray, is_turned_only: bool):
-    """Rigid where the matrix is; otherwise each point's own target. Orientations take the rotation alone."""
+    """A rigid motion if the matrix is rigid; otherwise a target for each point. Orientations use only the rotation."""
     linear = np.array(matrix.to_3x3())
     is_rigid = np.abs(linear.T @ linear - np.eye(3)).max() < _rigid_tolerance and np.linalg.det(linear) > 0
     if not (is_rigid or is_turned_only):

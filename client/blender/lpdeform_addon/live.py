@@ -1,4 +1,4 @@
-"""Meshes that follow their handles: one session each, and the timer that keeps them going."""
+"""Meshes that follow their handles: one session for each, and the timer that updates them."""
 
 import time
 from typing import NamedTuple
@@ -7,31 +7,31 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from . import handles, surface
+from . import handles, holds, surface
 from .client import NotReady, access, address, lpdeform, require
 from .told import Told
 
-_interval = 1 / 30  # seconds between two looks
-_stroke_pause = 0.2  # seconds without a change of weights, after which they are read: that is a loop over all vertices
+_interval = 1 / 30  # seconds between two updates
+_stroke_pause = 0.2  # seconds without a change of weights, after which they are read; reading them loops over all vertices
 
 _now = time.monotonic
 _running: dict = {}
-"""By the names of mesh objects."""
+"""The live meshes, by the names of their objects."""
 _showing: set = set()
-"""Names of mesh objects that change because a frame is shown."""
+"""Names of mesh objects that are changing because a frame is shown."""
 _messages: dict = {}
-"""What was last to be said of a mesh object."""
+"""The last message about a mesh object."""
 
 
 _settings = ("p", "stiffness", "region")
 _resize = "resize"
-"""Also the name of the handle that the server makes of it."""
+"""This is also the name of the handle that the server makes of it."""
 _taken_all_the_same = ("FAILED_PRECONDITION", "ABORTED")
-"""Names of codes that are about solving: the server has taken the update in."""
+"""Codes of errors about solving: the server has accepted the update."""
 
 
 class Present:
-    """Something that the server is to know, the same as another of the same value."""
+    """A value to send to the server, compared by its contents."""
 
     def __init__(self, value, empty=None, held=None, matrix=None, setting=None) -> None:
         self.value, self.empty, self.held, self.matrix, self.setting = value, empty, held, matrix, setting
@@ -41,7 +41,7 @@ class Present:
 
 
 class Held(NamedTuple):
-    """What a handle holds: vertices, or points inside faces; and where these are at rest."""
+    """What a handle holds, vertices or points inside faces, and where these are at rest."""
 
     vertices: np.ndarray
     points: object
@@ -54,7 +54,7 @@ class Held(NamedTuple):
 
 
 class LiveMesh:
-    """One mesh and its session. Everything is looked up by name each time: undo exchanges Blender's data."""
+    """One mesh and its session. Objects are looked up by name each time, because undo exchanges Blender's data."""
 
     def __init__(self, ob) -> None:
         self.name = ob.name
@@ -64,7 +64,7 @@ class LiveMesh:
         self.muted = surface.add_live_key(ob)
 
     def _open(self, ob) -> None:
-        """Raises NotReady, and then everything is as it was."""
+        """Raises NotReady, and then changes nothing."""
         rest, faces = surface.rest_positions(ob), surface.triangles(ob)
         self.session = _open_session(ob, rest, faces)
         self._rest, self._faces, self._weld = rest, faces, ob.lpdeform.weld
@@ -81,25 +81,25 @@ class LiveMesh:
 
     @property
     def notice(self) -> str:
-        """What the server says about itself, but that it is well again."""
+        """The server's last notice about itself, unless it says that all is well again."""
         notice = self.session.notice
         return notice.text if notice is not None and notice.reason != "recovered" else ""
 
     @property
     def mesh_notices(self) -> tuple:
-        """What is to be known of the mesh: that it comes apart where it is split."""
+        """What users should know of the mesh: that it comes apart where it is split."""
         return self.session.mesh_report.notices
 
     @property
     def has_refusals(self) -> bool:
-        """Something is as the server does not take it."""
+        """Whether the server has refused something that still stands."""
         return self._told.has_refusals
 
     def close(self) -> None:
         self.session.close()
 
     def vertices_changed(self, ob) -> None:
-        """Of handles."""
+        """By the names of handles."""
         self._held = {}
         by_vertex, by_face = surface.held(ob), surface.held_faces(ob)
         for number in np.unique(by_face[by_face > 0]):
@@ -110,14 +110,14 @@ class LiveMesh:
             self._held[int(number)] = Held(vertices, None, self._rest[vertices])
 
     def look(self, ob) -> None:
-        """Tells the server what is new, and shows what has come."""
+        """Sends changes to the server, and shows what has come."""
         was, self._mode = self._mode, ob.mode
         if ob.mode == "EDIT":
             return
         if was == "EDIT" or len(ob.data.vertices) != len(self._rest) or ob.lpdeform.weld != self._weld:
             self._look_again(ob)
         if was != ob.mode:
-            self._weights = {}  # to be read anew
+            self._weights = {}  # read again
         self._tell(ob)
         try:
             frame = self.session.poll()
@@ -133,7 +133,7 @@ class LiveMesh:
                 self.show(ob)
 
     def solve(self, ob, on_progress, timeout: float) -> None:
-        """Waits for a result of its own, with its bound, and shows it. Raises what the server has to say, Timeout, and NotReady."""
+        """Solves to the end, with a bound, and shows the result. Raises the server's errors, Timeout, and NotReady."""
         self.look(ob)
         try:
             self.result = self.session.solve(certify=True, on_progress=on_progress, timeout=timeout)
@@ -145,7 +145,7 @@ class LiveMesh:
 
     @property
     def shown(self):
-        """A frame, or the result of a solve; None where nothing came yet."""
+        """The last frame or the result of a solve; None if nothing has come yet."""
         return self.result or self.frame
 
     def _tell(self, ob) -> None:
@@ -159,19 +159,20 @@ class LiveMesh:
         values = {key: present.get(key) for key in news}
         try:
             self._told.tell(values, self.session.update(changes, lpdeform.Settings(**settings), resize))
-        except lpdeform.LpdeformError:  # it was not even sent
+        except lpdeform.LpdeformError:  # not even sent
             self._told.tell(values, 0)
             self._told.refused()
             raise
 
     def undone(self, ob) -> None:
-        """Blender has taken a step back, or has done one again: handles may be others, and what was shown is older than the frame."""
+        """Called after an undo or redo of Blender: handles may have changed, and the shown positions are older than the last
+        frame."""
         self.vertices_changed(ob)
         if self.shown is not None and len(ob.data.vertices) == len(self._rest):
             self.show(ob)
 
     def show(self, ob) -> None:
-        bpy.context.view_layer.update()  # of what others did: that is theirs
+        bpy.context.view_layer.update()  # changes by others are not ours
         surface.show_positions(ob, self.shown.positions)
         if ob.lpdeform.show_distortion:
             surface.show_distortion(ob, self.shown.distortion, ob.lpdeform.distortion_limit)
@@ -180,12 +181,12 @@ class LiveMesh:
         _showing.discard(self.name)
 
     def mesh_changed(self, ob) -> None:
-        """By somebody else. In weight paint mode that is a stroke."""
+        """Called when the mesh was changed by others. In weight paint mode that is a stroke."""
         if ob.mode == "WEIGHT_PAINT":
             self._painted = _now()
 
     def _look_again(self, ob) -> None:
-        """Where the mesh at rest may have become another one, or is to be welded or no longer."""
+        """Called when the mesh at rest may have changed, or welding was switched."""
         is_same = len(ob.data.vertices) == len(self._rest) and np.array_equal(surface.rest_positions(ob), self._rest)
         if is_same and np.array_equal(surface.triangles(ob), self._faces) and ob.lpdeform.weld == self._weld:
             self.vertices_changed(ob)
@@ -195,7 +196,7 @@ class LiveMesh:
         before.close()
 
     def _present_handles(self, ob) -> dict:
-        """Of each handle its empty, what it holds and how, and where it is."""
+        """For each handle its empty, what it holds and how, and where it is."""
         present = {}
         for empty in handles.of(ob):
             settings = empty.lpdeform_handle
@@ -209,12 +210,12 @@ class LiveMesh:
         return present
 
     def _change(self, key: str, present):
-        """Of a handle, from what the server has of it."""
+        """Restores the empty's settings from what the server has of the handle."""
         if present is None:
             return lpdeform.Removal()
         settings = present.empty.lpdeform_handle
         held = present.held
-        motion = handles.motion(present.matrix, held.places, settings.kind == "ORIENTATION")
+        motion = handles.motion(present.matrix, held.places, holds.KINDS[settings.kind].is_turned_only)
         last = self._told.last(key)
         if last is not None and last.value[0] == present.value[0]:
             return motion
@@ -255,7 +256,7 @@ class LiveMesh:
 
 
 def between(plain: float, painted: float, weights):
-    """One value, or one a vertex where there are weights."""
+    """One value, or one per vertex if there are weights."""
     return np.float64(plain) if weights is None else plain + weights * (painted - plain)
 
 
@@ -269,7 +270,7 @@ def message(ob) -> str:
 
 
 def start(ob) -> None:
-    """Raises NotReady with what a person has to do first."""
+    """Raises NotReady with what the user has to do first."""
     if of(ob) is not None:
         return
     _messages.pop(ob.name, None)
@@ -303,7 +304,7 @@ def _open_session(ob, rest, faces):
 
 
 def stop(ob, keep_as: str = "") -> None:
-    """Back to the mesh at rest; or the present pose stays, as a shape key of this name."""
+    """Ends live deformation. The mesh returns to rest, or keeps the present pose as a shape key of this name."""
     running = _running.pop(ob.name, None)
     if running is None:
         return
@@ -317,7 +318,7 @@ def stop(ob, keep_as: str = "") -> None:
 
 
 def tick():
-    """Looks after every live mesh; Blender's timer calls it."""
+    """Updates every live mesh; Blender's timer calls it."""
     for name, running in list(_running.items()):
         ob = bpy.data.objects.get(name)
         if ob is None or surface.live_key(ob) is None:
@@ -327,7 +328,7 @@ def tick():
             running.look(ob)
             if running.frame is not None and running.state == "connected" and not running.has_refusals:
                 _messages.pop(name, None)
-        except NotReady as error:  # the mesh was edited, and there is no session for what it has become
+        except NotReady as error:  # the mesh was edited, and no session can be made for it
             _forget(name, f"Ended: {error}")
         except lpdeform.LpdeformError as error:
             _messages[name] = str(error)

@@ -8,7 +8,7 @@ from .client import NotReady, lpdeform
 
 
 def mesh_of(context):
-    """The mesh that is meant: the active object, or the one that the active empty holds."""
+    """The mesh to work on: the active object, or the mesh that the active empty belongs to."""
     active = context.object
     if active is None:
         return None
@@ -54,7 +54,7 @@ class AddHandle(bpy.types.Operator):
 
 
 class RemoveHandle(bpy.types.Operator):
-    """Let go of the vertices of the selected handles and delete their empties"""
+    """Release the vertices of the selected handles and delete their empties"""
 
     bl_idname = "lpdeform.remove_handle"
     bl_label = "Remove handle"
@@ -99,7 +99,7 @@ class Start(bpy.types.Operator):
 
     bl_idname = "lpdeform.start"
     bl_label = "Go live"
-    bl_options = {"UNDO"}  # so that the first step taken back is not this one
+    bl_options = {"UNDO"}  # so that the first undo does not revert this
 
     @classmethod
     def poll(cls, context):
@@ -132,12 +132,12 @@ class Stop(bpy.types.Operator):
 
 
 class Solve(bpy.types.Operator):
-    """Wait for the finished result, with a bound on how far it can be from the optimum"""
+    """Wait for the finished result, with a bound on its distance from the optimum"""
 
     bl_idname = "lpdeform.solve"
     bl_label = "Solve"
 
-    timeout: FloatProperty(name="Seconds", default=60.0, min=0.0, description="To wait at most")
+    timeout: FloatProperty(name="Seconds", default=60.0, min=0.0, description="The longest time to wait")
 
     @classmethod
     def poll(cls, context):

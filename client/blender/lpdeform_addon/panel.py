@@ -4,7 +4,7 @@ import textwrap
 
 import bpy
 
-from . import live
+from . import holds, live
 from .client import address
 from .operators import mesh_of
 
@@ -17,7 +17,7 @@ _words = {
 
 
 def lines(text: str, width: float) -> list:
-    """Of what fits beside an icon into a sidebar of so many pixels, at Blender's usual size of text."""
+    """Splits a text into lines that fit beside an icon in a sidebar of this width in pixels, at Blender's usual text size."""
     return textwrap.wrap(text, max(12, int((width - 60) / 7.5)))
 
 
@@ -82,7 +82,7 @@ class MaterialPanel(_Below, bpy.types.Panel):
         self.layout.use_property_split = True
         for name in ("p", "stiffness"):
             column = self.layout.column(align=True)
-            column.enabled = tuple(ob.lpdeform.resize) == (1.0, 1.0, 1.0)  # which gives both
+            column.enabled = tuple(ob.lpdeform.resize) == (1.0, 1.0, 1.0)  # which sets both
             column.prop(ob.lpdeform, f"{name}_automatic", text="By shape")
             if getattr(ob.lpdeform, f"{name}_automatic") > 0:
                 continue
@@ -108,7 +108,7 @@ class HandlePanel(_Below, bpy.types.Panel):
         handle, layout = context.object.lpdeform_handle, self.layout
         layout.use_property_split = True
         layout.prop(handle, "kind")
-        if handle.kind in ("SOFT", "ORIENTATION"):
+        if holds.KINDS[handle.kind].has_weight:
             layout.prop(handle, "weight")
         layout.prop(handle, "footprint")
         row = layout.row(align=True)

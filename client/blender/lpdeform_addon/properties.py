@@ -1,15 +1,9 @@
-"""What is kept in the file: settings of a mesh, what an empty holds, and the server's address in the preferences."""
+"""What the file keeps: settings of a mesh, what an empty holds, and the server's address in the preferences."""
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty
 
-KINDS = (
-    ("EXACT", "Exact", "The vertices go exactly where the empty takes them"),
-    ("SOFT", "Soft", "The vertices are drawn to where the empty takes them"),
-    ("ORIENTATION", "Orientation", "The surface is turned as the empty is; its position is free"),
-    ("AXIS", "Axis", "The vertices slide along the empty's Z axis as it was at rest"),
-    ("PLANE", "Plane", "The vertices slide across the empty's Z axis as it was at rest"),
-)
+from . import holds
 
 
 class MeshSettings(bpy.types.PropertyGroup):
@@ -34,33 +28,33 @@ class MeshSettings(bpy.types.PropertyGroup):
     )  # fmt: skip
     p_automatic: FloatProperty(
         name="p by shape", default=0.0, min=0.0, max=1.0,
-        description="Lets the geometry choose p, with this strength; 0: as above",
+        description="The geometry chooses p, with this strength; 0: the values above",
     )  # fmt: skip
     stiffness_automatic: FloatProperty(
         name="Stiffness by shape", default=0.0, min=0.0, max=1.0,
-        description="Lets the geometry choose the stiffness, with this strength; 0: as above",
+        description="The geometry chooses the stiffness, with this strength; 0: the values above",
     )  # fmt: skip
     region_group: StringProperty(
-        name="Region", description="Vertex group: only what has a weight over 0.5 may move. Empty: everything may"
+        name="Region", description="Vertex group: only vertices with a weight over 0.5 may move. Empty: all vertices may move"
     )
     resize: FloatVectorProperty(
         name="Resize", default=(1.0, 1.0, 1.0), min=1.0, max=100.0, soft_max=4.0, size=3, subtype="XYZ",
-        description="Stretches the mesh along its own axes in such a way that what stands out keeps its shape. To make it smaller "
-        "along one, scale the object down and stretch it along the others. Gives p and stiffness meanwhile",
+        description="Stretches the mesh along its own axes; salient parts keep their shape. To make it smaller along one axis, "
+        "scale the object down and stretch it along the others. Sets p and stiffness meanwhile",
     )  # fmt: skip
     weld: BoolProperty(
         name="Weld", default=False,
-        description="Takes vertices that lie in the same place for one: the mesh holds together where it is split. Handles and paint "
-        "must be the same for all of them",
+        description="Welds vertices in the same place, so that the mesh holds together where it is split. Handles and paint must "
+        "be the same for all of them",
     )  # fmt: skip
     certify: BoolProperty(
-        name="Bound", default=False, description="Says how far a result can be from the optimum. Counts from the next start on"
+        name="Bound", default=False, description="Reports a bound on a result's distance from the optimum. Takes effect at the next start"
     )
     show_distortion: BoolProperty(
         name="As colour", default=True, description="Fills the colour attribute lpdeform distortion"
     )
     distortion_limit: FloatProperty(
-        name="Red from", default=0.0, min=0.0, description="Distortion that is red, in the mesh's unit; 0: the largest"
+        name="Red from", default=0.0, min=0.0, description="The distortion shown in red, in the mesh's unit; 0: the largest"
     )
 
 
@@ -68,15 +62,15 @@ class HandleSettings(bpy.types.PropertyGroup):
     """Of an empty that holds vertices of a mesh."""
 
     mesh: PointerProperty(type=bpy.types.Object, name="Mesh")
-    number: IntProperty(name="Number", description="Of its vertices in the mesh's attribute lpdeform_handle; 0: holds none")
-    rest: FloatVectorProperty(name="Rest", size=16, description="Its matrix at rest in the mesh's own space, by rows")
-    kind: EnumProperty(name="Hold", items=KINDS, default="EXACT")
+    number: IntProperty(name="Number", description="The value of its vertices in the mesh's attribute lpdeform_handle; 0: it holds none")
+    rest: FloatVectorProperty(name="Rest", size=16, description="Its matrix at rest, in the mesh's own space, row by row")
+    kind: EnumProperty(name="Hold", items=holds.ITEMS, default="EXACT")
     weight: FloatProperty(
-        name="Weight", default=1.0, min=0.0, max=1e6, soft_max=100.0, description="Of soft and orientation handles"
+        name="Weight", default=1.0, min=0.0, max=1e6, soft_max=100.0, description="For soft and orientation handles"
     )
     footprint: FloatProperty(
         name="Footprint", default=0.0, min=0.0, unit="LENGTH",
-        description="Radius of the surroundings that go along nearly rigidly, against spikes of single vertices",
+        description="Radius of a region that moves along nearly rigidly, against spikes at single vertices",
     )  # fmt: skip
 
 
@@ -94,12 +88,12 @@ class Preferences(bpy.types.AddonPreferences):
     )  # fmt: skip
     use_tls: BoolProperty(name="TLS", default=False, description="Connect with TLS")
     root_certificates: StringProperty(
-        name="Trusted", default="", subtype="FILE_PATH", description="Certificates of those to trust, PEM. Empty: the usual ones"
+        name="Trusted", default="", subtype="FILE_PATH", description="Certificates to trust, in PEM. Empty: the default ones"
     )
     certificate_chain: StringProperty(
-        name="Own certificate", default="", subtype="FILE_PATH", description="PEM, where the server asks for one"
+        name="Own certificate", default="", subtype="FILE_PATH", description="In PEM, if the server asks for one"
     )
-    private_key: StringProperty(name="Its key", default="", subtype="FILE_PATH", description="PEM, without a password")
+    private_key: StringProperty(name="Its key", default="", subtype="FILE_PATH", description="In PEM, without a password")
 
     def draw(self, context) -> None:
         self.layout.use_property_split = True

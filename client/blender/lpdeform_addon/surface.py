@@ -1,4 +1,4 @@
-"""Arrays of a Blender mesh, in and out. Nothing loops over vertices but the reading of vertex groups, for which Blender 3.4 has
+"""Converts arrays from and to a Blender mesh. Only the reading of vertex groups loops over vertices, because Blender 3.4 has
 no other way."""
 
 import numpy as np
@@ -14,7 +14,7 @@ _ramp = np.array([[0.02, 0.08, 0.55], [0.0, 0.45, 0.75], [0.1, 0.65, 0.15], [0.9
 
 
 def rest_positions(ob) -> np.ndarray:
-    """n x 3, in the object's own space: of the basis, where there are shape keys."""
+    """n x 3, in the object's own space: positions of the basis, if there are shape keys."""
     keys = ob.data.shape_keys
     source = keys.reference_key.data if keys is not None else ob.data.vertices
     positions = np.empty(3 * len(ob.data.vertices), np.float32)
@@ -31,21 +31,21 @@ def triangles(ob) -> np.ndarray:
 
 
 def selected(ob) -> np.ndarray:
-    """Indices of the vertices selected in Edit mode; to be asked for in Object mode."""
+    """Indices of the vertices selected in Edit mode; call it in Object mode."""
     mask = np.empty(len(ob.data.vertices), bool)
     ob.data.vertices.foreach_get("select", mask)
     return np.flatnonzero(mask)
 
 
 def selected_faces(ob) -> np.ndarray:
-    """Indices of the faces selected in Edit mode; to be asked for in Object mode."""
+    """Indices of the faces selected in Edit mode; call it in Object mode."""
     mask = np.empty(len(ob.data.polygons), bool)
     ob.data.polygons.foreach_get("select", mask)
     return np.flatnonzero(mask)
 
 
 def held(ob) -> np.ndarray:
-    """For each vertex the number of the handle that holds it; 0 where none does."""
+    """For each vertex the number of the handle that holds it; 0 if none does."""
     return _numbers(ob, HANDLE_ATTRIBUTE, len(ob.data.vertices))
 
 
@@ -54,7 +54,7 @@ def set_held(ob, numbers: np.ndarray) -> None:
 
 
 def held_faces(ob) -> np.ndarray:
-    """For each face the number of the handle that holds its middle; 0 where none does."""
+    """For each face the number of the handle that holds its middle; 0 if none does."""
     return _numbers(ob, FACE_ATTRIBUTE, len(ob.data.polygons))
 
 
@@ -78,7 +78,7 @@ def _set_numbers(ob, name: str, domain: str, numbers: np.ndarray) -> None:
 
 
 def middles(ob, faces, rest: np.ndarray):
-    """Of faces: k indices into triangles(), k x 3 barycentric coordinates in them, and k x 3 positions at rest."""
+    """Middles of faces: k indices into triangles(), k x 3 barycentric coordinates in them, and k x 3 positions at rest."""
     corners = triangles(ob)
     face_of = np.empty(len(corners), np.int32)
     ob.data.loop_triangles.foreach_get("polygon_index", face_of)
@@ -88,7 +88,7 @@ def middles(ob, faces, rest: np.ndarray):
         inside = np.flatnonzero(face_of == face)
         inner = [_barycentric(rest[corners[one]], middle) for one in inside]
         best = int(np.argmax([one.min() for one in inner]))
-        within = np.maximum(inner[best], 0.0)  # of a bent face the middle lies off its triangles
+        within = np.maximum(inner[best], 0.0)  # the middle of a bent face is not on its triangles
         found.append(inside[best])
         coordinates.append(within / within.sum())
     found, coordinates = np.array(found, np.int64), np.array(coordinates).reshape(-1, 3)
@@ -96,14 +96,14 @@ def middles(ob, faces, rest: np.ndarray):
 
 
 def _barycentric(triangle: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Of the point of the triangle's plane that is nearest to `point`."""
+    """Barycentric coordinates of the point of the triangle's plane that is nearest to `point`."""
     sides = (triangle[1:] - triangle[0]).astype(float)
     b, c = np.linalg.lstsq(sides.T, point - triangle[0], rcond=None)[0]
     return np.array([1 - b - c, b, c])
 
 
 def group_weights(ob, name: str):
-    """One a vertex, 0 outside of the group; None where there is no such group."""
+    """One weight per vertex, 0 outside the group; None if there is no such group."""
     group = ob.vertex_groups.get(name) if name else None
     if group is None:
         return None
@@ -122,7 +122,8 @@ def live_key(ob):
 
 
 def add_live_key(ob) -> list:
-    """Adds the key that frames are written to, over the basis, which stays as it is. Other keys are muted: the names of those."""
+    """Adds the key that frames are written to, above the basis, which does not change. Mutes other keys and returns their
+    names."""
     if ob.data.shape_keys is None:
         ob.shape_key_add(name="Basis", from_mix=False)
     key = live_key(ob) or ob.shape_key_add(name=LIVE_KEY, from_mix=False)
@@ -131,12 +132,12 @@ def add_live_key(ob) -> list:
     for one in others:
         one.mute = True
     key.value, key.mute = 1.0, False
-    ob.active_shape_key_index = 0  # Edit mode goes on editing the basis
+    ob.active_shape_key_index = 0  # Edit mode continues to edit the basis
     return [one.name for one in others]
 
 
 def drop_live_key(ob, muted: list, had_keys: bool) -> None:
-    """What add_live_key() did, undone. `had_keys`: there were shape keys before it."""
+    """Reverses add_live_key(). `had_keys`: whether there were shape keys before it."""
     key = live_key(ob)
     if key is not None:
         ob.shape_key_remove(key)
@@ -156,7 +157,7 @@ def show_positions(ob, positions: np.ndarray) -> None:
 
 
 def colours(distortion: np.ndarray, limit: float) -> np.ndarray:
-    """n x 4: from none, blue, to the limit, red. A limit of 0 is the largest distortion there is."""
+    """n x 4: from blue for none to red at the limit. A limit of 0 means the largest distortion."""
     most = limit if limit > 0 else float(distortion.max(initial=0.0))
     share = np.clip(distortion / most, 0.0, 1.0) if most > 0 else np.zeros(len(distortion))
     out = np.ones((len(distortion), 4), np.float32)

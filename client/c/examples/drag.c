@@ -1,8 +1,9 @@
-/* A game's loop, without a game: a sheet is held at one edge, and its opposite edge is dragged for 10 seconds at 60 frames a second.
+/* The loop of a game, without a game: a sheet is held at one edge, and its opposite edge is dragged for 10 seconds at
+ * 60 frames per second.
  *
- *   drag ADDRESS [CELLS [FRAMES]]     CELLS a side, 100 unless given: 10,201 vertices
+ *   drag ADDRESS [CELLS [FRAMES]]     CELLS per side, default 100: 10,201 vertices
  *
- * Prints each change of the session's state, then how long frames took, and what of it the library's calls cost. Runs on
+ * Prints each change of the session's state, then how long frames took, and the share of the library's calls. Continues
  * through restarts of the server. C99 and POSIX clocks. */
 #define _POSIX_C_SOURCE 200809L
 
@@ -13,7 +14,7 @@
 #include <string.h>
 #include <time.h>
 
-/* As an engine has its vertices: interleaved, to be drawn as they are. */
+/* Vertices as an engine stores them: interleaved, ready to draw. */
 typedef struct vertex {
   float position[3];
   float normal[3];
@@ -108,7 +109,7 @@ static void hold(lpdeform_session* session, const char* name, const uint32_t* ve
   check(lpdeform_set_handle(session, &handle, NULL, &error), name);
 }
 
-/* Lifts the edge and turns it about the middle of the sheet. */
+/* Lifts the edge and rotates it about the middle of the sheet. */
 static lpdeform_motion pose(double t) {
   lpdeform_motion motion = {LPDEFORM_RIGID, 0, {0}, {0}, {0}, NULL};
   const double angle = 0.8 * sin(2 * t);
@@ -173,7 +174,7 @@ static void drag(lpdeform_session* session, const sheet* sheet, int frames) {
     const double after = seconds();
     moves[frame] = between - before;
     if (code == LPDEFORM_OK) {
-      polls[drawn++] = after - between; /* here an engine sends the vertices to be drawn */
+      polls[drawn++] = after - between; /* here an engine would draw the vertices */
     } else {
       misses[missed++] = after - between;
       if (code != LPDEFORM_NO_FRAME) printf("frame %d: %s (%s)\n", frame, error.message, error.reason);
@@ -208,7 +209,7 @@ int main(int argc, char** argv) {
 
   drag(session, &sheet, argc > 3 ? atoi(argv[3]) : 600);
 
-  /* The last pose, as good as it gets. */
+  /* The last pose, solved to the end. */
   const lpdeform_buffers into = buffers_of(&sheet);
   lpdeform_frame frame = {.struct_size = sizeof frame};
   lpdeform_motion motion = pose(0);

@@ -5,7 +5,7 @@
 
 namespace lpdeform::cli {
 
-/// A handle's motion as core has it, and as the client library has it; each is the other's inverse.
+/// Convert a handle's motion between core and the client library; each is the inverse of the other.
 HandleMotion to_core(const client::Motion& motion);
 client::Motion to_client(const HandleMotion& motion);
 

@@ -9,9 +9,9 @@
 
 namespace lpdeform::cli {
 
-/// The numbers of a field: one a line, one line a vertex, in vertex order. Empty lines at the end are
-/// nothing. INVALID_ARGUMENT: FIELD_FILE_SYNTAX names the line and what stands there, FIELD_SIZE both counts.
-/// `name` is the file's, for messages. Whether the numbers are in range is for the server to say.
+/// Reads the numbers of a field: one number per line and one line per vertex, in vertex order. Empty lines at
+/// the end are ignored. INVALID_ARGUMENT: FIELD_FILE_SYNTAX names the line and quotes it, FIELD_SIZE names
+/// both counts. `name`: the file's name, for messages. The server checks the range of the numbers.
 absl::StatusOr<std::vector<double>> parse_field(std::string_view text, std::int64_t vertex_count,
                                                 std::string_view name);
 

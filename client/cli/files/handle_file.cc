@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/files/hold_keys.h"
 #include "client/cli/files/json_values.h"
+#include "client/cli/files/point_keys.h"
 #include "client/cli/files/text_file.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
@@ -41,7 +42,7 @@ std::vector<std::uint32_t> vertices_of(const json& object, const std::string& ow
   return index_list(list, owner, place, "vertex", Reason::kHandleVertexOutOfRange, vertex_count);
 }
 
-/// The vertices that may move; none where the file does not say.
+/// The vertices that may move; empty if the file does not say.
 std::vector<std::uint32_t> region_of(const json& file, std::int64_t vertex_count) {
   if (!file.contains("region")) return {};
   const json& list = file["region"];
@@ -96,7 +97,7 @@ client::Motion motion_of(const json& object, const std::string& owner, std::size
   return rigid;
 }
 
-/// A vertex belongs to one handle, and once.
+/// Checks that a vertex is in one handle only, and only once.
 class Owners {
  public:
   void claim(const NamedHandle& handle) {
@@ -116,7 +117,7 @@ class Owners {
   std::map<std::uint32_t, std::string> owner_;
 };
 
-/// Parses, and refuses a key that stands twice in one object: the library would silently keep the later one.
+/// Parses, and refuses an object with a repeated key. The library would silently keep the later value.
 json parse_strictly(std::string_view text) {
   std::vector<std::set<std::string>> keys;
   const auto watch = [&keys](int, json::parse_event_t event, json& parsed) {
@@ -138,6 +139,13 @@ json parse_strictly(std::string_view text) {
   }
 }
 
+std::vector<const char*> handle_keys() {
+  std::vector<const char*> keys{"name", "vertices", "points", "translate", "rotate", "positions"};
+  for (const char* const key : hold_keys()) keys.push_back(key);
+  keys.push_back("footprint");
+  return keys;
+}
+
 std::vector<NamedHandle> handles_of(const json& file, std::int64_t vertex_count) {
   const json& list = required(file, "the handle file", "handles");
   if (!list.is_array()) refuse_value("\"handles\"", "a list", list);
@@ -153,9 +161,7 @@ std::vector<NamedHandle> handles_of(const json& file, std::int64_t vertex_count)
     if (!names.insert(name).second)
       refuse(Reason::kHandleNameTwice, owner,
              absl::StrCat("There are two handles of the name \"", name, "\"."));
-    check_keys(object, owner,
-               {"name", "vertices", "points", "translate", "rotate", "positions", "soft", "orientation",
-                "axis_lock", "plane_lock", "footprint"});
+    check_keys(object, owner, handle_keys());
     NamedHandle& handle = handles.emplace_back(NamedHandle{name, {}});
     if (object.contains("points"))
       handle.handle.points = points_of(object, owner);
@@ -218,6 +224,7 @@ std::string handle_file_text(const std::vector<NamedHandle>& handles, std::strin
   for (const NamedHandle& handle : handles) {
     nlohmann::ordered_json object{{"name", handle.name}};
     if (handle.handle.points.empty()) object["vertices"] = handle.handle.vertices;
+    write_points(handle.handle.points, object);
     write_hold(handle.handle, object);
     if (const auto* const rigid = std::get_if<client::RigidMotion>(&handle.handle.motion)) {
       object["translate"] = rigid->translation;

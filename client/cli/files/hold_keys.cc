@@ -1,15 +1,15 @@
 #include "client/cli/files/hold_keys.h"
 
-#include <cmath>
-#include <limits>
+#include <variant>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "core/base/match.h"
 
 namespace lpdeform::cli {
 namespace {
 
 constexpr double kHighestWeight = 1e6;
-constexpr double kBarycentricSlack = 1e-6;
 
 double weight(const json& value, const std::string& owner, const char* key) {
   const double result = number(value, key_of(owner, key));
@@ -30,63 +30,86 @@ std::array<double, 3> direction(const json& value, const std::string& owner, con
   return result;
 }
 
-client::SurfacePoint point_of(const json& object, const std::string& owner, const std::string& place) {
-  check_keys(object, place, {"face", "barycentric"});
-  const json& face = required(object, place, "face");
-  if (!face.is_number_unsigned() || face.get<std::uint64_t>() > std::numeric_limits<std::int32_t>::max()) {
-    refuse_value(key_of(place, "face"), "a whole number from 0", face);
+/// A kind of hold in a handle file: its key, and its value both ways. There is one for each kind of client::Hold
+/// but Exactly, or hold_keys() does not compile.
+template <typename Kind>
+struct InFile;
+
+template <>
+struct InFile<client::Soft> {
+  static constexpr const char* key = "soft";
+  static client::Soft read(const json& value, const std::string& owner) {
+    return {weight(value, owner, key)};
   }
-  const auto barycentric = vector3(required(object, place, "barycentric"), key_of(place, "barycentric"));
-  double sum = 0;
-  bool is_inside = true;
-  for (const double coordinate : barycentric)
-    sum += coordinate, is_inside &= coordinate >= -kBarycentricSlack;
-  if (!is_inside || !(std::abs(sum - 1) <= kBarycentricSlack)) {
-    refuse(
-        Reason::kHandleBarycentric, owner,
-        absl::StrCat(key_of(place, "barycentric"), " must be three numbers from 0 on that add up to 1, not ",
-                     shown(object["barycentric"]), "."),
-        "each >= 0, sum = 1");
+  static double write(const client::Soft& hold) { return hold.weight; }
+};
+
+template <>
+struct InFile<client::Orientation> {
+  static constexpr const char* key = "orientation";
+  static client::Orientation read(const json& value, const std::string& owner) {
+    return {weight(value, owner, key)};
   }
-  return {face.get<std::uint32_t>(), barycentric};
+  static double write(const client::Orientation& hold) { return hold.weight; }
+};
+
+template <>
+struct InFile<client::AxisLock> {
+  static constexpr const char* key = "axis_lock";
+  static client::AxisLock read(const json& value, const std::string& owner) {
+    return {direction(value, owner, key)};
+  }
+  static std::array<double, 3> write(const client::AxisLock& hold) { return hold.axis; }
+};
+
+template <>
+struct InFile<client::PlaneLock> {
+  static constexpr const char* key = "plane_lock";
+  static client::PlaneLock read(const json& value, const std::string& owner) {
+    return {direction(value, owner, key)};
+  }
+  static std::array<double, 3> write(const client::PlaneLock& hold) { return hold.normal; }
+};
+
+template <typename Action, typename... Kinds>
+void for_each_key(const std::variant<client::Exactly, Kinds...>* /* which kinds there are */,
+                  const Action& action) {
+  (action(InFile<Kinds>()), ...);
+}
+
+/// Calls `action` with the InFile of each kind, in the order of client::Hold.
+template <typename Action>
+void for_each_key(const Action& action) {
+  for_each_key(static_cast<const client::Hold*>(nullptr), action);
+}
+
+/// "a", "b" and "c", with their quotation marks.
+std::string listed(std::vector<const char*> keys) {
+  const std::string last = keys.back();
+  keys.pop_back();
+  return absl::StrCat("\"", absl::StrJoin(keys, "\", \""), "\" and \"", last, "\"");
 }
 
 }  // namespace
 
-std::vector<client::SurfacePoint> points_of(const json& object, const std::string& owner) {
-  if (object.contains("vertices")) {
-    refuse(Reason::kHandlePointsAndVertices, owner,
-           absl::StrCat(owner, " has \"vertices\" and \"points\"; it takes one of the two."));
-  }
-  const json& list = object["points"];
-  const std::string place = key_of(owner, "points");
-  if (!list.is_array()) refuse_value(place, "a list of points", list);
-  if (list.empty()) refuse(Reason::kHandleEmpty, owner, absl::StrCat(owner, " has no points."));
-  std::vector<client::SurfacePoint> points;
-  for (std::size_t k = 0; k < list.size(); ++k) {
-    points.push_back(point_of(list[k], owner, absl::StrCat("point ", k, " of ", owner)));
-  }
-  return points;
+std::vector<const char*> hold_keys() {
+  std::vector<const char*> keys;
+  for_each_key([&](auto kind) { keys.push_back(decltype(kind)::key); });
+  return keys;
 }
 
 void read_hold(const json& object, const std::string& owner, client::Handle& handle) {
   int holds = 0;
-  for (const char* const key : {"soft", "orientation", "axis_lock", "plane_lock"}) {
+  for (const char* const key : hold_keys()) {
     if (object.contains(key)) ++holds;
   }
   if (holds > 1) {
     refuse(Reason::kHandleHoldTwice, owner,
-           absl::StrCat(owner,
-                        " has more than one of \"soft\", \"orientation\", \"axis_lock\" and "
-                        "\"plane_lock\"; it takes one at most."));
+           absl::StrCat(owner, " has more than one of ", listed(hold_keys()), "; it takes one at most."));
   }
-  if (object.contains("soft")) handle.hold = client::Soft{weight(object["soft"], owner, "soft")};
-  if (object.contains("orientation"))
-    handle.hold = client::Orientation{weight(object["orientation"], owner, "orientation")};
-  if (object.contains("axis_lock"))
-    handle.hold = client::AxisLock{direction(object["axis_lock"], owner, "axis_lock")};
-  if (object.contains("plane_lock"))
-    handle.hold = client::PlaneLock{direction(object["plane_lock"], owner, "plane_lock")};
+  for_each_key([&](auto kind) {
+    if (object.contains(kind.key)) handle.hold = kind.read(object[kind.key], owner);
+  });
   if (!object.contains("footprint")) return;
   handle.footprint = number(object["footprint"], key_of(owner, "footprint"));
   if (handle.footprint >= 0) return;
@@ -95,15 +118,9 @@ void read_hold(const json& object, const std::string& owner, client::Handle& han
 }
 
 void write_hold(const client::Handle& handle, nlohmann::ordered_json& object) {
-  for (const client::SurfacePoint& point : handle.points) {
-    object["points"].push_back({{"face", point.face}, {"barycentric", point.barycentric}});
-  }
-  if (const auto* const soft = std::get_if<client::Soft>(&handle.hold)) object["soft"] = soft->weight;
-  if (const auto* const turned = std::get_if<client::Orientation>(&handle.hold))
-    object["orientation"] = turned->weight;
-  if (const auto* const lock = std::get_if<client::AxisLock>(&handle.hold)) object["axis_lock"] = lock->axis;
-  if (const auto* const lock = std::get_if<client::PlaneLock>(&handle.hold))
-    object["plane_lock"] = lock->normal;
+  match(
+      handle.hold, [](const client::Exactly&) {},
+      [&]<typename Kind>(const Kind& hold) { object[InFile<Kind>::key] = InFile<Kind>::write(hold); });
   if (handle.footprint > 0) object["footprint"] = handle.footprint;
 }
 

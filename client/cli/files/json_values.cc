@@ -17,7 +17,7 @@ std::string key_of(const std::string& owner, const char* key) {
   return absl::StrCat("\"", key, "\" of ", owner);
 }
 
-// Not dumped where it is nested: that would recurse as deep as a hostile file likes.
+// A nested value is not printed: that would recurse as deep as a hostile file likes.
 std::string shown(const json& value) {
   const bool is_nested =
       std::ranges::any_of(value, [](const json& inner) { return inner.is_structured() && !inner.empty(); });
@@ -31,7 +31,7 @@ void refuse_value(const std::string& place, const char* wanted, const json& valu
          absl::StrCat(place, " must be ", wanted, ", not ", shown(value), "."));
 }
 
-void check_keys(const json& object, const std::string& owner, std::initializer_list<const char*> known) {
+void check_keys(const json& object, const std::string& owner, const std::vector<const char*>& known) {
   if (!object.is_object()) refuse_value(owner, "an object", object);
   for (const auto& [key, value] : object.items()) {
     if (std::ranges::find(known, key) != known.end()) continue;

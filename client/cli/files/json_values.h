@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdint>
-#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -14,8 +13,8 @@
 
 namespace lpdeform::cli {
 
-// Reading values out of JSON, with errors that name the place, the key and the value. A function that cannot give
-// its value throws a Refusal, so that reading can be an expression; the file's one entry point catches it.
+// Read values out of JSON, with errors that name the place, the key and the value. A function that cannot
+// return its value throws a Refusal, so that reading can be an expression. The file's entry point catches it.
 
 using nlohmann::json;
 
@@ -25,26 +24,26 @@ struct Refusal {
 
 [[noreturn]] void refuse(Reason reason, std::string element, std::string_view text, std::string limit = "");
 
-/// HANDLE_FILE_VALUE: `place` must be `wanted`.
+/// Throws HANDLE_FILE_VALUE: the value at `place` must be `wanted`.
 [[noreturn]] void refuse_value(const std::string& place, const char* wanted, const json& value);
 
-/// What is being read, for messages: `handle "tip"`, then `"rotate" of handle "tip"`.
+/// The place of a value, for messages: `handle "tip"`, then `"rotate" of handle "tip"`.
 std::string key_of(const std::string& owner, const char* key);
 
-/// `value` for a message.
+/// `value` as text for a message.
 std::string shown(const json& value);
 
-/// HANDLE_FILE_KEY where `object` has another key than the known; HANDLE_FILE_VALUE where it is no object.
-void check_keys(const json& object, const std::string& owner, std::initializer_list<const char*> known);
+/// HANDLE_FILE_KEY if `object` has an unknown key; HANDLE_FILE_VALUE if it is not an object.
+void check_keys(const json& object, const std::string& owner, const std::vector<const char*>& known);
 
-/// HANDLE_FILE_KEY where there is none.
+/// The value of a key that must exist; otherwise HANDLE_FILE_KEY.
 const json& required(const json& object, absl::string_view owner, const char* key);
 
 double number(const json& value, const std::string& place);
 std::array<double, 3> vector3(const json& value, const std::string& place);
 
-/// Whole numbers from 0 to `count` - 1, at least one: `what` for messages ("vertex"). `reason` where one is out of
-/// range.
+/// At least one whole number from 0 to `count` - 1. `what`: the noun for messages ("vertex"). `reason`: the
+/// error if a number is out of range.
 std::vector<std::uint32_t> index_list(const json& list, const std::string& owner, const std::string& place,
                                       const char* what, Reason reason, std::int64_t count);
 

@@ -30,7 +30,7 @@ absl::Status read_base(const MaterialOptions& options, std::int64_t vertex_count
   return absl::OkStatus();
 }
 
-/// The numbers to paint over: one, or one a vertex.
+/// The values to paint over: one, or one per vertex.
 absl::StatusOr<std::vector<double>> numbers_of(const client::FieldValue& value, const TriangleMesh& mesh,
                                                const Weld& weld, Field Material::*part) {
   if (const auto* const uniform = std::get_if<double>(&value)) return std::vector<double>{*uniform};
@@ -44,7 +44,7 @@ absl::StatusOr<std::vector<double>> numbers_of(const client::FieldValue& value, 
   return std::vector<double>(field.begin(), field.end());
 }
 
-/// One line where --p auto finds nothing to go by.
+/// Prints a line if --p auto finds no joints.
 absl::Status tell_of_joints(const MaterialOptions& options, const TriangleMesh& mesh, const Weld& weld) {
   if (options.automatic.value_or(0) == 0) return absl::OkStatus();
   auto shape = RestShape::create(welded(mesh, weld));
@@ -54,7 +54,7 @@ absl::Status tell_of_joints(const MaterialOptions& options, const TriangleMesh& 
   return absl::OkStatus();
 }
 
-/// What is said of one copy is said of all.
+/// Adds the other copies of each vertex, because a group that names one copy means them all.
 void add_copies(const Weld& weld, VertexGroup& group) {
   std::vector<bool> is_named(static_cast<std::size_t>(weld.welded_count()));
   for (const std::uint32_t vertex : group.vertices) is_named[weld.to_welded[vertex]] = true;

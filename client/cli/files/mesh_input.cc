@@ -69,7 +69,7 @@ client::Weld by_position(std::optional<double> tolerance) {
 
 void print_notices(const client::MeshReport& report) {
   for (const std::string& notice : report.notices)
-    std::fprintf(stderr, "lpdeform: %s With this program: --weld of deform and resize.\n", notice.c_str());
+    std::fprintf(stderr, "lpdeform: %s In this program use --weld of deform and resize.\n", notice.c_str());
 }
 
 std::vector<double> flat(const Points& points) {

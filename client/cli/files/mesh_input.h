@@ -15,23 +15,24 @@
 
 namespace lpdeform::cli {
 
-/// The same error, whose text begins with what it is about, a file or an option, unless it names that already.
+/// The same error, with a text that begins with its subject, a file or an option, unless the text names it
+/// already.
 absl::Status said_of(const std::string& what, const absl::Status& error);
 
 /// As read_mesh; errors name the file.
 absl::StatusOr<MeshFile> read_mesh_file(const std::filesystem::path& path);
 
-/// A mesh file that was read, examined, and can be deformed. Errors: as read_mesh and deformable have them.
+/// Reads and checks a mesh file that must be fit for deformation. Errors: those of read_mesh and deformable.
 absl::StatusOr<MeshFile> read_deformable(const std::filesystem::path& path);
 
-/// What a session on a server would report of `mesh`, which need not be fit for one.
+/// What a session on a server would report of `mesh`. The mesh need not be fit for deformation.
 MeshReport full_report(const TriangleMesh& mesh, WeightKind weights);
 
-/// By position with this tolerance (0: the default), or none.
+/// Welds by position with this tolerance (0: the default); not set: no weld.
 absl::StatusOr<Weld> weld_of(const TriangleMesh& mesh, std::optional<double> tolerance);
 client::Weld by_position(std::optional<double> tolerance);
 
-/// What the report's owner should know, a line each on stderr.
+/// Prints the report's notices to stderr, one per line.
 void print_notices(const client::MeshReport& report);
 
 /// For the client library.

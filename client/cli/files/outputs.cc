@@ -23,7 +23,8 @@ std::string ending_of(const std::filesystem::path& path) {
   return ending;
 }
 
-/// Also by different ways, as ./a and a. Streams such as /dev/stdout may be named as often as one likes.
+/// True also for different spellings of one path, such as ./a and a. Streams such as /dev/stdout never count
+/// as the same file, so they may be given several times.
 bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
   std::error_code error;
   if (std::filesystem::exists(a, error) && !std::filesystem::is_regular_file(a, error)) return false;

@@ -20,7 +20,7 @@ std::vector<std::string> names_on_line(TextScanner& scanner) {
   return names;
 }
 
-/// The vertices of a face line, from 0; as core/io/read_obj.cc counts them.
+/// The vertices of a face line, counted from 0, as in core/io/read_obj.cc.
 std::vector<std::uint32_t> face_vertices(TextScanner& scanner, std::int64_t vertices_so_far) {
   std::vector<std::uint32_t> vertices;
   for (std::string_view word = scanner.next_on_line(); !word.empty(); word = scanner.next_on_line()) {

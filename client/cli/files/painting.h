@@ -16,18 +16,19 @@ struct Paint {
   double value = 0;
 };
 
-/// INVALID_ARGUMENT (PAINT_SYNTAX) where `text` is not a name, '=' and a number; the name may contain '='.
+/// Parses a name, '=' and a number; the name may contain '='. INVALID_ARGUMENT (PAINT_SYNTAX) for anything
+/// else.
 absl::StatusOr<Paint> parse_paint(std::string_view text);
 
-/// The groups of an OBJ file: for each name on a "g" or "o" line the vertices of the faces after it,
-/// ascending, each once. A "g" line may have several names; groups without a face are left out. `obj_source`
-/// must have been read as a mesh before.
+/// The groups of an OBJ file. Each name on a "g" or "o" line has the vertices of the faces after it,
+/// ascending and without repetition. A "g" line may have several names. Groups without a face are omitted.
+/// `obj_source` must have been read as a mesh before.
 std::vector<VertexGroup> obj_groups(std::string_view obj_source);
 
-/// Fields of one value a vertex, painted: in this order the p and stiffness that `groups` have themselves,
-/// then `p_paints` and `stiffness_paints` as given; what comes later covers what came before. Where nothing
-/// paints a field it stays as it is. `p` and `stiffness` may be uniform (one value) or per vertex before.
-/// NOT_FOUND (GROUP_UNKNOWN) names the groups there are.
+/// Fields with one value per vertex, painted in this order: the p and stiffness of `groups` themselves, then
+/// `p_paints` and `stiffness_paints` as given. Later values cover earlier ones. A field that nothing paints
+/// stays as it is. Before painting, `p` and `stiffness` may be uniform (one value) or per vertex. NOT_FOUND
+/// (GROUP_UNKNOWN) lists the groups that exist.
 struct PaintedFields {
   std::vector<double> p, stiffness;
 };

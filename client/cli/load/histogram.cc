@@ -8,8 +8,8 @@
 namespace lpdeform::cli {
 namespace {
 
-constexpr int kBits = 11;                                    // of what is told apart
-constexpr std::uint64_t kExact = std::uint64_t{1} << kBits;  // below, every value has its own bucket
+constexpr int kBits = 11;                                    // bits of resolution
+constexpr std::uint64_t kExact = std::uint64_t{1} << kBits;  // below this, every value has its own bucket
 constexpr std::uint64_t kHalf = kExact / 2;
 
 std::size_t bucket_of(std::uint64_t value) {

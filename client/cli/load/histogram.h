@@ -6,8 +6,9 @@
 
 namespace lpdeform::cli {
 
-/// Counts of durations in microseconds, to three significant digits over all magnitudes, in the way of HdrHistogram:
-/// values below 2048 have a bucket each; above, every doubling has 1024 buckets of equal width. Not thread-safe.
+/// Counts durations in microseconds, with three significant digits at all magnitudes, like HdrHistogram.
+/// Values below 2048 have a bucket each. Above that, each power of two has 1024 buckets of equal width. Not
+/// thread-safe.
 class Histogram {
  public:
   void record(std::uint64_t microseconds);
@@ -17,10 +18,11 @@ class Histogram {
   double mean() const;
   std::uint64_t max() const { return max_; }
 
-  /// The smallest recorded value, to within its bucket, that `percent` of all are no larger than; 0 where there is none.
+  /// The smallest recorded value such that `percent` of all values are not larger, to within its bucket; 0 if
+  /// nothing is recorded.
   std::uint64_t percentile(double percent) const;
 
-  /// The buckets that are not empty: the largest value of each, and how many it has.
+  /// The buckets that are not empty: the largest value of each, and its count.
   std::vector<std::pair<std::uint64_t, std::uint64_t>> buckets() const;
 
  private:

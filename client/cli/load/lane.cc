@@ -19,7 +19,7 @@ std::uint64_t microseconds(Lane::Clock::duration duration) {
   return count > 0 ? static_cast<std::uint64_t>(count) : 0;
 }
 
-/// A square sheet of about so many vertices.
+/// A square sheet with about this many vertices.
 TriangleMesh sheet(int vertices) {
   const int side = std::max(1, static_cast<int>(std::lround(std::sqrt(vertices))) - 1);
   return grid(side, side, 0.2);
@@ -105,13 +105,13 @@ void Lane::move(Clock::time_point due) {
   const std::scoped_lock lock(mutex_);
   if (is_over_) return;
   ++tally_.due;
-  // Under the lock, so that no frame is looked at between the sending and the noting of it.
+  // Under the lock, so that no frame is examined between sending the update and noting it.
   const auto sent = driver_->move("tip", lifted(std::sqrt(vertices_), ++moves_ + 1));
   if (sent.ok()) {
     newest_seq_ = *sent;
     pending_.push_back({*sent, due});
   } else if (is_reconnecting_) {
-    pending_.push_back({newest_seq_ + 1, due});  // the new connection's first update will stand for it
+    pending_.push_back({newest_seq_ + 1, due});  // counts as the first update of the new connection
   } else {
     ++tally_.errors[fault_of(sent.status()).reason];
     ++tally_.unanswered;
@@ -130,7 +130,7 @@ void Lane::read() {
     }
     ++tally_.errors[fault_of(frame.status()).reason];
     changed_.wait_for(lock, kReadPatience,
-                      [&] { return is_over_; });  // what has failed may fail again at once
+                      [&] { return is_over_; });  // a call that has failed may fail again at once
   }
 }
 
@@ -172,7 +172,8 @@ void Lane::reconnect() {
   }
   auto joined = join();
   if (!joined.ok()) note(joined.status());
-  std::shared_ptr<client::Session> before;  // goes after the lock: it says goodbye to the server
+  // Destroyed after the lock is released, because it sends a farewell to the server.
+  std::shared_ptr<client::Session> before;
   const std::scoped_lock lock(mutex_);
   is_reconnecting_ = false;
   if (!joined.ok()) return;

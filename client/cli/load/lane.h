@@ -19,14 +19,14 @@
 
 namespace lpdeform::cli {
 
-/// What came of a lane, or of several together.
+/// The results of a lane, or of several lanes together.
 struct LoadTally {
-  Histogram latency;      // from when an update was due to when the first frame that answers it was there
-  Histogram setup;        // from asking for a session to its first finished result
-  std::uint64_t due = 0;  // updates that were to be sent
-  std::uint64_t unanswered = 0;  // of these, without a frame in the end
+  Histogram latency;             // from when an update was due to the first frame that answers it
+  Histogram setup;               // from asking for a session to its first finished result
+  std::uint64_t due = 0;         // updates that were due
+  std::uint64_t unanswered = 0;  // of these, updates without a frame at the end
   std::uint64_t frames = 0;
-  std::uint64_t skipped = 0;  // updates that no frame answers: a newer one came first
+  std::uint64_t skipped = 0;  // updates that no frame answers, because a newer one came first
   std::uint64_t stale = 0;    // frames for an older update than the newest one sent
   std::uint64_t payload_bytes = 0;
   std::uint64_t reconnects = 0;
@@ -35,15 +35,15 @@ struct LoadTally {
   void add(const LoadTally& other);
 };
 
-/// One session under load: a mesh of about so many vertices, one end held, the other moved with every update. Updates are
-/// due at times that nothing puts off, and each is measured from then on: a server or a lane that falls behind shows as
-/// latency, not as fewer updates.
+/// One session under load: a mesh of about this many vertices, with one end held and the other moved by every
+/// update. Updates are due at fixed times, and each is measured from when it was due. So a server or a lane
+/// that falls behind shows as latency, not as fewer updates.
 class Lane {
  public:
   using Clock = std::chrono::steady_clock;
   using Connect = std::function<absl::StatusOr<client::Client>()>;
 
-  /// Opens the session and waits for its first result. Errors: of the server.
+  /// Opens the session and waits for its first result. Errors: those of the server.
   static absl::StatusOr<std::unique_ptr<Lane>> open(const Connect& connect, int vertices, double p);
   /// Deletes the session.
   ~Lane();
@@ -53,16 +53,16 @@ class Lane {
   /// Sends the update that was due at `due`; does not wait.
   void move(Clock::time_point due);
 
-  /// Looks on beside the writer, a frame every `pause`.
+  /// Adds a second reader, which takes a frame every `pause`.
   void add_slow_reader(std::chrono::milliseconds pause);
 
-  /// Lets go of the connection and takes the session over on a new one.
+  /// Drops the connection and takes the session over on a new one.
   void reconnect();
 
-  /// Every update is answered.
+  /// Whether every update is answered.
   bool is_answered() const;
 
-  /// Ends the lane's threads; what is unanswered now stays so.
+  /// Ends the lane's threads. Updates that are unanswered now stay so.
   LoadTally finish();
 
  private:
@@ -76,8 +76,8 @@ class Lane {
 
   const Connect connect_;
   const int vertices_;
-  std::optional<client::Session>
-      owner_;  // made the session and does nothing more, so that it outlives reconnects
+  /// Makes the session and does nothing more, so that the session outlives reconnects.
+  std::optional<client::Session> owner_;
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;

@@ -6,21 +6,21 @@ namespace lpdeform {
 
 /// A perspective camera whose picture holds a cloud of points with a margin.
 ///
-/// It looks at the points' widest side, the one across the axis along which they extend least, from a quarter
-/// to the right and a little above. Up is z, or y where the points extend least along z.
+/// The camera looks at the points' widest side, which is across the axis of their least extent, from a
+/// quarter to the right and a little above. Up is z, or y if z is the axis of least extent.
 class Camera {
  public:
-  /// `points` must be finite, at least one.
+  /// `points` must be finite, and at least one.
   Camera(const Points& points, int width, int height);
 
-  /// Of a point: pixels from the left and from the top, and the inverse of its distance along the line of
-  /// sight, which, unlike the distance, is linear across the picture of a triangle.
+  /// Projects a point: pixels from the left, pixels from the top, and the inverse of its distance along the
+  /// line of sight. Unlike the distance, the inverse is linear across the picture of a triangle.
   Eigen::RowVector3d project(const Eigen::RowVector3d& point) const;
 
   /// A direction in the camera's axes: right, up, towards the camera.
   Eigen::RowVector3d turn(const Eigen::RowVector3d& direction) const { return direction * axes_; }
 
-  /// From `point` to the camera, in the camera's axes, length 1.
+  /// The direction from `point` to the camera, in the camera's axes, of length 1.
   Eigen::RowVector3d towards_camera(const Eigen::RowVector3d& point) const;
 
  private:

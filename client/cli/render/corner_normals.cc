@@ -9,7 +9,7 @@ namespace lpdeform {
 namespace {
 
 constexpr double kCosineOfCrease = 0.766;
-// A vertex of more faces than this keeps each face's own normal: comparing all pairs of them would take too
+// At a vertex of more faces than this, each face keeps its own normal: comparing all pairs would take too
 // long.
 constexpr std::int32_t kMostFacesCompared = 64;
 
@@ -24,7 +24,7 @@ Points area_normals(const Points& positions, const Faces& faces) {
   return normals;
 }
 
-/// The faces at each vertex: those of v stand from start[v] to start[v + 1].
+/// The faces at each vertex: those of vertex v are at start[v] to start[v + 1] - 1.
 struct FacesAtVertices {
   std::vector<std::int32_t> start, faces;
 };

@@ -7,11 +7,11 @@ namespace lpdeform {
 namespace {
 
 constexpr double kReachInDiagonals = 0.05;
-constexpr double kReachInHeights = 0.06;  // the same distance on the picture, about
-// Below it, curvature and rounding raise neighbours above the tangent plane, too.
+constexpr double kReachInHeights = 0.06;  // about this share of the picture's height
+// Below this height, curvature and rounding raise neighbours above the tangent plane, too.
 constexpr float kLeastHeight = 0.1F;
 
-/// From 0 to below 1, as if at random from one pixel to the next.
+/// A pseudo-random number in [0, 1) for each pixel.
 double scattered(int x, int y) {
   const double seed = 52.9829189 * std::fmod(0.06711056 * x + 0.00583715 * y, 1.0);
   return seed - std::floor(seed);
@@ -19,7 +19,7 @@ double scattered(int x, int y) {
 
 }  // namespace
 
-/// Pixels within `radius` of one, evenly spread, the first ones next to it.
+/// Offsets of pixels within `radius`, evenly spread, the nearest first.
 Openness::Offsets Openness::turned_spiral(double angle, double radius) {
   constexpr double kGoldenAngle = 2.39996322972865;
   Offsets result{};
@@ -45,7 +45,7 @@ Openness::Openness(const Scene& scene, int side, const Workers& workers)
                      [&](std::size_t, std::size_t begin, std::size_t end) { find_points(begin, end); });
 }
 
-/// Of the rows from `begin` to before `end`.
+/// For the rows from `begin` to `end` - 1.
 void Openness::find_points(std::size_t begin, std::size_t end) {
   for (std::size_t y = begin; y < end; ++y) {
     for (int x = 0; x < width_; ++x) {
@@ -70,7 +70,7 @@ double Openness::at(int x, int y) const {
     const float right = other.x - here.x, down = other.y - here.y, away = other.z - here.z;
     const float above = normal[0] * right + normal[1] * down + normal[2] * away;
     const float distance2 = right * right + down * down + away * away;
-    // Most neighbours end here, those on the background too: to ask by squares needs no root.
+    // Most neighbours stop here, background included; comparing squares avoids a square root.
     if (!(above > 0 && above * above > kLeastHeight * kLeastHeight * distance2)) continue;
     hidden += (above / std::sqrt(distance2) - kLeastHeight) / (1 + distance2 / reach2_);
   }

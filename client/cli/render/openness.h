@@ -9,14 +9,15 @@
 
 namespace lpdeform {
 
-/// How much of the sky each pixel's surface sees, as far as the picture tells: judged by the points that the pixels around it
-/// show, those within a small share of the picture's height.
+/// How much of the sky each pixel's surface sees, as far as the picture shows it. It is judged by the points
+/// that nearby pixels show, within a small share of the picture's height.
 class Openness {
  public:
-  /// A pixel is side x side samples of the scene, its middle one stands for it. `scene` must outlive this.
+  /// A pixel is side x side samples of the scene; the middle one represents it. `scene` must outlive this
+  /// object.
   Openness(const Scene& scene, int side, const Workers& workers);
 
-  /// Of a pixel: 1 in the open and on the background, down to 0 in holes and folds.
+  /// The value of a pixel: 1 in the open and on the background, down to 0 in holes and folds.
   double at(int x, int y) const;
 
  private:
@@ -35,7 +36,7 @@ class Openness {
   const Scene& scene_;
   int side_, width_, height_;
   float reach2_;
-  std::vector<Point> points_;  // a pixel's, not a number on the background
+  std::vector<Point> points_;  // one per pixel; NaN on the background
   std::array<Offsets, kTurns> offsets_;
 };
 

@@ -3,7 +3,7 @@
 namespace lpdeform {
 namespace {
 
-/// The samples, at k + 0.5, between two coordinates, cut to the picture: from first to before last.
+/// The samples (at k + 0.5) between two coordinates, clipped to the picture: a half-open range.
 std::array<int, 2> samples_between(double low, double high, int size) {
   const double first = std::clamp(std::ceil(low - 0.5), 0.0, double(size));
   const double last = std::clamp(std::floor(high - 0.5) + 1, 0.0, double(size));

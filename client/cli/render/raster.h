@@ -10,7 +10,7 @@
 
 namespace lpdeform {
 
-/// What is nearest at each sample of a picture: the face and where inside it.
+/// The nearest surface at each sample of a picture: the face, and where inside it.
 class Raster {
  public:
   struct Sample {
@@ -25,8 +25,8 @@ class Raster {
   int height() const { return height_; }
   const Sample& at(int x, int y) const { return samples_[std::size_t(y) * width_ + x]; }
 
-  /// Draws a triangle of points (x, y, inverse depth); a larger inverse depth hides a smaller one. Either
-  /// orientation.
+  /// Draws a triangle with corners (x, y, inverse depth); a larger inverse depth hides a smaller one. The
+  /// orientation does not matter.
   void draw(std::int32_t face, const std::array<Eigen::RowVector3d, 3>& corners);
 
  private:

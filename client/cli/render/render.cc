@@ -22,7 +22,7 @@ namespace {
 
 constexpr int kLargestSide = 16384;
 
-/// Samples along each side of a pixel: 3, or fewer where that would be more samples than memory is to hold.
+/// Samples along each side of a pixel: 3, or fewer if that would take too much memory.
 int samples_per_side(std::int64_t width, std::int64_t height) {
   constexpr std::int64_t kMostSamples = 16'000'000;
   int side = 3;
@@ -42,14 +42,14 @@ Faces drawable(const Faces& faces, const Points& positions) {
   return faces(kept, Eigen::all);
 }
 
-/// The vertices of a mesh, of which those that no face uses may be anything.
+/// The vertices that faces use; other vertices may have any coordinates.
 Points used(const Faces& faces, const Points& positions) {
   Points result(faces.size(), 3);
   for (Eigen::Index k = 0; k < faces.size(); ++k) result.row(k) = positions.row(faces.reshaped()[k]);
   return result;
 }
 
-/// Moves and scales so that `frame` lies within [-1, 1]: squares of lengths then stay in range.
+/// Moves and scales positions so that `frame` lies within [-1, 1]. Squares of lengths then stay in range.
 struct ToUnitSize {
   explicit ToUnitSize(const Points& frame) {
     const Eigen::RowVector3d low = frame.colwise().minCoeff(), high = frame.colwise().maxCoeff();
@@ -63,8 +63,8 @@ struct ToUnitSize {
   double half_size;
 };
 
-/// The colour of a pixel of side x side samples. Within one face it hardly changes, so that one sample tells it; at
-/// edges all do.
+/// The colour of a pixel of side x side samples. Within one face the colour hardly changes, so one sample is
+/// enough; at edges all samples are used.
 Rgb mean_colour(const Scene& scene, const Openness& openness_at, int x, int y, int side) {
   const int middle_x = side * x + side / 2, middle_y = side * y + side / 2;
   const double openness = openness_at.at(x, y);
@@ -86,7 +86,7 @@ double red_of(const PictureStyle& style) {
   return style.red > 0 ? style.red : distortion_of_red(style.distortion);
 }
 
-/// 0 to 1 from blue to red.
+/// Values from 0 (blue) to 1 (red).
 Field heat_of(const Field& distortion, double red) {
   if (!(red > 0)) return Field::Zero(distortion.size());
   return (distortion / red).cwiseMin(1);

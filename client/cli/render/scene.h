@@ -9,39 +9,38 @@
 
 namespace lpdeform {
 
-/// A mesh and its colours. All indices in range and all points that faces use finite.
+/// A mesh and its colours. All indices must be in range, and all points that faces use must be finite.
 struct Surface {
   Faces faces;
   Points positions;
-  Field heat;                // a value from 0 (blue) to 1 (red) for each vertex, or none
-  std::vector<Rgb> colours;  // where there is no heat: one for each vertex, or none: then the mesh is plain
+  Field heat;                // one value from 0 (blue) to 1 (red) per vertex, or empty
+  std::vector<Rgb> colours;  // used without heat: one per vertex; if empty, the mesh is plain
 };
 
-/// A mesh in front of a camera, drawn: what is to be seen at each sample of a picture of width x height
-/// samples.
+/// A mesh drawn in front of a camera: what is visible at each sample of a picture of width x height samples.
 class Scene {
  public:
-  /// At least one face. All is copied or drawn: nothing needs to outlive the call. The camera's picture has
-  /// width x height samples.
+  /// At least one face. Everything is copied or drawn, so nothing needs to outlive the call. The camera's
+  /// picture has width x height samples.
   Scene(const Surface& surface, Camera camera, int width, int height);
 
-  /// The same without colours, before a camera that holds the points that faces use.
+  /// The same without colours, with a camera that shows all points that faces use.
   Scene(const Faces& faces, const Points& positions, const Field& heat, int width, int height);
 
-  /// `openness` as in shaded(), which Openness finds.
+  /// The colour of a sample. `openness`: as in shaded(); Openness computes it.
   Rgb colour_at(int x, int y, double openness) const;
 
-  /// Whether the side x side samples from (x, y) on show one face, or all of them the background.
+  /// Whether the side x side samples from (x, y) on show a single face, or only background.
   bool is_one_face(int x, int y, int side) const;
 
-  /// The point of the surface that this sample shows; not a number on the background.
+  /// The surface point that this sample shows; NaN on the background.
   Eigen::RowVector3d point_at(int x, int y) const;
-  /// Its normal on the viewer's side, of length 1. Not to be asked on the background.
+  /// The normal of the surface on the viewer's side, of length 1. Undefined on the background.
   Eigen::RowVector3d normal_at(int x, int y) const { return normal_towards_camera(raster_.at(x, y)); }
 
   int width() const { return raster_.width(); }
   int height() const { return raster_.height(); }
-  /// Of the bounding box of what is drawn, in the mesh's unit of length.
+  /// Diagonal of the bounding box of what is drawn, in the mesh's unit of length.
   double diagonal() const;
 
  private:
@@ -55,7 +54,7 @@ class Scene {
 
   Points corners_, normals_;  // 3 f + k for corner k of face f
   Field heat_;                // the same, or empty
-  Points colours_;            // the same: red, green, blue, or empty
+  Points colours_;            // red, green, blue for the same, or empty
   Camera camera_;
   Raster raster_;
 };

@@ -9,7 +9,7 @@
 namespace lpdeform::reproduce {
 namespace {
 
-constexpr double kZero = 1e-6;  // of the diagonal
+constexpr double kZero = 1e-6;  // share of the diagonal
 
 double zero_share(const Experiment& experiment, double p) {
   return share_up_to(experiment.by_p.at(p).energies, kZero * diagonal(experiment.rest()));
@@ -82,16 +82,12 @@ Figure appendix(const Measurements& measured) {
       {minimisers_are_sparse(measured), cells_are_sparse(measured)},
       problem_table(measured) + cell_table(measured),
       {},
-      "The appendix prints m - 1 - r_s; u = s + b with s from a space of dimension r_s can vanish in r_s "
-      "places "
-      "for almost every b and not in more, so the count is m - r_s. It speaks of scalar residuals. A "
-      "cell of the energy has "
-      "three for each of its edges and goes to zero only as a whole, so a shape gets sparse where it can "
-      "move in "
-      "rigid pieces (creature) and not at all where everything has to bend (bar); held cells are among the "
-      "zeros for "
-      "every p. The claim counts as true only where L1 has more zeros on every shape: one very sparse shape "
-      "would carry a mean."};
+      "The appendix prints m - 1 - r_s. But for almost every b, u = s + b with s from a space of dimension "
+      "r_s can vanish in r_s places and not in more, so the count is m - r_s. The appendix is about scalar "
+      "residuals. A cell of the energy has three residuals for each of its edges and vanishes only if all of "
+      "them do. So a shape becomes sparse if it can move in rigid pieces (creature), and not at all if "
+      "everything has to bend (bar). Held cells are among the zeros for every p. The claim holds only if L1 "
+      "has more zeros on every shape, because one very sparse shape could dominate a mean."};
 }
 
 }  // namespace lpdeform::reproduce

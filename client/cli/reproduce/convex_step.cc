@@ -11,13 +11,13 @@ namespace {
 
 constexpr int kMostIterations = 400, kMostBacktracks = 40;
 constexpr double kSufficientDecrease = 0.3, kShortening = 0.5;  // the paper's alpha and beta
-constexpr double kEnough = 1e-9;       // of the energy: a step that promises no more ends the descent
+constexpr double kEnough = 1e-9;  // of the energy: a step that promises no more than this ends the descent
 constexpr double kFirstSmoothing = 1;  // eps^2 for p < 2, in mean edge lengths squared
 constexpr double kLastSmoothing = 1e-12, kSmoothingStep = 0.1;
-constexpr double kShake = 0.1;  // of the diagonal
+constexpr double kShake = 0.1;  // share of the diagonal
 constexpr double kTolerance = 1e-5;
 
-/// All that a descent with held rotations works on. Positions are in scaled units.
+/// The state of a descent with fixed rotations. Positions are in scaled units.
 class HeldRotations {
  public:
   HeldRotations(std::shared_ptr<const RestShape> shape, Constraints constraints, Metric metric, double p)
@@ -27,7 +27,8 @@ class HeldRotations {
         objective_(shape_, Workers(1)),
         norm_(Material::uniform(p), shape_->vertex_count(), shape_->mean_edge_length(), 1) {}
 
-  /// The naive Laplacian deformation, whose rotations are held from here on. None where the metric cannot be factored.
+  /// The naive Laplacian deformation, whose rotations are held from here on. nullopt if the metric cannot be
+  /// factored.
   std::optional<Points> begin();
   Points rest() const { return constraints_.targets; }
   Points shaken(Points x, std::mt19937& random) const;
@@ -36,7 +37,7 @@ class HeldRotations {
   Points lowest_from(Points x, std::stop_token stop);
   /// E^(1/p) in the caller's unit.
   double length(const Points& x);
-  /// Of the energy: see relative_gap.
+  /// The relative gap of the energy: see relative_gap.
   double gap(const Points& x, std::stop_token stop);
 
  private:
@@ -68,7 +69,7 @@ Points HeldRotations::shaken(Points x, std::mt19937& random) const {
   return x;
 }
 
-/// One step. False where there is nothing more to gain.
+/// One step. Returns false if there is nothing more to gain.
 bool HeldRotations::descend(Points& x, const LpNorm& norm) {
   const double value = objective_.evaluate_held(x, norm);
   Points gradient, direction;

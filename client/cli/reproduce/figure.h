@@ -8,12 +8,12 @@
 
 namespace lpdeform::reproduce {
 
-/// One thing that the paper says, held against what was measured.
+/// A statement of the paper, compared with what was measured.
 struct Claim {
-  std::string text;                                     // what the paper says, in one sentence
+  std::string text;                                     // the paper's statement, in one sentence
   std::string measured;                                 // the numbers that decide, in words
-  bool holds = false;                                   // by these numbers alone
-  std::vector<std::pair<std::string, double>> numbers;  // the same for programs
+  bool holds = false;                                   // decided by these numbers alone
+  std::vector<std::pair<std::string, double>> numbers;  // the same numbers for programs
 };
 
 struct Picture {
@@ -23,15 +23,15 @@ struct Picture {
   int width, height;
 };
 
-/// A figure or table of the paper, made again.
+/// A figure or table of the paper, reproduced.
 struct Figure {
   std::string id;     // "figure_3"
   std::string title;  // "Figure 3: a sheet is folded"
-  std::string shape;  // what is deformed, in a sentence
+  std::string shape;  // the deformed shape, in a sentence
   std::vector<Claim> claims;
   std::string body;               // HTML: tables and SVG plots
   std::vector<Picture> pictures;  // of one size, at most 5
-  std::string note;               // what a reader should know beside it; may be empty
+  std::string note;               // what a reader should know besides; may be empty
 };
 
 Figure table_1(const Measurements& measured);

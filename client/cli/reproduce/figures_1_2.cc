@@ -11,7 +11,7 @@
 namespace lpdeform::reproduce {
 namespace {
 
-/// A method has one colour and dash in all plots.
+/// The colour and dash of a method, the same in all plots.
 int style_of(Method method) {
   switch (method) {
     case Method::kConic:
@@ -25,7 +25,7 @@ int style_of(Method method) {
   }
 }
 
-/// E^(1/p) at iterations that stand apart on a logarithmic scale, the last one included.
+/// E^(1/p) at iterations that are spread on a logarithmic scale, the last one included.
 Series series_of(const Trace& trace) {
   const Method method = trace.summary.method;
   Series series{std::string(method_name(method)), {}, style_of(method)};
@@ -46,11 +46,11 @@ std::string energy_plot(const Measurements& measured, double p) {
   return line_plot(plot);
 }
 
-/// How much of itself the energy must rise by to count: rounding for methods that go down a line, and the accuracy
-/// that a cone program is solved to.
+/// By which share of itself the energy must rise to count as a rise: rounding for descent methods, and the
+/// accuracy to which a cone program is solved.
 constexpr double kRounding = 1e-12, kProgramAccuracy = 1e-6;
 
-/// Entries that are above the one before by more than `tolerance` of it.
+/// How many entries are above the previous one by more than `tolerance` of it.
 int rises(const std::vector<double>& energies, double tolerance) {
   int count = 0;
   for (std::size_t k = 1; k < energies.size(); ++k) {
@@ -65,7 +65,8 @@ std::vector<double> all_energies(const Trace& trace) {
   return energies;
 }
 
-/// After each iteration as the paper counts them: by conic a whole cone program, whose interior points are none.
+/// The energy after each iteration as the paper counts them. For conic an iteration is a whole cone program,
+/// so its interior points are left out.
 std::vector<double> energies_of(const Trace& trace) {
   if (trace.summary.method != Method::kConic) return all_energies(trace);
   std::vector<double> energies;
@@ -115,7 +116,7 @@ Claim line_search_takes_many_short_iterations(const Measurements& measured) {
            {"cone_program_milliseconds", conic_ms}}};
 }
 
-/// After how many iterations E^(1/p) is within `share` of where the trace ends.
+/// After how many iterations E^(1/p) is within `share` of its final value.
 int iterations_to(const Trace& trace, double share) {
   const auto& records = trace.summary.trace;
   const double wanted = std::pow(1 + share, trace.p) * records.back().energy;
@@ -124,7 +125,8 @@ int iterations_to(const Trace& trace, double share) {
   return near == records.end() ? trace.summary.iterations : near->iteration;
 }
 
-/// By the paper's own rule and by three others: a single one would decide by where it happens to stop.
+/// Uses the paper's own rule and three others, because a single rule would depend on where it happens to
+/// stop.
 Claim larger_p_converges_sooner(const Measurements& measured) {
   const Trace& low = measured.trace(1.5, Method::kLineSearch);
   const Trace& high = measured.trace(6, Method::kLineSearch);
@@ -146,9 +148,9 @@ Claim larger_p_converges_sooner(const Measurements& measured) {
   }
   absl::StrAppend(
       &claim.measured,
-      ". It holds where all four say so. The paper does not give its bar's unit of length, and its counts "
-      "depend on it: the rule stops at a step of 5e-5 units, and the search begins at t = 1. Here the "
-      "unit is the mean edge length, so the counts differ.");
+      ". The claim holds if all four rules agree. The paper does not give its bar's unit of length, on "
+      "which its counts depend: the rule stops at a step of 5e-5 units, and the search begins at t = 1. "
+      "Here the unit is the mean edge length, so the counts differ.");
   return claim;
 }
 
@@ -157,7 +159,7 @@ std::string iterations_text(const Trace& trace) {
   return absl::StrCat(is_over ? "" : "over ", trace.summary.iterations);
 }
 
-/// By the paper's rule and by the same three others, on each shape.
+/// Uses the paper's rule and the same three others, on each shape.
 bool converges_sooner(const Trace& high, const Trace& low) {
   bool sooner =
       high.summary.stop_reason == StopReason::kConverged && high.summary.iterations < low.summary.iterations;
@@ -185,9 +187,10 @@ Claim larger_p_converges_sooner_elsewhere(const Measurements& measured) {
   }
   claim.holds = sooner == std::ssize(measured.descents);
   claim.numbers.emplace_back("shapes_where_p6_is_sooner", sooner);
-  absl::StrAppend(&claim.measured,
-                  ". L6 takes fewer, also until E^(1/p) is within 10 %, 1 % and 0.1 % of the end, on ",
-                  sooner, " of ", measured.descents.size(), " shapes; it holds where it does on all.");
+  absl::StrAppend(
+      &claim.measured,
+      ". L6 takes fewer iterations, also until E^(1/p) is within 10 %, 1 % and 0.1 % of the end, on ", sooner,
+      " of ", measured.descents.size(), " shapes. The claim holds if it does on all.");
   if (const double share = measured.descents.front().share; share < 1) {
     absl::StrAppend(
         &claim.measured, " The shapes have ", number_text(share),
@@ -206,7 +209,7 @@ std::string energy_histogram(const Experiment& experiment, double p) {
       {absl::StrCat("p = ", p), "cell energy E_i", "cells", highest, histogram(energies, highest, kBins)});
 }
 
-/// The share of cells in the lowest of the bins from 0 to the largest energy.
+/// The share of cells in the lowest of the bins, which reach from 0 to the largest energy.
 double lowest_bin_share(const Field& energies) {
   return share_up_to(energies, energies.maxCoeff() / kBins);
 }
@@ -225,13 +228,11 @@ Figure figure_1(const Measurements& measured) {
           plots + "</div>\n",
           {},
           absl::StrCat(
-              "In the plots an iteration of conic is one of the interior-point method inside a cone program, "
-              "whose "
-              "points on the way may lie higher; the paper counts whole programs, and so does the first "
-              "claim. quasi_newton, "
-              "the default here, minimises a smoothed energy for p < 2, which never rises within a stage; "
-              "the true energy, which is shown, rose a little in ",
-              smoothed, " of its iterations at p = 1, and the lowest state is what it returns.")};
+              "In the plots an iteration of conic is one step of the interior-point method inside a cone "
+              "program, and its intermediate points may have a higher energy. The paper and the first claim "
+              "count whole programs. quasi_newton, the default here, minimises a smoothed energy for p < 2, "
+              "which never rises within a stage. The plots show the true energy, which rose a little in ",
+              smoothed, " of its iterations at p = 1. quasi_newton returns the state of lowest energy.")};
 }
 
 Figure figure_2(const Measurements& measured) {

@@ -14,7 +14,7 @@ namespace {
 
 using Rims = std::vector<std::vector<std::int32_t>>;
 
-/// The top-5 % share falls strictly as p grows.
+/// The share of the 5 % most distorted cells falls strictly as p grows.
 Claim smaller_p_concentrates(const Experiment& experiment, const std::string& text) {
   Claim claim{text, "Share of the 5 % most distorted cells in the sum of all:", true, {}};
   double before = std::numeric_limits<double>::infinity();
@@ -35,7 +35,8 @@ std::vector<Picture> pictures_for(const Experiment& experiment, const std::vecto
   return pictures;
 }
 
-/// The vertices around a tunnel's openings: near its wall and beyond `depth` along its axis, to either side.
+/// The vertices around a tunnel's openings: those near its wall that are farther than `depth` along its axis,
+/// on either side.
 Rims rims_of(const Points& rest, int axis, double radius, double depth) {
   Rims rims(2);
   for (Eigen::Index i = 0; i < rest.rows(); ++i) {

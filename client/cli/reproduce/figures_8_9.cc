@@ -25,7 +25,8 @@ std::vector<std::int32_t> region(const Experiment& experiment, const Mixed& mixe
   return result;
 }
 
-/// Within a region, the top-5 % share of the mixed solve lies nearer to that of its own p than to the other's.
+/// In a region, the top-5 % share of the mixed solve is closer to that of the region's own p than to that of
+/// the other p.
 Claim region_is_like_its_own(const Experiment& experiment, const Mixed& mixed, bool is_orange) {
   const std::vector<std::int32_t> vertices = region(experiment, mixed, is_orange);
   const auto share = [&](const Solve& solve) { return top_share(at(solve.energies, vertices)); };

@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::ArrayXd, Eigen::MatrixXd, Eigen::VectorXd;
 
-constexpr double kSmallestSmoothing = 1e-12;  // of the largest |b_i|
+constexpr double kSmallestSmoothing = 1e-12;  // share of the largest |b_i|
 constexpr int kMostNewtonSteps = 100;
 
 MatrixXd image_basis(const MatrixXd& a) {
@@ -22,7 +22,7 @@ ArrayXd smoothed_lengths(const VectorXd& u, double eps) {
   return (u.array().square() + eps * eps).sqrt();
 }
 
-/// One Newton step with backtracking on z, u = q z + b. False where it gains nothing any more.
+/// One Newton step with backtracking on z, with u = q z + b. Returns false if it gains nothing any more.
 bool newton_step(const MatrixXd& q, double eps, VectorXd& u) {
   const ArrayXd lengths = smoothed_lengths(u, eps);
   const VectorXd slope = q.transpose() * (u.array() / lengths).matrix();

@@ -13,13 +13,13 @@
 namespace lpdeform::reproduce {
 namespace {
 
-constexpr int kMostRuns = 5;             // of a solve for its time
-constexpr double kSecondsForRuns = 0.6;  // no further run once they took so long
+constexpr int kMostRuns = 5;             // of a solve, to measure its time
+constexpr double kSecondsForRuns = 0.6;  // no further run once the runs took this long
 constexpr int kTraceIterations = 20000;
 constexpr double kVariationTolerance = 1e-6;
 
-/// Makes one measurement after the other. After the first error all that it returns is empty and nothing is
-/// done any more; status() has the error.
+/// Makes the measurements one after another. After the first error it does nothing any more and returns empty
+/// results; status() has the error.
 class Laboratory {
  public:
   Laboratory(const Settings& settings, const Watch& watch, int total)
@@ -48,7 +48,7 @@ class Laboratory {
   absl::Status status_;
 };
 
-/// False where there is nothing to do any more.
+/// Returns false if nothing more is to be done.
 bool Laboratory::begin(const std::string& task) {
   if (status_.ok() && watch_.stop.stop_requested()) status_ = absl::CancelledError();
   if (!status_.ok()) return false;
@@ -112,7 +112,7 @@ Experiment Laboratory::experiment(const std::function<PaperPose()>& make_pose) {
   return result;
 }
 
-/// Orange is what lies above `border` along `axis`.
+/// The region above `border` along `axis` is orange.
 Mixed Laboratory::mixed(const Experiment& on, int axis, double border) {
   Mixed result;
   if (!begin(absl::StrCat(on.pose.name, ", p = 1 and 2"))) return result;
@@ -156,7 +156,7 @@ Minimum Laboratory::minimum(const Experiment& on, double p) {
   return {on.pose.name, step.ok() ? *std::move(step) : ConvexStep{}};
 }
 
-/// From the result for p each time, as a user changes one number.
+/// Each solve starts from the result for p, as when a user changes one number.
 absl::StatusOr<Variation> Laboratory::vary(const Experiment& on, double p) {
   auto deformer = Deformer::create(on.shape, {.threads = settings_.threads});
   if (!deformer.ok()) return deformer.status();
@@ -236,7 +236,7 @@ absl::StatusOr<Measurements> measure(const Settings& settings, const Watch& watc
   Laboratory laboratory(settings, watch, solves + rest);
   Measurements result;
   result.threads = settings.threads;
-  // Others' first: an error in them is told at once.
+  // Others' meshes first, so that an error in them is reported at once.
   for (const PaperPose& other : settings.others)
     result.others.push_back(laboratory.experiment([&] { return other; }));
   const double size = settings.size;

@@ -37,7 +37,7 @@ std::string claim_html(const Claim& claim) {
                       " <span class=\"verdict\">", verdict_text(claim), "</span></p>\n</div>\n");
 }
 
-/// The colours of the pictures, which have no legend of their own.
+/// The legend of the pictures' colours; the pictures themselves have none.
 std::string legend_html() {
   std::vector<std::string> stops;
   for (const double t : {0.0, 0.25, 0.5, 0.75, 1.0}) {
@@ -75,9 +75,8 @@ std::string figure_html(const Figure& figure) {
 
 std::string overview_html(const std::vector<Figure>& figures) {
   std::string html =
-      "<div class=\"wide\"><table>\n<thead><tr><th scope=\"col\">Figure</th><th scope=\"col\">Claims that "
-      "hold "
-      "here</th></tr></thead>\n<tbody>\n";
+      "<div class=\"wide\"><table>\n<thead><tr><th scope=\"col\">Figure</th>"
+      "<th scope=\"col\">Claims that hold here</th></tr></thead>\n<tbody>\n";
   for (const Figure& figure : figures) {
     const Count count = count_claims({figure});
     absl::StrAppend(&html, "<tr><th scope=\"row\"><a href=\"#", escaped(figure.id), "\">",
@@ -92,13 +91,10 @@ std::string header_html(const std::vector<Figure>& figures, const Settings& sett
   const Count count = count_claims(figures);
   return absl::StrCat(
       "<header>\n<h1>L<sub>p</sub> shape deformation, reproduced</h1>\n<p>Every figure and the table of Gao, "
-      "Zhang and "
-      "Lai, <cite>L<sub>p</sub> shape deformation</cite>, Science China Information Sciences 55, 2012 (doi "
-      "10.1007/s11432-012-4574-y), made again from solves on generated shapes",
-      settings.others.empty() ? "" : ", and meshes that were added beside them",
-      ". Each claim of the paper "
-      "stands beside the "
-      "number that decides it; the number is computed in the same run.</p>\n<p>",
+      "Zhang and Lai, <cite>L<sub>p</sub> shape deformation</cite>, Science China Information Sciences 55, "
+      "2012 (doi 10.1007/s11432-012-4574-y), reproduced by solves on generated shapes",
+      settings.others.empty() ? "" : " and on meshes that were added",
+      ". Next to each claim of the paper is the number that decides it, computed in the same run.</p>\n<p>",
       count.holding, " of ", count.all, " claims hold here",
       settings.size == 1
           ? ""
@@ -136,17 +132,17 @@ std::vector<Figure> all_figures(const Measurements& measured,
 
 std::string page_html(const std::vector<Figure>& figures, const Settings& settings) {
   std::string html = absl::StrCat(
-      "<!DOCTYPE html>\n<html lang=\"en\" xmlns=\"http://www.w3.org/1999/xhtml\">\n<head>\n<meta "
-      "charset=\"utf-8\" />\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\" />\n<title>L_p shape "
-      "deformation, "
-      "reproduced</title>\n<style>",
+      "<!DOCTYPE html>\n<html lang=\"en\" xmlns=\"http://www.w3.org/1999/xhtml\">\n<head>\n"
+      "<meta charset=\"utf-8\" />\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\" />\n"
+      "<title>L_p shape deformation, reproduced</title>\n<style>",
       kStyle, "</style>\n</head>\n<body>\n", header_html(figures, settings), overview_html(figures));
   for (const Figure& figure : figures) html += figure_html(figure);
   absl::StrAppend(&html, "<footer><p>Made by <code>", kMadeBy,
                   "</code>; the verdicts for programs are in <a "
                   "href=\"reproduce.json\">reproduce.json</a>.</p></footer>\n"
-                  "</body>\n</html>\n");
+                  "</body>\n"
+                  "</html>\n");
   return html;
 }
 

@@ -11,7 +11,7 @@ namespace lpdeform::reproduce {
 namespace {
 
 constexpr Rgb kPlain{205, 200, 190}, kHandle{40, 90, 225}, kOrange{240, 150, 50};
-/// All results in one cloud.
+/// The points of all results together.
 Points frame_of(const Experiment& experiment) {
   const Eigen::Index count = experiment.rest().rows();
   Points frame(count * static_cast<Eigen::Index>(experiment.by_p.size()), 3);
@@ -23,7 +23,7 @@ Points frame_of(const Experiment& experiment) {
   return frame;
 }
 
-/// Fills in the size, upright for what is tall, and draws.
+/// Chooses the size, upright for a tall shape, and draws.
 Picture drawn(const Experiment& experiment, const Points& positions, PictureStyle style, Picture picture) {
   const Eigen::RowVector3d extent =
       experiment.rest().colwise().maxCoeff() - experiment.rest().colwise().minCoeff();
@@ -36,7 +36,7 @@ Picture drawn(const Experiment& experiment, const Points& positions, PictureStyl
   return picture;
 }
 
-/// One scale of colours for all p: the distortion that the most distorted of them needs for its own red.
+/// One scale of colours for all p: the value shown in full red is the largest that any of them needs.
 double red_of(const Experiment& experiment) {
   double red = 0;
   for (const auto& [p, solve] : experiment.by_p) red = std::max(red, distortion_of_red(solve.energies));

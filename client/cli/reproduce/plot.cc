@@ -83,7 +83,7 @@ std::string polyline(const Series& series, const Scale& x, const Scale& y) {
   return svg + "\"/>\n";
 }
 
-/// The lowest and highest of a coordinate over all series, apart at least a little.
+/// The lowest and highest value of a coordinate over all series, kept apart by at least a little.
 std::array<double, 2> range_of(const std::vector<Series>& series, int coordinate) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const Series& line : series) {

@@ -1,4 +1,4 @@
-// What the paper says beside its figures: sections 3.2 and 5.
+// Statements of the paper outside its figures: sections 3.2 and 5.
 
 #include <algorithm>
 #include <cmath>
@@ -11,8 +11,8 @@
 namespace lpdeform::reproduce {
 namespace {
 
-constexpr double kOneMinimum = 1e-6;  // of E^(1/p): that far apart may the ends be that count as one
-constexpr double kCertified = 1e-3;   // and so far from the least there can be
+constexpr double kOneMinimum = 1e-6;  // of E^(1/p): results that differ by no more than this count as one
+constexpr double kCertified = 1e-3;   // largest proved distance from the minimum
 constexpr double kMostOnHalving = 0.75;
 
 std::string key(const std::string& shape, double p) {
@@ -32,8 +32,8 @@ Claim one_minimum(const Measurements& measured) {
   }
   claim.holds = spread <= kOneMinimum;
   claim.measured = absl::StrFormat(
-      "From %d starts each, %d of them random, %d descents end with E^(1/p) at most %.1e of itself apart. "
-      "It holds where none is more than %g apart.",
+      "From %d starts each, %d of them random, %d descents end with values of E^(1/p) that differ by at "
+      "most %.1e of it. The claim holds if none differs by more than %g.",
       2 + kRandomStarts, kRandomStarts, (2 + kRandomStarts) * static_cast<int>(measured.minima.size()),
       spread, kOneMinimum);
   return claim;
@@ -49,8 +49,8 @@ Claim certified_minimum(const Measurements& measured) {
   }
   claim.holds = worst <= kCertified;
   claim.measured = absl::StrFormat(
-      "By its dual problem no positions have an E^(1/p) more than %.1e of itself lower. It holds where this "
-      "is proved to %g.",
+      "The dual problem proves that no positions have an E^(1/p) lower by more than %.1e of it. The claim "
+      "holds if this bound is at most %g.",
       worst, kCertified);
   return claim;
 }
@@ -66,7 +66,8 @@ std::string minima_table(const Measurements& measured) {
   return html_table({"", "lowest E^(1/p)", "highest above it", "proved to be within"}, rows);
 }
 
-/// The largest share of the displacement that is left as dp is halved: 0.5 where it is in proportion, 1 where there is a jump.
+/// The largest share of the displacement that remains when dp is halved: 0.5 if it is proportional, 1 if
+/// there is a jump.
 double left_on_halving(const Variation& variation) {
   double most = 0;
   const std::vector<double>& moved = variation.displacements;
@@ -89,8 +90,8 @@ Claim varies_continuously(const Measurements& measured, bool is_at_one, std::str
   }
   claim.holds = continuous == count;
   claim.measured = absl::StrFormat(
-      "With half the step in p the largest displacement is at most %s as large (50 %% would be in "
-      "proportion). It is at most %s in %d of %d cases, and holds where it is in all.",
+      "With half the step in p the largest displacement is at most %s as large (50 %% would be "
+      "proportional). It is at most %s in %d of %d cases. The claim holds if it is in all cases.",
       percent_text(most), percent_text(kMostOnHalving), continuous, count);
   return claim;
 }
@@ -114,32 +115,29 @@ std::string variations_table(const Measurements& measured) {
 Figure section_3_2(const Measurements& measured) {
   return {"section_3_2",
           "Section 3.2: the global minimum for fixed rotations",
-          "The bar for each p, the block, the creature and the arm for p > 1; the rotations are held that "
-          "fit the naive "
-          "Laplacian deformation.",
+          "The bar for each p; the block, the creature and the arm for p > 1. The rotations are fixed to "
+          "those of the naive Laplacian deformation.",
           {one_minimum(measured), certified_minimum(measured)},
           minima_table(measured),
           {},
-          "The starts are the naive deformation, the shape at rest, and the naive one with each free vertex "
-          "off by a "
-          "tenth of the diagonal at random. With the rotations free again there are many minima, of which a "
-          "solve finds "
-          "one."};
+          "The starts are the naive deformation, the shape at rest, and the naive deformation with each "
+          "free vertex moved at random by a tenth of the diagonal. With free rotations there are many "
+          "minima, and a solve finds one of them."};
 }
 
 Figure section_5(const Measurements& measured) {
-  return {
-      "section_5",
-      "Section 5: continuous variation with p",
-      "The paper's five shapes; p goes on from 1, 1.5, 2 and 6, each time from the result before.",
-      {varies_continuously(measured, false,
-                           "Continuous variations of results can be obtained by changing p alone (from p "
-                           "= 1.5, 2 and 6)."),
-       varies_continuously(measured, true, "The same from p = 1.")},
-      variations_table(measured),
-      {},
-      "Shown is the largest displacement of a vertex in shares of the diagonal. At p = 1 the energy is not "
-      "strictly convex even for fixed rotations, so results of nearly the same energy can be far apart."};
+  return {"section_5",
+          "Section 5: continuous variation with p",
+          "The paper's five shapes; p goes on from 1, 1.5, 2 and 6, each time from the result before.",
+          {varies_continuously(measured, false,
+                               "Continuous variations of results can be obtained by changing p alone (from p "
+                               "= 1.5, 2 and 6)."),
+           varies_continuously(measured, true, "The same from p = 1.")},
+          variations_table(measured),
+          {},
+          "The table shows the largest displacement of a vertex as a share of the diagonal. At p = 1 the "
+          "energy is not "
+          "strictly convex even for fixed rotations, so results of nearly the same energy can be far apart."};
 }
 
 }  // namespace lpdeform::reproduce

@@ -2,7 +2,7 @@
 
 namespace lpdeform::reproduce {
 
-/// The page's style sheet: light and dark by the reader's setting, narrow screens, print.
+/// The page's style sheet: light or dark by the reader's setting, for narrow screens, and for print.
 inline constexpr const char* kStyle = R"(
 :root { color-scheme: light dark; --ink: #1d2329; --soft: #5b6670; --paper: #ffffff; --card: #f6f7f9; --line: #d9dee3;
   --good: #14703a; --good-back: #e2f4e8; --bad: #a3281f; --bad-back: #fbe6e3;

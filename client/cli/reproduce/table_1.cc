@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kColumns[] = {1, 2, 1.5, 6};  // p in the order of the paper's table
 
-/// A row of the paper's Table 1; 0 where it has no entry.
+/// A row of the paper's Table 1; 0 if the paper has no entry.
 struct PaperRow {
   const char* shape;
   const char* name;  // the paper's
@@ -89,7 +89,7 @@ Claim six_is_faster_than_two(const Measurements& measured) {
           {{"seconds_p6_over_p2", six / two}}};
 }
 
-/// The geometric mean of paper's seconds over ours, where the paper has an entry.
+/// The geometric mean of the paper's seconds over the measured ones, where the paper has an entry.
 double mean_ratio(const Measurements& measured) {
   double sum = 0, count = 0;
   for (const Experiment* const experiment : measured.all()) {
@@ -112,7 +112,7 @@ bool uses(const Measurements& measured, Method method) {
   });
 }
 
-/// Whether the sheet and the bar, whose numbers the paper gives, are the paper's.
+/// Whether the sheet and the bar have the numbers of vertices that the paper gives.
 bool has_papers_sizes(const Measurements& measured) {
   return measured.sheet.rest().rows() == kPaper[0].vertices &&
          measured.bar.rest().rows() == kPaper[1].vertices;
@@ -122,37 +122,36 @@ std::string shapes_text(const Measurements& measured) {
   return absl::StrCat(
       measured.others.empty() ? "All shapes are generated; " : "The paper's shapes are generated; ",
       has_papers_sizes(measured)
-          ? "the sheet and the bar have the paper's own numbers of vertices and faces, the others its kind "
-            "of "
-            "shape and about its number of vertices."
-          : absl::StrCat(
-                "they are the paper's kinds of shape with ", number_text(measured.sheet.size),
-                " times as many cells along each side, so that their numbers of vertices are not the "
-                "paper's."),
+          ? "the sheet and the bar have the same numbers of vertices and faces as in the paper. The others "
+            "are shapes of the same kind with about as many vertices."
+          : absl::StrCat("they are of the same kinds as in the paper, but with ",
+                         number_text(measured.sheet.size),
+                         " times as many cells along each side, so their numbers of vertices differ."),
       measured.others.empty() ? "" : " The others were added by --mesh.");
 }
 
 std::string methods_text(const Measurements& measured) {
   return absl::StrCat(
-      "Here: quasi_newton",
-      uses(measured, Method::kMultiresolution)
-          ? ", and where a number has a † multiresolution, which is chosen for large meshes and counts the "
-            "iterations on the fine level"
-          : " for every p",
-      "; at p = 1 both are tried, the better is kept, and the count is of both",
+      "Method: quasi_newton",
+      uses(measured, Method::kMultiresolution) ? ", and multiresolution for numbers with a †; it is chosen "
+                                                 "for large meshes, and its iterations are "
+                                                 "counted on the fine level"
+                                               : " for every p",
+      ". At p = 1 both are tried, the better result is kept, and the iterations of both are counted. ",
       absl::StrFormat(
-          ", from the naive Laplacian guess, to a relative tolerance of 1e-5; %d thread%s; seconds "
-          "are set-up and solve, the median of up to five runs; * ended short of the tolerance. ",
+          "Solves start from the naive Laplacian guess, with a relative tolerance of 1e-5 and %d thread%s. "
+          "Seconds include set-up and solve and are the median of up to five runs. A * marks solves that "
+          "ended short of the tolerance. ",
           measured.threads, measured.threads == 1 ? "" : "s"));
 }
 
 std::string times_text(const Measurements& measured) {
   if (!has_papers_sizes(measured))
-    return "The paper's times are those of its own numbers of vertices, and not to be held against these. ";
+    return "The paper's times are for its own numbers of vertices and cannot be compared with these. ";
   return absl::StrFormat(
-      "In the geometric mean of all entries the paper's times are %.0f times as long. Its machine (two "
-      "quad-core 2.27 GHz CPUs of 2011, one core used) and its methods differ: cone programs for L1, the "
-      "local-global alternation for L2, line search else. ",
+      "In the geometric mean of all entries the paper's times are %.0f times as long. Its machine was "
+      "different (two quad-core 2.27 GHz CPUs of 2011, one core used), and so were its methods: cone "
+      "programs for L1, the local-global alternation for L2, and line search otherwise. ",
       mean_ratio(measured));
 }
 
@@ -161,20 +160,19 @@ std::string times_text(const Measurements& measured) {
 Figure table_1(const Measurements& measured) {
   const double six = measured.trace(6, Method::kLineSearch).summary.solve_seconds;
   const double two = measured.trace(2, Method::kLocalGlobal).summary.solve_seconds;
-  return {
-      "table_1",
-      "Table 1: iterations and seconds",
-      shapes_text(measured),
-      {every_solve_converges(measured), six_is_faster_than_two(measured)},
-      table(measured),
-      {},
-      absl::StrCat(
-          methods_text(measured), times_text(measured),
-          "Which of L6 and L2 is quicker depends on the solver: the metric of quasi_newton is the exact "
-          "curvature for fixed rotations at p = 2 and must be learnt at p = 6. By the paper's own methods "
-          "the bar takes ",
-          number_text(six), " s for L6 (line_search) and ", number_text(two),
-          " s for L2 (local_global) here.")};
+  return {"table_1",
+          "Table 1: iterations and seconds",
+          shapes_text(measured),
+          {every_solve_converges(measured), six_is_faster_than_two(measured)},
+          table(measured),
+          {},
+          absl::StrCat(
+              methods_text(measured), times_text(measured),
+              "Whether L6 or L2 is faster depends on the solver: at p = 2 the metric of quasi_newton is the "
+              "exact curvature for fixed rotations; at p = 6 the solver must learn it. With the paper's own "
+              "methods the bar takes ",
+              number_text(six), " s for L6 (line_search) and ", number_text(two),
+              " s for L2 (local_global) here.")};
 }
 
 }  // namespace lpdeform::reproduce

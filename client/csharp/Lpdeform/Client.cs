@@ -7,13 +7,13 @@ namespace Lpdeform
     public sealed class ConnectionOptions
     {
         public bool Tls;
-        /// PEM; null: whom the system trusts.
+        /// PEM; null: the system's trusted certificates.
         public string RootCertificates;
-        /// PEM: our own and its key, where the server asks for one.
+        /// PEM: the client's own certificate and its key, if the server asks for one.
         public string CertificateChain, PrivateKey;
         /// Bearer token of each call; see Client.SetToken.
         public string Token;
-        /// For how long a session tries to reach a server that is away; 0 is for ever.
+        /// For how long a session tries to reach a server that is away; 0 is without limit.
         public double ReconnectSeconds;
     }
 
@@ -22,7 +22,7 @@ namespace Lpdeform
     {
         IntPtr client;
 
-        /// `address`: "host:port". Does not wait: connecting goes on by itself.
+        /// `address`: "host:port". Does not wait; the connection is made in the background.
         public Client(string address, ConnectionOptions options = null)
         {
             if (Native.lpdeform_abi() != 1) throw new NotSupportedException("This assembly is for another lpdeform_client.");
@@ -51,7 +51,7 @@ namespace Lpdeform
             get { return Marshal.PtrToStringAnsi(Native.lpdeform_version()); }
         }
 
-        /// The bearer token of calls from now on; null: none.
+        /// Sets the bearer token of later calls; null: none.
         public void SetToken(string token)
         {
             var error = LpdeformException.NewError();
@@ -92,7 +92,7 @@ namespace Lpdeform
             return pinned.Array(mesh.WeldGroups);
         }
 
-        /// Joins somebody's session by its name: to look on, or as its writer in place of whoever is.
+        /// Joins an existing session by its name: as a reader, or as its writer in place of the present one.
         public Session Join(string name, bool asWriter = false, SessionOptions options = null)
         {
             var error = LpdeformException.NewError();
@@ -104,8 +104,8 @@ namespace Lpdeform
             return new Session(session);
         }
 
-        /// Begins to make a session from a file of Session.Snapshot; does not wait. The surface is the same to the last bit, in the
-        /// coordinates that `options` says. A file that is none is the state Refused, with why.
+        /// Begins to make a session from a file of Session.Snapshot; does not wait. The surface is the same to the last bit, in
+        /// the coordinates that `options` names. If the file is not a snapshot, the session's state is Refused, with the reason.
         public Session Restore(byte[] snapshot, SessionOptions options = null)
         {
             if (snapshot == null) throw new ArgumentNullException("snapshot");
@@ -117,7 +117,7 @@ namespace Lpdeform
             return new Session(session);
         }
 
-        /// Waits until the sessions are closed, usually milliseconds. To be called before the process ends.
+        /// Waits until the sessions are closed, usually milliseconds. Call it before the process ends.
         public void Dispose()
         {
             var disconnecting = System.Threading.Interlocked.Exchange(ref client, IntPtr.Zero);

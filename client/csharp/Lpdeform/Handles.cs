@@ -4,21 +4,21 @@ using System.Runtime.InteropServices;
 
 namespace Lpdeform
 {
-    /// The handles of a session: groups of vertices that are held and moved. Every change returns its number: a frame whose InputSeq
-    /// is at least that takes it into account. Changes do not wait, and the newest of each handle wins; what the server says
-    /// of one is thrown by TryGetFrame.
+    /// The handles of a session: groups of vertices that are held and moved. Every change returns its number. A frame whose
+    /// InputSeq is at least that number takes the change into account. Changes do not wait, and the newest change of each handle
+    /// wins. TryGetFrame throws the server's error about a change.
     public sealed class Handles
     {
         readonly Func<IntPtr> session;
         readonly ConcurrentDictionary<string, byte[]> names = new ConcurrentDictionary<string, byte[]>();
 
-        /// `session` gives the native session; it throws where that is closed.
+        /// `session` returns the native session; it throws if that is closed.
         internal Handles(Func<IntPtr> session)
         {
             this.session = session;
         }
 
-        /// Holds the vertices where the mesh at rest has them; adds the handle or replaces the one of that name.
+        /// Holds the vertices where the mesh at rest has them; adds the handle, or replaces the one with this name.
         public ulong Set(string name, int[] vertices)
         {
             return Set(name, vertices, default(Motion));
@@ -30,7 +30,7 @@ namespace Lpdeform
             return Set(name, vertices, null, motion, how);
         }
 
-        /// The same with points inside faces of the mesh in place of vertices; exactly or soft.
+        /// The same with points inside faces of the mesh instead of vertices; exactly or soft.
         public ulong SetPoints(string name, SurfacePoint[] points, Motion motion = default(Motion),
                                HoldOptions how = default(HoldOptions))
         {
@@ -65,7 +65,7 @@ namespace Lpdeform
 
         [ThreadStatic] static byte[] moveError;
 
-        /// Moves a handle that is there. Makes no garbage.
+        /// Moves an existing handle. Allocates nothing.
         public ulong Move(string name, Motion motion)
         {
             ulong inputSeq;
@@ -76,7 +76,7 @@ namespace Lpdeform
             return inputSeq;
         }
 
-        /// The same as the beginning of a step of its own for Session.Undo: when a drag begins.
+        /// The same, but it begins a new step for Session.Undo. Call it when a drag begins.
         public ulong BeginMove(string name, Motion motion)
         {
             ulong inputSeq;
@@ -94,7 +94,7 @@ namespace Lpdeform
             return inputSeq;
         }
 
-        /// Moves each vertex or point of a handle to a place of its own: x, y, z of each.
+        /// Moves each vertex or point of a handle to a target: x, y, z of each.
         public ulong MoveTo(string name, double[] positions)
         {
             if (positions == null || positions.Length % 3 != 0) throw new ArgumentException("x, y, z of each", "positions");
@@ -112,7 +112,7 @@ namespace Lpdeform
             return inputSeq;
         }
 
-        /// Lets go of a handle.
+        /// Removes a handle.
         public ulong Remove(string name)
         {
             ulong inputSeq;

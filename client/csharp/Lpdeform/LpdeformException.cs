@@ -11,15 +11,15 @@ namespace Lpdeform
         Unavailable = 14, DataLoss = 15, Unauthenticated = 16
     }
 
-    /// What the server or the library says is wrong. A call that throws it has changed nothing.
+    /// An error of the server or the library. A call that throws it has changed nothing.
     public sealed class LpdeformException : Exception
     {
         public ErrorCode Code { get; }
         /// For programs: one of Reasons. May be empty.
         public string Reason { get; }
-        /// The first offending one: "face 3". May be empty.
+        /// The first offending element: "face 3". May be empty.
         public string Element { get; }
-        /// The bound that was broken: "0 <= vertex < 42". May be empty.
+        /// The limit that was violated: "0 <= vertex < 42". May be empty.
         public string Limit { get; }
 
         LpdeformException(int code, string reason, string element, string limit, string message) : base(message)
@@ -41,7 +41,7 @@ namespace Lpdeform
             return error;
         }
 
-        /// What `error` says; null where it says that all is well.
+        /// Converts `error`; null if it is not an error.
         internal static LpdeformException From(byte[] error)
         {
             int code = BitConverter.ToInt32(error, 4), at = TextsAt;

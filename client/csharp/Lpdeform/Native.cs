@@ -1,5 +1,5 @@
-// The C interface (client/c/lpdeform.h) as it is: what nobody outside this assembly sees. Every struct is blittable and laid out as in C;
-// tests/csharp compares the two.
+// The C interface (client/c/lpdeform.h) as it is; nothing outside this assembly uses it. Every struct is blittable and laid out
+// as in C; tests/csharp compares the two.
 
 using System;
 using System.Runtime.InteropServices;

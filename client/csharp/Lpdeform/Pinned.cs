@@ -5,7 +5,7 @@ using System.Text;
 
 namespace Lpdeform
 {
-    /// Arrays and texts at fixed places while a call of the library reads them.
+    /// Arrays and texts that are pinned while a call of the library reads them.
     sealed class Pinned : IDisposable
     {
         readonly List<GCHandle> handles = new List<GCHandle>();
@@ -32,7 +32,7 @@ namespace Lpdeform
 
         static readonly Encoding strict = new UTF8Encoding(false, true);
 
-        /// As C has texts, ending in a zero byte. Throws ArgumentException where that cannot be said.
+        /// UTF-8 with a zero byte at the end, as in C. Throws ArgumentException if the text cannot be converted.
         public static byte[] Utf8(string text)
         {
             if (text.IndexOf('\0') >= 0) throw new ArgumentException("A text has a zero character.");

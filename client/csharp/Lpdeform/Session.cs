@@ -3,8 +3,8 @@ using System.Runtime.InteropServices;
 
 namespace Lpdeform
 {
-    /// A mesh that deforms on a server while its handles are moved. Nothing here waits but Settle, Solve, Undo, Redo and Snapshot. Members
-    /// may be used from any thread, except that Dispose must not overlap another.
+    /// A mesh that deforms on a server while its handles are moved. Only Settle, Solve, Undo, Redo and Snapshot wait. Members may
+    /// be used from any thread, except that Dispose must not overlap another call.
     public sealed unsafe class Session : IDisposable
     {
         IntPtr session;
@@ -16,7 +16,7 @@ namespace Lpdeform
             Handles = new Handles(() => Pointer);
         }
 
-        /// What the user holds.
+        /// The handles that the user moves.
         public Handles Handles { get; }
 
         internal IntPtr Pointer
@@ -28,7 +28,7 @@ namespace Lpdeform
             }
         }
 
-        /// 0 while a session that was joined is not there yet.
+        /// 0 until a joined session is there.
         public int VertexCount
         {
             get { return (int)Native.lpdeform_vertex_count(Pointer); }
@@ -39,7 +39,7 @@ namespace Lpdeform
             get { return (SessionState)Native.lpdeform_session_state(Pointer, null); }
         }
 
-        /// Why the session is not live; null where there is nothing to say.
+        /// Why the session is not live; null if there is no problem.
         public LpdeformException Problem
         {
             get
@@ -50,7 +50,7 @@ namespace Lpdeform
             }
         }
 
-        /// What the server said about itself last.
+        /// The server's last notice about itself.
         public Notice Notice
         {
             get
@@ -61,7 +61,7 @@ namespace Lpdeform
             }
         }
 
-        /// Notice is another one. Raised by TryGetFrame, before it looks for a frame, on the thread that calls it.
+        /// Notice has changed. Raised by TryGetFrame, before it looks for a frame, on the thread that calls it.
         public event Action<Notice> Noticed;
 
         NoticeReason noticed;
@@ -88,19 +88,20 @@ namespace Lpdeform
             }
         }
 
-        /// p and stiffness, the same everywhere; 0 leaves one as it is. Returns the change's number.
+        /// Sets p and stiffness, the same everywhere; 0 keeps the present value. Returns the change's number.
         public ulong Set(double p = 0, double stiffness = 0)
         {
             return Set(new Native.Settings { P = p, Stiffness = stiffness });
         }
 
-        /// p and stiffness from the geometry, with this strength, up to 1; 0 leaves one as it is. Returns the change's number.
+        /// Sets p and stiffness from the geometry, with a strength of up to 1; 0 keeps the present value. Returns the change's
+        /// number.
         public ulong SetAutomatic(double p = 0, double stiffness = 0)
         {
             return Set(new Native.Settings { PAutomatic = p, StiffnessAutomatic = stiffness });
         }
 
-        /// Replaces how solves are made, whole. Returns the change's number.
+        /// Replaces all solver settings. Returns the change's number.
         public ulong SetSolver(SolverSettings solver)
         {
             return Set(new Native.Settings
@@ -110,13 +111,13 @@ namespace Lpdeform
             });
         }
 
-        /// The length of which edges count in mixed norms; negative takes the mean edge length back. Returns the change's number.
+        /// Sets the unit of length for mixed norms; a negative value restores the mean edge length. Returns the change's number.
         public ulong SetLengthUnit(double lengthUnit)
         {
             return Set(new Native.Settings { LengthUnit = lengthUnit });
         }
 
-        /// Only these vertices may move from now on; null: all may. Returns the change's number.
+        /// Lets only these vertices move from now on; null: all. Returns the change's number.
         public ulong SetRegion(int[] vertices)
         {
             using (var pinned = new Pinned())
@@ -128,7 +129,7 @@ namespace Lpdeform
             }
         }
 
-        /// p and stiffness, one a vertex; null leaves one as it is. Returns the change's number.
+        /// Sets p and stiffness, one value per vertex; null keeps the present values. Returns the change's number.
         public ulong SetPerVertex(double[] p, double[] stiffness = null)
         {
             using (var pinned = new Pinned())
@@ -143,8 +144,8 @@ namespace Lpdeform
             }
         }
 
-        /// Scales the mesh along the engine's axes, each by 0.01 to 100, in such a way that what is salient keeps its shape and
-        /// size. Sets the handle "resize", p and stiffness: to end it, remove that handle and set these. Returns the change's number.
+        /// Scales the mesh along the engine's axes, each by 0.01 to 100; salient parts keep their shape and size. Sets the handle
+        /// "resize", p and stiffness: to end it, remove that handle and set these. Returns the change's number.
         public ulong Resize(double x, double y, double z)
         {
             ulong inputSeq;
@@ -157,8 +158,9 @@ namespace Lpdeform
             return inputSeq;
         }
 
-        /// Waits until the server has taken the newest step of the handles back; frames follow. Moves of the same handles, none over
-        /// a second after the one before, are one step, unless Handles.BeginMove begins another. Returns the change's number. FailedPrecondition NOTHING_TO_UNDO.
+        /// Waits until the server has undone the newest step of the handles; frames follow. Moves of the same handles, none more
+        /// than a second after the one before, are one step, unless Handles.BeginMove begins a new one. Returns the change's
+        /// number. FailedPrecondition NOTHING_TO_UNDO.
         public ulong Undo()
         {
             ulong inputSeq;
@@ -167,7 +169,7 @@ namespace Lpdeform
             return inputSeq;
         }
 
-        /// Does again what was taken back last. As Undo; NOTHING_TO_REDO.
+        /// Redoes the step that was undone last. As Undo; NOTHING_TO_REDO.
         public ulong Redo()
         {
             ulong inputSeq;
@@ -176,8 +178,8 @@ namespace Lpdeform
             return inputSeq;
         }
 
-        /// Waits for the session as a file, for Client.Restore: mesh, handles, settings, what can be undone and the surface as it is, with
-        /// every change before it.
+        /// Waits for the session as a file, for Client.Restore: mesh, handles, settings, steps to undo and the present surface.
+        /// The file includes every earlier change.
         public byte[] Snapshot()
         {
             IntPtr snapshot;
@@ -206,8 +208,9 @@ namespace Lpdeform
             return inputSeq;
         }
 
-        /// Takes the newest frame that was not taken yet: x, y, z of each vertex, in the engine's coordinates. False where there is
-        /// none; nothing is written then. Throws what the server had to say about a change, once, and why the session is over.
+        /// Takes the newest frame that was not taken: x, y, z of each vertex, in the engine's coordinates. Returns false if there
+        /// is none; then nothing is written. Throws the server's error about a change, once, and the reason if the session has
+        /// ended.
         public bool TryGetFrame(Span<float> positions)
         {
             Frame frame;
@@ -226,13 +229,13 @@ namespace Lpdeform
             return Write(buffers, out frame, Asked.New, 0);
         }
 
-        /// Writes the frame taken last once more. False where none was taken.
+        /// Writes the frame taken last again. False if none was taken.
         public bool TryRepeatFrame(FrameBuffers buffers, out Frame frame)
         {
             return Write(buffers, out frame, Asked.Last, 0);
         }
 
-        /// Waits until the finished result of the newest change has come, and writes it: for tools and loading screens.
+        /// Waits for the finished result of the newest change, and writes it: for tools and loading screens.
         public Frame Settle(Span<float> positions, double timeoutSeconds = 60)
         {
             return Settle(new FrameBuffers { Positions = positions }, timeoutSeconds);
@@ -245,10 +248,10 @@ namespace Lpdeform
             return frame;
         }
 
-        /// Waits for a solve of its own to the end, for the present handles and settings, and writes the result; beside the frames,
-        /// of which it takes none. One at a time; while one runs no change is sent: those made meanwhile are sent after it.
-        /// `timeoutSeconds` is of all of it, waiting for another included; 0 is without limit. By Client.Dispose it ends with
-        /// Cancelled, or with FailedPrecondition SESSION_CLOSED where it had not begun.
+        /// Waits for a separate solve to its end, for the present handles and settings, and writes the result. It takes no
+        /// frames. One solve at a time; changes made during a solve are sent after it. `timeoutSeconds`: for the whole call,
+        /// including the wait for another solve; 0 is without limit. Client.Dispose ends it with Cancelled, or with
+        /// FailedPrecondition SESSION_CLOSED if it had not begun.
         public Frame Solve(FrameBuffers buffers, bool certify = false, double timeoutSeconds = 0)
         {
             Frame frame;
@@ -262,7 +265,7 @@ namespace Lpdeform
         {
             var native = new Native.Frame { StructSize = (uint)sizeof(Native.Frame) };
             int code;
-            // What waits does not keep others from a frame meanwhile.
+            // A call that waits must not keep others from a frame.
             var error = asked == Asked.New || asked == Asked.Last ? frameError : LpdeformException.NewError();
             fixed (float* positions = &MemoryMarshal.GetReference(into.Positions))
             fixed (float* normals = &MemoryMarshal.GetReference(into.Normals))
@@ -287,7 +290,7 @@ namespace Lpdeform
 
         static Native.Attribute At(void* data, int size, int count)
         {
-            if (count == 0) return default(Native.Attribute);  // an empty array is at a place, too
+            if (count == 0) return default(Native.Attribute);  // an empty array has an address, too
             return new Native.Attribute { Data = (IntPtr)data, Bytes = (UIntPtr)((ulong)size * (ulong)count) };
         }
 
@@ -306,7 +309,7 @@ namespace Lpdeform
             return Native.lpdeform_solve(Pointer, ref options, ref buffers, ref frame, error);
         }
 
-        /// The session is over; its end on the server goes on by itself.
+        /// Ends the session; the server's part is ended in the background.
         public void Dispose()
         {
             var closing = session;

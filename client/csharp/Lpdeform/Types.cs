@@ -8,15 +8,16 @@ namespace Lpdeform
     {
         /// x, y, z of each vertex.
         public float[] Positions;
-        /// Three 0-based vertex indices a triangle.
+        /// Three 0-based vertex indices per triangle.
         public int[] Indices;
         /// x, y, z of each vertex's normal as drawn at rest; null: smooth ones.
         public float[] Normals;
-        /// Vertices in the same place are one.
+        /// Whether vertices in the same place are one.
         public bool WeldByPosition;
-        /// How far apart these may be, as a share of the bounding box's diagonal, 0 to 0.001; 0 is the server's, 1e-6.
+        /// The largest distance of such vertices as a share of the bounding box's diagonal, 0 to 0.001; 0 takes the server's,
+        /// 1e-6.
         public double WeldTolerance;
-        /// In place of that, one number a vertex: those with the same number are one.
+        /// Instead of that, one number per vertex: vertices with the same number are one.
         public int[] WeldGroups;
     }
 
@@ -24,7 +25,7 @@ namespace Lpdeform
     public enum Weights { Cotangent, Uniform, IntrinsicDelaunay }
     public enum FreeComponents { Error, Stay, Follow }
 
-    /// How a session is opened; the engine's coordinates are Unity's unless set otherwise.
+    /// How a session is opened. The engine's coordinates are Unity's by default.
     public sealed class SessionOptions
     {
         public bool LeftHanded = true;
@@ -33,13 +34,13 @@ namespace Lpdeform
         public Weights Weights;
         public FreeComponents FreeComponents;
         public FrameEncoding Encoding;
-        /// What a server with a limit of bytes a second may go down to.
+        /// The least precise encoding that a server may use to keep its limit of bytes per second.
         public FrameEncoding LowestEncoding;
         public bool WithoutDistortion;
-        /// Frames under way and not taken yet, 1 to 8; 0 takes 2.
+        /// How many frames may be under way and not yet taken, 1 to 8; 0 takes 2.
         public int Credit;
         public bool WithNormals;
-        /// Raw frames travel as float64.
+        /// Whether raw frames are sent as float64.
         public bool DoublePrecision;
         public bool Certify;
         /// 0: without limit.
@@ -79,10 +80,10 @@ namespace Lpdeform
         public double TimeLimitSeconds;
     }
 
-    /// Where a handle is to be; always relative to the mesh at rest.
+    /// Where a handle moves; always relative to the mesh at rest.
     public struct Motion
     {
-        /// Turned about Center, then moved by Translation.
+        /// Rotates about Center, then moves by Translation.
         public Quaternion4 Rotation;
         public Vector3d Center, Translation;
 
@@ -119,15 +120,15 @@ namespace Lpdeform
     public struct HoldOptions
     {
         public Hold Hold;
-        /// Of Soft (0: 1) and Orientation (0: 100).
+        /// For Soft (0: 1) and Orientation (0: 100).
         public double Weight;
-        /// Of AxisLock and PlaneLock.
+        /// For AxisLock and PlaneLock.
         public Vector3d Direction;
-        /// Radius of the surroundings that go along nearly rigidly.
+        /// Radius of a region around the handle that moves with it nearly rigidly.
         public double Footprint;
     }
 
-    /// Where a frame is to be written; what is empty is not wanted.
+    /// Where to write a frame; an empty span is not written.
     public ref struct FrameBuffers
     {
         /// x, y, z of each vertex, in the engine's coordinates.
@@ -143,12 +144,12 @@ namespace Lpdeform
     public enum SessionState { Connecting, Live, Reconnecting, Refused }
     public enum NoticeReason { None, Overloaded, Recovered, Other, Mesh }
 
-    /// What a server says about itself, or about the mesh; nothing failed.
+    /// What a server says about itself or about the mesh; nothing has failed.
     public struct Notice
     {
-        /// None: nothing, on the connection that there is. After Overloaded frames come less often, and the last one of a change
-        /// later, until Recovered. Other: of a newer server.
-        /// Mesh: it is split and comes apart there, until something else is said.
+        /// None: no notice on the present connection. After Overloaded frames come less often, and the last frame of a change
+        /// comes later, until Recovered. Other: from a newer server. Mesh: the mesh is split and comes apart there, until another
+        /// notice comes.
         public NoticeReason Reason;
         /// One sentence for people.
         public string Text;
@@ -156,22 +157,22 @@ namespace Lpdeform
 
     public enum StopReason { Running, Converged, IterationLimit, TimeLimit, Cancelled, Stalled, NumericalBreakdown }
 
-    /// What is to be known of a frame.
+    /// The properties of a frame.
     public struct Frame
     {
         public int VertexCount;
         /// The newest change that it answers: see Handles.
         public ulong InputSeq;
         public int Iteration;
-        /// The result, however its solve ended (StopReason): no further frame until there is a new change.
+        /// Whether this is the result, however its solve ended (StopReason): no further frame comes until there is a new change.
         public bool IsFinal;
         public StopReason StopReason;
         /// Lengths in metres.
         public double Energy;
         public double SolveSeconds;
-        /// Only where it was asked for (SessionOptions.Certify), and of results.
+        /// Only for results, and if it was requested (SessionOptions.Certify).
         public double? OptimalityGap;
-        /// The distortion that colours show as red.
+        /// The distortion that the colours show as red.
         public double RedDistortion;
 
         internal static Frame From(Native.Frame frame)

@@ -1,7 +1,7 @@
-// A sample for Unity: fits a MeshFilter to the handles around it. Add the package (client/csharp/package.json) to the project and put
-// liblpdeform_client.so below Assets/Plugins; add this to an object with a MeshFilter whose mesh is readable; give it handles.
-//
-// Compiled here against declarations of what it uses of UnityEngine, and not run inside Unity.
+// A sample for Unity: fits a MeshFilter to the handles around it. Add the package (client/csharp/package.json) to the project and
+// put liblpdeform_client.so below Assets/Plugins. Add this to an object with a MeshFilter whose mesh is readable, and give it
+// handles.
+// The tests compile it against declarations of the parts of UnityEngine that it uses; they do not run it inside Unity.
 
 using System;
 using System.Runtime.InteropServices;
@@ -22,7 +22,7 @@ public sealed class LpdeformMesh : MonoBehaviour
         [NonSerialized] public Matrix4x4 start;
         [NonSerialized] public bool hasStart;
         [NonSerialized] public Motion sent;
-        /// It holds vertices, so that it can be moved.
+        /// Whether it holds vertices, so that it can be moved.
         [NonSerialized] public bool holds;
     }
 
@@ -34,14 +34,14 @@ public sealed class LpdeformMesh : MonoBehaviour
     Client client;
     Session session;
     UnityEngine.Mesh mesh;
-    /// As the mesh was when the object was first enabled, and is again when it is disabled.
+    /// The mesh as it was when the object was first enabled; it is restored when the object is disabled.
     Vector3[] rest, restNormals;
     Color32[] restColours;
     Vector3[] positions, normals;
     Color32[] colours;
     float sentP;
 
-    /// How the session is, for the Inspector: "Live", or "Refused: " and why.
+    /// The session's state for the Inspector: "Live", or "Refused: " and the reason.
     public string status = "";
     SessionState? said;
 
@@ -99,7 +99,7 @@ public sealed class LpdeformMesh : MonoBehaviour
         else session.Handles.Set(handle.name, held);
     }
 
-    /// Once a picture. Nothing here waits for the network.
+    /// Once per picture. Nothing here waits for the network.
     void Update()
     {
         if (session == null) return;
@@ -120,11 +120,11 @@ public sealed class LpdeformMesh : MonoBehaviour
         }
         catch (LpdeformException error)
         {
-            Debug.LogWarning("lpdeform: " + error.Message + " (" + error.Reason + ")", this);  // of a change; each comes once
+            Debug.LogWarning("lpdeform: " + error.Message + " (" + error.Reason + ")", this);  // about a change; each error comes once
         }
     }
 
-    /// Says how the session is where that has changed, and lets go of one that is over: it would throw at every call.
+    /// Shows the session's state if it has changed, and releases a session that has ended, because it would throw at every call.
     void Tell()
     {
         var state = session.State;
@@ -137,7 +137,7 @@ public sealed class LpdeformMesh : MonoBehaviour
         }
     }
 
-    /// The mesh stays as it is.
+    /// Ends the session; the mesh stays as it is.
     void Give(string why)
     {
         status = why;
@@ -159,7 +159,7 @@ public sealed class LpdeformMesh : MonoBehaviour
         handle.sent = motion;
     }
 
-    /// Without the garbage of Equals(object).
+    /// Without the allocation of Equals(object).
     static bool Same(Motion a, Motion b)
     {
         return a.Rotation.X == b.Rotation.X && a.Rotation.Y == b.Rotation.Y && a.Rotation.Z == b.Rotation.Z &&

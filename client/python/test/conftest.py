@@ -1,4 +1,4 @@
-"""A real server for each test file that asks for one, and shapes to deform."""
+"""A real server for each test file that needs one, and shapes to deform."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ import lpdeform
 
 ROOT = Path(__file__).resolve().parents[3]
 PROGRAM = os.environ.get("LPDEFORM_SERVER", str(ROOT / "build/release/bin/lpdeform-server"))
-PATIENCE = 60.0  # seconds that anything may take; never reached where all is well
+PATIENCE = 60.0  # a time limit in seconds, never reached if all is well
 
 
 def settle_all(session: lpdeform.Session) -> None:
-    """Until every update is answered: the frame may come before the word that its update was taken."""
+    """Waits until every update is answered: the frame may come before the answer to its update."""
     session.settle(PATIENCE)
     link = session._link
     with link.changed:
@@ -29,7 +29,7 @@ def settle_all(session: lpdeform.Session) -> None:
 
 
 class Server:
-    """lpdeform-server on a free port of this machine, which it keeps when it is started again."""
+    """lpdeform-server on a free port of this machine; it keeps the port when it is restarted."""
 
     def __init__(self, *flags: str) -> None:
         self.address = "127.0.0.1:0"
@@ -43,11 +43,11 @@ class Server:
         self.address = self._process.stdout.readline().split()[-1]
 
     def kill(self) -> None:
-        """Without a word to anybody."""
+        """Kills the server without notice."""
         self._end(signal.SIGKILL)
 
     def stop(self) -> None:
-        """Drains it."""
+        """Drains the server."""
         self._end(signal.SIGTERM)
 
     def _end(self, how: signal.Signals) -> None:

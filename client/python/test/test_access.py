@@ -1,4 +1,4 @@
-"""Bearer tokens and TLS against a real server, and what goes with every call."""
+"""Bearer tokens and TLS against a real server, and the headers of every call."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _base64url(data: bytes) -> str:
 
 
 class Keys:
-    """An authority, a server's and a client's certificate from it, a stranger's, and keys that sign tokens."""
+    """An authority, certificates from it for a server and a client, an unrelated one, and keys that sign tokens."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -188,7 +188,7 @@ def test_a_function_that_fails_is_an_error_and_nothing_is_sent() -> None:
 
 
 class _Calls(grpc.GenericRpcHandler):
-    """A server that refuses all calls and keeps what came with them."""
+    """A server that refuses all calls and records their headers."""
 
     def __init__(self) -> None:
         self.headers: list[str] = []

@@ -1,4 +1,4 @@
-"""What is given, before any server sees it."""
+"""Checks of arguments, before a server sees them."""
 
 from __future__ import annotations
 

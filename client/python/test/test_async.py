@@ -1,4 +1,4 @@
-"""The asyncio side; each test runs a loop of its own."""
+"""The asyncio interface; each test runs its own loop."""
 
 from __future__ import annotations
 

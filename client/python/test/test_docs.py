@@ -1,4 +1,4 @@
-"""Every example in the package and its README, run as it stands."""
+"""Runs every example in the package and its README as it stands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How waiting, sessions and what goes wrong on threads end."""
+"""How waiting ends, how sessions end, and what happens to errors on threads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames from parts, without a network. The numbers are made by hand."""
+"""Frames from parts, without a network and with numbers made by hand."""
 
 import numpy as np
 import pytest

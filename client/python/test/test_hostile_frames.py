@@ -1,4 +1,4 @@
-"""Frames that somebody damaged: each ends as a frame that fits, or as the error FRAME_PARTS, and never as anything else."""
+"""Damaged frames: each gives a valid frame or the error FRAME_PARTS, and never anything else."""
 
 import base64
 import json
@@ -24,7 +24,7 @@ def recorded_parts(stream: dict[str, list[str]]) -> list[frame_pb2.FramePart]:
 
 
 def halves(part: frame_pb2.FramePart, at: int) -> list[frame_pb2.FramePart]:
-    """A frame that came in one part, in two; of bytes that can be cut."""
+    """A recorded frame in one part and in two, with bytes that can be cut."""
     first, second = frame_pb2.FramePart(), frame_pb2.FramePart()
     first.CopyFrom(part)
     second.CopyFrom(part)

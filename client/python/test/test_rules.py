@@ -1,4 +1,4 @@
-"""The table of what clients do after a stream, an answer or a loss: tests/golden/recovery.json, which all of them replay."""
+"""The rules of what clients do after a stream, an answer or a loss: tests/golden/recovery.json, which all clients replay."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def said_of(change: Change) -> str:
 
 
 class Replay:
-    """A ledger, and what was sent of it."""
+    """A ledger, and the updates that it has sent."""
 
     def __init__(self, is_bare: bool) -> None:
         self.ledger = Ledger(begins_bare=is_bare)
@@ -102,6 +102,8 @@ class Replay:
             assert {name: said_of(change) for name, change in sent.items()} == step["handles"]
         elif what == "accept":
             ledger.accept(step["seq"], step["kept"])
+        elif what == "show":
+            ledger.show(step.get("epoch", 1), step["seq"])
         elif what == "refuse":
             ledger.refuse(step["seq"])
         elif what == "reopened":

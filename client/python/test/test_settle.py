@@ -1,4 +1,4 @@
-"""The finished result of the newest update, however it was come by."""
+"""The finished result of the newest update, by whichever call it was taken."""
 
 from __future__ import annotations
 

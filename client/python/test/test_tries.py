@@ -1,4 +1,4 @@
-"""What a session does between its streams, against a server whose every word the test chooses."""
+"""What a session does between its streams, against a server whose every message the test chooses."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class FakeStream:
         self.say(opened=service_pb2.StreamOpened(epoch=1, vertex_count=VERTICES))
         return self
 
-    # The client's end.
+    # The client's side.
 
     def cancel(self) -> None:
         self.end(make(Code.CANCELLED, "Cancelled."))
@@ -82,7 +82,7 @@ class FakeStream:
 
 
 class FakeServer:
-    """In place of an Rpc. Every call succeeds but for what `ends` has, in turn, by their names."""
+    """Replaces an Rpc. Every call succeeds except those for which `ends` has an error, in turn and by name."""
 
     address = "nowhere"
     reconnect_for = 120.0

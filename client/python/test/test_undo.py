@@ -1,4 +1,4 @@
-"""Steps taken back on the server, and sessions as files."""
+"""Undo and redo on the server, and sessions as files."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_every_kind_of_handle_comes_back_and_is_there_after_kill_9(session: lpde
     assert np.abs(session.settle(PATIENCE).positions - before).max() < 1e-2
     server.kill()
     server.start()
-    after = session.settle(PATIENCE).positions  # made anew from this side's book
+    after = session.settle(PATIENCE).positions  # recreated from the client's ledger
     assert np.abs(after - before).max() < 1e-2
     assert np.abs(after[[92, 93]] - [[8, 7, 1], [9, 7, 1]]).max() == 0
 
@@ -70,7 +70,7 @@ def test_a_session_opens_at_once_after_a_restart_though_another_has_just_tried_i
     for _ in range(3):
         with lpdeform.open(shape.vertices, shape.faces, address=server.address):
             server.kill()
-            time.sleep(0.5)  # its client tries again and again
+            time.sleep(0.5)  # its client retries
             server.start()
             with lpdeform.open(shape.vertices, shape.faces, address=server.address) as other:
                 assert other.name
@@ -178,7 +178,7 @@ def test_a_session_leaves_as_a_file_and_comes_back_the_same(session: lpdeform.Se
         assert restored.settle(PATIENCE).positions[11, 2] == 2
         server.kill()
         server.start()
-        assert restored.settle(PATIENCE).positions[11, 2] == 2  # made anew from the file, and what came after it
+        assert restored.settle(PATIENCE).positions[11, 2] == 2  # recreated from the file and the later changes
         restored.move("right", translation=[0, 0, 4])
         restored.remove("left")
         restored.settle(PATIENCE)
@@ -186,8 +186,8 @@ def test_a_session_leaves_as_a_file_and_comes_back_the_same(session: lpdeform.Se
         server.start()
         restored.set_handle("middle", [66])
         after = restored.settle(PATIENCE).positions
-        assert after[11, 2] == 4  # a handle of the file that was moved, and not set anew
-        assert abs(after[0, 2]) > 0.1  # and one that is no more
+        assert after[11, 2] == 4  # a handle of the file that was moved, but not set again
+        assert abs(after[0, 2]) > 0.1  # and one that was removed
 
 
 def test_files_that_are_no_snapshots_are_refused_by_name(session: lpdeform.Session, server: Server) -> None:

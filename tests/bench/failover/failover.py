@@ -2,8 +2,9 @@
 
     failover.py ADDRESS PROCESS      of Envoy, and of a running deploy/up --replicas N
 
-For each size a flat square is bent through Envoy; each server is killed once in the middle of moves, and the time from there to
-the finished result of the next move is taken. The longest is of the server that had the session. The session stays the same.
+For each size a flat square is bent through Envoy. Each server is killed once in the middle of moves, and the time from there to
+the finished result of the next move is taken. The longest time is that of the server that had the session. The session stays the
+same.
 """
 
 import os

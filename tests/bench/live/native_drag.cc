@@ -1,7 +1,7 @@
 // A live drag of the viewer's fine bar (10,124 vertices) by the C++ client, for the table of `npm run drag`:
 //   native_drag ADDRESS float32|quantized|compressed SECONDS
-// moves the upper end every 16 ms as the scripted user of that table does, takes frames as they come, and prints one line of
-// JSON: milliseconds from each move to the frame that answers it, also of moves that a newer one overtook.
+// Moves the upper end every 16 ms, like the scripted user of that table, and takes frames as they come. Prints one line of
+// JSON: milliseconds from each move to the frame that answers it, including moves that a newer one superseded.
 
 #include <algorithm>
 #include <chrono>

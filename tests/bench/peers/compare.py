@@ -1,8 +1,8 @@
 """Runs lpdeform and its peers on the same tasks; see run.
 
-Every program starts from the Laplacian deformation and stores its positions after its iterations. Energies are
-evaluated here, by one function that shares no code with any of them, and never count in a time. A peer's time to 1 %
-is the time of its iterations until E^(1/p) is within 1 % of the best energy that anybody found.
+Every program starts from the Laplacian deformation and stores its positions after its iterations. Energies are evaluated here, by
+one function that shares no code with any of them, and never count in a time. A peer's time to 1 % is the time of its iterations
+until E^(1/p) is within 1 % of the best energy that any program found.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-// What callers of the C interface may get wrong, without a server.
+// Errors that callers of the C interface may make, without a server.
 
 #include <gmock/gmock.h>
 

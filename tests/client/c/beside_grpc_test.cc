@@ -1,5 +1,5 @@
-// A program that has gRPC, Protocol Buffers and Abseil of its own, as an engine may, loads the shared library for everybody to see:
-// neither meets the other. beside_grpc_test LIBRARY
+// A program with its own gRPC, Protocol Buffers and Abseil, like an engine, loads the shared library with global symbols:
+// neither interferes with the other. beside_grpc_test LIBRARY
 
 #include <dlfcn.h>
 #include <gtest/gtest.h>

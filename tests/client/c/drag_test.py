@@ -1,6 +1,6 @@
-"""The example loop in C, 600 frames at 60 a second, while its server is killed and started again: drag_test.py SERVER DRAG.
+"""The example loop in C runs 600 frames at 60 per second while its server is killed and restarted: drag_test.py SERVER DRAG.
 
-The loop must see the server go and come back, never wait for it, and end with the shape that was asked for.
+The loop must see the server go and come back, never wait for it, and end with the requested shape.
 """
 
 import re

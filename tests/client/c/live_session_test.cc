@@ -1,4 +1,4 @@
-// How a session of the C interface is opened, against openings that the test chooses.
+// How a session of the C interface is opened; the test chooses the results of opening.
 
 #include "client/c/live_session.h"
 

@@ -1,4 +1,4 @@
-// What the C interface makes of a server that does not keep to the contract.
+// How the C interface handles a server that violates the contract.
 
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>

@@ -14,11 +14,11 @@
 
 namespace lpdeform::engine {
 
-// What tests of the C interface against a server share.
+// Shared by tests of the C interface against a server.
 
 inline constexpr double kPatienceSeconds = 60;
 
-/// As a game asks, again and again; a minute at most.
+/// Polls like a game; for a minute at most.
 inline bool eventually(const std::function<bool()>& holds) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatienceSeconds);
   while (!holds()) {

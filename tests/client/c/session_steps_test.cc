@@ -1,4 +1,4 @@
-// Steps of the handles taken back, resizing, and several threads that ask for frames, against a real server in this process.
+// Undo, resizing, and several threads that ask for frames, against a real server in this process.
 
 #include <gmock/gmock.h>
 

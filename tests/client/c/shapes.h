@@ -8,11 +8,11 @@
 
 namespace lpdeform::engine {
 
-// What tests of the C interface deform, and where it goes to.
+// Meshes and targets for tests of the C interface.
 
 using Point = std::array<float, 3>;
 
-/// Of arrays that outlive it.
+/// For arrays that outlive the mesh.
 inline lpdeform_mesh mesh_of(const std::vector<Point>& points, const std::vector<std::uint32_t>& indices) {
   lpdeform_mesh out{};
   out.struct_size = sizeof out;
@@ -23,7 +23,7 @@ inline lpdeform_mesh mesh_of(const std::vector<Point>& points, const std::vector
   return out;
 }
 
-/// The least there is to deform.
+/// The smallest mesh that can be deformed.
 struct Triangle {
   lpdeform_mesh mesh() const { return mesh_of(points, indices); }
 

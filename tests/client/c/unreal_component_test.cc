@@ -1,4 +1,4 @@
-// The sample for Unreal Engine with a little of the engine in its place (unreal_engine/), against a real server.
+// The sample for Unreal Engine with a small replacement of the engine (unreal_engine/), against a real server.
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,4 @@
-// The vector kernels against plain arithmetic and SVD, cell by cell, in every instruction set that this
-// processor has.
+// The vector kernels compared with plain arithmetic and SVD, cell by cell, in every instruction set that this processor has.
 
 #include "core/energy/cell_kernel.h"
 

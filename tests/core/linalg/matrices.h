@@ -59,8 +59,8 @@ inline LowerMatrix with_shortcuts(const LowerMatrix& matrix, int count) {
   return result;
 }
 
-/// The five-point Laplacian of a square, plus the identity: a tree with many branches. With `shortcuts` as many
-/// pairs of points are joined besides: a tree whose subtrees do not all lie together.
+/// The five-point Laplacian of a square, plus the identity: its tree has many branches. With `shortcuts`, that many pairs of
+/// points are joined in addition, so that subtrees are not all contiguous.
 inline LowerMatrix square_laplacian(int side, int shortcuts = 0) {
   if (shortcuts > 0) return with_shortcuts(square_laplacian(side), shortcuts);
   LowerMatrix result;

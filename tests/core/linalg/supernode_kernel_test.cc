@@ -1,4 +1,4 @@
-// The kernels of the single-precision factorisation against plain arithmetic, in every instruction set that this
+// The kernels of the single-precision factorisation compared with plain arithmetic, in every instruction set that this
 // processor has.
 
 #include "core/linalg/supernode_kernel.h"

@@ -1,4 +1,4 @@
-// Drags in a live session: each solve goes on from the state that the one before had reached.
+// Drags in a live session: each solve continues from the state that the previous one had reached.
 
 #include <gtest/gtest.h>
 

@@ -11,6 +11,7 @@
 namespace lpdeform {
 namespace {
 
+static_assert(std::variant_size_v<Hold> == 5, "each kind of hold is among the kinds under test");
 enum class Kind { kSoft, kPoint, kSoftPoint, kOrientation, kAxisLock, kPlaneLock };
 
 /// A bar whose lower end is held; the kind under test is at its upper end, sent up and over.

@@ -1,5 +1,5 @@
-// The result does not depend on how the mesh is numbered, nor on where it lies, how it is turned and in which unit: for the coarse
-// level, intrinsic weights, a region, footprints and soft handles as for the plain solve.
+// The result does not depend on the numbering of the mesh, nor on its position, orientation and unit: for the plain solve, and
+// for the coarse level, intrinsic weights, a region, footprints and soft handles.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// What holds for every method, through one suite.
+// What holds for every method, in one suite.
 
 #include <gmock/gmock.h>
 

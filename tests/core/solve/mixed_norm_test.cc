@@ -1,4 +1,5 @@
-// Solves of large p, and of p that differs by much over the surface: which minimum is found, what is converged, and what is zero.
+// Solves with large p, and with p that varies much over the surface: which minimum is found, what counts as converged, and what
+// is zero.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// What the paper shows in its figures, on shapes of its kind.
+// What the paper shows in its figures, on shapes of the same kind.
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,6 @@
-"""What client/blender/README.md tells a person to do, by the operators behind the buttons: the add-on is installed from its zip, a
-vertex of a cube held at each end, the mesh taken live, an empty moved.   blender --background --python in_blender.py -- ADD_ON.zip"""
+"""What client/blender/README.md tells users to do, by the operators behind the buttons: the add-on is installed from its zip,
+a vertex of a cube is held at each end, the mesh is taken live, and an empty is moved.   blender --background --python
+in_blender.py -- ADD_ON.zip"""
 
 import sys
 import time

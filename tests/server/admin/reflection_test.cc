@@ -1,4 +1,4 @@
-// What a client that knows nothing can ask the server about itself, as grpcurl and grpc_cli do.
+// What a client without the contract can ask the server about itself, like grpcurl and grpc_cli.
 
 #include <google/protobuf/descriptor.pb.h>
 #include <google/protobuf/empty.pb.h>

@@ -1,4 +1,4 @@
-// Callers that are told apart by their tokens: whose is what, and who may do what.
+// Callers that are identified by their tokens: who owns what, and who may do what.
 
 #include <unistd.h>
 

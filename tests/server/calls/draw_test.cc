@@ -1,4 +1,4 @@
-// Meshes as they are drawn: split vertices welded inside, and normals, through the running service.
+// Meshes as they are drawn, through the running service: split vertices are welded inside, and normals.
 
 #include <cstring>
 #include <functional>

@@ -1,4 +1,4 @@
-// What a frame costs beside its solve, and whether memory comes back: counted, or measured against something else in the same
+// What a frame costs besides its solve, and whether memory is given back. Counted, or compared with something else in the same
 // run, so that a busy machine does not matter.
 
 #include <malloc.h>

@@ -1,4 +1,4 @@
-// What the running service finds in a mesh's geometry by itself: automatic fields and resizing.
+// Values that the running service finds in a mesh's geometry: automatic fields and resizing.
 
 #include <array>
 #include <condition_variable>

@@ -1,4 +1,5 @@
-// Two servers with one Redis: who comes by the session's way to the one that does not have it is given it, who comes by another is not.
+// Two servers with one Redis: a caller with the session's route gets the session from a server that does not have it; a caller
+// with another route does not.
 
 #include <gtest/gtest.h>
 

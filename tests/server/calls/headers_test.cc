@@ -1,4 +1,4 @@
-// Headers that come twice: which one was meant, nobody can say.
+// Headers that come twice: it is not known which one was meant.
 
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-// The service with large meshes and many clients at a time.
+// The service with large meshes and many clients at the same time.
 
 #include <atomic>
 #include <thread>

@@ -1,4 +1,4 @@
-// UndoUpdate: live frames follow, and a restart keeps what can be taken back.
+// UndoUpdate: live frames follow, and a restart keeps the steps that can be undone.
 
 #include <gtest/gtest.h>
 

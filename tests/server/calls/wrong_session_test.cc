@@ -1,4 +1,4 @@
-// Sessions that the service refuses to make: what is wrong with them, or with the room that is left.
+// Sessions that the service refuses to make, because of their input or because a limit is reached.
 
 #include <functional>
 #include <limits>

@@ -1,5 +1,5 @@
-// What the keeper asks of a store as sessions come, go on elsewhere and come back: never two of one name for one, and what is not
-// written is not called kept.
+// What the keeper asks of a store as sessions come, move elsewhere and return. It never has two sessions of one name, and never
+// reports as stored what is not written.
 
 #include "server/keeping/keeper.h"
 
@@ -237,7 +237,7 @@ class KeeperTest : public testing::Test {
     Update update;
     update.input_seq = seq;
     update.settings.p = Field::Constant(1, 1 + 0.001 * static_cast<double>(seq));
-    const auto taken = one.update(one.lease().token, update);
+    const auto taken = one.update(one.writer(one.lease().token), update);
     EXPECT_TRUE(taken.ok()) << taken.status();
     std::promise<bool> kept;
     keeper_->changed(one, one.revision(), 0, [&](bool is) { kept.set_value(is); });
@@ -331,7 +331,7 @@ TEST_F(KeeperTest, OneThatIsBeingMadeIsHeldUntilItIsThereOrGivenUp) {
 
 TEST_F(KeeperTest, ASessionIsInUseAsLongAsItHasAStreamHoweverLongNobodyCalls) {
   const auto live = kept();
-  const auto stream = live->open_stream("", {});
+  const auto stream = live->open_stream(std::nullopt, {});
   ASSERT_TRUE(stream.ok());
   timers_->advance(2 * Keeper::kInUse);
   store_->forget();

@@ -1,4 +1,4 @@
-// A server with a store, and the one that comes after it.
+// A server with a store, and its successor.
 
 #include <gtest/gtest.h>
 

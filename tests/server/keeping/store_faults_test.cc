@@ -1,4 +1,4 @@
-// A server whose store fails or hangs: what goes on, what is refused, and that nothing acknowledged is lost.
+// A server whose store fails or hangs: what goes on, what is refused, and that no acknowledged update is lost.
 
 #include <gtest/gtest.h>
 

@@ -69,6 +69,28 @@ TEST_F(HistoryTest, APauseAMarkAndAnotherHandleEachBeginAStep) {
   }
 }
 
+TEST_F(HistoryTest, AnUpdateThatLeavesHandlesAsTheyAreIsNoStep) {
+  move(1);
+  timers_->advance(std::chrono::seconds(10));
+  move(1);  // as it is
+  Update again;
+  again.input_seq = ++seq_;
+  for (const auto& [name, handle] : mailbox_.newest().given_handles->handles())
+    again.handles.push_back({name, handle});
+  again.handles.push_back({"of old", Removal{}});
+  ASSERT_TRUE(mailbox_.take(again).ok());
+  EXPECT_EQ(mailbox_.history_size().undo_steps, 2u);
+  EXPECT_EQ(undo(), "");
+  EXPECT_EQ(tip(), 0);
+  move(0);  // as it is
+  EXPECT_EQ(redo(), "");
+  EXPECT_EQ(tip(), 1);
+  move(1, true);  // where a drag begins that was marked
+  move(2);
+  EXPECT_EQ(undo(), "");
+  EXPECT_EQ(tip(), 1);
+}
+
 TEST_F(HistoryTest, HandlesThatWereSetReplacedAndLetGoOfComeAndGo) {
   const std::vector<std::int32_t> middle = vertices_at(shape_->positions(), 5);
   const std::int32_t a = middle[0], b = middle[1], c = middle[2];
@@ -157,12 +179,13 @@ TEST_F(HistoryTest, AStepThatIsTooLargeEndsWhatWasBefore) {
   const Timers::TimePoint now;
   HandleSet small;
   ASSERT_TRUE(small.set("tip", Handle{{1}, shifted(0, 0, 0)}).ok());
-  history.note(small, {{}, {"tip"}, {}, true}, now, 1);
+  const HandleSet none;  // another one
+  history.note(small, none, {{}, {"tip"}, {}, true}, now, 1);
   EXPECT_EQ(history.undo_steps(), 1u);
-  history.note(before, {{"large"}, {"large"}, {}, true}, now, 2);
+  history.note(before, none, {{"large"}, {"large"}, {}, true}, now, 2);
   EXPECT_EQ(history.undo_steps(), 0u);
   EXPECT_EQ(history.bytes(), 0u);
-  history.note(small, {{}, {"tip"}, {}, true}, now, 3);
+  history.note(small, none, {{}, {"tip"}, {}, true}, now, 3);
   EXPECT_EQ(history.undo_steps(), 1u);
 }
 

@@ -118,7 +118,9 @@ class SessionTest : public testing::Test {
   }
 
   std::shared_ptr<FrameStream> open(Session& session, const std::string& token = "") {
-    auto stream = session.open_stream(token, {.credit = 2});
+    const auto writer = session.writer(token);
+    auto stream =
+        session.open_stream(writer.ok() ? std::make_optional(*writer) : std::nullopt, {.credit = 2});
     EXPECT_TRUE(stream.ok()) << stream.status();
     return *stream;
   }
@@ -135,8 +137,8 @@ TEST_F(SessionTest, AnswersUpdatesOnEveryStream) {
   const auto session = create();
   const std::string token = session->lease().token;
   Reader writer(open(*session, token)), reader(open(*session));
-  ASSERT_TRUE(session->update(token, hold_ends(rest_, 1, 1)).ok());
-  ASSERT_TRUE(session->update(token, move_tip(2, 2)).ok());
+  ASSERT_TRUE(session->update(session->writer(token), hold_ends(rest_, 1, 1)).ok());
+  ASSERT_TRUE(session->update(session->writer(token), move_tip(2, 2)).ok());
   const auto is_answer = [](const Frame& frame) { return frame.input_seq == 2 && frame.is_final; };
   EXPECT_TRUE(writer.wait_for_frame(is_answer));
   EXPECT_TRUE(reader.wait_for_frame(is_answer));
@@ -145,7 +147,7 @@ TEST_F(SessionTest, AnswersUpdatesOnEveryStream) {
 TEST_F(SessionTest, AnUpdateAndAStepTakenBackAreAnsweredBeforeRefinements) {
   const auto session = create();
   const std::string token = session->lease().token;
-  ASSERT_TRUE(session->update(token, hold_ends(rest_, 1, 1)).ok());
+  ASSERT_TRUE(session->update(session->writer(token), hold_ends(rest_, 1, 1)).ok());
   const auto are_busy = std::make_shared<std::latch>(scheduler_.threads());
   const auto let_go =
       std::make_shared<std::latch>(1);  // whoever waits may do so for longer than this test lasts
@@ -157,16 +159,18 @@ TEST_F(SessionTest, AnUpdateAndAStepTakenBackAreAnsweredBeforeRefinements) {
   }
   are_busy->wait();
   EXPECT_FALSE(scheduler_.is_answer_waiting());
-  EXPECT_TRUE(session->undo(token, 2, false).ok());
+  EXPECT_TRUE(session->undo(session->writer(token), 2, false).ok());
   EXPECT_TRUE(scheduler_.is_answer_waiting());
   let_go->count_down();
 }
 
 TEST_F(SessionTest, OnlyTheWriterChangesIt) {
   const auto session = create();
-  EXPECT_EQ(reason(session->update("", hold_ends(rest_, 1, 1)).status()), "WRITER_TOKEN_MISSING");
-  EXPECT_TRUE(absl::IsUnauthenticated(session->update("", hold_ends(rest_, 1, 1)).status()));
-  EXPECT_EQ(reason(session->update("wrong", hold_ends(rest_, 1, 1)).status()), "NOT_THE_WRITER");
+  EXPECT_EQ(reason(session->update(session->writer(""), hold_ends(rest_, 1, 1)).status()),
+            "WRITER_TOKEN_MISSING");
+  EXPECT_TRUE(absl::IsUnauthenticated(session->update(session->writer(""), hold_ends(rest_, 1, 1)).status()));
+  EXPECT_EQ(reason(session->update(session->writer("wrong"), hold_ends(rest_, 1, 1)).status()),
+            "NOT_THE_WRITER");
   EXPECT_EQ(session->info().inputs.input_seq, 0u);
 }
 
@@ -174,16 +178,18 @@ TEST_F(SessionTest, AnotherWriterEndsTheFirstOnesStreamAndTokenAndEpoch) {
   const auto session = create();
   const std::string first = session->lease().token;
   Reader writer(open(*session, first)), reader(open(*session));
-  ASSERT_TRUE(session->update(first, hold_ends(rest_, 7, 1)).ok());
+  ASSERT_TRUE(session->update(session->writer(first), hold_ends(rest_, 7, 1)).ok());
+  const auto shown_before = session->writer(first);
   const WriterLease second = session->acquire_writer();
   EXPECT_EQ(second.epoch, 2u);
   EXPECT_EQ(second.input_seq, 7u);
   const auto end = writer.wait_for_end();
   ASSERT_TRUE(end);
   EXPECT_EQ(end->reason, EndReason::kWriterReplaced);
-  EXPECT_EQ(reason(session->update(first, move_tip(8, 1)).status()), "NOT_THE_WRITER");
-  EXPECT_FALSE(session->open_stream(first, {}).ok());
-  EXPECT_TRUE(session->update(second.token, move_tip(8, 1)).ok());
+  EXPECT_EQ(reason(session->update(session->writer(first), move_tip(8, 1)).status()), "NOT_THE_WRITER");
+  EXPECT_EQ(reason(session->update(shown_before, move_tip(8, 1)).status()), "NOT_THE_WRITER");
+  EXPECT_EQ(reason(session->open_stream(*shown_before, {}).status()), "NOT_THE_WRITER");
+  EXPECT_TRUE(session->update(session->writer(second.token), move_tip(8, 1)).ok());
   EXPECT_TRUE(
       reader.wait_for_frame([](const Frame& frame) { return frame.epoch == 2 && frame.input_seq == 8; }));
 }
@@ -210,8 +216,8 @@ TEST_F(SessionTest, AnotherSolveOrWriterEndsASolveWithATypedError) {
         SolveOptions{}, nullptr,
         [&ended](const absl::StatusOr<SolveResult>& result) { ended.set_value(result.status()); });
   };
-  ASSERT_TRUE(session->solve(token, update, job(first)).ok());
-  ASSERT_TRUE(session->solve(token, std::nullopt, job(second)).ok());
+  ASSERT_TRUE(session->solve(session->writer(token), update, job(first)).ok());
+  ASSERT_TRUE(session->solve(session->writer(token), std::nullopt, job(second)).ok());
   EXPECT_EQ(reason(first.get_future().get()), "SUPERSEDED");
   session->acquire_writer();
   EXPECT_EQ(reason(second.get_future().get()), "WRITER_REPLACED");
@@ -225,7 +231,7 @@ TEST_F(SessionTest, DeletionEndsStreamsAndSolvesWithTheirReason) {
   update.settings.solver = SolveSettings{.method = Method::kLineSearch, .tolerance = 1e-13};
   std::promise<absl::Status> ended;
   ASSERT_TRUE(session
-                  ->solve(token, update,
+                  ->solve(session->writer(token), update,
                           std::make_shared<SolveJob>(SolveOptions{}, nullptr,
                                                      [&](const absl::StatusOr<SolveResult>& result) {
                                                        ended.set_value(result.status());
@@ -235,8 +241,8 @@ TEST_F(SessionTest, DeletionEndsStreamsAndSolvesWithTheirReason) {
   registry_->remove(session->name(), EndReason::kSessionDeleted, "gone");
   EXPECT_EQ(reason(ended.get_future().get()), "SESSION_DELETED");
   EXPECT_EQ(reader.wait_for_end()->reason, EndReason::kSessionDeleted);
-  EXPECT_EQ(reason(session->update(token, move_tip(2, 1)).status()), "SESSION_UNKNOWN");
-  EXPECT_EQ(reason(session->open_stream("", {}).status()), "SESSION_UNKNOWN");
+  EXPECT_EQ(reason(session->update(session->writer(token), move_tip(2, 1)).status()), "SESSION_UNKNOWN");
+  EXPECT_EQ(reason(session->open_stream(std::nullopt, {}).status()), "SESSION_UNKNOWN");
 }
 
 TEST_F(SessionTest, WhoHasHoldOfOneThatGoesOnElsewhereIsNotToldThatThereIsNone) {
@@ -246,16 +252,16 @@ TEST_F(SessionTest, WhoHasHoldOfOneThatGoesOnElsewhereIsNotToldThatThereIsNone) 
     return reason(registry_->find(one->name(), owner).status());
   };
   ASSERT_TRUE(registry_->remove(*session, EndReason::kDraining, "Another server has it now."));
-  EXPECT_EQ(reason(session->update(token, {}).status()), "DRAINING");
-  EXPECT_EQ(reason(session->undo(token, 9, false).status()), "DRAINING");
-  EXPECT_EQ(reason(session->solve(token, std::nullopt,
+  EXPECT_EQ(reason(session->update(session->writer(token), {}).status()), "DRAINING");
+  EXPECT_EQ(reason(session->undo(session->writer(token), 9, false).status()), "DRAINING");
+  EXPECT_EQ(reason(session->solve(session->writer(token), std::nullopt,
                                   std::make_shared<SolveJob>(SolveOptions{}, nullptr, nullptr))),
             "DRAINING");
-  EXPECT_EQ(reason(session->open_stream(token, {}).status()), "DRAINING");
+  EXPECT_EQ(reason(session->open_stream(*session->writer(token), {}).status()), "DRAINING");
   EXPECT_EQ(look(session), "SESSION_ELSEWHERE");
   EXPECT_EQ(look(session, "somebody else"), "SESSION_UNKNOWN");
   ASSERT_TRUE(registry_->remove(deleted->name(), EndReason::kSessionDeleted, ""));
-  EXPECT_EQ(reason(deleted->update(deleted->lease().token, {}).status()), "SESSION_UNKNOWN");
+  EXPECT_EQ(reason(deleted->update(deleted->writer(deleted->lease().token), {}).status()), "SESSION_UNKNOWN");
   EXPECT_EQ(look(deleted), "SESSION_UNKNOWN");
   registry_->forget_left(session->name());
   EXPECT_EQ(look(session), "SESSION_UNKNOWN");
@@ -304,10 +310,10 @@ TEST_F(SessionTest, StreamsAreBounded) {
   const auto session = create();
   std::vector<std::shared_ptr<FrameStream>> streams;
   for (std::size_t k = 0; k < SessionLimits().streams; ++k) streams.push_back(open(*session));
-  const auto refused = session->open_stream("", {});
+  const auto refused = session->open_stream(std::nullopt, {});
   EXPECT_EQ(reason(refused.status()), "STREAMS_FULL");
   session->forget_stream(*streams[0]);
-  EXPECT_TRUE(session->open_stream("", {}).ok());
+  EXPECT_TRUE(session->open_stream(std::nullopt, {}).ok());
 }
 
 TEST_F(SessionTest, TheRegistryHasRoomForSoManyAndSaysSo) {

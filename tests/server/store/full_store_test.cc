@@ -1,4 +1,4 @@
-// An SQLite store on a disk that is full, without one: what it refuses, what it still does, and that it comes back by itself.
+// An SQLite store on a full disk, simulated: what it refuses, what it still does, and that it recovers by itself.
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

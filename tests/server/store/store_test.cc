@@ -1,4 +1,4 @@
-// What every store promises, and what the folder of the SQLite store does when it is damaged, full or taken.
+// What every store promises, and how the folder of the SQLite store behaves when it is damaged, full or taken.
 
 #include "server/store/store.h"
 

@@ -7,8 +7,8 @@
         s.set_handle("tip", vertices[:, 2] > 0.9)
         frame = s.move("tip", translation=[0, 0, 1])                   # frame.positions, frame.distortion
 
-To drag, call `s.drag("tip", ...)` as often as the mouse moves and `s.poll()` once a picture: what is newest wins in both
-directions. `s.solve()` asks for one finished result with its trace and a bound on how far it can be from the optimum.
+To drag, call `s.drag("tip", ...)` on every mouse move and `s.poll()` once per picture: in both directions the newest value
+wins. `s.solve()` returns one finished result, with its trace and a bound on its distance from the optimum.
 """
 
 from lpdeform.access import Tls

@@ -1,4 +1,4 @@
-"""Calls that come after every update before them, and beside which none is sent."""
+"""Calls that must come after every earlier update, and during which no update is sent."""
 
 from __future__ import annotations
 
@@ -46,19 +46,19 @@ def alone(link: Link, timeout: float, stop: Stop) -> Iterator[None]:
 
 
 def send_restore(link: Link, stop: Stop) -> None:
-    """Gives a session made anew what the lost one had, on its own: it must not fall with an update that is refused."""
+    """Restores the state of a lost session in the recreated one, by an update of its own: a refused update must not affect it."""
     while link.ledger.has_restore:
         send_next(link, stop)
 
 
 def send_waiting(link: Link, stop: Stop) -> None:
-    """All that waits to be sent. Raises what the server says of it."""
+    """Sends everything that waits. Raises the server's errors."""
     while link.ledger.has_waiting:
         send_next(link, stop)
 
 
 def send_next(link: Link, stop: Stop) -> None:
-    """The next update, by a call of its own and not on the stream."""
+    """Sends the next update by a unary call, not on the stream."""
     with link.changed:
         update = link.ledger.send_next()
         lease = link.lease

@@ -1,4 +1,4 @@
-"""The newest frame not yet taken, what the server had to say, and who waits for either."""
+"""The newest frame that was not taken, the server's errors, and the callers who wait for either."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ _most_problems = 64
 
 
 class Taken(NamedTuple):
-    """A frame and the stream that it came on, which wants it acknowledged."""
+    """A frame, and the stream that it came on and that must acknowledge it."""
 
     frame: Frame
     stream: int
 
 
 class FrameBox:
-    """Frames of an older epoch or update than one before are dropped. May be used by any thread."""
+    """Drops frames of an older epoch or update than an earlier frame. May be used by any thread."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
         self._newest: Taken | None = None
         self.last_final: Frame | None = None
-        """The frame that take() returned last, where that one is final."""
+        """The frame that take() returned last, if it is final."""
         self.takes = 0
-        """How often take() had something to say."""
+        """How often take() returned or raised something."""
         self._epoch = 0
         self._input_seq = 0
         self._problems: deque[LpdeformError] = deque(maxlen=_most_problems)
@@ -38,7 +38,7 @@ class FrameBox:
         self._listeners: set[Callable[[], None]] = set()
 
     def put(self, frame: Frame, stream: int) -> bool:
-        """False where the frame is dropped."""
+        """Returns False if the frame is dropped."""
         with self._changed:
             if frame.epoch < self._epoch or frame.input_seq < self._input_seq:
                 return False
@@ -55,13 +55,13 @@ class FrameBox:
             self._wake()
 
     def begin_epoch(self, epoch: int) -> None:
-        """Frames of an earlier epoch are void."""
+        """Drops frames of earlier epochs."""
         with self._changed:
             if epoch > self._epoch:
                 self._epoch, self._newest = epoch, None
 
     def begin_session(self) -> None:
-        """Epochs begin anew: another session."""
+        """Epochs start again, because the session is a new one."""
         with self._changed:
             self._epoch, self._newest = 0, None
 
@@ -72,12 +72,13 @@ class FrameBox:
             self._wake()
 
     def resume(self) -> None:
-        """Undoes finish(). What was taken before is forgotten: another writer may have been there since."""
+        """Reverses finish(). Forgets the last frame taken, because another writer may have changed the session since."""
         with self._changed:
             self._end = self.last_final = None
 
     def take(self) -> Taken | None:
-        """What there is. Raises what the server had to say, each once; then, once nothing more comes, why, each time."""
+        """The newest frame, or None. Raises each error of the server once. When nothing more comes, raises the reason every
+        time."""
         with self._changed:
             if self._problems:
                 self._count_take()
@@ -95,9 +96,9 @@ class FrameBox:
         self._wake()
 
     def wait(self, deadline: float, takes: int) -> bool:
-        """Waits until take() has something to say, or has said more than `takes` times what it had.
+        """Waits until take() has something to return or raise, or has been served more than `takes` times.
 
-        False where time.monotonic() reached the deadline first.
+        Returns False if time.monotonic() reaches the deadline first.
         """
         with self._changed:
             return self._changed.wait_for(
@@ -108,7 +109,8 @@ class FrameBox:
         return bool(self._problems) or self._newest is not None or self._end is not None
 
     def listen(self, listener: Callable[[], None]) -> None:
-        """Calls `listener` whenever take() has something new to say or has said it, and now where it has. It must not wait."""
+        """Calls `listener` whenever take() gets something new or has returned it, and at once if it has something now. It must
+        not wait."""
         with self._changed:
             self._listeners.add(listener)
             if self._has_news():

@@ -1,4 +1,4 @@
-"""meshoptimizer's vertex codec, from the system's library (Debian: libmeshoptimizer2d): the one that the server has."""
+"""meshoptimizer's vertex codec from the system's library (Debian: libmeshoptimizer2d), which the server uses, too."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _decoder() -> Any:
 
 
 def require_decoder() -> None:
-    """Raises where compressed frames cannot be read here."""
+    """Raises an error if compressed frames cannot be read on this system."""
     if _decoder() is None:
         raise make(
             Code.UNIMPLEMENTED,
@@ -40,7 +40,7 @@ def require_decoder() -> None:
 
 
 def decompress(block: bytes, count: int) -> npt.NDArray[np.uint16] | None:
-    """Four 16-bit integers for each of `count` vertices; nothing where the block cannot be read."""
+    """Four 16-bit integers for each of `count` vertices; None if the block cannot be decoded."""
     decode = _decoder()
     if decode is None:
         return None

@@ -1,4 +1,4 @@
-"""What a client holds of a session on the server."""
+"""What a client knows of its session on the server."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ class Lease:
     input_seq: int
     report: MeshReport
     route: str = ""
-    """The header lpdeform-session that leads to it."""
+    """The header lpdeform-session that leads to the session's server."""
 
 
 @dataclass(frozen=True, eq=False)
 class Original:
-    """What a session is made from, and made anew from where the server has lost it. Everything is checked and copied."""
+    """What a session is created from, and recreated from if the server has lost it. Everything is checked and copied."""
 
     vertices: Copied
     faces: Copied
     normals: Copied | None
     weld: Copied | float | None
-    """One number a vertex, or the tolerance of a weld by position."""
+    """One number per vertex, or the tolerance of a weld by position."""
     weights: report_pb2.WeightKind
     free_components: service_pb2.FreeComponents
     settings: Settings
@@ -42,13 +42,13 @@ class Original:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A file that a session is made from, and made anew from."""
+    """A file that a session is created from, and recreated from."""
 
     file: bytes
 
 
 def create_session(rpc: Rpc, original: Original, request_id: str, stop: Stop) -> Lease:
-    """The same request id gives the same session, however often it is tried."""
+    """Creates the session. It is idempotent: the same request id gives the same session, however often it is tried."""
     packer = Packer(rpc, stop, request_id)
     request = service_pb2.CreateSessionRequest(
         request_id=request_id,
@@ -76,7 +76,7 @@ def restore_session(rpc: Rpc, snapshot: Snapshot, request_id: str, stop: Stop) -
 def _call_with(
     packer: Packer, rpc: Rpc, name: str, request: Message, response: type[Response], stop: Stop
 ) -> Response:
-    """The uploads stay while it is not known whether the server has taken the call: it is tried again with them."""
+    """Keeps the uploads while it is unknown whether the server took the call, because the retry needs them."""
     try:
         answer = rpc.call(name, request, response, stop)
     except LpdeformError as error:
@@ -88,7 +88,7 @@ def _call_with(
 
 
 def route_of(error: LpdeformError) -> str:
-    """The header that leads to a session which is at another of several servers; empty where the error says nothing of that."""
+    """The header that leads to a session on another of several servers; empty if the error does not name one."""
     said = "lpdeform-session: "
     is_elsewhere = error.reason == "SESSION_ELSEWHERE" and error.limit.startswith(said)
     return error.limit[len(said) :] if is_elsewhere else ""
@@ -108,7 +108,7 @@ def join_session(rpc: Rpc, name: str, as_writer: bool, stop: Stop) -> Lease:
 
 
 def check_vertex_count(count: int, wanted: int) -> None:
-    """Raises DATA_LOSS FRAME_VERTICES where a server speaks of `count` vertices of a mesh that has `wanted`."""
+    """Raises DATA_LOSS FRAME_VERTICES if a server reports `count` vertices for a mesh that has `wanted`."""
     if count != wanted:
         text = f"The server speaks of {count} vertices of a mesh that has {wanted}."
         raise make(Code.DATA_LOSS, text, "FRAME_VERTICES", "", f"vertices = {wanted}")

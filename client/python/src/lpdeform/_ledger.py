@@ -1,4 +1,4 @@
-"""The writer's book of updates."""
+"""The writer's record of updates."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ _resize_handle = "resize"
 
 
 class NumberedUpdate(NamedTuple):
-    """An update and its number, which the server knows as input_seq."""
+    """An update and its number, the input_seq for the server."""
 
     seq: int
     update: Update
 
 
 def merged(older: Update, newer: Update) -> Update:
-    """`newer` on top of `older`: the newest value of each handle and each setting wins.
+    """`older` and then `newer` as one update: the newest value of each handle and each setting wins.
 
-    A motion for a handle that `older` adds moves the added one.
+    A motion for a handle that `older` adds moves the added handle.
     """
     handles = dict(older.handles)
     settings = older.settings
@@ -44,13 +44,13 @@ def _changed(before: Change | None, change: Change) -> Change:
 
 
 def _settled(state: Update) -> Update:
-    """What is there once motions and removals have been carried out."""
+    """The state after all motions and removals have been carried out."""
     kept = {name: change for name, change in state.handles.items() if isinstance(change, Handle)}
     return replace(state, handles=kept, begins_step=False)
 
 
 def _without_old_removals(update: Update) -> Update:
-    """Bounds what is remembered of handles that are there no more. Motions stay: of handles that the session was made with."""
+    """Limits how many removed handles are remembered. Motions stay: they may move handles that the session was created with."""
     if sum(isinstance(change, Removal) for change in update.handles.values()) <= Ledger.most_removals:
         return update
     kept = {name: change for name, change in update.handles.items() if not isinstance(change, Removal)}
@@ -58,29 +58,30 @@ def _without_old_removals(update: Update) -> Update:
 
 
 class Ledger:
-    """What the server has accepted, what is on its way (at most `window`), and what waits, merged into one.
+    """What the server has accepted, what is under way (at most `window` updates), and what waits, coalesced into one update.
 
-    Bounded by the size of the handles and settings themselves. What was accepted is all that is needed to make the session
-    anew. Not for several threads at a time.
+    Its size is bounded by the handles and settings themselves. The accepted state is enough to recreate the session. Not
+    thread-safe.
     """
 
     window = 4
     most_removals = 8192
-    """Handles of which it is remembered that they were let go of; of more than that, none."""
+    """How many removed handles are remembered. If there are more, all of them are forgotten."""
 
     def __init__(self, begins_bare: bool = True) -> None:
-        """`begins_bare`: a session made anew has no handles but those of this book, otherwise also those that it is made with."""
+        """`begins_bare`: whether a recreated session has no handles but those recorded here; otherwise it also has those of
+        its file."""
         self._begins_bare = begins_bare
         self._next_seq = 1
         self._epoch = 0
         self._accepted = NumberedUpdate(0, Update())
-        self._unkept = NumberedUpdate(0, Update())  # accepted since the server last kept something, as it came
+        self._unkept = NumberedUpdate(0, Update())  # accepted since the server last stored something, as sent
         self._restore: NumberedUpdate | None = None
         self._in_flight: list[NumberedUpdate] = []
         self._waiting: NumberedUpdate | None = None
 
     def add(self, update: Update) -> int:
-        """Takes an update on; returns its number."""
+        """Accepts an update and returns its number."""
         seq = self._next_seq
         self._next_seq += 1
         self._waiting = NumberedUpdate(seq, merged(self._waiting.update if self._waiting else Update(), update))
@@ -96,7 +97,7 @@ class Ledger:
 
     @property
     def has_restore(self) -> bool:
-        """What send_next() gives is the state that a lost session had."""
+        """Whether send_next() will return the state of a lost session."""
         return self._restore is not None
 
     @property
@@ -104,7 +105,7 @@ class Ledger:
         return bool(self._in_flight)
 
     def send_next(self) -> NumberedUpdate:
-        """What is to be sent next, now on its way."""
+        """The next update to send, which is now under way."""
         if self._restore is not None:
             next_one, self._restore = self._restore, None
         elif self._waiting is not None:
@@ -115,21 +116,33 @@ class Ledger:
         return next_one
 
     def accept(self, seq: int, is_kept: bool = False) -> None:
-        """The server has taken the update of this number. Unknown numbers are nothing to us.
+        """The server has accepted the update with this number. Unknown numbers are ignored.
 
-        `is_kept`: it, and all taken before it, survive the end of the server.
+        `is_kept`: this update and all accepted before it survive a restart of the server.
         """
         for sent in [one for one in self._in_flight if one.seq == seq]:
             self.accept_change(sent, is_kept)
             self._in_flight.remove(sent)
+            return
+        if is_kept and seq >= self._unkept.seq:  # shown before it was answered
+            self._unkept = NumberedUpdate(0, Update())
+
+    def show(self, epoch: int, seq: int) -> None:
+        """A frame shows the update of this number.
+
+        If it is of the present epoch, the update is ours, so the server has taken it, though its answer may still be on its
+        way. Earlier updates without an answer may have been refused: then nothing changes until they are answered.
+        """
+        if epoch == self._epoch and self._in_flight and self._in_flight[0].seq == seq:
+            self.accept(seq)
 
     def take_number(self) -> int:
-        """For a change that the server makes by itself, and accept_change() is then told of."""
+        """A number for a change that the server computes itself; report it by accept_change()."""
         self._next_seq += 1
         return self._next_seq - 1
 
     def accept_change(self, change: NumberedUpdate, is_kept: bool) -> None:
-        """What the server has now."""
+        """Adds a change that the server has accepted."""
         if not is_kept:
             unkept = _without_old_removals(merged(self._unkept.update, change.update))
             self._unkept = NumberedUpdate(max(self._unkept.seq, change.seq), unkept)
@@ -140,25 +153,26 @@ class Ledger:
         self._accepted = NumberedUpdate(max(self._accepted.seq, change.seq), state)
 
     def resumed_at(self, seq: int) -> None:
-        """The session goes on, and the newest update that it has is `seq`.
+        """The session continues, and its newest update is `seq`.
 
-        What it took after that and did not keep is to be sent first, on its own.
+        Updates that the server accepted after that and did not store are sent first, by themselves.
         """
         if seq < self._unkept.seq and self._restore is None:
             self._restore = NumberedUpdate(self._accepted.seq, self._unkept.update)
 
     def reopened(self, epoch: int, seq: int) -> None:
-        """The same of a session that is at `epoch`.
+        """The same for a session that is now at `epoch`.
 
-        In a newer one than before another server has it, and its newest update says nothing of those before that: a call may
-        have brought it there. So all that was not kept is sent; of what the server has that changes nothing.
+        A newer epoch means that another server has the session. Its newest update may have come by a single call, so earlier
+        updates may be missing. Therefore everything that was not stored is sent again; values that the server has already do no
+        harm.
         """
         is_another = epoch > self._epoch
         self._epoch = max(epoch, self._epoch)
         self.resumed_at(0 if is_another else seq)
 
     def begin_epoch(self, epoch: int) -> None:
-        """Of a session just made, joined or taken over."""
+        """The session was just created, joined or taken over."""
         self._epoch = epoch
 
     @property
@@ -166,14 +180,14 @@ class Ledger:
         return self._accepted.seq
 
     def refuse(self, seq: int) -> None:
-        """The server has refused the update of this number."""
+        """The server has refused the update with this number."""
         self._in_flight = [one for one in self._in_flight if one.seq != seq]
 
     def connection_lost(self) -> None:
-        """What was on its way waits again. Sending it twice does no harm, it is the same value."""
+        """Updates under way wait again. Sending them twice does no harm, because they have the same values."""
         again: NumberedUpdate | None = None
         for sent in self._in_flight:
-            if sent.seq == self._accepted.seq:  # an unanswered restore stays on its own
+            if sent.seq == self._accepted.seq:  # an unanswered restore stays separate
                 self._restore = sent
             else:
                 again = NumberedUpdate(sent.seq, merged(again.update, sent.update) if again else sent.update)
@@ -185,20 +199,20 @@ class Ledger:
         self._waiting = again
 
     def session_lost(self) -> None:
-        """The server has lost the session: what it had accepted is to be sent first, on its own."""
+        """The server has lost the session: its accepted state is sent first, by itself."""
         self.connection_lost()
         if self._accepted.seq > 0:
             self._restore = self._accepted
 
     def drop_unaccepted(self) -> None:
-        """Another writer took over: what the server has not taken is void, and so is what it took and may have lost."""
+        """Another writer took over: drops everything that the server has not accepted, and everything that it may have lost."""
         self._restore = None
         self._unkept = NumberedUpdate(0, Update())
         self._in_flight = []
         self._waiting = None
 
     def count_from(self, seq: int) -> None:
-        """Numbers that follow are higher than `seq`, the newest that the server knows."""
+        """Later numbers are higher than `seq`, the newest that the server knows."""
         if self._next_seq > seq:
             return
         self._next_seq = seq + 1
@@ -208,7 +222,7 @@ class Ledger:
 
     @property
     def newest(self) -> int:
-        """The newest update that was not refused; 0 where there is none."""
+        """The newest update that was not refused; 0 if there is none."""
         if self._waiting is not None:
             return self._waiting.seq
         return max([self._accepted.seq, *(one.seq for one in self._in_flight)])

@@ -1,5 +1,5 @@
-"""A session from within: the lease on the server's session, the ledger of updates, the box of frames, and a Deform stream that
-is kept alive between them."""
+"""The inside of a session: the lease on the server's session, the ledger of updates, the box of frames, and a Deform stream
+that is kept open."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ _log = logging.getLogger("lpdeform")
 
 
 class Link:
-    """One thread reads a stream and opens the next one; gRPC's own runs requests(), which sends. Calls come on any thread.
+    """One thread reads a stream and opens the next one. A thread of gRPC runs requests(), which sends. Calls come on any thread.
 
-    `changed` guards all state; no call to the server is made under it.
+    `changed` guards all state. No call to the server is made while it is held.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class Link:
         self.interruption: LpdeformError | None = None
         self.options = options
         self.is_made_anew = False
-        """All its handles were sent in one update, after it was lost."""
+        """Whether the session was lost and all its handles were sent again in one update."""
         self._request_id = new_request_id()
         self._renewing = threading.Lock()
         self._over: LpdeformError | None = None
@@ -63,7 +63,7 @@ class Link:
         self.ledger.count_from(lease.input_seq)
         self.ledger.begin_epoch(lease.epoch)
 
-    # What callers ask, on their own threads.
+    # Calls from users, on their own threads.
 
     def update(self, update: Update) -> int:
         report = self.lease.report
@@ -93,7 +93,7 @@ class Link:
             self._thread.start()
 
     def take(self) -> Frame | None:
-        """The newest frame not yet taken; taking it tells the server to send on."""
+        """The newest frame that was not taken. Taking it lets the server send more."""
         if self.is_closing:
             raise session_closed()
         self.start_stream()
@@ -104,7 +104,7 @@ class Link:
         return taken.frame
 
     def take_result(self) -> Frame | None:
-        """The frame taken last, whoever took it, where it is the finished result of the newest update."""
+        """The frame taken last, by any caller, if it is the finished result of the newest update."""
         self.take()
         last = self.box.last_final
         return last if last is not None and self.is_result(last) else None
@@ -168,7 +168,7 @@ class Link:
         self.start_stream()
 
     def close(self) -> None:
-        """Deletes the session where we made it; where that fails, it expires by itself."""
+        """Deletes the session if this client created it. If that fails, the session expires by itself."""
         with self.changed:
             if self.is_closing:
                 return
@@ -190,7 +190,7 @@ class Link:
         self.rpc.close()
 
     def make_anew(self, lost: str) -> None:
-        """Once, however many ask."""
+        """Recreates the session once, even if several callers ask."""
         assert self.original is not None
         with self._renewing:
             with self.changed:
@@ -216,7 +216,7 @@ class Link:
         try:
             while self._recover(self._one_stream()):
                 pass
-        except Exception as error:  # no memory for a frame: whoever waits is told
+        except Exception as error:  # no memory for a frame: tells those who wait
             with self.changed:
                 stream = self._stream
                 if stream is not None:
@@ -259,7 +259,7 @@ class Link:
             raise session_closed() from None
 
     def _recover(self, ended: LpdeformError | None) -> bool:
-        """Pauses, makes the session anew where it is lost. False where it is all over."""
+        """Pauses, and recreates the session if it is lost. Returns False if the link has ended."""
         with self.changed:
             stream = self._stream
             assert stream is not None
@@ -289,7 +289,7 @@ class Link:
         return self._make_anew_or_pause(lost)
 
     def _wait_to_try_again(self, pause: float) -> bool:
-        """Not where the session was taken over. False where it is closed."""
+        """Waits unless the session was taken over. Returns False if it is closed."""
         self.changed.wait_for(lambda: self.is_closing or self._is_to_reopen, pause)
         return not self.is_closing
 
@@ -314,7 +314,7 @@ class Link:
         self.box.finish(why)
         self.changed.notify_all()
 
-    # What comes.
+    # Messages from the server.
 
     def _acknowledge(self, frame_seq: int, number: int) -> None:
         with self.changed:
@@ -342,8 +342,9 @@ class Link:
             if frame is not None:
                 with self.changed:
                     self._rules.frame_fitted()
+                    self.ledger.show(frame.epoch, frame.input_seq)
             if frame is not None and not self.box.put(frame, stream.number):
-                self._acknowledge(frame.frame_seq, stream.number)  # dropped, but its credit is owed
+                self._acknowledge(frame.frame_seq, stream.number)  # dropped, but its credit must be returned
         elif kind == "fault":
             self._take_fault(stream, response.event.fault)
         elif kind == "go_away":
@@ -370,7 +371,7 @@ class Link:
             self.changed.notify_all()
 
     def _take_fault(self, stream: Stream, fault: service_pb2.Fault) -> None:
-        """An error that is raised ends the stream: the next one sends the update again, after the pause that it asks for."""
+        """Raising the error ends the stream. The next stream sends the update again, after the pause that the error asks for."""
         error = from_fault(fault)
         with self.changed:
             answer = self.judge.answer_of(error, error.input_seq)

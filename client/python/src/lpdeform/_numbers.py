@@ -1,4 +1,4 @@
-"""Arrays as they are given, checked and copied; bytes as they travel. The ranges of numbers are the server's to refuse."""
+"""Checks and copies arrays from callers, and packs them as bytes. The server checks the ranges of numbers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _array(values: npt.ArrayLike, what: str) -> Copied:
 
 
 def numbers(values: npt.ArrayLike, what: str, width: int = 1) -> Copied:
-    """float32 where they are, otherwise float64: a copy of shape (k,), or (k, width)."""
+    """A copy of shape (k,) or (k, width): float32 if the values are float32, otherwise float64."""
     array = _array(values, what)
     if array.dtype.kind not in "fiu":
         raise invalid(f"The {what} are of type {array.dtype} and not numbers.", "ARRAY_TYPE", what, "float32 or float64")
@@ -30,7 +30,7 @@ def numbers(values: npt.ArrayLike, what: str, width: int = 1) -> Copied:
 
 
 def indices(values: npt.ArrayLike, what: str, width: int = 1, mask_length: int | None = None) -> Copied:
-    """uint32, a copy. Of a boolean mask of `mask_length`, where it is true; None: there is no such mask."""
+    """A copy as uint32. A boolean mask of `mask_length` becomes the indices where it is true; None: no mask is allowed."""
     array = _array(values, what)
     if array.dtype.kind == "b" and array.ndim == 1 and mask_length is not None:
         if array.size != mask_length:
@@ -55,7 +55,7 @@ def indices(values: npt.ArrayLike, what: str, width: int = 1, mask_length: int |
 
 
 def _shaped(array: Copied, what: str, width: int) -> Copied:
-    """Of shape (k,) or (k, width); a flat run of width times k numbers is taken, too."""
+    """Converts to shape (k,) or (k, width); a flat array of width * k numbers is accepted, too."""
     if width == 1 and array.ndim == 1:
         return array
     if width > 1 and array.ndim == 2 and array.shape[1] == width:
@@ -70,8 +70,9 @@ def is_single_precision(array: Copied) -> bool:
     return array.dtype.itemsize == 4
 
 
-# CRC-32C over many lanes at once: the bytes are cut into runs of one length, a step of the usual table goes over all runs
-# together, and their sums are joined in pairs, each pair as sum(ab) = advance(sum(a), length of b) ^ sum(b).
+# CRC-32C over many lanes at once. The bytes are cut into runs of the same length, and each step of the usual
+# table works on all runs together. The sums are then joined in pairs: sum(ab) = advance(sum(a), length of b)
+# ^ sum(b).
 
 _polynomial = 0x82F63B78
 _lane_bytes = 2048
@@ -88,7 +89,7 @@ _table = _make_table()
 
 
 def _apply(matrix: npt.NDArray[np.uint32], sums: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
-    """A linear map over bits, given by what it makes of each bit, to many sums."""
+    """Applies a linear map over bits, given by the image of each bit, to many sums."""
     out = np.zeros_like(sums)
     for bit in range(32):
         out ^= np.where((sums >> np.uint32(bit)) & np.uint32(1), matrix[bit], np.uint32(0)).astype(np.uint32)
@@ -111,7 +112,8 @@ def crc32c(data: bytes) -> int:
     if len(data) < 4:
         return _crc32c_short(data)
     lanes = 1 << (-(-len(data) // _lane_bytes) - 1).bit_length()
-    # Zeros in front change nothing where the register begins as zero; that it begins with ones goes into the first bytes.
+    # Zeros in front change nothing if the register begins as zero. Its true initial value, all ones, goes
+    # into the first bytes.
     runs = np.zeros(lanes * _lane_bytes, np.uint8)
     runs[runs.size - len(data) :] = np.frombuffer(data, np.uint8)
     runs[runs.size - len(data) :][:4] ^= np.uint8(0xFF)

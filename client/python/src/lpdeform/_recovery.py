@@ -1,4 +1,4 @@
-"""What to do when a stream has ended."""
+"""Decides what to do when a stream has ended."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lpdeform.v1 import service_pb2
 
 class Next(Enum):
     RESUME = "open a stream to the same session"
-    MAKE_ANEW = "the session is gone: make it from our copy, then open a stream"
+    MAKE_ANEW = "the session is gone: recreate it from the client's copy, then open a stream"
     GIVE_UP = "nothing more comes"
 
 
@@ -21,26 +21,26 @@ class Recovery(NamedTuple):
     next: Next
     why: LpdeformError
     pause: float
-    """Seconds; not to be tried before."""
+    """Seconds to wait before the next try."""
 
 
 class Ending(NamedTuple):
     """How a stream ended."""
 
     error: LpdeformError | None
-    """None where it ended without one."""
+    """The error; None if there was none."""
     go_away: service_pb2.GoAway | None = None
-    """The server's reason, where it gave one; goes before `error`."""
+    """The server's reason, if it gave one; it takes precedence over `error`."""
     stood: float = 0.0
-    """Seconds for which it was open."""
+    """For how many seconds the stream was open."""
     away: float = 0.0
-    """Seconds since a stream was open last."""
+    """Seconds since a stream was last open."""
 
 
 class Backoff:
-    """Growing pauses: 50 ms doubled up to 2 s, each between half and the whole of that by chance.
+    """Exponential backoff: 50 ms, doubled up to 2 s, each pause randomly between half and all of that.
 
-    So that the clients of a restarted server do not all come at once.
+    The random part keeps the clients of a restarted server from all returning at once.
     """
 
     first = 0.05
@@ -53,7 +53,7 @@ class Backoff:
         self._longest = self.first
 
     def next(self, asked: float = 0.0) -> float:
-        """On top of `asked`, what the server asks for."""
+        """The pause, in addition to `asked`, which the server asks for."""
         pause = (0.5 + 0.5 * self._chance()) * self._longest
         self._longest = min(2 * self._longest, self.most)
         return min(max(asked, 0.0), self.most_asked) + pause
@@ -69,27 +69,27 @@ class RecoveryRules:
     """
 
     most_misfits = 5
-    """Streams in a row that may end by something that does not fit, before it is taken to be of another version."""
+    """How many streams in a row may end with a message that does not fit, before the server counts as one of another version."""
 
     def __init__(self, has_copy: bool, reconnect_for: float, chance: Callable[[], float] = random.random) -> None:
-        """`has_copy`: the session can be made anew. Gives up after `reconnect_for` seconds without an open stream."""
+        """`has_copy`: the session can be recreated. Gives up after `reconnect_for` seconds without an open stream."""
         self._has_copy = has_copy
         self._reconnect_for = reconnect_for
         self._backoff = Backoff(chance)
         self._misfits = 0
 
     def frame_fitted(self) -> None:
-        """A whole frame came."""
+        """A complete frame came."""
         self._misfits = 0
 
     def begin(self) -> None:
-        """Another try is meant: what went wrong before does not count."""
+        """The caller starts again, so earlier failures do not count."""
         self._misfits = 0
         self._backoff.reset()
 
     def after(self, ending: Ending) -> Recovery:
         if ending.stood >= Backoff.most:
-            self._backoff.reset()  # one that breaks at once is no success
+            self._backoff.reset()  # a stream that breaks at once is not a success
         if ending.go_away is not None:
             next_step, why = _after_go_away(ending.go_away, self._has_copy)
             asked = ending.go_away.reconnect_after_ms / 1000
@@ -105,7 +105,7 @@ class RecoveryRules:
         return Recovery(next_step, why, self._backoff.next(asked))
 
     def after_failed_making(self, error: LpdeformError) -> Recovery:
-        """After the session could not be made anew."""
+        """The session could not be recreated."""
         step = Next.MAKE_ANEW if is_undecided(error) else Next.GIVE_UP
         return Recovery(step, error, self._backoff.next(error.retry_after))
 
@@ -124,13 +124,13 @@ _passing = {
 def _after_error(error: LpdeformError | None, has_copy: bool) -> tuple[Next, LpdeformError]:
     if error is None:
         return Next.RESUME, make(Code.UNAVAILABLE, "The server ended the stream.")
-    if error.reason in ("FRAME_VERTICES", "EXCEPTION"):  # it is another mesh; it would happen again
+    if error.reason in ("FRAME_VERTICES", "EXCEPTION"):  # it is another mesh, so it would happen again
         return Next.GIVE_UP, error
     if is_session_lost(error):
         return (Next.MAKE_ANEW if has_copy else Next.GIVE_UP), error
     if error.code in _passing or is_undecided(error):
         return Next.RESUME, error
-    if error.reason == "NOT_THE_WRITER":  # it happened while we were away
+    if error.reason == "NOT_THE_WRITER":  # it happened while no stream was open
         return Next.GIVE_UP, make(Code.ABORTED, "Another writer took the session over.", "WRITER_REPLACED")
     return Next.GIVE_UP, error
 
@@ -151,12 +151,12 @@ def _after_go_away(go_away: service_pb2.GoAway, has_copy: bool) -> tuple[Next, L
 
 
 class Answer(Enum):
-    """What an error says of the update that it answers, or that a call was made with."""
+    """What an error means for the update that it answers, or that a call carried."""
 
-    AGAIN = "it is to be sent again, not before error.retry_after"
-    MAKE_ANEW = "it waits for the session made anew"
-    TAKEN = "the server has it and cannot solve for it yet"
-    REFUSED = "it is void"
+    AGAIN = "send it again, not before error.retry_after"
+    MAKE_ANEW = "it waits until the session is recreated"
+    TAKEN = "the server has it, but cannot solve for it yet"
+    REFUSED = "it is refused"
 
 
 def answer_of(error: LpdeformError, is_second: bool = False) -> Answer:
@@ -170,10 +170,10 @@ def answer_of(error: LpdeformError, is_second: bool = False) -> Answer:
 
 
 class Judge:
-    """What errors say of updates that were sent.
+    """Decides what an error means for the updates that were sent.
 
-    Uploads went with a server that has ended, or to another one, and are sent anew; once, for a server that loses those as well
-    will not do better.
+    If uploads were lost, with a server that has ended or by a change of server, the update is sent again with new uploads, but
+    only once: a server that loses those as well will not do better.
     """
 
     def __init__(self) -> None:

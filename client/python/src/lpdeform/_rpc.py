@@ -1,4 +1,4 @@
-"""The calls of the service; nothing else touches gRPC. Every error that comes out is an LpdeformError."""
+"""The calls of the service; nothing else uses gRPC. Every error is raised as an LpdeformError."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _service = "/lpdeform.v1.DeformService/"
 _most_part_bytes = 1 << 20
 _most_inline_bytes = 1 << 20
 _channel_options = [
-    # Else all channels of a process to one address share a connection: a session that is opened after a server's restart would be told
-    # that none answers, as another one's attempt before it was.
+    # Otherwise all channels of a process to one address share a connection. A session that is opened after a
+    # restart of the server would then get the failure of another session's earlier attempt.
     ("grpc.use_local_subchannel_pool", 1),
     ("grpc.initial_reconnect_backoff_ms", 100),
     ("grpc.min_reconnect_backoff_ms", 1000),
@@ -32,9 +32,9 @@ _channel_options = [
     ("grpc.dns_min_time_between_resolutions_ms", 1000),
     ("grpc.keepalive_time_ms", 30_000),
     ("grpc.keepalive_timeout_ms", 10_000),
-    ("grpc.http2.bdp_probe", 0),  # bounds what is under way: a slow reader costs little memory
+    ("grpc.http2.bdp_probe", 0),  # limits the bytes under way, so a slow reader costs little memory
     ("grpc.http2.lookahead_bytes", 256 * 1024),
-    ("grpc.enable_retries", 0),  # sessions resume by themselves, and know what has to be sent again
+    ("grpc.enable_retries", 0),  # sessions resume by themselves, and know what must be sent again
 ]
 
 
@@ -75,7 +75,7 @@ class Stop:
             self._calls.discard(call)
 
     def wait(self, seconds: float) -> bool:
-        """True as soon as it is set, False after that time."""
+        """Waits; returns True as soon as it is set, False after that time."""
         return self._came.wait(seconds)
 
 
@@ -101,18 +101,18 @@ class Rpc:
         return self._caller.route
 
     def go_by(self, route: str) -> None:
-        """From now on calls come as those do that say this in the header lpdeform-session."""
+        """From now on calls have this value of the header lpdeform-session."""
         if is_header_text(route):
             self._caller.route = route
 
     def call(self, name: str, request: Message, response: type[Response], stop: Stop, timeout: float | None = None) -> Response:
-        """A call with one answer; waits for it."""
+        """A unary call; waits for the answer."""
         method = self._channel.unary_unary(_service + name, _serialize, response.FromString)
         longest = self.call_timeout if timeout is None else timeout
         metadata = self._caller.metadata()
         try:
             call = method.future(request, timeout=longest, metadata=metadata)
-        except ValueError as closed:  # the channel is
+        except ValueError as closed:  # the channel is closed
             raise make(Code.CANCELLED, "The connection is closed.") from closed
         stop.add(call)
         try:
@@ -122,14 +122,14 @@ class Rpc:
             raise make(Code.CANCELLED, "The call was ended.") from None
         except grpc.RpcError as error:
             raise from_call(error, self.address) from None
-        except BaseException:  # an interrupt in a notebook
+        except BaseException:  # for example an interrupt in a notebook
             call.cancel()
             raise
         finally:
             stop.remove(call)
 
     def deform(self, requests: Iterator[bytes]) -> Any:
-        """`requests`: messages as they travel, so that whoever makes them hears of one that cannot be."""
+        """`requests`: serialized messages, so that their creator notices a message that cannot be serialized."""
         method = self._channel.stream_stream(_service + "Deform", None, service_pb2.DeformResponse.FromString)
         return method(requests, metadata=self._caller.metadata())
 
@@ -140,7 +140,7 @@ class Rpc:
     def snapshot(
         self, request: service_pb2.SnapshotSessionRequest, stop: Stop
     ) -> Iterator[service_pb2.SnapshotSessionResponse]:
-        """Its parts as they come."""
+        """The parts of the snapshot as they come."""
         method = self._channel.unary_stream(
             _service + "SnapshotSession", _serialize, service_pb2.SnapshotSessionResponse.FromString
         )
@@ -155,7 +155,7 @@ class Rpc:
             stop.remove(call)
 
     def reach(self, session: str, stop: Stop, timeout: float) -> None:
-        """Waits until the server answers, at most `timeout`. gRPC makes a connection again while a call waits for it."""
+        """Waits until the server answers, at most `timeout`. gRPC reconnects while a call waits for the connection."""
         method = self._channel.unary_unary(_service + "GetSession", _serialize, service_pb2.GetSessionResponse.FromString)
         try:
             request = service_pb2.GetSessionRequest(session=session)
@@ -165,7 +165,7 @@ class Rpc:
             return
         stop.add(call)
         try:
-            call.exception()  # the next call says what is wrong
+            call.exception()  # the next call raises the error
         except grpc.FutureCancelledError:
             return
         finally:
@@ -180,14 +180,14 @@ def _serialize(message: Message) -> bytes:
 
 
 def new_request_id() -> str:
-    """128 random bits, in hexadecimal digits."""
+    """128 random bits as hexadecimal digits."""
     return secrets.token_hex(16)
 
 
 class Packer:
-    """Puts runs of numbers into the buffers of one message: inline up to 1 MiB together, the rest ahead as uploads.
+    """Puts arrays into the buffers of one message: inline up to 1 MiB in all, the rest by uploads that are made beforehand.
 
-    `request_id`: the same for every try of the same call, so that it is the same request to the last bit.
+    `request_id`: the same for every try of a call, so that the request stays identical.
     """
 
     def __init__(self, rpc: Rpc, stop: Stop, request_id: str | None = None) -> None:
@@ -224,7 +224,8 @@ class Packer:
         return created.upload
 
     def _send(self, part: service_pb2.UploadPartRequest) -> service_pb2.UploadPartResponse:
-        """A part that the server has no room for yet goes again after the pause that it asks for, within the time of a call."""
+        """If the server has no room for a part yet, sends it again after the pause that the server asks for, within a call's
+        time limit."""
         end = time.monotonic() + self._rpc.call_timeout
         backoff = Backoff()
         while True:
@@ -239,11 +240,11 @@ class Packer:
                 raise make(Code.CANCELLED, "The upload was stopped.")
 
     def discard(self) -> None:
-        """Gives the memory back before the uploads expire."""
+        """Frees the server's memory before the uploads expire."""
         names, self.uploads = self.uploads, []
         for name in names:
             try:
                 request = service_pb2.DeleteUploadRequest(upload=name)
                 self._rpc.call("DeleteUpload", request, service_pb2.DeleteUploadResponse, self._stop)
-            except Exception:  # it expires by itself
+            except Exception:  # the upload expires by itself
                 return

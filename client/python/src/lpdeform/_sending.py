@@ -1,4 +1,4 @@
-"""What a link sends on its Deform stream, on gRPC's thread."""
+"""What a link sends on its Deform stream, on a thread of gRPC."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from lpdeform.v1 import frame_pb2, service_pb2
 
 
 class Sender(Protocol):
-    """What sending needs of the session that it sends for."""
+    """What sending needs of its session."""
 
     rpc: Rpc
     options: frame_pb2.FrameOptions
     changed: threading.Condition
-    """Guards the rest, and the stream; notified of every change to them."""
+    """Guards the other members and the stream, and is notified of every change to them."""
     ledger: Ledger
     judge: Judge
     box: FrameBox
     is_solving: bool
-    """Updates wait: another call needs the session to itself."""
+    """Updates wait, because another call needs the session to itself."""
 
 
 def requests(sender: Sender, stream: Stream, lease: Lease) -> Iterator[bytes]:
-    """Messages as they travel. gRPC would take an exception here for a stream that broke, which is to be resumed."""
+    """The serialized messages to send. gRPC would take an exception here for a broken stream, which would then be resumed."""
     try:
         for request in _requests(sender, stream, lease):
             yield request.SerializeToString()
@@ -68,7 +68,7 @@ def _can_send(sender: Sender) -> bool:
 
 
 def _wait_for_work(sender: Sender, stream: Stream) -> bool:
-    """False where the stream is over. Ends one that has been silent for too long."""
+    """Returns False if the stream has ended. Ends a stream that has been silent for too long."""
 
     def has_work() -> bool:
         is_due = bool(stream.ack_due or stream.done) or _can_send(sender)
@@ -94,8 +94,8 @@ def _packed(sender: Sender, stream: Stream, update: NumberedUpdate) -> service_p
                 sender.ledger.refuse(update.seq)
                 sender.box.put_problem(error)
                 return None
-            if not stream.stop.is_set:  # otherwise its own end says more
-                stream.failure = error  # what is in flight waits again for the next stream
+            if not stream.stop.is_set:  # otherwise the stream's own end says more
+                stream.failure = error  # updates in flight wait for the next stream
         stream.cancel()
         return None
     if packer.uploads:

@@ -10,7 +10,7 @@ from lpdeform.v1 import service_pb2
 
 
 def snapshot(link: Link, stop: Stop) -> bytes:
-    """With every update before it."""
+    """The file includes every earlier update."""
     with alone(link, link.rpc.call_timeout, stop):
         send_waiting(link, stop)
         return _take(link, stop)

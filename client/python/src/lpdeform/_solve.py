@@ -1,4 +1,4 @@
-"""One Solve call, from its request to the finished result, and what becomes of it where the server goes away."""
+"""One Solve call from its request to the finished result, and how it recovers if the server goes away."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class SolveOptions:
 
 
 def checked_positions(values: npt.ArrayLike | None, vertex_count: int) -> Copied | None:
-    """Here, so that what the server finds invalid can only be the update."""
+    """Checked here, so that only the update can be what the server finds invalid."""
     if values is None:
         return None
     positions = numbers(values, "initial positions", 3)
@@ -60,7 +60,7 @@ def checked_positions(values: npt.ArrayLike | None, vertex_count: int) -> Copied
 
 
 def solve(link: Link, options: SolveOptions, stop: Stop) -> SolveResult:
-    """Begins again where the server went away, within the timeout and for as long as the stream would."""
+    """Starts again if the server went away, within the timeout and for as long as the stream would."""
     deadline = None if options.timeout is None else time.monotonic() + options.timeout
     longest = link.rpc.call_timeout if options.timeout is None else min(options.timeout, link.rpc.call_timeout)
     with alone(link, longest, stop):
@@ -111,12 +111,12 @@ def _solve_once(link: Link, options: SolveOptions, timeout: float | None, stop: 
         lease = link.lease
     try:
         result = _run(link, lease, update, options, timeout, stop)
-    except BaseException as error:  # an interrupt in a notebook, too
+    except BaseException as error:  # also an interrupt in a notebook
         with link.changed:
             if update is not None:
                 _note_answer(link.ledger, update.seq, error)
             if isinstance(error, Unavailable):
-                link.ledger.resumed_at(0)  # the server may have gone back: once more does no harm
+                link.ledger.resumed_at(0)  # the server may have gone back; sending twice does no harm
         raise
     with link.changed:
         if update is not None:
@@ -129,7 +129,7 @@ def _solve_once(link: Link, options: SolveOptions, timeout: float | None, stop: 
 
 
 def _note_answer(ledger: Ledger, seq: int, error: BaseException) -> None:
-    """What became of an update that a call was made with."""
+    """Notes what became of the update that a call carried."""
     answer = answer_of(error) if isinstance(error, LpdeformError) else Answer.AGAIN
     if answer is Answer.TAKEN:
         ledger.accept(seq)
@@ -169,13 +169,13 @@ def _run(
         raise from_call(error, link.rpc.address) from None
     finally:
         if call is not None:
-            call.cancel()  # an interrupt in a notebook; without effect on one that is over
+            call.cancel()  # an interrupt in a notebook; without effect on a finished call
             stop.remove(call)
         packer.discard()
 
 
 class _ResultBuilder:
-    """Takes in the messages of a Solve call."""
+    """Handles the messages of a Solve call."""
 
     def __init__(self, vertex_count: int, options: SolveOptions) -> None:
         self._assembly = FrameAssembly(vertex_count)

@@ -12,27 +12,27 @@ from lpdeform.v1 import service_pb2
 
 
 class Stream:
-    """One Deform call. Its fields are guarded by the lock of the link."""
+    """One Deform call. The link's lock guards its fields."""
 
     def __init__(self, number: int) -> None:
         self.number = number
         self.call: Any = None
         self.stop = Stop()
-        """Ends the uploads for it: those would be sent anew for the next."""
+        """Ends this stream's uploads; the next stream sends them again."""
         self.is_open = False
         self.is_over = False
         self.opened_at = 0.0
         self.heard_at = time.monotonic()
         self.longest_silence = 45.0
-        """After so long without a word the connection is dead: three of the heartbeats that the server announces."""
+        """After this long without a message the connection counts as dead: three of the heartbeats that the server announces."""
         self.ack_due = 0
         self.go_away: service_pb2.GoAway | None = None
         self.notice: Notice | None = None
         self.uploads: dict[int, Packer] = {}
-        """By the updates that name them, until these are answered."""
+        """By the updates that use them, until these are answered."""
         self.done: list[Packer] = []
         self.failure: LpdeformError | None = None
-        """What kept an update from being sent."""
+        """The error that kept an update from being sent."""
 
     def cancel(self) -> None:
         self.stop.set()

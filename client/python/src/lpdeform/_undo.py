@@ -1,4 +1,4 @@
-"""Steps of the handles taken back on the server, and done again."""
+"""Undo and redo of handle steps on the server."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from lpdeform.v1 import service_pb2
 
 
 def undo(link: Link, redo: bool, stop: Stop) -> int:
-    """The number of the update that this is."""
+    """Returns the number of the update that the undo or redo is."""
     link.require_writer()
     with alone(link, link.rpc.call_timeout, stop):
         send_waiting(link, stop)
@@ -35,7 +35,7 @@ def undo(link: Link, redo: bool, stop: Stop) -> int:
 def _undo_patiently(
     link: Link, request: service_pb2.UndoUpdateRequest, stop: Stop
 ) -> service_pb2.UndoUpdateResponse:
-    """The same call again does no harm, so a server that went away may be asked again: after what it may have lost."""
+    """Undo is idempotent, so the call may be repeated after the server went away, once the server has what it may have lost."""
     end = time.monotonic() + link.rpc.call_timeout
     backoff = Backoff()
     is_again = False
@@ -46,7 +46,7 @@ def _undo_patiently(
                 _catch_up(link, stop)
             if is_to_check:
                 _check_steps(link, request.session, stop)
-                is_to_check = False  # once: a call that was taken and not answered has made the steps fewer
+                is_to_check = False  # once only: a call that was carried out without an answer has reduced the steps
             return link.rpc.call("UndoUpdate", request, service_pb2.UndoUpdateResponse, stop)
         except LpdeformError as error:
             pause = backoff.next(error.retry_after)
@@ -59,7 +59,7 @@ def _undo_patiently(
 
 
 def _catch_up(link: Link, stop: Stop) -> None:
-    """Sends what the server has no more, and only that: it would be a step to it."""
+    """Sends only what the server does not have any more, because it would count as a step."""
     found = _session(link, link.lease.session, stop)
     with link.changed:
         link.ledger.reopened(found.epoch, found.input_seq)
@@ -67,7 +67,7 @@ def _catch_up(link: Link, stop: Stop) -> None:
 
 
 def _check_steps(link: Link, name: str, stop: Stop) -> None:
-    """All the handles of a session that was made anew are a step to the server, and none to anybody else."""
+    """In a recreated session, the update with all its handles counts as a step for the server. Users must not undo it."""
     if _session(link, name, stop).undo_steps <= 1:
         text = "The session was made anew, and knows no step from before."
         raise make(Code.FAILED_PRECONDITION, text, "NOTHING_TO_UNDO")

@@ -1,4 +1,5 @@
-"""From what is given to messages of the contract, in two steps: checked and copied at once, packed when it is sent."""
+"""Converts values to messages of the contract in two steps: they are checked and copied at once, and packed when they are
+sent."""
 
 from __future__ import annotations
 
@@ -10,8 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from lpdeform import types
+from lpdeform._holds import checked_hold, hold_from_wire, hold_to_wire
 from lpdeform._numbers import Copied, indices, is_single_precision, numbers
 from lpdeform._rpc import Packer
+from lpdeform._vectors import checked_vector, vector_from_wire, vector_to_wire
 from lpdeform.errors import invalid
 from lpdeform.v1 import data_pb2, frame_pb2, handle_pb2, report_pb2, service_pb2
 
@@ -55,21 +58,21 @@ def named(table: Mapping[Any, T], name: object, what: str) -> T:
     return table[name]
 
 
-# Checked and copied.
+# Check and copy.
 
 
 def checked_update(update: types.Update, vertices: int, faces: int) -> types.Update:
-    """Of a mesh of so many vertices and faces."""
+    """For a mesh with this many vertices and faces."""
     handles = {
         _checked_name(name): _checked_change(str(name), change, vertices, faces) for name, change in update.handles.items()
     }
     if update.resize is not None:
-        _vector(update.resize.scale, "resize.scale")
+        checked_vector(update.resize.scale, "resize.scale")
     return types.Update(handles, checked_settings(update.settings, vertices), update.resize, bool(update.begins_step))
 
 
 def _checked_name(name: object) -> str:
-    """Half a character, "\\ud800", cannot travel: nobody could parse the message that has it."""
+    """Raises an error for half a surrogate pair, "\\ud800": a message with it could not be parsed."""
     text = str(name)
     try:
         text.encode()
@@ -93,7 +96,7 @@ def _checked_change(name: str, change: types.Change, vertices: int, faces: int) 
             vertices=indices(change.vertices, f"vertices of {what}", mask_length=vertices),
             points=points,
             motion=_checked_motion(change.motion, what),
-            hold=_checked_hold(change.hold, what),
+            hold=checked_hold(change.hold, what),
         )
     if isinstance(change, types.Removal):
         return change
@@ -105,28 +108,18 @@ def _checked_motion(motion: types.Motion, what: str) -> types.Motion:
         return types.Targets(numbers(motion.positions, f"targets of {what}", 3))
     if isinstance(motion, types.RigidMotion):
         return types.RigidMotion(
-            _vector(motion.axis, f"axis of {what}"),
+            checked_vector(motion.axis, f"axis of {what}"),
             float(motion.angle),
-            _vector(motion.center, f"center of {what}"),
-            _vector(motion.translation, f"translation of {what}"),
+            checked_vector(motion.center, f"center of {what}"),
+            checked_vector(motion.translation, f"translation of {what}"),
         )
     if isinstance(motion, types.Fixed):
         return motion
     raise invalid(f"The motion of {what} is of type {type(motion).__name__}.", "MOTION_TYPE", what)
 
 
-def _checked_hold(hold: types.Hold, what: str) -> types.Hold:
-    if isinstance(hold, types.AxisLock):
-        return types.AxisLock(_vector(hold.axis, f"axis of {what}"))
-    if isinstance(hold, types.PlaneLock):
-        return types.PlaneLock(_vector(hold.normal, f"normal of {what}"))
-    if isinstance(hold, (types.Exact, types.Soft, types.Orientation)):
-        return hold
-    raise invalid(f"The hold of {what} is of type {type(hold).__name__}.", "HOLD_TYPE", what)
-
-
 def checked_settings(settings: types.Settings, vertices: int) -> types.Settings:
-    """Of a mesh of so many vertices."""
+    """For a mesh with this many vertices."""
     if settings.solver is not None:
         named(_methods, settings.solver.method, "method")
         named(_guesses, settings.solver.initial, "initial guess")
@@ -155,15 +148,7 @@ def _checked_field(value: types.Field | None, what: str, vertices: int) -> types
     return array
 
 
-def _vector(values: types.Vector3, what: str) -> types.Vector3:
-    array = numbers(values, what)
-    if array.shape != (3,):
-        raise invalid(f"The {what} is of shape {array.shape} and not three numbers.", "ARRAY_SHAPE", what, "(3,)")
-    x, y, z = (float(value) for value in array)
-    return (x, y, z)
-
-
-# Packed.
+# Pack.
 
 
 def scalar_of(array: Copied) -> data_pb2.Scalar:
@@ -184,7 +169,7 @@ def mesh_to_wire(vertices: Copied, faces: Copied, packer: Packer) -> data_pb2.Me
 
 
 def weld_to_wire(weld: Copied | float, packer: Packer) -> data_pb2.Weld:
-    """`weld`: one number a vertex, or the tolerance of a weld by position."""
+    """`weld`: one number per vertex, or the tolerance of a weld by position."""
     if isinstance(weld, float):
         return data_pb2.Weld(position=data_pb2.WeldByPosition(tolerance=weld))
     return data_pb2.Weld(groups=_packed(weld, packer))
@@ -283,15 +268,7 @@ def _handle_to_wire(handle: types.Handle, packer: Packer) -> handle_pb2.Handle:
             barycentric=_packed(barycentric, packer),
         )
         message.points.CopyFrom(points)
-    hold = handle.hold
-    if isinstance(hold, types.Soft):
-        message.soft.weight = hold.weight
-    elif isinstance(hold, types.Orientation):
-        message.orientation.weight = hold.weight
-    elif isinstance(hold, types.AxisLock):
-        message.axis_lock.axis.CopyFrom(_vector_to_wire(hold.axis))
-    elif isinstance(hold, types.PlaneLock):
-        message.plane_lock.normal.CopyFrom(_vector_to_wire(hold.normal))
+    hold_to_wire(handle.hold, message)
     return message
 
 
@@ -302,28 +279,23 @@ def _motion_to_wire(motion: types.Motion, packer: Packer) -> handle_pb2.Motion:
         return handle_pb2.Motion(targets=targets)
     if isinstance(motion, types.RigidMotion):
         rigid = handle_pb2.RigidMotion(
-            axis=_vector_to_wire(motion.axis),
+            axis=vector_to_wire(motion.axis),
             angle_radians=motion.angle,
-            center=_vector_to_wire(motion.center),
-            translation=_vector_to_wire(motion.translation),
+            center=vector_to_wire(motion.center),
+            translation=vector_to_wire(motion.translation),
         )
         return handle_pb2.Motion(rigid=rigid)
     return handle_pb2.Motion(fixed=handle_pb2.Fixed())
 
 
 def _resize_to_wire(resize: types.Resize) -> data_pb2.Resize:
-    message = data_pb2.Resize(scale=_vector_to_wire(resize.scale))
+    message = data_pb2.Resize(scale=vector_to_wire(resize.scale))
     if resize.origin is not None:
-        message.origin.CopyFrom(_vector_to_wire(resize.origin))
+        message.origin.CopyFrom(vector_to_wire(resize.origin))
     if resize.axes is not None:
-        message.x_axis.CopyFrom(_vector_to_wire(resize.axes[0]))
-        message.y_axis.CopyFrom(_vector_to_wire(resize.axes[1]))
+        message.x_axis.CopyFrom(vector_to_wire(resize.axes[0]))
+        message.y_axis.CopyFrom(vector_to_wire(resize.axes[1]))
     return message
-
-
-def _vector_to_wire(vector: types.Vector3) -> data_pb2.Vector3:
-    x, y, z = (float(value) for value in vector)
-    return data_pb2.Vector3(x=x, y=y, z=z)
 
 
 # From the wire.
@@ -350,7 +322,7 @@ def report_from_wire(report: report_pb2.MeshReport) -> types.MeshReport:
 
 
 def _mesh_notices(defects: Iterable[types.Defect]) -> tuple[str, ...]:
-    """The same as in client/cpp/mesh_notices.h."""
+    """The same texts as in client/cpp/mesh_notices.h."""
     return tuple(
         f"The mesh comes apart where it is split: {defect.count} vertices at its borders lie in the same place as others "
         f"(vertices {', '.join(map(str, defect.first))}{', ...' if defect.count > len(defect.first) else ''}). "
@@ -361,7 +333,7 @@ def _mesh_notices(defects: Iterable[types.Defect]) -> tuple[str, ...]:
 
 
 def changes_from_wire(changes: Iterable[handle_pb2.HandleUpdate]) -> types.Update:
-    """Of handles, as the server made them."""
+    """Converts changes of handles that the server made."""
     handles: dict[str, types.Change] = {}
     for message in changes:
         kind = message.WhichOneof("change")
@@ -382,33 +354,20 @@ def _handle_from_wire(handle: handle_pb2.Handle) -> types.Handle:
     return types.Handle(
         vertices=np.frombuffer(handle.vertices.inline, "<u4"),
         motion=_motion_from_wire(handle.motion),
-        hold=_hold_from_wire(handle),
+        hold=hold_from_wire(handle),
         points=points,
         footprint=handle.footprint_radius,
     )
-
-
-def _hold_from_wire(handle: handle_pb2.Handle) -> types.Hold:
-    kind = handle.WhichOneof("hold")
-    if kind == "soft":
-        return types.Soft(handle.soft.weight)
-    if kind == "orientation":
-        return types.Orientation(handle.orientation.weight)
-    if kind == "axis_lock":
-        return types.AxisLock(_vector_from_wire(handle.axis_lock.axis))
-    if kind == "plane_lock":
-        return types.PlaneLock(_vector_from_wire(handle.plane_lock.normal))
-    return types.Exact()
 
 
 def _motion_from_wire(motion: handle_pb2.Motion) -> types.Motion:
     if motion.HasField("rigid"):
         rigid = motion.rigid
         return types.RigidMotion(
-            _vector_from_wire(rigid.axis),
+            vector_from_wire(rigid.axis),
             rigid.angle_radians,
-            _vector_from_wire(rigid.center),
-            _vector_from_wire(rigid.translation),
+            vector_from_wire(rigid.center),
+            vector_from_wire(rigid.translation),
         )
     if motion.HasField("targets"):
         return types.Targets(_unpacked(motion.targets.positions, motion.targets.scalar))
@@ -418,7 +377,3 @@ def _motion_from_wire(motion: handle_pb2.Motion) -> types.Motion:
 def _unpacked(buffer: data_pb2.Buffer, scalar: data_pb2.Scalar) -> Copied:
     """k x 3."""
     return np.frombuffer(buffer.inline, "<f8" if scalar == data_pb2.SCALAR_FLOAT64 else "<f4").reshape(-1, 3)
-
-
-def _vector_from_wire(vector: data_pb2.Vector3) -> types.Vector3:
-    return (vector.x, vector.y, vector.z)

@@ -1,4 +1,4 @@
-"""Who calls, and over what: bearer tokens, TLS, and the header by which a proxy keeps a client's calls together."""
+"""Authentication and routing: bearer tokens, TLS, and the header by which a proxy keeps a client's calls together."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from lpdeform.errors import Code, invalid, make
 _SCHEMES = ("unix:", "unix-abstract:", "dns:", "ipv4:", "ipv6:", "xds:", "vsock:")
 
 Token: TypeAlias = str | Callable[[], str] | None
-"""A bearer token, or what gives the newest one when a call begins, on any thread; None: none."""
+"""A bearer token, or a function that returns the newest one, called on any thread when a call begins; None: no token."""
 
 
 @dataclass(frozen=True)
 class Tls:
-    """Connecting with TLS. Texts or bytes in PEM."""
+    """How to connect with TLS. Texts or bytes in PEM."""
 
     root_certificates: str | bytes | None = None
-    """Whom to trust; None: whom gRPC trusts by itself."""
+    """The certificates to trust; None: those that gRPC trusts by default."""
     certificate_chain: str | bytes | None = None
-    """Our own, where the server asks for one."""
+    """The client's own, if the server asks for one."""
     private_key: str | bytes | None = None
 
     def __repr__(self) -> str:
@@ -35,13 +35,13 @@ class Tls:
 
 
 class Caller:
-    """What every call over one connection says of its caller."""
+    """What every call over a connection says of its caller."""
 
     route: str
-    """A proxy before several servers sends all calls that say the same to one of them."""
+    """A proxy in front of several servers sends all calls with the same value to one of them."""
 
     def __init__(self, token: Token, route: str) -> None:
-        """`route`: any, the same for all calls of one client. Raises InvalidInput TOKEN_CHARACTERS."""
+        """`route`: any value, the same for all calls of one client. Raises InvalidInput TOKEN_CHARACTERS."""
         if isinstance(token, str) and not is_header_text(token):
             text = "The token has a character that a header cannot carry; a line break at its end, perhaps."
             raise invalid(text, "TOKEN_CHARACTERS", "token", "printable ASCII")
@@ -49,7 +49,7 @@ class Caller:
         self.route = route
 
     def metadata(self) -> list[tuple[str, str]]:
-        """Raises UNAUTHENTICATED TOKEN_FUNCTION where the caller's function does not give a token that a header can carry."""
+        """Raises UNAUTHENTICATED TOKEN_FUNCTION if the caller's function does not return a token that a header can carry."""
         found = [("lpdeform-session", self.route)]
         if token := self._newest():
             found.append(("authorization", f"Bearer {token}"))
@@ -73,7 +73,7 @@ def is_header_text(text: str) -> bool:
 
 
 def open_channel(address: str, tls: Tls | bool, options: list[tuple[str, int]]) -> Any:
-    """Raises InvalidInput where a text of `tls` cannot be used: gRPC would only find no way to the server."""
+    """Raises InvalidInput if a text of `tls` cannot be used: gRPC would only report that it cannot connect."""
     _check_address(address)
     if tls is False:
         return grpc.insecure_channel(address, options=options)
@@ -92,9 +92,9 @@ def open_channel(address: str, tls: Tls | bool, options: list[tuple[str, int]]) 
 
 
 def _check_address(address: str) -> None:
-    """Without this, a port above 65535 would reach another one."""
+    """Checks the port: without this, a port above 65535 would reach another one."""
     if address.startswith(_SCHEMES):
-        return  # gRPC looks at it itself
+        return  # gRPC checks these itself
     host, colon, port = address.rpartition(":")
     is_host = host != "" and "/" not in host and (":" not in host or (host[0] == "[" and host[-1] == "]"))
     if not (colon and is_host and port.isascii() and port.isdigit() and len(port) <= 5 and 1 <= int(port) <= 65535):
@@ -117,11 +117,11 @@ def _check_own(chain: bytes, key: bytes) -> None:
     if b"PRIVATE KEY-----" not in key:
         raise invalid("private_key is no private key in PEM.", "TLS_PRIVATE_KEY", "private_key", "PEM, without a password")
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    context.set_ciphers("DEFAULT:@SECLEVEL=0")  # the server says which keys are strong enough
-    with tempfile.TemporaryDirectory() as folder:  # of this user alone, as its files: Python's ssl reads no key from memory
+    context.set_ciphers("DEFAULT:@SECLEVEL=0")  # the server decides which keys are strong enough
+    with tempfile.TemporaryDirectory() as folder:  # readable by this user alone, because Python's ssl reads no key from memory
         try:
             own, secret = _kept(folder, "certificate_chain", chain), _kept(folder, "private_key", key)
-            context.load_cert_chain(own, secret, password=lambda: "")  # in place of asking on the terminal
+            context.load_cert_chain(own, secret, password=lambda: "")  # instead of asking on the terminal
         except ssl.SSLError as error:
             if error.reason in ("KEY_VALUES_MISMATCH", "KEY_TYPE_MISMATCH", "NO_CERTIFICATE_ASSIGNED"):
                 text = "private_key is not that of the first certificate of certificate_chain."

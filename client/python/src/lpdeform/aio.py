@@ -1,4 +1,4 @@
-"""The same sessions for asyncio: what waits is awaited. They work in any event loop, and cancelling ends what was asked for."""
+"""The same sessions for asyncio: everything that waits is awaitable. They work in any event loop; cancelling ends the call."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ T = TypeVar("T")
 
 
 async def _in_a_thread(work: Callable[[Stop], T]) -> T:
-    """`work` on another thread; cancelling ends its calls."""
+    """Runs `work` on another thread; cancelling ends its calls."""
     stop = Stop()
     try:
         return await asyncio.to_thread(work, stop)
@@ -48,7 +48,7 @@ async def _in_a_thread(work: Callable[[Stop], T]) -> T:
 
 
 class AsyncSession(Live):
-    """As Session. `async for frame in session` gives frames as they come, the newest first."""
+    """Like Session. `async for frame in session` gives frames as they come, the newest first."""
 
     async def move(
         self,
@@ -62,17 +62,17 @@ class AsyncSession(Live):
         targets: npt.ArrayLike | None = None,
         timeout: float = 60.0,
     ) -> Frame:
-        """As Session.move()."""
+        """Like Session.move()."""
         deadline_after(timeout)
         self.drag(name, motion, translation=translation, axis=axis, angle=angle, center=center, targets=targets)
         return await self.settle(timeout)
 
     async def next_frame(self, timeout: float = 60.0) -> Frame:
-        """As Session.next_frame()."""
+        """Like Session.next_frame()."""
         return await self._wait_for(self._link.take, deadline_after(timeout))
 
     async def settle(self, timeout: float = 60.0) -> Frame:
-        """As Session.settle()."""
+        """Like Session.settle()."""
         return await self._wait_for(self._link.take_result, deadline_after(timeout))
 
     async def _wait_for(self, ask: Callable[[], Frame | None], deadline: float) -> Frame:
@@ -115,7 +115,7 @@ class AsyncSession(Live):
         on_progress: Callable[[SolveProgress], None] | None = None,
         timeout: float | None = None,
     ) -> SolveResult:
-        """As Session.solve(); `on_progress` is called in the event loop."""
+        """Like Session.solve(); `on_progress` is called in the event loop."""
         loop = asyncio.get_running_loop()
 
         def report(progress: SolveProgress) -> None:
@@ -127,23 +127,23 @@ class AsyncSession(Live):
         return await _in_a_thread(lambda stop: solve(self._link, options, stop))
 
     async def undo(self) -> int:
-        """As Session.undo()."""
+        """Like Session.undo()."""
         return await _in_a_thread(lambda stop: undo(self._link, False, stop))
 
     async def redo(self) -> int:
-        """As Session.redo()."""
+        """Like Session.redo()."""
         return await _in_a_thread(lambda stop: undo(self._link, True, stop))
 
     async def snapshot(self) -> bytes:
-        """As Session.snapshot()."""
+        """Like Session.snapshot()."""
         return await _in_a_thread(lambda stop: snapshot(self._link, stop))
 
     async def take_over(self) -> None:
-        """As Session.take_over()."""
+        """Like Session.take_over()."""
         await asyncio.to_thread(self._link.take_over)
 
     async def close(self) -> None:
-        """As Session.close()."""
+        """Like Session.close()."""
         await asyncio.to_thread(self._link.close)
 
     async def __aenter__(self) -> AsyncSession:
@@ -159,7 +159,7 @@ class AsyncSession(Live):
 
 
 class Opening:
-    """A session to be: `session = await opening`, or `async with opening as session`."""
+    """A session that is being opened: `session = await opening`, or `async with opening as session`."""
 
     def __init__(self, make: Callable[[Stop], Link]) -> None:
         self._make = make
@@ -209,7 +209,7 @@ def open_async(
     call_timeout: float = 30.0,
     reconnect_for: float = 120.0,
 ) -> Opening:
-    """As open(): `async with lpdeform.open_async(vertices, faces) as session`."""
+    """Like open(): `async with lpdeform.open_async(vertices, faces) as session`."""
     options = frame_options(
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
     )
@@ -241,7 +241,7 @@ def join_async(
     call_timeout: float = 30.0,
     reconnect_for: float = 120.0,
 ) -> Opening:
-    """As join()."""
+    """Like join()."""
     options = frame_options(
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
     )
@@ -266,7 +266,7 @@ def restore_async(
     call_timeout: float = 30.0,
     reconnect_for: float = 120.0,
 ) -> Opening:
-    """As restore()."""
+    """Like restore()."""
     options = frame_options(
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
     )

@@ -1,4 +1,4 @@
-"""What this package raises. proto/errors.md lists the reasons."""
+"""The errors that this package raises. proto/errors.md lists the reasons."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from lpdeform.v1 import google_rpc_pb2, service_pb2
 
 
 class Code(str, Enum):
-    """The kinds of google.rpc.Code, by their names."""
+    """The names of google.rpc.Code."""
 
     CANCELLED = "cancelled"
     UNKNOWN = "unknown"
@@ -35,15 +35,15 @@ _by_number = dict(enumerate(Code, start=1))
 
 
 class LpdeformError(Exception):
-    """Every error of this package. `str(error)` is one sentence for people; programs read the rest.
+    """Base of all errors of this package. `str(error)` is one sentence for people; programs use the attributes.
 
     code: the kind of error.
-    reason: one of reasons.py, stable; a newer server may say others. Empty where the server was not reached.
+    reason: one of reasons.py, stable; a newer server may send others. Empty if the server was not reached.
     element: what is wrong: "vertex 17"; may be empty.
-    limit: the bound that was broken; may be empty.
-    metadata: all that the server said of it (google.rpc.ErrorInfo.metadata), `element` and `limit` included.
-    input_seq: the update that it is about; 0 where it is about none.
-    retry_after: seconds after which to try again; 0 where trying again does not help.
+    limit: the limit that was violated; may be empty.
+    metadata: all details from the server (google.rpc.ErrorInfo.metadata), including `element` and `limit`.
+    input_seq: the update that the error is about; 0 if none.
+    retry_after: seconds after which to retry; 0 if a retry does not help.
     """
 
     code: Code
@@ -80,7 +80,7 @@ class LpdeformError(Exception):
 
 
 class InvalidInput(LpdeformError, ValueError):
-    """What was given cannot be deformed: `element` and `limit` say what and why."""
+    """The input cannot be used: `element` and `limit` say what is wrong and why."""
 
 
 class Unavailable(LpdeformError, ConnectionError):
@@ -88,7 +88,7 @@ class Unavailable(LpdeformError, ConnectionError):
 
 
 class Timeout(LpdeformError, TimeoutError):
-    """What was waited for did not come in time."""
+    """The result did not come in time."""
 
 
 _classes: dict[Code, type[LpdeformError]] = {
@@ -109,7 +109,7 @@ def make(
     input_seq: int = 0,
     retry_after: float = 0.0,
 ) -> LpdeformError:
-    """The error of the class that its code asks for."""
+    """The error of the class for `code`."""
     return _classes.get(code, LpdeformError)(
         code, message, reason, element, limit, metadata=metadata, input_seq=input_seq, retry_after=retry_after
     )
@@ -124,12 +124,12 @@ def session_closed() -> LpdeformError:
 
 
 def exception(error: Exception) -> LpdeformError:
-    """Of something unforeseen on a thread of ours."""
+    """For an unexpected exception on a thread of this package."""
     return make(Code.INTERNAL, f"{type(error).__name__}: {error}", "EXCEPTION")
 
 
 def again(error: LpdeformError) -> LpdeformError:
-    """A copy to be raised, so that tracebacks of several calls do not pile up on one error."""
+    """A copy to raise, so that tracebacks of several calls do not accumulate on one error."""
     return make(
         error.code,
         str(error.args[0]),
@@ -157,7 +157,7 @@ def from_fault(fault: service_pb2.Fault) -> LpdeformError:
 
 
 def from_call(error: Any, address: str) -> LpdeformError:
-    """Of the grpc.RpcError that a call ended with: its google.rpc.Status, where the server sent one."""
+    """The error of a grpc.RpcError, from its google.rpc.Status if the server sent one."""
     code = Code[error.code().name] if error.code().name in Code.__members__ else Code.UNKNOWN
     info, retry = google_rpc_pb2.ErrorInfo(), google_rpc_pb2.RetryInfo()
     for key, value in error.trailing_metadata() or ():
@@ -184,17 +184,17 @@ def from_call(error: Any, address: str) -> LpdeformError:
 
 
 def is_session_lost(error: LpdeformError) -> bool:
-    """The server has the session no more."""
+    """Whether the server does not have the session any more."""
     return error.code is Code.NOT_FOUND and error.reason.startswith("SESSION_")
 
 
 def is_undecided(error: LpdeformError) -> bool:
-    """Whether the server took the call is not known, or may change: it is to be tried again."""
+    """Whether it is unknown if the server took the call, or may change: then the call is retried."""
     passing = (Code.UNAVAILABLE, Code.CANCELLED, Code.DEADLINE_EXCEEDED, Code.UNKNOWN)
     may_have_room = error.code is Code.RESOURCE_EXHAUSTED and error.retry_after > 0
     return error.code in passing or may_have_room or is_session_lost(error) or error.reason == "UPLOAD_UNKNOWN"
 
 
 def is_taken_all_the_same(error: LpdeformError) -> bool:
-    """The server took the update, and cannot solve for it yet."""
+    """Whether the server took the update, but cannot solve for it yet."""
     return error.code in (Code.FAILED_PRECONDITION, Code.ABORTED)

@@ -1,4 +1,4 @@
-"""Frames, and how they are put together from what the server sends."""
+"""Frames, and how they are assembled from the server's messages."""
 
 from __future__ import annotations
 
@@ -18,41 +18,41 @@ _most_unsigned, _most_signed = 65535.0, 32767.0
 
 
 class QuantizedSurface(NamedTuple):
-    """What came, where it came "quantized" or "compressed"."""
+    """The received integers of a frame in encoding "quantized" or "compressed"."""
 
     vertices: npt.NDArray[np.uint16]
-    """n x 4: x, y, z and distortion; a position is origin + q / 65535 extent, by components."""
+    """n x 4: x, y, z and distortion; a position is origin + q / 65535 * extent, per component."""
     normals: npt.NDArray[np.int16]
-    """n x 4: x, y, z and 0, of 32767; 0 x 4 where they were not asked for."""
+    """n x 4: x, y, z and 0, as integers with 32767 for 1; 0 x 4 if they were not requested."""
     origin: npt.NDArray[np.float64]
     extent: npt.NDArray[np.float64]
     distortion_extent: float
-    """E_i = q / 65535 distortion_extent."""
+    """E_i = q / 65535 * distortion_extent."""
 
 
 class Frame:
     """A state of the surface on its way to the optimum.
 
-    Arrays are views of what came and cannot be written to; copy them to change them. Where a frame came quantized, they are
-    made when they are first read.
+    Arrays are read-only views of the received bytes; copy them to change them. For a quantized frame they are computed when they
+    are first read.
     """
 
     def __init__(self, header: frame_pb2.FrameHeader) -> None:
         self.input_seq: int = header.input_seq
-        """The newest update that it answers; never falls."""
+        """The newest update that the frame answers; never falls."""
         self.frame_seq: int = header.frame_seq
         """Rises within an epoch."""
         self.epoch: int = header.epoch
         self.skipped_inputs: int = header.skipped_inputs
-        """Updates since the frame before that no frame answers."""
+        """Updates since the previous frame that no frame answers."""
         self.iteration: int = header.iteration
         self.energy: float = header.energy
-        """E of the positions, Eq. 3 of the paper, in the mesh's unit, with soft terms."""
+        """E of the positions, Eq. 3 of the paper, in the mesh's unit, including soft terms."""
         self.soft_energy: float = header.soft_energy
-        """The part of it that soft and orientation handles have."""
+        """The part of the energy that soft and orientation handles have."""
         self.is_final: bool = header.is_final
-        """The result for input_seq, however its solve ended (stop_reason): no further frame until there is a new update, but for
-        the same one with its gap."""
+        """The result for input_seq, however its solve ended (stop_reason). No further frame comes until there is a new update,
+        except the same frame with its gap."""
         self.stop_reason: str = stop_reason_name(header.stop_reason)
         self.solve_seconds: float = header.solve_seconds
         self.method: str = method_name(header.method)
@@ -61,14 +61,14 @@ class Frame:
         """(E - lower bound) / E of the convex problem with its rotations held; see `certify` of open()."""
         self.quantized: QuantizedSurface | None = None
         self.wire_bytes: int = 0
-        """Of positions, distortion and normals, as they travelled."""
+        """Bytes of positions, distortion and normals as received."""
         self.received_at: float = 0.0
-        """Of time.perf_counter(), when its last part came."""
+        """When its last part came, on the clock of time.perf_counter()."""
         self._raw: dict[str, Floats] = {}
 
     @cached_property
     def positions(self) -> Floats:
-        """n x 3: float32, or float64 where that was asked for."""
+        """n x 3: float32, or float64 if that was requested."""
         if self.quantized is None:
             return self._raw["positions"]
         vertices, _, origin, extent, _ = self.quantized
@@ -76,7 +76,7 @@ class Frame:
 
     @cached_property
     def distortion(self) -> Floats:
-        """E_i of each vertex, in the mesh's unit of length; of length 0 where it was not asked for."""
+        """E_i of each vertex, in the mesh's unit of length; empty if it was not requested."""
         if self.quantized is None:
             return self._raw["distortion"]
         scale = self.quantized.distortion_extent / _most_unsigned
@@ -84,7 +84,7 @@ class Frame:
 
     @cached_property
     def normals(self) -> Floats:
-        """n x 3, of length 1; 0 x 3 where they were not asked for."""
+        """n x 3, of length 1; 0 x 3 if they were not requested."""
         if self.quantized is None:
             return self._raw["normals"]
         return _sealed((self.quantized.normals[:, :3] / _most_signed).astype(np.float32))
@@ -96,7 +96,7 @@ class Frame:
 
 
 class FrameAssembly:
-    """Puts the parts of frames together; whatever does not fit is an error (FRAME_PARTS)."""
+    """Assembles frames from their parts; a part that does not fit is an error (FRAME_PARTS)."""
 
     def __init__(self, vertex_count: int) -> None:
         self._vertex_count = vertex_count
@@ -106,10 +106,10 @@ class FrameAssembly:
         self._quantization: frame_pb2.Quantization | None = None
         self._received = 0
         self._whole: dict[str, npt.NDArray[Any]] = {}
-        self._given: dict[str, int] = {}  # for how many vertices
+        self._given: dict[str, int] = {}  # for how many vertices values have come
 
     def add(self, part: frame_pb2.FramePart) -> Frame | None:
-        """The frame, where this part makes it whole."""
+        """The frame, if this part completes it."""
         frame = self._begin(part.header) if part.HasField("header") else self._frame
         self._frame = None
         count, first = part.vertex_count, part.first_vertex
@@ -174,14 +174,14 @@ class FrameAssembly:
             self._join(name, values if name == "vertices" else values.view("<i2"), part)
 
     def _join(self, name: str, values: npt.NDArray[Any], part: frame_pb2.FramePart) -> None:
-        """`values` at their place in the whole, which they are where the part is all of it."""
+        """Stores `values` at their place in the whole array; a part with all vertices becomes the whole array."""
         self._given[name] = self._given.get(name, 0) + part.vertex_count
         if part.vertex_count == self._vertex_count:
             self._whole[name] = values
             return
         if name not in self._whole:
             self._whole[name] = np.zeros((self._vertex_count, values.shape[1]), values.dtype)
-        if part.vertex_count > 0:  # the whole may be the part before, which cannot be written to
+        if part.vertex_count > 0:  # the array may be a read-only view of an earlier part
             self._whole[name][part.first_vertex : part.first_vertex + part.vertex_count] = values
 
     def _finish(self, frame: Frame) -> None:
@@ -219,13 +219,13 @@ def _wrong_size(part: frame_pb2.FramePart) -> LpdeformError:
 
 
 def stop_reason_name(reason: int) -> str:
-    """"converged" and so on; "running" where it has none."""
+    """"converged" and so on; "running" if there is none."""
     known = frame_pb2.StopReason.items()
     names = {number: name.removeprefix("STOP_REASON_").lower() for name, number in known}
     return "running" if reason == frame_pb2.STOP_REASON_UNSPECIFIED else names.get(reason, "running")
 
 
 def method_name(method: int) -> str:
-    """"quasi_newton" and so on; empty where none runs."""
+    """"quasi_newton" and so on; empty if no method runs."""
     names = {number: name.removeprefix("METHOD_").lower() for name, number in handle_pb2.Method.items()}
     return "" if method == handle_pb2.METHOD_UNSPECIFIED else names.get(method, "")

@@ -1,4 +1,4 @@
-"""How sessions are made and joined."""
+"""Functions that create and join sessions."""
 
 from __future__ import annotations
 
@@ -120,28 +120,28 @@ def open(  # noqa: A001  (called as lpdeform.open)
     call_timeout: float = 30.0,
     reconnect_for: float = 120.0,
 ) -> Session:
-    """Makes a session from a triangle mesh; the order of vertices is never changed.
+    """Creates a session from a triangle mesh; the order of vertices is never changed.
 
     vertices: n x 3, in any unit. faces: m x 3, 0-based, counter-clockwise seen from outside.
-    address: "host:port" or "unix:/path"; otherwise the environment variable LPDEFORM_ADDRESS, or localhost:50051.
-    token: a bearer token, or a function that gives the newest one when a call begins, on any thread.
+    address: "host:port" or "unix:/path"; by default the environment variable LPDEFORM_ADDRESS, or localhost:50051.
+    token: a bearer token, or a function that returns the newest one, called on any thread when a call begins.
     tls: True, or a Tls with certificates.
-    handles: to begin with. p, stiffness, length_unit, solver, region: as in Settings.
+    handles: the handles to begin with. p, stiffness, length_unit, solver, region: as in Settings.
     normals: n x 3, as drawn at rest, for frames with normals.
-    free_components: what becomes of a connected component that no handle holds: "error" is raised, "stay", "follow".
-    weld: True where vertices in the same place are copies of one; or how far apart these may be, as a share of the bounding box's
-        diagonal, at most 1e-3; or one number a vertex, the same for copies. True and 0 are 1e-6, as copies may be apart by rounding;
-        False is none.
-    encoding: how frames travel: "float64", "float32" (16 bytes a vertex), "quantized" (8, off by half of 1/65535 of the frame's
-        extent), "compressed" (the same, 3 to 5; needs the system's meshoptimizer).
-    lowest_encoding: what the server may go down to where its limit of bytes a second asks for it.
-    credit: frames that may be under way and not yet taken, 1 to 8; 0 takes the server's 2.
-    certify: a result that stands comes again with its optimality_gap.
+    free_components: what happens to a connected component that no handle holds: "error" (raised), "stay", "follow".
+    weld: True if vertices in the same place are copies of one. Or the largest distance of copies as a share of the bounding box's
+        diagonal, at most 1e-3. Or one number per vertex, which is the same for copies. True and 0 mean 1e-6, because copies may
+        differ by rounding. False: no weld.
+    encoding: how frames are sent: "float64", "float32" (16 bytes per vertex), "quantized" (8 bytes, off by half of 1/65535 of the
+        frame's extent), "compressed" (the same precision, 3 to 5 bytes; needs the system's meshoptimizer).
+    lowest_encoding: the least precise encoding that the server may use to keep its limit of bytes per second.
+    credit: how many frames may be under way and not yet taken, 1 to 8; 0 takes the server's 2.
+    certify: a finished result is sent again with its optimality_gap.
     max_frames_per_second: 0 is without limit; the last frame of an update always comes.
-    call_timeout, reconnect_for: seconds of every call but solve(), and after which a session whose server stays away gives up.
-
-    Raises InvalidInput with the first element that cannot be deformed, or a certificate or token that cannot be used;
-    Unavailable (NO_SERVER) where nobody answers.
+    call_timeout: time limit in seconds of every call but solve().
+    reconnect_for: seconds after which a session gives up if the server does not return.
+    Raises InvalidInput with the first element that cannot be deformed, or with a certificate or token that cannot be used;
+    Unavailable (NO_SERVER) if no server answers.
 
     >>> import lpdeform
     >>> with lpdeform.open([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]) as session:
@@ -176,9 +176,9 @@ def join(
     call_timeout: float = 30.0,
     reconnect_for: float = 120.0,
 ) -> Session:
-    """Joins somebody's session by name: as a reader of its frames, or taking over as its writer.
+    """Joins an existing session by name: as a reader of its frames, or as its writer by taking over.
 
-    It is not made anew where the server loses it, and not deleted by close(). The rest as in open().
+    It is not recreated if the server loses it, and close() does not delete it. Everything else is as in open().
     """
     options = frame_options(
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
@@ -196,7 +196,7 @@ def join_link(rpc: Rpc, stop: Stop, name: str, as_writer: bool, options: frame_p
 
 
 def _join_where_it_is(rpc: Rpc, stop: Stop, name: str, as_writer: bool) -> Lease:
-    """Where several servers stand behind a proxy: comes as those do who have the session."""
+    """With several servers behind a proxy, uses the route of the server that has the session."""
     try:
         lease = join_session(rpc, name, as_writer, stop)
         if lease.route:
@@ -226,10 +226,11 @@ def restore(
     call_timeout: float = 30.0,
     reconnect_for: float = 120.0,
 ) -> Session:
-    """Makes a session from what Session.snapshot() gave, on any server of the same version or a later one.
+    """Creates a session from the result of Session.snapshot(), on any server of the same or a later version.
 
-    It shows the same surface to the last bit, has the same handles, settings and steps to undo, and is as one of open() from
-    then on. Raises InvalidInput (SNAPSHOT_FOREIGN, SNAPSHOT_NEWER, SNAPSHOT_TRUNCATED, SNAPSHOT_DAMAGED); otherwise as open().
+    It shows the same surface to the last bit, and has the same handles, settings and steps to undo. From then on it is like a
+    session of open(). Raises InvalidInput (SNAPSHOT_FOREIGN, SNAPSHOT_NEWER, SNAPSHOT_TRUNCATED, SNAPSHOT_DAMAGED); otherwise as
+    open().
     """
     options = frame_options(
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify

@@ -54,13 +54,13 @@ def _close_all() -> None:
 
 
 def _abandon(link: Link) -> None:
-    """Of a session that nobody has any more. The collector may run on any thread, so it must not wait here."""
+    """Closes the link of a session without references. The garbage collector may run on any thread, so it must not wait here."""
     threading.Thread(target=link.close, daemon=True).start()
 
 
 class Live:
-    """What sessions have that does not wait. Changes made faster than the connection takes them are merged, the newest value of
-    each handle and each setting winning."""
+    """The functions of sessions that do not wait. Changes that come faster than the connection takes them are coalesced: the
+    newest value of each handle and each setting wins."""
 
     def __init__(self, link: Link) -> None:
         self._link = link
@@ -70,38 +70,38 @@ class Live:
 
     @property
     def name(self) -> str:
-        """"sessions/<32 hexadecimal digits>"; another one after the session had to be made anew."""
+        """"sessions/<32 hexadecimal digits>"; it changes when the session has to be recreated."""
         return self._link.lease.session
 
     @property
     def address(self) -> str:
-        """Of the server."""
+        """The server's address."""
         return self._link.rpc.address
 
     @property
     def mesh_report(self) -> MeshReport:
-        """What the server found in the mesh."""
+        """What the server reported of the mesh."""
         return self._link.lease.report
 
     @property
     def connection(self) -> Connection:
-        """"idle" before the first update or frame; "reconnecting" while the server is away; "closed" when all is over."""
+        """"idle" before the first update or frame; "reconnecting" while the server is away; "closed" at the end."""
         return self._link.connection
 
     @property
     def interruption(self) -> LpdeformError | None:
-        """Why it is "reconnecting", or was the last time: DRAINING where the server shuts down."""
+        """Why the session is "reconnecting", or was the last time: DRAINING if the server shuts down."""
         return self._link.interruption
 
     @property
     def notice(self) -> Notice | None:
-        """What the server said about itself last, on the stream of frames that there is; None where it said nothing. Also logged,
-        by the logger "lpdeform": as a warning where it is overloaded."""
+        """The last notice of the server about itself on the present stream; None if there was none. It is also logged, by the
+        logger "lpdeform": as a warning if the server is overloaded."""
         return self._link.notice
 
     @property
     def newest_input(self) -> int:
-        """The newest update that was not refused; 0 where there is none."""
+        """The newest update that was not refused; 0 if there is none."""
         with self._link.changed:
             return self._link.ledger.newest
 
@@ -112,17 +112,17 @@ class Live:
         resize: Resize | None = None,
         begins_step: bool = False,
     ) -> int:
-        """Sends a change, which the server takes whole or not at all, and returns its number: a frame whose input_seq is at
-        least that takes it into account. `begins_step`: what it does to handles is undone by itself, see Update.
+        """Sends a change, which the server accepts or refuses as a whole, and returns its number. A frame whose input_seq is at
+        least that number takes the change into account. `begins_step`: its effect on handles is undone separately, see Update.
 
-        What the server refuses is raised by the next call that takes frames, once; the session goes on without it, and
-        without what was merged into it. Raises at once where the session is closed (SESSION_CLOSED), for a reader
-        (NOT_THE_WRITER), and for arrays of the wrong type or shape.
+        If the server refuses the change, the next call that takes frames raises the error, once. The session goes on without the
+        change, and without changes that were coalesced with it. Raises at once if the session is closed (SESSION_CLOSED), for a
+        reader (NOT_THE_WRITER), and for arrays of the wrong type or shape.
         """
         return self._link.update(Update(handles or {}, settings or Settings(), resize, begins_step))
 
     def set_handles(self, handles: Mapping[str, Handle]) -> int:
-        """Adds handles or replaces those of the same names. As update()."""
+        """Adds handles, or replaces those with the same names. Raises as update()."""
         return self.update(handles)
 
     def set_handle(
@@ -135,7 +135,7 @@ class Live:
         points: SurfacePoints | None = None,
         footprint: float = 0.0,
     ) -> int:
-        """Adds a handle or replaces the one of that name. As update()."""
+        """Adds a handle, or replaces the one with this name. Raises as update()."""
         return self.update({name: Handle(vertices, motion, hold, points, footprint)})
 
     def drag(
@@ -149,11 +149,11 @@ class Live:
         center: Vector3 | None = None,
         targets: npt.ArrayLike | None = None,
     ) -> int:
-        """Moves a handle without waiting for the surface. As update(); the motion as in move()."""
+        """Moves a handle without waiting for the surface. Raises as update(); the motion is given as in move()."""
         return self.update({name: motion_of(motion, translation, axis, angle, center, targets)})
 
     def remove(self, name: str) -> int:
-        """Lets go of a handle. As update()."""
+        """Removes a handle. Raises as update()."""
         return self.update({name: Removal()})
 
     def set(
@@ -165,14 +165,14 @@ class Live:
         solver: SolverSettings | None = None,
         region: npt.ArrayLike | None = None,
     ) -> int:
-        """Changes what is given. As update()."""
+        """Changes the given settings. Raises as update()."""
         return self.update(settings=Settings(p, stiffness, length_unit, solver, region))
 
     def poll(self) -> Frame | None:
-        """The newest frame not yet taken, where there is one; does not wait.
+        """The newest frame that was not taken, or None; does not wait.
 
-        Taking a frame tells the server to send on, so that a reader who stops asking costs a bounded number of frames. Raises
-        what the server had to say about an update, once, and once nothing more comes, why.
+        Taking a frame lets the server send more, so a reader that stops asking costs a bounded number of frames. Raises the
+        server's error about an update, once; when nothing more comes, raises the reason.
         """
         return self._link.take()
 
@@ -194,11 +194,11 @@ class Live:
 
 
 class Session(Live):
-    """A mesh being deformed on a server; open() and join() make sessions. Every function may be called from any thread.
+    """A mesh that is deformed on a server; open() and join() make sessions. Every function may be called from any thread.
 
-    Frames come over a stream. While it is down, the session reconnects with growing pauses: to the same session where the
-    server still has it, otherwise to a new one that it makes from its own copy of mesh, handles and settings. Frames of an
-    older epoch or an older update than one that was shown are dropped.
+    Frames come over a stream. If it breaks, the session reconnects with growing pauses: to the same session if the server still
+    has it, otherwise to a new one that it creates from its own copy of mesh, handles and settings. Frames of an older epoch or an
+    older update than an earlier frame are dropped.
 
     Iterating gives frames as they come, the newest first.
     """
@@ -217,23 +217,24 @@ class Session(Live):
     ) -> Frame:
         """Moves a handle and waits for the finished result.
 
-        By a motion; or by its parts, x = R (p - center) + center + translation with the rotation by `angle` radians about
-        `axis`; or to `targets`, one position a vertex. Always relative to the rest mesh: the same call twice moves once.
+        Give a motion; or its parts, x = R (p - center) + center + translation with the rotation by `angle` radians about `axis`;
+        or `targets`, one position per vertex. The motion is always relative to the rest mesh: calling twice has the same effect
+        as once.
         """
         deadline_after(timeout)
         self.drag(name, motion, translation=translation, axis=axis, angle=angle, center=center, targets=targets)
         return self.settle(timeout)
 
     def next_frame(self, timeout: float = 60.0) -> Frame:
-        """The newest frame not yet taken; waits for one. Raises as poll(), and Timeout (NO_FRAME); at once where the timeout is 0."""
+        """Waits for the newest frame that was not taken. Raises as poll(), and Timeout (NO_FRAME); at once if the timeout is
+        0."""
         return self._wait_for(self._link.take, deadline_after(timeout))
 
     def settle(self, timeout: float = 60.0) -> Frame:
-        """The finished result of the newest update. Takes frames until it is there.
+        """The finished result of the newest update. Takes frames until it comes.
 
-        At once, also with a timeout of 0, where the newest frame that was taken before, here or by next_frame() or poll(), is
-        that result: also while the connection is down. Does not wait for its optimality_gap, which the next frame has. Raises
-        as next_frame().
+        Returns at once, even with a timeout of 0 or without a connection, if the last frame taken, here or by next_frame() or
+        poll(), is that result. Does not wait for its optimality_gap, which the next frame has. Raises as next_frame().
         """
         return self._wait_for(self._link.take_result, deadline_after(timeout))
 
@@ -247,7 +248,7 @@ class Session(Live):
                 raise self._link.no_frame()
 
     def __iter__(self) -> Iterator[Frame]:
-        """Ends when the session is closed; raises why where it is over otherwise."""
+        """Ends when the session is closed; if it ended otherwise, raises the reason."""
         while not self._link.is_closing:
             try:
                 yield self._wait_for(self._link.take, time.monotonic() + 3600)
@@ -267,46 +268,47 @@ class Session(Live):
         on_progress: Callable[[SolveProgress], None] | None = None,
         timeout: float | None = None,
     ) -> SolveResult:
-        """Solves for the present handles and settings and returns the finished result, in float64.
+        """Solves for the present handles and settings, and returns the finished result in float64.
 
-        `on_progress` is called at most ten times a second. Begins again where the server went away, for as long as the
-        stream would. `timeout`: seconds for all of it, waiting for another solve included; None is without limit, and with 0
-        nothing is sent. While it runs, changes wait and are sent after it. Raises what the server refuses, and Timeout
-        (SOLVE_UNDER_WAY where it was spent waiting, SOLVE_TIME_PASSED where none was left to begin); SESSION_CLOSED (of
-        FAILED_PRECONDITION) where close() is called meanwhile.
+        `on_progress` is called at most ten times per second. If the server goes away, the solve starts again, for as long as the
+        stream would. `timeout`: seconds in all, including the wait for another solve; None is without limit; with 0 nothing is
+        sent. Changes made during the solve wait and are sent after it. Raises the server's errors, and Timeout: SOLVE_UNDER_WAY
+        if the time was spent waiting, SOLVE_TIME_PASSED if no time was left to begin. Raises SESSION_CLOSED (FAILED_PRECONDITION)
+        if close() is called meanwhile.
         """
         options = self._solve_options(certify, trace, with_normals, initial_positions, on_progress, timeout)
         return solve(self._link, options, self._link.stop)
 
     def undo(self) -> int:
-        """Takes the newest step of the handles back on the server, and returns the number of the update that this is.
+        """Undoes the newest step of the handles on the server, and returns the number of the update that the undo is.
 
-        A step is what a person sees as one change: updates that move the same handles, none of them over a second after the
-        one before, or each other update that changes handles; `begins_step` of update() begins one in any case. Settings are
-        no part of it. Sent after all changes before it; waits for the answer, and settle() for the frame. Raises
-        FAILED_PRECONDITION NOTHING_TO_UNDO (also of steps before the session had to be made anew), NOT_THE_WRITER for a reader, what the server says of a change before it, Timeout.
+        A step is what a person sees as one change: updates that move the same handles, none of them more than a second after the
+        one before; or any other update that changes handles. `begins_step` of update() always begins a new step. Settings are not
+        part of a step. The undo is sent after all earlier changes; it waits for the answer, and settle() waits for the frame.
+        Raises FAILED_PRECONDITION NOTHING_TO_UNDO (also for steps before the session had to be recreated), NOT_THE_WRITER for a
+        reader, the server's error about an earlier change, Timeout.
         """
         return undo(self._link, False, self._link.stop)
 
     def redo(self) -> int:
-        """Does again what was taken back last. As undo(); NOTHING_TO_REDO."""
+        """Redoes the step that was undone last. Raises as undo(), and NOTHING_TO_REDO."""
         return undo(self._link, True, self._link.stop)
 
     def snapshot(self) -> bytes:
-        """The session as a file, for restore(): mesh, handles, settings, what can be undone and the surface as it is.
+        """The session as a file for restore(): mesh, handles, settings, steps to undo, and the present surface.
 
-        With all changes before it. Waits for it to come in parts, and changes made meanwhile are sent after it. Raises what the
-        server says of a change before it, RESOURCE_EXHAUSTED, Timeout.
+        The file includes all earlier changes. Waits until all its parts have come; changes made meanwhile are sent afterwards.
+        Raises the server's error about an earlier change, RESOURCE_EXHAUSTED, Timeout.
         """
         return snapshot(self._link, self._link.stop)
 
     def take_over(self) -> None:
-        """Becomes the writer in place of whoever is, as a reader or after a WRITER_REPLACED."""
+        """Becomes the writer in place of the present one, as a reader or after a WRITER_REPLACED."""
         self._link.take_over()
 
     def close(self) -> None:
-        """Ends the stream and every waiting call. Deletes the session on the server where open() made it; where no server
-        answers, it expires there by itself."""
+        """Ends the stream and every waiting call. Deletes the session on the server if open() created it; if no server
+        answers, the session expires there by itself."""
         self._link.close()
 
     def __enter__(self: Self) -> Self:

@@ -1,6 +1,6 @@
-"""What goes in and comes out. Arrays are anything that NumPy takes for one, and are copied when they are given.
+"""Types of inputs and results. An array may be anything that NumPy accepts, and is copied at the call.
 
-Where vertices are meant, indices and boolean masks over all vertices do equally: `vertices[:, 2] < 0.1`.
+Vertices may be given as indices or as a boolean mask over all vertices: `vertices[:, 2] < 0.1`.
 """
 
 from __future__ import annotations
@@ -56,28 +56,28 @@ class Exact:
 
 @dataclass(frozen=True)
 class Soft:
-    """Drawn to its targets: 0 lets go, 1 is about as strong as one edge of the surface. 0 to 1e6."""
+    """Pulled towards its targets: 0 has no effect, 1 is about as strong as one edge of the surface. 0 to 1e6."""
 
     weight: float = 1.0
 
 
 @dataclass(frozen=True)
 class Orientation:
-    """Turned by the rotation of the handle's motion, its position free. Vertices only, no targets. 0 to 1e6."""
+    """Rotated by the handle's motion, with a free position. For vertices only, without targets. 0 to 1e6."""
 
     weight: float = 100.0
 
 
 @dataclass(frozen=True)
 class AxisLock:
-    """Each vertex free along a line through its target. Vertices only."""
+    """Each vertex is free along a line through its target. For vertices only."""
 
     axis: Vector3 = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class PlaneLock:
-    """Each vertex free within a plane through its target. Vertices only."""
+    """Each vertex is free within a plane through its target. For vertices only."""
 
     normal: Vector3 = (0.0, 0.0, 1.0)
 
@@ -87,11 +87,12 @@ Hold = Union[Exact, Soft, Orientation, AxisLock, PlaneLock]
 
 @dataclass(frozen=True, eq=False)
 class SurfacePoints:
-    """Points inside faces of the rest mesh: a face, and three barycentric coordinates in the order of its corners, each."""
+    """Points inside faces of the rest mesh: for each point a face, and three barycentric coordinates in the order of its
+    corners."""
 
     faces: npt.ArrayLike
     barycentric: npt.ArrayLike
-    """k x 3, each at least 0, the sum of three 1, both to 1e-6."""
+    """k x 3, each at least 0, with a sum of 1 per row, both to within 1e-6."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,31 +103,32 @@ class Handle:
     motion: Motion = Fixed()
     hold: Hold = Exact()
     points: SurfacePoints | None = None
-    """In place of vertices; held exactly or soft."""
+    """Used instead of vertices; held exactly or soft."""
     footprint: float = 0.0
-    """Radius, along the surface, of the surroundings that go along nearly rigidly, against spikes. 0: none."""
+    """Radius, along the surface, of a region around the handle that moves with it nearly rigidly, against spikes. 0: none."""
 
 
 @dataclass(frozen=True)
 class Removal:
-    """Lets go of a handle."""
+    """Removes a handle."""
 
 
 @dataclass(frozen=True)
 class Automatic:
-    """p or stiffness from the shape's geometry, found by the server: joints soft, parts rigid."""
+    """p or stiffness from the shape's geometry, computed by the server: joints are soft, parts are rigid."""
 
     strength: float = 1.0
     """0 to 1; 0 is p = 2 and stiffness 1 everywhere."""
 
 
 Field = Union[float, npt.ArrayLike, Automatic]
-"""The same number everywhere, one a vertex, or found from the geometry."""
+"""The same number everywhere, one per vertex, or computed from the geometry."""
 
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """How a solve is made and when it stops. One setting: it is replaced whole. 0 takes the server's default."""
+    """How a solve is made and when it stops. This is a single setting and is replaced as a whole. 0 takes the server's
+    default."""
 
     method: Method = "auto"
     tolerance: float = 0.0
@@ -139,48 +141,48 @@ class SolverSettings:
 
 @dataclass(frozen=True, eq=False)
 class Settings:
-    """What is None keeps its value."""
+    """A setting that is None keeps its value."""
 
     p: Field | None = None
     """1 to 64."""
     stiffness: Field | None = None
     """1e-6 to 1e6."""
     length_unit: float | None = None
-    """Of mixed norms, in the mesh's unit; 0 takes the mean rest edge length."""
+    """The unit of length for mixed norms, in the mesh's unit; 0 takes the mean rest edge length."""
     solver: SolverSettings | None = None
     region: npt.ArrayLike | None = None
-    """The vertices that may move; everything outside is held where it is. Empty: everything may move again."""
+    """The vertices that may move; all others stay where they are. Empty: everything may move again."""
 
 
 @dataclass(frozen=True)
 class Resize:
-    """A scaling by different factors along three axes in which salient parts keep their shape and size.
+    """A scaling by different factors along three axes. Salient parts keep their shape and size.
 
-    Makes the handle "resize", which holds the ends along scaled axes, and sets p and stiffness, where the same update does not.
-    Along the other axes the extent changes, unless plane locks hold ends there.
+    It makes the handle "resize", which holds the ends along scaled axes, and sets p and stiffness unless the same update sets
+    them. Along the other axes the extent changes, unless plane locks hold the ends there.
     """
 
     scale: Vector3
     """Along the axes, relative to the rest mesh; each 0.01 to 100."""
     origin: Vector3 | None = None
-    """Stays where it is; the middle of the mesh's bounding box where left out."""
+    """The point that stays in place; the default is the middle of the mesh's bounding box."""
     axes: tuple[Vector3, Vector3] | None = None
-    """Of the first and the second axis, of any length; x and y of the mesh where left out."""
+    """Directions of the first and second axis, of any length; the default is x and y of the mesh."""
 
 
 Change = Union[Handle, Fixed, RigidMotion, Targets, Removal]
-"""A Handle adds or replaces, a motion moves, a Removal lets go."""
+"""A Handle adds or replaces, a motion moves, a Removal removes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Update:
-    """A change of handles and settings; the server takes it whole or not at all."""
+    """A change of handles and settings; the server accepts or refuses it as a whole."""
 
     handles: Mapping[str, Change] = field(default_factory=dict)
     settings: Settings = Settings()
     resize: Resize | None = None
     begins_step: bool = False
-    """What it does to handles is a step of its own, which undo() takes back: to be set when a drag begins."""
+    """Whether its effect on handles begins a new step for undo(). Set it when a drag begins."""
 
 
 @dataclass(frozen=True)
@@ -195,7 +197,7 @@ class Defect:
 
 @dataclass(frozen=True)
 class MeshReport:
-    """What the server found in the mesh."""
+    """What the server reported of the mesh."""
 
     vertices: int
     faces: int
@@ -205,17 +207,19 @@ class MeshReport:
     defects: tuple[Defect, ...]
     """Every kind, also those with count 0."""
     welded_vertices: int
-    """Copies of a vertex before them."""
+    """How many vertices are copies of an earlier one."""
     notices: tuple[str, ...]
-    """What is to be known before the mesh is deformed, one sentence for people each: that it comes apart where it is split."""
+    """What users should know before they deform the mesh, one sentence each: for example that it comes apart where it is
+    split."""
 
 
 @dataclass(frozen=True)
 class Notice:
-    """What a server says about itself; nothing failed."""
+    """What a server says about itself; nothing has failed."""
 
     reason: Literal["overloaded", "recovered", "other"]
-    """After "overloaded" frames come less often, and the last one of an update later, until "recovered"; "other": of a newer server."""
+    """After "overloaded" frames come less often, and the last frame of an update comes later, until "recovered"; "other": from
+    a newer server."""
     text: str
     """One sentence for people."""
 
@@ -224,7 +228,7 @@ class IterationRecord(NamedTuple):
     iteration: int
     seconds: float
     energy: float
-    """The true one."""
+    """The true energy."""
     objective: float
     """What the method minimises, in its own unit."""
     stage: int
@@ -238,14 +242,14 @@ class SolveProgress(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SolveResult:
-    """A finished solve. Arrays cannot be written to; copy them to change them."""
+    """A finished solve. Arrays are read-only; copy them to change them."""
 
     positions: Floats
     """n x 3, float64."""
     distortion: Floats
     """n, float64: E_i of each vertex."""
     normals: Floats
-    """n x 3, or 0 x 3 where they were not asked for."""
+    """n x 3, or 0 x 3 if they were not requested."""
     method: str
     stop_reason: str
     iterations: int
@@ -253,7 +257,7 @@ class SolveResult:
     energy: float
     soft_energy: float
     optimality_gap: float | None
-    """(E - lower bound) / E of the convex problem with its rotations held; where it was asked for."""
+    """(E - lower bound) / E of the convex problem with its rotations held, if it was requested."""
     setup_seconds: float
     solve_seconds: float
     threads: int

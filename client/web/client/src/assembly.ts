@@ -7,23 +7,23 @@ import { Encoding, type FrameHeader, type FramePart } from "./gen/lpdeform/v1/fr
 type Numbers = Float32Array | Float64Array | Uint16Array | Int16Array;
 
 /**
- * Puts the parts of frames together. A frame of one part, as up to 50,000 vertices give, becomes views of the message that
- * carried it; of several parts, each is copied once as a whole. Whatever does not fit is an error (FRAME_PARTS).
+ * Assembles frames from their parts. A frame of one part, with up to about 50,000 vertices, becomes views of the message that
+ * carried it. For a frame of several parts, each part is copied once. A part that does not fit is an error (FRAME_PARTS).
  */
 export class FrameAssembly {
   #frame: WireFrame | undefined;
   #isCompressed = false;
   #received = 0;
-  #withDistortion = 0; // vertices that came with it
+  #withDistortion = 0; // how many vertices with distortion have come
   #withNormals = 0;
 
-  /** `isDouble`: what comes raw are doubles. */
+  /** `isDouble`: raw numbers are doubles. */
   constructor(
     readonly vertexCount: number,
     readonly isDouble = false,
   ) {}
 
-  /** The frame, where this part makes it whole. */
+  /** The frame, if this part completes it. */
   add(part: FramePart): WireFrame | undefined {
     const frame = part.header ? this.#begin(part.header) : this.#frame;
     this.#frame = undefined;
@@ -100,7 +100,10 @@ export class FrameAssembly {
     quantized.normals = this.#join(quantized.normals, new Int16Array(buffer, byteOffset, length), normals, 4, part);
   }
 
-  /** `values`, which are all that `bytes` hold, at their place in the whole, which is made with its first part, or is them. */
+  /**
+   * Puts `values`, the numbers of `bytes`, at their place in the whole array. The first part makes that array; if it has all
+   * values, it is the array.
+   */
   #join<Array extends Numbers>(whole: Array, values: Array, bytes: Uint8Array, width: number, part: FramePart): Array {
     const isWhole = bytes.byteLength === values.byteLength;
     if (!isWhole || values.length !== width * part.vertexCount) {

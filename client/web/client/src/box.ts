@@ -1,13 +1,16 @@
 import type { LpdeformError } from "./errors.js";
 import type { WireFrame } from "./frame.js";
 
-/** A frame and the stream that it came on, which wants it acknowledged. */
+/** A frame, and the stream that it came on and that must acknowledge it. */
 export interface Taken {
   frame: WireFrame;
   streamId: string;
 }
 
-/** The newest frame not yet taken, and who waits for it. Frames of an older epoch or update than one before are dropped. */
+/**
+ * The newest frame that was not taken, and the callers who wait for it. Drops frames of an older epoch or update than an
+ * earlier frame.
+ */
 export class FrameBox {
   #newest: Taken | undefined;
   #epoch = 0;
@@ -17,7 +20,7 @@ export class FrameBox {
   #lastFinal: WireFrame | undefined;
   #takes = 0;
 
-  /** The frame that take() returned last, where that one is final. */
+  /** The frame that take() returned last, if it is final. */
   get lastFinal(): WireFrame | undefined {
     return this.#lastFinal;
   }
@@ -27,7 +30,7 @@ export class FrameBox {
     return this.#takes;
   }
 
-  /** False where the frame is dropped. */
+  /** Returns false if the frame is dropped. */
   put(frame: WireFrame, streamId: string): boolean {
     if (frame.epoch < this.#epoch || frame.inputSeq < this.#inputSeq) return false;
     this.#epoch = frame.epoch;
@@ -38,14 +41,14 @@ export class FrameBox {
     return true;
   }
 
-  /** Frames of an earlier epoch are void. */
+  /** Drops frames of earlier epochs. */
   beginEpoch(epoch: number): void {
     if (epoch <= this.#epoch) return;
     this.#epoch = epoch;
     this.#newest = undefined;
   }
 
-  /** Epochs begin anew: another session. */
+  /** Epochs start again, because the session is a new one. */
   beginSession(): void {
     this.#epoch = 0;
     this.#newest = undefined;
@@ -57,13 +60,13 @@ export class FrameBox {
     this.#wake();
   }
 
-  /** Undoes finish(). What was taken before is forgotten: another writer may have been there since. */
+  /** Reverses finish(). Forgets the last frame taken, because another writer may have changed the session since. */
   resume(): void {
     this.#lastFinal = undefined;
     if (this.#end !== "closed") this.#end = undefined;
   }
 
-  /** What there is; throws why nothing more comes. */
+  /** The newest frame, if there is one; throws the reason if nothing more comes. */
   take(): Taken | undefined {
     const taken = this.#newest;
     this.#newest = undefined;
@@ -81,8 +84,8 @@ export class FrameBox {
   }
 
   /**
-   * Waits until take() has something to say or has returned more than `takes` frames, or the signal says that nobody wants to
-   * know any more.
+   * Waits until take() has something to return or throw, until it has returned more than `takes` frames, or until the signal
+   * aborts.
    */
   async wait(takes: number, signal?: AbortSignal): Promise<void> {
     while (!this.#newest && !this.#end && this.#takes === takes && !signal?.aborted) {

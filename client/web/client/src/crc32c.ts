@@ -4,7 +4,7 @@ const table = Uint32Array.from({ length: 256 }, (_, byte) => {
   return rest;
 });
 
-/** CRC-32C (Castagnoli), as an unsigned number. */
+/** CRC-32C (Castagnoli) as an unsigned number. */
 export function crc32c(bytes: Uint8Array): number {
   let rest = 0xffffffff;
   for (const byte of bytes) rest = table[(rest ^ byte) & 0xff]! ^ (rest >>> 8);

@@ -1,13 +1,13 @@
 import { LpdeformError } from "./errors.js";
 import type { QuantizedSurface } from "./types.js";
 
-/** In place where the bytes lie at a multiple of four, as the server sees to; otherwise of one copy. */
+/** A view if the bytes are aligned to a multiple of four, which the server makes sure of; otherwise a copy. */
 export function float32View(bytes: Uint8Array): Float32Array {
   const aligned = bytes.byteOffset % 4 === 0 ? bytes : bytes.slice();
   return new Float32Array(aligned.buffer, aligned.byteOffset, aligned.byteLength / 4);
 }
 
-/** As float32View(), at a multiple of eight. */
+/** Like float32View(), aligned to a multiple of eight. */
 export function float64View(bytes: Uint8Array): Float64Array {
   const aligned = bytes.byteOffset % 8 === 0 ? bytes : bytes.slice();
   return new Float64Array(aligned.buffer, aligned.byteOffset, aligned.byteLength / 8);
@@ -57,14 +57,14 @@ export function normalsOf({ normals }: QuantizedSurface): Float32Array {
 type Decoder = (typeof import("meshoptimizer/decoder"))["MeshoptDecoder"];
 let decoder: Decoder | undefined;
 
-/** To be awaited before the first compressed frame; loads meshoptimizer's decoder, which nobody else pays for. */
+/** Loads meshoptimizer's decoder, only if it is needed. Await it before the first compressed frame. */
 export async function loadDecompressor(): Promise<void> {
   const { MeshoptDecoder } = await import("meshoptimizer/decoder");
   await MeshoptDecoder.ready;
   decoder = MeshoptDecoder;
 }
 
-/** A block of `count` times four 16-bit integers. */
+/** Decompresses a block of `count` times four 16-bit integers. */
 export function decompress(block: Uint8Array, count: number): Uint8Array {
   const bytes = new Uint8Array(8 * count);
   try {

@@ -3,7 +3,7 @@ import { Code, ConnectError } from "@connectrpc/connect";
 import type { Fault } from "./gen/lpdeform/v1/service_pb.js";
 import type { Reason } from "./reasons.js";
 
-/** Of google.rpc.Code: "invalid_argument" and so on. */
+/** The names of google.rpc.Code: "invalid_argument" and so on. */
 export type ErrorCode = keyof typeof names;
 
 const names = {
@@ -28,15 +28,15 @@ const names = {
 const codes = new Map<number, ErrorCode>(Object.entries(names).map(([name, code]) => [code, name as ErrorCode]));
 
 export interface ErrorDetails {
-  /** Stable (proto/errors.md); empty where the server was not reached. */
+  /** Stable (proto/errors.md); empty if the server was not reached. */
   reason?: Reason;
   /** What is wrong: "vertex 17". May be empty. */
   element?: string;
-  /** The bound that was broken. May be empty. */
+  /** The limit that was violated. May be empty. */
   limit?: string;
-  /** Of the update that it is about; 0 where it is about none. */
+  /** The update that the error is about; 0 if none. */
   inputSeq?: number;
-  /** Try again after this long; 0 where trying again does not help. */
+  /** When to retry; 0 if a retry does not help. */
   retryAfterMs?: number;
 }
 
@@ -85,7 +85,7 @@ export function sessionClosed(): LpdeformError {
 
 export const cannotBeReached = "The server cannot be reached.";
 
-/** Whatever a call has thrown. */
+/** Converts anything that a call has thrown. */
 export function fromCall(thrown: unknown): LpdeformError {
   if (thrown instanceof LpdeformError) return thrown;
   const error = ConnectError.from(thrown);
@@ -96,13 +96,13 @@ export function fromCall(thrown: unknown): LpdeformError {
     if (detail.type === "google.rpc.ErrorInfo") readErrorInfo(detail.value, details);
     if (detail.type === "google.rpc.RetryInfo") details.retryAfterMs = readRetryInfo(detail.value);
   }
-  // What fetch throws where nobody listens, or the connection breaks.
+  // What fetch throws if no server listens, or if the connection breaks.
   const isNetwork = error.cause instanceof TypeError || thrown instanceof TypeError;
   const code = isNetwork ? "unavailable" : (codes.get(error.code) ?? "unknown");
   return new LpdeformError(code, isNetwork ? cannotBeReached : error.rawMessage, details, thrown);
 }
 
-/** Calls `visit` for each field of a serialised message; it reads the value where it returns true. */
+/** Calls `visit` for each field of a serialized message. If `visit` returns true, it has read the value. */
 function forEachField(bytes: Uint8Array, visit: (field: number, reader: BinaryReader) => boolean): void {
   const reader = new BinaryReader(bytes);
   while (reader.pos < reader.len) {
@@ -111,7 +111,8 @@ function forEachField(bytes: Uint8Array, visit: (field: number, reader: BinaryRe
   }
 }
 
-// Field numbers of google/rpc/error_details.proto, which never change; reading by them spares users those messages.
+// Field numbers of google/rpc/error_details.proto, which never change. Reading them directly keeps those
+// messages out of users' pages.
 
 function readErrorInfo(bytes: Uint8Array, details: ErrorDetails): void {
   forEachField(bytes, (field, reader) => {

@@ -8,7 +8,7 @@ type Surface<Numbers> = Record<"positions" | "distortion" | "normals", Numbers>;
 const none = new Float32Array(0);
 const noDoubles = new Float64Array(0);
 
-/** A frame as it is put together: its numbers as they came, or decoded when they are first asked for. */
+/** A frame as it is assembled. Its numbers are stored as received, or decoded when they are first read. */
 export class WireFrame implements Frame {
   readonly inputSeq: number;
   readonly frameSeq: number;
@@ -24,7 +24,7 @@ export class WireFrame implements Frame {
   readonly method: string;
   wireBytes = 0;
   receivedAt = 0;
-  /** Doubles only where FrameAssembly was told to expect them. */
+  /** Doubles only if FrameAssembly was told to expect them. */
   raw: Surface<Float32Array | Float64Array> = { positions: none, distortion: none, normals: none };
   quantized: QuantizedSurface | undefined;
   readonly #decoded: Partial<Surface<Float32Array>> = {};

@@ -1,5 +1,5 @@
 import { LpdeformError } from "./errors.js";
-import { type Buffer, Scalar, type Vector3 as WireVector } from "./gen/lpdeform/v1/data_pb.js";
+import { type Buffer, Scalar } from "./gen/lpdeform/v1/data_pb.js";
 import { StopReason } from "./gen/lpdeform/v1/frame_pb.js";
 import {
   type Handle as WireHandle,
@@ -10,6 +10,7 @@ import {
 } from "./gen/lpdeform/v1/handle_pb.js";
 import type { MeshReport as WireMeshReport } from "./gen/lpdeform/v1/report_pb.js";
 import { NoticeReason, type Notice as WireNotice } from "./gen/lpdeform/v1/service_pb.js";
+import { holdFromWire, vectorOf } from "./hold_kinds.js";
 import type * as api from "./types.js";
 
 // From messages of the contract to the values of this library.
@@ -33,7 +34,7 @@ export function noticeFromWire({ reason, text }: WireNotice): api.Notice {
   return { reason: reason === NoticeReason.RECOVERED ? "recovered" : "other", text };
 }
 
-/** As in reports: "quasi_newton". Empty where none runs. */
+/** As in reports: "quasi_newton". Empty if no method runs. */
 export function methodName(method: Method): string {
   return method === Method.UNSPECIFIED ? "" : (Method[method]?.toLowerCase() ?? "");
 }
@@ -83,20 +84,6 @@ function handleFromWire({ vertices, points, motion, hold, footprintRadius }: Wir
   };
 }
 
-function holdFromWire(hold: WireHandle["hold"]): api.Hold {
-  switch (hold.case) {
-    case "soft":
-    case "orientation":
-      return { kind: hold.case, ...(hold.value.weight !== undefined && { weight: hold.value.weight }) };
-    case "axisLock":
-      return { kind: "axisLock", axis: vectorOf(hold.value.axis) };
-    case "planeLock":
-      return { kind: "planeLock", normal: vectorOf(hold.value.normal) };
-    default:
-      return { kind: "exact" };
-  }
-}
-
 function motionFromWire({ kind }: WireMotion): api.Motion {
   if (kind.case === "rigid") {
     const { axis, angleRadians, center, translation } = kind.value;
@@ -119,11 +106,7 @@ function pointsFromWire({ faces, scalar, barycentric }: SurfacePoints): api.Surf
   }));
 }
 
-function vectorOf(vector: WireVector | undefined): api.Vector3 {
-  return [vector?.x ?? 0, vector?.y ?? 0, vector?.z ?? 0];
-}
-
-/** Of their own: messages are views of what came. */
+/** A copy of the bytes, because messages are views of the received data. */
 function bytesOf(buffer: Buffer | undefined, width: number): ArrayBuffer {
   const bytes = buffer?.source.case === "inline" ? buffer.source.value : new Uint8Array();
   if (bytes.byteLength % width === 0) return bytes.slice().buffer as ArrayBuffer;

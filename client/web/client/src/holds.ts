@@ -1,13 +1,13 @@
-/** What is under way in a session, as far as holds ask. */
+/** The state of a session's updates, as far as holds need it. */
 export interface Traffic {
-  /** No update is on its way. */
+  /** Whether no update is under way. */
   isQuiet(): boolean;
   isClosed(): boolean;
   /** Updates may be sent again. */
   released(): void;
 }
 
-/** Keeps updates from being sent while a call is made that none may overtake. */
+/** Keeps updates from being sent during a call that no update may overtake. */
 export class Holds {
   #count = 0;
   #isUndoing = false;
@@ -15,19 +15,19 @@ export class Holds {
 
   constructor(readonly traffic: Traffic) {}
 
-  /** No update may be sent. */
+  /** Whether updates are held back. */
   get areThere(): boolean {
     return this.#count > 0;
   }
 
-  /** Waits until no update is on its way, and keeps others from being sent until the result is called. */
+  /** Waits until no update is under way, and holds updates back until the returned function is called. */
   async updates(signal: AbortSignal): Promise<() => void> {
     ++this.#count;
     await this.#until(() => this.traffic.isQuiet() && !this.#isUndoing, signal);
     return () => this.#letGo();
   }
 
-  /** As updates(), and keeps solves from beginning, too; waits for those that there are. Rejects where the signal ends it. */
+  /** Like updates(), but also keeps solves from beginning, after waiting for those under way. Rejects if the signal aborts. */
   async all(signal: AbortSignal): Promise<() => void> {
     const isFree = () => this.#count === 0;
     while (!isFree() && !signal.aborted) await this.#until(isFree, signal);
@@ -41,7 +41,7 @@ export class Holds {
     };
   }
 
-  /** Something has ended: whoever waits looks again. */
+  /** Something has ended: those who wait check again. */
   readonly wake = () => {
     for (const resolve of this.#waiting) resolve();
     this.#waiting.clear();

@@ -15,10 +15,10 @@ import {
 } from "./gen/lpdeform/v1/service_pb.js";
 import { isSessionLost } from "./verdict.js";
 
-/** What streams ask of the server. */
+/** The calls to the server that streams need. */
 export interface StreamCalls {
   readonly client: Pick<Client<typeof DeformService>, "streamSessions">;
-  /** What is silent for longer is dead. A stream that opens says how long that is. */
+  /** A stream that is silent for longer counts as dead. The server gives the interval when a stream opens. */
   longestSilenceMs: number;
   call(
     name: "ackFrames",
@@ -27,7 +27,7 @@ export interface StreamCalls {
   ): Promise<unknown>;
 }
 
-/** Takes what comes on a lane. `opened` comes again whenever the stream was opened anew; `ended` comes once, and last. */
+/** Takes the messages of a lane. `opened` comes whenever the stream was opened again; `ended` comes once, as the last. */
 export interface LaneSink {
   opened(opened: StreamOpened): void;
   part(part: FramePart): void;
@@ -35,24 +35,23 @@ export interface LaneSink {
   goAway(goAway: GoAway): void;
   notice(notice: Notice): void;
   ended(error?: LpdeformError): void;
-  /** Nothing is to be sent, and nobody waits but to see what comes. */
+  /** Whether nothing is to be sent, and no caller waits for a frame. */
   isQuiet(): boolean;
-  /** The stream rests; `opened` comes when it goes on. */
+  /** The stream pauses; `opened` comes when it continues. */
   resting(): void;
 }
 
 export type WireFrameOptions = MessageInitShape<typeof FrameOptionsSchema>;
 
 const mostLanes = 16;
-/** How often a hidden page looks whether its stream may rest. */
+/** How often a hidden page checks whether its stream may pause. */
 const restIntervalMs = 10_000;
 
 /**
- * The frames of all sessions of a page on one stream. Over plain HTTP a browser has six connections to an origin, for all its
- * tabs together; a stream holds one of them for as long as it lives. So a page that is hidden, and has nothing to
- * send, lets its stream rest until it is seen again or has an update: frames under way are for nobody, and a page that is hidden
- * may not even take them. A session that comes along or goes away makes
- * the stream be opened anew, with the newest frame of each first.
+ * The frames of all sessions of a page on one stream. Over plain HTTP a browser allows six connections to an origin for all its
+ * tabs together, and a stream holds one of them for as long as it lives. So a hidden page that has nothing to send pauses its
+ * stream until it is visible again or has an update: frames are of no use meanwhile, and a hidden page may not even be able to
+ * take them. When a session is added or removed, the stream is opened again, with the newest frame of each session first.
  */
 export class StreamHub {
   readonly #streams = new Set<SharedStream>();
@@ -78,7 +77,7 @@ export class StreamHub {
 
 /** One session's part of a stream. */
 export class Lane {
-  /** Of the stream that there is; empty until it is open. */
+  /** The id of the present stream; empty until it is open. */
   streamId = "";
   refusal: LpdeformError | undefined;
   readonly #abort = new AbortController();
@@ -91,18 +90,18 @@ export class Lane {
     readonly options: WireFrameOptions,
     readonly sink: LaneSink,
     readonly close: () => void,
-    /** There is an update, or somebody waits for a frame: a stream that rests has to go on. */
+    /** There is an update, or a caller waits for a frame: a paused stream must continue. */
     readonly wake: () => void,
   ) {}
 
-  /** This frame of that stream and all before it have been taken; gives their credit back. */
+  /** Returns the credit of this frame of this stream and of all frames before it. */
   acknowledge(frameSeq: number, streamId: string): void {
     if (streamId !== this.streamId) return;
     this.#ackDue = Math.max(this.#ackDue, frameSeq);
     if (!this.#isAcking) void this.#sendAcks();
   }
 
-  /** There is no stream, until another one is open. */
+  /** There is no stream until another one is open. */
   beginsAnew(): void {
     this.streamId = "";
     this.#ackDue = 0;
@@ -119,7 +118,7 @@ export class Lane {
     this.sink.ended(error);
   }
 
-  /** One call at a time, with what is newest. */
+  /** One call at a time, for the newest frame. */
   async #sendAcks(): Promise<void> {
     this.#isAcking = true;
     let sent = "";
@@ -131,7 +130,7 @@ export class Lane {
       try {
         await this.calls.call("ackFrames", { session, streamId, frameSeq }, this.#abort.signal);
       } catch (thrown) {
-        // Without credit the stream would stay silent. One that was replaced meanwhile needs none.
+        // Without credit the stream would stay silent. A stream that was replaced meanwhile needs none.
         if (streamId === this.streamId && !this.#abort.signal.aborted) {
           const error = thrown as LpdeformError;
           this.close();
@@ -143,7 +142,7 @@ export class Lane {
   }
 }
 
-/** A StreamSessions call, made anew as lanes come. Dead after three heartbeats of silence. */
+/** A StreamSessions call, repeated when lanes are added. It counts as dead after three heartbeats of silence. */
 class SharedStream {
   readonly lanes = new Set<Lane>();
   #call: AbortController | undefined;
@@ -233,8 +232,8 @@ class SharedStream {
     } catch (thrown) {
       error = call.signal.reason instanceof LpdeformError ? call.signal.reason : fromCall(thrown);
     }
-    if (this.#call !== call) return; // replaced, or given up
-    call.abort(); // where the failure was ours, the server is to know
+    if (this.#call !== call) return; // replaced or given up
+    call.abort(); // if the failure was on this side, tells the server
     const left = [...this.lanes];
     this.lanes.clear();
     this.#end();
@@ -265,7 +264,7 @@ class SharedStream {
     }
   }
 
-  /** What does not fit ends its session's lane; the others' frames go on. */
+  /** An error in a session's messages ends that session's lane; other lanes go on. */
   #fit(lane: Lane, take: () => void): void {
     try {
       take();

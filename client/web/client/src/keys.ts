@@ -1,8 +1,10 @@
 import { LpdeformError } from "./errors.js";
+import { checkHold } from "./hold_kinds.js";
+import { checkKeys, checkVector, checkVectors, checkWord, isNumbers, mistyped, refused } from "./key_checks.js";
 import type * as api from "./types.js";
 
-// What callers hand over, key by key: one that is not known is refused by name, since ignoring it would do something else than was
-// meant. The compiler sees to it that no key of types.ts is missing here.
+// The keys of what callers pass in. An unknown key is refused by name, because ignoring it would not do what the caller meant. The
+// compiler makes sure that no key of types.ts is missing here.
 
 type Keys<Bag> = Readonly<Record<Bag extends unknown ? keyof Bag : never, true>>;
 
@@ -52,14 +54,6 @@ const solver: Keys<api.SolverSettings> = {
   initial: true,
 };
 const resize: Keys<api.Resize> = { scale: true, origin: true, axes: true };
-const weight = { kind: true, weight: true } as const;
-const holds: Readonly<Record<api.Hold["kind"], Readonly<Record<string, true>>>> = {
-  exact: { kind: true },
-  soft: weight,
-  orientation: weight,
-  axisLock: { kind: true, axis: true },
-  planeLock: { kind: true, normal: true },
-};
 
 const methods: Readonly<Record<api.Method, true>> = {
   auto: true,
@@ -117,7 +111,7 @@ export function checkSolveOptions(given: api.SolveOptions | api.DoubleSolveOptio
   if ("scalar" in given) checkWord(given.scalar, { float64: true }, "scalar");
 }
 
-/** Of calls that take few: `known` by name. */
+/** For calls with few options, whose names are `known`. */
 export function checkCallOptions(given: object, ...known: string[]): void {
   checkKeys(given, Object.fromEntries(known.map((key) => [key, true])), "options");
 }
@@ -143,11 +137,7 @@ function checkHandle(given: api.Handle, owner: string): void {
   checkKeys(given, handle, owner);
   for (const one of given.points ?? []) checkKeys(one, point, `a point of ${owner}`);
   if (given.motion !== undefined) checkMotion(given.motion, owner);
-  if (!given.hold) return;
-  checkWord(given.hold.kind, holds, `hold of ${owner}`);
-  checkKeys(given.hold, holds[given.hold.kind], `hold of ${owner}`);
-  if (given.hold.kind === "axisLock") checkVector(given.hold.axis, `axis of ${owner}`);
-  if (given.hold.kind === "planeLock") checkVector(given.hold.normal, `normal of ${owner}`);
+  if (given.hold) checkHold(given.hold, owner);
 }
 
 function checkMotion(given: api.Motion, owner: string): void {
@@ -178,49 +168,7 @@ function checkField(value: unknown, field: string): void {
   if (!isNumbers(value)) checkKeys(value, { automatic: true }, field);
 }
 
-/** Vectors among the values of `given`. */
-function checkVectors<Bag extends object>(given: Bag, keys: readonly (keyof Bag & string)[], owner: string): void {
-  for (const key of keys) checkVector(given[key], `${key} of ${owner}`);
-}
-
-function checkVector(value: unknown, element: string): void {
-  if (value === undefined) return;
-  const isVector =
-    typeof value === "object" &&
-    value !== null &&
-    isNumbers(value) &&
-    (value as ArrayLike<unknown>).length === 3 &&
-    Array.from(value as ArrayLike<unknown>).every((number) => typeof number === "number");
-  if (!isVector) throw mistyped(`${element} is ${JSON.stringify(value)}`, element, "three numbers");
-}
-
 function checkEncodings({ encoding, lowestEncoding }: api.FrameOptions): void {
   checkWord(encoding, encodings, "encoding");
   checkWord(lowestEncoding, encodings, "lowestEncoding");
-}
-
-function isNumbers(value: object): boolean {
-  return Array.isArray(value) || ArrayBuffer.isView(value);
-}
-
-function checkKeys(given: object, known: Readonly<Record<string, true>>, element: string): void {
-  for (const key of Object.keys(given)) {
-    if (!Object.hasOwn(known, key)) throw refused(`${element} has the unknown key "${key}"`, element, known);
-  }
-}
-
-function checkWord(given: string | undefined, known: Readonly<Record<string, unknown>>, element: string): void {
-  if (given === undefined || Object.hasOwn(known, given)) return;
-  throw refused(`${element} is "${given}", which is not known`, element, known);
-}
-
-function mistyped(what: string, element: string, limit: string): LpdeformError {
-  const text = `${what[0]!.toUpperCase()}${what.slice(1)}; it must be ${limit}.`;
-  return new LpdeformError("invalid_argument", text, { reason: "ARRAY_TYPE", element, limit });
-}
-
-function refused(what: string, element: string, known: object): LpdeformError {
-  const limit = Object.keys(known).join(", ");
-  const text = `${what[0]!.toUpperCase()}${what.slice(1)}; known are ${limit}.`;
-  return new LpdeformError("invalid_argument", text, { reason: "UNKNOWN_KEY", element, limit });
 }

@@ -8,7 +8,7 @@ import type { Mesh, MeshReport, OpenOptions } from "./types.js";
 import { Uploads } from "./upload.js";
 import { isUndecided } from "./verdict.js";
 
-/** What a client holds of a session on the server. */
+/** What a client knows of its session on the server. */
 export interface Lease {
   session: string;
   /** Empty for a reader. */
@@ -16,19 +16,19 @@ export interface Lease {
   epoch: number;
   inputSeq: number;
   report: MeshReport;
-  /** The header lpdeform-session that leads to it, where one is known. */
+  /** The header lpdeform-session that leads to the session's server, if one is known. */
   route?: string;
 }
 
-/** What a session that was lost can be made anew from. */
+/** What a lost session can be recreated from. */
 export interface Copy {
-  /** The same session for the same request id. */
+  /** Idempotent: the same request id gives the same session. */
   make(requestId: string, signal: AbortSignal): Promise<Lease>;
-  /** Without handles. */
+  /** Whether the copy has no handles. */
   isBare: boolean;
 }
 
-/** Makes a session. The same request id gives the same session, however often it is tried. */
+/** Creates a session. It is idempotent: the same request id gives the same session, however often it is tried. */
 export async function createSession(
   rpc: Rpc,
   mesh: Mesh,
@@ -61,7 +61,7 @@ export async function createSession(
   }
 }
 
-/** What a server says that made a session. */
+/** The lease from the answer of a server that created a session. */
 export function leaseOf(session: WireSession | undefined, writerToken: string): Lease {
   if (!session?.mesh) throw new LpdeformError("internal", "The server made a session and did not say which.");
   return {
@@ -73,7 +73,7 @@ export function leaseOf(session: WireSession | undefined, writerToken: string): 
   };
 }
 
-/** Throws where a server speaks of `count` vertices of a mesh that has `wanted`: arrays are made for those. */
+/** Throws if a server reports `count` vertices for a mesh that has `wanted`: arrays have the latter size. */
 export function checkVertexCount(count: number, wanted: number): void {
   if (count === wanted) return;
   throw new LpdeformError("data_loss", `The server speaks of ${count} vertices of a mesh that has ${wanted}.`, {
@@ -82,7 +82,7 @@ export function checkVertexCount(count: number, wanted: number): void {
   });
 }
 
-/** The header that leads to a session which is at another of several servers; empty where the error says nothing of that. */
+/** The header that leads to a session on another of several servers; empty if the error does not name one. */
 export function routeOf(error: LpdeformError): string {
   const said = "lpdeform-session: ";
   const isElsewhere = error.reason === "SESSION_ELSEWHERE" && error.limit.startsWith(said);

@@ -1,6 +1,6 @@
 import type { HandleChange, Settings, Update } from "./types.js";
 
-/** An update and its number, which the server knows as input_seq. */
+/** An update and its number, the input_seq for the server. */
 export interface NumberedUpdate {
   seq: number;
   update: Update;
@@ -8,7 +8,10 @@ export interface NumberedUpdate {
 
 const resizeHandle = "resize";
 
-/** `newer` on top of `older`: the newest value of each handle and setting wins; a motion moves a handle that `older` adds. */
+/**
+ * `older` and then `newer` as one update: the newest value of each handle and setting wins; a motion moves a handle that
+ * `older` adds.
+ */
 export function merged(older: Update, newer: Update): Update {
   // Without a prototype, so that a handle may have any name.
   const handles: Record<string, HandleChange> = Object.assign(Object.create(null), older.handles);
@@ -31,14 +34,14 @@ export function merged(older: Update, newer: Update): Update {
   return { handles, settings, ...(resize && { resize }), ...(beginsStep && { beginsStep }) };
 }
 
-/** What is there once motions and removals have been carried out. */
+/** The state after all motions and removals have been carried out. */
 function settled(state: Update): Update {
   const kept = Object.entries(state.handles ?? {}).filter(([, change]) => "set" in change);
   const { beginsStep: _, ...lasting } = state;
   return { ...lasting, handles: Object.assign(Object.create(null), Object.fromEntries(kept)) };
 }
 
-/** Bounds what is remembered of handles that are there no more. Motions stay: of handles that the session was made with. */
+/** Limits how many removed handles are remembered. Motions stay: they may move handles that the session was created with. */
 function withoutOldRemovals(update: Update): Update {
   const entries = Object.entries(update.handles ?? {});
   const kept = entries.filter(([, change]) => !("remove" in change));
@@ -57,30 +60,35 @@ function isMovesOnly({ update }: NumberedUpdate): boolean {
 }
 
 /**
- * The writer's book of updates: what the server has accepted (all that is needed to make the session anew), what is on its
- * way, and what waits (merged into one). Bounded by the size of the handles and settings themselves.
+ * The writer's record of updates: what the server has accepted (which is enough to recreate the session), what is under way,
+ * and what waits, coalesced into one update. Its size is bounded by the handles and settings themselves.
  */
 export class Ledger {
-  /** Updates on their way; of these, several at a time only where all merely move handles, so that order does not matter. */
+  /**
+   * How many updates may be under way. There are several only if all of them merely move handles, so that their order does not
+   * matter.
+   */
   static readonly window = 2;
-  /** Handles of which it is remembered that they were let go of; of more than that, none. */
+  /** How many removed handles are remembered. If there are more, all of them are forgotten. */
   static readonly mostRemovals = 8192;
 
   #nextSeq = 1;
   #epoch = 0;
   #accepted: NumberedUpdate = { seq: 0, update: {} };
-  /** What was accepted since the server last kept something, as it came. */
+  /** Accepted since the server last stored something, as sent. */
   #unkept: NumberedUpdate = { seq: 0, update: {} };
   #restore: NumberedUpdate | undefined;
   #inFlight: NumberedUpdate[] = [];
-  /** Updates that were answered, and whether they were kept. */
+  /** Updates that were answered, and whether they were stored. */
   readonly #answered = new Map<NumberedUpdate, boolean>();
   #waiting: NumberedUpdate | undefined;
 
-  /** `beginsBare`: a session made anew has no handles but those of this book, else also those that it is made with. */
+  /**
+   * `beginsBare`: whether a recreated session has no handles but those recorded here; otherwise it also has those of its copy.
+   */
   constructor(readonly beginsBare = true) {}
 
-  /** Takes an update on; returns its number. */
+  /** Accepts an update and returns its number. */
   add(update: Update): number {
     const seq = this.#nextSeq++;
     this.#waiting = { seq, update: merged(this.#waiting?.update ?? {}, update) };
@@ -94,7 +102,7 @@ export class Ledger {
     return this.#inFlight.length < Ledger.window && [...this.#inFlight, next].every(isMovesOnly);
   }
 
-  /** What sendNext() gives is the state that a lost session had. */
+  /** Whether sendNext() will return the state of a lost session. */
   get hasRestore(): boolean {
     return this.#restore !== undefined;
   }
@@ -107,32 +115,43 @@ export class Ledger {
     return this.#inFlight.length > 0;
   }
 
-  /** What is to be sent next, now on its way. */
+  /** The next update to send, which is now under way. */
   sendNext(): NumberedUpdate {
     const next = this.#restore ?? this.#waiting;
     if (!next) throw new Error("nothing waits");
     if (this.#restore) this.#restore = undefined;
     else this.#waiting = undefined;
-    const sent = { ...next }; // each sending is one of its own
+    const sent = { ...next }; // each sending is an object of its own
     this.#inFlight.push(sent);
     return sent;
   }
 
   /**
-   * Whether it waits for an answer yet. After connectionLost() it does not: what it held is sent again, perhaps with more, and an
-   * answer that comes late says nothing of that.
+   * Whether the update still waits for an answer. After connectionLost() it does not: its contents are sent again, perhaps with
+   * more, and a late answer to the first sending is ignored.
    */
   isInFlight(sent: NumberedUpdate): boolean {
     return this.#inFlight.includes(sent);
   }
 
   /**
-   * The server has taken what sendNext() gave. Taken on in the order of sending, however answers overtake each other.
-   * `isKept`: it, and all taken before it, survive the end of the server.
+   * The server has accepted the update from sendNext(). Updates are recorded in the order of sending, whatever the order of the
+   * answers. `isKept`: this update and all accepted before it survive a restart of the server.
    */
   accept(sent: NumberedUpdate, isKept = false): void {
     if (this.isInFlight(sent)) this.#answered.set(sent, isKept);
+    else if (isKept && sent.seq >= this.#unkept.seq) this.#unkept = { seq: 0, update: {} }; // shown before it was answered
     this.#takeAnswered();
+  }
+
+  /**
+   * A frame shows the update of this number. If it is of the present epoch, the update is ours, so the server has taken it,
+   * though its answer may still be on its way. Earlier updates without an answer may have been refused: then nothing changes
+   * until they are answered.
+   */
+  show(epoch: number, seq: number): void {
+    const [first] = this.#inFlight;
+    if (epoch === this.#epoch && first?.seq === seq) this.accept(first);
   }
 
   #takeAnswered(): void {
@@ -158,34 +177,34 @@ export class Ledger {
     };
   }
 
-  /** A number for a change that the server makes by itself. */
+  /** A number for a change that the server computes itself. */
   takeNumber(): number {
     return this.#nextSeq++;
   }
 
-  /** The change of that number. */
+  /** Records the change with that number. */
   acceptChange(change: NumberedUpdate, isKept: boolean): void {
     this.#takeOn(change, isKept);
   }
 
-  /** The server has refused what sendNext() gave. */
+  /** The server has refused the update from sendNext(). */
   refuse(sent: NumberedUpdate): void {
     this.#inFlight = this.#inFlight.filter((one) => one !== sent);
     this.#takeAnswered();
   }
 
   /**
-   * The session goes on, and the newest update that it has is `seq`: what it took after that and did not keep is to be sent
-   * first, on its own.
+   * The session continues, and its newest update is `seq`. Updates that the server accepted after that and did not store are
+   * sent first, by themselves.
    */
   resumedAt(seq: number): void {
     if (seq < this.#unkept.seq) this.#restore ??= { seq: this.#accepted.seq, update: this.#unkept.update };
   }
 
   /**
-   * The same of a session that is at `epoch`. In a newer one than before another server has it, and its newest update says
-   * nothing of those before that: a call may have brought it there. So all that was not kept is sent; of what the server has
-   * that changes nothing.
+   * The same for a session that is now at `epoch`. A newer epoch means that another server has the session. Its newest update
+   * may have come by a single call, so earlier updates may be missing. Therefore everything that was not stored is sent again;
+   * values that the server has already do no harm.
    */
   reopened(epoch: number, seq: number): void {
     const isAnother = epoch > this.#epoch;
@@ -193,17 +212,17 @@ export class Ledger {
     this.resumedAt(isAnother ? 0 : seq);
   }
 
-  /** Of a session just made, joined or taken over. */
+  /** The session was just created, joined or taken over. */
   beginEpoch(epoch: number): void {
     this.#epoch = epoch;
   }
 
-  /** What was on its way waits again. Sending it twice does no harm, it is the same value. */
+  /** Updates under way wait again. Sending them twice does no harm, because they have the same values. */
   connectionLost(): void {
     let again: NumberedUpdate | undefined;
     for (const sent of this.#inFlight) {
       if (sent.seq === this.#accepted.seq)
-        this.#restore = sent; // an unanswered restore stays on its own
+        this.#restore = sent; // an unanswered restore stays separate
       else again = { seq: sent.seq, update: merged(again?.update ?? {}, sent.update) };
     }
     this.#inFlight = [];
@@ -214,13 +233,13 @@ export class Ledger {
       : again;
   }
 
-  /** The server has lost the session: what it had accepted is to be sent first, on its own. */
+  /** The server has lost the session: its accepted state is sent first, by itself. */
   sessionLost(): void {
     this.connectionLost();
     if (this.#accepted.seq > 0) this.#restore = this.#accepted;
   }
 
-  /** Another writer took over: what the server has not taken is void, and so is what it took and may have lost. */
+  /** Another writer took over: drops everything that the server has not accepted, and everything that it may have lost. */
   dropUnaccepted(): void {
     this.#restore = undefined;
     this.#unkept = { seq: 0, update: {} };
@@ -229,14 +248,14 @@ export class Ledger {
     this.#waiting = undefined;
   }
 
-  /** Numbers that follow are higher than `seq`, the newest that the server knows. */
+  /** Later numbers are higher than `seq`, the newest that the server knows. */
   countFrom(seq: number): void {
     if (this.#nextSeq > seq) return;
     this.#nextSeq = seq + 1;
     if (this.#waiting) this.#waiting = { ...this.#waiting, seq: this.#nextSeq++ };
   }
 
-  /** The newest update that was not refused; 0 where there is none. */
+  /** The newest update that was not refused; 0 if there is none. */
   get newest(): number {
     return this.#waiting?.seq ?? Math.max(this.#accepted.seq, ...this.#inFlight.map((one) => one.seq));
   }

@@ -18,8 +18,8 @@ import { isUndecided } from "./verdict.js";
 import { Pauses } from "./waiting.js";
 
 /**
- * A session from within: the lease on the server's session, the ledger of updates, the box of frames, and the feed that is
- * kept alive between them.
+ * The inside of a session: the lease on the server's session, the ledger of updates, the box of frames, and the stream of
+ * frames that is kept open.
  */
 export class Link {
   readonly box = new FrameBox();
@@ -31,34 +31,34 @@ export class Link {
     isClosed: () => this.isClosed,
     released: () => this.#send(),
   });
-  /** Its handles were sent in one update, after it was lost. */
+  /** Whether the session was lost and all its handles were sent again in one update. */
   isMadeAnew = false;
-  /** What ended the stream of frames the last time that one did. */
+  /** What ended the stream of frames the last time. */
   interruption: LpdeformError | undefined;
   #lease: Lease;
   #lane: Lane | undefined;
   #assembly = new FrameAssembly(0);
   #goAway: GoAway | undefined;
-  /** The stream ended or rests: a server may go on meanwhile from an older state. Updates wait until it says from which. */
+  /** Set while no stream is open: the server may continue from an older state. Updates wait until it says which. */
   #mayHaveGoneBack = false;
   #connection: Connection = "idle";
   #notice: Notice | undefined;
-  /** Who waits for frames whether they can be seen or not. */
+  /** How many callers wait for frames even if the page is hidden. */
   #waitingForFrames = 0;
   #isStreaming = false;
   #isSending = false;
   #requestId = newRequestId();
   #making: Promise<void> | undefined;
-  /** When the stream was opened that there is. */
+  /** When the present stream was opened. */
   #openedAt: number | undefined;
   #downSince: number | undefined;
-  /** The last update whose uploads the server knew no more. */
+  /** The last update that was sent again because the server had lost its uploads. */
   #sentAgain = 0;
   #over: LpdeformError | undefined; // nothing is tried any more, for this reason
-  /** Before the next try. */
+  /** Pauses before the next try. */
   readonly #pauses = new Pauses(this.stop.signal);
   readonly #rules: RecoveryRules;
-  /** Of updates where the server is away. */
+  /** For updates while the server is away. */
   readonly #backoff = new Backoff();
 
   constructor(
@@ -87,7 +87,7 @@ export class Link {
     return this.#notice;
   }
 
-  /** Nothing is tried, for now or for good. */
+  /** Whether nothing is tried, for now or for good. */
   get #isOver(): boolean {
     return this.isClosed || this.#over !== undefined;
   }
@@ -96,7 +96,7 @@ export class Link {
     return this.stop.signal.aborted;
   }
 
-  /** Throws where the session takes no updates of ours. */
+  /** Throws if the session takes no updates from this client. */
   checkWriter(): void {
     if (this.isClosed) throw sessionClosed();
     if (this.#over) throw this.#over;
@@ -122,21 +122,21 @@ export class Link {
     this.#subscribe();
   }
 
-  /** The newest frame not yet taken; taking it tells the server to send on. */
+  /** The newest frame that was not taken. Taking it lets the server send more. */
   take(): Frame | undefined {
     const taken = this.box.take();
     if (taken) this.#lane?.acknowledge(taken.frame.frameSeq, taken.streamId);
     return taken?.frame;
   }
 
-  /** The frame taken last, whoever took it, where it is the finished result of the newest update. */
+  /** The frame taken last, by any caller, if it is the finished result of the newest update. */
   takeResult(): Frame | undefined {
     if (!this.take() && this.box.isClosed) return undefined;
     const last = this.box.lastFinal;
     return last && last.inputSeq >= this.ledger.newest ? last : undefined;
   }
 
-  /** Frames come on a page that is hidden as well, until the result is called. */
+  /** Frames come even if the page is hidden, until the returned function is called. */
   holdStream(): () => void {
     ++this.#waitingForFrames;
     this.startStream();
@@ -180,7 +180,7 @@ export class Link {
       opened: (opened) => {
         checkVertexCount(opened.vertexCount, this.#lease.report.vertices);
         this.#assembly = new FrameAssembly(opened.vertexCount, this.frameOptions.scalar === Scalar.FLOAT64);
-        this.#setNotice(undefined); // what was said was said of another stream
+        this.#setNotice(undefined); // the notice was about an earlier stream
         this.#resumed(Number(opened.epoch), Number(opened.inputSeq));
         this.#openedAt = performance.now();
         this.#downSince = undefined;
@@ -190,8 +190,9 @@ export class Link {
       part: (part) => {
         const frame = this.#assembly.add(part);
         if (frame) this.#rules.frameFitted();
+        if (frame) this.ledger.show(frame.epoch, frame.inputSeq);
         if (!frame || this.box.put(frame, lane.streamId)) return;
-        lane.acknowledge(frame.frameSeq, lane.streamId); // dropped, but its credit is owed
+        lane.acknowledge(frame.frameSeq, lane.streamId); // dropped, but its credit must be returned
       },
       fault: (fault) => {
         const error = fromFault(fault);
@@ -212,7 +213,7 @@ export class Link {
     this.#lane = lane;
   }
 
-  /** The newest update that the server has is `inputSeq`. */
+  /** The server's newest update is `inputSeq`. */
   #resumed(epoch: number, inputSeq: number): void {
     this.#mayHaveGoneBack = false;
     this.box.beginEpoch(epoch);
@@ -220,7 +221,7 @@ export class Link {
     this.ledger.reopened(epoch, inputSeq);
   }
 
-  /** `session`: which the stream was of. */
+  /** `session`: the session that the stream was for. */
   async #recover(ended: LpdeformError | undefined, session: string): Promise<void> {
     if (this.isClosed) return;
     const now = performance.now();
@@ -245,7 +246,7 @@ export class Link {
     if (!this.#isOver) this.#subscribe();
   }
 
-  /** Since the server was there last. */
+  /** Time since the server was last there. */
   #awayMs(): number {
     this.#downSince ??= performance.now();
     return performance.now() - this.#downSince;
@@ -263,14 +264,14 @@ export class Link {
     this.holds.wake();
   }
 
-  /** Once for each session that is lost, however many find that out, and however late. */
+  /** Recreates a lost session once, however many callers notice the loss, and however late. */
   makeAnew(lost: string): Promise<void> {
     if (this.#lease.session !== lost) return Promise.resolve();
     this.#making ??= this.#make().finally(() => (this.#making = undefined));
     return this.#making;
   }
 
-  /** After makeAnew() has failed, and the pause that the server asks for. False where it is the end. */
+  /** After makeAnew() has failed: waits for the pause that the server asks for. False if it must not be tried again. */
   async #mayMakeAgain(failure: LpdeformError): Promise<boolean> {
     const { next, pauseMs } = this.#rules.afterFailedMaking(failure);
     if (next === "giveUp") this.#giveUp(failure);
@@ -301,7 +302,8 @@ export class Link {
 
   async #sendOne(update: NumberedUpdate): Promise<void> {
     const lease = this.#lease;
-    // What was on its way when the connection or the session was lost is sent again, whatever becomes of the first time.
+    // An update that was under way when the connection or the session was lost is sent again, whatever
+    // happens to the first sending.
     try {
       this.ledger.accept(update, await sendUpdate(this.rpc, lease, update, this.stop.signal));
       this.#downSince = undefined;
@@ -320,7 +322,7 @@ export class Link {
       if (error.reason === "UPLOAD_UNKNOWN") this.#sentAgain = update.seq;
       this.#isSending = true;
       this.ledger.connectionLost();
-      // Where no stream says what the server has, once more does no harm.
+      // If no stream says what the server has, sending again does no harm.
       if (!this.#isStreaming && error.code !== "resource_exhausted") this.ledger.resumedAt(0);
       try {
         if (error.code === "resource_exhausted" || error.reason === "UPLOAD_UNKNOWN") this.#downSince = undefined;
@@ -341,12 +343,12 @@ export class Link {
     this.#report(this.#judged(update, error, answer), update.seq, answer);
   }
 
-  /** That the server cannot solve for an update yet is nothing to the caller once a newer one is there. */
+  /** Reports an error, unless it only says that the server cannot solve for the update yet and a newer update is there. */
   #report(why: LpdeformError, seq: number, answer: Answer): void {
     if (answer !== "taken" || seq === 0 || seq >= this.ledger.newest) this.watcher.problem(why);
   }
 
-  /** The server refuses the update, or cannot solve for it yet: what the caller is told. */
+  /** The error to report for an update that the server refuses or cannot solve for yet. */
   #judged(update: NumberedUpdate, error: LpdeformError, answer: Answer): LpdeformError {
     if (answer === "taken") this.ledger.accept(update);
     else this.ledger.refuse(update);
@@ -356,13 +358,13 @@ export class Link {
     return writerReplaced();
   }
 
-  /** Sends what a server that went away may have lost, while updates are held. */
+  /** Sends what a server that went away may have lost, while updates are held back. */
   async sendRestore(signal: AbortSignal): Promise<void> {
     if (this.#mayHaveGoneBack) this.ledger.resumedAt(0);
     while (this.ledger.hasRestore) await this.#sendHeld(signal);
   }
 
-  /** Sends all that waits, while updates are held. Rejects where the server is away, and with what it refuses. */
+  /** Sends everything that waits, while updates are held back. Rejects if the server is away, and with its errors. */
   async sendWaiting(signal: AbortSignal): Promise<void> {
     await this.sendRestore(signal);
     while (this.ledger.hasWaiting) await this.#sendHeld(signal);

@@ -1,7 +1,7 @@
 import type { LpdeformError } from "./errors.js";
 import type { Connection, Notice } from "./types.js";
 
-/** Who is told what becomes of a session. */
+/** Is told what happens to a session. */
 export interface Watcher {
   problem(error: LpdeformError): void;
   connection(state: Connection): void;
@@ -9,8 +9,8 @@ export interface Watcher {
 }
 
 /**
- * Calls what the user of this library gave. What it throws is reported as any fault of the page's, to its "error" event: it is no
- * fault of the session, which goes on.
+ * Calls a user's listener. If it throws, the error is reported as any other error of the page, by its "error" event. It is not
+ * an error of the session, which goes on.
  */
 export function tell<Value>(listener: (value: Value) => void, value: Value): void {
   try {

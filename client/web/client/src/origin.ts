@@ -1,11 +1,12 @@
 import { cannotBeReached, type ErrorDetails, LpdeformError } from "./errors.js";
 
-/** What the probes may take. */
+/** Time limit of the probes. */
 const probeMs = 3000;
 
 /**
- * Browsers say of a call that a proxy does not allow to pages of their address what they say of one that reaches nobody. Where the
- * proxy answers, but not to this page, the error says that and what to do; otherwise it stays as it is.
+ * Browsers report the same error for a call that a proxy does not allow to this page's origin as for a call that reaches no
+ * server. If the proxy answers, but not to this page, the returned error says so and what to do. Otherwise the error stays as
+ * it is.
  */
 export async function explained(error: LpdeformError, baseUrl: string): Promise<LpdeformError> {
   const page = globalThis.location?.origin;

@@ -5,13 +5,16 @@ import { type Buffer, BufferSchema, Scalar } from "./gen/lpdeform/v1/data_pb.js"
 export type Numbers = Float32Array | Float64Array | readonly number[];
 export type Indices = Uint32Array | readonly number[];
 
-/** Inline bytes of one message together; more goes ahead as uploads, so that no message outgrows what servers take. */
+/**
+ * Limit of the inline bytes in one message. More bytes are uploaded beforehand, so that no message exceeds the limit of
+ * servers.
+ */
 const mostInlineBytes = 1 << 20;
 
-/** Sends bytes ahead and returns the name by which a buffer refers to them. */
+/** Uploads bytes and returns the name by which a buffer refers to them. */
 export type Upload = (bytes: Uint8Array) => Promise<string>;
 
-/** Puts runs of numbers into the buffers of one message. To be flushed before the message is sent. */
+/** Puts arrays into the buffers of one message. Call flush() before the message is sent. */
 export class Packer {
   #left = mostInlineBytes;
   readonly #large: { buffer: Buffer; bytes: Uint8Array }[] = [];
@@ -36,7 +39,7 @@ export class Packer {
     return this.pack(bytesOfIndices(indices));
   }
 
-  /** Sends ahead what was too large. */
+  /** Uploads what was too large. */
   async flush(upload: Upload): Promise<void> {
     for (const { buffer, bytes } of this.#large) {
       buffer.source = { case: "upload", value: await upload(bytes) };
@@ -45,14 +48,14 @@ export class Packer {
   }
 }
 
-/** Little-endian, as every browser keeps them. */
+/** Little-endian, the byte order of every browser. */
 export function bytesOfNumbers(numbers: Numbers): { scalar: Scalar; bytes: Uint8Array } {
   if (numbers instanceof Float32Array) return { scalar: Scalar.FLOAT32, bytes: bytesOf(numbers) };
   const doubles = numbers instanceof Float64Array ? numbers : Float64Array.from(numbers);
   return { scalar: Scalar.FLOAT64, bytes: bytesOf(doubles) };
 }
 
-/** Throws where a number is no index: a Uint32Array would take -1 for 4294967295, 1.5 for 1 and NaN for 0. */
+/** Throws if a number is not an index: a Uint32Array would turn -1 into 4294967295, 1.5 into 1 and NaN into 0. */
 export function bytesOfIndices(indices: Indices): Uint8Array {
   if (indices instanceof Uint32Array) return bytesOf(indices);
   const exact = Uint32Array.from(indices);

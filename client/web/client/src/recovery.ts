@@ -8,23 +8,25 @@ export type NextStep = "resume" | "makeAnew" | "giveUp";
 export interface Recovery {
   next: NextStep;
   why: LpdeformError;
-  /** Not to be tried before. */
+  /** How long to wait before the next try. */
   pauseMs: number;
 }
 
 /** How a stream ended. */
 export interface Ending {
-  /** Nothing where it ended without one. */
+  /** Undefined if there was no error. */
   error?: LpdeformError | undefined;
-  /** The server's reason, where it gave one; goes before `error`. */
+  /** The server's reason, if it gave one; it takes precedence over `error`. */
   goAway?: GoAway | undefined;
-  /** For which it was open. */
+  /** How long the stream was open. */
   stoodMs: number;
-  /** Since a stream was open last. */
+  /** Time since a stream was last open. */
   awayMs: number;
 }
 
-/** Growing pauses, 50 ms to 2 s, each spread over its upper half so that clients do not come back all at once. */
+/**
+ * Exponential backoff from 50 ms to 2 s. Each pause is random within its upper half, so that clients do not all return at once.
+ */
 export class Backoff {
   static readonly mostMs = 2000;
   /** The longest pause that a server may ask for. */
@@ -32,10 +34,10 @@ export class Backoff {
   static readonly #firstMs = 50;
   #longestMs = Backoff.#firstMs;
 
-  /** `chance`: from 0 to 1. */
+  /** `chance`: returns a number from 0 to 1. */
   constructor(readonly chance: () => number = Math.random) {}
 
-  /** On top of what the server asks for. */
+  /** The next pause, in addition to what the server asks for. */
   nextMs(askedMs = 0): number {
     const longest = this.#longestMs;
     this.#longestMs = Math.min(2 * longest, Backoff.mostMs);
@@ -52,12 +54,12 @@ export class Backoff {
  * languages replay.
  */
 export class RecoveryRules {
-  /** Streams in a row that may end by something that does not fit, before it is taken to be of another version. */
+  /** How many streams in a row may end with a message that does not fit, before the server counts as one of another version. */
   static readonly mostMisfits = 5;
   readonly backoff: Backoff;
   #misfits = 0;
 
-  /** `hasCopy`: the session can be made anew. Gives up after `reconnectForMs` without an open stream. */
+  /** `hasCopy`: the session can be recreated. Gives up after `reconnectForMs` without an open stream. */
   constructor(
     readonly hasCopy: boolean,
     readonly reconnectForMs: number,
@@ -66,19 +68,19 @@ export class RecoveryRules {
     this.backoff = new Backoff(chance);
   }
 
-  /** A whole frame came. */
+  /** A complete frame came. */
   frameFitted(): void {
     this.#misfits = 0;
   }
 
-  /** Another try is meant. */
+  /** The caller starts again. */
   begin(): void {
     this.#misfits = 0;
     this.backoff.reset();
   }
 
   after({ error, goAway, stoodMs, awayMs }: Ending): Recovery {
-    if (stoodMs >= Backoff.mostMs) this.backoff.reset(); // one that breaks at once is no success
+    if (stoodMs >= Backoff.mostMs) this.backoff.reset(); // a stream that breaks at once is not a success
     const found = goAway ? afterGoAway(goAway, this.hasCopy) : afterError(error, this.hasCopy);
     const isMisfit = found.why.reason === "FRAME_PARTS" && ++this.#misfits >= RecoveryRules.mostMisfits;
     const next = isMisfit || awayMs > this.reconnectForMs ? "giveUp" : found.next;
@@ -86,14 +88,14 @@ export class RecoveryRules {
     return { next, why: found.why, pauseMs: this.backoff.nextMs(askedMs) };
   }
 
-  /** After the session could not be made anew. */
+  /** The session could not be recreated. */
   afterFailedMaking(error: LpdeformError): Recovery {
     const next = isUndecided(error) ? "makeAnew" : "giveUp";
     return { next, why: error, pauseMs: this.backoff.nextMs(error.retryAfterMs) };
   }
 }
 
-/** What an error says of the update that it answers, or that a call was made with. */
+/** What an error means for the update that it answers, or that a call carried. */
 export type Answer = "again" | "makeAnew" | "taken" | "refused";
 
 /** `isSecond`: this update had the same answer before. */
@@ -108,14 +110,14 @@ type Found = Pick<Recovery, "next" | "why">;
 
 function afterError(error: LpdeformError | undefined, hasCopy: boolean): Found {
   if (!error) return { next: "resume", why: new LpdeformError("unavailable", "The server ended the stream.") };
-  // It is another mesh; it would happen again.
+  // It is another mesh, so it would happen again.
   if (error.reason === "FRAME_VERTICES" || error.reason === "EXCEPTION") return { next: "giveUp", why: error };
   if (isSessionLost(error)) return { next: hasCopy ? "makeAnew" : "giveUp", why: error };
   if (passing.has(error.code) || isUndecided(error)) return { next: "resume", why: error };
   return { next: "giveUp", why: error.reason === "NOT_THE_WRITER" ? writerReplaced() : error };
 }
 
-/** What a writer is told that is none any more. */
+/** The error for a writer who has been replaced. */
 export function writerReplaced(text = "Another writer took the session over."): LpdeformError {
   return new LpdeformError("aborted", text, { reason: "WRITER_REPLACED" });
 }

@@ -16,7 +16,7 @@ type Shared = Map<string, Rpc>;
 const withoutToken: Shared = new Map();
 const byToken = new WeakMap<object, Shared>();
 
-/** Those who call with the same token. */
+/** The connections of callers with the same token. */
 function sharedBy(token: ConnectOptions["token"]): Shared {
   if (!token) return withoutToken;
   const known = byToken.get(token) ?? new Map();
@@ -24,7 +24,9 @@ function sharedBy(token: ConnectOptions["token"]): Shared {
   return known;
 }
 
-/** Lets a proxy before several servers send all calls of a page to one of them, as sessions that share a stream need. */
+/**
+ * Lets a proxy in front of several servers send all calls of a page to one of them, which sessions that share a stream need.
+ */
 function keepTogether(id: string): Interceptor {
   return (next) => (request) => {
     request.header.set("lpdeform-session", id);
@@ -32,11 +34,14 @@ function keepTogether(id: string): Interceptor {
   };
 }
 
-/** The calls of the service. Every error that comes out is an LpdeformError. */
+/** The calls of the service. Every error is thrown as an LpdeformError. */
 export class Rpc {
   readonly client: Client<typeof DeformService>;
   readonly hub = new StreamHub(this);
-  /** Three heartbeats: what is silent for longer is dead. Of 15 s until a stream says otherwise. */
+  /**
+   * Three heartbeats: a stream that is silent for longer counts as dead. Heartbeats are 15 s apart until a stream says
+   * otherwise.
+   */
   longestSilenceMs = 45_000;
 
   constructor(
@@ -47,7 +52,10 @@ export class Rpc {
     this.client = createClient(DeformService, transport);
   }
 
-  /** The same for the same options, so that sessions share a stream. `route`: see goingBy(); any where it is left out. */
+  /**
+   * Returns the same object for the same options, so that sessions share a stream. `route`: see goingBy(); a default is used if
+   * it is empty.
+   */
   static connect(options: ConnectOptions, route = ""): Rpc {
     const { url, callTimeoutMs, reconnectForMs, token, fetch } = options;
     const baseUrl = url ?? globalThis.location?.origin;
@@ -69,11 +77,13 @@ export class Rpc {
 
   #route = "";
   #baseUrl = "";
-  /** A call was answered: it is no matter of what the proxy allows. */
+  /** Whether a call was ever answered. Then errors have nothing to do with what the proxy allows. */
   #wasAnswered = false;
   #another: ((route: string) => Rpc) | undefined;
 
-  /** The same server or proxy, by another value of the header lpdeform-session: a proxy before several servers goes by it. */
+  /**
+   * The same server or proxy with another value of the header lpdeform-session, by which a proxy chooses among several servers.
+   */
   goingBy(route: string): Rpc {
     return route === this.#route ? this : (this.#another?.(route) ?? this);
   }

@@ -5,7 +5,7 @@ import type { Rpc } from "./rpc.js";
 import { updateToWire } from "./towire.js";
 import { Uploads } from "./upload.js";
 
-/** Whether the update survives the end of the server. What it has of large arrays is uploaded first. */
+/** Sends an update, after uploading its large arrays. Resolves with whether it survives a restart of the server. */
 export async function sendUpdate(
   rpc: Rpc,
   { session, writerToken }: Lease,

@@ -45,17 +45,17 @@ export interface SessionEvents {
   /** The server refused an update, or cannot solve for it yet; the session goes on. */
   problem: LpdeformError;
   connection: Connection;
-  /** What the server says about itself; undefined where the stream that it was said on has ended. */
+  /** What the server says about itself; undefined if the stream of the last notice has ended. */
   notice: Notice | undefined;
 }
 
 /**
- * A mesh being deformed on a server. Functions that return no promise do not wait: changes made faster than the connection
- * takes them are merged, the newest value of each handle and each setting winning.
+ * A mesh that is deformed on a server. Functions that return no promise do not wait. Changes that come faster than the
+ * connection takes them are coalesced: the newest value of each handle and each setting wins.
  *
- * Frames come over a stream that begins when they are first asked for. While it is down, the session reconnects with growing
- * pauses: to the same session where the server still has it, otherwise to a new one that it makes from its own copy of mesh,
- * handles and settings. Frames of an older epoch or an older update than one that was shown are dropped.
+ * Frames come over a stream that begins when they are first requested. If it breaks, the session reconnects with growing
+ * pauses: to the same session if the server still has it, otherwise to a new one that it creates from its own copy of mesh,
+ * handles and settings. Frames of an older epoch or an older update than an earlier frame are dropped.
  */
 export class Session implements AsyncIterable<Frame> {
   readonly #link: Link;
@@ -74,12 +74,12 @@ export class Session implements AsyncIterable<Frame> {
     });
   }
 
-  /** "sessions/<32 hexadecimal digits>"; another one after the session had to be made anew. */
+  /** "sessions/<32 hexadecimal digits>"; it changes when the session has to be recreated. */
   get name(): string {
     return this.#link.lease.session;
   }
 
-  /** What the server found in the mesh. */
+  /** What the server reported of the mesh. */
   get meshReport(): MeshReport {
     return this.#link.lease.report;
   }
@@ -88,17 +88,17 @@ export class Session implements AsyncIterable<Frame> {
     return this.#link.connection;
   }
 
-  /** Why it is "reconnecting", or was the last time: DRAINING where the server shuts down. */
+  /** Why the session is "reconnecting", or was the last time: DRAINING if the server shuts down. */
   get interruption(): LpdeformError | undefined {
     return this.#link.interruption;
   }
 
-  /** What the server said about itself last, on the stream of frames that there is; undefined where it said nothing. */
+  /** The last notice of the server about itself on the present stream; undefined if there was none. */
   get notice(): Notice | undefined {
     return this.#link.notice;
   }
 
-  /** The newest update that was not refused; 0 where there is none. */
+  /** The newest update that was not refused; 0 if there is none. */
   get newestInput(): number {
     return this.#link.ledger.newest;
   }
@@ -111,16 +111,16 @@ export class Session implements AsyncIterable<Frame> {
   }
 
   /**
-   * Sends a change and returns its number: a frame whose inputSeq is at least that takes it into account. What the server
-   * refuses comes as a "problem", once; the session goes on without it. Throws once closed or over, for a reader, and for
-   * a key or a word that it does not know (UNKNOWN_KEY).
+   * Sends a change and returns its number. A frame whose inputSeq is at least that number takes the change into account. If the
+   * server refuses the change, a "problem" comes, once; the session goes on without the change. Throws if the session is closed
+   * or has ended, for a reader, and for an unknown key or word (UNKNOWN_KEY).
    */
   update(update: Update): number {
     checkUpdate(update);
     return this.#link.update(update);
   }
 
-  /** Adds handles or replaces those of the same names. As update(). */
+  /** Adds handles, or replaces those with the same names. Throws as update(). */
   setHandles(handles: Readonly<Record<string, Handle>>): number {
     const changes = Object.entries(handles).map(([name, handle]) => [name, { set: handle }] as const);
     return this.update({ handles: Object.fromEntries(changes) });
@@ -130,40 +130,40 @@ export class Session implements AsyncIterable<Frame> {
     return this.update({ handles: { [name]: { set: handle } } });
   }
 
-  /** Moves a handle. As update(). */
+  /** Moves a handle. Throws as update(). */
   move(name: string, motion: Motion): number {
     return this.update({ handles: { [name]: { move: motion } } });
   }
 
-  /** Lets go of a handle. As update(). */
+  /** Removes a handle. Throws as update(). */
   remove(name: string): number {
     return this.update({ handles: { [name]: { remove: true } } });
   }
 
-  /** Changes p, stiffness, method and so on. As update(). */
+  /** Changes p, stiffness, method and so on. Throws as update(). */
   set(settings: Settings): number {
     return this.update({ settings });
   }
 
   /**
-   * The newest frame not yet taken, where there is one. Taking a frame, here or by iterating, tells the server to send on, so
-   * a reader who stops asking costs a bounded number of frames. Throws why, once nothing more comes.
+   * The newest frame that was not taken, if there is one. Taking a frame, here or by iterating, lets the server send more, so a
+   * reader that stops asking costs a bounded number of frames. When nothing more comes, throws the reason.
    */
   poll(): Frame | undefined {
     this.#link.startStream();
     return this.#link.take();
   }
 
-  /** Frames as they come, the newest first, until the session is closed. Throws why, where the session is over otherwise. */
+  /** Frames as they come, the newest first, until the session is closed. If the session ended otherwise, throws the reason. */
   async *[Symbol.asyncIterator](): AsyncGenerator<Frame, void, undefined> {
     const next = () => this.#waitFor(() => this.#link.take());
     for (let frame = await next(); frame; frame = await next()) yield frame;
   }
 
   /**
-   * The finished result of the newest update. Takes frames until it is there; at once, also with a timeout of 0, where the
-   * newest frame that was taken before, here or by poll() or by iterating, is that result: also while the connection is down.
-   * Rejects with the first "problem".
+   * The finished result of the newest update. Takes frames until it comes. Resolves at once, even with a timeout of 0 or
+   * without a connection, if the last frame taken, here or by poll() or by iterating, is that result. Rejects with the first
+   * "problem".
    */
   async settle(options: { timeoutMs?: number; signal?: AbortSignal } = {}): Promise<Frame> {
     checkCallOptions(options, "timeoutMs", "signal");
@@ -182,13 +182,13 @@ export class Session implements AsyncIterable<Frame> {
     }
   }
 
-  /** What `ask` returns as soon as that is something; nothing where the session is closed. */
+  /** Waits until `ask` returns something; undefined if the session is closed. */
   async #waitFor(ask: () => Frame | undefined, signal?: AbortSignal): Promise<Frame | undefined> {
     const { box } = this.#link;
     this.#link.startStream();
     for (;;) {
       const { takes } = box;
-      if (signal?.reason instanceof LpdeformError) throw signal.reason; // what the server refuses comes before any result
+      if (signal?.reason instanceof LpdeformError) throw signal.reason; // an error of the server takes precedence over any result
       const frame = ask();
       if (frame || box.isClosed) return frame;
       if (signal?.aborted) throw abortReason(signal, "No new frame came in time.", "NO_FRAME");
@@ -197,8 +197,9 @@ export class Session implements AsyncIterable<Frame> {
   }
 
   /**
-   * Solves for the present handles and settings on the server and returns the finished result. Works beside the stream of
-   * frames. Begins again where the server went away, for as long as the stream would. Rejects with what the server refuses.
+   * Solves for the present handles and settings on the server, and returns the finished result. Works in parallel to the stream
+   * of frames. If the server goes away, the solve starts again, for as long as the stream would. Rejects with the server's
+   * errors.
    */
   solve(options: DoubleSolveOptions): Promise<SolveResult<Float64Array>>;
   solve(options?: SolveOptions): Promise<SolveResult>;
@@ -246,7 +247,7 @@ export class Session implements AsyncIterable<Frame> {
         const isPassing = lost === undefined ? error.code === "unavailable" : isUndecided(error);
         if (link.copy && isSessionLost(error)) lost ??= lease.session;
         else if (!isPassing) throw error;
-        else if (lost === undefined) link.ledger.resumedAt(0); // it may have gone back: once more does no harm
+        else if (lost === undefined) link.ledger.resumedAt(0); // the server may have gone back; sending twice does no harm
         latest ??= performance.now() + link.rpc.reconnectForMs;
         if (performance.now() > latest) throw error;
         await pause(backoff.nextMs(error.retryAfterMs), signal);
@@ -280,17 +281,17 @@ export class Session implements AsyncIterable<Frame> {
   }
 
   /**
-   * Takes the newest step of the handles back on the server, or does again what was taken back last: see
-   * Update.beginsStep. After all updates before it, and after solves that are under way. Resolves with the number of the
-   * update that this is, when the server has it; frames show what comes of it. Rejects with FAILED_PRECONDITION
-   * (NOTHING_TO_UNDO, NOTHING_TO_REDO), ABORTED (INPUT_SEQ_PASSED) where another update came before it, DEADLINE_EXCEEDED
-   * where the server stays away. A session that had to be made anew knows no steps from before: NOT_FOUND where that
-   * happens meanwhile, NOTHING_TO_UNDO afterwards.
+   * Undoes the newest step of the handles on the server: see Update.beginsStep. The call is sent after all earlier updates and
+   * after solves under way. Resolves with the number of the update that the undo is, when the server has it; frames show the
+   * result. Rejects with FAILED_PRECONDITION (NOTHING_TO_UNDO, NOTHING_TO_REDO), with ABORTED (INPUT_SEQ_PASSED) if another
+   * update came first, and with DEADLINE_EXCEEDED if the server stays away. A recreated session knows no earlier steps:
+   * NOT_FOUND if it is lost during the call, NOTHING_TO_UNDO afterwards.
    */
   undo(options: { signal?: AbortSignal } = {}): Promise<number> {
     return this.#step(false, options);
   }
 
+  /** Redoes the step that was undone last. As undo(). */
   redo(options: { signal?: AbortSignal } = {}): Promise<number> {
     return this.#step(true, options);
   }
@@ -309,8 +310,8 @@ export class Session implements AsyncIterable<Frame> {
   }
 
   /**
-   * The session as a file: mesh, handles, settings, what can be undone and the surface as it is, but not who writes. The session
-   * goes on meanwhile. For restoreSession(), on any server of the same version or a later one.
+   * The session as a file: mesh, handles, settings, steps to undo and the present surface, but not the writer. The session goes
+   * on meanwhile. For restoreSession(), on any server of the same or a later version.
    */
   async snapshot(options: { signal?: AbortSignal } = {}): Promise<Uint8Array<ArrayBuffer>> {
     checkCallOptions(options, "signal");
@@ -320,18 +321,18 @@ export class Session implements AsyncIterable<Frame> {
     return takeSnapshot(rpc, lease.session, signal);
   }
 
-  /** Becomes the writer in place of whoever is, as a reader or after a WRITER_REPLACED. */
+  /** Becomes the writer in place of the present one, as a reader or after a WRITER_REPLACED. */
   takeOver(): Promise<void> {
     return this.#link.takeOver();
   }
 
-  /** Ends the stream and every waiting call. Deletes the session on the server where openSession() made it. */
+  /** Ends the stream and every waiting call. Deletes the session on the server if openSession() created it. */
   close(): Promise<void> {
     return this.#link.close();
   }
 }
 
-/** Makes a session on the server. Rejects with the first element of the mesh that cannot be deformed. */
+/** Creates a session on the server. Rejects with the first element of the mesh that cannot be deformed. */
 export async function openSession(mesh: Mesh, options: OpenOptions = {}): Promise<Session> {
   return openWith(Rpc.connect(options), mesh, options);
 }
@@ -347,8 +348,8 @@ export async function openWith(rpc: Rpc, mesh: Mesh, options: OpenOptions): Prom
 }
 
 /**
- * Makes a session from a file of Session.snapshot(): the same surface to the last bit, under a new name, with the caller as its
- * writer. Where the server loses it, it is made anew from the file, which must not change, and from what came after.
+ * Creates a session from a file of Session.snapshot(): the same surface to the last bit, under a new name, with the caller as
+ * its writer. If the server loses the session, it is recreated from the file, which must not change, and the later changes.
  * Rejects with INVALID_ARGUMENT (SNAPSHOT_FOREIGN, SNAPSHOT_NEWER, SNAPSHOT_TRUNCATED, SNAPSHOT_DAMAGED).
  */
 export async function restoreSession(snapshot: Uint8Array, options: RestoreOptions = {}): Promise<Session> {
@@ -368,7 +369,7 @@ export async function restoreWith(rpc: Rpc, snapshot: Uint8Array, options: Resto
   return new Session(rpc, lease, options, { make, isBare: false });
 }
 
-/** Joins somebody's session by name. It is not made anew where the server loses it, and not deleted by close(). */
+/** Joins an existing session by name. It is not recreated if the server loses it, and close() does not delete it. */
 export async function joinSessionByName(name: string, options: JoinOptions = {}): Promise<Session> {
   return joinWith(Rpc.connect(options), name, options);
 }
@@ -389,17 +390,17 @@ export async function joinWith(rpc: Rpc, name: string, options: JoinOptions): Pr
   }
 }
 
-/** Loads what frames are decompressed with, where any may come. */
+/** Loads the decoder if compressed frames may come. */
 async function prepareFor({ encoding, lowestEncoding }: FrameOptions): Promise<void> {
   if (encoding === "compressed" || lowestEncoding === "compressed") await loadDecompressor();
 }
 
-/** What timers take. */
+/** Limits a time to what timers accept. */
 function timerMs(milliseconds: number): number {
   return Math.min(Math.max(Math.ceil(milliseconds), 0), 2 ** 31 - 1);
 }
 
-/** `text` and `reasonOfLate`: of running out of time. */
+/** `text` and `reasonOfLate` describe a timeout. */
 function abortReason({ reason }: AbortSignal, text: string, reasonOfLate: Reason = ""): LpdeformError {
   if (reason instanceof LpdeformError) return reason;
   const isLate = reason instanceof DOMException && reason.name === "TimeoutError";

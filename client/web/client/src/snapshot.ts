@@ -5,7 +5,7 @@ import type { Rpc } from "./rpc.js";
 import { Uploads } from "./upload.js";
 import { isUndecided } from "./verdict.js";
 
-/** The session as a file. Rejects with DATA_LOSS where parts of it are missing. */
+/** The session as a file. Rejects with DATA_LOSS if parts of it are missing. */
 export async function takeSnapshot(rpc: Rpc, session: string, signal: AbortSignal): Promise<Uint8Array<ArrayBuffer>> {
   const parts: Uint8Array[] = [];
   let [has, size] = [0, 0];
@@ -30,7 +30,9 @@ export async function takeSnapshot(rpc: Rpc, session: string, signal: AbortSigna
   return file;
 }
 
-/** A new session from such a file. The same request id gives the same session, however often it is tried. */
+/**
+ * Creates a session from such a file. It is idempotent: the same request id gives the same session, however often it is tried.
+ */
 export async function restoreSnapshot(
   rpc: Rpc,
   file: Uint8Array,

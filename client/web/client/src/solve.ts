@@ -14,8 +14,8 @@ import type { DoubleSolveOptions, IterationRecord, SolveOptions, SolveResult } f
 import { Uploads } from "./upload.js";
 
 /**
- * One Solve call, from its request to the finished result. `end`: of the time for it, on the clock of performance.now().
- * Dead after three heartbeats of silence.
+ * One Solve call, from its request to the finished result. `end`: its deadline, on the clock of performance.now(). The call
+ * counts as dead after three heartbeats of silence.
  */
 export async function runSolve(
   rpc: Rpc,

@@ -2,7 +2,7 @@ import type { Interceptor } from "@connectrpc/connect";
 import { LpdeformError } from "./errors.js";
 import type { ConnectOptions } from "./types.js";
 
-/** Sends a bearer token with each call, asked for when that begins. */
+/** Sends a bearer token with each call, requested from the caller's function when the call begins. */
 export function bearing(token: NonNullable<ConnectOptions["token"]>): Interceptor {
   return (next) => async (request) => {
     const text = await newest(token);

@@ -19,6 +19,7 @@ import {
 } from "./gen/lpdeform/v1/handle_pb.js";
 import { WeightKind } from "./gen/lpdeform/v1/report_pb.js";
 import { FreeComponents, UpdateSchema, type Update as WireUpdate } from "./gen/lpdeform/v1/service_pb.js";
+import { holdToWire, vector } from "./hold_kinds.js";
 import { bytesOfIndices, bytesOfNumbers, type Packer } from "./packer.js";
 import type * as api from "./types.js";
 
@@ -165,21 +166,6 @@ function pointsToWire(points: readonly api.SurfacePoint[], packer: Packer) {
   return { faces, scalar, barycentric: buffer };
 }
 
-function holdToWire(hold: api.Hold): NonNullable<MessageInitShape<typeof HandleSchema>["hold"]> {
-  switch (hold.kind) {
-    case "exact":
-      return { case: undefined };
-    case "soft":
-      return { case: "soft", value: hold.weight === undefined ? {} : { weight: hold.weight } };
-    case "orientation":
-      return { case: "orientation", value: hold.weight === undefined ? {} : { weight: hold.weight } };
-    case "axisLock":
-      return { case: "axisLock", value: { axis: vector(hold.axis) } };
-    case "planeLock":
-      return { case: "planeLock", value: { normal: vector(hold.normal) } };
-  }
-}
-
 function motionToWire(motion: api.Motion, packer: Packer): MessageInitShape<typeof MotionSchema> {
   if (motion === "fixed") return { kind: { case: "fixed", value: {} } };
   if ("targets" in motion) {
@@ -201,8 +187,4 @@ function resizeToWire(resize: api.Resize) {
     ...(resize.origin && { origin: vector(resize.origin) }),
     ...(resize.axes && { xAxis: vector(resize.axes[0]), yAxis: vector(resize.axes[1]) }),
   };
-}
-
-function vector([x, y, z]: api.Vector3) {
-  return { x, y, z };
 }

@@ -7,8 +7,8 @@ import { Backoff } from "./recovery.js";
 import { pause } from "./waiting.js";
 
 /**
- * Takes the newest step of the handles back on the server, or does again what was taken back last; after all updates before it.
- * The number of the update that this is.
+ * Undoes the newest step of the handles on the server, or redoes the step that was undone last, after all earlier updates.
+ * Resolves with the number of the update that this is.
  */
 export async function takeStep(link: Link, redo: boolean, signal: AbortSignal): Promise<number> {
   const release = await link.holds.all(signal);
@@ -22,7 +22,7 @@ export async function takeStep(link: Link, redo: boolean, signal: AbortSignal): 
   }
 }
 
-/** The same call again gives the same answer, so a server that went away may be asked again. */
+/** The call is idempotent, so it may be repeated after the server went away. */
 async function askPatiently(
   link: Link,
   redo: boolean,
@@ -38,7 +38,7 @@ async function askPatiently(
       await link.sendWaiting(signal);
       const { writerToken } = link.lease;
       if (link.lease.session !== session) throw forgotten("not_found", "SESSION_UNKNOWN");
-      // Once: a call that was taken and not answered has made the steps fewer.
+      // Once only: a call that was carried out without an answer has reduced the steps.
       if (seq === undefined && !redo && link.isMadeAnew) await checkSteps(link, signal);
       seq ??= link.ledger.takeNumber();
       const request = { session, writerToken, inputSeq: BigInt(seq), redo };
@@ -53,13 +53,13 @@ async function askPatiently(
   }
 }
 
-/** What the server has no more is to be sent first, and only that: it would be a step to it. */
+/** What the server does not have any more is sent first, and only that, because it would count as a step. */
 async function noteLosses({ rpc, lease, ledger }: Link, signal: AbortSignal): Promise<void> {
   const { session } = await rpc.call("getSession", { session: lease.session }, signal);
   ledger.reopened(Number(session?.epoch ?? 0), Number(session?.inputSeq ?? 0));
 }
 
-/** All the handles of a session that was made anew are a step to the server, and none to anybody else. */
+/** In a recreated session, the update with all its handles counts as a step for the server. Users must not undo it. */
 async function checkSteps({ rpc, lease }: Link, signal: AbortSignal): Promise<void> {
   const { session } = await rpc.call("getSession", { session: lease.session }, signal);
   if ((session?.undoSteps ?? 0) <= 1) throw forgotten("failed_precondition", "NOTHING_TO_UNDO");

@@ -8,12 +8,12 @@ import { pause } from "./waiting.js";
 
 const mostPartBytes = 1 << 20;
 
-/** Bytes sent ahead of a call, in parts with a checksum. */
+/** Bytes uploaded before a call, in parts with a checksum. */
 export class Uploads {
   readonly #names: string[] = [];
   #count = 0;
 
-  /** `id`: the same for every try of the same call, so that it is the same request to the last bit. */
+  /** `id`: the same for every try of a call, so that the request stays identical. */
   constructor(
     readonly rpc: Rpc,
     readonly signal?: AbortSignal,
@@ -40,7 +40,10 @@ export class Uploads {
     });
   }
 
-  /** A part that the server has no room for yet goes again after the pause that it asks for, within the time of a call. */
+  /**
+   * If the server has no room for a part yet, sends it again after the pause that the server asks for, within a call's time
+   * limit.
+   */
   async #send(part: { upload: string; offset: bigint; data: Uint8Array }): Promise<UploadPartResponse> {
     const end = performance.now() + this.rpc.callTimeoutMs;
     const backoff = new Backoff();
@@ -57,7 +60,7 @@ export class Uploads {
     }
   }
 
-  /** Gives the memory back before the uploads expire; does not wait. */
+  /** Frees the server's memory before the uploads expire; does not wait. */
   discard(): void {
     for (const upload of this.#names.splice(0)) this.rpc.call("deleteUpload", { upload }).catch(() => undefined);
   }

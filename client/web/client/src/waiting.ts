@@ -1,4 +1,4 @@
-/** Ends early where the signal says so. */
+/** Ends early if the signal aborts. */
 export function pause(milliseconds: number, signal?: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
     const done = () => {
@@ -12,7 +12,7 @@ export function pause(milliseconds: number, signal?: AbortSignal): Promise<void>
   });
 }
 
-/** As the promise, or rejects with the signal's reason as soon as it says so. What is waited for goes on. */
+/** Like the promise, but rejects with the signal's reason as soon as the signal aborts. The work behind the promise goes on. */
 export function unlessAborted<Value>(promise: Promise<Value>, signal: AbortSignal): Promise<Value> {
   return new Promise((resolve, reject) => {
     const stop = () => reject(signal.reason);
@@ -27,10 +27,10 @@ export function unlessAborted<Value>(promise: Promise<Value>, signal: AbortSigna
 export class Pauses {
   #abort = new AbortController();
 
-  /** `over`: none any more. */
+  /** `over`: when it aborts, there are no more pauses. */
   constructor(readonly over: AbortSignal) {}
 
-  /** True where end() came before the time was over. */
+  /** True if end() was called before the time was over. */
   async wait(milliseconds: number): Promise<boolean> {
     if (this.over.aborted) return true;
     const { signal } = this.#abort;
@@ -38,7 +38,7 @@ export class Pauses {
     return signal.aborted;
   }
 
-  /** Of all that wait now. */
+  /** Ends all present pauses. */
   end(): void {
     this.#abort.abort();
     this.#abort = new AbortController();

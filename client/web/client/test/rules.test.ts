@@ -130,6 +130,7 @@ class Replay {
   readonly steps: Record<string, (step: LedgerStep) => unknown> = {
     add: ({ handles }) => this.ledger.add({ handles: mapped(handles, changeOf) }),
     send: ({ seq, handles }) => expect(this.send(seq)).toEqual(handles),
+    show: ({ epoch, seq }) => this.ledger.show(epoch ?? 1, seq),
     accept: ({ seq, kept }) => this.ledger.accept(this.latest(seq), kept),
     refuse: ({ seq }) => this.ledger.refuse(this.latest(seq)),
     connection_lost: () => this.ledger.connectionLost(),

@@ -6,7 +6,7 @@ import { GoAwayReason, UndoUpdateResponseSchema } from "../src/gen/lpdeform/v1/s
 import { Packer } from "../src/packer.js";
 import { joinWith, openWith, restoreWith } from "../src/session.js";
 import { updateToWire } from "../src/towire.js";
-import type { HandleChange } from "../src/types.js";
+import type { HandleChange, Hold } from "../src/types.js";
 import { FakeServer, triangle } from "./fake_server.js";
 import { at, begin, gate, opened, refusal } from "./harness.js";
 
@@ -216,21 +216,21 @@ test("a step that is to be one of its own is, and is not sent beside another", a
   expect(server.updates.map(({ update }) => update!.beginsStep)).toEqual([true, false]);
 });
 
+const everyHold: { [K in Hold["kind"]]: Extract<Hold, { kind: K }> } = {
+  exact: { kind: "exact" },
+  soft: { kind: "soft", weight: 3 },
+  orientation: { kind: "orientation" },
+  axisLock: { kind: "axisLock", axis: [1, 0, 0] },
+  planeLock: { kind: "planeLock", normal: [0, 1, 0] },
+};
+
 test("changes of every kind come back from the wire as they went out", () => {
   const handles: Record<string, HandleChange> = {
     moved: { move: { axis: [0, 0, 2], angle: 0.5, center: [1, 2, 3], translation: [4, 5, 6] } },
     freed: { move: "fixed" },
     gone: { remove: true },
     ...Object.fromEntries(
-      (
-        [
-          { kind: "exact" },
-          { kind: "soft", weight: 3 },
-          { kind: "orientation" },
-          { kind: "axisLock", axis: [1, 0, 0] },
-          { kind: "planeLock", normal: [0, 1, 0] },
-        ] as const
-      ).map((hold) => [
+      Object.values(everyHold).map((hold) => [
         hold.kind,
         { set: { vertices: new Uint32Array([2, 1]), motion: "fixed" as const, hold, footprint: 0.25 } },
       ]),

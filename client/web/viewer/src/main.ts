@@ -42,7 +42,7 @@ async function start(): Promise<void> {
   startShortcuts(app, files, help);
   exposeForTests(app);
   const keeper = new Keeper(app, wantsBack);
-  // Where nothing is kept, a page that is left by mistake takes the work along.
+  // If nothing is kept, leaving the page by mistake loses the work.
   window.addEventListener("beforeunload", (event) => {
     if (app.history.canUndo && !keeper.isKeeping) event.preventDefault();
   });

@@ -7,6 +7,7 @@ import { writePly } from "../src/io/ply.js";
 import { readMesh } from "../src/io/read.js";
 import { writeStl } from "../src/io/stl.js";
 import { emptyDocument } from "../src/model/document.js";
+import { type HoldKind, holdKinds } from "../src/model/hold_kinds.js";
 import { shapeKinds } from "../src/model/shapes.js";
 
 const { mesh, document } = shapeKinds[3]!.make("coarse");
@@ -176,6 +177,13 @@ describe("a handle file", () => {
     expect(numbers(parsed.handles[3])).toBe(numbers({ name: "drawn", vertices: [11, 12], translate: [1, 0, 0], soft: 0.5 }));
     expect(parsed.region).toEqual(rest.region);
     expect(numbers(parsed.handles[1]!.rotate!.angle_degrees)).toBe("30");
+  });
+
+  it.each(Object.values<HoldKind>(holdKinds))("has the hold “$label” under its key and gives it back", ({ fresh, fileKey }) => {
+    const [first, ...others] = document.handles;
+    const written = writeHandleFile({ ...document, handles: [{ ...first!, hold: fresh }, ...others] }, mesh.name);
+    if (fileKey) expect(written).toContain(`"${fileKey}":`);
+    expect(readHandleFile(written, emptyDocument, mesh).handles[0]!.hold).toEqual(fresh);
   });
 
   it("keeps what the page begins with", () => {

@@ -1,5 +1,5 @@
-// A little of Unreal Engine 5, so that the sample can be compiled and run without it: what it uses, declared as there, and no more of it
-// than that. Transforms have no scale.
+// A small replacement of Unreal Engine 5, so that the sample can be compiled and run without it. It declares only what the
+// sample uses, as Unreal does. Transforms have no scale.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// What Unreal's tool makes of the header's marks: the name of the class before.
+// What Unreal's tool generates from the header's macros: the name of the base class.
 #pragma once
 
 #define GENERATED_BODY() using Super = UDynamicMeshComponent;

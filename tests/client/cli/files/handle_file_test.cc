@@ -5,7 +5,9 @@
 
 #include <numbers>
 
+#include "client/cli/files/hold_keys.h"
 #include "core/base/fault.h"
+#include "tests/support/one_of_each.h"
 
 namespace lpdeform::cli {
 namespace {
@@ -90,6 +92,21 @@ TEST(HandleFile, ReadsEveryKindOfHandleAndTheRegion) {
     EXPECT_EQ(std::get<client::AxisLock>(handles[3].handle.hold).axis, (std::array<double, 3>{1, 0, 0}));
     EXPECT_EQ(std::get<client::PlaneLock>(handles[4].handle.hold).normal, (std::array<double, 3>{0, 1, 0}));
   }
+}
+
+TEST(HandleFile, EveryKindOfHoldIsWrittenUnderItsKeyAndReadsBack) {
+  std::size_t key = 0;
+  for (const client::Hold& hold : one_of_each<client::Hold>()) {
+    const std::string text = handle_file_text({{"tip", {.vertices = {1}, .hold = hold}}}, "", "");
+    if (hold.index() > 0) {
+      EXPECT_THAT(text, HasSubstr(hold_keys().at(key++)));
+    }
+    const auto file = parse_handles(text, kVertexCount);
+    ASSERT_TRUE(file.ok()) << file.status();
+    EXPECT_EQ(file->handles[0].handle.hold.index(), hold.index()) << text;
+    EXPECT_EQ(handle_file_text(file->handles, "", ""), text);
+  }
+  EXPECT_EQ(key, hold_keys().size());
 }
 
 TEST(HandleFile, NamesWhatIsWrongWithAKindOfHandle) {

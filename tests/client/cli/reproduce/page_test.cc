@@ -1,4 +1,4 @@
-// The page and its verdicts from figures that this file makes up.
+// The page and its verdicts, from figures made up here.
 
 #include "client/cli/reproduce/page.h"
 

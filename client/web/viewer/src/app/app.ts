@@ -3,6 +3,7 @@ import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import { isAlike } from "../model/alike.js";
 import { History } from "../model/history.js";
+import { kindOf } from "../model/hold_kinds.js";
 import { boundsOf, type Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
 import { type Seams, seamsOf } from "../model/seams.js";
@@ -18,7 +19,7 @@ import type { Pane } from "./pane.js";
 import { Panes } from "./panes.js";
 import type { Workbench } from "./workbench.js";
 
-/** The page's one object: the work, how it is looked at, the panes; and the loop that draws them. */
+/** The page's central object: the work, the view, the panes, and the loop that draws them. */
 export class App implements Workbench {
   readonly view = new State<View>(firstView);
   readonly facts = new State<Facts>(firstFacts);
@@ -68,7 +69,7 @@ export class App implements Workbench {
     });
   }
 
-  /** Both panes have the same. */
+  /** Both panes have the same report. */
   #showReport(report: MeshReport): void {
     const isKnown = this.facts.now.report !== undefined;
     this.facts.set({ report });
@@ -79,7 +80,7 @@ export class App implements Workbench {
     return this.#panes.all;
   }
 
-  /** Where the panes are on the page. */
+  /** The element that holds the panes. */
   get stages(): HTMLElement {
     return this.#panes.element;
   }
@@ -105,24 +106,24 @@ export class App implements Workbench {
     this.view.set({ shape: kind.id, detail, selected: first, tool: "move", isYUp: false, pinned: undefined });
   }
 
-  /** Without anything of what was there before. */
+  /** Starts without anything of the previous work. */
   beginAnew(id: string, detail: Detail): void {
     const { isTouched } = this;
     this.#openShape(id, detail, emptyDocument);
     if (isTouched) this.#asides.letGo();
   }
 
-  /** There is more than what was opened. */
+  /** Whether anything was changed since the work was opened. */
   get isTouched(): boolean {
     return this.#isBroughtBack || this.history.canUndo || this.history.canRedo;
   }
 
-  /** Which vertices are taken for one, where any are. */
+  /** Which vertices count as one, if any do. */
   get seams(): Seams | undefined {
     return this.view.now.isWelded ? this.#seams : undefined;
   }
 
-  /** Whether vertices along seams move as one from now on. */
+  /** Sets whether vertices along seams move as one. */
   weld(isWelded: boolean): void {
     if (!this.#seams) return;
     this.view.set({ isWelded });
@@ -138,7 +139,7 @@ export class App implements Workbench {
     this.#documentChanged(performance.now());
   }
 
-  /** `isBroughtBack`: somebody has worked on it. */
+  /** `isBroughtBack`: the user has worked on it before. */
   open(mesh: Mesh, document: Document, isBroughtBack = false, isWelded = true): void {
     for (const editing of this.#editings) editing.letGo();
     if (this.isTouched) this.#asides.put({ ...this.#present(), steps: this.history.steps });
@@ -168,8 +169,8 @@ export class App implements Workbench {
   }
 
   /**
-   * What the user would miss, first what a reload is to show: the work that is here, where something was done to it, and what has
-   * made room. A mesh that only was opened is missed where no work is.
+   * What the user would miss, first what a reload must show: the present work if it was changed, and work that was set aside. A
+   * mesh that was only opened counts if there is no other work.
    */
   get worthKeeping(): readonly Kept[] {
     const { wanted } = this.#asides;
@@ -177,7 +178,7 @@ export class App implements Workbench {
     return isMissed ? [this.#present(), ...wanted] : wanted;
   }
 
-  /** Work that was kept over a reload, the newest first, beside what is here. */
+  /** Adds works that were kept over a reload, the newest first. */
   setAside(works: readonly Kept[]): void {
     for (const work of works.toReversed()) this.#asides.put(work);
     this.#tellAsides();
@@ -188,7 +189,7 @@ export class App implements Workbench {
     this.#tellAsides();
   }
 
-  /** The work that was set aside, with what can be undone; what is there now is set aside in its place. */
+  /** Restores work that was set aside, with its history. The present work is set aside instead. */
   bringBack(id: number): void {
     const aside = this.#asides.take(id);
     if (!aside) return;
@@ -203,13 +204,13 @@ export class App implements Workbench {
     this.facts.set({ setAside: this.#asides.names });
   }
 
-  /** A step that can be undone. */
+  /** Makes a step that can be undone. */
   change(document: Document): void {
     this.history.push(document);
     this.#documentChanged(performance.now());
   }
 
-  /** Part of a gesture, made by an input at `time`; endGesture() makes a step of it. */
+  /** A part of a gesture, from an input at `time`; endGesture() makes a step of all parts. */
   during(document: Document, time: number): void {
     this.history.during(document);
     this.#documentChanged(time);
@@ -220,7 +221,7 @@ export class App implements Workbench {
     this.#documentChanged(performance.now());
   }
 
-  /** As during(), by a key: the gesture lasts until the key is let go, however often it repeats. */
+  /** Like during(), by a key: the gesture lasts until the key is released, however often it repeats. */
   byKey(document: Document, { timeStamp }: KeyboardEvent): void {
     this.#isKeyHeld = true;
     this.during(document, timeStamp);
@@ -232,7 +233,7 @@ export class App implements Workbench {
     this.endGesture();
   }
 
-  /** What the gesture has changed, by pointer, slider or key, is as before, without a step. False where none is under way. */
+  /** Reverts what the present gesture has changed, by pointer, slider or key, without a step. False if there is no gesture. */
   cancelGesture(): boolean {
     this.#isKeyHeld = false;
     if (!this.history.cancel()) return false;
@@ -240,7 +241,7 @@ export class App implements Workbench {
     return true;
   }
 
-  /** As cancelGesture(); also lets go of what the pointer holds, in whichever picture. */
+  /** Like cancelGesture(), and also ends drags by the pointer in every picture. */
   cancelAll(): boolean {
     const held = [...this.#editings].map((editing) => editing.cancel());
     return this.cancelGesture() || held.includes(true);
@@ -258,17 +259,17 @@ export class App implements Workbench {
     this.facts.set({ notice: { text, isBad } });
   }
 
-  /** Whether the handle can be dragged to another place; where not, the user is told why. */
+  /** Whether the handle can be dragged to another place; if not, tells the user why. */
   canShift({ name, isLocked, hold }: Handle): boolean {
     if (isLocked) this.notify(`“${name}” is locked: its padlock in the list lets it move.`);
-    else if (hold.kind === "orientation") {
+    else if (kindOf(hold).isTurnedOnly) {
       this.notify(`“${name}” is held by its direction alone: turn it by its rings or with arrow keys.`);
       this.view.set({ gizmo: "rotate" });
     } else return true;
     return false;
   }
 
-  /** A line that stays until the result is called, or another one comes. */
+  /** Shows a line that stays until the returned function is called, or until another line comes. */
   notifyWhile(text: string): () => void {
     const notice = { text, isBad: false, stays: true };
     this.facts.set({ notice });
@@ -281,12 +282,12 @@ export class App implements Workbench {
     for (const pane of this.panes) pane.fit(this.view.now.isYUp);
   }
 
-  /** Turns to some vertices of the mesh. */
+  /** Turns the view to some vertices of the mesh. */
   lookAt(vertices: readonly number[]): void {
     for (const pane of this.panes) pane.lookAt(vertices);
   }
 
-  /** By keys: of the picture that has the focus, or the first; the other one follows. */
+  /** Changes the view by keys, in the picture with the focus or else the first; the other one follows. */
   changeView(change: (stage: Stage) => void): void {
     this.#panes.changeView(change);
   }
@@ -297,12 +298,12 @@ export class App implements Workbench {
 
   // The panes.
 
-  /** The distortion in full red: the same in both panes, so that they can be compared. */
+  /** The distortion in full red, the same in both panes so that they can be compared. */
   get red(): number {
     return this.view.now.pinned ?? (this.isDistorted ? this.#red : 0);
   }
 
-  /** What rounding leaves of a surface at rest is no distortion. */
+  /** Whether the distortion is more than rounding at rest. */
   get isDistorted(): boolean {
     return this.#red > 1e-8 * this.diagonal;
   }
@@ -345,11 +346,11 @@ export class App implements Workbench {
     const pose = tool === "move" && handle && !handle.isLocked && !handle.targets ? handle.pose : undefined;
     for (const pane of this.panes) {
       pane.mark(document, this.view.now, pointedOut, colour);
-      pane.stage.gizmo.show(pose, handle?.hold.kind === "orientation" ? "rotate" : gizmo);
+      pane.stage.gizmo.show(pose, handle && kindOf(handle.hold).isTurnedOnly ? "rotate" : gizmo);
     }
   }
 
-  /** False, with a word about it, where the browser draws no second picture. */
+  /** Returns false, and tells the user, if the browser cannot draw a second picture. */
   #addSecondPane(): boolean {
     try {
       const pane = this.#panes.add("second");
@@ -389,7 +390,7 @@ export class App implements Workbench {
     if (document.handles !== before.handles) this.#needsMarks = true;
     if (document !== before) this.#needsColours = true;
     this.#panes.show(document, time);
-    // A gesture that ends changes nothing: what the server said of its last change stands.
+    // The end of a gesture changes nothing, so the server's answer to its last change still holds.
     const problem = document === before ? this.facts.now.problem : undefined;
     this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem });
     if (selected !== undefined && !handleOf(document, selected)) this.view.set({ selected: undefined });

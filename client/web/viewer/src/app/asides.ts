@@ -4,7 +4,7 @@ import type { Mesh } from "../model/mesh.js";
 import type { View } from "../model/view.js";
 import type { Look } from "../stage/stage.js";
 
-/** All of some work but what can be undone. */
+/** Work without its history. */
 export interface Kept {
   mesh: Mesh;
   document: Document;
@@ -12,19 +12,19 @@ export interface Kept {
   look: Look;
 }
 
-/** Work that has made room for other work. */
+/** Work that was set aside for other work. */
 export interface Aside extends Kept {
-  /** Nothing where a reload has brought it back. */
+  /** Undefined if the work was restored by a reload. */
   steps?: Steps<Document>;
 }
 
-/** As the page lists it. */
+/** A work's entry in the page's list. */
 export interface AsideName {
   id: number;
   name: string;
 }
 
-/** All work that has made room, the newest first. None is let go but by the user. */
+/** All works that were set aside, the newest first. Only the user removes them. */
 export class Asides {
   #all: { id: number; work: Aside; isLetGo: boolean }[] = [];
   #newest = 0;
@@ -33,14 +33,14 @@ export class Asides {
     this.#all.unshift({ id: ++this.#newest, work, isLetGo: false });
   }
 
-  /** No longer here. */
+  /** Takes the work out of the list. */
   take(id: number): Aside | undefined {
     const taken = this.#all.find((one) => one.id === id);
     this.#all = this.#all.filter((one) => one !== taken);
     return taken?.work;
   }
 
-  /** The user wants the newest no more: it is here until the page is left. */
+  /** The user does not want the newest any more. It stays until the page is left. */
   letGo(): void {
     if (this.#all[0]) this.#all[0].isLetGo = true;
   }
@@ -49,7 +49,7 @@ export class Asides {
     return this.#all.map(({ id, work }) => ({ id, name: work.mesh.name }));
   }
 
-  /** What is to be here after the page was left. */
+  /** What must be available after a reload. */
   get wanted(): readonly Kept[] {
     return this.#all.filter(({ isLetGo }) => !isLetGo).map(({ work }) => work);
   }

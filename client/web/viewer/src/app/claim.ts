@@ -1,6 +1,6 @@
 const prefix = "lpdeform-work-";
 const channelName = "lpdeform-claims";
-/** What a page that is awake needs to answer. */
+/** How long an active page may take to answer. */
 const answerMs = 250;
 
 interface Call {
@@ -10,8 +10,8 @@ interface Call {
 }
 
 /**
- * Whether the work is nobody else's, from now on for as long as this page lives. By the browser's locks; where there are none,
- * as on pages from plain HTTP, by asking the other pages.
+ * Whether this page alone has the work, from now on and for as long as it lives. It uses the browser's locks. Without them, as
+ * on pages from plain HTTP, it asks the other pages.
  */
 export function claim(id: string, waitMs: number): Promise<boolean> {
   if (!navigator.locks) return claimByAsking(id, waitMs);
@@ -25,7 +25,7 @@ export function claim(id: string, waitMs: number): Promise<boolean> {
   });
 }
 
-/** Does it with the work, which nobody else has or takes meanwhile; not at all where somebody has it. */
+/** Acts on the work while no other page has it or can take it; does nothing if another page has it. */
 export async function whileFree(id: string, act: () => Promise<void>): Promise<void> {
   if (navigator.locks) await navigator.locks.request(prefix + id, { ifAvailable: true }, (lock) => lock && act());
   else if (!(await isHeld(id))) await act();
@@ -37,7 +37,10 @@ async function claimByAsking(id: string, waitMs: number): Promise<boolean> {
   return true;
 }
 
-/** Of pages that want the same at once, the one with the smallest lot has it. Who has it goes on saying so. */
+/**
+ * If several pages ask at once, the page with the smallest random number gets the work. The page that has it answers from then
+ * on.
+ */
 function contend(id: string): Promise<boolean> {
   const channel = new BroadcastChannel(channelName);
   const lot = Math.random();
@@ -55,7 +58,7 @@ function contend(id: string): Promise<boolean> {
       if (data.kind === "whose" || (data.kind === "want" && isMine)) say("mine");
       else if (isMine) return;
       else if (data.kind === "mine" || data.lot <= lot) giveWay();
-      else say("want"); // whoever came later has not heard it
+      else say("want"); // pages that came later have not heard it
     };
     say("want");
   });

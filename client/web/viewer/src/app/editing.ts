@@ -45,12 +45,12 @@ export class Editing implements PointingTarget {
     window.addEventListener("keyup", (event) => setViewOnly(event, false), { signal });
   }
 
-  /** Puts back what the pointer does in this picture. False where it holds nothing. */
+  /** Reverts what the pointer does in this picture. False if it does nothing. */
   cancel(): boolean {
     return this.pane.stage.gizmo.cancel() || this.#pointing.cancel();
   }
 
-  /** As if the pointer were up: what it has moved is a step. What it has drawn is dropped. */
+  /** Ends a drag as if the pointer was released: what it has moved becomes a step; what it has drawn is dropped. */
   letGo(): void {
     if (!this.pane.stage.gizmo.isDragging && !this.#pointing.isBusy) return;
     this.work.endGesture();
@@ -71,7 +71,7 @@ export class Editing implements PointingTarget {
     }
   }
 
-  /** With the tool that moves: a new handle on the surface; beside it, nothing is selected any more. */
+  /** With the move tool, a click on the surface makes a handle; a click beside it clears the selection. */
   click(at: PointerAt): void {
     const { work } = this;
     if (work.view.now.tool !== "move") return;
@@ -90,7 +90,7 @@ export class Editing implements PointingTarget {
     return at?.hit ? ofVertices(this.#dabAt(at)) : nothing;
   }
 
-  /** What a press by key does: the tool's work at one place. */
+  /** A press by key: uses the tool at one place. */
   #workAt(at: PointerAt): boolean {
     const { work } = this;
     if (!at.hit) {
@@ -121,7 +121,7 @@ export class Editing implements PointingTarget {
     return this.#withCopies(dab(pane.stage.surface!.positions, adjacency, seed, hit!.point, radius));
   }
 
-  /** What is said of a vertex is said of all that are one with it. */
+  /** Adds the copies of each vertex, because they belong together. */
   #withCopies(vertices: number[]): number[] {
     return this.work.seams?.withCopies(vertices) ?? vertices;
   }
@@ -133,7 +133,7 @@ export class Editing implements PointingTarget {
     return this.work.canShift(handle) ? this.#drag(handle, at) : undefined;
   }
 
-  /** The handle that holds something of the face that is pointed at, or near by on the screen, for fingers. */
+  /** The handle that holds a vertex of the face under the pointer, or one nearby on the screen, for fingers. */
   #handleAt(at: PointerAt): Handle | undefined {
     const { work, pane } = this;
     const { hit } = at;
@@ -166,7 +166,7 @@ export class Editing implements PointingTarget {
     return nearest;
   }
 
-  /** In the plane that faces the eye. */
+  /** Drags in the plane that faces the camera. */
   #drag(handle: Handle, start: PointerAt): Stroke {
     const { work, pane } = this;
     const grip = start.hit?.point ?? add(handle.pose.center, handle.pose.translation);
@@ -254,7 +254,7 @@ export class Editing implements PointingTarget {
     if (mode === "release") return work.change(releaseVertices(before, vertices, rest));
     if (mode === "add" && handleOf(before, selected)) return work.change(extendHandle(before, selected!, vertices, rest));
     const { positions } = this.pane.stage.surface!;
-    const current = isAtRest(positions, rest, vertices) ? rest : positions; // what frames round away moves nothing
+    const current = isAtRest(positions, rest, vertices) ? rest : positions; // ignores differences that are only the rounding of frames
     const after = addHandle(before, vertices, rest, {}, current);
     if (after === before) return work.notify("Another handle holds these vertices already.");
     work.change(after);

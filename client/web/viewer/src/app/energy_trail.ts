@@ -1,8 +1,8 @@
-/** Energies (their p-th roots) by iteration, solve after solve in one line; the oldest are forgotten. */
+/** Energies (their p-th roots) by iteration, all solves in one line; the oldest are dropped. */
 export class EnergyTrail {
   iterations: number[] = [];
   energies: number[] = [];
-  /** Where a solve began. */
+  /** Where each solve began. */
   starts: number[] = [];
   #offset = 0;
   #last = -1;

@@ -5,7 +5,7 @@ import type { Mesh } from "../model/mesh.js";
 import { nothing, type PointedOut } from "../model/pointed.js";
 import type { AsideName } from "./asides.js";
 
-/** What the page shows beside the pictures. */
+/** What the page shows besides the pictures. */
 export interface Facts {
   document: Document;
   mesh: Mesh;
@@ -13,17 +13,17 @@ export interface Facts {
   status: Status;
   /** Why the newest change cannot be shown. */
   problem: LpdeformError | undefined;
-  /** One line that goes by itself, or stays until what it tells of is over. */
+  /** One line that disappears by itself, or stays until its cause is over. */
   notice: { text: string; isBad: boolean; stays?: boolean } | undefined;
-  /** When the work was kept that a reload has brought back, of Date.now(). */
+  /** When the work that a reload has restored was kept, as Date.now(). */
   restoredFrom: number | undefined;
-  /** Work whose place other work has taken, the newest first; bringBack() swaps them. */
+  /** Works that were set aside, the newest first; bringBack() swaps one with the present work. */
   setAside: readonly AsideName[];
-  /** What a brush or a warning points out. */
+  /** What a brush or a warning highlights. */
   pointedOut: PointedOut;
   canUndo: boolean;
   canRedo: boolean;
-  /** Vertices that lie on others along seams, welded or not. */
+  /** Vertices that coincide with others along seams, welded or not. */
   seamVertices: number;
 }
 

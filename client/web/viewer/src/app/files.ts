@@ -14,11 +14,11 @@ import { sentence } from "../link/status.js";
 import type { Pane } from "./pane.js";
 import { pictureOf } from "./picture.js";
 
-/** For the result that is exported. */
+/** Time limit for the result that is exported. */
 const solveMs = 60_000;
-/** Of a file: browsers have no longer texts. */
+/** Limit of a file's size: browsers cannot hold longer texts. */
 const mostBytes = 500e6;
-/** From so many on, the page is busy with a file for long enough to be told. */
+/** Above this size, reading a file takes so long that the user is told. */
 const largeBytes = 2e6;
 
 const isHandles = ({ name }: File) => /\.json$/i.test(name);
@@ -31,7 +31,7 @@ interface Exported {
 
 export type MeshFormat = "ply" | "obj" | "off" | "stl";
 
-/** What comes from files and goes into them. */
+/** Opens and saves files. */
 export class Files {
   readonly #input = document.createElement("input");
 
@@ -50,7 +50,7 @@ export class Files {
     this.#input.click();
   }
 
-  /** A mesh, handles, or both, whatever comes first. What lies beside a mesh, as materials do, is left aside. */
+  /** Opens a mesh, handles, or both, in any order. Files beside a mesh, such as materials, are ignored. */
   async open(files: readonly File[]): Promise<void> {
     const meshes = files.filter(isMesh);
     if (meshes.length > 1) {
@@ -83,7 +83,7 @@ export class Files {
     }
   }
 
-  /** In the doubles of the server's result, which what is drawn does not have. */
+  /** In the doubles of the server's result, which are more precise than the drawn surface. */
   async exportMesh(format: MeshFormat): Promise<void> {
     const panes = [...this.app.panes];
     const stem = this.#stem;
@@ -100,7 +100,7 @@ export class Files {
       const lost = lostIn(mesh, format);
       if (lost.length > 0) {
         const better = obj ? " Saved as OBJ, they stay." : "";
-        this.app.notify(`${name} is without what the file had beside: ${lost.join(", ")}.${better}`);
+        this.app.notify(`${name} does not have what the original file also had: ${lost.join(", ")}.${better}`);
       }
     }
   }
@@ -178,7 +178,7 @@ export class Files {
   }
 }
 
-/** What a file had that it has not where it is saved in the format, in words. */
+/** What a file had that this format cannot hold, in words. */
 function lostIn({ beside = [], corners, obj }: Mesh, format: MeshFormat): readonly string[] {
   if (format === "obj" && obj) return [];
   return format === "stl" && corners ? [...beside, "faces of more than three corners"] : beside;

@@ -6,43 +6,46 @@ import type { App } from "./app.js";
 import type { Kept } from "./asides.js";
 import { claim, whileFree } from "./claim.js";
 
-/** What the user says of work at which the page stopped last time. */
+/** When the user wants to see work again at which the page stopped last time. */
 export type WhenToShow = "now" | "later" | "never";
 
 const key = "lpdeform-work";
 /**
- * Remembered, for all tabs, while work is being brought back: found at the beginning, it tells of a page that did not survive that.
+ * Stored for all tabs while work is being restored. If it is found at the start, the page did not survive the previous restore.
  */
 const restoringKey = (id: string) => `lpdeform-restoring-${id}`;
 const saveEveryMs = 500;
-/** Longer than a page that is being reloaded takes to let go of its work. */
+/** Longer than a page that is being reloaded takes to release its work. */
 const patienceMs = 3000;
 const mostWorks = 8;
 const oldestMs = 30 * 24 * 3600 * 1000;
 
 /**
- * Keeps the work of this tab in the browser, and brings it back after a reload; in a new tab, what a closed one left. Each tab
- * holds a lock on its work, so that no two write to the same.
+ * Keeps the work of this tab in the browser, and restores it after a reload; in a new tab, restores the work of a closed one.
+ * Each tab holds a lock on its work, so that no two tabs write to the same work.
  */
 export class Keeper {
-  /** The work is kept, but for what the last moment changed, which a page that is being left keeps yet. */
+  /** The work is kept, except changes of the last moment, which are kept when the page is left. */
   isKeeping = false;
   #store: Store | undefined;
   #id = "";
-  /** Of the meshes that are kept: their keys. */
+  /** Keys of the meshes that are kept. */
   #kept = new Map<Mesh, string>();
-  /** The tab's work is yet that which was put off. */
+  /** Whether the tab's work is still the one that was put off. */
   #hasPutOff = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #camera = "";
 
-  /** `wantsBack`: when the user wants work again at which the page stopped last time, by the name of its mesh. */
+  /**
+   * `wantsBack`: asks when the user wants to see work again at which the page stopped last time; its argument is the mesh's
+   * name.
+   */
   constructor(
     readonly app: App,
     readonly wantsBack: (name: string) => Promise<WhenToShow>,
   ) {}
 
-  /** True where there was work. Where the browser keeps nothing, all goes on without. */
+  /** Returns true if there was work. If the browser keeps nothing, the page works without it. */
   async restore(): Promise<boolean> {
     try {
       const store = await within(Store.open(), patienceMs);
@@ -62,7 +65,7 @@ export class Keeper {
     }
   }
 
-  /** From now on every change is kept. */
+  /** Keeps every change from now on. */
   start(): void {
     const { app } = this;
     if (!this.#store) return;
@@ -82,7 +85,7 @@ export class Keeper {
     document.addEventListener("visibilitychange", now);
   }
 
-  /** Of this tab, of what it was before the reload, or of a tab that is no more. */
+  /** The work of this tab, of this tab before the reload, or of a closed tab. */
   async #claimWork(store: Store): Promise<Work | undefined> {
     const own = sessionStorage.getItem(key);
     if (own && (await claim(own, patienceMs))) this.#id = own;
@@ -95,7 +98,7 @@ export class Keeper {
     }
     if (this.#id === "") await this.#claimNew();
     sessionStorage.setItem(key, this.#id);
-    // Only now does nobody else write to it.
+    // From here on no other tab writes to it.
     const works = await store.works();
     void this.#makeRoom(store, works).catch(() => undefined); // the next page tries again
     return works.find(({ id, address }) => id === this.#id && address === location.search);
@@ -106,13 +109,13 @@ export class Keeper {
     await claim(this.#id, patienceMs);
   }
 
-  /** The work stays kept. Whichever tab has it next asks again: this one, unless there is other work of it by then. */
+  /** The work stays kept. The next tab that gets it asks again; that may be this one, unless it has other work by then. */
   async #putOff(): Promise<void> {
     await this.#claimNew();
     this.#hasPutOff = true;
   }
 
-  /** Lets go of what is old or too much, but of nothing that a tab has open, this one's included. */
+  /** Removes old or excessive works, but none that a tab has open, including this one. */
   async #makeRoom(store: Store, works: readonly Work[]): Promise<void> {
     const old = works.filter(({ savedAt }, k) => k >= mostWorks || savedAt < Date.now() - oldestMs);
     for (const { id } of old) {
@@ -147,7 +150,7 @@ export class Keeper {
     this.app.setAside(works);
   }
 
-  /** Until the first picture, or until the page is left in good order. */
+  /** Until the first picture, or until the page is left in the normal way. */
   #watchOver(): void {
     const { afterDrawing } = this.app;
     const mark = restoringKey(this.#id);

@@ -9,17 +9,17 @@ const directions: Record<string, readonly [number, number]> = {
   ArrowUp: [0, -1],
   ArrowDown: [0, 1],
 };
-/** Of the picture's height; with Shift a pixel. */
+/** Of the picture's height; with Shift one pixel. */
 const stepShare = 0.02;
 
 export interface KeyPointerTarget {
-  /** The cross lies there; nothing where it is hidden. */
+  /** The cross is there; undefined if it is hidden. */
   hover(event: PointerEvent | undefined): void;
-  /** Enter. True where it has done its work, and the cross may go. */
+  /** Enter was pressed. Returns true if it has had an effect and the cross may be hidden. */
   press(event: PointerEvent): boolean;
 }
 
-/** A cross on a picture in place of the pointer: Enter shows it and then presses, arrow keys move it, Escape hides it. */
+/** A cross on a picture that replaces the pointer: Enter shows it and then presses, arrow keys move it, Escape hides it. */
 export class KeyPointer {
   readonly element = document.createElement("div");
   #at: readonly [number, number] | undefined;
@@ -52,14 +52,14 @@ export class KeyPointer {
     return true;
   }
 
-  /** Once, however long it is held; there is nothing to press on until there is a surface. */
+  /** Once, however long the key is held. Without a surface there is nothing to press on. */
   #enter(event: KeyboardEvent): void {
     if (event.repeat || !this.pane.stage.surface) return;
     if (!this.#at) this.#show(this.#middle(), event);
     else if (this.target.press(this.#asPointer(this.#at, event))) this.#show(undefined);
   }
 
-  /** Of the surface, as it is seen. */
+  /** The middle of the visible surface. */
   #middle(): readonly [number, number] {
     const { stage } = this.pane;
     const { positions, mesh } = stage.surface!;

@@ -2,7 +2,7 @@ import { stops } from "../model/colours.js";
 import { short } from "../model/words.js";
 import type { App } from "./app.js";
 
-/** What the colours mean. */
+/** The meaning of the colours. */
 export function legendOf(app: App): { title: string; low: string; middle: string; high: string } | undefined {
   switch (app.view.now.colourBy) {
     case "distortion":
@@ -17,7 +17,7 @@ export function legendOf(app: App): { title: string; low: string; middle: string
   }
 }
 
-/** The legend for a picture, `ratio` pixels for one of the page's. */
+/** The legend for a picture that has `ratio` pixels for one of the page's. */
 export function legendCanvas(app: App, ratio: number): HTMLCanvasElement | undefined {
   const all = legendOf(app);
   if (!all) return undefined;

@@ -1,9 +1,9 @@
 const restMs = 300;
-/** Slower than this, and the picture is drawn more coarsely while it moves. */
+/** If a picture takes longer than this, it is drawn more coarsely while it moves. */
 const slowMs = 55;
 const coarse = 0.6;
 
-/** How finely to draw: coarsely while things move and drawing is slow, finely once they rest. */
+/** How finely to draw: coarsely while the picture moves and drawing is slow, finely at rest. */
 export class Pace {
   quality = 1;
   #last = -Infinity;
@@ -11,7 +11,7 @@ export class Pace {
   #timer: ReturnType<typeof setTimeout> | undefined;
   #interval = 16;
 
-  /** `rest`: called when nothing has moved for a while. */
+  /** `rest`: called when nothing has moved for some time. */
   constructor(readonly rest: () => void) {}
 
   /** A picture was drawn because something had changed. */
@@ -19,7 +19,7 @@ export class Pace {
     const interval = now - this.#last;
     if (interval < restMs) {
       this.#interval += 0.15 * (interval - this.#interval);
-      if (this.#interval > slowMs) this.quality = coarse; // until all rests: changing the size costs a picture
+      if (this.#interval > slowMs) this.quality = coarse; // until rest, because changing the size costs a picture
     }
     this.#last = now;
     this.#isFine = false;
@@ -27,7 +27,7 @@ export class Pace {
     this.#timer = setTimeout(this.rest, restMs + 20);
   }
 
-  /** True once, when it is time for a fine picture. */
+  /** Returns true once, when it is time for a fine picture. */
   isAtRest(now: number): boolean {
     if (this.#isFine || now - this.#last < restMs) return false;
     this.#isFine = true;

@@ -24,13 +24,13 @@ export interface PaneWatcher {
 
 const nothing: EnergyStatistics = { max: 0, red: 0, top5Share: 0 };
 
-/** One of the pictures side by side: a stage, and the session that feeds it. */
+/** One of the pictures side by side: a stage, and the session that supplies it. */
 export class Pane {
   readonly element = document.createElement("div");
   readonly stage: Stage;
   readonly overlay = new Overlay();
   readonly trail = new EnergyTrail();
-  /** Aborted when the pane is closed. */
+  /** Aborts when the pane is closed. */
   readonly over = new AbortController();
   live: Live | undefined;
   frame: Frame | undefined;
@@ -75,13 +75,13 @@ export class Pane {
     return this.frame?.distortion ?? new Float32Array((this.stage.surface?.mesh.positions.length ?? 0) / 3);
   }
 
-  /** Takes the newest frame where there is one; true where the surface has changed. */
+  /** Takes the newest frame if there is one. Returns true if the surface has changed. */
   takeFrame(): boolean {
     const frame = this.live?.take();
     if (!frame || !this.stage.surface) return false;
     const before = this.frame;
     if (frame.optimalityGap !== undefined && before?.inputSeq === frame.inputSeq && before.energy === frame.energy) {
-      this.frame = frame; // the same one again, with its certificate
+      this.frame = frame; // the same frame again, with its certificate
       return false;
     }
     this.frame = this.#onScreenNext = frame;
@@ -123,7 +123,7 @@ export class Pane {
     this.stage.fit(surface, isYUp);
   }
 
-  /** Near enough to see them, far enough to see where they are, from outside. */
+  /** Near enough to see them, far enough to see where they are, and from outside. */
   lookAt(vertices: readonly number[]): void {
     const { surface } = this.stage;
     if (!surface || vertices.length === 0) return;
@@ -141,7 +141,7 @@ export class Pane {
     if (this.stage.resize(clientWidth, clientHeight, isMoving, quality)) this.#isDirty = true;
   }
 
-  /** Draws what has changed, or all of it finely, for a picture at rest. True where there was something. */
+  /** Draws what has changed, or everything finely for a picture at rest. Returns true if anything was drawn. */
   draw(isAtRest: boolean, quality: number): boolean {
     if (isAtRest || this.#isDirty) this.#resize(!isAtRest, quality);
     else this.#resizeToPage();
@@ -151,13 +151,16 @@ export class Pane {
     return !isAtRest;
   }
 
-  /** Where the page's layout has changed and nothing else. */
+  /** If only the page's layout has changed. */
   #resizeToPage(): void {
     const { clientWidth, clientHeight } = this.element;
     if (clientWidth !== this.stage.width || clientHeight !== this.stage.height) this.#resize(true, 1);
   }
 
-  /** A frame was drawn; at the next animation frame the screen has it, as far as a page can know. */
+  /**
+   * Whether a frame was drawn that is not yet on the screen, as far as a page can know: it is there at the next animation
+   * frame.
+   */
   get isWaitingForScreen(): boolean {
     return this.#onScreenNext !== undefined;
   }

@@ -5,25 +5,25 @@ import type { Look, Stage } from "../stage/stage.js";
 import { Pane, type PaneWatcher } from "./pane.js";
 import { placeOf, watchPlaces } from "./sides.js";
 
-/** What keys do in a picture, for those who have it read to them. */
+/** What keys do in a picture, for screen readers. */
 const keysText = document.createElement("p");
 keysText.id = "picture-keys";
 keysText.className = "unseen";
 keysText.textContent =
   "Enter shows a cross: arrow keys move it, Enter places a handle there or selects the one that is there, Escape hides it. " +
-  "Arrow keys and Page Up and Down move the selected handle, turn it where it has rings (R), and turn the view where none is " +
-  "selected. Control and arrow keys turn the view, with Shift they shift it; plus and minus zoom.";
+  "Arrow keys and Page Up and Down move the selected handle, or turn it if it has rings (R); without a selection they turn the " +
+  "view. Control and arrow keys turn the view, with Shift they shift it; plus and minus zoom.";
 
-/** From the worst on. */
+/** The worst first. */
 const worse: readonly Status["kind"][] = ["refused", "full", "draining", "away", "opening", "idle", "live"];
 
-/** The pictures, one or two, which look the same way. */
+/** The pictures, one or two, which share their view. */
 export class Panes {
   readonly element = document.createElement("div");
   readonly all: Pane[] = [];
   #turned: Pane | undefined;
 
-  /** `added`: a pane is there, before its view can be turned. */
+  /** `added`: called when a pane is there, before its view can be changed. */
   constructor(
     readonly watcher: PaneWatcher,
     readonly added: (pane: Pane) => void,
@@ -33,7 +33,7 @@ export class Panes {
     watchPlaces(() => this.#nameAll());
   }
 
-  /** Throws where the browser draws no other picture: it has only so many. */
+  /** Throws if the browser cannot draw another picture, because it allows only a few. */
   add(side: "first" | "second"): Pane {
     const pane: Pane = new Pane(side, {
       ...this.watcher,
@@ -63,13 +63,13 @@ export class Panes {
     for (const { element } of this.all) if (!element.isConnected) this.element.append(element);
   }
 
-  /** The worst of the panes'. */
+  /** The worse status of the panes. */
   get status(): Status {
     const [worst] = this.all.map(({ status }) => status).sort((a, b) => worse.indexOf(a.kind) - worse.indexOf(b.kind));
     return worst!;
   }
 
-  /** By keys: of the picture that has the focus, or the first; the other one follows. */
+  /** Changes the view by keys, in the picture with the focus or else the first; the other one follows. */
   changeView(change: (stage: Stage) => void): void {
     const pane = this.all.find(({ stage }) => stage.canvas === document.activeElement) ?? this.all[0]!;
     this.#turned = pane;
@@ -80,7 +80,7 @@ export class Panes {
     for (const pane of this.all) pane.stage.lookFrom(look);
   }
 
-  /** The other pane looks the same way as the one that is being turned. */
+  /** The other pane takes the view of the pane that is being turned. */
   #follow(pane: Pane): void {
     if (pane !== this.#turned) return;
     for (const other of this.all) {
@@ -90,7 +90,7 @@ export class Panes {
     }
   }
 
-  /** `time`: of the input that made the document so. */
+  /** `time`: of the input that led to this document. */
   show(work: Document, time: number): void {
     for (const pane of this.all) {
       pane.live?.show(work, time);
@@ -100,7 +100,7 @@ export class Panes {
     this.#nameAll();
   }
 
-  /** For those who do not see them. */
+  /** Names the pictures for screen readers. */
   #nameAll(): void {
     for (const { side, element, stage } of this.all) {
       const picture = this.all.length > 1 ? capital(`${placeOf(side)} picture`) : "Picture";

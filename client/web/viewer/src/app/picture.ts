@@ -2,7 +2,7 @@ import type { App } from "./app.js";
 import { legendCanvas } from "./legend.js";
 import { placeOf } from "./sides.js";
 
-/** What the panes show, as they lie on the page: with the legend, and each with its p where there are two. */
+/** The panes as they are on the page: with the legend, and with p for each if there are two. */
 export function pictureOf(app: App): HTMLCanvasElement {
   const { panes } = app;
   const pictures = panes.map(({ stage }) => stage.picture());

@@ -24,18 +24,19 @@ const arrows: Record<string, readonly [number, number]> = {
   ArrowDown: [0, -1],
 };
 const zooms: Record<string, number> = { "+": 1 / 1.15, "=": 1 / 1.15, "-": 1.15 };
-/** What goes on while the key is held; what turns something on or off does not. */
+/** Keys that repeat while they are held; keys that switch something do not. */
 const steps = new Set(["[", "]", ",", "."]);
 const turnRadians = Math.PI / 24;
-/** Of a handle, of the mesh's diagonal or about an axis; a tenth of it with Shift. */
+/** Share of the mesh's diagonal, or of a turn about an axis; a tenth of it with Shift. */
 const nudgeShare = 0.01;
 const nudgeRadians = Math.PI / 60;
-/** Of the picture's height. */
+/** Share of the picture's height. */
 const shiftShare = 0.05;
 
-/** Keys, where nothing is being written. ui/help.ts tells them. */
+/** Keys, unless the user is typing text. ui/help.ts lists them. */
 export function startShortcuts(app: App, files: Files, help: HTMLDialogElement): void {
-  // Escape puts back what is under way, and does nothing else then. One listener: the pictures share the gesture.
+  // Escape reverts what is under way, and has no other effect then. One listener, because the pictures share
+  // the gesture.
   window.addEventListener("keydown", (event) => {
     if (event.code === "Escape" && app.cancelAll()) event.stopImmediatePropagation();
   });
@@ -137,7 +138,7 @@ function selectNext(app: App): void {
   if (handles.length > 0) app.view.set({ selected: handles[(at + 1) % handles.length]!.name, tool: "move" });
 }
 
-/** Along the mesh's axes by a hundredth of its diagonal; about them by three degrees where the handle has rings. */
+/** Moves along the mesh's axes by a hundredth of its diagonal; rotates by three degrees if the handle has rings. */
 function nudge(app: App, direction: readonly [number, number, number], event: KeyboardEvent): boolean {
   const handle = handleOf(app.document, app.view.now.selected);
   if (!handle) return false;

@@ -1,15 +1,15 @@
 import type { Side } from "../model/changes.js";
 
-/** Where style/small.css lays the two pictures one above the other. */
+/** Whether style/small.css places the two pictures one above the other. */
 const isUpright = matchMedia("(max-aspect-ratio: 1/1) and (max-width: 900px)");
 
-/** What people call the places of two pictures. */
+/** The words for the places of two pictures. */
 export function placeOf(side: Side): "left" | "right" | "upper" | "lower" {
   if (isUpright.matches) return side === "first" ? "upper" : "lower";
   return side === "first" ? "left" : "right";
 }
 
-/** When they move from beside each other to above each other, or back. */
+/** Calls `moved` when the pictures change between side by side and one above the other. */
 export function watchPlaces(moved: () => void): void {
   isUpright.addEventListener("change", moved);
 }

@@ -4,7 +4,7 @@ import { viewProjection } from "../stage/pointing.js";
 import type { App } from "./app.js";
 import type { Pane } from "./pane.js";
 
-/** What scripted users ask of the page: `window.__lpdeform`. Reads only. */
+/** What tests may read of the page: `window.__lpdeform`. Read only. */
 export function exposeForTests(app: App): void {
   const paneAt = (pane: number) => app.panes[pane]!;
   const inspect = {

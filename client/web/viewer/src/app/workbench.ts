@@ -6,26 +6,26 @@ import type { State } from "../model/state.js";
 import type { View } from "../model/view.js";
 import type { Facts } from "./facts.js";
 
-/** What the tools work on: the mesh, the document, and how they are looked at. */
+/** What the tools work on: the mesh, the document, and the view. */
 export interface Workbench {
   readonly view: State<View>;
   readonly facts: State<Facts>;
   readonly mesh: Mesh;
   readonly document: Document;
   readonly adjacency: Adjacency;
-  /** Which vertices are taken for one, where any are. */
+  /** Which vertices count as one, if any do. */
   readonly seams: Seams | undefined;
-  /** Of the box around the mesh. */
+  /** Of the mesh's bounding box. */
   readonly diagonal: number;
 
-  /** A step that can be undone. */
+  /** Makes a step that can be undone. */
   change(document: Document): void;
-  /** Part of a gesture, made by an input at `time`; endGesture() makes a step of it. */
+  /** A part of a gesture, from an input at `time`; endGesture() makes a step of all parts. */
   during(document: Document, time: number): void;
   endGesture(): void;
-  /** What the gesture has changed is as before, without a step. False where none is under way. */
+  /** Reverts what the present gesture has changed, without a step. False if there is no gesture. */
   cancelGesture(): boolean;
-  /** Whether the handle can be dragged to another place; where not, the user is told why. */
+  /** Whether the handle can be dragged to another place; if not, tells the user why. */
   canShift(handle: Handle): boolean;
   /** Shows the user one line. */
   notify(text: string): void;

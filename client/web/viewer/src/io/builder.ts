@@ -1,17 +1,17 @@
 import type { Mesh } from "../model/mesh.js";
 import { FileFault } from "./fault.js";
 
-/** Squares of distances stay within what float32 can say. */
+/** Squares of distances then stay within the range of float32. */
 const mostCoordinate = 1e18;
 
-/** Puts a mesh together; polygons become fans of triangles. */
+/** Assembles a mesh; polygons become fans of triangles. */
 export class MeshBuilder {
   readonly positions: number[] = [];
   readonly faces: number[] = [];
   readonly #corners: number[] = [];
   readonly #beside = new Set<string>();
 
-  /** `most`: vertices, and triangles, that a page can take in. */
+  /** `most`: the largest number of vertices, and of triangles, that a page can handle. */
   constructor(readonly most = 5_000_000) {}
 
   get vertexCount(): number {
@@ -34,7 +34,7 @@ export class MeshBuilder {
     this.#checkCount(this.faces.length / 3, "triangles", where);
   }
 
-  /** The file has something that a mesh here has not, in words. */
+  /** The file has something that a mesh here cannot hold, described in words. */
   leftAside(what: string): void {
     this.#beside.add(what);
   }

@@ -1,5 +1,6 @@
 import type { Hold, SurfacePoint } from "lpdeform-client";
 import { addHandle, type Document, type Handle, paint, withoutPaint } from "../model/document.js";
+import { type HoldKind, holdKinds, kindOf } from "../model/hold_kinds.js";
 import { centroid, type Mesh, type Vector3 } from "../model/mesh.js";
 import { capital } from "../model/words.js";
 import { axisAngle, isAtRest, noRotation, type Pose, quaternionOf } from "../model/pose.js";
@@ -8,8 +9,8 @@ import { arrayOf, checkKeys, objectOf, textOf, vector3, vertexNumbers, weightOf 
 
 // The handle file of the command line; client/cli/README.md describes it whole.
 
-const handleKeys = ["name", "vertices", "points", "translate", "rotate", "positions", "footprint", "soft", "orientation"];
-const lockKeys = ["axis_lock", "plane_lock"];
+const holdKeys = Object.values<HoldKind>(holdKinds).flatMap(({ fileKey }) => fileKey ?? []);
+const handleKeys = ["name", "vertices", "points", "translate", "rotate", "positions", "footprint", ...holdKeys];
 
 /**
  * The document with the handles, region and painted groups of a file in place of its own. Throws a FileFault. `withCopies`: adds
@@ -47,7 +48,7 @@ function withHandle(document: Document, json: unknown, mesh: Mesh): Document {
   const object = objectOf(json, `handle ${document.handles.length + 1}`);
   const name = textOf(object["name"], `the name of handle ${document.handles.length + 1}`);
   const owner = `handle “${name}”`;
-  checkKeys(object, [...handleKeys, ...lockKeys], owner);
+  checkKeys(object, handleKeys, owner);
   if (document.handles.some((handle) => handle.name === name)) throw new FileFault(`There are two handles “${name}”.`);
   const points = object["points"] === undefined ? undefined : surfacePoints(object["points"], owner, mesh);
   if ((points === undefined) === (object["vertices"] === undefined)) {
@@ -105,17 +106,18 @@ function motionOf(
 
 function holdOf(object: Record<string, unknown>, owner: string): Hold {
   const holds: Hold[] = [];
-  if (object["soft"] !== undefined) holds.push({ kind: "soft", weight: weightOf(object["soft"], `“soft” of ${owner}`, 1e6) });
-  if (object["orientation"] !== undefined) {
-    holds.push({ kind: "orientation", weight: weightOf(object["orientation"], `“orientation” of ${owner}`, 1e6) });
+  for (const { fileKey, weight, direction } of Object.values<HoldKind>(holdKinds)) {
+    if (fileKey === undefined || object[fileKey] === undefined) continue;
+    const value = object[fileKey];
+    holds.push(
+      weight ? weight.with(weightOf(value, `“${fileKey}” of ${owner}`, 1e6)) : direction.with(directionOf(value, owner)),
+    );
   }
-  if (object["axis_lock"] !== undefined) holds.push({ kind: "axisLock", axis: direction(object["axis_lock"], owner) });
-  if (object["plane_lock"] !== undefined) holds.push({ kind: "planeLock", normal: direction(object["plane_lock"], owner) });
   if (holds.length > 1) throw new FileFault(`${capital(owner)} is held in two ways.`);
-  return holds[0] ?? { kind: "exact" };
+  return holds[0] ?? holdKinds.exact.fresh;
 }
 
-function direction(json: unknown, owner: string): Vector3 {
+function directionOf(json: unknown, owner: string): Vector3 {
   const vector = vector3(json, `the lock of ${owner}`);
   if (Math.hypot(...vector) === 0) throw new FileFault(`The lock of ${owner} has no direction.`);
   return vector;
@@ -184,16 +186,14 @@ export function writeHandleFile(document: Document, meshName: string): string {
 
 function handleJson({ name, vertices, points, pose, targets, hold, footprint }: Handle): object {
   const { axis, angle } = axisAngle(pose.rotation);
+  const { fileKey, weight, direction } = kindOf(hold);
   return {
     name,
     ...(points ? { points } : { vertices }),
     ...(targets && { positions: targets.flatMap((_, k) => (k % 3 === 0 ? [targets.slice(k, k + 3)] : [])) }),
     ...(!targets && !isAtRest(pose) && pose.translation.some((value) => value !== 0) && { translate: pose.translation }),
     ...(!targets && angle !== 0 && { rotate: { axis, angle_degrees: (angle * 180) / Math.PI, center: pose.center } }),
-    ...(hold.kind === "soft" && { soft: hold.weight ?? 1 }),
-    ...(hold.kind === "orientation" && { orientation: hold.weight ?? 100 }),
-    ...(hold.kind === "axisLock" && { axis_lock: hold.axis }),
-    ...(hold.kind === "planeLock" && { plane_lock: hold.normal }),
+    ...(fileKey && { [fileKey]: (weight ?? direction).of(hold) }),
     ...(footprint > 0 && { footprint }),
   };
 }

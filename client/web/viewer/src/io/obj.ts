@@ -2,7 +2,7 @@ import { polygonsOf, type Mesh, type WrittenMesh } from "../model/mesh.js";
 import { MeshBuilder } from "./builder.js";
 import { cornerOf, logicalLines } from "./obj_lines.js";
 
-/** What a keyword stands for that a mesh here has not. */
+/** What a keyword of an OBJ file stands for that a mesh here cannot hold. */
 const beside: Readonly<Record<string, string>> = {
   vt: "texture coordinates",
   vn: "normals",
@@ -17,7 +17,7 @@ const beside: Readonly<Record<string, string>> = {
   surf: "curved surfaces",
 };
 
-/** The positions and faces of an OBJ file; what it has beside is named. */
+/** The positions and faces of an OBJ file. Other contents are only named. */
 export function readObj(name: string, text: string): Mesh {
   const builder = new MeshBuilder();
   for (const { words, number } of logicalLines(text)) {

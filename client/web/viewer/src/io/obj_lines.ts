@@ -1,10 +1,10 @@
-/** A line of an OBJ file, with all that a backslash at its end continues. */
+/** A line of an OBJ file, including the lines that a backslash at its end continues. */
 export interface ObjLine {
-  /** As it is in the file, without its end. */
+  /** As in the file, without the line's end. */
   text: string;
-  /** Up to a comment. */
+  /** The words before a comment. */
   words: string[];
-  /** Of its last line in the file, from 1. */
+  /** The number of its last line in the file, from 1. */
   number: number;
 }
 
@@ -19,7 +19,7 @@ export function* logicalLines(text: string): Generator<ObjLine> {
   }
 }
 
-/** The vertex of a corner "7/8/9": numbers count from 1, negative ones back from the newest. */
+/** The vertex of a corner such as "7/8/9": numbers count from 1, negative ones back from the newest. */
 export function cornerOf(word: string, vertexCount: number): number {
   return indexOf(word.split("/")[0]!, vertexCount);
 }

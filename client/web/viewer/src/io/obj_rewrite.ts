@@ -3,8 +3,8 @@ import { cornerOf, indexOf, logicalLines } from "./obj_lines.js";
 import { type Numbers, NormalTurner } from "./turned_normals.js";
 
 /**
- * The OBJ file with other positions: every line stays as it is but those of vertices (what follows their three numbers stays, too)
- * and of normals, which turn with the surface. Since a normal may stand with many vertices, each pair gets one of its own.
+ * The OBJ file with new positions. All lines stay as they are except vertices (whatever follows their three numbers stays) and
+ * normals, which turn with the surface. Several vertices may share a normal, so each pair gets a normal of its own.
  */
 export function rewriteObj({ obj, positions: drawn, exact, faces }: Mesh & { obj: Uint8Array }, positions: Numbers): string {
   const turner = new NormalTurner(exact ?? drawn, positions, faces);
@@ -51,7 +51,7 @@ export function rewriteObj({ obj, positions: drawn, exact, faces }: Mesh & { obj
   return out.join("\n");
 }
 
-/** A direction needs no more. */
+/** Enough digits for a direction. */
 function shortest(value: number): string {
   return String(Number(value.toPrecision(7)));
 }

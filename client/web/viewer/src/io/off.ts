@@ -4,7 +4,7 @@ import { FileFault } from "./fault.js";
 
 const beside = { ST: "texture coordinates", C: "colours of vertices", N: "normals" };
 
-/** OFF, and its variants with normals, colours and texture coordinates, of which the positions are read. */
+/** OFF and its variants with normals, colours and texture coordinates. Only positions and faces are read. */
 export function readOff(name: string, text: string): Mesh {
   const lines = text
     .split(/\r?\n|\r/)

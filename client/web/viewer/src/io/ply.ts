@@ -6,7 +6,7 @@ import { FileFault } from "./fault.js";
 interface Property {
   name: string;
   type: string;
-  /** Of a list: the type of its length. */
+  /** For a list: the type of its length. */
   lengthType?: string;
 }
 
@@ -16,7 +16,7 @@ interface Element {
   properties: Property[];
 }
 
-/** What PLY's widest type of a whole number can say. */
+/** The largest value of PLY's widest integer type. */
 const mostInList = 2 ** 32 - 1;
 
 const sizes: Record<string, number> = {
@@ -38,7 +38,7 @@ const sizes: Record<string, number> = {
   float64: 8,
 };
 
-/** PLY as text or binary in either byte order. */
+/** PLY as text, or binary in either byte order. */
 export function readPly(name: string, bytes: Uint8Array): Mesh {
   const { format, elements, length } = readHeader(name, bytes);
   const body = bytes.subarray(length);
@@ -76,13 +76,13 @@ function readHeader(name: string, bytes: Uint8Array): { format: string; elements
     throw new FileFault(`${name} is in the format “${format}”, which PLY does not know.`);
   }
   for (const { name: element, count, properties } of elements) {
-    // Rows of nothing would be read without end.
+    // Rows without bytes would be read for ever.
     if (count > 0 && properties.length === 0) throw new FileFault(`Element “${element}” of ${name} has no property.`);
   }
   return { format, elements, length: end.index + end[0].length };
 }
 
-/** What properties stand for that a mesh here has not. */
+/** What properties stand for that a mesh here cannot hold. */
 const beside: readonly (readonly [RegExp, string])[] = [
   [/^n[xyz]$/, "normals"],
   [/^(s|t|u|v|texture_[uv]|texcoord|texnumber)$/, "texture coordinates"],
@@ -95,7 +95,7 @@ function besideOf({ name, count, properties }: Element): string[] {
   const names = properties.map((property) => property.name);
   const own = name === "face" ? /^vertex_ind/ : /^[xyz]$/;
   const others = names.filter((property) => !own.test(property));
-  // What this page itself has written beside a distortion is written anew.
+  // Properties that this page has written together with a distortion are written again.
   if (names.includes("distortion")) return others.filter((property) => !/^(distortion|red|green|blue)$/.test(property));
   return others.map((property) => beside.find(([key]) => key.test(property))?.[1] ?? `“${property}”`);
 }
@@ -173,8 +173,8 @@ function binaryReader(name: string, bytes: Uint8Array, littleEndian: boolean): (
 }
 
 /**
- * Binary, with the distortion and a colour of each vertex, `red` being the distortion that is drawn in full red. Numbers are
- * float or double as they are given.
+ * Binary, with the distortion and a colour of each vertex. `red`: the distortion that is drawn in full red. Numbers are float
+ * or double, as given.
  */
 export function writePly(
   { positions, faces, corners }: WrittenMesh,

@@ -5,7 +5,7 @@ import { readOff } from "./off.js";
 import { readPly } from "./ply.js";
 import { readStl } from "./stl.js";
 
-/** A mesh file by the ending of its name. Throws a FileFault. */
+/** Reads a mesh file by the ending of its name. Throws a FileFault. */
 export function readMesh(name: string, bytes: Uint8Array): Mesh {
   switch (name.toLowerCase().split(".").at(-1)) {
     case "off":

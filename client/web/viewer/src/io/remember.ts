@@ -1,4 +1,4 @@
-/** What was remembered in this browser; nothing where it forbids that. */
+/** A value remembered in this browser; undefined if there is none or the browser forbids it. */
 export function remembered(key: string): string | undefined {
   try {
     return localStorage.getItem(key) ?? undefined;
@@ -15,11 +15,11 @@ export function forget(key: string): void {
   }
 }
 
-/** For the next visit, where the browser lets a page do that. */
+/** Remembers a value for the next visit, if the browser allows it. */
 export function remember(key: string, value: string): void {
   try {
     localStorage.setItem(key, value);
   } catch {
-    // forbidden, or full: the next visit begins as the first
+    // forbidden or full: the next visit starts like the first
   }
 }

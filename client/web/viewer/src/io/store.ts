@@ -2,22 +2,22 @@ import type { Document } from "../model/document.js";
 import type { Mesh, Vector3 } from "../model/mesh.js";
 import type { View } from "../model/view.js";
 
-/** The work of one tab, as it is kept over a reload; its mesh lies beside it, since that seldom changes. */
+/** The work of one tab as it is kept over a reload. Its mesh is stored separately, because it seldom changes. */
 export interface Work {
-  /** Raised where the shape of what is kept changes: what another version kept is left alone. */
+  /** Raised when this structure changes. Work of another version is ignored. */
   version: 2;
   id: string;
-  /** What followed the page's path: location.search. */
+  /** location.search of the page. */
   address: string;
-  /** Of Date.now(). */
+  /** As Date.now(). */
   savedAt: number;
   document: Document;
   view: Partial<View>;
-  /** From where to where it looks. */
+  /** The camera's position and target. */
   camera: { position: Vector3; target: Vector3 };
   /** Begins with the id and "/". */
   meshKey: string;
-  /** What has made room for it, the newest first; their keys begin with this id, too. */
+  /** Works that were set aside, the newest first; their keys begin with this id, too. */
   asides: AsideWork[];
 }
 
@@ -25,10 +25,10 @@ export interface AsideWork extends Pick<Work, "document" | "camera" | "meshKey">
   view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned" | "isWelded">;
 }
 
-/** What comes after all keys that begin with an id and "/". */
+/** Comes after all keys that begin with an id and "/". */
 const end = (id: string) => `${id}/\uffff`;
 
-/** The browser's database (IndexedDB), which everything of this page shares. Rejects with what the browser says. */
+/** The browser's database (IndexedDB), shared by all pages of this origin. Rejects with the browser's error. */
 export class Store {
   private constructor(readonly database: IDBDatabase) {}
 
@@ -39,18 +39,19 @@ export class Store {
       request.result.createObjectStore("meshes");
     };
     const database = await answer(request);
-    // A newer page must not wait for this one; from then on this one says that it keeps nothing.
+    // A newer version of the page must not wait for this one, which from then on reports that it keeps
+    // nothing.
     database.onversionchange = () => database.close();
     return new Store(database);
   }
 
-  /** All of it or nothing. `newMeshes`: those that are not kept already, with their keys. */
+  /** Stores everything or nothing. `newMeshes`: meshes that are not stored yet, with their keys. */
   put(work: Work, newMeshes: readonly (readonly [Mesh, string])[]): Promise<void> {
     const { id, meshKey, asides } = work;
     return this.#write((works, meshes) => {
       works.put(work);
       for (const [mesh, key] of newMeshes) meshes.put(mesh, key);
-      // Between the keys that there are lie those of what is here no more.
+      // Deletes the keys between those in use: they belong to things that are not here any more.
       const keys = [`${id}/`, ...new Set([meshKey, ...asides.map((aside) => aside.meshKey)]), end(id)].sort();
       for (let k = 1; k < keys.length; ++k) meshes.delete(IDBKeyRange.bound(keys[k - 1], keys[k], true, true));
     });

@@ -3,8 +3,8 @@ export type Numbers = Float32Array | Float64Array;
 type Vector = readonly [number, number, number];
 
 /**
- * Turns directions at vertices as the surface turns there: what they are at rest in the frame of the vertex's normal and of the
- * way to a neighbour, they are in that frame of the deformed surface. So a rigid motion turns them as it turns the surface.
+ * Turns directions at vertices as the surface turns there. A direction keeps its coordinates in the frame of the vertex's
+ * normal and of the direction to a neighbour. So a rigid motion turns it like the surface.
  */
 export class NormalTurner {
   readonly #normals: readonly [Float64Array, Float64Array];
@@ -20,7 +20,7 @@ export class NormalTurner {
     faces.forEach((vertex, corner) => (this.#neighbours[vertex] = faces[corner % 3 === 2 ? corner - 2 : corner + 1]!));
   }
 
-  /** As it is where the surface has no frame. */
+  /** Unchanged if the surface has no frame there. */
   turned(vertex: number, direction: readonly number[]): readonly number[] {
     const from = this.#frame(this.rest, this.#normals[0], vertex);
     const to = this.#frame(this.deformed, this.#normals[1], vertex);

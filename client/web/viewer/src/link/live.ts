@@ -25,12 +25,13 @@ export interface LiveWatcher {
   notice(text: string): void;
 }
 
-/** Frames answer one of the newest inputs. */
+/** Frames answer one of the newest inputs, so no more are needed. */
 const mostExponents = 100;
 
 /**
- * A document kept on the server, and its surface as it comes. The server may be away at any time: the document is told again
- * when it is back. A frame is taken when it is drawn, which lets the server send on: a page that draws slowly gets fewer frames.
+ * A document on the server, and its surface as it comes. The server may go away at any time; the document is sent again when
+ * the server is back. A frame is taken when it is drawn, which lets the server send more: a page that draws slowly gets fewer
+ * frames.
  */
 export class Live {
   readonly meter = new Meter();
@@ -42,9 +43,9 @@ export class Live {
   #inputs: { seq: number; time: number; sent: number }[] = [];
   #newest = 0;
   #drawn = 0;
-  /** p from each input on that changed it. */
+  /** p for each input that changed it. */
   #exponents: { seq: number; p: number }[] = [];
-  /** Of sessions that cannot be opened or break at once: by the client's rules, on top of what the server asks for. */
+  /** For sessions that cannot be opened or break at once: by the client's rules, in addition to what the server asks for. */
   readonly #backoff = new Backoff();
   readonly #over = new AbortController();
 
@@ -54,13 +55,13 @@ export class Live {
     readonly side: Side,
     readonly encoding: Encoding,
     readonly watcher: LiveWatcher,
-    /** Of each vertex, a number that those have which are taken for one with it. */
+    /** For each vertex a number, the same for vertices that count as one. */
     readonly weld?: Uint32Array,
   ) {
     void this.#run();
   }
 
-  /** `time`: of the input that made this change, for the latency. */
+  /** `time`: of the input that made this change, to measure the latency. */
   show(document: Document, time = performance.now()): void {
     this.document = document;
     this.#tell(time);
@@ -76,16 +77,16 @@ export class Live {
     return newer ?? frame;
   }
 
-  /** One that has come since. */
+  /** A frame that has come since. */
   #poll(): Frame | undefined {
     try {
       return this.#session?.poll();
     } catch {
-      return undefined; // the session is over; reading frames finds out why
+      return undefined; // the session has ended; reading frames tells why
     }
   }
 
-  /** The frame that was taken has been drawn and is on the screen since `time`. */
+  /** The frame that was taken is on the screen since `time`. */
   drawn(frame: Frame, time: number): void {
     this.meter.drawn(time, frame.wireBytes);
     this.#drawn = frame.inputSeq;
@@ -103,14 +104,14 @@ export class Live {
     return this.#exponents.findLast(({ seq }) => seq <= inputSeq)?.p ?? 2;
   }
 
-  /** There are changes that no picture answers yet. */
+  /** Whether there are changes that no picture answers yet. */
   get isSettling(): boolean {
     return this.#newest > this.#drawn;
   }
 
   /**
-   * The result for the document in the doubles that the server computes in. Rejects where the server is away, or has nothing to
-   * solve, or takes longer than `deadlineMs`.
+   * The result for the document in the doubles that the server computes. Rejects if the server is away, has nothing to solve,
+   * or takes longer than `deadlineMs`.
    */
   async solve(deadlineMs: number): Promise<SolveResult<Float64Array>> {
     const session = this.#session;
@@ -121,7 +122,7 @@ export class Live {
   close(): void {
     this.#over.abort();
     this.#taken?.();
-    this.#session?.close().catch(() => undefined); // it expires by itself where the server is away
+    this.#session?.close().catch(() => undefined); // the session expires by itself if the server is away
     this.#session = undefined;
   }
 
@@ -142,13 +143,14 @@ export class Live {
       const openedAt = performance.now();
       const { hadFrames, askedMs } = await this.#readFrames(session);
       if (this.#over.signal.aborted || !isPassing(this.status)) return;
-      // A server that opens sessions and gives no frames, or breaks at once, must not be sent the mesh over and over.
+      // A server that opens sessions but gives no frames, or breaks at once, must not be sent the mesh again
+      // and again.
       if (hadFrames && performance.now() - openedAt >= Backoff.mostMs) this.#backoff.reset();
       await pause(this.#backoff.nextMs(askedMs), this.#over.signal);
     }
   }
 
-  /** As often as it takes; nothing where the mesh is refused or the page has done with it. */
+  /** Tries until it succeeds; undefined if the mesh is refused or the pane is closed. */
   async #open(): Promise<Session | undefined> {
     const { positions, exact, faces } = this.mesh;
     const { signal } = this.#over;
@@ -178,7 +180,9 @@ export class Live {
     }
   }
 
-  /** Until the session is over; whether there was any, and the pause that the server asked for at the end. */
+  /**
+   * Reads frames until the session ends. Returns whether there were any, and the pause that the server asked for at the end.
+   */
   async #readFrames(session: Session): Promise<{ hadFrames: boolean; askedMs: number }> {
     let [hadFrames, askedMs] = [false, 0];
     try {
@@ -237,7 +241,7 @@ export class Live {
   }
 }
 
-/** Ends early where the signal says so. */
+/** Ends early if the signal aborts. */
 function pause(milliseconds: number, signal: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
     const done = () => {

@@ -1,6 +1,6 @@
 import { percentile } from "../model/statistics.js";
 
-/** What a second has brought, and how long inputs took. Times in milliseconds of performance.now(). */
+/** What the last second has brought, and how long inputs took. Times are milliseconds of performance.now(). */
 export class Meter {
   readonly #frames: { time: number; bytes: number }[] = [];
   readonly #latencies: number[] = [];
@@ -16,7 +16,7 @@ export class Meter {
     this.#forget(time);
   }
 
-  /** `latency`: from an input to the picture that answers it; `service`: the part of it from sending to receiving. */
+  /** `latency`: from an input to the picture that answers it; `service`: the part of that between sending and receiving. */
   answered(latency: number, service: number): void {
     this.#latencies.push(latency);
     this.#services.push(service);

@@ -2,12 +2,12 @@ import type { LpdeformError } from "lpdeform-client";
 import type { Handle } from "../model/document.js";
 import { nothing, ofVertices, type PointedOut } from "../model/pointed.js";
 
-/** How things stand with the server, in words for people. */
+/** The state of the connection, in words for users. */
 export interface Status {
   kind: "idle" | "opening" | "live" | "away" | "full" | "draining" | "refused";
   title: string;
   text: string;
-  /** What the server named: "vertex 17", "face 3". */
+  /** The element that the server named: "vertex 17", "face 3". */
   element: string;
 }
 
@@ -25,7 +25,7 @@ export function statusOf(error: LpdeformError): Status {
   if (["unavailable", "unknown", "deadline_exceeded", "internal", "cancelled", "data_loss"].includes(code)) {
     return say("away", "The server is away", `${kept}. Reconnecting by itself…`);
   }
-  if (isSessionOver(reason)) return say("away", "The server has let go of this session", `${kept}. Beginning anew…`);
+  if (isSessionOver(reason)) return say("away", "The server has removed this session", `${kept}. Starting again…`);
   if (code === "unauthenticated" || code === "permission_denied") {
     return say("refused", "The server does not let you in", `${sentence(message)} ${kept}.`);
   }
@@ -35,7 +35,7 @@ export function statusOf(error: LpdeformError): Status {
   return { ...say("refused", "The server refuses this mesh", sentence(message)), element };
 }
 
-/** Where nothing is tried again but by beginning anew. */
+/** The status when nothing is tried again until the user starts again. */
 export function statusAtEnd(error: LpdeformError): Status {
   if (error.reason !== "FRAME_PARTS" && error.reason !== "FRAME_VERTICES") return statusOf(error);
   const advice = "Page and server may be of different versions: reload the page.";
@@ -50,12 +50,12 @@ export function say(kind: Status["kind"], title: string, text = ""): Status {
   return { kind, title, text, element: "" };
 }
 
-/** Whether the same may go well later. */
+/** Whether the same may succeed later. */
 export function isPassing({ kind }: Status): boolean {
   return kind === "away" || kind === "full" || kind === "draining";
 }
 
-/** Of many digits; numbers of elements stay as they are. */
+/** Formats numbers with many digits; numbers of elements stay as they are. */
 const amounts = /(?<=≤\u00a0)\d{5,}|\b\d{5,}(?= (?:vertices|faces|bytes))/g;
 
 export function sentence(text: string): string {
@@ -66,8 +66,8 @@ export function sentence(text: string): string {
 }
 
 /**
- * The elements in what a server names: "vertex 17", "face 3", "edge 4-5", "vertices 1 and 2", "handle \"tip\"" of `handles`.
- * Nothing where it names none: "component 2".
+ * The elements that a server names: "vertex 17", "face 3", "edge 4-5", "vertices 1 and 2", "handle \"tip\"" of `handles`. Empty
+ * if it names none: "component 2".
  */
 export function elementsIn(element: string, handles: readonly Pick<Handle, "name" | "vertices">[] = []): PointedOut {
   const [, name] = /^handle "(.*)"/.exec(element) ?? [];

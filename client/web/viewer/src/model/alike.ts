@@ -1,4 +1,4 @@
-/** Whether plain values, with arrays and objects in them, are the same through and through. */
+/** Whether plain values, including nested arrays and objects, are equal. */
 export function isAlike(a: unknown, b: unknown): boolean {
   if (Object.is(a, b)) return true;
   if (typeof a !== "object" || typeof b !== "object" || a === null || b === null) return false;

@@ -1,6 +1,6 @@
 import type { Mesh } from "./mesh.js";
 
-/** The boundary of those of nx x ny x nz unit cells that are solid, each side two triangles, one corner at the origin. */
+/** The boundary of the solid cells among nx x ny x nz unit cells, with two triangles per side and one corner at the origin. */
 export function blockSurface(nx: number, ny: number, nz: number, isSolid: (x: number, y: number, z: number) => boolean): Mesh {
   const size = [nx, ny, nz] as const;
   const solid = (cell: readonly number[]) =>
@@ -28,7 +28,7 @@ export function blockSurface(nx: number, ny: number, nz: number, isSolid: (x: nu
             next[axis]! += isFar ? 1 : -1;
             if (solid(next)) continue;
             const [a, b, c, d] = cellSide([x, y, z], axis, isFar).map(vertex) as [number, number, number, number];
-            // Diagonals by turns, so that no direction is preferred.
+            // The diagonals alternate, so that no direction is preferred.
             if ((x + y + z) % 2 === 0) faces.push(a, b, c, a, c, d);
             else faces.push(a, b, d, b, c, d);
           }

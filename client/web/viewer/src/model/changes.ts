@@ -2,10 +2,10 @@ import type { FieldValue, Handle as WireHandle, HandleChange, Settings, Update }
 import { type Document, emptyDocument, type Handle, pField } from "./document.js";
 import { toMotion } from "./pose.js";
 
-/** Which pane of the split view: each has its own p. */
+/** A pane of the split view: each has its own p. */
 export type Side = "first" | "second";
 
-/** What a session that has `before` must be told to have `after`; nothing where they are the same to it. */
+/** The update that takes a session from `before` to `after`; undefined if they are the same for it. */
 export function changes(before: Document, after: Document, side: Side = "first"): Update | undefined {
   const handles = handleChanges(before.handles, after.handles);
   const settings = settingChanges(before, after, side);
@@ -13,7 +13,7 @@ export function changes(before: Document, after: Document, side: Side = "first")
   return { handles, settings };
 }
 
-/** Where every session begins. */
+/** The state in which every session begins. */
 export const newSession: Document = { ...emptyDocument, p: NaN, secondP: NaN };
 
 function handleChanges(before: readonly Handle[], after: readonly Handle[]): Record<string, HandleChange> {
@@ -30,7 +30,7 @@ function handleChanges(before: readonly Handle[], after: readonly Handle[]): Rec
     }
   }
   for (const name of old.keys()) changed.set(name, { remove: true });
-  return Object.fromEntries(changed); // takes any name, "__proto__" too
+  return Object.fromEntries(changed); // works for any name, also "__proto__"
 }
 
 function isHeldAlike(a: Handle, b: Handle): boolean {
@@ -67,7 +67,7 @@ function pOf(document: Document, p: number): FieldValue {
   return pField(document, p) ?? p;
 }
 
-/** p of the energy as a whole: that of the slider, also where parts are painted; 2 where the server finds p by itself. */
+/** p of the energy as a whole: the slider's, even if parts are painted; 2 if the server finds p by itself. */
 export function exponent({ isAutomatic, p, secondP }: Document, side: Side): number {
   return isAutomatic ? 2 : side === "first" ? p : secondP;
 }

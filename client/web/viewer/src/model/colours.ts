@@ -1,6 +1,6 @@
 export type Rgb = readonly [number, number, number];
 
-/** Blue over cyan, green and yellow to red, each 0 to 255: those of the command line's pictures. */
+/** Blue, cyan, green, yellow, red, each 0 to 255, as in the command line's pictures. */
 export const stops: readonly Rgb[] = [
   [38, 70, 200],
   [60, 180, 230],
@@ -9,7 +9,7 @@ export const stops: readonly Rgb[] = [
   [215, 40, 35],
 ];
 
-/** Of t in 0 to 1; what is outside is clamped. */
+/** The colour for t from 0 to 1; values outside are clamped. */
 export function blueToRed(t: number): Rgb {
   const scaled = Math.min(Math.max(t, 0), 1) * (stops.length - 1);
   const stop = Math.min(Math.floor(scaled), stops.length - 2);
@@ -17,7 +17,7 @@ export function blueToRed(t: number): Rgb {
   return [0, 1, 2].map((k) => Math.round(low[k]! + (high[k]! - low[k]!) * (scaled - stop))) as unknown as Rgb;
 }
 
-/** Told apart by most eyes, on light and on dark; groups take them in turn. */
+/** Distinct for most eyes, on light and on dark; groups use them in turn. */
 export const groupColours: readonly string[] = [
   "#ff7a1a",
   "#2f8cff",

@@ -9,7 +9,7 @@ interface Limb {
   rb: number;
 }
 
-/** x looks forward, y to the left, z up; the feet stand near z = 0. */
+/** x points forward, y to the left, z up; the feet are near z = 0. */
 function limbs(): Limb[] {
   const parts: Limb[] = [
     { a: [-0.24, 0, 0.45], b: [0.02, 0, 0.47], ra: 0.15, rb: 0.135 }, // trunk
@@ -31,7 +31,7 @@ function limbs(): Limb[] {
   return parts;
 }
 
-/** About 0.78 resolution^2 vertices; a closed surface, blended from limbs so that it is smooth everywhere. */
+/** About 0.78 resolution^2 vertices. A closed surface, blended from limbs so that it is smooth everywhere. */
 export function creature(resolution: number): Mesh {
   const parts = limbs();
   const width = 0.02;

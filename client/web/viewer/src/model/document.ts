@@ -4,32 +4,32 @@ import { fitPose } from "./fit.js";
 import { centroid, type Vector3 } from "./mesh.js";
 import { about, add, type Pose } from "./pose.js";
 
-/** A group of vertices that the user holds, or of points inside faces (from a file). */
+/** A group of vertices, or of points inside faces (from a file), that the user holds. */
 export interface Handle {
   readonly name: string;
   readonly colour: string;
   readonly vertices: readonly number[];
   readonly points?: readonly SurfacePoint[];
   readonly pose: Pose;
-  /** x, y, z for each vertex or point, in place of the pose; from a file. */
+  /** x, y, z for each vertex or point, instead of the pose; from a file. */
   readonly targets?: readonly number[];
   readonly hold: Hold;
   readonly footprint: number;
-  /** It cannot be dragged. */
+  /** Whether it is protected against dragging. */
   readonly isLocked: boolean;
 }
 
-/** Everything that undo brings back and that a server could lose. Never changed in place. */
+/** Everything that undo restores and that a server could lose. Immutable. */
 export interface Document {
   readonly handles: readonly Handle[];
   readonly p: number;
-  /** Of the second pane of the split view. */
+  /** For the second pane of the split view. */
   readonly secondP: number;
-  /** p and stiffness found by the server from the shape. */
+  /** p and stiffness are computed by the server from the shape. */
   readonly isAutomatic: boolean;
-  /** One a vertex, NaN where the slider decides. */
+  /** One per vertex, NaN where the slider decides. */
   readonly paintedP?: Float32Array;
-  /** One a vertex. */
+  /** One per vertex. */
   readonly stiffness?: Float32Array;
   /** The vertices that may move; from a file. */
   readonly region?: readonly number[];
@@ -41,14 +41,14 @@ export function handleOf(document: Document, name: string | undefined): Handle |
   return document.handles.find((handle) => handle.name === name);
 }
 
-/** Which handle each vertex belongs to. */
+/** The handle of each held vertex. */
 export function ownersOf({ handles }: Document): Map<number, Handle> {
   const owners = new Map<number, Handle>();
   for (const handle of handles) for (const vertex of handle.vertices) owners.set(vertex, handle);
   return owners;
 }
 
-/** "Handle 3": the first such name that is free. */
+/** The first free name of the form "Handle 3". */
 export function freeName({ handles }: Document, stem = "Handle"): string {
   const taken = new Set(handles.map(({ name }) => name));
   let number = 1;
@@ -61,7 +61,9 @@ function freeColour({ handles }: Document): string {
   return groupColours.reduce((best, colour) => (uses(colour) < uses(best) ? colour : best));
 }
 
-/** A new handle of those of the vertices that no other holds, where they are now; the same document where none is left. */
+/**
+ * Adds a handle of the vertices that no other handle holds, at their present place. Returns the same document if none is left.
+ */
 export function addHandle(
   document: Document,
   vertices: readonly number[],
@@ -90,7 +92,7 @@ export function changeHandle(document: Document, name: string, change: Partial<H
   return { ...document, handles };
 }
 
-/** What becomes of a handle that is moved by so much from where it is. */
+/** The changes of a handle that is moved by this much from where it is. */
 export function shifted({ targets, pose }: Handle, by: Vector3): Partial<Handle> {
   if (targets) return { targets: targets.map((value, k) => value + by[k % 3]!) };
   return { pose: { ...pose, translation: add(pose.translation, by) } };
@@ -100,7 +102,7 @@ export function removeHandle(document: Document, name: string): Document {
   return { ...document, handles: document.handles.filter((handle) => handle.name !== name) };
 }
 
-/** Adds vertices that nobody holds; the handle stays where it is, turning about its new middle. */
+/** Adds vertices that no handle holds. The handle stays where it is and then turns about its new middle. */
 export function extendHandle(document: Document, name: string, vertices: readonly number[], rest: Float32Array): Document {
   const handle = handleOf(document, name);
   if (!handle || handle.points || handle.targets) return document;
@@ -109,7 +111,7 @@ export function extendHandle(document: Document, name: string, vertices: readonl
   return changeHandle(document, name, { vertices: all, pose: about(handle.pose, centroid(rest, all)) });
 }
 
-/** Takes vertices out of whatever handles hold them; handles without any are gone. */
+/** Removes vertices from all handles; handles without vertices are removed. */
 export function releaseVertices(document: Document, vertices: readonly number[], rest: Float32Array): Document {
   const released = new Set(vertices);
   const handles: Handle[] = [];
@@ -123,7 +125,7 @@ export function releaseVertices(document: Document, vertices: readonly number[],
   return { ...document, handles };
 }
 
-/** Why the name cannot be that of the handle; nothing where it can. */
+/** Why the handle cannot have this name; undefined if it can. */
 export function nameFault(document: Document, old: string, name: string): string | undefined {
   if (name === "") return "A handle needs a name.";
   if (new TextEncoder().encode(name).length > 128) return "A name has 128 bytes at most.";
@@ -153,12 +155,12 @@ export function withoutPaint(document: Document): Document {
   return rest;
 }
 
-/** p of each vertex, where it is painted. */
+/** p of each vertex, if it is painted. */
 export function pField({ paintedP }: Document, p: number): Float32Array | undefined {
   return paintedP?.map((value) => (Number.isNaN(value) ? p : value));
 }
 
-/** The anchor of a handle, and of one with targets the middle of these. */
+/** The anchor of a handle; for one with targets, the middle of the targets. */
 export function anchorOfHandle(handle: Handle): Vector3 {
   if (handle.targets) {
     const points = Float32Array.from(handle.targets);

@@ -1,7 +1,7 @@
 import { centroid } from "./mesh.js";
 import { atRest, type Pose, type Quaternion } from "./pose.js";
 
-/** The rigid motion that brings the vertices from `rest` nearest to where they are in `current` (Horn's quaternion). */
+/** The rigid motion that best takes the vertices from `rest` to `current` (Horn's quaternion). */
 export function fitPose(rest: Float32Array, current: Float32Array, vertices: readonly number[]): Pose {
   const center = centroid(rest, vertices);
   if (rest === current) return atRest(center);
@@ -25,7 +25,7 @@ export function fitPose(rest: Float32Array, current: Float32Array, vertices: rea
     number,
     number,
   ];
-  // Of w, x, y, z; the rotation is the eigenvector of the largest eigenvalue.
+  // In the order w, x, y, z; the rotation is the eigenvector of the largest eigenvalue.
   const n = [
     [xx + yy + zz, yz - zy, zx - xz, xy - yx],
     [yz - zy, xx - yy - zz, xy + yx, zx + xz],
@@ -39,7 +39,7 @@ export function fitPose(rest: Float32Array, current: Float32Array, vertices: rea
   };
 }
 
-/** By squaring the shifted matrix again and again, which makes that direction outgrow the others. */
+/** By repeated squaring of the shifted matrix, which makes that direction outgrow the others. */
 function largestEigenvector(n: number[][]): Quaternion {
   const shift = Math.max(...n.map((row) => row.reduce((sum, value) => sum + Math.abs(value), 0)));
   let power = n.map((row, i) => row.map((value, j) => value + (i === j ? shift : 0)));
@@ -58,7 +58,7 @@ function largestEigenvector(n: number[][]): Quaternion {
   return length === 0 ? [0, 0, 0, 1] : [x / length, y / length, z / length, w / length];
 }
 
-/** Vertices on a line, or fewer than three, leave the turn about it open. */
+/** Vertices on a line, or fewer than three, do not determine the turn about it. */
 function isLine(rest: Float32Array, center: readonly number[], vertices: readonly number[]): boolean {
   const offsets = vertices.map((v) => [0, 1, 2].map((axis) => rest[3 * v + axis]! - center[axis]!));
   const longest = offsets.reduce((best, one) => (Math.hypot(...one) > Math.hypot(...best) ? one : best), [0, 0, 0]) as [

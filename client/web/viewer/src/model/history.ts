@@ -1,18 +1,18 @@
-/** All of a history, to go back to it. */
+/** The whole of a history, to return to it. */
 export interface Steps<Value> {
   past: Value[];
   present: Value;
   future: Value[];
 }
 
-/** Undo and redo of an immutable value. A gesture is many values and one step. */
+/** Undo and redo of an immutable value. A gesture is many values and a single step. */
 export class History<Value> {
   #past: Value[] = [];
   #future: Value[] = [];
   #present: Value;
   #before: Value | undefined;
 
-  /** `isSame`: of values of which the second is no step beyond the first. */
+  /** `isSame`: whether the second of two values is not a new step. */
   constructor(
     present: Value,
     readonly isSame: (a: Value, b: Value) => boolean = Object.is,
@@ -33,14 +33,14 @@ export class History<Value> {
     return this.#future.length > 0;
   }
 
-  /** A step of its own. */
+  /** Makes a step of its own. */
   push(value: Value): void {
     this.end();
     this.during(value);
     this.end();
   }
 
-  /** A value on the way; end() makes a step of all since the last one. */
+  /** An intermediate value; end() makes one step of all since the last step. */
   during(value: Value): void {
     this.#before ??= this.#present;
     this.#present = value;
@@ -59,7 +59,7 @@ export class History<Value> {
     this.#future = [];
   }
 
-  /** As if the gesture had not been. False where there is none. */
+  /** Reverts the gesture. False if there is none. */
   cancel(): boolean {
     if (this.#before === undefined) return false;
     this.#present = this.#before;
@@ -85,7 +85,7 @@ export class History<Value> {
     return true;
   }
 
-  /** After which another history may take the place of this one. */
+  /** Another history may then replace this one. */
   get steps(): Steps<Value> {
     this.end();
     return { past: [...this.#past], present: this.#present, future: [...this.#future] };
@@ -98,7 +98,7 @@ export class History<Value> {
     this.#present = present;
   }
 
-  /** Begins anew. */
+  /** Starts again. */
   reset(value: Value): void {
     this.restore({ past: [], present: value, future: [] });
   }

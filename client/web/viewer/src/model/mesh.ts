@@ -1,17 +1,20 @@
-/** A triangle mesh as flat arrays, in the order of its file; neither changes. */
+/** A triangle mesh as flat arrays, in the order of its file. The arrays do not change. */
 export interface Mesh {
   name: string;
-  /** x, y, z of each vertex, as they are drawn. */
+  /** x, y, z of each vertex, as drawn. */
   positions: Float32Array;
-  /** The same as the file has them, where float32 rounds some of them: what the server is given. */
+  /** The exact positions of the file if float32 rounds some of them; the server gets these. */
   exact?: Float64Array;
-  /** Three vertices a triangle, counter-clockwise seen from outside. */
+  /** Three vertices per triangle, counter-clockwise seen from outside. */
   faces: Uint32Array;
-  /** Of each face of the file, where some are no triangles: a polygon of n corners is a fan of n - 2 triangles about its first. */
+  /**
+   * The number of corners of each face of the file, if some are not triangles: a polygon of n corners is a fan of n - 2
+   * triangles about its first corner.
+   */
   corners?: Uint32Array;
-  /** What the file has beside, in words: "texture coordinates". */
+  /** Other contents of the file, in words: "texture coordinates". */
   beside?: readonly string[];
-  /** An OBJ file itself: what it has beside is saved with it. */
+  /** The OBJ file itself, so that its other contents can be saved with it. */
   obj?: Uint8Array;
 }
 
@@ -40,7 +43,7 @@ export interface Bounds {
   diagonal: number;
 }
 
-/** Of all positions, or of those that faces use. */
+/** The bounds of all positions, or of those that faces use. */
 export function boundsOf(positions: Float32Array, faces?: Uint32Array): Bounds {
   const min: [number, number, number] = [Infinity, Infinity, Infinity];
   const max: [number, number, number] = [-Infinity, -Infinity, -Infinity];
@@ -58,7 +61,7 @@ export function boundsOf(positions: Float32Array, faces?: Uint32Array): Bounds {
   return { min, max, center, diagonal: Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) || 1 };
 }
 
-/** Whether vertices are where the mesh has them, as far as frames of 16 bits can tell. */
+/** Whether vertices are where the mesh has them, to within the precision of 16-bit frames. */
 export function isAtRest(positions: Float32Array, rest: Float32Array, vertices?: readonly number[]): boolean {
   const step = boundsOf(rest).diagonal / 65535;
   const isSame = (at: number) => Math.abs(positions[at]! - rest[at]!) <= step;

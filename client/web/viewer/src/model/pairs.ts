@@ -1,4 +1,4 @@
-/** A number for each ordered pair of vertices, as a Map would have it, in a fraction of the time. */
+/** A number for each ordered pair of vertices, like a Map but much faster. */
 export class Pairs {
   readonly #first: Int32Array;
   readonly #second: Int32Array;
@@ -6,7 +6,7 @@ export class Pairs {
   readonly #mask: number;
   #size = 0;
 
-  /** For at most that many pairs. */
+  /** For at most this many pairs. */
   constructor(most: number) {
     const room = 2 ** Math.ceil(Math.log2(1.4 * most + 8));
     this.#first = new Int32Array(room);
@@ -19,12 +19,12 @@ export class Pairs {
     return this.#size;
   }
 
-  /** -1 where there is none. */
+  /** -1 if there is none. */
   get(a: number, b: number): number {
     return this.#values[this.#slot(a, b)]!;
   }
 
-  /** In place of what the pair had. `value`: from 0 on. True where it had none. */
+  /** Replaces the pair's value. `value`: from 0 on. Returns true if the pair had none. */
   set(a: number, b: number, value: number): boolean {
     const slot = this.#slot(a, b);
     const isNew = this.#values[slot]! < 0;
@@ -37,7 +37,7 @@ export class Pairs {
     return isNew;
   }
 
-  /** That of the pair, or the free one where it would be. */
+  /** The slot of the pair, or the free one where it would be. */
   #slot(a: number, b: number): number {
     const mixed = Math.imul(a, 0x9e3779b1) ^ Math.imul(b, 0x85ebca6b);
     let slot = (mixed ^ (mixed >>> 15)) & this.#mask;

@@ -1,6 +1,6 @@
 import type { SurfacePoint } from "lpdeform-client";
 
-/** Places on a surface, however it is deformed: of each, three vertices and how much of each makes it. */
+/** Places on a surface, however it is deformed: three vertices for each place, and their weights. */
 export interface Places {
   corners: number[];
   weights: number[];
@@ -17,7 +17,7 @@ export function placesOf(vertices: readonly number[], points: readonly SurfacePo
   return { corners, weights };
 }
 
-/** x, y, z of each place, into `out`. */
+/** Writes x, y, z of each place to `out`. */
 export function follow(
   { corners, weights }: Places,
   positions: Float32Array,

@@ -1,7 +1,7 @@
-/** Elements of the mesh under a brush or of a warning. */
+/** Elements of the mesh that a brush or a warning highlights. */
 export interface PointedOut {
   vertices: readonly number[];
-  /** Two vertices each. */
+  /** Two vertices per edge. */
   edges: readonly number[];
   faces: readonly number[];
 }
@@ -12,7 +12,7 @@ export function ofVertices(vertices: readonly number[]): PointedOut {
   return { ...nothing, vertices };
 }
 
-/** Without what the mesh does not have. */
+/** Without elements that the mesh does not have. */
 export function within({ vertices, edges, faces }: PointedOut, vertexCount: number, faceCount: number): PointedOut {
   return {
     vertices: vertices.filter((vertex) => vertex < vertexCount),
@@ -21,18 +21,18 @@ export function within({ vertices, edges, faces }: PointedOut, vertexCount: numb
   };
 }
 
-/** Three vertices a face that is pointed out. */
+/** Three vertices per highlighted face. */
 export function trianglesOf({ faces }: PointedOut, meshFaces: Uint32Array): number[] {
   return faces.flatMap((face) => [...meshFaces.subarray(3 * face, 3 * face + 3)]);
 }
 
-/** The edges and the sides of the faces: two vertices each. */
+/** The highlighted edges and the sides of the highlighted faces: two vertices each. */
 export function linesOf(pointed: PointedOut, meshFaces: Uint32Array): number[] {
   const corners = trianglesOf(pointed, meshFaces);
   return [...pointed.edges, ...corners.flatMap((corner, k) => [corner, corners[k % 3 === 2 ? k - 2 : k + 1]!])];
 }
 
-/** Every vertex of it, once. */
+/** Every vertex of the elements, once. */
 export function cornersOf(pointed: PointedOut, meshFaces: Uint32Array): number[] {
   return [...new Set([...pointed.vertices, ...pointed.edges, ...trianglesOf(pointed, meshFaces)])];
 }

@@ -21,7 +21,7 @@ export function isAtRest({ rotation, translation }: Pose): boolean {
   return Math.abs(rotation[3]) > 1 - 1e-12 && translation.every((value) => value === 0);
 }
 
-/** Where the middle of the handle goes. */
+/** The place to which the middle of the handle moves. */
 export function anchorOf({ center, translation }: Pose): Vector3 {
   return add(center, translation);
 }
@@ -48,7 +48,7 @@ export function apply({ rotation, translation, center }: Pose, point: Vector3): 
   return add(add(rotate(rotation, subtract(point, center)), center), translation);
 }
 
-/** Turned by `angle` radians about an axis through where its center is. */
+/** Rotated by `angle` radians about an axis through the present place of its center. */
 export function turned(pose: Pose, axis: Vector3, angle: number): Pose {
   return { ...pose, rotation: product(quaternionOf(axis, angle), pose.rotation) };
 }
@@ -66,7 +66,7 @@ export function subtract(a: Vector3, b: Vector3): Vector3 {
   return [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 }
 
-/** The second first, of length 1 however often it is done. */
+/** The product that applies the second rotation first, normalised so that errors do not accumulate. */
 function product([ax, ay, az, aw]: Quaternion, [bx, by, bz, bw]: Quaternion): Quaternion {
   const [x, y, z] = add(cross([ax, ay, az], [bx, by, bz]), [aw * bx + bw * ax, aw * by + bw * ay, aw * bz + bw * az]);
   const w = aw * bw - ax * bx - ay * by - az * bz;

@@ -1,21 +1,21 @@
 import { boundsOf, type Mesh } from "./mesh.js";
 import { Pairs } from "./pairs.js";
 
-/** In shares of the diagonal: what is no farther apart is in one place, as the server has it by default. */
+/** Share of the diagonal. Vertices that are no farther apart are in the same place, as the server's default says. */
 const samePlace = 1e-6;
 
 /**
- * Vertices on open borders that are in one place: files of engines have them where texture coordinates or normals change along a
- * seam. The surface hangs together only where they are taken for one.
+ * Vertices on open borders that are in the same place. Files of game engines have them where texture coordinates or normals
+ * change along a seam. The surface holds together only if such vertices count as one.
  */
 export class Seams {
-  /** Vertices that are copies of one before them. */
+  /** How many vertices are copies of an earlier one. */
   readonly copyCount: number;
-  /** The mesh's, by the first vertex of each place. */
+  /** The faces of the mesh, with the first vertex of each place. */
   readonly faces: Uint32Array;
   readonly #members = new Map<number, number[]>();
 
-  /** `groups`: the first vertex that is where the vertex is; itself where it is alone. */
+  /** `groups`: for each vertex the first vertex in the same place, which may be the vertex itself. */
   constructor(
     readonly groups: Uint32Array,
     faces: Uint32Array,
@@ -32,14 +32,14 @@ export class Seams {
     this.copyCount = copyCount;
   }
 
-  /** The vertices with all that are where they are, in their order. */
+  /** The vertices and all their copies, in order. */
   withCopies(vertices: readonly number[]): number[] {
     const all = vertices.flatMap((vertex) => this.#members.get(this.groups[vertex]!) ?? [vertex]);
     return [...new Set(all)];
   }
 }
 
-/** Nothing where no vertices on borders are in one place. */
+/** Undefined if no vertices on borders are in the same place. */
 export function seamsOf(mesh: Mesh): Seams | undefined {
   const positions = mesh.exact ?? mesh.positions;
   const border = borderVertices(mesh.faces);
@@ -60,7 +60,7 @@ export function seamsOf(mesh: Mesh): Seams | undefined {
   return new Seams(groups, mesh.faces);
 }
 
-/** Of edges that one face has, rising. */
+/** The vertices of edges that belong to one face only, ascending. */
 function borderVertices(faces: Uint32Array): number[] {
   const counts = new Pairs(faces.length); // 1, or 2 for more
   const forEachEdge = (visit: (low: number, high: number) => void) => {
@@ -79,7 +79,10 @@ function borderVertices(faces: Uint32Array): number[] {
 
 type Numbers = Float32Array | Float64Array;
 
-/** Every pair at most `distance` apart, found by cells of space that are much larger than that and yet hardly hold two places. */
+/**
+ * Visits every pair that is at most `distance` apart, using cells of space that are much larger than that but seldom hold two
+ * places.
+ */
 function forEachInOnePlace(
   positions: Numbers,
   vertices: readonly number[],
@@ -89,7 +92,7 @@ function forEachInOnePlace(
   const size = 1000 * distance;
   const cells = new Map<string, number[]>();
   for (const vertex of vertices) {
-    let isThere = false; // exactly: then one of them stands for both, however many there are
+    let isThere = false; // exactly the same place: one vertex stands for all of them
     for (const other of cellsNear(positions, vertex, size, distance).flatMap((cell) => cells.get(cell) ?? [])) {
       const far = distanceBetween(positions, vertex, other);
       if (far <= distance) found(other, vertex);
@@ -103,7 +106,7 @@ function forEachInOnePlace(
   }
 }
 
-/** Those that something within `reach` of the vertex may be in. */
+/** The cells that may hold something within `reach` of the vertex. */
 function cellsNear(positions: Numbers, vertex: number, size: number, reach: number): string[] {
   let cells = [""];
   for (let axis = 0; axis < 3; ++axis) {

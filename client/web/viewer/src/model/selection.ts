@@ -1,8 +1,8 @@
 import type { Adjacency } from "./adjacency.js";
 
 /**
- * The vertices within `radius` of `point` that hang together with `seed`, `seed` first, so that a brush does not reach through
- * a thin sheet to its other side by way of the air.
+ * The vertices within `radius` of `point` that are connected to `seed` within it, `seed` first. So a brush does not reach
+ * through a thin sheet to its other side.
  */
 export function dab(
   positions: Float32Array,
@@ -29,7 +29,7 @@ export function dab(
   return found;
 }
 
-/** Columns first, as three.js has its matrices. */
+/** Column by column, as in three.js. */
 export type Matrix4 = ArrayLike<number>;
 
 /** x and y of each vertex in pixels from the upper left corner; NaN behind the camera. */
@@ -51,7 +51,7 @@ export function project(positions: Float32Array, viewProjection: Matrix4, width:
   return screen;
 }
 
-/** Vertices whose pixels lie in the polygon (x, y by turns, by the even-odd rule). */
+/** Vertices whose pixels lie in the polygon (x and y in turn; even-odd rule). */
 export function insidePolygon(screen: Float32Array, polygon: readonly number[]): number[] {
   const found: number[] = [];
   for (let v = 0; 2 * v < screen.length; ++v) {
@@ -75,7 +75,7 @@ export function boxPolygon(x0: number, y0: number, x1: number, y1: number): numb
   return [x0, y0, x1, y0, x1, y1, x0, y1];
 }
 
-/** Those whose normal looks towards the eye. */
+/** The vertices whose normals point towards the camera. */
 export function facing(
   vertices: readonly number[],
   positions: Float32Array,

@@ -5,7 +5,7 @@ import { blockSurface } from "./block.js";
 
 export type Detail = "coarse" | "medium" | "fine";
 
-/** A generated mesh with handles to begin with: the first stay, the last is there to be dragged. */
+/** A generated mesh with handles to begin with: the first ones stay, the last one is there to be dragged. */
 export interface Shape {
   mesh: Mesh;
   document: Document;
@@ -42,7 +42,7 @@ function bar(detail: Detail): Shape {
   ]);
 }
 
-/** The sheet of its Figure 3 (medium: 3962 vertices), upright. */
+/** The sheet of the paper's Figure 3 (medium: 3962 vertices), upright. */
 function sheet(detail: Detail): Shape {
   const scale = { coarse: 0.5, medium: 1, fine: 1.6 }[detail];
   const [width, height] = [Math.round(30 * scale), Math.round(60 * scale)];
@@ -59,7 +59,7 @@ function sheet(detail: Detail): Shape {
   ]);
 }
 
-/** A row of three square holes, as wide as what is between them. */
+/** A row of three square holes, as wide as the bars between them. */
 function block(detail: Detail): Shape {
   const unit = { coarse: 2, medium: 4, fine: 7 }[detail];
   const isHole = (x: number, z: number) => Math.floor(x / unit - 1) % 4 < 2 && x >= unit && z >= unit && z < 3 * unit;

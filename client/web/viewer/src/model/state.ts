@@ -1,4 +1,4 @@
-/** Values that views are made from; who watches is told of every change, once. */
+/** Values that views are made from. Watchers are told of every change, once. */
 export class State<Values extends object> {
   readonly #watchers = new Set<(values: Values, before: Values) => void>();
   #values: Values;

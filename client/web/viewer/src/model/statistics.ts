@@ -1,9 +1,9 @@
-/** What the side panel says of the energies of the cells. */
+/** What the side panel shows of the energies of the cells. */
 export interface EnergyStatistics {
   max: number;
-  /** The energy drawn in full red: the 95th percentile, the maximum where that is 0. */
+  /** The energy drawn in full red: the 95th percentile, or the maximum if that percentile is 0. */
   red: number;
-  /** The sum of the largest ceil(n/20) over the sum of all; 0 where all are 0. */
+  /** The sum of the largest ceil(n/20) energies divided by the sum of all; 0 if all are 0. */
   top5Share: number;
 }
 
@@ -12,8 +12,8 @@ const bins = new Uint32Array(binCount);
 const sums = new Float64Array(binCount);
 
 /**
- * By bins, in two passes and without sorting, so that it can be asked for with each frame: percentile and share are off by one
- * of 4096 bins at most.
+ * Uses bins, in two passes and without sorting, so it is fast enough for every frame. Percentile and share are off by at most
+ * one of 4096 bins.
  */
 export function energyStatistics(energies: Float32Array): EnergyStatistics {
   let max = 0;
@@ -26,7 +26,7 @@ export function energyStatistics(energies: Float32Array): EnergyStatistics {
   if (!(max > 0)) return { max: 0, red: 0, top5Share: 0 };
   bins.fill(0);
   sums.fill(0);
-  // By the square root: most energies are far below the largest.
+  // In square roots, because most energies are far below the largest.
   const scale = (binCount - 1) / Math.sqrt(max);
   for (let k = 0; k < energies.length; ++k) {
     const energy = energies[k]!;
@@ -47,7 +47,7 @@ export function energyStatistics(energies: Float32Array): EnergyStatistics {
   return { max, red: percentile > 0 ? Math.min(percentile, max) : max, top5Share: (share + left * within) / total };
 }
 
-/** How many energies lie in each of `count` equal bins from 0 to `max`; what is beyond goes to the last. */
+/** How many energies lie in each of `count` equal bins from 0 to `max`; larger ones count in the last bin. */
 export function histogram(energies: Float32Array, max: number, count: number): Uint32Array {
   const counts = new Uint32Array(count);
   const scale = max > 0 ? count / max : 0;
@@ -55,7 +55,7 @@ export function histogram(energies: Float32Array, max: number, count: number): U
   return counts;
 }
 
-/** The value that a share of the numbers does not exceed; NaN of none. */
+/** The value that this share of the numbers does not exceed; NaN without numbers. */
 export function percentile(numbers: readonly number[], share: number): number {
   if (numbers.length === 0) return NaN;
   const sorted = Float64Array.from(numbers).sort();

@@ -4,8 +4,9 @@ import type { Mesh, Vector3 } from "./mesh.js";
 export type Field = (x: number, y: number, z: number) => number;
 
 /**
- * The surface where a field is 0, which is negative inside: a vertex in each cell that the surface crosses, a square across each
- * edge that it crosses ("surface nets"), evened out by relaxing in the surface. `resolution`: cells along x.
+ * The surface where a field is 0 ("surface nets"); the field is negative inside. There is a vertex in each cell that the
+ * surface crosses, and a square for each edge that it crosses. The mesh is then evened out by relaxation within the surface.
+ * `resolution`: cells along x.
  */
 export function surfaceNet(field: Field, low: Vector3, high: Vector3, resolution: number): Mesh {
   const step = (high[0] - low[0]) / resolution;
@@ -52,7 +53,7 @@ export function surfaceNet(field: Field, low: Vector3, high: Vector3, resolution
   return mesh;
 }
 
-/** The mean of the places where the edges of a cell cross the surface, within the cell. */
+/** The mean of the points where the edges of a cell cross the surface, within the cell. */
 function crossing(values: Float32Array, cell: number, strides: readonly [number, number, number]): number[] {
   const sum = [0, 0, 0];
   let count = 0;
@@ -72,7 +73,7 @@ function crossing(values: Float32Array, cell: number, strides: readonly [number,
   return sum.map((value) => value / count);
 }
 
-/** Moves each vertex to the mean of its neighbours and back onto the surface, some times. */
+/** Moves each vertex several times to the mean of its neighbours and back onto the surface. */
 function relax({ positions, faces }: Mesh, field: Field, step: number): void {
   const { starts, neighbours } = adjacencyOf(positions.length / 3, faces);
   const next = new Float32Array(positions.length);

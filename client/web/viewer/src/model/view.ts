@@ -3,21 +3,21 @@ import type { Detail } from "./shapes.js";
 
 export type Tool = "move" | "brush" | "lasso" | "box" | "paint";
 
-/** What the colours tell. */
+/** What the colours show. */
 export type ColourBy = "distortion" | "p" | "stiffness" | "normals" | "plain";
 
-/** What a selecting stroke does: a new handle, more for the selected one, or letting go of vertices. */
+/** What a selecting stroke does: make a new handle, add to the selected one, or release vertices. */
 export type StrokeMode = "new" | "add" | "release";
 
-/** How the page is looked at and used: not part of the work, not undone. */
+/** How the page is viewed and used. It is not part of the work and not undone. */
 export interface View {
   tool: Tool;
   mode: StrokeMode;
   selected: string | undefined;
   gizmo: "translate" | "rotate";
-  /** Of the brush, in shares of the mesh's diagonal. */
+  /** Of the brush, as a share of the mesh's diagonal. */
   radius: number;
-  /** Lasso and box take vertices that face away, too. */
+  /** Whether lasso and box also take vertices that face away. */
   isThrough: boolean;
   paintField: "p" | "stiffness";
   paintP: number;
@@ -25,15 +25,15 @@ export interface View {
   colourBy: ColourBy;
   wireframe: boolean;
   ghost: boolean;
-  /** The distortion in full red, where the scale is pinned. */
+  /** The distortion in full red, if the scale is pinned. */
   pinned: number | undefined;
   isSplit: boolean;
   isYUp: boolean;
-  /** Vertices in one place along seams are taken for one; see Seams. */
+  /** Whether vertices in the same place along seams count as one; see Seams. */
   isWelded: boolean;
   isDark: boolean;
   isPanelOpen: boolean;
-  /** Letters, digits and signs are shortcuts. */
+  /** Whether letters, digits and signs are shortcuts. */
   hasSingleKeys: boolean;
   detail: Detail;
   shape: string;

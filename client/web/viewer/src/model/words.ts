@@ -1,4 +1,4 @@
-/** "1.2 k", "0.031": three digits, for reading at a glance. */
+/** Three digits, for reading at a glance: "1.2 k", "0.031". */
 export function short(value: number): string {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);

@@ -3,7 +3,10 @@ import * as three from "three";
 const light = ["#dfe5ee", "#f8fafc"] as const;
 const dark = ["#10151f", "#2a3446"] as const;
 
-/** What is behind the surface: two colours, blended from below to above. Part of the picture, which is opaque: quicker to show. */
+/**
+ * The background of the surface: two colours, blended from bottom to top. It is part of the picture; an opaque picture is
+ * displayed faster.
+ */
 export class Backdrop {
   readonly object: three.Mesh;
   readonly #material = new three.ShaderMaterial({

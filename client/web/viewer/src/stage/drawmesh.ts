@@ -2,16 +2,16 @@ import type { Mesh } from "../model/mesh.js";
 import { Pairs } from "../model/pairs.js";
 
 /**
- * What is drawn of a mesh: its vertices, split where faces meet at a sharp edge at rest, so that hard edges stay hard and smooth
- * ones smooth. Made once a mesh; a frame is then two passes over flat arrays.
+ * The vertices to draw for a mesh. They are split where faces meet at an edge that is sharp at rest, so that hard edges stay
+ * hard and smooth edges smooth. Made once per mesh; a frame is then two passes over flat arrays.
  */
 export class DrawMesh {
-  /** The vertex of the mesh that each drawn one is. */
+  /** The mesh's vertex for each drawn vertex. */
   readonly source: Uint32Array;
   readonly indices: Uint32Array;
   readonly positions: Float32Array;
   readonly normals: Float32Array;
-  /** Every edge has a face on either side. */
+  /** Whether every edge has a face on either side. */
   readonly isClosed: boolean;
 
   constructor(
@@ -27,7 +27,7 @@ export class DrawMesh {
     this.take(mesh.positions);
   }
 
-  /** Positions of the mesh's vertices; normals are the faces', weighted by area. */
+  /** Takes positions of the mesh's vertices; normals are those of the faces, weighted by area. */
   take(positions: Float32Array): void {
     const { source, positions: drawn } = this;
     for (let k = 0; k < source.length; ++k) {
@@ -39,17 +39,17 @@ export class DrawMesh {
     addNormals(drawn, this.indices, this.normals);
   }
 
-  /** One value a vertex of the mesh, spread to the drawn ones. */
+  /** Spreads one value per vertex of the mesh to the drawn vertices. */
   spread(values: Float32Array, into: Float32Array): void {
     const { source } = this;
     for (let k = 0; k < source.length; ++k) into[k] = values[source[k]!]!;
   }
 }
 
-/** Of the face that was asked for last. */
+/** The normal of the last face. */
 const normal = new Float64Array(3);
 
-/** Twice the area long; `a`, `b` and `c`: where its corners begin in the positions. */
+/** Of a length of twice the area. `a`, `b` and `c`: where the corners begin in the positions. */
 function findNormal(positions: Float32Array, a: number, b: number, c: number): void {
   const ax = positions[a]!;
   const ay = positions[a + 1]!;
@@ -65,7 +65,7 @@ function findNormal(positions: Float32Array, a: number, b: number, c: number): v
   normal[2] = ux * vy - uy * vx;
 }
 
-/** Not of length 1: the shader sees to that. */
+/** Not of length 1; the shader normalises them. */
 function addNormals(positions: Float32Array, faces: Uint32Array, normals: Float32Array): void {
   normals.fill(0);
   for (let f = 0; f < faces.length; f += 3) {
@@ -95,7 +95,7 @@ export function vertexNormals(positions: Float32Array, faces: Uint32Array): Floa
   return normals;
 }
 
-/** Corners around a vertex belong together where they are joined by edges that are not sharp. */
+/** Corners around a vertex belong together if they are joined by edges that are not sharp. */
 function split({ positions, faces }: Mesh, leastCosine: number): Pick<DrawMesh, "source" | "indices" | "isClosed"> {
   const normals = faceNormals(positions, faces);
   const parents = Uint32Array.from({ length: faces.length }, (_, corner) => corner);
@@ -104,7 +104,7 @@ function split({ positions, faces }: Mesh, leastCosine: number): Pick<DrawMesh, 
     return corner;
   };
   const join = (a: number, b: number) => (parents[root(a)] = root(b));
-  const edges = new Pairs(faces.length); // of a directed edge: the corner that it begins at
+  const edges = new Pairs(faces.length); // for a directed edge: the corner at which it begins
   for (let corner = 0; corner < faces.length; ++corner) edges.set(faces[corner]!, faces[nextCorner(corner)]!, corner);
   let isClosed = edges.size === faces.length;
   for (let corner = 0; corner < faces.length; ++corner) {

@@ -4,11 +4,11 @@ import { isAtRest, type Pose, type Quaternion } from "../model/pose.js";
 
 /** Arrows and rings on the selected handle. */
 export class Gizmo {
-  /** What it does to the pose, while it does it. */
+  /** Called with each pose during a drag. */
   onPose: (pose: Pose) => void = () => undefined;
   onDragging: (isDragging: boolean) => void = () => undefined;
   onEnd: () => void = () => undefined;
-  /** It was let go of in the middle: nothing of what it did is to stay. */
+  /** The drag was cancelled: it must have no effect. */
   onCancel: () => void = () => undefined;
   readonly #anchor = new three.Object3D();
   readonly #controls: TransformControls;
@@ -19,7 +19,7 @@ export class Gizmo {
     this.#controls = new TransformControls(camera, canvas);
     this.object.add(this.#controls.getHelper(), this.#anchor);
     removeBackwardArrows(this.#controls.getHelper());
-    // The browser has taken the pointer; its own listeners know only of one that is let go.
+    // The browser has taken the pointer; three.js listens only for a pointer that is released.
     canvas.addEventListener("pointercancel", () => this.cancel());
     this.#controls.setSize(0.72);
     this.#controls.addEventListener("change", changed);
@@ -32,7 +32,7 @@ export class Gizmo {
     this.#controls.addEventListener("objectChange", () => this.#moved());
   }
 
-  /** To be drawn with the rest. */
+  /** Drawn with the rest of the scene. */
   readonly object = new three.Group();
 
   get isDragging(): boolean {
@@ -44,7 +44,7 @@ export class Gizmo {
     return this.#controls.axis !== null && this.#controls.object !== undefined;
   }
 
-  /** Lets go in the middle of a drag; what the pointer does until it is up moves nothing. False where there is none. */
+  /** Cancels a drag; until the pointer is released it moves nothing. False if there is no drag. */
   cancel(): boolean {
     if (!this.isDragging) return false;
     this.#isCancelled = true;
@@ -54,7 +54,7 @@ export class Gizmo {
     return true;
   }
 
-  /** Nothing: no handle is selected, or it cannot be moved. */
+  /** Undefined: no handle is selected, or it cannot be moved. */
   show(pose: Pose | undefined, mode: "translate" | "rotate"): void {
     this.#controls.setMode(mode);
     if (this.isDragging) return;
@@ -85,7 +85,7 @@ export class Gizmo {
   }
 }
 
-/** One arrow an axis is enough to see which way it points. */
+/** One arrow per axis is enough to show its direction. */
 function removeBackwardArrows(helper: three.Object3D): void {
   const backward: three.Object3D[] = [];
   helper.traverse((object) => {

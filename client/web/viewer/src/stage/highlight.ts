@@ -4,7 +4,7 @@ import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
 import { linesOf, nothing, type PointedOut, trianglesOf } from "../model/pointed.js";
 
-/** Edges and faces that are pointed out: seen through what lies before them, so that they can be found. */
+/** Highlighted edges and faces. They are drawn through whatever is in front of them, so that they can be found. */
 export class Highlight {
   readonly object = new three.Group();
   readonly #lineMaterial = new LineMaterial({ linewidth: 3.5, depthTest: false });
@@ -54,7 +54,7 @@ export class Highlight {
     corners.needsUpdate = true;
   }
 
-  /** Of the picture in CSS pixels, which widths of lines are in. */
+  /** The size of the picture in CSS pixels, in which widths of lines are given. */
   resize(width: number, height: number): void {
     this.#lineMaterial.resolution.set(width, height);
   }

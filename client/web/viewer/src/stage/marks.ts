@@ -26,7 +26,7 @@ void main() {
   gl_FragColor = vec4(mix(vColour, vec3(1.0), vRing * smoothstep(0.62, 0.72, far)), 1.0);
 }`;
 
-/** Points on the surface: handles in their colours, and whatever is being pointed out. */
+/** Points on the surface: handles in their colours, and highlighted vertices. */
 export class Marks {
   readonly object: three.Points;
   readonly #material = new three.ShaderMaterial({ vertexShader, fragmentShader, uniforms: { pixelRatio: { value: 1 } } });
@@ -38,7 +38,7 @@ export class Marks {
     this.object.renderOrder = 1;
   }
 
-  /** `faces`: of the mesh; `pointedOut`: vertices. */
+  /** `faces`: of the mesh; `pointedOut`: highlighted vertices. */
   show(
     handles: readonly Handle[],
     faces: Uint32Array,

@@ -8,7 +8,7 @@ export class Overlay {
     this.element.append(this.#line);
   }
 
-  /** x and y by turns; nothing hides it. */
+  /** x and y in turn; an empty polygon hides the line. */
   show(polygon: readonly number[]): void {
     const points: string[] = [];
     for (let k = 0; k + 1 < polygon.length; k += 2) points.push(`${polygon[k]},${polygon[k + 1]}`);

@@ -3,11 +3,11 @@ import type { Vector3 } from "../model/mesh.js";
 import { type Hit, raycast } from "../model/raycast.js";
 import type { Stage } from "./stage.js";
 
-/** What pointing at a stage does. Positions are pixels from the canvas's upper left corner, times those of the events. */
+/** What pointing at a stage does. Positions are pixels from the canvas's upper left corner; times are those of the events. */
 export interface PointingTarget {
-  /** Takes a press, or leaves it to the view and its click. */
+  /** Takes a press, or leaves it to the view, which reports a click. */
   press(at: PointerAt): Stroke | undefined;
-  /** A press that was left, and went nowhere. */
+  /** A press that was not taken and did not move. */
   click(at: PointerAt): void;
   hover(at: PointerAt | undefined): void;
 }
@@ -23,7 +23,7 @@ export interface PointerAt {
   hit: Hit | undefined;
 }
 
-/** A press that was taken, until it is let go. */
+/** A press that was taken, until it is released. */
 export interface Stroke {
   move(at: PointerAt): void;
   end(): void;
@@ -31,15 +31,15 @@ export interface Stroke {
   cancel(): void;
 }
 
-/** Pixels that a finger or a mouse may move within a click. */
+/** How many pixels a finger or a mouse may move within a click. */
 const clickSlack = { touch: 10, mouse: 4 };
 
-/** Turns the events of a stage's canvas into strokes and clicks; whatever is not taken turns the view. */
+/** Turns the events of a stage's canvas into strokes and clicks. Everything that is not taken changes the view. */
 export class Pointing {
   isHandOver = false;
   #stroke: { pointer: number; stroke: Stroke; down: PointerEvent } | undefined;
   #press: { at: PointerAt; pointer: number } | undefined;
-  /** While the space bar is held, everything turns the view. */
+  /** While the space bar is held, every drag changes the view. */
   isViewOnly = false;
 
   constructor(
@@ -59,7 +59,7 @@ export class Pointing {
     return this.#stroke !== undefined;
   }
 
-  /** False where no stroke is under way. */
+  /** False if there is no stroke. */
   cancel(): boolean {
     const taken = this.#stroke;
     this.#stroke = undefined;
@@ -139,7 +139,7 @@ export class Pointing {
     if (Math.hypot(at.x - press.at.x, at.y - press.at.y) <= slack) this.target.click(at);
   }
 
-  /** Two fingers turn and zoom the view, also where the first has begun a stroke. */
+  /** Two fingers turn and zoom the view, even if the first has begun a stroke. */
   #handOver(first: PointerEvent): void {
     this.cancel();
     this.isHandOver = true;
@@ -150,7 +150,7 @@ export class Pointing {
   }
 }
 
-/** Where a ray meets the plane through `point` that faces the camera. */
+/** The point where a ray meets the plane through `point` that faces the camera. */
 export function onPlane(stage: Stage, ray: three.Ray, point: Vector3): Vector3 | undefined {
   const normal = stage.camera.getWorldDirection(new three.Vector3());
   const plane = new three.Plane().setFromNormalAndCoplanarPoint(normal, new three.Vector3(...point));

@@ -1,9 +1,9 @@
 const context = document.createElement("canvas").getContext("webgl2");
 
-/** Nothing can be drawn where there is no WebGL. */
+/** Without WebGL nothing can be drawn. */
 export const canDraw = context !== null;
 
-/** Drawn by the processor, where each pixel counts. */
+/** Whether the processor draws; then every pixel counts. */
 export const isSoftware = context !== null && isByProcessor(context);
 
 function isByProcessor(context: WebGL2RenderingContext): boolean {

@@ -8,21 +8,21 @@ import { Marks } from "./marks.js";
 import { isSoftware } from "./software.js";
 import { Surface } from "./surface.js";
 
-/** From where to where. */
+/** The camera's position and target. */
 export interface Look {
   position: Vector3;
   target: Vector3;
 }
 
-/** Of a picture on which marks are as large as they can be; on lower ones they would hide the surface. */
+/** Height of a picture on which marks have their full size; on smaller pictures they would hide the surface. */
 const fullSizeHeight = 700;
 
-/** What lies over a picture of that width at its edges, in pixels. */
+/** The pixels that the page's controls cover at the edges of a picture of this width. */
 function coveredAt(width: number): { left: number; top: number; bottom: number } {
   return width > 620 ? { left: 70, top: 50, bottom: 120 } : { left: 40, top: 110, bottom: 165 };
 }
 
-/** One picture of a surface: canvas, camera, and what is drawn. Draws when it is told to, not by itself. */
+/** One picture of a surface: canvas, camera, and what is drawn. It draws only when it is told to. */
 export class Stage {
   readonly canvas = document.createElement("canvas");
   readonly camera = new three.PerspectiveCamera(32, 1, 0.01, 1000);
@@ -49,7 +49,7 @@ export class Stage {
     this.#scene.add(this.#backdrop.object, this.marks.object, this.highlight.object, this.gizmo.object);
   }
 
-  /** After whoever else listens to the canvas: what these take for themselves does not turn the view. */
+  /** Called after all other listeners to the canvas are set: what they take does not turn the view. */
   startControls(): void {
     const controls = new OrbitControls(this.camera, this.canvas);
     controls.rotateSpeed = 0.9;
@@ -59,9 +59,9 @@ export class Stage {
     this.#controls = controls;
   }
 
-  /** `faces`: across which it is drawn smoothly, where these are not the mesh's own. */
+  /** `faces`: the faces to shade smoothly, if these are not the mesh's own. */
   open(mesh: Mesh, faces?: Uint32Array): void {
-    const surface = new Surface(mesh, faces); // before the old one goes: there may be no memory for it
+    const surface = new Surface(mesh, faces); // made before the old one is removed, because there may be no memory for it
     this.surface?.group.removeFromParent();
     this.surface?.dispose();
     this.surface = surface;
@@ -72,7 +72,7 @@ export class Stage {
     return this.#controls?.target ?? new three.Vector3();
   }
 
-  /** Looks at all of it, from in front and a little above. */
+  /** Shows everything, from the front and a little above. */
   fit({ positions, mesh }: Surface, isYUp: boolean): void {
     const { min, max, center, diagonal } = boundsOf(positions, mesh.faces);
     const away = isYUp ? new three.Vector3(0.62, 0.42, 1) : new three.Vector3(0.62, -1, 0.42);
@@ -94,7 +94,9 @@ export class Stage {
     this.changed();
   }
 
-  /** From `place`, at which a box fits into what is free of the picture as the camera is turned. */
+  /**
+   * The distance at which a box fits into the free part of the picture, seen from `place` in the camera's present direction.
+   */
   #distanceFor(min: Vector3, max: Vector3, place: Vector3): number {
     const { camera } = this;
     const [width, height] = this.#size as [number, number];
@@ -116,7 +118,7 @@ export class Stage {
     return { position: this.camera.position.toArray(), target: this.target.toArray() };
   }
 
-  /** After fit(). */
+  /** Call it after fit(). */
   lookFrom({ position, target }: Look): void {
     this.camera.position.set(...position);
     this.target.set(...target);
@@ -126,13 +128,13 @@ export class Stage {
   }
 
   /**
-   * Towards a place from outside, where `normal` points; from where it looks now where that is nothing. The surface is in sight with
-   * it, from as near as `least` and no farther than `most`; where it is too far from the place for that, the place alone.
+   * Looks at the place from outside, along `normal`; from the present direction if that is undefined. The surface is in sight
+   * with it, at a distance from `least` to `most`. If the surface is too far away for that, only the place is.
    */
   lookAt(place: Vector3, normal: Vector3, [least, most]: readonly [number, number]): void {
     const towards = new three.Vector3(...normal);
     if (towards.length() < 1e-6) towards.copy(this.camera.position).sub(this.target);
-    // Not from straight above or below, where nobody knows what is left and right.
+    // Not from straight above or below, where left and right are unclear.
     const { up } = this.camera;
     towards.normalize().addScaledVector(up, -0.2 * towards.dot(up));
     if (towards.clone().cross(up).length() < 0.1) towards.add(new three.Vector3(0.3, up.z ? -0.3 : 0, up.y ? 0.3 : 0));
@@ -147,7 +149,7 @@ export class Stage {
     this.lookFrom({ position: middle.addScaledVector(towards, distance).toArray(), target });
   }
 
-  /** As dragging the surface to the right and up by so many radians does. */
+  /** Turns like dragging the surface to the right and up by this many radians. */
   turn(right: number, up: number): void {
     const { camera, target } = this;
     const toZ = new three.Quaternion().setFromUnitVectors(camera.up, new three.Vector3(0, 1, 0));
@@ -160,7 +162,7 @@ export class Stage {
     this.lookFrom({ position: position.toArray(), target: target.toArray() });
   }
 
-  /** The view by so many heights of the picture to the right and up. */
+  /** Shifts the view by this many heights of the picture to the right and up. */
   shift(right: number, up: number): void {
     const { camera, target } = this;
     const height = 2 * Math.tan((camera.fov * Math.PI) / 360) * camera.position.distanceTo(target);
@@ -168,7 +170,7 @@ export class Stage {
     this.lookFrom({ position: camera.position.clone().add(by).toArray(), target: target.clone().add(by).toArray() });
   }
 
-  /** To so many times the distance. */
+  /** Changes the distance by this factor. */
   approach(factor: number): void {
     const { camera, target } = this;
     const position = target.clone().lerp(camera.position, factor);
@@ -187,8 +189,8 @@ export class Stage {
   }
 
   /**
-   * The size on the page in CSS pixels. Where drawing is slow, the picture is finer at rest than while it moves; `quality`, up
-   * to 1, makes it coarser still. True where the size has changed.
+   * Sets the size on the page in CSS pixels. If drawing is slow, the picture is finer at rest than while it moves; `quality`,
+   * up to 1, makes it coarser still. Returns true if the size has changed.
    */
   resize(width: number, height: number, isMoving: boolean, quality = 1): boolean {
     const ratio = isSoftware ? (isMoving ? quality : 2) : Math.min(devicePixelRatio, 2);
@@ -213,7 +215,7 @@ export class Stage {
     this.#renderer.render(this.#scene, this.camera);
   }
 
-  /** What is drawn, as finely as at rest, without the gizmo. */
+  /** What is drawn, as fine as at rest, without the gizmo. */
   picture(): HTMLCanvasElement {
     this.resize(this.width, this.height, false);
     const wasVisible = this.gizmo.object.visible;
@@ -242,7 +244,7 @@ export class Stage {
     this.highlight.dispose();
     this.surface?.dispose();
     this.#renderer.dispose();
-    this.#renderer.forceContextLoss(); // browsers have few, and take the oldest away
+    this.#renderer.forceContextLoss(); // browsers allow only a few, and remove the oldest
     this.canvas.remove();
   }
 }

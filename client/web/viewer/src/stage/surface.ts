@@ -6,20 +6,20 @@ import { DrawMesh } from "./drawmesh.js";
 import { isSoftware } from "./software.js";
 import { colourByNormal, surfaceMaterial } from "./surface_material.js";
 
-/** Of what value each colour is. */
+/** The value for each colour. */
 export interface Scale {
   low: number;
   red: number;
   isLogarithmic: boolean;
 }
 
-/** From so many on, light at the vertices looks like light everywhere. */
+/** With this many vertices, lighting per vertex looks like lighting per pixel. */
 const denseVertices = 4000;
 
 /** The surface of a pane: faces, wireframe, the original as a ghost. */
 export class Surface {
   readonly group = new three.Group();
-  /** Of the mesh's vertices, as drawn. */
+  /** The positions of the mesh's vertices, as drawn. */
   positions: Float32Array;
   readonly #draw: DrawMesh;
   readonly #geometry = new three.BufferGeometry();
@@ -92,7 +92,7 @@ export class Surface {
     this.#material.dispose();
   }
 
-  /** Once, when they are first asked for: on large meshes that takes a while. */
+  /** Once, when they are first needed, because it takes some time for large meshes. */
   #findEdges(): void {
     const { geometry } = this.#wire;
     if (geometry.index) return;

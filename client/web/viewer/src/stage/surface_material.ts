@@ -1,7 +1,8 @@
 import * as three from "three";
 import { stops } from "../model/colours.js";
 
-// Lit from the eye and from above, in sRGB throughout: no conversions, so that the legend's colours are the surface's.
+// Lit from the camera and from above, in sRGB throughout: without conversions the surface has the legend's
+// colours.
 
 const light = `
 /* How bright, and how shiny, a place is that looks along the normal, seen from toEye. */
@@ -75,8 +76,8 @@ void main() {
 }`;
 
 /**
- * `isPerVertex`: light is found at vertices and not at pixels, which a processor that draws takes half the time for, and which
- * shows on coarse meshes alone. `isClosed`: nobody sees the inside, which need not be drawn.
+ * `isPerVertex`: lighting is computed per vertex instead of per pixel. If the processor draws, that takes half the time, and it
+ * is visible only on coarse meshes. `isClosed`: the inside is never visible, so it is not drawn.
  */
 export function surfaceMaterial(isPerVertex: boolean, isClosed: boolean): three.ShaderMaterial {
   return new three.ShaderMaterial({

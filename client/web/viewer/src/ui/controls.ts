@@ -22,7 +22,7 @@ export function slider(
   const input = el("input", { type: "range", min: String(min), max: String(max), step: String(step), aria: { label } });
   const shown = el("output");
   input.addEventListener("input", () => changed(input.valueAsNumber));
-  // A key that is held changes it over and over; that is one change.
+  // A held key changes the value many times; that is a single change.
   input.addEventListener("keydown", () => input.classList.add("held"));
   for (const end of ["keyup", "blur"]) {
     input.addEventListener(end, () => {

@@ -5,9 +5,9 @@ import { leastP, mostP, steppedP } from "../model/exponent.js";
 import { capital, short } from "../model/words.js";
 import { el, setText, toggle } from "./dom.js";
 
-/** The values of the paper's figures. */
+/** The values in the paper's figures. */
 const stops = [1, 1.5, 2, 6] as const;
-/** Low values take most of the way, where they differ most: share = log(p) / log(10). */
+/** Low values take most of the slider, because they differ most: share = log(p) / log(10). */
 export function shareOf(p: number): number {
   return Math.log(p / leastP) / Math.log(mostP / leastP);
 }
@@ -20,7 +20,7 @@ export function pAt(share: number): number {
 
 type Field = "p" | "secondP";
 
-/** The slider of p at the lower edge, two of them in the split view, and automatic p. */
+/** The slider of p at the lower edge (two of them in the split view), and automatic p. */
 export function dock(app: App): HTMLElement {
   const first = pSlider(app, "p");
   const second = pSlider(app, "secondP");

@@ -16,14 +16,14 @@ export function el<Tag extends keyof HTMLElementTagNameMap>(
 ): HTMLElementTagNameMap[Tag] {
   const element = document.createElement(tag);
   Object.assign(element, properties);
-  if (style) element.style.cssText = style; // the attribute is not for pages of a strict policy
+  if (style) element.style.cssText = style; // a strict content policy forbids the attribute
   for (const [name, value] of Object.entries(data ?? {})) element.dataset[name] = value;
   for (const [name, value] of Object.entries(aria ?? {})) element.setAttribute(`aria-${name}`, value);
   element.append(...children.filter((child): child is Node | string => child !== undefined && child !== false));
   return element;
 }
 
-/** Sets the text where it differs. */
+/** Sets the text if it differs. */
 export function setText(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }

@@ -11,7 +11,7 @@ export interface HandleRow {
   show(handle: Handle, isSelected: boolean): void;
 }
 
-/** A line of the list: colour, name, count, padlock, bin. It stays while what it shows changes, and the focus in it. */
+/** A line of the list: colour, name, count, padlock, bin. It stays when its contents change, so it keeps the focus. */
 export function handleRow(app: App): HandleRow {
   let shown: Handle | undefined;
   const change = (part: (handle: Handle) => Partial<Handle>) =>

@@ -1,6 +1,8 @@
 import type { Hold } from "lpdeform-client";
 import type { App } from "../app/app.js";
 import { changeHandle, type Handle, handleOf } from "../model/document.js";
+import { type HoldKind, holdKinds, kindOf } from "../model/hold_kinds.js";
+import type { Vector3 } from "../model/mesh.js";
 import { atRest, isAtRest } from "../model/pose.js";
 import { short } from "../model/words.js";
 import { el } from "./dom.js";
@@ -8,7 +10,7 @@ import { icon } from "./icons.js";
 import { slider } from "./controls.js";
 import { type HandleRow, handleRow } from "./handle_row.js";
 
-/** The handles with their names and colours, and what the selected one can be told. */
+/** The handles with their names and colours, and the settings of the selected handle. */
 export function handlesPanel(app: App): HTMLElement {
   const list = el("ul", { className: "handles" });
   const none = el("li", { className: "empty" }, "None yet: click the surface.");
@@ -55,7 +57,7 @@ export function handlesPanel(app: App): HTMLElement {
   return el("div", {}, list, details);
 }
 
-/** The focus goes to what is called as it was. */
+/** Moves the focus to the control with the same name. */
 function renew(details: HTMLElement, parts: readonly Node[]): void {
   const { activeElement } = document;
   const label = details.contains(activeElement) ? activeElement!.getAttribute("aria-label") : undefined;
@@ -68,45 +70,25 @@ function isSliding(details: HTMLElement): boolean {
   return details.querySelector("input[type=range]:is(:active, .held)") !== null;
 }
 
-const kinds: readonly (readonly [Hold["kind"], string])[] = [
-  ["exact", "Exactly"],
-  ["soft", "Softly"],
-  ["orientation", "By its direction alone"],
-  ["axisLock", "Free along an axis"],
-  ["planeLock", "Free in a plane"],
-];
-
 const axes = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] } as const;
-
-function newHold(kind: Hold["kind"]): Hold {
-  switch (kind) {
-    case "soft":
-      return { kind, weight: 1 };
-    case "orientation":
-      return { kind, weight: 100 };
-    case "axisLock":
-      return { kind, axis: axes.z };
-    case "planeLock":
-      return { kind, normal: axes.z };
-    default:
-      return { kind };
-  }
-}
 
 function detailsOf(app: App, handle: Handle): Node[] {
   const { name, hold, pose } = handle;
   const change = (part: Partial<Handle>) => app.change(changeHandle(app.document, name, part));
   const kind = el("select", { aria: { label: "How it is held" } });
-  // Points inside faces are held as they are or softly.
-  const possible = handle.points ? kinds.slice(0, 2) : kinds;
-  for (const [value, text] of possible) kind.append(el("option", { value, textContent: text, selected: value === hold.kind }));
+  for (const { label, fresh, takesPoints } of Object.values<HoldKind>(holdKinds)) {
+    if (handle.points && !takesPoints) continue;
+    kind.append(el("option", { value: fresh.kind, textContent: label, selected: fresh.kind === hold.kind }));
+  }
   kind.addEventListener("change", () => {
-    change({ hold: newHold(kind.value as Hold["kind"]) });
-    if (kind.value === "orientation") app.view.set({ gizmo: "rotate" });
+    const { fresh, isTurnedOnly } = holdKinds[kind.value as Hold["kind"]];
+    change({ hold: fresh });
+    if (isTurnedOnly) app.view.set({ gizmo: "rotate" });
   });
   const parts: Node[] = [el("label", { className: "pair" }, el("span", {}, "Held"), kind)];
-  if (hold.kind === "soft" || hold.kind === "orientation") parts.push(weight(app, name, hold));
-  if (hold.kind === "axisLock" || hold.kind === "planeLock") parts.push(direction(app, name, hold));
+  const { weight, direction } = kindOf(hold);
+  if (weight) parts.push(weightSlider(app, name, weight.of(hold), weight.with));
+  if (direction) parts.push(directionChoice(app, name, direction.label, direction.of(hold), direction.with));
   if (handle.vertices.length <= 12) parts.push(footprint(app, handle));
   const back = el(
     "button",
@@ -124,9 +106,8 @@ function detailsOf(app: App, handle: Handle): Node[] {
 }
 
 /** On a logarithmic scale, 0.001 to 1e6. */
-function weight(app: App, name: string, hold: Extract<Hold, { weight?: number }>): HTMLElement {
-  const set = (power: number) =>
-    changeHandle(app.document, name, { hold: { ...hold, weight: Number((10 ** power).toPrecision(2)) } });
+function weightSlider(app: App, name: string, now: number, holdWith: (weight: number) => Hold): HTMLElement {
+  const set = (power: number) => changeHandle(app.document, name, { hold: holdWith(Number((10 ** power).toPrecision(2))) });
   const { element, show } = slider(
     "Weight",
     -3,
@@ -138,26 +119,29 @@ function weight(app: App, name: string, hold: Extract<Hold, { weight?: number }>
     },
     () => app.endGesture(),
   );
-  show(Math.log10(Math.max(hold.weight ?? 1, 1e-3)), short(hold.weight ?? 1));
+  show(Math.log10(Math.max(now, 1e-3)), short(now));
   return element;
 }
 
-function direction(app: App, name: string, hold: Extract<Hold, { kind: "axisLock" | "planeLock" }>): HTMLElement {
-  const current = hold.kind === "axisLock" ? hold.axis : hold.normal;
+function directionChoice(
+  app: App,
+  name: string,
+  label: string,
+  now: Vector3,
+  holdWith: (direction: Vector3) => Hold,
+): HTMLElement {
   const select = el("select", { aria: { label: "Direction" } });
-  const known = Object.entries(axes).find(([, axis]) => axis.every((value, k) => value === current[k]));
+  const known = Object.entries(axes).find(([, axis]) => axis.every((value, k) => value === now[k]));
   for (const axis of Object.keys(axes))
     select.append(el("option", { value: axis, textContent: axis, selected: axis === known?.[0] }));
-  if (!known) select.append(el("option", { value: "", textContent: current.map(short).join(", "), selected: true }));
+  if (!known) select.append(el("option", { value: "", textContent: now.map(short).join(", "), selected: true }));
   select.addEventListener("change", () => {
-    const chosen = axes[select.value as keyof typeof axes];
-    const next: Hold = hold.kind === "axisLock" ? { kind: "axisLock", axis: chosen } : { kind: "planeLock", normal: chosen };
-    app.change(changeHandle(app.document, name, { hold: next }));
+    app.change(changeHandle(app.document, name, { hold: holdWith(axes[select.value as keyof typeof axes]) }));
   });
-  return el("label", { className: "pair" }, el("span", {}, hold.kind === "axisLock" ? "Along" : "Across"), select);
+  return el("label", { className: "pair" }, el("span", {}, label), select);
 }
 
-/** In mean edges of the mesh. */
+/** In mean edge lengths of the mesh. */
 function footprint(app: App, { name, footprint: radius }: Handle): HTMLElement {
   const edges = radius / app.edge;
   const text = (value: number) => (value === 0 ? "none" : `${short(value)} edges`);
@@ -173,6 +157,6 @@ function footprint(app: App, { name, footprint: radius }: Handle): HTMLElement {
     () => app.endGesture(),
   );
   show(edges, text(Number(edges.toPrecision(2))));
-  element.title = "The surroundings go along nearly rigidly: against spikes of handles of few vertices";
+  element.title = "The surroundings move along nearly rigidly: against spikes at handles with few vertices";
   return element;
 }

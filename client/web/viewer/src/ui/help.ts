@@ -55,7 +55,7 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
   ],
 ];
 
-/** A sheet of what can be done; Escape closes it. */
+/** The help sheet; Escape closes it. */
 export function helpSheet(app: App): HTMLDialogElement {
   app.view.set({ hasSingleKeys: remembered(singleKeys) !== "off" });
   const single = toggle(

@@ -6,7 +6,7 @@ import { icon } from "./icons.js";
 
 const gradient = stops.map(([r, g, b]) => `rgb(${r}, ${g}, ${b})`).join(", ");
 
-/** The scale at the lower left, with a pin that keeps it as it is. */
+/** The scale at the lower left, with a pin that keeps it. */
 export function legend(app: App): HTMLElement {
   const title = el("span", { className: "legend-title" });
   const numbers = [el("span"), el("span"), el("span")] as const;

@@ -3,7 +3,7 @@ import type { App } from "../app/app.js";
 import type { ColourBy } from "../model/view.js";
 import { choice, el, toggle } from "./dom.js";
 
-/** What is drawn, and how it travels. */
+/** What is drawn, and how frames are sent. */
 export function lookPanel(app: App): HTMLElement {
   const colour = choice<ColourBy>(
     "Colours",
@@ -25,11 +25,11 @@ export function lookPanel(app: App): HTMLElement {
     "Keep the colours' scale as it is (P)",
   );
   const up = toggle("Y is up", false, (isOn) => app.view.set({ isYUp: isOn }), "For meshes whose y axis points up");
-  const encoding = el("select", { aria: { label: "How frames travel" } });
+  const encoding = el("select", { aria: { label: "How frames are sent" } });
   for (const [value, text] of [
-    ["float32", "exact, 16 bytes a vertex"],
-    ["quantized", "16 bits, 8 bytes a vertex"],
-    ["compressed", "compressed, some 3 bytes"],
+    ["float32", "exact, 16 bytes per vertex"],
+    ["quantized", "16 bits, 8 bytes per vertex"],
+    ["compressed", "compressed, about 3 bytes"],
   ]) {
     encoding.append(el("option", { value: value!, textContent: text! }));
   }

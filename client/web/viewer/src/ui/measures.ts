@@ -8,18 +8,18 @@ import { el, setText } from "./dom.js";
 import { plotBars, plotLines } from "./plot.js";
 
 const binCount = 48;
-/** Plots are for eyes: some a second do. */
+/** Plots are drawn less often than numbers. */
 const plotEveryMs = 200;
 
 const rows = [
-  ["fps", "Frames a second", "Pictures with a new surface"],
-  ["latency", "Input to frame, ms", "From moving to seeing it: the median and 99 of 100"],
-  ["service", "…of it service, ms", "Server and way there and back, without drawing: the median and 99 of 100"],
-  ["bytes", "Received", "As it travels"],
+  ["fps", "Frames per second", "Pictures with a new surface"],
+  ["latency", "Input to frame, ms", "From an input to the picture that shows it: median and 99th percentile"],
+  ["service", "…of it service, ms", "Server and network, without drawing: median and 99th percentile"],
+  ["bytes", "Received", "Bytes received over the network"],
   ["vertices", "Vertices · faces", ""],
   ["energy", "Energy", "E of Eq. 3 of the paper"],
-  ["share", "In the top 5 %", "Share of the distortion that the most distorted twentieth of the cells has"],
-  ["method", "Method", "With the iterations of the newest solve"],
+  ["share", "In the top 5 %", "Share of the distortion in the 5 % most distorted cells"],
+  ["method", "Method", "And the iterations of the newest solve"],
   ["stop", "Stop reason", "Why the solve ended"],
   ["gap", "Gap, at most", "How far the energy can be from the optimum for its rotations"],
 ] as const;
@@ -121,7 +121,7 @@ function showNumbers(app: App, values: Record<Row, HTMLElement>, now: number): v
   );
 }
 
-/** The server says 1 where it has found no bound in its time. */
+/** The server reports 1 if it has found no bound in time. */
 function gapText(gap: number): string {
   return gap < 1 ? `${short(100 * gap)} %` : "not found";
 }
@@ -132,7 +132,7 @@ interface HistogramFigure {
   bars: HTMLCanvasElement;
 }
 
-/** Of one pane. */
+/** The histogram of one pane. */
 function histogramFigure(): HistogramFigure {
   const caption = el("figcaption");
   const bars = el("canvas", { className: "plot", role: "img" });
@@ -157,7 +157,7 @@ function showPlots(app: App, energy: HTMLCanvasElement, histograms: readonly His
   const counts = app.panes.map(({ distortion }) =>
     most > 0 ? histogram(distortion, most, binCount) : new Float64Array(binCount),
   );
-  // One scale for all, so that they can be compared.
+  // One scale for all panes, so that they can be compared.
   const highest = Math.max(...counts.flatMap((bins) => [...bins]));
   histograms.forEach(({ figure, caption, bars }, k) => {
     const pane = app.panes[k];

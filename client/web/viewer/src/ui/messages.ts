@@ -6,10 +6,10 @@ import { pointOutNamed } from "./report.js";
 
 /** How long a line stays. */
 const noticeMs = 6000;
-/** How long the server may be away without a word. */
+/** How long the server may be away before a message appears. */
 const awayMs = 400;
 
-/** What a problem asks of the user; what only says that a newer change came asks nothing. */
+/** Reasons that need no action by the user: they only say that a newer change came. */
 const quiet = new Set<Reason>(["SUPERSEDED", "NO_HANDLES"]);
 
 /** The pill of the connection, the banner while something is wrong, and lines that come and go. */
@@ -56,7 +56,7 @@ export function messages(app: App, beginAnew: () => void): HTMLElement {
     showStatus(app.facts.now.status);
   };
   app.facts.watch((facts, before) => {
-    // A short interruption is not worth words; how long it is does not depend on what else changes meanwhile.
+    // A short interruption needs no message. Its length does not depend on what else changes meanwhile.
     if (facts.status.kind !== "away") stopWaiting();
     else if (before.status.kind === "live") late ??= setTimeout(sayAway, awayMs);
     if (late === undefined) showStatus(facts.status);
@@ -75,7 +75,7 @@ export function messages(app: App, beginAnew: () => void): HTMLElement {
   return el("div", { className: "messages" }, pill, banner, restored, asideNote(app), hint, notice);
 }
 
-/** Says that the work is that of before, until it is changed, dismissed or let go. */
+/** Says that the work was restored, until it is changed or the note is dismissed. */
 function restoredNote(app: App, beginAnew: () => void): HTMLElement {
   const text = el("span");
   const discard = el("button", { type: "button", className: "plain", textContent: "Discard it" });
@@ -90,10 +90,10 @@ function restoredNote(app: App, beginAnew: () => void): HTMLElement {
   return note;
 }
 
-/** Says what has made room for other work: each can be brought back. */
+/** Lists works that were set aside; each can be restored. */
 function asideNote(app: App): HTMLElement {
   const text = el("span");
-  const which = el("select", { aria: { label: "Work that has made room" } });
+  const which = el("select", { aria: { label: "Work that was set aside" } });
   const back = el("button", { type: "button", className: "plain", textContent: "Bring it back" });
   const dismiss = el("button", { type: "button", className: "plain", textContent: "Dismiss" });
   back.addEventListener("click", () => app.bringBack(Number(which.value)));
@@ -106,8 +106,8 @@ function asideNote(app: App): HTMLElement {
     which.hidden = setAside.length < 2;
     which.replaceChildren(...setAside.map(({ id, name }) => el("option", { value: String(id), textContent: name })));
     if (!newest) return;
-    const one = `“${newest.name}” has made room, with your work on it.`;
-    setText(text, setAside.length > 1 ? `${setAside.length} have made room, with your work:` : one);
+    const one = `“${newest.name}” was set aside with your work on it.`;
+    setText(text, setAside.length > 1 ? `${setAside.length} were set aside with your work:` : one);
   });
   return note;
 }
@@ -125,7 +125,7 @@ function pillText({ kind, title }: Status): string {
   return kind === "live" ? "Live" : kind === "idle" || kind === "opening" ? "Preparing…" : title;
 }
 
-/** The next step, until it is plain. */
+/** A hint at the next step, until the user knows the page. */
 function hintOf(app: App): string {
   const { document, status } = app.facts.now;
   const { tool } = app.view.now;

@@ -1,6 +1,6 @@
 import { el } from "./dom.js";
 
-/** In place of everything, where the browser cannot draw. */
+/** Replaces the page if the browser cannot draw. */
 export function noPictures(): HTMLElement {
   return el(
     "section",

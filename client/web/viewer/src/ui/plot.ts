@@ -31,11 +31,11 @@ export interface Line {
   x: readonly number[];
   y: readonly number[];
   colour?: string;
-  /** Where there are several: what it is of. */
+  /** A name, if there are several lines. */
   name?: string;
 }
 
-/** Lines over a common x; the y axis is logarithmic where the values ask for it. */
+/** Lines over a common x; the y axis is logarithmic if the values need it. */
 export function plotLines(
   canvas: HTMLCanvasElement,
   lines: readonly Line[],
@@ -50,14 +50,15 @@ export function plotLines(
   const [left, right] = [Math.min(...xs), Math.max(...xs)];
   if (ys.length < 2 || !(right > left)) return empty(frame, "Drag a handle");
   let [low, high] = [ys.reduce((a, b) => Math.min(a, b)), ys.reduce((a, b) => Math.max(a, b))];
-  // Rest, where a drag begins, is nothing beside it: without it there is more to see of the rest of the line.
+  // A drag begins at rest, where the value is tiny. Without that point more of the rest of the line is
+  // visible.
   const tops = lines.map(({ y }) => y.reduce((a, b) => Math.max(a, b), 0)).filter((top) => top > 0);
   low = Math.max(low, 0.01 * tops.reduce((a, b) => Math.min(a, b)));
   const isLogarithmic = high / low > 20;
   const scale = isLogarithmic ? Math.log : (y: number) => y;
   if (!isLogarithmic) [low, high] = [low - 0.05 * (high - low || high), high + 0.05 * (high - low || high)];
   const toX = (x: number) => 2 + ((x - left) / (right - left)) * (width - 4);
-  // Above and below the lines there is room for words.
+  // Leaves room for words above and below the lines.
   const [roof, floor] = [16, height - 16];
   const toY = (y: number) => floor - ((scale(Math.max(y, low)) - scale(low)) / (scale(high) - scale(low))) * (floor - roof);
   context.strokeStyle = faint;
@@ -94,8 +95,8 @@ export function plotLines(
 }
 
 /**
- * Bars of places from 0 on, in the colours of their places, the one of `highest` as high as can be; heights by the root, so that few
- * are seen beside many.
+ * Bars from 0 on, each in the colour of its place; the bar of `highest` has the full height. Heights are square roots, so that
+ * small counts are visible beside large ones.
  */
 export function plotBars(
   canvas: HTMLCanvasElement,

@@ -5,7 +5,7 @@ import { cornersOf, nothing, type PointedOut, within } from "../model/pointed.js
 import { el, setText, toggle } from "./dom.js";
 import { icon } from "./icons.js";
 
-/** What a defect is of: the numbers in its list are of vertices, faces, or pairs of vertices. */
+/** The elements of a defect: the numbers in its list are vertices, faces, or pairs of vertices. */
 type Element = "vertex" | "face" | "edge";
 const keys = { vertex: "vertices", face: "faces", edge: "edges" } as const;
 
@@ -14,19 +14,19 @@ function elementOf(kind: string): Element {
   return /face|triangle/.test(kind) ? "face" : "vertex";
 }
 
-/** What the server sees to by itself, and most meshes have some of. */
+/** Defects that the server handles by itself, and that most meshes have some of. */
 const mild = new Set(["clamped_edges", "floored_vertices", "flipped_edges"]);
 
 function defectsOf(report: MeshReport | undefined): Defect[] {
   return (report?.defects ?? []).filter(({ count }) => count > 0);
 }
 
-/** What somebody who cares for the mesh wants to know. */
+/** The defects that a user who cares for the mesh wants to know. */
 export function warningsOf(report: MeshReport | undefined): Defect[] {
   return defectsOf(report).filter(({ kind }) => !mild.has(kind));
 }
 
-/** The mesh's report: each warning points out its elements. */
+/** The mesh's report: each warning highlights its elements. */
 export function reportPanel(app: App): HTMLElement {
   const summary = el("p", { className: "quiet" });
   const list = el("ul", { className: "warnings" });
@@ -92,7 +92,7 @@ function warning(app: App, { kind, count, first }: Defect): HTMLElement {
   return el("li", { className: mild.has(kind) ? "mild" : "" }, press);
 }
 
-/** Marks elements and turns to them; what was marked is no more. */
+/** Highlights elements and turns to them; removes the previous highlight. */
 export function pointOut(app: App, elements: PointedOut): void {
   const { positions, faces } = app.mesh;
   const pointedOut = within(elements, positions.length / 3, faces.length / 3);

@@ -3,7 +3,7 @@ import { remember, remembered } from "../io/remember.js";
 
 const key = "lpdeform-theme";
 
-/** As the user chose last, otherwise as the system has it. */
+/** The user's last choice, otherwise the system's setting. */
 export function startTheme(app: App): void {
   const isSystemDark = matchMedia("(prefers-color-scheme: dark)");
   const chosen = remembered(key);
@@ -11,7 +11,7 @@ export function startTheme(app: App): void {
   isSystemDark.addEventListener("change", () => {
     if (!remembered(key)) app.view.set({ isDark: isSystemDark.matches });
   });
-  // The picture shows that it has the focus to those who move it by keys.
+  // The picture shows its focus to users of the keyboard.
   window.addEventListener("keydown", ({ key }) => key === "Tab" && document.body.classList.add("by-keyboard"));
   window.addEventListener("pointerdown", () => document.body.classList.remove("by-keyboard"));
   app.view.watch(({ isDark }, before) => {

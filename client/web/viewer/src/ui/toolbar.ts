@@ -15,7 +15,7 @@ const tools: readonly (readonly [Tool, IconName, string, string])[] = [
   ["paint", "paint", "p brush", "Paint p or stiffness onto the surface (5)"],
 ];
 
-/** The tools at the left edge, and beside them what the chosen one can be told. */
+/** The tools at the left edge, and next to them the settings of the chosen one. */
 export function toolbar(app: App): HTMLElement {
   const buttons = tools.map(([tool, picture, label, title]) => {
     const element = el(

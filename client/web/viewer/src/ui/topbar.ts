@@ -6,7 +6,7 @@ import { icon, type IconName } from "./icons.js";
 import { menu } from "./menu.js";
 import { button } from "./controls.js";
 
-/** The name, what is opened, undo, and what is done with the whole. */
+/** The name, opening, undo, and actions on the whole work. */
 export function topbar(app: App, files: Files, showHelp: () => void): HTMLElement {
   const shapes = el("select", { title: "A shape to begin with", aria: { label: "Shape" } });
   for (const { id, title } of shapeKinds) shapes.append(el("option", { value: id, textContent: title }));

@@ -1,7 +1,7 @@
 import type { WhenToShow } from "../app/keeper.js";
 import { el } from "./dom.js";
 
-/** Asks when work is to be shown again that the page perhaps could not bear; Escape puts it off. */
+/** Asks when to show work again that may have been too much for the page; Escape puts it off. */
 export function wantsBack(name: string): Promise<WhenToShow> {
   const yes = el("button", { type: "button", className: "plain", textContent: "Show it again", autofocus: true });
   const later = el("button", { type: "button", className: "plain", textContent: "Not now" });

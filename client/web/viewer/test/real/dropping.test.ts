@@ -145,7 +145,9 @@ it("an OBJ file keeps what it has beside where it is saved as such, and it is sa
   expect(saved).toContain(`f ${faces[0]!.join(" ")}\n`);
   expect(saved.split("\n")[4]).toBe("v 0 0 3");
   await user.save("Mesh as STL");
-  const notice = user.page.locator(".notice", { hasText: "chimney-deformed.stl is without what the file had beside" });
+  const notice = user.page.locator(".notice", {
+    hasText: "chimney-deformed.stl does not have what the original file also had",
+  });
   await notice.waitFor();
   expect(await notice.textContent()).toContain(
     "texture coordinates, groups, materials, faces of more than three corners. Saved as OBJ, they stay.",

@@ -112,7 +112,7 @@ it("work that another shape, a file or letting go takes the place of is brought 
   const bent = await work();
   const aside = user.page.locator(".aside");
   const bringBack = async () => {
-    expect(await aside.textContent()).toContain("“bar” has made room");
+    expect(await aside.textContent()).toContain("“bar” was set aside");
     await aside.getByRole("button", { name: "Bring it back" }).click();
     await user.settled();
     expect([await work(), await user.ask("app.mesh.name"), await user.ask("app.view.now.shape")]).toEqual([bent, "bar", "bar"]);
@@ -147,7 +147,7 @@ it("work that another shape, a file or letting go takes the place of is brought 
   expect(await aside.isHidden()).toBe(true);
 });
 
-it("work that has made room stays, however much is opened after it and left as it was, over a reload too", async () => {
+it("work that was set aside stays, however much is opened after it and left as it was, over a reload too", async () => {
   await bend();
   const bent = await work();
   const aside = user.page.locator(".aside");
@@ -158,7 +158,7 @@ it("work that has made room stays, however much is opened after it and left as i
     await user.until("window.__lpdeform.app.mesh.name === 'tower.off'");
     await user.page.getByLabel("Shape").selectOption("block");
     await user.settled();
-    expect(await aside.textContent()).toContain("“bar” has made room");
+    expect(await aside.textContent()).toContain("“bar” was set aside");
   };
   await openOthers();
   await aside.getByRole("button", { name: "Bring it back" }).click();
@@ -195,7 +195,7 @@ it("each work that is followed by another stays, however many there are, over a 
   const expectThird = async () => {
     expect([await user.ask("app.mesh.name"), await work()]).toEqual(["third.off", works[2]]);
     expect(await names()).toEqual(["second.off", "bar"]);
-    expect(await aside.textContent()).toContain("2 have made room, with your work:");
+    expect(await aside.textContent()).toContain("2 were set aside with your work:");
   };
   await expectThird();
   await user.page.waitForTimeout(700);
@@ -204,7 +204,7 @@ it("each work that is followed by another stays, however many there are, over a 
   await expectThird();
 
   const bringBack = async (name: string) => {
-    await aside.getByLabel("Work that has made room").selectOption(name);
+    await aside.getByLabel("Work that was set aside").selectOption(name);
     await aside.getByRole("button", { name: "Bring it back" }).click();
     await user.until(`window.__lpdeform.app.mesh.name === '${name}'`);
     return work();
@@ -215,7 +215,7 @@ it("each work that is followed by another stays, however many there are, over a 
   expect(await names()).toEqual(["bar", "third.off"]);
   await aside.getByRole("button", { name: "Dismiss" }).click();
   expect(await names()).toEqual(["third.off"]);
-  expect(await aside.textContent()).toContain("“third.off” has made room, with your work on it.");
+  expect(await aside.textContent()).toContain("“third.off” was set aside with your work on it.");
   await user.page.waitForTimeout(700);
   await user.page.reload();
   await user.until("window.__lpdeform?.status() === 'live'");
