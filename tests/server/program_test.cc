@@ -191,8 +191,8 @@ TEST(Program, HelpNamesEveryOptionsVariable) {
   Arguments arguments;
   for (const Flag& flag : flags_of(arguments)) {
     EXPECT_NE(help.find(absl::StrCat("  --", flag.name)), std::string::npos) << flag.name;
-    if (flag.is_in_environment)
-      EXPECT_NE(help.find(environment_variable(flag) + ")"), std::string::npos) << flag.name;
+    if (!flag.is_in_environment) continue;
+    EXPECT_NE(help.find(environment_variable(flag) + ")"), std::string::npos) << flag.name;
   }
 }
 
