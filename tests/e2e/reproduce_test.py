@@ -61,7 +61,7 @@ class Reproduce(unittest.TestCase):
         self.assertNotIn("paper's own numbers of vertices and faces", text)
         self.assertIn("0.25 times as many cells", text)
         self.assertNotIn("mean of all entries", text)
-        self.assertIn("not to be held against these", text)
+        self.assertIn("cannot be compared with these", text)
 
     def test_a_method_has_one_colour_in_all_plots_of_figure_1(self):
         styles = {}

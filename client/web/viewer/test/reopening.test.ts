@@ -4,7 +4,14 @@ import { Live } from "../src/link/live.js";
 import { emptyDocument } from "../src/model/document.js";
 
 /** Sessions that open, or are refused, and whose stream then fails; `frames` before it does, `stoodMs` after they opened. */
-const healthy = { isFull: false, frames: 0, stoodMs: 0, code: "unavailable" as ErrorCode, reason: "" as Reason, retryAfterMs: 0 };
+const healthy = {
+  isFull: false,
+  frames: 0,
+  stoodMs: 0,
+  code: "unavailable" as ErrorCode,
+  reason: "" as Reason,
+  retryAfterMs: 0,
+};
 const server = vi.hoisted(() => ({ asked: 0, says: undefined as unknown as typeof healthy }));
 
 vi.mock("lpdeform-client", async (original) => {
