@@ -159,7 +159,7 @@ void Link::send_update(DeformCall& call, const NumberedUpdate& update, std::uniq
   lock.lock();
   if (packed.ok()) return;
   const Answer answer = judge(update.seq, packed);
-  if (answer == Answer::kAgain || answer == Answer::kMakeAnew) {
+  if (answer == Answer::kAgain || answer == Answer::kRecreate) {
     if (!is_over_) unsent_ = packed;  // otherwise the error of the stream says more
     call.cancel();                    // updates in flight then wait for the next stream
     changed_.wait(lock, [this] { return is_over_; });
@@ -196,12 +196,12 @@ bool Link::recover(const absl::Status& ended) {
 
   const std::string lost = lease_.session;
   lock.unlock();
-  const absl::Status made = make_anew(lost);
+  const absl::Status made = recreate(lost);
   lock.lock();
   if (made.ok() || is_to_reopen_) return true;
   const Recovery failed = rules_.after_failed_making(made);
   last_problem_ = made;
-  if (failed.next == NextStep::kMakeAnew) return wait_to_try_again(failed, lock);
+  if (failed.next == NextStep::kRecreate) return wait_to_try_again(failed, lock);
   give_up(made);
   return false;
 }

@@ -84,7 +84,7 @@ class Link {
   absl::Status check_initial_positions(const SolveOptions& options) const;
   absl::StatusOr<std::optional<Frame>> take_frame(Clock::time_point deadline);
   absl::StatusOr<SolveResult> solve_patiently(const SolveOptions& options, Clock::time_point start);
-  absl::StatusOr<SolveResult> solve_or_make_anew(const SolveOptions& options);
+  absl::StatusOr<SolveResult> solve_or_recreate(const SolveOptions& options);
   absl::StatusOr<SolveResult> solve_once(const SolveOptions& options);
   void note_answer(std::uint64_t seq, const absl::Status& status);
   absl::Status send_restore(std::unique_lock<std::mutex>& lock);
@@ -96,7 +96,7 @@ class Link {
   absl::StatusOr<v1::UndoUpdateResponse> undo_patiently(const v1::UndoUpdateRequest& request,
                                                         std::unique_lock<std::mutex>& lock);
   absl::Status check_steps(const v1::UndoUpdateRequest& request, std::unique_lock<std::mutex>& lock);
-  absl::Status make_anew(const std::string& lost);
+  absl::Status recreate(const std::string& lost);
   absl::Status no_frame() const;
 
   const std::shared_ptr<Rpc> rpc_;
@@ -114,7 +114,7 @@ class Link {
   Ledger ledger_;
   RecoveryRules rules_;
   std::string request_id_;     // of the next session to be created
-  bool is_made_anew_ = false;  // the session was created again, and all its handles were sent in one update
+  bool is_recreated_ = false;  // the session was created again, and all its handles were sent in one update
   bool is_closing_ = false;
   bool is_solving_ = false;
   bool is_taking_over_ = false;

@@ -168,7 +168,7 @@ absl::Status Link::catch_up(std::unique_lock<std::mutex>& lock) {
 /// When a session is created again, the server counts the update with all its handles as an undo step; users do not.
 /// FAILED_PRECONDITION NOTHING_TO_UNDO if that step is the newest.
 absl::Status Link::check_steps(const v1::UndoUpdateRequest& undo, std::unique_lock<std::mutex>& lock) {
-  if (undo.redo() || !is_made_anew_) return absl::OkStatus();
+  if (undo.redo() || !is_recreated_) return absl::OkStatus();
   v1::GetSessionRequest request;
   request.set_session(undo.session());
   lock.unlock();
@@ -233,7 +233,7 @@ absl::StatusOr<SolveResult> Link::solve_patiently(const SolveOptions& options, C
   }
   Backoff backoff;
   for (;;) {
-    absl::StatusOr<SolveResult> result = solve_or_make_anew(left);
+    absl::StatusOr<SolveResult> result = solve_or_recreate(left);
     if (!absl::IsUnavailable(result.status())) return result;
     const Clock::time_point now = Clock::now();
     const auto pause = backoff.next(retry_after(result.status()));
@@ -253,11 +253,11 @@ absl::StatusOr<SolveResult> Link::solve_patiently(const SolveOptions& options, C
   }
 }
 
-absl::StatusOr<SolveResult> Link::solve_or_make_anew(const SolveOptions& options) {
+absl::StatusOr<SolveResult> Link::solve_or_recreate(const SolveOptions& options) {
   const std::string session = name();
   absl::StatusOr<SolveResult> result = solve_once(options);
   if (!is_session_lost(result.status()) || !copy_) return result;
-  const absl::Status made = make_anew(session);
+  const absl::Status made = recreate(session);
   return made.ok() ? solve_once(options) : made;
 }
 
@@ -286,7 +286,7 @@ void Link::note_answer(std::uint64_t seq, const absl::Status& status) {
   const Answer answer = status.ok() ? Answer::kTaken : answer_of(status);
   if (answer == Answer::kTaken) ledger_.accept(seq);
   if (answer == Answer::kRefused) ledger_.refuse(seq);
-  if (answer == Answer::kAgain || answer == Answer::kMakeAnew) ledger_.connection_lost();
+  if (answer == Answer::kAgain || answer == Answer::kRecreate) ledger_.connection_lost();
 }
 
 /// Sends the state of the lost session to the new session, as an update of its own: it was accepted before, and must
@@ -334,7 +334,7 @@ absl::Status Link::send_by_call(std::unique_lock<std::mutex>& lock) {
   return sent;
 }
 
-absl::Status Link::make_anew(const std::string& lost) {
+absl::Status Link::recreate(const std::string& lost) {
   const std::scoped_lock renewing(renewing_);
   std::string request_id;
   {
@@ -350,7 +350,7 @@ absl::Status Link::make_anew(const std::string& lost) {
   ledger_.session_lost();
   ledger_.count_from(lease_.input_seq);
   ledger_.begin_epoch(lease_.epoch);
-  is_made_anew_ = copy_.is_bare && ledger_.has_restore();
+  is_recreated_ = copy_.is_bare && ledger_.has_restore();
   box_.begin_session();
   return absl::OkStatus();
 }

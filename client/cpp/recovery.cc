@@ -23,7 +23,7 @@ std::pair<NextStep, absl::Status> after_go_away(const v1::GoAway& go_away, bool 
       return {NextStep::kGiveUp,
               ended_because(absl::StatusCode::kNotFound, Reason::kSessionDeleted, go_away)};
     case v1::GO_AWAY_REASON_SESSION_EXPIRED:
-      return {has_copy ? NextStep::kMakeAnew : NextStep::kGiveUp,
+      return {has_copy ? NextStep::kRecreate : NextStep::kGiveUp,
               ended_because(absl::StatusCode::kNotFound, Reason::kSessionExpired, go_away)};
     case v1::GO_AWAY_REASON_WRITER_REPLACED:
       return {NextStep::kGiveUp, ended_because(absl::StatusCode::kAborted, Reason::kWriterReplaced, go_away)};
@@ -57,7 +57,7 @@ std::pair<NextStep, absl::Status> after_status(const absl::Status& ended, bool h
   if (ended.ok()) return {NextStep::kResume, absl::UnavailableError("The server ended the stream.")};
   // The server has another mesh, or an exception occurred: a retry would fail again.
   if (reason == Reason::kFrameVertices || reason == Reason::kException) return {NextStep::kGiveUp, ended};
-  if (is_session_lost(ended)) return {has_copy ? NextStep::kMakeAnew : NextStep::kGiveUp, ended};
+  if (is_session_lost(ended)) return {has_copy ? NextStep::kRecreate : NextStep::kGiveUp, ended};
   if (is_passing(ended.code()) || is_undecided(ended)) return {NextStep::kResume, ended};
   if (reason == Reason::kNotTheWriter) {  // another writer took over while we were disconnected
     return {NextStep::kGiveUp,
@@ -103,12 +103,12 @@ Recovery RecoveryRules::after(const Ending& ending) {
 }
 
 Recovery RecoveryRules::after_failed_making(const absl::Status& failed) {
-  return with_pause(is_undecided(failed) ? NextStep::kMakeAnew : NextStep::kGiveUp, failed,
+  return with_pause(is_undecided(failed) ? NextStep::kRecreate : NextStep::kGiveUp, failed,
                     retry_after(failed));
 }
 
 Answer answer_of(const absl::Status& status, bool is_second) {
-  if (is_session_lost(status)) return Answer::kMakeAnew;
+  if (is_session_lost(status)) return Answer::kRecreate;
   if (is_taken_all_the_same(status)) return Answer::kTaken;
   const bool is_in_vain = is_second && fault_of(status).reason == Reason::kUploadUnknown;
   return is_undecided(status) && !is_in_vain ? Answer::kAgain : Answer::kRefused;

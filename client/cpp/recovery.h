@@ -13,7 +13,7 @@ namespace lpdeform::client {
 /// What to do when a stream has ended.
 enum class NextStep {
   kResume,    // open a stream to the same session
-  kMakeAnew,  // the session is lost: create it from our copy, then open a stream
+  kRecreate,  // the session is lost: create it from our copy, then open a stream
   kGiveUp,
 };
 
@@ -89,7 +89,7 @@ class RecoveryRules {
 /// What an error means for the update that it answers, or for the update in a call.
 enum class Answer {
   kAgain,     // send it again, after retry_after()
-  kMakeAnew,  // it waits until the session is created again
+  kRecreate,  // it waits until the session is created again
   kTaken,     // the server has accepted it but cannot solve for it yet
   kRefused,
 };

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/analysis/face_bvh.h"
 #include "core/analysis/face_geometry.h"
-#include "core/analysis/face_tree.h"
 
 namespace lpdeform {
 namespace {
@@ -41,7 +41,7 @@ struct Triangle {
 };
 
 /// The faces as triangles, in the tree's order.
-std::vector<Triangle> triangles_of(const RestShape& shape, const FaceTree& tree,
+std::vector<Triangle> triangles_of(const RestShape& shape, const FaceBvh& tree,
                                    const std::vector<double>& signs) {
   std::vector<Triangle> triangles;
   triangles.reserve(tree.order().size());
@@ -83,7 +83,7 @@ std::vector<double> outward_signs(const RestShape& shape) {
 }
 
 std::vector<double> thickness_behind_faces(const RestShape& shape, const Workers& workers) {
-  const FaceTree tree(shape.scaled_positions(), shape.faces());
+  const FaceBvh tree(shape.scaled_positions(), shape.faces());
   const std::vector<double> signs = outward_signs(shape);
   const std::vector<Triangle> triangles = triangles_of(shape, tree, signs);
   const double rounding = kRounding * shape.diagonal() / shape.mean_edge_length();

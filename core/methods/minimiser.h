@@ -73,7 +73,7 @@ class Minimiser {
 
   /// An intermediate state other than x(), if there is a new one since the last call: finite, and all constraints are
   /// satisfied. problem.objective then holds the evaluation there. Calling this does not change steps or their results.
-  virtual std::optional<Points> in_hand() { return std::nullopt; }
+  virtual std::optional<Points> intermediate_state() { return std::nullopt; }
 
   /// The outcome if a limit ends the solve now. Empty if no method has finished.
   virtual std::optional<Outcome> outcome_before() const { return std::nullopt; }

@@ -5,7 +5,7 @@
 
 namespace lpdeform {
 
-/// The inputs and outputs for a new pair of L-BFGS; see PairMemory::direction.
+/// The inputs and outputs for a new pair of L-BFGS; see LbfgsMemory::direction.
 struct NewPair {
   const double *gradient, *gradient_before;  // y = gradient - gradient_before
   const double *h, *h_before;                // z = h - h_before

@@ -167,7 +167,7 @@ bool QuasiNewton::refresh_metric() {
   return true;
 }
 
-/// d = -H g with the H_0 of PairMemory. Returns <g, d>.
+/// d = -H g with the H_0 of LbfgsMemory. Returns <g, d>.
 double QuasiNewton::direction() {
   preconditioned_.swap(preconditioned_before_);
   problem_.precondition(gradient_, preconditioned_);

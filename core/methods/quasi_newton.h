@@ -3,8 +3,8 @@
 #include <deque>
 #include <vector>
 
+#include "core/methods/lbfgs_memory.h"
 #include "core/methods/minimiser.h"
-#include "core/methods/pair_memory.h"
 
 namespace lpdeform {
 
@@ -80,7 +80,7 @@ class QuasiNewton : public Minimiser {
   double objective_ = 0;
   double smoothing_sum_ = 0;  // part of objective_; if p is mixed, in the last stage
   double true_sum_ = 0;       // the sum of problem_.norm at x_
-  PairMemory memory_;
+  LbfgsMemory memory_;
   std::deque<double> history_;  // objectives of the stage's last 21 iterations
   int stage_iterations_ = 0, since_refresh_ = 0;
   bool is_metric_good_ = false;

@@ -44,7 +44,7 @@ void Multiresolution::even_out(Points& found) const {
   found -= step;
 }
 
-std::optional<Points> Multiresolution::in_hand() {
+std::optional<Points> Multiresolution::intermediate_state() {
   const int done = level_.solver().iterations();
   if (fine_ || done < next_look_) return std::nullopt;
   next_look_ = 2 * done;

@@ -22,7 +22,7 @@ class Multiresolution : public Minimiser {
   const Points& x() const override { return fine_ ? fine_->x() : x_; }
   /// The prolonged state of the coarse level. This costs about as much as two iterations, so there is a new one only
   /// when the coarse level has made twice as many iterations as at the previous one.
-  std::optional<Points> in_hand() override;
+  std::optional<Points> intermediate_state() override;
 
  private:
   static constexpr int kFirstLook = 8;

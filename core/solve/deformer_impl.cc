@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "core/constraints/holds.h"
+#include "core/methods/best_of_two.h"
 #include "core/methods/conic.h"
 #include "core/methods/line_search.h"
 #include "core/methods/local_global.h"
-#include "core/methods/two_attempts.h"
 #include "core/multiresolution/multiresolution.h"
 
 namespace lpdeform {
@@ -141,7 +141,7 @@ std::unique_ptr<Minimiser> Deformer::Impl::with_second(std::unique_ptr<Minimiser
     return make_minimiser(second, guess, Warmth::kCold);
   };
   const int most = static_cast<int>(kSecondWork / shape->vertex_count());
-  return std::make_unique<TwoAttempts>(std::move(first), make, most, zero_objective());
+  return std::make_unique<BestOfTwo>(std::move(first), make, most, zero_objective());
 }
 
 std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points guess, Warmth warmth) {
@@ -221,7 +221,7 @@ void Deformer::Impl::keep(const Points& from, double sum) {
 
 void Deformer::Impl::catch_up() {
   if (!minimiser) return;
-  const std::optional<Points> found = minimiser->in_hand();
+  const std::optional<Points> found = minimiser->intermediate_state();
   if (!found) return;
   if (const double sum = objective.sum(*norm); sum < best_sum) keep(*found, sum);
   summarise();

@@ -60,7 +60,7 @@ class FrameCall : public WritePump<Reactor, Response> {
     return std::holds_alternative<EndNote>(*note) ? Made::kLastMessage : Made::kMessage;
   }
 
-  void let_go() final {
+  void release() final {
     if (open_.stream && !std::exchange(is_forgotten_, true))
       backend_.forget(this->context(), open_, this->how_ended_locked());
   }

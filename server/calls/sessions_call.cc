@@ -112,7 +112,7 @@ class StreamSessionsCall final
     lane.is_over = true;
   }
 
-  void let_go() override { forget_all(); }
+  void release() override { forget_all(); }
 
   void forget_all() {
     for (Lane& lane : lanes_) {

@@ -47,7 +47,7 @@ class SnapshotCall final
     return sent_ == file_.bytes.size() ? Made::kLastMessage : Made::kMessage;
   }
 
-  void let_go() override { file_ = {}; }
+  void release() override { file_ = {}; }
 
   Backend& backend_;
   Backend::SnapshotFile file_;

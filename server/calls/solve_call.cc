@@ -134,7 +134,7 @@ class SolveCall final : public WritePump<SolveReactor, Outgoing<v1::SolveRespons
     is_beat_due_ = false;
   }
 
-  void let_go() override {
+  void release() override {
     if (job_) job_->abandon();
   }
 

@@ -51,7 +51,7 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
     const auto self = this->shared_from_this();
     const std::scoped_lock lock(mutex_);
     is_cancelled_ = true;
-    let_go();
+    release();
     pump_locked();
   }
 
@@ -66,7 +66,7 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
   virtual Made make(Response& response) = 0;
 
   /// The call is over: release what it holds. Called with the lock held, at least once.
-  virtual void let_go() = 0;
+  virtual void release() = 0;
 
   /// A message has been made, so there may be room for more. Called with the lock held.
   virtual void on_made() {}
@@ -109,7 +109,7 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
  private:
   void finish_locked(const absl::Status& status) {
     if (std::exchange(is_finished_, true)) return;
-    let_go();
+    release();
     record_->ended(status);
     this->Finish(to_grpc(status));
   }

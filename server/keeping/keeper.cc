@@ -184,7 +184,9 @@ void Keeper::give_up(const std::string& name) {
     being_made_.erase(found);
   }
   // If this is not done, the session is free when the lease ends.
-  static_cast<void>(reader_.try_post([this, name, epoch] { store_->let_go({{name, epoch}}).IgnoreError(); }));
+  static_cast<void>(reader_.try_post([this, name, epoch] {
+    store_->release({{name, epoch}}).IgnoreError();
+  }));
 }
 
 void Keeper::changed(const Session& session, std::uint64_t revision, std::uint64_t epoch, OnKept on_kept) {

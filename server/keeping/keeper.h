@@ -141,7 +141,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   /// Calls to make after the lock is released.
   struct Calls {
     std::vector<std::function<void()>> all;
-    std::vector<HeldSession> to_let_go;  // released in the store with one round trip
+    std::vector<HeldSession> to_release;  // released in the store with one round trip
 
     void add(std::function<void()> call) { all.push_back(std::move(call)); }
   };

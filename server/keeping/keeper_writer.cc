@@ -193,7 +193,7 @@ void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
   answer_kept(entry, calls);
   if (entry.is_leaving && !due_.contains(work.name)) {
     entries_.erase(found);
-    calls.to_let_go.push_back({work.name, work.change.epoch});
+    calls.to_release.push_back({work.name, work.change.epoch});
   }
 }
 
@@ -255,7 +255,7 @@ void Keeper::answer_all(Entry& entry, Calls& calls) {
 void Keeper::make(const Calls& calls) {
   for (const auto& call : calls.all) call();
   // If this is not done, the sessions are free when the lease ends.
-  if (!calls.to_let_go.empty()) store_->let_go(calls.to_let_go).IgnoreError();
+  if (!calls.to_release.empty()) store_->release(calls.to_release).IgnoreError();
 }
 
 void Keeper::note_waited(const Waiting& one) {

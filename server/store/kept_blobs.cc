@@ -14,7 +14,7 @@ void KeptBlobs::finish(const std::string& session) {
   std::erase_if(pinned_, [](const auto& pin) { return pin.second.empty(); });
 }
 
-void KeptBlobs::let_go_of(const std::string& session) {
+void KeptBlobs::release_all_of(const std::string& session) {
   for (const auto& [key, sessions] : pinned_) {
     if (sessions.contains(session)) loose_.insert(key);
   }

@@ -30,9 +30,9 @@ class KeptBlobs {
   void finish(const std::string& session);
 
   /// A session that used this blob was removed: the blob is loose.
-  void let_go(const std::string& key) { loose_.insert(key); }
+  void release(const std::string& key) { loose_.insert(key); }
   /// The same for the blobs of a session that was given up while it was being made.
-  void let_go_of(const std::string& session);
+  void release_all_of(const std::string& session);
   void take(const std::string& key) { loose_.erase(key); }
 
   /// Removes the loose blobs that no session uses. `is_used`: the answer of the database. If it does not know

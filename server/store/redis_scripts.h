@@ -33,7 +33,7 @@ inline const std::string kUsed = kRan + "redis.call('ZADD', 'lpdeform:used', ran
 
 /// A function: takes this blob away from the session.
 inline const std::string kLetGoOf =
-    "local function let_go_of(blob, name) "
+    "local function release_blob(blob, name) "
     "  redis.call('SREM', 'lpdeform:u:' .. blob, name); "
     "  if redis.call('SCARD', 'lpdeform:u:' .. blob) == 0 then redis.call('DEL', 'lpdeform:b:' .. blob) end "
     "end ";
@@ -46,8 +46,8 @@ inline const std::string kForget =
     "local function forget(key, epoch, most) "
     "  local name = string.sub(key, 12); "
     "  local has = redis.call('HMGET', key, 'blobs', 'request', 'owner', 'epoch'); "
-    "  for blob in string.gmatch(has[1] or '', '%x+') do let_go_of(blob, name) end "
-    "  for _, blob in ipairs(redis.call('SMEMBERS', 'lpdeform:m:' .. name)) do let_go_of(blob, name) end "
+    "  for blob in string.gmatch(has[1] or '', '%x+') do release_blob(blob, name) end "
+    "  for _, blob in ipairs(redis.call('SMEMBERS', 'lpdeform:m:' .. name)) do release_blob(blob, name) end "
     "  if has[2] and has[2] ~= '' then redis.call('DEL', has[2]) end "
     "  if has[3] then redis.call('ZREM', 'lpdeform:o:' .. redis.sha1hex(has[3]), key) end "
     "  redis.call('ZREM', 'lpdeform:used', key); "
@@ -131,7 +131,7 @@ inline const std::string kCommit =
     "  redis.call('ZADD', 'lpdeform:o:' .. redis.sha1hex(has[1]), 0, KEYS[1]); "
     "  if has[2] and has[2] ~= '' then redis.call('SET', has[2], name) end "
     "  for blob in string.gmatch(blobs_before, '%x+') do "
-    "    if not string.find(has[3], blob, 1, true) then let_go_of(blob, name) end "
+    "    if not string.find(has[3], blob, 1, true) then release_blob(blob, name) end "
     "  end "
     "  redis.call('DEL', 'lpdeform:m:' .. name) "
     "end " +

@@ -69,7 +69,7 @@ class RedisStore final : public Store {
   absl::StatusOr<std::string> blob(const std::string& key) override;
   absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) override;
   std::chrono::milliseconds touch_every() const override { return options_.lease / 3; }
-  absl::Status let_go(const std::vector<HeldSession>& sessions) override;
+  absl::Status release(const std::vector<HeldSession>& sessions) override;
   absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) override;
   absl::StatusOr<std::optional<StoreFigures>> figures() override {
     const auto info = teller_.run({"INFO"});
@@ -240,7 +240,7 @@ absl::StatusOr<std::size_t> RedisStore::remove_unused(std::int64_t idle_ms) {
   }
 }
 
-absl::Status RedisStore::let_go(const std::vector<HeldSession>& sessions) {
+absl::Status RedisStore::release(const std::vector<HeldSession>& sessions) {
   std::vector<Command> commands;
   for (const HeldSession& session : sessions) {
     commands.push_back(script(kLetGo, session.name));

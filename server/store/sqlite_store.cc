@@ -45,7 +45,7 @@ class SqliteStore final : public Store {
   absl::Status keep_blob(const std::string& session, const std::string& key, std::string_view bytes) override;
   absl::StatusOr<std::string> blob(const std::string& key) override { return folder_.read(key); }
   absl::StatusOr<TouchResult> touch(std::span<const TouchedSession> sessions) override;
-  absl::Status let_go(const std::vector<HeldSession>&) override { return absl::OkStatus(); }
+  absl::Status release(const std::vector<HeldSession>&) override { return absl::OkStatus(); }
   absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) override;
   std::optional<StoreRoom> room() override;
 
@@ -201,8 +201,8 @@ absl::Status SqliteStore::remove(const std::string& session) {
   blobs.bind(1, session);
   const auto keys = names_of(blobs);
   if (!keys.ok()) return keys.status();
-  for (const std::string& key : *keys) blobs_.let_go(key);
-  blobs_.let_go_of(session);
+  for (const std::string& key : *keys) blobs_.release(key);
+  blobs_.release_all_of(session);
   for (const Sql which : {Sql::kRemoveBlobs, Sql::kRemoveSession}) {
     sql(which).bind(1, session);
     if (absl::Status status = sql(which).run(); !status.ok()) return status;

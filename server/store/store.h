@@ -146,7 +146,7 @@ class Store {
   virtual std::chrono::milliseconds touch_every() const { return std::chrono::milliseconds(0); }
   /// This process releases the sessions that it holds in the given epochs. Another process may take them over
   /// at once.
-  virtual absl::Status let_go(const std::vector<HeldSession>& sessions) = 0;
+  virtual absl::Status release(const std::vector<HeldSession>& sessions) = 0;
   /// Removes the sessions that nobody has touched for this long. Time in which no server ran does not count
   /// if the store knows it. Returns how many were removed.
   virtual absl::StatusOr<std::size_t> remove_unused(std::int64_t idle_ms) = 0;

@@ -103,8 +103,8 @@ std::vector<Numbers> aligned(const PartInMessage& part, const FramePiece& piece)
 
 /// A slice of the bytes of `surface`. It keeps the surface alive.
 grpc::Slice slice_of(std::shared_ptr<const Surface> surface, std::string_view bytes) {
-  const auto let_go = [](void* held) { delete static_cast<std::shared_ptr<const Surface>*>(held); };
-  return {const_cast<char*>(bytes.data()), bytes.size(), let_go,
+  const auto release = [](void* held) { delete static_cast<std::shared_ptr<const Surface>*>(held); };
+  return {const_cast<char*>(bytes.data()), bytes.size(), release,
           new std::shared_ptr<const Surface>(std::move(surface))};
 }
 

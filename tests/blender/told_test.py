@@ -48,7 +48,7 @@ class Changes(unittest.TestCase):
         self.tell({"a": 1, "b": "good", "p": 2})
         self.assertFalse(self.told.has_refusals)
 
-    def test_a_handle_whose_move_was_refused_is_let_go_of_all_the_same(self):
+    def test_a_handle_whose_move_was_refused_is_released_all_the_same(self):
         self.tell({"a": 1})
         self.told.answered(self.number)
         self.tell({"a": "bad"})

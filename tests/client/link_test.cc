@@ -300,7 +300,7 @@ TEST_F(LinkTest, AnUndoIsAskedForAgainAfterWhatAServerThatWentAwayHasLost) {
   for (const v1::UpdateHandlesRequest& one : sent) EXPECT_EQ(one.update().input_seq(), 1u);
 }
 
-TEST_F(LinkTest, AnUndoGoesAfterAllUpdatesAndIsPartOfWhatASessionMadeAnewGets) {
+TEST_F(LinkTest, AnUndoGoesAfterAllUpdatesAndIsPartOfWhatASessionRecreatedGets) {
   open();
   link_->update(adding("tip")).value();
   link_->update(adding("ear")).value();
@@ -326,7 +326,7 @@ TEST_F(LinkTest, AnUndoGoesAfterAllUpdatesAndIsPartOfWhatASessionMadeAnewGets) {
   EXPECT_EQ(all->update().handles(0).name(), "tip");
 }
 
-TEST_F(LinkTest, AnUndoInASessionMadeAnewTakesBackWhatCameAfterThatAndNotAllItsHandles) {
+TEST_F(LinkTest, AnUndoInASessionRecreatedTakesBackWhatCameAfterThatAndNotAllItsHandles) {
   open();
   const auto stream = opened_stream();
   link_->update(adding("tip")).value();

@@ -70,9 +70,9 @@ Ending ending_of(const Json& step) {
 }
 
 const std::map<std::string, NextStep> kNextSteps{
-    {"resume", NextStep::kResume}, {"make_anew", NextStep::kMakeAnew}, {"give_up", NextStep::kGiveUp}};
+    {"resume", NextStep::kResume}, {"recreate", NextStep::kRecreate}, {"give_up", NextStep::kGiveUp}};
 const std::map<std::string, Answer> kAnswers{{"again", Answer::kAgain},
-                                             {"make_anew", Answer::kMakeAnew},
+                                             {"recreate", Answer::kRecreate},
                                              {"taken", Answer::kTaken},
                                              {"refused", Answer::kRefused}};
 

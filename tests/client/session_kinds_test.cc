@@ -75,7 +75,7 @@ TEST_F(SessionTest, ARegionOfInterestIsSetChangedAndRemovedLive) {
   EXPECT_LT(still.energy, 1e-3 * free.energy);
 }
 
-TEST_F(SessionTest, KindsComeBackWhenTheSessionIsMadeAnew) {
+TEST_F(SessionTest, KindsComeBackWhenTheSessionIsRecreated) {
   Session session = open_bar();
   session.set_handle("middle", {vertices_of("middle"), twist(90), Soft{0.5}}).value();
   const double energy = session.solve().value().energy;

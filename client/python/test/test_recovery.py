@@ -26,7 +26,7 @@ def session(server: Server, shape: Grid) -> Iterator[lpdeform.Session]:
         yield made
 
 
-def test_after_kill_9_the_session_is_made_anew_and_shows_the_same_surface(
+def test_after_kill_9_the_session_is_recreated_and_shows_the_same_surface(
     session: lpdeform.Session, server: Server
 ) -> None:
     before = session.move("right", translation=[0, 0, 5])

@@ -106,7 +106,7 @@ def test_a_server_that_went_away_is_asked_again_and_gets_what_it_has_lost(
         assert session.settle(PATIENCE).positions[11, 2] == 0
 
 
-def test_a_session_made_anew_takes_back_what_came_after_that_and_not_all_its_handles(
+def test_a_session_recreated_takes_back_what_came_after_that_and_not_all_its_handles(
     session: lpdeform.Session, server: Server
 ) -> None:
     session.move("right", translation=[0, 0, 2])
@@ -122,7 +122,7 @@ def test_a_session_made_anew_takes_back_what_came_after_that_and_not_all_its_han
     assert session.settle(PATIENCE).positions[11, 2] == 3
 
 
-def test_an_undo_that_was_taken_and_not_answered_is_no_fewer_steps_to_a_session_made_anew(
+def test_an_undo_that_was_taken_and_not_answered_is_no_fewer_steps_to_a_session_recreated(
     session: lpdeform.Session, server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session.move("right", translation=[0, 0, 2])

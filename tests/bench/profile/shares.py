@@ -17,7 +17,7 @@ PARTS = (
     ("back-substitution", r"SingleFactor|Metric|solve_triangle|add_below|add_from_below"),
     ("rotation fit, energy", r"EvaluateBlocks|evaluate_blocks|fit_rotation|CellPass::(evaluate|sum)|RotationFit|Objective"),
     ("gradient, weights c", r"GradientOfBlocks|gradient|CellPass|LpNorm|__ieee754_(pow|exp|log)|pow@|exp@|log@|restrict_to_free"),
-    ("L-BFGS, search", r"Sweep|PairMemory|QuasiNewton|go_along|pair_"),
+    ("L-BFGS, search", r"Sweep|LbfgsMemory|QuasiNewton|go_along|pair_"),
     ("thread pool", r"tbb|Workers"),
     ("memory", r"mem(set|cpy|move)|malloc|free|clear_page|page_fault|asm_exc"),
 )

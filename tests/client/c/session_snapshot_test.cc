@@ -50,7 +50,7 @@ class CSnapshotTest : public CSessionTest {
   }
 };
 
-TEST_F(CSnapshotTest, ComesBackTheSameWithItsStepsAndIsMadeAnewFromItsFile) {
+TEST_F(CSnapshotTest, ComesBackTheSameWithItsStepsAndIsRecreatedFromItsFile) {
   open(strip_.mesh());
   hold("base", {0, 1});
   hold("tip", {20, 21}, shift(0, 1, 0));

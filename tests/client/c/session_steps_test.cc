@@ -64,7 +64,7 @@ TEST_F(CStepsTest, AStepIsTakenBackAndDoneAgain) {
   EXPECT_EQ(lpdeform_undo(nullptr, nullptr, &error_), LPDEFORM_INVALID_ARGUMENT);
 }
 
-TEST_F(CStepsTest, ASessionMadeAnewTakesBackWhatCameAfterThatAndNotAllItsHandles) {
+TEST_F(CStepsTest, ASessionRecreatedTakesBackWhatCameAfterThatAndNotAllItsHandles) {
   open(strip_.mesh());
   hold("base", {0, 1});
   hold("tip", {20, 21}, shift(0, 1, 0));

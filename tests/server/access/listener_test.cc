@@ -71,7 +71,7 @@ class ListenerTest : public testing::Test {
     return changed_.wait_for(lock, std::chrono::minutes(1), [&] { return taken_.size() >= count; });
   }
 
-  void let_go_of_all() {
+  void release_all() {
     const std::scoped_lock lock(mutex_);
     for (const int fd : taken_) close(fd);
     taken_.clear();
@@ -95,7 +95,7 @@ TEST_F(ListenerTest, TakesNoMoreThanItMayAndAgainWhenOthersHaveGone) {
     }
     ASSERT_TRUE(has_taken(2));
     EXPECT_TRUE(Connection(listener_->address()).is_closed_by_other(std::chrono::minutes(1)));
-    let_go_of_all();
+    release_all();
   }
   EXPECT_EQ(listener_->accepted(), 6u);
 }
@@ -108,7 +108,7 @@ TEST_F(ListenerTest, LetsNoAddressTakeThePlacesOfOthers) {
   EXPECT_TRUE(Connection(listener_->address()).is_closed_by_other(std::chrono::minutes(1)));
   kept.push_back(std::make_unique<Connection>(listener_->address(), INADDR_LOOPBACK + 1));  // 127.0.0.2
   ASSERT_TRUE(has_taken(3));
-  let_go_of_all();
+  release_all();
   while (listener_->accepted() < 4) {
     auto connection = std::make_unique<Connection>(listener_->address());
     if (!connection->is_closed_by_other(std::chrono::milliseconds(10))) kept.push_back(std::move(connection));

@@ -123,7 +123,7 @@ class NotingStore final : public Store {
     if (!read_failure_.ok()) return read_failure_;
     return result;
   }
-  absl::Status let_go(const std::vector<HeldSession>& sessions) override {
+  absl::Status release(const std::vector<HeldSession>& sessions) override {
     const std::scoped_lock lock(mutex_);
     note(absl::StrCat("let go of ", sessions.size()));
     for (const HeldSession& session : sessions) note(absl::StrCat("let go ", session.epoch));

@@ -236,7 +236,7 @@ TEST_F(StoreFaultsTest, OneThatWorksAgainInTimeTakesAll) {
   EXPECT_EQ(seen(session), after);
 }
 
-TEST_F(StoreFaultsTest, ASessionWhoseMeshIsDamagedIsToBeMadeAnew) {
+TEST_F(StoreFaultsTest, ASessionWhoseMeshIsDamagedIsToBeRecreated) {
   const auto session = create(mesh_);
   const auto other = create(box_surface(2, 2, 4));
   server_.reset();

@@ -30,14 +30,14 @@ void spin(std::chrono::microseconds duration) {
 }
 
 TEST(Scheduler, HeavyOnesNeverTakeAllThreads) {
-  std::latch let_go(1);
+  std::latch release(1);
   std::promise<void> first_runs, second_ran, light_ran;
   std::atomic<bool> has_second_run = false;
   {
     Scheduler scheduler(2);
     scheduler.wake(std::make_shared<Job>(true, [&] {
       first_runs.set_value();
-      let_go.wait();
+      release.wait();
       return false;
     }));
     first_runs.get_future().wait();
@@ -52,20 +52,20 @@ TEST(Scheduler, HeavyOnesNeverTakeAllThreads) {
     }));
     light_ran.get_future().wait();
     EXPECT_FALSE(has_second_run);
-    let_go.count_down();
+    release.count_down();
     second_ran.get_future().wait();
   }
 }
 
 TEST(Scheduler, WhoeverUsedLessTimeGoesFirst) {
   // One thread is kept busy, so the other one has to choose between the two all the time.
-  std::latch let_go(1);
+  std::latch release(1);
   std::promise<void> is_busy, done;
   std::atomic<int> small = 0, large = 0;
   Scheduler scheduler(2);
   scheduler.wake(std::make_shared<Job>(true, [&] {
     is_busy.set_value();
-    let_go.wait();
+    release.wait();
     return false;
   }));
   is_busy.get_future().wait();
@@ -80,7 +80,7 @@ TEST(Scheduler, WhoeverUsedLessTimeGoesFirst) {
     return false;
   }));
   done.get_future().wait();
-  let_go.count_down();
+  release.count_down();
   // Equal shares of time mean a hundred small slices for each large one; with turns in order it would be one.
   EXPECT_GE(small, 200);
   EXPECT_LT(large, 40);
@@ -92,15 +92,15 @@ class OneThread {
   OneThread() {
     scheduler.wake(std::make_shared<Job>(true, [this] {
       is_busy_.set_value();
-      let_go_.wait();
+      release_.wait();
       return false;
     }));
     is_busy_.get_future().wait();
   }
-  ~OneThread() { let_go_.count_down(); }
+  ~OneThread() { release_.count_down(); }
 
  private:
-  std::latch let_go_{1};
+  std::latch release_{1};
   std::promise<void> is_busy_;
 
  public:

@@ -149,19 +149,19 @@ TEST_F(SessionTest, AnUpdateAndAStepTakenBackAreAnsweredBeforeRefinements) {
   const std::string token = session->lease().token;
   ASSERT_TRUE(session->update(session->writer(token), hold_ends(rest_, 1, 1)).ok());
   const auto are_busy = std::make_shared<std::latch>(scheduler_.threads());
-  const auto let_go =
+  const auto release =
       std::make_shared<std::latch>(1);  // whoever waits may do so for longer than this test lasts
   for (int k = 0; k < scheduler_.threads(); ++k) {
-    scheduler_.wake(std::make_shared<Blocker>([are_busy, let_go] {
+    scheduler_.wake(std::make_shared<Blocker>([are_busy, release] {
       are_busy->count_down();
-      let_go->wait();
+      release->wait();
     }));
   }
   are_busy->wait();
   EXPECT_FALSE(scheduler_.is_answer_waiting());
   EXPECT_TRUE(session->undo(session->writer(token), 2, false).ok());
   EXPECT_TRUE(scheduler_.is_answer_waiting());
-  let_go->count_down();
+  release->count_down();
 }
 
 TEST_F(SessionTest, OnlyTheWriterChangesIt) {

@@ -114,7 +114,7 @@ TEST_P(StoreTest, GivesBackWhatWasCommittedAfterItWasClosed) {
                           .epoch = 1,
                           .parts = {{"inputs", "2"}, {"m:tip", std::nullopt}, {"p", "x"}}};
   ASSERT_EQ(*commit(*store_, next), ChangeOutcome::kKept);
-  ASSERT_TRUE(store_->let_go({{"a", 1}}).ok());
+  ASSERT_TRUE(store_->release({{"a", 1}}).ok());
   open();
   const auto found = store_->take_over("a", "anna");
   ASSERT_TRUE(found.ok()) << found.status();
@@ -314,9 +314,9 @@ TEST_F(RedisStoreTest, ASessionInUseIsHeldUntilItIsLetGo) {
   ASSERT_TRUE(commit(*first, beginning("a")).ok());
   EXPECT_EQ(reason(second->take_over("a", "anna").status()), "SESSION_ELSEWHERE");
   EXPECT_TRUE(absl::IsUnavailable(second->take_over("a", "anna").status()));
-  ASSERT_TRUE(second->let_go({{"a", 1}}).ok());  // it is not the second's to let go
+  ASSERT_TRUE(second->release({{"a", 1}}).ok());  // it is not the second's to let go
   EXPECT_FALSE(second->take_over("a", "anna").ok());
-  ASSERT_TRUE(first->let_go({{"a", 1}}).ok());
+  ASSERT_TRUE(first->release({{"a", 1}}).ok());
   EXPECT_EQ(second->take_over("a", "anna")->epoch, kSecondLife);
 }
 
@@ -336,7 +336,7 @@ TEST_F(RedisStoreTest, WhoIsRefusedLearnsTheWayAndWhoComesThatWayIsGivenIt) {
   do EXPECT_EQ(reason(ask("the way")), "SESSION_ELSEWHERE");
   while (!is_wanted() && std::chrono::steady_clock::now() < end);
   EXPECT_TRUE(is_wanted());
-  ASSERT_TRUE(first->let_go({{"a", 1}}).ok());
+  ASSERT_TRUE(first->release({{"a", 1}}).ok());
   const auto taken = second->take_over("a", "anna", "the way");
   ASSERT_TRUE(taken.ok());
   EXPECT_EQ(taken->route, "the way");
@@ -415,7 +415,7 @@ TEST_F(HandOverTest, WhoWantedItIsGivenItFirst) {
   EXPECT_TRUE(is_wanted(*first_));
   set_ago("wanted", -kAges);  // however slow this machine is
   EXPECT_EQ(ask(*third_, "the way"), "SESSION_ELSEWHERE");
-  ASSERT_TRUE(first_->let_go({{"a", 1}}).ok());
+  ASSERT_TRUE(first_->release({{"a", 1}}).ok());
   EXPECT_EQ(ask(*first_, "the way"), "SESSION_ELSEWHERE");
   EXPECT_EQ(ask(*third_, ""), "SESSION_ELSEWHERE");
   EXPECT_EQ(ask(*second_, "the way"), "");
@@ -423,7 +423,7 @@ TEST_F(HandOverTest, WhoWantedItIsGivenItFirst) {
 
 TEST_F(HandOverTest, WhoWantedItAndIsGoneHoldsNobodyUp) {
   EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
-  ASSERT_TRUE(first_->let_go({{"a", 1}}).ok());
+  ASSERT_TRUE(first_->release({{"a", 1}}).ok());
   set_ago("wanted", kAges);
   EXPECT_EQ(ask(*third_, "the way"), "");
 }
@@ -431,7 +431,7 @@ TEST_F(HandOverTest, WhoWantedItAndIsGoneHoldsNobodyUp) {
 TEST_F(HandOverTest, WhoWantedItAndHasEndedHoldsNobodyUp) {
   EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
   set_ago("wanted", -kAges);
-  ASSERT_TRUE(first_->let_go({{"a", 1}}).ok());
+  ASSERT_TRUE(first_->release({{"a", 1}}).ok());
   EXPECT_EQ(ask(*third_, "the way"), "SESSION_ELSEWHERE");
   second_.reset();
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
@@ -453,7 +453,7 @@ TEST_F(HandOverTest, TwoThatWantItInTurnGetItLessAndLessOften) {
     EXPECT_EQ(ask(wants, "the way"), "SESSION_ELSEWHERE");
     EXPECT_TRUE(is_wanted(has)) << stays;
     set_ago("wanted", -kAges);
-    ASSERT_TRUE(has.let_go({{"a", epoch}}).ok());
+    ASSERT_TRUE(has.release({{"a", epoch}}).ok());
     if (turn == 0) stays /= 2;  // it had been there for long
     const auto taken = wants.take_over("a", "anna", "the way");
     ASSERT_TRUE(taken.ok()) << taken.status();
@@ -463,16 +463,16 @@ TEST_F(HandOverTest, TwoThatWantItInTurnGetItLessAndLessOften) {
 
 TEST_F(HandOverTest, LettingGoOfAnEarlierEpochIsTooLate) {
   ASSERT_EQ(ask(*first_, "the way"), "");
-  ASSERT_TRUE(first_->let_go({{"a", 1}}).ok());  // of the epoch before
+  ASSERT_TRUE(first_->release({{"a", 1}}).ok());  // of the epoch before
   EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
-  ASSERT_TRUE(first_->let_go({{"a", kSecondLife}}).ok());
+  ASSERT_TRUE(first_->release({{"a", kSecondLife}}).ok());
   const std::vector<TouchedSession> late{{"a", kSecondLife, true}};
   EXPECT_EQ(first_->touch(late)->lost, std::vector<std::string>{"a"});
   EXPECT_EQ(ask(*second_, "the way"), "");
 }
 
 TEST_F(HandOverTest, WhatHasExpiredForTheHolderBeforeIsNotRemoved) {
-  ASSERT_TRUE(first_->let_go({{"a", 1}}).ok());
+  ASSERT_TRUE(first_->release({{"a", 1}}).ok());
   ASSERT_EQ(ask(*second_, "the way"), "");
   const StoredChange expiry{
       .session = "a", .epoch_before = kSecondLife + kEpochsOfALife, .is_removal = true, .is_expiry = true};
@@ -569,7 +569,7 @@ TEST_F(RedisStoreTest, ARedisThatHangsIsNotWaitedForOnceTheProcessEnds) {
   EXPECT_TRUE(is_away(refused.status()));
   EXPECT_EQ(reason(refused.status()), "STORE_FAILING");
   EXPECT_TRUE(is_away(store->touch({}).status()));
-  EXPECT_TRUE(is_away(store->let_go({{"a", 1}})));
+  EXPECT_TRUE(is_away(store->release({{"a", 1}})));
   EXPECT_LT(std::chrono::steady_clock::now() - begin, kPatience);
   redis_.resume();
 }
@@ -688,7 +688,7 @@ TEST_F(RedisStoreTest, TheTimeThatRedisWasAwayOrNoServerRanDoesNotCountAsWithout
   for (const std::string& name : redis.all()) EXPECT_EQ(redis.run({"TTL", name}).number, -1) << name;
   EXPECT_EQ(*store->find_request("anna", "request"), "a");
   EXPECT_EQ(*store->blob(key), "mesh");
-  ASSERT_TRUE(store->let_go({{"a", 1}}).ok());
+  ASSERT_TRUE(store->release({{"a", 1}}).ok());
   EXPECT_EQ(open()->take_over("a", "anna")->epoch, kSecondLife);
 }
 
@@ -728,7 +728,7 @@ TEST_F(RedisStoreTest, WhatRedisHasLostIsToldAndWrittenAnewByItsHolder) {
   EXPECT_EQ(*store->find_request("anna", "request"), "a");
   EXPECT_EQ(*store->list("anna", "", 10), std::vector<std::string>{"a"});
   EXPECT_EQ(reason(other->take_over("a", "anna", "elsewhere").status()), "SESSION_ELSEWHERE");
-  ASSERT_TRUE(store->let_go({{"a", 1}}).ok());
+  ASSERT_TRUE(store->release({{"a", 1}}).ok());
   const auto taken = other->take_over("a", "anna");
   ASSERT_TRUE(taken.ok()) << taken.status();
   EXPECT_EQ(taken->route, "way");
@@ -888,7 +888,7 @@ TEST_F(RedisStoreTest, AFullRedisTakesNothingNewAndStillLetsGo) {
   EXPECT_NE(refused.message().find("OOM"), std::string::npos) << refused;
   const std::vector<TouchedSession> used{{"a", 1, true, 0}};
   EXPECT_TRUE(store->touch(used).ok());
-  ASSERT_TRUE(store->let_go({{"a", 1}}).ok());
+  ASSERT_TRUE(store->release({{"a", 1}}).ok());
   EXPECT_TRUE(store->take_over("a", "anna").ok());
   ASSERT_TRUE(commit(*store, {.session = "a", .is_removal = true}).ok());
   redis.run({"CONFIG", "SET", "maxmemory", "0"});

@@ -48,7 +48,7 @@ class Link:
         self.lease = lease
         self.interruption: LpdeformError | None = None
         self.options = options
-        self.is_made_anew = False
+        self.is_recreated = False
         """Whether the session was lost and all its handles were sent again in one update."""
         self._request_id = new_request_id()
         self._renewing = threading.Lock()
@@ -189,7 +189,7 @@ class Link:
                 pass
         self.rpc.close()
 
-    def make_anew(self, lost: str) -> None:
+    def recreate(self, lost: str) -> None:
         """Recreates the session once, even if several callers ask."""
         assert self.original is not None
         with self._renewing:
@@ -205,7 +205,7 @@ class Link:
                 self.lease = lease
                 self._request_id = new_request_id()
                 self.ledger.session_lost()
-                self.is_made_anew = isinstance(self.original, Original) and self.ledger.has_restore
+                self.is_recreated = isinstance(self.original, Original) and self.ledger.has_restore
                 self.ledger.count_from(lease.input_seq)
                 self.ledger.begin_epoch(lease.epoch)
                 self.box.begin_session()
@@ -286,23 +286,23 @@ class Link:
         self.rpc.reach(lost, self.stop, Backoff.most)
         if recovery.next is Next.RESUME or self._is_to_reopen:
             return True
-        return self._make_anew_or_pause(lost)
+        return self._recreate_or_pause(lost)
 
     def _wait_to_try_again(self, pause: float) -> bool:
         """Waits unless the session was taken over. Returns False if it is closed."""
         self.changed.wait_for(lambda: self.is_closing or self._is_to_reopen, pause)
         return not self.is_closing
 
-    def _make_anew_or_pause(self, lost: str) -> bool:
+    def _recreate_or_pause(self, lost: str) -> bool:
         try:
-            self.make_anew(lost)
+            self.recreate(lost)
         except LpdeformError as error:
             with self.changed:
                 if self._is_to_reopen:
                     return True
                 failed = self._rules.after_failed_making(error)
                 self.interruption = error
-                if failed.next is Next.MAKE_ANEW:
+                if failed.next is Next.RECREATE:
                     return self._wait_to_try_again(failed.pause)
                 self._give_up(error)
                 return False

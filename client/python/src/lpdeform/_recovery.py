@@ -13,7 +13,7 @@ from lpdeform.v1 import service_pb2
 
 class Next(Enum):
     RESUME = "open a stream to the same session"
-    MAKE_ANEW = "the session is gone: recreate it from the client's copy, then open a stream"
+    RECREATE = "the session is gone: recreate it from the client's copy, then open a stream"
     GIVE_UP = "nothing more comes"
 
 
@@ -106,7 +106,7 @@ class RecoveryRules:
 
     def after_failed_making(self, error: LpdeformError) -> Recovery:
         """The session could not be recreated."""
-        step = Next.MAKE_ANEW if is_undecided(error) else Next.GIVE_UP
+        step = Next.RECREATE if is_undecided(error) else Next.GIVE_UP
         return Recovery(step, error, self._backoff.next(error.retry_after))
 
 
@@ -127,7 +127,7 @@ def _after_error(error: LpdeformError | None, has_copy: bool) -> tuple[Next, Lpd
     if error.reason in ("FRAME_VERTICES", "EXCEPTION"):  # it is another mesh, so it would happen again
         return Next.GIVE_UP, error
     if is_session_lost(error):
-        return (Next.MAKE_ANEW if has_copy else Next.GIVE_UP), error
+        return (Next.RECREATE if has_copy else Next.GIVE_UP), error
     if error.code in _passing or is_undecided(error):
         return Next.RESUME, error
     if error.reason == "NOT_THE_WRITER":  # it happened while no stream was open
@@ -140,7 +140,7 @@ def _after_go_away(go_away: service_pb2.GoAway, has_copy: bool) -> tuple[Next, L
     if go_away.reason == service_pb2.GO_AWAY_REASON_SESSION_DELETED:
         return Next.GIVE_UP, make(Code.NOT_FOUND, text, "SESSION_DELETED")
     if go_away.reason == service_pb2.GO_AWAY_REASON_SESSION_EXPIRED:
-        return (Next.MAKE_ANEW if has_copy else Next.GIVE_UP), make(Code.NOT_FOUND, text, "SESSION_EXPIRED")
+        return (Next.RECREATE if has_copy else Next.GIVE_UP), make(Code.NOT_FOUND, text, "SESSION_EXPIRED")
     if go_away.reason == service_pb2.GO_AWAY_REASON_WRITER_REPLACED:
         return Next.GIVE_UP, make(Code.ABORTED, text, "WRITER_REPLACED")
     if go_away.reason == service_pb2.GO_AWAY_REASON_PROTOCOL_ERROR:
@@ -154,7 +154,7 @@ class Answer(Enum):
     """What an error means for the update that it answers, or that a call carried."""
 
     AGAIN = "send it again, not before error.retry_after"
-    MAKE_ANEW = "it waits until the session is recreated"
+    RECREATE = "it waits until the session is recreated"
     TAKEN = "the server has it, but cannot solve for it yet"
     REFUSED = "it is refused"
 
@@ -162,7 +162,7 @@ class Answer(Enum):
 def answer_of(error: LpdeformError, is_second: bool = False) -> Answer:
     """`is_second`: this update had the same answer before."""
     if is_session_lost(error):
-        return Answer.MAKE_ANEW
+        return Answer.RECREATE
     if is_taken_all_the_same(error):
         return Answer.TAKEN
     is_in_vain = is_second and error.reason == "UPLOAD_UNKNOWN"

@@ -90,7 +90,7 @@ def _packed(sender: Sender, stream: Stream, update: NumberedUpdate) -> service_p
         message = _wire.update_to_wire(update.update, update.seq, packer)
     except LpdeformError as error:
         with sender.changed:
-            if sender.judge.answer_of(error, update.seq) not in (Answer.AGAIN, Answer.MAKE_ANEW):
+            if sender.judge.answer_of(error, update.seq) not in (Answer.AGAIN, Answer.RECREATE):
                 sender.ledger.refuse(update.seq)
                 sender.box.put_problem(error)
                 return None

@@ -89,7 +89,7 @@ def _solve_patiently(link: Link, options: SolveOptions, deadline: float | None, 
         link.rpc.reach(session, stop, min(Backoff.most, max(left, 0.0)))
         if is_lost:
             try:
-                link.make_anew(session)
+                link.recreate(session)
             except LpdeformError as error:
                 if not is_undecided(error):
                     raise

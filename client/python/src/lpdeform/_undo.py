@@ -39,7 +39,7 @@ def _undo_patiently(
     end = time.monotonic() + link.rpc.call_timeout
     backoff = Backoff()
     is_again = False
-    is_to_check = link.is_made_anew and not request.redo
+    is_to_check = link.is_recreated and not request.redo
     while True:
         try:
             if is_again:

@@ -24,7 +24,7 @@ export class Holds {
   async updates(signal: AbortSignal): Promise<() => void> {
     ++this.#count;
     await this.#until(() => this.traffic.isQuiet() && !this.#isUndoing, signal);
-    return () => this.#letGo();
+    return () => this.#release();
   }
 
   /** Like updates(), but also keeps solves from beginning, after waiting for those under way. Rejects if the signal aborts. */
@@ -37,7 +37,7 @@ export class Holds {
     await this.#until(() => this.traffic.isQuiet(), signal);
     return () => {
       this.#isUndoing = false;
-      this.#letGo();
+      this.#release();
     };
   }
 
@@ -47,7 +47,7 @@ export class Holds {
     this.#waiting.clear();
   };
 
-  #letGo(): void {
+  #release(): void {
     --this.#count;
     this.wake();
     this.traffic.released();

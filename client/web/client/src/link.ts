@@ -32,7 +32,7 @@ export class Link {
     released: () => this.#send(),
   });
   /** Whether the session was lost and all its handles were sent again in one update. */
-  isMadeAnew = false;
+  isRecreated = false;
   /** What ended the stream of frames the last time. */
   interruption: LpdeformError | undefined;
   #lease: Lease;
@@ -236,9 +236,9 @@ export class Link {
     if (recovery.next === "giveUp") return this.#giveUp(recovery.why);
     const isTakenOver = await this.#pauses.wait(recovery.pauseMs);
     if (this.#isOver) return;
-    if (recovery.next === "makeAnew" && !isTakenOver) {
+    if (recovery.next === "recreate" && !isTakenOver) {
       try {
-        await this.makeAnew(session);
+        await this.recreate(session);
       } catch (error) {
         if (!(await this.#mayMakeAgain(error as LpdeformError))) return;
       }
@@ -265,13 +265,13 @@ export class Link {
   }
 
   /** Recreates a lost session once, however many callers notice the loss, and however late. */
-  makeAnew(lost: string): Promise<void> {
+  recreate(lost: string): Promise<void> {
     if (this.#lease.session !== lost) return Promise.resolve();
     this.#making ??= this.#make().finally(() => (this.#making = undefined));
     return this.#making;
   }
 
-  /** After makeAnew() has failed: waits for the pause that the server asks for. False if it must not be tried again. */
+  /** After recreate() has failed: waits for the pause that the server asks for. False if it must not be tried again. */
   async #mayMakeAgain(failure: LpdeformError): Promise<boolean> {
     const { next, pauseMs } = this.#rules.afterFailedMaking(failure);
     if (next === "giveUp") this.#giveUp(failure);
@@ -284,7 +284,7 @@ export class Link {
     this.#downSince = undefined;
     this.#requestId = newRequestId();
     this.ledger.sessionLost();
-    this.isMadeAnew = this.copy!.isBare && this.ledger.hasRestore;
+    this.isRecreated = this.copy!.isBare && this.ledger.hasRestore;
     this.ledger.countFrom(this.#lease.inputSeq);
     this.ledger.beginEpoch(this.#lease.epoch);
     this.box.beginSession();
@@ -318,7 +318,7 @@ export class Link {
   async #unsent(update: NumberedUpdate, error: LpdeformError, session: string): Promise<void> {
     if (this.isClosed) return;
     const answer = answerOf(error, update.seq === this.#sentAgain);
-    if (answer === "again" || answer === "makeAnew") {
+    if (answer === "again" || answer === "recreate") {
       if (error.reason === "UPLOAD_UNKNOWN") this.#sentAgain = update.seq;
       this.#isSending = true;
       this.ledger.connectionLost();
@@ -328,9 +328,9 @@ export class Link {
         if (error.code === "resource_exhausted" || error.reason === "UPLOAD_UNKNOWN") this.#downSince = undefined;
         if (this.#awayMs() > this.rpc.reconnectForMs) return this.#giveUp(error);
         const isTakenOver = await this.#pauses.wait(this.#backoff.nextMs(error.retryAfterMs));
-        if (answer === "makeAnew" && !isTakenOver) {
+        if (answer === "recreate" && !isTakenOver) {
           if (!this.copy) return this.#giveUp(error);
-          await this.makeAnew(session);
+          await this.recreate(session);
         }
       } catch (again) {
         await this.#mayMakeAgain(again as LpdeformError);

@@ -2,7 +2,7 @@ import { LpdeformError } from "./errors.js";
 import { type GoAway, GoAwayReason } from "./gen/lpdeform/v1/service_pb.js";
 import { isSessionLost, isTakenAllTheSame, isUndecided } from "./verdict.js";
 
-export type NextStep = "resume" | "makeAnew" | "giveUp";
+export type NextStep = "resume" | "recreate" | "giveUp";
 
 /** What to do when a stream has ended. */
 export interface Recovery {
@@ -90,17 +90,17 @@ export class RecoveryRules {
 
   /** The session could not be recreated. */
   afterFailedMaking(error: LpdeformError): Recovery {
-    const next = isUndecided(error) ? "makeAnew" : "giveUp";
+    const next = isUndecided(error) ? "recreate" : "giveUp";
     return { next, why: error, pauseMs: this.backoff.nextMs(error.retryAfterMs) };
   }
 }
 
 /** What an error means for the update that it answers, or that a call carried. */
-export type Answer = "again" | "makeAnew" | "taken" | "refused";
+export type Answer = "again" | "recreate" | "taken" | "refused";
 
 /** `isSecond`: this update had the same answer before. */
 export function answerOf(error: LpdeformError, isSecond = false): Answer {
-  if (isSessionLost(error)) return "makeAnew";
+  if (isSessionLost(error)) return "recreate";
   if (isTakenAllTheSame(error)) return "taken";
   const isInVain = isSecond && error.reason === "UPLOAD_UNKNOWN";
   return isUndecided(error) && !isInVain ? "again" : "refused";
@@ -112,7 +112,7 @@ function afterError(error: LpdeformError | undefined, hasCopy: boolean): Found {
   if (!error) return { next: "resume", why: new LpdeformError("unavailable", "The server ended the stream.") };
   // It is another mesh, so it would happen again.
   if (error.reason === "FRAME_VERTICES" || error.reason === "EXCEPTION") return { next: "giveUp", why: error };
-  if (isSessionLost(error)) return { next: hasCopy ? "makeAnew" : "giveUp", why: error };
+  if (isSessionLost(error)) return { next: hasCopy ? "recreate" : "giveUp", why: error };
   if (passing.has(error.code) || isUndecided(error)) return { next: "resume", why: error };
   return { next: "giveUp", why: error.reason === "NOT_THE_WRITER" ? writerReplaced() : error };
 }
@@ -138,7 +138,7 @@ function afterGoAway({ reason, text }: GoAway, hasCopy: boolean): Found {
       return { next: "giveUp", why: new LpdeformError("not_found", text, { reason: "SESSION_DELETED" }) };
     case GoAwayReason.SESSION_EXPIRED:
       return {
-        next: hasCopy ? "makeAnew" : "giveUp",
+        next: hasCopy ? "recreate" : "giveUp",
         why: new LpdeformError("not_found", text, { reason: "SESSION_EXPIRED" }),
       };
     case GoAwayReason.WRITER_REPLACED:

@@ -236,7 +236,7 @@ export class Session implements AsyncIterable<Frame> {
       let { lease } = link;
       try {
         if (lost !== undefined) {
-          await unlessAborted(link.makeAnew(lost), signal);
+          await unlessAborted(link.recreate(lost), signal);
           lost = undefined;
           lease = link.lease;
         }

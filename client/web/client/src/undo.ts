@@ -39,7 +39,7 @@ async function askPatiently(
       const { writerToken } = link.lease;
       if (link.lease.session !== session) throw forgotten("not_found", "SESSION_UNKNOWN");
       // Once only: a call that was carried out without an answer has reduced the steps.
-      if (seq === undefined && !redo && link.isMadeAnew) await checkSteps(link, signal);
+      if (seq === undefined && !redo && link.isRecreated) await checkSteps(link, signal);
       seq ??= link.ledger.takeNumber();
       const request = { session, writerToken, inputSeq: BigInt(seq), redo };
       return { seq, response: await link.rpc.call("undoUpdate", request, signal) };

@@ -23,7 +23,7 @@ interface EndStep {
   away_ms?: number;
   fitted?: boolean;
   begin?: boolean;
-  next: "resume" | "make_anew" | "give_up";
+  next: "resume" | "recreate" | "give_up";
   code: string;
   reason: string;
   pause_ms: [number, number];
@@ -56,7 +56,7 @@ const errorOf = (said: Said | undefined) =>
     ? new LpdeformError(said.code, "No.", { reason: said.reason ?? "", retryAfterMs: said.retry_after_ms ?? 0 })
     : undefined;
 
-const steps = { resume: "resume", make_anew: "makeAnew", give_up: "giveUp" } as const;
+const steps = { resume: "resume", recreate: "recreate", give_up: "giveUp" } as const;
 
 function recoveryOf(rules: RecoveryRules, step: EndStep) {
   if (step.fitted) rules.frameFitted();
@@ -85,7 +85,7 @@ describe.each([0, 1])("after a stream, with chance %d", (chance) => {
 });
 
 test.each(table.answers)("after an answer: $error.code $error.reason", ({ error, outcome, is_second }) => {
-  const name = outcome === "make_anew" ? "makeAnew" : outcome;
+  const name = outcome === "recreate" ? "recreate" : outcome;
   expect(answerOf(errorOf(error)!, is_second)).toBe(name);
 });
 

@@ -1,6 +1,6 @@
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { type Frame, openSession, type Session } from "../../src/index.js";
-import { resultMadeAnew } from "../support/made_anew.js";
+import { resultRecreated } from "../support/recreated.js";
 import { Service } from "../support/service.js";
 import { grid } from "../support/shapes.js";
 
@@ -30,7 +30,7 @@ test("after kill -9 the session is made anew and shows the same surface", async 
   const { name } = session;
   await service.killServer();
   await service.startServer();
-  const after = await resultMadeAnew(session, name);
+  const after = await resultRecreated(session, name);
   expect(after.inputSeq).toBe(before.inputSeq);
   expect(largestDifference(before, after)).toBeLessThan(1e-4 * 27);
   session.move("right", lifted(6));

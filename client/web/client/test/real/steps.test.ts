@@ -1,6 +1,6 @@
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { type Frame, joinSession, openSession, restoreSession, type Session } from "../../src/index.js";
-import { resultMadeAnew } from "../support/made_anew.js";
+import { resultRecreated } from "../support/recreated.js";
 import { Service } from "../support/service.js";
 import { grid } from "../support/shapes.js";
 
@@ -52,7 +52,7 @@ test("a step that was taken back stays so where the server loses the session", a
   const { name } = session;
   await service.killServer();
   await service.startServer();
-  expect(heightOf(await resultMadeAnew(session, name))).toBeCloseTo(2, 5);
+  expect(heightOf(await resultRecreated(session, name))).toBeCloseTo(2, 5);
   await session.close();
 });
 
@@ -89,7 +89,7 @@ test("a snapshot is restored to the same surface and steps, and goes on from the
   const { name } = restored;
   await service.killServer();
   await service.startServer();
-  expect(heightOf(await resultMadeAnew(restored, name))).toBeCloseTo(3, 5);
+  expect(heightOf(await resultRecreated(restored, name))).toBeCloseTo(3, 5);
   await restored.close();
 });
 

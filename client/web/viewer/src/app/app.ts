@@ -64,7 +64,7 @@ export class App implements Workbench {
     const editing = new Editing(this, pane);
     this.#editings.add(editing);
     pane.over.signal.addEventListener("abort", () => {
-      editing.letGo();
+      editing.release();
       this.#editings.delete(editing);
     });
   }
@@ -110,7 +110,7 @@ export class App implements Workbench {
   beginAnew(id: string, detail: Detail): void {
     const { isTouched } = this;
     this.#openShape(id, detail, emptyDocument);
-    if (isTouched) this.#asides.letGo();
+    if (isTouched) this.#asides.release();
   }
 
   /** Whether anything was changed since the work was opened. */
@@ -141,7 +141,7 @@ export class App implements Workbench {
 
   /** `isBroughtBack`: the user has worked on it before. */
   open(mesh: Mesh, document: Document, isBroughtBack = false, isWelded = true): void {
-    for (const editing of this.#editings) editing.letGo();
+    for (const editing of this.#editings) editing.release();
     if (this.isTouched) this.#asides.put({ ...this.#present(), steps: this.history.steps });
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);

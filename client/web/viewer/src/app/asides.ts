@@ -41,7 +41,7 @@ export class Asides {
   }
 
   /** The user does not want the newest any more. It stays until the page is left. */
-  letGo(): void {
+  release(): void {
     if (this.#all[0]) this.#all[0].isLetGo = true;
   }
 

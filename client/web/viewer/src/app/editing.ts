@@ -51,7 +51,7 @@ export class Editing implements PointingTarget {
   }
 
   /** Ends a drag as if the pointer was released: what it has moved becomes a step; what it has drawn is dropped. */
-  letGo(): void {
+  release(): void {
     if (!this.pane.stage.gizmo.isDragging && !this.#pointing.isBusy) return;
     this.work.endGesture();
     this.cancel();

@@ -22,9 +22,9 @@ namespace lpdeform {
 /// Each iteration makes only two passes over all vectors. Pairs are stored in single precision, since they only affect
 /// the search direction. Runs in parallel in fixed chunks, which gives the same bits on any number of threads. One
 /// caller at a time.
-class PairMemory {
+class LbfgsMemory {
  public:
-  PairMemory(Workers workers, std::size_t most_pairs)
+  LbfgsMemory(Workers workers, std::size_t most_pairs)
       : workers_(std::move(workers)), most_pairs_(most_pairs) {}
 
   /// Forgets all pairs: M has changed.

@@ -1,4 +1,4 @@
-#include "core/methods/pair_memory.h"
+#include "core/methods/lbfgs_memory.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,16 +13,16 @@ constexpr double kLeastGamma = 0.05, kMostGamma = 4;
 
 }  // namespace
 
-std::vector<KeptPair> PairMemory::kept() const {
+std::vector<KeptPair> LbfgsMemory::kept() const {
   std::vector<KeptPair> result;
   for (const Pair& pair : pairs_) result.push_back({pair.s.data(), pair.z.data()});
   return result;
 }
 
 /// The sums of sweep_products over all chunks, added in chunk order.
-std::vector<double> PairMemory::products(const Points& gradient, const Points& gradient_before,
-                                         const Points& h, const Points& h_before, double length,
-                                         const Points& d) {
+std::vector<double> LbfgsMemory::products(const Points& gradient, const Points& gradient_before,
+                                          const Points& h, const Points& h_before, double length,
+                                          const Points& d) {
   const auto count = static_cast<std::size_t>(gradient.size());
   candidate_.s.resize(count);
   candidate_.z.resize(count);
@@ -40,7 +40,7 @@ std::vector<double> PairMemory::products(const Points& gradient, const Points& g
 }
 
 /// Stores the candidate; drops the oldest pair if there are too many.
-void PairMemory::take_in(const std::vector<double>& sums) {
+void LbfgsMemory::take_in(const std::vector<double>& sums) {
   Pair pair = std::move(candidate_);
   pair.sy.clear();
   pair.zy.clear();
@@ -58,8 +58,8 @@ void PairMemory::take_in(const std::vector<double>& sums) {
   }
 }
 
-double PairMemory::direction(const Points& gradient, const Points& gradient_before, const Points& h,
-                             const Points& h_before, double length, Points& d) {
+double LbfgsMemory::direction(const Points& gradient, const Points& gradient_before, const Points& h,
+                              const Points& h_before, double length, Points& d) {
   if (length == 0) {
     d = -gamma_ * h;
     return gradient.cwiseProduct(d).sum();

@@ -11,11 +11,11 @@ namespace lpdeform {
 
 /// A tree of bounding boxes around triangles, to find the first triangle along a ray. Each node is split at the median
 /// of the centres along its longest side until at most kLeaf triangles are left. Immutable; thread-safe.
-class FaceTree {
+class FaceBvh {
  public:
   static constexpr std::int32_t kLeaf = 4;
 
-  FaceTree(const Points& positions, const Faces& faces);
+  FaceBvh(const Points& positions, const Faces& faces);
 
   /// The faces in the tree's order: faces that are close in space are close in this order.
   const std::vector<std::int32_t>& order() const { return order_; }

@@ -1,4 +1,4 @@
-#include "core/methods/two_attempts.h"
+#include "core/methods/best_of_two.h"
 
 #include <gmock/gmock.h>
 
@@ -42,14 +42,14 @@ Bent lifted_grid(double height) {
   return result;
 }
 
-class TwoAttemptsTest : public testing::Test {
+class BestOfTwoTest : public testing::Test {
  protected:
   static SolveSummary solve(const Bent& bent, const SolveSettings& settings) {
     return deformer(rest_shape(bent.mesh), bent.handles, Material::uniform(1))->solve(settings).value();
   }
 };
 
-TEST_F(TwoAttemptsTest, AutoEndsAsLowAsTheBetterMethod) {
+TEST_F(BestOfTwoTest, AutoEndsAsLowAsTheBetterMethod) {
   int first_is_lower = 0, second_is_lower = 0;
   for (const Bent& bent : {sheet(0.5), lifted_grid(5)}) {
     const SolveSummary one = solve(bent, cold(Method::kQuasiNewton));
@@ -65,7 +65,7 @@ TEST_F(TwoAttemptsTest, AutoEndsAsLowAsTheBetterMethod) {
   EXPECT_EQ(second_is_lower, 1);
 }
 
-TEST_F(TwoAttemptsTest, StagesAndTrueEnergiesFollowOneAnother) {
+TEST_F(BestOfTwoTest, StagesAndTrueEnergiesFollowOneAnother) {
   const SolveSummary both = solve(bar(120), cold(Method::kAuto));
   double lowest = both.initial_energy;
   int stage = 0;
@@ -78,7 +78,7 @@ TEST_F(TwoAttemptsTest, StagesAndTrueEnergiesFollowOneAnother) {
   EXPECT_EQ(both.trace.back().energy, both.energy);
 }
 
-TEST_F(TwoAttemptsTest, ALimitAfterTheFirstHasConvergedLeavesItsResult) {
+TEST_F(BestOfTwoTest, ALimitAfterTheFirstHasConvergedLeavesItsResult) {
   const Bent bent = bar(80);
   const SolveSummary one = solve(bent, cold(Method::kQuasiNewton));
   SolveSettings few = cold(Method::kAuto);
@@ -91,7 +91,7 @@ TEST_F(TwoAttemptsTest, ALimitAfterTheFirstHasConvergedLeavesItsResult) {
 }
 
 // Where the second is the better one already and not at its end, that is no convergence, though the first had converged.
-TEST_F(TwoAttemptsTest, ALimitAfterTheSecondIsTheBetterSaysThatItIsNotAtItsEnd) {
+TEST_F(BestOfTwoTest, ALimitAfterTheSecondIsTheBetterSaysThatItIsNotAtItsEnd) {
   const Bent bent = sheet(0.5);
   const SolveSummary one = solve(bent, cold(Method::kQuasiNewton));
   const SolveSummary both = solve(bent, cold(Method::kAuto));
@@ -105,7 +105,7 @@ TEST_F(TwoAttemptsTest, ALimitAfterTheSecondIsTheBetterSaysThatItIsNotAtItsEnd) 
   EXPECT_EQ(cut.method, Method::kMultiresolution);
 }
 
-TEST_F(TwoAttemptsTest, ADragGoesOnFromTheBetterWithoutASecond) {
+TEST_F(BestOfTwoTest, ADragGoesOnFromTheBetterWithoutASecond) {
   Bent bent = bar(80);
   auto solver = deformer(rest_shape(bent.mesh), bent.handles, Material::uniform(1));
   (void)solver->solve(cold(Method::kAuto)).value();
@@ -118,7 +118,7 @@ TEST_F(TwoAttemptsTest, ADragGoesOnFromTheBetterWithoutASecond) {
   EXPECT_LT((solver->positions() - before).rowwise().norm().maxCoeff(), 3);  // the handle moved by 0.5
 }
 
-TEST_F(TwoAttemptsTest, IsTheSameEachTime) {
+TEST_F(BestOfTwoTest, IsTheSameEachTime) {
   auto a = deformer(rest_shape(bar(80).mesh), bar(80).handles, Material::uniform(1));
   auto b = deformer(rest_shape(bar(80).mesh), bar(80).handles, Material::uniform(1));
   (void)a->solve(cold(Method::kAuto));

@@ -1,4 +1,4 @@
-#include "core/methods/pair_memory.h"
+#include "core/methods/lbfgs_memory.h"
 
 #include <gtest/gtest.h>
 
@@ -11,9 +11,9 @@ constexpr Eigen::Index kCount = 5001;  // vertices: some chunks, none of them wh
 constexpr double kSingle = 1e-5;       // pairs are kept in single precision
 
 /// A quadratic f = sum_k h_k x_k^2 / 2 and a diagonal metric m_k that is not its Hessian.
-class PairMemoryTest : public testing::TestWithParam<int> {
+class LbfgsMemoryTest : public testing::TestWithParam<int> {
  protected:
-  PairMemoryTest() {
+  LbfgsMemoryTest() {
     for (Eigen::Index k = 0; k < 3 * kCount; ++k) {
       hessian_.data()[k] = 1 + 0.5 * std::sin(0.37 * static_cast<double>(k));
       metric_.data()[k] = 2 + 0.9 * std::cos(0.11 * static_cast<double>(k));
@@ -56,16 +56,16 @@ class PairMemoryTest : public testing::TestWithParam<int> {
 
   Points hessian_{kCount, 3}, metric_{kCount, 3}, x_{kCount, 3}, g_, g_before_, h_, h_before_, d_;
   std::vector<Points> steps_, changes_;
-  PairMemory memory_{Workers(GetParam()), 3};
+  LbfgsMemory memory_{Workers(GetParam()), 3};
 };
 
-TEST_P(PairMemoryTest, BeginsWithTheMetric) {
+TEST_P(LbfgsMemoryTest, BeginsWithTheMetric) {
   const double slope = direction(0);
   EXPECT_EQ(d_, -h_);
   EXPECT_NEAR(slope, -g_.cwiseProduct(h_).sum(), 1e-9 * std::abs(slope));
 }
 
-TEST_P(PairMemoryTest, IsTheTwoLoopRecursionOverTheLastPairs) {
+TEST_P(LbfgsMemoryTest, IsTheTwoLoopRecursionOverTheLastPairs) {
   double slope = direction(0);
   for (std::size_t step = 1; step <= 6; ++step) {
     const double length = step == 2 ? 0.5 : 0.9;
@@ -77,7 +77,7 @@ TEST_P(PairMemoryTest, IsTheTwoLoopRecursionOverTheLastPairs) {
   }
 }
 
-TEST_P(PairMemoryTest, LeavesOutAStepWithoutCurvature) {
+TEST_P(LbfgsMemoryTest, LeavesOutAStepWithoutCurvature) {
   direction(0);
   hessian_.setZero();
   walk(1);
@@ -85,7 +85,7 @@ TEST_P(PairMemoryTest, LeavesOutAStepWithoutCurvature) {
   EXPECT_EQ(d_, -h_);
 }
 
-TEST_P(PairMemoryTest, ForgetsWhenCleared) {
+TEST_P(LbfgsMemoryTest, ForgetsWhenCleared) {
   direction(0);
   walk(0.9);
   direction(0.9);
@@ -95,10 +95,10 @@ TEST_P(PairMemoryTest, ForgetsWhenCleared) {
   EXPECT_NEAR(d_.cwiseProduct(h_).sum(), -d_.norm() * h_.norm(), 1e-12 * d_.norm() * h_.norm());
 }
 
-TEST(PairMemory, GivesTheSameBitsOnAnyNumberOfThreads) {
+TEST(LbfgsMemory, GivesTheSameBitsOnAnyNumberOfThreads) {
   std::vector<Points> results;
   for (const int threads : {1, 2, 4}) {
-    PairMemory memory(Workers(threads), 2);
+    LbfgsMemory memory(Workers(threads), 2);
     const Points g0 = Points::Constant(kCount, 3, 1.25);
     Points d;
     memory.direction(g0, g0, g0, g0, 0, d);
@@ -111,7 +111,7 @@ TEST(PairMemory, GivesTheSameBitsOnAnyNumberOfThreads) {
   EXPECT_EQ(results[0], results[2]);
 }
 
-INSTANTIATE_TEST_SUITE_P(Threads, PairMemoryTest, testing::Values(1, 2));
+INSTANTIATE_TEST_SUITE_P(Threads, LbfgsMemoryTest, testing::Values(1, 2));
 
 }  // namespace
 }  // namespace lpdeform

@@ -1,10 +1,10 @@
-#include "core/analysis/face_tree.h"
+#include "core/analysis/face_bvh.h"
 
 #include <numeric>
 
 namespace lpdeform {
 
-FaceTree::FaceTree(const Points& positions, const Faces& faces) : order_(faces.rows()) {
+FaceBvh::FaceBvh(const Points& positions, const Faces& faces) : order_(faces.rows()) {
   if (order_.empty()) return;
   std::iota(order_.begin(), order_.end(), 0);
   Points centres(faces.rows(), 3);
@@ -17,8 +17,8 @@ FaceTree::FaceTree(const Points& positions, const Faces& faces) : order_(faces.r
 }
 
 /// Fills the node of order_[begin, end) and the subtree below it.
-void FaceTree::fill(std::int32_t node, std::int32_t begin, std::int32_t end, const Points& positions,
-                    const Faces& faces, const Points& centres) {
+void FaceBvh::fill(std::int32_t node, std::int32_t begin, std::int32_t end, const Points& positions,
+                   const Faces& faces, const Points& centres) {
   Eigen::Array3d low = Eigen::Array3d::Constant(kInfinity), high = -low;
   Eigen::Array3d first_centre = low, last_centre = high;
   for (std::int32_t k = begin; k < end; ++k) {

@@ -1,4 +1,4 @@
-#include "core/analysis/face_tree.h"
+#include "core/analysis/face_bvh.h"
 
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ double meeting(const Points& points, const Faces& faces, std::int32_t face, cons
 }
 
 void expect_the_nearest(const TriangleMesh& mesh, const Eigen::Vector3d& origin,
-                        const Eigen::Vector3d& direction, const FaceTree& tree) {
+                        const Eigen::Vector3d& direction, const FaceBvh& tree) {
   double least = kInfinity;
   for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f)
     least =
@@ -39,10 +39,10 @@ void expect_the_nearest(const TriangleMesh& mesh, const Eigen::Vector3d& origin,
   EXPECT_EQ(found, least) << origin.transpose() << " to " << direction.transpose();
 }
 
-TEST(FaceTree, FindsTheFirstFaceAlongARay) {
+TEST(FaceBvh, FindsTheFirstFaceAlongARay) {
   TriangleMesh mesh = box_surface(5, 6, 7);
   mesh.vertices = shaken(mesh.vertices, 0.4);
-  const FaceTree tree(mesh.vertices, mesh.faces);
+  const FaceBvh tree(mesh.vertices, mesh.faces);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> number(-1, 1);
   for (int k = 0; k < 500; ++k) {
@@ -51,9 +51,9 @@ TEST(FaceTree, FindsTheFirstFaceAlongARay) {
   }
 }
 
-TEST(FaceTree, FindsWhatLiesAlongTheAxes) {
+TEST(FaceBvh, FindsWhatLiesAlongTheAxes) {
   const TriangleMesh mesh = box_surface(5, 6, 7);  // rays within the planes of boxes, and on their borders
-  const FaceTree tree(mesh.vertices, mesh.faces);
+  const FaceBvh tree(mesh.vertices, mesh.faces);
   for (const double at : {0.0, 0.5, 2.0, 2.25, 5.0}) {
     for (int axis = 0; axis < 3; ++axis) {
       for (const double sign : {1.0, -1.0}) {
@@ -64,12 +64,12 @@ TEST(FaceTree, FindsWhatLiesAlongTheAxes) {
   }
 }
 
-TEST(FaceTree, OfNoFacesOrOneIsATreeToo) {
+TEST(FaceBvh, OfNoFacesOrOneIsATreeToo) {
   TriangleMesh mesh = grid(1, 1);
-  const FaceTree none(mesh.vertices, Faces(0, 3));
+  const FaceBvh none(mesh.vertices, Faces(0, 3));
   EXPECT_EQ(none.nearest({0, 0, 1}, {0, 0, -1}, 1e-9, [](std::int32_t) { return 0.0; }), kInfinity);
   mesh.faces.conservativeResize(1, 3);
-  const FaceTree one(mesh.vertices, mesh.faces);
+  const FaceBvh one(mesh.vertices, mesh.faces);
   EXPECT_EQ(one.order(), std::vector<std::int32_t>{0});
   const Eigen::Vector3d middle = (mesh.vertices.row(mesh.faces(0, 0)) + mesh.vertices.row(mesh.faces(0, 1)) +
                                   mesh.vertices.row(mesh.faces(0, 2))) /
@@ -77,12 +77,12 @@ TEST(FaceTree, OfNoFacesOrOneIsATreeToo) {
   expect_the_nearest(mesh, middle + Eigen::Vector3d::UnitZ(), -Eigen::Vector3d::UnitZ(), one);
 }
 
-TEST(FaceTree, KeepsFacesWithOneCentreApart) {
+TEST(FaceBvh, KeepsFacesWithOneCentreApart) {
   TriangleMesh mesh = grid(1, 1);
   const Faces twice = mesh.faces;
   mesh.faces.resize(40 * twice.rows(), 3);
   for (int k = 0; k < 40; ++k) mesh.faces.middleRows(k * twice.rows(), twice.rows()) = twice;
-  const FaceTree tree(mesh.vertices, mesh.faces);
+  const FaceBvh tree(mesh.vertices, mesh.faces);
   std::vector<std::int32_t> order = tree.order();
   std::ranges::sort(order);
   for (std::size_t k = 0; k < order.size(); ++k) EXPECT_EQ(order[k], static_cast<std::int32_t>(k));

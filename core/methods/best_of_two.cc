@@ -1,4 +1,4 @@
-#include "core/methods/two_attempts.h"
+#include "core/methods/best_of_two.h"
 
 #include <algorithm>
 #include <limits>
@@ -11,21 +11,21 @@ constexpr double kComesNearer = 0.1;  // the least share of the difference to th
 
 }  // namespace
 
-TwoAttempts::TwoAttempts(std::unique_ptr<Minimiser> first,
-                         std::function<std::unique_ptr<Minimiser>()> make_second, int most_iterations,
-                         double zero_sum)
+BestOfTwo::BestOfTwo(std::unique_ptr<Minimiser> first,
+                     std::function<std::unique_ptr<Minimiser>()> make_second, int most_iterations,
+                     double zero_sum)
     : present_(std::move(first)),
       make_second_(std::move(make_second)),
       most_iterations_(most_iterations),
       zero_sum_(zero_sum) {}
 
-bool TwoAttempts::is_hopeless() const {
+bool BestOfTwo::is_hopeless() const {
   if (iterations_ >= most_iterations_) return true;
   if (sums_.size() <= kWindow || sums_.back() <= lowest_) return false;
   return sums_.front() - sums_.back() < kComesNearer * (sums_.back() - lowest_);
 }
 
-StepResult TwoAttempts::step_first() {
+StepResult BestOfTwo::step_first() {
   StepResult result = present_->step();
   lowest_ = std::min(lowest_, result.true_sum.value_or(lowest_));
   first_stage_ = result.stage + 1;
@@ -35,14 +35,14 @@ StepResult TwoAttempts::step_first() {
   return result;
 }
 
-StepResult TwoAttempts::begin_second() {
+StepResult BestOfTwo::begin_second() {
   is_second_ = true;
   present_.reset();
   present_ = make_second_();
   return {Outcome::kProgress, lowest_, first_stage_ - 1, lowest_};
 }
 
-StepResult TwoAttempts::step() {
+StepResult BestOfTwo::step() {
   if (!best_outcome_) return step_first();
   if (!is_second_) return begin_second();
   StepResult result = present_->step();

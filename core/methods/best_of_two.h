@@ -18,16 +18,16 @@ namespace lpdeform {
 /// As long as the second method is not the better one, it is abandoned after `most_iterations`, or if in 60 iterations
 /// its true sum has approached the lowest sum by less than a tenth of the remaining difference. Iterations in which its
 /// true sum does not change, as while a coarse level runs, do not count.
-class TwoAttempts : public Minimiser {
+class BestOfTwo : public Minimiser {
  public:
   /// `make_second` is called when the first method has ended, unless that method's true sum is at most `zero_sum`,
   /// which leaves nothing to improve. It must leave the evaluation at the guess in problem.objective.
-  TwoAttempts(std::unique_ptr<Minimiser> first, std::function<std::unique_ptr<Minimiser>()> make_second,
-              int most_iterations, double zero_sum);
+  BestOfTwo(std::unique_ptr<Minimiser> first, std::function<std::unique_ptr<Minimiser>()> make_second,
+            int most_iterations, double zero_sum);
 
   StepResult step() override;
   const Points& x() const override { return present_->x(); }
-  std::optional<Points> in_hand() override { return present_->in_hand(); }
+  std::optional<Points> intermediate_state() override { return present_->intermediate_state(); }
   std::optional<Outcome> outcome_before() const override { return best_outcome_; }
   bool is_best_present() const override { return !is_second_ || is_second_best_; }
 
