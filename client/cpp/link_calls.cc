@@ -177,7 +177,7 @@ absl::Status Link::check_steps(const v1::UndoUpdateRequest& undo, std::unique_lo
   if (!found.ok()) return found.status();
   if (found->session().undo_steps() > 1) return absl::OkStatus();
   return make_fault({Reason::kNothingToUndo, "", ""},
-                    "The session was made anew, and knows no step from before.");
+                    "The session was recreated, and has no steps from before.");
 }
 
 /// An undo is idempotent, so it is retried if the server becomes unreachable, after the updates that the server has

@@ -70,7 +70,7 @@ TEST(Ledger, AResizingEndsWithItsHandle) {
   ledger.add(resizing(2));
   ledger.accept(ledger.send_next().seq);
   ledger.session_lost();
-  EXPECT_TRUE(ledger.send_next().update.resize);  // made anew with it
+  EXPECT_TRUE(ledger.send_next().update.resize);  // recreated with it
   Update state = resizing(2);
   merge(state, removing("resize"));
   EXPECT_FALSE(state.resize);

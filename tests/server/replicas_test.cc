@@ -134,7 +134,7 @@ TEST_F(ReplicasTest, ASessionOutlivesEveryServerThatDies) {
     times.push_back(seconds_since(dead));
     begin(k);
   }
-  EXPECT_EQ(session.name(), name);  // it was not made anew
+  EXPECT_EQ(session.name(), name);  // it was not recreated
   std::printf("%zu vertices: open to first result %.2f s; kill -9 to the next result, for each server:",
               mesh.vertices.size() / 3, setup);
   for (const double time : times) std::printf(" %.2f", time);

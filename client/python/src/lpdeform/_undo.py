@@ -69,7 +69,7 @@ def _catch_up(link: Link, stop: Stop) -> None:
 def _check_steps(link: Link, name: str, stop: Stop) -> None:
     """In a recreated session, the update with all its handles counts as a step for the server. Users must not undo it."""
     if _session(link, name, stop).undo_steps <= 1:
-        text = "The session was made anew, and knows no step from before."
+        text = "The session was recreated, and has no steps from before."
         raise make(Code.FAILED_PRECONDITION, text, "NOTHING_TO_UNDO")
 
 

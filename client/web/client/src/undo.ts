@@ -66,5 +66,5 @@ async function checkSteps({ rpc, lease }: Link, signal: AbortSignal): Promise<vo
 }
 
 function forgotten(code: ErrorCode, reason: Reason): LpdeformError {
-  return new LpdeformError(code, "The session was made anew, and knows no step from before.", { reason });
+  return new LpdeformError(code, "The session was recreated, and has no steps from before.", { reason });
 }

@@ -6,7 +6,7 @@ import { FakeServer } from "./fake_server.js";
 import { at, begin, next, opened, refusal } from "./harness.js";
 
 describe("a session that the server has lost", () => {
-  test("is made anew from mesh, handles and settings as they were accepted", async () => {
+  test("is recreated from mesh, handles and settings as they were accepted", async () => {
     const { server, session } = await begin();
     session.setHandles({ base: { vertices: [0] }, tip: { vertices: [1] } });
     await server.until(() => server.updates.length === 1);
@@ -60,7 +60,7 @@ describe("a session that the server has lost", () => {
     expect(server.creations.length).toBe(2);
   });
 
-  test("is made anew once, however many updates and streams find out, and however late", async () => {
+  test("is recreated once, however many updates and streams find out, and however late", async () => {
     const { server, session } = await begin();
     session.setHandles({ base: { vertices: [0] }, tip: { vertices: [1] } });
     await server.until(() => server.updates.length === 1);
@@ -101,7 +101,7 @@ describe("a session that the server has lost", () => {
     expect([server.creations.length, session.name]).toEqual([3, "sessions/3"]);
   });
 
-  test("by expiring is made anew", async () => {
+  test("by expiring is recreated", async () => {
     const { server } = await begin();
     server.stream.goAway(GoAwayReason.SESSION_EXPIRED);
     server.stream.queue.finish();

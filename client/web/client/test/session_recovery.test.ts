@@ -283,7 +283,7 @@ describe("a session that is taken over", () => {
     expect(performance.now() - start).toBeLessThan(500);
   });
 
-  test("is not made anew for what went before", async () => {
+  test("is not recreated for what went before", async () => {
     const { server, session } = await begin();
     server.stream.queue.finish(refusal("SESSION_UNKNOWN", {}, Code.NotFound));
     await new Promise((resolve) => setTimeout(resolve, 5));
@@ -335,7 +335,7 @@ describe("a server that speaks of another mesh", () => {
     expect(server.streams.length).toBe(2);
   });
 
-  test("when the session is made anew ends it", async () => {
+  test("when the session is recreated ends it", async () => {
     const { server, session } = await begin();
     server.vertexCount = 2;
     server.stream.goAway(GoAwayReason.SESSION_EXPIRED);

@@ -254,7 +254,7 @@ describe("solving, while it waits,", () => {
     expect(new Set(server.creations.slice(1).map(({ requestId }) => requestId)).size).toBe(1);
   });
 
-  test("for a session to be made anew ends at once with an abort, and with what refuses the mesh now", async () => {
+  test("for a session to be recreated ends at once with an abort, and with what refuses the mesh now", async () => {
     const { server, session } = await begin();
     server.on.solve = () => {
       throw refusal("SESSION_UNKNOWN", {}, Code.NotFound);

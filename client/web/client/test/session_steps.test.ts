@@ -25,7 +25,7 @@ const backTo = (x: number) => ({
 });
 
 describe("undo", () => {
-  test("goes after all updates before it, and is part of what a session made anew gets", async () => {
+  test("goes after all updates before it, and is part of what a session recreated gets", async () => {
     const { server, session } = await begin();
     const answer = gate();
     server.on.update = (_, count) => (count === 1 ? answer.isOpen : undefined);
@@ -77,7 +77,7 @@ describe("undo", () => {
     expect(server.updates[1]!.update).toMatchObject({ inputSeq: 1n, handles: [{ name: "tip" }] });
   });
 
-  test("in a session that was made anew takes back what came after that, and not all its handles", async () => {
+  test("in a session that was recreated takes back what came after that, and not all its handles", async () => {
     const { server, session } = await begin();
     session.setHandle("tip", { vertices: [1] });
     await server.until(() => server.updates.length === 1);
@@ -99,7 +99,7 @@ describe("undo", () => {
     expect(server.undos.map(({ redo }) => redo)).toEqual([false, false, true]);
   });
 
-  test("is not done to a session that was made anew while the server was away", async () => {
+  test("is not done to a session that was recreated while the server was away", async () => {
     const { server, session } = await begin();
     session.setHandle("tip", { vertices: [1] });
     await server.until(() => server.updates.length === 1);

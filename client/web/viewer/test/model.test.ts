@@ -218,7 +218,7 @@ describe("history", () => {
     expect(steps).toBe(3);
   });
 
-  it("makes no step of a value that is made anew and says the same", () => {
+  it("makes no step of a value that is recreated and says the same", () => {
     const made = (p: number, painted: number) => ({
       p,
       handles: [{ name: "a", vertices: [1, 2] }],

@@ -24,7 +24,7 @@ function largestDifference(one: Frame, other: Frame): number {
   return Math.max(...one.positions.map((value, k) => Math.abs(value - other.positions[k]!)));
 }
 
-test("after kill -9 the session is made anew and shows the same surface", async () => {
+test("after kill -9 the session is recreated and shows the same surface", async () => {
   const session = await held();
   const before = await session.settle({ timeoutMs: 20_000 });
   const { name } = session;
