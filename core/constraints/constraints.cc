@@ -9,6 +9,7 @@
 #include "core/base/reasons.h"
 #include "core/constraints/holds.h"
 #include "core/energy/rotation_fit.h"
+#include "core/problem/check_handle.h"
 #include "core/problem/footprint.h"
 
 namespace lpdeform {
@@ -166,10 +167,7 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
                                              FreeComponents free_components, const Points* outside) {
   absl::Status status = check_handles(handles, shape.vertex_count(), shape.face_count());
   if (!status.ok()) return status;
-  if (handles.handles().empty()) {
-    return make_fault({Reason::kNoHandles, "", "at least 1 handle"},
-                      "there is no handle; a deformation needs at least one");
-  }
+  if (handles.handles().empty()) return no_handles();
   Constraints constraints{std::vector<char>(shape.vertex_count(), false),
                           shape.scaled_positions(),
                           shape.positions(),

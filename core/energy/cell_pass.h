@@ -18,6 +18,9 @@ namespace lpdeform {
 ///   df/dx_k  = sum_{j in N(k)} 2 w_kj [(c_k + c_j)(x_k - x_j) - (c_k R_k + c_j R_j)(p_k - p_j)]
 ///   c_i      = weight_i(E_i^2)
 ///
+/// w_ij are the weights (weights.h), and p_i is the rest position of vertex i, as in the paper. The exponents, also
+/// called p_i, are inside term_i and weight_i (lp_norm.h). f is Eq. 3 but for a constant factor.
+///
 /// The gradient is that of f with fitted rotations: they are optimal for every p, so their own change adds nothing
 /// (envelope theorem). Runs in parallel in chunks of a fixed size and sums in chunk order, which gives the same bits on
 /// any number of threads. One caller at a time.

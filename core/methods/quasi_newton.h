@@ -18,13 +18,13 @@ enum class Warmth {
 
 /// Limited-memory BFGS (Nocedal & Wright, algorithm 7.4) on E(x) with the reweighted Laplacian as initial metric (after
 /// Liu et al. 2017). The line search starts at t = 1 and backtracks by interpolation. The default for every p. In the
-/// metric, the weight of a cell with p_i > 2 is at least the mean weight of such cells. With c_i ~ E_i^(p_i - 2) alone,
-/// a cell at rest would have almost no weight, each step would increase its energy greatly, and the line search would
-/// shorten the step.
+/// metric, the weight of a cell with p_i > 2 is at least the mean weight of such cells. Without this bound,
+/// an undeformed cell would have the weight c_i ~ E_i^(p_i - 2), almost 0; each step would raise its energy sharply, and
+/// the line search would backtrack.
 ///
 /// If some p_i < 2, the method runs in stages (continuation): p goes from 2 towards p_i, then cell energies are
-/// smoothed with an eps that falls until it does not matter. Each stage begins with a metric refactored for the current
-/// cell weights and an empty memory. The metric is also refactored every 40th iteration, and after a shortened step,
+/// smoothed by eps, which is decreased until its effect is negligible. At the start of each stage the metric is
+/// refactored with the current cell weights, and the memory is cleared. The metric is also refactored every 40th iteration, and after a shortened step,
 /// which shows that the weights have changed. The memory then keeps the last pair, in the new metric; without it, p > 2
 /// and shallow valleys take two to three times as many iterations. If no weight has changed (p = 2), all pairs are
 /// kept. In a live session the method starts at p_i with an eps that adds at most a tenth to the mean cell's E^p, and
@@ -34,8 +34,8 @@ enum class Warmth {
 /// Converged when, in the last stage, the objective f has decreased over 20 iterations by at most tolerance * p * f, p
 /// the largest p_i (a relative decrease of E^(1/p) of at most the tolerance); or when no step decreases f and the
 /// decrease predicted by a fresh metric, -<gradient, direction> / 2, is at most that; or when E is 0 to rounding. If p
-/// is mixed, the f in tolerance * p * f of the first criterion excludes the part that smoothing adds to cells with
-/// p_i < 2, because next to a large p this part can exceed all other energy. Stalled if the distortions of cells with
+/// varies over the surface, the f in tolerance * p * f of the first criterion leaves out what smoothing adds to cells
+/// with p_i < 2, because next to a large p this part can exceed all other energy. Stalled if the distortions of cells with
 /// p_i < 2 are at the level of rounding, and smoothing still adds over a hundredth to the objective, as with p = 1 and p = 10
 /// side by side.
 class QuasiNewton : public Minimiser {

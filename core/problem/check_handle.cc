@@ -91,12 +91,20 @@ std::string handle_element(std::string_view name) {
   return absl::StrCat("handle \"", std::string(name.substr(0, kLongestName)), "\"");
 }
 
+absl::Status check_handle_name(std::string_view name) {
+  if (!name.empty() && name.size() <= kLongestName) return absl::OkStatus();
+  return make_fault({Reason::kHandleName, handle_element(name), "1 to 128 bytes"},
+                    absl::StrCat("a handle's name has ", name.size(), " bytes; it must have 1 to 128"));
+}
+
+absl::Status no_handles() {
+  return make_fault({Reason::kNoHandles, "", "at least 1 handle"},
+                    "there is no handle; a deformation needs at least one");
+}
+
 absl::Status check_handle(std::string_view name, const Handle& handle) {
-  if (name.empty() || name.size() > kLongestName) {
-    return make_fault({Reason::kHandleName, handle_element(name), "1 to 128 bytes"},
-                      absl::StrCat("a handle's name has ", name.size(), " bytes; it must have 1 to 128"));
-  }
-  absl::Status status = check_members(name, handle);
+  absl::Status status = check_handle_name(name);
+  if (status.ok()) status = check_members(name, handle);
   if (status.ok()) status = check_hold(name, handle.hold);
   if (status.ok()) status = check_footprint(name, handle.footprint);
   return status.ok() ? check_motion(name, handle, handle.motion) : status;

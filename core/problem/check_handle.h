@@ -11,6 +11,12 @@ namespace lpdeform {
 /// `handle "tip"`, for messages. A long name is cut to its first 128 bytes.
 std::string handle_element(std::string_view name);
 
+/// HANDLE_NAME: a name has 1 to 128 bytes.
+absl::Status check_handle_name(std::string_view name);
+
+/// FAILED_PRECONDITION NO_HANDLES, for what needs a handle where there is none.
+absl::Status no_handles();
+
 /// Checks a handle by itself. INVALID_ARGUMENT: HANDLE_NAME, HANDLE_EMPTY, HANDLE_POINTS_AND_VERTICES,
 /// HANDLE_KIND_NEEDS_VERTICES, HANDLE_BARYCENTRIC, HANDLE_WEIGHT_OUT_OF_RANGE, HANDLE_LOCK_DIRECTION,
 /// HANDLE_FOOTPRINT_OUT_OF_RANGE, and the reasons of check_motion.

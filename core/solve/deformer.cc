@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "core/problem/check_handle.h"
 #include "core/problem/check_settings.h"
 #include "core/solve/deformer_impl.h"
 
@@ -104,10 +105,7 @@ absl::Status Deformer::set_positions(const Points& positions) {
 absl::Status Deformer::start(const SolveSettings& settings, std::stop_token stop) {
   Impl& self = *impl_;
   if (absl::Status status = check_settings(settings, self.material); !status.ok()) return status;
-  if (!self.constraints) {
-    return make_fault({Reason::kNoHandles, "", "at least 1 handle"},
-                      "there is no handle; a deformation needs at least one");
-  }
+  if (!self.constraints) return no_handles();
   if (absl::Status status = check_method_takes(settings.method, self.handles); !status.ok()) return status;
   self.interrupt();
   self.begin(settings, std::move(stop));

@@ -123,13 +123,13 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   };
 
   /// Waits, before the process ends, until everything is stored, and retries while the store fails, until
-  /// `end`. After `end` the store is neither asked nor waited for. Callers who wait for it, or come later,
+  /// `end`. After `end` no store call is begun or awaited. Callers who wait for it, or come later,
   /// are told STORE_FAILING, or that their update is not kept. Returns what is not stored. The log has a line
   /// for each such session.
   std::vector<Unkept> flush(std::chrono::steady_clock::time_point end);
 
-  /// A session counts as in use for this long after its last use, and as long as it has a stream, because a
-  /// drag may rest.
+  /// A session counts as in use for this long after its last use, and as long as it has a stream, because the
+  /// user may pause in a drag.
   static constexpr std::chrono::milliseconds kInUse{1000};
   static constexpr std::chrono::milliseconds kPatience{250};
   static constexpr std::chrono::milliseconds kPatienceForNew{10'000};

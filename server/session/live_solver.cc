@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "core/problem/check_handle.h"
 #include "server/runtime/metrics.h"
 
 namespace lpdeform {
@@ -13,11 +14,6 @@ namespace {
 absl::Status superseded(std::uint64_t input_seq) {
   return make_fault({Reason::kSuperseded, absl::StrCat("update ", input_seq), ""},
                     absl::StrCat("Update ", input_seq, " came before the solve was finished."));
-}
-
-absl::Status no_handles() {
-  return make_fault({Reason::kNoHandles, "", "handles >= 1"},
-                    "The session has no handle; a solve needs at least one.");
 }
 
 }  // namespace
@@ -59,6 +55,7 @@ bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
 
 void LiveSolver::take_over(const Inputs& inputs) {
   absl::Status status;
+  // Here a new p, or stiffness, reaches the solver.
   if (inputs.material != inputs_.material) status = deformer_->set_material(*inputs.material);
   const bool has_handles = !inputs.handles->handles().empty();
   if (status.ok() && has_handles && inputs.handles != held_) {

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "core/problem/check_handle.h"
 #include "server/session/mailbox_candidate.h"
 
 namespace lpdeform {
@@ -222,14 +223,10 @@ absl::Status Mailbox::change_handles(const Update& update, Candidate& next) cons
   std::set<std::string_view> names;
   for (const HandleChange& change : update.handles) {
     if (!names.insert(change.name).second) {
-      return make_fault({Reason::kHandleChangedTwice, element_of(change.name), "one change a handle"},
-                        absl::StrCat("The update changes ", element_of(change.name), " twice."));
+      return make_fault({Reason::kHandleChangedTwice, handle_element(change.name), "one change a handle"},
+                        absl::StrCat("The update changes ", handle_element(change.name), " twice."));
     }
-    if (change.name.empty() || change.name.size() > kLongestName) {
-      return make_fault(
-          {Reason::kHandleName, element_of(change.name), absl::StrCat("1 to ", kLongestName, " bytes")},
-          absl::StrCat("A handle's name has ", change.name.size(), " bytes, not 1 to ", kLongestName, "."));
-    }
+    if (absl::Status named = check_handle_name(change.name); !named.ok()) return named;
     if (!replaces_handle(change.name, update, next)) continue;
     next.named.push_back(change.name);
     absl::Status status;

@@ -32,8 +32,8 @@ struct Inputs {
 };
 
 /// The input_seq of the newest value of each part. Removed handles are remembered so that a late update does
-/// not bring them back. The oldest of these memories are dropped first. From then on, an update of an unknown
-/// handle that is as old as they were counts as stale.
+/// not bring them back. The oldest of these tombstones are dropped first. After that, an update of an
+/// unknown handle counts as stale if its input_seq is not above that of a dropped one.
 struct InputAges {
   std::map<std::string, std::uint64_t, std::less<>> handles;
   std::uint64_t forgotten = 0;  // the newest age that was dropped
@@ -76,8 +76,8 @@ struct InputLimits {
 /// instead of queueing: the solver reads the newest values when it has time. Thread-safe.
 class Mailbox {
  public:
-  /// `weld`: from the vertices of updates to those of `shape`; null if they are the same. `timers`: tells
-  /// pauses between gestures; null: there are no pauses.
+  /// `weld`: from the vertices of updates to those of `shape`; null if they are the same. `timers`: used to
+  /// detect pauses between gestures; if null, none are detected.
   explicit Mailbox(std::shared_ptr<const RestShape> shape, std::shared_ptr<const Weld> weld = nullptr,
                    InputLimits limits = {}, std::shared_ptr<Timers> timers = nullptr);
 

@@ -1,13 +1,10 @@
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "absl/strings/str_cat.h"
 #include "server/session/mailbox.h"
 
 namespace lpdeform {
@@ -36,13 +33,6 @@ struct Mailbox::Candidate {
   }
   bool has_material() const { return has_p || has_stiffness || has_length_unit; }
 };
-
-inline constexpr std::size_t kLongestName = 128;
-
-/// How errors name a handle.
-inline std::string element_of(std::string_view name) {
-  return absl::StrCat("handle \"", absl::string_view(name.data(), std::min(name.size(), kLongestName)), "\"");
-}
 
 absl::Status too_many_handles(std::size_t handles, std::size_t most);
 

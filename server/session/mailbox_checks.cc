@@ -6,6 +6,7 @@
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
 #include "core/constraints/constraints.h"
+#include "core/problem/check_handle.h"
 #include "core/problem/check_settings.h"
 #include "core/problem/welded_inputs.h"
 #include "server/session/mailbox_candidate.h"
@@ -75,9 +76,10 @@ absl::Status Mailbox::check_targets(const std::string& name, const Handle& handl
     const double distance = (targets.row(k) - shape_->centre()).stableNorm();
     if (distance <= farthest) continue;
     return make_fault(
-        {Reason::kHandleTargetTooFar, element_of(name), absl::StrCat("distance <= ", farthest)},
-        absl::StrCat(place_of(handle, static_cast<std::size_t>(k)), " of ", element_of(name), " would be ",
-                     distance, " from the mesh's centre, over ", kFarthestTarget, " of its diagonals."));
+        {Reason::kHandleTargetTooFar, handle_element(name), absl::StrCat("distance <= ", farthest)},
+        absl::StrCat(place_of(handle, static_cast<std::size_t>(k)), " of ", handle_element(name),
+                     " would be ", distance, " from the mesh's centre, over ", kFarthestTarget,
+                     " of its diagonals."));
   }
   return absl::OkStatus();
 }
