@@ -7,16 +7,12 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "core/base/fault.h"
+#include "core/base/match.h"
 
 namespace lpdeform {
 namespace {
 
 constexpr std::uint64_t kKiB = 1024;
-
-template <typename... Cases>
-struct Overloaded : Cases... {
-  using Cases::operator()...;
-};
 
 double seconds_of(std::chrono::milliseconds time) {
   return std::chrono::duration<double>(time).count();
@@ -32,17 +28,17 @@ std::string size_text(std::uint64_t bytes) {
 
 /// What the range is of; empty where it is of nothing.
 std::optional<double> number_in(const FlagValue& value) {
-  return std::visit(
-      Overloaded{
-          [](const std::string*) { return std::optional<double>(); },
-          [](const bool*) { return std::optional<double>(); },
-          [](const std::chrono::milliseconds* time) { return std::optional(seconds_of(*time)); },
-          [](const ByteLimit* limit) { return limit->bytes ? std::nullopt : std::optional(limit->percent); },
-          [](const SizeValue& size) { return std::optional(static_cast<double>(*size.bytes)); },
-          [](const MemoryValue& size) { return std::optional(static_cast<double>(*size.bytes)); },
-          [](const auto* number) { return std::optional(static_cast<double>(*number)); },
-      },
-      value);
+  using Number = std::optional<double>;
+  return match(
+      value, [](const std::string*) { return Number(); }, [](const bool*) { return Number(); },
+      [](const int* number) { return Number(*number); },
+      [](const std::uint32_t* number) { return Number(*number); },
+      [](const std::size_t* number) { return Number(static_cast<double>(*number)); },
+      [](const double* number) { return Number(*number); },
+      [](const std::chrono::milliseconds* time) { return Number(seconds_of(*time)); },
+      [](const ByteLimit* limit) { return limit->bytes ? Number() : Number(limit->percent); },
+      [](const SizeValue& size) { return Number(static_cast<double>(*size.bytes)); },
+      [](const MemoryValue& size) { return Number(static_cast<double>(*size.bytes)); });
 }
 
 /// "1234567" with commas, "256MiB" with a space, and "s" after seconds.
@@ -74,18 +70,19 @@ std::string help_of(const Flag& flag) {
 }
 
 std::string value_of(const Flag& flag) {
-  return std::visit(Overloaded{
-                        [](const std::string* text) { return *text; },
-                        [](const bool* is_set) { return std::string(*is_set ? "true" : ""); },
-                        [](const std::chrono::milliseconds* time) { return absl::StrCat(seconds_of(*time)); },
-                        [](const ByteLimit* limit) {
-                          return limit->bytes ? size_text(*limit->bytes) : absl::StrCat(limit->percent, "%");
-                        },
-                        [](const SizeValue& size) { return size_text(*size.bytes); },
-                        [](const MemoryValue& size) { return size_text(*size.bytes); },
-                        [](const auto* number) { return absl::StrCat(*number); },
-                    },
-                    flag.value);
+  return match(
+      flag.value, [](const std::string* text) { return *text; },
+      [](const bool* is_set) { return std::string(*is_set ? "true" : ""); },
+      [](const int* number) { return absl::StrCat(*number); },
+      [](const std::uint32_t* number) { return absl::StrCat(*number); },
+      [](const std::size_t* number) { return absl::StrCat(*number); },
+      [](const double* number) { return absl::StrCat(*number); },
+      [](const std::chrono::milliseconds* time) { return absl::StrCat(seconds_of(*time)); },
+      [](const ByteLimit* limit) {
+        return limit->bytes ? size_text(*limit->bytes) : absl::StrCat(limit->percent, "%");
+      },
+      [](const SizeValue& size) { return size_text(*size.bytes); },
+      [](const MemoryValue& size) { return size_text(*size.bytes); });
 }
 
 absl::Status must_be(const std::string& name, const std::string& what) {

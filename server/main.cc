@@ -25,11 +25,10 @@ constexpr int kRefused = 1, kNotKept = 2;
 constexpr std::chrono::seconds kToEnd{10}, kToEndWithout{2};
 
 constexpr char kDescription[] =
-    "Deforms triangle meshes as a gRPC service (lpdeform.v1). Every option may also be given by the "
-    "environment "
-    "variable named beside it. SIGTERM and SIGINT stop it gracefully. It exits with 0 then; with 2 where the "
-    "store did "
-    "not take all that was answered, which the log says by session; with 1 where it does not start.";
+    "Deforms triangle meshes as a gRPC service (lpdeform.v1). Each option can also be set by the environment "
+    "variable beside it. SIGTERM or SIGINT stops the server. Exit status: 0 stopped; 1 did not start; 2 "
+    "stopped, "
+    "but the store lacks answered updates (the log names the sessions).";
 
 int refuse(const absl::Status& why) {
   std::fprintf(stderr, "lpdeform-server: %s\n", lpdeform::text_for_operators(why).c_str());
