@@ -43,7 +43,8 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
                                              FreeComponents free_components, const Points* outside = nullptr);
 
 /// Whether points held exactly and locks can hold together: the errors of LinearConstraints::create, without making
-/// constraints. `handles` have passed check_handles, and their targets are no farther than kFarthestTarget.
+/// constraints. `handles` have passed check_handles, and their targets are no farther than kFarthestTarget. A session asks
+/// this when handles are set, to refuse the update; the Deformer makes the constraints later, once for the newest handles.
 absl::Status check_equations(const RestShape& shape, const HandleSet& handles);
 
 /// The rotation and translation that bring points `from` nearest to points `to`: to_k = R from_k + t. For a single
