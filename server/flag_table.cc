@@ -48,12 +48,11 @@ void add_access(std::vector<Flag>& flags, ServerOptions& server) {
           {"token-keys", kAccess, &server.token_keys_file,
            "Let in only callers with a bearer token (JWT) that one of these public keys signed, in PEM; "
            "read again when it changes"},
-          {"token-issuer", kAccess, &server.token_issuer, "What the tokens' \"iss\" must be (not looked at)"},
-          {"token-audience", kAccess, &server.token_audience,
-           "What the tokens' \"aud\" must have in it (not looked at)"},
+          {"token-issuer", kAccess, &server.token_issuer, "Required \"iss\" of tokens (any)"},
+          {"token-audience", kAccess, &server.token_audience, "Required entry of the tokens' \"aud\" (any)"},
           {"allow-anonymous", kAccess, &server.allow_anonymous,
-           "Without --token-keys and --tls-client-ca, serve other machines, too: whoever reaches the "
-           "address is let in"}});
+           "Accept callers from other machines without tokens or client certificates: anyone who reaches "
+           "the address may call"}});
 }
 
 void add_threads(std::vector<Flag>& flags, ServerOptions& server) {
@@ -81,7 +80,7 @@ void add_limits_of_connections(std::vector<Flag>& flags, ServerOptions& server) 
           {"max-calls-per-connection", kLimits, &server.max_calls_per_connection,
            "Calls on one connection at a time, streams included; more wait in the client", kCount},
           {"max-calls-waiting", kLimits, &server.max_calls_waiting,
-           "Calls that wait for a thread to look at them", kCount, Reason::kServerBusy}});
+           "Calls that may wait for a thread; more are refused", kCount, Reason::kServerBusy}});
 }
 
 void add_limits_of_sessions(std::vector<Flag>& flags, ServerOptions& server) {
@@ -113,8 +112,8 @@ void add_limits_of_memory(std::vector<Flag>& flags, ServerOptions& server) {
          {{"max-bytes",
            kLimits,
            MemoryValue{&server.max_bytes},
-           "Memory of all sessions and of what has come of uploads, by the server's own count; as 4GiB, in "
-           "bytes, or as 25% of what the machine or its control group has; 0: 75%",
+           "Memory for sessions and received upload bytes, as the server counts it: 4GiB, bytes, or 25% of "
+           "the machine's or control group's memory; 0: 75%",
            {},
            Reason::kMemoryFull},
           {"max-bytes-per-caller", kLimits, &server.max_bytes_per_caller,
@@ -122,7 +121,8 @@ void add_limits_of_memory(std::vector<Flag>& flags, ServerOptions& server) {
            "apart; as 4GiB, in bytes, or as 25% of --max-bytes; 0: without limit",
            kShare, Reason::kCallerMemoryFull},
           {"max-uploads", kLimits, &server.max_uploads,
-           "Uploads at a time; those that are 10 s old and of which nothing has come make room for others",
+           "Uploads at a time. When all are taken, one that is over 10 s old and empty is dropped for a new "
+           "one",
            kCount, Reason::kUploadsFull},
           {"max-uploads-per-caller", kLimits, &server.max_uploads_per_caller,
            "Uploads of one caller at a time, where callers are told apart; 0: without limit", kCountOrNone,
@@ -139,11 +139,11 @@ void add_limits_of_rates(std::vector<Flag>& flags, ServerOptions& server) {
            "one second; 0: without limit",
            kRates, Reason::kUploadRate},
           {"max-stream-rate", kLimits, &server.max_stream_bytes_per_second,
-           "Bytes a second of one stream's frames; lowers the frame rate first, to 10 a second, then the "
-           "precision where the client takes less; 0: without limit",
+           "Bytes per second of one stream's frames. The server lowers the frame rate first, to 10 per "
+           "second, then the precision if the client allows it; 0: no limit",
            kRates},
           {"max-frame-rate", kLimits, &server.max_stream_frames_per_second,
-           "Frames a second of one stream; the newest come, and the last of an update always; 0: without "
+           "Frames per second of one stream. The newest are sent, and always the last of an update; 0: no "
            "limit",
            kRates}});
 }
@@ -154,8 +154,8 @@ void add_limits_of_time(std::vector<Flag>& flags, ServerOptions& server) {
                   "Time without use after which a session expires", kSeconds, Reason::kSessionUnknown},
                  {"upload-idle", kLimits, &server.upload_idle,
                   "Time without use after which an upload expires", kSeconds, Reason::kUploadUnknown},
-                 {"heartbeat", kLimits, &server.heartbeat, "Silence after which a stream says something",
-                  kSeconds}});
+                 {"heartbeat", kLimits, &server.heartbeat,
+                  "Longest silence of a stream before a heartbeat is sent", kSeconds}});
 }
 
 void add_store(std::vector<Flag>& flags, Arguments& arguments) {
@@ -168,7 +168,7 @@ void add_store(std::vector<Flag>& flags, Arguments& arguments) {
           {.name = "store-user",
            .group = kStore,
            .value = &options.login.user,
-           .help = "Who the server is to the Redis of --store, where that knows several",
+           .help = "User name for the Redis of --store, if it has users",
            .needs = "store-password-file"},
           {"store-password-file", kStore, &options.login.password_file,
            "A file with the password that the Redis of --store asks for; read again with each connection"},
@@ -185,9 +185,8 @@ void add_program(std::vector<Flag>& flags, Arguments& arguments) {
   using enum FlagGroup;
   append(flags,
          {{"grace", kLimits, &arguments.grace,
-           "Time that calls have to end when the server is stopped; the store has 5 s more to take what is "
-           "left",
-           kSecondsOrNone, Reason::kDraining},
+           "Time for running calls to end after a stop; the store then has 5 s more", kSecondsOrNone,
+           Reason::kDraining},
           {.name = "log-level",
            .group = kProgram,
            .value = &arguments.log_level,
@@ -196,7 +195,7 @@ void add_program(std::vector<Flag>& flags, Arguments& arguments) {
           {.name = "healthcheck",
            .group = kProgram,
            .value = &arguments.probed,
-           .help = "Asks the server at this address for its health and exits: 0 where it serves, 1 where "
+           .help = "Asks the server at this address for its health and exits with 0 if it serves and 1 if "
                    "not; http://HOST:PORT asks its admin port, which needs no certificate",
            .type = "ADDRESS",
            .is_in_environment = false}});

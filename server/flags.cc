@@ -26,7 +26,7 @@ std::string size_text(std::uint64_t bytes) {
   return absl::StrCat(bytes, kUnits[unit]);
 }
 
-/// What the range is of; empty where it is of nothing.
+/// The number that the range applies to; empty if there is none.
 std::optional<double> number_in(const FlagValue& value) {
   using Number = std::optional<double>;
   return match(

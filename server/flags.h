@@ -41,8 +41,8 @@ struct MemoryValue {
   std::size_t* bytes;
 };
 
-/// Where the value goes, in its own unit. What stands there before is the default. Durations are said in seconds; a ByteLimit
-/// is said as a size or as a share of another limit, "25%".
+/// Where the value is stored. Its content before parsing is the default. Durations are given in seconds, a ByteLimit as a
+/// size or a share of another limit.
 using FlagValue = std::variant<std::string*, bool*, int*, std::uint32_t*, std::size_t*, double*,
                                std::chrono::milliseconds*, ByteLimit*, SizeValue, MemoryValue>;
 
@@ -62,7 +62,7 @@ struct Flag {
   FlagValue value;
   std::string help;  // without the range
   FlagRange range = {};
-  std::optional<Reason> refusal = {};     // what is told to those who pass this limit
+  std::optional<Reason> refusal = {};     // the reason sent to callers who exceed this limit
   std::string needs = {};                 // a flag without which it makes no sense
   std::vector<std::string> choices = {};  // empty: any text
   const char* type = "TEXT";              // of a text, in --help

@@ -13,10 +13,9 @@ namespace {
   if (const std::shared_ptr<const Log> log = to.lock()) {
     const auto written = std::make_shared<std::promise<void>>();
     std::thread([log, written] {
-      log->warning(
-          "end_forced",
-          {{"text",
-            "Something did not end in time, for example a disk does not answer; the process ends anyway."}});
+      log->warning("end_forced", {{"text",
+                                   "A thread did not end in time, for example because a disk does not "
+                                   "answer. The process ends now."}});
       log->end();
       written->set_value();
     }).detach();

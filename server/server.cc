@@ -96,10 +96,10 @@ void warn_of_what_is_open(const ServerOptions& options, const Listener& listener
     log.warning("no_authentication",
                 {{"address", listener.address()},
                  {"text", listener.is_local() ? "Every program on this machine is let in."
-                                              : "Whoever reaches the address is let in."}});
+                                              : "Anyone who reaches the address may call."}});
   } else if (!options.tls.is_on() && !listener.is_local()) {
     log.warning("no_encryption", {{"address", listener.address()},
-                                  {"text", "Tokens travel in the open unless a proxy adds TLS."}});
+                                  {"text", "Tokens are sent unencrypted unless a proxy adds TLS."}});
   }
 }
 

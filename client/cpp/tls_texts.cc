@@ -55,7 +55,7 @@ absl::StatusOr<Key> read_key(const std::string& text) {
   ERR_clear_error();
   if (key != nullptr) return key;
   return make_fault({Reason::kTlsPrivateKey, "private_key", "PEM, without a password"},
-                    "private_key cannot be read: it is no private key in PEM, or one with a password.");
+                    "private_key is not a PEM private key, or it has a password.");
 }
 
 absl::Status check_own(const Tls& tls) {

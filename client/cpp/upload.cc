@@ -52,7 +52,7 @@ absl::StatusOr<std::string> Uploads::add(std::string_view bytes) {
   }
   if (finished) return created->upload();
   return make_fault({Reason::kUploadIncomplete, created->upload(), ""},
-                    "The server misses parts of an upload that were all sent.");
+                    "The server reports missing parts although all were sent.");
 }
 
 /// If the server has no room for a part yet, retries after the pause that it asks for, within the call timeout; the

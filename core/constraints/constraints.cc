@@ -59,7 +59,7 @@ std::vector<char> movable_vertices(const RestShape& shape, const std::vector<std
   return may_move;
 }
 
-/// Rows are void that only vertices meet which do not move.
+/// Drops rows all of whose vertices are held: they constrain nothing.
 void drop_void_rows(const std::vector<char>& may_move, Holds& holds) {
   std::erase_if(holds.rows, [&](const LinearRow& row) {
     return std::none_of(row.point.vertices.begin(), row.point.vertices.begin() + row.point.count,

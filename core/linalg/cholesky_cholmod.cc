@@ -173,8 +173,7 @@ absl::StatusOr<std::optional<SupernodePattern>> analyse_supernodes(const LowerMa
     return make_fault(
         {Reason::kFactorTooLarge, "mesh", absl::StrCat("entries <= ", most)},
         absl::StrCat("The factorisation of this mesh would have more than ", most,
-                     " entries. Take one with fewer vertices, or whose faces lie beside one another as on a "
-                     "surface in space."));
+                     " entries. Use a mesh with fewer vertices, or one whose faces form a surface."));
   }
   const cholmod_factor& factor = *cholmod.factor;
   const auto* const order = static_cast<const std::int32_t*>(factor.Perm);

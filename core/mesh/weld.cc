@@ -48,11 +48,11 @@ absl::Status check_distances(const Points& positions, const std::vector<std::int
   for (std::size_t v = 0; v < lowest.size(); ++v) {
     const double distance = (positions.row(static_cast<Eigen::Index>(v)) - positions.row(lowest[v])).norm();
     if (!(distance > kFarthestCopy * diagonal)) continue;
-    return make_fault(
-        {Reason::kWeldTooFar, absl::StrCat("vertex ", v),
-         absl::StrCat("distance <= ", kFarthestCopy * diagonal)},
-        absl::StrCat("Vertex ", v, " is ", distance, " away from vertex ", lowest[v],
-                     ", whose copy it is to be; at most ", kFarthestCopy, " of the mesh's diagonal is."));
+    return make_fault({Reason::kWeldTooFar, absl::StrCat("vertex ", v),
+                       absl::StrCat("distance <= ", kFarthestCopy * diagonal)},
+                      absl::StrCat("Vertex ", v, " is ", distance, " away from vertex ", lowest[v],
+                                   ", of which it is to be a copy; at most ", kFarthestCopy,
+                                   " of the diagonal is allowed."));
   }
   return absl::OkStatus();
 }

@@ -136,7 +136,7 @@ absl::Status Deformer::start_certificate(std::stop_token stop, double max_second
   self.interrupt();
   if (!self.norm) {
     return make_fault({Reason::kNotSolved, "", ""},
-                      "there was no solve for the present inputs; a certificate is that of a result");
+                      "Solve for the current inputs before you ask for a certificate.");
   }
   self.stop = std::move(stop);
   self.begin_certificate(max_seconds);

@@ -151,8 +151,7 @@ absl::StatusOr<Caller> Backend::identify(const CallContext& call, Access access)
                       "The call has the header lpdeform-session more than once; send it once.");
   }
   if (!caller.ok() || access == Access::kRead || !caller->is_viewer) return caller;
-  return make_fault({Reason::kReadOnly, "authorization", ""},
-                    "The bearer token lets its holder look on and change nothing.");
+  return make_fault({Reason::kReadOnly, "authorization", ""}, "The bearer token is read-only.");
 }
 
 absl::StatusOr<std::shared_ptr<Session>> Backend::find(const CallContext& call, Access access,

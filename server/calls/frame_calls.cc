@@ -95,8 +95,7 @@ class DeformCall final : public FrameCall<DeformReactor, Outgoing<v1::DeformResp
       is_open_ = is_open_ || (ok && received_.is_whole && request_.has_open());
     }
     if (!ok) return end_of_input(is_open);
-    if (!received_.is_whole)
-      return break_off("A message cannot be parsed; a text that is not UTF-8, perhaps.");
+    if (!received_.is_whole) return break_off("The message cannot be parsed; perhaps a string is not UTF-8.");
     record().received(request_.ByteSizeLong());
     switch (request_.message_case()) {
       case v1::DeformRequest::kOpen:

@@ -20,9 +20,8 @@ using grpc::experimental::ServerInterceptorFactoryInterface;
 using grpc::experimental::ServerRpcInfo;
 
 absl::Status message_unreadable() {
-  return make_fault(
-      {Reason::kMessageUnreadable, "", ""},
-      "The message cannot be parsed as the request of this call; a text that is not UTF-8, perhaps.");
+  return make_fault({Reason::kMessageUnreadable, "", ""},
+                    "The message cannot be parsed; perhaps a string is not UTF-8.");
 }
 
 class Teller final : public Interceptor {

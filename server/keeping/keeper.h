@@ -35,7 +35,7 @@ namespace lpdeform {
 /// again. The same holds for a full store, but only for changes that it has no room for: they are retried now
 /// and then, while removals and changes that need no more room are written at once. If the store does not
 /// answer, callers that need an answer are refused at once. The keeper knows this after one caller has waited
-/// in vain, or after a call of the store has been under way for too long (StoreCalls). Thread-safe. Held by a
+/// without an answer, or after a call of the store has been under way for too long (StoreCalls). Thread-safe. Held by a
 /// shared pointer.
 class Keeper : public std::enable_shared_from_this<Keeper> {
  public:

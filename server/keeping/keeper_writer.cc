@@ -301,7 +301,7 @@ void Keeper::note_health(const absl::Status& status) {
   if (is_failing) {
     services_.log->warning("store_failing", {{"text", text_for_operators(status)}});
   } else {
-    services_.log->info("store_works", {{"text", "The store has everything that it had missed."}});
+    services_.log->info("store_works", {{"text", "The store works again and has all changes."}});
   }
 }
 
@@ -313,7 +313,8 @@ void Keeper::note_slow(std::size_t updates) {
   const std::scoped_lock lock(mutex_);
   if (updates == 0 || now < next_word_) return;
   next_word_ = now + kBetweenWords;
-  services_.log->warning("store_slow", {{"text", "Updates are answered before they are kept."}});
+  services_.log->warning("store_slow",
+                         {{"text", "The store is slow: updates are answered before they are stored."}});
 }
 
 }  // namespace lpdeform

@@ -129,7 +129,7 @@ absl::Status Uploads::check_share(const std::string& owner) const {
   return make_fault(
       {Reason::kCallerUploadsFull, "uploads", absl::StrCat("uploads <= ", limits_.most_uploads_each)},
       absl::StrCat("The caller has all of the ", limits_.most_uploads_each,
-                   " uploads that one caller may have; delete those that have served."));
+                   " uploads that one caller may have; delete those that you no longer need."));
 }
 
 /// If no place is free, forgets an upload without bytes. Searches all uploads only when that may help, so
@@ -158,7 +158,7 @@ absl::Status Uploads::make_place() {
   return retry_after(
       make_fault({Reason::kUploadsFull, "uploads", absl::StrCat("uploads <= ", limits_.most_uploads)},
                  absl::StrCat("The server has all of its ", limits_.most_uploads,
-                              " uploads in use; delete those that have served, or try again later.")),
+                              " uploads in use; delete those that you no longer need, or try again later.")),
       no_place_before_ - now);
 }
 

@@ -26,7 +26,7 @@ std::size_t bytes_of(const HandleChange& change) {
   return bytes;
 }
 
-/// Whether something is not as it was. An update that is sent again, under a higher number, may set handles to what they are.
+/// Whether the update changed anything: a resent update may set what is already set.
 bool is_change(const HandleSet& before, const HandleSet& after, const HandleEffects& effects) {
   const auto differs = [&](const std::string& name) {
     const auto was = before.handles().find(name), is = after.handles().find(name);

@@ -23,17 +23,15 @@ absl::Status too_high(std::uint64_t input_seq) {
                     absl::StrCat("The update's input_seq is ", input_seq, "; it must be below 2^63."));
 }
 
-absl::Status passed(std::uint64_t input_seq, std::uint64_t newest) {
-  return make_fault({Reason::kInputSeqPassed, "input_seq", absl::StrCat("input_seq > ", newest)},
-                    absl::StrCat("The session has taken update ", newest, ", so ", input_seq,
-                                 " cannot take a step back; look at what there is and ask again."));
+absl::Status passed(std::uint64_t newest) {
+  return make_fault(
+      {Reason::kInputSeqPassed, "input_seq", absl::StrCat("input_seq > ", newest)},
+      absl::StrCat("An undo needs an input_seq above ", newest, ". Read the session's state and try again."));
 }
 
 absl::Status nothing_to(bool redo) {
-  return redo ? make_fault({Reason::kNothingToRedo, "", ""},
-                           "No step of the handles was taken back since they were changed last.")
-              : make_fault({Reason::kNothingToUndo, "", ""},
-                           "The session remembers no step of its handles that could be taken back.");
+  return redo ? make_fault({Reason::kNothingToRedo, "", ""}, "There is no step to redo.")
+              : make_fault({Reason::kNothingToUndo, "", ""}, "There is no step to undo.");
 }
 
 /// The effects of changes that are all made.
@@ -110,7 +108,7 @@ absl::StatusOr<UndoResult> Mailbox::undo(std::uint64_t input_seq, bool redo) {
   if (last_undo_ && last_undo_->input_seq == input_seq && last_undo_->redo == redo) return last_undo_->result;
   if (input_seq > kHighestInputSeq) return too_high(input_seq);
   const Inputs before = newest();
-  if (input_seq <= before.input_seq) return passed(input_seq, before.input_seq);
+  if (input_seq <= before.input_seq) return passed(before.input_seq);
   const std::vector<HandleChange>* const changes = history_.next(redo);
   if (changes == nullptr) return nothing_to(redo);
   Update update{input_seq, *changes, {}, false};

@@ -16,7 +16,7 @@ namespace lpdeform {
 absl::Status too_many_handles(std::size_t handles, std::size_t most) {
   return make_fault({Reason::kTooManyHandles, "", absl::StrCat("handles <= ", most)},
                     absl::StrCat("The session would have ", handles, " handles; it may have ", most,
-                                 ". Let go of some first."));
+                                 ". Remove some first."));
 }
 
 absl::Status Mailbox::check(const Candidate& next, const Inputs& before) const {

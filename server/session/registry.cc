@@ -169,8 +169,7 @@ absl::StatusOr<Registry::Page> Registry::list(std::size_t most, const std::strin
                                               const std::string& owner) const {
   std::uint64_t before = 0;
   if (!page_token.empty() && !absl::SimpleAtoi(page_token, &before)) {
-    return make_fault({Reason::kPageToken, "page_token", ""},
-                      "The page token is none that this server gave out.");
+    return make_fault({Reason::kPageToken, "page_token", ""}, "This server did not issue the page token.");
   }
   const std::scoped_lock lock(mutex_);
   Page page;

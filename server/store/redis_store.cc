@@ -54,7 +54,7 @@ class RedisStore final : public Store {
     const auto ran = toucher_.run({"HGET", "lpdeform:time", "ran"});
     if (!ran.ok()) return ran.status();
     if (!ran->is_nothing && !absl::SimpleAtoi(ran->text, &ran_))
-      return store_failing("lpdeform:time, which Redis has, is none of lpdeform's");
+      return store_failing("the key lpdeform:time in Redis was not written by lpdeform");
     told_ = ran_;
     return absl::OkStatus();
   }

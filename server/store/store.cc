@@ -91,7 +91,7 @@ absl::Status session_damaged(const absl::Status& why) {
   const Fault fault = fault_of(why);
   absl::Status status = session_damaged(std::string_view(why.message().data(), why.message().size()));
   status.SetPayload(kDamage,
-                    absl::Cord(absl::StrCat("what it holds is refused: ", fault.reason, " ", fault.element)));
+                    absl::Cord(absl::StrCat("its contents are invalid: ", fault.reason, " ", fault.element)));
   return status;
 }
 
@@ -105,11 +105,11 @@ std::string route_header(const std::string& route) {
 }
 
 absl::Status session_elsewhere(const std::string& route) {
-  const std::string text = route.empty()
-                               ? "Another server has the session in use; try again. It was made without the "
-                                 "header lpdeform-session, so none leads there."
-                               : absl::StrCat("Another server has the session; call again with the header ",
-                                              route_header(route), ".");
+  const std::string text =
+      route.empty() ? "Another server has the session in use; try again. The session was created without the "
+                      "header lpdeform-session, so no header leads to its server."
+                    : absl::StrCat("Another server has the session; call again with the header ",
+                                   route_header(route), ".");
   return make_fault({Reason::kSessionElsewhere, "session", route.empty() ? "" : route_header(route)}, text);
 }
 

@@ -30,8 +30,7 @@ absl::StatusOr<HandleMotion> Decoder::motion(const v1::Motion& message) {
                        decode_vector(rigid.translation())};
   }
   if (!message.has_targets()) {
-    return make_fault({Reason::kMotionMissing, "motion", ""},
-                      "A motion says neither fixed nor rigid nor targets.");
+    return make_fault({Reason::kMotionMissing, "motion", ""}, "A motion must set fixed, rigid or targets.");
   }
   const auto targets = points(message.targets().scalar(), message.targets().positions(), "target positions");
   if (!targets.ok()) return targets.status();
@@ -125,7 +124,7 @@ absl::StatusOr<HandleChange> Decoder::handle(const v1::HandleUpdate& message) {
   }
   if (!message.has_set()) {
     return make_fault({Reason::kHandleChangeMissing, "handles", ""},
-                      "A change of a handle says neither set nor move nor remove.");
+                      "A change must set, move or remove the handle.");
   }
   auto handle = group(message.set(), message.name());
   if (!handle.ok()) return handle.status();

@@ -84,7 +84,7 @@ class Process:
 
 
 class Server(Process):
-    """Sessions go after 20 s without use: of one that another server took over, a copy that nobody asks for stays as long."""
+    """Sessions expire after 20 s. A server keeps its stale copy of a session that another server took over for as long."""
 
     def __init__(self, store: str) -> None:
         self.admin = free_port()

@@ -159,7 +159,7 @@ class Tokens(OnFiles):
         self.assertIn("not one that this server takes", self.ask(server, "--token-file", other).stderr)
         self.assertNotIn(programs.read_text(other).strip()[:40], "".join(server.log))
         look = self.token("first", sub="alice", aud="lpdeform", exp=FOREVER, lpdeform_role="viewer")
-        self.assertIn("look on and change nothing", self.ask(server, "--token-file", look).stderr)
+        self.assertIn("bearer token is read-only", self.ask(server, "--token-file", look).stderr)
 
     def test_files_that_cannot_be_used_are_named(self):
         self.assertIn("no PEM block", self.start_fails("--token-keys", self.write("empty.pem", "")))
@@ -192,7 +192,7 @@ class Exposure(OnFiles):
             line = process.stdout.readline()
             self.assertNotEqual(line, "")
             said += line
-        self.assertIn("Whoever reaches the address is let in", said)
+        self.assertIn("Anyone who reaches the address may call", said)
 
 
 def status_of(url):

@@ -109,7 +109,7 @@ class Owners {
               ? absl::StrCat("twice in handle \"", handle.name, "\"")
               : absl::StrCat("in handles \"", place->second, "\" and \"", handle.name, "\"");
       refuse(Reason::kHandleVertexTwice, absl::StrCat("vertex ", vertex),
-             absl::StrCat("Vertex ", vertex, " is ", where, "; it belongs to one handle, once."));
+             absl::StrCat("Vertex ", vertex, " is ", where, "; a vertex may be held once, by one handle."));
     }
   }
 
@@ -125,7 +125,7 @@ json parse_strictly(std::string_view text) {
     if (event == json::parse_event_t::object_end) keys.pop_back();
     if (event == json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second) {
       refuse(Reason::kHandleFileKey, parsed.get<std::string>(),
-             absl::StrCat("The key ", shown(parsed), " stands twice in one object."));
+             absl::StrCat("The key ", shown(parsed), " occurs twice in one object."));
     }
     return true;
   };

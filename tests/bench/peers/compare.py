@@ -97,7 +97,7 @@ def program(command, out, n, energy, p):
 
 
 def with_median_setup(run, command_for, out):
-    """Set-up again, with as good as no solving after it: the median of SETUPS, the first of which had a cold start."""
+    """Repeats the set-up with almost no solving: the median of SETUPS, the first of which had a cold start."""
     setups = [run.setup]
     while len(setups) < SETUPS:
         subprocess.run([str(part) for part in command_for(0.001)], check=True)
@@ -139,8 +139,8 @@ def igl_run(task, energy, limit):
 
 
 def open3d_run(task, energy, limit):
-    """Open3D's deform_as_rigid_as_possible, whose first iteration is the Laplacian deformation. A call does
-    everything anew, so that longer and longer ones are timed, less one without iterations. Doubling ends at the limit."""
+    """Open3D's deform_as_rigid_as_possible, whose first iteration is the Laplacian deformation. Each call
+    starts from scratch, so runs of increasing length are timed, less one without iterations. Doubling ends at the limit."""
     import open3d
 
     open3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)

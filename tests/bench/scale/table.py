@@ -60,8 +60,8 @@ def table(rows, limit, large_limit):
             cells += ["-" if exponent is None else f"n^{exponent:.2f}" for exponent in exponents] + [""]
             lines.append("| " + " | ".join(cells) + " |")
     lines.append("")
-    lines.append(f"A dash: not reached within {limit:g} s ({large_limit:g} s from 500,000 vertices on), or no solve was over by "
-                 "then, so that what it would have found is not known. Growth: fitted from 10,000 vertices on.")
+    lines.append(f"A dash: the target was not reached within {limit:g} s ({large_limit:g} s from 500,000 vertices on), or no "
+                 "solve ended, so the final value is unknown. Growth: fitted from 10,000 vertices on.")
     return "\n".join(lines)
 
 

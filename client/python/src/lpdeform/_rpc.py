@@ -219,7 +219,7 @@ class Packer:
             )
             is_finished = self._send(part).finished
         if not is_finished:
-            text = "The server misses parts of an upload that were all sent."
+            text = "The server reports missing parts although all were sent."
             raise make(Code.DATA_LOSS, text, "UPLOAD_INCOMPLETE", created.upload)
         return created.upload
 

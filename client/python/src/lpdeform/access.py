@@ -126,7 +126,7 @@ def _check_own(chain: bytes, key: bytes) -> None:
             if error.reason in ("KEY_VALUES_MISMATCH", "KEY_TYPE_MISMATCH", "NO_CERTIFICATE_ASSIGNED"):
                 text = "private_key is not that of the first certificate of certificate_chain."
                 raise invalid(text, "TLS_KEY_MISMATCH", "private_key") from None
-            text = "private_key cannot be read: it is no private key in PEM, or one with a password."
+            text = "private_key is not a PEM private key, or it has a password."
             raise invalid(text, "TLS_PRIVATE_KEY", "private_key", "PEM, without a password") from None
 
 

@@ -57,7 +57,7 @@ export class Lane {
   }
 
   #watch(session: Session): void {
-    // Of one that another has taken over from, it is its end that is told of.
+    // A stream that another replaced reports how it ended.
     session.on("problem", (error) => {
       if (session === this.#driver && !this.#isReconnecting) this.#note(error);
     });
@@ -154,7 +154,7 @@ export class Lane {
       this.#watch(joined);
       this.#driver = joined;
       ++this.tally.reconnects;
-      // What the one before did not get through is answered with the first that this one sends.
+      // Updates that the previous connection left unanswered are answered with the first update of this one.
       const first = joined.move("tip", this.#lifted(this.#moves + 1));
       for (const one of this.#pending) one.inputSeq = Math.min(one.inputSeq, first);
       this.#reading.push(this.#read(joined));

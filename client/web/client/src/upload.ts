@@ -34,7 +34,7 @@ export class Uploads {
       ({ finished } = await this.#send({ upload, offset: BigInt(offset), data }));
     }
     if (finished) return upload;
-    throw new LpdeformError("data_loss", "The server misses parts of an upload that were all sent.", {
+    throw new LpdeformError("data_loss", "The server reports missing parts although all were sent.", {
       reason: "UPLOAD_INCOMPLETE",
       element: upload,
     });
