@@ -1,5 +1,6 @@
-"""The operator's page, deploy/operating.md: every alert leads to a section of it, every section says what to check in which
-order, and everything that it names exists in the server. `operating_test.py PROGRAM [TEST...]` with lpdeform-server's path."""
+"""The operator's pages, deploy/operating.md and those of deploy/operating/: every alert leads to a section of them, every section
+says what to check in which order, and everything that they name exists in the server. `operating_test.py PROGRAM [TEST...]` with
+lpdeform-server's path."""
 
 import pathlib
 import re
@@ -11,7 +12,7 @@ import urllib.request
 import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PAGE = "deploy/operating.md"
+PAGES = ["deploy/operating.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "deploy/operating").glob("*.md"))]
 SERVER = sys.argv.pop(1)
 
 
@@ -20,10 +21,13 @@ def slug(heading):
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
-def sections(text):
-    """{target: what stands under that heading}."""
-    parts = re.split(r"(?m)^#+ (.+)$", text)
-    return {slug(heading): body for heading, body in zip(parts[1::2], parts[2::2])}
+def sections(pages):
+    """{page#target: what stands under that heading}, of {page: text}."""
+    found = {}
+    for page, text in pages.items():
+        parts = re.split(r"(?m)^#+ (.+)$", text)
+        found |= {f"{page}#{slug(heading)}": body for heading, body in zip(parts[1::2], parts[2::2])}
+    return found
 
 
 def alerts():
@@ -31,15 +35,11 @@ def alerts():
     return [rule for group in groups for rule in group["rules"]]
 
 
-def astray(rules, text):
-    """Alerts that lead to no section, or to one that does not name them; names of alerts on the page that are none."""
-    found = sections(text)
-    wrong = []
-    for rule in rules:
-        page, _, target = rule["annotations"].get("runbook", "").partition("#")
-        if page != PAGE or f"`{rule['alert']}`" not in found.get(target, ""):
-            wrong.append(rule["alert"])
-    named = set(re.findall(r"`(Lpdeform\w+)`", text))
+def astray(rules, pages):
+    """Alerts that lead to no section, or to one that does not name them; names of alerts on the pages that are none."""
+    found = sections(pages)
+    wrong = [rule["alert"] for rule in rules if f"`{rule['alert']}`" not in found.get(rule["annotations"].get("runbook"), "")]
+    named = set(re.findall(r"`(Lpdeform\w+)`", "\n".join(pages.values())))
     return wrong + sorted(named - {rule["alert"] for rule in rules})
 
 
@@ -50,7 +50,7 @@ def steps(body):
 
 def is_place_to_look(step):
     """A line of the log, a metric, a command, or a section that says more."""
-    return re.search(r"[Ll]og `\w+`|`[a-z]+ ?[^`]*`|\]\(#|it says", step) is not None
+    return re.search(r"[Ll]og `\w+`|`[a-z]+ ?[^`]*`|\]\([\w.]*#|it says", step) is not None
 
 
 SOURCES = "\n".join(path.read_text() for path in sorted((ROOT / "server").rglob("*.cc")))
@@ -63,32 +63,37 @@ def events(*levels):
     return set(re.findall(rf'(?:\.|->|&Log::)(?:{"|".join(levels)})\)?\(\s*"(\w+)"', SOURCES))
 
 
-class Page(unittest.TestCase):
-    text = (ROOT / PAGE).read_text()
-    found = sections(text)
+class Pages(unittest.TestCase):
+    pages = {page: (ROOT / page).read_text() for page in PAGES}
+    text = "\n".join(pages.values())
+    found = sections(pages)
 
     def test_every_alert_leads_to_a_section_that_names_it(self):
         self.assertGreater(len(alerts()), 30)
-        self.assertEqual(astray(alerts(), self.text), [])
+        self.assertEqual(astray(alerts(), self.pages), [])
 
     def test_the_check_above_finds_alerts_and_sections_that_are_not_there(self):
-        rule = {"alert": "LpdeformDown", "annotations": {"runbook": f"{PAGE}#a-server-is-gone"}}
-        page = "## A server is gone\n\nAlert `LpdeformDown`.\n"
-        self.assertEqual(astray([rule], page), [])
-        self.assertEqual(astray([rule], page.replace("gone", "lost")), ["LpdeformDown"])
-        self.assertEqual(astray([rule], page + "`LpdeformUp`"), ["LpdeformUp"])
-        self.assertEqual(astray([{"alert": "LpdeformUp", "annotations": {}}], page), ["LpdeformUp", "LpdeformDown"])
+        rule = {"alert": "LpdeformDown", "annotations": {"runbook": "server.md#a-server-is-gone"}}
+        text = "## A server is gone\n\nAlert `LpdeformDown`.\n"
+        self.assertEqual(astray([rule], {"server.md": text}), [])
+        self.assertEqual(astray([rule], {"envoy.md": text}), ["LpdeformDown"])
+        self.assertEqual(astray([rule], {"server.md": text.replace("gone", "lost")}), ["LpdeformDown"])
+        self.assertEqual(astray([rule], {"server.md": text, "envoy.md": "`LpdeformUp`"}), ["LpdeformUp"])
+        rule = {"alert": "LpdeformUp", "annotations": {}}
+        self.assertEqual(astray([rule], {"server.md": text}), ["LpdeformUp", "LpdeformDown"])
 
     def test_every_section_of_an_alert_says_what_to_look_at_in_which_order(self):
-        for target in {rule["annotations"]["runbook"].partition("#")[2] for rule in alerts()}:
+        for target in {rule["annotations"]["runbook"] for rule in alerts()}:
             with self.subTest(section=target):
                 self.assertGreaterEqual(len(steps(self.found[target])), 2)
                 for step in steps(self.found[target])[:2]:
                     self.assertTrue(is_place_to_look(step), step)
 
     def test_links_lead_to_sections(self):
-        for target in re.findall(r"\]\(#([^)]*)\)", self.text):
-            self.assertIn(target, self.found)
+        for page, text in self.pages.items():
+            for path, target in re.findall(r"\]\(([^)#]*)#([^)]*)\)", text):
+                other = str((ROOT / page).parent.joinpath(path).resolve().relative_to(ROOT)) if path else page
+                self.assertIn(f"{other}#{target}", self.found | sections({other: (ROOT / other).read_text()}))
 
     def test_events_of_the_log_that_it_names_are_written_by_the_server(self):
         written = set(re.findall(r'"(\w+)"', SOURCES)) | WATCHED
@@ -103,7 +108,7 @@ class Page(unittest.TestCase):
 
     def test_its_table_of_how_streams_end_is_the_servers(self):
         names = re.findall(r'return "(\w+)";', (ROOT / "server/runtime/stream_ends.cc").read_text())
-        table = re.findall(r"(?m)^\| `(\w+)` \|", self.found["frames-stop"])
+        table = re.findall(r"(?m)^\| `(\w+)` \|", self.found["deploy/operating/calls.md#frames-stop"])
         self.assertGreater(len(names), 8)
         self.assertEqual(sorted(table), sorted(names))
 
@@ -124,7 +129,7 @@ class Metrics(unittest.TestCase):
             server.terminate()
         # What was never counted is not shown yet: calls and refusals.
         shown |= set(re.findall(r'"((?:lpdeform|grpc_server)_\w+)"', (ROOT / "server/runtime/metrics.cc").read_text()))
-        named = set(re.findall(r"`((?:lpdeform|process|grpc_server)_[a-z_]+)`", Page.text))
+        named = set(re.findall(r"`((?:lpdeform|process|grpc_server)_[a-z_]+)`", Pages.text))
         self.assertGreater(len(named), 25)
         self.assertEqual(named - shown, set())
 

@@ -1,6 +1,7 @@
-"""Envoy's metrics for Prometheus (deploy/web --stats): dashboard, alerts and the operator's page use only metrics that exist."""
+"""Envoy's metrics for Prometheus (deploy/web --stats): dashboard, alerts and the operator's pages use only metrics that exist."""
 
 import contextlib
+import glob
 import http.client
 import os
 import re
@@ -11,7 +12,7 @@ import metrics_test
 import programs
 from envoy_test import Envoy
 
-PAGE = os.path.join(os.path.dirname(__file__), "..", "..", "deploy", "operating.md")
+PAGES = glob.glob(os.path.join(os.path.dirname(__file__), "..", "..", "deploy", "operating", "*.md"))
 METRIC = re.compile(r"\b(envoy_[a-z0-9_]+)\s*(\{[^}]*\})?")
 
 
@@ -102,8 +103,8 @@ class EnvoyMetrics(programs.OnShapes):
         self.assertEqual(metrics_test.unknown_in("envoy_cluster_members > 0", scraped, METRIC), ["envoy_cluster_members"])
         self.assertEqual(metrics_test.unknown_in('envoy_server_live{zone="a"}', scraped, METRIC), ["envoy_server_live{zone}"])
 
-    def test_every_metric_of_the_operators_page_is_among_them(self):
-        named = set(re.findall(r"`(envoy_[a-z0-9_]+)`", programs.read_text(PAGE)))
+    def test_every_metric_of_the_operators_pages_is_among_them(self):
+        named = {name for page in PAGES for name in re.findall(r"`(envoy_[a-z0-9_]+)`", programs.read_text(page))}
         self.assertGreater(len(named), 8)
         self.assertEqual(named - set(self.scraped()), set())
 
