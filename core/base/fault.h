@@ -26,7 +26,8 @@ absl::Status make_fault(NewFault fault, std::string_view text);
 /// The same with another code than the usual one: proto/reasons.toml says of which reasons (`other_code`).
 absl::Status make_fault(absl::StatusCode code, NewFault fault, std::string_view text);
 
-/// A fault as clients receive it. A newer server may send a reason that this version does not know.
+/// A fault as clients receive it: it travels inside an absl::Status and reaches them unchanged. A newer server may send
+/// a reason that this version does not know.
 struct Fault {
   /// Stable, upper case, never reworded: "MESH_NOT_FINITE", "HANDLE_VERTEX_TWICE".
   std::string reason;
