@@ -325,7 +325,7 @@ class Schedule {
         const auto note = open.stream->next();
         if (!note) break;
         Outgoing<v1::DeformResponse> response;
-        encode(*note, *open.stream, open.session->vertex_count(), response);
+        encode(*note, *open.stream, open.session()->vertex_count(), response);
         LPDEFORM_CHECK(response.ByteSizeLong() < (1u << 22));
         (void)open.stream->acknowledge(open.stream->last_frame_seq());
       }
