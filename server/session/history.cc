@@ -64,8 +64,7 @@ std::vector<HandleChange> changes_back(const HandleSet& before, const HandleEffe
 void HandleHistory::note(const HandleSet& before, const HandleSet& after, const HandleEffects& effects,
                          Timers::TimePoint now, std::uint64_t revision) {
   if (most_steps_ == 0) return;
-  std::vector<HandleChange> back = changes_back(before, effects);
-  if (back.empty()) return;
+  if (effects.regrouped.empty() && effects.moved.empty() && effects.removed.empty()) return;
   const bool only_moves = effects.regrouped.empty() && effects.removed.empty();
   std::vector<std::string> names = only_moves ? effects.moved : std::vector<std::string>();
   std::ranges::sort(names);
@@ -76,7 +75,7 @@ void HandleHistory::note(const HandleSet& before, const HandleSet& after, const 
   if (!goes_on && effects.begins_step) gesture_.clear();
   if (!is_step) return;
   while (redo_steps() > 0) drop_last(revision);
-  put(steps_.size(), std::move(back), revision);
+  put(steps_.size(), changes_back(before, effects), revision);
   ++undo_steps_;
   gesture_ = std::move(names);
   keep_limits(revision);
