@@ -38,13 +38,18 @@ Number number_of(const Flag& flag, const std::string& text) {
   return number;
 }
 
-/// "4GiB" or "4096". CLI11's own takes -1 for the largest size.
+/// "4GiB" or "4096". CLI11's own conversion takes -1 for the largest size, and throws at an overflow without the flag's name.
 std::uint64_t size_of(const Flag& flag, std::string text) {
-  const std::string name = absl::StrCat("--", flag.name);
-  if (text.find('-') != std::string::npos) throw CLI::ValidationError(name, "must not be negative");
-  const std::string why = CLI::AsSizeValue(false)(text);
-  if (!why.empty()) throw CLI::ValidationError(name, why);
-  return std::stoull(text);
+  const auto is_size = [&text] {
+    try {
+      return text.find('-') == std::string::npos && CLI::AsSizeValue(false)(text).empty();
+    } catch (const CLI::ValidationError&) {
+      return false;
+    }
+  };
+  if (is_size()) return std::stoull(text);
+  throw CLI::ValidationError(
+      absl::StrCat("--", flag.name, " must be a size below 16 EiB, such as 4GiB or 4096."));
 }
 
 bool is_share(const std::string& text) {
