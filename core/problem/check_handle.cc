@@ -5,11 +5,11 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "core/problem/handle_name.h"
 
 namespace lpdeform {
 namespace {
 
-constexpr std::size_t kLongestName = 128;
 constexpr double kBarycentricSlack = 1e-6;
 
 absl::Status not_finite(std::string_view name, const std::string& what) {
@@ -86,16 +86,6 @@ absl::Status check_footprint(std::string_view name, double radius) {
 }
 
 }  // namespace
-
-std::string handle_element(std::string_view name) {
-  return absl::StrCat("handle \"", std::string(name.substr(0, kLongestName)), "\"");
-}
-
-absl::Status check_handle_name(std::string_view name) {
-  if (!name.empty() && name.size() <= kLongestName) return absl::OkStatus();
-  return make_fault({Reason::kHandleName, handle_element(name), "1 to 128 bytes"},
-                    absl::StrCat("a handle's name has ", name.size(), " bytes; it must have 1 to 128"));
-}
 
 absl::Status no_handles() {
   return make_fault({Reason::kNoHandles, "", "at least 1 handle"},

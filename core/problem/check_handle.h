@@ -1,18 +1,11 @@
 #pragma once
 
-#include <string>
 #include <string_view>
 
 #include "absl/status/status.h"
-#include "core/problem/handles.h"
+#include "core/problem/handle.h"
 
 namespace lpdeform {
-
-/// `handle "tip"`, for messages. A long name is cut to its first 128 bytes.
-std::string handle_element(std::string_view name);
-
-/// HANDLE_NAME: a name has 1 to 128 bytes.
-absl::Status check_handle_name(std::string_view name);
 
 /// FAILED_PRECONDITION NO_HANDLES, for what needs a handle where there is none.
 absl::Status no_handles();

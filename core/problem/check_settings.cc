@@ -5,7 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
-#include "core/problem/check_handle.h"
+#include "core/problem/handle_name.h"
 
 namespace lpdeform {
 namespace {

@@ -6,7 +6,7 @@
 #include "core/base/fault.h"
 #include "core/base/match.h"
 #include "core/base/reasons.h"
-#include "core/problem/check_handle.h"
+#include "core/problem/handle_name.h"
 
 namespace lpdeform {
 namespace {

@@ -3,7 +3,8 @@
 #include <vector>
 
 #include "core/analysis/shape_features.h"
-#include "core/resize/resize.h"
+#include "core/energy/rest_shape.h"
+#include "core/resize/scaling.h"
 
 namespace lpdeform {
 

@@ -5,7 +5,7 @@
 namespace lpdeform {
 
 /// Why a stream of frames ended. The set is closed: these are all reasons of `stream_ended` in the log and of
-/// lpdeform_streams_ended_total. deploy/operating/calls.md says what each means for an operator.
+/// lpdeform_streams_ended_total. deploy/operating/streams.md says what each means for an operator.
 enum class StreamEnd {
   // The server ended the stream and told the client (GoAway).
   kSessionDeleted,

@@ -9,7 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
-#include "core/problem/check_handle.h"
+#include "core/problem/handle_name.h"
 #include "server/session/mailbox_candidate.h"
 
 namespace lpdeform {

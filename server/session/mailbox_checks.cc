@@ -6,8 +6,8 @@
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
 #include "core/constraints/constraints.h"
-#include "core/problem/check_handle.h"
 #include "core/problem/check_settings.h"
+#include "core/problem/handle_name.h"
 #include "core/problem/welded_inputs.h"
 #include "server/session/mailbox_candidate.h"
 

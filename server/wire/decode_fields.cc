@@ -10,6 +10,7 @@
 #include "core/resize/resize.h"
 #include "server/wire/decode.h"
 #include "server/wire/decode_parts.h"
+#include "server/wire/vectors.h"
 
 namespace lpdeform {
 

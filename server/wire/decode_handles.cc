@@ -8,6 +8,7 @@
 #include "server/wire/decode.h"
 #include "server/wire/decode_parts.h"
 #include "server/wire/holds.h"
+#include "server/wire/vectors.h"
 
 namespace lpdeform {
 

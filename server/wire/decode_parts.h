@@ -54,8 +54,4 @@ inline void unpack_indices(std::string_view bytes, std::size_t count, std::int32
     out[k] = static_cast<std::int32_t>(std::min(packed_index(bytes, k), kMostIndex));
 }
 
-inline Eigen::Vector3d decode_vector(const v1::Vector3& message) {
-  return {message.x(), message.y(), message.z()};
-}
-
 }  // namespace lpdeform

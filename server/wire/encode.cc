@@ -10,6 +10,7 @@
 #include "core/base/match.h"
 #include "server/runtime/refusals.h"
 #include "server/wire/holds.h"
+#include "server/wire/vectors.h"
 
 namespace lpdeform {
 namespace {
@@ -233,12 +234,6 @@ v1::WeightKind encode_weights(WeightKind weights) {
       return v1::WEIGHT_KIND_INTRINSIC_DELAUNAY;
   }
   return v1::WEIGHT_KIND_UNSPECIFIED;
-}
-
-void encode_vector(const Eigen::Vector3d& vector, v1::Vector3& out) {
-  out.set_x(vector.x());
-  out.set_y(vector.y());
-  out.set_z(vector.z());
 }
 
 void encode_solver(const SolveSettings& settings, v1::SolverSettings& out) {

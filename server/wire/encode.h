@@ -18,7 +18,6 @@ void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint no
 
 v1::WeightKind encode_weights(WeightKind weights);
 v1::FreeComponents encode_free_components(FreeComponents free_components);
-void encode_vector(const Eigen::Vector3d& vector, v1::Vector3& out);
 /// For settings as Decoder makes them: max_iterations is not 0.
 void encode_solver(const SolveSettings& settings, v1::SolverSettings& out);
 

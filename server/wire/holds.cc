@@ -1,8 +1,7 @@
 #include "server/wire/holds.h"
 
 #include "core/base/match.h"
-#include "server/wire/decode_parts.h"
-#include "server/wire/encode.h"
+#include "server/wire/vectors.h"
 
 namespace lpdeform {
 

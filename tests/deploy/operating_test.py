@@ -108,7 +108,7 @@ class Pages(unittest.TestCase):
 
     def test_its_table_of_how_streams_end_is_the_servers(self):
         names = re.findall(r'return "(\w+)";', (ROOT / "server/runtime/stream_ends.cc").read_text())
-        table = re.findall(r"(?m)^\| `(\w+)` \|", self.found["deploy/operating/calls.md#frames-stop"])
+        table = re.findall(r"(?m)^\| `(\w+)` \|", self.found["deploy/operating/streams.md#frames-stop"])
         self.assertGreater(len(names), 8)
         self.assertEqual(sorted(table), sorted(names))
 
