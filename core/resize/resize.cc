@@ -47,12 +47,6 @@ Field narrowness(const RestShape& shape, const Eigen::Matrix3d& axes, const Eige
 
 }  // namespace
 
-Eigen::Vector3d stretch_shares(const Eigen::Vector3d& scale) {
-  const Eigen::Vector3d stretch = scale.array().log().abs();
-  const double largest = stretch.maxCoeff();
-  return largest > 0 ? Eigen::Vector3d(stretch / largest) : Eigen::Vector3d(1, 0, 0);
-}
-
 absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling) {
   if (absl::Status status = check_scaling(scaling); !status.ok()) return status;
   std::vector<char> is_spared;

@@ -54,9 +54,6 @@ absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const 
 absl::StatusOr<ResizeInputs> resize_inputs(const ShapeFeatures& features, const Scaling& scaling,
                                            const std::vector<char>& is_spared);
 
-/// a_k above; (1, 0, 0) if all scales are 1.
-Eigen::Vector3d stretch_shares(const Eigen::Vector3d& scale);
-
 /// The smallest of the three factors. Divided by it, all three factors are at least 1, so every axis is stretched or
 /// unchanged. A factor below 1 would compress an axis, and a thin surface buckles under compression.
 double shared_factor(const Eigen::Vector3d& scale);

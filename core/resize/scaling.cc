@@ -46,4 +46,10 @@ absl::StatusOr<Eigen::Matrix3d> axes_of(const Eigen::Vector3d& x_axis, const Eig
   return axes;
 }
 
+Eigen::Vector3d stretch_shares(const Eigen::Vector3d& scale) {
+  const Eigen::Vector3d stretch = scale.array().log().abs();
+  const double largest = stretch.maxCoeff();
+  return largest > 0 ? Eigen::Vector3d(stretch / largest) : Eigen::Vector3d(1, 0, 0);
+}
+
 }  // namespace lpdeform

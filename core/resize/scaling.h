@@ -28,4 +28,7 @@ absl::StatusOr<Eigen::Matrix3d> axes_of(const Eigen::Vector3d& x_axis, const Eig
 /// INVALID_ARGUMENT: RESIZE_SCALE_OUT_OF_RANGE, RESIZE_ORIGIN_NOT_FINITE.
 absl::Status check_scaling(const Scaling& scaling);
 
+/// |log scale_k| / max_j |log scale_j|; (1, 0, 0) if all scales are 1.
+Eigen::Vector3d stretch_shares(const Eigen::Vector3d& scale);
+
 }  // namespace lpdeform
