@@ -110,8 +110,8 @@ Recovery RecoveryRules::after_failed_making(const absl::Status& failed) {
 Answer answer_of(const absl::Status& status, bool is_second) {
   if (is_session_lost(status)) return Answer::kRecreate;
   if (is_taken_all_the_same(status)) return Answer::kTaken;
-  const bool is_in_vain = is_second && fault_of(status).reason == Reason::kUploadUnknown;
-  return is_undecided(status) && !is_in_vain ? Answer::kAgain : Answer::kRefused;
+  const bool is_hopeless = is_second && fault_of(status).reason == Reason::kUploadUnknown;
+  return is_undecided(status) && !is_hopeless ? Answer::kAgain : Answer::kRefused;
 }
 
 }  // namespace lpdeform::client

@@ -50,7 +50,7 @@ Keeper::~Keeper() {
 
 /// OK, or the reason not to ask the store: it does not answer at the moment, or the caller has waited for too
 /// long.
-absl::Status Keeper::asked_in_vain(Clock::time_point since) const {
+absl::Status Keeper::check_store_answers(Clock::time_point since) const {
   if (Clock::now() - since > kPatienceForNew) return store_failing("it is too slow");
   const std::scoped_lock lock(mutex_);
   return is_hanging_ || is_stuck_ ? store_away("it does not answer") : absl::OkStatus();
@@ -60,7 +60,7 @@ absl::Status Keeper::asked_in_vain(Clock::time_point since) const {
 /// answer, at most.
 template <typename Ask>
 std::invoke_result_t<Ask> Keeper::ask(Clock::time_point since, const Ask& what, std::size_t bytes) {
-  if (absl::Status status = asked_in_vain(since); !status.ok()) return status;
+  if (absl::Status status = check_store_answers(since); !status.ok()) return status;
   const Clock::time_point begin = Clock::now();
   auto answer = [&] {
     const StoreCalls::UnderWay call(calls_, begin, bytes);
@@ -112,7 +112,7 @@ void Keeper::add(std::shared_ptr<Session> session, StoredHead head, const std::s
 /// out when changes are written.
 absl::Status Keeper::keep_blob(Clock::time_point since, const std::string& name, const std::string& key,
                                const std::string& bytes) {
-  if (absl::Status status = asked_in_vain(since); !status.ok()) return status;
+  if (absl::Status status = check_store_answers(since); !status.ok()) return status;
   const Clock::time_point begin = Clock::now();
   const absl::Status status = [&] {
     const StoreCalls::UnderWay call(calls_, begin, bytes.size());

@@ -184,12 +184,12 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void run();
   std::vector<Work> take_work(bool is_retry);
   static void fill_in(Work& work);
-  static void fill_in_anew(Work& work);
+  static void refill(Work& work);
   void write(std::vector<Work> works, bool is_all);
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const Work> works);
   static std::size_t bytes_of(std::span<const Work> works);
   void write_all(Entry& entry, const std::string& name);
-  void write_anew(Entry& entry, const std::string& name);
+  void rewrite(Entry& entry, const std::string& name);
   void note_kept(const Work& work, ChangeOutcome outcome, Calls& calls);
   void note_failed(const Work& work, const absl::Status& why, Calls& calls);
   void note_written(const absl::Status& status, bool is_all);
@@ -203,7 +203,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   void note_health(const absl::Status& status);
   void try_again_later();
   void note_slow(std::size_t updates);
-  absl::Status asked_in_vain(Clock::time_point since) const;
+  absl::Status check_store_answers(Clock::time_point since) const;
   absl::Status keep_blob(Clock::time_point since, const std::string& name, const std::string& key,
                          const std::string& bytes);
   template <typename Ask>

@@ -168,7 +168,7 @@ void Keeper::write_again(const TouchResult& result, const Sessions& touched) {
     if (Entry* const entry = same_entry(name, touched)) write_all(*entry, name);
   }
   for (const std::string& name : result.missing) {
-    if (Entry* const entry = same_entry(name, touched)) write_anew(*entry, name);
+    if (Entry* const entry = same_entry(name, touched)) rewrite(*entry, name);
   }
 }
 

@@ -69,7 +69,7 @@ std::vector<Keeper::Work> Keeper::take_work(bool is_all) {
       work.change.session = name;
       work.change.epoch_before = entry.epoch;
       work.change.is_expiry = entry.is_expired;
-      work.change.is_anew = entry.is_lost;
+      work.change.is_recreated = entry.is_lost;
       if (entry.epoch == 0) {
         work.change.request_id = entry.request_id;
         work.change.blobs = entry.blobs;
@@ -85,7 +85,7 @@ void Keeper::fill_in(Work& work) {
   StoredChange& change = work.change;
   change.is_removal = work.session == nullptr;
   if (change.is_removal) return;
-  if (change.is_anew) fill_in_anew(work);
+  if (change.is_recreated) refill(work);
   const SessionChanges changes = work.session->changes_since(change.epoch_before == 0 ? 0 : work.revision);
   change.revision_before = work.revision;
   change.revision = work.revision = changes.inputs.revision;
@@ -99,7 +99,7 @@ void Keeper::fill_in(Work& work) {
 }
 
 /// Also fills in the session's blobs.
-void Keeper::fill_in_anew(Work& work) {
+void Keeper::refill(Work& work) {
   auto head = encode_head_again(*work.session, work.head);
   work.status = head.status();
   if (!head.ok()) return;
@@ -181,9 +181,9 @@ void Keeper::note_kept(const Work& work, ChangeOutcome outcome, Calls& calls) {
     return;
   }
   if (outcome == ChangeOutcome::kBehind) return write_all(entry, work.name);
-  if (outcome == ChangeOutcome::kLost) return write_anew(entry, work.name);
-  if (work.change.is_anew) entry.head = work.head;
-  if (work.change.is_anew) entry.is_lost = false;
+  if (outcome == ChangeOutcome::kLost) return rewrite(entry, work.name);
+  if (work.change.is_recreated) entry.head = work.head;
+  if (work.change.is_recreated) entry.is_lost = false;
   entry.is_refused = false;
   entry.revision = work.revision;
   entry.epoch = work.change.epoch;
@@ -206,7 +206,7 @@ void Keeper::write_all(Entry& entry, const std::string& name) {
 }
 
 /// Called with the lock held. The store lost the whole session.
-void Keeper::write_anew(Entry& entry, const std::string& name) {
+void Keeper::rewrite(Entry& entry, const std::string& name) {
   entry.is_lost = true;
   write_all(entry, name);
 }

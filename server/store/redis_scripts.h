@@ -168,8 +168,8 @@ inline const std::string kTakeOver =
     kWanted +
     "; "
     "if has[1] ~= ARGV[1] and not is_gone(has[1]) then "
-    "  local is_astray = route ~= '' and ARGV[4] ~= route; "
-    "  if number('until') > now or (is_astray and number('alive') > now) then "
+    "  local is_misrouted = route ~= '' and ARGV[4] ~= route; "
+    "  if number('until') > now or (is_misrouted and number('alive') > now) then "
     "    if route ~= '' and route == ARGV[4] and now - number('since') > stays and "
     "      (not is_wanted or has[4] == ARGV[1]) then "
     "      redis.call('HSET', KEYS[1], 'wanted', now, 'wanter', ARGV[1]) "

@@ -113,9 +113,9 @@ Command RedisStore::command_of(const StoredChange& change) {
   Command command = script(kCommit, change.session);
   command.insert(command.end(),
                  {holder_, absl::StrCat(change.epoch_before), absl::StrCat(change.epoch), lease(),
-                  change.is_anew ? "2" : (change.replaces_all ? "1" : "0"),
+                  change.is_recreated ? "2" : (change.replaces_all ? "1" : "0"),
                   absl::StrCat(change.revision_before), absl::StrCat(change.revision), told()});
-  if (change.epoch_before == 0 || change.is_anew) {
+  if (change.epoch_before == 0 || change.is_recreated) {
     const std::string request = change.request_id.empty() ? "" : request_key(change.owner, change.request_id);
     command.insert(
         command.end(),

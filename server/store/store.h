@@ -38,7 +38,7 @@ struct StoredChange {
   std::string request_id = {};          // only for a new session: for Store::find_request; may be empty
   std::vector<std::string> blobs = {};  // only for a new session: keys of its blobs
   bool replaces_all = false;            // removes all parts that are not named here
-  bool is_anew = false;  // the store has lost the session: owner, route, request and blobs are set, too
+  bool is_recreated = false;  // the store has lost the session: owner, route, request and blobs are set, too
   std::map<std::string, std::optional<std::string>> parts = {};  // a part without a value is removed
   bool is_removal = false;                                       // removes the session, whoever holds it
   bool is_expiry = false;  // with is_removal: only if this process still holds it; else kFenced

@@ -391,7 +391,7 @@ class AddOn(unittest.TestCase):
         self.assertEqual(set(numbers[self.top[:10]]), {2})
         self.assertEqual(set(numbers[self.top[10:]]), {1})
 
-    def test_a_mesh_changed_in_edit_mode_is_sent_anew(self):
+    def test_a_mesh_changed_in_edit_mode_is_sent_again(self):
         _, tip = self.held()
         self.shift(tip, 0.5, 0, 0)
         stage.settle(self.tube)
@@ -404,7 +404,7 @@ class AddOn(unittest.TestCase):
         self.assertEqual(live.of(self.tube).frame.positions.shape[0], len(self.tube.data.vertices))
         self.assertTrue(np.allclose(stage.shown(self.tube)[self.top], self.rest[self.top] + [0.5, 0, 0], atol=1e-5))
 
-    def test_a_mesh_changed_by_a_script_is_sent_anew(self):
+    def test_a_mesh_changed_by_a_script_is_sent_again(self):
         _, tip = self.held()
         self.shift(tip, 0.5, 0, 0)
         stage.settle(self.tube)

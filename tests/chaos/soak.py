@@ -67,7 +67,7 @@ def sample(server: Soaked) -> dict[str, float]:
 
 
 def idle_sample(server: Soaked) -> dict[str, float]:
-    """Once connections that were let go of are gone: the smallest of a few seconds."""
+    """Once released connections are gone: the smallest of a few seconds."""
     samples = []
     for _ in range(50):
         samples.append(sample(server))

@@ -55,7 +55,7 @@ class Wire:
         return call(request, timeout=timeout, metadata=self.metadata)
 
     def patiently(self, name: str, request, is_over=lambda: False):
-        """Until the server is there, and has let go of what the one before it held."""
+        """Until the server is there, and has released what the one before it held."""
         end = time.monotonic() + PATIENCE
         while True:
             try:

@@ -35,7 +35,7 @@ def alerts():
     return [rule for group in groups for rule in group["rules"]]
 
 
-def astray(rules, pages):
+def misplaced(rules, pages):
     """Alerts that lead to no section, or to one that does not name them; names of alerts on the pages that are none."""
     found = sections(pages)
     wrong = [rule["alert"] for rule in rules if f"`{rule['alert']}`" not in found.get(rule["annotations"].get("runbook"), "")]
@@ -70,17 +70,17 @@ class Pages(unittest.TestCase):
 
     def test_every_alert_leads_to_a_section_that_names_it(self):
         self.assertGreater(len(alerts()), 30)
-        self.assertEqual(astray(alerts(), self.pages), [])
+        self.assertEqual(misplaced(alerts(), self.pages), [])
 
     def test_the_check_above_finds_alerts_and_sections_that_are_not_there(self):
         rule = {"alert": "LpdeformDown", "annotations": {"runbook": "server.md#a-server-is-gone"}}
         text = "## A server is gone\n\nAlert `LpdeformDown`.\n"
-        self.assertEqual(astray([rule], {"server.md": text}), [])
-        self.assertEqual(astray([rule], {"envoy.md": text}), ["LpdeformDown"])
-        self.assertEqual(astray([rule], {"server.md": text.replace("gone", "lost")}), ["LpdeformDown"])
-        self.assertEqual(astray([rule], {"server.md": text, "envoy.md": "`LpdeformUp`"}), ["LpdeformUp"])
+        self.assertEqual(misplaced([rule], {"server.md": text}), [])
+        self.assertEqual(misplaced([rule], {"envoy.md": text}), ["LpdeformDown"])
+        self.assertEqual(misplaced([rule], {"server.md": text.replace("gone", "lost")}), ["LpdeformDown"])
+        self.assertEqual(misplaced([rule], {"server.md": text, "envoy.md": "`LpdeformUp`"}), ["LpdeformUp"])
         rule = {"alert": "LpdeformUp", "annotations": {}}
-        self.assertEqual(astray([rule], {"server.md": text}), ["LpdeformUp", "LpdeformDown"])
+        self.assertEqual(misplaced([rule], {"server.md": text}), ["LpdeformUp", "LpdeformDown"])
 
     def test_every_section_of_an_alert_says_what_to_look_at_in_which_order(self):
         for target in {rule["annotations"]["runbook"] for rule in alerts()}:

@@ -233,7 +233,7 @@ class RedisThatIsStopped(OfServers):
         with socket.socket() as tried:
             return tried.connect_ex(("127.0.0.1", port)) == 0
 
-    def drag_in_vain(self):
+    def drag_unkept(self):
         for input_seq in range(2, 102):
             self.assertFalse(self.client.set_p(self.session, input_seq, 1.5 + input_seq / 1000))
 
@@ -249,17 +249,17 @@ class RedisThatIsStopped(OfServers):
 
     def test_what_one_that_was_killed_did_not_take_is_named_at_the_end(self):
         self.redis.kill()
-        self.drag_in_vain()
+        self.drag_unkept()
         self.expect_not_kept()
 
     def test_what_one_that_hangs_did_not_take_is_named_at_the_end(self):
         self.redis.send_signal(signal.SIGSTOP)
-        self.drag_in_vain()
+        self.drag_unkept()
         self.expect_not_kept()
 
     def test_one_that_comes_back_in_time_takes_all(self):
         self.redis.send_signal(signal.SIGSTOP)
-        self.drag_in_vain()
+        self.drag_unkept()
         self.server.process.send_signal(signal.SIGTERM)
         self.server.waits_for("draining")
         time.sleep(1)  # of the 5 s that it has

@@ -80,7 +80,7 @@ class Writer {
         patiently([&](grpc::ClientContext& context) { return stub->GetSession(&context, get, &got); });
     ASSERT_TRUE(found.ok()) << found.error_message();
     lost_ += got.session().input_seq() < kept_seq_ ? 1 : 0;
-    lost_ += got.session().epoch() <= epoch_ ? 1 : 0;  // frames begin anew
+    lost_ += got.session().epoch() <= epoch_ ? 1 : 0;  // frames begin again at 1
     epoch_ = got.session().epoch();
     if (p_seq_ > 0) lost_ += p_.may_be(got.session().settings().p().uniform()) ? 0 : 1;
     check_positions(*stub);
@@ -100,7 +100,7 @@ class Writer {
         grpc::CreateCustomChannel(places_.address, grpc::InsecureChannelCredentials(), arguments));
   }
 
-  /// Until the server is there, and lets go of what the one before it held.
+  /// Until the server is there, and has released what the one before it held.
   template <typename Call>
   static grpc::Status patiently(const Call& call) {
     const auto end = std::chrono::system_clock::now() + kTestDeadline;

@@ -168,7 +168,7 @@ def test_a_session_taken_over_does_not_wait_for_the_pause_between_tries(link: Li
     assert time.monotonic() - begun < 30
 
 
-def test_a_session_taken_over_does_not_wait_for_the_next_try_to_make_it_anew(link: Link, server: FakeServer) -> None:
+def test_a_session_taken_over_does_not_wait_for_the_next_try_to_recreate_it(link: Link, server: FakeServer) -> None:
     server.ends["CreateSession"] = [full("SESSIONS_FULL", 60)]
     server.stream().opened().end(make(Code.NOT_FOUND, "Gone.", "SESSION_UNKNOWN"))
     until(lambda: len(server.asked("CreateSession")) == 1)
@@ -179,7 +179,7 @@ def test_a_session_taken_over_does_not_wait_for_the_next_try_to_make_it_anew(lin
     assert len(server.asked("CreateSession")) == 1
 
 
-def test_a_session_taken_over_begins_the_count_of_streams_that_do_not_fit_anew(link: Link, server: FakeServer) -> None:
+def test_a_session_taken_over_counts_streams_that_do_not_fit_from_the_start(link: Link, server: FakeServer) -> None:
     for _ in range(2):
         for _ in range(RecoveryRules.most_misfits):
             server.stream().opened().end(make(Code.DATA_LOSS, "No frame.", "FRAME_PARTS"))
@@ -187,7 +187,7 @@ def test_a_session_taken_over_begins_the_count_of_streams_that_do_not_fit_anew(l
         link.take_over()
 
 
-def test_uploads_are_sent_anew_once_also_where_the_update_was_asked_for_again_for_another_reason(
+def test_lost_uploads_are_sent_again_once_also_where_the_update_was_asked_for_for_another_reason(
     link: Link, server: FakeServer
 ) -> None:
     link.update(Update({"tip": Removal()}))
@@ -273,7 +273,7 @@ def test_no_part_is_waited_for_once_the_call_is_stopped(server: FakeServer) -> N
     assert time.monotonic() - begun < 30
 
 
-def test_an_upload_for_a_stream_that_has_ended_is_begun_anew_for_the_next(link: Link, server: FakeServer) -> None:
+def test_an_upload_for_a_stream_that_has_ended_is_begun_again_for_the_next(link: Link, server: FakeServer) -> None:
     server.call_timeout = 120
     server.ends["UploadPart"] = [full("UPLOAD_RATE", 59)]
     first = server.stream().opened()

@@ -66,7 +66,7 @@ def test_every_kind_of_handle_comes_back_and_is_there_after_kill_9(session: lpde
     assert np.abs(after[[92, 93]] - [[8, 7, 1], [9, 7, 1]]).max() == 0
 
 
-def test_a_session_opens_at_once_after_a_restart_though_another_has_just_tried_in_vain(server: Server, shape: Grid) -> None:
+def test_a_session_opens_at_once_after_a_restart_though_another_has_just_failed_to(server: Server, shape: Grid) -> None:
     for _ in range(3):
         with lpdeform.open(shape.vertices, shape.faces, address=server.address):
             server.kill()

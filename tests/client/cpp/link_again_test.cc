@@ -55,7 +55,7 @@ Update large() {
   return update;
 }
 
-TEST_F(LinkTest, SendsUploadsAnewOnceAlsoWhereTheUpdateWasAskedForAgainForAnotherReason) {
+TEST_F(LinkTest, SendsLostUploadsAgainOnceAlsoWhereTheUpdateWasAskedForForAnotherReason) {
   open();
   const auto first = opened_stream();
   link_->update(adding("tip")).value();
@@ -125,7 +125,7 @@ TEST_F(LinkTest, AClosedSessionWaitsForNoPart) {
   EXPECT_LT(std::chrono::steady_clock::now() - start, kPatience);
 }
 
-TEST_F(LinkTest, AnUploadForAStreamThatHasEndedIsBegunAnewForTheNext) {
+TEST_F(LinkTest, AnUploadForAStreamThatHasEndedIsBegunAgainForTheNext) {
   open();
   const auto first = opened_stream();
   rpc_->longest_call = std::chrono::minutes(2);

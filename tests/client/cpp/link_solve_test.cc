@@ -20,7 +20,7 @@ TEST_F(LinkTest, SolveSendsWhatWaitsAndWorksWithoutAStream) {
   EXPECT_FALSE(rpc_->solved()[1].has_update());
 }
 
-TEST_F(LinkTest, SolveMakesALostSessionAnew) {
+TEST_F(LinkTest, SolveMakesALostSessionAgain) {
   open();
   link_->update(adding("tip")).value();
   ASSERT_TRUE(link_->solve({}).ok());
@@ -43,7 +43,7 @@ TEST_F(LinkTest, SolveTriesAgainWhileTheServerIsAway) {
   EXPECT_EQ(rpc_->solved()[2].update().input_seq(), rpc_->solved()[0].update().input_seq());
 }
 
-TEST_F(LinkTest, SolveTriesAgainToMakeALostSessionAnew) {
+TEST_F(LinkTest, SolveTriesAgainToRecreateALostSession) {
   open();
   rpc_->solve_ends.push_back(
       carry_fault(absl::StatusCode::kNotFound, {"SESSION_UNKNOWN", "session", ""}, "lost"));

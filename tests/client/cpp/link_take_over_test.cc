@@ -48,7 +48,7 @@ TEST_F(TakeOverTest, DoesNotWaitForAConnection) {
   expect_stream_of_ours(rpc_->next_stream());
 }
 
-TEST_F(TakeOverTest, DoesNotWaitForTheNextTryToMakeTheSessionAnew) {
+TEST_F(TakeOverTest, DoesNotWaitForTheNextTryToRecreateTheSession) {
   open();
   const auto stream = opened_stream();
   rpc_->create_ends = {busy(absl::StatusCode::kResourceExhausted)};
@@ -59,7 +59,7 @@ TEST_F(TakeOverTest, DoesNotWaitForTheNextTryToMakeTheSessionAnew) {
   EXPECT_EQ(rpc_->created().size(), 2u);
 }
 
-TEST_F(TakeOverTest, BeginsTheCountOfStreamsThatDoNotFitAnew) {
+TEST_F(TakeOverTest, BeginsTheCountOfStreamsThatDoNotFitAgain) {
   v1::DeformResponse misfit = frame(1, 0);
   misfit.mutable_event()->mutable_frame()->set_positions("abc");
   open();

@@ -78,7 +78,7 @@ TEST_F(LinkTest, ResumesWhenTheServerDrains) {
   EXPECT_TRUE(next_frame().ok());
 }
 
-TEST_F(LinkTest, MakesALostSessionAnewFromWhatTheServerHadAccepted) {
+TEST_F(LinkTest, RecreatesALostSessionFromWhatTheServerHadAccepted) {
   open();
   const auto broken = opened_stream();
   link_->update(adding("tip")).value();
@@ -105,7 +105,7 @@ TEST_F(LinkTest, MakesALostSessionAnewFromWhatTheServerHadAccepted) {
   stream->say(result(1));
 }
 
-TEST_F(LinkTest, MakingASessionAnewAgainIsTheSameRequestToTheLastBit) {
+TEST_F(LinkTest, RecreatingASessionTwiceIsTheSameRequestToTheLastBit) {
   open(200'000);  // large enough for an upload
   rpc_->create_ends = {absl::UnavailableError("the answer was lost")};
   opened_stream()->end(session_unknown());
@@ -319,8 +319,8 @@ TEST_F(LinkTest, AnUndoGoesAfterAllUpdatesAndIsPartOfWhatASessionRecreatedGets) 
   const auto stream = opened_stream();
   stream->say(go_away(v1::GO_AWAY_REASON_SESSION_EXPIRED));
   stream->end(absl::OkStatus());
-  const auto anew = answered(rpc_->next_stream());
-  const auto all = anew->hear();
+  const auto next = answered(rpc_->next_stream());
+  const auto all = next->hear();
   ASSERT_TRUE(all && all->has_update());
   ASSERT_EQ(all->update().handles_size(), 1);
   EXPECT_EQ(all->update().handles(0).name(), "tip");
@@ -334,10 +334,10 @@ TEST_F(LinkTest, AnUndoInASessionRecreatedTakesBackWhatCameAfterThatAndNotAllIts
   stream->say(result(1));
   stream->say(go_away(v1::GO_AWAY_REASON_SESSION_EXPIRED));
   stream->end(absl::OkStatus());
-  const auto anew = answered(rpc_->next_stream());
-  const auto all = anew->hear();
+  const auto next = answered(rpc_->next_stream());
+  const auto all = next->hear();
   ASSERT_TRUE(all && all->has_update());
-  anew->say(result(all->update().input_seq()));
+  next->say(result(all->update().input_seq()));
   rpc_->undo_steps = 1;  // all the handles at once
   const auto refused = link_->undo(false);
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kFailedPrecondition);

@@ -127,7 +127,7 @@ TEST_F(SessionTest, AComponentWithoutAHandleIsNamedUntilItHasOne) {
   EXPECT_TRUE(session.settle(kPatience).ok());
 }
 
-TEST_F(SessionTest, AServerThatCameBackWithoutItsSessionsGetsOursAnew) {
+TEST_F(SessionTest, AServerThatCameBackWithoutItsSessionsGetsOursAgain) {
   Session session = open_bar({.settings = {.p = 1.5}});
   const Frame before = session.settle(kPatience).value();
   session.set({.stiffness = 2.0}).value();
@@ -160,7 +160,7 @@ TEST_F(SessionTest, UpdatesMadeWhileTheServerIsAwayArriveWhenItIsBack) {
   EXPECT_LT(distance(settled->positions, bar().vertices), 1e-3);  // no twist: at rest, to the tolerance
 }
 
-TEST_F(SessionTest, SolveFindsItsSessionLostAndMakesItAnew) {
+TEST_F(SessionTest, SolveFindsItsSessionLostAndRecreatesIt) {
   Session session = open_bar();
   const double energy = session.solve().value().energy;
   server_.stop();

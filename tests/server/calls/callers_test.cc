@@ -254,7 +254,7 @@ TEST_F(CallersWithLimitsTest, OneCallerCannotTakeAllMemory) {
   v1::DeleteSessionResponse removed;
   EXPECT_EQ(call(alice_, &Stub::DeleteSession, remove, removed), "");
   const auto end =
-      std::chrono::steady_clock::now() + kTestDeadline;  // it goes when the last thread lets go of it
+      std::chrono::steady_clock::now() + kTestDeadline;  // it goes when the last thread releases it
   do create_as(alice_);
   while (refusal_ == "CALLER_MEMORY_FULL" && std::chrono::steady_clock::now() < end);
   EXPECT_EQ(refusal_, "");

@@ -94,8 +94,8 @@ TEST_F(HandOverCallsTest, InTheMiddleOfADragNoUpdateIsRefusedAndNoneThatWasKeptI
   }
   EXPECT_GE(found.input_seq(), kept);
   EXPECT_GT(found.epoch(), session.session().epoch());
-  v1::Session astray;
-  const grpc::Status elsewhere = get_by("another way", *stub_, name, astray);
+  v1::Session misrouted;
+  const grpc::Status elsewhere = get_by("another way", *stub_, name, misrouted);
   EXPECT_EQ(details_of(elsewhere).info.reason(), "SESSION_ELSEWHERE");
 }
 

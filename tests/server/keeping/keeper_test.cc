@@ -94,7 +94,7 @@ class NotingStore final : public Store {
     for (const StoredChange& change : changes)
       note(change.is_expiry ? "expiry" : (change.is_removal ? "removal" : "change"));
     if (!changes.empty()) newest_ = changes.back();
-    if (newest_.is_anew) note("anew");
+    if (newest_.is_recreated) note("recreated");
     changed_.wait(lock, [this] { return !is_held_; });
     if (!failure_.ok()) return failure_;
     for (const StoredChange& change : changes) {
@@ -125,8 +125,8 @@ class NotingStore final : public Store {
   }
   absl::Status release(const std::vector<HeldSession>& sessions) override {
     const std::scoped_lock lock(mutex_);
-    note(absl::StrCat("let go of ", sessions.size()));
-    for (const HeldSession& session : sessions) note(absl::StrCat("let go ", session.epoch));
+    note(absl::StrCat("released all ", sessions.size()));
+    for (const HeldSession& session : sessions) note(absl::StrCat("released ", session.epoch));
     return absl::OkStatus();
   }
   std::chrono::milliseconds touch_every() const override { return kTouch; }
@@ -279,7 +279,7 @@ TEST_F(KeeperTest, OneThatLeavesIsWrittenBeforeItIsTakenOverAgain) {
   ASSERT_TRUE(store_->wait_for("touched"));  // by the thread that takes over, afterwards
   for (const std::string& asked : store_->asked()) EXPECT_NE(asked, "take over");
   store_->hold_changes(false);
-  ASSERT_TRUE(store_->wait_for("let go 1"));
+  ASSERT_TRUE(store_->wait_for("released 1"));
   ASSERT_TRUE(pass_until("take over"));
   EXPECT_TRUE(found_.get_future().get().ok());
 }
@@ -314,7 +314,7 @@ TEST_F(KeeperTest, OneThatIsBeingMadeIsHeldUntilItIsThereOrGivenUp) {
   ASSERT_TRUE(found_.get_future().get().ok());
   ASSERT_TRUE(pass_until("is being made 2"));
   keeper_->give_up(kName);
-  ASSERT_TRUE(store_->wait_for("let go 2"));
+  ASSERT_TRUE(store_->wait_for("released 2"));
   store_->forget();
   ASSERT_TRUE(pass_until("touched"));
   for (const std::string& asked : store_->asked()) EXPECT_EQ(asked, "touched");
@@ -342,28 +342,28 @@ TEST_F(KeeperTest, ASessionIsInUseAsLongAsItHasAStreamHoweverLongNobodyCalls) {
   ASSERT_TRUE(pass_until("not in use"));
 }
 
-TEST_F(KeeperTest, OneThatTheStoreHasLostIsWrittenAnewWithItsMesh) {
+TEST_F(KeeperTest, OneThatTheStoreHasLostIsWrittenAgainWithItsMesh) {
   const auto live = kept();
   const auto write = [&] { keeper_->changed(*live, live->revision() + 1, 0, [](bool) {}); };
   const auto expect_all = [&] {
-    const StoredChange anew = store_->newest();
-    EXPECT_TRUE(anew.is_anew && anew.replaces_all);
-    for (const char* const part : {"head", "inputs", "writer"}) EXPECT_TRUE(anew.parts.contains(part));
-    ASSERT_EQ(anew.blobs.size(), 1u);
-    EXPECT_TRUE(store_->wait_for("blob " + anew.blobs[0]));
+    const StoredChange again = store_->newest();
+    EXPECT_TRUE(again.is_recreated && again.replaces_all);
+    for (const char* const part : {"head", "inputs", "writer"}) EXPECT_TRUE(again.parts.contains(part));
+    ASSERT_EQ(again.blobs.size(), 1u);
+    EXPECT_TRUE(store_->wait_for("blob " + again.blobs[0]));
   };
   store_->answer_once(ChangeOutcome::kLost);
   write();
-  ASSERT_TRUE(store_->wait_for("anew"));
+  ASSERT_TRUE(store_->wait_for("recreated"));
   expect_all();
   keeper_->flush(std::chrono::steady_clock::now() + kPatience);
   store_->forget();
   write();
   ASSERT_TRUE(store_->wait_for("change"));
-  EXPECT_FALSE(store_->newest().is_anew);
+  EXPECT_FALSE(store_->newest().is_recreated);
   keeper_->flush(std::chrono::steady_clock::now() + kPatience);
   store_->lose_session();
-  ASSERT_TRUE(pass_until("anew"));
+  ASSERT_TRUE(pass_until("recreated"));
   expect_all();
 }
 
@@ -509,7 +509,7 @@ TEST_F(KeeperTest, ThoseThatLeaveTogetherAreLetGoOfTogether) {
   const auto all = three_that_wait();
   for (const auto& one : all) keeper_->release(*one);
   store_->hold_changes(false);
-  EXPECT_TRUE(store_->wait_for("let go of 3"));
+  EXPECT_TRUE(store_->wait_for("released all 3"));
 }
 
 TEST_F(KeeperTest, OneThatNobodyUsedHereIsNotRemovedFromWhoHasIt) {

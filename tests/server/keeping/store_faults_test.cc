@@ -328,7 +328,7 @@ TEST_F(RedisFaultsTest, OneThatIsAwayForLongerThanSessionsLiveUnusedLosesNone) {
   EXPECT_EQ(seen(session), before);
 }
 
-TEST_F(RedisFaultsTest, OneThatCameBackEmptyGetsLiveSessionsAnew) {
+TEST_F(RedisFaultsTest, OneThatCameBackEmptyGetsLiveSessionsAgain) {
   const auto left = create(mesh_);
   begin();
   const auto session = create(mesh_);

@@ -314,7 +314,7 @@ TEST_F(RedisStoreTest, ASessionInUseIsHeldUntilItIsLetGo) {
   ASSERT_TRUE(commit(*first, beginning("a")).ok());
   EXPECT_EQ(reason(second->take_over("a", "anna").status()), "SESSION_ELSEWHERE");
   EXPECT_TRUE(absl::IsUnavailable(second->take_over("a", "anna").status()));
-  ASSERT_TRUE(second->release({{"a", 1}}).ok());  // it is not the second's to let go
+  ASSERT_TRUE(second->release({{"a", 1}}).ok());  // it is not the second's to release
   EXPECT_FALSE(second->take_over("a", "anna").ok());
   ASSERT_TRUE(first->release({{"a", 1}}).ok());
   EXPECT_EQ(second->take_over("a", "anna")->epoch, kSecondLife);
@@ -382,7 +382,7 @@ class HandOverTest : public RedisStoreTest {
   RedisConnection connection_{"127.0.0.1", redis_.port(), std::chrono::seconds(5)};
 };
 
-TEST_F(HandOverTest, WhoComesAstrayIsShownTheWayAsLongAsTheHolderLives) {
+TEST_F(HandOverTest, AMisroutedCallerIsShownTheWayAsLongAsTheHolderLives) {
   set_ago("until", kAges);  // nobody uses it
   EXPECT_EQ(ask(*second_, "another way"), "SESSION_ELSEWHERE");
   EXPECT_EQ(fault_of(second_->take_over("a", "anna", "another way").status()).limit,
@@ -510,10 +510,10 @@ TEST_F(RedisStoreTest, WhatAServerHeldThatHasEndedIsFreeBeforeItsLeaseEnds) {
   change.route = "the way";
   ASSERT_TRUE(commit(*first, change).ok());
   EXPECT_EQ(reason(second->take_over("a", "anna", "the way").status()), "SESSION_ELSEWHERE");
-  first.reset();  // without letting go
+  first.reset();  // without a release
   absl::StatusOr<StoredSession> taken;
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  do taken = second->take_over("a", "anna", "astray");
+  do taken = second->take_over("a", "anna", "another way");
   while (reason(taken.status()) == "SESSION_ELSEWHERE" && std::chrono::steady_clock::now() < end);
   EXPECT_TRUE(taken.ok()) << taken.status();
 }
@@ -615,7 +615,7 @@ TEST_F(RedisStoreTest, ARedisThatWentBackIsTold) {
   const auto other = store->take_over("a", "anna");
   ASSERT_TRUE(other.ok());
   EXPECT_EQ(other->parts.at("m:tip"), "there");
-  next.epoch_before = next.epoch = other->epoch;  // a process that counts anew
+  next.epoch_before = next.epoch = other->epoch;  // a process that counts from the start
   next.revision_before = 5;
   EXPECT_EQ(*commit(*store, next), ChangeOutcome::kKept);
 }
@@ -701,14 +701,14 @@ StoredChange next_of(const StoredChange& made) {
   return next;
 }
 
-StoredChange anew(const StoredChange& change) {
+StoredChange recreated(const StoredChange& change) {
   StoredChange all = change;
   all.parts = {{"head", "h"}, {"inputs", "2"}, {"m:tip", "there"}};
-  all.replaces_all = all.is_anew = true;
+  all.replaces_all = all.is_recreated = true;
   return all;
 }
 
-TEST_F(RedisStoreTest, WhatRedisHasLostIsToldAndWrittenAnewByItsHolder) {
+TEST_F(RedisStoreTest, WhatRedisHasLostIsToldAndWrittenAgainByItsHolder) {
   const auto store = open(), other = open();
   RedisKeys redis(redis_.port());
   StoredChange made = beginning("a");
@@ -722,8 +722,8 @@ TEST_F(RedisStoreTest, WhatRedisHasLostIsToldAndWrittenAnewByItsHolder) {
   const StoredChange next = next_of(made);
   EXPECT_EQ(*commit(*store, next), ChangeOutcome::kLost);
   EXPECT_FALSE(store->take_over("a", "anna").ok());
-  EXPECT_EQ(*commit(*store, anew(next)), ChangeOutcome::kKept);
-  EXPECT_EQ(*commit(*store, anew(next)), ChangeOutcome::kKept);  // again: its answer may have been lost
+  EXPECT_EQ(*commit(*store, recreated(next)), ChangeOutcome::kKept);
+  EXPECT_EQ(*commit(*store, recreated(next)), ChangeOutcome::kKept);  // again: its answer may have been lost
   EXPECT_TRUE(store->touch(used)->missing.empty());
   EXPECT_EQ(*store->find_request("anna", "request"), "a");
   EXPECT_EQ(*store->list("anna", "", 10), std::vector<std::string>{"a"});
@@ -747,7 +747,7 @@ TEST_F(RedisStoreTest, ABlobThatRedisHasLostIsToldAndTheOneInItsPlaceIsKept) {
   EXPECT_TRUE(store->touch(used)->missing.empty());
   redis.run({"DEL", "lpdeform:b:" + old});
   EXPECT_EQ(store->touch(used)->missing, std::vector<std::string>{"a"});
-  StoredChange all = anew(next_of(made));
+  StoredChange all = recreated(next_of(made));
   all.blobs = {fresh, same};
   ASSERT_TRUE(store->keep_blob("a", fresh, "fresh").ok() && store->keep_blob("a", same, "same").ok());
   EXPECT_EQ(*commit(*store, all), ChangeOutcome::kKept);
@@ -759,7 +759,7 @@ TEST_F(RedisStoreTest, ABlobThatRedisHasLostIsToldAndTheOneInItsPlaceIsKept) {
   EXPECT_FALSE(store->blob(same).ok());
 }
 
-TEST_F(RedisStoreTest, WhatWasRemovedIsNotWrittenAnewByWhoDidNotKnow) {
+TEST_F(RedisStoreTest, WhatWasRemovedIsNotWrittenAgainByWhoDidNotKnow) {
   const auto store = open(std::chrono::milliseconds(1)), other = open();
   const StoredChange made = beginning("a");
   ASSERT_TRUE(commit(*store, made).ok());
@@ -769,7 +769,7 @@ TEST_F(RedisStoreTest, WhatWasRemovedIsNotWrittenAnewByWhoDidNotKnow) {
   ASSERT_TRUE(commit(*other, {.session = "a", .is_removal = true}).ok());
   const std::vector<TouchedSession> used{{"a", 1, true, 0}};
   EXPECT_EQ(store->touch(used)->lost, std::vector<std::string>{"a"});
-  EXPECT_EQ(*commit(*store, anew(next_of(made))), ChangeOutcome::kFenced);
+  EXPECT_EQ(*commit(*store, recreated(next_of(made))), ChangeOutcome::kFenced);
   EXPECT_FALSE(other->take_over("a", "anna").ok());
 }
 
@@ -793,7 +793,7 @@ TEST_F(RedisStoreTest, OfThoseThatWereRemovedOnlyTheLastAreRemembered) {
   for (int k = 0; k < 100; ++k) go(absl::StrCat("another", k));
   EXPECT_EQ(redis.run({"ZCARD", "lpdeform:gone"}).number, 10);
   EXPECT_EQ(redis.run({"ZSCORE", "lpdeform:gone", "a"}).text, "");  // nothing knows of its end
-  EXPECT_EQ(*commit(*cut_off, anew(next_of(made))), ChangeOutcome::kFenced);
+  EXPECT_EQ(*commit(*cut_off, recreated(next_of(made))), ChangeOutcome::kFenced);
   const std::vector<TouchedSession> used{{"a", 1, true, 0}};
   EXPECT_EQ(cut_off->touch(used)->lost, std::vector<std::string>{"a"});
 
@@ -804,7 +804,7 @@ TEST_F(RedisStoreTest, OfThoseThatWereRemovedOnlyTheLastAreRemembered) {
   redis.run({"DEL", "lpdeform:s:live"});
   const std::vector<TouchedSession> lost{{"live", 1, true, 0}};
   EXPECT_EQ(cut_off->touch(lost)->missing, std::vector<std::string>{"live"});
-  EXPECT_EQ(*commit(*cut_off, anew(next_of(live))), ChangeOutcome::kKept);
+  EXPECT_EQ(*commit(*cut_off, recreated(next_of(live))), ChangeOutcome::kKept);
 }
 
 TEST_F(RedisStoreTest, WhatExpiresForOneThatHadItBeforeStaysWithTheOneThatHasIt) {
@@ -825,10 +825,10 @@ TEST_F(RedisStoreTest, WhatExpiresForOneThatHadItBeforeStaysWithTheOneThatHasIt)
   EXPECT_EQ(now->touch(used)->missing, std::vector<std::string>{"a"});
   StoredChange next = next_of(made);
   next.epoch_before = next.epoch = kSecondLife;
-  EXPECT_EQ(*commit(*now, anew(next)), ChangeOutcome::kKept);
+  EXPECT_EQ(*commit(*now, recreated(next)), ChangeOutcome::kKept);
 }
 
-TEST_F(RedisStoreTest, WhatWasRemovedAsUnusedIsWrittenAnewOnlyByWhoHadItLast) {
+TEST_F(RedisStoreTest, WhatWasRemovedAsUnusedIsWrittenAgainOnlyByWhoHadItLast) {
   RedisKeys redis(redis_.port());
   const auto cut_off = open(std::chrono::milliseconds(1)), other = open();
   const std::vector<TouchedSession> used{{"a", 1, true, 0}};
@@ -841,13 +841,13 @@ TEST_F(RedisStoreTest, WhatWasRemovedAsUnusedIsWrittenAnewOnlyByWhoHadItLast) {
   ASSERT_TRUE(commit(*cut_off, made).ok());
   go_unused();  // while the server that has it in use is cut off
   EXPECT_EQ(cut_off->touch(used)->missing, std::vector<std::string>{"a"});
-  EXPECT_EQ(*commit(*cut_off, anew(next_of(made))), ChangeOutcome::kKept);
+  EXPECT_EQ(*commit(*cut_off, recreated(next_of(made))), ChangeOutcome::kKept);
   absl::StatusOr<StoredSession> taken;
   do taken = other->take_over("a", "anna");
   while (!taken.ok());
   go_unused();
   EXPECT_EQ(cut_off->touch(used)->lost, std::vector<std::string>{"a"});
-  EXPECT_EQ(*commit(*cut_off, anew(next_of(made))), ChangeOutcome::kFenced);
+  EXPECT_EQ(*commit(*cut_off, recreated(next_of(made))), ChangeOutcome::kFenced);
 }
 
 TEST_F(RedisStoreTest, AHolderOfALaterEpochWinsOverARedisThatWentBack) {
@@ -868,7 +868,7 @@ TEST_F(RedisStoreTest, AHolderOfALaterEpochWinsOverARedisThatWentBack) {
   StoredChange next = next_of(made);
   next.epoch_before = next.epoch = kSecondLife;
   absl::StatusOr<ChangeOutcome> outcome;
-  do outcome = commit(*second, anew(next));
+  do outcome = commit(*second, recreated(next));
   while (!outcome.ok());
   EXPECT_EQ(*outcome, ChangeOutcome::kKept);
   while (!first->touch(kNone).ok()) {

@@ -165,8 +165,8 @@ def answer_of(error: LpdeformError, is_second: bool = False) -> Answer:
         return Answer.RECREATE
     if is_taken_all_the_same(error):
         return Answer.TAKEN
-    is_in_vain = is_second and error.reason == "UPLOAD_UNKNOWN"
-    return Answer.AGAIN if is_undecided(error) and not is_in_vain else Answer.REFUSED
+    is_hopeless = is_second and error.reason == "UPLOAD_UNKNOWN"
+    return Answer.AGAIN if is_undecided(error) and not is_hopeless else Answer.REFUSED
 
 
 class Judge:
@@ -177,10 +177,10 @@ class Judge:
     """
 
     def __init__(self) -> None:
-        self._sent_anew = 0
+        self._resent = 0
 
     def answer_of(self, error: LpdeformError, seq: int) -> Answer:
-        answer = answer_of(error, seq == self._sent_anew)
+        answer = answer_of(error, seq == self._resent)
         if error.reason == "UPLOAD_UNKNOWN":
-            self._sent_anew = seq
+            self._resent = seq
         return answer

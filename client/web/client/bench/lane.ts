@@ -144,7 +144,7 @@ export class Lane {
     }
   }
 
-  /** Lets go of the connection and takes the session over on a new one. */
+  /** Drops the connection and takes the session over on a new one. */
   async reconnect(): Promise<void> {
     if (this.#isOver || this.#isReconnecting) return;
     this.#isReconnecting = true;

@@ -102,13 +102,13 @@ export class Lane {
   }
 
   /** There is no stream until another one is open. */
-  beginsAnew(): void {
+  forgetStream(): void {
     this.streamId = "";
     this.#ackDue = 0;
   }
 
   opened(opened: StreamOpened): void {
-    this.beginsAnew();
+    this.forgetStream();
     this.streamId = opened.streamId;
     this.sink.opened(opened);
   }
@@ -183,16 +183,16 @@ class SharedStream {
 
   add(lane: Lane): void {
     this.lanes.add(lane);
-    this.#openAnew();
+    this.#reopen();
   }
 
   remove(lane: Lane): void {
     if (!this.lanes.delete(lane)) return;
     if (this.lanes.size === 0) this.#end();
-    else this.#openAnew();
+    else this.#reopen();
   }
 
-  #openAnew(): void {
+  #reopen(): void {
     if (this.#isOpening) return;
     this.#isOpening = true;
     queueMicrotask(() => {
@@ -216,7 +216,7 @@ class SharedStream {
     const call = new AbortController();
     this.#call = call;
     const lanes = [...this.lanes];
-    for (const lane of lanes) lane.beginsAnew();
+    for (const lane of lanes) lane.forgetStream();
     const request: MessageInitShape<typeof StreamSessionsRequestSchema> = {
       streams: lanes.map(({ session, options }) => ({ session, options })),
     };

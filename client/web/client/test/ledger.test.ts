@@ -153,7 +153,7 @@ describe("ledger", () => {
     expect(ledger.hasInFlight).toBe(true);
   });
 
-  test("restores what was accepted on its own, without what was let go of", () => {
+  test("restores what was accepted on its own, without what was removed", () => {
     const ledger = new Ledger();
     ledger.add({
       handles: { tip: { set: { vertices: [1] } }, base: { set: { vertices: [2] } } },

@@ -130,7 +130,7 @@ describe("frames", () => {
     expect(first.poll()).toBeUndefined();
   });
 
-  test("of a session that comes later make the stream be opened anew, and old credit is not given to it", async () => {
+  test("of a session that comes later reopen the stream, and old credit is not given to it", async () => {
     const { server, session, rpc } = await begin();
     server.stream.frame({ frameSeq: 4n });
     await arrived(server, session);

@@ -240,7 +240,7 @@ describe("solving, while it waits,", () => {
     expect(left.at(-1)).toBeLessThan(900);
   });
 
-  test("for a server that starts makes the session that was lost anew", async () => {
+  test("for a server that starts recreates the session that was lost", async () => {
     const { server, session } = await begin();
     server.on.solve = async function* ({ session: name }) {
       if (name === "sessions/1") throw refusal("SESSION_UNKNOWN", {}, Code.NotFound);

@@ -109,7 +109,7 @@ describe("undo", () => {
       server.streams[0]!.queue.finish();
       throw new ConnectError("away", Code.Unavailable);
     };
-    server.on.update = async () => server.until(() => server.streams.length === 2); // it is anew by then
+    server.on.update = async () => server.until(() => server.streams.length === 2); // it is recreated by then
     await expect(session.undo()).rejects.toMatchObject({ code: "not_found", reason: "SESSION_UNKNOWN" });
     expect(server.undos.length).toBe(1);
   });

@@ -33,7 +33,7 @@ async function start(): Promise<void> {
     toolbar(app),
     legend(app),
     dock(app),
-    messages(app, () => beginAnew()),
+    messages(app, () => startOver()),
     sidePanel(app),
     help,
     dropHere,
@@ -51,9 +51,9 @@ async function start(): Promise<void> {
   const asked = new URLSearchParams(location.search);
   const detail = asked.get("detail");
   const encoding = asked.get("encoding");
-  const beginAnew = () =>
-    app.beginAnew(asked.get("shape") ?? "creature", detail === "coarse" || detail === "fine" ? detail : "medium");
+  const startOver = () =>
+    app.startOver(asked.get("shape") ?? "creature", detail === "coarse" || detail === "fine" ? detail : "medium");
   if (encoding === "float32" || encoding === "quantized" || encoding === "compressed") app.view.set({ encoding });
-  if (!(await keeper.restore())) beginAnew();
+  if (!(await keeper.restore())) startOver();
   keeper.start();
 }

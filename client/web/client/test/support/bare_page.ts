@@ -146,7 +146,7 @@ export class BarePage {
     await this.#page.send("Input.dispatchKeyEvent", { type: "keyUp", ...event });
   }
 
-  /** Bytes that the page's scripts hold, after what they have let go of has been collected, and the browser's processes. */
+  /** Bytes that the page's scripts hold, after what they no longer use has been collected, and the browser's processes. */
   async held(): Promise<{ scripts: number; processes: number[] }> {
     await this.#page.send("HeapProfiler.collectGarbage");
     const heap = await this.#page.send<{ usedSize: number; backingStorageSize?: number }>("Runtime.getHeapUsage");

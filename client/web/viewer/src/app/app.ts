@@ -107,7 +107,7 @@ export class App implements Workbench {
   }
 
   /** Starts without anything of the previous work. */
-  beginAnew(id: string, detail: Detail): void {
+  startOver(id: string, detail: Detail): void {
     const { isTouched } = this;
     this.#openShape(id, detail, emptyDocument);
     if (isTouched) this.#asides.release();

@@ -13,7 +13,7 @@ const awayMs = 400;
 const quiet = new Set<Reason>(["SUPERSEDED", "NO_HANDLES"]);
 
 /** The pill of the connection, the banner while something is wrong, and lines that come and go. */
-export function messages(app: App, beginAnew: () => void): HTMLElement {
+export function messages(app: App, startOver: () => void): HTMLElement {
   const pill = el("div", { className: "pill", role: "status" });
   const title = el("strong");
   const text = el("span");
@@ -27,7 +27,7 @@ export function messages(app: App, beginAnew: () => void): HTMLElement {
   );
   const notice = el("div", { className: "notice", role: "status", hidden: true });
   const hint = el("div", { className: "hint" });
-  const restored = restoredNote(app, beginAnew);
+  const restored = restoredNote(app, startOver);
   let element = "";
   let timer: ReturnType<typeof setTimeout> | undefined;
   let late: ReturnType<typeof setTimeout> | undefined;
@@ -76,11 +76,11 @@ export function messages(app: App, beginAnew: () => void): HTMLElement {
 }
 
 /** Says that the work was restored, until it is changed or the note is dismissed. */
-function restoredNote(app: App, beginAnew: () => void): HTMLElement {
+function restoredNote(app: App, startOver: () => void): HTMLElement {
   const text = el("span");
   const discard = el("button", { type: "button", className: "plain", textContent: "Discard it" });
   const keep = el("button", { type: "button", className: "plain", textContent: "Go on" });
-  discard.addEventListener("click", beginAnew);
+  discard.addEventListener("click", startOver);
   keep.addEventListener("click", () => app.facts.set({ restoredFrom: undefined }));
   const note = el("div", { className: "restored", role: "status", hidden: true }, text, keep, discard);
   app.facts.watch(({ restoredFrom, mesh }) => {

@@ -124,11 +124,11 @@ describe("in the second of two pictures", () => {
     await mouse.up();
     await keyboard.press("Control+z");
     await keyboard.press("n");
-    await keyboard.press("n"); // Escape has let go of what was selected
+    await keyboard.press("n"); // Escape has cleared the selection
     await isAsBefore();
   });
 
-  it("what the brush has painted is let go of, and what is selected stays so", async () => {
+  it("what the brush has painted is dropped, and the selection stays", async () => {
     const { keyboard, mouse } = user.page;
     await keyboard.press("2");
     const from = await user.vertexOnPage(await user.vertexNear([0.5, 0, 2]), 1);

@@ -84,7 +84,7 @@ it("a reload brings handles, groups, p, painting, both panes and the view back, 
   expect(await note().isHidden()).toBe(true);
 });
 
-it("a mesh from a file comes back, and is let go on demand, for good", async () => {
+it("a mesh from a file comes back, and is deleted on demand, for good", async () => {
   const tower = blockSurface(2, 2, 6, () => true);
   await user.openFiles({ name: "tower.off", content: writeOff(tower) });
   await user.until("window.__lpdeform.app.facts.now.report && window.__lpdeform.app.mesh.name === 'tower.off'");
@@ -107,7 +107,7 @@ it("a mesh from a file comes back, and is let go on demand, for good", async () 
   expect(await note().isHidden()).toBe(true);
 });
 
-it("work that another shape, a file or letting go takes the place of is brought back", async () => {
+it("work that another shape or a file replaced, or that was discarded, is brought back", async () => {
   await bend();
   const bent = await work();
   const aside = user.page.locator(".aside");
@@ -271,7 +271,7 @@ it("work at which the page stopped is shown again only where that is wanted", as
   await user.settled();
   await user.page.locator(".dock").getByRole("button", { name: "6", exact: true }).click();
   await user.page.waitForTimeout(700);
-  await reload(); // lets go of what was put off
+  await reload(); // drops what was put off
   expect(await note().textContent()).toContain("is here again");
   const [asked, context, address] = [await work(), user.page.context(), user.page.url()];
   expect(asked).not.toBe(bent);
@@ -324,7 +324,7 @@ it("a new tab leaves the work of an open one alone, and has that of a closed one
   expect(await third.evaluate("JSON.stringify(window.__lpdeform.document())")).toBe(before);
 });
 
-it("what is old is let go, but not the work of an open tab", async () => {
+it("what is old is deleted, but not the work of an open tab", async () => {
   await bend();
   await user.page.waitForTimeout(700);
   // The open tab's and a closed one's, both of long ago.
