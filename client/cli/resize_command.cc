@@ -118,8 +118,8 @@ absl::StatusOr<client::SolveResult> solve_on(client::Client& server, const Trian
   return result;
 }
 
-/// One solve along one axis, blended with the plain scaling. `shares`: the result of sparing() for the mesh
-/// as it is in its file.
+/// One solve along one axis, blended with the mesh scaled without sparing. `shares`: the result of sparing()
+/// for the mesh as it is in its file.
 absl::Status stretch(client::Client& server, const Scaling& plain, std::optional<double> welding,
                      const Weld& weld, int axis, const std::vector<double>& shares, Interrupt& interrupt,
                      Resized& resized) {

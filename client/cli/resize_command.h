@@ -24,10 +24,10 @@ struct ResizeOptions {
 };
 
 /// Content-aware resizing of a mesh to the extent of the scaled one along every axis. The least of the three
-/// factors is plain scaling. Then there is one solve for each axis with a larger factor, each from the
-/// previous result (core/resize/resize.h and resize_extents.h). Each result is blended with the plain
-/// scaling, as sparing.h finds for the given mesh. Prints one line per solve. The distortion written to a
-/// .ply or shown in a .png is that of the last solve.
+/// factors scales uniformly. Then there is one solve for each axis with a larger factor, each from the
+/// previous result (core/resize/resize.h and resize_extents.h). Each result is blended with the mesh scaled
+/// by that factor without sparing, as sparing.h finds for the given mesh. Prints one line per solve. The
+/// distortion written to a .ply or shown in a .png is that of the last solve.
 ExitStatus run_resize(const ResizeOptions& options);
 
 }  // namespace lpdeform::cli

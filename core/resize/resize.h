@@ -36,8 +36,8 @@ struct ResizeInputs {
 /// second factor this is close to the ends, where slices are small, and a tip would be drawn out into a spike.
 ///
 /// If the sparing of a component (core/resize/sparing.h) is below one half, as for a ball or an ellipsoid, all its
-/// vertices are held at their positions under plain scaling. If no component is spared, the material is p = 2.
-/// Otherwise a ball would become a ball with two cones: its slices are cheapest at some distance from the ends, and
+/// vertices are held where the three factors bring them, without sparing. If no component is spared, the material is
+/// p = 2. Otherwise a ball would become a ball with two cones: its slices are cheapest at some distance from the ends, and
 /// p = 1 gathers the whole stretch there. A handle either holds a vertex or does not, so this is a hard switch; `lpdeform
 /// resize` blends the two results.
 ///

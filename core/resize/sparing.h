@@ -8,7 +8,8 @@
 
 namespace lpdeform {
 
-/// To what extent the resizing of each component spares its salient parts, 0 to 1. 0 is plain scaling:
+/// To what extent the resizing of each component spares its salient parts, 0 to 1. At 0 it is scaled by
+/// the three factors, without sparing:
 ///
 ///   sparing = share(ramp(salience_i; 0.4, 0.5)) share(ramp(d_i; 0.1, 0.25))
 ///   ramp(x; a, b) = 0 for x <= a, 1 for x >= b, smooth in between

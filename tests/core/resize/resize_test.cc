@@ -68,9 +68,9 @@ TEST(Resize, KeepsTheHolesOfABlockThatIsTwiceAsLong) {
   const Scaling twice = along(2, 1, 1);
   const Points aware = resized(block, twice);
   EXPECT_NEAR(worst_rim_ratio(block, block.vertices), 1, 1e-12);
-  EXPECT_NEAR(worst_rim_ratio(block, twice(block.vertices)), 2, 1e-12);  // plain scaling
+  EXPECT_NEAR(worst_rim_ratio(block, twice(block.vertices)), 2, 1e-12);  // without sparing
   EXPECT_LT(worst_rim_ratio(block, aware), 1.05);
-  // Stiffness that is the same everywhere is not enough, for p = 2 not even as good as plain scaling.
+  // Stiffness that is the same everywhere is not enough, for p = 2 not even as good as no sparing.
   EXPECT_GT(worst_rim_ratio(block, resized(block, twice, Material::uniform(1))), 1.5);
   EXPECT_GT(worst_rim_ratio(block, resized(block, twice, Material::uniform(2))), 1.5);
   EXPECT_NEAR(aware.col(0).maxCoeff() - aware.col(0).minCoeff(), 56, 1e-9);
