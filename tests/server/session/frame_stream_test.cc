@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <string>
 #include <vector>
 
 #include "core/base/fault.h"
@@ -51,7 +52,8 @@ class FrameStreamTest : public testing::Test {
   }
 
   std::shared_ptr<ManualTimers> timers_ = std::make_shared<ManualTimers>();
-  std::shared_ptr<Publisher> publisher_ = std::make_shared<Publisher>();
+  std::shared_ptr<Metrics> metrics_ = std::make_shared<Metrics>();
+  std::shared_ptr<Publisher> publisher_ = std::make_shared<Publisher>(metrics_);
   int wakes_ = 0;
 };
 
@@ -91,6 +93,25 @@ TEST_F(FrameStreamTest, SendsNoMoreThanItsCreditAndThenTheNewest) {
   EXPECT_TRUE(next[0].frame->is_final);
   EXPECT_EQ(next[0].skipped_inputs, 7u);
   EXPECT_TRUE(drain(*stream).empty());
+}
+
+TEST_F(FrameStreamTest, CountsThatAReaderWithoutCreditStalledOnceAndMissedFrames) {
+  const auto has_line = [&](const std::string& line) {
+    return metrics_->text().find("\n" + line + "\n") != std::string::npos;
+  };
+  const auto stream = open({.credit = 1});
+  publisher_->took(1, std::chrono::steady_clock::now());
+  for (const std::uint64_t input : {1, 2, 3, 4}) {  // the first goes out, the rest wait
+    publish(input);
+    drain(*stream);
+  }
+  EXPECT_TRUE(has_line("lpdeform_credit_stalls_total 1"));
+  ASSERT_TRUE(stream->acknowledge(1).ok());
+  drain(*stream);
+  EXPECT_TRUE(has_line("lpdeform_frames_published_total 4"));
+  EXPECT_TRUE(has_line("lpdeform_frames_sent_total 2"));
+  EXPECT_TRUE(has_line("lpdeform_frames_superseded_total 2"));
+  EXPECT_TRUE(has_line("lpdeform_input_to_frame_seconds_count 1"));
 }
 
 TEST_F(FrameStreamTest, TheFrameWithACertificateGoesToThoseWhoAskedOrHaveNotSeenIt) {
