@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "core/constraints/check_positions.h"
 #include "core/constraints/holds.h"
 #include "core/energy/rotation_fit.h"
 #include "core/problem/check_handle.h"
@@ -15,33 +16,18 @@
 namespace lpdeform {
 namespace {
 
-/// The handle's targets in scaled units.
-absl::StatusOr<Points> scaled_targets(const RestShape& shape, const std::string& name, const Handle& handle,
-                                      const Points& targets) {
-  const Points scaled = (targets.rowwise() - shape.centre()) / shape.mean_edge_length();
-  for (Eigen::Index k = 0; k < scaled.rows(); ++k) {
-    if (scaled.row(k).stableNorm() * shape.mean_edge_length() <= kFarthestTarget * shape.diagonal()) continue;
-    const std::string member =
-        handle.points.empty() ? absl::StrCat("vertex ", handle.vertices[k]) : absl::StrCat("point ", k);
-    return make_fault(
-        {Reason::kHandleTargetTooFar, member, "1e9 diagonals of the mesh"},
-        absl::StrCat("handle \"", name, "\" sends ", member, " over 1e9 diagonals of the mesh away"));
-  }
-  return scaled;
-}
-
 /// `hold` is called with each vertex that is held exactly, its target in scaled units and in the caller's.
 template <typename HoldVertex>
 absl::Status hold_handles(const RestShape& shape, const HandleSet& handles, Holds& holds,
                           const HoldVertex& hold) {
   for (const auto& [name, handle] : handles.handles()) {
     const Points targets = target_positions(handle, shape.positions(), shape.faces());
-    const auto scaled = scaled_targets(shape, name, handle, targets);
-    if (!scaled.ok()) return scaled.status();
-    add_holds(shape, name, handle, *scaled, holds);
+    if (absl::Status status = check_targets(shape, name, handle, targets); !status.ok()) return status;
+    const Points scaled = (targets.rowwise() - shape.centre()) / shape.mean_edge_length();
+    add_holds(shape, name, handle, scaled, holds);
     if (!handle.fixes_vertices()) continue;
     for (std::size_t k = 0; k < handle.vertices.size(); ++k) {
-      hold(handle.vertices[k], scaled->row(k), targets.row(k));
+      hold(handle.vertices[k], scaled.row(k), targets.row(k));
     }
   }
   return absl::OkStatus();

@@ -31,11 +31,8 @@ struct Constraints {
   std::size_t memory_bytes() const;
 };
 
-/// No position may be farther from the rest mesh's centre than this many of its diagonals.
-inline constexpr double kFarthestTarget = 1e9;
-
-/// Makes the constraints. Errors: those of check_handles and LinearConstraints::create; INVALID_ARGUMENT:
-/// HANDLE_TARGET_TOO_FAR (over 1e9 diagonals from the rest mesh); FAILED_PRECONDITION: NO_HANDLES,
+/// Makes the constraints. Errors: those of check_handles, check_targets and LinearConstraints::create;
+/// FAILED_PRECONDITION: NO_HANDLES,
 /// COMPONENT_WITHOUT_HANDLE (names the component and its lowest vertex; an orientation handle does not hold its
 /// component). `outside`: positions at which vertices outside the region of interest are held, in the caller's units;
 /// null means the rest positions.
@@ -43,7 +40,7 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
                                              FreeComponents free_components, const Points* outside = nullptr);
 
 /// Whether points held exactly and locks can hold together: the errors of LinearConstraints::create, without making
-/// constraints. `handles` have passed check_handles, and their targets are no farther than kFarthestTarget. A session asks
+/// constraints. `handles` have passed check_handles, and their targets check_targets. A session asks
 /// this when handles are set, to refuse the update; the Deformer makes the constraints later, once for the newest handles.
 absl::Status check_equations(const RestShape& shape, const HandleSet& handles);
 

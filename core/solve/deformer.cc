@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "core/constraints/check_positions.h"
 #include "core/problem/check_handle.h"
 #include "core/problem/check_settings.h"
 #include "core/solve/deformer_impl.h"
@@ -81,18 +82,7 @@ absl::Status Deformer::set_material(const Material& material) {
 }
 
 absl::Status Deformer::set_positions(const Points& positions) {
-  const std::int32_t n = impl_->shape->vertex_count();
-  if (positions.rows() != n) {
-    return make_fault({Reason::kPositionsSize, "positions", absl::StrCat(n, " positions")},
-                      absl::StrCat("there are ", positions.rows(), " positions for ", n, " vertices"));
-  }
-  const double farthest = kFarthestTarget * impl_->shape->diagonal();
-  for (Eigen::Index i = 0; i < n; ++i) {
-    if ((positions.row(i) - impl_->shape->centre()).stableNorm() <= farthest) continue;
-    return make_fault(
-        {Reason::kPositionsNotFinite, absl::StrCat("vertex ", i), "1e9 diagonals of the mesh"},
-        absl::StrCat("the position of vertex ", i, " is not finite, or over 1e9 diagonals of the mesh away"));
-  }
+  if (absl::Status status = check_positions(*impl_->shape, positions); !status.ok()) return status;
   impl_->change_inputs();
   impl_->x_before_move.resize(0, 3);
   impl_->x = (positions.rowwise() - impl_->shape->centre()) / impl_->unit();

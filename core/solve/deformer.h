@@ -55,8 +55,8 @@ class Deformer {
   /// Replaces the material. Errors: as check_material. Ends a running solve with kCancelled.
   absl::Status set_material(const Material& material);
 
-  /// Makes `positions` the current state, from which InitialGuess::kCurrent starts. INVALID_ARGUMENT: POSITIONS_SIZE,
-  /// POSITIONS_NOT_FINITE. Ends a running solve with kCancelled.
+  /// Makes `positions` the current state, from which InitialGuess::kCurrent starts. Errors: as check_positions.
+  /// Ends a running solve with kCancelled.
   absl::Status set_positions(const Points& positions);
 
   /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P,

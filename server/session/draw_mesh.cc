@@ -9,6 +9,7 @@
 #include "core/base/check.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "core/constraints/check_positions.h"
 #include "core/problem/welded_inputs.h"
 
 namespace lpdeform {
@@ -36,9 +37,7 @@ MeshReport DrawMesh::report() const {
 absl::StatusOr<Points> DrawMesh::solver_positions(Points positions) const {
   if (!weld_) return positions;
   for (Eigen::Index v = 0; v < positions.rows(); ++v) {
-    if (positions.row(v).allFinite()) continue;
-    return make_fault({Reason::kPositionsNotFinite, absl::StrCat("vertex ", v), "finite coordinates"},
-                      absl::StrCat("The position of vertex ", v, " has a NaN or infinite coordinate."));
+    if (!positions.row(v).allFinite()) return position_too_far(v);
   }
   return welded(positions, *weld_, "positions");
 }

@@ -135,8 +135,6 @@ class Mailbox {
   absl::Status check(const Candidate& next, const Inputs& before) const;
   absl::Status weld(Candidate& next) const;
   absl::Status check_welded(const Candidate& next) const;
-  absl::Status check_targets(const std::string& name, const Handle& handle) const;
-  std::string place_of(const Handle& handle, std::size_t k) const;
   std::int32_t vertex_count() const { return weld_ ? weld_->split_count() : shape_->vertex_count(); }
 
   void note_ages(const Candidate& next, std::uint64_t seq);

@@ -5,9 +5,9 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "core/constraints/check_positions.h"
 #include "core/constraints/constraints.h"
 #include "core/problem/check_settings.h"
-#include "core/problem/handle_name.h"
 #include "core/problem/welded_inputs.h"
 #include "server/session/mailbox_candidate.h"
 
@@ -56,32 +56,13 @@ absl::Status Mailbox::check_welded(const Candidate& next) const {
   const HandleSet& handles = next.solver_handles ? *next.solver_handles : *next.handles;
   absl::Status status;
   for (const std::string& name : next.moved) {
-    if (status.ok()) status = check_targets(name, handles.handles().find(name)->second);
+    if (!status.ok()) break;
+    const Handle& handle = handles.handles().find(name)->second;
+    const Points targets = target_positions(handle, shape_->positions(), shape_->faces());
+    status = check_targets(*shape_, name, handle, targets, weld_ ? &weld_->first_copy : nullptr);
   }
   if (status.ok() && next.is_regrouped) status = check_equations(*shape_, handles);
   return status;
-}
-
-/// "Vertex 17" as the client counts, or "Point 2" of a handle of points.
-std::string Mailbox::place_of(const Handle& handle, std::size_t k) const {
-  if (!handle.points.empty()) return absl::StrCat("Point ", k);
-  const std::int32_t vertex = handle.vertices[k];
-  return absl::StrCat("Vertex ", weld_ ? weld_->first_copy[vertex] : vertex);
-}
-
-absl::Status Mailbox::check_targets(const std::string& name, const Handle& handle) const {
-  const double farthest = kFarthestTarget * shape_->diagonal();
-  const Points targets = target_positions(handle, shape_->positions(), shape_->faces());
-  for (Eigen::Index k = 0; k < targets.rows(); ++k) {
-    const double distance = (targets.row(k) - shape_->centre()).stableNorm();
-    if (distance <= farthest) continue;
-    return make_fault(
-        {Reason::kHandleTargetTooFar, handle_element(name), absl::StrCat("distance <= ", farthest)},
-        absl::StrCat(place_of(handle, static_cast<std::size_t>(k)), " of ", handle_element(name),
-                     " would be ", distance, " from the mesh's centre, over ", kFarthestTarget,
-                     " of its diagonals."));
-  }
-  return absl::OkStatus();
 }
 
 }  // namespace lpdeform

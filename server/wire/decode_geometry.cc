@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "core/constraints/check_positions.h"
 #include "server/wire/decode.h"
 #include "server/wire/decode_parts.h"
 
@@ -78,9 +79,7 @@ absl::StatusOr<Points> Decoder::positions(const v1::Positions& message) {
   const auto packed = points(message.scalar(), message.data(), "positions");
   if (!packed.ok()) return packed.status();
   if (packed->count == vertex_count_) return packed->unpack();
-  return make_fault(
-      {Reason::kPositionsSize, "positions", absl::StrCat(vertex_count_, " positions")},
-      absl::StrCat("There are ", packed->count, " positions for ", vertex_count_, " vertices."));
+  return wrong_position_count(static_cast<std::int64_t>(packed->count), vertex_count_);
 }
 
 absl::StatusOr<Points> Decoder::normals(const v1::Normals& message) {
