@@ -12,12 +12,8 @@ namespace {
 
 absl::Status check_field(const Field& field, std::int32_t vertex_count, const std::string& name,
                          double lowest, double highest, Reason reason) {
-  if (field.size() != 1 && field.size() != vertex_count) {
-    return make_fault(
-        {Reason::kFieldSize, name, absl::StrCat("1 or ", vertex_count, " values")},
-        absl::StrCat(name, " has ", field.size(), " values; it takes one, or one for each of the ",
-                     vertex_count, " vertices"));
-  }
+  if (field.size() != 1 && field.size() != vertex_count)
+    return wrong_field_size(name, field.size(), vertex_count);
   for (Eigen::Index i = 0; i < field.size(); ++i) {
     if (field[i] >= lowest && field[i] <= highest) continue;
     const std::string element = field.size() == 1 ? name : absl::StrCat(name, "[", i, "]");
@@ -43,6 +39,13 @@ bool Material::has_uniform_p() const {
 bool Material::operator==(const Material& other) const {
   const auto equal = [](const Field& a, const Field& b) { return a.size() == b.size() && a == b; };
   return equal(p, other.p) && equal(stiffness, other.stiffness) && length_unit == other.length_unit;
+}
+
+absl::Status wrong_field_size(std::string_view name, std::int64_t values, std::int64_t vertex_count) {
+  const std::string field(name);
+  return make_fault({Reason::kFieldSize, field, absl::StrCat("1 or ", vertex_count, " values")},
+                    absl::StrCat(field, " has ", values, " values; it takes one, or one for each of the ",
+                                 vertex_count, " vertices"));
 }
 
 absl::Status check_material(const Material& material, std::int32_t vertex_count) {

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstdint>
+#include <string_view>
+
 #include "absl/status/status.h"
 #include "core/base/geometry.h"
 
@@ -28,5 +31,8 @@ struct Material {
 /// Checks sizes and ranges. INVALID_ARGUMENT (FIELD_SIZE, P_OUT_OF_RANGE, STIFFNESS_OUT_OF_RANGE,
 /// LENGTH_UNIT_OUT_OF_RANGE); names the vertex.
 absl::Status check_material(const Material& material, std::int32_t vertex_count);
+
+/// FIELD_SIZE, for callers who find it before they have a field. `name`: "p" or "stiffness".
+absl::Status wrong_field_size(std::string_view name, std::int64_t values, std::int64_t vertex_count);
 
 }  // namespace lpdeform

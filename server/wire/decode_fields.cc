@@ -43,12 +43,8 @@ absl::StatusOr<Field> Decoder::field(const v1::Field& message, std::string_view 
     return wrong_size(what, data->view.size(), absl::StrCat("a multiple of ", bytes_of(*scalar)));
   }
   const std::size_t count = data->view.size() / bytes_of(*scalar);
-  if (count != 1 && count != vertex_count_) {
-    return make_fault(
-        {Reason::kFieldSize, std::string(what), absl::StrCat("1 or ", vertex_count_, " values")},
-        absl::StrCat("The field ", std::string(what), " has ", count, " values for ", vertex_count_,
-                     " vertices."));
-  }
+  if (count != 1 && count != vertex_count_)
+    return wrong_field_size(what, static_cast<std::int64_t>(count), vertex_count_);
   Field field(static_cast<Eigen::Index>(count));
   unpack(*scalar, data->view, field);
   return field;
