@@ -174,8 +174,16 @@ WriterLease Session::acquire_writer() {
   return lease;
 }
 
-/// The common part of all changes by a writer: applies `change` to the mailbox, and makes sure that a frame
-/// will answer its input_seq.
+/// The common part of all changes by a writer: applies `change` to the mailbox. Called with writing_ held.
+template <typename Change>
+auto Session::take_in_locked(const absl::StatusOr<Writer>& writer, const Change& change) {
+  using Result = decltype(change(mailbox_));
+  absl::Status status = check_still_writes_locked(writer);
+  if (status.ok() && is_closed_) status = closed();
+  return status.ok() ? change(mailbox_) : Result(std::move(status));
+}
+
+/// A change, and the promise that a frame will answer its input_seq.
 template <typename Change>
 auto Session::take_in(const absl::StatusOr<Writer>& writer, const Change& change) {
   touch();
@@ -183,10 +191,7 @@ auto Session::take_in(const absl::StatusOr<Writer>& writer, const Change& change
   decltype(change(mailbox_)) result;
   {
     const std::scoped_lock lock(writing_);
-    absl::Status status = check_still_writes_locked(writer);
-    if (status.ok() && is_closed_) status = closed();
-    if (!status.ok()) return result = status;
-    result = change(mailbox_);
+    result = take_in_locked(writer, change);
     if (result.ok()) publisher_->took(input_seq_of(*result), since);
   }
   if (result.ok()) services_.scheduler.wake(shared_from_this(), Urgency::kAnswer);
@@ -208,12 +213,11 @@ absl::Status Session::solve(const absl::StatusOr<Writer>& writer, const std::opt
   std::shared_ptr<SolveJob> before;
   {
     const std::scoped_lock lock(writing_);
-    if (absl::Status status = check_still_writes_locked(writer); !status.ok()) return status;
-    if (update) {
-      if (absl::Status status = mailbox_.take(*update).status(); !status.ok()) return status;
-    }
+    const absl::Status taken = take_in_locked(
+        writer, [&](Mailbox& mailbox) { return update ? mailbox.take(*update).status() : absl::OkStatus(); });
+    if (!taken.ok()) return taken;
     const std::scoped_lock job_lock(mutex_);
-    if (is_closed_) return closed();
+    if (is_closed_) return closed();  // meanwhile
     job->version = mailbox_.newest().version;
     before = std::exchange(job_, job);
   }

@@ -179,6 +179,8 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   absl::Status check_still_writes_locked(const absl::StatusOr<Writer>& writer) const;
   template <typename Change>
   auto take_in(const absl::StatusOr<Writer>& writer, const Change& change);
+  template <typename Change>
+  auto take_in_locked(const absl::StatusOr<Writer>& writer, const Change& change);
   absl::Status closed() const;
   std::shared_ptr<SolveJob> take_job();
   void end_job(const absl::Status& why);
