@@ -327,7 +327,7 @@ void Keeper::take_over_until(const std::string& name, const Asker& asker, Timers
 absl::StatusOr<Keeper::Found> Keeper::find(const std::string& name, const Asker& asker,
                                            Clock::time_point since) {
   if (is_being_removed(name)) return session_unknown();
-  if (is_leaving(name)) return session_left();
+  if (is_leaving(name)) return session_elsewhere();
   return read(name, asker, since);
 }
 

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <string>
 
 #include "absl/status/status.h"
 #include "absl/strings/cord.h"
@@ -46,10 +47,12 @@ inline absl::Status session_unknown() {
                     "There is no such session; it may have expired or been deleted.");
 }
 
-/// UNAVAILABLE SESSION_ELSEWHERE: the session has just moved to another server.
-inline absl::Status session_left() {
-  return make_fault({Reason::kSessionElsewhere, "session", ""},
-                    "The session goes on at another server; try again.");
+/// UNAVAILABLE SESSION_ELSEWHERE. `header`: that of calls which reach the other server; empty if there is none, or it is not known.
+/// `advice`: ends the sentence, and says what to do.
+inline absl::Status session_elsewhere(const std::string& header = "",
+                                      const std::string& advice = "try again.") {
+  return make_fault({Reason::kSessionElsewhere, "session", header},
+                    absl::StrCat("Another server has the session; ", advice));
 }
 
 /// RESOURCE_EXHAUSTED SERVER_BUSY. `wait`: until the calls that wait now have had their turn.

@@ -160,7 +160,7 @@ absl::StatusOr<std::shared_ptr<Session>> Registry::find(const std::string& name,
     }
     const auto left = left_.find(name);
     if (left != left_.end() && left->second.owner == owner && timers_->now() < left->second.until)
-      return session_left();
+      return session_elsewhere();
   }
   return session_unknown();
 }

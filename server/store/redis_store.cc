@@ -149,7 +149,7 @@ absl::StatusOr<StoredSession> RedisStore::take_over(const std::string& session, 
   const auto reply = reader_.run(command);
   if (!reply.ok()) return reply.status();
   if (reply->elements.empty()) return session_unknown();
-  if (reply->elements[0].number == kIsHeld) return session_elsewhere(reply->elements[1].text);
+  if (reply->elements[0].number == kIsHeld) return held_elsewhere(reply->elements[1].text);
   StoredSession found;
   found.owner = owner;
   for (std::size_t k = 0; k + 1 < reply->elements.size(); k += 2) {

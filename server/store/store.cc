@@ -10,6 +10,7 @@
 #include "absl/strings/strip.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "server/runtime/refusals.h"
 
 namespace lpdeform {
 namespace {
@@ -104,13 +105,13 @@ std::string route_header(const std::string& route) {
   return absl::StrCat("lpdeform-session: ", route);
 }
 
-absl::Status session_elsewhere(const std::string& route) {
-  const std::string text =
-      route.empty() ? "Another server has the session in use; try again. The session was created without the "
-                      "header lpdeform-session, so no header leads to its server."
-                    : absl::StrCat("Another server has the session; call again with the header ",
-                                   route_header(route), ".");
-  return make_fault({Reason::kSessionElsewhere, "session", route.empty() ? "" : route_header(route)}, text);
+absl::Status held_elsewhere(const std::string& route) {
+  if (route.empty())
+    return session_elsewhere(
+        "",
+        "try again. The session was created without the header lpdeform-session, so no header leads there.");
+  return session_elsewhere(route_header(route),
+                           absl::StrCat("call again with the header ", route_header(route), "."));
 }
 
 }  // namespace lpdeform

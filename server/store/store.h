@@ -189,6 +189,6 @@ std::string damage_of(const absl::Status& status);
 /// The header that a call must have to reach this route.
 std::string route_header(const std::string& route);
 /// UNAVAILABLE SESSION_ELSEWHERE, with route_header() as its limit. `route`: of the session; may be empty.
-absl::Status session_elsewhere(const std::string& route = "");
+absl::Status held_elsewhere(const std::string& route);
 
 }  // namespace lpdeform
