@@ -31,10 +31,10 @@ const char* heading(FlagGroup group) {
 template <typename Number>
 Number number_of(const Flag& flag, const std::string& text) {
   Number number{};
-  if (!CLI::detail::lexical_cast(text, number))
-    throw CLI::ValidationError(absl::StrCat("--", flag.name, " must be ", flag.range.text, "."));
-  if (const absl::Status in_range = check_range(flag, static_cast<double>(number)); !in_range.ok())
-    throw CLI::ValidationError(std::string(in_range.message()));
+  const bool is_number = CLI::detail::lexical_cast(text, number);
+  const absl::Status in_range =
+      is_number ? check_range(flag, static_cast<double>(number)) : must_be(flag.name, flag.range.text);
+  if (!in_range.ok()) throw CLI::ValidationError(std::string(in_range.message()));
   return number;
 }
 
@@ -58,10 +58,7 @@ bool is_share(const std::string& text) {
 
 /// The number before "%".
 double percent_of(const Flag& flag, const std::string& text) {
-  double percent = 0;
-  const bool is_number = CLI::detail::lexical_cast(text.substr(0, text.size() - 1), percent);
-  if (is_number && percent >= 1 && percent <= 100) return percent;
-  throw CLI::ValidationError(absl::StrCat("--", flag.name, " must be 1% to 100%, or a size."));
+  return number_of<double>(flag, text.substr(0, text.size() - 1));
 }
 
 /// Puts the value that `text` says where the flag says.

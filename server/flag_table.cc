@@ -109,13 +109,10 @@ void add_limits_of_sessions(std::vector<Flag>& flags, ServerOptions& server) {
 void add_limits_of_memory(std::vector<Flag>& flags, ServerOptions& server) {
   using enum FlagGroup;
   append(flags,
-         {{"max-bytes",
-           kLimits,
-           MemoryValue{&server.max_bytes},
-           "Memory for sessions and received upload bytes, as the server counts it: 4GiB, bytes, or 25% of "
-           "the machine's or control group's memory; 0: 75%",
-           {},
-           Reason::kMemoryFull},
+         {{"max-bytes", kLimits, MemoryValue{&server.max_bytes},
+           "Memory for sessions and received uploads, by the server's own count. A size such as 4GiB, or a "
+           "share such as 25% of the memory of the machine or control group. 0: 75%",
+           kShare, Reason::kMemoryFull},
           {"max-bytes-per-caller", kLimits, &server.max_bytes_per_caller,
            "Memory of one caller's sessions and of what has come of its uploads, where callers are told "
            "apart; as 4GiB, in bytes, or as 25% of --max-bytes; 0: without limit",

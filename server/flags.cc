@@ -38,7 +38,7 @@ std::optional<double> number_in(const FlagValue& value) {
       [](const std::chrono::milliseconds* time) { return Number(seconds_of(*time)); },
       [](const ByteLimit* limit) { return limit->bytes ? Number() : Number(limit->percent); },
       [](const SizeValue& size) { return Number(static_cast<double>(*size.bytes)); },
-      [](const MemoryValue& size) { return Number(static_cast<double>(*size.bytes)); });
+      [](const MemoryValue&) { return Number(); });
 }
 
 /// "1234567" with commas, "256MiB" with a space, and "s" after seconds.

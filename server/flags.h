@@ -36,7 +36,7 @@ struct SizeValue {
   std::uint64_t* bytes;
 };
 
-/// The same, or a share of the memory that this process may have: "25%".
+/// The same, or a share of the memory that this process may have: "25%". A range bounds the share.
 struct MemoryValue {
   std::size_t* bytes;
 };
