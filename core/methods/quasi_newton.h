@@ -31,13 +31,19 @@ enum class Warmth {
 /// keeps the previous metric for its first ten iterations. If the largest p_i is over 12 and none is below 2, a cold
 /// solve first has one stage near p = 4. This takes fewer iterations in total; without it, a bent grid folds.
 ///
-/// Converged when, in the last stage, the objective f has decreased over 20 iterations by at most tolerance * p * f, p
-/// the largest p_i (a relative decrease of E^(1/p) of at most the tolerance); or when no step decreases f and the
-/// decrease predicted by a fresh metric, -<gradient, direction> / 2, is at most that; or when E is 0 to rounding. If p
-/// varies over the surface, the f in tolerance * p * f of the first criterion leaves out what smoothing adds to cells
-/// with p_i < 2, because next to a large p this part can exceed all other energy. Stalled if the distortions of cells with
-/// p_i < 2 are at the level of rounding, and smoothing still adds over a hundredth to the objective, as with p = 1 and p = 10
-/// side by side.
+/// f is the objective of the last stage, f_k after k of its iterations, g its gradient, d the direction, p the largest p_i.
+/// Converged where
+///
+///   f_(k-20) - f_k <= tolerance p f_k , a relative decrease of E^(1/p) of at most the tolerance; or
+///   -<g, d> / 2 <= tolerance p f_k with a fresh metric and no decreasing step; or
+///   E = 0 to rounding.
+///
+/// If p varies, the f_k on the right of the first leaves out what smoothing adds to cells with p_i < 2, because next to a
+/// large p this part can exceed all other energy. Stalled where, with F the objective without smoothing,
+///
+///   f - F > 0.01 F as one of the first two holds, so that distortions of cells with p_i < 2 are at the level of rounding,
+///     as with p = 1 and p = 10 side by side; or
+///   -<g, d> / 2 > tolerance p f_k with a fresh metric and no decreasing step.
 class QuasiNewton : public Minimiser {
  public:
   QuasiNewton(Problem problem, Points x, Warmth warmth);
