@@ -5,18 +5,18 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "core/base/match.h"
+#include "core/problem/hold.h"
 
 namespace lpdeform::cli {
 namespace {
 
-constexpr double kHighestWeight = 1e6;
-
 double weight(const json& value, const std::string& owner, const char* key) {
   const double result = number(value, key_of(owner, key));
-  if (!(result >= 0 && result <= kHighestWeight)) {
-    refuse(Reason::kHandleWeightOutOfRange, owner,
-           absl::StrCat(key_of(owner, key), " is ", result, "; it must be from 0 to 1e6."),
-           "0 <= weight <= 1e6");
+  if (!(result >= 0 && result <= kHighestSoftWeight)) {
+    refuse(
+        Reason::kHandleWeightOutOfRange, owner,
+        absl::StrCat(key_of(owner, key), " is ", result, "; it must be from 0 to ", kHighestSoftWeight, "."),
+        absl::StrCat("0 <= weight <= ", kHighestSoftWeight));
   }
   return result;
 }
