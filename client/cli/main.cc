@@ -181,7 +181,7 @@ void add_weld(CLI::App& app, std::optional<double>& weld) {
   app.add_option(
          "--weld", weld,
          "Weld vertices in the same place, for meshes split along seams of texture or normals. TOLERANCE is "
-         "their largest distance as a share of the bounding box's diagonal, 0 to 0.001 (1e-9)")
+         "their largest distance as a share of the bounding box's diagonal, 0 to 0.001 (1e-6)")
       ->check(within(0, 1e-3))
       ->option_text("[TOLERANCE]");
 }
