@@ -26,9 +26,8 @@ constexpr std::chrono::seconds kToEnd{10}, kToEndWithout{2};
 
 constexpr char kDescription[] =
     "Deforms triangle meshes as a gRPC service (lpdeform.v1). Each option can also be set by the environment "
-    "variable beside it. SIGTERM or SIGINT stops the server. Exit status: 0 stopped; 1 did not start; 2 "
-    "stopped, "
-    "but the store lacks answered updates (the log names the sessions).";
+    "variable beside it. SIGTERM or SIGINT stops the server. Exit status: 0 stopped; 1 did not start; "
+    "2 stopped, but the store lacks answered updates (the log names the sessions).";
 
 int refuse(const absl::Status& why) {
   std::fprintf(stderr, "lpdeform-server: %s\n", lpdeform::text_for_operators(why).c_str());

@@ -61,8 +61,9 @@ Extent extent_of(const Points& positions, const std::vector<std::int32_t>& compo
 absl::Status check_scale(const Extent& extent) {
   const double largest = std::max(extent.low.cwiseAbs().maxCoeff(), extent.high.cwiseAbs().maxCoeff());
   if (largest > RestShape::kLargestCoordinate) {
-    return make_fault({Reason::kMeshScale, "", "|coordinate| <= 1e25"},
-                      absl::StrCat("The mesh's largest coordinate is ", largest, "; it may be 1e25."));
+    return make_fault(
+        {Reason::kMeshScale, "", "|coordinate| <= 1e25"},
+        absl::StrCat("The mesh's largest coordinate is ", largest, "; it may be at most 1e25."));
   }
   const double diagonal = (extent.high - extent.low).norm();
   if (diagonal < RestShape::kSmallestDiagonal) {

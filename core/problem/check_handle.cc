@@ -47,10 +47,9 @@ absl::Status check_targets(std::string_view name, const Handle& handle, const Ta
 
 absl::Status check_points(std::string_view name, const Handle& handle) {
   if (!takes_points(handle.hold)) {
-    return make_fault({Reason::kHandleKindNeedsVertices, handle_element(name), "vertices"},
-                      absl::StrCat(handle_element(name),
-                                   " is an orientation or a lock and has points "
-                                   "inside faces; it takes vertices"));
+    return make_fault(
+        {Reason::kHandleKindNeedsVertices, handle_element(name), "vertices"},
+        absl::StrCat(handle_element(name), " has points inside faces, but its kind takes vertices only"));
   }
   for (std::size_t k = 0; k < handle.points.size(); ++k) {
     const Eigen::Vector3d& b = handle.points[k].barycentric;
@@ -70,10 +69,9 @@ absl::Status check_members(std::string_view name, const Handle& handle) {
                       absl::StrCat(handle_element(name), " has no vertices; it needs at least one"));
   }
   if (!handle.vertices.empty() && !handle.points.empty()) {
-    return make_fault({Reason::kHandlePointsAndVertices, handle_element(name), "vertices or points"},
-                      absl::StrCat(handle_element(name),
-                                   " has vertices and points inside faces; it takes "
-                                   "one of the two"));
+    return make_fault(
+        {Reason::kHandlePointsAndVertices, handle_element(name), "vertices or points"},
+        absl::StrCat(handle_element(name), " has vertices and points inside faces; it takes one of the two"));
   }
   return handle.points.empty() ? absl::OkStatus() : check_points(name, handle);
 }

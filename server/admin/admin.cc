@@ -205,7 +205,7 @@ absl::StatusOr<std::unique_ptr<Admin>> Admin::start(const std::string& address,
   if (!listener.ok()) {
     return make_fault(
         {Reason::kAddressNotBound, address, ""},
-        absl::StrCat("The admin port does not open. ", absl::string_view(listener.status().message())));
+        absl::StrCat("The admin port cannot be opened. ", absl::string_view(listener.status().message())));
   }
   auto impl = std::make_unique<Impl>();
   impl->patience = patience;

@@ -35,7 +35,7 @@ absl::StatusOr<UploadProgress> Upload::add(std::uint64_t offset, std::string_vie
   if (is_finished_) return UploadProgress{size(), true};
   if (bytes_.runs() >= kMostRuns && !bytes_.joins_a_run(offset, offset + data.size())) {
     return make_fault({Reason::kUploadScattered, name_, absl::StrCat("runs <= ", kMostRuns)},
-                      absl::StrCat("What is there is in ", kMostRuns,
+                      absl::StrCat("The bytes received form ", kMostRuns,
                                    " runs with gaps between them; send a part that joins one of them."));
   }
   if (absl::Status status = put(offset, data); !status.ok()) return status;

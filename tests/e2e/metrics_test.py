@@ -254,7 +254,7 @@ class Health(programs.OnShapes):
             done = subprocess.run([programs.server(), "--address", "127.0.0.1:0", "--admin-address", address],
                                   capture_output=True, text=True, timeout=programs.PATIENCE)
             self.assertEqual(done.returncode, 1, address)
-            self.assertIn(f"lpdeform-server: The admin port does not open. The server cannot listen on {address}", done.stderr)
+            self.assertIn(f"lpdeform-server: The admin port cannot be opened. The server cannot listen on {address}", done.stderr)
 
 
 if __name__ == "__main__":
