@@ -5,6 +5,7 @@
 
 #include "server/wire/encode.h"
 #include "server/wire/holds.h"
+#include "server/wire/vectors.h"
 
 namespace lpdeform {
 namespace {

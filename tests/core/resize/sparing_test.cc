@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/resize/resize.h"
 #include "tests/core/poses.h"
 #include "tests/core/round_shapes.h"
 
