@@ -126,18 +126,19 @@ Figure section_3_2(const Measurements& measured) {
 }
 
 Figure section_5(const Measurements& measured) {
-  return {"section_5",
-          "Section 5: continuous variation with p",
-          "The paper's five shapes; p goes on from 1, 1.5, 2 and 6, each time from the result before.",
-          {varies_continuously(measured, false,
-                               "Continuous variations of results can be obtained by changing p alone (from p "
-                               "= 1.5, 2 and 6)."),
-           varies_continuously(measured, true, "The same from p = 1.")},
-          variations_table(measured),
-          {},
-          "The table shows the largest displacement of a vertex as a share of the diagonal. At p = 1 the "
-          "energy is not "
-          "strictly convex even for fixed rotations, so results of nearly the same energy can be far apart."};
+  return {
+      "section_5",
+      "Section 5: continuous variation with p",
+      "The paper's five shapes; p goes on from 1, 1.5, 2 and 6, each time from the result before.",
+      {varies_continuously(measured, false,
+                           "Continuous variations of results can be obtained by changing p alone (from p "
+                           "= 1.5, 2 and 6)."),
+       varies_continuously(measured, true, "The same from p = 1.")},
+      variations_table(measured),
+      {},
+      "The table shows the largest displacement of a vertex as a share of the diagonal. At p = 1 the "
+      "energy is not strictly convex even for fixed rotations, so results of nearly the same energy can be "
+      "far apart."};
 }
 
 }  // namespace lpdeform::reproduce
