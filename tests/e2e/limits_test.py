@@ -74,16 +74,17 @@ class Limits(unittest.TestCase):
         self.assertAlmostEqual(self.memory_limit("--max-bytes", "75%") / unsaid, 1, places=6)
 
     def test_values_that_are_no_limits_are_refused_by_name(self):
-        for flag, value, why in (("max-bytes", "-1", "must not be negative"), ("max-bytes", "0.5%", "must be 1% to 100%"),
+        for flag, value, why in (("max-bytes", "-1", "must be a size below 16 EiB"), ("max-bytes", "0.5%", "must be 1% to 100%"),
                                  ("max-bytes", "101%", "must be 1% to 100%"), ("max-bytes", "x%", "must be 1% to 100%"),
-                                 ("max-bytes-per-caller", "-1", "must not be negative"),
+                                 ("max-bytes-per-caller", "-1", "must be a size below 16 EiB"),
                                  ("max-bytes-per-caller", "0.5%", "must be 1% to 100%"),
+                                 ("max-bytes", "99999999999999999999GiB", "must be a size below 16 EiB"),
                                  ("max-bytes-per-caller", "101%", "must be 1% to 100%"),
                                  ("max-bytes-per-caller", "%", "must be 1% to 100%"),
                                  ("max-uploads-per-caller", "-1", "lpdeform-server: --max-uploads-per-caller must be 0 to 10^6"),
                                  ("max-streams-per-caller", "-1", "lpdeform-server: --max-streams-per-caller must be 0 to 10^6"),
                                  ("max-sessions-per-caller", "-1", "lpdeform-server: --max-sessions-per-caller must be 0 to 10^6"),
-                                 ("max-upload-bytes", "-4KiB", "must not be negative"),
+                                 ("max-upload-bytes", "-4KiB", "must be a size below 16 EiB"),
                                  ("session-idle", "1e300", "must be 0.001 to 1e+09 seconds"),
                                  ("session-idle", "nan", "must be 0.001 to 1e+09 seconds"),
                                  ("heartbeat", "0", "must be 0.001 to 1e+09 seconds"),
