@@ -4,8 +4,8 @@
 #include <cstring>
 #include <string>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/strings/str_cat.h"
+#include "core/base/hash_map.h"
 #include "core/io/byte_order.h"
 #include "core/io/readers.h"
 #include "core/io/text_scanner.h"
@@ -36,7 +36,7 @@ class Welder {
   }
 
   MeshBuilder builder_;
-  absl::flat_hash_map<std::array<std::uint64_t, 3>, std::int32_t> vertices_;
+  HashMap<std::array<std::uint64_t, 3>, std::int32_t> vertices_;
 };
 
 std::uint64_t claimed_size(std::string_view bytes) {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "absl/container/flat_hash_map.h"
+#include "core/base/hash_map.h"
 #include "core/mesh/half_edges.h"
 
 namespace lpdeform {
@@ -86,8 +86,8 @@ class Grid {
   const Points& points_;
   Eigen::RowVector3d low_;  // halved, like all extents here: full ones may overflow
   double half_extent_ = 1, nearest_ = 0, side_ = 1;
-  absl::flat_hash_map<Cell, std::int32_t> heads_;  // the last point of each cell
-  std::vector<std::int32_t> next_;                 // the previous point in the cell of each point
+  HashMap<Cell, std::int32_t> heads_;  // the last point of each cell
+  std::vector<std::int32_t> next_;     // the previous point in the cell of each point
 };
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
+#include "core/base/hash_map.h"
 
 namespace lpdeform {
 namespace {
@@ -112,7 +112,7 @@ class Marcher {
   SampleGrid grid_;
   std::int64_t step_y_, step_z_;
   std::vector<double> values_;
-  absl::flat_hash_map<Edge, std::int32_t> cuts_;
+  HashMap<Edge, std::int32_t> cuts_;
   std::vector<Eigen::RowVector3d> points_;
   std::vector<Triangle> triangles_;
 };
