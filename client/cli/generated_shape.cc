@@ -106,6 +106,20 @@ GeneratedShape neck(int detail) {
   return shape;
 }
 
+/// Holds the lowest twentieth of a shape, and turns and moves the highest.
+template <TriangleMesh (*make)(int resolution), int kResolution>
+GeneratedShape bent_over(int detail) {
+  GeneratedShape shape{make(kResolution * detail), {}, "the foot stays, the top is bent over"};
+  const Point low = shape.mesh.vertices.colwise().minCoeff(), high = shape.mesh.vertices.colwise().maxCoeff();
+  const double height = high.z() - low.z();
+  hold(shape, "foot", [=](const Point& p) { return p.z() < low.z() + 0.05 * height; });
+  hold(
+      shape, "top", [=](const Point& p) { return p.z() > high.z() - 0.05 * height; },
+      client::RigidMotion{
+          .axis = {1, 0, 0}, .angle_radians = radians(50), .center = {0, 0, (low.z() + high.z()) / 2}});
+  return shape;
+}
+
 struct Entry {
   const char* name;
   GeneratedShape (*make)(int detail);
@@ -120,7 +134,9 @@ constexpr Entry kShapes[] = {{"bar", paper_shape<paper_bar>, kMostDetail},
                              {"sphere", ball, 6},
                              {"creature", animal, 6},
                              {"arm", paper_shape<paper_arm>, 6},
-                             {"neck", neck, kMostDetail / 2}};
+                             {"neck", neck, kMostDetail / 2},
+                             {"scan", bent_over<scan, 48>, kMostDetail / 2},
+                             {"tree", bent_over<tube_tree, 80>, kMostDetail / 2}};
 
 }  // namespace
 

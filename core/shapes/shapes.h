@@ -30,6 +30,14 @@ TriangleMesh sphere(int levels);
 /// resolution >= 24.
 TriangleMesh creature(int resolution);
 
+/// A bust as a scanner might give it: a rough surface of one component with seven holes, and vertices that are off it by
+/// up to 0.2 edge lengths. Generated like the creature. resolution >= 24 is the number of cells along z.
+TriangleMesh scan(int resolution);
+
+/// A trunk along z with four levels of forks: 31 tubes, whose radius falls from 0.09 to 0.02. Generated like the
+/// creature. resolution >= 48 is the number of cells along the longest side.
+TriangleMesh tube_tree(int resolution);
+
 /// Measures of pierced_block.
 struct PiercedBlock {
   static constexpr double kHalfSide = 10, kHalfLength = 19, kHoleRadius = 5.5;

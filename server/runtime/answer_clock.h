@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <utility>
 
 namespace lpdeform {
 
@@ -18,6 +19,16 @@ class AnswerClock {
   void took(std::uint64_t input_seq, TimePoint now) {
     const bool is_late = !waiting_.empty() && input_seq <= waiting_.back().input_seq;
     if (!is_late && waiting_.size() < kMostWaiting) waiting_.push_back({input_seq, now});
+  }
+
+  /// The solver has taken over this update and all before it. Calls `on_waited` with the seconds that each of them waited
+  /// for that.
+  void begun(std::uint64_t input_seq, TimePoint now, const std::function<void(double)>& on_waited) {
+    for (Waiting& one : waiting_) {
+      if (one.input_seq > input_seq) return;
+      if (!std::exchange(one.is_begun, true))
+        on_waited(std::chrono::duration<double>(now - one.since).count());
+    }
   }
 
   /// A frame answers this update and all before it. Calls `on_waited` with the seconds that each of them
@@ -39,6 +50,7 @@ class AnswerClock {
   struct Waiting {
     std::uint64_t input_seq;
     TimePoint since;
+    bool is_begun = false;
   };
   std::deque<Waiting> waiting_;
 };

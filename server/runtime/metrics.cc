@@ -76,6 +76,10 @@ constexpr std::array kLevels{
 constexpr std::array kSpans{
     Entry{"lpdeform_input_to_frame_seconds",
           "From taking an update to the first frame that answers it, if a stream is open."},
+    Entry{"lpdeform_input_to_solve_seconds", "The part of that until the solver takes the update over."},
+    Entry{"lpdeform_frame_to_stream_seconds",
+          "From the publication of a frame until a stream begins to send it: its credit, its pace and its "
+          "turn."},
     Entry{"lpdeform_solve_seconds", "Duration of finished solves."},
     Entry{"lpdeform_setup_seconds", "Time that finished solves spent factoring."},
     Entry{"lpdeform_scheduler_queue_seconds", "From when a session is ready to run until it runs."},
@@ -103,8 +107,8 @@ const Buckets& call_bytes() {
 
 /// From a fifth of a frame at 60 Hz up to waits that nobody would accept.
 const Buckets& our_seconds() {
-  static const Buckets buckets{0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.05, 0.075, 0.1,
-                               0.15,   0.25,  0.5,   1,     2,     5,     10,    30,   60,    300};
+  static const Buckets buckets{0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.05, 0.075,
+                               0.1,    0.15,   0.25,   0.5,   1,     2,     5,     10,    30,    60,   300};
   return buckets;
 }
 

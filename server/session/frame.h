@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <bit>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -123,6 +124,7 @@ struct Frame {
   Method method = Method::kAuto;
   std::optional<double> optimality_gap;  // of a final state, once it is known
   std::uint64_t repeats = 0;             // frame_seq of the same state before its gap was known; 0: none
+  std::chrono::steady_clock::time_point published_at;
   std::shared_ptr<const Surface> surface;
 };
 

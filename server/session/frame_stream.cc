@@ -107,6 +107,8 @@ void FrameStream::begin_frame(Timers::TimePoint now) {
   if (const Timers::TimePoint when = next_frame_at(); now < when) return arm(is_pace_armed_, when);
   is_stalled_ = false;
   publisher_->metrics().add(Count::kFramesSent);
+  const std::chrono::duration<double> waited = std::chrono::steady_clock::now() - newest->published_at;
+  publisher_->metrics().observe(Span::kFrameToStream, waited.count());
   if (has_sent_frame_) {
     publisher_->metrics().add(Count::kFramesSuperseded,
                               static_cast<double>(newest->frame_seq - last_seq_ - 1));

@@ -1,5 +1,6 @@
 #include "server/session/live_solver.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -66,6 +67,7 @@ void LiveSolver::take_over(const Inputs& inputs) {
     publisher_.metrics().add(Count::kUpdatesCoalesced, static_cast<double>(inputs.taken - inputs_.taken - 1));
   }
   inputs_ = inputs;
+  publisher_.begun(inputs.input_seq);
   blocked_ = has_handles ? status : no_handles();
   phase_ = blocked_.ok() ? Phase::kWaiting : Phase::kDone;
   was_begun_ = false;
@@ -111,9 +113,12 @@ void LiveSolver::pause() {
 }
 
 void LiveSolver::run_steps(SolveJob* job, const Pace& pace) {
-  const Clock::time_point end = Clock::now() + pace.slice;
+  const bool is_first = job == nullptr && !is_refinement();
+  const Clock::time_point end = Clock::now() + (is_first ? std::min(pace.slice, kFirstSlice) : pace.slice);
   bool has_more = true;
-  while (has_more && Clock::now() < end) has_more = deformer_->step();
+  do {
+    has_more = deformer_->step();
+  } while (has_more && Clock::now() < end && !is_outdated());
   if (!has_more) return end_solve(job);
   if (job != nullptr) report(*job);
   if (is_frame_due(pace)) publish(false);
@@ -121,9 +126,10 @@ void LiveSolver::run_steps(SolveJob* job, const Pace& pace) {
 
 /// A frame is due if it can be sent to a reader at once, or if the frame that waits for slow readers is old.
 bool LiveSolver::is_frame_due(const Pace& pace) const {
-  if (deformer_->is_certifying()) return false;  // the positions are those of the result
-  const bool is_refinement = shown_version_ == inputs_.version;
-  if (pace.is_sparing && is_refinement && Clock::now() - last_published_ < kBetweenRefinements) return false;
+  if (deformer_->is_certifying()) return false;        // the positions are those of the result
+  if (is_refinement() && is_outdated()) return false;  // the frame of the newer inputs is next
+  if (pace.is_sparing && is_refinement() && Clock::now() - last_published_ < kBetweenRefinements)
+    return false;
   if (publisher_.is_frame_wanted()) return true;
   return publisher_.reader_count() > 0 && Clock::now() - last_published_ >= kOldestWaiting;
 }

@@ -39,6 +39,8 @@ class LiveSolver {
              std::shared_ptr<const DrawMesh> mesh, Alarm alarm, std::stop_token stop);
 
   static constexpr std::chrono::milliseconds kSlice{8};
+  /// Until inputs are shown for the first time: their first frame comes this soon, and better ones follow.
+  static constexpr std::chrono::milliseconds kFirstSlice{1};
   /// While others wait for an answer; under overload.
   static constexpr std::chrono::milliseconds kShortSlice{1}, kOneStep{0};
   static constexpr std::chrono::milliseconds kBetweenRefinements{250};
@@ -56,7 +58,8 @@ class LiveSolver {
     bool is_sparing = false;
   };
 
-  /// Runs for about pace.slice, or for one step if that takes longer. `job` may be null. Returns true if
+  /// Runs for about pace.slice, or for one step if that takes longer. The first slice for new inputs is at most
+  /// kFirstSlice, and a slice ends early when newer inputs come. `job` may be null. Returns true if
   /// there is more to do.
   bool run_slice(SolveJob* job, const Pace& pace);
   bool run_slice(SolveJob* job) { return run_slice(job, Pace()); }
@@ -87,6 +90,8 @@ class LiveSolver {
   bool begin_certificate();
   void set_alarm();
   void report(const SolveJob& job);
+  bool is_refinement() const { return shown_version_ == inputs_.version; }
+  bool is_outdated() const { return mailbox_.version() != inputs_.version; }
   bool is_frame_due(const Pace& pace) const;
   std::shared_ptr<const Frame> publish(bool is_final);
 

@@ -62,6 +62,11 @@ Inputs Mailbox::newest() const {
   return inputs_;
 }
 
+std::uint64_t Mailbox::version() const {
+  const std::scoped_lock lock(mutex_);
+  return inputs_.version;
+}
+
 absl::StatusOr<UpdateResult> Mailbox::take(const Update& update) {
   if (update.input_seq > kHighestInputSeq) return too_high(update.input_seq);
   if (update.input_seq == 0) {

@@ -108,6 +108,8 @@ class Mailbox {
   HistorySize history_size() const;
 
   Inputs newest() const;
+  /// newest().version
+  std::uint64_t version() const;
 
   /// Rises with each update that changes something.
   std::uint64_t revision() const;

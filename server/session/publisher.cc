@@ -20,6 +20,7 @@ std::shared_ptr<const Frame> Publisher::publish(Frame frame) {
     const std::scoped_lock lock(mutex_);
     frame.frame_seq = ++frames_;
     frame.epoch = epoch_;
+    frame.published_at = std::chrono::steady_clock::now();
     published = newest_ = std::make_shared<const Frame>(std::move(frame));
     measure_answer();
   }
@@ -74,6 +75,12 @@ void Publisher::took(std::uint64_t input_seq, AnswerClock::TimePoint since) {
   waiting_.took(input_seq, since);
   if (newest_ && newest_->input_seq >= input_seq)
     measure_answer();  // the frame was published before this call
+}
+
+void Publisher::begun(std::uint64_t input_seq) {
+  const std::scoped_lock lock(mutex_);
+  waiting_.begun(input_seq, std::chrono::steady_clock::now(),
+                 [this](double seconds) { metrics_->observe(Span::kInputToSolve, seconds); });
 }
 
 std::shared_ptr<const Frame> Publisher::newest() const {

@@ -46,6 +46,9 @@ class Publisher {
   /// An update was taken. Starts to measure how long readers wait for the first frame that answers it.
   void took(std::uint64_t input_seq, AnswerClock::TimePoint since);
 
+  /// The solver has taken over this update and all before it.
+  void begun(std::uint64_t input_seq);
+
   std::shared_ptr<const Frame> newest() const;
   std::optional<Standing> standing() const;
 

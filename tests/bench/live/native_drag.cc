@@ -1,5 +1,6 @@
-// A live drag of the viewer's fine bar (10,124 vertices) by the C++ client, for the table of `npm run drag`:
-//   native_drag ADDRESS float32|quantized|compressed SECONDS
+// A live drag of the viewer's fine bar (10,124 vertices, p = 1.5) by the C++ client, for the table of `npm run drag`; and of
+// bars of other sizes, for tests/bench/latency/run:
+//   native_drag ADDRESS float32|quantized|compressed SECONDS [VERTICES P MOVES_A_SECOND]
 // Moves the upper end every 16 ms, like the scripted user of that table, and takes frames as they come. Prints one line of
 // JSON: milliseconds from each move to the frame that answers it, including moves that a newer one superseded.
 
@@ -23,29 +24,32 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr int kCells = 21, kHeight = 110;
+struct Drag {
+  int cells = 21, height = 110;
+  double p = 1.5, moves_a_second = 62.5;
+};
 constexpr milliseconds kPatience{60'000};
 
-Mesh bar() {
-  const TriangleMesh box = box_surface(kCells, kCells, kHeight);
+Mesh bar(const Drag& drag) {
+  const TriangleMesh box = box_surface(drag.cells, drag.cells, drag.height);
   Mesh mesh;
   for (Eigen::Index k = 0; k < box.vertices.size(); ++k)
-    mesh.vertices.push_back(box.vertices.data()[k] / kCells);
+    mesh.vertices.push_back(box.vertices.data()[k] / drag.cells);
   mesh.faces.assign(box.faces.data(), box.faces.data() + box.faces.size());
   return mesh;
 }
 
-Update ends(const Mesh& mesh) {
+Update ends(const Mesh& mesh, const Drag& drag) {
   Handle base, top;
   for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
     const double z = mesh.vertices[3 * v + 2];
     if (z < 0.01) base.vertices.push_back(static_cast<std::uint32_t>(v));
-    if (z > 1.0 * kHeight / kCells - 0.01) top.vertices.push_back(static_cast<std::uint32_t>(v));
+    if (z > 1.0 * drag.height / drag.cells - 0.01) top.vertices.push_back(static_cast<std::uint32_t>(v));
   }
   Update update;
   update.handles.emplace("base", base);
   update.handles.emplace("top", top);
-  update.settings.p = 1.5;
+  update.settings.p = drag.p;
   return update;
 }
 
@@ -72,8 +76,8 @@ void take_frames(Session& session, Tally& tally, std::uint64_t& last_input) {
   }
 }
 
-int run(const std::string& address, Encoding encoding, double seconds) {
-  const Mesh mesh = bar();
+int run(const std::string& address, Encoding encoding, double seconds, const Drag& drag) {
+  const Mesh mesh = bar(drag);
   absl::StatusOr<Client> client = Client::connect(address);
   if (!client.ok()) return std::fprintf(stderr, "%s\n", client.status().ToString().c_str()), 1;
   OpenOptions options;
@@ -81,13 +85,14 @@ int run(const std::string& address, Encoding encoding, double seconds) {
   options.max_frames_per_second = 60;
   absl::StatusOr<Session> session = client->open(mesh, options);
   if (!session.ok()) return std::fprintf(stderr, "%s\n", session.status().ToString().c_str()), 1;
-  (void)session->update(ends(mesh));
+  (void)session->update(ends(mesh, drag));
   if (!session->settle(kPatience).ok()) return std::fprintf(stderr, "nothing settles\n"), 1;
 
   Tally tally;
   std::uint64_t last_input = 0;
   std::jthread reading([&] { take_frames(*session, tally, last_input); });
   const Clock::time_point begin = Clock::now();
+  int moves = 0;
   for (double now = 0; now < seconds; now = std::chrono::duration<double>(Clock::now() - begin).count()) {
     const double aside = std::sin(now / 0.9), down = 0.36 * (1 - std::cos(now / 0.7));
     {
@@ -96,7 +101,8 @@ int run(const std::string& address, Encoding encoding, double seconds) {
       tally.waiting.emplace_back(session->move("top", RigidMotion{.translation = {aside, 0, -down}}).value(),
                                  moved);
     }
-    std::this_thread::sleep_for(milliseconds(16));
+    std::this_thread::sleep_until(begin + std::chrono::duration_cast<Clock::duration>(
+                                              std::chrono::duration<double>(++moves / drag.moves_a_second)));
   }
   {
     const std::lock_guard lock(tally.mutex);
@@ -122,9 +128,19 @@ int main(int count, char** arguments) {
   const std::map<std::string, Encoding> encodings = {{"float32", Encoding::kRaw},
                                                      {"quantized", Encoding::kQuantized},
                                                      {"compressed", Encoding::kCompressed}};
-  if (count != 4 || !encodings.contains(arguments[2])) {
-    std::fprintf(stderr, "native_drag ADDRESS float32|quantized|compressed SECONDS\n");
+  const bool is_sized = count == 7;
+  if ((count != 4 && !is_sized) || !encodings.contains(arguments[2])) {
+    std::fprintf(stderr,
+                 "native_drag ADDRESS float32|quantized|compressed SECONDS [VERTICES P MOVES_A_SECOND]\n");
     return 2;
   }
-  return lpdeform::client::run(arguments[1], encodings.at(arguments[2]), std::stod(arguments[3]));
+  lpdeform::client::Drag drag;
+  if (is_sized) {
+    drag.cells = std::max(
+        1, static_cast<int>(std::sqrt(std::stod(arguments[4]) / 22)));  // 1 x 1 x 5 cells: 22 c^2 vertices
+    drag.height = 5 * drag.cells;
+    drag.p = std::stod(arguments[5]);
+    drag.moves_a_second = std::stod(arguments[6]);
+  }
+  return lpdeform::client::run(arguments[1], encodings.at(arguments[2]), std::stod(arguments[3]), drag);
 }

@@ -155,5 +155,17 @@ TEST(Shapes, FinerCreaturesEncloseTheSameVolume) {
   EXPECT_NEAR(signed_volume(creature(70)) / signed_volume(creature(140)), 1, 0.015);
 }
 
+TEST(Shapes, ScanIsRoughAndHasSevenHoles) {
+  const TriangleMesh mesh = scan(60);
+  expect_sound(mesh, 7, 0);
+  EXPECT_EQ(mesh.vertices, scan(60).vertices);
+}
+
+TEST(Shapes, TubeTreeIsClosedAndBranches) {
+  const TriangleMesh mesh = tube_tree(96);
+  expect_sound(mesh, 0, 0);
+  EXPECT_GT(signed_volume(mesh), 0);
+}
+
 }  // namespace
 }  // namespace lpdeform

@@ -35,6 +35,20 @@ TEST_F(AnswerClockTest, AnUpdateThatCameLateDoesNotCount) {
   EXPECT_EQ(answered(7, 1000), std::vector<double>{1.0});
 }
 
+TEST_F(AnswerClockTest, EachUpdateIsBegunOnceAndStillWaitsForItsFrame) {
+  const auto begun = [this](std::uint64_t seq, int ms) {
+    std::vector<double> waits;
+    clock_.begun(seq, at(ms), [&](double seconds) { waits.push_back(seconds); });
+    return waits;
+  };
+  clock_.took(1, at(0));
+  clock_.took(2, at(250));
+  EXPECT_EQ(begun(1, 500), std::vector<double>{0.5});
+  EXPECT_EQ(begun(2, 1000), std::vector<double>{0.75});
+  EXPECT_EQ(begun(2, 2000), std::vector<double>());
+  EXPECT_EQ(answered(2, 1250), (std::vector<double>{1.25, 1.0}));
+}
+
 TEST_F(AnswerClockTest, ForgetsAndIsBounded) {
   clock_.took(1, at(0));
   clock_.forget();

@@ -19,7 +19,8 @@ TEST(Metrics, EveryCountLevelAndSpanIsThereFromTheBeginning) {
        {"lpdeform_updates_total 0", "lpdeform_updates_coalesced_total 0", "lpdeform_frames_published_total 0",
         "lpdeform_frames_sent_total 0", "lpdeform_frames_superseded_total 0", "lpdeform_frame_bytes_total 0",
         "lpdeform_credit_stalls_total 0", "lpdeform_sessions_created_total 0", "lpdeform_draining 0",
-        "lpdeform_input_to_frame_seconds_count 0", "lpdeform_call_queue_seconds_count 0"}) {
+        "lpdeform_input_to_frame_seconds_count 0", "lpdeform_input_to_solve_seconds_count 0",
+        "lpdeform_call_queue_seconds_count 0"}) {
     EXPECT_TRUE(has_line(metrics, name)) << name;
   }
 }

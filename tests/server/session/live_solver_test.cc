@@ -1,7 +1,9 @@
 #include "server/session/live_solver.h"
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
+#include <thread>
 
 #include "live_solver_fixture.h"
 
@@ -112,6 +114,34 @@ TEST_F(LiveSolverTest, UnderOverloadAnswersComeAtOnceAndRefinementsSeldom) {
     while (stream->next()) {
     }
     ASSERT_TRUE(stream->acknowledge(publisher_->newest()->frame_seq).ok());
+  }
+}
+
+TEST_F(LiveSolverTest, ASliceOfNoTimeMakesAStep) {
+  const auto stream = look_on();
+  ASSERT_TRUE(mailbox_.take(hold_ends(rest(), 1, 8)).ok());
+  ASSERT_TRUE(solver_.run_slice(nullptr, {.slice = LiveSolver::kOneStep, .is_sparing = true}));
+  EXPECT_EQ(publisher_->newest()->input_seq, 1u);
+  EXPECT_EQ(publisher_->newest()->iteration, 1u);
+}
+
+TEST_F(LiveSolverTest, ASliceEndsWhenNewerInputsCome) {
+  const auto stream = look_on();
+  Update update = hold_ends(rest(), 1, 8);
+  update.settings.solver =
+      SolveSettings{.method = Method::kLineSearch, .tolerance = 1e-14, .max_iterations = 1 << 30};
+  ASSERT_TRUE(mailbox_.take(update).ok());
+  for (std::uint64_t input = 2; input <= 6; ++input) {
+    ASSERT_TRUE(solver_.run_slice(nullptr));  // the first one for its inputs; the next one only refines
+    std::atomic<bool> is_running = false;
+    std::jthread updating([&] {
+      is_running.wait(false);
+      EXPECT_TRUE(mailbox_.take(hold_ends(rest(), input, 8 + 0.1 * static_cast<double>(input))).ok());
+    });
+    is_running = true;
+    is_running.notify_one();
+    ASSERT_TRUE(solver_.run_slice(nullptr, {.slice = std::chrono::hours(1)}));
+    EXPECT_FALSE(publisher_->newest()->is_final);
   }
 }
 
