@@ -15,9 +15,10 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kCertificateSeconds = 1;  // it may take this long, even beyond the time limit
-constexpr std::size_t kCopyChunk = 4096;   // vertices
-constexpr std::int32_t kLargeMesh = 5000;  // vertices from which on a coarse level pays off
+constexpr double kCertificateSeconds = 1;    // it may take this long, even beyond the time limit
+constexpr std::size_t kCopyChunk = 4096;     // vertices
+constexpr std::int32_t kLargeMesh = 5000;    // vertices from which on a coarse level pays off
+constexpr std::int32_t kLargeAtTwo = 10000;  // the same if every p is 2, where the gain is smaller
 // If some p is at most kManyMinima, cold solves with kAuto try both methods on meshes with kFewestForTwo to kMostForTwo
 // vertices. kSecondWork limits iterations times vertices of the second method.
 constexpr double kManyMinima = 1.2;
@@ -114,7 +115,8 @@ bool Deformer::Impl::prepare_coarse() {
 
 Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {
   if (asked == Method::kAuto) {
-    asked = is_warm || shape->vertex_count() < kLargeMesh ? Method::kQuasiNewton : Method::kMultiresolution;
+    const std::int32_t large = (material.p.array() == 2).all() ? kLargeAtTwo : kLargeMesh;
+    asked = is_warm || shape->vertex_count() < large ? Method::kQuasiNewton : Method::kMultiresolution;
   }
   if (asked != Method::kMultiresolution || (!is_warm && prepare_coarse())) return asked;
   return Method::kQuasiNewton;
