@@ -1,6 +1,6 @@
 // A live drag of the viewer's fine bar (10,124 vertices, p = 1.5) by the C++ client, for the table of `npm run drag`; and of
 // bars of other sizes, for tests/bench/latency/run:
-//   native_drag ADDRESS float32|quantized|compressed SECONDS [VERTICES P MOVES_A_SECOND]
+//   native_drag ADDRESS float32|quantized|compressed SECONDS [VERTICES P MOVES_A_SECOND FRAMES_A_SECOND]
 // Moves the upper end every 16 ms, like the scripted user of that table, and takes frames as they come. Prints one line of
 // JSON: milliseconds from each move to the frame that answers it, including moves that a newer one superseded.
 
@@ -11,6 +11,7 @@
 #include <deque>
 #include <map>
 #include <mutex>
+#include <numeric>
 #include <string>
 #include <thread>
 #include <vector>
@@ -26,7 +27,7 @@ using std::chrono::milliseconds;
 
 struct Drag {
   int cells = 21, height = 110;
-  double p = 1.5, moves_a_second = 62.5;
+  double p = 1.5, moves_a_second = 62.5, frames_a_second = 60;  // frames: 0 for no limit
 };
 constexpr milliseconds kPatience{60'000};
 
@@ -82,7 +83,7 @@ int run(const std::string& address, Encoding encoding, double seconds, const Dra
   if (!client.ok()) return std::fprintf(stderr, "%s\n", client.status().ToString().c_str()), 1;
   OpenOptions options;
   options.encoding = options.lowest_encoding = encoding;
-  options.max_frames_per_second = 60;
+  options.max_frames_per_second = drag.frames_a_second;
   absl::StatusOr<Session> session = client->open(mesh, options);
   if (!session.ok()) return std::fprintf(stderr, "%s\n", session.status().ToString().c_str()), 1;
   (void)session->update(ends(mesh, drag));
@@ -115,8 +116,11 @@ int run(const std::string& address, Encoding encoding, double seconds, const Dra
     return all.empty() ? NAN : all[static_cast<std::size_t>(share * static_cast<double>(all.size() - 1))];
   };
   std::printf(
-      "{\"vertices\": %zu, \"inputs\": %zu, \"framesPerSecond\": %.1f, \"p50\": %.2f, \"p99\": %.2f}\n",
-      mesh.vertex_count(), all.size(), tally.frames / seconds, at(0.5), at(0.99));
+      "{\"vertices\": %zu, \"inputs\": %zu, \"framesPerSecond\": %.1f, \"p50\": %.2f, \"p99\": %.2f, "
+      "\"mean\": "
+      "%.2f}\n",
+      mesh.vertex_count(), all.size(), tally.frames / seconds, at(0.5), at(0.99),
+      std::accumulate(all.begin(), all.end(), 0.0) / static_cast<double>(all.size()));
   return 0;
 }
 
@@ -128,10 +132,11 @@ int main(int count, char** arguments) {
   const std::map<std::string, Encoding> encodings = {{"float32", Encoding::kRaw},
                                                      {"quantized", Encoding::kQuantized},
                                                      {"compressed", Encoding::kCompressed}};
-  const bool is_sized = count == 7;
+  const bool is_sized = count == 8;
   if ((count != 4 && !is_sized) || !encodings.contains(arguments[2])) {
     std::fprintf(stderr,
-                 "native_drag ADDRESS float32|quantized|compressed SECONDS [VERTICES P MOVES_A_SECOND]\n");
+                 "native_drag ADDRESS float32|quantized|compressed SECONDS [VERTICES P MOVES_A_SECOND "
+                 "FRAMES_A_SECOND]\n");
     return 2;
   }
   lpdeform::client::Drag drag;
@@ -141,6 +146,7 @@ int main(int count, char** arguments) {
     drag.height = 5 * drag.cells;
     drag.p = std::stod(arguments[5]);
     drag.moves_a_second = std::stod(arguments[6]);
+    drag.frames_a_second = std::stod(arguments[7]);
   }
   return lpdeform::client::run(arguments[1], encodings.at(arguments[2]), std::stod(arguments[3]), drag);
 }
