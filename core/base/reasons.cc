@@ -32,6 +32,7 @@ constexpr Row kRows[] = {
     {"COPIES_DIFFER", absl::StatusCode::kInvalidArgument},
     {"CREDIT_OUT_OF_RANGE", absl::StatusCode::kInvalidArgument},
     {"DRAINING", absl::StatusCode::kUnavailable},
+    {"EFFORT_OUT_OF_RANGE", absl::StatusCode::kInvalidArgument},
     {"ENUM_UNKNOWN", absl::StatusCode::kInvalidArgument},
     {"EXCEPTION", absl::StatusCode::kInternal},
     {"FACTOR_TOO_LARGE", absl::StatusCode::kInvalidArgument},

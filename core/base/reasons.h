@@ -30,6 +30,7 @@ enum class Reason {
   kCopiesDiffer,
   kCreditOutOfRange,
   kDraining,
+  kEffortOutOfRange,
   kEnumUnknown,
   kException,
   kFactorTooLarge,

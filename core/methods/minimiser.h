@@ -74,11 +74,6 @@ class Minimiser {
   /// An intermediate state other than x(), if there is a new one since the last call: finite, and all constraints are
   /// satisfied. problem.objective then holds the evaluation there. Calling this does not change steps or their results.
   virtual std::optional<Points> intermediate_state() { return std::nullopt; }
-
-  /// The outcome if a limit ends the solve now. Empty if no method has finished.
-  virtual std::optional<Outcome> outcome_before() const { return std::nullopt; }
-  /// Whether the best state so far comes from the method that is running now, so that the metric belongs to that state.
-  virtual bool is_best_present() const { return true; }
 };
 
 /// Restricts `values`, a gradient or a direction, to what the constraints allow: rows of held vertices become zero, and

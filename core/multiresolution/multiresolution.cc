@@ -10,12 +10,13 @@ constexpr double kCoarseTolerance = 1e-4;  // relative, of E^(1/p); the levels d
 
 }  // namespace
 
-Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level)
+Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level, int effort)
     : problem_(std::move(problem)), x_(std::move(x)), level_(level) {
   objective_ = problem_.objective.reweigh(problem_.norm);
   SolveSettings settings;
   settings.initial = InitialGuess::kLaplacian;
   settings.tolerance = std::max(problem_.tolerance, kCoarseTolerance);
+  settings.effort = effort;
   if (!level_.solver().start(settings, problem_.stop).ok())
     fine_ = std::make_unique<QuasiNewton>(problem_, x_, Warmth::kCold);
 }

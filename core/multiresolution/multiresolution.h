@@ -15,8 +15,9 @@ namespace lpdeform {
 /// guess, QuasiNewton starts from the guess. The convergence criterion is that of QuasiNewton.
 class Multiresolution : public Minimiser {
  public:
-  /// `level` must already have the handles and the material (take_over), and must outlive this object.
-  Multiresolution(Problem problem, Points x, CoarseLevel& level);
+  /// `level` must already have the handles and the material (take_over), and must outlive this object. It looks for lower
+  /// minima with `effort` (SolveSettings::effort).
+  Multiresolution(Problem problem, Points x, CoarseLevel& level, int effort);
 
   StepResult step() override;
   const Points& x() const override { return fine_ ? fine_->x() : x_; }

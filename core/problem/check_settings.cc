@@ -27,6 +27,11 @@ absl::Status check_limits(const SolveSettings& settings) {
     return out_of_range(Reason::kTimeLimitOutOfRange, "time_limit_seconds", settings.time_limit_seconds,
                         "0 < time_limit_seconds");
   }
+  const int effort = settings.effort.value_or(0);
+  if (effort < 0 || effort > SolveSettings::kHighestEffort) {
+    return out_of_range(Reason::kEffortOutOfRange, "effort", effort,
+                        absl::StrCat("0 <= effort <= ", SolveSettings::kHighestEffort));
+  }
   return absl::OkStatus();
 }
 

@@ -7,9 +7,7 @@
 namespace lpdeform {
 
 enum class Method {
-  /// kMultiresolution for cold solves of large meshes, otherwise kQuasiNewton. Cold solves of 300 to 15,000 vertices with
-  /// some p_i <= 1.2 run both and keep the better result.
-  kAuto,
+  kAuto,             // kMultiresolution for cold solves of large meshes, otherwise kQuasiNewton
   kQuasiNewton,      // L-BFGS on E(x) in the metric of the prefactored, reweighted Laplacian. Every p.
   kMultiresolution,  // a coarse level first, then kQuasiNewton. Every p.
   kLineSearch,       // the paper's section 3.2: gradient descent with backtracking. Every p.
@@ -51,12 +49,18 @@ struct SolveSettings {
   int max_iterations = 100000;                                          // >= 0
   double time_limit_seconds = std::numeric_limits<double>::infinity();  // of solving, without set-up; > 0
 
+  /// How far to look for lower minima once the first one is found: from 8 `effort` further starts (MinimaSearch), each of
+  /// which takes at most about as long as the first. 0 to kHighestEffort; 0 takes the first minimum. Not set: 1 for cold solves with
+  /// kAuto if some p_i < 2, where there are many minima; otherwise 0. The result depends on it, but not on the threads.
+  std::optional<int> effort = {};
+
   /// Whether to keep a record of each iteration (SolveSummary::trace). Off in live sessions.
   bool keep_trace = false;
   /// Whether to compute the certificate at the end (SolveSummary::optimality_gap).
   bool certify = false;
 
   static constexpr double kDefaultTolerance = 1e-5;
+  static constexpr int kHighestEffort = 1000;
 };
 
 }  // namespace lpdeform

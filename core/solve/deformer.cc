@@ -16,6 +16,11 @@ namespace {
 // What a solve holds at most, in positions of all vertices: states, gradients and the pairs of L-BFGS.
 constexpr std::size_t kWorkspace = 24;
 
+absl::Status not_solved(const char* what) {
+  return make_fault({Reason::kNotSolved, "", ""},
+                    absl::StrCat("Solve for the current inputs before you ", what, "."));
+}
+
 }  // namespace
 
 Deformer::Deformer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -105,7 +110,14 @@ absl::Status Deformer::start(const SolveSettings& settings, std::stop_token stop
 bool Deformer::step() {
   Impl& self = *impl_;
   if (self.certificate) return self.certify();
-  if (!self.minimiser) return false;
+  if (is_searching()) {
+    if (self.stop.stop_requested())
+      self.interrupt();
+    else
+      self.search_on();
+    return self.search != nullptr;
+  }
+  if (!self.minimiser && !self.search) return false;
   if (self.stop.stop_requested())
     self.end(StopReason::kCancelled);
   else if (self.seconds() >= self.settings.time_limit_seconds)
@@ -114,7 +126,7 @@ bool Deformer::step() {
     self.end(StopReason::kIterationLimit);
   else
     self.iterate();
-  return self.minimiser != nullptr || self.certificate != nullptr;
+  return self.minimiser != nullptr || self.search != nullptr || self.certificate != nullptr;
 }
 
 void Deformer::catch_up() {
@@ -124,13 +136,41 @@ void Deformer::catch_up() {
 absl::Status Deformer::start_certificate(std::stop_token stop, double max_seconds) {
   Impl& self = *impl_;
   self.interrupt();
-  if (!self.norm) {
-    return make_fault({Reason::kNotSolved, "", ""},
-                      "Solve for the current inputs before you ask for a certificate.");
-  }
+  if (!self.norm) return not_solved("ask for a certificate");
   self.stop = std::move(stop);
   self.begin_certificate(max_seconds);
   return absl::OkStatus();
+}
+
+absl::Status Deformer::start_search(int effort, std::stop_token stop) {
+  Impl& self = *impl_;
+  if (absl::Status status = check_settings({.effort = effort}, self.material); !status.ok()) return status;
+  self.interrupt();
+  if (!self.norm) return not_solved("look for a lower minimum");
+  self.settings.effort = effort;
+  const int starts = self.further_starts();
+  if (starts == 0) return absl::OkStatus();
+  self.stop = std::move(stop);
+  self.is_search_apart = true;
+  self.begin_search(starts);
+  return absl::OkStatus();
+}
+
+bool Deformer::is_searching() const {
+  return impl_->search != nullptr && impl_->is_search_apart;
+}
+
+std::optional<double> Deformer::better_energy() const {
+  if (!impl_->better) return std::nullopt;
+  return impl_->norm->true_energy(impl_->better->sum);
+}
+
+bool Deformer::take_better() {
+  Impl& self = *impl_;
+  self.interrupt();
+  if (!self.better) return false;
+  self.take_better();
+  return true;
 }
 
 bool Deformer::is_certifying() const {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <stop_token>
 
 #include "absl/status/status.h"
@@ -23,6 +24,8 @@ struct DeformerOptions {
   int threads = 1;
   /// Smaller meshes use only the calling thread, because more threads would make them slower.
   std::int32_t parallel_from = 8000;  // vertices
+  /// Larger meshes look for lower minima on their coarse levels only.
+  std::int32_t search_up_to = 15000;  // vertices
   /// Admission control: called once with the memory that a solve takes, before it is allocated. create() returns its
   /// error.
   std::function<absl::Status(std::size_t bytes)> admit = {};
@@ -77,6 +80,19 @@ class Deformer {
                                  double max_seconds = std::numeric_limits<double>::infinity());
   /// Whether the current steps are those of a certificate; positions() then do not change any more.
   bool is_certifying() const;
+
+  /// Begins to look for minima lower than positions(), which must be the result of a solve for the current inputs: from 8
+  /// `effort` further starts (SolveSettings::effort), or, on a mesh larger than DeformerOptions::search_up_to, by a cold solve
+  /// whose coarse levels do so. A second call goes on with other starts. step() continues it; when step() returns false, or
+  /// anything else is started, better_energy() has what was found. positions() do not change. Does nothing where a lower
+  /// minimum cannot be. INVALID_ARGUMENT (EFFORT_OUT_OF_RANGE); FAILED_PRECONDITION (NOT_SOLVED). `stop` ends it.
+  absl::Status start_search(int effort, std::stop_token stop = {});
+  /// Whether the current steps are those of such a search.
+  bool is_searching() const;
+  /// The true energy of the lowest minimum that start_search has found for the current inputs, if it is below summary().energy.
+  std::optional<double> better_energy() const;
+  /// Makes that minimum the current state: positions(), cell_energies() and the energies of summary(). False if there is none.
+  bool take_better();
 
   /// Updates positions(), cell_energies() and summary() to the prolonged state of the coarse level of a running
   /// kMultiresolution, if that is better than the guess; otherwise does nothing. Later steps and the result do not

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "core/constraints/holds.h"
-#include "core/methods/best_of_two.h"
 #include "core/methods/conic.h"
 #include "core/methods/line_search.h"
 #include "core/methods/local_global.h"
@@ -19,11 +18,7 @@ constexpr double kCertificateSeconds = 1;    // it may take this long, even beyo
 constexpr std::size_t kCopyChunk = 4096;     // vertices
 constexpr std::int32_t kLargeMesh = 5000;    // vertices from which on a coarse level pays off
 constexpr std::int32_t kLargeAtTwo = 10000;  // the same if every p is 2, where the gain is smaller
-// If some p is at most kManyMinima, cold solves with kAuto try both methods on meshes with kFewestForTwo to kMostForTwo
-// vertices. kSecondWork limits iterations times vertices of the second method.
-constexpr double kManyMinima = 1.2;
-constexpr std::int32_t kFewestForTwo = 300, kMostForTwo = 15000;
-constexpr double kSecondWork = 2e7;
+constexpr std::int32_t kLargestSearchedLevel = 5000;  // vertices of a coarse level that looks for lower minima itself
 constexpr double kRounding = 1e-13;  // relative to the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
@@ -105,7 +100,9 @@ Problem Deformer::Impl::make_problem() {
 /// if the coarse level has no vertices for the handles.
 bool Deformer::Impl::prepare_coarse() {
   const auto make_solver = [this](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
-    const DeformerOptions of_level{.free_components = FreeComponents::kStay, .threads = workers().threads()};
+    const DeformerOptions of_level{.free_components = FreeComponents::kStay,
+                                   .threads = workers().threads(),
+                                   .search_up_to = kLargestSearchedLevel};
     auto deformer = Deformer::create(std::move(level), of_level);
     return deformer.ok() ? std::make_unique<DeformerOfLevel>(*std::move(deformer)) : nullptr;
   };
@@ -122,28 +119,6 @@ Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {
   return Method::kQuasiNewton;
 }
 
-/// The method to try after settings.method, which kAuto has chosen; kAuto if there is none.
-Method Deformer::Impl::second_method(Method asked, bool is_warm) {
-  const std::int32_t n = shape->vertex_count();
-  const bool tries = asked == Method::kAuto && !is_warm && n >= kFewestForTwo && n <= kMostForTwo &&
-                     material.p.minCoeff() <= kManyMinima;
-  if (!tries) return Method::kAuto;
-  if (settings.method == Method::kMultiresolution) return Method::kQuasiNewton;
-  return prepare_coarse() ? Method::kMultiresolution : Method::kAuto;
-}
-
-/// Runs `first`, then the second method from the same guess with a metric of equal weights, as if it ran alone.
-std::unique_ptr<Minimiser> Deformer::Impl::with_second(std::unique_ptr<Minimiser> first,
-                                                       const Points& guess) {
-  const auto make = [this, guess] {
-    forget_weights();
-    if (prepare_metric(true)) objective.evaluate(guess, *norm);
-    return make_minimiser(second, guess, Warmth::kCold);
-  };
-  const int most = static_cast<int>(kSecondWork / shape->vertex_count());
-  return std::make_unique<BestOfTwo>(std::move(first), make, most, zero_objective());
-}
-
 std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points guess, Warmth warmth) {
   Problem problem = make_problem();
   switch (method) {
@@ -154,7 +129,7 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points 
     case Method::kConic:
       return std::make_unique<Conic>(std::move(problem), std::move(guess));
     case Method::kMultiresolution:
-      return std::make_unique<Multiresolution>(std::move(problem), std::move(guess), *coarse);
+      return std::make_unique<Multiresolution>(std::move(problem), std::move(guess), *coarse, *settings.effort);
     case Method::kAuto:
     case Method::kQuasiNewton:
       break;
@@ -248,13 +223,14 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   stop = std::move(new_stop);
   summary = {};
   summary.threads = workers().threads();
+  better.reset();
+  next_start = 0;
   evaluations_before = objective.evaluations();
   back_substitutions_before = metric.back_substitutions();
   const bool is_warm = settings.initial == InitialGuess::kCurrent && state == State::kDeformed;
   if (!is_warm) x_before_move.resize(0, 3);
-  const Method asked = settings.method;
-  settings.method = summary.method = chosen_method(asked, is_warm);
-  second = second_method(asked, is_warm);
+  if (!settings.effort) settings.effort = default_effort(is_warm);
+  settings.method = summary.method = chosen_method(settings.method, is_warm);
   const bool keeps_metric =
       is_warm && factor == Factor::kQuasiNewton && metric.is_factored_for(constraints->is_held);
   warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
@@ -275,8 +251,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   norm.emplace(effective_material(), shape->vertex_count(), unit(), reference);
   objective.reweigh(*norm);  // typical_energy has evaluated the guess
   best_sum = std::numeric_limits<double>::infinity();
-  minimiser = make_minimiser(settings.method, guess, warmth);
-  if (second != Method::kAuto) minimiser = with_second(std::move(minimiser), guess);
+  minimiser = make_minimiser(settings.method, std::move(guess), warmth);
   factor = settings.method == Method::kQuasiNewton ? Factor::kQuasiNewton : Factor::kUsable;
   const double sum = objective.sum(*norm);
   keep_if_best(sum);
@@ -286,8 +261,9 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
 }
 
 void Deformer::Impl::iterate() {
-  const StepResult result = minimiser->step();
   ++summary.iterations;
+  if (search) return search_on();
+  const StepResult result = minimiser->step();
   double sum = result.true_sum ? *result.true_sum : objective.sum(*norm);
   keep_if_best(sum);
   const bool is_over = result.outcome == Outcome::kConverged || result.outcome == Outcome::kStalled;
@@ -297,45 +273,50 @@ void Deformer::Impl::iterate() {
     case Outcome::kProgress:
       return;
     case Outcome::kConverged:
-      return end(StopReason::kConverged);
+      return settle(StopReason::kConverged);
     case Outcome::kStalled:
-      return end(StopReason::kStalled);
+      return settle(StopReason::kStalled);
     case Outcome::kBreakdown:
       return end(StopReason::kNumericalBreakdown);
   }
 }
 
-/// After two methods were tried: records which of them the result is from, and restores what belongs to it.
-void Deformer::Impl::settle_methods() {
-  if (!minimiser || second == Method::kAuto) return;
-  if (!minimiser->outcome_before()) return;  // only the first method ran
-  if (minimiser->is_best_present()) {
-    settings.method = summary.method = second;
-    factor = second == Method::kQuasiNewton ? Factor::kQuasiNewton : Factor::kUsable;
-  } else {
-    objective.evaluate(x, *norm);  // the next solve reads the previous soft targets from it
-  }
+/// The minimiser has converged or stalled: goes on with the search for lower minima, if one is wanted.
+void Deformer::Impl::settle(StopReason reason) {
+  end_minimiser(reason);
+  summary.minima.push_back(summary.energy);
+  const int starts = further_starts();
+  if (starts == 0 || is_large()) return conclude();  // the coarse levels of a large mesh have looked already
+  is_search_apart = false;
+  begin_search(starts);
 }
 
-void Deformer::Impl::end(StopReason reason) {
+void Deformer::Impl::end_minimiser(StopReason reason) {
   catch_up();
-  const bool is_limit = reason == StopReason::kTimeLimit || reason == StopReason::kIterationLimit;
-  const bool is_of_first = minimiser && !minimiser->is_best_present();
-  if (is_limit && is_of_first && minimiser->outcome_before() == Outcome::kConverged)
-    reason = StopReason::kConverged;
-  settle_methods();
-  const bool has_metric = !minimiser || minimiser->is_best_present();
   // Before convergence the metric may still be that of the guess.
   if (settings.method == Method::kMultiresolution && reason == StopReason::kConverged)
     factor = Factor::kQuasiNewton;
   else if (settings.method == Method::kMultiresolution)
     forget_weights();
-  if (!has_metric) forget_weights();
   minimiser.reset();
   state = is_best_zero() ? State::kUndistorted : State::kDeformed;
   summary.stop_reason = reason;
   summary.solve_seconds = seconds();
-  if (!settings.certify || reason == StopReason::kCancelled) return;
+}
+
+/// Ends the running solve because of a limit or because it was cancelled.
+void Deformer::Impl::end(StopReason reason) {
+  if (minimiser) end_minimiser(reason);
+  if (search) end_search();
+  if (reason == StopReason::kCancelled)
+    summary.stop_reason = reason;
+  else
+    conclude();
+}
+
+/// Goes on with the certificate, if one is wanted.
+void Deformer::Impl::conclude() {
+  if (!settings.certify) return;
   const double rest = settings.time_limit_seconds - summary.solve_seconds;
   begin_certificate(std::max(kCertificateSeconds, rest));
 }

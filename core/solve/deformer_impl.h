@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/certificate/certificate.h"
+#include "core/methods/minima_search.h"
 #include "core/methods/minimiser.h"
 #include "core/methods/quasi_newton.h"
 #include "core/multiresolution/coarse_level.h"
@@ -14,8 +15,8 @@
 
 namespace lpdeform {
 
-/// The state of a Deformer, and the loop of a solve. Initial guesses are in deformer_guess.cc, everything else in
-/// deformer_impl.cc.
+/// The state of a Deformer, and the loop of a solve. Initial guesses are in deformer_guess.cc, the search for lower minima in
+/// deformer_search.cc, everything else in deformer_impl.cc.
 struct Deformer::Impl {
   Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options, Metric first_metric)
       : shape(std::move(rest_shape)),
@@ -43,8 +44,6 @@ struct Deformer::Impl {
   Method chosen_method(Method asked, bool is_warm);
   bool prepare_coarse();
   std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, Warmth warmth);
-  Method second_method(Method asked, bool is_warm);
-  std::unique_ptr<Minimiser> with_second(std::unique_ptr<Minimiser> first, const Points& guess);
   bool prepare_metric(bool needs_plain_weights);
   void keep_if_best(double sum);
   void keep(const Points& from, double sum);
@@ -53,10 +52,22 @@ struct Deformer::Impl {
   Material effective_material() const;
   void summarise();
   void record(const StepResult& result, double sum);
-  void settle_methods();
   void begin(const SolveSettings& new_settings, std::stop_token new_stop);
   void iterate();
+  void settle(StopReason reason);
+  void end_minimiser(StopReason reason);
   void end(StopReason reason);
+  void conclude();
+  bool is_large() const { return shape->vertex_count() > options.search_up_to; }
+  int default_effort(bool is_warm) const;
+  int further_starts() const;
+  Points displaced(const Points& from, int number) const;
+  std::unique_ptr<Minimiser> make_start(int number, const Points& guess, const Points& lowest);
+  std::unique_ptr<Minimiser> make_large_start(const Points& guess);
+  void begin_search(int starts);
+  void search_on();
+  void end_search();
+  void take_better();
   void begin_certificate(double max_seconds);
   bool certify();
   void replace_constraints(Constraints next);
@@ -65,10 +76,15 @@ struct Deformer::Impl {
   void forget_weights() { factor = std::min(factor, Factor::kUsable); }
   void interrupt() {
     certificate.reset();
-    if (minimiser) end(StopReason::kCancelled);
+    if (search && is_search_apart)
+      end_search();
+    else if (search || minimiser)
+      end(StopReason::kCancelled);
   }
   void change_inputs() {
     interrupt();
+    better.reset();
+    next_start = 0;
     norm.reset();
   }
 
@@ -94,6 +110,12 @@ struct Deformer::Impl {
   Points positions;      // x in the caller's units, made when asked for
   bool is_positions_current = true;
 
+  /// A state of lower energy than x, for the same inputs.
+  struct BetterShape {
+    Points x;
+    double sum;  // true sum
+  };
+
   enum class Factor {
     kOutdated,  // made for other soft terms or linear rows than the present ones
     kUsable,    // for the present ones, with any cell weights
@@ -104,12 +126,16 @@ struct Deformer::Impl {
   // The running solve.
   SolveSettings settings;
   Warmth warmth = Warmth::kCold;
-  Method second = Method::kAuto;  // tried after settings.method; kAuto: none
   std::stop_token stop;
   std::optional<LpNorm> norm;           // true norm, and the reference of the running solve
   std::unique_ptr<CoarseLevel> coarse;  // made when first needed
   std::unique_ptr<Minimiser> minimiser;
-  std::unique_ptr<Certificate> certificate;  // runs after the minimiser has ended
+  std::unique_ptr<MinimaSearch> search;      // runs after the minimiser has ended
+  bool is_search_apart = false;              // its result goes to `better`, not to x
+  int search_stage = 0;                      // of its records
+  int next_start = 0;                        // of the next search for the same inputs
+  std::optional<BetterShape> better;         // the lowest minimum known, if it is lower than x
+  std::unique_ptr<Certificate> certificate;  // runs after the minimiser and the search have ended
   std::chrono::steady_clock::time_point started;
   double best_sum = 0, best_soft_sum = 0;
   int evaluations_before = 0, back_substitutions_before = 0;  // counts of this Deformer when the solve began

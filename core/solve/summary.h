@@ -31,6 +31,11 @@ struct SolveSummary {
   /// bounds how far the result can be from the optimum for these rotations. 0 if E is 0 to rounding. Empty if not
   /// requested.
   std::optional<double> optimality_gap;
+  /// True energies of the minima that were seen, in order: the first one, and those that the search for lower ones found
+  /// (SolveSettings::effort). `energy` is the lowest of them. Empty if a limit has ended the solve before the first.
+  std::vector<double> minima;
+  /// The starts from which the search looked for lower minima. Those that came nowhere near have no entry in `minima`.
+  int further_starts = 0;
   double setup_seconds = 0;  // factorisation for these handles; 0 if it was reused
   double solve_seconds = 0;
   int threads = 1;

@@ -23,6 +23,7 @@ namespace Lpdeform
         public const string CopiesDiffer = "COPIES_DIFFER";
         public const string CreditOutOfRange = "CREDIT_OUT_OF_RANGE";
         public const string Draining = "DRAINING";
+        public const string EffortOutOfRange = "EFFORT_OUT_OF_RANGE";
         public const string EnumUnknown = "ENUM_UNKNOWN";
         public const string Exception = "EXCEPTION";
         public const string FactorTooLarge = "FACTOR_TOO_LARGE";

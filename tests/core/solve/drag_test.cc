@@ -59,7 +59,7 @@ class DragTest : public testing::TestWithParam<DragCase> {
   /// Moves the handles and iterates, `iterations` at most. The first state goes to `first`.
   static void move(Deformer& live, const HandleSet& handles, int iterations, Points* first = nullptr) {
     ASSERT_TRUE(live.set_handles(handles).ok());
-    ASSERT_TRUE(live.start({}).ok());
+    ASSERT_TRUE(live.start({.effort = 0}).ok());
     live.step();
     if (first != nullptr) *first = live.positions();
     for (int k = 1; k < iterations && live.step(); ++k) {
@@ -71,7 +71,7 @@ TEST_P(DragTest, FramesDoNotFlicker) {
   for (const PaperPose& pose : poses()) {
     const auto live =
         deformer(rest_shape(pose.mesh), part_way(pose.handles, 0), Material::uniform(GetParam().p));
-    ASSERT_TRUE(live->solve({}).ok());
+    ASSERT_TRUE(live->solve({.effort = 0}).ok());
     for (int k = 1; k <= GetParam().moves; ++k) {
       const HandleSet handles = part_way(pose.handles, double(k) / GetParam().moves);
       const Points before = live->positions();
@@ -87,7 +87,7 @@ TEST_P(DragTest, FramesThatRefineAMoveGoOneWay) {
   for (const PaperPose& pose : poses()) {
     const auto live =
         deformer(rest_shape(pose.mesh), part_way(pose.handles, 0), Material::uniform(GetParam().p));
-    ASSERT_TRUE(live->solve({}).ok());
+    ASSERT_TRUE(live->solve({.effort = 0}).ok());
     for (int k = 1; k <= GetParam().moves; ++k) {
       ASSERT_TRUE(live->set_handles(part_way(pose.handles, double(k) / GetParam().moves)).ok());
       ASSERT_TRUE(live->start({}).ok());
@@ -109,7 +109,7 @@ TEST_P(DragTest, ADragBackToTheStartEndsAtRest) {
   for (const PaperPose& pose : poses()) {
     const auto live =
         deformer(rest_shape(pose.mesh), part_way(pose.handles, 0), Material::uniform(GetParam().p));
-    ASSERT_TRUE(live->solve({}).ok());
+    ASSERT_TRUE(live->solve({.effort = 0}).ok());
     const int moves = GetParam().moves;
     double largest = 0;
     for (int k = 1; k <= 2 * moves; ++k) {
@@ -143,7 +143,7 @@ TEST(PushedDragTest, EndsAtRest) {
       const TriangleMesh mesh = grid(kSide, kSide, push > 0 ? 0 : 1);
       for (const int iterations : {1, 2, 3}) {
         const auto live = deformer(rest_shape(mesh), handles_at(mesh, 0, 0), Material::uniform(6));
-        ASSERT_TRUE(live->solve({}).ok());
+        ASSERT_TRUE(live->solve({.effort = 0}).ok());
         double largest = 0;
         for (int k = 1; k <= 2 * kMoves; ++k) {
           const double share = double(std::min(k, 2 * kMoves - k)) / kMoves;

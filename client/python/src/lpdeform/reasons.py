@@ -25,6 +25,7 @@ Reason = Literal[
     "COPIES_DIFFER",
     "CREDIT_OUT_OF_RANGE",
     "DRAINING",
+    "EFFORT_OUT_OF_RANGE",
     "ENUM_UNKNOWN",
     "EXCEPTION",
     "FACTOR_TOO_LARGE",

@@ -21,6 +21,7 @@ export type Reason =
   | "COPIES_DIFFER"
   | "CREDIT_OUT_OF_RANGE"
   | "DRAINING"
+  | "EFFORT_OUT_OF_RANGE"
   | "ENUM_UNKNOWN"
   | "EXCEPTION"
   | "FACTOR_TOO_LARGE"

@@ -1,0 +1,176 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <utility>
+
+#include "core/solve/deformer_impl.h"
+
+namespace lpdeform {
+namespace {
+
+constexpr int kStartsOfEffort = 8;           // starts for each unit of effort
+constexpr std::int32_t kSmallestMesh = 100;  // vertices; smaller ones have few minima
+constexpr double kWork = 2e7;                // iterations times vertices of a start, at most
+
+/// Start k begins at the Laplacian deformation or at the lowest minimum, displaced by a share of the diagonal: at kOrigins[k mod
+/// 4]. No single one of them reaches the lowest minimum of every problem (tests/bench/README.md, "Minima").
+struct Origin {
+  bool is_lowest;
+  double share;
+};
+constexpr std::array kOrigins = {Origin{false, 0.08}, Origin{true, 0.2}, Origin{false, 0.2}, Origin{true, 0.08}};
+
+constexpr double kRoughTolerance = 1e-3;
+constexpr int kWaves = 6;
+constexpr double kMostWaves = 2;  // along the diagonal, for each axis
+
+/// Minimises with p = 2 everywhere first, and from there with the true norm. Where p is mixed, this leads to other minima than
+/// a path that changes all p_i together.
+class ByWayOfTwo : public Minimiser {
+ public:
+  ByWayOfTwo(Problem problem, Points x)
+      : problem_(std::move(problem)), two_(problem_.norm.nearer_two(0)), present_(at_two(std::move(x))) {}
+
+  StepResult step() override {
+    StepResult result = present_->step();
+    result.true_sum = problem_.objective.sum(problem_.norm);
+    result.stage += is_second_ ? 1 : 0;
+    if (is_second_ || result.outcome == Outcome::kProgress) return result;
+    problem_.objective.reweigh(problem_.norm);
+    present_ = std::make_unique<QuasiNewton>(problem_, present_->x(), Warmth::kWarm);
+    is_second_ = true;
+    result.outcome = Outcome::kProgress;
+    return result;
+  }
+  const Points& x() const override { return present_->x(); }
+
+ private:
+  std::unique_ptr<Minimiser> at_two(Points x) const {
+    problem_.objective.reweigh(two_);
+    const Problem& of = problem_;
+    return std::make_unique<QuasiNewton>(
+        Problem{of.objective, of.metric, of.constraints, two_, of.tolerance, of.length_unit, of.diagonal,
+                of.zero_objective, of.zero_squares, of.stop},
+        std::move(x), Warmth::kCold);
+  }
+
+  const Problem problem_;
+  const LpNorm two_;
+  std::unique_ptr<Minimiser> present_;
+  bool is_second_ = false;
+};
+
+}  // namespace
+
+int Deformer::Impl::default_effort(bool is_warm) const {
+  return settings.method == Method::kAuto && !is_warm && material.p.minCoeff() < 2 ? 1 : 0;
+}
+
+int Deformer::Impl::further_starts() const {
+  if (state == State::kUndistorted || shape->vertex_count() < kSmallestMesh) return 0;
+  return *settings.effort == 0 || !is_large() ? kStartsOfEffort * *settings.effort : 1;
+}
+
+/// `from` displaced by a sum of kWaves smooth waves with random directions, wavelengths and phases, which depend on `number`
+/// only. Held vertices stay at their targets, and the surface around them follows.
+Points Deformer::Impl::displaced(const Points& from, int number) const {
+  std::mt19937_64 bits(static_cast<std::uint64_t>(number) + 101);
+  const auto uniform = [&bits] { return static_cast<double>(bits() >> 11) * 0x1p-53; };
+  const auto centred = [&uniform]() -> Eigen::Vector3d {
+    const double x = uniform() - 0.5, y = uniform() - 0.5, z = uniform() - 0.5;
+    return {x, y, z};
+  };
+  const double diagonal = shape->diagonal() / unit();
+  const double share = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()].share;
+  Points x = from;
+  for (int wave = 0; wave < kWaves; ++wave) {
+    const Eigen::Vector3d frequency = 4 * std::numbers::pi * kMostWaves / diagonal * centred();
+    const double phase = 2 * std::numbers::pi * uniform();
+    const Eigen::RowVector3d amplitude = share * diagonal * centred().transpose();
+    for (Eigen::Index i = 0; i < x.rows(); ++i) {
+      x.row(i) += std::cos(shape->scaled_positions().row(i).dot(frequency) + phase) * amplitude;
+    }
+  }
+  Points back = Points::Zero(x.rows(), 3);
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    if (constraints->is_held[i]) back.row(i) = constraints->targets.row(i) - x.row(i);
+  }
+  metric.extend(constraints->is_held, back, workers());
+  x += back;
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    if (constraints->is_held[i]) x.row(i) = constraints->targets.row(i);
+  }
+  constraints->linear.satisfy_within(metric, x, workers());
+  return x;
+}
+
+std::unique_ptr<Minimiser> Deformer::Impl::make_start(int number, const Points& guess, const Points& lowest) {
+  const Origin origin = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()];
+  const bool goes_by_two = number == 0 && !material.has_uniform_p();
+  Points x = goes_by_two ? guess : displaced(origin.is_lowest ? lowest : guess, number);
+  if (!x.allFinite()) x = lowest;
+  forget_weights();
+  (void)prepare_metric(true);
+  objective.evaluate(x, *norm);
+  Problem problem = make_problem();
+  problem.tolerance = std::max(problem.tolerance, kRoughTolerance);
+  if (goes_by_two) return std::make_unique<ByWayOfTwo>(std::move(problem), std::move(x));
+  return std::make_unique<QuasiNewton>(std::move(problem), std::move(x), Warmth::kWithMetric);
+}
+
+/// On a mesh that is too large to be searched itself: a cold solve, whose coarse levels look for lower minima.
+std::unique_ptr<Minimiser> Deformer::Impl::make_large_start(const Points& guess) {
+  objective.evaluate(guess, *norm);
+  return make_minimiser(prepare_coarse() ? Method::kMultiresolution : Method::kQuasiNewton, guess, Warmth::kCold);
+}
+
+void Deformer::Impl::begin_search(int starts) {
+  forget_weights();
+  MinimaSearch::Scope scope{.first = next_start, .starts = starts};
+  scope.most_iterations = static_cast<int>(kWork / shape->vertex_count());
+  if (is_large()) scope.most_iterations = std::numeric_limits<int>::max();
+  (void)prepare_metric(true);  // if that fails, so do the starts
+  auto start = [this, guess = laplacian_guess()](int number, const Points& lowest) {
+    return is_large() ? make_large_start(guess) : make_start(number, guess, lowest);
+  };
+  auto finish = [this](Points rough) {
+    return std::make_unique<QuasiNewton>(make_problem(), std::move(rough), Warmth::kWithMetric);
+  };
+  search = std::make_unique<MinimaSearch>(std::move(start), std::move(finish), scope, better ? better->x : x,
+                                          better ? better->sum : best_sum);
+  search_stage = summary.trace.empty() ? 0 : summary.trace.back().stage + 1;
+}
+
+void Deformer::Impl::search_on() {
+  const bool has_more = search->step();
+  if (!has_more) end_search();
+  if (is_search_apart) return;
+  record({Outcome::kProgress, best_sum, search_stage}, best_sum);
+  if (!has_more) conclude();
+}
+
+/// Keeps the lowest minimum found, and leaves the evaluation at x, of which the next solve reads the previous soft targets.
+void Deformer::Impl::end_search() {
+  summary.further_starts += search->starts();
+  next_start += search->starts();
+  for (const double sum : search->minima()) summary.minima.push_back(norm->true_energy(sum));
+  if (search->has_improved() && is_search_apart) better = BetterShape{search->lowest(), search->lowest_sum()};
+  const bool takes_it = search->has_improved() && !is_search_apart;
+  objective.evaluate(takes_it ? search->lowest() : x, *norm);
+  if (takes_it) keep(search->lowest(), search->lowest_sum());
+  if (!is_search_apart) summarise();
+  search.reset();
+}
+
+void Deformer::Impl::take_better() {
+  objective.evaluate(better->x, *norm);
+  keep(better->x, better->sum);
+  better.reset();
+  summary.energy = norm->true_energy(best_sum);
+  summary.soft_energy = norm->true_energy(best_soft_sum);
+}
+
+}  // namespace lpdeform

@@ -1,0 +1,198 @@
+#include "core/methods/minima_search.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+
+#include "core/base/fault.h"
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+SolveSettings cold(std::optional<int> effort = std::nullopt) {
+  SolveSettings result;
+  result.effort = effort;
+  result.initial = InitialGuess::kLaplacian;
+  result.keep_trace = true;
+  return result;
+}
+
+/// The first minimum of bar(80) is 2.8 % above the lowest one known, p = 1.5.
+struct Bent {
+  TriangleMesh mesh;
+  HandleSet handles;
+};
+
+Bent bar(double degrees) {
+  Bent result{box_surface(6, 6, 40), {}};
+  (void)result.handles.set("bottom", {slice(result.mesh, 2, 0, 0), Fixed{}});
+  (void)result.handles.set(
+      "top", {slice(result.mesh, 2, 40, 40), turn(Eigen::Vector3d::UnitX(), degrees, {3, 3, 20})});
+  return result;
+}
+
+Bent lifted_grid(double height) {
+  Bent result{grid(30, 30, 1.0), {}};
+  (void)result.handles.set("corner", {{0, 1, 31}, Fixed{}});
+  (void)result.handles.set("lifted", {{960}, RigidMotion{.translation = {0, 0, height}}});
+  return result;
+}
+
+class MinimaSearchTest : public testing::Test {
+ protected:
+  static std::unique_ptr<Deformer> solver_of(const Bent& bent, int threads = 1) {
+    auto result = Deformer::create(rest_shape(bent.mesh), {.threads = threads, .parallel_from = 1}).value();
+    EXPECT_TRUE(result->set_handles(bent.handles).ok());
+    EXPECT_TRUE(result->set_material(Material::uniform(1.5)).ok());
+    return result;
+  }
+  static SolveSummary solve(const Bent& bent, const SolveSettings& settings) {
+    return solver_of(bent)->solve(settings).value();
+  }
+  static void run(Deformer& deformer) {
+    while (deformer.step()) {
+    }
+  }
+};
+
+TEST_F(MinimaSearchTest, EffortZeroTakesTheFirstMinimum) {
+  const SolveSummary first = solve(bar(80), cold(0));
+  EXPECT_THAT(first.minima, testing::ElementsAre(first.energy));
+  EXPECT_EQ(first.further_starts, 0);
+}
+
+TEST_F(MinimaSearchTest, TheDefaultEndsInALowerMinimum) {
+  for (const Bent& bent : {bar(80), bar(120), lifted_grid(5)}) {
+    const SolveSummary first = solve(bent, cold(0)), lowest = solve(bent, cold());
+    EXPECT_LE(lowest.energy, first.energy);
+    EXPECT_EQ(lowest.stop_reason, StopReason::kConverged);
+    EXPECT_EQ(lowest.further_starts, 8);
+    EXPECT_EQ(lowest.minima.front(), first.energy);
+    EXPECT_EQ(lowest.energy, std::ranges::min(lowest.minima));
+  }
+  EXPECT_LT(solve(bar(80), cold()).energy, 0.98 * solve(bar(80), cold(0)).energy);
+}
+
+TEST_F(MinimaSearchTest, TheEnergyIsThatOfThePositions) {
+  const auto solver = solver_of(bar(80));
+  const SolveSummary summary = solver->solve(cold()).value();
+  EXPECT_NEAR(solver->cell_energies().array().pow(1.5).sum(), summary.energy, 1e-9 * summary.energy);
+}
+
+TEST_F(MinimaSearchTest, StagesAndTrueEnergiesFollowOneAnother) {
+  const SolveSummary summary = solve(bar(80), cold());
+  int stage = 0;
+  for (const IterationRecord& record : summary.trace) {
+    EXPECT_GE(record.stage, stage);
+    stage = record.stage;
+  }
+  EXPECT_EQ(summary.trace.back().energy, summary.energy);
+}
+
+TEST_F(MinimaSearchTest, ALimitDuringTheSearchLeavesTheFirstMinimum) {
+  const Bent bent = bar(80);
+  const SolveSummary first = solve(bent, cold(0));
+  SolveSettings few = cold();
+  few.max_iterations = first.iterations + 5;
+  const SolveSummary cut = solve(bent, few);
+  EXPECT_EQ(cut.stop_reason, StopReason::kConverged);
+  EXPECT_EQ(cut.energy, first.energy);
+  few.max_iterations = first.iterations - 5;
+  const SolveSummary before = solve(bent, few);
+  EXPECT_EQ(before.stop_reason, StopReason::kIterationLimit);
+  EXPECT_TRUE(before.minima.empty());
+}
+
+TEST_F(MinimaSearchTest, ADragGoesOnWithoutASearch) {
+  Bent bent = bar(80);
+  auto solver = solver_of(bent);
+  (void)solver->solve(cold()).value();
+  (void)bent.handles.set_motion("top", turn(Eigen::Vector3d::UnitX(), 81, {3, 3, 20}));
+  ASSERT_TRUE(solver->set_handles(bent.handles).ok());
+  const Points before = solver->positions();
+  SolveSettings warm = cold();
+  warm.initial = InitialGuess::kCurrent;
+  EXPECT_EQ(solver->solve(warm).value().further_starts, 0);
+  EXPECT_LT((solver->positions() - before).rowwise().norm().maxCoeff(), 3);  // the handle moved by 0.5
+}
+
+TEST_F(MinimaSearchTest, IsTheSameOnAnyNumberOfThreads) {
+  const auto one = solver_of(bar(80), 1), two = solver_of(bar(80), 2);
+  (void)one->solve(cold());
+  (void)two->solve(cold());
+  EXPECT_EQ(one->positions(), two->positions());
+}
+
+TEST_F(MinimaSearchTest, AnEffortBelowZeroOrOverTheLimitIsRefused) {
+  const auto solver = solver_of(bar(80));
+  for (const int effort : {-1, 1001}) {
+    const absl::Status status = solver->solve(cold(effort)).status();
+    EXPECT_EQ(fault_of(status).reason, "EFFORT_OUT_OF_RANGE");
+    EXPECT_EQ(fault_of(status).limit, "0 <= effort <= 1000");
+  }
+}
+
+TEST_F(MinimaSearchTest, ASearchApartChangesNothingUntilItsResultIsTaken) {
+  const auto solver = solver_of(bar(80));
+  const SolveSummary first = solver->solve(cold(0)).value();
+  const Points before = solver->positions();
+  ASSERT_TRUE(solver->start_search(1).ok());
+  EXPECT_TRUE(solver->is_searching());
+  run(*solver);
+  EXPECT_FALSE(solver->is_searching());
+  EXPECT_EQ(solver->positions(), before);
+  EXPECT_EQ(solver->summary().energy, first.energy);
+  ASSERT_TRUE(solver->better_energy().has_value());
+  const double better = *solver->better_energy();
+  EXPECT_LT(better, 0.98 * first.energy);
+  ASSERT_TRUE(solver->take_better());
+  EXPECT_EQ(solver->summary().energy, better);
+  EXPECT_NE(solver->positions(), before);
+  EXPECT_NEAR(solver->cell_energies().array().pow(1.5).sum(), better, 1e-9 * better);
+  EXPECT_FALSE(solver->take_better());
+}
+
+TEST_F(MinimaSearchTest, ASecondSearchGoesOnWithOtherStarts) {
+  const auto solver = solver_of(lifted_grid(5));
+  (void)solver->solve(cold(0)).value();
+  ASSERT_TRUE(solver->start_search(1).ok());
+  run(*solver);
+  const std::vector<double> after_one = solver->summary().minima;
+  EXPECT_EQ(solver->summary().further_starts, 8);
+  ASSERT_TRUE(solver->start_search(1).ok());
+  run(*solver);
+  EXPECT_EQ(solver->summary().further_starts, 16);
+  EXPECT_GE(solver->summary().minima.size(), after_one.size());
+}
+
+TEST_F(MinimaSearchTest, NewInputsForgetWhatWasFound) {
+  Bent bent = bar(80);
+  const auto solver = solver_of(bent);
+  (void)solver->solve(cold(0)).value();
+  ASSERT_TRUE(solver->start_search(1).ok());
+  for (int k = 0; k < 50; ++k) (void)solver->step();
+  ASSERT_TRUE(solver->set_handles(bent.handles).ok());
+  EXPECT_FALSE(solver->is_searching());
+  EXPECT_FALSE(solver->better_energy().has_value());
+  EXPECT_EQ(fault_of(solver->start_search(1)).reason, "NOT_SOLVED");
+}
+
+TEST_F(MinimaSearchTest, ALargeMeshIsSearchedOnItsCoarseLevels) {
+  const Bent bent = bar(80);
+  auto solver = Deformer::create(rest_shape(bent.mesh), {.search_up_to = 1000}).value();
+  ASSERT_TRUE(solver->set_handles(bent.handles).ok());
+  ASSERT_TRUE(solver->set_material(Material::uniform(1.5)).ok());
+  SolveSettings first = cold(0);
+  first.method = Method::kQuasiNewton;
+  (void)solver->solve(first).value();
+  const Points before = solver->positions();
+  ASSERT_TRUE(solver->start_search(1).ok());
+  EXPECT_TRUE(solver->is_searching());
+  run(*solver);
+  EXPECT_EQ(solver->positions(), before);
+  EXPECT_EQ(solver->summary().further_starts, 1);
+}
+
+}  // namespace
+}  // namespace lpdeform
