@@ -35,6 +35,7 @@ FrameStream::FrameStream(StreamOptions options, std::shared_ptr<Publisher> publi
       opened_(opened),
       is_overloaded_(std::move(is_overloaded)),
       last_frame_at_(timers_->now()),
+      pace_(options.max_frames_per_second),
       last_sent_at_(last_frame_at_) {}
 
 void FrameStream::start(std::function<void()> waker) {
@@ -104,7 +105,10 @@ void FrameStream::begin_frame(Timers::TimePoint now) {
     stalled_since_ = now;
     return publisher_->metrics().add(Count::kCreditStalls);
   }
-  if (const Timers::TimePoint when = next_frame_at(); now < when) return arm(is_pace_armed_, when);
+  if (const Timers::TimePoint when = next_frame_at(kind_of(newest->taken)); now < when) {
+    const Timers::TimePoint of_answer = next_frame_at(FramePace::Kind::kAnswer);
+    return arm(is_pace_armed_, now < of_answer ? of_answer : when);  // an answer may come meanwhile
+  }
   is_stalled_ = false;
   publisher_->metrics().add(Count::kFramesSent);
   const std::chrono::duration<double> waited = std::chrono::steady_clock::now() - newest->published_at;
@@ -118,6 +122,7 @@ void FrameStream::begin_frame(Timers::TimePoint now) {
   last_taken_ = newest->taken;
   has_sent_frame_ = true;
   last_frame_at_ = now;
+  pace_.begin(now);
   in_flight_.push_back(last_seq_);
   last_bytes_ = 0;
   cutter_ = FrameCutter(newest, options_.format_for(*newest->surface), options_.with_distortion,
@@ -131,15 +136,16 @@ FramePiece FrameStream::next_piece() {
   return piece;
 }
 
-Timers::TimePoint FrameStream::next_frame_at() const {
-  double seconds = 0;
-  if (options_.max_frames_per_second > 0) seconds = 1.0 / options_.max_frames_per_second;
-  if (options_.max_bytes_per_second > 0) {
-    seconds = std::max(seconds, static_cast<double>(last_bytes_) / options_.max_bytes_per_second);
-  }
-  if (!has_sent_frame_ || seconds <= 0) return Timers::TimePoint::min();
+FramePace::Kind FrameStream::kind_of(std::uint64_t taken) const {
+  return taken > last_taken_ ? FramePace::Kind::kAnswer : FramePace::Kind::kRefinement;
+}
+
+Timers::TimePoint FrameStream::next_frame_at(FramePace::Kind kind) const {
+  const Timers::TimePoint by_rate = pace_.next_at(kind);
+  if (!has_sent_frame_ || options_.max_bytes_per_second <= 0) return by_rate;
+  const double seconds = static_cast<double>(last_bytes_) / options_.max_bytes_per_second;
   const std::chrono::duration<double> pause(std::min(seconds, 3600.0));
-  return last_frame_at_ + std::chrono::duration_cast<Timers::Duration>(pause);
+  return std::max(by_rate, last_frame_at_ + std::chrono::duration_cast<Timers::Duration>(pause));
 }
 
 /// Sets a timer that makes the sender call next() at `when`.
@@ -218,10 +224,10 @@ Timers::Duration FrameStream::waited_for_credit() const {
   return is_stalled_ ? timers_->now() - stalled_since_ : Timers::Duration(0);
 }
 
-bool FrameStream::wants_frame() const {
+bool FrameStream::wants_frame(std::uint64_t taken) const {
   const std::scoped_lock lock(mutex_);
   return !is_ended_ && !end_ && !cutter_.has_more() && in_flight_.size() < options_.credit &&
-         timers_->now() >= next_frame_at();
+         timers_->now() >= next_frame_at(kind_of(taken));
 }
 
 }  // namespace lpdeform

@@ -12,6 +12,7 @@
 #include "absl/status/status.h"
 #include "server/runtime/timers.h"
 #include "server/session/frame.h"
+#include "server/session/frame_pace.h"
 #include "server/session/update.h"
 
 namespace lpdeform {
@@ -27,7 +28,7 @@ struct StreamOptions {
   bool with_distortion = true;
   bool with_normals = false;
   bool with_certificate = false;
-  double max_frames_per_second = 0;
+  double max_frames_per_second = 0;  // see FramePace
   /// The server's limit; 0: without limit. To keep it, the stream first lowers the frame rate down to
   /// kLowestRate, then the precision, then the frame rate again.
   double max_bytes_per_second = 0;
@@ -122,14 +123,15 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   /// Tells the sender that next() may have something new.
   void wake();
 
-  /// Whether a frame published now could be sent at once.
-  bool wants_frame() const;
+  /// Whether a frame with this Frame::taken, if published now, could be sent at once.
+  bool wants_frame(std::uint64_t taken) const;
 
  private:
   std::optional<Note> next_locked(Timers::TimePoint now);
   void begin_frame(Timers::TimePoint now);
   FramePiece next_piece();
-  Timers::TimePoint next_frame_at() const;
+  FramePace::Kind kind_of(std::uint64_t taken) const;
+  Timers::TimePoint next_frame_at(FramePace::Kind kind) const;
   void arm(bool& is_armed, Timers::TimePoint when);
 
   const std::string id_;
@@ -159,6 +161,7 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   std::uint64_t last_fault_ = 0;
   std::size_t last_bytes_ = 0;  // the numbers of the last frame
   Timers::TimePoint last_frame_at_;
+  FramePace pace_;
   Timers::TimePoint last_sent_at_;
   bool is_heartbeat_armed_ = false;  // a timer is set; at most one of each kind
   bool is_pace_armed_ = false;

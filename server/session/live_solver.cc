@@ -130,7 +130,7 @@ bool LiveSolver::is_frame_due(const Pace& pace) const {
   if (is_refinement() && is_outdated()) return false;  // the frame of the newer inputs is next
   if (pace.is_sparing && is_refinement() && Clock::now() - last_published_ < kBetweenRefinements)
     return false;
-  if (publisher_.is_frame_wanted()) return true;
+  if (publisher_.is_frame_wanted(inputs_.taken)) return true;
   return publisher_.reader_count() > 0 && Clock::now() - last_published_ >= kOldestWaiting;
 }
 

@@ -118,9 +118,9 @@ std::size_t Publisher::reader_count() const {
       std::count_if(streams_.begin(), streams_.end(), [](const auto& one) { return !one.expired(); }));
 }
 
-bool Publisher::is_frame_wanted() const {
+bool Publisher::is_frame_wanted(std::uint64_t taken) const {
   const auto all = readers();
-  return std::any_of(all.begin(), all.end(), [](const auto& stream) { return stream->wants_frame(); });
+  return std::any_of(all.begin(), all.end(), [&](const auto& stream) { return stream->wants_frame(taken); });
 }
 
 bool Publisher::is_certificate_wanted() const {

@@ -59,8 +59,8 @@ class Publisher {
   std::shared_ptr<FrameStream> find(const std::string& id) const;
 
   std::size_t reader_count() const;
-  /// Whether any reader could be sent a frame at once.
-  bool is_frame_wanted() const;
+  /// Whether any reader could be sent a frame with this Frame::taken at once.
+  bool is_frame_wanted(std::uint64_t taken) const;
   /// Whether any reader asked for certificates.
   bool is_certificate_wanted() const;
 

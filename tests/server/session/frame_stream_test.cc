@@ -85,7 +85,7 @@ TEST_F(FrameStreamTest, SendsNoMoreThanItsCreditAndThenTheNewest) {
     for (const FramePiece& piece : drain(*stream)) sent.push_back(piece.frame->input_seq);
   }
   EXPECT_EQ(sent, (std::vector<std::uint64_t>{1, 2}));
-  EXPECT_FALSE(stream->wants_frame());
+  EXPECT_FALSE(stream->wants_frame(11));
   ASSERT_TRUE(stream->acknowledge(1).ok());
   const auto next = drain(*stream);
   ASSERT_EQ(next.size(), 1u);
@@ -236,8 +236,8 @@ TEST_F(FrameStreamTest, KeepsToItsRateAndStillSendsTheLastFrame) {
   const auto stream = open({.credit = 8, .max_frames_per_second = 10});
   publish(1);
   EXPECT_EQ(drain(*stream).size(), 1u);
-  publish(2, true);
-  EXPECT_FALSE(stream->wants_frame());
+  publish(1, true);
+  EXPECT_FALSE(stream->wants_frame(1));
   EXPECT_TRUE(drain(*stream).empty());
   const int wakes = wakes_;
   timers_->advance(milliseconds(99));
@@ -247,6 +247,36 @@ TEST_F(FrameStreamTest, KeepsToItsRateAndStillSendsTheLastFrame) {
   const auto last = drain(*stream);
   ASSERT_EQ(last.size(), 1u);
   EXPECT_TRUE(last[0].frame->is_final);
+}
+
+TEST_F(FrameStreamTest, SendsAnAnswerEvenIfARefinementHasJustTakenItsPlace) {
+  const auto stream = open({.credit = 8, .max_frames_per_second = 10});
+  publish(1);
+  EXPECT_EQ(drain(*stream).size(), 1u);
+  timers_->advance(milliseconds(100));
+  publish(1);
+  EXPECT_EQ(drain(*stream).size(), 1u);
+  publish(2);
+  EXPECT_EQ(drain(*stream).size(), 1u);
+  EXPECT_FALSE(stream->wants_frame(3));
+}
+
+TEST_F(FrameStreamTest, AnAnswerDoesNotWaitForTheTimerOfTheRefinementThatItReplaces) {
+  const auto stream = open({.credit = 8, .max_frames_per_second = 10});
+  for (const std::uint64_t input : {1, 2}) {  // both tokens
+    publish(input);
+    EXPECT_EQ(drain(*stream).size(), 1u);
+  }
+  publish(2);
+  EXPECT_TRUE(drain(*stream).empty());
+  publish(3);
+  EXPECT_TRUE(drain(*stream).empty());
+  timers_->advance(milliseconds(99));
+  EXPECT_TRUE(drain(*stream).empty());
+  const int wakes = wakes_;
+  timers_->advance(milliseconds(1));
+  EXPECT_GT(wakes_, wakes);
+  EXPECT_EQ(drain(*stream).size(), 1u);
 }
 
 TEST_F(FrameStreamTest, EndsWithExactlyOneReasonAndThenIsSilent) {

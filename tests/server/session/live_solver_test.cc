@@ -52,7 +52,7 @@ TEST_F(LiveSolverTest, WhatWaitsForAReaderWithoutCreditIsRenewed) {
   ASSERT_TRUE(publisher_->add(stream));
   while (stream->next()) {
   }
-  ASSERT_FALSE(stream->wants_frame());
+  ASSERT_FALSE(stream->wants_frame(0));
   Update update = hold_ends(rest(), 1, 8);
   update.settings.p = Field::Constant(1, 1.0);
   update.settings.solver =

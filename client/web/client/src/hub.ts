@@ -13,6 +13,7 @@ import {
   type StreamOpened,
   type StreamSessionsRequestSchema,
 } from "./gen/lpdeform/v1/service_pb.js";
+import { inTaskOfItsOwn } from "./task.js";
 import { isSessionLost } from "./verdict.js";
 
 /** The calls to the server that streams need. */
@@ -94,11 +95,16 @@ export class Lane {
     readonly wake: () => void,
   ) {}
 
-  /** Returns the credit of this frame of this stream and of all frames before it. */
+  /**
+   * Returns the credit of this frame of this stream and of all frames before it. Whoever takes the frame has it first, because
+   * to begin a call keeps a page busy for a millisecond or two.
+   */
   acknowledge(frameSeq: number, streamId: string): void {
     if (streamId !== this.streamId) return;
     this.#ackDue = Math.max(this.#ackDue, frameSeq);
-    if (!this.#isAcking) void this.#sendAcks();
+    if (this.#isAcking) return;
+    this.#isAcking = true;
+    inTaskOfItsOwn(() => void this.#sendAcks());
   }
 
   /** There is no stream until another one is open. */
@@ -120,7 +126,6 @@ export class Lane {
 
   /** One call at a time, for the newest frame. */
   async #sendAcks(): Promise<void> {
-    this.#isAcking = true;
     let sent = "";
     for (;;) {
       const { session, streamId } = this;
