@@ -32,6 +32,10 @@ absl::Status check_limits(const SolveSettings& settings) {
     return out_of_range(Reason::kEffortOutOfRange, "effort", effort,
                         absl::StrCat("0 <= effort <= ", SolveSettings::kHighestEffort));
   }
+  const double share = settings.standing.least_share;
+  if (!(share >= 0 && share <= 1)) {
+    return out_of_range(Reason::kLeastShareOutOfRange, "least_share", share, "0 <= least_share <= 1");
+  }
   return absl::OkStatus();
 }
 

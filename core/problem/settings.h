@@ -38,6 +38,14 @@ std::optional<Method> method_named(std::string_view name);
 std::string_view initial_guess_name(InitialGuess guess);
 std::string_view stop_reason_name(StopReason reason);  // "iteration_limit"
 
+/// What a live session does with a lower minimum that it has found while its result stands. Not used by Deformer.
+struct StandingSearch {
+  bool shows = false;         // shows it; otherwise announces it
+  double least_share = 0.02;  // of the energy that must be saved, 0 to 1
+
+  bool operator==(const StandingSearch&) const = default;
+};
+
 struct SolveSettings {
   Method method = Method::kAuto;
   InitialGuess initial = InitialGuess::kCurrent;
@@ -53,6 +61,7 @@ struct SolveSettings {
   /// which takes at most about as long as the first. 0 to kHighestEffort; 0 takes the first minimum. Not set: 1 for cold solves with
   /// kAuto if some p_i < 2, where there are many minima; otherwise 0. The result depends on it, but not on the threads.
   std::optional<int> effort = {};
+  StandingSearch standing = {};
 
   /// Whether to keep a record of each iteration (SolveSummary::trace). Off in live sessions.
   bool keep_trace = false;

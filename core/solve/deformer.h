@@ -91,7 +91,8 @@ class Deformer {
   bool is_searching() const;
   /// The true energy of the lowest minimum that start_search has found for the current inputs, if it is below summary().energy.
   std::optional<double> better_energy() const;
-  /// Makes that minimum the current state: positions(), cell_energies() and the energies of summary(). False if there is none.
+  /// Makes that minimum the current state: positions(), cell_energies() and the energies of summary(), which has
+  /// no certificate then. False if there is none.
   bool take_better();
 
   /// Updates positions(), cell_energies() and summary() to the prolonged state of the coarse level of a running

@@ -171,6 +171,7 @@ void Deformer::Impl::take_better() {
   better.reset();
   summary.energy = norm->true_energy(best_sum);
   summary.soft_energy = norm->true_energy(best_soft_sum);
+  summary.optimality_gap.reset();
 }
 
 }  // namespace lpdeform

@@ -73,6 +73,8 @@ class Backend {
                       v1::AcquireWriterResponse& response, Done done);
   void update_handles(const CallContext& call, const v1::UpdateHandlesRequest& request,
                       v1::UpdateHandlesResponse& response, Done done);
+  void take_better_shape(const CallContext& call, const v1::TakeBetterShapeRequest& request,
+                         v1::TakeBetterShapeResponse& response, Done done);
   void undo_update(const CallContext& call, const v1::UndoUpdateRequest& request,
                    v1::UndoUpdateResponse& response, Done done);
 

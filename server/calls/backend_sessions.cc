@@ -261,6 +261,19 @@ void Backend::update_handles(const CallContext& call, const v1::UpdateHandlesReq
       });
 }
 
+void Backend::take_better_shape(const CallContext& call, const v1::TakeBetterShapeRequest& request,
+                                v1::TakeBetterShapeResponse& response, Done done) {
+  with_session(call, Access::kChange, request.session(),
+               [&request, &response, done = std::move(done)](const auto& session) {
+                 if (!session.ok()) return done(session.status());
+                 const auto better = (*session)->take_better((*session)->writer(request.writer_token()));
+                 if (!better.ok()) return done(better.status());
+                 response.set_input_seq(better->input_seq);
+                 response.set_energy(better->energy);
+                 done(absl::OkStatus());
+               });
+}
+
 void Backend::undo_update(const CallContext& call, const v1::UndoUpdateRequest& request,
                           v1::UndoUpdateResponse& response, Done done) {
   with_session(call, Access::kChange, request.session(),

@@ -232,6 +232,12 @@ grpc::ServerUnaryReactor* Service::UndoUpdate(Context* context, const v1::UndoUp
   return about_session(backend_, *context, "UndoUpdate", &Backend::undo_update, *request, *response);
 }
 
+grpc::ServerUnaryReactor* Service::TakeBetterShape(Context* context,
+                                                   const v1::TakeBetterShapeRequest* request,
+                                                   v1::TakeBetterShapeResponse* response) {
+  return about_session(backend_, *context, "TakeBetterShape", &Backend::take_better_shape, *request, *response);
+}
+
 grpc::ServerUnaryReactor* Service::AckFrames(Context* context, const v1::AckFramesRequest* request,
                                              v1::AckFramesResponse* response) {
   return about_session(backend_, *context, "AckFrames", &Backend::ack_frames, *request, *response);

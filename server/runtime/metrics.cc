@@ -37,6 +37,7 @@ constexpr std::array kCounts{
           "Frames never sent to a reader because a newer one came first."},
     Entry{"lpdeform_frame_bytes_total", "Bytes of positions, distortion and normals in frames sent."},
     Entry{"lpdeform_credit_stalls_total", "How often a frame had to wait for a reader's credit."},
+    Entry{"lpdeform_better_shapes_total", "Shapes of lower energy that were found while a session stood."},
     Entry{"lpdeform_sessions_created_total", "Sessions made."},
     Entry{"lpdeform_connections_total", "Connections taken."},
     Entry{"lpdeform_connections_refused_total", "Connections closed at once because of --max-connections."},

@@ -16,6 +16,7 @@ enum class Count {
   kFramesSuperseded,  // published, but not sent to a reader because a newer one came first; counted per reader
   kFrameBytes,        // bytes of the numbers in frames sent
   kCreditStalls,      // a frame had to wait until its reader gave credit back
+  kBetterShapes,      // found by the search for lower minima while a session stood, and announced or shown
   kSessionsCreated,
   kConnections,         // taken
   kConnectionsRefused,  // closed because the limit was reached

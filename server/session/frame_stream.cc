@@ -89,6 +89,10 @@ std::optional<Note> FrameStream::next_locked(Timers::TimePoint now) {
     last_fault_ = standing->number;
     return standing->fault;
   }
+  if (const auto better = publisher_->better(); better && better->number > last_better_) {
+    last_better_ = better->number;
+    return *better;
+  }
   if (now - last_sent_at_ >= heartbeat_) return HeartbeatNote{};
   return std::nullopt;
 }

@@ -65,6 +65,13 @@ struct HeartbeatNote {};
 struct LoadNote {
   bool is_overloaded = false;
 };
+/// A shape of lower energy is known for the session's newest inputs. `number` rises with each one.
+struct BetterNote {
+  std::uint64_t number = 0;
+  std::uint64_t input_seq = 0;
+  double energy = 0;
+  double saved_share = 0;  // of the present energy
+};
 struct FaultNote {
   absl::Status status;
   std::uint64_t input_seq = 0;
@@ -73,7 +80,8 @@ struct EndNote {
   EndReason reason = EndReason::kDraining;
   std::string text;
 };
-using Note = std::variant<OpenedNote, FramePiece, UpdateResult, FaultNote, LoadNote, HeartbeatNote, EndNote>;
+using Note = std::variant<OpenedNote, FramePiece, UpdateResult, FaultNote, LoadNote, BetterNote, HeartbeatNote,
+                          EndNote>;
 
 /// One reader of a session: decides what to send to it and when. It holds at most one frame, the one that is
 /// being cut into pieces. The next frame is the publisher's newest at that time. Backpressure: a frame is
@@ -159,6 +167,7 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   Timers::TimePoint stalled_since_;
   bool has_said_overloaded_ = false;
   std::uint64_t last_fault_ = 0;
+  std::uint64_t last_better_ = 0;  // number of the last better shape announced
   std::size_t last_bytes_ = 0;  // the numbers of the last frame
   Timers::TimePoint last_frame_at_;
   FramePace pace_;

@@ -42,8 +42,10 @@ bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
   if (phase_ == Phase::kRunning && running_for_ != wanted) pause();
   if (wanted == kNobody) return false;
   if (wanted == kReaders && (phase_ == Phase::kAnswered || phase_ == Phase::kCertifying)) {
-    return look_for_certificate();
+    if (publisher_.is_certificate_wanted() && !deformer_->is_searching()) return look_for_certificate();
   }
+  const bool is_over = phase_ == Phase::kAnswered || phase_ == Phase::kDone;
+  if (wanted == kReaders && is_over && is_search_due_) return look_for_better(pace);
   if (phase_ != Phase::kRunning) {
     if (!(job != nullptr ? begin_job(*job) : begin_live())) return false;
     phase_ = Phase::kRunning;
@@ -71,6 +73,8 @@ void LiveSolver::take_over(const Inputs& inputs) {
   blocked_ = has_handles ? status : no_handles();
   phase_ = blocked_.ok() ? Phase::kWaiting : Phase::kDone;
   was_begun_ = false;
+  is_search_due_ = false;
+  publisher_.forget_better();
   publisher_.set_standing(status.ok() ? std::nullopt
                                       : std::make_optional(FaultNote{status, inputs.input_seq}));
   if (!has_handles) publish(true);
@@ -99,6 +103,7 @@ bool LiveSolver::begin_live() {
   if (phase_ != Phase::kWaiting) return false;
   SolveSettings settings = inputs_.solver;
   if (was_begun_) settings.initial = InitialGuess::kCurrent;
+  settings.effort = 0;
   const absl::Status status = deformer_->start(settings, stop_);
   if (status.ok()) return true;
   blocked_ = status;
@@ -144,6 +149,9 @@ void LiveSolver::end_solve(SolveJob* job) {
   is_alarm_set_ = false;
   if (!is_certified && publisher_.is_certificate_wanted()) set_alarm();
   running_for_ = kNobody;
+  is_search_due_ = deformer_->summary().further_starts == 0 && standing_effort() > 0;
+  if (is_search_due_) postpone_search(answered_at_ + kSearchQuiet);
+  publisher_.forget_better();
   const std::shared_ptr<const Frame> frame = publish(true);
   if (job != nullptr) job->finish(SolveResult{deformer_->summary(), frame});
 }
@@ -158,7 +166,7 @@ bool LiveSolver::look_for_certificate() {
   if (has_more) return true;
   phase_ = Phase::kDone;
   publisher_.certify_newest(deformer_->summary().optimality_gap.value());
-  return false;
+  return is_search_due_;
 }
 
 /// Returns false if it is too early; then the alarm is set.
@@ -174,6 +182,58 @@ bool LiveSolver::begin_certificate() {
 
 void LiveSolver::set_alarm() {
   if (!std::exchange(is_alarm_set_, true)) alarm_.timers->at(answered_at_ + kQuiet, alarm_.ring);
+}
+
+int LiveSolver::standing_effort() const {
+  const SolveSettings& settings = inputs_.solver;
+  const bool has_many_minima = settings.method == Method::kAuto && inputs_.material->p.minCoeff() < 2;
+  return settings.effort.value_or(has_many_minima ? 1 : 0);
+}
+
+/// Looks for minima lower than the result. Returns true while there is more to do now.
+bool LiveSolver::look_for_better(const Pace& pace) {
+  const Timers::TimePoint now = alarm_.timers->now();
+  if (now < answered_at_ + kSearchQuiet) return postpone_search(answered_at_ + kSearchQuiet);
+  if (pace.is_sparing || pace.slice < kSlice) return postpone_search(now + kQuiet);
+  if (!deformer_->is_searching() && !begin_search()) return false;
+  const Clock::time_point end = Clock::now() + kSlice;
+  bool has_more = true;
+  while (has_more && Clock::now() < end && !is_outdated()) has_more = deformer_->step();
+  if (!has_more) end_search();
+  return true;
+}
+
+/// Returns false if there is nothing to look for.
+bool LiveSolver::begin_search() {
+  is_search_due_ = deformer_->start_search(standing_effort(), stop_).ok() && deformer_->is_searching();
+  return is_search_due_;
+}
+
+bool LiveSolver::postpone_search(Timers::TimePoint until) {
+  if (until > search_alarm_) alarm_.timers->at(until, alarm_.ring);
+  search_alarm_ = std::max(search_alarm_, until);
+  return false;
+}
+
+void LiveSolver::end_search() {
+  is_search_due_ = false;
+  const std::optional<double> energy = deformer_->better_energy();
+  const double present = deformer_->summary().energy;
+  if (!energy || !(present > 0)) return;
+  const double saved = 1 - *energy / present;
+  if (saved < inputs_.solver.standing.least_share) return;
+  publisher_.announce({.input_seq = inputs_.input_seq, .energy = *energy, .saved_share = saved});
+  if (inputs_.solver.standing.shows) take_better();
+}
+
+void LiveSolver::take_better() {
+  if (is_outdated() || !deformer_->take_better()) return;
+  publisher_.forget_better();
+  phase_ = Phase::kAnswered;
+  answered_at_ = alarm_.timers->now();
+  is_alarm_set_ = false;
+  if (publisher_.is_certificate_wanted()) set_alarm();
+  publish(true);
 }
 
 void LiveSolver::report(const SolveJob& job) {

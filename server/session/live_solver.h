@@ -25,6 +25,9 @@ namespace lpdeform {
 /// If a reader asked for certificates and a result has stood for kQuiet, the solver searches for the
 /// certificate of that result. It publishes the frame again with the certificate, after kCertificateSeconds
 /// with the bound found so far. A newer input or a Solve call ends the search.
+///
+/// Solves for readers take the first minimum. If a result has stood for kSearchQuiet, the solver looks for lower
+/// minima (Deformer::start_search) while nobody waits for an answer, and announces or shows the lowest one.
 class LiveSolver {
  public:
   /// How the solver asks to be run again later. `ring` is called on the timers' thread and may outlive the
@@ -50,6 +53,7 @@ class LiveSolver {
   static constexpr std::chrono::milliseconds kOldestWaiting{100};
   static constexpr std::chrono::milliseconds kQuiet{100};
   static constexpr double kCertificateSeconds = 10;
+  static constexpr std::chrono::milliseconds kSearchQuiet{1000};
 
   /// How a slice is run.
   struct Pace {
@@ -63,6 +67,9 @@ class LiveSolver {
   /// there is more to do.
   bool run_slice(SolveJob* job, const Pace& pace);
   bool run_slice(SolveJob* job) { return run_slice(job, Pace()); }
+
+  /// Publishes the better shape that was announced, unless there are newer inputs.
+  void take_better();
 
   /// Whether a solve was ever begun. From then on memory_bytes() includes the factors.
   bool has_solved() const { return deformer_->summary().method != Method::kAuto; }
@@ -89,6 +96,11 @@ class LiveSolver {
   bool look_for_certificate();
   bool begin_certificate();
   void set_alarm();
+  int standing_effort() const;
+  bool look_for_better(const Pace& pace);
+  bool begin_search();
+  bool postpone_search(Timers::TimePoint until);
+  void end_search();
   void report(const SolveJob& job);
   bool is_refinement() const { return shown_version_ == inputs_.version; }
   bool is_outdated() const { return mailbox_.version() != inputs_.version; }
@@ -114,6 +126,8 @@ class LiveSolver {
   std::uint64_t shown_version_ = 0;  // of the inputs in the last frame
   Timers::TimePoint answered_at_;    // while kAnswered
   bool is_alarm_set_ = false;        // set since answered_at_
+  bool is_search_due_ = false;       // the result was not searched yet, or not completely
+  Timers::TimePoint search_alarm_;   // the latest that was set
 };
 
 }  // namespace lpdeform

@@ -68,6 +68,26 @@ void Publisher::set_standing(std::optional<FaultNote> fault) {
   wake_all();
 }
 
+void Publisher::announce(BetterNote better) {
+  {
+    const std::scoped_lock lock(mutex_);
+    better.number = ++better_shapes_;
+    better_ = better;
+  }
+  metrics_->add(Count::kBetterShapes);
+  wake_all();
+}
+
+void Publisher::forget_better() {
+  const std::scoped_lock lock(mutex_);
+  better_.reset();
+}
+
+std::optional<BetterNote> Publisher::better() const {
+  const std::scoped_lock lock(mutex_);
+  return better_;
+}
+
 void Publisher::took(std::uint64_t input_seq, AnswerClock::TimePoint since) {
   metrics_->add(Count::kUpdates);
   const std::scoped_lock lock(mutex_);

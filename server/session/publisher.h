@@ -43,6 +43,11 @@ class Publisher {
   /// Sets the standing fault, or clears it.
   void set_standing(std::optional<FaultNote> fault);
 
+  /// Announces a better shape to every reader, also to those that come later, until forget_better(). Gives it its number.
+  void announce(BetterNote better);
+  void forget_better();
+  std::optional<BetterNote> better() const;
+
   /// An update was taken. Starts to measure how long readers wait for the first frame that answers it.
   void took(std::uint64_t input_seq, AnswerClock::TimePoint since);
 
@@ -78,6 +83,8 @@ class Publisher {
   std::shared_ptr<const Frame> newest_;
   std::optional<Standing> standing_;
   std::uint64_t faults_ = 0;
+  std::optional<BetterNote> better_;
+  std::uint64_t better_shapes_ = 0;
   std::uint64_t frames_ = 0;
   std::uint64_t epoch_ = 1;
   bool is_closed_ = false;

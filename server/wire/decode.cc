@@ -73,6 +73,12 @@ absl::StatusOr<SolveSettings> decode_solver(const v1::SolverSettings& message) {
   SolveSettings settings;
   settings.method = *method;
   settings.initial = *initial;
+  if (message.has_search()) {
+    const v1::MinimaSearch& search = message.search();
+    settings.effort = static_cast<int>(std::min<std::uint32_t>(search.effort(), kMostIterations));
+    settings.standing.shows = search.show();
+    if (search.least_share() != 0) settings.standing.least_share = search.least_share();
+  }
   if (message.tolerance() != 0) settings.tolerance = message.tolerance();
   if (message.time_limit_seconds() != 0) settings.time_limit_seconds = message.time_limit_seconds();
   if (message.max_iterations() > kMostIterations) {

@@ -6,6 +6,7 @@
 #include <utility>
 #include <variant>
 
+#include "absl/strings/str_format.h"
 #include "core/base/fault.h"
 #include "core/base/match.h"
 #include "server/runtime/refusals.h"
@@ -169,6 +170,14 @@ void encode_notice(const LoadNote& load, v1::Notice& out) {
                    : "The server is no longer overloaded.");
 }
 
+void encode_notice(const BetterNote& better, v1::Notice& out) {
+  out.set_reason(v1::NOTICE_REASON_BETTER_SHAPE);
+  out.set_input_seq(better.input_seq);
+  out.set_energy(better.energy);
+  out.set_saved_share(better.saved_share);
+  out.set_text(absl::StrFormat("A shape with %.3g %% less energy is known.", 100 * better.saved_share));
+}
+
 void encode_event(const Note& note, const FrameStream& stream, std::uint32_t vertex_count,
                   v1::StreamEvent& out) {
   const Match put{[&](const OpenedNote& opened) {
@@ -194,6 +203,7 @@ void encode_event(const Note& note, const FrameStream& stream, std::uint32_t ver
                   [&](const UpdateResult&) {},  // not an event: see encode() of a DeformResponse
                   [&](const FaultNote& fault) { encode(fault, *out.mutable_fault()); },
                   [&](const LoadNote& load) { encode_notice(load, *out.mutable_notice()); },
+                  [&](const BetterNote& better) { encode_notice(better, *out.mutable_notice()); },
                   [&](const HeartbeatNote&) { out.mutable_heartbeat(); },
                   [&](const EndNote& end) {
                     out.mutable_go_away()->set_reason(encode_reason(end.reason));
@@ -243,6 +253,10 @@ void encode_solver(const SolveSettings& settings, v1::SolverSettings& out) {
   const bool has_limit = settings.time_limit_seconds < std::numeric_limits<double>::infinity();
   out.set_time_limit_seconds(has_limit ? settings.time_limit_seconds : 0);
   out.set_initial(encode_initial(settings.initial));
+  if (!settings.effort) return;
+  out.mutable_search()->set_effort(static_cast<std::uint32_t>(*settings.effort));
+  out.mutable_search()->set_show(settings.standing.shows);
+  out.mutable_search()->set_least_share(settings.standing.least_share);
 }
 
 void encode(const SessionInfo& info, Timers::Duration idle, Timers::TimePoint now, v1::Session& out) {
@@ -298,6 +312,8 @@ void encode(const SolveResult& result, v1::SolveSummary& out) {
   out.set_setup_seconds(summary.setup_seconds);
   out.set_solve_seconds(summary.solve_seconds);
   out.set_threads(static_cast<std::uint32_t>(summary.threads));
+  out.mutable_minima()->Assign(summary.minima.begin(), summary.minima.end());
+  out.set_further_starts(static_cast<std::uint32_t>(summary.further_starts));
   out.set_input_seq(result.frame->input_seq);
 }
 

@@ -64,6 +64,7 @@ namespace Lpdeform
         public const string InputSeqTooHigh = "INPUT_SEQ_TOO_HIGH";
         public const string InputSeqZero = "INPUT_SEQ_ZERO";
         public const string IterationsOutOfRange = "ITERATIONS_OUT_OF_RANGE";
+        public const string LeastShareOutOfRange = "LEAST_SHARE_OUT_OF_RANGE";
         public const string LengthUnitOutOfRange = "LENGTH_UNIT_OUT_OF_RANGE";
         public const string MaskSize = "MASK_SIZE";
         public const string MemoryFull = "MEMORY_FULL";
@@ -88,6 +89,7 @@ namespace Lpdeform
         public const string NothingToUndo = "NOTHING_TO_UNDO";
         public const string NotConnected = "NOT_CONNECTED";
         public const string NotTheWriter = "NOT_THE_WRITER";
+        public const string NoBetterShape = "NO_BETTER_SHAPE";
         public const string NoDecoder = "NO_DECODER";
         public const string NoDistortion = "NO_DISTORTION";
         public const string NoFrame = "NO_FRAME";
