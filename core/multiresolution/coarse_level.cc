@@ -12,8 +12,6 @@ namespace lpdeform {
 namespace {
 
 constexpr std::size_t kChunk = 4096;  // vertices
-constexpr std::int32_t kLargeMesh = 30000;
-constexpr int kRatio = 6, kRatioOfLarge = 3;
 
 /// The field at the coarse vertices; a single value stays a single value.
 Field restricted(const Field& field, const std::vector<std::int32_t>& fine_vertex) {
@@ -30,20 +28,14 @@ double at(const Field& field, Eigen::Index i) {
 
 }  // namespace
 
-int CoarseLevel::ratio_for(const RestShape& fine, const Material& material) {
-  const bool is_above_two = material.p.minCoeff() >= 2 && material.p.maxCoeff() > 2;
-  return fine.vertex_count() >= kLargeMesh && is_above_two ? kRatioOfLarge : kRatio;
-}
-
-std::unique_ptr<CoarseLevel> CoarseLevel::create(const RestShape& fine, int ratio,
-                                                 const MakeLevelSolver& make_solver) {
-  CoarseMesh coarse = coarsen({fine.positions(), fine.faces()}, fine.vertex_count() / ratio);
+std::unique_ptr<CoarseLevel> CoarseLevel::create(const RestShape& fine, const MakeLevelSolver& make_solver) {
+  CoarseMesh coarse = coarsen({fine.positions(), fine.faces()}, fine.vertex_count() / kRatio);
   if (2 * coarse.mesh.vertices.rows() > fine.vertex_count() || coarse.mesh.faces.rows() == 0) return nullptr;
   auto shape = RestShape::create(coarse.mesh, fine.weight_kind());
   if (!shape.ok()) return nullptr;
   std::unique_ptr<LevelSolver> solver = make_solver(*shape);
   if (!solver) return nullptr;
-  std::unique_ptr<CoarseLevel> level(new CoarseLevel(ratio));
+  std::unique_ptr<CoarseLevel> level(new CoarseLevel);
   level->fine_vertex_ = std::move(coarse.fine_vertex);
   level->coarse_vertex_ = std::move(coarse.coarse_vertex);
   level->share_.assign(level->fine_vertex_.size(), 0.0);
@@ -98,7 +90,7 @@ absl::Status CoarseLevel::take_over(const RestShape& fine, const HandleSet& hand
     for (std::size_t c = 0; c < n; ++c) {
       const auto i = static_cast<Eigen::Index>(c);
       stiffness[i] =
-          std::clamp(at(coarse.stiffness, i) * std::pow(share_[c] / ratio_, 1 - at(coarse.p, i) / 2),
+          std::clamp(at(coarse.stiffness, i) * std::pow(share_[c] / kRatio, 1 - at(coarse.p, i) / 2),
                      Material::kLowestStiffness, Material::kHighestStiffness);
     }
     coarse.stiffness = std::move(stiffness);

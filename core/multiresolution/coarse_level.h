@@ -11,27 +11,23 @@
 
 namespace lpdeform {
 
-/// A coarse level: a shape with a third or a sixth of the fine shape's vertices, a solver of its own, and the restriction
-/// and prolongation between the two levels. This is the "subspace technique" of the paper's future work. Its result is only
+/// A coarse level: a shape with a sixth of the fine shape's vertices, a solver of its own, and the restriction and
+/// prolongation between the two levels. This is the "subspace technique" of the paper's future work. Its result is only
 /// an initial guess for the fine level, never a final result. One caller at a time.
 class CoarseLevel {
  public:
-  /// The fine vertices per coarse one that suit this material: 6; or 3 from 30,000 vertices on, if no p_i is below
-  /// 2 and some are above it. The surface then has less far to go on the fine level.
-  static int ratio_for(const RestShape& fine, const Material& material);
+  static constexpr std::int32_t kRatio = 6;
 
   /// Null if the mesh cannot be coarsened to half its vertices, or if no solver can be made for the coarse shape.
-  static std::unique_ptr<CoarseLevel> create(const RestShape& fine, int ratio,
-                                             const MakeLevelSolver& make_solver);
+  static std::unique_ptr<CoarseLevel> create(const RestShape& fine, const MakeLevelSolver& make_solver);
 
   /// Restricts the inputs of the fine level to the coarse solver: coarse_handles, and `material`. A coarse cell stands
   /// for m fine cells, and its E_i^2 is a sum over them. If p_i is not 2, s_i is therefore multiplied by (m /
-  /// ratio)^(1 - p_i / 2) and clamped to the permitted range.
+  /// kRatio)^(1 - p_i / 2) and clamped to the permitted range.
   absl::Status take_over(const RestShape& fine, const HandleSet& handles, const Constraints& constraints,
                          const Material& material);
 
   LevelSolver& solver() { return *solver_; }
-  int ratio() const { return ratio_; }
 
   /// Prolongation: the fine shape moved with the coarse one, in scaled units of the fine shape. Each vertex follows the
   /// fitted rigid motions of the nearest coarse vertices around it, blended by distance.
@@ -40,7 +36,7 @@ class CoarseLevel {
   std::size_t memory_bytes() const;
 
  private:
-  explicit CoarseLevel(int ratio) : ratio_(ratio) {}
+  CoarseLevel() = default;
   void find_guides(const RestShape& fine);
 
   static constexpr std::size_t kGuides = 4;
@@ -48,7 +44,6 @@ class CoarseLevel {
     std::array<std::int32_t, kGuides> vertex;  // coarse
     std::array<double, kGuides> weight;        // weights add up to 1
   };
-  const int ratio_;
   std::vector<std::int32_t> fine_vertex_, coarse_vertex_;  // see CoarseMesh
   std::vector<double> share_;                              // the number of fine vertices of each coarse one
   std::vector<Guides> guides_;                             // of each fine vertex

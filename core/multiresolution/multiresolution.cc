@@ -6,16 +6,8 @@
 namespace lpdeform {
 namespace {
 
-// The tolerance of the coarse level, relative, of E^(1/p); the levels differ by more than this. Where the fine level has
-// far to go in any case (kLargeMesh, some p_i > 2), a closer guess does not save what it costs.
-constexpr double kCoarseTolerance = 1e-4, kCoarseToleranceOfLarge = 1e-3;
-constexpr std::int32_t kLargeMesh = 30000;  // vertices
-
-double coarse_tolerance(const Problem& problem) {
-  const bool is_loose = problem.shape().vertex_count() >= kLargeMesh && problem.norm.lowest_p() >= 2 &&
-                        problem.norm.highest_p() > 2;
-  return std::max(problem.tolerance, is_loose ? kCoarseToleranceOfLarge : kCoarseTolerance);
-}
+constexpr double kCoarseTolerance = 1e-4;  // relative, of E^(1/p); the levels differ by more than this
+constexpr double kRoughCoarseTolerance = 1e-3;  // where the first minimum is taken as it comes, and p is not 2
 
 }  // namespace
 
@@ -24,7 +16,9 @@ Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level, 
   objective_ = problem_.objective.reweigh(problem_.norm);
   SolveSettings settings;
   settings.initial = InitialGuess::kLaplacian;
-  settings.tolerance = coarse_tolerance(problem_);
+  const bool is_at_two = problem_.norm.lowest_p() == 2 && problem_.norm.highest_p() == 2;
+  const double coarse = effort == 0 && !is_at_two ? kRoughCoarseTolerance : kCoarseTolerance;
+  settings.tolerance = std::max(problem_.tolerance, coarse);
   settings.effort = effort;
   if (!level_.solver().start(settings, problem_.stop).ok())
     fine_ = std::make_unique<QuasiNewton>(problem_, x_, Warmth::kCold);

@@ -106,8 +106,7 @@ bool Deformer::Impl::prepare_coarse() {
     auto deformer = Deformer::create(std::move(level), of_level);
     return deformer.ok() ? std::make_unique<DeformerOfLevel>(*std::move(deformer)) : nullptr;
   };
-  const int ratio = CoarseLevel::ratio_for(*shape, material);
-  if (!coarse || coarse->ratio() != ratio) coarse = CoarseLevel::create(*shape, ratio, make_solver);
+  if (!coarse) coarse = CoarseLevel::create(*shape, make_solver);
   return coarse && coarse->take_over(*shape, handles, *constraints, effective_material()).ok();
 }
 
