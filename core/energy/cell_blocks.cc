@@ -28,7 +28,8 @@ std::vector<std::int32_t> cells_by_valence(const RestShape& shape, std::size_t c
 
 }  // namespace
 
-CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_by_valence(shape, chunk)) {
+CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk)
+    : rest(shape.scaled_positions().data()), cells(cells_by_valence(shape, chunk)) {
   LPDEFORM_CHECK(chunk % kLanes == 0);
   const auto& offsets = shape.offsets();
   first_slot.push_back(0);
@@ -48,7 +49,6 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_
   rest_size.resize(cells.size());
   neighbour.resize(slot_count() * kLanes);
   weight.resize(slot_count() * kLanes);
-  rest_edge.resize(slot_count() * kLanes * 3);
   opposite.resize(slot_count() * kLanes);
   std::vector<std::uint32_t> place_of_entry(shape.neighbours().size());  // of directed edges in `opposite`
   for (std::size_t c = 0; c < cells.size(); ++c) {
@@ -67,9 +67,6 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk) : cells(cells_
       place_of_entry[k] = opposite[at];
       weight[at] = shape.weights()[k];
       const Eigen::RowVector3d edge = shape.scaled_positions().row(i) - shape.scaled_positions().row(j);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        rest_edge[(slot * 3 + axis) * kLanes + lane] = edge[static_cast<Eigen::Index>(axis)];
-      }
       rest_size[c] += weight[at] * edge.squaredNorm();
     }
   }
@@ -88,7 +85,7 @@ std::size_t CellBlocks::memory_bytes() const {
   return (first_slot.capacity() + cells.capacity() + centre.capacity() + neighbour.capacity() +
           opposite.capacity()) *
              sizeof(std::int32_t) +
-         (rest_size.capacity() + weight.capacity() + rest_edge.capacity()) * sizeof(double);
+         (rest_size.capacity() + weight.capacity()) * sizeof(double);
 }
 
 }  // namespace lpdeform
