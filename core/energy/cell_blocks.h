@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/workers.h"
 #include "core/energy/rest_shape.h"
 
 namespace lpdeform {
@@ -17,7 +18,7 @@ struct CellBlocks {
   static constexpr std::size_t kLanes = 8;
 
   /// `chunk`: a multiple of kLanes.
-  CellBlocks(const RestShape& shape, std::size_t chunk);
+  CellBlocks(const RestShape& shape, std::size_t chunk, const Workers& workers = Workers(1));
 
   std::size_t block_count() const { return first_slot.size() - 1; }
   std::size_t slot_count() const { return first_slot.back(); }
@@ -33,6 +34,9 @@ struct CellBlocks {
   std::vector<std::int32_t> neighbour;  // [slot][lane]: vertex; 0 in lanes without a cell
   std::vector<double> weight;           // [slot][lane]: w_ij
   std::vector<std::uint32_t> opposite;  // [slot][lane]: index of the reverse edge, from j to i
+
+ private:
+  void fill(const RestShape& shape, std::size_t c, std::vector<std::uint32_t>& place_of_entry);
 };
 
 }  // namespace lpdeform

@@ -13,7 +13,7 @@ constexpr std::size_t kRowChunk = 4096;  // vertices
 CellPass::CellPass(std::shared_ptr<const RestShape> shape, Workers workers)
     : shape_(std::move(shape)),
       workers_(std::move(workers)),
-      blocks_(*shape_, kChunk),
+      blocks_(*shape_, kChunk, workers_),
       state_(blocks_),
       rows_(shape_->vertex_count() * kRow, 0.0),
       c_(shape_->vertex_count(), 0.0),
