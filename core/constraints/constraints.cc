@@ -186,7 +186,8 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   if (free != is_tied.end() && free_components == FreeComponents::kError) {
     return name_free_component(shape, static_cast<std::int32_t>(free - is_tied.begin()));
   }
-  if (free != is_tied.end()) hold_free_components(shape, handles, free_components, is_tied, exact, constraints);
+  if (free != is_tied.end())
+    hold_free_components(shape, handles, free_components, is_tied, exact, constraints);
   constraints.exact = held_rows(constraints.is_held, exact);
   constraints.soft = std::move(holds.soft);
   auto linear = LinearConstraints::create(std::move(holds.rows), constraints.is_held);
@@ -213,8 +214,8 @@ absl::Status check_equations(const RestShape& shape, const HandleSet& handles) {
 
 std::size_t Constraints::memory_bytes() const {
   return is_held.capacity() + (targets.size() + exact.positions.size() + footprint.size()) * sizeof(double) +
-         exact.vertices.capacity() * sizeof(std::int32_t) +
-         soft.rows().capacity() * sizeof(SoftRow) + linear.memory_bytes();
+         exact.vertices.capacity() * sizeof(std::int32_t) + soft.rows().capacity() * sizeof(SoftRow) +
+         linear.memory_bytes();
 }
 
 RigidTransform fit_rigid(const Points& from, const Points& to) {

@@ -54,7 +54,8 @@ HWY_INLINE Vector difference(const Vector& a, const Vector& b) {
   return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
 
-constexpr std::size_t kEdge = 6 * kLanes;  // numbers of a slot in the buffer of edges: x_i - x_j, then p_i - p_j
+constexpr std::size_t kEdge =
+    6 * kLanes;  // numbers of a slot in the buffer of edges: x_i - x_j, then p_i - p_j
 
 /// Writes the edges of the lanes from `lane` on to `edges`, as [slot][axis][lane], and returns the sums that the fit
 /// needs.
@@ -102,7 +103,7 @@ HWY_INLINE void subtract_rotated(const CellBlocks& blocks, std::size_t block, st
     const Vector wr{hn::Mul(w, r.x), hn::Mul(w, r.y), hn::Mul(w, r.z)};
     squared = hn::Add(squared, dot(wr, r));
     sum = {hn::Add(sum.x, wr.x), hn::Add(sum.y, wr.y), hn::Add(sum.z, wr.z)};
-    store_rows(wr, state.residuals.data() + (slot * kLanes + lane) * kRow);
+    store_packed(wr, state.residuals.data() + (slot * kLanes + lane) * 3);
   }
   hn::StoreU(squared, d, squares + lane);
   store_rows(sum, state.residual_sums.data() + (block * kLanes + lane) * kRow);
@@ -141,8 +142,7 @@ void EvaluateBlocks(const CellBlocks& blocks, std::size_t first, std::size_t las
     FitSums sums[kVectors];
     for (std::size_t v = 0; v < kVectors; ++v)
       sums[v] = gather_edges(blocks, block, v * lanes, rows, edges.data());
-    double* const rotations =
-        state.rotations.empty() ? fitted : state.rotations.data() + block * 9 * kLanes;
+    double* const rotations = state.rotations.empty() ? fitted : state.rotations.data() + block * 9 * kLanes;
     if (is_fit) fit_block(sums, blocks.rest_size.data() + block * kLanes, rotations);
     for (std::size_t v = 0; v < kVectors; ++v)
       subtract_rotated(blocks, block, v * lanes, edges.data(), rotations, squares, state);
@@ -160,7 +160,7 @@ void GradientOfBlocks(const CellBlocks& blocks, std::size_t first, std::size_t l
     return *reinterpret_cast<const Row*>(state.residual_sums.data() + at * kRow);
   };
   const auto residual = [&](std::size_t at) -> const SingleRow& {
-    return *reinterpret_cast<const SingleRow*>(state.residuals.data() + at * kRow);
+    return *reinterpret_cast<const SingleRow*>(state.residuals.data() + at * 3);  // the fourth is not used
   };
   for (std::size_t block = first; block < last; ++block) {
     const std::size_t begin = blocks.first_slot[block], end = blocks.first_slot[block + 1];
@@ -187,10 +187,10 @@ HWY_EXPORT(EvaluateBlocks);
 HWY_EXPORT(GradientOfBlocks);
 
 BlockState::BlockState(const CellBlocks& blocks)
-    : squared(static_cast<std::size_t>(
-          std::find(blocks.cells.begin(), blocks.cells.end(), -1) - blocks.cells.begin())),
+    : squared(static_cast<std::size_t>(std::find(blocks.cells.begin(), blocks.cells.end(), -1) -
+                                       blocks.cells.begin())),
       residual_sums(blocks.cells.size() * kRow),
-      residuals(blocks.slot_count() * CellBlocks::kLanes * kRow) {}
+      residuals(blocks.slot_count() * CellBlocks::kLanes * 3 + 1) {}
 
 void BlockState::keep_rotations(const CellBlocks& blocks) {
   constexpr std::size_t kLanes = CellBlocks::kLanes;

@@ -20,7 +20,8 @@ struct BlockState {
   std::vector<double> rotations;      // [block][entry, row-major][lane]: R_i; empty if they are not kept
   std::vector<double> squared;        // of each vertex: E_i^2
   std::vector<double> residual_sums;  // [block][lane][axis, filler]: sum_j r_ij
-  std::vector<float> residuals;  // [slot][lane][axis, filler]: r_ij = w_ij ((x_i - x_j) - R_i (p_i - p_j));
+  std::vector<float>
+      residuals;  // [slot][lane][axis], then a filler: r_ij = w_ij ((x_i - x_j) - R_i (p_i - p_j));
       // single precision: a small relative error is harmless, and memory bandwidth is the bottleneck
 };
 

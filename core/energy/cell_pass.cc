@@ -70,7 +70,8 @@ double CellPass::reweigh(const LpNorm& norm) {
 double CellPass::sum(const LpNorm& norm) const {
   return sum_of_chunks([&](std::size_t begin, std::size_t end) {
     double sum = 0;
-    for (std::size_t i = begin; i < end; ++i) sum += norm.term(static_cast<std::int32_t>(i), state_.squared[i]).value;
+    for (std::size_t i = begin; i < end; ++i)
+      sum += norm.term(static_cast<std::int32_t>(i), state_.squared[i]).value;
     return sum;
   });
 }

@@ -41,7 +41,7 @@ class CellPass {
 
   // Of the last evaluation.
   const std::vector<double>& squared_energies() const { return state_.squared; }  // E_i^2
-  const std::vector<double>& cell_weights() const { return c_; }       // c_i
+  const std::vector<double>& cell_weights() const { return c_; }                  // c_i
   std::vector<Eigen::Matrix3d> rotations() const;  // R_i; the first call takes as long as an evaluation
 
   const RestShape& shape() const { return *shape_; }

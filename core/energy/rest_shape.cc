@@ -97,8 +97,8 @@ double mean_length(const TriangleMesh& mesh, const EdgeWeights& weights) {
 
 }  // namespace
 
-absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const TriangleMesh& mesh,
-                                                                   WeightKind kind, const Workers& workers) {
+absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const TriangleMesh& mesh, WeightKind kind,
+                                                                   const Workers& workers) {
   MeshReport report;
   EdgeWeights edges;
   const bool is_at_once =

@@ -90,7 +90,9 @@ HWY_INLINE Vector gather_packed(const double* rows, const std::int32_t* indices)
 #if HWY_TARGET == HWY_AVX2
   const hn::FixedTag<double, 4> quad;
   const auto three = hn::FirstN(quad, 3);
-  const auto row = [&](int k) { return hn::MaskedLoad(three, quad, rows + 3 * static_cast<std::size_t>(indices[k])); };
+  const auto row = [&](int k) {
+    return hn::MaskedLoad(three, quad, rows + 3 * static_cast<std::size_t>(indices[k]));
+  };
   return transposed(row(0), row(1), row(2), row(3));
 #else
   const hn::RebindToSigned<D> wide;
@@ -108,10 +110,10 @@ HWY_INLINE void store_rows(const Vector& v, double* at) {
   hn::StoreInterleaved4(v.x, v.y, v.z, hn::Zero(d), d, at);
 }
 
-/// The same in single precision.
-HWY_INLINE void store_rows(const Vector& v, float* at) {
+/// The same in single precision, three numbers each.
+HWY_INLINE void store_packed(const Vector& v, float* at) {
   const hn::Rebind<float, D> d;
-  hn::StoreInterleaved4(hn::DemoteTo(d, v.x), hn::DemoteTo(d, v.y), hn::DemoteTo(d, v.z), hn::Zero(d), d, at);
+  hn::StoreInterleaved3(hn::DemoteTo(d, v.x), hn::DemoteTo(d, v.y), hn::DemoteTo(d, v.z), d, at);
 }
 
 HWY_INLINE Matrix rotation_of(const Quaternion& q) {

@@ -10,8 +10,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr std::size_t kChunk = 4096;       // vertices
-constexpr std::int32_t kMostKept = 20000;  // vertices of a level that keeps its solver
+constexpr std::size_t kChunk = 4096;  // vertices
 
 /// The field at the coarse vertices; a single value stays a single value.
 Field restricted(const Field& field, const std::vector<std::int32_t>& fine_vertex) {
@@ -136,13 +135,13 @@ Points CoarseLevel::prolong(const RestShape& fine, const Workers& workers) const
 }
 
 void CoarseLevel::leave() {
-  if (shape_->vertex_count() > kMostKept) solver_.reset();
+  if (leaves()) solver_.reset();
 }
 
 std::size_t CoarseLevel::memory_bytes() const {
   return (fine_vertex_.capacity() + coarse_vertex_.capacity()) * sizeof(std::int32_t) +
          share_.capacity() * sizeof(double) + guides_.capacity() * sizeof(Guides) + shape_->memory_bytes() +
-         (solver_ ? solver_->memory_bytes() : 0);
+         (solver_ && !leaves() ? solver_->memory_bytes() : 0);
 }
 
 }  // namespace lpdeform

@@ -44,11 +44,17 @@ class CoarseLevel {
   /// fitted rigid motions of the nearest coarse vertices around it, blended by distance.
   Points prolong(const RestShape& fine, const Workers& workers) const;
 
+  /// Without temporary_bytes().
   std::size_t memory_bytes() const;
+  /// Bytes of the solver, if leave() frees it.
+  std::size_t temporary_bytes() const { return leaves() && solver_ ? solver_->memory_bytes() : 0; }
 
  private:
   CoarseLevel() = default;
+  bool leaves() const { return shape_->vertex_count() > kMostKept; }
   void find_guides(const RestShape& fine);
+
+  static constexpr std::int32_t kMostKept = 10000;  // vertices of a level that keeps its solver
 
   static constexpr std::size_t kGuides = 4;
   struct Guides {

@@ -1,5 +1,6 @@
 #include "core/solve/deformer.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -19,9 +20,9 @@ namespace {
 constexpr std::size_t kWorkspace = 14;
 // What a Deformer holds besides: x, positions, x_before_move, energies and weights.
 constexpr std::size_t kStates = 4;
-constexpr std::size_t kCellBytes = 96, kEdgeBytes = 34;  // of CellPass: per vertex, per directed edge
+constexpr std::size_t kCellBytes = 96, kEdgeBytes = 30;  // of CellPass: per vertex, per directed edge
 constexpr std::size_t kCoarseShare = 6;                  // the coarse levels take about 1 / kCoarseShare more
-constexpr std::int32_t kCoarsenBeforehand = 10000;       // vertices from which on cold solves have a coarse level
+constexpr std::int32_t kCoarsenBeforehand = 10000;  // vertices from which on cold solves have a coarse level
 
 /// Memory of a Deformer without its metric.
 std::size_t bytes_beside_metric(const RestShape& shape) {
@@ -180,12 +181,15 @@ const Points& Deformer::positions() const {
 
 std::size_t Deformer::memory_bytes() const {
   const std::size_t points = impl_->x.size() * sizeof(double);
-  const std::size_t numbers = impl_->x.size() + impl_->positions.size() + impl_->x_before_move.size() +
-                              impl_->best_energies.size();
+  const std::size_t numbers =
+      impl_->x.size() + impl_->positions.size() + impl_->x_before_move.size() + impl_->best_energies.size();
   const std::size_t held = impl_->constraints ? impl_->constraints->memory_bytes() : 0;
   const std::size_t coarse = impl_->coarse ? impl_->coarse->memory_bytes() : 0;
+  // A solver that leaves runs before the fine level has a workspace.
+  const std::size_t workspace =
+      std::max(kWorkspace * points, impl_->coarse ? impl_->coarse->temporary_bytes() : 0);
   return sizeof(Impl) + held + coarse + impl_->objective.cells().memory_bytes() +
-         impl_->metric.memory_bytes() + numbers * sizeof(double) + kWorkspace * points +
+         impl_->metric.memory_bytes() + numbers * sizeof(double) + workspace +
          (impl_->coarse_mesh ? impl_->coarse_mesh->memory_bytes() : 0);
 }
 
