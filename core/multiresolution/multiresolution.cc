@@ -45,8 +45,9 @@ void Multiresolution::even_out(Points& found) const {
 }
 
 std::optional<Points> Multiresolution::intermediate_state() {
+  if (fine_) return std::nullopt;
   const int done = level_.solver().iterations();
-  if (fine_ || done < next_look_) return std::nullopt;
+  if (done < next_look_) return std::nullopt;
   next_look_ = 2 * done;
   level_.solver().catch_up();
   Points found = prolonged();

@@ -339,6 +339,7 @@ void Deformer::Impl::end(StopReason reason) {
     forget_weights();
   if (!has_metric) forget_weights();
   minimiser.reset();
+  if (coarse) coarse->leave();
   state = is_best_zero() ? State::kUndistorted : State::kDeformed;
   summary.stop_reason = reason;
   summary.solve_seconds = seconds();
