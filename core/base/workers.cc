@@ -93,6 +93,10 @@ void Workers::for_chunks(std::size_t count, std::size_t chunk_size,
   ChunkLoop(chunks, run).run_in(arena_->arena);
 }
 
+void Workers::run_both(const std::function<void()>& first, const std::function<void()>& second) const {
+  for_chunks(2, 1, [&](std::size_t chunk, std::size_t, std::size_t) { chunk == 0 ? first() : second(); });
+}
+
 int available_cores() {
   return std::max(1, tbb::info::default_concurrency());
 }

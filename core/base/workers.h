@@ -23,6 +23,9 @@ class Workers {
       std::size_t count, std::size_t chunk_size,
       const std::function<void(std::size_t chunk, std::size_t begin, std::size_t end)>& body) const;
 
+  /// Calls both functions, at the same time where there are two threads. They must not throw.
+  void run_both(const std::function<void()>& first, const std::function<void()>& second) const;
+
  private:
   struct Arena;
   int threads_;

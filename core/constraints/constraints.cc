@@ -55,13 +55,13 @@ void drop_void_rows(const std::vector<char>& may_move, Holds& holds) {
 
 /// Holds all vertices outside the region at their positions in `outside`, and unreferenced vertices where handles have them.
 void hold_outside(const RestShape& shape, const std::vector<char>& may_move, const Points& outside,
-                  Constraints& constraints) {
+                  Points& exact, Constraints& constraints) {
   for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
     if (may_move[i]) continue;
     constraints.is_held[i] = true;
     if (shape.components()[i] < 0) continue;
     constraints.targets.row(i) = (outside.row(i) - shape.centre()) / shape.mean_edge_length();
-    constraints.exact.row(i) = outside.row(i);
+    exact.row(i) = outside.row(i);
   }
 }
 
@@ -129,7 +129,7 @@ Points component_centres(const RestShape& shape) {
 
 /// Holds every vertex of the components that no handle holds, at rest or moved, as `free_components` says.
 void hold_free_components(const RestShape& shape, const HandleSet& handles, FreeComponents free_components,
-                          const std::vector<char>& has_handle, Constraints& constraints) {
+                          const std::vector<char>& has_handle, Points& exact, Constraints& constraints) {
   std::vector<RigidTransform> motions(shape.component_count());
   if (free_components == FreeComponents::kFollow) {
     const Points centres = component_centres(shape);
@@ -143,8 +143,18 @@ void hold_free_components(const RestShape& shape, const HandleSet& handles, Free
     constraints.is_held[i] = true;
     constraints.targets.row(i) = motions[component](shape.scaled_positions().row(i));
     if (free_components == FreeComponents::kStay) continue;
-    constraints.exact.row(i) = constraints.targets.row(i) * shape.mean_edge_length() + shape.centre();
+    exact.row(i) = constraints.targets.row(i) * shape.mean_edge_length() + shape.centre();
   }
+}
+
+HeldPositions held_rows(const std::vector<char>& is_held, const Points& positions) {
+  HeldPositions result;
+  for (std::size_t i = 0; i < is_held.size(); ++i) {
+    if (is_held[i]) result.vertices.push_back(static_cast<std::int32_t>(i));
+  }
+  result.vertices.shrink_to_fit();
+  result.positions = positions(result.vertices, Eigen::all);
+  return result;
 }
 
 }  // namespace
@@ -156,26 +166,29 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   if (handles.handles().empty()) return no_handles();
   Constraints constraints{std::vector<char>(shape.vertex_count(), false),
                           shape.scaled_positions(),
-                          shape.positions(),
+                          {},
                           {},
                           {},
                           footprint_stiffness(shape, handles)};
+  Points exact = shape.positions();
   Holds holds;
-  const auto hold = [&](std::int32_t vertex, const auto& scaled, const auto& exact) {
+  const auto hold = [&](std::int32_t vertex, const auto& scaled, const auto& as_given) {
     constraints.is_held[vertex] = true;
     constraints.targets.row(vertex) = scaled;
-    constraints.exact.row(vertex) = exact;
+    exact.row(vertex) = as_given;
   };
   if (status = hold_handles(shape, handles, holds, hold); !status.ok()) return status;
   const std::vector<char> may_move = movable_vertices(shape, handles.region());
-  hold_outside(shape, may_move, outside ? *outside : shape.positions(), constraints);
+  hold_outside(shape, may_move, outside ? *outside : shape.positions(), exact, constraints);
   drop_void_rows(may_move, holds);
   const std::vector<char> is_tied = tied_components(shape, handles, constraints, Tie::kPartial);
   const auto free = std::find(is_tied.begin(), is_tied.end(), false);
   if (free != is_tied.end() && free_components == FreeComponents::kError) {
     return name_free_component(shape, static_cast<std::int32_t>(free - is_tied.begin()));
   }
-  if (free != is_tied.end()) hold_free_components(shape, handles, free_components, is_tied, constraints);
+  if (free != is_tied.end())
+    hold_free_components(shape, handles, free_components, is_tied, exact, constraints);
+  constraints.exact = held_rows(constraints.is_held, exact);
   constraints.soft = std::move(holds.soft);
   auto linear = LinearConstraints::create(std::move(holds.rows), constraints.is_held);
   if (!linear.ok()) return linear.status();
@@ -200,8 +213,9 @@ absl::Status check_equations(const RestShape& shape, const HandleSet& handles) {
 }
 
 std::size_t Constraints::memory_bytes() const {
-  return is_held.capacity() + (targets.size() + exact.size() + footprint.size()) * sizeof(double) +
-         soft.rows().capacity() * sizeof(SoftRow) + linear.memory_bytes();
+  return is_held.capacity() + (targets.size() + exact.positions.size() + footprint.size()) * sizeof(double) +
+         exact.vertices.capacity() * sizeof(std::int32_t) + soft.rows().capacity() * sizeof(SoftRow) +
+         linear.memory_bytes();
 }
 
 RigidTransform fit_rigid(const Points& from, const Points& to) {

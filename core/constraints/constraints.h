@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -17,13 +19,24 @@ enum class FreeComponents {
   kFollow,  // moves rigidly with the handle that has the vertex nearest to its centre at rest
 };
 
+/// Positions of some vertices.
+struct HeldPositions {
+  std::vector<std::int32_t> vertices;  // ascending
+  Points positions;                    // of each of `vertices`
+
+  /// `vertex` must be one of `vertices`. O(log n).
+  Eigen::RowVector3d of(std::int32_t vertex) const {
+    return positions.row(std::lower_bound(vertices.begin(), vertices.end(), vertex) - vertices.begin());
+  }
+};
+
 /// The constraints that handles and the region of interest put on positions. Held vertices do not move in a solve. They
 /// are the vertices of handles that hold Exactly, vertices outside the region of interest, unreferenced vertices and,
 /// if asked for (FreeComponents), all vertices of components that nothing keeps from drifting off.
 struct Constraints {
   std::vector<char> is_held;  // one per vertex
   Points targets;             // scaled units; rows of free vertices are the rest positions
-  Points exact;               // the targets in the caller's units; for held vertices exactly as given
+  HeldPositions exact;        // of held vertices: the targets in the caller's units, exactly as given
   SoftTerms soft;             // terms of soft and orientation handles; the length unit is not set
   LinearConstraints linear;   // points inside faces and locks
   Field footprint;            // factors of the cells' stiffness; empty if all are 1

@@ -19,6 +19,7 @@ LowerMatrix lower_pattern(const RestShape& shape) {
   LowerMatrix matrix;
   const std::int32_t n = shape.vertex_count();
   matrix.columns.reserve(n + 1);
+  matrix.rows.reserve(n + shape.neighbours().size() / 2);
   matrix.columns.push_back(0);
   for (std::int32_t i = 0; i < n; ++i) {
     matrix.rows.push_back(i);
@@ -212,7 +213,7 @@ std::size_t Metric::memory_bytes() const {
   return (single_ ? single_->memory_bytes() : 0) + (double_ ? double_->memory_bytes() : 0) +
          copy_.memory_bytes() + cell_weights_.capacity() * sizeof(double) + is_held_.capacity() +
          entries_.capacity() * sizeof(MatrixEntry) + matrix_.columns.capacity() * sizeof(std::int32_t) +
-         matrix_.rows.capacity() * (sizeof(std::int32_t) + sizeof(double));
+         matrix_.rows.capacity() * sizeof(std::int32_t) + matrix_.values.capacity() * sizeof(double);
 }
 
 }  // namespace lpdeform

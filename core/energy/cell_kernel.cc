@@ -9,6 +9,8 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
+
 #include "core/energy/rotation_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -48,21 +50,29 @@ struct FitSums {
   V moved_size;  // sum_j w_ij |x_i - x_j|^2
 };
 
-/// Writes the edges x_i - x_j of the lanes from `lane` on to `edges`, as [slot][axis][lane], and returns the sums that
-/// the fit needs.
+HWY_INLINE Vector difference(const Vector& a, const Vector& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+
+constexpr std::size_t kEdge =
+    6 * kLanes;  // numbers of a slot in the buffer of edges: x_i - x_j, then p_i - p_j
+
+/// Writes the edges of the lanes from `lane` on to `edges`, as [slot][axis][lane], and returns the sums that the fit
+/// needs.
 HWY_INLINE FitSums gather_edges(const CellBlocks& blocks, std::size_t block, std::size_t lane,
                                 const double* rows, double* edges) {
   const D d;
   FitSums sums{zero_matrix(), hn::Zero(d)};
-  const Vector centre = gather(rows, blocks.centre.data() + block * kLanes + lane);
+  const std::int32_t* const cells = blocks.centre.data() + block * kLanes + lane;
+  const Vector centre = gather(rows, cells), rest_centre = gather_packed(blocks.rest, cells);
   for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
-       ++slot, edges += 3 * kLanes) {
-    const Vector neighbour = gather(rows, blocks.neighbour.data() + slot * kLanes + lane);
-    const Vector edge{hn::Sub(centre.x, neighbour.x), hn::Sub(centre.y, neighbour.y),
-                      hn::Sub(centre.z, neighbour.z)};
+       ++slot, edges += kEdge) {
+    const std::int32_t* const neighbours = blocks.neighbour.data() + slot * kLanes + lane;
+    const Vector edge = difference(centre, gather(rows, neighbours));
+    const Vector rest = difference(rest_centre, gather_packed(blocks.rest, neighbours));
     store(edge, edges + lane);
+    store(rest, edges + 3 * kLanes + lane);
     const V w = hn::LoadU(d, blocks.weight.data() + slot * kLanes + lane);
-    const Vector rest = load(blocks.rest_edge.data() + slot * 3 * kLanes + lane);
     const Vector we{hn::Mul(w, edge.x), hn::Mul(w, edge.y), hn::Mul(w, edge.z)};
     sums.moved_size = hn::Add(sums.moved_size, dot(we, edge));
     const auto add = [&](int r, V scale) {
@@ -79,23 +89,23 @@ HWY_INLINE FitSums gather_edges(const CellBlocks& blocks, std::size_t block, std
 
 /// Computes the residuals, and E_i^2 as a sum of squares, which has no cancellation where it is small.
 HWY_INLINE void subtract_rotated(const CellBlocks& blocks, std::size_t block, std::size_t lane,
-                                 const double* edges, BlockState& state) {
+                                 const double* edges, const double* rotations, double* squares,
+                                 BlockState& state) {
   const D d;
-  const Matrix rotation = load_matrix(state.rotations.data() + block * 9 * kLanes + lane);
+  const Matrix rotation = load_matrix(rotations + lane);
   V squared = hn::Zero(d);
   Vector sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
   for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
-       ++slot, edges += 3 * kLanes) {
+       ++slot, edges += kEdge) {
     const V w = hn::LoadU(d, blocks.weight.data() + slot * kLanes + lane);
-    const Vector edge = load(edges + lane);
-    const Vector turned = times(rotation, load(blocks.rest_edge.data() + slot * 3 * kLanes + lane));
-    const Vector r{hn::Sub(edge.x, turned.x), hn::Sub(edge.y, turned.y), hn::Sub(edge.z, turned.z)};
+    const Vector turned = times(rotation, load(edges + 3 * kLanes + lane));
+    const Vector r = difference(load(edges + lane), turned);
     const Vector wr{hn::Mul(w, r.x), hn::Mul(w, r.y), hn::Mul(w, r.z)};
     squared = hn::Add(squared, dot(wr, r));
     sum = {hn::Add(sum.x, wr.x), hn::Add(sum.y, wr.y), hn::Add(sum.z, wr.z)};
-    store_rows(wr, state.residuals.data() + (slot * kLanes + lane) * kRow);
+    store_packed(wr, state.residuals.data() + (slot * kLanes + lane) * 3);
   }
-  hn::StoreU(squared, d, state.squared.data() + block * kLanes + lane);
+  hn::StoreU(squared, d, squares + lane);
   store_rows(sum, state.residual_sums.data() + (block * kLanes + lane) * kRow);
 }
 
@@ -126,16 +136,19 @@ HWY_INLINE void fit_block(const FitSums (&sums)[kVectors], const double* rest_si
 void EvaluateBlocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const double* rows,
                     bool is_fit, BlockState& state) {
   const std::size_t lanes = hn::Lanes(D());
-  std::vector<double> edges(blocks.most_slots * 3 * kLanes);
+  std::vector<double> edges(blocks.most_slots * kEdge);
+  double fitted[9 * kLanes], squares[kLanes];
   for (std::size_t block = first; block < last; ++block) {
     FitSums sums[kVectors];
     for (std::size_t v = 0; v < kVectors; ++v)
       sums[v] = gather_edges(blocks, block, v * lanes, rows, edges.data());
-    if (is_fit) {
-      fit_block(sums, blocks.rest_size.data() + block * kLanes, state.rotations.data() + block * 9 * kLanes);
-    }
+    double* const rotations = state.rotations.empty() ? fitted : state.rotations.data() + block * 9 * kLanes;
+    if (is_fit) fit_block(sums, blocks.rest_size.data() + block * kLanes, rotations);
     for (std::size_t v = 0; v < kVectors; ++v)
-      subtract_rotated(blocks, block, v * lanes, edges.data(), state);
+      subtract_rotated(blocks, block, v * lanes, edges.data(), rotations, squares, state);
+    const std::int32_t* const cells = blocks.cells.data() + block * kLanes;
+    for (std::size_t lane = 0; lane < kLanes && cells[lane] >= 0; ++lane)
+      state.squared[static_cast<std::size_t>(cells[lane])] = squares[lane];
   }
 }
 
@@ -147,7 +160,7 @@ void GradientOfBlocks(const CellBlocks& blocks, std::size_t first, std::size_t l
     return *reinterpret_cast<const Row*>(state.residual_sums.data() + at * kRow);
   };
   const auto residual = [&](std::size_t at) -> const SingleRow& {
-    return *reinterpret_cast<const SingleRow*>(state.residuals.data() + at * kRow);
+    return *reinterpret_cast<const SingleRow*>(state.residuals.data() + at * 3);  // the fourth is not used
   };
   for (std::size_t block = first; block < last; ++block) {
     const std::size_t begin = blocks.first_slot[block], end = blocks.first_slot[block + 1];
@@ -174,11 +187,14 @@ HWY_EXPORT(EvaluateBlocks);
 HWY_EXPORT(GradientOfBlocks);
 
 BlockState::BlockState(const CellBlocks& blocks)
-    : rotations(blocks.cells.size() * 9),
-      squared(blocks.cells.size()),
+    : squared(static_cast<std::size_t>(std::find(blocks.cells.begin(), blocks.cells.end(), -1) -
+                                       blocks.cells.begin())),
       residual_sums(blocks.cells.size() * kRow),
-      residuals(blocks.slot_count() * CellBlocks::kLanes * kRow) {
+      residuals(blocks.slot_count() * CellBlocks::kLanes * 3 + 1) {}
+
+void BlockState::keep_rotations(const CellBlocks& blocks) {
   constexpr std::size_t kLanes = CellBlocks::kLanes;
+  rotations.assign(blocks.cells.size() * 9, 0.0);
   for (std::size_t block = 0; block < blocks.block_count(); ++block) {
     for (std::size_t entry = 0; entry < 9; entry += 4) {
       std::fill_n(rotations.begin() + static_cast<std::ptrdiff_t>((block * 9 + entry) * kLanes), kLanes, 1.0);

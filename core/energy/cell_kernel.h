@@ -14,16 +14,20 @@ struct BlockState {
   explicit BlockState(const CellBlocks& blocks);
   std::size_t memory_bytes() const;
 
-  std::vector<double> rotations;      // [block][entry, row-major][lane]: R_i; initially the identity
-  std::vector<double> squared;        // [block][lane]: E_i^2
+  /// Makes room for rotations, so that evaluations store them.
+  void keep_rotations(const CellBlocks& blocks);
+
+  std::vector<double> rotations;      // [block][entry, row-major][lane]: R_i; empty if they are not kept
+  std::vector<double> squared;        // of each vertex: E_i^2
   std::vector<double> residual_sums;  // [block][lane][axis, filler]: sum_j r_ij
-  std::vector<float> residuals;  // [slot][lane][axis, filler]: r_ij = w_ij ((x_i - x_j) - R_i (p_i - p_j));
-      // single precision: a small relative error is harmless, and memory bandwidth is the bottleneck
+  std::vector<float>
+      residuals;  // [slot][lane][axis], then a filler: r_ij = w_ij ((x_i - x_j) - R_i (p_i - p_j));
+  // single precision: a small relative error is harmless, and memory bandwidth is the bottleneck
 };
 
 /// Computes rotations (Eq. 2, as fit_rotation does), squared energies and residuals of blocks first to last - 1 at
-/// positions x, in scaled units. `rows` has x, y, z and a filler for each vertex. If `fit` is false, the rotations in
-/// `state` are kept. Uses the widest vector instructions that the processor has; lanes whose fit is uncertain go
+/// positions x, in scaled units. `rows` has x, y, z and a filler for each vertex. If `fit` is false, the rotations kept in
+/// `state` are used. Uses the widest vector instructions that the processor has; lanes whose fit is uncertain go
 /// through fit_rotation. Different blocks may be computed at the same time.
 void evaluate_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const double* rows,
                      bool fit, BlockState& state);

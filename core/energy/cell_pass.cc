@@ -13,32 +13,33 @@ constexpr std::size_t kRowChunk = 4096;  // vertices
 CellPass::CellPass(std::shared_ptr<const RestShape> shape, Workers workers)
     : shape_(std::move(shape)),
       workers_(std::move(workers)),
-      blocks_(*shape_, kChunk),
+      blocks_(*shape_, kChunk, workers_),
       state_(blocks_),
       rows_(shape_->vertex_count() * kRow, 0.0),
-      e2_(shape_->vertex_count(), 0.0),
       c_(shape_->vertex_count(), 0.0),
       chunk_sums_((shape_->vertex_count() + kChunk - 1) / kChunk) {}
 
 double CellPass::evaluate(const Points& x, const LpNorm& norm) {
+  state_.rotations = {};  // of the x before
   return evaluate_cells(x, norm, true);
 }
 
 double CellPass::evaluate_held(const Points& x, const LpNorm& norm) {
+  keep_rotations();
   return evaluate_cells(x, norm, false);
 }
 
 /// Adds up body(begin, end) over all chunks; body returns the sum over its cells.
 template <typename Body>
 double CellPass::sum_of_chunks(const Body& body) const {
-  workers_.for_chunks(e2_.size(), kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+  workers_.for_chunks(c_.size(), kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     chunk_sums_[chunk] = body(begin, end);
   });
   return std::accumulate(chunk_sums_.begin(), chunk_sums_.end(), 0.0);
 }
 
 double CellPass::evaluate_cells(const Points& x, const LpNorm& norm, bool fit) {
-  workers_.for_chunks(e2_.size(), kRowChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+  workers_.for_chunks(c_.size(), kRowChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     const double* from = x.data() + 3 * begin;
     for (double* to = rows_.data() + kRow * begin; begin < end; ++begin, to += kRow, from += 3) {
       to[0] = from[0], to[1] = from[1], to[2] = from[2];
@@ -47,9 +48,6 @@ double CellPass::evaluate_cells(const Points& x, const LpNorm& norm, bool fit) {
   return sum_of_chunks([&](std::size_t begin, std::size_t end) {
     const std::size_t first = begin / kLanes, last = (end + kLanes - 1) / kLanes;
     evaluate_blocks(blocks_, first, last, rows_.data(), fit, state_);
-    for (std::size_t k = first * kLanes; k < last * kLanes && blocks_.cells[k] >= 0; ++k) {
-      e2_[blocks_.cells[k]] = state_.squared[k];
-    }
     return weigh(norm, begin, end);
   });
 }
@@ -58,7 +56,7 @@ double CellPass::evaluate_cells(const Points& x, const LpNorm& norm, bool fit) {
 double CellPass::weigh(const LpNorm& norm, std::size_t begin, std::size_t end) {
   double sum = 0;
   for (std::size_t i = begin; i < end; ++i) {
-    const LpNorm::Term term = norm.term(static_cast<std::int32_t>(i), e2_[i]);
+    const LpNorm::Term term = norm.term(static_cast<std::int32_t>(i), state_.squared[i]);
     c_[i] = term.weight;
     sum += term.value;
   }
@@ -72,21 +70,33 @@ double CellPass::reweigh(const LpNorm& norm) {
 double CellPass::sum(const LpNorm& norm) const {
   return sum_of_chunks([&](std::size_t begin, std::size_t end) {
     double sum = 0;
-    for (std::size_t i = begin; i < end; ++i) sum += norm.term(static_cast<std::int32_t>(i), e2_[i]).value;
+    for (std::size_t i = begin; i < end; ++i)
+      sum += norm.term(static_cast<std::int32_t>(i), state_.squared[i]).value;
     return sum;
   });
 }
 
 void CellPass::gradient(Points& result) const {
   result.resize(shape_->vertex_count(), 3);
-  workers_.for_chunks(e2_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+  workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     gradient_of_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, state_, c_.data(),
                        result.data());
   });
 }
 
+/// Most methods need no rotations. The others have the last x evaluated again, which changes nothing else.
+void CellPass::keep_rotations() const {
+  if (!state_.rotations.empty()) return;
+  state_.keep_rotations(blocks_);
+  workers_.for_chunks(blocks_.block_count(), kChunk / kLanes,
+                      [&](std::size_t, std::size_t begin, std::size_t end) {
+                        evaluate_blocks(blocks_, begin, end, rows_.data(), true, state_);
+                      });
+}
+
 std::vector<Eigen::Matrix3d> CellPass::rotations() const {
-  std::vector<Eigen::Matrix3d> result(e2_.size());
+  keep_rotations();
+  std::vector<Eigen::Matrix3d> result(c_.size());
   for (std::size_t k = 0; k < blocks_.cells.size(); ++k) {
     if (blocks_.cells[k] < 0) continue;
     const double* const lane = state_.rotations.data() + k / kLanes * 9 * kLanes + k % kLanes;
@@ -97,7 +107,7 @@ std::vector<Eigen::Matrix3d> CellPass::rotations() const {
 
 std::size_t CellPass::memory_bytes() const {
   return blocks_.memory_bytes() + state_.memory_bytes() +
-         (rows_.capacity() + e2_.capacity() + c_.capacity() + chunk_sums_.capacity()) * sizeof(double);
+         (rows_.capacity() + c_.capacity() + chunk_sums_.capacity()) * sizeof(double);
 }
 
 }  // namespace lpdeform

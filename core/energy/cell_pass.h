@@ -40,9 +40,9 @@ class CellPass {
   void gradient(Points& result) const;
 
   // Of the last evaluation.
-  const std::vector<double>& squared_energies() const { return e2_; }  // E_i^2
-  const std::vector<double>& cell_weights() const { return c_; }       // c_i
-  std::vector<Eigen::Matrix3d> rotations() const;                      // R_i
+  const std::vector<double>& squared_energies() const { return state_.squared; }  // E_i^2
+  const std::vector<double>& cell_weights() const { return c_; }                  // c_i
+  std::vector<Eigen::Matrix3d> rotations() const;  // R_i; the first call takes as long as an evaluation
 
   const RestShape& shape() const { return *shape_; }
   const Workers& workers() const { return workers_; }
@@ -55,13 +55,14 @@ class CellPass {
   double sum_of_chunks(const Body& body) const;
   double weigh(const LpNorm& norm, std::size_t begin, std::size_t end);
   double evaluate_cells(const Points& x, const LpNorm& norm, bool fit);
+  void keep_rotations() const;
 
   std::shared_ptr<const RestShape> shape_;
   Workers workers_;
   CellBlocks blocks_;
-  BlockState state_;
+  mutable BlockState state_;  // its rotations are made when first needed after an evaluation
   std::vector<double> rows_;  // x, with fillers
-  std::vector<double> e2_, c_;
+  std::vector<double> c_;
   mutable std::vector<double> chunk_sums_;
 };
 

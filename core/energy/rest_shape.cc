@@ -73,6 +73,12 @@ absl::Status check_scale(const Extent& extent) {
   return absl::OkStatus();
 }
 
+/// Whether edge_weights can be called before the mesh has been checked.
+bool has_weights(const TriangleMesh& mesh) {
+  return mesh.faces.size() > 0 && mesh.faces.minCoeff() >= 0 &&
+         mesh.faces.maxCoeff() < mesh.vertices.rows() && mesh.vertices.allFinite();
+}
+
 /// The mean length of the mesh's own edges, even if the weights have other edges.
 double mean_length(const TriangleMesh& mesh, const EdgeWeights& weights) {
   double total = 0, count = 0;
@@ -91,9 +97,16 @@ double mean_length(const TriangleMesh& mesh, const EdgeWeights& weights) {
 
 }  // namespace
 
-absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const TriangleMesh& mesh,
-                                                                   WeightKind kind) {
-  MeshReport report = check_mesh(mesh);
+absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const TriangleMesh& mesh, WeightKind kind,
+                                                                   const Workers& workers) {
+  MeshReport report;
+  EdgeWeights edges;
+  const bool is_at_once =
+      workers.threads() > 1 && kind != WeightKind::kIntrinsicDelaunay && has_weights(mesh);
+  workers.run_both([&] { report = check_mesh(mesh); },
+                   [&] {
+                     if (is_at_once) edges = edge_weights(mesh, kind);
+                   });
   if (absl::Status status = deformable(report); !status.ok()) return status;
 
   const auto shape = std::shared_ptr<RestShape>(new RestShape);
@@ -105,7 +118,7 @@ absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const Triangl
   shape->kind_ = kind;
   shape->component_count_ = static_cast<std::int32_t>(report.components);
 
-  const EdgeWeights edges = edge_weights(mesh, kind);
+  if (!is_at_once) edges = edge_weights(mesh, kind);
   count_weight_defects(edges, report);
   shape->report_ = std::move(report);
   make_rows(shape->vertex_count(), edges, shape->offsets_, shape->neighbours_, shape->weights_);

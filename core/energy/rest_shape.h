@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/base/workers.h"
 #include "core/energy/weights.h"
 #include "core/mesh/mesh.h"
 #include "core/mesh/report.h"
@@ -17,7 +18,8 @@ class RestShape {
  public:
   /// Errors: INVALID_ARGUMENT with the reasons of deformable(), or MESH_SCALE; names the element. O(n log n).
   static absl::StatusOr<std::shared_ptr<const RestShape>> create(const TriangleMesh& mesh,
-                                                                 WeightKind kind = WeightKind::kCotangent);
+                                                                 WeightKind kind = WeightKind::kCotangent,
+                                                                 const Workers& workers = Workers(1));
 
   static constexpr double kLargestCoordinate = 1e25, kSmallestDiagonal = 1e-25;
 

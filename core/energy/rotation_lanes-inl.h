@@ -57,21 +57,48 @@ HWY_INLINE void store(const Vector& v, double* at) {
   hn::StoreU(v.z, d, at + 2 * kLanes);
 }
 
+#if HWY_TARGET == HWY_AVX2
+/// The columns of four rows.
+HWY_INLINE Vector transposed(V r0, V r1, V r2, V r3) {
+  const D d;
+  const V xz01 = hn::InterleaveLower(d, r0, r1), y01 = hn::InterleaveUpper(d, r0, r1);
+  const V xz23 = hn::InterleaveLower(d, r2, r3), y23 = hn::InterleaveUpper(d, r2, r3);
+  return {hn::ConcatLowerLower(d, xz23, xz01), hn::ConcatLowerLower(d, y23, y01),
+          hn::ConcatUpperUpper(d, xz23, xz01)};
+}
+#endif
+
 /// Gathers the rows of these vertices, kRow numbers each.
 HWY_INLINE Vector gather(const double* rows, const std::int32_t* indices) {
   const D d;
 #if HWY_TARGET == HWY_AVX2
   const hn::FixedTag<double, 4> quad;
   const auto row = [&](int k) { return hn::LoadU(quad, rows + kRow * static_cast<std::size_t>(indices[k])); };
-  const V r0 = row(0), r1 = row(1), r2 = row(2), r3 = row(3);
-  const V xz01 = hn::InterleaveLower(d, r0, r1), y01 = hn::InterleaveUpper(d, r0, r1);
-  const V xz23 = hn::InterleaveLower(d, r2, r3), y23 = hn::InterleaveUpper(d, r2, r3);
-  return {hn::ConcatLowerLower(d, xz23, xz01), hn::ConcatLowerLower(d, y23, y01),
-          hn::ConcatUpperUpper(d, xz23, xz01)};
+  return transposed(row(0), row(1), row(2), row(3));
 #else
   const hn::RebindToSigned<D> wide;
   const hn::Rebind<std::int32_t, D> narrow;
   const auto index = hn::ShiftLeft<2>(hn::PromoteTo(wide, hn::LoadU(narrow, indices)));
+  return {hn::GatherIndex(d, rows, index), hn::GatherIndex(d, rows + 1, index),
+          hn::GatherIndex(d, rows + 2, index)};
+#endif
+}
+
+/// Gathers the rows of these vertices, three numbers each.
+HWY_INLINE Vector gather_packed(const double* rows, const std::int32_t* indices) {
+  const D d;
+#if HWY_TARGET == HWY_AVX2
+  const hn::FixedTag<double, 4> quad;
+  const auto three = hn::FirstN(quad, 3);
+  const auto row = [&](int k) {
+    return hn::MaskedLoad(three, quad, rows + 3 * static_cast<std::size_t>(indices[k]));
+  };
+  return transposed(row(0), row(1), row(2), row(3));
+#else
+  const hn::RebindToSigned<D> wide;
+  const hn::Rebind<std::int32_t, D> narrow;
+  const auto vertex = hn::PromoteTo(wide, hn::LoadU(narrow, indices));
+  const auto index = hn::Add(vertex, hn::ShiftLeft<1>(vertex));
   return {hn::GatherIndex(d, rows, index), hn::GatherIndex(d, rows + 1, index),
           hn::GatherIndex(d, rows + 2, index)};
 #endif
@@ -83,10 +110,10 @@ HWY_INLINE void store_rows(const Vector& v, double* at) {
   hn::StoreInterleaved4(v.x, v.y, v.z, hn::Zero(d), d, at);
 }
 
-/// The same in single precision.
-HWY_INLINE void store_rows(const Vector& v, float* at) {
+/// The same in single precision, three numbers each.
+HWY_INLINE void store_packed(const Vector& v, float* at) {
   const hn::Rebind<float, D> d;
-  hn::StoreInterleaved4(hn::DemoteTo(d, v.x), hn::DemoteTo(d, v.y), hn::DemoteTo(d, v.z), hn::Zero(d), d, at);
+  hn::StoreInterleaved3(hn::DemoteTo(d, v.x), hn::DemoteTo(d, v.y), hn::DemoteTo(d, v.z), d, at);
 }
 
 HWY_INLINE Matrix rotation_of(const Quaternion& q) {

@@ -59,6 +59,12 @@ std::vector<std::int32_t> collapse(HalfEdgeMesh& mesh, std::int32_t vertices) {
 
 }  // namespace
 
+std::size_t CoarseMesh::memory_bytes() const {
+  return static_cast<std::size_t>(mesh.vertices.size()) * sizeof(double) +
+         (static_cast<std::size_t>(mesh.faces.size()) + fine_vertex.capacity() + coarse_vertex.capacity()) *
+             sizeof(std::int32_t);
+}
+
 CoarseMesh coarsen(const TriangleMesh& mesh, std::int32_t vertices) {
   HalfEdgeMesh half_edges = to_collapsible(mesh);
   std::vector<std::int32_t> went_into = collapse(half_edges, vertices);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -12,6 +13,8 @@ struct CoarseMesh {
   TriangleMesh mesh;
   std::vector<std::int32_t> fine_vertex;    // of each coarse vertex
   std::vector<std::int32_t> coarse_vertex;  // of each fine vertex: the one that it was collapsed into
+
+  std::size_t memory_bytes() const;
 };
 
 /// Collapses short edges into one of their ends, in rounds of growing edge length, until about `vertices` vertices are

@@ -67,13 +67,13 @@ class Coarsener {
     for (std::size_t c = 0; c < levels_.fine_vertex.size(); ++c) {
       const std::int32_t v = levels_.fine_vertex[c];
       if (constraints_.is_held[v] && take(static_cast<std::int32_t>(c)))
-        targets.emplace_back(static_cast<std::int32_t>(c), constraints_.exact.row(v));
+        targets.emplace_back(static_cast<std::int32_t>(c), constraints_.exact.of(v));
     }
     for (const auto& [name, handle] : fine.handles()) {
       if (!handle.fixes_vertices() || some_stay(handle)) continue;
       for (const std::int32_t v : handle.vertices) {
         const std::int32_t c = levels_.coarse_vertex[v];
-        if (take(c)) targets.emplace_back(c, constraints_.exact.row(v) + offset(v));
+        if (take(c)) targets.emplace_back(c, constraints_.exact.of(v) + offset(v));
       }
     }
     return with_targets({}, targets);

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "core/energy/cell_pass.h"
-#include "core/mesh/coarsen.h"
 #include "core/multiresolution/coarse_handles.h"
 
 namespace lpdeform {
@@ -28,8 +27,12 @@ double at(const Field& field, Eigen::Index i) {
 
 }  // namespace
 
-std::unique_ptr<CoarseLevel> CoarseLevel::create(const RestShape& fine, const MakeLevelSolver& make_solver) {
-  CoarseMesh coarse = coarsen({fine.positions(), fine.faces()}, fine.vertex_count() / kRatio);
+CoarseMesh CoarseLevel::coarsened(const RestShape& fine) {
+  return coarsen({fine.positions(), fine.faces()}, fine.vertex_count() / kRatio);
+}
+
+std::unique_ptr<CoarseLevel> CoarseLevel::create(const RestShape& fine, CoarseMesh coarse,
+                                                 MakeLevelSolver make_solver) {
   if (2 * coarse.mesh.vertices.rows() > fine.vertex_count() || coarse.mesh.faces.rows() == 0) return nullptr;
   auto shape = RestShape::create(coarse.mesh, fine.weight_kind());
   if (!shape.ok()) return nullptr;
@@ -41,6 +44,7 @@ std::unique_ptr<CoarseLevel> CoarseLevel::create(const RestShape& fine, const Ma
   level->share_.assign(level->fine_vertex_.size(), 0.0);
   for (const std::int32_t c : level->coarse_vertex_) level->share_[c] += 1;
   level->shape_ = *std::move(shape);
+  level->make_solver_ = std::move(make_solver);
   level->solver_ = std::move(solver);
   level->find_guides(fine);
   return level;
@@ -82,6 +86,8 @@ void CoarseLevel::find_guides(const RestShape& fine) {
 
 absl::Status CoarseLevel::take_over(const RestShape& fine, const HandleSet& handles,
                                     const Constraints& constraints, const Material& material) {
+  if (!solver_) solver_ = make_solver_(shape_);
+  if (!solver_) return absl::InternalError("The solver of a coarse level could not be made again.");
   const std::size_t n = fine_vertex_.size();
   Material coarse{restricted(material.p, fine_vertex_), restricted(material.stiffness, fine_vertex_),
                   material.length_unit > 0 ? material.length_unit : fine.mean_edge_length()};
@@ -128,10 +134,14 @@ Points CoarseLevel::prolong(const RestShape& fine, const Workers& workers) const
   return result;
 }
 
+void CoarseLevel::leave() {
+  if (leaves()) solver_.reset();
+}
+
 std::size_t CoarseLevel::memory_bytes() const {
   return (fine_vertex_.capacity() + coarse_vertex_.capacity()) * sizeof(std::int32_t) +
          share_.capacity() * sizeof(double) + guides_.capacity() * sizeof(Guides) + shape_->memory_bytes() +
-         solver_->memory_bytes();
+         (solver_ && !leaves() ? solver_->memory_bytes() : 0);
 }
 
 }  // namespace lpdeform

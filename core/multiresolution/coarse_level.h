@@ -7,6 +7,7 @@
 #include "core/constraints/constraints.h"
 #include "core/energy/material.h"
 #include "core/energy/rest_shape.h"
+#include "core/mesh/coarsen.h"
 #include "core/multiresolution/level_solver.h"
 
 namespace lpdeform {
@@ -18,8 +19,13 @@ class CoarseLevel {
  public:
   static constexpr std::int32_t kRatio = 6;
 
-  /// Null if the mesh cannot be coarsened to half its vertices, or if no solver can be made for the coarse shape.
-  static std::unique_ptr<CoarseLevel> create(const RestShape& fine, const MakeLevelSolver& make_solver);
+  /// The mesh of the coarse level of `fine`.
+  static CoarseMesh coarsened(const RestShape& fine);
+
+  /// `coarse` is what coarsened() returns. Null if the mesh could not be coarsened to half its vertices, or if no solver
+  /// can be made for the coarse shape.
+  static std::unique_ptr<CoarseLevel> create(const RestShape& fine, CoarseMesh coarse,
+                                             MakeLevelSolver make_solver);
 
   /// Restricts the inputs of the fine level to the coarse solver: coarse_handles, and `material`. A coarse cell stands
   /// for m fine cells, and its E_i^2 is a sum over them. If p_i is not 2, s_i is therefore multiplied by (m /
@@ -27,17 +33,28 @@ class CoarseLevel {
   absl::Status take_over(const RestShape& fine, const HandleSet& handles, const Constraints& constraints,
                          const Material& material);
 
+  /// Only between take_over() and leave().
   LevelSolver& solver() { return *solver_; }
+
+  /// Call when the solver has ended and the fine level goes on. Large levels free their solver, which the fine level's
+  /// workspace then takes the place of; the next take_over() makes it again.
+  void leave();
 
   /// Prolongation: the fine shape moved with the coarse one, in scaled units of the fine shape. Each vertex follows the
   /// fitted rigid motions of the nearest coarse vertices around it, blended by distance.
   Points prolong(const RestShape& fine, const Workers& workers) const;
 
+  /// Without temporary_bytes().
   std::size_t memory_bytes() const;
+  /// Bytes of the solver, if leave() frees it.
+  std::size_t temporary_bytes() const { return leaves() && solver_ ? solver_->memory_bytes() : 0; }
 
  private:
   CoarseLevel() = default;
+  bool leaves() const { return shape_->vertex_count() > kMostKept; }
   void find_guides(const RestShape& fine);
+
+  static constexpr std::int32_t kMostKept = 10000;  // vertices of a level that keeps its solver
 
   static constexpr std::size_t kGuides = 4;
   struct Guides {
@@ -48,7 +65,8 @@ class CoarseLevel {
   std::vector<double> share_;                              // the number of fine vertices of each coarse one
   std::vector<Guides> guides_;                             // of each fine vertex
   std::shared_ptr<const RestShape> shape_;
-  std::unique_ptr<LevelSolver> solver_;
+  MakeLevelSolver make_solver_;
+  std::unique_ptr<LevelSolver> solver_;  // null if leave() has freed it
 };
 
 }  // namespace lpdeform

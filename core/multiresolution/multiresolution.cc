@@ -49,8 +49,9 @@ void Multiresolution::even_out(Points& found) const {
 }
 
 std::optional<Points> Multiresolution::intermediate_state() {
+  if (fine_) return std::nullopt;
   const int done = level_.solver().iterations();
-  if (fine_ || done < next_look_) return std::nullopt;
+  if (done < next_look_) return std::nullopt;
   next_look_ = 2 * done;
   level_.solver().catch_up();
   Points found = prolonged();
@@ -62,6 +63,7 @@ std::optional<Points> Multiresolution::intermediate_state() {
 /// Starts QuasiNewton from the better of the guess and the result of the coarse level.
 void Multiresolution::begin_fine() {
   Points found = prolonged();
+  level_.leave();
   const bool is_better = found.allFinite() && problem_.objective.evaluate(found, problem_.norm) < objective_;
   if (is_better) {
     x_.swap(found);

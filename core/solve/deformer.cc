@@ -1,5 +1,7 @@
 #include "core/solve/deformer.h"
 
+#include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -13,8 +15,21 @@
 namespace lpdeform {
 namespace {
 
-// What a solve holds at most, in positions of all vertices: states, gradients and the pairs of L-BFGS.
-constexpr std::size_t kWorkspace = 24;
+// What a running solve holds, in positions of all vertices: QuasiNewton has 7 states, gradients and directions, and 7
+// pairs of L-BFGS in single precision.
+constexpr std::size_t kWorkspace = 14;
+// What a Deformer holds besides: x, positions, x_before_move, energies and weights.
+constexpr std::size_t kStates = 4;
+constexpr std::size_t kCellBytes = 96, kEdgeBytes = 30;  // of CellPass: per vertex, per directed edge
+constexpr std::size_t kCoarseShare = 6;                  // the coarse levels take about 1 / kCoarseShare more
+constexpr std::int32_t kCoarsenBeforehand = 10000;  // vertices from which on cold solves have a coarse level
+
+/// Memory of a Deformer without its metric.
+std::size_t bytes_beside_metric(const RestShape& shape) {
+  const auto n = static_cast<std::size_t>(shape.vertex_count());
+  return n * ((kWorkspace + kStates) * 3 * sizeof(double) + kCellBytes) +
+         kEdgeBytes * shape.neighbours().size();
+}
 
 absl::Status not_solved(const char* what) {
   return make_fault({Reason::kNotSolved, "", ""},
@@ -35,14 +50,22 @@ absl::StatusOr<std::unique_ptr<Deformer>> Deformer::create(std::shared_ptr<const
   }
   const Metric::Admission admit = [&](std::size_t metric_bytes) {
     if (!options.admit) return absl::OkStatus();
-    const std::size_t points = 3 * sizeof(double) * static_cast<std::size_t>(shape->vertex_count());
-    return options.admit(metric_bytes + kWorkspace * points);
+    const std::size_t own = metric_bytes + bytes_beside_metric(*shape);
+    const bool has_coarse = shape->vertex_count() >= kCoarsenBeforehand;
+    return options.admit(has_coarse ? own + own / kCoarseShare : own);
   };
-  auto metric = Metric::create(shape, admit);
-  if (!metric.ok()) return metric.status();
+  std::optional<absl::StatusOr<Metric>> metric;
+  std::optional<CoarseMesh> coarse;
+  const Workers workers(shape->vertex_count() < options.parallel_from ? 1 : options.threads);
+  workers.run_both([&] { metric = Metric::create(shape, admit); },
+                   [&] {
+                     if (workers.threads() > 1 && shape->vertex_count() >= kCoarsenBeforehand)
+                       coarse = CoarseLevel::coarsened(*shape);
+                   });
+  if (!metric->ok()) return metric->status();
   options.admit = nullptr;
-  return std::unique_ptr<Deformer>(
-      new Deformer(std::make_unique<Impl>(std::move(shape), std::move(options), *std::move(metric))));
+  return std::unique_ptr<Deformer>(new Deformer(
+      std::make_unique<Impl>(std::move(shape), std::move(options), **std::move(metric), std::move(coarse))));
 }
 
 const RestShape& Deformer::shape() const {
@@ -188,9 +211,9 @@ const Points& Deformer::positions() const {
   Impl& self = *impl_;
   if (!self.is_positions_current) {
     self.positions = (self.x * self.unit()).rowwise() + self.shape->centre();
-    for (Eigen::Index i = 0; i < self.x.rows(); ++i) {
-      if (self.constraints->is_held[i]) self.positions.row(i) = self.constraints->exact.row(i);
-    }
+    const HeldPositions& exact = self.constraints->exact;
+    for (std::size_t k = 0; k < exact.vertices.size(); ++k)
+      self.positions.row(exact.vertices[k]) = exact.positions.row(static_cast<Eigen::Index>(k));
     self.is_positions_current = true;
   }
   return self.positions;
@@ -198,10 +221,16 @@ const Points& Deformer::positions() const {
 
 std::size_t Deformer::memory_bytes() const {
   const std::size_t points = impl_->x.size() * sizeof(double);
+  const std::size_t numbers =
+      impl_->x.size() + impl_->positions.size() + impl_->x_before_move.size() + impl_->best_energies.size();
   const std::size_t held = impl_->constraints ? impl_->constraints->memory_bytes() : 0;
   const std::size_t coarse = impl_->coarse ? impl_->coarse->memory_bytes() : 0;
+  // A solver that leaves runs before the fine level has a workspace.
+  const std::size_t workspace =
+      std::max(kWorkspace * points, impl_->coarse ? impl_->coarse->temporary_bytes() : 0);
   return sizeof(Impl) + held + coarse + impl_->objective.cells().memory_bytes() +
-         impl_->metric.memory_bytes() + kWorkspace * points;
+         impl_->metric.memory_bytes() + numbers * sizeof(double) + workspace +
+         (impl_->coarse_mesh ? impl_->coarse_mesh->memory_bytes() : 0);
 }
 
 }  // namespace lpdeform

@@ -106,7 +106,10 @@ bool Deformer::Impl::prepare_coarse() {
     auto deformer = Deformer::create(std::move(level), of_level);
     return deformer.ok() ? std::make_unique<DeformerOfLevel>(*std::move(deformer)) : nullptr;
   };
-  if (!coarse) coarse = CoarseLevel::create(*shape, make_solver);
+  if (!coarse) {
+    CoarseMesh mesh = coarse_mesh ? *std::exchange(coarse_mesh, {}) : CoarseLevel::coarsened(*shape);
+    coarse = CoarseLevel::create(*shape, std::move(mesh), make_solver);
+  }
   return coarse && coarse->take_over(*shape, handles, *constraints, effective_material()).ok();
 }
 
@@ -230,11 +233,13 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   const bool is_warm = settings.initial == InitialGuess::kCurrent && state == State::kDeformed;
   if (!is_warm) x_before_move.resize(0, 3);
   if (!settings.effort) settings.effort = default_effort(is_warm);
-  settings.method = summary.method = chosen_method(settings.method, is_warm);
   const bool keeps_metric =
       is_warm && factor == Factor::kQuasiNewton && metric.is_factored_for(constraints->is_held);
   warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
-  const bool is_factored = prepare_metric(!is_warm || factor == Factor::kOutdated);
+  bool is_factored = false;
+  const auto make_coarse = [&] { settings.method = summary.method = chosen_method(settings.method, is_warm); };
+  workers().run_both([&] { is_factored = prepare_metric(!is_warm || factor == Factor::kOutdated); },
+                     make_coarse);
   summary.setup_seconds = seconds();
 
   started = Clock::now();
@@ -299,6 +304,7 @@ void Deformer::Impl::end_minimiser(StopReason reason) {
   else if (settings.method == Method::kMultiresolution)
     forget_weights();
   minimiser.reset();
+  if (coarse) coarse->leave();
   state = is_best_zero() ? State::kUndistorted : State::kDeformed;
   summary.stop_reason = reason;
   summary.solve_seconds = seconds();

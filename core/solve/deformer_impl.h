@@ -18,11 +18,13 @@ namespace lpdeform {
 /// The state of a Deformer, and the loop of a solve. Initial guesses are in deformer_guess.cc, the search for lower minima in
 /// deformer_search.cc, everything else in deformer_impl.cc.
 struct Deformer::Impl {
-  Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options, Metric first_metric)
+  Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options, Metric first_metric,
+       std::optional<CoarseMesh> first_coarse_mesh)
       : shape(std::move(rest_shape)),
         options(std::move(deformer_options)),
         objective(shape, Workers(shape->vertex_count() < options.parallel_from ? 1 : options.threads)),
         metric(std::move(first_metric)),
+        coarse_mesh(std::move(first_coarse_mesh)),
         x(shape->scaled_positions()),
         best_energies(Field::Zero(shape->vertex_count())),
         positions(shape->positions()) {}
@@ -92,6 +94,7 @@ struct Deformer::Impl {
   DeformerOptions options;
   Objective objective;
   Metric metric;
+  std::optional<CoarseMesh> coarse_mesh;  // of `coarse`, where it was made beforehand
   HandleSet handles;
   Material material;
   std::optional<Constraints> constraints;

@@ -21,7 +21,8 @@ std::size_t estimate(const v1::Mesh& mesh) {
 }
 
 /// Makes the shape, and the mesh that clients draw.
-absl::Status make_mesh(const v1::CreateSessionRequest& request, Decoder& decoder, SessionParts& parts) {
+absl::Status make_mesh(const v1::CreateSessionRequest& request, Decoder& decoder, const Workers& workers,
+                       SessionParts& parts) {
   const auto weights = decode_weights(request.weights());
   if (!weights.ok()) return weights.status();
   auto mesh = decoder.mesh(request.mesh());
@@ -31,7 +32,7 @@ absl::Status make_mesh(const v1::CreateSessionRequest& request, Decoder& decoder
   const auto weld = decoder.weld(request.weld(), mesh->vertices);
   if (!weld.ok()) return weld.status();
 
-  auto shape = RestShape::create(*weld ? welded(*mesh, **weld) : *mesh, *weights);
+  auto shape = RestShape::create(*weld ? welded(*mesh, **weld) : *mesh, *weights, workers);
   // If possible, an error names the client's vertices.
   if (!shape.ok() && *weld) {
     if (absl::Status status = deformable(check_mesh(*mesh)); !status.ok()) return status;
@@ -69,7 +70,8 @@ absl::Status SessionFactory::make_shape(const v1::CreateSessionRequest& request,
   if (!memory.ok()) return memory.status();
   parts.free_components = *free_components;
   parts.memory = *std::move(memory);
-  if (absl::Status status = make_mesh(request, decoder, parts); !status.ok()) return status;
+  if (absl::Status status = make_mesh(request, decoder, Workers(threads()), parts); !status.ok())
+    return status;
   const std::size_t held = parts.shape->memory_bytes() + parts.mesh->memory_bytes();
   auto deformer = Deformer::create(parts.shape, {.free_components = parts.free_components,
                                                  .threads = threads(),

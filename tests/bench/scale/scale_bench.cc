@@ -46,7 +46,7 @@ void print_seconds(const char* name, double seconds) {
 void solve(const TriangleMesh& mesh, double p, int threads, double limit, double known) {
   const HandleSet handles = creature_turn(mesh);
   const Clock::time_point start = Clock::now();
-  const auto shape = RestShape::create(mesh).value();
+  const auto shape = RestShape::create(mesh, WeightKind::kCotangent, Workers(threads)).value();
   auto deformer = Deformer::create(shape, {.threads = threads}).value();
   (void)deformer->set_handles(handles);
   (void)deformer->set_material(Material::uniform(p));

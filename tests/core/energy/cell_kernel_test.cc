@@ -26,6 +26,7 @@ class CellKernel : public testing::TestWithParam<std::int64_t> {
   void expect_right(const RestShape& shape, const Points& x, double tolerance = 1e-14) {
     const CellBlocks blocks(shape, 64);
     BlockState state(blocks);
+    state.keep_rotations(blocks);
     evaluate_blocks(blocks, 0, blocks.block_count(), with_fillers(x).data(), true, state);
     std::vector<int> seen(shape.vertex_count(), 0);
     for (std::size_t k = 0; k < blocks.cells.size(); ++k) {
@@ -39,8 +40,8 @@ class CellKernel : public testing::TestWithParam<std::int64_t> {
       ASSERT_LT((r * r.transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-13) << "vertex " << i;
       ASSERT_NEAR(r.determinant(), 1, 1e-13) << "vertex " << i;
       const Cell cell(shape, x, i);
-      ASSERT_NEAR(state.squared[k], cell.squared_energy(r), 1e-14 * cell.size) << "vertex " << i;
-      ASSERT_NEAR(state.squared[k], cell.squared_energy(fit_rotation_svd(cell.b)), tolerance * cell.size)
+      ASSERT_NEAR(state.squared[i], cell.squared_energy(r), 1e-14 * cell.size) << "vertex " << i;
+      ASSERT_NEAR(state.squared[i], cell.squared_energy(fit_rotation_svd(cell.b)), tolerance * cell.size)
           << "vertex " << i;
     }
     EXPECT_EQ(seen, std::vector<int>(shape.vertex_count(), 1));
@@ -135,6 +136,7 @@ TEST_P(CellKernel, HoldsRotationsWhereTheyAreNotToBeFitted) {
   const auto shape = rest_shape(box_surface(2, 2, 2));
   const CellBlocks blocks(*shape, 64);
   BlockState state(blocks);
+  state.keep_rotations(blocks);
   evaluate_blocks(blocks, 0, blocks.block_count(),
                   with_fillers(turned(shape->scaled_positions(), 1, {0, 0, 1})).data(), false, state);
   double sum = 0;

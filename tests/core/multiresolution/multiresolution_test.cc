@@ -177,6 +177,28 @@ TEST_F(MultiresolutionTest, CatchesUpWithTheCoarseLevelWithoutChangingWhatFollow
   }
 }
 
+// Its coarse level has more vertices than a level that keeps its solver.
+TEST_F(MultiresolutionTest, MakesTheSolverOfALargeLevelAgainForTheNextColdSolve) {
+  const TriangleMesh mesh = grid(250, 250, 1);
+  HandleSet handles;
+  (void)handles.set("left", {slice(mesh, 0, 0, 0), Fixed{}});
+  (void)handles.set("right", {slice(mesh, 0, 250, 250), RigidMotion{.translation = {0, 0, 50}}});
+  auto solver = deformer(rest_shape(mesh), handles, Material::uniform(2), {.threads = 2});
+  SolveSettings cold = settings(Method::kMultiresolution);
+  cold.tolerance = 1e-3;
+  double energy = 0;
+  for (int round = 0; round < 2; ++round) {
+    ASSERT_TRUE(solver->start(cold).ok());
+    do solver->catch_up();
+    while (solver->step());
+    EXPECT_EQ(solver->summary().stop_reason, StopReason::kConverged);
+    if (round > 0) {
+      EXPECT_EQ(solver->summary().energy, energy);
+    }
+    energy = solver->summary().energy;
+  }
+}
+
 TEST_F(MultiresolutionTest, GivesTheSameBitsOnAnyNumberOfThreads) {
   auto one = deformer(shape, bend(), Material::uniform(1.5), {.threads = 1, .parallel_from = 0});
   auto two = deformer(shape, bend(), Material::uniform(1.5), {.threads = 2, .parallel_from = 0});
