@@ -1,0 +1,155 @@
+// The search for lower minima in a live session.
+
+#include <numbers>
+
+#include "live_solver_fixture.h"
+
+namespace lpdeform {
+namespace {
+
+/// A bar that is bent by 80 degrees. At p = 1.5 its first minimum is 2.8 % above the lowest one known.
+class LiveSearchTest : public LiveSolverTest {
+ protected:
+  LiveSearchTest() : LiveSolverTest(box_surface(6, 6, 40)) {}
+
+  Update bend(std::uint64_t input_seq, double degrees = 80) const {
+    Update update;
+    update.input_seq = input_seq;
+    update.handles.push_back({"base", Handle{vertices_at(rest(), 0), Fixed{}}});
+    const RigidMotion turn{Eigen::Vector3d::UnitX(), degrees * std::numbers::pi / 180, {3, 3, 20}, {0, 0, 0}};
+    update.handles.push_back({"tip", Handle{vertices_at(rest(), 40), turn}});
+    update.settings.p = Field::Constant(1, 1.5);
+    return update;
+  }
+
+  /// Takes the update, and searches once its result has stood.
+  std::shared_ptr<const Frame> search(const Update& update) {
+    EXPECT_TRUE(mailbox_.take(update).ok());
+    settle();
+    auto result = publisher_->newest();
+    timers_->advance(LiveSolver::kSearchQuiet);
+    settle();
+    return result;
+  }
+
+  static std::optional<BetterNote> announced(FrameStream& stream) {
+    std::optional<BetterNote> found;
+    while (const auto note = stream.next()) {
+      if (const auto* better = std::get_if<BetterNote>(&*note)) found = *better;
+    }
+    return found;
+  }
+};
+
+TEST_F(LiveSearchTest, ABetterShapeIsAnnouncedOnceAndShownWhenItIsTaken) {
+  const auto stream = look_on();
+  const auto result = search(bend(1));
+  ASSERT_TRUE(result->is_final);
+  EXPECT_EQ(publisher_->newest(), result);
+  const auto better = announced(*stream);
+  ASSERT_TRUE(better.has_value());
+  EXPECT_EQ(better->input_seq, 1u);
+  EXPECT_GT(better->saved_share, 0.02);
+  EXPECT_NEAR(better->energy, (1 - better->saved_share) * result->energy, 1e-9 * result->energy);
+  EXPECT_FALSE(announced(*stream).has_value());
+
+  solver_.take_better();
+  const auto shown = publisher_->newest();
+  EXPECT_GT(shown->frame_seq, result->frame_seq);
+  EXPECT_EQ(shown->input_seq, 1u);
+  EXPECT_TRUE(shown->is_final);
+  EXPECT_EQ(shown->energy, better->energy);
+  EXPECT_NE(shown->surface->positions(), result->surface->positions());
+  EXPECT_FALSE(publisher_->better().has_value());
+  solver_.take_better();
+  EXPECT_EQ(publisher_->newest(), shown);
+}
+
+TEST_F(LiveSearchTest, ALaterReaderIsToldToo) {
+  const auto stream = look_on();
+  search(bend(1));
+  EXPECT_TRUE(announced(*look_on()).has_value());
+}
+
+TEST_F(LiveSearchTest, NothingIsSearchedBeforeTheResultHasStood) {
+  const auto stream = look_on();
+  ASSERT_TRUE(mailbox_.take(bend(1)).ok());
+  settle();
+  timers_->advance(LiveSolver::kSearchQuiet / 2);
+  settle();
+  EXPECT_FALSE(announced(*stream).has_value());
+  timers_->advance(LiveSolver::kSearchQuiet);
+  EXPECT_GE(rings_, 1);
+}
+
+TEST_F(LiveSearchTest, ANewInputEndsTheSearchAndVoidsWhatItFound) {
+  const auto stream = look_on();
+  search(bend(1));
+  ASSERT_TRUE(announced(*stream).has_value());
+  ASSERT_TRUE(mailbox_.take(bend(2, 10)).ok());
+  solver_.take_better();  // too late
+  settle();
+  EXPECT_EQ(publisher_->newest()->input_seq, 2u);
+  EXPECT_FALSE(publisher_->better().has_value());
+}
+
+TEST_F(LiveSearchTest, WhereItIsWantedABetterShapeIsShownAtOnce) {
+  const auto stream = look_on();
+  Update update = bend(1);
+  update.settings.solver = SolveSettings{.effort = 1, .standing = {.shows = true}};
+  const auto result = search(update);
+  EXPECT_LT(publisher_->newest()->energy, 0.98 * result->energy);
+  EXPECT_TRUE(publisher_->newest()->is_final);
+  EXPECT_FALSE(publisher_->better().has_value());
+}
+
+TEST_F(LiveSearchTest, WhatSavesLessThanTheLeastShareIsNotAnnounced) {
+  const auto stream = look_on();
+  Update update = bend(1);
+  update.settings.solver = SolveSettings{.effort = 1, .standing = {.least_share = 0.5}};
+  search(update);
+  EXPECT_FALSE(announced(*stream).has_value());
+}
+
+TEST_F(LiveSearchTest, NothingIsSearchedWithoutEffortOrAtPOfTwo) {
+  const auto stream = look_on();
+  Update update = bend(1);
+  update.settings.solver = SolveSettings{.effort = 0};
+  search(update);
+  EXPECT_FALSE(announced(*stream).has_value());
+  EXPECT_EQ(rings_, 0);
+  update = bend(2);
+  update.settings.p = Field::Constant(1, 2.0);
+  update.settings.solver = SolveSettings{};
+  search(update);
+  EXPECT_EQ(rings_, 0);
+}
+
+TEST_F(LiveSearchTest, TheSearchRestsWhileOthersWaitForAnswers) {
+  const auto stream = look_on();
+  ASSERT_TRUE(mailbox_.take(bend(1)).ok());
+  settle();
+  timers_->advance(LiveSolver::kSearchQuiet);
+  EXPECT_FALSE(solver_.run_slice(nullptr, {.slice = LiveSolver::kShortSlice}));
+  EXPECT_FALSE(announced(*stream).has_value());
+  const int rings = rings_;
+  timers_->advance(LiveSolver::kQuiet);
+  EXPECT_GT(rings_, rings);
+  settle();
+  EXPECT_TRUE(announced(*stream).has_value());
+}
+
+TEST_F(LiveSearchTest, ACertificateComesFirstAndAgainForTheBetterShape) {
+  const auto stream = look_on(true);
+  search(bend(1));
+  EXPECT_TRUE(publisher_->newest()->optimality_gap.has_value());
+  ASSERT_TRUE(announced(*stream).has_value());
+  solver_.take_better();
+  EXPECT_FALSE(publisher_->newest()->optimality_gap.has_value());
+  timers_->advance(LiveSolver::kQuiet);
+  settle();
+  EXPECT_TRUE(publisher_->newest()->optimality_gap.has_value());
+}
+
+}  // namespace
+}  // namespace lpdeform
