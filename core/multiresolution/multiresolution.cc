@@ -1,13 +1,15 @@
 #include "core/multiresolution/multiresolution.h"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 namespace lpdeform {
 namespace {
 
 constexpr double kCoarseTolerance = 1e-4;  // relative, of E^(1/p); the levels differ by more than this
-constexpr double kRoughCoarseTolerance = 1e-3;  // where the first minimum is taken as it comes, and p is not 2
+constexpr double kRoughCoarseTolerance = 1e-3;  // if some p_i < 2 and the first minimum is taken as it comes
+constexpr int kCostOfLook = 5;  // looking at the coarse level takes at most one part in this many of the time
 
 }  // namespace
 
@@ -16,9 +18,8 @@ Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level, 
   objective_ = problem_.objective.reweigh(problem_.norm);
   SolveSettings settings;
   settings.initial = InitialGuess::kLaplacian;
-  const bool is_at_two = problem_.norm.lowest_p() == 2 && problem_.norm.highest_p() == 2;
-  const double coarse = effort == 0 && !is_at_two ? kRoughCoarseTolerance : kCoarseTolerance;
-  settings.tolerance = std::max(problem_.tolerance, coarse);
+  const bool is_rough = effort == 0 && problem_.norm.lowest_p() < 2;
+  settings.tolerance = std::max(problem_.tolerance, is_rough ? kRoughCoarseTolerance : kCoarseTolerance);
   settings.effort = effort;
   if (!level_.solver().start(settings, problem_.stop).ok())
     fine_ = std::make_unique<QuasiNewton>(problem_, x_, Warmth::kCold);
@@ -51,13 +52,16 @@ void Multiresolution::even_out(Points& found) const {
 std::optional<Points> Multiresolution::intermediate_state() {
   if (fine_) return std::nullopt;
   const int done = level_.solver().iterations();
-  if (done < next_look_) return std::nullopt;
-  next_look_ = 2 * done;
+  const auto begun = std::chrono::steady_clock::now();
+  if (done < kFirstLook || done == looked_at_ || begun < next_look_) return std::nullopt;
+  looked_at_ = done;
   level_.solver().catch_up();
   Points found = prolonged();
-  if (!found.allFinite()) return std::nullopt;
-  problem_.objective.evaluate(found, problem_.norm);
-  return found;
+  const bool is_good = found.allFinite();
+  if (is_good) problem_.objective.evaluate(found, problem_.norm);
+  const auto now = std::chrono::steady_clock::now();
+  next_look_ = now + (kCostOfLook - 1) * (now - begun);
+  return is_good ? std::make_optional(std::move(found)) : std::nullopt;
 }
 
 /// Starts QuasiNewton from the better of the guess and the result of the coarse level.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <optional>
 
@@ -22,7 +23,7 @@ class Multiresolution : public Minimiser {
   StepResult step() override;
   const Points& x() const override { return fine_ ? fine_->x() : x_; }
   /// The prolonged state of the coarse level. This costs about as much as two iterations, so there is a new one only
-  /// when the coarse level has made twice as many iterations as at the previous one.
+  /// when four times that time has passed since the previous one.
   std::optional<Points> intermediate_state() override;
 
  private:
@@ -36,7 +37,8 @@ class Multiresolution : public Minimiser {
   Points x_;
   double objective_ = 0;
   CoarseLevel& level_;
-  int next_look_ = kFirstLook;         // iterations of the coarse level at the next prolongation
+  int looked_at_ = 0;  // iterations of the coarse level at the last prolongation
+  std::chrono::steady_clock::time_point next_look_;
   std::unique_ptr<QuasiNewton> fine_;  // null while the coarse level runs
 };
 

@@ -228,7 +228,8 @@ std::size_t Deformer::memory_bytes() const {
   // A solver that leaves runs before the fine level has a workspace.
   const std::size_t workspace =
       std::max(kWorkspace * points, impl_->coarse ? impl_->coarse->temporary_bytes() : 0);
-  return sizeof(Impl) + held + coarse + impl_->objective.cells().memory_bytes() +
+  const std::size_t searched = (impl_->better ? points : 0) + (impl_->search ? 3 * points : 0);
+  return sizeof(Impl) + searched + held + coarse + impl_->objective.cells().memory_bytes() +
          impl_->metric.memory_bytes() + numbers * sizeof(double) + workspace +
          (impl_->coarse_mesh ? impl_->coarse_mesh->memory_bytes() : 0);
 }

@@ -80,7 +80,7 @@ void show(const TriangleMesh& mesh, const HandleSet& handles, double p, int thre
   const auto deformer = Deformer::create(shape, {.threads = threads}).value();
   (void)deformer->set_material(Material::uniform(p));
   (void)deformer->set_handles(handles);
-  (void)deformer->start({});
+  (void)deformer->start({.effort = 0});
   Points shown = deformer->positions();
   double solving = 0, due = 0, jump = 0, stand = 0, changed_at = 0;
   Bend worst, last;
