@@ -6,12 +6,13 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kComesNearer = 0.03;  // the least share of the difference to the lowest sum
+constexpr double kComesNearer = 0.03;     // the least share of the difference to the lowest sum
 constexpr double kWorthFinishing = 1.02;  // a rough minimum's sum over the lowest, at most
 
 }  // namespace
 
-MinimaSearch::MinimaSearch(MakeStart make_start, MakeFinish make_finish, Scope scope, Points lowest, double sum)
+MinimaSearch::MinimaSearch(MakeStart make_start, MakeFinish make_finish, Scope scope, Points lowest,
+                           double sum)
     : make_start_(std::move(make_start)),
       make_finish_(std::move(make_finish)),
       scope_(scope),

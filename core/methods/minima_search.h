@@ -61,8 +61,8 @@ class MinimaSearch {
   int number_;                            // of the start that runs, or is next
   std::unique_ptr<Minimiser> minimiser_;  // null between two starts
   bool is_rough_ = true;
-  int iterations_ = 0;                    // of the start
-  std::deque<double> sums_;               // of its last iterations
+  int iterations_ = 0;       // of the start
+  std::deque<double> sums_;  // of its last iterations
 };
 
 }  // namespace lpdeform

@@ -7,7 +7,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr double kCoarseTolerance = 1e-4;  // relative, of E^(1/p); the levels differ by more than this
+constexpr double kCoarseTolerance = 1e-4;       // relative, of E^(1/p); the levels differ by more than this
 constexpr double kRoughCoarseTolerance = 1e-3;  // if some p_i < 2 and the first minimum is taken as it comes
 constexpr int kCostOfLook = 5;  // looking at the coarse level takes at most one part in this many of the time
 

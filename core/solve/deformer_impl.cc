@@ -18,7 +18,8 @@ constexpr double kCertificateSeconds = 1;    // it may take this long, even beyo
 constexpr std::size_t kCopyChunk = 4096;     // vertices
 constexpr std::int32_t kLargeMesh = 5000;    // vertices from which on a coarse level pays off
 constexpr std::int32_t kLargeAtTwo = 10000;  // the same if every p is 2, where the gain is smaller
-constexpr std::int32_t kLargestSearchedLevel = 5000;  // vertices of a coarse level that looks for lower minima itself
+constexpr std::int32_t kLargestSearchedLevel =
+    5000;                            // vertices of a coarse level that looks for lower minima itself
 constexpr double kRounding = 1e-13;  // relative to the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
@@ -132,7 +133,8 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points 
     case Method::kConic:
       return std::make_unique<Conic>(std::move(problem), std::move(guess));
     case Method::kMultiresolution:
-      return std::make_unique<Multiresolution>(std::move(problem), std::move(guess), *coarse, *settings.effort);
+      return std::make_unique<Multiresolution>(std::move(problem), std::move(guess), *coarse,
+                                               *settings.effort);
     case Method::kAuto:
     case Method::kQuasiNewton:
       break;
@@ -237,7 +239,9 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
       is_warm && factor == Factor::kQuasiNewton && metric.is_factored_for(constraints->is_held);
   warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
   bool is_factored = false;
-  const auto make_coarse = [&] { settings.method = summary.method = chosen_method(settings.method, is_warm); };
+  const auto make_coarse = [&] {
+    settings.method = summary.method = chosen_method(settings.method, is_warm);
+  };
   workers().run_both([&] { is_factored = prepare_metric(!is_warm || factor == Factor::kOutdated); },
                      make_coarse);
   summary.setup_seconds = seconds();

@@ -21,7 +21,8 @@ struct Origin {
   bool is_lowest;
   double share;
 };
-constexpr std::array kOrigins = {Origin{false, 0.08}, Origin{true, 0.2}, Origin{false, 0.2}, Origin{true, 0.08}};
+constexpr std::array kOrigins = {Origin{false, 0.08}, Origin{true, 0.2}, Origin{false, 0.2},
+                                 Origin{true, 0.08}};
 
 constexpr double kRoughTolerance = 1e-3;
 constexpr int kWaves = 6;
@@ -124,7 +125,8 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_start(int number, const Points& 
 /// On a mesh that is too large to be searched itself: a cold solve, whose coarse levels look for lower minima.
 std::unique_ptr<Minimiser> Deformer::Impl::make_large_start(const Points& guess) {
   objective.evaluate(guess, *norm);
-  return make_minimiser(prepare_coarse() ? Method::kMultiresolution : Method::kQuasiNewton, guess, Warmth::kCold);
+  return make_minimiser(prepare_coarse() ? Method::kMultiresolution : Method::kQuasiNewton, guess,
+                        Warmth::kCold);
 }
 
 void Deformer::Impl::begin_search(int starts) {

@@ -235,7 +235,8 @@ grpc::ServerUnaryReactor* Service::UndoUpdate(Context* context, const v1::UndoUp
 grpc::ServerUnaryReactor* Service::TakeBetterShape(Context* context,
                                                    const v1::TakeBetterShapeRequest* request,
                                                    v1::TakeBetterShapeResponse* response) {
-  return about_session(backend_, *context, "TakeBetterShape", &Backend::take_better_shape, *request, *response);
+  return about_session(backend_, *context, "TakeBetterShape", &Backend::take_better_shape, *request,
+                       *response);
 }
 
 grpc::ServerUnaryReactor* Service::AckFrames(Context* context, const v1::AckFramesRequest* request,

@@ -37,7 +37,7 @@ class Service final : public v1::DeformService::CallbackService {
   grpc::ServerUnaryReactor* UndoUpdate(Context* context, const v1::UndoUpdateRequest* request,
                                        v1::UndoUpdateResponse* response) override;
   grpc::ServerUnaryReactor* TakeBetterShape(Context* context, const v1::TakeBetterShapeRequest* request,
-                                       v1::TakeBetterShapeResponse* response) override;
+                                            v1::TakeBetterShapeResponse* response) override;
   grpc::ServerUnaryReactor* AckFrames(Context* context, const v1::AckFramesRequest* request,
                                       v1::AckFramesResponse* response) override;
 

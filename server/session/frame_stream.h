@@ -80,8 +80,8 @@ struct EndNote {
   EndReason reason = EndReason::kDraining;
   std::string text;
 };
-using Note = std::variant<OpenedNote, FramePiece, UpdateResult, FaultNote, LoadNote, BetterNote, HeartbeatNote,
-                          EndNote>;
+using Note = std::variant<OpenedNote, FramePiece, UpdateResult, FaultNote, LoadNote, BetterNote,
+                          HeartbeatNote, EndNote>;
 
 /// One reader of a session: decides what to send to it and when. It holds at most one frame, the one that is
 /// being cut into pieces. The next frame is the publisher's newest at that time. Backpressure: a frame is
@@ -168,7 +168,7 @@ class FrameStream : public std::enable_shared_from_this<FrameStream> {
   bool has_said_overloaded_ = false;
   std::uint64_t last_fault_ = 0;
   std::uint64_t last_better_ = 0;  // number of the last better shape announced
-  std::size_t last_bytes_ = 0;  // the numbers of the last frame
+  std::size_t last_bytes_ = 0;     // the numbers of the last frame
   Timers::TimePoint last_frame_at_;
   FramePace pace_;
   Timers::TimePoint last_sent_at_;

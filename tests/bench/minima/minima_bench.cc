@@ -32,9 +32,11 @@ void solve(int number, const SolveSettings& settings) {
   (void)deformer->set_material(problem.material);
   const double begun = processor_seconds();
   const SolveSummary summary = deformer->solve(settings).value();
-  std::printf("{\"problem\": \"%s\", \"vertices\": %td, \"energy\": %.10g, \"stop\": \"%s\", \"starts\": %d, \"minima\": [",
-              problem.name.c_str(), problem.mesh.vertices.rows(), summary.energy,
-              std::string(stop_reason_name(summary.stop_reason)).c_str(), summary.further_starts);
+  std::printf(
+      "{\"problem\": \"%s\", \"vertices\": %td, \"energy\": %.10g, \"stop\": \"%s\", \"starts\": %d, "
+      "\"minima\": [",
+      problem.name.c_str(), problem.mesh.vertices.rows(), summary.energy,
+      std::string(stop_reason_name(summary.stop_reason)).c_str(), summary.further_starts);
   for (std::size_t k = 0; k < summary.minima.size(); ++k)
     std::printf("%s%.10g", k == 0 ? "" : ", ", summary.minima[k]);
   std::printf("], \"seconds\": %.3f}\n", processor_seconds() - begun);

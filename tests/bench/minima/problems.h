@@ -20,8 +20,8 @@ struct MinimaProblem {
   Material material;
 };
 
-inline constexpr std::array kMinimaShapes = {"box",   "bumps", "holes", "necked", "sphere",
-                                             "creature", "scan", "tree",  "block",  "rocker"};
+inline constexpr std::array kMinimaShapes = {"box",      "bumps", "holes", "necked", "sphere",
+                                             "creature", "scan",  "tree",  "block",  "rocker"};
 
 inline TriangleMesh minima_shape(std::string_view name) {
   if (name == "box") return box_surface(3, 24, 48);
@@ -56,7 +56,9 @@ inline MinimaProblem minima_problem(int number) {
   problem.handles = family_pose(problem.mesh, static_cast<unsigned>(pose + 1));
   const std::string_view p = material == 0 ? "1" : material == 1 ? "1.5" : pose == 0 ? "6" : "mixed";
   problem.material = p == "mixed" ? mixed_material(problem.mesh)
-                                  : Material::uniform(material == 0 ? 1 : material == 1 ? 1.5 : 6);
+                                  : Material::uniform(material == 0   ? 1
+                                                      : material == 1 ? 1.5
+                                                                      : 6);
   problem.name = std::string(shape) + " " + std::to_string(pose + 1) + " " + std::string(p);
   return problem;
 }
