@@ -13,7 +13,7 @@ FAMILIES = ("creature", "scan", "tree", "sheet")
 
 def runs_of(program: str, family: str, options: argparse.Namespace) -> dict[tuple[float, int], dict]:
     command = [program, family, str(options.vertices), options.p, str(options.poses), str(options.threads),
-               str(options.seconds)]
+               str(options.seconds)] + ([str(options.effort)] if options.effort is not None else [])
     lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
     return {(run["p"], run["pose"]): run for run in map(json.loads, lines)}
 
@@ -38,6 +38,7 @@ def main() -> None:
     parser.add_argument("--p", default="1,1.5,2,6")
     parser.add_argument("--seconds", type=float, default=20)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--effort", type=int, help="SolveSettings::effort; the default one if not given")
     parser.add_argument("--beside")
     options = parser.parse_args()
     programs = {"this": options.program} | ({"beside": options.beside} if options.beside else {})
