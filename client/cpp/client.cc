@@ -70,6 +70,10 @@ absl::StatusOr<std::uint64_t> Session::redo() {
   return link_->undo(true);
 }
 
+absl::StatusOr<BetterShape> Session::take_better_shape() {
+  return link_->take_better_shape();
+}
+
 absl::StatusOr<std::string> Session::snapshot() {
   return link_->snapshot();
 }

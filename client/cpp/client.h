@@ -139,6 +139,12 @@ class Session {
   absl::StatusOr<std::uint64_t> undo();
   absl::StatusOr<std::uint64_t> redo();
 
+  /// Shows the better shape that the notice kBetterShape has announced, as a new final frame for the same update. The shape
+  /// is not part of steps for undo. Waits for the answer, not for the frame. Not retried: after UNAVAILABLE or
+  /// DEADLINE_EXCEEDED the shape may have been taken, which a frame then shows. FAILED_PRECONDITION (NO_BETTER_SHAPE if none
+  /// is known for the newest update; NOT_THE_WRITER; SESSION_CLOSED).
+  absl::StatusOr<BetterShape> take_better_shape();
+
   /// Solves for the current handles and settings on the server; waits for the final result and returns it. Works with
   /// and without the stream of frames. If the server becomes unreachable, the solve is retried within the deadline and
   /// for at most reconnect_for. Only one solve runs at a time; updates made meanwhile are sent after it. If another
@@ -165,8 +171,9 @@ class Session {
   /// The error with which the connection broke last, or with which the last attempt to reconnect failed; OK while it is
   /// connected.
   absl::Status last_problem() const;
-  /// The last notice from the server on the present stream of frames. Empty if there was none, and while the stream is
-  /// down.
+  /// The notice of a better shape for as long as it applies: until the shape is shown, or a frame for a later update
+  /// arrives. Otherwise the last notice from the server about itself on the present stream of frames. Empty if there was
+  /// none, and while the stream is down.
   std::optional<Notice> notice() const;
   /// The server's report on the mesh.
   MeshReport mesh_report() const;

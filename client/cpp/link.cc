@@ -89,6 +89,7 @@ absl::Status Link::one_stream() {
     uploads_done_.clear();
     go_away_.reset();
     notice_.reset();
+    better_.reset();
     broken_ = unsent_ = absl::OkStatus();
     last_heard_ = Clock::now();
     open = open_request(lease_, options_);

@@ -42,6 +42,7 @@ class Link {
   absl::StatusOr<Frame> settle(FrameBox::Clock::time_point deadline);
   bool is_result(const Frame& frame) const;
   absl::StatusOr<std::uint64_t> undo(bool redo);
+  absl::StatusOr<BetterShape> take_better_shape();
   absl::StatusOr<std::string> snapshot();
   absl::StatusOr<SolveResult> solve(const SolveOptions& options);
   absl::Status take_over();
@@ -80,6 +81,7 @@ class Link {
   absl::Status take(const v1::Fault& fault);
 
   // On any thread.
+  absl::Status check_writer() const;
   void acknowledge(std::uint64_t frame_seq, std::uint64_t stream);
   absl::Status check_initial_positions(const SolveOptions& options) const;
   absl::StatusOr<std::optional<Frame>> take_frame(Clock::time_point deadline);
@@ -131,9 +133,10 @@ class Link {
   std::map<std::uint64_t, Uploads> uploads_in_use_;  // by the updates that name them
   std::vector<Uploads> uploads_done_;                // to be deleted
   std::optional<v1::GoAway> go_away_;
-  std::optional<Notice> notice_;
-  absl::Status broken_;  // why we ended the stream
-  absl::Status unsent_;  // why an update could not be sent on the stream
+  std::optional<Notice> notice_;  // of the server about itself
+  std::optional<Notice> better_;  // of a better shape, while it applies
+  absl::Status broken_;           // why we ended the stream
+  absl::Status unsent_;           // why an update could not be sent on the stream
   std::optional<FrameAssembly> assembly_;
   Clock::time_point last_heard_;
   /// After this much silence the connection counts as dead: three of the server's heartbeat intervals.

@@ -16,15 +16,19 @@
 #include "core/base/reasons.h"
 
 namespace lpdeform::client {
+/// Whether the caller may change the session. Called with the lock held.
+absl::Status Link::check_writer() const {
+  if (is_closing_) return session_closed();
+  if (!lease_.writer_token.empty()) return absl::OkStatus();
+  return make_fault(absl::StatusCode::kFailedPrecondition, {Reason::kNotTheWriter, "", ""},
+                    "A reader cannot change the session: take_over() first.");
+}
+
 absl::StatusOr<std::uint64_t> Link::update(Update update) {
   const absl::Status checked = check_names(update);
   if (!checked.ok()) return checked;
   const std::scoped_lock lock(mutex_);
-  if (is_closing_) return session_closed();
-  if (lease_.writer_token.empty()) {
-    return make_fault(absl::StatusCode::kFailedPrecondition, {Reason::kNotTheWriter, "", ""},
-                      "A reader cannot change the session: take_over() first.");
-  }
+  if (absl::Status may = check_writer(); !may.ok()) return may;
   const std::uint64_t seq = ledger_.add(std::move(update));
   changed_.notify_all();
   return seq;
@@ -204,6 +208,21 @@ absl::StatusOr<v1::UndoUpdateResponse> Link::undo_patiently(const v1::UndoUpdate
     if (!absl::IsUnavailable(undone.status()) || Clock::now() + pause > end) return undone;
     if (changed_.wait_for(lock, pause, [this] { return is_closing_; })) return session_closed();
   }
+}
+
+/// Called once only: if the answer is lost, the shape may have been taken, and then there is no other.
+absl::StatusOr<BetterShape> Link::take_better_shape() {
+  std::unique_lock lock(mutex_);
+  if (absl::Status may = check_writer(); !may.ok()) return may;
+  v1::TakeBetterShapeRequest request;
+  request.set_session(lease_.session);
+  request.set_writer_token(lease_.writer_token);
+  lock.unlock();
+  const auto taken = rpc_->call(request, stop_.get_token());
+  lock.lock();
+  if (taken.ok() || fault_of(taken.status()).reason == Reason::kNoBetterShape) better_.reset();
+  if (!taken.ok()) return is_closing_ ? session_closed() : taken.status();
+  return BetterShape{.input_seq = taken->input_seq(), .energy = taken->energy()};
 }
 
 absl::StatusOr<SolveResult> Link::solve(const SolveOptions& options) {
@@ -427,7 +446,8 @@ absl::Status Link::last_problem() const {
 
 std::optional<Notice> Link::notice() const {
   const std::scoped_lock lock(mutex_);
-  return is_open_ ? notice_ : std::nullopt;
+  if (!is_open_) return std::nullopt;
+  return better_ ? better_ : notice_;  // better_ concerns a session that stands, load the next updates
 }
 
 MeshReport Link::mesh_report() const {

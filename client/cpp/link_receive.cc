@@ -66,7 +66,8 @@ absl::Status Link::take(const v1::StreamEvent& event) {
     }
     case v1::StreamEvent::kNotice: {
       const std::scoped_lock lock(mutex_);
-      notice_ = from_wire(event.notice());
+      Notice notice = from_wire(event.notice());
+      (notice.reason == Notice::Reason::kBetterShape ? better_ : notice_) = std::move(notice);
       break;
     }
     default:
@@ -110,6 +111,9 @@ absl::Status Link::take(const v1::FramePart& part) {
     stream = stream_;
     rules_.frame_fitted();
     ledger_.show((*frame)->epoch, (*frame)->input_seq);
+    const bool is_void =
+        better_ && ((*frame)->input_seq > better_->input_seq || (*frame)->energy <= better_->energy);
+    if (is_void) better_.reset();
   }
   const std::uint64_t frame_seq = (*frame)->frame_seq;
   if (box_.put(*std::move(*frame), stream)) return absl::OkStatus();

@@ -197,6 +197,10 @@ class GrpcRpc final : public Rpc {
                                               const std::stop_token& stop) override {
     return unary(&Stub::UndoUpdate, request, stop);
   }
+  absl::StatusOr<v1::TakeBetterShapeResponse> call(const v1::TakeBetterShapeRequest& request,
+                                                   const std::stop_token& stop) override {
+    return unary(&Stub::TakeBetterShape, request, stop);
+  }
 
   absl::Status snapshot(
       const v1::SnapshotSessionRequest& request, const std::stop_token& stop,

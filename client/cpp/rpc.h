@@ -71,6 +71,8 @@ class Rpc {
                                                           const std::stop_token& stop) = 0;
   virtual absl::StatusOr<v1::UndoUpdateResponse> call(const v1::UndoUpdateRequest& request,
                                                       const std::stop_token& stop) = 0;
+  virtual absl::StatusOr<v1::TakeBetterShapeResponse> call(const v1::TakeBetterShapeRequest& request,
+                                                           const std::stop_token& stop) = 0;
 
   /// Calls `on_response` for each message, on this thread; an error of it ends the call and is returned.
   virtual absl::Status snapshot(

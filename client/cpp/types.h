@@ -153,6 +153,20 @@ enum class StopReason {
 /// "iteration_limit" and so on, as in reports.
 std::string stop_reason_name(StopReason reason);
 
+/// How far to look for lower minima once the first one is found. The energy is not convex: it has many minima, above all
+/// where p is below 2.
+struct MinimaSearch {
+  /// The search begins from 8 `effort` further starts, each of which takes at most about as long as the first solve. 0 to
+  /// 1000; 0 takes the first minimum. Session::solve searches before it answers. A session with an open stream shows the
+  /// first minimum, and searches when no update has arrived for a second.
+  std::uint32_t effort = 0;
+  /// What the session does with a lower minimum that it has found then. False: it announces it (Notice::kBetterShape), and
+  /// Session::take_better_shape shows it. True: it shows it, as a new frame for the same update.
+  bool show = false;
+  /// The share of the energy that must be saved for this, 0 to 1; 0 means 0.02.
+  double least_share = 0;
+};
+
 /// The method of a solve and when it stops. This is one setting: a new value replaces all fields.
 struct SolverSettings {
   Method method = Method::kAuto;
@@ -160,6 +174,9 @@ struct SolverSettings {
   std::uint32_t max_iterations = 0;  // 0 means the server's default
   double time_limit_seconds = 0;     // 0 means no limit
   InitialGuess initial = InitialGuess::kCurrent;
+  /// If left out: effort 1 if the method is kAuto and some p < 2, and for Session::solve if it also starts cold; otherwise
+  /// 0.
+  std::optional<MinimaSearch> search = {};
 };
 
 /// p or stiffness that the server computes from the shape's geometry: softer at joints (concave creases, and places
@@ -214,15 +231,26 @@ struct Update {
   bool begins_step = false;
 };
 
-/// A message about the server's condition; nothing failed.
+/// A message about the server's condition or about the session's surface; nothing failed.
 struct Notice {
   enum class Reason {
-    kOther,       // a reason that only newer servers send
-    kOverloaded,  // frames come less often, and the final frame of an update later
-    kRecovered,   // no longer overloaded
+    kOther,        // a reason that only newer servers send
+    kOverloaded,   // frames come less often, and the final frame of an update later
+    kRecovered,    // no longer overloaded
+    kBetterShape,  // a shape of lower energy is known for the newest update: see MinimaSearch
   };
   Reason reason = Reason::kOther;
   std::string text = {};  // one sentence for people
+  // Of kBetterShape only.
+  std::uint64_t input_seq = 0;  // the update that the shape is for
+  double energy = 0;            // of the shape
+  double saved_share = 0;       // the share of the present energy that it saves, 0 to 1
+};
+
+/// A better shape that was taken: see Session::take_better_shape.
+struct BetterShape {
+  std::uint64_t input_seq = 0;  // the update that the shape is for
+  double energy = 0;
 };
 
 /// One kind of defect of a mesh.
@@ -260,7 +288,8 @@ struct Frame {
   double energy = 0;       // E of the positions, Eq. 3 of the paper, in the mesh's unit, with soft terms
   double soft_energy = 0;  // the part of `energy` from soft and orientation handles
   /// The final frame for input_seq, however its solve ended (stop_reason). No further frame follows until there is a
-  /// new update, except the same result with its optimality_gap.
+  /// new update, except the same result with its optimality_gap, and a better shape that is taken or shown
+  /// (MinimaSearch).
   bool is_final = false;
   StopReason stop_reason = StopReason::kRunning;
   double solve_seconds = 0;
@@ -315,6 +344,11 @@ struct SolveResult {
   std::uint32_t threads = 0;
   std::uint64_t input_seq = 0;
   std::vector<IterationRecord> trace = {};
+  /// The energies of the minima that were seen, in order: the first one, and those that the search for lower ones came to
+  /// (see MinimaSearch). `energy` is the lowest. Empty if a limit has ended the solve before the first.
+  std::vector<double> minima = {};
+  /// How many further starts the search made. Those that came nowhere near the lowest minimum have no entry in `minima`.
+  std::uint32_t further_starts = 0;
 };
 
 }  // namespace lpdeform::client

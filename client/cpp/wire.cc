@@ -51,6 +51,10 @@ void to_wire(const SolverSettings& settings, v1::SolverSettings& out) {
   out.set_max_iterations(settings.max_iterations);
   out.set_time_limit_seconds(settings.time_limit_seconds);
   out.set_initial(to_wire(settings.initial));
+  if (!settings.search) return;
+  out.mutable_search()->set_effort(settings.search->effort);
+  out.mutable_search()->set_show(settings.search->show);
+  out.mutable_search()->set_least_share(settings.search->least_share);
 }
 
 absl::Status to_wire(const FieldValue& value, Packer& packer, v1::Field& out) {
@@ -279,6 +283,8 @@ void from_wire(const v1::SolveSummary& summary, SolveResult& out) {
   out.solve_seconds = summary.solve_seconds();
   out.threads = summary.threads();
   out.input_seq = summary.input_seq();
+  out.minima.assign(summary.minima().begin(), summary.minima().end());
+  out.further_starts = summary.further_starts();
 }
 
 absl::Status from_wire(const v1::Fault& fault) {
@@ -290,11 +296,14 @@ absl::Status from_wire(const v1::Fault& fault) {
 Notice from_wire(const v1::Notice& notice) {
   switch (notice.reason()) {
     case v1::NOTICE_REASON_OVERLOADED:
-      return {Notice::Reason::kOverloaded, notice.text()};
+      return {.reason = Notice::Reason::kOverloaded, .text = notice.text()};
     case v1::NOTICE_REASON_RECOVERED:
-      return {Notice::Reason::kRecovered, notice.text()};
+      return {.reason = Notice::Reason::kRecovered, .text = notice.text()};
+    case v1::NOTICE_REASON_BETTER_SHAPE:
+      return {Notice::Reason::kBetterShape, notice.text(), notice.input_seq(), notice.energy(),
+              notice.saved_share()};
     default:
-      return {Notice::Reason::kOther, notice.text()};
+      return {.reason = Notice::Reason::kOther, .text = notice.text()};
   }
 }
 

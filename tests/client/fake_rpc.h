@@ -271,6 +271,20 @@ class FakeRpc final : public Rpc {
     for (const v1::HandleUpdate& change : undo_changes) *response.add_changes() = change;
     return response;
   }
+
+  /// Answers with what the test put into better_shape.
+  absl::StatusOr<v1::TakeBetterShapeResponse> call(const v1::TakeBetterShapeRequest& request,
+                                                   const std::stop_token&) override {
+    const std::scoped_lock lock(mutex_);
+    taken_better_.push_back(request);
+    return better_shape;
+  }
+  absl::StatusOr<v1::TakeBetterShapeResponse> better_shape = v1::TakeBetterShapeResponse();
+  std::vector<v1::TakeBetterShapeRequest> taken_better() {
+    const std::scoped_lock lock(mutex_);
+    return taken_better_;
+  }
+
   std::vector<v1::HandleUpdate> undo_changes;
   std::size_t undos_away = 0;    // how many undos are carried out without an answer first
   std::uint32_t undo_steps = 0;  // as GetSession reports; an undo reduces it
@@ -349,6 +363,7 @@ class FakeRpc final : public Rpc {
   std::vector<double> solve_deadlines_;
   std::vector<v1::UpdateHandlesRequest> restored_;
   std::vector<v1::UndoUpdateRequest> undone_;
+  std::vector<v1::TakeBetterShapeRequest> taken_better_;
   std::size_t upload_bytes_left_ = 0;
   std::vector<std::uint64_t> parts_;
 };

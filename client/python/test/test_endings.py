@@ -13,7 +13,7 @@ import pytest
 
 import lpdeform
 from conftest import PATIENCE, Grid, Server, settle_all
-from lpdeform.v1 import service_pb2
+from lpdeform.v1 import frame_pb2, service_pb2
 
 MakeGrid = Callable[[int], Grid]
 
@@ -56,6 +56,30 @@ def test_what_the_server_says_about_itself_is_logged_and_there_while_its_stream_
     server.start()
     session.move("right", translation=[0, 0, 1], timeout=PATIENCE)  # it goes on
     assert session.notice is None
+
+
+def test_a_better_shape_is_announced_until_a_frame_shows_it_or_a_later_update(session: lpdeform.Session) -> None:
+    settle_all(session)
+    link = session._link
+    stream = link._stream
+    assert stream is not None
+
+    def say(reason: int, **numbers: float) -> None:
+        notice = service_pb2.Notice(reason=reason, text="Of its own.", **numbers)  # type: ignore[arg-type]
+        link._take(stream, [], service_pb2.DeformResponse(event=service_pb2.StreamEvent(notice=notice)))
+
+    def after_frame(input_seq: int, energy: float) -> str | None:
+        say(service_pb2.NOTICE_REASON_BETTER_SHAPE, input_seq=7, energy=3.0, saved_share=0.25)
+        assert session.notice == lpdeform.Notice("better_shape", "Of its own.", 7, 3.0, 0.25)
+        with link.changed:
+            stream.shown(lpdeform.Frame(frame_pb2.FrameHeader(input_seq=input_seq, energy=energy)))
+        return session.notice and session.notice.reason
+
+    assert after_frame(8, 9.0) is None
+    say(service_pb2.NOTICE_REASON_OVERLOADED)
+    assert after_frame(7, 4.0) == "better_shape"  # the same result with its certificate
+    assert after_frame(7, 3.0) == "overloaded"
+    assert after_frame(8, 9.0) == "overloaded"
 
 
 def test_waiting_ends_at_its_time(session: lpdeform.Session) -> None:

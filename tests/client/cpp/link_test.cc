@@ -286,6 +286,105 @@ TEST_F(LinkTest, SaysWhatTheServerSaidAboutItselfForAsLongAsItsStreamLasts) {
   answered(next);
 }
 
+/// A stream that has told of a better shape for update 7, of energy 3, on a server that is overloaded.
+class BetterShapeTest : public LinkTest {
+ protected:
+  void told() {
+    open();
+    stream_ = opened_stream();
+    v1::DeformResponse said;
+    v1::Notice& notice = *said.mutable_event()->mutable_notice();
+    notice.set_reason(v1::NOTICE_REASON_OVERLOADED);
+    stream_->say(said);
+    notice.set_reason(v1::NOTICE_REASON_BETTER_SHAPE);
+    notice.set_text("Better.");
+    notice.set_input_seq(7);
+    notice.set_energy(3);
+    notice.set_saved_share(0.25);
+    stream_->say(said);
+    shows(7, 4);
+    ASSERT_EQ(reason(), Notice::Reason::kBetterShape);
+  }
+  void shows(std::uint64_t input_seq, double energy) {
+    v1::DeformResponse shown = frame(++frame_seq_, input_seq);
+    shown.mutable_event()->mutable_frame()->mutable_header()->set_energy(energy);
+    stream_->say(shown);
+    EXPECT_TRUE(next_frame().ok());
+  }
+  Notice::Reason reason() { return link_->notice().value_or(Notice{}).reason; }
+
+  std::shared_ptr<Stream> stream_;
+  std::uint64_t frame_seq_ = 0;
+};
+
+TEST_F(BetterShapeTest, IsAnnouncedWithItsEnergyAndWhatItSavesAndNoMoreOnceItIsTaken) {
+  told();
+  const Notice notice = link_->notice().value();
+  EXPECT_EQ(notice.text, "Better.");
+  EXPECT_EQ(notice.input_seq, 7u);
+  EXPECT_EQ(notice.energy, 3);
+  EXPECT_EQ(notice.saved_share, 0.25);
+  rpc_->better_shape->set_input_seq(7);
+  rpc_->better_shape->set_energy(3);
+  const BetterShape taken = link_->take_better_shape().value();
+  EXPECT_EQ(taken.input_seq, 7u);
+  EXPECT_EQ(taken.energy, 3);
+  ASSERT_EQ(rpc_->taken_better().size(), 1u);
+  EXPECT_EQ(rpc_->taken_better()[0].session(), "sessions/1");
+  EXPECT_EQ(rpc_->taken_better()[0].writer_token(), "token");
+  EXPECT_EQ(reason(), Notice::Reason::kOverloaded);
+}
+
+TEST_F(BetterShapeTest, IsVoidOnceItIsShownWhoeverHasTakenIt) {
+  told();
+  shows(7, 3);
+  EXPECT_EQ(reason(), Notice::Reason::kOverloaded);
+}
+
+TEST_F(BetterShapeTest, IsVoidOnceThereIsAFrameForALaterUpdate) {
+  told();
+  shows(8, 9);
+  EXPECT_EQ(reason(), Notice::Reason::kOverloaded);
+}
+
+TEST_F(BetterShapeTest, ThatIsNotThereAnyMoreIsAnErrorAndNotAnnouncedAnyMore) {
+  told();
+  rpc_->better_shape = make_fault({Reason::kNoBetterShape, "", ""}, "None.");
+  EXPECT_EQ(fault_of(link_->take_better_shape().status()).reason, "NO_BETTER_SHAPE");
+  EXPECT_EQ(reason(), Notice::Reason::kOverloaded);
+}
+
+TEST_F(BetterShapeTest, IsAskedForOnceOnly) {
+  told();
+  rpc_->better_shape = absl::UnavailableError("away");
+  EXPECT_EQ(link_->take_better_shape().status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(rpc_->taken_better().size(), 1u);
+  EXPECT_EQ(reason(), Notice::Reason::kBetterShape);
+}
+
+TEST_F(BetterShapeTest, IsRefusedAfterTheEnd) {
+  told();
+  ASSERT_TRUE(link_->close().ok());
+  EXPECT_EQ(fault_of(link_->take_better_shape().status()).reason, "SESSION_CLOSED");
+  EXPECT_TRUE(rpc_->taken_better().empty());
+}
+
+TEST_F(LinkTest, SaysHowFarToLookForLowerMinimaOrLeavesItToTheServer) {
+  open();
+  const auto stream = opened_stream();
+  const auto sent = [&](const SolverSettings& solver) {
+    link_->update({.settings = {.solver = solver}}).value();
+    return stream->hear()->update().settings().solver();
+  };
+  EXPECT_FALSE(sent({}).has_search());
+  const v1::MinimaSearch search =
+      sent({.search = MinimaSearch{.effort = 3, .show = true, .least_share = 0.1}}).search();
+  EXPECT_EQ(search.effort(), 3u);
+  EXPECT_TRUE(search.show());
+  EXPECT_EQ(search.least_share(), 0.1);
+  EXPECT_TRUE(sent({.search = MinimaSearch{}}).has_search());
+}
+
 TEST_F(LinkTest, AnUndoIsAskedForAgainAfterWhatAServerThatWentAwayHasLost) {
   open();
   link_->update(adding("tip")).value();

@@ -5,6 +5,15 @@
 namespace lpdeform::client {
 namespace {
 
+/// Waits without taking frames.
+Notice awaited_notice(const Session& session) {
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (!session.notice() && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return session.notice().value_or(Notice{});
+}
+
 TEST_F(SessionTest, SettlesOnAFrameThatMeetsTheHandles) {
   Session session = open_bar();
   EXPECT_EQ(session.mesh_report().vertices, 370);
@@ -58,6 +67,48 @@ TEST_F(SessionTest, SolveReturnsDoublesATraceAndACertificate) {
   for (const std::uint32_t vertex : vertices_of("end_a")) {
     for (int k = 0; k < 3; ++k) EXPECT_EQ(solved->positions[3 * vertex + k], rest.vertices[3 * vertex + k]);
   }
+}
+
+class BentBarTest : public SessionTest {
+ protected:
+  /// One end turned by 80 degrees. The first minimum that the solver comes to is 2 % above another one.
+  Session open_bent(MinimaSearch search) {
+    search.least_share = 0.001;
+    Update update;
+    update.settings = {.p = 1.5, .solver = SolverSettings{.search = search}};
+    const RigidMotion turn{
+        .axis = {1, 0, 0}, .angle_radians = 80 * std::numbers::pi / 180, .center = {2, 2, 10.5}};
+    update.handles["end_a"] = Handle{.vertices = vertices_of("end_a")};
+    update.handles["end_b"] = Handle{.vertices = vertices_of("end_b"), .motion = turn};
+    Session session = connect()->open(bar()).value();
+    session.update(update).value();
+    return session;
+  }
+};
+
+TEST_F(BentBarTest, ASessionThatStandsAnnouncesABetterShapeWhichIsTakenOnce) {
+  Session session = open_bent({.effort = 2});
+  const Frame first = session.settle(kPatience).value();
+  const Notice notice = awaited_notice(session);
+  ASSERT_EQ(notice.reason, Notice::Reason::kBetterShape);
+  EXPECT_EQ(notice.input_seq, first.input_seq);
+  EXPECT_NEAR(notice.saved_share, 1 - notice.energy / first.energy, 1e-12);
+  const BetterShape taken = session.take_better_shape().value();
+  EXPECT_EQ(taken.energy, notice.energy);
+  EXPECT_FALSE(session.notice());
+  const Frame shown = session.next_frame(kPatience).value();
+  EXPECT_TRUE(shown.is_final);
+  EXPECT_EQ(shown.input_seq, first.input_seq);
+  EXPECT_EQ(shown.energy, notice.energy);
+  EXPECT_EQ(fault_of(session.take_better_shape().status()).reason, "NO_BETTER_SHAPE");
+}
+
+TEST_F(BentBarTest, ASolveSaysWhichMinimaItHasSeen) {
+  Session session = open_bent({.effort = 1});
+  const SolveResult lowest = session.solve().value();
+  EXPECT_EQ(lowest.further_starts, 8u);
+  EXPECT_EQ(lowest.energy, std::ranges::min(lowest.minima));
+  EXPECT_EQ(fault_of(session.take_better_shape().status()).reason, "NO_BETTER_SHAPE");
 }
 
 TEST_F(SessionTest, AResultComesAgainWithItsGapWhereItWasAskedFor) {

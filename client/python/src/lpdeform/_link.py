@@ -136,6 +136,12 @@ class Link:
             stream = self._stream
             return stream.notice if stream is not None and stream.is_open and not stream.is_over else None
 
+    def drop_better_shape(self) -> None:
+        """The notice of a better shape no longer applies."""
+        with self.changed:
+            if self._stream is not None:
+                self._stream.better = None
+
     def take_over(self) -> None:
         with self.changed:
             if self.is_closing:
@@ -343,6 +349,7 @@ class Link:
                 with self.changed:
                     self._rules.frame_fitted()
                     self.ledger.show(frame.epoch, frame.input_seq)
+                    stream.shown(frame)
             if frame is not None and not self.box.put(frame, stream.number):
                 self._acknowledge(frame.frame_seq, stream.number)  # dropped, but its credit must be returned
         elif kind == "fault":
@@ -356,7 +363,7 @@ class Link:
     def _take_notice(self, stream: Stream, said: service_pb2.Notice) -> None:
         notice = _wire.notice_from_wire(said)
         with self.changed:
-            stream.notice = notice
+            stream.take_notice(notice)
         _log.log(logging.WARNING if notice.reason == "overloaded" else logging.INFO, "%s: %s", self.rpc.address, notice.text)
 
     def _take_opened(self, stream: Stream, opened: service_pb2.StreamOpened) -> None:

@@ -216,5 +216,7 @@ class _ResultBuilder:
             solve_seconds=summary.solve_seconds,
             threads=summary.threads,
             input_seq=summary.input_seq,
+            minima=tuple(summary.minima),
+            further_starts=summary.further_starts,
             trace=tuple(self._trace),
         )

@@ -232,6 +232,11 @@ def settings_to_wire(settings: types.Settings, packer: Packer) -> handle_pb2.Set
         message.solver.max_iterations = solver.max_iterations
         message.solver.time_limit_seconds = solver.time_limit
         message.solver.initial = _guesses[solver.initial]
+        if (search := solver.search) is not None:
+            message.solver.search.SetInParent()
+            message.solver.search.effort = search.effort
+            message.solver.search.show = search.show
+            message.solver.search.least_share = search.least_share
     if settings.region is not None:
         message.region.SetInParent()
         if np.size(settings.region):
@@ -304,6 +309,8 @@ def _resize_to_wire(resize: types.Resize) -> data_pb2.Resize:
 def notice_from_wire(notice: service_pb2.Notice) -> types.Notice:
     if notice.reason == service_pb2.NOTICE_REASON_OVERLOADED:
         return types.Notice("overloaded", notice.text)
+    if notice.reason == service_pb2.NOTICE_REASON_BETTER_SHAPE:
+        return types.Notice("better_shape", notice.text, notice.input_seq, notice.energy, notice.saved_share)
     return types.Notice("recovered" if notice.reason == service_pb2.NOTICE_REASON_RECOVERED else "other", notice.text)
 
 

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy.typing as npt
 
+from lpdeform._better import take_better_shape
 from lpdeform._link import Link
 from lpdeform._rpc import Stop
 from lpdeform._snapshot import snapshot
@@ -21,6 +22,7 @@ from lpdeform.frames import Frame
 from lpdeform.opening import connect, frame_options, join_link, open_link, restore_link
 from lpdeform.session import Live, deadline_after
 from lpdeform.types import (
+    BetterShape,
     Encoding,
     Field,
     FreeComponents,
@@ -133,6 +135,10 @@ class AsyncSession(Live):
     async def redo(self) -> int:
         """Like Session.redo()."""
         return await _in_a_thread(lambda stop: undo(self._link, True, stop))
+
+    async def take_better_shape(self) -> BetterShape:
+        """Like Session.take_better_shape()."""
+        return await _in_a_thread(lambda stop: take_better_shape(self._link, stop))
 
     async def snapshot(self) -> bytes:
         """Like Session.snapshot()."""

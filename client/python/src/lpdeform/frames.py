@@ -52,7 +52,7 @@ class Frame:
         """The part of the energy that soft and orientation handles have."""
         self.is_final: bool = header.is_final
         """The result for input_seq, however its solve ended (stop_reason). No further frame comes until there is a new update,
-        except the same frame with its gap."""
+        except the same frame with its gap, and a better shape that is taken or shown (MinimaSearch)."""
         self.stop_reason: str = stop_reason_name(header.stop_reason)
         self.solve_seconds: float = header.solve_seconds
         self.method: str = method_name(header.method)

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 import numpy.typing as npt
 
+from lpdeform._better import take_better_shape
 from lpdeform._link import Link
 from lpdeform._snapshot import snapshot
 from lpdeform._solve import SolveOptions, checked_positions, solve
@@ -19,6 +20,7 @@ from lpdeform._undo import undo
 from lpdeform.errors import LpdeformError, invalid, session_closed
 from lpdeform.frames import Frame
 from lpdeform.types import (
+    BetterShape,
     Change,
     Connection,
     Field,
@@ -95,8 +97,9 @@ class Live:
 
     @property
     def notice(self) -> Notice | None:
-        """The last notice of the server about itself on the present stream; None if there was none. It is also logged, by the
-        logger "lpdeform": as a warning if the server is overloaded."""
+        """The notice of a better shape for as long as it applies: until it is taken, or a frame for a later update comes.
+        Otherwise the last notice of the server about itself on the present stream; None if there was none. Each is also logged, by
+        the logger "lpdeform": as a warning if the server is overloaded."""
         return self._link.notice
 
     @property
@@ -293,6 +296,15 @@ class Session(Live):
     def redo(self) -> int:
         """Redoes the step that was undone last. Raises as undo(), and NOTHING_TO_REDO."""
         return undo(self._link, True, self._link.stop)
+
+    def take_better_shape(self) -> BetterShape:
+        """Shows the better shape that the notice "better_shape" has announced, as a new final frame for the same update.
+
+        The shape is not part of the steps of undo(). The call is not repeated: after Unavailable or Timeout the shape may have been
+        taken, which a frame then shows. Raises FAILED_PRECONDITION NO_BETTER_SHAPE if none is known for the newest update,
+        NOT_THE_WRITER for a reader.
+        """
+        return take_better_shape(self._link, self._link.stop)
 
     def snapshot(self) -> bytes:
         """The session as a file for restore(): mesh, handles, settings, steps to undo, and the present surface.

@@ -126,6 +126,22 @@ Field = Union[float, npt.ArrayLike, Automatic]
 
 
 @dataclass(frozen=True)
+class MinimaSearch:
+    """How far to look for lower minima once the first one is found. The energy is not convex: it has many minima, above all
+    where p is below 2."""
+
+    effort: int = 0
+    """The search begins from 8 `effort` further starts, each of which takes at most about as long as the first solve. 0 to 1000;
+    0 takes the first minimum. solve() searches before it answers. A session whose frames are read shows the first minimum, and
+    searches when no update has come for a second."""
+    show: bool = False
+    """What the session does with a lower minimum that it has found then. False: a notice "better_shape" announces it, and
+    take_better_shape() shows it. True: it is shown at once, as a new frame for the same update."""
+    least_share: float = 0.0
+    """The share of the energy that must be saved for this, 0 to 1; 0 means 0.02."""
+
+
+@dataclass(frozen=True)
 class SolverSettings:
     """How a solve is made and when it stops. This is a single setting and is replaced as a whole. 0 takes the server's
     default."""
@@ -137,6 +153,9 @@ class SolverSettings:
     time_limit: float = 0.0
     """Seconds; 0 is without limit."""
     initial: InitialGuess = "current"
+    search: MinimaSearch | None = None
+    """The default is effort 1 if the method is "auto" and p is below 2 somewhere, and for solve() if it also starts cold;
+    otherwise 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,13 +234,28 @@ class MeshReport:
 
 @dataclass(frozen=True)
 class Notice:
-    """What a server says about itself; nothing has failed."""
+    """What a server says about itself, or about the session's surface; nothing has failed."""
 
-    reason: Literal["overloaded", "recovered", "other"]
-    """After "overloaded" frames come less often, and the last frame of an update comes later, until "recovered"; "other": from
-    a newer server."""
+    reason: Literal["overloaded", "recovered", "better_shape", "other"]
+    """After "overloaded" frames come less often, and the last frame of an update comes later, until "recovered". "better_shape":
+    a shape of lower energy is known for the newest update, and take_better_shape() shows it. "other": from a newer server."""
     text: str
     """One sentence for people."""
+    input_seq: int = 0
+    """Of a better shape: the update that it is for. The notice is void once there is a frame for a later one, or a frame of the
+    shape."""
+    energy: float = 0.0
+    """Of a better shape."""
+    saved_share: float = 0.0
+    """Of a better shape: the share of the present energy that it saves, 0 to 1."""
+
+
+class BetterShape(NamedTuple):
+    """A better shape that was taken."""
+
+    input_seq: int
+    """The update that the shape is for."""
+    energy: float
 
 
 class IterationRecord(NamedTuple):
@@ -262,6 +296,11 @@ class SolveResult:
     solve_seconds: float
     threads: int
     input_seq: int
+    minima: tuple[float, ...]
+    """The energies of the minima that were seen, in order: the first one, and those that the search for lower ones came to (see
+    MinimaSearch). `energy` is the lowest. Empty if a limit has ended the solve before the first."""
+    further_starts: int
+    """How many further starts the search made. Those that came nowhere near the lowest minimum have no entry in `minima`."""
     trace: tuple[IterationRecord, ...]
 
     def __repr__(self) -> str:

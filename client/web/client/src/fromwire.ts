@@ -29,7 +29,10 @@ export function stopReasonFromWire(reason: StopReason): api.StopReason {
   return stopReasons[reason] ?? "running";
 }
 
-export function noticeFromWire({ reason, text }: WireNotice): api.Notice {
+export function noticeFromWire({ reason, text, inputSeq, energy, savedShare }: WireNotice): api.Notice {
+  if (reason === NoticeReason.BETTER_SHAPE) {
+    return { reason: "better_shape", text, inputSeq: Number(inputSeq), energy, savedShare };
+  }
   if (reason === NoticeReason.OVERLOADED) return { reason: "overloaded", text };
   return { reason: reason === NoticeReason.RECOVERED ? "recovered" : "other", text };
 }

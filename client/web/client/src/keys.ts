@@ -52,7 +52,9 @@ const solver: Keys<api.SolverSettings> = {
   maxIterations: true,
   timeLimitSeconds: true,
   initial: true,
+  search: true,
 };
+const search: Keys<api.MinimaSearch> = { effort: true, show: true, leastShare: true };
 const resize: Keys<api.Resize> = { scale: true, origin: true, axes: true };
 
 const methods: Readonly<Record<api.Method, true>> = {
@@ -159,6 +161,7 @@ function checkSettings(given: api.Settings): void {
   checkKeys(given.solver, solver, "solver");
   checkWord(given.solver.method, methods, "method");
   checkWord(given.solver.initial, guesses, "initial");
+  if (given.solver.search) checkKeys(given.solver.search, search, "search");
 }
 
 function checkField(value: unknown, field: string): void {

@@ -9,10 +9,11 @@ import type { Lane, WireFrameOptions } from "./hub.js";
 import { checkVertexCount, type Copy, joinSession, type Lease } from "./lease.js";
 import { Ledger, type NumberedUpdate } from "./ledger.js";
 import type { Watcher } from "./listeners.js";
+import { Notices } from "./notices.js";
 import { type Answer, answerOf, Backoff, RecoveryRules, writerReplaced } from "./recovery.js";
 import type { Rpc } from "./rpc.js";
 import { sendUpdate } from "./sendupdate.js";
-import type { Connection, Frame, Notice, Update } from "./types.js";
+import type { BetterShape, Connection, Frame, Notice, Update } from "./types.js";
 import { newRequestId } from "./requestid.js";
 import { isUndecided } from "./verdict.js";
 import { Pauses } from "./waiting.js";
@@ -42,7 +43,7 @@ export class Link {
   /** Set while no stream is open: the server may continue from an older state. Updates wait until it says which. */
   #mayHaveGoneBack = false;
   #connection: Connection = "idle";
-  #notice: Notice | undefined;
+  readonly #notices = new Notices();
   /** How many callers wait for frames even if the page is hidden. */
   #waitingForFrames = 0;
   #isStreaming = false;
@@ -84,7 +85,7 @@ export class Link {
   }
 
   get notice(): Notice | undefined {
-    return this.#notice;
+    return this.#notices.last;
   }
 
   /** Whether nothing is tried, for now or for good. */
@@ -180,7 +181,7 @@ export class Link {
       opened: (opened) => {
         checkVertexCount(opened.vertexCount, this.#lease.report.vertices);
         this.#assembly = new FrameAssembly(opened.vertexCount, this.frameOptions.scalar === Scalar.FLOAT64);
-        this.#setNotice(undefined); // the notice was about an earlier stream
+        this.#clearNotices(); // they were about an earlier stream
         this.#resumed(Number(opened.epoch), Number(opened.inputSeq));
         this.#openedAt = performance.now();
         this.#downSince = undefined;
@@ -191,6 +192,7 @@ export class Link {
         const frame = this.#assembly.add(part);
         if (frame) this.#rules.frameFitted();
         if (frame) this.ledger.show(frame.epoch, frame.inputSeq);
+        if (frame && this.#notices.shown(frame)) this.#tellNotice();
         if (!frame || this.box.put(frame, lane.streamId)) return;
         lane.acknowledge(frame.frameSeq, lane.streamId); // dropped, but its credit must be returned
       },
@@ -199,14 +201,18 @@ export class Link {
         this.#report(error, error.inputSeq, answerOf(error));
       },
       goAway: (goAway) => (this.#goAway = goAway),
-      notice: (notice) => this.#setNotice(noticeFromWire(notice)),
+      notice: (wire) => {
+        const notice = noticeFromWire(wire);
+        this.#notices.add(notice);
+        this.watcher.notice(notice);
+      },
       ended: (error) => void this.#recover(error, session),
       isQuiet: () => !this.ledger.hasWaiting && !this.ledger.hasInFlight && this.#waitingForFrames === 0,
       resting: () => {
         this.#openedAt = undefined;
         this.#downSince = undefined; // nothing is tried meanwhile
         this.#mayHaveGoneBack = true;
-        this.#setNotice(undefined);
+        this.#clearNotices();
         this.#setConnection("idle");
       },
     });
@@ -231,7 +237,7 @@ export class Link {
     const recovery = this.#rules.after({ error: ended, goAway: this.#goAway, stoodMs, awayMs: this.#awayMs() });
     this.interruption = recovery.why;
     this.#mayHaveGoneBack = true;
-    this.#setNotice(undefined);
+    this.#clearNotices();
     this.#setConnection("reconnecting");
     if (recovery.next === "giveUp") return this.#giveUp(recovery.why);
     const isTakenOver = await this.#pauses.wait(recovery.pauseMs);
@@ -388,10 +394,26 @@ export class Link {
     }
   }
 
-  #setNotice(notice: Notice | undefined): void {
-    if (this.#notice === notice) return;
-    this.#notice = notice;
-    this.watcher.notice(notice);
+  /** Asks once only: if the answer is lost, the shape may have been taken, and then there is no other. */
+  async takeBetterShape(signal: AbortSignal): Promise<BetterShape> {
+    const { session, writerToken } = this.#lease;
+    try {
+      const { inputSeq, energy } = await this.rpc.call("takeBetterShape", { session, writerToken }, signal);
+      if (this.#notices.dropBetter()) this.#tellNotice();
+      return { inputSeq: Number(inputSeq), energy };
+    } catch (thrown) {
+      const { reason } = thrown as LpdeformError;
+      if (reason === "NO_BETTER_SHAPE" && this.#notices.dropBetter()) this.#tellNotice();
+      throw thrown;
+    }
+  }
+
+  #clearNotices(): void {
+    if (this.#notices.clear()) this.#tellNotice();
+  }
+
+  #tellNotice(): void {
+    this.watcher.notice(this.#notices.last);
   }
 
   #setConnection(state: Connection): void {

@@ -19,6 +19,7 @@ import { restoreSnapshot, takeSnapshot } from "./snapshot.js";
 import { runSolve } from "./solve.js";
 import { frameOptionsToWire } from "./towire.js";
 import type {
+  BetterShape,
   Connection,
   DoubleSolveOptions,
   Frame,
@@ -45,7 +46,9 @@ export interface SessionEvents {
   /** The server refused an update, or cannot solve for it yet; the session goes on. */
   problem: LpdeformError;
   connection: Connection;
-  /** What the server says about itself; undefined if the stream of the last notice has ended. */
+  /**
+   * Each notice as it comes. If a notice no longer applies, what `Session.notice` then has: undefined if the stream has ended.
+   */
   notice: Notice | undefined;
 }
 
@@ -93,7 +96,10 @@ export class Session implements AsyncIterable<Frame> {
     return this.#link.interruption;
   }
 
-  /** The last notice of the server about itself on the present stream; undefined if there was none. */
+  /**
+   * The notice of a better shape for as long as it applies: until it is taken, or a frame for a later update comes. Otherwise the
+   * last notice of the server about itself on the present stream; undefined if there was none.
+   */
   get notice(): Notice | undefined {
     return this.#link.notice;
   }
@@ -304,6 +310,23 @@ export class Session implements AsyncIterable<Frame> {
     const signal = AbortSignal.any([link.stop.signal, late, options.signal].filter((one) => one !== undefined));
     try {
       return await takeStep(link, redo, signal);
+    } catch (error) {
+      throw signal.aborted ? abortReason(signal, "The server did not answer in time.") : error;
+    }
+  }
+
+  /**
+   * Shows the better shape that the notice "better_shape" has announced, as a new final frame for the same update. The shape is
+   * not part of the steps for undo(). Rejects with FAILED_PRECONDITION (NO_BETTER_SHAPE) if none is known for the newest update.
+   * The call is not repeated: after UNAVAILABLE or DEADLINE_EXCEEDED the shape may have been taken, which a frame then shows.
+   */
+  async takeBetterShape(options: { signal?: AbortSignal } = {}): Promise<BetterShape> {
+    checkCallOptions(options, "signal");
+    const link = this.#link;
+    link.checkWriter();
+    const signal = AbortSignal.any([link.stop.signal, options.signal].filter((one) => one !== undefined));
+    try {
+      return await link.takeBetterShape(signal);
     } catch (error) {
       throw signal.aborted ? abortReason(signal, "The server did not answer in time.") : error;
     }

@@ -123,10 +123,15 @@ export function settingsToWire(settings: api.Settings, packer: Packer): MessageI
         maxIterations: solver.maxIterations ?? 0,
         timeLimitSeconds: solver.timeLimitSeconds ?? 0,
         initial: guesses[solver.initial ?? "current"],
+        ...(solver.search && { search: searchToWire(solver.search) }),
       },
     }),
     ...(region && { region: region.length > 0 ? { vertices: packer.indices(region) } : {} }),
   };
+}
+
+function searchToWire({ effort = 0, show = false, leastShare = 0 }: api.MinimaSearch) {
+  return { effort, show, leastShare };
 }
 
 function fieldToWire(value: api.FieldValue, packer: Packer): Field {

@@ -80,6 +80,31 @@ export interface SolverSettings {
   /** Default: without limit. */
   timeLimitSeconds?: number;
   initial?: InitialGuess;
+  /**
+   * Default: effort 1 if the method is "auto" and p is below 2 somewhere, and for Session.solve() if it also starts cold;
+   * otherwise 0.
+   */
+  search?: MinimaSearch;
+}
+
+/**
+ * How far to look for lower minima once the first one is found. The energy is not convex: it has many minima, above all where p
+ * is below 2.
+ */
+export interface MinimaSearch {
+  /**
+   * The search begins from 8 `effort` further starts, each of which takes at most about as long as the first solve. 0 to 1000;
+   * the default, 0, takes the first minimum. Session.solve() searches before it answers. A session whose frames are read shows
+   * the first minimum, and searches when no update has come for a second.
+   */
+  effort?: number;
+  /**
+   * What the session does with a lower minimum that it has found then. False, the default: a notice "better_shape" announces it,
+   * and Session.takeBetterShape() shows it. True: it is shown at once, as a new frame for the same update.
+   */
+  show?: boolean;
+  /** The share of the energy that must be saved for this, 0 to 1; the default, also for 0, is 0.02. */
+  leastShare?: number;
 }
 
 /** The same number everywhere, one per vertex, or computed by the server from the shape's geometry (strength 0 to 1). */
@@ -213,7 +238,7 @@ export interface Frame {
   readonly softEnergy: number;
   /**
    * Whether this is the result for inputSeq, however its solve ended (stopReason). No further frame comes until there is a new
-   * update, except the same frame with its optimalityGap.
+   * update, except the same frame with its optimalityGap, and a better shape that is taken or shown (MinimaSearch).
    */
   readonly isFinal: boolean;
   readonly stopReason: StopReason;
@@ -285,6 +310,13 @@ export interface SolveResult<Numbers = Float32Array> {
   solveSeconds: number;
   threads: number;
   inputSeq: number;
+  /**
+   * The energies of the minima that were seen, in order: the first one, and those that the search for lower ones came to (see
+   * MinimaSearch). `energy` is the lowest. Empty if a limit has ended the solve before the first.
+   */
+  minima: readonly number[];
+  /** How many further starts the search made. Those that came nowhere near the lowest minimum have no entry in `minima`. */
+  furtherStarts: number;
   trace: readonly IterationRecord[];
 }
 
@@ -306,8 +338,10 @@ export interface WeldByPosition {
  */
 export type Weld = "byPosition" | WeldByPosition | Uint32Array | readonly number[];
 
-/** What a server says about itself; nothing has failed. */
-export interface Notice {
+/** What a server says about itself, or about the session's surface; nothing has failed. */
+export type Notice = ServerNotice | BetterShapeNotice;
+
+export interface ServerNotice {
   /**
    * After "overloaded" frames come less often, and the last frame of an update comes later, until "recovered". "other": from a
    * newer server.
@@ -315,6 +349,26 @@ export interface Notice {
   reason: "overloaded" | "recovered" | "other";
   /** One sentence for people. */
   text: string;
+}
+
+/** A shape of lower energy is known for the newest update: see MinimaSearch. Session.takeBetterShape() shows it. */
+export interface BetterShapeNotice {
+  reason: "better_shape";
+  /** One sentence for people. */
+  text: string;
+  /** The update that the shape is for. The notice is void once there is a frame for a later one, or a frame of the shape. */
+  inputSeq: number;
+  /** Of the shape. */
+  energy: number;
+  /** The share of the present energy that the shape saves, 0 to 1. */
+  savedShare: number;
+}
+
+/** A better shape that was taken. */
+export interface BetterShape {
+  /** The update that the shape is for. */
+  inputSeq: number;
+  energy: number;
 }
 
 /**

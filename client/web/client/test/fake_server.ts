@@ -12,6 +12,8 @@ import {
   type StreamEventSchema,
   type StreamSessionsRequest,
   StreamSessionsResponseSchema,
+  type TakeBetterShapeRequest,
+  type TakeBetterShapeResponseSchema,
   type UndoUpdateRequest,
   type UndoUpdateResponseSchema,
   type UpdateHandlesRequest,
@@ -100,6 +102,7 @@ export class FakeServer {
   readonly creations: CreateSessionRequest[] = [];
   readonly updates: UpdateHandlesRequest[] = [];
   readonly undos: UndoUpdateRequest[] = [];
+  readonly betters: TakeBetterShapeRequest[] = [];
   readonly acks: AckFramesRequest[] = [];
   readonly solves: SolveRequest[] = [];
   readonly deleted: string[] = [];
@@ -118,6 +121,7 @@ export class FakeServer {
     create?: (request: CreateSessionRequest, count: number) => void;
     update?: (request: UpdateHandlesRequest, count: number) => void | Promise<void>;
     undo?: (request: UndoUpdateRequest, count: number) => MessageInitShape<typeof UndoUpdateResponseSchema>;
+    better?: (request: TakeBetterShapeRequest) => MessageInitShape<typeof TakeBetterShapeResponseSchema>;
     restore?: (request: RestoreSessionRequest) => MessageInitShape<typeof RestoreSessionResponseSchema>;
     snapshot?: ServiceImpl<typeof DeformService>["snapshotSession"];
     ack?: (request: AckFramesRequest) => void | Promise<void>;
@@ -184,6 +188,11 @@ export class FakeServer {
           this.undos.push(request);
           this.#note();
           return this.on.undo?.(request, this.undos.length) ?? { result: { inputSeq: request.inputSeq } };
+        },
+        takeBetterShape: (request) => {
+          this.betters.push(request);
+          this.#note();
+          return this.on.better?.(request) ?? {};
         },
         getSession: ({ session: name }) => ({
           session: { ...session(name).session, undoSteps: this.undoSteps, inputSeq: this.inputSeq },

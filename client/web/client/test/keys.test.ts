@@ -39,6 +39,7 @@ describe("an update is refused at once, by the name of the key that is not known
     ["settings", { settings: { P: 2 } }, "settings", "P", "p, stiffness, lengthUnit, solver, region"],
     ["a field", { settings: { p: { auto: 1 } } }, "p", "auto", "automatic"],
     ["the solver", { settings: { solver: { tol: 1 } } }, "solver", "tol", "method, tolerance"],
+    ["the search", { settings: { solver: { search: { efort: 1 } } } }, "search", "efort", "effort, show, leastShare"],
     ["a method", { settings: { solver: { method: "newton" } } }, "method", "newton", "auto, quasiNewton"],
     ["a guess", { settings: { solver: { initial: "zero" } } }, "initial", "zero", "current, laplacian, rest"],
     ["a resize", { resize: { scales: [1, 1, 1] } }, "resize", "scales", "scale, origin, axes"],
@@ -114,6 +115,7 @@ describe("a call is refused by the name of the option that is not known, before 
     ["double", (session) => session.solve(untyped({ scalar: "double" }))],
     ["deadlineMs", (session) => session.undo(untyped({ deadlineMs: 5 }))],
     ["deadlineMs", (session) => session.redo(untyped({ deadlineMs: 5 }))],
+    ["deadlineMs", (session) => session.takeBetterShape(untyped({ deadlineMs: 5 }))],
     ["deadlineMs", (session) => session.snapshot(untyped({ deadlineMs: 5 }))],
   ])("%s of a session's call", async (key, call) => {
     const { session } = await begin();

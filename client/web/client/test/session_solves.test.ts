@@ -7,7 +7,14 @@ import { at, begin, opened, refusal } from "./harness.js";
 
 const summary = {
   case: "summary",
-  value: { energy: 3, iterations: 5, inputSeq: 2n, certificate: { relativeGap: 0.5 } },
+  value: {
+    energy: 3,
+    iterations: 5,
+    inputSeq: 2n,
+    certificate: { relativeGap: 0.5 },
+    minima: [4, 3] as number[],
+    furtherStarts: 8,
+  },
 } as const;
 const frame = {
   case: "frame",
@@ -38,6 +45,7 @@ describe("solving", () => {
     session.move("tip", at(1));
     const result = await solving;
     expect(result).toMatchObject({ energy: 3, iterations: 5, optimalityGap: 0.5, inputSeq: 2 });
+    expect([result.minima, result.furtherStarts]).toEqual([[4, 3], 8]);
     expect(result.positions.length).toBe(9);
     expect(result.trace).toMatchObject([{ iteration: 1, energy: 9, objective: 4 }]);
     expect(progress).toEqual([9]);

@@ -2,13 +2,13 @@ import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { describe, expect, test } from "vitest";
 import { changesFromWire } from "../src/fromwire.js";
-import { GoAwayReason, UndoUpdateResponseSchema } from "../src/gen/lpdeform/v1/service_pb.js";
+import { GoAwayReason, NoticeReason, UndoUpdateResponseSchema } from "../src/gen/lpdeform/v1/service_pb.js";
 import { Packer } from "../src/packer.js";
 import { joinWith, openWith, restoreWith } from "../src/session.js";
 import { updateToWire } from "../src/towire.js";
 import type { HandleChange, Hold } from "../src/types.js";
 import { FakeServer, triangle } from "./fake_server.js";
-import { at, begin, gate, opened, refusal } from "./harness.js";
+import { arrived, at, begin, gate, opened, refusal } from "./harness.js";
 
 const backTo = (x: number) => ({
   changes: [
@@ -22,6 +22,92 @@ const backTo = (x: number) => ({
   ],
   undoSteps: 1,
   redoSteps: 1,
+});
+
+describe("a better shape", () => {
+  const notice = (inputSeq: bigint) => ({
+    case: "notice" as const,
+    value: { reason: NoticeReason.BETTER_SHAPE, text: "Better.", inputSeq, energy: 3, savedShare: 0.25 },
+  });
+  const overloaded = { reason: "overloaded", text: "Too much." };
+
+  /** A session that was told of a better shape for update 1, on a server that is overloaded. */
+  async function told() {
+    const { server, session } = await begin();
+    session.setHandle("tip", { vertices: [1] });
+    server.stream.send({ case: "notice", value: { reason: NoticeReason.OVERLOADED, text: "Too much." } });
+    server.stream.frame({ frameSeq: 1n, inputSeq: 1n, energy: 4, isFinal: true });
+    server.stream.send(notice(1n));
+    await arrived(server, session);
+    const heard: unknown[] = [];
+    session.on("notice", (said) => heard.push(said));
+    return { server, session, heard };
+  }
+
+  test("is announced with its energy and what it saves, and taken once, with what the server says of it", async () => {
+    const { server, session, heard } = await told();
+    expect(session.notice).toEqual({
+      reason: "better_shape",
+      text: "Better.",
+      inputSeq: 1,
+      energy: 3,
+      savedShare: 0.25,
+    });
+    server.on.better = () => ({ inputSeq: 1n, energy: 3 });
+    expect(await session.takeBetterShape()).toEqual({ inputSeq: 1, energy: 3 });
+    expect(server.betters).toMatchObject([{ session: "sessions/1", writerToken: "token" }]);
+    expect([session.notice, heard]).toEqual([overloaded, [overloaded]]);
+  });
+
+  test.each([
+    ["stays while the same result comes again, with its certificate", { inputSeq: 1n, energy: 4 }, "better_shape"],
+    ["is void once its frame is there, whoever has taken it", { inputSeq: 1n, energy: 3 }, "overloaded"],
+    ["is void once there is a frame for a later update", { inputSeq: 2n, energy: 9 }, "overloaded"],
+  ])("%s", async (_, header, reason) => {
+    const { server, session, heard } = await told();
+    server.stream.frame({ frameSeq: 2n, isFinal: true, ...header });
+    await arrived(server, session);
+    expect([session.notice?.reason, heard.length]).toEqual([reason, reason === "overloaded" ? 1 : 0]);
+  });
+
+  test("does not hide for ever what the server says of itself meanwhile", async () => {
+    const { server, session, heard } = await told();
+    server.stream.send({ case: "notice", value: { reason: NoticeReason.RECOVERED, text: "No more." } });
+    await arrived(server, session);
+    expect([session.notice?.reason, heard]).toEqual(["better_shape", [{ reason: "recovered", text: "No more." }]]);
+    server.stream.frame({ frameSeq: 2n, inputSeq: 2n });
+    await arrived(server, session);
+    expect(session.notice?.reason).toBe("recovered");
+  });
+
+  test("that is not there any more is an error, after which it is not announced any more either", async () => {
+    const { server, session } = await told();
+    server.on.better = () => {
+      throw refusal("NO_BETTER_SHAPE", {}, Code.FailedPrecondition);
+    };
+    const error = { code: "failed_precondition", reason: "NO_BETTER_SHAPE" };
+    await expect(session.takeBetterShape()).rejects.toMatchObject(error);
+    expect(session.notice).toEqual(overloaded);
+  });
+
+  test("is asked for once only, because a call that was carried out leaves nothing to a second one", async () => {
+    const { server, session } = await told();
+    server.on.better = () => {
+      throw new ConnectError("away", Code.Unavailable);
+    };
+    await expect(session.takeBetterShape()).rejects.toMatchObject({ code: "unavailable" });
+    expect([server.betters.length, session.notice?.reason]).toEqual([1, "better_shape"]);
+  });
+
+  test("is refused to readers without a call, and once the session is closed", async () => {
+    const server = new FakeServer();
+    const session = await joinWith(server.rpc(), "sessions/1", {});
+    opened.push(session);
+    await expect(session.takeBetterShape()).rejects.toMatchObject({ reason: "NOT_THE_WRITER" });
+    await session.close();
+    await expect(session.takeBetterShape()).rejects.toMatchObject({ reason: "SESSION_CLOSED" });
+    expect(server.betters).toEqual([]);
+  });
 });
 
 describe("undo", () => {

@@ -5,6 +5,21 @@ import { FakeServer, triangle } from "./fake_server.js";
 import { at, begin, gate, opened, problems, refusal } from "./harness.js";
 
 describe("updates", () => {
+  test("say how far to look for lower minima, or leave it to the server", async () => {
+    const { server, session } = await begin();
+    session.set({ solver: { search: { effort: 3, show: true, leastShare: 0.1 } } });
+    await server.until(() => server.updates.length === 1);
+    session.set({ solver: { search: {} } });
+    await server.until(() => server.updates.length === 2);
+    session.set({ solver: {} });
+    await server.until(() => server.updates.length === 3);
+    expect(server.updates.map(({ update }) => update!.settings!.solver!.search)).toMatchObject([
+      { effort: 3, show: true, leastShare: 0.1 },
+      { effort: 0, show: false, leastShare: 0 },
+      undefined,
+    ]);
+  });
+
   test("made faster than they are taken are merged into one", async () => {
     const { server, session } = await begin();
     let answer = () => {};

@@ -39,7 +39,7 @@ vi.mock("lpdeform-client", async (original) => {
   };
 });
 
-const quiet = { status: vi.fn(), report: vi.fn(), problem: vi.fn(), notice: vi.fn() };
+const quiet = { status: vi.fn(), report: vi.fn(), problem: vi.fn(), notice: vi.fn(), better: vi.fn() };
 const watcher = { frame: vi.fn(() => queueMicrotask(() => live.take())), ...quiet };
 let live: Live;
 const begin = (says: Partial<typeof healthy>) => {

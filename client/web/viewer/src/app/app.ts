@@ -43,6 +43,7 @@ export class App implements Workbench {
       report: (report) => this.#showReport(report),
       problem: (problem) => this.facts.set({ problem }),
       notice: (text) => this.notify(text),
+      better: () => this.facts.set({ better: this.#better }),
     },
     (pane) => this.#edit(pane),
   );
@@ -269,6 +270,16 @@ export class App implements Workbench {
     return false;
   }
 
+  /** The largest share of energy that a better shape saves. */
+  get #better(): number | undefined {
+    const shares = this.panes.map(({ live }) => live?.better?.savedShare ?? 0);
+    return Math.max(...shares) || undefined;
+  }
+
+  takeBetter(): void {
+    for (const { live } of this.panes) void live?.takeBetter();
+  }
+
   /** Shows a line that stays until the returned function is called, or until another line comes. */
   notifyWhile(text: string): () => void {
     const notice = { text, isBad: false, stays: true };
@@ -392,7 +403,7 @@ export class App implements Workbench {
     this.#panes.show(document, time);
     // The end of a gesture changes nothing, so the server's answer to its last change still holds.
     const problem = document === before ? this.facts.now.problem : undefined;
-    this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem });
+    this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem, better: this.#better });
     if (selected !== undefined && !handleOf(document, selected)) this.view.set({ selected: undefined });
     this.requestDraw();
   }

@@ -15,6 +15,8 @@ export interface Facts {
   problem: LpdeformError | undefined;
   /** One line that disappears by itself, or stays until its cause is over. */
   notice: { text: string; isBad: boolean; stays?: boolean } | undefined;
+  /** The share of its energy that a shape saves which the server knows and the user may take. */
+  better: number | undefined;
   /** When the work that a reload has restored was kept, as Date.now(). */
   restoredFrom: number | undefined;
   /** Works that were set aside, the newest first; bringBack() swaps one with the present work. */
@@ -36,6 +38,7 @@ export const firstFacts: Facts = {
   status: say("idle", ""),
   problem: undefined,
   notice: undefined,
+  better: undefined,
   restoredFrom: undefined,
   setAside: [],
   pointedOut: nothing,

@@ -20,6 +20,7 @@ export interface PaneWatcher {
   report(report: MeshReport): void;
   problem(error: LpdeformError): void;
   notice(text: string): void;
+  better(): void;
 }
 
 const nothing: EnergyStatistics = { max: 0, red: 0, top5Share: 0 };
@@ -62,8 +63,10 @@ export class Pane {
       report: (report) => this.watcher.report(report),
       problem: (error) => this.watcher.problem(error),
       notice: (text) => this.watcher.notice(text),
+      better: () => this.watcher.better(),
     };
     this.live = new Live(mesh, document, this.side, view.encoding, watcher, seams?.groups);
+    this.watcher.better();
     this.#isDirty = true;
   }
 

@@ -1,9 +1,11 @@
 import {
   Backoff,
+  type BetterShapeNotice,
   type Encoding,
   type Frame,
   LpdeformError,
   type MeshReport,
+  type Notice,
   openSession,
   type Session,
   type SolveResult,
@@ -23,6 +25,8 @@ export interface LiveWatcher {
   problem(error: LpdeformError): void;
   /** What the server says about itself. */
   notice(text: string): void;
+  /** Live.better may have changed. */
+  better(): void;
 }
 
 /** Frames answer one of the newest inputs, so no more are needed. */
@@ -41,6 +45,8 @@ export class Live {
   #waiting: Frame | undefined;
   #taken: (() => void) | undefined;
   #inputs: { seq: number; time: number; sent: number }[] = [];
+  #said: Notice | undefined;
+  #isTakingBetter = false;
   #newest = 0;
   #drawn = 0;
   /** p for each input that changed it. */
@@ -119,6 +125,37 @@ export class Live {
     return await session.solve({ scalar: "float64", deadlineMs, signal: AbortSignal.timeout(deadlineMs) });
   }
 
+  /** A shape of lower energy for the present document; undefined if none is known, or as soon as it is being taken. */
+  get better(): BetterShapeNotice | undefined {
+    const session = this.#session;
+    const notice = session?.notice;
+    if (notice?.reason !== "better_shape" || this.#isTakingBetter) return undefined;
+    return notice.inputSeq >= session!.newestInput ? notice : undefined;
+  }
+
+  /** Frames show it. */
+  async takeBetter(): Promise<void> {
+    if (!this.better) return;
+    this.#isTakingBetter = true;
+    this.watcher.better();
+    try {
+      await this.#session!.takeBetterShape();
+    } catch (thrown) {
+      this.watcher.notice((thrown as LpdeformError).message);
+    } finally {
+      this.#isTakingBetter = false;
+      this.watcher.better();
+    }
+  }
+
+  #say(notice: Notice | undefined): void {
+    if (notice && notice.reason !== "better_shape" && notice !== this.#said) {
+      this.#said = notice;
+      this.watcher.notice(notice.text);
+    }
+    this.watcher.better();
+  }
+
   close(): void {
     this.#over.abort();
     this.#taken?.();
@@ -138,7 +175,7 @@ export class Live {
       this.watcher.report(session.meshReport);
       session.on("problem", (error) => this.watcher.problem(error));
       session.on("connection", () => this.#connection());
-      session.on("notice", (notice) => notice && this.watcher.notice(notice.text));
+      session.on("notice", (notice) => this.#say(notice));
       this.#tell(performance.now());
       const openedAt = performance.now();
       const { hadFrames, askedMs } = await this.#readFrames(session);

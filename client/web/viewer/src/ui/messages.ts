@@ -72,7 +72,23 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     if (!stays) timer = setTimeout(() => (notice.hidden = true), isBad ? 2 * noticeMs : noticeMs);
   });
   app.view.watch(() => setText(hint, hintOf(app)));
-  return el("div", { className: "messages" }, pill, banner, restored, asideNote(app), hint, notice);
+  return el("div", { className: "messages" }, pill, banner, restored, asideNote(app), hint, betterButton(app), notice);
+}
+
+/** There while the server knows a shape of lower energy. */
+function betterButton(app: App): HTMLElement {
+  const take = el("button", { type: "button", className: "plain better", hidden: true });
+  take.addEventListener("click", () => app.takeBetter());
+  app.facts.watch(({ better }) => {
+    take.hidden = better === undefined;
+    if (better !== undefined) setText(take, `Take a shape with ${percent(better)} less energy`);
+  });
+  return take;
+}
+
+/** "7 %"; at least one, at most 99. */
+function percent(share: number): string {
+  return `${Math.min(Math.max(Math.round(100 * share), 1), 99)}\u00a0%`;
 }
 
 /** Says that the work was restored, until it is changed or the note is dismissed. */

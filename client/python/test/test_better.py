@@ -1,0 +1,134 @@
+"""Lower minima: looked for by solves and by sessions that stand, announced, and taken or shown."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import lpdeform
+from conftest import PATIENCE, Server
+
+
+def box(side: int, height: int) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+    """The closed surface of a box of side x side x height cells."""
+    cells = np.array([side, side, height])
+    corners: list[tuple[int, ...]] = []
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        for end in (0, cells[axis]):
+            for i in range(cells[u]):
+                for j in range(cells[v]):
+                    square = []
+                    for di, dj in ((0, 0), (1, 0), (1, 1), (0, 1)):
+                        at = [0, 0, 0]
+                        at[axis], at[u], at[v] = end, i + di, j + dj
+                        square.append(tuple(at))
+                    a, b, c, d = square if end else square[::-1]
+                    corners += [a, b, c, a, c, d]
+    vertices, inverse = np.unique(np.array(corners, float), axis=0, return_inverse=True)
+    return vertices, inverse.reshape(-1, 3)
+
+
+def bend(server: Server, **search: float) -> lpdeform.Session:
+    """A box whose top is turned by 80 degrees. The first minimum that the solver comes to is 2 % above another one."""
+    vertices, faces = box(4, 20)
+    session = lpdeform.open(vertices, faces, address=server.address)
+    settings = lpdeform.MinimaSearch(least_share=0.001, **search)  # type: ignore[arg-type]
+    session.set(p=1.5, solver=lpdeform.SolverSettings(search=settings))
+    turn = lpdeform.RigidMotion((1, 0, 0), np.radians(80), (2, 2, 10))
+    bottom = np.flatnonzero(vertices[:, 2] == 0)
+    top = np.flatnonzero(vertices[:, 2] == 20)
+    session.set_handles({"bottom": lpdeform.Handle(bottom), "top": lpdeform.Handle(top, turn)})
+    return session
+
+
+def until(is_so: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE
+    while not is_so():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def better(session: lpdeform.Session) -> bool:
+    return session.notice is not None and session.notice.reason == "better_shape"
+
+
+def test_a_session_that_stands_announces_a_better_shape_which_is_taken_once(server: Server) -> None:
+    with bend(server, effort=2) as session:
+        first = session.settle(PATIENCE)
+        until(lambda: better(session))
+        notice = session.notice
+        assert notice is not None
+        assert notice.input_seq == first.input_seq
+        assert notice.saved_share == pytest.approx(1 - notice.energy / first.energy)
+        assert session.take_better_shape() == (first.input_seq, notice.energy)
+        assert not better(session)
+        shown = session.next_frame(PATIENCE)
+        assert (shown.is_final, shown.input_seq, shown.energy) == (True, first.input_seq, notice.energy)
+        with pytest.raises(lpdeform.LpdeformError) as caught:
+            session.take_better_shape()
+        assert caught.value.reason == "NO_BETTER_SHAPE"
+
+
+def test_a_better_shape_is_not_announced_any_more_once_a_frame_answers_a_later_change(server: Server) -> None:
+    with bend(server, effort=2) as session:
+        session.settle(PATIENCE)
+        until(lambda: better(session))
+        session.move("top", axis=(1, 0, 0), angle=0.1, timeout=PATIENCE)
+        assert not better(session)
+
+
+def test_a_better_shape_is_shown_at_once_if_that_is_asked_for(server: Server) -> None:
+    with bend(server, effort=2, show=True) as session:
+        first = session.settle(PATIENCE)
+        shown = session.next_frame(PATIENCE)
+        assert shown.is_final
+        assert shown.input_seq == first.input_seq
+        assert shown.energy < first.energy
+        assert not better(session)
+
+
+def test_a_solve_says_which_minima_it_has_seen(server: Server) -> None:
+    with bend(server, effort=1) as session:
+        result = session.solve()
+        assert result.further_starts == 8
+        assert result.energy == min(result.minima)
+    with bend(server, effort=0) as session:
+        result = session.solve()
+        assert (result.minima, result.further_starts) == ((result.energy,), 0)
+
+
+def test_a_search_out_of_range_is_refused_by_name(server: Server) -> None:
+    for search, reason in (({"effort": 1001}, "EFFORT_OUT_OF_RANGE"), ({"least_share": 2.0}, "LEAST_SHARE_OUT_OF_RANGE")):
+        vertices, faces = box(1, 1)
+        with lpdeform.open(vertices, faces, address=server.address) as session:
+            session.set(solver=lpdeform.SolverSettings(search=lpdeform.MinimaSearch(**search)))  # type: ignore[arg-type]
+            with pytest.raises(lpdeform.InvalidInput) as caught:
+                session.settle(PATIENCE)
+            assert caught.value.reason == reason
+
+
+def test_readers_may_not_take_it_and_closed_sessions_neither(server: Server) -> None:
+    with bend(server) as session:
+        with lpdeform.join(session.name, address=server.address) as reader:
+            with pytest.raises(lpdeform.LpdeformError) as caught:
+                reader.take_better_shape()
+            assert caught.value.reason == "NOT_THE_WRITER"
+    with pytest.raises(lpdeform.LpdeformError) as caught:
+        session.take_better_shape()
+    assert caught.value.reason == "SESSION_CLOSED"
+
+
+def test_it_is_asked_for_from_asyncio_as_well(server: Server) -> None:
+    async def ask() -> str:
+        vertices, faces = box(1, 1)
+        async with lpdeform.open_async(vertices, faces, address=server.address) as session:
+            with pytest.raises(lpdeform.LpdeformError) as caught:
+                await session.take_better_shape()
+        return caught.value.reason
+
+    assert asyncio.run(ask()) == "NO_BETTER_SHAPE"

@@ -1,0 +1,105 @@
+import { afterEach, expect, it, vi } from "vitest";
+import { LpdeformError, type Notice } from "lpdeform-client";
+import { Live } from "../src/link/live.js";
+import { addHandle, changeHandle, type Document, emptyDocument } from "../src/model/document.js";
+
+/** A session that the test speaks for. */
+const session = vi.hoisted(() => ({
+  meshReport: { notices: [] },
+  newestInput: 0,
+  notice: undefined as Notice | undefined,
+  tell: (_: Notice | undefined) => {},
+  takeBetterShape: vi.fn<() => Promise<unknown>>(),
+  on(name: string, listener: (notice: Notice | undefined) => void) {
+    if (name === "notice") this.tell = listener;
+  },
+  update() {
+    return ++this.newestInput;
+  },
+  poll: () => undefined,
+  close: () => Promise.resolve(),
+  async *[Symbol.asyncIterator]() {
+    await new Promise(() => {});
+    yield undefined;
+  },
+}));
+
+vi.mock("lpdeform-client", async (original) => ({
+  ...(await original<typeof import("lpdeform-client")>()),
+  openSession: () => Promise.resolve(session),
+}));
+
+const rest = new Float32Array(9);
+const one: Document = addHandle(emptyDocument, [0], rest, { name: "tip" });
+const better: Notice = { reason: "better_shape", text: "Better.", inputSeq: 1, energy: 3, savedShare: 0.07 };
+const watcher = {
+  frame: vi.fn(),
+  status: vi.fn(),
+  report: vi.fn(),
+  problem: vi.fn(),
+  notice: vi.fn(),
+  better: vi.fn(() => void shares.push(live.better?.savedShare)),
+};
+let live: Live;
+/** What the page is told of better shapes, one after the other. */
+let shares: (number | undefined)[] = [];
+
+function say(notice: Notice | undefined): void {
+  session.notice = notice;
+  session.tell(notice);
+}
+
+/** A document on the server, which knows a better shape for it. */
+async function told(): Promise<void> {
+  Object.assign(session, { newestInput: 0, notice: undefined });
+  const mesh = { name: "a", positions: rest, faces: Uint32Array.of(0, 1, 2) };
+  live = new Live(mesh, one, "first", "float32", watcher);
+  await vi.waitFor(() => expect(session.newestInput).toBe(1));
+  shares = [];
+  say(better);
+}
+
+afterEach(() => {
+  live.close();
+  vi.clearAllMocks();
+});
+
+it("a better shape is offered by what it saves, without a line of text, and no more once it is being taken", async () => {
+  await told();
+  session.takeBetterShape.mockImplementation(() => {
+    say(undefined);
+    return Promise.resolve({});
+  });
+  await live.takeBetter();
+  await live.takeBetter();
+  expect(shares).toEqual([0.07, undefined, undefined, undefined]);
+  expect([session.takeBetterShape.mock.calls.length, watcher.notice.mock.calls.length]).toEqual([1, 0]);
+});
+
+it("a better shape is not offered any more once there is a newer input, also before a frame answers it", async () => {
+  await told();
+  live.show(changeHandle(one, "tip", { vertices: [0, 1] }));
+  expect([session.newestInput, live.better]).toEqual([2, undefined]);
+  await live.takeBetter();
+  expect(session.takeBetterShape).not.toHaveBeenCalled();
+});
+
+it("a better shape that the server does not have any more is told in one line", async () => {
+  await told();
+  const error = new LpdeformError("failed_precondition", "None is known.", { reason: "NO_BETTER_SHAPE" });
+  session.takeBetterShape.mockImplementation(() => {
+    say(undefined);
+    return Promise.reject(error);
+  });
+  await live.takeBetter();
+  expect(watcher.notice.mock.calls).toEqual([["None is known."]]);
+  expect(live.better).toBeUndefined();
+});
+
+it("what the server says about itself is told once, also if it applies again after a better shape", async () => {
+  await told();
+  const overloaded: Notice = { reason: "overloaded", text: "Too much." };
+  session.tell(overloaded); // while the better shape is still there
+  say(overloaded);
+  expect(watcher.notice.mock.calls).toEqual([["Too much."]]);
+});
