@@ -90,6 +90,13 @@ std::optional<FieldValue> read_field(double uniform, const double* per_vertex, s
   return std::nullopt;
 }
 
+std::optional<MinimaSearch> read_search(const lpdeform_settings& settings) {
+  if (settings.set_search == 0) return std::nullopt;
+  return MinimaSearch{.effort = settings.search_effort,
+                      .show = settings.search_shows != 0,
+                      .least_share = settings.search_least_share};
+}
+
 /// False if the update already has a change of this handle.
 bool add(Update& update, const char* name, Update::Change change) {
   return update.handles.emplace(name, std::move(change)).second;
@@ -162,7 +169,8 @@ absl::StatusOr<Handle> read_handle(const lpdeform_handle& handle, const Space& s
 }
 
 absl::StatusOr<Settings> read_settings(const lpdeform_settings& settings, const Space& space) {
-  const absl::Status reserved = check_reserved("settings", settings.reserved | settings.reserved_too);
+  const absl::Status reserved =
+      check_reserved("settings", settings.reserved | settings.reserved_too | settings.reserved_search);
   if (!reserved.ok()) return reserved;
   Settings out;
   out.p = read_field(settings.p, settings.p_per_vertex, settings.p_count, settings.p_automatic);
@@ -178,7 +186,8 @@ absl::StatusOr<Settings> read_settings(const lpdeform_settings& settings, const 
     out.solver = SolverSettings{.method = static_cast<Method>(settings.method),
                                 .tolerance = settings.tolerance,
                                 .max_iterations = settings.max_iterations,
-                                .time_limit_seconds = settings.time_limit_seconds};
+                                .time_limit_seconds = settings.time_limit_seconds,
+                                .search = read_search(settings)};
   }
   if (settings.set_region != 0) {
     if (settings.region == nullptr && settings.region_count > 0) return argument_missing("settings.region");

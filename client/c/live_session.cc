@@ -164,6 +164,24 @@ absl::StatusOr<std::uint64_t> LiveSession::undo(bool redo) {
   return ours(*seq);
 }
 
+absl::Status LiveSession::take_better_shape() {
+  const auto live = session();
+  if (!live.ok()) return live.status();
+  if (facts_.is_reader) return not_the_writer();
+  if (*live == nullptr) return not_there_yet();
+  return (*live)->take_better_shape().status();
+}
+
+std::optional<lpdeform_better_shape> LiveSession::better_shape() const {
+  const std::optional<client::Notice> said = notice();
+  if (!said || said->reason != client::Notice::Reason::kBetterShape) return std::nullopt;
+  lpdeform_better_shape out{};
+  out.input_seq = ours(said->input_seq);
+  out.energy = said->energy;
+  out.saved_share = said->saved_share;
+  return out;
+}
+
 absl::StatusOr<std::string> LiveSession::snapshot() {
   const auto live = session();
   if (!live.ok()) return live.status();

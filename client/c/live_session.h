@@ -47,6 +47,10 @@ class LiveSession {
   absl::StatusOr<std::uint64_t> send(client::Update update);
   /// As lpdeform_undo and lpdeform_redo. Waits.
   absl::StatusOr<std::uint64_t> undo(bool redo);
+  /// As lpdeform_take_better_shape. Waits.
+  absl::Status take_better_shape();
+  /// Of the notice, while it applies.
+  std::optional<lpdeform_better_shape> better_shape() const;
   /// As lpdeform_take_snapshot. Waits.
   absl::StatusOr<std::string> snapshot();
   lpdeform_state state(absl::Status& why) const;

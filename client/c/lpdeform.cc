@@ -158,6 +158,8 @@ lpdeform_notice notice_reason(client::Notice::Reason reason) {
       return LPDEFORM_NOTICE_OVERLOADED;
     case client::Notice::Reason::kRecovered:
       return LPDEFORM_NOTICE_RECOVERED;
+    case client::Notice::Reason::kBetterShape:
+      return LPDEFORM_NOTICE_BETTER_SHAPE;
     default:
       return LPDEFORM_NOTICE_OTHER;
   }
@@ -285,6 +287,19 @@ lpdeform_notice lpdeform_session_notice(const lpdeform_session* session, char* t
   return said;
 }
 
+lpdeform_code lpdeform_session_better_shape(const lpdeform_session* session, lpdeform_better_shape* better,
+                                            lpdeform_error* error) {
+  bool is_there = false;
+  const lpdeform_code code = guarded(error, [&]() -> absl::Status {
+    if (session == nullptr) return argument_missing("session");
+    const std::optional<lpdeform_better_shape> known = session->live->better_shape();
+    is_there = known.has_value();
+    if (is_there) engine::write_struct(*known, better);
+    return absl::OkStatus();
+  });
+  return code == LPDEFORM_OK && !is_there ? LPDEFORM_NO_FRAME : code;
+}
+
 lpdeform_code lpdeform_session_name(const lpdeform_session* session, char* name, size_t bytes,
                                     lpdeform_error* error) {
   return guarded(error, [&]() -> absl::Status {
@@ -381,6 +396,13 @@ lpdeform_code lpdeform_undo(lpdeform_session* session, uint64_t* input_seq, lpde
 
 lpdeform_code lpdeform_redo(lpdeform_session* session, uint64_t* input_seq, lpdeform_error* error) {
   return take_back(session, true, input_seq, error);
+}
+
+lpdeform_code lpdeform_take_better_shape(lpdeform_session* session, lpdeform_error* error) {
+  return guarded(error, [&]() -> absl::Status {
+    if (session == nullptr) return argument_missing("session");
+    return session->live->take_better_shape();
+  });
 }
 
 lpdeform_code lpdeform_poll(lpdeform_session* session, const lpdeform_buffers* buffers, lpdeform_frame* frame,

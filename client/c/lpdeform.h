@@ -319,14 +319,32 @@ enum {
   LPDEFORM_NOTICE_OVERLOADED = 1, /* the server is overloaded: frames come less often */
   LPDEFORM_NOTICE_RECOVERED = 2,  /* no longer overloaded */
   LPDEFORM_NOTICE_OTHER = 3,      /* a notice that only newer servers send */
-  LPDEFORM_NOTICE_MESH = 4 /* the mesh splits open where it is not welded. Until there is another notice */
+  LPDEFORM_NOTICE_MESH = 4, /* the mesh splits open where it is not welded. Until there is another notice */
+  /* A shape of lower energy is known for the newest change: see lpdeform_take_better_shape. */
+  LPDEFORM_NOTICE_BETTER_SHAPE = 5
 };
 
-/* The last notice on the present connection, or about the mesh. NONE if there is none, and for a NULL session. Writes
- * one sentence for people to `text`, which has `bytes` bytes and may be NULL; it is cut like the texts of errors. Log
+/* BETTER_SHAPE while it applies: until the shape is shown, or a frame for a later change arrives. Otherwise the last
+ * notice of the server about itself on the present connection, or about the mesh. NONE if there is none, and for a NULL
+ * session. Writes one sentence for people to `text`, which has `bytes` bytes and may be NULL; it is cut like the texts of errors. Log
  * it when it changes. */
 LPDEFORM_API lpdeform_notice lpdeform_session_notice(const lpdeform_session* session, char* text,
                                                      size_t bytes);
+
+/* A shape of lower energy for the newest change. */
+typedef struct lpdeform_better_shape {
+  uint32_t struct_size;
+  uint32_t reserved;  /* 0 */
+  uint64_t input_seq; /* of the change */
+  double energy;      /* of the shape, as lpdeform_frame.energy */
+  double saved_share; /* the share of the present energy that the shape saves, 0 to 1 */
+} lpdeform_better_shape;
+
+/* The numbers of LPDEFORM_NOTICE_BETTER_SHAPE. LPDEFORM_NO_FRAME if no such notice applies; nothing is then written.
+ * `better` may be NULL. INVALID_ARGUMENT for a NULL session. */
+LPDEFORM_API lpdeform_code lpdeform_session_better_shape(const lpdeform_session* session,
+                                                         lpdeform_better_shape* better,
+                                                         lpdeform_error* error);
 
 /* The name "sessions/<32 hexadecimal digits>", for lpdeform_join. It changes if the server loses the session.
  * FAILED_PRECONDITION while there is no session. INVALID_ARGUMENT if `bytes` is too small; 64 is enough. */
@@ -420,6 +438,13 @@ typedef struct lpdeform_settings {
   const uint32_t* region;
   uint32_t region_count;
   uint32_t reserved_too; /* 0 */
+  /* With set_solver. 1: the next three fields say how far to look for lower minima once the first one is found (see
+   * MinimaSearch in client/cpp/types.h); 0: the server's default. */
+  uint32_t set_search;
+  uint32_t search_effort;    /* 8 times as many further starts, 0 to 1000; 0 takes the first minimum */
+  double search_least_share; /* the share of energy that a better shape must save, up to 1; 0 means 0.02 */
+  uint32_t search_shows;     /* 1: a better shape is shown at once; 0: it is announced (BETTER_SHAPE) */
+  uint32_t reserved_search;  /* 0 */
 } lpdeform_settings;
 
 /* A motion for an existing handle. */
@@ -496,6 +521,13 @@ LPDEFORM_API lpdeform_code lpdeform_undo(lpdeform_session* session, uint64_t* in
 /* Redoes the step that was undone last. As lpdeform_undo; NOTHING_TO_REDO. */
 LPDEFORM_API lpdeform_code lpdeform_redo(lpdeform_session* session, uint64_t* input_seq,
                                          lpdeform_error* error);
+
+/* WAITS until the server has taken the better shape that LPDEFORM_NOTICE_BETTER_SHAPE announces. It comes as a new final
+ * frame for the same change. It is not part of steps for lpdeform_undo. Not retried: after UNAVAILABLE or
+ * DEADLINE_EXCEEDED the shape may have been taken, which a frame then shows. Errors: FAILED_PRECONDITION
+ * (NO_BETTER_SHAPE if none is known for the newest change; NOT_CONNECTED; NOT_THE_WRITER), UNAVAILABLE,
+ * DEADLINE_EXCEEDED after call_timeout_seconds. */
+LPDEFORM_API lpdeform_code lpdeform_take_better_shape(lpdeform_session* session, lpdeform_error* error);
 
 /* ---- frames ---- */
 

@@ -22,6 +22,8 @@ inline constexpr std::size_t kFirstSize = sizeof(Struct);
 template <>
 inline constexpr std::size_t kFirstSize<lpdeform_update> = offsetof(lpdeform_update, begins_step);
 template <>
+inline constexpr std::size_t kFirstSize<lpdeform_settings> = offsetof(lpdeform_settings, set_search);
+template <>
 inline constexpr std::size_t kFirstSize<lpdeform_mesh> = offsetof(lpdeform_mesh, weld_tolerance);
 
 /// Copies `given` to a struct of this library's size. Fields that the caller does not know yet are 0. `name` is for

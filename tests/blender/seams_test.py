@@ -104,7 +104,7 @@ class Seams(unittest.TestCase):
 
     def test_what_a_newer_server_says_of_itself_is_shown_as_well(self):
         self.bend()
-        live.of(self.tube).session._link._stream.notice = live.lpdeform.Notice("other", "News of tomorrow.")
+        live.of(self.tube).session._link._stream.server_notice = live.lpdeform.Notice("other", "News of tomorrow.")
         self.assertIn("News of tomorrow.", said_in_panel(self.tube))
 
 

@@ -49,6 +49,7 @@ static class Layout
         Tell("SurfacePoint", typeof(SurfacePoint));
         Tell("Handle", typeof(Native.Handle));
         Tell("Settings", typeof(Native.Settings));
+        Tell("BetterShape", typeof(Native.BetterShape));
         Tell("Move", typeof(Native.Move));
         Tell("Update", typeof(Native.Update));
         Tell("Buffers", typeof(Native.Buffers));

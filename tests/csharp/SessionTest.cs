@@ -403,13 +403,29 @@ static class SessionTest
         }
     }
 
+    static void ASearchIsAskedForAndABetterShapeOnlyThereWhenAnnounced()
+    {
+        using (var client = new Client(server.Address))
+        using (var session = OpenStrip(client))
+        {
+            session.SetSolver(new SolverSettings { Search = new MinimaSearch { Effort = 1, LeastShare = 0.5 } });
+            var positions = new float[66];
+            session.Settle(positions);
+            Expect(session.Notice.Reason == NoticeReason.None && session.Notice.SavedShare == 0, "there is none");
+            Refused("NO_BETTER_SHAPE", () => session.TakeBetterShape());
+            session.SetSolver(new SolverSettings { Search = new MinimaSearch { Effort = 1001 } });
+            Refused("EFFORT_OUT_OF_RANGE", () => session.Settle(positions));
+        }
+    }
+
     static int Main(string[] arguments)
     {
         var tests = new Action[] { FramesComeIntoTheCallersSpans, ErrorsCarryTheServersReason, ARefusedMeshIsAState,
                                    WorkGoesOnWhenTheServerComesBack, PerFrameCallsMakeNoGarbage, EmptyArraysAreNothing,
                                    TextsThatCannotBeSaidAreRefused, TargetsPointsAndRegions, ASolveIsItsOwnResult, StepsAreTakenBackAndDoneAgain,
                                    ResizingScalesAlongUnitysAxes, SolversStopWhereTheyAreToldTo,
-                                   GroupsOfVerticesAreOne, ASessionLeavesAsAFileAndComesBackTheSame, SettingsAndReaders };
+                                   GroupsOfVerticesAreOne, ASessionLeavesAsAFileAndComesBackTheSame, SettingsAndReaders,
+                                   ASearchIsAskedForAndABetterShapeOnlyThereWhenAnnounced };
         int failed = 0;
         using (server = new Server(arguments[0]))
         {

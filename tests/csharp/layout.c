@@ -104,6 +104,17 @@ int main(void) {
   FIELD(lpdeform_settings, region);
   FIELD(lpdeform_settings, region_count);
   FIELD(lpdeform_settings, reserved_too);
+  FIELD(lpdeform_settings, set_search);
+  FIELD(lpdeform_settings, search_effort);
+  FIELD(lpdeform_settings, search_least_share);
+  FIELD(lpdeform_settings, search_shows);
+  FIELD(lpdeform_settings, reserved_search);
+  STRUCT("BetterShape", lpdeform_better_shape);
+  FIELD(lpdeform_better_shape, struct_size);
+  FIELD(lpdeform_better_shape, reserved);
+  FIELD(lpdeform_better_shape, input_seq);
+  FIELD(lpdeform_better_shape, energy);
+  FIELD(lpdeform_better_shape, saved_share);
   STRUCT("Move", lpdeform_move);
   FIELD(lpdeform_move, name);
   FIELD(lpdeform_move, motion);

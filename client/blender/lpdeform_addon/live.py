@@ -86,6 +86,12 @@ class LiveMesh:
         return notice.text if notice is not None and notice.reason != "recovered" else ""
 
     @property
+    def has_better(self) -> bool:
+        """Whether the server knows a shape of lower energy."""
+        notice = self.session.notice
+        return notice is not None and notice.reason == "better_shape"
+
+    @property
     def mesh_notices(self) -> tuple:
         """What users should know of the mesh: that it comes apart where it is split."""
         return self.session.mesh_report.notices

@@ -160,6 +160,26 @@ class Solve(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class TakeBetter(bpy.types.Operator):
+    """Shows the shape of lower energy that the server has found."""
+
+    bl_idname = "lpdeform.take_better"
+    bl_label = "Take the better shape"
+
+    @classmethod
+    def poll(cls, context):
+        running = live.of(mesh_of(context))
+        return running is not None and running.has_better
+
+    def execute(self, context):
+        try:
+            live.of(mesh_of(context)).session.take_better_shape()
+        except lpdeform.LpdeformError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
 class Apply(bpy.types.Operator):
     """End live deformation and keep the present pose as a shape key"""
 
@@ -179,4 +199,4 @@ class Apply(bpy.types.Operator):
         return {"FINISHED"}
 
 
-register, unregister = bpy.utils.register_classes_factory((AddHandle, RemoveHandle, PutBack, Start, Stop, Solve, Apply))
+register, unregister = bpy.utils.register_classes_factory((AddHandle, RemoveHandle, PutBack, Start, Stop, Solve, TakeBetter, Apply))

@@ -53,6 +53,8 @@ class MainPanel(bpy.types.Panel):
             column.operator("lpdeform.apply", icon="SHAPEKEY_DATA")
             if running.notice:
                 _say(layout, context, running.notice, "TIME")
+            if running.has_better:
+                layout.operator("lpdeform.take_better", icon="CHECKMARK")
             for notice in running.mesh_notices:
                 _say(layout, context, notice, "INFO")
         if live.message(ob):

@@ -96,6 +96,17 @@ namespace Lpdeform
             public uint MaxIterations, SetRegion;
             public IntPtr Region;
             public uint RegionCount, ReservedToo;
+            public uint SetSearch, SearchEffort;
+            public double SearchLeastShare;
+            public uint SearchShows, ReservedSearch;
+        }
+
+        [StructLayout(LayoutKind.Sequential)]
+        public struct BetterShape
+        {
+            public uint StructSize, Reserved;
+            public ulong InputSeq;
+            public double Energy, SavedShare;
         }
 
         [StructLayout(LayoutKind.Sequential)]
@@ -181,6 +192,10 @@ namespace Lpdeform
         public static extern int lpdeform_session_state(IntPtr session, byte[] error);
         [DllImport(Library, CallingConvention = C)]
         public static extern int lpdeform_session_notice(IntPtr session, byte[] text, UIntPtr bytes);
+        [DllImport(Library, CallingConvention = C)]
+        public static extern int lpdeform_session_better_shape(IntPtr session, ref BetterShape better, byte[] error);
+        [DllImport(Library, CallingConvention = C)]
+        public static extern int lpdeform_take_better_shape(IntPtr session, byte[] error);
         [DllImport(Library, CallingConvention = C)]
         public static extern int lpdeform_session_name(IntPtr session, byte[] name, UIntPtr bytes, byte[] error);
         [DllImport(Library, CallingConvention = C)]

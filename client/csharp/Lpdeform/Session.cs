@@ -3,8 +3,8 @@ using System.Runtime.InteropServices;
 
 namespace Lpdeform
 {
-    /// A mesh that deforms on a server while its handles are moved. Only Settle, Solve, Undo, Redo and Snapshot wait. Members may
-    /// be used from any thread, except that Dispose must not overlap another call.
+    /// A mesh that deforms on a server while its handles are moved. Only Settle, Solve, Undo, Redo, Snapshot and
+    /// TakeBetterShape wait. Members may be used from any thread, except that Dispose must not overlap another call.
     public sealed unsafe class Session : IDisposable
     {
         IntPtr session;
@@ -50,14 +50,20 @@ namespace Lpdeform
             }
         }
 
-        /// The server's last notice about itself.
+        /// That of a better shape while it applies, otherwise the server's last notice about itself.
         public Notice Notice
         {
             get
             {
                 var text = new byte[512];
                 var reason = (NoticeReason)Native.lpdeform_session_notice(Pointer, text, (UIntPtr)(uint)text.Length);
-                return new Notice { Reason = reason, Text = System.Text.Encoding.UTF8.GetString(text, 0, Array.IndexOf(text, (byte)0)) };
+                var better = new Native.BetterShape { StructSize = (uint)sizeof(Native.BetterShape) };
+                if (reason == NoticeReason.BetterShape) Native.lpdeform_session_better_shape(Pointer, ref better, null);
+                return new Notice
+                {
+                    Reason = reason, Text = System.Text.Encoding.UTF8.GetString(text, 0, Array.IndexOf(text, (byte)0)),
+                    InputSeq = better.InputSeq, Energy = better.Energy, SavedShare = better.SavedShare
+                };
             }
         }
 
@@ -104,8 +110,11 @@ namespace Lpdeform
         /// Replaces all solver settings. Returns the change's number.
         public ulong SetSolver(SolverSettings solver)
         {
+            var search = solver.Search ?? new MinimaSearch();
             return Set(new Native.Settings
             {
+                SetSearch = solver.Search == null ? 0u : 1u, SearchEffort = (uint)search.Effort,
+                SearchShows = search.Show ? 1u : 0u, SearchLeastShare = search.LeastShare,
                 SetSolver = 1, Method = (int)solver.Method, Tolerance = solver.Tolerance, MaxIterations = (uint)solver.MaxIterations,
                 TimeLimitSeconds = solver.TimeLimitSeconds
             });
@@ -176,6 +185,15 @@ namespace Lpdeform
             var error = LpdeformException.NewError();
             LpdeformException.Check(Native.lpdeform_redo(Pointer, out inputSeq, error), error);
             return inputSeq;
+        }
+
+        /// Waits until the server has taken the better shape that NoticeReason.BetterShape announces; it comes as a new final frame
+        /// for the same change. It is not part of steps for Undo. FailedPrecondition NO_BETTER_SHAPE if none is known any more. After
+        /// Unavailable the shape may have been taken, which a frame then shows.
+        public void TakeBetterShape()
+        {
+            var error = LpdeformException.NewError();
+            LpdeformException.Check(Native.lpdeform_take_better_shape(Pointer, error), error);
         }
 
         /// Waits for the session as a file, for Client.Restore: mesh, handles, settings, steps to undo and the present surface.

@@ -78,6 +78,22 @@ namespace Lpdeform
         public int MaxIterations;
         /// 0 is without limit.
         public double TimeLimitSeconds;
+        /// null takes the server's default: an effort of 1 if Method is Auto and p is below 2 somewhere, otherwise 0.
+        public MinimaSearch? Search;
+    }
+
+    /// How far to look for lower minima once the first one is found: below p = 2 the energy has many.
+    public struct MinimaSearch
+    {
+        /// The search begins from 8 times as many further starts, each of which takes at most about as long as the first solve. 0
+        /// to 1000; 0 takes the first minimum. Solve searches before it returns; a session searches when nothing has changed for a
+        /// second.
+        public int Effort;
+        /// What the session does with a lower minimum that it has found then. False: NoticeReason.BetterShape announces it, and
+        /// TakeBetterShape shows it. True: it is shown at once, as a new frame for the same change.
+        public bool Show;
+        /// The share of the energy that must be saved for this, up to 1; 0 means 0.02.
+        public double LeastShare;
     }
 
     /// Where a handle moves; always relative to the mesh at rest.
@@ -142,17 +158,21 @@ namespace Lpdeform
     }
 
     public enum SessionState { Connecting, Live, Reconnecting, Refused }
-    public enum NoticeReason { None, Overloaded, Recovered, Other, Mesh }
+    public enum NoticeReason { None, Overloaded, Recovered, Other, Mesh, BetterShape }
 
     /// What a server says about itself or about the mesh; nothing has failed.
     public struct Notice
     {
         /// None: no notice on the present connection. After Overloaded frames come less often, and the last frame of a change
         /// comes later, until Recovered. Other: from a newer server. Mesh: the mesh is split and comes apart there, until another
-        /// notice comes.
+        /// notice comes. BetterShape: a shape of lower energy is known for the newest change, until it is shown or a frame for a
+        /// later change comes; see Session.TakeBetterShape.
         public NoticeReason Reason;
         /// One sentence for people.
         public string Text;
+        /// Of BetterShape: the change, the energy of the shape, and the share of the present energy that it saves, 0 to 1.
+        public ulong InputSeq;
+        public double Energy, SavedShare;
     }
 
     public enum StopReason { Running, Converged, IterationLimit, TimeLimit, Cancelled, Stalled, NumericalBreakdown }

@@ -179,6 +179,22 @@ TEST(Changes, SettingsThatAreZeroAreLeftAlone) {
   EXPECT_EQ(std::get<double>(*read.stiffness), 3);
 }
 
+TEST(Changes, HowFarToLookForLowerMinimaIsTheServersUnlessItIsSet) {
+  lpdeform_settings settings{};
+  settings.struct_size = sizeof settings;
+  settings.set_solver = settings.search_shows = 1;
+  settings.search_effort = 3;
+  settings.search_least_share = 0.1;
+  EXPECT_FALSE(read_settings(settings, Space())->solver->search);
+  settings.set_search = 1;
+  const client::MinimaSearch read = read_settings(settings, Space())->solver->search.value();
+  EXPECT_EQ(read.effort, 3u);
+  EXPECT_TRUE(read.show);
+  EXPECT_EQ(read.least_share, 0.1);
+  settings.struct_size = offsetof(lpdeform_settings, set_search);  // of a caller that does not know it
+  EXPECT_EQ(read_struct(&settings, "settings")->set_search, 0u);
+}
+
 TEST(MeshInput, ExtentsAreComparedBeyond32Bits) {
   const Fault fault = fault_of(check_extent("positions", 100, 0xffffffff, 0xffffffff, 12, 0xffffffff));
   EXPECT_EQ(fault.reason, "BUFFER_TOO_SMALL");

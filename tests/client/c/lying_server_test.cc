@@ -53,6 +53,10 @@ class LyingServer final : public v1::DeformService::Service {
     response.mutable_event()->mutable_notice()->set_reason(v1::NOTICE_REASON_OVERLOADED);
     response.mutable_event()->mutable_notice()->set_text("Too m\u00fcch to do.");
     if (is_overloaded) stream->Write(response);
+    response.mutable_event()->mutable_notice()->set_reason(v1::NOTICE_REASON_BETTER_SHAPE);
+    response.mutable_event()->mutable_notice()->set_energy(-1);
+    response.mutable_event()->mutable_notice()->set_saved_share(0.25);
+    if (has_better) stream->Write(response);
     v1::FramePart& part = *response.mutable_event()->mutable_frame();
     part.set_vertex_count(framed);
     part.set_positions(std::string(12 * framed, '\1'));
@@ -67,10 +71,17 @@ class LyingServer final : public v1::DeformService::Service {
     return grpc::Status::OK;
   }
 
+  grpc::Status TakeBetterShape(grpc::ServerContext*, const v1::TakeBetterShapeRequest* request,
+                               v1::TakeBetterShapeResponse*) override {
+    ++takings;
+    return request->writer_token() == "token" ? grpc::Status::OK
+                                              : grpc::Status(grpc::StatusCode::INTERNAL, "");
+  }
+
   std::uint32_t created = 3, opened = 3, framed = 3;
-  std::atomic<int> calls = 0, deletions = 0;
+  std::atomic<int> calls = 0, deletions = 0, takings = 0;
   int failures = 0;
-  bool hangs = false, deletion_hangs = false, is_overloaded = false;
+  bool hangs = false, deletion_hangs = false, is_overloaded = false, has_better = false;
 };
 
 class LyingServerTest : public testing::Test {
@@ -153,6 +164,27 @@ TEST_F(LyingServerTest, WhatAServerSaysAboutItselfIsHandedOnAndCutWhereThereIsNo
   server_.reset();
   EXPECT_TRUE(
       eventually([&] { return lpdeform_session_notice(session_, nullptr, 0) == LPDEFORM_NOTICE_NONE; }));
+}
+
+TEST_F(LyingServerTest, ABetterShapeIsToldWithItsNumbersAndNoMoreOnceItIsTaken) {
+  service_.is_overloaded = service_.has_better = true;
+  start();
+  std::vector<Point> points(3);
+  const lpdeform_buffers buffers = buffers_of(points);
+  EXPECT_EQ(lpdeform_settle(session_, kPatienceSeconds, &buffers, nullptr, &error_), LPDEFORM_OK);
+  EXPECT_EQ(lpdeform_session_notice(session_, nullptr, 0), LPDEFORM_NOTICE_BETTER_SHAPE);
+  lpdeform_better_shape better{};
+  better.struct_size = sizeof better;
+  EXPECT_EQ(lpdeform_session_better_shape(session_, &better, &error_), LPDEFORM_OK);
+  EXPECT_EQ(better.energy, -1);
+  EXPECT_EQ(better.saved_share, 0.25);
+  EXPECT_EQ(lpdeform_session_better_shape(session_, nullptr, &error_), LPDEFORM_OK);
+  EXPECT_EQ(lpdeform_take_better_shape(session_, &error_), LPDEFORM_OK) << error_.message;
+  EXPECT_EQ(service_.takings, 1);
+  EXPECT_EQ(lpdeform_session_notice(session_, nullptr, 0), LPDEFORM_NOTICE_OVERLOADED);
+  EXPECT_EQ(lpdeform_session_better_shape(session_, &better, &error_), LPDEFORM_NO_FRAME);
+  EXPECT_EQ(lpdeform_session_better_shape(nullptr, &better, &error_), LPDEFORM_INVALID_ARGUMENT);
+  EXPECT_EQ(lpdeform_take_better_shape(nullptr, &error_), LPDEFORM_INVALID_ARGUMENT);
 }
 
 TEST_F(LyingServerTest, ClosingDoesNotWaitForAServerThatHangs) {

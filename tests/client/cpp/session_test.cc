@@ -71,16 +71,24 @@ TEST_F(SessionTest, SolveReturnsDoublesATraceAndACertificate) {
 
 class BentBarTest : public SessionTest {
  protected:
-  /// One end turned by 80 degrees. The first minimum that the solver comes to is 2 % above another one.
+  /// One end turned by 80 degrees. The first minimum that the solver comes to is 2.8 % above another one.
   Session open_bent(MinimaSearch search) {
+    const Mesh mesh = cli::to_client(box_surface(6, 6, 40));
+    const auto end = [&mesh](double z) {
+      Handle out;
+      for (std::uint32_t v = 0; v < mesh.vertex_count(); ++v) {
+        if (mesh.vertices[3 * v + 2] == z) out.vertices.push_back(v);
+      }
+      return out;
+    };
     search.least_share = 0.001;
     Update update;
     update.settings = {.p = 1.5, .solver = SolverSettings{.search = search}};
-    const RigidMotion turn{
-        .axis = {1, 0, 0}, .angle_radians = 80 * std::numbers::pi / 180, .center = {2, 2, 10.5}};
-    update.handles["end_a"] = Handle{.vertices = vertices_of("end_a")};
-    update.handles["end_b"] = Handle{.vertices = vertices_of("end_b"), .motion = turn};
-    Session session = connect()->open(bar()).value();
+    update.handles["bottom"] = end(0);
+    update.handles["top"] = end(40);
+    std::get<Handle>(update.handles["top"]).motion =
+        RigidMotion{.axis = {1, 0, 0}, .angle_radians = 80 * std::numbers::pi / 180, .center = {3, 3, 20}};
+    Session session = connect()->open(mesh).value();
     session.update(update).value();
     return session;
   }

@@ -56,6 +56,15 @@ it("changes the surface with p", async () => {
   expect(await user.ask("document().p")).toBe(6);
 });
 
+it("offers a better shape by a button with what it saves, which goes with the next change", async () => {
+  const take = user.page.getByRole("button", { name: "Take a shape with 7 % less energy" });
+  await user.ask("app.facts.set({ better: 0.0714 })");
+  await take.waitFor();
+  await user.page.getByRole("button", { name: "2", exact: true }).click();
+  await take.waitFor({ state: "hidden" });
+  await user.settled();
+});
+
 it("places a handle where the surface is clicked, and takes it back", async () => {
   const count = await user.ask<number>("document().handles.length");
   const place = await user.vertexOnPage(await user.vertexNear([0.5, 0, 2.6]));
