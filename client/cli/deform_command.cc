@@ -1,5 +1,6 @@
 #include "client/cli/deform_command.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -47,12 +48,14 @@ absl::Status read_initial(const DeformOptions& options, Inputs& inputs) {
 }
 
 client::SolverSettings solver_settings(const DeformOptions& options) {
-  return {
+  client::SolverSettings result{
       .method = options.method,
       .tolerance = options.tolerance,
       .max_iterations = options.max_iterations.value_or(0),
       .time_limit_seconds = options.time_limit_seconds.value_or(0),
       .initial = options.initial == "rest" ? client::InitialGuess::kRest : client::InitialGuess::kLaplacian};
+  if (options.effort) result.search = client::MinimaSearch{.effort = *options.effort};
+  return result;
 }
 
 /// The result may overwrite the mesh. No output may overwrite another input or another output.
@@ -155,6 +158,17 @@ absl::Status write_results(const DeformOptions& options, const Inputs& inputs, c
   return written;
 }
 
+/// What the certificate does not say: it is about the rotations of the result, and another minimum may be lower.
+void print_search(const client::SolveResult& result) {
+  if (result.further_starts == 0 || result.minima.empty()) {
+    std::printf("no other minima were looked for (--effort)\n");
+    return;
+  }
+  const auto [lowest, highest] = std::ranges::minmax(result.minima);
+  std::printf("looked for lower minima from %u further starts; %zu seen, E from %.6g to %.6g\n",
+              result.further_starts, result.minima.size(), lowest, highest);
+}
+
 void print_summary(const Inputs& inputs, const client::SolveResult& result) {
   std::printf("%s after %u iterations of %s, %.3f s: E = %.6g, from %.6g",
               stop_reason_name(result.stop_reason).c_str(), result.iterations, result.method.c_str(),
@@ -163,6 +177,7 @@ void print_summary(const Inputs& inputs, const client::SolveResult& result) {
     std::printf("; E^(1/p) = %.6g", std::pow(result.energy, 1 / *p));
   if (result.optimality_gap) std::printf("; gap %.2g", *result.optimality_gap);
   std::printf("\n");
+  if (result.optimality_gap || result.further_starts > 0) print_search(result);
 }
 
 }  // namespace

@@ -25,6 +25,7 @@ struct DeformOptions {
   client::FreeComponents free_components = client::FreeComponents::kError;
   std::optional<std::uint32_t> max_iterations;
   double tolerance = 0;  // 0: the server's default
+  std::optional<std::uint32_t> effort;
   std::optional<double> time_limit_seconds;
   int threads = 0;             // for a server in this process; 0: all cores
   std::optional<double> weld;  // tolerance, 0: the default; not set: no weld

@@ -142,8 +142,7 @@ void add_solver_options(CLI::App& app, DeformOptions& options) {
        {"local_global", client::Method::kLocalGlobal},
        {"conic", client::Method::kConic}},
       "The algorithm. local_global needs p = 2. conic needs p = 1 and stops like the paper, some percent "
-      "above the minimum. auto takes quasi_newton, or multiresolution on large meshes; with 300 to 15,000 "
-      "vertices and p of 1.2 or less somewhere it tries both and keeps the better result (auto)");
+      "above the minimum. auto takes quasi_newton, or multiresolution on large meshes (auto)");
   app.add_option("--initial", options.initial,
                  "The initial guess; a mesh must have as many vertices as MESH (laplacian)")
       ->option_text("laplacian|rest|MESH");
@@ -154,6 +153,12 @@ void add_solver_options(CLI::App& app, DeformOptions& options) {
                  "Stop when the relative gain still possible is below this, 1e-14 to 0.1 (1e-5)")
       ->check(within(1e-14, 0.1))
       ->option_text("T");
+  app.add_option("--effort", options.effort,
+                 "How far to look for lower minima, 0 to 1000: from 8 N further starts; 0 takes the first "
+                 "minimum. Without "
+                 "this option: 1 with method auto where some p is below 2, otherwise 0")
+      ->check(within(0, 1000))
+      ->option_text("N");
   app.add_option("--time-limit", options.time_limit_seconds, "Stop after this many seconds of solving")
       ->check(positive())
       ->option_text("SECONDS");

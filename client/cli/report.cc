@@ -127,6 +127,8 @@ std::string report_json(const client::MeshReport& mesh, const client::FieldValue
                             {"energy", result.energy},
                             {"soft_energy", result.soft_energy},
                             {"optimality_gap", gap},
+                            {"minima", result.minima},
+                            {"further_starts", result.further_starts},
                             {"setup_seconds", result.setup_seconds},
                             {"solve_seconds", result.solve_seconds},
                             {"trace", trace_array(result.trace)},
