@@ -165,7 +165,7 @@ void print_search(const client::SolveResult& result) {
     return;
   }
   const auto [lowest, highest] = std::ranges::minmax(result.minima);
-  std::printf("looked for lower minima from %u further starts; %zu seen, E from %.6g to %.6g\n",
+  std::printf("looked for lower minima from %u further starts; %zu reached, E from %.6g to %.6g\n",
               result.further_starts, result.minima.size(), lowest, highest);
 }
 
