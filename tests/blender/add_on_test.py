@@ -294,10 +294,14 @@ class AddOn(unittest.TestCase):
         running = live.of(self.tube)
         self.assertEqual(running.notice, "")
         stream = running.session._link._stream
-        stream.notice = client.lpdeform.Notice("overloaded", "Too much.")
+        stream.server_notice = client.lpdeform.Notice("overloaded", "Too much.")
         self.assertEqual(running.notice, "Too much.")
-        stream.notice = client.lpdeform.Notice("recovered", "No more.")
+        stream.server_notice = client.lpdeform.Notice("recovered", "No more.")
         self.assertEqual(running.notice, "")
+        self.assertFalse(bpy.ops.lpdeform.take_better.poll())
+        stream.better = client.lpdeform.Notice("better_shape", "A better one.")
+        self.assertEqual(running.notice, "A better one.")
+        self.assertTrue(bpy.ops.lpdeform.take_better.poll())
 
     def test_what_is_said_in_the_panel_is_not_cut(self):
         said = "The target of vertex 1440 of handle 2 is over 1e9 diagonals of the mesh away. (HANDLE_TARGET_TOO_FAR)"
