@@ -26,6 +26,8 @@ struct DeformerOptions {
   std::int32_t parallel_from = 8000;  // vertices
   /// Larger meshes look for lower minima on their coarse levels only.
   std::int32_t search_up_to = 15000;  // vertices
+  /// The search of a solve keeps the first minimum unless another one saves at least this share of the energy.
+  double least_saving = 0;
   /// Admission control: called once with the memory that a solve takes, before it is allocated. create() returns its
   /// error.
   std::function<absl::Status(std::size_t bytes)> admit = {};

@@ -19,7 +19,10 @@ constexpr std::size_t kCopyChunk = 4096;     // vertices
 constexpr std::int32_t kLargeMesh = 5000;    // vertices from which on a coarse level pays off
 constexpr std::int32_t kLargeAtTwo = 10000;  // the same if every p is 2, where the gain is smaller
 constexpr std::int32_t kLargestSearchedLevel =
-    5000;                            // vertices of a coarse level that looks for lower minima itself
+    5000;  // vertices of a coarse level that looks for lower minima itself
+// Minima of a coarse level that differ by less than this may be in another order on the fine level. It counts where the fine
+// level is too large to be searched itself.
+constexpr double kLeastSavingOfLevel = 0.02;
 constexpr double kRounding = 1e-13;  // relative to the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
@@ -103,7 +106,8 @@ bool Deformer::Impl::prepare_coarse() {
   const auto make_solver = [this](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
     const DeformerOptions of_level{.free_components = FreeComponents::kStay,
                                    .threads = workers().threads(),
-                                   .search_up_to = kLargestSearchedLevel};
+                                   .search_up_to = kLargestSearchedLevel,
+                                   .least_saving = is_large() ? kLeastSavingOfLevel : 0};
     auto deformer = Deformer::create(std::move(level), of_level);
     return deformer.ok() ? std::make_unique<DeformerOfLevel>(*std::move(deformer)) : nullptr;
   };

@@ -95,6 +95,7 @@ bool LiveSolver::begin_job(SolveJob& job) {
   }
   if (status.ok()) status = deformer_->start(settings, job.stop_token());
   if (!status.ok()) job.finish(status);
+  if (status.ok()) publisher_.forget_better();
   return status.ok();
 }
 
@@ -222,8 +223,9 @@ void LiveSolver::end_search() {
   if (!energy || !(present > 0)) return;
   const double saved = 1 - *energy / present;
   if (saved < inputs_.solver.standing.least_share) return;
+  publisher_.metrics().add(Count::kBetterShapes);
+  if (inputs_.solver.standing.shows) return take_better();
   publisher_.announce({.input_seq = inputs_.input_seq, .energy = *energy, .saved_share = saved});
-  if (inputs_.solver.standing.shows) take_better();
 }
 
 void LiveSolver::take_better() {

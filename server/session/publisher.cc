@@ -74,7 +74,6 @@ void Publisher::announce(BetterNote better) {
     better.number = ++better_shapes_;
     better_ = better;
   }
-  metrics_->add(Count::kBetterShapes);
   wake_all();
 }
 
