@@ -14,8 +14,8 @@ namespace lpdeform {
 /// lowest, or nearly so, it is minimised to the tolerance. One caller at a time.
 ///
 /// A start is abandoned after `most_iterations`, or if in 60 iterations its true sum has approached the lowest one by less
-/// than a tenth of the remaining difference. Iterations in which its true sum does not change, as while a coarse level
-/// runs, do not count.
+/// than 3 % of the remaining difference. Iterations in which its true sum does not change, as while a coarse level runs, do
+/// not count.
 class MinimaSearch {
  public:
   /// Makes the rough minimiser of a start. It begins at a state that depends only on the number of the start and on `lowest`,

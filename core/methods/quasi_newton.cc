@@ -31,6 +31,8 @@ constexpr int kTrial = 10;
 constexpr double kSmoothingStep = 0.1;
 /// eps^2 over the squared diagonal, of the first: after a plain guess, and after a coarse level.
 constexpr double kColdSmoothing = 1e-8, kPreparedSmoothing = 1e-9;
+/// After a coarse level eps is at most kMostSmoothing mean E_i , which decides where the handles have moved little.
+constexpr double kMostSmoothing = 30;
 /// A live session's first eps adds a tenth to the mean cell: eps^p = kLiveBias (mean E_i)^p , p the lowest p_i.
 constexpr double kLiveBias = 0.1;
 /// Smoothing has ended where eps^2 <= kLeastSmoothing diagonal^2 (rounding),
@@ -40,8 +42,10 @@ constexpr double kBias = 3e-4;
 /// What was minimised is the true objective F where f - F <= kLeastBias F . Else the solve has stalled, not converged.
 constexpr double kLeastBias = 0.01;
 
-/// A cold solve goes by way of p = 4 where the largest p_i > kLargeP and the lowest p_i >= 2 .
-constexpr double kLargeP = 12;
+/// If the lowest p_i >= 2, solves go by way of p = kMiddleP: a cold one where the largest p_i > kLargeP , and for at most
+/// kEveningIterations after a coarse level where the largest p_i > kMiddleP .
+constexpr double kMiddleP = 4, kLargeP = 12;
+constexpr int kEveningIterations = 20;
 
 }  // namespace
 
@@ -49,7 +53,8 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
     : problem_(std::move(problem)),
       norm_(problem_.norm),
       x_(std::move(x)),
-      memory_(problem_.objective.cells().workers(), kMemory) {
+      memory_(problem_.objective.cells().workers(), kMemory),
+      is_prepared_(warmth == Warmth::kPrepared) {
   const double lowest = problem_.norm.lowest_p();
   if (lowest < 2) eps2_ = first_smoothing(warmth, lowest);
   // If all p_i > 2, there is no continuation from p = 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8
@@ -57,10 +62,11 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
   for (const double p : {2.0, 1.6, 1.35, 1.2, 1.1, 1.05}) {
     if (warmth == Warmth::kCold && p > lowest) shares_.push_back((2 - p) / (2 - lowest));
   }
-  // If p is larger still, the solve goes through p = 4 first: without this stage, a bent grid at p = 24 ends at 1.9
-  // times the E^(1/p).
+  // Without the stage at p = 4, a bent grid at p = 24 ends at 1.9 times the E^(1/p). After a coarse level, what the
+  // prolongation has left in a few cells outweighs the rest of the surface at a large p.
   const double highest = problem_.norm.highest_p();
-  if (warmth == Warmth::kCold && lowest >= 2 && highest > kLargeP) shares_.push_back((4 - 2) / (highest - 2));
+  if (lowest >= 2 && ((warmth == Warmth::kCold && highest > kLargeP) || (is_prepared_ && highest > kMiddleP)))
+    shares_.push_back((kMiddleP - 2) / (highest - 2));
   begin_stage(warmth == Warmth::kWithMetric);
   true_sum_ = problem_.objective.sum(problem_.norm);
 }
@@ -93,7 +99,10 @@ double QuasiNewton::mean_energy() const {
 double QuasiNewton::first_smoothing(Warmth warmth, double lowest_p) const {
   const double diagonal2 = problem_.diagonal * problem_.diagonal;
   if (warmth == Warmth::kCold) return kColdSmoothing * diagonal2;
-  if (warmth == Warmth::kPrepared) return kPreparedSmoothing * diagonal2;
+  if (warmth == Warmth::kPrepared) {
+    const double most = kMostSmoothing * mean_energy();
+    return std::max(std::min(kPreparedSmoothing * diagonal2, most * most), kLeastSmoothing * diagonal2);
+  }
   const double eps = std::pow(kLiveBias, 1 / lowest_p) * mean_energy();
   return std::max(eps * eps, kLeastSmoothing * diagonal2);
 }
@@ -252,7 +261,9 @@ void QuasiNewton::accept(double length) {
 
 StepResult QuasiNewton::step() {
   if (problem_.is_zero(true_sum_)) return result(Outcome::kConverged);
-  if (!is_last_stage_ && (stage_iterations_ >= kStageIterations || is_stage_over())) {
+  const bool is_evening = is_prepared_ && stage_ < static_cast<int>(shares_.size());
+  const int most = is_evening ? kEveningIterations : kStageIterations;
+  if (!is_last_stage_ && (stage_iterations_ >= most || is_stage_over())) {
     ++stage_;
     begin_stage();
   } else if (since_refresh_ >= kRefresh || (last_length_ < kShortStep && since_refresh_ >= kSoonest)) {

@@ -24,12 +24,15 @@ enum class Warmth {
 ///
 /// If some p_i < 2, the method runs in stages (continuation): p goes from 2 towards p_i, then cell energies are
 /// smoothed by eps, which is decreased until its effect is negligible. At the start of each stage the metric is
-/// refactored with the current cell weights, and the memory is cleared. The metric is also refactored every 40th iteration, and after a shortened step,
-/// which shows that the weights have changed. The memory then keeps the last pair, in the new metric; without it, p > 2
-/// and shallow valleys take two to three times as many iterations. If no weight has changed (p = 2), all pairs are
-/// kept. In a live session the method starts at p_i with an eps that adds at most a tenth to the mean cell's E^p, and
-/// keeps the previous metric for its first ten iterations. If the largest p_i is over 12 and none is below 2, a cold
-/// solve first has one stage near p = 4. This takes fewer iterations in total; without it, a bent grid folds.
+/// refactored with the current cell weights, and the memory is cleared. The metric is also refactored every 40th
+/// iteration, and after a shortened step, which shows that the weights have changed. The memory then keeps the last pair,
+/// in the new metric; without it, p > 2 and shallow valleys take two to three times as many iterations. If no weight has
+/// changed (p = 2), all pairs are kept. In a live session the method starts at p_i with an eps that adds at most a tenth
+/// to the mean cell's E^p, and keeps the previous metric for its first ten iterations.
+///
+/// If no p_i is below 2 and the largest is over 12, a cold solve first has one stage near p = 4. This takes fewer
+/// iterations in total; without it, a bent grid folds. If the largest is over 4, a solve that starts from a coarse level
+/// first makes 20 iterations near p = 4, which even out what the prolongation has left.
 ///
 /// f is the objective of the last stage, f_k after k of its iterations, g its gradient, d the direction, p the largest p_i.
 /// Converged where
@@ -87,6 +90,7 @@ class QuasiNewton : public Minimiser {
   double smoothing_sum_ = 0;  // part of objective_; if p is mixed, in the last stage
   double true_sum_ = 0;       // the sum of problem_.norm at x_
   LbfgsMemory memory_;
+  const bool is_prepared_;      // x comes from a coarse level
   std::deque<double> history_;  // objectives of the stage's last 21 iterations
   int stage_iterations_ = 0, since_refresh_ = 0;
   bool is_metric_good_ = false;

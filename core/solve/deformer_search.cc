@@ -26,7 +26,8 @@ constexpr std::array kOrigins = {Origin{false, 0.08}, Origin{true, 0.2}, Origin{
 
 constexpr double kRoughTolerance = 1e-3;
 constexpr int kWaves = 6;
-constexpr double kMostWaves = 2;  // along the diagonal, for each axis
+constexpr double kMostWaves = 2;      // along the diagonal, for each axis
+constexpr std::size_t kChunk = 4096;  // vertices
 
 /// Minimises with p = 2 everywhere first, and from there with the true norm. Where p is mixed, this leads to other minima than
 /// a path that changes all p_i together.
@@ -86,15 +87,27 @@ Points Deformer::Impl::displaced(const Points& from, int number) const {
   };
   const double diagonal = shape->diagonal() / unit();
   const double share = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()].share;
-  Points x = from;
-  for (int wave = 0; wave < kWaves; ++wave) {
-    const Eigen::Vector3d frequency = 4 * std::numbers::pi * kMostWaves / diagonal * centred();
-    const double phase = 2 * std::numbers::pi * uniform();
-    const Eigen::RowVector3d amplitude = share * diagonal * centred().transpose();
-    for (Eigen::Index i = 0; i < x.rows(); ++i) {
-      x.row(i) += std::cos(shape->scaled_positions().row(i).dot(frequency) + phase) * amplitude;
-    }
+  struct Wave {
+    Eigen::Vector3d frequency;
+    double phase;
+    Eigen::RowVector3d amplitude;
+  };
+  std::array<Wave, kWaves> waves;
+  for (Wave& wave : waves) {
+    wave.frequency = 4 * std::numbers::pi * kMostWaves / diagonal * centred();
+    wave.phase = 2 * std::numbers::pi * uniform();
+    wave.amplitude = share * diagonal * centred().transpose();
   }
+  Points x = from;
+  workers().for_chunks(
+      static_cast<std::size_t>(x.rows()), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+        for (auto i = static_cast<Eigen::Index>(begin); i < static_cast<Eigen::Index>(end); ++i) {
+          for (const Wave& wave : waves) {
+            const double angle = shape->scaled_positions().row(i).dot(wave.frequency) + wave.phase;
+            x.row(i) += std::cos(angle) * wave.amplitude;
+          }
+        }
+      });
   Points back = Points::Zero(x.rows(), 3);
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     if (constraints->is_held[i]) back.row(i) = constraints->targets.row(i) - x.row(i);
@@ -111,10 +124,10 @@ Points Deformer::Impl::displaced(const Points& from, int number) const {
 std::unique_ptr<Minimiser> Deformer::Impl::make_start(int number, const Points& guess, const Points& lowest) {
   const Origin origin = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()];
   const bool goes_by_two = number == 0 && !material.has_uniform_p();
+  forget_weights();
+  (void)prepare_metric(true);  // of equal weights, which displaced() reads, too
   Points x = goes_by_two ? guess : displaced(origin.is_lowest ? lowest : guess, number);
   if (!x.allFinite()) x = lowest;
-  forget_weights();
-  (void)prepare_metric(true);
   objective.evaluate(x, *norm);
   Problem problem = make_problem();
   problem.tolerance = std::max(problem.tolerance, kRoughTolerance);

@@ -335,13 +335,13 @@ TEST_F(BetterShapeTest, IsAnnouncedWithItsEnergyAndWhatItSavesAndNoMoreOnceItIsT
   EXPECT_EQ(reason(), Notice::Reason::kOverloaded);
 }
 
-TEST_F(BetterShapeTest, IsVoidOnceItIsShownWhoeverHasTakenIt) {
+TEST_F(BetterShapeTest, EndsWhenAFrameShowsItEvenIfAnotherWriterTookIt) {
   told();
   shows(7, 3);
   EXPECT_EQ(reason(), Notice::Reason::kOverloaded);
 }
 
-TEST_F(BetterShapeTest, IsVoidOnceThereIsAFrameForALaterUpdate) {
+TEST_F(BetterShapeTest, EndsWhenThereIsAFrameForALaterUpdate) {
   told();
   shows(8, 9);
   EXPECT_EQ(reason(), Notice::Reason::kOverloaded);

@@ -242,7 +242,7 @@ class Notice:
     text: str
     """One sentence for people."""
     input_seq: int = 0
-    """Of a better shape: the update that it is for. The notice is void once there is a frame for a later one, or a frame of the
+    """Of a better shape: the update that it is for. The notice ends with a frame for a later update or a frame of the
     shape."""
     energy: float = 0.0
     """Of a better shape."""

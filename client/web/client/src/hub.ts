@@ -96,8 +96,8 @@ export class Lane {
   ) {}
 
   /**
-   * Returns the credit of this frame of this stream and of all frames before it. Whoever takes the frame has it first, because
-   * to begin a call keeps a page busy for a millisecond or two.
+   * Returns the credit of this frame of this stream and of all frames before it. The call begins in a task of its own, after the
+   * session has received the frame: to begin a call keeps a page busy for a millisecond or two.
    */
   acknowledge(frameSeq: number, streamId: string): void {
     if (streamId !== this.streamId) return;

@@ -356,7 +356,7 @@ export interface BetterShapeNotice {
   reason: "better_shape";
   /** One sentence for people. */
   text: string;
-  /** The update that the shape is for. The notice is void once there is a frame for a later one, or a frame of the shape. */
+  /** The update that the shape is for. The notice ends with a frame for a later update or a frame of the shape. */
   inputSeq: number;
   /** Of the shape. */
   energy: number;

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { Lane, type LaneSink } from "../src/hub.js";
 
-test("whoever waits for a frame has it before the call that acknowledges it begins", async () => {
+test("the call that acknowledges a frame begins after the session has received the frame", async () => {
   const order: string[] = [];
   let acknowledged = () => {};
   const isAcknowledged = new Promise<void>((resolve) => (acknowledged = resolve));

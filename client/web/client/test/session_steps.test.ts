@@ -61,8 +61,8 @@ describe("a better shape", () => {
 
   test.each([
     ["stays while the same result comes again, with its certificate", { inputSeq: 1n, energy: 4 }, "better_shape"],
-    ["is void once its frame is there, whoever has taken it", { inputSeq: 1n, energy: 3 }, "overloaded"],
-    ["is void once there is a frame for a later update", { inputSeq: 2n, energy: 9 }, "overloaded"],
+    ["ends when a frame shows the shape, also if another writer took it", { inputSeq: 1n, energy: 3 }, "overloaded"],
+    ["ends when there is a frame for a later update", { inputSeq: 2n, energy: 9 }, "overloaded"],
   ])("%s", async (_, header, reason) => {
     const { server, session, heard } = await told();
     server.stream.frame({ frameSeq: 2n, isFinal: true, ...header });
