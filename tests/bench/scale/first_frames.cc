@@ -1,24 +1,30 @@
 // The frames that a viewer shows of a first move.
 //
-//   first_frames FAMILY VERTICES P[,P...] POSE THREADS SECONDS      a line of JSON for each p
+//   first_frames FAMILY VERTICES P[,P...] POSE THREADS SECONDS [PICTURES]      a line of JSON for each p
 //
 // A session at rest gets the handles of a pose (families.h) at once, and they then stand. A frame is taken after every 33 ms
 // of solving; the first is the Laplacian deformation. "stand" is the longest time in which frames do not change, and "jump"
 // the largest way of a vertex from one frame to the next, in shares of the diagonal, after the first change.
 // "bend" is the change since rest of the angle between the normals of two faces with a common edge, in degrees: the 99th
 // percentile of all edges, and the largest; the worst of all frames but the first and the last, and those of the last.
+// PICTURES-P.png shows, from left to right, the frames at kShown seconds and the last one.
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
 #include <map>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "client/cli/render/render.h"
 #include "tests/bench/scale/families.h"
 
 namespace {
@@ -26,7 +32,9 @@ namespace {
 using namespace lpdeform;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kFrame = 0.033;  // seconds
+constexpr double kFrame = 0.033;                          // seconds
+constexpr std::array kShown = {0.0, 0.1, 0.3, 1.0, 3.0};  // seconds
+constexpr int kWidth = 400, kHeight = 320;                // of a picture, pixels
 
 using FacePairs = std::vector<std::pair<std::int32_t, std::int32_t>>;
 
@@ -73,7 +81,23 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-void show(const TriangleMesh& mesh, const HandleSet& handles, double p, int threads, double limit) {
+Image side_by_side(const TriangleMesh& mesh, const std::vector<Points>& frames) {
+  PictureStyle style{.width = kWidth, .height = kHeight};
+  style.frame.resize(2 * mesh.vertices.rows(), 3);
+  style.frame << mesh.vertices, frames.back();
+  const auto count = static_cast<int>(frames.size());
+  Image all(count * kWidth, kHeight);
+  for (int k = 0; k < count; ++k) {
+    const Image one = render(mesh.faces, frames[static_cast<std::size_t>(k)], style);
+    for (int y = 0; y < kHeight; ++y)
+      std::copy_n(one.bytes.begin() + 3 * y * kWidth, 3 * kWidth,
+                  all.bytes.begin() + 3 * (y * count + k) * kWidth);
+  }
+  return all;
+}
+
+void show(const TriangleMesh& mesh, const HandleSet& handles, double p, int threads, double limit,
+          const std::string& pictures) {
   const auto shape = RestShape::create(mesh).value();
   const FacePairs pairs = adjacent_faces(mesh.faces);
   const std::vector<double> rest = angles(mesh.vertices, mesh.faces, pairs);
@@ -86,6 +110,7 @@ void show(const TriangleMesh& mesh, const HandleSet& handles, double p, int thre
   Bend worst, last;
   int changes = 0;
   bool has_more = true;
+  std::vector<Points> frames;
   while (has_more && solving < limit) {
     const Clock::time_point start = Clock::now();
     has_more = deformer->step();
@@ -94,6 +119,8 @@ void show(const TriangleMesh& mesh, const HandleSet& handles, double p, int thre
     solving += seconds_since(start);
     if (!is_due) continue;
     due = solving + kFrame;
+    if (frames.size() < kShown.size() && solving >= kShown[frames.size()])
+      frames.push_back(deformer->positions());
     const double way = (deformer->positions() - shown).rowwise().norm().maxCoeff() / shape->diagonal();
     if (way == 0) continue;
     ++changes;
@@ -110,6 +137,10 @@ void show(const TriangleMesh& mesh, const HandleSet& handles, double p, int thre
   std::printf("\"worst_bend\": [%.3g, %.3g], \"last_bend\": [%.3g, %.3g]}\n", worst.usual, worst.most,
               last.usual, last.most);
   std::fflush(stdout);
+  if (pictures.empty()) return;
+  frames.push_back(deformer->positions());
+  std::ofstream(absl::StrCat(pictures, "-", p, ".png"), std::ios::binary)
+      << png_bytes(side_by_side(mesh, frames));
 }
 
 }  // namespace
@@ -118,7 +149,7 @@ int main(int count, char** arguments) {
   double vertices = 0, seconds = 0;
   int pose = 0, threads = 0;
   std::vector<double> exponents;
-  bool is_good = count == 7 && absl::SimpleAtod(arguments[2], &vertices) &&
+  bool is_good = (count == 7 || count == 8) && absl::SimpleAtod(arguments[2], &vertices) &&
                  absl::SimpleAtoi(arguments[4], &pose) && absl::SimpleAtoi(arguments[5], &threads) &&
                  absl::SimpleAtod(arguments[6], &seconds);
   if (is_good) {
@@ -126,10 +157,10 @@ int main(int count, char** arguments) {
       is_good = absl::SimpleAtod(p, &exponents.emplace_back()) && is_good;
   }
   if (!is_good) {
-    std::fprintf(stderr, "first_frames FAMILY VERTICES P[,P...] POSE THREADS SECONDS\n");
+    std::fprintf(stderr, "first_frames FAMILY VERTICES P[,P...] POSE THREADS SECONDS [PICTURES]\n");
     return 2;
   }
   const TriangleMesh mesh = family_of(arguments[1], vertices);
   const HandleSet handles = family_pose(mesh, static_cast<unsigned>(pose));
-  for (const double p : exponents) show(mesh, handles, p, threads, seconds);
+  for (const double p : exponents) show(mesh, handles, p, threads, seconds, count == 8 ? arguments[7] : "");
 }

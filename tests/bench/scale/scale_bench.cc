@@ -3,7 +3,7 @@
 //   scale_bench make MESH.ply VERTICES                      the creature with about so many vertices
 //   scale_bench solve MESH.ply P[,P...] THREADS SECONDS [ENERGY[,ENERGY...]]     a line of JSON for each p
 //
-// Every solve is cold, from the Laplacian deformation, and goes on to its own end or to the time limit. "to" are the
+// Every solve is cold, from the Laplacian deformation, and goes on to its first minimum or to the time limit. "to" are the
 // seconds of solving until E^(1/p) is within 5 %, 1 % and 0.1 % of the lowest that it found, or that of ENERGY where it
 // is given (0: not); null where that was not reached, or is not known because the limit came first.
 
@@ -55,6 +55,7 @@ void solve(const TriangleMesh& mesh, double p, int threads, double limit, double
   settings.initial = InitialGuess::kLaplacian;
   settings.time_limit_seconds = limit;
   settings.keep_trace = true;
+  settings.effort = 0;
   const SolveSummary summary = deformer->solve(settings).value();
   const bool is_whole = summary.stop_reason != StopReason::kTimeLimit;
   const double lowest = known > 0 ? known : summary.energy;
