@@ -42,7 +42,7 @@ void MinimaSearch::end_start(Outcome outcome) {
     sums_.clear();
     return;
   }
-  if (is_minimum) minima_.push_back(sum);
+  if (is_minimum && !is_rough_) minima_.push_back(sum);
   if (is_minimum && sum < lowest_sum_) {
     lowest_ = minimiser_->x();
     lowest_sum_ = sum;

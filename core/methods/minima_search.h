@@ -38,9 +38,9 @@ class MinimaSearch {
   double lowest_sum() const { return lowest_sum_; }
   /// Whether lowest() is another state than the one to begin with.
   bool has_improved() const { return has_improved_; }
-  /// The true sums at which starts have ended, in order; of those that were minimised roughly, too. Abandoned starts have none.
+  /// The true sums of the starts that were minimised to the tolerance, in order. Several may be of the same minimum.
   const std::vector<double>& minima() const { return minima_; }
-  /// Starts that have ended or were abandoned.
+  /// Starts that have ended, with those that were given up.
   int starts() const { return number_ - scope_.first; }
 
  private:

@@ -24,6 +24,8 @@ class LevelSolver {
   virtual bool step() = 0;
   virtual void catch_up() = 0;
   virtual int iterations() const = 0;  // of the running or the last solve
+  /// Whether the last solve's search has found a minimum lower than its first, and has taken it (SolveSettings::effort).
+  virtual bool has_found_lower() const = 0;
   virtual const Points& positions() const = 0;
   virtual std::size_t memory_bytes() const = 0;
 };

@@ -14,11 +14,11 @@ constexpr int kCostOfLook = 5;  // looking at the coarse level takes at most one
 }  // namespace
 
 Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level, int effort)
-    : problem_(std::move(problem)), x_(std::move(x)), level_(level) {
+    : problem_(std::move(problem)), x_(std::move(x)), level_(level), is_search_(effort != 0) {
   objective_ = problem_.objective.reweigh(problem_.norm);
   SolveSettings settings;
   settings.initial = InitialGuess::kLaplacian;
-  const bool is_rough = effort == 0 && problem_.norm.lowest_p() < 2;
+  const bool is_rough = !is_search_ && problem_.norm.lowest_p() < 2;
   settings.tolerance = std::max(problem_.tolerance, is_rough ? kRoughCoarseTolerance : kCoarseTolerance);
   settings.effort = effort;
   if (!level_.solver().start(settings, problem_.stop).ok())
@@ -85,6 +85,8 @@ StepResult Multiresolution::step() {
     return result;
   }
   if (level_.solver().step()) return {Outcome::kProgress, objective_, 0, objective_};
+  if (is_search_ && !level_.solver().has_found_lower())
+    return {Outcome::kBreakdown, objective_, 0, objective_};
   begin_fine();
   const double sum = problem_.objective.sum(problem_.norm);
   return {Outcome::kProgress, sum, 0, sum};

@@ -16,8 +16,9 @@ namespace lpdeform {
 /// guess, QuasiNewton starts from the guess. The convergence criterion is that of QuasiNewton.
 class Multiresolution : public Minimiser {
  public:
-  /// `level` must already have the handles and the material (take_over), and must outlive this object. It looks for lower
-  /// minima with `effort` (SolveSettings::effort).
+  /// `level` must already have the handles and the material (take_over), and must outlive this object. If `effort` is not 0,
+  /// the coarse level looks for lower minima with this effort (SolveSettings::effort); unless it finds one, the outcome is
+  /// kBreakdown and the fine level is not begun.
   Multiresolution(Problem problem, Points x, CoarseLevel& level, int effort);
 
   StepResult step() override;
@@ -37,6 +38,7 @@ class Multiresolution : public Minimiser {
   Points x_;
   double objective_ = 0;
   CoarseLevel& level_;
+  const bool is_search_;
   int looked_at_ = 0;  // iterations of the coarse level at the last prolongation
   std::chrono::steady_clock::time_point next_look_;
   std::unique_ptr<QuasiNewton> fine_;  // null while the coarse level runs

@@ -190,8 +190,8 @@ std::optional<double> Deformer::better_energy() const {
 
 bool Deformer::take_better() {
   Impl& self = *impl_;
-  self.interrupt();
   if (!self.better) return false;
+  self.interrupt();
   self.take_better();
   return true;
 }

@@ -39,6 +39,10 @@ class DeformerOfLevel : public LevelSolver {
   bool step() override { return deformer_->step(); }
   void catch_up() override { deformer_->catch_up(); }
   int iterations() const override { return deformer_->summary().iterations; }
+  bool has_found_lower() const override {
+    const SolveSummary& summary = deformer_->summary();
+    return !summary.minima.empty() && summary.energy < summary.minima.front();
+  }
   const Points& positions() const override { return deformer_->positions(); }
   std::size_t memory_bytes() const override { return deformer_->memory_bytes(); }
 
@@ -137,8 +141,7 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points 
     case Method::kConic:
       return std::make_unique<Conic>(std::move(problem), std::move(guess));
     case Method::kMultiresolution:
-      return std::make_unique<Multiresolution>(std::move(problem), std::move(guess), *coarse,
-                                               *settings.effort);
+      return std::make_unique<Multiresolution>(std::move(problem), std::move(guess), *coarse, 0);
     case Method::kAuto:
     case Method::kQuasiNewton:
       break;
@@ -239,6 +242,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   const bool is_warm = settings.initial == InitialGuess::kCurrent && state == State::kDeformed;
   if (!is_warm) x_before_move.resize(0, 3);
   if (!settings.effort) settings.effort = default_effort(is_warm);
+  summary.effort = *settings.effort;
   const bool keeps_metric =
       is_warm && factor == Factor::kQuasiNewton && metric.is_factored_for(constraints->is_held);
   warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
@@ -299,9 +303,9 @@ void Deformer::Impl::settle(StopReason reason) {
   end_minimiser(reason);
   summary.minima.push_back(summary.energy);
   const int starts = further_starts();
-  if (starts == 0 || is_large()) return conclude();  // the coarse levels of a large mesh have looked already
   is_search_apart = false;
-  begin_search(starts);
+  if (starts > 0) begin_search(starts);
+  if (!search) conclude();
 }
 
 void Deformer::Impl::end_minimiser(StopReason reason) {

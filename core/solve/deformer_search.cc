@@ -6,6 +6,7 @@
 #include <random>
 #include <utility>
 
+#include "core/multiresolution/multiresolution.h"
 #include "core/solve/deformer_impl.h"
 
 namespace lpdeform {
@@ -125,8 +126,9 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_start(int number, const Points& 
   const Origin origin = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()];
   const bool goes_by_two = number == 0 && !material.has_uniform_p();
   forget_weights();
-  (void)prepare_metric(true);  // of equal weights, which displaced() reads, too
-  Points x = goes_by_two ? guess : displaced(origin.is_lowest ? lowest : guess, number);
+  const bool is_factored = prepare_metric(true);  // of equal weights, which displaced() reads, too
+  Points x = lowest;
+  if (is_factored) x = goes_by_two ? guess : displaced(origin.is_lowest ? lowest : guess, number);
   if (!x.allFinite()) x = lowest;
   objective.evaluate(x, *norm);
   Problem problem = make_problem();
@@ -135,11 +137,12 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_start(int number, const Points& 
   return std::make_unique<QuasiNewton>(std::move(problem), std::move(x), Warmth::kWithMetric);
 }
 
-/// On a mesh that is too large to be searched itself: a cold solve, whose coarse levels look for lower minima.
+/// On a mesh that is too large to be searched itself: a solve by way of its coarse levels, which look for lower minima. Null if
+/// there is no coarse level.
 std::unique_ptr<Minimiser> Deformer::Impl::make_large_start(const Points& guess) {
+  if (!prepare_coarse()) return nullptr;
   objective.evaluate(guess, *norm);
-  return make_minimiser(prepare_coarse() ? Method::kMultiresolution : Method::kQuasiNewton, guess,
-                        Warmth::kCold);
+  return std::make_unique<Multiresolution>(make_problem(), guess, *coarse, *settings.effort);
 }
 
 void Deformer::Impl::begin_search(int starts) {
@@ -147,9 +150,10 @@ void Deformer::Impl::begin_search(int starts) {
   MinimaSearch::Scope scope{.first = next_start, .starts = starts};
   scope.most_iterations = static_cast<int>(kWork / shape->vertex_count());
   if (is_large()) scope.most_iterations = std::numeric_limits<int>::max();
-  (void)prepare_metric(true);  // if that fails, so do the starts
+  if (!prepare_metric(true)) return;
   auto start = [this, guess = laplacian_guess()](int number, const Points& lowest) {
-    return is_large() ? make_large_start(guess) : make_start(number, guess, lowest);
+    std::unique_ptr<Minimiser> large = is_large() ? make_large_start(guess) : nullptr;
+    return large ? std::move(large) : make_start(number, guess, lowest);
   };
   auto finish = [this](Points rough) {
     return std::make_unique<QuasiNewton>(make_problem(), std::move(rough), Warmth::kWithMetric);
@@ -161,10 +165,13 @@ void Deformer::Impl::begin_search(int starts) {
 
 void Deformer::Impl::search_on() {
   const bool has_more = search->step();
-  if (!has_more) end_search();
-  if (is_search_apart) return;
-  record({Outcome::kProgress, best_sum, search_stage}, best_sum);
-  if (!has_more) conclude();
+  if (!is_search_apart) {
+    ++summary.search_iterations;
+    summarise();
+  }
+  if (has_more) return;
+  end_search();
+  if (!is_search_apart) conclude();
 }
 
 /// Keeps the lowest minimum found, and leaves the evaluation at x, of which the next solve reads the previous soft targets.
@@ -176,15 +183,20 @@ void Deformer::Impl::end_search() {
   const bool saves_enough = search->lowest_sum() <= (1 - options.least_saving) * best_sum;
   const bool takes_it = search->has_improved() && !is_search_apart && saves_enough;
   objective.evaluate(takes_it ? search->lowest() : x, *norm);
-  if (takes_it) keep(search->lowest(), search->lowest_sum());
-  if (!is_search_apart) summarise();
+  if (takes_it) {
+    keep(search->lowest(), search->lowest_sum());
+    x_before_move.resize(0, 3);
+  }
   search.reset();
+  if (coarse) coarse->leave();
+  if (!is_search_apart) record({Outcome::kProgress, best_sum, search_stage}, best_sum);
 }
 
 void Deformer::Impl::take_better() {
   objective.evaluate(better->x, *norm);
   keep(better->x, better->sum);
   better.reset();
+  x_before_move.resize(0, 3);
   summary.energy = norm->true_energy(best_sum);
   summary.soft_energy = norm->true_energy(best_soft_sum);
   summary.optimality_gap.reset();

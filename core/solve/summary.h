@@ -31,12 +31,16 @@ struct SolveSummary {
   /// bounds how far the result can be from the optimum for these rotations. 0 if E is 0 to rounding. Empty if not
   /// requested.
   std::optional<double> optimality_gap;
-  /// True energies of the minima that were seen, in order: the first one, and those that the search for lower ones found
-  /// (SolveSettings::effort). `energy` is the lowest of them. Empty if a limit has ended the solve before the first.
+  /// True energies at which starts have converged, in order: the first minimum, then those of the search for lower ones
+  /// (SolveSettings::effort). Several starts may converge to the same minimum. `energy` is the lowest. Empty if a limit has
+  /// ended the solve before the first.
   std::vector<double> minima;
-  /// The starts from which the search looked for lower minima. Those that came nowhere near have no entry in `minima`.
+  /// The further starts of the search. Those that were given up, because they came nowhere near the lowest minimum, have no
+  /// entry in `minima`.
   int further_starts = 0;
-  double setup_seconds = 0;  // factorisation for these handles; 0 if it was reused
+  int search_iterations = 0;  // the part of `iterations` that the search made
+  int effort = 0;             // SolveSettings::effort, or its default
+  double setup_seconds = 0;   // factorisation for these handles; 0 if it was reused
   double solve_seconds = 0;
   int threads = 1;
   // The work of the fine level: evaluations of all cells with fitted rotations, and back-substitutions for three

@@ -61,7 +61,6 @@ void Scheduler::run_once(std::function<void()> job) {
 
 void Scheduler::wake(std::shared_ptr<Runnable> runnable, Urgency urgency) {
   const std::scoped_lock lock(mutex_);
-  const bool is_answer = urgency == Urgency::kAnswer;
   switch (runnable->state_) {
     case Runnable::State::kAsleep:
       runnable->urgency_ = urgency;
@@ -69,15 +68,16 @@ void Scheduler::wake(std::shared_ptr<Runnable> runnable, Urgency urgency) {
       enqueue(std::move(runnable));
       return changed_.notify_one();
     case Runnable::State::kWaiting:
-      if (is_answer && runnable->urgency_ != Urgency::kAnswer) hasten(runnable);
+      if (urgency > runnable->urgency_) hasten(runnable, urgency);
       return;
     default:
       runnable->state_ = Runnable::State::kWokenWhileRunning;
-      if (is_answer) runnable->urgency_ = Urgency::kAnswer;
+      runnable->urgency_ = std::max(runnable->urgency_, urgency);
   }
 }
 
 Scheduler::Queue& Scheduler::queue_of(Urgency urgency) {
+  if (urgency == Urgency::kIdle) return idle_;
   return urgency == Urgency::kAnswer ? answers_ : ordinary_;
 }
 
@@ -93,13 +93,14 @@ void Scheduler::enqueue(std::shared_ptr<Runnable> runnable) {
   answers_waiting_ = static_cast<int>(answers_.size());
 }
 
-/// A Runnable in the ordinary queue must answer now. The time that it has waited there counts as a wait.
-void Scheduler::hasten(const std::shared_ptr<Runnable>& runnable) {
+/// A Runnable that waits has become more urgent. The time that it has waited in the ordinary queue counts as a wait.
+void Scheduler::hasten(const std::shared_ptr<Runnable>& runnable, Urgency urgency) {
   const TimePoint now = std::chrono::steady_clock::now();
-  ordinary_gauge_.waited(now - runnable->ready_since_, now);
-  ordinary_.erase(runnable);
-  runnable->urgency_ = Urgency::kAnswer;
+  if (runnable->urgency_ == Urgency::kOrdinary) ordinary_gauge_.waited(now - runnable->ready_since_, now);
+  queue_of(runnable->urgency_).erase(runnable);
+  runnable->urgency_ = urgency;
   enqueue(runnable);
+  changed_.notify_one();
 }
 
 /// The Runnable in `queue` that may run now and has used the least time; end() if none may run.
@@ -113,12 +114,21 @@ bool Scheduler::may_run(const Queue& queue) const {
   return first(queue) != queue.end();
 }
 
+bool Scheduler::may_run_idle() const {
+  const bool is_nobody_waiting = answers_.empty() && ordinary_.empty();
+  return is_nobody_waiting && idle_running_ < std::max(1, threads() / 2) && may_run(idle_);
+}
+
 std::shared_ptr<Runnable> Scheduler::take_next() {
   const bool is_ordinarys_turn = may_run(ordinary_) && (owed_seconds_ > 0 || !may_run(answers_));
-  Queue& queue = is_ordinarys_turn ? ordinary_ : answers_;
+  const bool is_idle = !may_run(ordinary_) && !may_run(answers_);
+  Queue& queue = is_idle ? idle_ : is_ordinarys_turn ? ordinary_ : answers_;
   std::shared_ptr<Runnable> runnable = std::move(queue.extract(first(queue)).value());
   answers_waiting_ = static_cast<int>(answers_.size());
-  level_ = std::max(level_, runnable->used_seconds_);
+  if (is_idle)
+    ++idle_running_;
+  else
+    level_ = std::max(level_, runnable->used_seconds_);
   runnable->state_ = Runnable::State::kRunning;
   if (runnable->is_heavy_) ++heavy_running_;
   return runnable;
@@ -131,12 +141,14 @@ void Scheduler::run() {
     if (is_stopping_) return;
     std::shared_ptr<Runnable> runnable = take_next();
     const Urgency urgency = std::exchange(runnable->urgency_, Urgency::kOrdinary);
+    runnable->is_next_idle_ = false;
     const TimePoint begin = std::chrono::steady_clock::now();
     const auto wait = begin - runnable->ready_since_;
-    gauge_of(urgency).waited(wait, begin);
+    const bool is_idle = urgency == Urgency::kIdle;
+    if (!is_idle) gauge_of(urgency).waited(wait, begin);
 
     lock.unlock();
-    if (on_waited_) on_waited_(std::chrono::duration<double>(wait).count());
+    if (on_waited_ && !is_idle) on_waited_(std::chrono::duration<double>(wait).count());
     const bool has_more = runnable->run();
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
     lock.lock();
@@ -152,11 +164,16 @@ void Scheduler::run() {
 void Scheduler::finish_slice(std::shared_ptr<Runnable> runnable, double seconds, Urgency urgency,
                              bool has_more) {
   if (runnable->is_heavy_) --heavy_running_;
-  runnable->used_seconds_ += seconds / runnable->weight_;
-  owed_seconds_ += urgency == Urgency::kAnswer ? kOwed * seconds : -seconds;
-  owed_seconds_ = std::clamp(owed_seconds_, -kMostOwed, ordinary_.empty() ? 0 : kMostOwed);
+  if (urgency == Urgency::kIdle) {
+    --idle_running_;
+  } else {
+    runnable->used_seconds_ += seconds / runnable->weight_;
+    owed_seconds_ += urgency == Urgency::kAnswer ? kOwed * seconds : -seconds;
+    owed_seconds_ = std::clamp(owed_seconds_, -kMostOwed, ordinary_.empty() ? 0 : kMostOwed);
+  }
   const bool was_woken = runnable->state_ == Runnable::State::kWokenWhileRunning;
   runnable->state_ = Runnable::State::kAsleep;
+  if (has_more && !was_woken && runnable->is_next_idle_) runnable->urgency_ = Urgency::kIdle;
   // No other thread needs to be woken: this thread is free now, for this Runnable or for a heavy one that had
   // to wait.
   if (has_more || was_woken) enqueue(std::move(runnable));

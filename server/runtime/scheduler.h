@@ -15,8 +15,9 @@
 
 namespace lpdeform {
 
-/// The two kinds of slices; answers go first.
+/// The kinds of slices; the later ones go first.
 enum class Urgency {
+  kIdle,      // only while no slice of another kind waits
   kOrdinary,  // improves a result that was sent already, or prepares something
   kAnswer,    // a client has sent an update and has not seen any result of it yet
 };
@@ -34,6 +35,10 @@ class Runnable {
   /// next wake().
   virtual bool run() = 0;
 
+ protected:
+  /// For run(): the next slice is idle, unless wake() is called before.
+  void make_next_idle() { is_next_idle_ = true; }
+
  private:
   friend class Scheduler;
   enum class State { kAsleep, kWaiting, kRunning, kWokenWhileRunning };
@@ -43,6 +48,7 @@ class Runnable {
   const double weight_;
   State state_ = State::kAsleep;
   Urgency urgency_ = Urgency::kOrdinary;  // of the slice that waits, or of the next one while a slice runs
+  bool is_next_idle_ = false;             // written by the running slice
   double used_seconds_ = 0;               // divided by the weight
   std::chrono::steady_clock::time_point ready_since_;
   std::uint64_t ticket_ = 0;
@@ -52,7 +58,7 @@ class Runnable {
 /// ordinary slices keep a quarter of the time. Within each kind, the Runnable that has used the least time,
 /// divided by its weight, goes next. Under overload, therefore, answers are refined later and less often
 /// before they come later. A Runnable that slept gets the least used time of those awake, so sleeping earns
-/// no credit. There are more threads than cores, and heavy Runnables never take more than half of them, so
+/// no credit. Idle slices take at most half of the threads, cost no time, and are no overload. There are more threads than cores, and heavy Runnables never take more than half of them, so
 /// that the operating system shares the cores between a long factorisation and all other sessions.
 /// Thread-safe.
 class Scheduler {
@@ -64,7 +70,7 @@ class Scheduler {
   ~Scheduler();
 
   /// Makes `runnable` run at least once from now on. Does not wait. With Urgency::kAnswer the next slice is
-  /// urgent, and those after it are ordinary again.
+  /// urgent, and those after it are ordinary again. `urgency` is not kIdle: only a running slice asks for that.
   void wake(std::shared_ptr<Runnable> runnable, Urgency urgency = Urgency::kOrdinary);
 
   /// Runs `job` once, as a heavy Runnable of its own. Does not wait.
@@ -93,22 +99,23 @@ class Scheduler {
   void enqueue(std::shared_ptr<Runnable> runnable);
   Queue& queue_of(Urgency urgency);
   LoadGauge& gauge_of(Urgency urgency);
-  void hasten(const std::shared_ptr<Runnable>& runnable);
+  void hasten(const std::shared_ptr<Runnable>& runnable, Urgency urgency);
   std::shared_ptr<Runnable> take_next();
-  bool has_next() const { return may_run(answers_) || may_run(ordinary_); }
+  bool has_next() const { return may_run(answers_) || may_run(ordinary_) || may_run_idle(); }
   bool may_run(const Queue& queue) const;
+  bool may_run_idle() const;
   Queue::const_iterator first(const Queue& queue) const;
   void finish_slice(std::shared_ptr<Runnable> runnable, double seconds, Urgency urgency, bool has_more);
 
   const std::function<void(double)> on_waited_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  Queue answers_, ordinary_;              // those that wait
+  Queue answers_, ordinary_, idle_;       // those that wait
   std::atomic<int> answers_waiting_ = 0;  // answers_.size()
   LoadGauge answer_gauge_, ordinary_gauge_;
   double owed_seconds_ = 0;  // what the ordinary slices have not had of their share
   double level_ = 0;         // the least time used by any Runnable awake, as last seen
-  int heavy_running_ = 0;
+  int heavy_running_ = 0, idle_running_ = 0;
   std::uint64_t tickets_ = 0;
   bool is_stopping_ = false;
   std::vector<std::thread> threads_;

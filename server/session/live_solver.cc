@@ -93,9 +93,9 @@ bool LiveSolver::begin_job(SolveJob& job) {
     settings.initial = InitialGuess::kCurrent;
     status = deformer_->set_positions(*job.options().initial_positions);
   }
+  publisher_.forget_better();  // start() may take long, and nothing of before it can be taken then
   if (status.ok()) status = deformer_->start(settings, job.stop_token());
   if (!status.ok()) job.finish(status);
-  if (status.ok()) publisher_.forget_better();
   return status.ok();
 }
 
@@ -150,7 +150,9 @@ void LiveSolver::end_solve(SolveJob* job) {
   is_alarm_set_ = false;
   if (!is_certified && publisher_.is_certificate_wanted()) set_alarm();
   running_for_ = kNobody;
-  is_search_due_ = deformer_->summary().further_starts == 0 && standing_effort() > 0;
+  const StopReason reason = deformer_->summary().stop_reason;
+  const bool is_minimum = reason == StopReason::kConverged || reason == StopReason::kStalled;
+  is_search_due_ = is_minimum && deformer_->summary().further_starts == 0 && standing_effort() > 0;
   if (is_search_due_) postpone_search(answered_at_ + kSearchQuiet);
   publisher_.forget_better();
   const std::shared_ptr<const Frame> frame = publish(true);

@@ -71,6 +71,9 @@ class LiveSolver {
   /// Publishes the better shape that was announced, unless there are newer inputs.
   void take_better();
 
+  /// Whether all that is left to do is to look for a better shape.
+  bool is_searching() const { return deformer_->is_searching(); }
+
   /// Whether a solve was ever begun. From then on memory_bytes() includes the factors.
   bool has_solved() const { return deformer_->summary().method != Method::kAuto; }
 

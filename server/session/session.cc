@@ -345,6 +345,7 @@ bool Session::run() {
     if (job_ == job) job_.reset();
     has_more = true;  // the readers' solve may have to go on
   }
+  if (solver_->is_searching()) make_next_idle();
   if (solver_->has_solved()) {  // until then the estimate stands
     memory_bytes_ = shape_->memory_bytes() + mesh_->memory_bytes() + solver_->memory_bytes() +
                     mailbox_.history_size().bytes;

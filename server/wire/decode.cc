@@ -75,7 +75,12 @@ absl::StatusOr<SolveSettings> decode_solver(const v1::SolverSettings& message) {
   settings.initial = *initial;
   if (message.has_search()) {
     const v1::MinimaSearch& search = message.search();
-    settings.effort = static_cast<int>(std::min<std::uint32_t>(search.effort(), kMostIterations));
+    if (search.effort() > SolveSettings::kHighestEffort) {
+      return make_fault({Reason::kEffortOutOfRange, "effort",
+                         absl::StrCat("0 <= effort <= ", SolveSettings::kHighestEffort)},
+                        absl::StrCat("effort is ", search.effort(), "."));
+    }
+    if (search.has_effort()) settings.effort = static_cast<int>(search.effort());
     settings.standing.shows = search.show();
     if (search.least_share() != 0) settings.standing.least_share = search.least_share();
   }

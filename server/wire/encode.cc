@@ -253,8 +253,8 @@ void encode_solver(const SolveSettings& settings, v1::SolverSettings& out) {
   const bool has_limit = settings.time_limit_seconds < std::numeric_limits<double>::infinity();
   out.set_time_limit_seconds(has_limit ? settings.time_limit_seconds : 0);
   out.set_initial(encode_initial(settings.initial));
-  if (!settings.effort) return;
-  out.mutable_search()->set_effort(static_cast<std::uint32_t>(*settings.effort));
+  if (!settings.effort && settings.standing == StandingSearch{}) return;
+  if (settings.effort) out.mutable_search()->set_effort(static_cast<std::uint32_t>(*settings.effort));
   out.mutable_search()->set_show(settings.standing.shows);
   out.mutable_search()->set_least_share(settings.standing.least_share);
 }
@@ -314,6 +314,8 @@ void encode(const SolveResult& result, v1::SolveSummary& out) {
   out.set_threads(static_cast<std::uint32_t>(summary.threads));
   out.mutable_minima()->Assign(summary.minima.begin(), summary.minima.end());
   out.set_further_starts(static_cast<std::uint32_t>(summary.further_starts));
+  out.set_search_iterations(static_cast<std::uint32_t>(summary.search_iterations));
+  out.set_effort(static_cast<std::uint32_t>(summary.effort));
   out.set_input_seq(result.frame->input_seq);
 }
 

@@ -118,10 +118,15 @@ TEST_F(MinimaSearchTest, ADragGoesOnWithoutASearch) {
 }
 
 TEST_F(MinimaSearchTest, IsTheSameOnAnyNumberOfThreads) {
-  const auto one = solver_of(bar(80), 1), two = solver_of(bar(80), 2);
-  (void)one->solve(cold());
-  (void)two->solve(cold());
+  const Bent bent{grid(66, 66, 1.0), lifted_grid(5).handles};  // more vertices than a chunk has
+  const auto one = solver_of(bent, 1), two = solver_of(bent, 2);
+  SolveSettings settings = cold();
+  settings.max_iterations = 3000;
+  const SolveSummary first = one->solve(settings).value(), second = two->solve(settings).value();
+  EXPECT_GT(first.further_starts, 0);
   EXPECT_EQ(one->positions(), two->positions());
+  EXPECT_EQ(first.minima, second.minima);
+  EXPECT_EQ(first.further_starts, second.further_starts);
 }
 
 TEST_F(MinimaSearchTest, AnEffortBelowZeroOrOverTheLimitIsRefused) {
@@ -192,6 +197,48 @@ TEST_F(MinimaSearchTest, ALargeMeshIsSearchedOnItsCoarseLevels) {
   run(*solver);
   EXPECT_EQ(solver->positions(), before);
   EXPECT_EQ(solver->summary().further_starts, 1);
+}
+
+TEST_F(MinimaSearchTest, UnderAnyLimitItIsNoWorseThanTheFirstMinimum) {
+  const Bent bent{box_surface(14, 14, 90), {}};
+  Bent large = bent;
+  (void)large.handles.set("bottom", {slice(bent.mesh, 2, 0, 0), Fixed{}});
+  (void)large.handles.set("top",
+                          {slice(bent.mesh, 2, 90, 90), turn(Eigen::Vector3d::UnitX(), 80, {7, 7, 45})});
+  ASSERT_GT(bent.mesh.vertices.rows(), 5000);  // a coarse level comes first
+  const int whole = solve(large, cold(0)).iterations;
+  for (const int most : {whole / 3, whole, 2 * whole}) {
+    SolveSettings first = cold(0), searching = cold(1);
+    first.max_iterations = searching.max_iterations = most;
+    EXPECT_LE(solve(large, searching).energy, solve(large, first).energy) << most;
+  }
+}
+
+TEST_F(MinimaSearchTest, ASolveOfALargeMeshSearchesItsCoarseLevels) {
+  const Bent bent = bar(80);
+  auto solver = Deformer::create(rest_shape(bent.mesh), {.search_up_to = 1000}).value();
+  ASSERT_TRUE(solver->set_handles(bent.handles).ok());
+  ASSERT_TRUE(solver->set_material(Material::uniform(1.5)).ok());
+  for (const Method method : {Method::kAuto, Method::kMultiresolution}) {
+    SolveSettings settings = cold(1);
+    settings.method = method;
+    const SolveSummary summary = solver->solve(settings).value();
+    EXPECT_EQ(summary.further_starts, 1);
+    EXPECT_EQ(summary.effort, 1);
+    EXPECT_GT(summary.search_iterations, 0);
+    EXPECT_LT(summary.search_iterations, summary.iterations);
+    EXPECT_EQ(summary.energy, std::ranges::min(summary.minima));
+  }
+}
+
+TEST_F(MinimaSearchTest, TheSummarySaysWhatTheSearchWas) {
+  const SolveSummary none = solve(bar(80), cold(0)), usual = solve(bar(80), cold());
+  EXPECT_EQ(none.effort, 0);
+  EXPECT_EQ(none.search_iterations, 0);
+  EXPECT_EQ(usual.effort, 1);
+  EXPECT_EQ(usual.iterations - usual.search_iterations, none.iterations);
+  // All that is listed was minimised to the tolerance, so nothing is far above the lowest.
+  EXPECT_LT(std::ranges::max(usual.minima), 1.05 * usual.energy);
 }
 
 }  // namespace

@@ -208,6 +208,93 @@ TEST(Scheduler, LongWaitsAreOverload) {
   EXPECT_TRUE(was_overloaded);
 }
 
+/// Every slice after the first is idle.
+class IdleJob final : public Runnable {
+ public:
+  explicit IdleJob(std::function<bool()> slice) : Runnable(false), slice_(std::move(slice)) {}
+  bool run() override {
+    make_next_idle();
+    return slice_();
+  }
+
+ private:
+  std::function<bool()> slice_;
+};
+
+TEST(Scheduler, IdleSlicesRunWhileNothingElseWaits) {
+  std::promise<void> ended;
+  std::atomic<int> idle = 0;
+  Scheduler scheduler(2);
+  scheduler.wake(std::make_shared<IdleJob>([&] {
+    if (++idle < 50) return true;
+    ended.set_value();
+    return false;
+  }));
+  ended.get_future().wait();
+  EXPECT_EQ(idle, 50);
+}
+
+TEST(Scheduler, IdleSlicesWaitForAllOthersAndAreNoOverload) {
+  std::promise<void> idle_runs, ended;
+  std::atomic<int> idle = 0, ordinary = 0;
+  std::atomic<int> idle_meanwhile = 0;
+  {
+    Scheduler scheduler(2);
+    // Three that always have something to do on two threads: one of them always waits.
+    const auto busy = [&] {
+      spin(std::chrono::milliseconds(2));
+      if (ordinary == 0) idle_meanwhile = -idle;
+      if (++ordinary < 300) return true;
+      if (ordinary == 300) {
+        idle_meanwhile += idle;
+        ended.set_value();
+      }
+      return false;
+    };
+    scheduler.wake(std::make_shared<IdleJob>([&] {
+      if (++idle == 10) idle_runs.set_value();
+      spin(std::chrono::microseconds(100));
+      return true;
+    }));
+    idle_runs.get_future().wait();
+    for (int k = 0; k < 3; ++k) scheduler.wake(std::make_shared<Job>(false, busy));
+    ended.get_future().wait();
+    EXPECT_FALSE(scheduler.is_overloaded());
+  }
+  EXPECT_LE(idle_meanwhile, 200);  // some before all three were awake; while they run, none
+}
+
+TEST(Scheduler, AnIdleSliceThatIsWokenGoesWithItsNewUrgency) {
+  std::latch release(1);
+  std::promise<void> first_ran, blocked, answered;
+  std::atomic<int> slices = 0;
+  {
+    Scheduler scheduler(2);
+    const auto idle = std::make_shared<IdleJob>([&] {
+      if (++slices == 1) first_ran.set_value();
+      if (slices == 1) blocked.get_future().wait();
+      if (slices == 2) answered.set_value();
+      return slices < 2;
+    });
+    scheduler.wake(idle);
+    first_ran.get_future().wait();
+    // The other thread always has ordinary work, and more waits.
+    std::atomic<bool> is_over = false;
+    for (int k = 0; k < 3; ++k) {
+      scheduler.wake(std::make_shared<Job>(false, [&] {
+        spin(std::chrono::microseconds(200));
+        return !is_over;
+      }));
+    }
+    blocked.set_value();
+    scheduler.wake(idle, Urgency::kAnswer);
+    answered.get_future().wait();
+    is_over = true;
+    release.count_down();
+  }
+  EXPECT_EQ(slices, 2);
+}
+
 TEST(Scheduler, WakingOneThatRunsMakesItRunAgain) {
   std::promise<void> runs, again;
   std::latch go_on(1);
