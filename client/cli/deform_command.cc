@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "client/cli/files/handle_file.h"
 #include "client/cli/files/mesh_input.h"
 #include "client/cli/files/outputs.h"
@@ -23,6 +24,8 @@
 
 namespace lpdeform::cli {
 namespace {
+
+constexpr double kSameMinimum = 1e-3;  // energies that differ by less, relatively, are counted as one minimum
 
 /// All inputs of the command, read and checked before any work is done.
 struct Inputs {
@@ -158,26 +161,45 @@ absl::Status write_results(const DeformOptions& options, const Inputs& inputs, c
   return written;
 }
 
-/// What the certificate does not say: it is about the rotations of the result, and another minimum may be lower.
-void print_search(const client::SolveResult& result) {
-  if (result.further_starts == 0 || result.minima.empty()) {
-    std::printf("no other minima were looked for (--effort)\n");
-    return;
-  }
-  const auto [lowest, highest] = std::ranges::minmax(result.minima);
-  std::printf("looked for lower minima from %u further starts; %zu reached, E from %.6g to %.6g\n",
-              result.further_starts, result.minima.size(), lowest, highest);
+/// How many of the energies are different minima, beyond the tolerance of solves.
+std::size_t different(std::vector<double> minima) {
+  std::ranges::sort(minima);
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < minima.size(); ++k)
+    count += k == 0 || minima[k] > (1 + kSameMinimum) * minima[k - 1] ? 1 : 0;
+  return count;
 }
 
-void print_summary(const Inputs& inputs, const client::SolveResult& result) {
+/// What the certificate does not say: it is about the rotations of the result, and another minimum may be lower.
+std::string search_text(const Solved& solved) {
+  const client::SolveResult& result = solved.result;
+  if (result.minima.empty()) return "no minimum was reached, and so no other was looked for";
+  if (result.effort == 0) return "no other minima were looked for (--effort 1 does that)";
+  if (result.further_starts == 0 && result.search_iterations > 0)
+    return "the search for other minima was cut off by a limit before a start had ended";
+  if (result.further_starts == 0)
+    return "no other minima were looked for: a search needs 100 vertices and a distortion";
+  const auto [lowest, highest] = std::ranges::minmax(result.minima);
+  const std::size_t count = different(result.minima);
+  const std::string seen =
+      count == 1 ? absl::StrFormat("1 minimum was seen, E = %.6g", lowest)
+                 : absl::StrFormat("%u minima were seen, E from %.6g to %.6g", count, lowest, highest);
+  if (result.further_starts == 1) return "looked for lower minima on coarse levels; " + seen;
+  return absl::StrFormat("looked for lower minima from %u further starts, of which %u converged; %s",
+                         result.further_starts, result.minima.size() - 1, seen);
+}
+
+void print_summary(const Inputs& inputs, const Solved& solved) {
+  const client::SolveResult& result = solved.result;
   std::printf("%s after %u iterations of %s, %.3f s: E = %.6g, from %.6g",
-              stop_reason_name(result.stop_reason).c_str(), result.iterations, result.method.c_str(),
-              result.setup_seconds + result.solve_seconds, result.energy, result.initial_energy);
+              stop_reason_name(result.stop_reason).c_str(), result.iterations - result.search_iterations,
+              result.method.c_str(), result.setup_seconds + result.solve_seconds, result.energy,
+              result.initial_energy);
   if (const double* const p = std::get_if<double>(&inputs.p))
     std::printf("; E^(1/p) = %.6g", std::pow(result.energy, 1 / *p));
   if (result.optimality_gap) std::printf("; gap %.2g", *result.optimality_gap);
   std::printf("\n");
-  if (result.optimality_gap || result.further_starts > 0) print_search(result);
+  if (result.optimality_gap || result.effort > 0) std::printf("%s\n", search_text(solved).c_str());
 }
 
 }  // namespace
@@ -198,7 +220,7 @@ ExitStatus run_deform(const DeformOptions& options) {
   if (interrupt.happened()) return kInterrupted;
   if (!solved.ok()) return complain(solved.status());
 
-  print_summary(*inputs, solved->result);
+  print_summary(*inputs, *solved);
   const absl::Status written = write_results(options, *inputs, *solved);
   if (!written.ok()) return complain(written);
   return exit_status_of(solved->result.stop_reason, options.max_iterations.has_value(),

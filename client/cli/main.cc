@@ -153,10 +153,11 @@ void add_solver_options(CLI::App& app, DeformOptions& options) {
                  "Stop when the relative gain still possible is below this, 1e-14 to 0.1 (1e-5)")
       ->check(within(1e-14, 0.1))
       ->option_text("T");
-  app.add_option("--effort", options.effort,
-                 "How far to look for lower minima, 0 to 1000: from 8 N further starts; 0 takes the first "
-                 "minimum. Without "
-                 "this option: 1 with method auto where some p is below 2, otherwise 0")
+  app.add_option(
+         "--effort", options.effort,
+         "How far to look for lower minima, 0 to 1000: 8 times N further starts. 0 takes the first "
+         "minimum. Without this option: 1 with method auto where some p is below 2 and no --initial is "
+         "given, otherwise 0")
       ->check(within(0, 1000))
       ->option_text("N");
   app.add_option("--time-limit", options.time_limit_seconds, "Stop after this many seconds of solving")
