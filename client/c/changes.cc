@@ -92,9 +92,9 @@ std::optional<FieldValue> read_field(double uniform, const double* per_vertex, s
 
 std::optional<MinimaSearch> read_search(const lpdeform_settings& settings) {
   if (settings.set_search == 0) return std::nullopt;
-  return MinimaSearch{.effort = settings.search_effort,
-                      .show = settings.search_shows != 0,
-                      .least_share = settings.search_least_share};
+  MinimaSearch out{.show = settings.search_shows != 0, .least_share = settings.search_least_share};
+  if (settings.search_effort != 0) out.effort = std::max(settings.search_effort, 0);
+  return out;
 }
 
 /// False if the update already has a change of this handle.

@@ -438,10 +438,16 @@ typedef struct lpdeform_settings {
   const uint32_t* region;
   uint32_t region_count;
   uint32_t reserved_too; /* 0 */
-  /* With set_solver. 1: the next three fields say how far to look for lower minima once the first one is found (see
-   * MinimaSearch in client/cpp/types.h); 0: the server's default. */
+  /* With set_solver. 1: the next three fields say how far to look for lower minima once the first one is found; 0: they
+   * are not read, and have their defaults. The energy has many minima where p is below 2. A session searches when nothing
+   * changes for a second. lpdeform_solve searches with what is left of its limits, before it returns. */
   uint32_t set_search;
-  uint32_t search_effort;    /* 8 times as many further starts, 0 to 1000; 0 takes the first minimum */
+  /* The number of further starts is 8 times the effort, 1 to 1000. Negative: no search, the first minimum is taken. 0: the
+   * default, which is 1 if `method` is AUTO and p is below 2 somewhere, and for lpdeform_solve if it also starts cold;
+   * otherwise there is no search. A start takes up to two or three times as long as the first minimum. Meshes of fewer than
+   * 100 vertices are not searched. Meshes of more than 15,000 vertices are searched on their coarse levels, and only what
+   * is lower there is tried on the mesh itself, as one further start. */
+  int32_t search_effort;
   double search_least_share; /* the share of energy that a better shape must save, up to 1; 0 means 0.02 */
   uint32_t search_shows;     /* 1: a better shape is shown at once; 0: it is announced (BETTER_SHAPE) */
   uint32_t reserved_search;  /* 0 */
@@ -524,8 +530,9 @@ LPDEFORM_API lpdeform_code lpdeform_redo(lpdeform_session* session, uint64_t* in
 
 /* WAITS until the server has taken the better shape that LPDEFORM_NOTICE_BETTER_SHAPE announces. It comes as a new final
  * frame for the same change. It is not part of steps for lpdeform_undo. Not retried: after UNAVAILABLE or
- * DEADLINE_EXCEEDED the shape may have been taken, which a frame then shows. Errors: FAILED_PRECONDITION
- * (NO_BETTER_SHAPE if none is known for the newest change; NOT_CONNECTED; NOT_THE_WRITER), UNAVAILABLE,
+ * DEADLINE_EXCEEDED the shape may have been taken, which a frame then shows. lpdeform_solve makes the server forget the
+ * shape; the session then searches again. Errors: FAILED_PRECONDITION (NO_BETTER_SHAPE if none is known for the newest
+ * change, as after lpdeform_solve; NOT_CONNECTED; NOT_THE_WRITER), UNAVAILABLE,
  * DEADLINE_EXCEEDED after call_timeout_seconds. */
 LPDEFORM_API lpdeform_code lpdeform_take_better_shape(lpdeform_session* session, lpdeform_error* error);
 

@@ -142,7 +142,7 @@ class Session {
   /// Shows the better shape that the notice kBetterShape has announced, as a new final frame for the same update. The shape
   /// is not part of steps for undo. Waits for the answer, not for the frame. Not retried: after UNAVAILABLE or
   /// DEADLINE_EXCEEDED the shape may have been taken, which a frame then shows. FAILED_PRECONDITION (NO_BETTER_SHAPE if none
-  /// is known for the newest update; NOT_THE_WRITER; SESSION_CLOSED).
+  /// is known for the newest update, as after solve (see MinimaSearch); NOT_THE_WRITER; SESSION_CLOSED).
   absl::StatusOr<BetterShape> take_better_shape();
 
   /// Solves for the current handles and settings on the server; waits for the final result and returns it. Works with

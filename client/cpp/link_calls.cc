@@ -447,7 +447,7 @@ absl::Status Link::last_problem() const {
 std::optional<Notice> Link::notice() const {
   const std::scoped_lock lock(mutex_);
   if (!is_open_) return std::nullopt;
-  return better_ ? better_ : notice_;  // better_ concerns a session that stands, load the next updates
+  return better_ ? better_ : notice_;  // better_ concerns the newest result, load the next updates
 }
 
 MeshReport Link::mesh_report() const {

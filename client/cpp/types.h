@@ -156,10 +156,17 @@ std::string stop_reason_name(StopReason reason);
 /// How far to look for lower minima once the first one is found. The energy is not convex: it has many minima, above all
 /// where p is below 2.
 struct MinimaSearch {
-  /// The search begins from 8 `effort` further starts, each of which takes at most about as long as the first solve. 0 to
-  /// 1000; 0 takes the first minimum. Session::solve searches before it answers. A session with an open stream shows the
-  /// first minimum, and searches when no update has arrived for a second.
-  std::uint32_t effort = 0;
+  /// The number of further starts is 8 times the effort, 0 to 1000. 0 takes the first minimum. If left out: 1 if the
+  /// method is kAuto and some p < 2, and for Session::solve if it also starts cold; otherwise 0. A start takes up to two
+  /// or three times as long as the first minimum. Meshes of fewer than 100 vertices are not searched. Meshes of more than
+  /// 15,000 vertices are searched on their coarse levels, and only what is lower there is tried on the mesh itself, as one
+  /// further start.
+  ///
+  /// Session::solve finds the first minimum, then searches with what is left of its limits, and then answers. A session
+  /// with an open stream shows the first minimum, and searches when nothing changes for a second. Session::solve makes it
+  /// forget the shape that it has announced: Session::take_better_shape then fails with NO_BETTER_SHAPE, and the session
+  /// searches again.
+  std::optional<std::uint32_t> effort = {};
   /// What the session does with a lower minimum that it has found then. False: it announces it (Notice::kBetterShape), and
   /// Session::take_better_shape shows it. True: it shows it, as a new frame for the same update.
   bool show = false;
@@ -174,9 +181,7 @@ struct SolverSettings {
   std::uint32_t max_iterations = 0;  // 0 means the server's default
   double time_limit_seconds = 0;     // 0 means no limit
   InitialGuess initial = InitialGuess::kCurrent;
-  /// If left out: effort 1 if the method is kAuto and some p < 2, and for Session::solve if it also starts cold; otherwise
-  /// 0.
-  std::optional<MinimaSearch> search = {};
+  std::optional<MinimaSearch> search = {};  // if left out, all its fields have their defaults
 };
 
 /// p or stiffness that the server computes from the shape's geometry: softer at joints (concave creases, and places
@@ -344,11 +349,13 @@ struct SolveResult {
   std::uint32_t threads = 0;
   std::uint64_t input_seq = 0;
   std::vector<IterationRecord> trace = {};
-  /// The energies of the minima that were seen, in order: the first one, and those that the search for lower ones came to
-  /// (see MinimaSearch). `energy` is the lowest. Empty if a limit has ended the solve before the first.
+  /// The energies at which starts have converged, in order: the first minimum, then those of the search for lower ones
+  /// (MinimaSearch). Several starts may converge to the same minimum. Starts that were given up have no entry. `energy` is
+  /// the lowest. Empty if a limit has ended the solve before the first.
   std::vector<double> minima = {};
-  /// How many further starts the search made. Those that came nowhere near the lowest minimum have no entry in `minima`.
-  std::uint32_t further_starts = 0;
+  std::uint32_t further_starts = 0;     // of the search, including those that were given up
+  std::uint32_t search_iterations = 0;  // the part of `iterations` that the search made
+  std::uint32_t effort = 0;             // of the search: the one asked for, or the default
 };
 
 }  // namespace lpdeform::client

@@ -52,7 +52,7 @@ void to_wire(const SolverSettings& settings, v1::SolverSettings& out) {
   out.set_time_limit_seconds(settings.time_limit_seconds);
   out.set_initial(to_wire(settings.initial));
   if (!settings.search) return;
-  out.mutable_search()->set_effort(settings.search->effort);
+  if (settings.search->effort) out.mutable_search()->set_effort(*settings.search->effort);
   out.mutable_search()->set_show(settings.search->show);
   out.mutable_search()->set_least_share(settings.search->least_share);
 }
@@ -285,6 +285,8 @@ void from_wire(const v1::SolveSummary& summary, SolveResult& out) {
   out.input_seq = summary.input_seq();
   out.minima.assign(summary.minima().begin(), summary.minima().end());
   out.further_starts = summary.further_starts();
+  out.search_iterations = summary.search_iterations();
+  out.effort = summary.effort();
 }
 
 absl::Status from_wire(const v1::Fault& fault) {

@@ -96,7 +96,8 @@ namespace Lpdeform
             public uint MaxIterations, SetRegion;
             public IntPtr Region;
             public uint RegionCount, ReservedToo;
-            public uint SetSearch, SearchEffort;
+            public uint SetSearch;
+            public int SearchEffort;
             public double SearchLeastShare;
             public uint SearchShows, ReservedSearch;
         }

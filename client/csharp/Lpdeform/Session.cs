@@ -113,7 +113,7 @@ namespace Lpdeform
             var search = solver.Search ?? new MinimaSearch();
             return Set(new Native.Settings
             {
-                SetSearch = solver.Search == null ? 0u : 1u, SearchEffort = (uint)search.Effort,
+                SetSearch = solver.Search == null ? 0u : 1u, SearchEffort = search.Effort == 0 ? -1 : search.Effort ?? 0,
                 SearchShows = search.Show ? 1u : 0u, SearchLeastShare = search.LeastShare,
                 SetSolver = 1, Method = (int)solver.Method, Tolerance = solver.Tolerance, MaxIterations = (uint)solver.MaxIterations,
                 TimeLimitSeconds = solver.TimeLimitSeconds
@@ -188,8 +188,8 @@ namespace Lpdeform
         }
 
         /// Waits until the server has taken the better shape that NoticeReason.BetterShape announces; it comes as a new final frame
-        /// for the same change. It is not part of steps for Undo. FailedPrecondition NO_BETTER_SHAPE if none is known any more. After
-        /// Unavailable the shape may have been taken, which a frame then shows.
+        /// for the same change. It is not part of steps for Undo. FailedPrecondition NO_BETTER_SHAPE if none is known any more, as
+        /// after Solve. After Unavailable the shape may have been taken, which a frame then shows.
         public void TakeBetterShape()
         {
             var error = LpdeformException.NewError();

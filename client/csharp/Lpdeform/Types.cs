@@ -78,17 +78,22 @@ namespace Lpdeform
         public int MaxIterations;
         /// 0 is without limit.
         public double TimeLimitSeconds;
-        /// null takes the server's default: an effort of 1 if Method is Auto and p is below 2 somewhere, otherwise 0.
+        /// null: all its fields have their defaults.
         public MinimaSearch? Search;
     }
 
     /// How far to look for lower minima once the first one is found: below p = 2 the energy has many.
     public struct MinimaSearch
     {
-        /// The search begins from 8 times as many further starts, each of which takes at most about as long as the first solve. 0
-        /// to 1000; 0 takes the first minimum. Solve searches before it returns; a session searches when nothing has changed for a
-        /// second.
-        public int Effort;
+        /// The number of further starts is 8 times the effort, 0 to 1000. 0 takes the first minimum. null: 1 if Method is Auto and
+        /// p is below 2 somewhere, and for Solve if it also starts cold; otherwise 0. A start takes up to two or three times as long
+        /// as the first minimum. Meshes of fewer than 100 vertices are not searched. Meshes of more than 15,000 vertices are
+        /// searched on their coarse levels, and only what is lower there is tried on the mesh itself, as one further start.
+        ///
+        /// Solve searches with what is left of its limits, before it returns. A session searches when nothing changes for a second.
+        /// Solve makes it forget the shape that it has announced: TakeBetterShape then fails with NO_BETTER_SHAPE, and the session
+        /// searches again.
+        public int? Effort;
         /// What the session does with a lower minimum that it has found then. False: NoticeReason.BetterShape announces it, and
         /// TakeBetterShape shows it. True: it is shown at once, as a new frame for the same change.
         public bool Show;

@@ -7,7 +7,20 @@ from typing import cast
 import numpy as np
 import pytest
 
-from lpdeform import Handle, InvalidInput, Settings, SurfacePoints, Targets, Update
+from lpdeform import (
+    Automatic,
+    Handle,
+    InvalidInput,
+    MinimaSearch,
+    Resize,
+    RigidMotion,
+    Settings,
+    Soft,
+    SolverSettings,
+    SurfacePoints,
+    Targets,
+    Update,
+)
 from lpdeform._numbers import crc32c, indices, numbers
 from lpdeform._rpc import Packer
 from lpdeform._wire import checked_update, settings_to_wire
@@ -68,12 +81,48 @@ MANY = np.ones(43)
         (Update({"tip": Handle(np.ones(42))}), "ARRAY_TYPE", "vertices of handle 'tip'"),
         (Update({"tip": Handle([0, -1])}), "INDEX_OUT_OF_RANGE", "vertices of handle 'tip', number 1"),
         (Update({"tip": Targets(np.ones((2, 3), bool))}), "ARRAY_TYPE", "targets of handle 'tip'"),
+        (Update({"tip": Handle([0], footprint="wide")}), "ARRAY_TYPE", "footprint of handle 'tip'"),  # type: ignore[arg-type]
+        (Update({"tip": Handle([0], hold=Soft("weak"))}), "ARRAY_TYPE", "weight of handle 'tip'"),  # type: ignore[arg-type]
+        (Update({"tip": RigidMotion(angle="right")}), "ARRAY_TYPE", "angle of handle 'tip'"),  # type: ignore[arg-type]
+        (Update(settings=Settings(length_unit="m")), "ARRAY_TYPE", "length_unit"),  # type: ignore[arg-type]
+        (Update(settings=Settings(p=Automatic("high"))), "ARRAY_TYPE", "strength of p"),  # type: ignore[arg-type]
+        (Update(resize=Resize((1, 1, 2), origin=(0, 0))), "ARRAY_SHAPE", "resize.origin"),
+        (Update(resize=Resize((1, 1, 2), axes=((1, 0, 0), (0, 1)))), "ARRAY_SHAPE", "resize.axes[1]"),
     ],
 )
 def test_what_cannot_be_of_this_mesh_is_refused_before_it_is_sent(update: Update, reason: str, element: str) -> None:
     with pytest.raises(InvalidInput) as caught:
         checked_update(update, 42, 40)
     assert (caught.value.reason, caught.value.element) == (reason, element)
+
+
+@pytest.mark.parametrize(
+    ("solver", "element", "limit"),
+    [
+        (SolverSettings(max_iterations=-1), "max_iterations", "0 <= max_iterations <= 2147483647"),
+        (SolverSettings(max_iterations=2**32), "max_iterations", "0 <= max_iterations <= 2147483647"),
+        (SolverSettings(max_iterations=1.5), "max_iterations", "0 <= max_iterations <= 2147483647"),  # type: ignore[arg-type]
+        (SolverSettings(tolerance="small"), "tolerance", "a number"),  # type: ignore[arg-type]
+        (SolverSettings(time_limit=10**400), "time_limit", "a number"),
+        (SolverSettings(search=MinimaSearch(effort=-1)), "effort", "0 <= effort <= 1000"),
+        (SolverSettings(search=MinimaSearch(effort=2**32)), "effort", "0 <= effort <= 1000"),
+        (SolverSettings(search=MinimaSearch(effort=True)), "effort", "0 <= effort <= 1000"),
+        (SolverSettings(search=MinimaSearch(least_share="all")), "least_share", "a number"),  # type: ignore[arg-type]
+    ],
+)
+def test_what_no_message_can_hold_is_refused_with_its_limit(solver: SolverSettings, element: str, limit: str) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        checked_update(Update(settings=Settings(solver=solver)), 42, 40)
+    assert (caught.value.reason, caught.value.element, caught.value.limit) == ("ARRAY_TYPE", element, limit)
+    assert element in str(caught.value)
+
+
+@pytest.mark.parametrize("effort", [None, 0, np.int64(3)])
+def test_an_effort_is_sent_only_if_it_is_given(effort: int | None) -> None:
+    search = MinimaSearch(effort=effort, show=True)
+    settings = checked_update(Update(settings=Settings(solver=SolverSettings(search=search))), 42, 40).settings
+    sent = settings_to_wire(settings, cast(Packer, None)).solver.search
+    assert (sent.HasField("effort"), sent.effort, sent.show) == (effort is not None, effort or 0, True)
 
 
 @pytest.mark.parametrize("one", [2.0, 2, np.float32(2), [2], [2.0], np.array([2.0], np.float32), np.array(2.0)])

@@ -1,4 +1,4 @@
-"""Lower minima: looked for by solves and by sessions that stand, announced, and taken or shown."""
+"""Lower minima: looked for by solves and by sessions in which nothing changes, announced, and taken or shown."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def better(session: lpdeform.Session) -> bool:
     return session.notice is not None and session.notice.reason == "better_shape"
 
 
-def test_a_session_that_stands_announces_a_better_shape_which_is_taken_once(server: Server) -> None:
+def test_a_session_in_which_nothing_changes_announces_a_better_shape_which_is_taken_once(server: Server) -> None:
     with bend(server, effort=2) as session:
         first = session.settle(PATIENCE)
         until(lambda: better(session))
@@ -110,6 +110,21 @@ def test_a_search_out_of_range_is_refused_by_name(server: Server) -> None:
             with pytest.raises(lpdeform.InvalidInput) as caught:
                 session.settle(PATIENCE)
             assert caught.value.reason == reason
+
+
+def test_a_search_that_no_message_can_hold_raises_at_once_and_the_session_goes_on(server: Server) -> None:
+    vertices, faces = box(1, 1)
+    with lpdeform.open(vertices, faces, address=server.address) as session:
+        for solver in (
+            lpdeform.SolverSettings(search=lpdeform.MinimaSearch(effort=-1)),
+            lpdeform.SolverSettings(search=lpdeform.MinimaSearch(effort=2**32)),
+            lpdeform.SolverSettings(max_iterations=-1),
+        ):
+            with pytest.raises(lpdeform.InvalidInput):
+                session.set(solver=solver)
+        assert session.newest_input == 0
+        session.set_handle("base", [0])
+        assert session.settle(PATIENCE).is_final
 
 
 def test_readers_may_not_take_it_and_closed_sessions_neither(server: Server) -> None:

@@ -195,6 +195,16 @@ TEST(Changes, HowFarToLookForLowerMinimaIsTheServersUnlessItIsSet) {
   EXPECT_EQ(read_struct(&settings, "settings")->set_search, 0u);
 }
 
+TEST(Changes, TheEffortOfASearchIsTheServersUnlessItIsSetAndNoneIfNegative) {
+  lpdeform_settings settings{};
+  settings.set_solver = settings.set_search = settings.search_shows = 1;
+  const auto read = [&] { return read_settings(settings, Space())->solver->search.value(); };
+  EXPECT_TRUE(read().show);
+  EXPECT_FALSE(read().effort);
+  settings.search_effort = -1;
+  EXPECT_EQ(read().effort, 0u);
+}
+
 TEST(MeshInput, ExtentsAreComparedBeyond32Bits) {
   const Fault fault = fault_of(check_extent("positions", 100, 0xffffffff, 0xffffffff, 12, 0xffffffff));
   EXPECT_EQ(fault.reason, "BUFFER_TOO_SMALL");

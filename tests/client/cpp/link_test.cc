@@ -385,6 +385,21 @@ TEST_F(LinkTest, SaysHowFarToLookForLowerMinimaOrLeavesItToTheServer) {
   EXPECT_TRUE(sent({.search = MinimaSearch{}}).has_search());
 }
 
+TEST_F(LinkTest, LeavesTheEffortOfASearchToTheServerUnlessItIsGiven) {
+  open();
+  const auto stream = opened_stream();
+  const auto sent = [&](const MinimaSearch& search) {
+    link_->update({.settings = {.solver = SolverSettings{.search = search}}}).value();
+    return stream->hear()->update().settings().solver().search();
+  };
+  const v1::MinimaSearch shown = sent({.show = true});
+  EXPECT_TRUE(shown.show());
+  EXPECT_FALSE(shown.has_effort());
+  const v1::MinimaSearch none = sent({.effort = 0});
+  EXPECT_TRUE(none.has_effort());
+  EXPECT_EQ(none.effort(), 0u);
+}
+
 TEST_F(LinkTest, AnUndoIsAskedForAgainAfterWhatAServerThatWentAwayHasLost) {
   open();
   link_->update(adding("tip")).value();

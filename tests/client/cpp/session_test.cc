@@ -94,7 +94,7 @@ class BentBarTest : public SessionTest {
   }
 };
 
-TEST_F(BentBarTest, ASessionThatStandsAnnouncesABetterShapeWhichIsTakenOnce) {
+TEST_F(BentBarTest, ASessionInWhichNothingChangesAnnouncesABetterShapeWhichIsTakenOnce) {
   Session session = open_bent({.effort = 2});
   const Frame first = session.settle(kPatience).value();
   const Notice notice = awaited_notice(session);

@@ -29,6 +29,21 @@ TEST(Packer, KeepsSmallRunsInTheMessageAndUploadsWhatDoesNotFit) {
   EXPECT_EQ(uploaded, std::vector<std::size_t>{20});
 }
 
+TEST(Wire, ASummaryTellsWhatTheSearchForMinimaDid) {
+  v1::SolveSummary summary;
+  summary.add_minima(4);
+  summary.add_minima(3);
+  summary.set_further_starts(8);
+  summary.set_search_iterations(90);
+  summary.set_effort(1);
+  SolveResult out;
+  from_wire(summary, out);
+  EXPECT_EQ(out.minima, (std::vector<double>{4, 3}));
+  EXPECT_EQ(out.further_starts, 8u);
+  EXPECT_EQ(out.search_iterations, 90u);
+  EXPECT_EQ(out.effort, 1u);
+}
+
 TEST(Wire, AnUpdateWithoutSettingsChangesNone) {
   Update update;
   update.handles.emplace("tip", Update::Removal{});

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import NoReturn
 
 from lpdeform import types
+from lpdeform._numbers import number
 from lpdeform._vectors import checked_vector, vector_from_wire, vector_to_wire
 from lpdeform.errors import invalid
 from lpdeform.v1 import handle_pb2
@@ -16,8 +17,12 @@ from lpdeform.v1 import handle_pb2
 def checked_hold(hold: types.Hold, what: str) -> types.Hold:
     """With copies of its vectors. The ranges of numbers are the server's to refuse."""
     match hold:
-        case types.Exact() | types.Soft() | types.Orientation():
+        case types.Exact():
             return hold
+        case types.Soft():
+            return types.Soft(number(hold.weight, f"weight of {what}"))
+        case types.Orientation():
+            return types.Orientation(number(hold.weight, f"weight of {what}"))
         case types.AxisLock():
             return types.AxisLock(checked_vector(hold.axis, f"axis of {what}"))
         case types.PlaneLock():

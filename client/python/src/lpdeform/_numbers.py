@@ -1,7 +1,8 @@
-"""Checks and copies arrays from callers, and packs them as bytes. The server checks the ranges of numbers."""
+"""Checks and copies numbers and arrays from callers, and packs them as bytes. The server checks the ranges of numbers."""
 
 from __future__ import annotations
 
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,27 @@ def indices(values: npt.ArrayLike, what: str, width: int = 1, mask_length: int |
             f"0 <= index <= {_most_index}",
         )
     return _shaped(np.array(array, dtype="<u4", order="C"), what, width)
+
+
+def number(value: float, what: str) -> float:
+    if not isinstance(value, (str, bytes, bool, np.bool_)):
+        try:
+            return float(value)
+        except (TypeError, ValueError, OverflowError):
+            pass
+    raise invalid(f"The {what} is {value!r} and not a number.", "ARRAY_TYPE", what, "a number")
+
+
+def count(value: int, what: str, most: int) -> int:
+    """Refuses what no message can hold. Of the rest, the server refuses what is over `most`."""
+    limit = f"0 <= {what} <= {most}"
+    if not isinstance(value, (bool, np.bool_)):
+        try:
+            if 0 <= (given := index(value)) <= _most_index:
+                return given
+        except TypeError:
+            pass
+    raise invalid(f"The {what} is {value!r} and not an integer with {limit}.", "ARRAY_TYPE", what, limit)
 
 
 def _shaped(array: Copied, what: str, width: int) -> Copied:

@@ -218,5 +218,7 @@ class _ResultBuilder:
             input_seq=summary.input_seq,
             minima=tuple(summary.minima),
             further_starts=summary.further_starts,
+            search_iterations=summary.search_iterations,
+            effort=summary.effort,
             trace=tuple(self._trace),
         )

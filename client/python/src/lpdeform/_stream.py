@@ -39,7 +39,7 @@ class Stream:
 
     @property
     def notice(self) -> Notice | None:
-        """A better shape takes precedence: it concerns a session that stands, and load the next updates."""
+        """A better shape takes precedence: it concerns the newest result, and load the next updates."""
         return self.better or self.server_notice
 
     def take_notice(self, notice: Notice) -> None:

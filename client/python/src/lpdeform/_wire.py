@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from lpdeform import types
 from lpdeform._holds import checked_hold, hold_from_wire, hold_to_wire
-from lpdeform._numbers import Copied, indices, is_single_precision, numbers
+from lpdeform._numbers import Copied, count, indices, is_single_precision, number, numbers
 from lpdeform._rpc import Packer
 from lpdeform._vectors import checked_vector, vector_from_wire, vector_to_wire
 from lpdeform.errors import invalid
@@ -66,9 +66,17 @@ def checked_update(update: types.Update, vertices: int, faces: int) -> types.Upd
     handles = {
         _checked_name(name): _checked_change(str(name), change, vertices, faces) for name, change in update.handles.items()
     }
-    if update.resize is not None:
-        checked_vector(update.resize.scale, "resize.scale")
-    return types.Update(handles, checked_settings(update.settings, vertices), update.resize, bool(update.begins_step))
+    resize = None if update.resize is None else _checked_resize(update.resize)
+    return types.Update(handles, checked_settings(update.settings, vertices), resize, bool(update.begins_step))
+
+
+def _checked_resize(resize: types.Resize) -> types.Resize:
+    scale = checked_vector(resize.scale, "resize.scale")
+    origin = None if resize.origin is None else checked_vector(resize.origin, "resize.origin")
+    if resize.axes is None:
+        return types.Resize(scale, origin)
+    first, second = resize.axes
+    return types.Resize(scale, origin, (checked_vector(first, "resize.axes[0]"), checked_vector(second, "resize.axes[1]")))
 
 
 def _checked_name(name: object) -> str:
@@ -97,6 +105,7 @@ def _checked_change(name: str, change: types.Change, vertices: int, faces: int) 
             points=points,
             motion=_checked_motion(change.motion, what),
             hold=checked_hold(change.hold, what),
+            footprint=number(change.footprint, f"footprint of {what}"),
         )
     if isinstance(change, types.Removal):
         return change
@@ -109,7 +118,7 @@ def _checked_motion(motion: types.Motion, what: str) -> types.Motion:
     if isinstance(motion, types.RigidMotion):
         return types.RigidMotion(
             checked_vector(motion.axis, f"axis of {what}"),
-            float(motion.angle),
+            number(motion.angle, f"angle of {what}"),
             checked_vector(motion.center, f"center of {what}"),
             checked_vector(motion.translation, f"translation of {what}"),
         )
@@ -120,20 +129,41 @@ def _checked_motion(motion: types.Motion, what: str) -> types.Motion:
 
 def checked_settings(settings: types.Settings, vertices: int) -> types.Settings:
     """For a mesh with this many vertices."""
-    if settings.solver is not None:
-        named(_methods, settings.solver.method, "method")
-        named(_guesses, settings.solver.initial, "initial guess")
     return replace(
         settings,
+        length_unit=None if settings.length_unit is None else number(settings.length_unit, "length_unit"),
+        solver=None if settings.solver is None else _checked_solver(settings.solver),
         p=_checked_field(settings.p, "p", vertices),
         stiffness=_checked_field(settings.stiffness, "stiffness", vertices),
         region=None if settings.region is None else indices(settings.region, "region", mask_length=vertices),
     )
 
 
+def _checked_solver(solver: types.SolverSettings) -> types.SolverSettings:
+    named(_methods, solver.method, "method")
+    named(_guesses, solver.initial, "initial guess")
+    return replace(
+        solver,
+        tolerance=number(solver.tolerance, "tolerance"),
+        max_iterations=count(solver.max_iterations, "max_iterations", 2**31 - 1),
+        time_limit=number(solver.time_limit, "time_limit"),
+        search=None if solver.search is None else _checked_search(solver.search),
+    )
+
+
+def _checked_search(search: types.MinimaSearch) -> types.MinimaSearch:
+    return types.MinimaSearch(
+        None if search.effort is None else count(search.effort, "effort", 1000),
+        bool(search.show),
+        number(search.least_share, "least_share"),
+    )
+
+
 def _checked_field(value: types.Field | None, what: str, vertices: int) -> types.Field | None:
-    if value is None or isinstance(value, types.Automatic):
-        return value
+    if value is None:
+        return None
+    if isinstance(value, types.Automatic):
+        return types.Automatic(number(value.strength, f"strength of {what}"))
     if np.ndim(value) == 0 and not isinstance(value, (str, bytes, bool, np.bool_)):
         try:
             return float(value)  # type: ignore[arg-type]
@@ -234,7 +264,8 @@ def settings_to_wire(settings: types.Settings, packer: Packer) -> handle_pb2.Set
         message.solver.initial = _guesses[solver.initial]
         if (search := solver.search) is not None:
             message.solver.search.SetInParent()
-            message.solver.search.effort = search.effort
+            if search.effort is not None:
+                message.solver.search.effort = search.effort
             message.solver.search.show = search.show
             message.solver.search.least_share = search.least_share
     if settings.region is not None:

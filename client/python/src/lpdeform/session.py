@@ -301,8 +301,8 @@ class Session(Live):
         """Shows the better shape that the notice "better_shape" has announced, as a new final frame for the same update.
 
         The shape is not part of the steps of undo(). The call is not repeated: after Unavailable or Timeout the shape may have been
-        taken, which a frame then shows. Raises FAILED_PRECONDITION NO_BETTER_SHAPE if none is known for the newest update,
-        NOT_THE_WRITER for a reader.
+        taken, which a frame then shows. Raises FAILED_PRECONDITION NO_BETTER_SHAPE if none is known for the newest update, as
+        after solve(), which makes the session forget it and search again; NOT_THE_WRITER for a reader.
         """
         return take_better_shape(self._link, self._link.stop)
 

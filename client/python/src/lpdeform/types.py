@@ -130,10 +130,16 @@ class MinimaSearch:
     """How far to look for lower minima once the first one is found. The energy is not convex: it has many minima, above all
     where p is below 2."""
 
-    effort: int = 0
-    """The search begins from 8 `effort` further starts, each of which takes at most about as long as the first solve. 0 to 1000;
-    0 takes the first minimum. solve() searches before it answers. A session whose frames are read shows the first minimum, and
-    searches when no update has come for a second."""
+    effort: int | None = None
+    """The number of further starts is 8 times the effort, 0 to 1000. 0 takes the first minimum. None takes 1 if the method is
+    "auto" and p is below 2 somewhere, and for solve() if it also starts cold, which is not from an earlier result; otherwise 0.
+    A start takes up to two or three times as long as the first minimum. Meshes of fewer than 100 vertices are not searched.
+    Meshes of more than 15,000 vertices are searched on their coarse levels, and only what is lower there is tried on the mesh
+    itself, as one further start.
+
+    solve() finds the first minimum, then searches with what is left of its limits, and then returns. A session whose frames are
+    read shows the first minimum, and searches when nothing changes for a second. solve() makes it forget the shape that it has
+    announced: take_better_shape() then raises NO_BETTER_SHAPE, and the session searches again."""
     show: bool = False
     """What the session does with a lower minimum that it has found then. False: a notice "better_shape" announces it, and
     take_better_shape() shows it. True: it is shown at once, as a new frame for the same update."""
@@ -154,8 +160,7 @@ class SolverSettings:
     """Seconds; 0 is without limit."""
     initial: InitialGuess = "current"
     search: MinimaSearch | None = None
-    """The default is effort 1 if the method is "auto" and p is below 2 somewhere, and for solve() if it also starts cold;
-    otherwise 0."""
+    """None: all its fields have their defaults."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,10 +302,15 @@ class SolveResult:
     threads: int
     input_seq: int
     minima: tuple[float, ...]
-    """The energies of the minima that were seen, in order: the first one, and those that the search for lower ones came to (see
-    MinimaSearch). `energy` is the lowest. Empty if a limit has ended the solve before the first."""
+    """The energies at which starts have converged, in order: the first minimum, then those of the search for lower ones (see
+    MinimaSearch). Several starts may converge to the same minimum. Starts that were given up have no entry. `energy` is the
+    lowest. Empty if a limit has ended the solve before the first."""
     further_starts: int
-    """How many further starts the search made. Those that came nowhere near the lowest minimum have no entry in `minima`."""
+    """How many further starts the search made, including those that were given up."""
+    search_iterations: int
+    """The part of `iterations` that the search made."""
+    effort: int
+    """The effort of the search: the one asked for, or the default."""
     trace: tuple[IterationRecord, ...]
 
     def __repr__(self) -> str:

@@ -5,7 +5,7 @@ export class Notices {
   #ofServer: ServerNotice | undefined;
   #better: BetterShapeNotice | undefined;
 
-  /** A better shape takes precedence: it concerns a session that stands, and load the next updates. */
+  /** A better shape takes precedence: it concerns the newest result, and load the next updates. */
   get last(): Notice | undefined {
     return this.#better ?? this.#ofServer;
   }

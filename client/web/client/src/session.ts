@@ -317,8 +317,9 @@ export class Session implements AsyncIterable<Frame> {
 
   /**
    * Shows the better shape that the notice "better_shape" has announced, as a new final frame for the same update. The shape is
-   * not part of the steps for undo(). Rejects with FAILED_PRECONDITION (NO_BETTER_SHAPE) if none is known for the newest update.
-   * The call is not repeated: after UNAVAILABLE or DEADLINE_EXCEEDED the shape may have been taken, which a frame then shows.
+   * not part of the steps for undo(). Rejects with FAILED_PRECONDITION (NO_BETTER_SHAPE) if none is known for the newest update,
+   * as after solve(), which makes the session forget it and search again. The call is not repeated: after UNAVAILABLE or
+   * DEADLINE_EXCEEDED the shape may have been taken, which a frame then shows.
    */
   async takeBetterShape(options: { signal?: AbortSignal } = {}): Promise<BetterShape> {
     checkCallOptions(options, "signal");

@@ -130,8 +130,8 @@ export function settingsToWire(settings: api.Settings, packer: Packer): MessageI
   };
 }
 
-function searchToWire({ effort = 0, show = false, leastShare = 0 }: api.MinimaSearch) {
-  return { effort, show, leastShare };
+function searchToWire({ effort, show = false, leastShare = 0 }: api.MinimaSearch) {
+  return { ...(effort !== undefined && { effort }), show, leastShare };
 }
 
 function fieldToWire(value: api.FieldValue, packer: Packer): Field {

@@ -80,10 +80,6 @@ export interface SolverSettings {
   /** Default: without limit. */
   timeLimitSeconds?: number;
   initial?: InitialGuess;
-  /**
-   * Default: effort 1 if the method is "auto" and p is below 2 somewhere, and for Session.solve() if it also starts cold;
-   * otherwise 0.
-   */
   search?: MinimaSearch;
 }
 
@@ -93,9 +89,14 @@ export interface SolverSettings {
  */
 export interface MinimaSearch {
   /**
-   * The search begins from 8 `effort` further starts, each of which takes at most about as long as the first solve. 0 to 1000;
-   * the default, 0, takes the first minimum. Session.solve() searches before it answers. A session whose frames are read shows
-   * the first minimum, and searches when no update has come for a second.
+   * The number of further starts is 8 times the effort, 0 to 1000. 0 takes the first minimum. Default: 1 if the method is "auto"
+   * and p is below 2 somewhere, and for Session.solve() if it also starts cold; otherwise 0. A start takes up to two or three
+   * times as long as the first minimum. Meshes of fewer than 100 vertices are not searched. Meshes of more than 15,000 vertices
+   * are searched on their coarse levels, and only what is lower there is tried on the mesh itself, as one further start.
+   *
+   * Session.solve() finds the first minimum, then searches with what is left of its limits, and then answers. A session whose
+   * frames are read shows the first minimum, and searches when nothing changes for a second. Session.solve() makes it forget the
+   * shape that it has announced: Session.takeBetterShape() then rejects with NO_BETTER_SHAPE, and the session searches again.
    */
   effort?: number;
   /**
@@ -311,12 +312,17 @@ export interface SolveResult<Numbers = Float32Array> {
   threads: number;
   inputSeq: number;
   /**
-   * The energies of the minima that were seen, in order: the first one, and those that the search for lower ones came to (see
-   * MinimaSearch). `energy` is the lowest. Empty if a limit has ended the solve before the first.
+   * The energies at which starts have converged, in order: the first minimum, then those of the search for lower ones (see
+   * MinimaSearch). Several starts may converge to the same minimum. Starts that were given up have no entry. `energy` is the
+   * lowest. Empty if a limit has ended the solve before the first.
    */
   minima: readonly number[];
-  /** How many further starts the search made. Those that came nowhere near the lowest minimum have no entry in `minima`. */
+  /** How many further starts the search made, including those that were given up. */
   furtherStarts: number;
+  /** The part of `iterations` that the search made. */
+  searchIterations: number;
+  /** The effort of the search: the one asked for, or the default. */
+  effort: number;
   trace: readonly IterationRecord[];
 }
 

@@ -15,9 +15,19 @@ describe("updates", () => {
     await server.until(() => server.updates.length === 3);
     expect(server.updates.map(({ update }) => update!.settings!.solver!.search)).toMatchObject([
       { effort: 3, show: true, leastShare: 0.1 },
-      { effort: 0, show: false, leastShare: 0 },
+      { show: false, leastShare: 0 },
       undefined,
     ]);
+  });
+
+  test("leave the effort of a search to the server unless it is given", async () => {
+    const { server, session } = await begin();
+    session.set({ solver: { search: { show: true } } });
+    await server.until(() => server.updates.length === 1);
+    session.set({ solver: { search: { effort: 0 } } });
+    await server.until(() => server.updates.length === 2);
+    const [shown, none] = server.updates.map(({ update }) => update!.settings!.solver!.search!);
+    expect([shown!.show, shown!.effort, none!.effort]).toEqual([true, undefined, 0]);
   });
 
   test("made faster than they are taken are merged into one", async () => {

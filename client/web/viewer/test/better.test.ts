@@ -2,6 +2,7 @@ import { afterEach, expect, it, vi } from "vitest";
 import { LpdeformError, type Notice } from "lpdeform-client";
 import { Live } from "../src/link/live.js";
 import { addHandle, changeHandle, type Document, emptyDocument } from "../src/model/document.js";
+import { betterText } from "../src/ui/messages.js";
 
 /** A session that the test speaks for. */
 const session = vi.hoisted(() => ({
@@ -102,4 +103,9 @@ it("what the server says about itself is told once, also if it applies again aft
   session.tell(overloaded); // while the better shape is still there
   say(overloaded);
   expect(watcher.notice.mock.calls).toEqual([["Too much."]]);
+});
+
+it("one better shape is offered by what it saves, several by the most that one of them saves", () => {
+  expect(betterText([0.0714])).toBe("Take a shape with 7\u00a0% less energy");
+  expect(betterText([0.03, 0.0714])).toBe("Take shapes with up to 7\u00a0% less energy");
 });

@@ -19,7 +19,7 @@ async function bent(search: MinimaSearch): Promise<Session> {
   return session;
 }
 
-test("a session that stands announces a better shape, which is taken once", async () => {
+test("a session in which nothing changes announces a better shape, which is taken once", async () => {
   const session = await bent({ effort: 2 });
   const first = await session.settle({ timeoutMs: 20_000 });
   const notice = await new Promise<BetterShapeNotice>((resolve) => {

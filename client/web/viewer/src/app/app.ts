@@ -270,12 +270,11 @@ export class App implements Workbench {
     return false;
   }
 
-  /** The largest share of energy that a better shape saves. */
-  get #better(): number | undefined {
-    const shares = this.panes.map(({ live }) => live?.better?.savedShare ?? 0);
-    return Math.max(...shares) || undefined;
+  get #better(): number[] {
+    return this.panes.map(({ live }) => live?.better?.savedShare).filter((share) => share !== undefined);
   }
 
+  /** In every pane. */
   takeBetter(): void {
     for (const { live } of this.panes) void live?.takeBetter();
   }

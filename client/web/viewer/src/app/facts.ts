@@ -15,8 +15,8 @@ export interface Facts {
   problem: LpdeformError | undefined;
   /** One line that disappears by itself, or stays until its cause is over. */
   notice: { text: string; isBad: boolean; stays?: boolean } | undefined;
-  /** The share of its energy that a shape saves which the server knows and the user may take. */
-  better: number | undefined;
+  /** For each pane whose shape has a better one that the user may take: the share of energy that this saves. */
+  better: readonly number[];
   /** When the work that a reload has restored was kept, as Date.now(). */
   restoredFrom: number | undefined;
   /** Works that were set aside, the newest first; bringBack() swaps one with the present work. */
@@ -38,7 +38,7 @@ export const firstFacts: Facts = {
   status: say("idle", ""),
   problem: undefined,
   notice: undefined,
-  better: undefined,
+  better: [],
   restoredFrom: undefined,
   setAside: [],
   pointedOut: nothing,

@@ -75,15 +75,21 @@ export function messages(app: App, startOver: () => void): HTMLElement {
   return el("div", { className: "messages" }, pill, banner, restored, asideNote(app), hint, betterButton(app), notice);
 }
 
-/** There while the server knows a shape of lower energy. */
+/** There while the server knows a shape of lower energy; takes those of all panes. */
 function betterButton(app: App): HTMLElement {
   const take = el("button", { type: "button", className: "plain better", hidden: true });
   take.addEventListener("click", () => app.takeBetter());
   app.facts.watch(({ better }) => {
-    take.hidden = better === undefined;
-    if (better !== undefined) setText(take, `Take a shape with ${percent(better)} less energy`);
+    take.hidden = better.length === 0;
+    if (better.length > 0) setText(take, betterText(better));
   });
   return take;
+}
+
+/** For the shares of energy that shapes save, of which there is at least one. */
+export function betterText(shares: readonly number[]): string {
+  const most = percent(Math.max(...shares));
+  return shares.length === 1 ? `Take a shape with ${most} less energy` : `Take shapes with up to ${most} less energy`;
 }
 
 /** "7 %"; at least one, at most 99. */

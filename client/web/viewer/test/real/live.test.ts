@@ -58,7 +58,7 @@ it("changes the surface with p", async () => {
 
 it("offers a better shape by a button with what it saves, which goes with the next change", async () => {
   const take = user.page.getByRole("button", { name: "Take a shape with 7 % less energy" });
-  await user.ask("app.facts.set({ better: 0.0714 })");
+  await user.ask("app.facts.set({ better: [0.0714] })");
   await take.waitFor();
   await user.page.getByRole("button", { name: "2", exact: true }).click();
   await take.waitFor({ state: "hidden" });
