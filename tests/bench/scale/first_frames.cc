@@ -82,7 +82,9 @@ double seconds_since(Clock::time_point start) {
 }
 
 Image side_by_side(const TriangleMesh& mesh, const std::vector<Points>& frames) {
-  PictureStyle style{.width = kWidth, .height = kHeight};
+  PictureStyle style;
+  style.width = kWidth;
+  style.height = kHeight;
   style.frame.resize(2 * mesh.vertices.rows(), 3);
   style.frame << mesh.vertices, frames.back();
   const auto count = static_cast<int>(frames.size());
