@@ -83,11 +83,12 @@ class Deformer {
   /// Whether the current steps are those of a certificate; positions() then do not change any more.
   bool is_certifying() const;
 
-  /// Begins to look for minima lower than positions(), which must be the result of a solve for the current inputs: from 8
-  /// `effort` further starts (SolveSettings::effort), or, on a mesh larger than DeformerOptions::search_up_to, by a cold solve
-  /// whose coarse levels do so. A second call goes on with other starts. step() continues it; when step() returns false, or
-  /// anything else is started, better_energy() has what was found. positions() do not change. Does nothing where a lower
-  /// minimum cannot be. INVALID_ARGUMENT (EFFORT_OUT_OF_RANGE); FAILED_PRECONDITION (NOT_SOLVED). `stop` ends it.
+  /// Begins to look for minima lower than positions(), which must be the result of a solve for the current inputs, from as many
+  /// further starts as SolveSettings::effort says. A second call goes on with other starts; on a mesh larger than
+  /// DeformerOptions::search_up_to it repeats the one by the coarse levels. step() continues the search. When step() returns
+  /// false, or anything else is started, better_energy() has what was found. positions() do not change. Limits of solves do not
+  /// hold. Does nothing where a lower minimum cannot be. INVALID_ARGUMENT (EFFORT_OUT_OF_RANGE); FAILED_PRECONDITION
+  /// (NOT_SOLVED). `stop` ends it.
   absl::Status start_search(int effort, std::stop_token stop = {});
   /// Whether the current steps are those of such a search.
   bool is_searching() const;

@@ -16,7 +16,6 @@ namespace {
 
 constexpr double kCertificateSeconds = 1;    // it may take this long, even beyond the time limit
 constexpr std::size_t kCopyChunk = 4096;     // vertices
-constexpr std::int32_t kLargeMesh = 5000;    // vertices from which on a coarse level pays off
 constexpr std::int32_t kLargeAtTwo = 10000;  // the same if every p is 2, where the gain is smaller
 constexpr std::int32_t kLargestSearchedLevel =
     5000;  // vertices of a coarse level that looks for lower minima itself

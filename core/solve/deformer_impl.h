@@ -29,6 +29,8 @@ struct Deformer::Impl {
         best_energies(Field::Zero(shape->vertex_count())),
         positions(shape->positions()) {}
 
+  static constexpr std::int32_t kLargeMesh = 5000;  // vertices from which on a coarse level pays off
+
   double unit() const { return shape->mean_edge_length(); }
   const Workers& workers() const { return objective.cells().workers(); }
   double length_unit() const { return material.length_unit > 0 ? material.length_unit : unit(); }
@@ -65,7 +67,8 @@ struct Deformer::Impl {
   int further_starts() const;
   Points displaced(const Points& from, int number) const;
   std::unique_ptr<Minimiser> make_start(int number, const Points& guess, const Points& lowest);
-  std::unique_ptr<Minimiser> make_large_start(const Points& guess);
+  bool is_by_coarse_levels(int start) const;
+  std::unique_ptr<Minimiser> make_coarse_start(const Points& guess);
   void begin_search(int starts);
   void search_on();
   void end_search();

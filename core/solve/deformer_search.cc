@@ -124,7 +124,8 @@ Points Deformer::Impl::displaced(const Points& from, int number) const {
 
 std::unique_ptr<Minimiser> Deformer::Impl::make_start(int number, const Points& guess, const Points& lowest) {
   const Origin origin = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()];
-  const bool goes_by_two = number == 0 && !material.has_uniform_p();
+  const int first = is_by_coarse_levels(0) ? 1 : 0;
+  const bool goes_by_two = number == first && !material.has_uniform_p();
   forget_weights();
   const bool is_factored = prepare_metric(true);  // of equal weights, which displaced() reads, too
   Points x = lowest;
@@ -137,9 +138,13 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_start(int number, const Points& 
   return std::make_unique<QuasiNewton>(std::move(problem), std::move(x), Warmth::kWithMetric);
 }
 
-/// On a mesh that is too large to be searched itself: a solve by way of its coarse levels, which look for lower minima. Null if
-/// there is no coarse level.
-std::unique_ptr<Minimiser> Deformer::Impl::make_large_start(const Points& guess) {
+/// The first start on a mesh with coarse levels, and every start on one that is too large to be searched itself.
+bool Deformer::Impl::is_by_coarse_levels(int start) const {
+  return is_large() || (start == 0 && shape->vertex_count() >= kLargeMesh);
+}
+
+/// A solve by way of the coarse levels, which look for lower minima. Null if there is no coarse level.
+std::unique_ptr<Minimiser> Deformer::Impl::make_coarse_start(const Points& guess) {
   if (!prepare_coarse()) return nullptr;
   objective.evaluate(guess, *norm);
   return std::make_unique<Multiresolution>(make_problem(), guess, *coarse, *settings.effort);
@@ -152,8 +157,8 @@ void Deformer::Impl::begin_search(int starts) {
   if (is_large()) scope.most_iterations = std::numeric_limits<int>::max();
   if (!prepare_metric(true)) return;
   auto start = [this, guess = laplacian_guess()](int number, const Points& lowest) {
-    std::unique_ptr<Minimiser> large = is_large() ? make_large_start(guess) : nullptr;
-    return large ? std::move(large) : make_start(number, guess, lowest);
+    std::unique_ptr<Minimiser> by_coarse = is_by_coarse_levels(number) ? make_coarse_start(guess) : nullptr;
+    return by_coarse ? std::move(by_coarse) : make_start(number, guess, lowest);
   };
   auto finish = [this](Points rough) {
     return std::make_unique<QuasiNewton>(make_problem(), std::move(rough), Warmth::kWithMetric);
