@@ -88,6 +88,11 @@ std::uint64_t FrameBox::takes() const {
   return takes_;
 }
 
+bool FrameBox::has_problem() const {
+  const std::scoped_lock lock(mutex_);
+  return !problems_.empty();
+}
+
 std::optional<Frame> FrameBox::last_final() const {
   const std::scoped_lock lock(mutex_);
   return last_final_;

@@ -52,6 +52,8 @@ class FrameBox {
 
   /// The number of frames and errors that take() has returned.
   std::uint64_t takes() const;
+  /// Whether an error waits for take().
+  bool has_problem() const;
   /// The frame that take() returned last, if it was final.
   std::optional<Frame> last_final() const;
 

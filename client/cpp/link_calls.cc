@@ -66,13 +66,16 @@ absl::StatusOr<Frame> Link::next_frame(Clock::time_point deadline) {
   return *std::move(*frame);
 }
 
-/// Another thread may take the result meanwhile; this call returns it as well.
+/// Another thread may take the result meanwhile; this call returns it as well. If the last frame is the result only because
+/// a newer update has been refused meanwhile, the refusal is returned first.
 absl::StatusOr<Frame> Link::settle(Clock::time_point deadline) {
   for (;;) {
     const std::uint64_t takes = box_.takes();
     const absl::StatusOr<std::optional<Frame>> taken = take_frame(Clock::now());
     if (!taken.ok()) return taken.status();
-    if (std::optional<Frame> last = box_.last_final(); last && is_result(*last)) return *std::move(last);
+    std::optional<Frame> last = box_.last_final();
+    const bool is_settled = last && is_result(*last);
+    if (is_settled && !box_.has_problem()) return *std::move(last);
     if (!box_.wait(deadline, takes)) return no_frame();
   }
 }

@@ -131,22 +131,20 @@ Answer Link::judge(std::uint64_t seq, const absl::Status& status) {
 }
 
 /// If the update must be sent again, the fault ends the stream; the next stream sends it after the pause that the fault
-/// asks for. A fault that only says why a solve for the update failed is not reported once there is a newer update.
+/// asks for. A fault that only says why a solve for the update failed is not reported once there is a newer update. The
+/// ledger and the box change under one lock, so that settle() finds the error of every refusal that the ledger shows.
 absl::Status Link::take(const v1::Fault& fault) {
   const absl::Status status = from_wire(fault);
   const std::uint64_t seq = fault.input_seq();
-  bool is_void = false;
-  {
-    const std::scoped_lock lock(mutex_);
-    const Answer answer = judge(seq, status);
-    if (seq != 0 && answer == Answer::kAgain) return status;
-    is_void = answer == Answer::kTaken && seq != 0 && seq < ledger_.newest();
-    if (answer == Answer::kTaken) ledger_.accept(seq);
-    if (answer == Answer::kRefused) ledger_.refuse(seq);
-    note_answered(seq);
-    changed_.notify_all();
-  }
+  const std::scoped_lock lock(mutex_);
+  const Answer answer = judge(seq, status);
+  if (seq != 0 && answer == Answer::kAgain) return status;
+  const bool is_void = answer == Answer::kTaken && seq != 0 && seq < ledger_.newest();
+  if (answer == Answer::kTaken) ledger_.accept(seq);
+  if (answer == Answer::kRefused) ledger_.refuse(seq);
+  note_answered(seq);
   if (!is_void) box_.put_problem(status);
+  changed_.notify_all();
   return absl::OkStatus();
 }
 

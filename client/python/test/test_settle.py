@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -52,6 +53,26 @@ def test_what_was_refused_leaves_the_result_before_it(session: lpdeform.Session)
     with pytest.raises(lpdeform.InvalidInput):
         session.settle(PATIENCE)
     assert session.settle(0) is frame
+
+
+def test_a_refusal_that_comes_while_it_looks_is_raised_first(
+    session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session.move("right", translation=[0, 0, 1])
+    number = session.set_handle("beyond", [10**6])
+    link = session._link
+    look = link.is_result
+
+    def look_after_the_refusal(frame: lpdeform.Frame) -> bool:
+        deadline = time.monotonic() + PATIENCE
+        while link.ledger.newest >= number:
+            assert time.monotonic() < deadline
+            time.sleep(0.001)
+        return look(frame)
+
+    monkeypatch.setattr(link, "is_result", look_after_the_refusal)
+    with pytest.raises(lpdeform.InvalidInput, match="HANDLE_VERTEX_OUT_OF_RANGE"):
+        session.settle(PATIENCE)
 
 
 def test_every_thread_that_waits_gets_it(session: lpdeform.Session) -> None:

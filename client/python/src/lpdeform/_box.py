@@ -80,9 +80,7 @@ class FrameBox:
         """The newest frame, or None. Raises each error of the server once. When nothing more comes, raises the reason every
         time."""
         with self._changed:
-            if self._problems:
-                self._count_take()
-                raise again(self._problems.popleft())
+            self.raise_problem()
             taken, self._newest = self._newest, None
             if taken is None and self._end is not None:
                 raise again(self._end)
@@ -90,6 +88,13 @@ class FrameBox:
                 self.last_final = taken.frame if taken.frame.is_final else None
                 self._count_take()
             return taken
+
+    def raise_problem(self) -> None:
+        """Raises the next error of the server, if there is one."""
+        with self._changed:
+            if self._problems:
+                self._count_take()
+                raise again(self._problems.popleft())
 
     def _count_take(self) -> None:
         self.takes += 1

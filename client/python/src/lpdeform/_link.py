@@ -104,10 +104,16 @@ class Link:
         return taken.frame
 
     def take_result(self) -> Frame | None:
-        """The frame taken last, by any caller, if it is the finished result of the newest update."""
+        """The frame taken last, by any caller, if it is the finished result of the newest update.
+
+        Raises the refusal first if the last frame is the result only because a newer update has been refused meanwhile.
+        """
         self.take()
         last = self.box.last_final
-        return last if last is not None and self.is_result(last) else None
+        if last is None or not self.is_result(last):
+            return None
+        self.box.raise_problem()
+        return last
 
     def is_result(self, frame: Frame) -> bool:
         with self.changed:
@@ -390,8 +396,8 @@ class Link:
             elif answer is Answer.REFUSED:
                 self.ledger.refuse(error.input_seq)
             self._note_answered(stream, error.input_seq)
-        if not is_void:
-            self.box.put_problem(error)
+            if not is_void:
+                self.box.put_problem(error)  # under the same lock: who sees the refusal in the ledger finds its error
 
     def _note_answered(self, stream: Stream, seq: int) -> None:
         packer = stream.uploads.pop(seq, None)
