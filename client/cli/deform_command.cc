@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
 #include "client/cli/files/handle_file.h"
 #include "client/cli/files/mesh_input.h"
 #include "client/cli/files/outputs.h"
@@ -18,14 +17,13 @@
 #include "client/cli/local_server.h"
 #include "client/cli/progress.h"
 #include "client/cli/report.h"
+#include "client/cli/search_text.h"
 #include "client/cpp/client.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
 
 namespace lpdeform::cli {
 namespace {
-
-constexpr double kSameMinimum = 1e-3;  // energies that differ by less, relatively, are counted as one minimum
 
 /// All inputs of the command, read and checked before any work is done.
 struct Inputs {
@@ -161,34 +159,6 @@ absl::Status write_results(const DeformOptions& options, const Inputs& inputs, c
   return written;
 }
 
-/// How many of the energies are different minima, beyond the tolerance of solves.
-std::size_t different(std::vector<double> minima) {
-  std::ranges::sort(minima);
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < minima.size(); ++k)
-    count += k == 0 || minima[k] > (1 + kSameMinimum) * minima[k - 1] ? 1 : 0;
-  return count;
-}
-
-/// What the certificate does not say: it is about the rotations of the result, and another minimum may be lower.
-std::string search_text(const Solved& solved) {
-  const client::SolveResult& result = solved.result;
-  if (result.minima.empty()) return "no minimum was reached, and so no other was looked for";
-  if (result.effort == 0) return "no other minima were looked for (--effort 1 does that)";
-  if (result.further_starts == 0 && result.search_iterations > 0)
-    return "the search for other minima was cut off by a limit before a start had ended";
-  if (result.further_starts == 0)
-    return "no other minima were looked for: a search needs 100 vertices and a distortion";
-  const auto [lowest, highest] = std::ranges::minmax(result.minima);
-  const std::size_t count = different(result.minima);
-  const std::string seen =
-      count == 1 ? absl::StrFormat("1 minimum was seen, E = %.6g", lowest)
-                 : absl::StrFormat("%u minima were seen, E from %.6g to %.6g", count, lowest, highest);
-  if (result.further_starts == 1) return "looked for lower minima on coarse levels; " + seen;
-  return absl::StrFormat("looked for lower minima from %u further starts, of which %u converged; %s",
-                         result.further_starts, result.minima.size() - 1, seen);
-}
-
 void print_summary(const Inputs& inputs, const Solved& solved) {
   const client::SolveResult& result = solved.result;
   std::printf("%s after %u iterations of %s, %.3f s: E = %.6g, from %.6g",
@@ -199,7 +169,7 @@ void print_summary(const Inputs& inputs, const Solved& solved) {
     std::printf("; E^(1/p) = %.6g", std::pow(result.energy, 1 / *p));
   if (result.optimality_gap) std::printf("; gap %.2g", *result.optimality_gap);
   std::printf("\n");
-  if (result.optimality_gap || result.effort > 0) std::printf("%s\n", search_text(solved).c_str());
+  if (result.optimality_gap || result.effort > 0) std::printf("%s\n", search_text(result).c_str());
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_replace.h"
+#include "client/cli/search_text.h"
 #include "core/base/geometry.h"
 #include "core/solve/summary.h"
 
@@ -129,6 +130,7 @@ std::string report_json(const client::MeshReport& mesh, const client::FieldValue
                             {"soft_energy", result.soft_energy},
                             {"optimality_gap", gap},
                             {"minima", result.minima},
+                            {"different_energies", different_energies(result.minima)},
                             {"effort", result.effort},
                             {"further_starts", result.further_starts},
                             {"setup_seconds", result.setup_seconds},

@@ -83,6 +83,53 @@ class Deform(OnShapes):
         report = self.deform("--p", 1, "--time-limit", 1e-6)
         self.assertEqual(report["stop_reason"], "time_limit")
 
+    def second_line(self, *options, shape="bar"):
+        """What `deform` prints of the search."""
+        done = run("deform", self.at(f"{shape}.off"), "--handles", self.at(f"{shape}.json"), *options)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lines = done.stdout.splitlines()
+        return lines[1] if len(lines) > 1 else None
+
+    def test_an_effort_looks_for_lower_minima_and_the_report_says_from_how_many_starts(self):
+        first = self.deform("--p", 1.5, "--effort", 0)
+        self.assertEqual((first["effort"], first["further_starts"], first["search_iterations"]), (0, 0, 0))
+        self.assertEqual(first["minima"], [first["energy"]])
+        for effort, starts in ((None, 8), (2, 16)):
+            report = self.deform("--p", 1.5, *(("--effort", effort) if effort else ()))
+            self.assertEqual((report["effort"], report["further_starts"]), (effort or 1, starts))
+            self.assertEqual(report["minima"][0], first["energy"])
+            self.assertEqual(report["energy"], min(report["minima"]))
+            self.assertLessEqual(len(report["minima"]), 1 + starts)
+            self.assertEqual(report["iterations"] - report["search_iterations"], first["iterations"])
+            ascending = sorted(report["minima"])
+            different = 1 + sum(after > 1.001 * before for before, after in zip(ascending, ascending[1:]))
+            self.assertEqual(report["different_energies"], different)
+
+    def test_the_second_line_says_what_was_searched_and_no_more(self):
+        report = self.deform("--p", 1.5)
+        first = report["iterations"] - report["search_iterations"]
+        converged = len(report["minima"]) - 1
+        self.assertTrue(self.second_line("--p", 1.5).startswith(
+            f"looked for lower minima from 8 further starts, of which {converged} converged; "
+            f"minima of {report['different_energies']} energ"))
+        self.assertEqual(self.second_line("--p", 1.5, "--effort", 0, "--certify"), "no other minima were looked for (effort 0)")
+        self.assertIsNone(self.second_line("--p", 1.5, "--effort", 0))
+        # The bar is large enough and has distortion: only the limit has kept it from a search.
+        self.assertEqual(self.second_line("--p", 1.5, "--max-iterations", first), "no other minima were looked for (effort 1)")
+        self.assertEqual(self.second_line("--p", 1.5, "--max-iterations", first + 1),
+                         "the search for lower minima ended before its first start did")
+        self.assertEqual(self.second_line("--p", 1.5, "--max-iterations", 1),
+                         "the solve ended before a first minimum, and no other was looked for")
+
+    def test_meshes_of_fewer_than_100_vertices_are_not_searched(self):
+        self.write("tiny.off", "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n")
+        self.write("tiny.json", '{"handles": [{"name": "a", "vertices": [0, 1]}, '
+                                '{"name": "b", "vertices": [3], "translate": [0, 0, 2]}]}')
+        self.assertEqual(self.second_line("--p", 1.5, "--effort", 4, shape="tiny"), "no other minima were looked for (effort 4)")
+
+    def test_an_effort_over_1000_is_refused(self):
+        self.assertIn("--effort", self.refused(2, "deform", self.at("bar.off"), "--handles", self.at("bar.json"), "--effort", 1001))
+
     def test_a_solve_that_stalls_short_of_its_tolerance_is_status_1_and_still_reported(self):
         # Gradient descent has no step left that lowers the energy in double precision long before 1e-14.
         report = self.deform("--p", 2, "--method", "line_search", "--tolerance", 1e-14, status=1)
@@ -181,7 +228,7 @@ class Deform(OnShapes):
     def test_help_explains_every_option(self):
         text = run("deform", "--help").stdout
         for option in ("--handles", "--p ", "--p-field", "--stiffness-field", "--length-unit", "--method", "--weights",
-                       "--initial", "--free-components", "--max-iterations", "--tolerance", "--time-limit", "--threads",
+                       "--initial", "--free-components", "--max-iterations", "--tolerance", "--time-limit", "--threads", "--effort",
                        "--weld", "--normals", "--out", "--certify", "--report", "--server", "--p-group", "--stiffness-group", "Exit status"):
             self.assertIn(option, text)
         self.assertRegex(run("--version").stdout, r"^lpdeform \d+\.\d+\.\d+\n$")

@@ -95,7 +95,8 @@ TEST(Report, HasEveryKeyThatIsPromised) {
   const auto report = nlohmann::json::parse(report_json(mesh, 1.5, small_result()));
   for (const char* key :
        {"mesh", "p", "method", "threads", "stop_reason", "iterations", "initial_energy", "energy",
-        "optimality_gap", "setup_seconds", "solve_seconds", "trace", "distortion"}) {
+        "optimality_gap", "minima", "different_energies", "effort", "further_starts", "search_iterations",
+        "setup_seconds", "solve_seconds", "trace", "distortion"}) {
     EXPECT_TRUE(report.contains(key)) << key;
   }
   for (const char* key : {"min", "mean", "max", "median", "top_5_percent_share"}) {
@@ -115,6 +116,20 @@ TEST(Report, SaysNullWhereTheGapWasNotComputed) {
   EXPECT_TRUE(nlohmann::json::parse(report_json({}, 2.0, result))["optimality_gap"].is_null());
   result.optimality_gap = 1e-4;
   EXPECT_EQ(nlohmann::json::parse(report_json({}, 2.0, result))["optimality_gap"], 1e-4);
+}
+
+TEST(Report, HasTheEnergiesOfAllMinimaAndHowManyDiffer) {
+  client::SolveResult result = small_result();
+  result.minima = {9, 8, 8.001, 9};
+  result.further_starts = 5;
+  result.search_iterations = 40;
+  result.effort = 2;
+  const auto report = nlohmann::json::parse(report_json({}, 1.5, result));
+  EXPECT_EQ(report["minima"], nlohmann::json::parse("[9.0, 8.0, 8.001, 9.0]"));
+  EXPECT_EQ(report["different_energies"], 2);
+  EXPECT_EQ(report["further_starts"], 5);
+  EXPECT_EQ(report["search_iterations"], 40);
+  EXPECT_EQ(report["effort"], 2);
 }
 
 TEST(Report, SumsUpAFieldOfP) {
