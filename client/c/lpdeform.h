@@ -324,8 +324,8 @@ enum {
   LPDEFORM_NOTICE_BETTER_SHAPE = 5
 };
 
-/* BETTER_SHAPE while it applies: until the shape is shown, or a frame for a later change arrives. Otherwise the last
- * notice of the server about itself on the present connection, or about the mesh. NONE if there is none, and for a NULL
+/* BETTER_SHAPE while it applies: until the shape is shown, a frame for a later change arrives, or an lpdeform_solve
+ * ends. Otherwise the last notice of the server about itself on the present connection, or about the mesh. NONE if there is none, and for a NULL
  * session. Writes one sentence for people to `text`, which has `bytes` bytes and may be NULL; it is cut like the texts of errors. Log
  * it when it changes. */
 LPDEFORM_API lpdeform_notice lpdeform_session_notice(const lpdeform_session* session, char* text,
@@ -570,7 +570,9 @@ typedef struct lpdeform_frame {
   uint64_t epoch;
   uint64_t skipped_inputs; /* changes since the previous frame for which there is no frame */
   uint32_t iteration;
-  uint32_t is_final; /* 1: final, however the solve ended; no further frame until there is a new change */
+  /* 1: final, however the solve ended. No further frame until there is a new change, except this one again with its
+   * optimality_gap (certify), and a better shape that is taken or shown. */
+  uint32_t is_final;
   lpdeform_stop_reason stop_reason;
   uint32_t has_optimality_gap;
   double energy; /* lengths in metres */

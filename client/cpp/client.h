@@ -171,8 +171,8 @@ class Session {
   /// The error with which the connection broke last, or with which the last attempt to reconnect failed; OK while it is
   /// connected.
   absl::Status last_problem() const;
-  /// The notice of a better shape for as long as it applies: until the shape is shown, or a frame for a later update
-  /// arrives. Otherwise the last notice from the server about itself on the present stream of frames. Empty if there was
+  /// The notice of a better shape for as long as it applies: until the shape is shown, a frame for a later update
+  /// arrives, or a solve() ends. Otherwise the last notice from the server about itself on the present stream of frames. Empty if there was
   /// none, and while the stream is down.
   std::optional<Notice> notice() const;
   /// The server's report on the mesh.

@@ -292,7 +292,12 @@ absl::StatusOr<SolveResult> Link::solve_once(const SolveOptions& options) {
   const Lease lease = lease_;
   lock.unlock();
 
-  absl::StatusOr<SolveResult> result = run_solve(*rpc_, lease, update, options, stop_.get_token());
+  const auto forget_better = [this] {  // as the server has; it searches again
+    const std::scoped_lock held(mutex_);
+    better_.reset();
+  };
+  absl::StatusOr<SolveResult> result =
+      run_solve(*rpc_, lease, update, options, stop_.get_token(), forget_better);
   lock.lock();
   if (update) note_answer(update->seq, result.status());
   if (absl::IsUnavailable(result.status()))

@@ -34,8 +34,9 @@ absl::Status fill_request(const Lease& lease, const std::optional<NumberedUpdate
 /// Assembles the result from the messages of a Solve call.
 class ResultBuilder {
  public:
-  ResultBuilder(std::uint32_t vertex_count, const SolveOptions& options)
-      : assembly_(vertex_count), options_(options) {}
+  ResultBuilder(std::uint32_t vertex_count, const SolveOptions& options,
+                const std::function<void()>& on_solved)
+      : assembly_(vertex_count), options_(options), on_solved_(on_solved) {}
 
   absl::Status take(const v1::SolveResponse& response) {
     switch (response.message_case()) {
@@ -44,6 +45,7 @@ class ResultBuilder {
         break;
       case v1::SolveResponse::kSummary:
         from_wire(response.summary(), result_);
+        on_solved_();
         break;
       case v1::SolveResponse::kTrace:
         for (const auto& record : response.trace().records()) result_.trace.push_back(from_wire(record));
@@ -80,6 +82,7 @@ class ResultBuilder {
 
   FrameAssembly assembly_;
   const SolveOptions& options_;
+  const std::function<void()>& on_solved_;
   SolveResult result_;
   bool is_whole_ = false;
 };
@@ -88,12 +91,13 @@ class ResultBuilder {
 
 absl::StatusOr<SolveResult> run_solve(Rpc& rpc, const Lease& lease,
                                       const std::optional<NumberedUpdate>& update,
-                                      const SolveOptions& options, const std::stop_token& stop) {
+                                      const SolveOptions& options, const std::stop_token& stop,
+                                      const std::function<void()>& on_solved) {
   v1::SolveRequest request;
   Uploads uploads(rpc, stop);
   const absl::Status filled = fill_request(lease, update, options, uploads, request);
   if (!filled.ok()) return filled;
-  ResultBuilder builder(static_cast<std::uint32_t>(lease.mesh.vertices), options);
+  ResultBuilder builder(static_cast<std::uint32_t>(lease.mesh.vertices), options, on_solved);
   const absl::Status ended =
       rpc.solve(request, options.deadline_seconds, stop,
                 [&](const v1::SolveResponse& response) { return builder.take(response); });

@@ -170,8 +170,8 @@ namespace Lpdeform
     {
         /// None: no notice on the present connection. After Overloaded frames come less often, and the last frame of a change
         /// comes later, until Recovered. Other: from a newer server. Mesh: the mesh is split and comes apart there, until another
-        /// notice comes. BetterShape: a shape of lower energy is known for the newest change, until it is shown or a frame for a
-        /// later change comes; see Session.TakeBetterShape.
+        /// notice comes. BetterShape: a shape of lower energy is known for the newest change, until it is shown, a frame for a
+        /// later change comes, or Session.Solve ends; see Session.TakeBetterShape.
         public NoticeReason Reason;
         /// One sentence for people.
         public string Text;
@@ -189,7 +189,8 @@ namespace Lpdeform
         /// The newest change that it answers: see Handles.
         public ulong InputSeq;
         public int Iteration;
-        /// Whether this is the result, however its solve ended (StopReason): no further frame comes until there is a new change.
+        /// Whether this is the result, however its solve ended (StopReason). No further frame comes until there is a new change,
+        /// except this one again with its OptimalityGap, and a better shape that is taken or shown.
         public bool IsFinal;
         public StopReason StopReason;
         /// Lengths in metres.

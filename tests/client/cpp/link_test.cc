@@ -347,6 +347,19 @@ TEST_F(BetterShapeTest, EndsWhenThereIsAFrameForALaterUpdate) {
   EXPECT_EQ(reason(), Notice::Reason::kOverloaded);
 }
 
+TEST_F(BetterShapeTest, EndsWithASolveOfTheSameUpdateAfterWhichTheServerSearchesAgain) {
+  told();
+  ASSERT_TRUE(link_->solve({}).ok());
+  EXPECT_EQ(reason(), Notice::Reason::kOverloaded);
+}
+
+TEST_F(BetterShapeTest, StaysWhereASolveFails) {
+  told();
+  rpc_->solve_ends.push_back(absl::ResourceExhaustedError("full"));
+  EXPECT_FALSE(link_->solve({}).ok());
+  EXPECT_EQ(reason(), Notice::Reason::kBetterShape);
+}
+
 TEST_F(BetterShapeTest, ThatIsNotThereAnyMoreIsAnErrorAndNotAnnouncedAnyMore) {
   told();
   rpc_->better_shape = make_fault({Reason::kNoBetterShape, "", ""}, "None.");

@@ -161,7 +161,7 @@ def _run(
             request.initial_positions.data.CopyFrom(packer.pack(initial.tobytes()))
         call = link.rpc.solve(request, timeout)
         stop.add(call)
-        builder = _ResultBuilder(lease.report.vertices, options)
+        builder = _ResultBuilder(lease.report.vertices, options, link.drop_better_shape)
         for response in call:
             builder.take(response)
         return builder.finish()
@@ -177,9 +177,11 @@ def _run(
 class _ResultBuilder:
     """Handles the messages of a Solve call."""
 
-    def __init__(self, vertex_count: int, options: SolveOptions) -> None:
+    def __init__(self, vertex_count: int, options: SolveOptions, on_solved: Callable[[], None]) -> None:
+        """`on_solved`: called once the server has solved, before the result has come."""
         self._assembly = FrameAssembly(vertex_count)
         self._options = options
+        self._on_solved = on_solved
         self._summary: service_pb2.SolveSummary | None = None
         self._trace: list[IterationRecord] = []
         self._frame: Frame | None = None
@@ -191,6 +193,7 @@ class _ResultBuilder:
             self._options.on_progress(SolveProgress(progress.iteration, progress.energy, progress.seconds))
         elif kind == "summary":
             self._summary = response.summary
+            self._on_solved()
         elif kind == "trace":
             for one in response.trace.records:
                 self._trace.append(IterationRecord(one.iteration, one.seconds, one.energy, one.objective, one.stage))

@@ -97,8 +97,8 @@ class Live:
 
     @property
     def notice(self) -> Notice | None:
-        """The notice of a better shape for as long as it applies: until it is taken, or a frame for a later update comes.
-        Otherwise the last notice of the server about itself on the present stream; None if there was none. Each is also logged, by
+        """The notice of a better shape for as long as it applies: until it is taken, a frame for a later update comes, or a
+        solve() ends. Otherwise the last notice of the server about itself on the present stream; None if there was none. Each is also logged, by
         the logger "lpdeform": as a warning if the server is overloaded."""
         return self._link.notice
 

@@ -399,13 +399,18 @@ export class Link {
     const { session, writerToken } = this.#lease;
     try {
       const { inputSeq, energy } = await this.rpc.call("takeBetterShape", { session, writerToken }, signal);
-      if (this.#notices.dropBetter()) this.#tellNotice();
+      this.forgetBetter();
       return { inputSeq: Number(inputSeq), energy };
     } catch (thrown) {
       const { reason } = thrown as LpdeformError;
-      if (reason === "NO_BETTER_SHAPE" && this.#notices.dropBetter()) this.#tellNotice();
+      if (reason === "NO_BETTER_SHAPE") this.forgetBetter();
       throw thrown;
     }
+  }
+
+  /** The better shape that was announced is not there any more: it was taken, or a solve has ended. */
+  forgetBetter(): void {
+    if (this.#notices.dropBetter()) this.#tellNotice();
   }
 
   #clearNotices(): void {

@@ -97,8 +97,8 @@ export class Session implements AsyncIterable<Frame> {
   }
 
   /**
-   * The notice of a better shape for as long as it applies: until it is taken, or a frame for a later update comes. Otherwise the
-   * last notice of the server about itself on the present stream; undefined if there was none.
+   * The notice of a better shape for as long as it applies: until it is taken, a frame for a later update comes, or a solve() ends.
+   * Otherwise the last notice of the server about itself on the present stream; undefined if there was none.
    */
   get notice(): Notice | undefined {
     return this.#link.notice;
@@ -272,7 +272,7 @@ export class Session implements AsyncIterable<Frame> {
     const update = ledger.hasWaiting ? ledger.sendNext() : undefined;
     const { newest } = ledger;
     try {
-      const result = await runSolve(rpc, lease, update, options, end, signal);
+      const result = await runSolve(rpc, lease, update, options, end, signal, () => this.#link.forgetBetter());
       if (update) ledger.accept(update);
       if (result.inputSeq < newest) ledger.resumedAt(result.inputSeq);
       if (result.inputSeq >= newest || !ledger.hasRestore) return result;

@@ -15,7 +15,7 @@ import { Uploads } from "./upload.js";
 
 /**
  * One Solve call, from its request to the finished result. `end`: its deadline, on the clock of performance.now(). The call
- * counts as dead after three heartbeats of silence.
+ * counts as dead after three heartbeats of silence. `onSolved`: called once the server has solved, before the result has come.
  */
 export async function runSolve(
   rpc: Rpc,
@@ -24,6 +24,7 @@ export async function runSolve(
   options: SolveOptions | DoubleSolveOptions,
   end: number | undefined,
   signal: AbortSignal,
+  onSolved: () => void,
 ): Promise<SolveResult<Float32Array | Float64Array>> {
   const uploads = new Uploads(rpc, signal);
   const packer = new Packer();
@@ -51,7 +52,7 @@ export async function runSolve(
       signal: AbortSignal.any([signal, dead.signal]),
       timeoutMs: end === undefined ? 0 : Math.max(Math.ceil(end - performance.now()), 1),
     };
-    const result = new ResultBuilder(lease.report.vertices, options);
+    const result = new ResultBuilder(lease.report.vertices, options, onSolved);
     heard();
     for await (const response of rpc.client.solve(request, calling)) {
       heard();
@@ -79,6 +80,7 @@ class ResultBuilder {
   constructor(
     vertexCount: number,
     readonly options: SolveOptions | DoubleSolveOptions,
+    readonly onSolved: () => void,
   ) {
     this.#assembly = new FrameAssembly(vertexCount, isDouble(options));
   }
@@ -100,6 +102,7 @@ class ResultBuilder {
           inputSeq: Number(inputSeq),
           ...(certificate && { optimalityGap: certificate.relativeGap }),
         };
+        this.onSolved();
         break;
       }
       case "trace":

@@ -2,6 +2,7 @@ import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { describe, expect, test } from "vitest";
 import { changesFromWire } from "../src/fromwire.js";
+import { Encoding } from "../src/gen/lpdeform/v1/frame_pb.js";
 import { GoAwayReason, NoticeReason, UndoUpdateResponseSchema } from "../src/gen/lpdeform/v1/service_pb.js";
 import { Packer } from "../src/packer.js";
 import { joinWith, openWith, restoreWith } from "../src/session.js";
@@ -30,6 +31,15 @@ describe("a better shape", () => {
     value: { reason: NoticeReason.BETTER_SHAPE, text: "Better.", inputSeq, energy: 3, savedShare: 0.25 },
   });
   const overloaded = { reason: "overloaded", text: "Too much." };
+  /** Of a triangle, as a solve gives it. */
+  const surface = {
+    header: { vertexCount: 3, frameSeq: 1n, encoding: Encoding.RAW },
+    frameSeq: 1n,
+    vertexCount: 3,
+    last: true,
+    positions: new Uint8Array(36),
+    distortion: new Uint8Array(12),
+  };
 
   /** A session that was told of a better shape for update 1, on a server that is overloaded. */
   async function told() {
@@ -68,6 +78,22 @@ describe("a better shape", () => {
     server.stream.frame({ frameSeq: 2n, isFinal: true, ...header });
     await arrived(server, session);
     expect([session.notice?.reason, heard.length]).toEqual([reason, reason === "overloaded" ? 1 : 0]);
+  });
+
+  test("ends with a solve of the same update, after which the server searches again, and stays where that fails", async () => {
+    const { server, session, heard } = await told();
+    server.on.solve = async function* () {
+      throw refusal("OUT_OF_MEMORY", {}, Code.ResourceExhausted);
+    };
+    await expect(session.solve()).rejects.toMatchObject({ code: "resource_exhausted" });
+    expect([session.notice?.reason, heard]).toEqual(["better_shape", []]);
+    server.on.solve = async function* () {
+      yield { message: { case: "summary", value: { energy: 4, inputSeq: 1n } } };
+      expect([session.notice?.reason, heard]).toEqual(["overloaded", [overloaded]]);
+      yield { message: { case: "frame", value: surface } };
+    };
+    expect((await session.solve()).energy).toBe(4);
+    expect(heard.length).toBe(1);
   });
 
   test("does not hide for ever what the server says of itself meanwhile", async () => {
