@@ -19,10 +19,8 @@ std::string without_minimum(client::StopReason reason) {
 }
 
 std::string starts_text(const client::SolveResult& result) {
-  const std::size_t converged = result.minima.size() - 1;
-  if (result.further_starts == 1)
-    return absl::StrCat("1 further start, which ", converged == 1 ? "converged" : "was given up");
-  return absl::StrFormat("%u further starts, of which %u converged", result.further_starts, converged);
+  return absl::StrFormat("%u further start%s, of which %u converged", result.further_starts,
+                         result.further_starts == 1 ? "" : "s", result.minima.size() - 1);
 }
 
 std::string energies_text(const std::vector<double>& minima) {

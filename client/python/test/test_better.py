@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import time
 from collections.abc import Callable
 
@@ -82,6 +83,19 @@ def test_a_better_shape_is_not_announced_any_more_once_a_frame_answers_a_later_c
         assert not better(session)
 
 
+def test_a_better_shape_is_not_announced_any_more_after_a_solve(server: Server) -> None:
+    with bend(server, effort=2) as session:
+        session.settle(PATIENCE)
+        until(lambda: better(session))
+        known = []
+        session.solve(on_progress=lambda _: known.append(better(session)))
+        assert all(known)  # until the server has solved
+        # It may have searched again by now, and then the shape is one that it has.
+        if better(session):
+            session.take_better_shape()
+        assert not better(session)
+
+
 def test_a_better_shape_is_shown_at_once_if_that_is_asked_for(server: Server) -> None:
     with bend(server, effort=2, show=True) as session:
         first = session.settle(PATIENCE)
@@ -97,9 +111,33 @@ def test_a_solve_says_which_minima_it_has_seen(server: Server) -> None:
         result = session.solve()
         assert result.further_starts == 8
         assert result.energy == min(result.minima)
+        starts = f"looked for lower minima from 8 further starts, of which {len(result.minima) - 1} converged; minima of "
+        assert result.searched.startswith(starts)
     with bend(server, effort=0) as session:
-        result = session.solve()
+        result = session.solve(certify=True)
         assert (result.minima, result.further_starts) == ((result.energy,), 0)
+        assert result.searched == "no other minima were looked for (effort 0)"
+        assert repr(result).endswith(" for its rotations; no other minima were looked for (effort 0)>")
+
+
+def test_what_was_searched_is_said_without_a_word_too_much(server: Server) -> None:
+    with bend(server, effort=0) as session:
+        solved = session.solve()
+
+    def said(**facts: object) -> str:
+        return dataclasses.replace(solved, **facts).searched  # type: ignore[arg-type]
+
+    # A single start may be the result of coarse levels, or the only one before a limit.
+    assert said(minima=(8.0,), further_starts=1) == (
+        "looked for lower minima from 1 further start, of which 0 converged; minima of 1 energy were seen, E = 8"
+    )
+    assert said(minima=(8.0, 8.004, 7.0, 7.001, 7.5), further_starts=8) == (
+        "looked for lower minima from 8 further starts, of which 4 converged; minima of 3 energies were seen, E from 7 to 8.004"
+    )
+    assert said(search_iterations=3) == "the search for lower minima ended before its first start did"
+    assert said(minima=()) == "the server does not say whether it looked for other minima"
+    limited = said(minima=(), stop_reason="time_limit", effort=1)
+    assert limited == "the solve ended before a first minimum, and no other was looked for"
 
 
 def test_a_search_out_of_range_is_refused_by_name(server: Server) -> None:

@@ -34,13 +34,15 @@ TEST(SearchText, CountsTheStartsThatConvergedAndTheEnergiesThatDiffer) {
 
 TEST(SearchText, DoesNotSayWhereASingleStartLooked) {
   // It is the result of coarse levels, or the only one of a small mesh before a limit.
-  EXPECT_EQ(search_text(searched(1, 1, {7})),
-            "looked for lower minima from 1 further start, which converged; minima of 2 energies were seen, "
-            "E from 7 to "
-            "8");
-  EXPECT_EQ(search_text(searched(1, 1)),
-            "looked for lower minima from 1 further start, which was given up; minima of 1 energy were seen, "
-            "E = 8");
+  EXPECT_EQ(
+      search_text(searched(1, 1, {7})),
+      "looked for lower minima from 1 further start, of which 1 converged; minima of 2 energies were seen, "
+      "E from 7 to "
+      "8");
+  EXPECT_EQ(
+      search_text(searched(1, 1)),
+      "looked for lower minima from 1 further start, of which 0 converged; minima of 1 energy were seen, "
+      "E = 8");
 }
 
 TEST(SearchText, GivesNoReasonWhyThereWasNoSearch) {

@@ -313,8 +313,29 @@ class SolveResult:
     """The effort of the search: the one asked for, or the default."""
     trace: tuple[IterationRecord, ...]
 
+    @property
+    def searched(self) -> str:
+        """What was searched, in one line for people. `optimality_gap` does not say it: it is about the rotations of the result, and
+        another minimum may be lower. An energy that is at most 0.1 % above the next lower one is not counted."""
+        minima = sorted(self.minima)
+        if not minima and self.stop_reason in ("converged", "stalled"):  # a server that is older than the search
+            return "the server does not say whether it looked for other minima"
+        if not minima:
+            return "the solve ended before a first minimum, and no other was looked for"
+        if self.further_starts == 0 and self.search_iterations > 0:
+            return "the search for lower minima ended before its first start did"
+        if self.further_starts == 0:
+            return f"no other minima were looked for (effort {self.effort})"
+        count = 1 + sum(high > 1.001 * low for low, high in zip(minima, minima[1:], strict=False))
+        starts = f"{self.further_starts} further start{'s' if self.further_starts > 1 else ''}"
+        energies = f"1 energy were seen, E = {minima[0]:.6g}"
+        if count > 1:
+            energies = f"{count} energies were seen, E from {minima[0]:.6g} to {minima[-1]:.6g}"
+        return f"looked for lower minima from {starts}, of which {len(minima) - 1} converged; minima of {energies}"
+
     def __repr__(self) -> str:
+        gap = "" if self.optimality_gap is None else f", gap {self.optimality_gap:.2g} for its rotations"
         return (
             f"<SolveResult of {len(self.positions)} vertices: {self.stop_reason} after {self.iterations} iterations of "
-            f"{self.method}, energy {self.energy:.6g}>"
+            f"{self.method}, energy {self.energy:.6g}{gap}; {self.searched}>"
         )

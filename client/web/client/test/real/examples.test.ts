@@ -44,9 +44,10 @@ test("drag.ts ends where the pointer did", async () => {
 });
 
 test("solve.ts comes with its proof", async () => {
-  const [how, gap] = (await run("solve")).split("\n");
+  const [how, gap, search] = (await run("solve")).split("\n");
   expect(how).toMatch(/^converged after \d+ iterations of \w+$/);
   expect(Number(/within (\S+) %/.exec(gap!)![1])).toBeLessThan(1);
+  expect(search).toMatch(/^looked for lower minima from 0 further starts; minima were seen at E = [\d.]+$/);
 });
 
 test("steps.ts takes a step back and does it again in the session that is restored", async () => {
