@@ -23,5 +23,7 @@ console.log(`${result.stopReason} after ${result.trace.at(-1)!.iteration} iterat
 console.log(`within ${(100 * result.optimalityGap!).toPrecision(2)} % of the optimum for its rotations`);
 // Another minimum may be lower. This mesh is not searched: it has fewer than 100 vertices.
 const seen = result.minima.map((energy) => energy.toPrecision(3)).join(", ");
-console.log(`looked for lower minima from ${result.furtherStarts} further starts; minima were seen at E = ${seen || "?"}`);
+console.log(
+  `looked for lower minima from ${result.furtherStarts} further starts; minima were seen at E = ${seen || "?"}`,
+);
 await session.close();

@@ -2,6 +2,7 @@ import { afterEach, expect, it, vi } from "vitest";
 import { LpdeformError, type Notice } from "lpdeform-client";
 import { Live } from "../src/link/live.js";
 import { addHandle, changeHandle, type Document, emptyDocument } from "../src/model/document.js";
+import { lowerText, percent } from "../src/model/words.js";
 import { betterText } from "../src/ui/messages.js";
 
 /** A session that the test speaks for. */
@@ -108,4 +109,13 @@ it("what the server says about itself is told once, also if it applies again aft
 it("one better shape is offered by what it saves, several by the most that one of them saves", () => {
   expect(betterText([0.0714])).toBe("Take a shape with 7\u00a0% less energy");
   expect(betterText([0.03, 0.0714])).toBe("Take shapes with up to 7\u00a0% less energy");
+});
+
+it("what a better shape saves is not rounded up to a whole percent", () => {
+  expect([0.003, 0.0096, 0.0149, 0.07, 0.999].map(percent)).toEqual([0.3, 1, 1, 7, 99].map((value) => `${value}\u00a0%`));
+});
+
+it("beside the gap stands what is known of lower minima, and otherwise that there may be one", () => {
+  expect(lowerText(0.0714)).toBe("known, 7\u00a0% less energy");
+  expect(lowerText(undefined)).toBe("may exist");
 });

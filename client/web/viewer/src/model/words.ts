@@ -13,6 +13,20 @@ export function short(value: number): string {
   return Number(value.toPrecision(3)).toString();
 }
 
+/** "7 %", "0.3 %"; at most 99. */
+export function percent(share: number): string {
+  const value = 100 * share;
+  return `${value < 1 ? short(Number(value.toPrecision(1))) : Math.min(Math.round(value), 99)}\u00a0%`;
+}
+
+/**
+ * What is known of minima that are lower than a result. Frames do not say whether the server has searched. `saved`: the share of
+ * energy that the better shape saves, if one is known.
+ */
+export function lowerText(saved: number | undefined): string {
+  return saved === undefined ? "may exist" : `known, ${percent(saved)} less energy`;
+}
+
 export function capital(text: string): string {
   return text.slice(0, 1).toUpperCase() + text.slice(1);
 }

@@ -3,7 +3,7 @@ import type { Pane } from "../app/pane.js";
 import { placeOf } from "../app/sides.js";
 import { blueToRed } from "../model/colours.js";
 import { histogram } from "../model/statistics.js";
-import { short } from "../model/words.js";
+import { lowerText, short } from "../model/words.js";
 import { el, setText } from "./dom.js";
 import { plotBars, plotLines } from "./plot.js";
 
@@ -22,6 +22,7 @@ const rows = [
   ["method", "Method", "And the iterations of the newest solve"],
   ["stop", "Stop reason", "Why the solve ended"],
   ["gap", "Gap, at most", "How far the energy can be from the optimum for its rotations"],
+  ["lower", "A lower minimum", "The gap does not say whether another minimum is lower"],
 ] as const;
 
 type Row = (typeof rows)[number][0];
@@ -74,6 +75,9 @@ export function measures(app: App): HTMLElement {
   };
   app.afterDrawing.add(soon);
   app.view.watch(soon);
+  app.facts.watch(({ better }, before) => {
+    if (better !== before.better) soon();
+  });
   return element;
 }
 
@@ -118,6 +122,10 @@ function showNumbers(app: App, values: Record<Row, HTMLElement>, now: number): v
   setText(
     values.gap,
     both(({ frame }) => (frame?.optimalityGap === undefined ? "–" : gapText(frame.optimalityGap))),
+  );
+  setText(
+    values.lower,
+    both(({ frame, live }) => (app.isDistorted && frame?.isFinal ? lowerText(live?.better?.savedShare) : "–")),
   );
 }
 

@@ -1,6 +1,7 @@
 import type { Reason } from "lpdeform-client";
 import type { App } from "../app/app.js";
 import { elementsIn, isPassing, sentence, type Status } from "../link/status.js";
+import { percent } from "../model/words.js";
 import { el, setText } from "./dom.js";
 import { pointOutNamed } from "./report.js";
 
@@ -90,11 +91,6 @@ function betterButton(app: App): HTMLElement {
 export function betterText(shares: readonly number[]): string {
   const most = percent(Math.max(...shares));
   return shares.length === 1 ? `Take a shape with ${most} less energy` : `Take shapes with up to ${most} less energy`;
-}
-
-/** "7 %"; at least one, at most 99. */
-function percent(share: number): string {
-  return `${Math.min(Math.max(Math.round(100 * share), 1), 99)}\u00a0%`;
 }
 
 /** Says that the work was restored, until it is changed or the note is dismissed. */

@@ -270,6 +270,7 @@ describe("p", () => {
     // The server looks for the gaps by itself, once all rests.
     await user.until("[0, 1].every((pane) => window.__lpdeform.frame(pane).gap !== undefined)");
     await expect.poll(() => user.page.locator('[data-measure="gap"]').textContent()).toMatch(/^[^–]* %/);
+    await expect.poll(() => user.page.locator('[data-measure="lower"]').textContent()).toMatch(/^(may exist|known, )/);
     await press("s");
     await expect.poll(() => user.page.locator(".measures figcaption:visible").allTextContents()).toContain("Cells by energy");
     expect(await label(0)).toBe(`Picture of the surface, p = ${leftP}`);
