@@ -1,10 +1,12 @@
 """The add-on as people use it."""
 
+import dataclasses
 import os
 import signal
 import sys
 import tempfile
 import time
+import types
 import typing
 import unittest
 from unittest import mock
@@ -299,9 +301,43 @@ class AddOn(unittest.TestCase):
         stream.server_notice = client.lpdeform.Notice("recovered", "No more.")
         self.assertEqual(running.notice, "")
         self.assertFalse(bpy.ops.lpdeform.take_better.poll())
-        stream.better = client.lpdeform.Notice("better_shape", "A better one.")
+
+    def test_a_better_shape_is_offered_until_something_newer_is_sent(self):
+        _, tip = self.held()
+        stage.settle(self.tube)
+        running = live.of(self.tube)
+        self.assertFalse(bpy.ops.lpdeform.take_better.poll())
+        stream = running.session._link._stream
+        newest = running.session.newest_input
+        stream.better = client.lpdeform.Notice("better_shape", "A better one.", newest, 1.0, 0.07)
         self.assertEqual(running.notice, "A better one.")
         self.assertTrue(bpy.ops.lpdeform.take_better.poll())
+        self.shift(tip, 0.1, 0, 0)
+        running._tell(self.tube)  # no frame has come for it yet
+        self.assertGreater(running.session.newest_input, newest)
+        stream.better = client.lpdeform.Notice("better_shape", "A better one.", newest, 1.0, 0.07)
+        self.assertEqual(running.notice, "")
+        stage.activate(self.tube)
+        self.assertFalse(bpy.ops.lpdeform.take_better.poll())
+
+    def test_the_certificate_is_said_of_the_rotations_and_below_it_what_is_known_of_other_minima(self):
+        self.held()
+        stage.settle(self.tube)
+        running = live.of(self.tube)
+        self.assertEqual(running.proof, [])
+        running.frame = types.SimpleNamespace(optimality_gap=0.002, input_seq=running.frame.input_seq)
+        rotations = "Optimal to 0.2 % for its rotations"
+        self.assertEqual(running.proof, [rotations, "Another minimum may be lower"])
+        better = client.lpdeform.Notice("better_shape", "A better one.", running.session.newest_input, 1.0, 0.07)
+        running.session._link._stream.better = better
+        self.assertEqual((running.proof, running.notice), ([rotations], "A better one."))
+        self.assertEqual(bpy.ops.lpdeform.solve(), {"FINISHED"})
+        said, searched = running.proof
+        self.assertRegex(said, r"^Optimal to \S+ % for its rotations$")
+        self.assertEqual(searched.lower(), running.result.searched)
+        self.assertEqual(running.notice, "")  # the server has forgotten that shape
+        running.result = dataclasses.replace(running.result, optimality_gap=1.0)
+        self.assertEqual(running.proof[0], "No bound was found")
 
     def test_what_is_said_in_the_panel_is_not_cut(self):
         said = "The target of vertex 1440 of handle 2 is over 1e9 diagonals of the mesh away. (HANDLE_TARGET_TOO_FAR)"

@@ -81,15 +81,31 @@ class LiveMesh:
 
     @property
     def notice(self) -> str:
-        """The server's last notice about itself, unless it says that all is well again."""
+        """That of a better shape, or the server's last one about itself, unless it says that all is well again."""
         notice = self.session.notice
-        return notice.text if notice is not None and notice.reason != "recovered" else ""
+        is_past = notice is None or notice.reason == "recovered" or (notice.reason == "better_shape" and not self.has_better)
+        return "" if is_past else notice.text
 
     @property
     def has_better(self) -> bool:
-        """Whether the server knows a shape of lower energy."""
+        """Whether the server knows a shape of lower energy, and nothing newer was sent."""
         notice = self.session.notice
-        return notice is not None and notice.reason == "better_shape"
+        return notice is not None and notice.reason == "better_shape" and notice.input_seq >= self.session.newest_input
+
+    @property
+    def proof(self) -> list:
+        """What the certificate says of what is shown, and what is known of other minima, of which it says nothing. A line each. A
+        better shape that is known is in `notice`."""
+        gap = self.shown.optimality_gap if self.shown is not None else None
+        if gap is None:
+            return []
+        # The server says 1 if it has found no bound in time.
+        lines = [f"Optimal to {100 * gap:.2g} % for its rotations" if gap < 1 else "No bound was found"]
+        if self.result is not None:
+            lines.append(self.result.searched[0].upper() + self.result.searched[1:])
+        elif gap > 0 and not self.has_better:  # 0 is also what a shape without distortion has
+            lines.append("Another minimum may be lower")
+        return lines
 
     @property
     def mesh_notices(self) -> tuple:

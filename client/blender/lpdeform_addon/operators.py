@@ -156,7 +156,7 @@ class Solve(bpy.types.Operator):
         finally:
             manager.progress_end()
         result = running.result
-        self.report({"INFO"}, f"{result.stop_reason} after {result.iterations} iterations")
+        self.report({"INFO"}, f"{result.stop_reason} after {result.iterations} iterations; {result.searched}")
         return {"FINISHED"}
 
 

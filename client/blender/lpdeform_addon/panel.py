@@ -45,8 +45,8 @@ class MainPanel(bpy.types.Panel):
             layout.operator("lpdeform.start", icon="PLAY")
         else:
             layout.label(text=_words[running.state].format(address()), icon="LINKED")
-            if running.shown is not None and running.shown.optimality_gap is not None:
-                layout.label(text=f"Optimal to {100 * running.shown.optimality_gap:.2g} %", icon="CHECKMARK")
+            for line in running.proof:
+                _say(layout, context, line, "CHECKMARK")
             column = layout.column(align=True)
             column.operator("lpdeform.solve", icon="SHADERFX")
             column.operator("lpdeform.stop", icon="X")
