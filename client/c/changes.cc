@@ -90,8 +90,12 @@ std::optional<FieldValue> read_field(double uniform, const double* per_vertex, s
   return std::nullopt;
 }
 
-std::optional<MinimaSearch> read_search(const lpdeform_settings& settings) {
+absl::StatusOr<std::optional<MinimaSearch>> read_search(const lpdeform_settings& settings) {
   if (settings.set_search == 0) return std::nullopt;
+  if (settings.search_effort < -1) {
+    return make_fault({Reason::kEffortOutOfRange, "search_effort", "-1 <= search_effort <= 1000"},
+                      "The effort of the search for lower minima is negative.");
+  }
   MinimaSearch out{.show = settings.search_shows != 0, .least_share = settings.search_least_share};
   if (settings.search_effort != 0) out.effort = std::max(settings.search_effort, 0);
   return out;
@@ -183,11 +187,13 @@ absl::StatusOr<Settings> read_settings(const lpdeform_settings& settings, const 
     if (settings.method < LPDEFORM_METHOD_AUTO || settings.method > LPDEFORM_METHOD_MULTIRESOLUTION) {
       return check_enum("method", settings.method, LPDEFORM_METHOD_MULTIRESOLUTION);
     }
+    const absl::StatusOr<std::optional<MinimaSearch>> search = read_search(settings);
+    if (!search.ok()) return search.status();
     out.solver = SolverSettings{.method = static_cast<Method>(settings.method),
                                 .tolerance = settings.tolerance,
                                 .max_iterations = settings.max_iterations,
                                 .time_limit_seconds = settings.time_limit_seconds,
-                                .search = read_search(settings)};
+                                .search = *search};
   }
   if (settings.set_region != 0) {
     if (settings.region == nullptr && settings.region_count > 0) return argument_missing("settings.region");

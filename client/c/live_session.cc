@@ -51,6 +51,14 @@ client::Frame frame_of(client::SolveResult result) {
   return out;
 }
 
+void tell_search(const client::SolveResult& result, lpdeform_search& out) {
+  out.minima_count = static_cast<std::uint32_t>(result.minima.size());
+  std::copy_n(result.minima.begin(), std::min(out.minima_count, out.minima_capacity), out.minima);
+  out.further_starts = result.further_starts;
+  out.search_iterations = result.search_iterations;
+  out.effort = result.effort;
+}
+
 }  // namespace
 
 LiveSession::LiveSession(Opening opening, Facts facts)
@@ -329,7 +337,8 @@ absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::settle(double timeout
 }
 
 absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::solve(double timeout_seconds, bool certify,
-                                                                 const lpdeform_buffers& buffers) {
+                                                                 const lpdeform_buffers& buffers,
+                                                                 lpdeform_search& search) {
   const double longest = timeout_seconds > 0 ? timeout_seconds : 1e9;
   const Clock::time_point start = Clock::now();
   const auto live = wait_for_session(
@@ -344,6 +353,7 @@ absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::solve(double timeout_
   if (timeout_seconds > 0) options.deadline_seconds = std::max(timeout_seconds - waited, 1e-3);
   absl::StatusOr<client::SolveResult> result = (*live)->solve(options);
   if (!result.ok()) return result.status();
+  tell_search(*result, search);
   return write(frame_of(*std::move(result)), buffers);
 }
 

@@ -68,7 +68,8 @@ class LiveSession {
                                                        const lpdeform_buffers& buffers);
   /// As lpdeform_solve; `timeout_seconds` 0 means no limit.
   absl::StatusOr<std::optional<lpdeform_frame>> solve(double timeout_seconds, bool certify,
-                                                      const lpdeform_buffers& buffers);
+                                                      const lpdeform_buffers& buffers,
+                                                      lpdeform_search& search);
 
   /// Ends the session for the caller. The thread closes it; if it is still being opened, after that.
   void close();

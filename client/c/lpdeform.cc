@@ -152,6 +152,15 @@ lpdeform_code write(lpdeform_session* session, const lpdeform_buffers* buffers, 
   return code == LPDEFORM_OK && !is_there ? LPDEFORM_NO_FRAME : code;
 }
 
+/// A copy of `given`, with room for nothing if it is NULL.
+absl::StatusOr<lpdeform_search> read_search(const lpdeform_search* given) {
+  if (given == nullptr) return lpdeform_search{};
+  const auto search = engine::read_struct(given, "search");
+  if (!search.ok()) return search.status();
+  if (search->minima == nullptr && search->minima_capacity > 0) return argument_missing("search.minima");
+  return *search;
+}
+
 lpdeform_notice notice_reason(client::Notice::Reason reason) {
   switch (reason) {
     case client::Notice::Reason::kOverloaded:
@@ -430,16 +439,21 @@ lpdeform_code lpdeform_settle(lpdeform_session* session, double timeout_seconds,
 
 lpdeform_code lpdeform_solve(lpdeform_session* session, const lpdeform_solve_options* options,
                              const lpdeform_buffers* buffers, lpdeform_frame* frame, lpdeform_error* error) {
-  return write(
-      session, buffers, frame, error,
-      [=](engine::LiveSession& live,
-          const lpdeform_buffers& into) -> absl::StatusOr<std::optional<lpdeform_frame>> {
-        lpdeform_solve_options defaults{};
-        defaults.struct_size = sizeof defaults;
-        const auto given = engine::read_struct(options == nullptr ? &defaults : options, "solve_options");
-        if (!given.ok()) return given.status();
-        const absl::Status checked = engine::check_seconds("timeout_seconds", given->timeout_seconds);
-        if (!checked.ok()) return checked;
-        return live.solve(given->timeout_seconds, given->certify != 0, into);
-      });
+  return write(session, buffers, frame, error,
+               [=](engine::LiveSession& live,
+                   const lpdeform_buffers& into) -> absl::StatusOr<std::optional<lpdeform_frame>> {
+                 lpdeform_solve_options defaults{};
+                 defaults.struct_size = sizeof defaults;
+                 const auto given =
+                     engine::read_struct(options == nullptr ? &defaults : options, "solve_options");
+                 if (!given.ok()) return given.status();
+                 absl::Status checked = engine::check_seconds("timeout_seconds", given->timeout_seconds);
+                 const absl::StatusOr<lpdeform_search> search = read_search(given->search);
+                 checked.Update(search.status());
+                 if (!checked.ok()) return checked;
+                 lpdeform_search found = *search;
+                 const auto frame = live.solve(given->timeout_seconds, given->certify != 0, into, found);
+                 if (frame.ok()) engine::write_struct(found, given->search);
+                 return frame;
+               });
 }

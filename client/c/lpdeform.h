@@ -442,7 +442,7 @@ typedef struct lpdeform_settings {
    * are not read, and have their defaults. The energy has many minima where p is below 2. A session searches when nothing
    * changes for a second. lpdeform_solve searches with what is left of its limits, before it returns. */
   uint32_t set_search;
-  /* The number of further starts is 8 times the effort, 1 to 1000. Negative: no search, the first minimum is taken. 0: the
+  /* The number of further starts is 8 times the effort, 1 to 1000. -1: no search, the first minimum is taken. 0: the
    * default, which is 1 if `method` is AUTO and p is below 2 somewhere, and for lpdeform_solve if it also starts cold;
    * otherwise there is no search. A start takes up to two or three times as long as the first minimum. Meshes of fewer than
    * 100 vertices are not searched. Meshes of more than 15,000 vertices are searched on their coarse levels, and only what
@@ -605,10 +605,28 @@ LPDEFORM_API lpdeform_code lpdeform_settle(lpdeform_session* session, double tim
                                            const lpdeform_buffers* buffers, lpdeform_frame* frame,
                                            lpdeform_error* error);
 
+/* What lpdeform_solve has searched. frame.optimality_gap does not say it: it is about the rotations of the result, and
+ * another minimum may be lower. The library writes all fields but the first three. */
+typedef struct lpdeform_search {
+  uint32_t struct_size;
+  uint32_t minima_capacity; /* how many numbers `minima` has room for */
+  /* Receives the energies at which starts have converged, in order, as many as there is room for: the first minimum, then
+   * those of the search for lower ones. Several starts may converge to the same minimum. frame.energy is the lowest. May
+   * be NULL with minima_capacity 0. */
+  double* minima;
+  /* How many energies there are, also if it is more than minima_capacity: up to 1 + further_starts. 0 if a limit has ended
+   * the solve before the first minimum, and with a server that is older than the search. */
+  uint32_t minima_count;
+  uint32_t further_starts;    /* of the search, including those that were given up, which have no energy */
+  uint32_t search_iterations; /* the part of frame.iteration that the search made */
+  uint32_t effort;            /* of the search: search_effort, or the default; 0 is no search */
+} lpdeform_search;
+
 typedef struct lpdeform_solve_options {
   uint32_t struct_size;
-  uint32_t certify;       /* 1: compute frame.optimality_gap */
-  double timeout_seconds; /* of the whole call, including the wait for another solve; 0 means no limit */
+  uint32_t certify;        /* 1: compute frame.optimality_gap */
+  double timeout_seconds;  /* of the whole call, including the wait for another solve; 0 means no limit */
+  lpdeform_search* search; /* is written if the call returns LPDEFORM_OK. May be NULL */
 } lpdeform_solve_options;
 
 /* WAITS for a complete solve for the current handles and settings, and writes the result in full precision; for

@@ -24,6 +24,8 @@ inline constexpr std::size_t kFirstSize<lpdeform_update> = offsetof(lpdeform_upd
 template <>
 inline constexpr std::size_t kFirstSize<lpdeform_settings> = offsetof(lpdeform_settings, set_search);
 template <>
+inline constexpr std::size_t kFirstSize<lpdeform_solve_options> = offsetof(lpdeform_solve_options, search);
+template <>
 inline constexpr std::size_t kFirstSize<lpdeform_mesh> = offsetof(lpdeform_mesh, weld_tolerance);
 
 /// Copies `given` to a struct of this library's size. Fields that the caller does not know yet are 0. `name` is for

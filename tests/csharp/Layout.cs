@@ -55,6 +55,7 @@ static class Layout
         Tell("Buffers", typeof(Native.Buffers));
         Tell("Frame", typeof(Native.Frame));
         Tell("SolveOptions", typeof(Native.SolveOptions));
+        Tell("Search", typeof(Native.Search));
         Tell("Resizing", typeof(Native.Resizing));
         Console.WriteLine("Error {0} {1}", LpdeformException.Size, LpdeformException.Size - 512);
     }

@@ -2,6 +2,7 @@
 // fails.
 
 using System;
+using System.Collections.Generic;
 using System.Diagnostics;
 using System.Linq;
 using System.Threading;
@@ -256,6 +257,38 @@ static class SessionTest
         }
     }
 
+    static void ASolveTellsWhatItHasSearched()
+    {
+        const int side = 11;  // 121 vertices: enough to be searched
+        var rest = new float[3 * side * side];
+        var indices = new List<int>();
+        for (int v = 0; v < side * side; ++v)
+        {
+            rest[3 * v] = v / side;
+            rest[3 * v + 2] = v % side;
+            if (v / side == side - 1 || v % side == side - 1) continue;
+            foreach (var corner in new[] { 0, 1, side + 1, 0, side + 1, side }) indices.Add(v + corner);
+        }
+        using (var client = new Client(server.Address))
+        using (var session = client.Open(new MeshData { Positions = rest, Indices = indices.ToArray() }))
+        {
+            session.Handles.Set("base", new[] { 0, 1, 2 });
+            session.Handles.Set("tip", new[] { 118, 119, 120 }, Motion.Move(-6, 3, 0));
+            session.Set(p: 1.5);
+            var buffers = new FrameBuffers { Positions = new float[rest.Length] };
+            SearchReport search;
+            session.SetSolver(new SolverSettings { Search = new MinimaSearch { Effort = 1 } });
+            var frame = session.Solve(buffers, out search, timeoutSeconds: Patience);
+            Expect(search.Effort == 1 && search.FurtherStarts == 8, "eight further starts");
+            Expect(search.Iterations > 0 && search.Iterations < frame.Iteration, "some of the iterations were the search's");
+            Expect(search.Minima.Length <= 9 && search.Minima.Min() == frame.Energy, "the result is the lowest minimum");
+            session.SetSolver(new SolverSettings { Search = new MinimaSearch { Effort = 0 } });
+            session.Solve(buffers, out search, timeoutSeconds: Patience);
+            Expect(search.Minima.Length == 1 && search.FurtherStarts == 0 && search.Effort == 0, "one minimum without a search");
+            Refused("EFFORT_OUT_OF_RANGE", () => session.SetSolver(new SolverSettings { Search = new MinimaSearch { Effort = -1 } }));
+        }
+    }
+
     static void StepsAreTakenBackAndDoneAgain()
     {
         using (var client = new Client(server.Address))
@@ -422,7 +455,7 @@ static class SessionTest
     {
         var tests = new Action[] { FramesComeIntoTheCallersSpans, ErrorsCarryTheServersReason, ARefusedMeshIsAState,
                                    WorkGoesOnWhenTheServerComesBack, PerFrameCallsMakeNoGarbage, EmptyArraysAreNothing,
-                                   TextsThatCannotBeSaidAreRefused, TargetsPointsAndRegions, ASolveIsItsOwnResult, StepsAreTakenBackAndDoneAgain,
+                                   TextsThatCannotBeSaidAreRefused, TargetsPointsAndRegions, ASolveIsItsOwnResult, ASolveTellsWhatItHasSearched, StepsAreTakenBackAndDoneAgain,
                                    ResizingScalesAlongUnitysAxes, SolversStopWhereTheyAreToldTo,
                                    GroupsOfVerticesAreOne, ASessionLeavesAsAFileAndComesBackTheSame, SettingsAndReaders,
                                    ASearchIsAskedForAndABetterShapeOnlyThereWhenAnnounced };

@@ -159,6 +159,15 @@ int main(void) {
   FIELD(lpdeform_solve_options, struct_size);
   FIELD(lpdeform_solve_options, certify);
   FIELD(lpdeform_solve_options, timeout_seconds);
+  FIELD(lpdeform_solve_options, search);
+  STRUCT("Search", lpdeform_search);
+  FIELD(lpdeform_search, struct_size);
+  FIELD(lpdeform_search, minima_capacity);
+  FIELD(lpdeform_search, minima);
+  FIELD(lpdeform_search, minima_count);
+  FIELD(lpdeform_search, further_starts);
+  FIELD(lpdeform_search, search_iterations);
+  FIELD(lpdeform_search, effort);
   STRUCT("Resizing", lpdeform_resizing);
   FIELD(lpdeform_resizing, struct_size);
   FIELD(lpdeform_resizing, set_origin);

@@ -152,6 +152,15 @@ namespace Lpdeform
         {
             public uint StructSize, Certify;
             public double TimeoutSeconds;
+            public IntPtr Search;
+        }
+
+        [StructLayout(LayoutKind.Sequential)]
+        public struct Search
+        {
+            public uint StructSize, MinimaCapacity;
+            public IntPtr Minima;
+            public uint MinimaCount, FurtherStarts, SearchIterations, Effort;
         }
 
         [StructLayout(LayoutKind.Sequential)]

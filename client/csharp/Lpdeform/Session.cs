@@ -111,9 +111,11 @@ namespace Lpdeform
         public ulong SetSolver(SolverSettings solver)
         {
             var search = solver.Search ?? new MinimaSearch();
+            var effort = search.Effort ?? 1;
+            if (effort <= 0) --effort;  // C has -1 for none and 0 for the default, and refuses what is below
             return Set(new Native.Settings
             {
-                SetSearch = solver.Search == null ? 0u : 1u, SearchEffort = search.Effort == 0 ? -1 : search.Effort ?? 0,
+                SetSearch = solver.Search == null ? 0u : 1u, SearchEffort = search.Effort == null ? 0 : effort,
                 SearchShows = search.Show ? 1u : 0u, SearchLeastShare = search.LeastShare,
                 SetSolver = 1, Method = (int)solver.Method, Tolerance = solver.Tolerance, MaxIterations = (uint)solver.MaxIterations,
                 TimeLimitSeconds = solver.TimeLimitSeconds
@@ -277,9 +279,34 @@ namespace Lpdeform
             return frame;
         }
 
+        /// The same, and says what was searched.
+        public Frame Solve(FrameBuffers buffers, out SearchReport search, bool certify = false, double timeoutSeconds = 0)
+        {
+            Frame frame;
+            var minima = new double[MostMinima];
+            fixed (double* room = minima)
+            {
+                var native = new Native.Search
+                {
+                    StructSize = (uint)sizeof(Native.Search), Minima = (IntPtr)room, MinimaCapacity = MostMinima
+                };
+                Write(buffers, out frame, certify ? Asked.CertifiedSolve : Asked.Solve, timeoutSeconds, (IntPtr)(&native));
+                search = new SearchReport
+                {
+                    FurtherStarts = (int)native.FurtherStarts, Iterations = (int)native.SearchIterations, Effort = (int)native.Effort
+                };
+                Array.Resize(ref minima, (int)Math.Min(native.MinimaCount, MostMinima));
+            }
+            search.Minima = minima;
+            return frame;
+        }
+
+        const int MostMinima = 1 + 8 * 1000;  // with the largest effort
+
         enum Asked { New, Last, Result, Solve, CertifiedSolve }
 
-        bool Write(FrameBuffers into, out Frame frame, Asked asked, double timeout)
+        /// `search`: null, or a Native.Search for what a solve has searched.
+        bool Write(FrameBuffers into, out Frame frame, Asked asked, double timeout, IntPtr search = default(IntPtr))
         {
             var native = new Native.Frame { StructSize = (uint)sizeof(Native.Frame) };
             int code;
@@ -298,7 +325,7 @@ namespace Lpdeform
                 buffers.Distortion = At(distortion, sizeof(float), into.Distortion.Length);
                 lock (error)
                 {
-                    code = Call(asked, timeout, ref buffers, ref native, error);
+                    code = Call(asked, timeout, search, ref buffers, ref native, error);
                     if (code != Native.Ok && code != Native.NoFrame) throw LpdeformException.From(error);
                 }
             }
@@ -314,7 +341,7 @@ namespace Lpdeform
 
         const int Rgba8 = 5;
 
-        int Call(Asked asked, double timeout, ref Native.Buffers buffers, ref Native.Frame frame, byte[] error)
+        int Call(Asked asked, double timeout, IntPtr search, ref Native.Buffers buffers, ref Native.Frame frame, byte[] error)
         {
             if (asked == Asked.New) return Native.lpdeform_poll(Pointer, ref buffers, ref frame, error);
             if (asked == Asked.Last) return Native.lpdeform_repeat(Pointer, ref buffers, ref frame, error);
@@ -322,7 +349,7 @@ namespace Lpdeform
             var options = new Native.SolveOptions
             {
                 StructSize = (uint)sizeof(Native.SolveOptions), Certify = asked == Asked.CertifiedSolve ? 1u : 0u,
-                TimeoutSeconds = timeout
+                TimeoutSeconds = timeout, Search = search
             };
             return Native.lpdeform_solve(Pointer, ref options, ref buffers, ref frame, error);
         }

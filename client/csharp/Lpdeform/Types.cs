@@ -101,6 +101,22 @@ namespace Lpdeform
         public double LeastShare;
     }
 
+    /// What Session.Solve has searched. Frame.OptimalityGap does not say it: it is about the rotations of the result, and another
+    /// minimum may be lower.
+    public struct SearchReport
+    {
+        /// The energies at which starts have converged, in order: the first minimum, then those of the search for lower ones.
+        /// Several starts may converge to the same minimum. Frame.Energy is the lowest. Empty if a limit has ended the solve before
+        /// the first, and with a server that is older than the search.
+        public double[] Minima;
+        /// Of the search, including those that were given up, which have no energy.
+        public int FurtherStarts;
+        /// The part of Frame.Iteration that the search made.
+        public int Iterations;
+        /// MinimaSearch.Effort, or its default.
+        public int Effort;
+    }
+
     /// Where a handle moves; always relative to the mesh at rest.
     public struct Motion
     {

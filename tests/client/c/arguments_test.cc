@@ -195,7 +195,7 @@ TEST(Changes, HowFarToLookForLowerMinimaIsTheServersUnlessItIsSet) {
   EXPECT_EQ(read_struct(&settings, "settings")->set_search, 0u);
 }
 
-TEST(Changes, TheEffortOfASearchIsTheServersUnlessItIsSetAndNoneIfNegative) {
+TEST(Changes, TheEffortOfASearchIsTheServersUnlessItIsSetAndNoneAtMinusOne) {
   lpdeform_settings settings{};
   settings.set_solver = settings.set_search = settings.search_shows = 1;
   const auto read = [&] { return read_settings(settings, Space())->solver->search.value(); };
@@ -203,6 +203,10 @@ TEST(Changes, TheEffortOfASearchIsTheServersUnlessItIsSetAndNoneIfNegative) {
   EXPECT_FALSE(read().effort);
   settings.search_effort = -1;
   EXPECT_EQ(read().effort, 0u);
+  settings.search_effort = -2;
+  const Fault fault = fault_of(read_settings(settings, Space()).status());
+  EXPECT_EQ(fault.reason, "EFFORT_OUT_OF_RANGE");
+  EXPECT_EQ(fault.limit, "-1 <= search_effort <= 1000");
 }
 
 TEST(MeshInput, ExtentsAreComparedBeyond32Bits) {

@@ -2,9 +2,13 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
+#include <span>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include "tests/client/c/session_fixture.h"
@@ -171,6 +175,59 @@ TEST_F(CSessionTest, SolvingGivesAResultOfItsOwnBesideTheFrames) {
   ASSERT_EQ(lpdeform_remove_handle(session_, "base", nullptr, &error_), LPDEFORM_OK);
   EXPECT_EQ(lpdeform_solve(session_, nullptr, &buffers, nullptr, &error_), LPDEFORM_FAILED_PRECONDITION);
   EXPECT_STREQ(error_.reason, "NO_HANDLES");
+}
+
+TEST_F(CSessionTest, ASolveTellsWhatItHasSearchedAsFarAsThereIsRoom) {
+  std::vector<Point> grid;  // of 121 vertices: enough to be searched
+  std::vector<std::uint32_t> indices;
+  for (std::uint32_t v = 0; v < 121; ++v) grid.push_back({float(v / 11), 0, float(v % 11)});
+  for (std::uint32_t v = 0; v < 110; ++v) {
+    if (v % 11 == 10) continue;
+    for (const std::uint32_t corner : {0U, 1U, 12U, 0U, 12U, 11U}) indices.push_back(v + corner);
+  }
+  open(mesh_of(grid, indices));
+  hold("base", {0, 1, 2});
+  hold("tip", {118, 119, 120}, shift(-6, 3, 0));
+  lpdeform_settings settings{};
+  settings.struct_size = sizeof settings;
+  settings.p = 1.5;
+  settings.set_solver = settings.set_search = 1;
+  settings.search_effort = 1;
+  ASSERT_EQ(lpdeform_set(session_, &settings, nullptr, &error_), LPDEFORM_OK) << error_.message;
+  std::vector<Point> points(121);
+  const lpdeform_buffers buffers = buffers_of(points);
+  std::array<double, 9> minima{};
+  lpdeform_search search{};
+  search.struct_size = sizeof search;
+  search.minima = minima.data();
+  search.minima_capacity = minima.size();
+  lpdeform_solve_options options{};
+  options.struct_size = sizeof options;
+  options.search = &search;
+  ASSERT_EQ(lpdeform_solve(session_, &options, &buffers, &frame_, &error_), LPDEFORM_OK) << error_.message;
+  EXPECT_EQ(search.effort, 1);
+  EXPECT_EQ(search.further_starts, 8);
+  EXPECT_GT(search.search_iterations, 0);
+  EXPECT_LT(search.search_iterations, frame_.iteration);
+  ASSERT_GE(search.minima_count, 1);
+  ASSERT_LE(search.minima_count, minima.size());
+  EXPECT_EQ(std::ranges::min(std::span(minima).first(search.minima_count)), frame_.energy);
+
+  settings.search_effort = -1;
+  ASSERT_EQ(lpdeform_set(session_, &settings, nullptr, &error_), LPDEFORM_OK) << error_.message;
+  search.minima_capacity = 0;
+  minima = {-1};
+  ASSERT_EQ(lpdeform_solve(session_, &options, &buffers, &frame_, &error_), LPDEFORM_OK) << error_.message;
+  EXPECT_EQ(std::tuple(search.minima_count, search.further_starts, search.search_iterations, search.effort),
+            std::tuple(1, 0, 0, 0));
+  EXPECT_EQ(minima[0], -1);
+
+  search.minima = nullptr;
+  search.minima_capacity = 1;
+  EXPECT_EQ(lpdeform_solve(session_, &options, &buffers, nullptr, &error_), LPDEFORM_INVALID_ARGUMENT);
+  EXPECT_STREQ(error_.element, "search.minima");
+  options.struct_size = offsetof(lpdeform_solve_options, search);  // of a caller that does not know it
+  EXPECT_EQ(lpdeform_solve(session_, &options, &buffers, nullptr, &error_), LPDEFORM_OK) << error_.message;
 }
 
 TEST_F(CSessionTest, TheLastFrameStaysWhileTheServerIsAwayAndWorkGoesOnAfter) {
