@@ -35,6 +35,7 @@ void ULpdeformComponent::BeginPlay() {
     UE_LOG(LogTemp, Warning, TEXT("lpdeform: %s"), UTF8_TO_TCHAR(Error.what()));
     return;
   }
+  Follower->set(P, bShowBetterShapes);
   for (FLpdeformHandle& Handle : Handles) Hold(Handle, Positions);
   SetComponentTickEnabled(true);
 }
@@ -81,6 +82,8 @@ void ULpdeformComponent::TickComponent(float Seconds, ELevelTick Tick, FActorCom
   const bool bIsOver = Follower->is_over();
   const std::string Problem = Follower->problem();
   if (!Problem.empty()) UE_LOG(LogTemp, Warning, TEXT("lpdeform: %s"), UTF8_TO_TCHAR(Problem.c_str()));
+  const std::string Notice = Follower->notice();
+  if (!Notice.empty()) UE_LOG(LogTemp, Log, TEXT("lpdeform: %s"), UTF8_TO_TCHAR(Notice.c_str()));
   if (bIsOver) {  // said once; the mesh stays as it is
     Follower.reset();
     SetComponentTickEnabled(false);

@@ -41,6 +41,12 @@ class ULpdeformComponent : public UDynamicMeshComponent {
   FString Address = TEXT("localhost:50051");
   UPROPERTY(EditAnywhere, Category = "Lpdeform")
   TArray<FLpdeformHandle> Handles;
+  /** Counts from the next BeginPlay. Below 2, the server looks for shapes of lower energy while nothing changes. */
+  UPROPERTY(EditAnywhere, Category = "Lpdeform", meta = (ClampMin = 1, ClampMax = 64))
+  double P = 2;
+  /** Show such a shape at once. Otherwise a line of the log says that it is known. */
+  UPROPERTY(EditAnywhere, Category = "Lpdeform")
+  bool bShowBetterShapes = false;
 
   void BeginPlay() override;
   void EndPlay(const EEndPlayReason::Type Reason) override;

@@ -74,6 +74,17 @@ class LpdeformFollower {
     return said(lpdeform_move_handle(session_, name, &motion, nullptr, &error_));
   }
 
+  /// p, 1 to 64, everywhere. `shows_better`: a shape of lower energy that the server finds while nothing changes is shown at once;
+  /// otherwise notice() says that there is one. Below p = 2 there are many minima. Does not wait.
+  bool set(double p, bool shows_better) {
+    lpdeform_settings settings{};
+    settings.struct_size = sizeof settings;
+    settings.p = p;
+    settings.set_solver = settings.set_search = 1;
+    settings.search_shows = shows_better ? 1 : 0;
+    return said(lpdeform_set(session_, &settings, nullptr, &error_));
+  }
+
   /// Once a tick: true where positions(), normals() and colours() are new. Does not wait.
   bool tick() {
     lpdeform_buffers buffers{};
@@ -81,7 +92,7 @@ class LpdeformFollower {
     buffers.positions = {positions_.data(), positions_.size() * sizeof(float), 0, 0, LPDEFORM_FLOAT32, 0};
     buffers.normals = {normals_.data(), normals_.size() * sizeof(float), 0, 0, LPDEFORM_FLOAT32, 0};
     buffers.colours = {colours_.data(), colours_.size(), 0, 0, LPDEFORM_BGRA8, 0};  // as FColor
-    const lpdeform_code code = lpdeform_poll(session_, &buffers, nullptr, &error_);
+    const lpdeform_code code = lpdeform_poll(session_, &buffers, &frame_, &error_);
     if (code != LPDEFORM_NO_FRAME) said(code);
     return code == LPDEFORM_OK;
   }
@@ -89,6 +100,9 @@ class LpdeformFollower {
   const std::vector<float>& positions() const { return positions_; }
   const std::vector<float>& normals() const { return normals_; }
   const std::vector<std::uint8_t>& colours() const { return colours_; }
+
+  /// Of the newest frame.
+  const lpdeform_frame& frame() const { return frame_; }
 
   lpdeform_state state() const { return lpdeform_session_state(session_, nullptr); }
 
@@ -102,6 +116,13 @@ class LpdeformFollower {
   /// The last thing that went wrong, once; empty where nothing did.
   std::string problem() { return std::exchange(problem_, {}); }
 
+  /// What the server says of itself or of a better shape, once when it changes; otherwise empty.
+  std::string notice() {
+    char text[512] = "";
+    const lpdeform_notice now = lpdeform_session_notice(session_, text, sizeof text);
+    return std::exchange(noticed_, now) == now ? std::string() : std::string(text);
+  }
+
  private:
   bool said(lpdeform_code code) {
     if (code != LPDEFORM_OK) problem_ = std::string(error_.message) + " (" + error_.reason + ")";
@@ -113,6 +134,12 @@ class LpdeformFollower {
     error.struct_size = sizeof error;
     return error;
   }();
+  lpdeform_frame frame_ = [] {
+    lpdeform_frame frame{};
+    frame.struct_size = sizeof frame;
+    return frame;
+  }();
+  lpdeform_notice noticed_ = LPDEFORM_NOTICE_NONE;
   lpdeform_client* client_ = nullptr;
   lpdeform_session* session_ = nullptr;
   std::string problem_;

@@ -5,8 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <numbers>
 #include <thread>
 
+#include "core/shapes/shapes.h"
 #include "tests/client/in_process_server.h"
 
 namespace lpdeform {
@@ -53,6 +58,60 @@ TEST(UnrealFollower, FollowsAHandleInCentimetres) {
     problem = follower.problem();
   }
   EXPECT_NE(problem.find("HANDLE_EMPTY"), std::string::npos) << problem;
+}
+
+/// A bar of which one end is turned by 80 degrees. The first minimum that the solver comes to is 2.8 % above another one.
+class UnrealFollowerOfABentBar : public testing::Test {
+ protected:
+  UnrealFollowerOfABentBar() {
+    const TriangleMesh bar = box_surface(6, 6, 40);
+    std::vector<float> positions;
+    std::vector<std::uint32_t> bottom, top;
+    for (std::uint32_t v = 0; v < bar.vertices.rows(); ++v) {
+      for (int k = 0; k < 3; ++k) positions.push_back(static_cast<float>(100 * bar.vertices(v, k)));
+      if (bar.vertices(v, 2) == 0) bottom.push_back(v);
+      if (bar.vertices(v, 2) == 40) top.push_back(v);
+    }
+    const std::vector<std::uint32_t> indices(bar.faces.data(), bar.faces.data() + bar.faces.size());
+    follower_ = std::make_unique<LpdeformFollower>(server_.address(), positions, indices);
+    EXPECT_TRUE(follower_->hold("bottom", bottom));
+    EXPECT_TRUE(follower_->hold("top", top));
+    // About the line through (300, 300, 2000) along x.
+    const double angle = 80 * std::numbers::pi / 180, c = std::cos(angle), s = std::sin(angle);
+    EXPECT_TRUE(follower_->move("top", {std::sin(angle / 2), 0, 0, std::cos(angle / 2)},
+                                {0, 300 - 300 * c + 2000 * s, 2000 - 300 * s - 2000 * c}));
+  }
+
+  bool tick_until(const std::function<bool()>& holds) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!holds()) {
+      if (std::chrono::steady_clock::now() > deadline) return false;
+      if (!follower_->tick()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return true;
+  }
+
+  const client::InProcessServer server_;
+  std::unique_ptr<LpdeformFollower> follower_;
+};
+
+TEST_F(UnrealFollowerOfABentBar, ShowsABetterShapeWhereThatIsAskedFor) {
+  EXPECT_TRUE(follower_->set(1.5, true));
+  const auto is_result = [this] {
+    return follower_->frame().is_final == 1 && follower_->frame().input_seq == 4;
+  };
+  ASSERT_TRUE(tick_until(is_result)) << follower_->problem();
+  const double first = follower_->frame().energy;
+  ASSERT_TRUE(tick_until([&] { return is_result() && follower_->frame().energy < 0.98 * first; }));
+  EXPECT_EQ(follower_->notice(), "");
+}
+
+TEST_F(UnrealFollowerOfABentBar, SaysOnceThatABetterShapeIsKnown) {
+  EXPECT_TRUE(follower_->set(1.5, false));
+  std::string said;
+  ASSERT_TRUE(tick_until([&] { return !(said = follower_->notice()).empty(); })) << follower_->problem();
+  EXPECT_NE(said.find("energy"), std::string::npos) << said;
+  EXPECT_EQ(follower_->notice(), "");
 }
 
 }  // namespace
