@@ -34,6 +34,7 @@ bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
   const Inputs newest = mailbox_.newest();
   if (job != nullptr && newest.version > job->version) job->finish(superseded(newest.input_seq));
   if (job != nullptr && job->is_done()) job = nullptr;
+  if (publisher_.is_better_taken()) withdraw_better();
   if (newest.version != inputs_.version) take_over(newest);
 
   const std::uint64_t wanted = job != nullptr                  ? job->number()
@@ -57,6 +58,7 @@ bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
 }
 
 void LiveSolver::take_over(const Inputs& inputs) {
+  withdraw_better();
   absl::Status status;
   // Here a new p, or stiffness, reaches the solver.
   if (inputs.material != inputs_.material) status = deformer_->set_material(*inputs.material);
@@ -74,7 +76,6 @@ void LiveSolver::take_over(const Inputs& inputs) {
   phase_ = blocked_.ok() ? Phase::kWaiting : Phase::kDone;
   was_begun_ = false;
   is_search_due_ = false;
-  publisher_.forget_better();
   publisher_.set_standing(status.ok() ? std::nullopt
                                       : std::make_optional(FaultNote{status, inputs.input_seq}));
   if (!has_handles) publish(true);
@@ -84,6 +85,7 @@ void LiveSolver::take_over(const Inputs& inputs) {
 bool LiveSolver::begin_job(SolveJob& job) {
   if (phase_ == Phase::kCertifying)
     phase_ = Phase::kAnswered;  // if begin_job() fails, the search begins again later
+  withdraw_better();
   absl::Status status = blocked_;
   if (inputs_.handles == nullptr) status = no_handles();
   SolveSettings settings = inputs_.solver;
@@ -93,7 +95,6 @@ bool LiveSolver::begin_job(SolveJob& job) {
     settings.initial = InitialGuess::kCurrent;
     status = deformer_->set_positions(*job.options().initial_positions);
   }
-  publisher_.forget_better();  // start() may take long, and nothing of before it can be taken then
   if (status.ok()) status = deformer_->start(settings, job.stop_token());
   if (!status.ok()) job.finish(status);
   return status.ok();
@@ -154,7 +155,6 @@ void LiveSolver::end_solve(SolveJob* job) {
   const bool is_minimum = reason == StopReason::kConverged || reason == StopReason::kStalled;
   is_search_due_ = is_minimum && deformer_->summary().further_starts == 0 && standing_effort() > 0;
   if (is_search_due_) postpone_search(answered_at_ + kSearchQuiet);
-  publisher_.forget_better();
   const std::shared_ptr<const Frame> frame = publish(true);
   if (job != nullptr) job->finish(SolveResult{deformer_->summary(), frame});
 }
@@ -226,13 +226,18 @@ void LiveSolver::end_search() {
   const double saved = 1 - *energy / present;
   if (saved < inputs_.solver.standing.least_share) return;
   publisher_.metrics().add(Count::kBetterShapes);
-  if (inputs_.solver.standing.shows) return take_better();
+  if (inputs_.solver.standing.shows) return show_better();
   publisher_.announce({.input_seq = inputs_.input_seq, .energy = *energy, .saved_share = saved});
 }
 
-void LiveSolver::take_better() {
-  if (is_outdated() || !deformer_->take_better()) return;
-  publisher_.forget_better();
+/// Called before the deformer loses the better shape, and when a writer has taken it. The writer was told that it is
+/// taken, so that the state is replaced even if newer inputs or a solve are next.
+void LiveSolver::withdraw_better() {
+  if (publisher_.forget_better()) show_better();
+}
+
+void LiveSolver::show_better() {
+  if (!deformer_->take_better()) return;
   phase_ = Phase::kAnswered;
   answered_at_ = alarm_.timers->now();
   is_alarm_set_ = false;

@@ -27,7 +27,8 @@ namespace lpdeform {
 /// with the bound found so far. A newer input or a Solve call ends the search.
 ///
 /// Solves for readers take the first minimum. If a result has stood for kSearchQuiet, the solver looks for lower
-/// minima (Deformer::start_search) while nobody waits for an answer, and announces or shows the lowest one.
+/// minima (Deformer::start_search) while nobody waits for an answer, and announces or shows the lowest one. If
+/// that is taken (Publisher::take_better), it is the state from which all that follows goes on.
 class LiveSolver {
  public:
   /// How the solver asks to be run again later. `ring` is called on the timers' thread and may outlive the
@@ -68,9 +69,6 @@ class LiveSolver {
   bool run_slice(SolveJob* job, const Pace& pace);
   bool run_slice(SolveJob* job) { return run_slice(job, Pace()); }
 
-  /// Publishes the better shape that was announced, unless there are newer inputs.
-  void take_better();
-
   /// Whether all that is left to do is to look for a better shape.
   bool is_searching() const { return deformer_->is_searching(); }
 
@@ -104,6 +102,8 @@ class LiveSolver {
   bool begin_search();
   bool postpone_search(Timers::TimePoint until);
   void end_search();
+  void withdraw_better();
+  void show_better();
   void report(const SolveJob& job);
   bool is_refinement() const { return shown_version_ == inputs_.version; }
   bool is_outdated() const { return mailbox_.version() != inputs_.version; }
