@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "core/constraints/check_positions.h"
 #include "core/problem/check_handle.h"
 #include "server/runtime/metrics.h"
 
@@ -85,15 +86,20 @@ void LiveSolver::take_over(const Inputs& inputs) {
 bool LiveSolver::begin_job(SolveJob& job) {
   if (phase_ == Phase::kCertifying)
     phase_ = Phase::kAnswered;  // if begin_job() fails, the search begins again later
+  absl::Status status = inputs_.handles == nullptr ? no_handles() : blocked_;
+  const auto& initial = job.options().initial_positions;
+  if (status.ok() && initial) status = check_positions(deformer_->shape(), *initial);
+  if (!status.ok()) {  // what was announced still holds
+    job.finish(status);
+    return false;
+  }
   withdraw_better();
-  absl::Status status = blocked_;
-  if (inputs_.handles == nullptr) status = no_handles();
   SolveSettings settings = inputs_.solver;
   settings.certify = job.options().certify;
   settings.keep_trace = job.options().keep_trace;
-  if (status.ok() && job.options().initial_positions) {
+  if (initial) {
     settings.initial = InitialGuess::kCurrent;
-    status = deformer_->set_positions(*job.options().initial_positions);
+    status = deformer_->set_positions(*initial);
   }
   if (status.ok()) status = deformer_->start(settings, job.stop_token());
   if (!status.ok()) job.finish(status);

@@ -94,6 +94,20 @@ TEST_F(LiveSearchTest, ALateUpdateDoesNotLoseATakenShape) {
   EXPECT_NEAR(publisher_->newest()->energy, better->energy, 1e-3 * better->energy);
 }
 
+TEST_F(LiveSearchTest, ARefusedSolveLeavesWhatIsAnnounced) {
+  const auto stream = look_on();
+  search(bend(1));
+  const auto better = announced(*stream);
+  Points positions = rest();
+  positions(7, 1) = std::numeric_limits<double>::quiet_NaN();
+  const auto refused = job({.initial_positions = positions});
+  settle(refused.get());
+  EXPECT_EQ(failure(), "POSITIONS_NOT_FINITE");
+  ASSERT_TRUE(better && take());
+  settle();
+  EXPECT_EQ(publisher_->newest()->energy, better->energy);
+}
+
 TEST_F(LiveSearchTest, ASolveThatFollowsATakenShapeGoesOnFromIt) {
   const auto stream = look_on();
   search(bend(1));
