@@ -46,7 +46,7 @@ bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
   if (wanted == kReaders && (phase_ == Phase::kAnswered || phase_ == Phase::kCertifying)) {
     if (publisher_.is_certificate_wanted() && !deformer_->is_searching()) return look_for_certificate();
   }
-  const bool is_over = phase_ == Phase::kAnswered || phase_ == Phase::kDone;
+  const bool is_over = phase_ != Phase::kWaiting && phase_ != Phase::kRunning;
   if (wanted == kReaders && is_over && is_search_due_) return look_for_better(pace);
   if (phase_ != Phase::kRunning) {
     if (!(job != nullptr ? begin_job(*job) : begin_live())) return false;
@@ -214,6 +214,7 @@ bool LiveSolver::look_for_better(const Pace& pace) {
 
 /// Returns false if there is nothing to look for.
 bool LiveSolver::begin_search() {
+  if (phase_ == Phase::kCertifying) phase_ = Phase::kAnswered;  // start_search() ends the certificate
   is_search_due_ = deformer_->start_search(standing_effort(), stop_).ok() && deformer_->is_searching();
   return is_search_due_;
 }
