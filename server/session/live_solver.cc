@@ -139,7 +139,10 @@ void LiveSolver::run_steps(SolveJob* job, const Pace& pace) {
 
 /// A frame is due if it can be sent to a reader at once, or if the frame that waits for slow readers is old.
 bool LiveSolver::is_frame_due(const Pace& pace) const {
-  if (deformer_->is_certifying()) return false;        // the positions are those of the result
+  if (deformer_->is_certifying()) return false;  // the positions are those of the result
+  const SolveSummary& summary = deformer_->summary();
+  // From the first minimum on a solve searches, and the state stays as it is until it ends.
+  if (is_refinement() && !summary.minima.empty() && summary.energy == shown_energy_) return false;
   if (is_refinement() && is_outdated()) return false;  // the frame of the newer inputs is next
   if (pace.is_sparing && is_refinement() && Clock::now() - last_published_ < kBetweenRefinements)
     return false;
@@ -265,6 +268,7 @@ std::shared_ptr<const Frame> LiveSolver::publish(bool is_final) {
   shown_version_ = inputs_.version;
   deformer_->catch_up();
   const SolveSummary& summary = deformer_->summary();
+  shown_energy_ = summary.energy;
   Frame frame;
   frame.input_seq = inputs_.input_seq;
   frame.taken = inputs_.taken;

@@ -127,6 +127,7 @@ class LiveSolver {
   Clock::time_point last_report_;
   Clock::time_point last_published_;
   std::uint64_t shown_version_ = 0;  // of the inputs in the last frame
+  double shown_energy_ = 0;          // of the last frame
   Timers::TimePoint answered_at_;    // while kAnswered
   bool is_alarm_set_ = false;        // set since answered_at_
   bool is_search_due_ = false;       // the result was not searched yet, or not completely

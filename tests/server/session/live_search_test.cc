@@ -1,6 +1,9 @@
 // The search for lower minima in a live session.
 
+#include <algorithm>
+#include <limits>
 #include <numbers>
+#include <vector>
 
 #include "live_solver_fixture.h"
 
@@ -123,6 +126,24 @@ TEST_F(LiveSearchTest, ALaterReaderIsToldToo) {
   const auto stream = look_on();
   search(bend(1));
   EXPECT_TRUE(announced(*look_on()).has_value());
+}
+
+TEST_F(LiveSearchTest, TheSearchOfASolveCallSendsNoFrames) {
+  const auto stream = look_on();
+  ASSERT_TRUE(mailbox_.take(bend(1)).ok());
+  const auto solve = job();
+  std::vector<double> energies;  // of each frame
+  auto shown = publisher_->newest();
+  while (solver_.run_slice(solve.get())) {
+    if (publisher_->newest() != shown) energies.push_back(publisher_->newest()->energy);
+    shown = publisher_->newest();
+    while (stream->next()) {
+    }
+    ASSERT_TRUE(stream->acknowledge(stream->last_frame_seq()).ok());
+  }
+  ASSERT_TRUE(result_ && result_->ok());
+  EXPECT_EQ((*result_)->summary.further_starts, 8);
+  EXPECT_EQ(std::ranges::adjacent_find(energies), energies.end());
 }
 
 TEST_F(LiveSearchTest, NothingIsSearchedBeforeTheResultHasStood) {
