@@ -43,7 +43,9 @@ class ByWayOfTwo : public Minimiser {
     result.stage += is_second_ ? 1 : 0;
     if (is_second_ || result.outcome == Outcome::kProgress) return result;
     problem_.objective.reweigh(problem_.norm);
-    present_ = std::make_unique<QuasiNewton>(problem_, present_->x(), Warmth::kWarm);
+    Points x = present_->x();
+    present_.reset();  // two of them would take twice the memory
+    present_ = std::make_unique<QuasiNewton>(problem_, std::move(x), Warmth::kWarm);
     is_second_ = true;
     result.outcome = Outcome::kProgress;
     return result;

@@ -183,6 +183,33 @@ TEST_F(MinimaSearchTest, NewInputsForgetWhatWasFound) {
   EXPECT_EQ(fault_of(solver->start_search(1)).reason, "NOT_SOLVED");
 }
 
+/// A minimiser that ends at once. Counts those that are there.
+class Instant : public Minimiser {
+ public:
+  explicit Instant(int& alive) : alive_(alive) { ++alive_; }
+  ~Instant() override { --alive_; }
+  StepResult step() override { return {Outcome::kConverged, 1, 0, 1}; }
+  const Points& x() const override { return x_; }
+
+ private:
+  int& alive_;
+  const Points x_ = Points::Zero(1, 3);
+};
+
+TEST_F(MinimaSearchTest, ThereIsOneMinimiserAtATime) {
+  int alive = 0, made = 0;
+  const auto make = [&] {
+    EXPECT_EQ(alive, 0);
+    ++made;
+    return std::make_unique<Instant>(alive);
+  };
+  MinimaSearch search([&](int, const Points&) { return make(); }, [&](Points) { return make(); },
+                      {.starts = 3, .most_iterations = 10}, Points::Zero(1, 3), 1);
+  while (search.step()) {
+  }
+  EXPECT_EQ(made, 6);  // a rough one and a finishing one of each start
+}
+
 TEST_F(MinimaSearchTest, ALargeMeshIsSearchedOnItsCoarseLevels) {
   const Bent bent = bar(80);
   auto solver = Deformer::create(rest_shape(bent.mesh), {.search_up_to = 1000}).value();
