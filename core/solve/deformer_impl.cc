@@ -219,6 +219,7 @@ void Deformer::Impl::summarise() {
   summary.solve_seconds = seconds();
   summary.evaluations = objective.evaluations() - evaluations_before;
   summary.back_substitutions = metric.back_substitutions() - back_substitutions_before;
+  summary.factorisations = static_cast<int>(metric.version() - metric_before);
 }
 
 void Deformer::Impl::record(const StepResult& result, double sum) {
@@ -238,6 +239,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   next_start = 0;
   evaluations_before = objective.evaluations();
   back_substitutions_before = metric.back_substitutions();
+  metric_before = metric.version();
   const bool is_warm = settings.initial == InitialGuess::kCurrent && state == State::kDeformed;
   if (!is_warm) x_before_move.resize(0, 3);
   if (!settings.effort) settings.effort = default_effort(is_warm);

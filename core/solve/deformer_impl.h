@@ -72,6 +72,7 @@ struct Deformer::Impl {
   void begin_search(int starts);
   void search_on();
   void end_search();
+  void restore_metric();
   void take_better();
   void begin_certificate(double max_seconds);
   bool certify();
@@ -145,6 +146,7 @@ struct Deformer::Impl {
   std::chrono::steady_clock::time_point started;
   double best_sum = 0, best_soft_sum = 0;
   int evaluations_before = 0, back_substitutions_before = 0;  // counts of this Deformer when the solve began
+  std::uint64_t metric_before = 0;                            // its version then
   SolveSummary summary;
 };
 

@@ -178,7 +178,10 @@ void Deformer::Impl::search_on() {
   }
   if (has_more) return;
   end_search();
-  if (!is_search_apart) conclude();
+  if (is_search_apart)
+    restore_metric();
+  else
+    conclude();
 }
 
 /// Keeps the lowest minimum found, and leaves the evaluation at x, of which the next solve reads the previous soft targets.
@@ -199,7 +202,16 @@ void Deformer::Impl::end_search() {
   if (!is_search_apart) record({Outcome::kProgress, best_sum, search_stage}, best_sum);
 }
 
+/// Makes the metric of x in which a warm solve begins, as quasi_newton had left one before the search. Otherwise the next move
+/// would begin with a factorisation, and that while somebody waits for it.
+void Deformer::Impl::restore_metric() {
+  if (summary.method != Method::kQuasiNewton && summary.method != Method::kMultiresolution) return;
+  const QuasiNewton made_for_its_metric(make_problem(), x, Warmth::kWarm);
+  factor = Factor::kQuasiNewton;
+}
+
 void Deformer::Impl::take_better() {
+  forget_weights();  // those of x, from which the better shape differs
   objective.evaluate(better->x, *norm);
   keep(better->x, better->sum);
   better.reset();

@@ -210,6 +210,25 @@ TEST_F(MinimaSearchTest, ThereIsOneMinimiserAtATime) {
   EXPECT_EQ(made, 6);  // a rough one and a finishing one of each start
 }
 
+TEST_F(MinimaSearchTest, AMoveAfterASearchThatFoundNothingIsAsWithoutOne) {
+  const auto move = [](bool searches, int most_iterations) {
+    const auto solver = solver_of(lifted_grid(5));
+    (void)solver->solve(cold(0)).value();
+    const absl::Status status = searches ? solver->start_search(1) : absl::OkStatus();
+    EXPECT_TRUE(status.ok());
+    run(*solver);
+    EXPECT_FALSE(solver->better_energy().has_value());
+    EXPECT_TRUE(solver->set_handles(lifted_grid(5.1).handles).ok());
+    return solver->solve({.max_iterations = most_iterations}).value();
+  };
+  // Warm solves keep the metric that they find for ten iterations.
+  for (const bool searches : {false, true}) EXPECT_EQ(move(searches, 9).factorisations, 0) << searches;
+  const SolveSummary without = move(false, 1000), with = move(true, 1000);
+  EXPECT_EQ(with.stop_reason, StopReason::kConverged);
+  EXPECT_LE(with.iterations, 1.2 * without.iterations);  // the metrics are not the same to the last bit
+  EXPECT_NEAR(with.energy, without.energy, 1e-5 * without.energy);
+}
+
 TEST_F(MinimaSearchTest, ALargeMeshIsSearchedOnItsCoarseLevels) {
   const Bent bent = bar(80);
   auto solver = Deformer::create(rest_shape(bent.mesh), {.search_up_to = 1000}).value();
