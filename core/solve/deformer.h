@@ -101,8 +101,9 @@ class Deformer {
   /// Updates positions(), cell_energies() and summary() to the prolonged state of the coarse level of a running
   /// kMultiresolution, if that is better than the guess; otherwise does nothing. Later steps and the result do not
   /// change. Takes about as long as two iterations. Does nothing if the coarse level has made little progress since the
-  /// last call.
-  void catch_up();
+  /// last call. With `is_last`, for a solve that will not go on, the state then depends on its steps alone, not on earlier
+  /// calls or the time.
+  void catch_up(bool is_last = false);
 
   /// Calls start, then step until the end.
   absl::StatusOr<SolveSummary> solve(const SolveSettings& settings, std::stop_token stop = {});
