@@ -180,6 +180,10 @@ absl::Status Deformer::start_search(int effort, std::stop_token stop) {
   return absl::OkStatus();
 }
 
+bool Deformer::has_other_starts() const {
+  return !impl_->is_large();
+}
+
 bool Deformer::is_searching() const {
   return impl_->search != nullptr && impl_->is_search_apart;
 }

@@ -12,7 +12,6 @@
 namespace lpdeform {
 namespace {
 
-constexpr int kStartsOfEffort = 8;           // starts for each unit of effort
 constexpr std::int32_t kSmallestMesh = 100;  // vertices; smaller ones have few minima
 constexpr double kWork = 2e7;                // iterations times vertices of a start, at most
 

@@ -162,8 +162,8 @@ void LiveSolver::end_solve(SolveJob* job) {
   running_for_ = kNobody;
   const StopReason reason = deformer_->summary().stop_reason;
   const bool is_minimum = reason == StopReason::kConverged || reason == StopReason::kStalled;
-  is_search_due_ = is_minimum && deformer_->summary().further_starts == 0 && standing_effort() > 0;
-  if (is_search_due_) postpone_search(answered_at_ + kSearchQuiet);
+  is_search_due_ = false;
+  if (is_minimum) plan_search();
   const std::shared_ptr<const Frame> frame = publish(true);
   if (job != nullptr) job->finish(SolveResult{deformer_->summary(), frame});
 }
@@ -194,65 +194,6 @@ bool LiveSolver::begin_certificate() {
 
 void LiveSolver::set_alarm() {
   if (!std::exchange(is_alarm_set_, true)) alarm_.timers->at(answered_at_ + kQuiet, alarm_.ring);
-}
-
-int LiveSolver::standing_effort() const {
-  const SolveSettings& settings = inputs_.solver;
-  const bool has_many_minima = settings.method == Method::kAuto && inputs_.material->p.minCoeff() < 2;
-  return settings.effort.value_or(has_many_minima ? 1 : 0);
-}
-
-/// Looks for minima lower than the result. Returns true while there is more to do now.
-bool LiveSolver::look_for_better(const Pace& pace) {
-  const Timers::TimePoint now = alarm_.timers->now();
-  if (now < answered_at_ + kSearchQuiet) return postpone_search(answered_at_ + kSearchQuiet);
-  if (pace.is_sparing || pace.slice < kSlice) return postpone_search(now + kQuiet);
-  if (!deformer_->is_searching() && !begin_search()) return false;
-  const Clock::time_point end = Clock::now() + kSlice;
-  bool has_more = true;
-  while (has_more && Clock::now() < end && !is_outdated()) has_more = deformer_->step();
-  if (!has_more) end_search();
-  return true;
-}
-
-/// Returns false if there is nothing to look for.
-bool LiveSolver::begin_search() {
-  if (phase_ == Phase::kCertifying) phase_ = Phase::kAnswered;  // start_search() ends the certificate
-  is_search_due_ = deformer_->start_search(standing_effort(), stop_).ok() && deformer_->is_searching();
-  return is_search_due_;
-}
-
-bool LiveSolver::postpone_search(Timers::TimePoint until) {
-  if (until > search_alarm_) alarm_.timers->at(until, alarm_.ring);
-  search_alarm_ = std::max(search_alarm_, until);
-  return false;
-}
-
-void LiveSolver::end_search() {
-  is_search_due_ = false;
-  const std::optional<double> energy = deformer_->better_energy();
-  const double present = deformer_->summary().energy;
-  if (!energy || !(present > 0)) return;
-  const double saved = 1 - *energy / present;
-  if (saved < inputs_.solver.standing.least_share) return;
-  publisher_.metrics().add(Count::kBetterShapes);
-  if (inputs_.solver.standing.shows) return show_better();
-  publisher_.announce({.input_seq = inputs_.input_seq, .energy = *energy, .saved_share = saved});
-}
-
-/// Called before the deformer loses the better shape, and when a writer has taken it. The writer was told that it is
-/// taken, so that the state is replaced even if newer inputs or a solve are next.
-void LiveSolver::withdraw_better() {
-  if (publisher_.forget_better()) show_better();
-}
-
-void LiveSolver::show_better() {
-  if (!deformer_->take_better()) return;
-  phase_ = Phase::kAnswered;
-  answered_at_ = alarm_.timers->now();
-  is_alarm_set_ = false;
-  if (publisher_.is_certificate_wanted()) set_alarm();
-  publish(true);
 }
 
 void LiveSolver::report(const SolveJob& job) {

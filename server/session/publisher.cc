@@ -71,6 +71,7 @@ void Publisher::set_standing(std::optional<FaultNote> fault) {
 void Publisher::announce(BetterNote better) {
   {
     const std::scoped_lock lock(mutex_);
+    if (is_better_taken_) return;  // the lowest one is about to be shown
     better.number = ++better_shapes_;
     better_ = better;
   }

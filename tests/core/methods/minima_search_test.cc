@@ -243,6 +243,8 @@ TEST_F(MinimaSearchTest, ALargeMeshIsSearchedOnItsCoarseLevels) {
   run(*solver);
   EXPECT_EQ(solver->positions(), before);
   EXPECT_EQ(solver->summary().further_starts, 1);
+  EXPECT_FALSE(solver->has_other_starts());
+  EXPECT_TRUE(solver_of(bent)->has_other_starts());
 }
 
 TEST_F(MinimaSearchTest, UnderAnyLimitItIsNoWorseThanTheFirstMinimum) {

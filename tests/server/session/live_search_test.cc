@@ -38,6 +38,18 @@ class LiveSearchTest : public LiveSolverTest {
   /// As a writer does it. The solver has not run since.
   bool take() { return publisher_->take_better(mailbox_.newest().input_seq).has_value(); }
 
+  /// Until the next search begins, in units of kSearchQuiet. Runs it to its end. 0 if none comes for long.
+  int wait_for_search() {
+    for (int waited = 1; waited <= 300; ++waited) {
+      timers_->advance(LiveSolver::kSearchQuiet);
+      solver_.run_slice(nullptr);
+      if (!solver_.is_searching()) continue;  // none that begins ends within a slice
+      settle();
+      return waited;
+    }
+    return 0;
+  }
+
   static std::optional<BetterNote> announced(FrameStream& stream) {
     std::optional<BetterNote> found;
     while (const auto note = stream.next()) {
@@ -126,6 +138,53 @@ TEST_F(LiveSearchTest, ALaterReaderIsToldToo) {
   const auto stream = look_on();
   search(bend(1));
   EXPECT_TRUE(announced(*look_on()).has_value());
+}
+
+TEST_F(LiveSearchTest, ASessionThatStandsGoesOnLookingEverMoreSeldomAndEnds) {
+  const auto stream = look_on();
+  search(bend(1));
+  const int searches = LiveSolver::kMostStarts / Deformer::kStartsOfEffort;
+  for (int k = 1; k < searches; ++k) EXPECT_EQ(wait_for_search(), 1 << k);
+  EXPECT_EQ(wait_for_search(), 0);
+}
+
+TEST_F(LiveSearchTest, TheStartsThatTheEffortAsksForFollowOneAnotherAtOnce) {
+  const auto stream = look_on();
+  Update update = bend(1);
+  update.settings.solver = SolveSettings{.effort = 3};
+  search(update);
+  EXPECT_EQ(wait_for_search(), 1 << 3);
+}
+
+TEST_F(LiveSearchTest, ALongPauseDoesNotDelayTheSearchForANewInput) {
+  const auto stream = look_on();
+  search(bend(1));
+  for (int k = 1; k < 4; ++k) EXPECT_GT(wait_for_search(), 0);
+  ASSERT_TRUE(mailbox_.take(bend(2, 60)).ok());
+  settle();
+  const int rings = rings_;
+  timers_->advance(LiveSolver::kSearchQuiet);
+  EXPECT_GT(rings_, rings);
+  solver_.run_slice(nullptr);
+  EXPECT_TRUE(solver_.is_searching());
+}
+
+TEST_F(LiveSearchTest, TheSearchGoesOnOnceItsShapeIsTaken) {
+  const auto stream = look_on();
+  search(bend(1));
+  ASSERT_TRUE(take());
+  settle();
+  EXPECT_EQ(wait_for_search(), 2);
+}
+
+TEST_F(LiveSearchTest, TheSearchOfASolveCallIsGoneOnWith) {
+  const auto stream = look_on();
+  ASSERT_TRUE(mailbox_.take(bend(1)).ok());
+  const auto solve = job();
+  settle(solve.get());
+  ASSERT_TRUE(result_ && result_->ok());
+  ASSERT_EQ((*result_)->summary.further_starts, 8);
+  EXPECT_EQ(wait_for_search(), 2);
 }
 
 TEST_F(LiveSearchTest, TheSearchOfASolveCallSendsNoFrames) {
