@@ -37,7 +37,9 @@ void MinimaSearch::end_start(Outcome outcome) {
   const double sum = sums_.back();
   const bool is_minimum = outcome == Outcome::kConverged || outcome == Outcome::kStalled;
   if (is_minimum && is_rough_ && sum < kWorthFinishing * lowest_sum_) {
-    minimiser_ = make_finish_(minimiser_->x());
+    Points rough = minimiser_->x();
+    minimiser_.reset();  // two of them would take twice the memory
+    minimiser_ = make_finish_(std::move(rough));
     is_rough_ = false;
     sums_.clear();
     return;

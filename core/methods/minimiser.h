@@ -72,8 +72,9 @@ class Minimiser {
   virtual const Points& x() const = 0;
 
   /// An intermediate state other than x(), if there is a new one since the last call: finite, and all constraints are
-  /// satisfied. problem.objective then holds the evaluation there. Calling this does not change steps or their results.
-  virtual std::optional<Points> intermediate_state() { return std::nullopt; }
+  /// satisfied. problem.objective then holds the evaluation there. Calling this does not change steps or their results. With
+  /// `is_last` the answer depends on the steps alone, not on earlier calls or the time.
+  virtual std::optional<Points> intermediate_state(bool /*is_last*/) { return std::nullopt; }
 };
 
 /// Restricts `values`, a gradient or a direction, to what the constraints allow: rows of held vertices become zero, and

@@ -22,7 +22,7 @@ class LevelSolver {
   virtual absl::Status set_handles(const HandleSet& handles) = 0;
   virtual absl::Status start(const SolveSettings& settings, std::stop_token stop) = 0;
   virtual bool step() = 0;
-  virtual void catch_up() = 0;
+  virtual void catch_up(bool is_last) = 0;
   virtual int iterations() const = 0;  // of the running or the last solve
   /// Whether the last solve's search has found a minimum lower than its first, and has taken it (SolveSettings::effort).
   virtual bool has_found_lower() const = 0;

@@ -49,13 +49,14 @@ void Multiresolution::even_out(Points& found) const {
   found -= step;
 }
 
-std::optional<Points> Multiresolution::intermediate_state() {
+std::optional<Points> Multiresolution::intermediate_state(bool is_last) {
   if (fine_) return std::nullopt;
   const int done = level_.solver().iterations();
   const auto begun = std::chrono::steady_clock::now();
-  if (done < kFirstLook || done == looked_at_ || begun < next_look_) return std::nullopt;
+  const bool is_due = done != looked_at_ && begun >= next_look_;
+  if (done < kFirstLook || !(is_due || is_last)) return std::nullopt;
   looked_at_ = done;
-  level_.solver().catch_up();
+  level_.solver().catch_up(is_last);
   Points found = prolonged();
   const bool is_good = found.allFinite();
   if (is_good) problem_.objective.evaluate(found, problem_.norm);

@@ -24,8 +24,8 @@ class Multiresolution : public Minimiser {
   StepResult step() override;
   const Points& x() const override { return fine_ ? fine_->x() : x_; }
   /// The prolonged state of the coarse level. This costs about as much as two iterations, so there is a new one only
-  /// when four times that time has passed since the previous one.
-  std::optional<Points> intermediate_state() override;
+  /// when four times that time has passed since the previous one, or if it is the last.
+  std::optional<Points> intermediate_state(bool is_last) override;
 
  private:
   static constexpr int kFirstLook = 8;

@@ -152,8 +152,9 @@ bool Deformer::step() {
   return self.minimiser != nullptr || self.search != nullptr || self.certificate != nullptr;
 }
 
-void Deformer::catch_up() {
-  impl_->catch_up();
+void Deformer::catch_up(bool is_last) {
+  if (is_last) impl_->forget_looks();
+  impl_->catch_up(is_last);
 }
 
 absl::Status Deformer::start_certificate(std::stop_token stop, double max_seconds) {
@@ -177,6 +178,10 @@ absl::Status Deformer::start_search(int effort, std::stop_token stop) {
   self.is_search_apart = true;
   self.begin_search(starts);
   return absl::OkStatus();
+}
+
+bool Deformer::has_other_starts() const {
+  return !impl_->is_large();
 }
 
 bool Deformer::is_searching() const {
@@ -229,7 +234,8 @@ std::size_t Deformer::memory_bytes() const {
   const std::size_t workspace =
       std::max(kWorkspace * points, impl_->coarse ? impl_->coarse->temporary_bytes() : 0);
   const std::size_t searched = (impl_->better ? points : 0) + (impl_->search ? 3 * points : 0);
-  return sizeof(Impl) + searched + held + coarse + impl_->objective.cells().memory_bytes() +
+  const std::size_t looked_at = impl_->best_step ? points : 0;
+  return sizeof(Impl) + searched + looked_at + held + coarse + impl_->objective.cells().memory_bytes() +
          impl_->metric.memory_bytes() + numbers * sizeof(double) + workspace +
          (impl_->coarse_mesh ? impl_->coarse_mesh->memory_bytes() : 0);
 }

@@ -83,6 +83,7 @@ class Deformer {
   /// Whether the current steps are those of a certificate; positions() then do not change any more.
   bool is_certifying() const;
 
+  static constexpr int kStartsOfEffort = 8;  // further starts for each unit of SolveSettings::effort
   /// Begins to look for minima lower than positions(), which must be the result of a solve for the current inputs, from as many
   /// further starts as SolveSettings::effort says. A second call goes on with other starts; on a mesh larger than
   /// DeformerOptions::search_up_to it repeats the one by the coarse levels. step() continues the search. When step() returns
@@ -90,6 +91,8 @@ class Deformer {
   /// hold. Does nothing where a lower minimum cannot be. INVALID_ARGUMENT (EFFORT_OUT_OF_RANGE); FAILED_PRECONDITION
   /// (NOT_SOLVED). `stop` ends it.
   absl::Status start_search(int effort, std::stop_token stop = {});
+  /// Whether a second call would go on with other starts.
+  bool has_other_starts() const;
   /// Whether the current steps are those of such a search.
   bool is_searching() const;
   /// The true energy of the lowest minimum that start_search has found for the current inputs, if it is below summary().energy.
@@ -101,8 +104,9 @@ class Deformer {
   /// Updates positions(), cell_energies() and summary() to the prolonged state of the coarse level of a running
   /// kMultiresolution, if that is better than the guess; otherwise does nothing. Later steps and the result do not
   /// change. Takes about as long as two iterations. Does nothing if the coarse level has made little progress since the
-  /// last call.
-  void catch_up();
+  /// last call. With `is_last`, for a solve that will not go on, the state then depends on its steps alone, not on earlier
+  /// calls or the time.
+  void catch_up(bool is_last = false);
 
   /// Calls start, then step until the end.
   absl::StatusOr<SolveSummary> solve(const SolveSettings& settings, std::stop_token stop = {});

@@ -36,7 +36,7 @@ class DeformerOfLevel : public LevelSolver {
     return deformer_->start(settings, std::move(stop));
   }
   bool step() override { return deformer_->step(); }
-  void catch_up() override { deformer_->catch_up(); }
+  void catch_up(bool is_last) override { deformer_->catch_up(is_last); }
   int iterations() const override { return deformer_->summary().iterations; }
   bool has_found_lower() const override {
     const SolveSummary& summary = deformer_->summary();
@@ -190,7 +190,12 @@ bool Deformer::Impl::keep_rest_if_best() {
 /// Keeps minimiser->x() if it is the best state so far. `objective` holds its evaluation; `sum` is its true sum.
 void Deformer::Impl::keep_if_best(double sum) {
   const bool is_first = summary.iterations == 0;
-  if (is_first || sum < best_sum) keep(minimiser->x(), sum);
+  if (is_first || sum < best_sum) {
+    best_step.reset();
+    keep(minimiser->x(), sum);
+  } else if (best_step && sum < best_step->sum) {
+    best_step = KnownShape{minimiser->x(), sum};
+  }
 }
 
 void Deformer::Impl::keep(const Points& from, double sum) {
@@ -205,12 +210,23 @@ void Deformer::Impl::keep(const Points& from, double sum) {
   });
 }
 
-void Deformer::Impl::catch_up() {
+void Deformer::Impl::catch_up(bool is_last) {
   if (!minimiser) return;
-  const std::optional<Points> found = minimiser->intermediate_state();
+  const std::optional<Points> found = minimiser->intermediate_state(is_last);
   if (!found) return;
-  if (const double sum = objective.sum(*norm); sum < best_sum) keep(*found, sum);
+  if (const double sum = objective.sum(*norm); sum < best_sum) {
+    if (!best_step) best_step = KnownShape{x, best_sum};
+    keep(*found, sum);
+  }
   summarise();
+}
+
+/// Goes back to the best state that a step has reached.
+void Deformer::Impl::forget_looks() {
+  if (!best_step) return;
+  objective.evaluate(best_step->x, *norm);
+  keep(best_step->x, best_step->sum);
+  best_step.reset();
 }
 
 void Deformer::Impl::summarise() {
@@ -219,6 +235,7 @@ void Deformer::Impl::summarise() {
   summary.solve_seconds = seconds();
   summary.evaluations = objective.evaluations() - evaluations_before;
   summary.back_substitutions = metric.back_substitutions() - back_substitutions_before;
+  summary.factorisations = static_cast<int>(metric.version() - metric_before);
 }
 
 void Deformer::Impl::record(const StepResult& result, double sum) {
@@ -238,6 +255,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   next_start = 0;
   evaluations_before = objective.evaluations();
   back_substitutions_before = metric.back_substitutions();
+  metric_before = metric.version();
   const bool is_warm = settings.initial == InitialGuess::kCurrent && state == State::kDeformed;
   if (!is_warm) x_before_move.resize(0, 3);
   if (!settings.effort) settings.effort = default_effort(is_warm);
@@ -308,7 +326,11 @@ void Deformer::Impl::settle(StopReason reason) {
 }
 
 void Deformer::Impl::end_minimiser(StopReason reason) {
-  catch_up();
+  // Who cancels is in a hurry; every other result must not depend on whether somebody has looked on.
+  const bool is_last = reason != StopReason::kCancelled;
+  if (is_last) forget_looks();
+  catch_up(is_last);
+  best_step.reset();
   // Before convergence the metric may still be that of the guess.
   if (settings.method == Method::kMultiresolution && reason == StopReason::kConverged)
     factor = Factor::kQuasiNewton;

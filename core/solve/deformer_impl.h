@@ -52,7 +52,8 @@ struct Deformer::Impl {
   void keep_if_best(double sum);
   void keep(const Points& from, double sum);
   bool keep_rest_if_best();
-  void catch_up();
+  void catch_up(bool is_last);
+  void forget_looks();
   Material effective_material() const;
   void summarise();
   void record(const StepResult& result, double sum);
@@ -72,6 +73,7 @@ struct Deformer::Impl {
   void begin_search(int starts);
   void search_on();
   void end_search();
+  void restore_metric();
   void take_better();
   void begin_certificate(double max_seconds);
   bool certify();
@@ -116,8 +118,8 @@ struct Deformer::Impl {
   Points positions;      // x in the caller's units, made when asked for
   bool is_positions_current = true;
 
-  /// A state of lower energy than x, for the same inputs.
-  struct BetterShape {
+  /// A state for the present inputs.
+  struct KnownShape {
     Points x;
     double sum;  // true sum
   };
@@ -140,11 +142,13 @@ struct Deformer::Impl {
   bool is_search_apart = false;              // its result goes to `better`, not to x
   int search_stage = 0;                      // of its records
   int next_start = 0;                        // of the next search for the same inputs
-  std::optional<BetterShape> better;         // the lowest minimum known, if it is lower than x
+  std::optional<KnownShape> better;          // the lowest minimum known, if it is lower than x
   std::unique_ptr<Certificate> certificate;  // runs after the minimiser and the search have ended
   std::chrono::steady_clock::time_point started;
   double best_sum = 0, best_soft_sum = 0;
+  std::optional<KnownShape> best_step;  // while x is a better state, which catch_up() has found
   int evaluations_before = 0, back_substitutions_before = 0;  // counts of this Deformer when the solve began
+  std::uint64_t metric_before = 0;                            // its version then
   SolveSummary summary;
 };
 

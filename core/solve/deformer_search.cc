@@ -12,7 +12,6 @@
 namespace lpdeform {
 namespace {
 
-constexpr int kStartsOfEffort = 8;           // starts for each unit of effort
 constexpr std::int32_t kSmallestMesh = 100;  // vertices; smaller ones have few minima
 constexpr double kWork = 2e7;                // iterations times vertices of a start, at most
 
@@ -43,7 +42,9 @@ class ByWayOfTwo : public Minimiser {
     result.stage += is_second_ ? 1 : 0;
     if (is_second_ || result.outcome == Outcome::kProgress) return result;
     problem_.objective.reweigh(problem_.norm);
-    present_ = std::make_unique<QuasiNewton>(problem_, present_->x(), Warmth::kWarm);
+    Points x = present_->x();
+    present_.reset();  // two of them would take twice the memory
+    present_ = std::make_unique<QuasiNewton>(problem_, std::move(x), Warmth::kWarm);
     is_second_ = true;
     result.outcome = Outcome::kProgress;
     return result;
@@ -176,7 +177,10 @@ void Deformer::Impl::search_on() {
   }
   if (has_more) return;
   end_search();
-  if (!is_search_apart) conclude();
+  if (is_search_apart)
+    restore_metric();
+  else
+    conclude();
 }
 
 /// Keeps the lowest minimum found, and leaves the evaluation at x, of which the next solve reads the previous soft targets.
@@ -184,7 +188,7 @@ void Deformer::Impl::end_search() {
   summary.further_starts += search->starts();
   next_start += search->starts();
   for (const double sum : search->minima()) summary.minima.push_back(norm->true_energy(sum));
-  if (search->has_improved() && is_search_apart) better = BetterShape{search->lowest(), search->lowest_sum()};
+  if (search->has_improved() && is_search_apart) better = KnownShape{search->lowest(), search->lowest_sum()};
   const bool saves_enough = search->lowest_sum() <= (1 - options.least_saving) * best_sum;
   const bool takes_it = search->has_improved() && !is_search_apart && saves_enough;
   objective.evaluate(takes_it ? search->lowest() : x, *norm);
@@ -197,7 +201,16 @@ void Deformer::Impl::end_search() {
   if (!is_search_apart) record({Outcome::kProgress, best_sum, search_stage}, best_sum);
 }
 
+/// Makes the metric of x in which a warm solve begins, as quasi_newton had left one before the search. Otherwise the next move
+/// would begin with a factorisation, and that while somebody waits for it.
+void Deformer::Impl::restore_metric() {
+  if (summary.method != Method::kQuasiNewton && summary.method != Method::kMultiresolution) return;
+  const QuasiNewton made_for_its_metric(make_problem(), x, Warmth::kWarm);
+  factor = Factor::kQuasiNewton;
+}
+
 void Deformer::Impl::take_better() {
+  forget_weights();  // those of x, from which the better shape differs
   objective.evaluate(better->x, *norm);
   keep(better->x, better->sum);
   better.reset();

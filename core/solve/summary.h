@@ -43,10 +43,11 @@ struct SolveSummary {
   double setup_seconds = 0;   // factorisation for these handles; 0 if it was reused
   double solve_seconds = 0;
   int threads = 1;
-  // The work of the fine level: evaluations of all cells with fitted rotations, and back-substitutions for three
-  // right-hand sides.
+  // The work of the fine level: evaluations of all cells with fitted rotations, back-substitutions for three right-hand
+  // sides, and numeric factorisations.
   int evaluations = 0;
   int back_substitutions = 0;
+  int factorisations = 0;
   std::vector<IterationRecord> trace;
 };
 

@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "core/constraints/check_positions.h"
 #include "core/problem/check_handle.h"
 #include "server/runtime/metrics.h"
 
@@ -34,6 +35,7 @@ bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
   const Inputs newest = mailbox_.newest();
   if (job != nullptr && newest.version > job->version) job->finish(superseded(newest.input_seq));
   if (job != nullptr && job->is_done()) job = nullptr;
+  if (publisher_.is_better_taken()) withdraw_better();
   if (newest.version != inputs_.version) take_over(newest);
 
   const std::uint64_t wanted = job != nullptr                  ? job->number()
@@ -44,7 +46,7 @@ bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
   if (wanted == kReaders && (phase_ == Phase::kAnswered || phase_ == Phase::kCertifying)) {
     if (publisher_.is_certificate_wanted() && !deformer_->is_searching()) return look_for_certificate();
   }
-  const bool is_over = phase_ == Phase::kAnswered || phase_ == Phase::kDone;
+  const bool is_over = phase_ != Phase::kWaiting && phase_ != Phase::kRunning;
   if (wanted == kReaders && is_over && is_search_due_) return look_for_better(pace);
   if (phase_ != Phase::kRunning) {
     if (!(job != nullptr ? begin_job(*job) : begin_live())) return false;
@@ -57,6 +59,7 @@ bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
 }
 
 void LiveSolver::take_over(const Inputs& inputs) {
+  withdraw_better();
   absl::Status status;
   // Here a new p, or stiffness, reaches the solver.
   if (inputs.material != inputs_.material) status = deformer_->set_material(*inputs.material);
@@ -74,7 +77,6 @@ void LiveSolver::take_over(const Inputs& inputs) {
   phase_ = blocked_.ok() ? Phase::kWaiting : Phase::kDone;
   was_begun_ = false;
   is_search_due_ = false;
-  publisher_.forget_better();
   publisher_.set_standing(status.ok() ? std::nullopt
                                       : std::make_optional(FaultNote{status, inputs.input_seq}));
   if (!has_handles) publish(true);
@@ -84,16 +86,21 @@ void LiveSolver::take_over(const Inputs& inputs) {
 bool LiveSolver::begin_job(SolveJob& job) {
   if (phase_ == Phase::kCertifying)
     phase_ = Phase::kAnswered;  // if begin_job() fails, the search begins again later
-  absl::Status status = blocked_;
-  if (inputs_.handles == nullptr) status = no_handles();
+  absl::Status status = inputs_.handles == nullptr ? no_handles() : blocked_;
+  const auto& initial = job.options().initial_positions;
+  if (status.ok() && initial) status = check_positions(deformer_->shape(), *initial);
+  if (!status.ok()) {  // what was announced still holds
+    job.finish(status);
+    return false;
+  }
+  withdraw_better();
   SolveSettings settings = inputs_.solver;
   settings.certify = job.options().certify;
   settings.keep_trace = job.options().keep_trace;
-  if (status.ok() && job.options().initial_positions) {
+  if (initial) {
     settings.initial = InitialGuess::kCurrent;
-    status = deformer_->set_positions(*job.options().initial_positions);
+    status = deformer_->set_positions(*initial);
   }
-  publisher_.forget_better();  // start() may take long, and nothing of before it can be taken then
   if (status.ok()) status = deformer_->start(settings, job.stop_token());
   if (!status.ok()) job.finish(status);
   return status.ok();
@@ -132,7 +139,10 @@ void LiveSolver::run_steps(SolveJob* job, const Pace& pace) {
 
 /// A frame is due if it can be sent to a reader at once, or if the frame that waits for slow readers is old.
 bool LiveSolver::is_frame_due(const Pace& pace) const {
-  if (deformer_->is_certifying()) return false;        // the positions are those of the result
+  if (deformer_->is_certifying()) return false;  // the positions are those of the result
+  const SolveSummary& summary = deformer_->summary();
+  // From the first minimum on a solve searches, and the state stays as it is until it ends.
+  if (is_refinement() && !summary.minima.empty() && summary.energy == shown_energy_) return false;
   if (is_refinement() && is_outdated()) return false;  // the frame of the newer inputs is next
   if (pace.is_sparing && is_refinement() && Clock::now() - last_published_ < kBetweenRefinements)
     return false;
@@ -152,9 +162,8 @@ void LiveSolver::end_solve(SolveJob* job) {
   running_for_ = kNobody;
   const StopReason reason = deformer_->summary().stop_reason;
   const bool is_minimum = reason == StopReason::kConverged || reason == StopReason::kStalled;
-  is_search_due_ = is_minimum && deformer_->summary().further_starts == 0 && standing_effort() > 0;
-  if (is_search_due_) postpone_search(answered_at_ + kSearchQuiet);
-  publisher_.forget_better();
+  is_search_due_ = false;
+  if (is_minimum) plan_search();
   const std::shared_ptr<const Frame> frame = publish(true);
   if (job != nullptr) job->finish(SolveResult{deformer_->summary(), frame});
 }
@@ -187,59 +196,6 @@ void LiveSolver::set_alarm() {
   if (!std::exchange(is_alarm_set_, true)) alarm_.timers->at(answered_at_ + kQuiet, alarm_.ring);
 }
 
-int LiveSolver::standing_effort() const {
-  const SolveSettings& settings = inputs_.solver;
-  const bool has_many_minima = settings.method == Method::kAuto && inputs_.material->p.minCoeff() < 2;
-  return settings.effort.value_or(has_many_minima ? 1 : 0);
-}
-
-/// Looks for minima lower than the result. Returns true while there is more to do now.
-bool LiveSolver::look_for_better(const Pace& pace) {
-  const Timers::TimePoint now = alarm_.timers->now();
-  if (now < answered_at_ + kSearchQuiet) return postpone_search(answered_at_ + kSearchQuiet);
-  if (pace.is_sparing || pace.slice < kSlice) return postpone_search(now + kQuiet);
-  if (!deformer_->is_searching() && !begin_search()) return false;
-  const Clock::time_point end = Clock::now() + kSlice;
-  bool has_more = true;
-  while (has_more && Clock::now() < end && !is_outdated()) has_more = deformer_->step();
-  if (!has_more) end_search();
-  return true;
-}
-
-/// Returns false if there is nothing to look for.
-bool LiveSolver::begin_search() {
-  is_search_due_ = deformer_->start_search(standing_effort(), stop_).ok() && deformer_->is_searching();
-  return is_search_due_;
-}
-
-bool LiveSolver::postpone_search(Timers::TimePoint until) {
-  if (until > search_alarm_) alarm_.timers->at(until, alarm_.ring);
-  search_alarm_ = std::max(search_alarm_, until);
-  return false;
-}
-
-void LiveSolver::end_search() {
-  is_search_due_ = false;
-  const std::optional<double> energy = deformer_->better_energy();
-  const double present = deformer_->summary().energy;
-  if (!energy || !(present > 0)) return;
-  const double saved = 1 - *energy / present;
-  if (saved < inputs_.solver.standing.least_share) return;
-  publisher_.metrics().add(Count::kBetterShapes);
-  if (inputs_.solver.standing.shows) return take_better();
-  publisher_.announce({.input_seq = inputs_.input_seq, .energy = *energy, .saved_share = saved});
-}
-
-void LiveSolver::take_better() {
-  if (is_outdated() || !deformer_->take_better()) return;
-  publisher_.forget_better();
-  phase_ = Phase::kAnswered;
-  answered_at_ = alarm_.timers->now();
-  is_alarm_set_ = false;
-  if (publisher_.is_certificate_wanted()) set_alarm();
-  publish(true);
-}
-
 void LiveSolver::report(const SolveJob& job) {
   const Clock::time_point now = Clock::now();
   if (now - last_report_ < kBetweenReports) return;
@@ -253,6 +209,7 @@ std::shared_ptr<const Frame> LiveSolver::publish(bool is_final) {
   shown_version_ = inputs_.version;
   deformer_->catch_up();
   const SolveSummary& summary = deformer_->summary();
+  shown_energy_ = summary.energy;
   Frame frame;
   frame.input_seq = inputs_.input_seq;
   frame.taken = inputs_.taken;

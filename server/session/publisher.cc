@@ -71,15 +71,29 @@ void Publisher::set_standing(std::optional<FaultNote> fault) {
 void Publisher::announce(BetterNote better) {
   {
     const std::scoped_lock lock(mutex_);
+    if (is_better_taken_) return;  // the lowest one is about to be shown
     better.number = ++better_shapes_;
     better_ = better;
   }
   wake_all();
 }
 
-void Publisher::forget_better() {
+bool Publisher::forget_better() {
   const std::scoped_lock lock(mutex_);
   better_.reset();
+  return std::exchange(is_better_taken_, false);
+}
+
+std::optional<BetterNote> Publisher::take_better(std::uint64_t input_seq) {
+  const std::scoped_lock lock(mutex_);
+  if (!better_ || better_->input_seq != input_seq) return std::nullopt;
+  is_better_taken_ = true;
+  return better_;
+}
+
+bool Publisher::is_better_taken() const {
+  const std::scoped_lock lock(mutex_);
+  return is_better_taken_;
 }
 
 std::optional<BetterNote> Publisher::better() const {

@@ -45,8 +45,13 @@ class Publisher {
 
   /// Announces a better shape to every reader, also to those that come later, until forget_better(). Gives it its number.
   void announce(BetterNote better);
-  void forget_better();
   std::optional<BetterNote> better() const;
+  /// Takes what is announced, if it is for this input. The solver must then make it the session's state, whatever comes next.
+  /// It learns of it by is_better_taken(), and by forget_better(), after which nothing can be taken.
+  std::optional<BetterNote> take_better(std::uint64_t input_seq);
+  bool is_better_taken() const;
+  /// Returns whether it was taken.
+  bool forget_better();
 
   /// An update was taken. Starts to measure how long readers wait for the first frame that answers it.
   void took(std::uint64_t input_seq, AnswerClock::TimePoint since);
@@ -84,6 +89,7 @@ class Publisher {
   std::optional<Standing> standing_;
   std::uint64_t faults_ = 0;
   std::optional<BetterNote> better_;
+  bool is_better_taken_ = false;
   std::uint64_t better_shapes_ = 0;
   std::uint64_t frames_ = 0;
   std::uint64_t epoch_ = 1;

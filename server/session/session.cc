@@ -214,12 +214,11 @@ absl::StatusOr<BetterNote> Session::take_better(const absl::StatusOr<Writer>& wr
     const std::scoped_lock lock(writing_);
     if (absl::Status status = check_still_writes_locked(writer); !status.ok()) return status;
     if (is_closed_) return closed();
-    better = publisher_->better();
-    if (!better || better->input_seq != mailbox_.newest().input_seq) {
+    better = publisher_->take_better(mailbox_.newest().input_seq);
+    if (!better) {
       return make_fault({Reason::kNoBetterShape, "", ""},
                         "No shape of lower energy is known for the session's present inputs.");
     }
-    takes_better_ = true;
   }
   services_.scheduler.wake(shared_from_this(), Urgency::kAnswer);
   return *better;
@@ -337,7 +336,6 @@ bool Session::run() {
   if (services_.scheduler.is_answer_waiting()) {
     pace.slice = pace.is_sparing ? LiveSolver::kOneStep : LiveSolver::kShortSlice;
   }
-  if (takes_better_.exchange(false)) solver_->take_better();
   bool has_more = solver_->run_slice(job.get(), pace);
   if (job && job->is_done()) {
     touch();

@@ -141,8 +141,8 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   /// those of Mailbox::undo.
   absl::StatusOr<UndoResult> undo(const absl::StatusOr<Writer>& writer, std::uint64_t input_seq, bool redo);
 
-  /// Shows the better shape that was announced for the newest inputs. Errors: as update(); FAILED_PRECONDITION
-  /// NO_BETTER_SHAPE.
+  /// Shows the better shape that was announced for the newest inputs. What comes after it, an update or a
+  /// solve, goes on from that shape. Errors: as update(); FAILED_PRECONDITION NO_BETTER_SHAPE.
   absl::StatusOr<BetterNote> take_better(const absl::StatusOr<Writer>& writer);
 
   /// Takes `update`, if there is one, and runs `job`. An earlier job ends with ABORTED SUPERSEDED. Errors: as
@@ -204,7 +204,6 @@ class Session final : public Runnable, public std::enable_shared_from_this<Sessi
   std::atomic<bool> is_closed_ = false;
   std::atomic<EndReason> closed_by_ = EndReason::kSessionDeleted;
   std::atomic<bool> is_draining_ = false;
-  std::atomic<bool> takes_better_ = false;  // take_better() was called
   std::stop_source stop_;
   Mailbox mailbox_;
   const std::shared_ptr<Publisher> publisher_;

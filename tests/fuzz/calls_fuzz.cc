@@ -258,6 +258,10 @@ class Schedule {
         v1::UndoUpdateResponse response;
         return about_session(&Backend::undo_update, call.undo_update(), response);
       }
+      case fuzz::Call::kTakeBetter: {
+        v1::TakeBetterShapeResponse response;
+        return about_session(&Backend::take_better_shape, call.take_better(), response);
+      }
       case fuzz::Call::kRestore:
         return restore(call.restore());
       case fuzz::Call::kSnapshot: {

@@ -94,7 +94,7 @@ def schedules():
                f"weld {{ position {{}} }} }} }} calls {{ delete_upload {{}} }}")
     write("calls", "upload", encode(uploads))
     others = (stream % ("ENCODING_RAW", "true") + update % (1, move) + solve + "calls { get_session {} } calls { snapshot {} } "
-              "calls { undo_update {} } calls { acquire_writer {} } calls { list_sessions {} } calls { delete_session {} }")
+              "calls { undo_update {} } calls { take_better {} } calls { acquire_writer {} } calls { list_sessions {} } calls { delete_session {} }")
     write("calls", "second_caller", encode(create + others.replace("calls {", "calls { caller: 1") + solve))
 
 

@@ -183,6 +183,52 @@ TEST_F(MinimaSearchTest, NewInputsForgetWhatWasFound) {
   EXPECT_EQ(fault_of(solver->start_search(1)).reason, "NOT_SOLVED");
 }
 
+/// A minimiser that ends at once. Counts those that are there.
+class Instant : public Minimiser {
+ public:
+  explicit Instant(int& alive) : alive_(alive) { ++alive_; }
+  ~Instant() override { --alive_; }
+  StepResult step() override { return {Outcome::kConverged, 1, 0, 1}; }
+  const Points& x() const override { return x_; }
+
+ private:
+  int& alive_;
+  const Points x_ = Points::Zero(1, 3);
+};
+
+TEST_F(MinimaSearchTest, ThereIsOneMinimiserAtATime) {
+  int alive = 0, made = 0;
+  const auto make = [&] {
+    EXPECT_EQ(alive, 0);
+    ++made;
+    return std::make_unique<Instant>(alive);
+  };
+  MinimaSearch search([&](int, const Points&) { return make(); }, [&](Points) { return make(); },
+                      {.starts = 3, .most_iterations = 10}, Points::Zero(1, 3), 1);
+  while (search.step()) {
+  }
+  EXPECT_EQ(made, 6);  // a rough one and a finishing one of each start
+}
+
+TEST_F(MinimaSearchTest, AMoveAfterASearchThatFoundNothingIsAsWithoutOne) {
+  const auto move = [](bool searches, int most_iterations) {
+    const auto solver = solver_of(lifted_grid(5));
+    (void)solver->solve(cold(0)).value();
+    const absl::Status status = searches ? solver->start_search(1) : absl::OkStatus();
+    EXPECT_TRUE(status.ok());
+    run(*solver);
+    EXPECT_FALSE(solver->better_energy().has_value());
+    EXPECT_TRUE(solver->set_handles(lifted_grid(5.1).handles).ok());
+    return solver->solve({.max_iterations = most_iterations}).value();
+  };
+  // Warm solves keep the metric that they find for ten iterations.
+  for (const bool searches : {false, true}) EXPECT_EQ(move(searches, 9).factorisations, 0) << searches;
+  const SolveSummary without = move(false, 1000), with = move(true, 1000);
+  EXPECT_EQ(with.stop_reason, StopReason::kConverged);
+  EXPECT_LE(with.iterations, 1.2 * without.iterations);  // the metrics are not the same to the last bit
+  EXPECT_NEAR(with.energy, without.energy, 1e-5 * without.energy);
+}
+
 TEST_F(MinimaSearchTest, ALargeMeshIsSearchedOnItsCoarseLevels) {
   const Bent bent = bar(80);
   auto solver = Deformer::create(rest_shape(bent.mesh), {.search_up_to = 1000}).value();
@@ -197,6 +243,8 @@ TEST_F(MinimaSearchTest, ALargeMeshIsSearchedOnItsCoarseLevels) {
   run(*solver);
   EXPECT_EQ(solver->positions(), before);
   EXPECT_EQ(solver->summary().further_starts, 1);
+  EXPECT_FALSE(solver->has_other_starts());
+  EXPECT_TRUE(solver_of(bent)->has_other_starts());
 }
 
 TEST_F(MinimaSearchTest, UnderAnyLimitItIsNoWorseThanTheFirstMinimum) {

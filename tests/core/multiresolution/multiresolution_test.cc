@@ -177,6 +177,34 @@ TEST_F(MultiresolutionTest, CatchesUpWithTheCoarseLevelWithoutChangingWhatFollow
   }
 }
 
+TEST_F(MultiresolutionTest, StoppedWithinTheCoarseLevelItHasTheSameWhetherOrNotSomebodyLooked) {
+  const TriangleMesh large = grid(180, 180, 1);  // its coarse level has a coarse level, too
+  HandleSet raised;
+  (void)raised.set("left", {slice(large, 0, 0, 0), Fixed{}});
+  (void)raised.set("right", {slice(large, 0, 180, 180), RigidMotion{.translation = {0, 0, 80}}});
+  const auto large_shape = rest_shape(large);
+  for (const bool is_large : {false, true}) {
+    for (const int most : {9, 15, 40}) {
+      const auto make = [&] {
+        return is_large ? deformer(large_shape, raised, Material::uniform(1))
+                        : deformer(shape, bend(), Material::uniform(1));
+      };
+      SolveSettings few = settings(Method::kMultiresolution);
+      few.max_iterations = most;
+      const auto alone = make(), looked_at = make();
+      const SolveSummary summary = alone->solve(few).value();
+      ASSERT_EQ(summary.trace.back().energy, summary.initial_energy) << "the fine level had begun";
+      EXPECT_LT(summary.energy, summary.initial_energy);
+      ASSERT_TRUE(looked_at->start(few).ok());
+      do looked_at->catch_up();
+      while (looked_at->step());
+      EXPECT_EQ(looked_at->positions(), alone->positions()) << most << " iterations";
+      EXPECT_EQ(looked_at->summary().energy, summary.energy);
+      EXPECT_EQ(looked_at->cell_energies(), alone->cell_energies());
+    }
+  }
+}
+
 // Its coarse level has more vertices than a level that keeps its solver.
 TEST_F(MultiresolutionTest, MakesTheSolverOfALargeLevelAgainForTheNextColdSolve) {
   const TriangleMesh mesh = grid(250, 250, 1);

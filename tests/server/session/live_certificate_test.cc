@@ -114,6 +114,20 @@ TEST_F(LargeBarTest, ANewerInputEndsTheSearchForACertificate) {
   EXPECT_EQ(publisher_->newest()->input_seq, 2u);
 }
 
+TEST_F(LargeBarTest, AMinimumIsLookedForWhenWhoWantedTheCertificateHasLeft) {
+  const auto stays = look_on(), leaves = look_on(kWithCertificate);
+  begin_certificate();
+  timers_->advance(LiveSolver::kSearchQuiet);
+  ASSERT_TRUE(solver_.run_slice(nullptr));
+  ASSERT_FALSE(solver_.is_searching());
+  publisher_->remove(*leaves);
+  ASSERT_TRUE(solver_.run_slice(nullptr));
+  EXPECT_TRUE(solver_.is_searching());
+  const auto comes = look_on(kWithCertificate);
+  settle();
+  EXPECT_TRUE(publisher_->newest()->optimality_gap.has_value());
+}
+
 TEST_F(LargeBarTest, ASolveCallEndsTheSearchForACertificate) {
   const auto stream = look_on(kWithCertificate);
   begin_certificate();

@@ -1,6 +1,9 @@
 // The search for lower minima in a live session.
 
+#include <algorithm>
+#include <limits>
 #include <numbers>
+#include <vector>
 
 #include "live_solver_fixture.h"
 
@@ -32,6 +35,21 @@ class LiveSearchTest : public LiveSolverTest {
     return result;
   }
 
+  /// As a writer does it. The solver has not run since.
+  bool take() { return publisher_->take_better(mailbox_.newest().input_seq).has_value(); }
+
+  /// Until the next search begins, in units of kSearchQuiet. Runs it to its end. 0 if none comes for long.
+  int wait_for_search() {
+    for (int waited = 1; waited <= 300; ++waited) {
+      timers_->advance(LiveSolver::kSearchQuiet);
+      solver_.run_slice(nullptr);
+      if (!solver_.is_searching()) continue;  // none that begins ends within a slice
+      settle();
+      return waited;
+    }
+    return 0;
+  }
+
   static std::optional<BetterNote> announced(FrameStream& stream) {
     std::optional<BetterNote> found;
     while (const auto note = stream.next()) {
@@ -53,7 +71,8 @@ TEST_F(LiveSearchTest, ABetterShapeIsAnnouncedOnceAndShownWhenItIsTaken) {
   EXPECT_NEAR(better->energy, (1 - better->saved_share) * result->energy, 1e-9 * result->energy);
   EXPECT_FALSE(announced(*stream).has_value());
 
-  solver_.take_better();
+  ASSERT_TRUE(take());
+  settle();
   const auto shown = publisher_->newest();
   EXPECT_GT(shown->frame_seq, result->frame_seq);
   EXPECT_EQ(shown->input_seq, 1u);
@@ -61,14 +80,129 @@ TEST_F(LiveSearchTest, ABetterShapeIsAnnouncedOnceAndShownWhenItIsTaken) {
   EXPECT_EQ(shown->energy, better->energy);
   EXPECT_NE(shown->surface->positions(), result->surface->positions());
   EXPECT_FALSE(publisher_->better().has_value());
-  solver_.take_better();
-  EXPECT_EQ(publisher_->newest(), shown);
+  EXPECT_FALSE(take());
+}
+
+TEST_F(LiveSearchTest, AnInputThatFollowsATakenShapeGoesOnFromIt) {
+  const auto stream = look_on();
+  const auto result = search(bend(1));
+  const auto better = announced(*stream);
+  ASSERT_TRUE(better && take());
+  ASSERT_TRUE(mailbox_.take(bend(2)).ok());  // the same handles, before the solver has run
+  settle();
+  EXPECT_EQ(publisher_->newest()->input_seq, 2u);
+  EXPECT_TRUE(publisher_->newest()->is_final);
+  EXPECT_NEAR(publisher_->newest()->energy, better->energy, 1e-3 * better->energy);
+  EXPECT_FALSE(publisher_->is_better_taken());
+}
+
+TEST_F(LiveSearchTest, ALateUpdateDoesNotLoseATakenShape) {
+  const auto stream = look_on();
+  search(bend(5));
+  const auto better = announced(*stream);
+  Update late;
+  late.input_seq = 3;
+  late.settings.length_unit = 2;
+  ASSERT_TRUE(mailbox_.take(late).ok());
+  ASSERT_TRUE(better && take());
+  settle();
+  EXPECT_NEAR(publisher_->newest()->energy, better->energy, 1e-3 * better->energy);
+}
+
+TEST_F(LiveSearchTest, ARefusedSolveLeavesWhatIsAnnounced) {
+  const auto stream = look_on();
+  search(bend(1));
+  const auto better = announced(*stream);
+  Points positions = rest();
+  positions(7, 1) = std::numeric_limits<double>::quiet_NaN();
+  const auto refused = job({.initial_positions = positions});
+  settle(refused.get());
+  EXPECT_EQ(failure(), "POSITIONS_NOT_FINITE");
+  ASSERT_TRUE(better && take());
+  settle();
+  EXPECT_EQ(publisher_->newest()->energy, better->energy);
+}
+
+TEST_F(LiveSearchTest, ASolveThatFollowsATakenShapeGoesOnFromIt) {
+  const auto stream = look_on();
+  search(bend(1));
+  const auto better = announced(*stream);
+  ASSERT_TRUE(better && take());
+  const auto solve = job();
+  settle(solve.get());
+  ASSERT_TRUE(result_ && result_->ok());
+  EXPECT_LE((*result_)->summary.energy, 1.001 * better->energy);
 }
 
 TEST_F(LiveSearchTest, ALaterReaderIsToldToo) {
   const auto stream = look_on();
   search(bend(1));
   EXPECT_TRUE(announced(*look_on()).has_value());
+}
+
+TEST_F(LiveSearchTest, ASessionThatStandsGoesOnLookingEverMoreSeldomAndEnds) {
+  const auto stream = look_on();
+  search(bend(1));
+  const int searches = LiveSolver::kMostStarts / Deformer::kStartsOfEffort;
+  for (int k = 1; k < searches; ++k) EXPECT_EQ(wait_for_search(), 1 << k);
+  EXPECT_EQ(wait_for_search(), 0);
+}
+
+TEST_F(LiveSearchTest, TheStartsThatTheEffortAsksForFollowOneAnotherAtOnce) {
+  const auto stream = look_on();
+  Update update = bend(1);
+  update.settings.solver = SolveSettings{.effort = 3};
+  search(update);
+  EXPECT_EQ(wait_for_search(), 1 << 3);
+}
+
+TEST_F(LiveSearchTest, ALongPauseDoesNotDelayTheSearchForANewInput) {
+  const auto stream = look_on();
+  search(bend(1));
+  for (int k = 1; k < 4; ++k) EXPECT_GT(wait_for_search(), 0);
+  ASSERT_TRUE(mailbox_.take(bend(2, 60)).ok());
+  settle();
+  const int rings = rings_;
+  timers_->advance(LiveSolver::kSearchQuiet);
+  EXPECT_GT(rings_, rings);
+  solver_.run_slice(nullptr);
+  EXPECT_TRUE(solver_.is_searching());
+}
+
+TEST_F(LiveSearchTest, TheSearchGoesOnOnceItsShapeIsTaken) {
+  const auto stream = look_on();
+  search(bend(1));
+  ASSERT_TRUE(take());
+  settle();
+  EXPECT_EQ(wait_for_search(), 2);
+}
+
+TEST_F(LiveSearchTest, TheSearchOfASolveCallIsGoneOnWith) {
+  const auto stream = look_on();
+  ASSERT_TRUE(mailbox_.take(bend(1)).ok());
+  const auto solve = job();
+  settle(solve.get());
+  ASSERT_TRUE(result_ && result_->ok());
+  ASSERT_EQ((*result_)->summary.further_starts, 8);
+  EXPECT_EQ(wait_for_search(), 2);
+}
+
+TEST_F(LiveSearchTest, TheSearchOfASolveCallSendsNoFrames) {
+  const auto stream = look_on();
+  ASSERT_TRUE(mailbox_.take(bend(1)).ok());
+  const auto solve = job();
+  std::vector<double> energies;  // of each frame
+  auto shown = publisher_->newest();
+  while (solver_.run_slice(solve.get())) {
+    if (publisher_->newest() != shown) energies.push_back(publisher_->newest()->energy);
+    shown = publisher_->newest();
+    while (stream->next()) {
+    }
+    ASSERT_TRUE(stream->acknowledge(stream->last_frame_seq()).ok());
+  }
+  ASSERT_TRUE(result_ && result_->ok());
+  EXPECT_EQ((*result_)->summary.further_starts, 8);
+  EXPECT_EQ(std::ranges::adjacent_find(energies), energies.end());
 }
 
 TEST_F(LiveSearchTest, NothingIsSearchedBeforeTheResultHasStood) {
@@ -87,7 +221,7 @@ TEST_F(LiveSearchTest, ANewInputEndsTheSearchAndVoidsWhatItFound) {
   search(bend(1));
   ASSERT_TRUE(announced(*stream).has_value());
   ASSERT_TRUE(mailbox_.take(bend(2, 10)).ok());
-  solver_.take_better();  // too late
+  EXPECT_FALSE(take());  // too late
   settle();
   EXPECT_EQ(publisher_->newest()->input_seq, 2u);
   EXPECT_FALSE(publisher_->better().has_value());
@@ -144,7 +278,8 @@ TEST_F(LiveSearchTest, ACertificateComesFirstAndAgainForTheBetterShape) {
   search(bend(1));
   EXPECT_TRUE(publisher_->newest()->optimality_gap.has_value());
   ASSERT_TRUE(announced(*stream).has_value());
-  solver_.take_better();
+  ASSERT_TRUE(take());
+  settle();
   EXPECT_FALSE(publisher_->newest()->optimality_gap.has_value());
   timers_->advance(LiveSolver::kQuiet);
   settle();

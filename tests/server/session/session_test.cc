@@ -7,6 +7,7 @@
 #include <future>
 #include <latch>
 #include <mutex>
+#include <numbers>
 
 #include "absl/strings/str_cat.h"
 #include "bar.h"
@@ -47,13 +48,17 @@ class Reader {
     return found;
   }
 
-  std::optional<EndNote> wait_for_end() {
-    std::unique_lock lock(state_->mutex);
-    state_->changed.wait_for(lock, std::chrono::seconds(60), [&] { return state_->end.has_value(); });
-    return state_->end;
-  }
+  std::optional<EndNote> wait_for_end() { return wait_for(state_->end); }
+  std::optional<BetterNote> wait_for_better() { return wait_for(state_->better); }
 
  private:
+  template <typename Value>
+  std::optional<Value> wait_for(const std::optional<Value>& value) {
+    std::unique_lock lock(state_->mutex);
+    state_->changed.wait_for(lock, std::chrono::seconds(60), [&] { return value.has_value(); });
+    return value;
+  }
+
   struct State {
     void pump() {
       const std::scoped_lock one_at_a_time(pumping);
@@ -67,6 +72,7 @@ class Reader {
             received = piece->frame->frame_seq;
           }
           if (const auto* const note_end = std::get_if<EndNote>(&*note)) end = *note_end;
+          if (const auto* const note_better = std::get_if<BetterNote>(&*note)) better = *note_better;
         }
         changed.notify_all();
         if (received != 0) stream->acknowledge(received).IgnoreError();
@@ -79,6 +85,7 @@ class Reader {
     std::condition_variable changed;
     std::vector<std::shared_ptr<const Frame>> frames;
     std::optional<EndNote> end;
+    std::optional<BetterNote> better;
   };
   std::shared_ptr<State> state_;
 };
@@ -100,8 +107,8 @@ class SessionTest : public testing::Test {
  protected:
   ~SessionTest() override { registry_->clear(EndReason::kDraining, ""); }
 
-  std::shared_ptr<Session> create(const std::string& request_id = "") {
-    const auto shape = shape_of(bar_mesh());
+  std::shared_ptr<Session> create(const std::string& request_id = "", const TriangleMesh& mesh = bar_mesh()) {
+    const auto shape = shape_of(mesh);
     SessionParts parts{.name = absl::StrCat("sessions/", ++count_),
                        .shape = shape,
                        .deformer = deformer_of(shape),
@@ -123,6 +130,20 @@ class SessionTest : public testing::Test {
         session.open_stream(writer.ok() ? std::make_optional(*writer) : std::nullopt, {.credit = 2});
     EXPECT_TRUE(stream.ok()) << stream.status();
     return *stream;
+  }
+
+  /// Keeps the scheduler from running anything until the latch is counted down.
+  std::shared_ptr<std::latch> block() {
+    const auto are_busy = std::make_shared<std::latch>(scheduler_.threads());
+    auto release = std::make_shared<std::latch>(1);  // whoever waits may do so for longer than a test lasts
+    for (int k = 0; k < scheduler_.threads(); ++k) {
+      scheduler_.wake(std::make_shared<Blocker>([are_busy, release] {
+        are_busy->count_down();
+        release->wait();
+      }));
+    }
+    are_busy->wait();
+    return release;
   }
 
   std::shared_ptr<ManualTimers> timers_ = std::make_shared<ManualTimers>();
@@ -148,20 +169,80 @@ TEST_F(SessionTest, AnUpdateAndAStepTakenBackAreAnsweredBeforeRefinements) {
   const auto session = create();
   const std::string token = session->lease().token;
   ASSERT_TRUE(session->update(session->writer(token), hold_ends(rest_, 1, 1)).ok());
-  const auto are_busy = std::make_shared<std::latch>(scheduler_.threads());
-  const auto release =
-      std::make_shared<std::latch>(1);  // whoever waits may do so for longer than this test lasts
-  for (int k = 0; k < scheduler_.threads(); ++k) {
-    scheduler_.wake(std::make_shared<Blocker>([are_busy, release] {
-      are_busy->count_down();
-      release->wait();
-    }));
-  }
-  are_busy->wait();
+  const auto release = block();
   EXPECT_FALSE(scheduler_.is_answer_waiting());
   EXPECT_TRUE(session->undo(session->writer(token), 2, false).ok());
   EXPECT_TRUE(scheduler_.is_answer_waiting());
   release->count_down();
+}
+
+/// A bar that is bent by 80 degrees, and what its search announces.
+class BetterShapeTest : public SessionTest {
+ protected:
+  BetterShapeTest()
+      : session_(create("", box_surface(6, 6, 40))),
+        token_(session_->lease().token),
+        reader_(open(*session_, token_)) {}
+
+  Update bend(std::uint64_t input_seq) const {
+    constexpr double kAngle = 80 * std::numbers::pi / 180;
+    Update update = hold_ends(rest_, input_seq, 0);
+    update.handles.back().change =
+        Handle{vertices_at(rest_, highest_z(rest_)),
+               RigidMotion{Eigen::Vector3d::UnitX(), kAngle, {3, 3, 20}, {0, 0, 0}}};
+    update.settings.p = Field::Constant(1, 1.5);
+    return update;
+  }
+
+  std::shared_ptr<const Frame> wait_for_result(std::uint64_t input_seq) {
+    return reader_.wait_for_frame(
+        [&](const Frame& frame) { return frame.input_seq == input_seq && frame.is_final; });
+  }
+
+  std::optional<BetterNote> search() {
+    EXPECT_TRUE(session_->update(session_->writer(token_), bend(1)).ok());
+    EXPECT_TRUE(wait_for_result(1));
+    timers_->advance(LiveSolver::kSearchQuiet);
+    return reader_.wait_for_better();
+  }
+
+  absl::StatusOr<BetterNote> take() { return session_->take_better(session_->writer(token_)); }
+
+  const std::shared_ptr<Session> session_;
+  const std::string token_;
+  Reader reader_;
+};
+
+TEST_F(BetterShapeTest, OnlyTheWriterTakesItAndOnlyWhatWasAnnounced) {
+  EXPECT_EQ(reason(take().status()), "NO_BETTER_SHAPE");
+  const auto better = search();
+  ASSERT_TRUE(better);
+  EXPECT_EQ(reason(session_->take_better(session_->writer("")).status()), "WRITER_TOKEN_MISSING");
+  EXPECT_EQ(reason(session_->take_better(session_->writer("wrong")).status()), "NOT_THE_WRITER");
+  const auto taken = take();
+  ASSERT_TRUE(taken.ok()) << taken.status();
+  EXPECT_EQ(taken->input_seq, 1u);
+  EXPECT_EQ(taken->energy, better->energy);
+  EXPECT_TRUE(reader_.wait_for_frame(
+      [&](const Frame& frame) { return frame.is_final && frame.energy == better->energy; }));
+  EXPECT_EQ(reason(take().status()), "NO_BETTER_SHAPE");
+}
+
+TEST_F(BetterShapeTest, AnUpdateRightAfterwardsGoesOnFromIt) {
+  const auto better = search();
+  ASSERT_TRUE(better);
+  const auto release = block();
+  EXPECT_TRUE(take().ok());
+  EXPECT_TRUE(session_->update(session_->writer(token_), bend(2)).ok());
+  EXPECT_EQ(reason(take().status()), "NO_BETTER_SHAPE");  // it is for the inputs before
+  release->count_down();
+  EXPECT_NEAR(wait_for_result(2)->energy, better->energy, 1e-3 * better->energy);
+}
+
+TEST_F(BetterShapeTest, AClosedSessionHasNone) {
+  ASSERT_TRUE(search());
+  registry_->remove(session_->name(), EndReason::kSessionDeleted, "gone");
+  EXPECT_EQ(reason(take().status()), "SESSION_UNKNOWN");
 }
 
 TEST_F(SessionTest, OnlyTheWriterChangesIt) {
