@@ -1,5 +1,6 @@
 #include "core/energy/cell_pass.h"
 
+#include <algorithm>
 #include <numeric>
 
 namespace lpdeform {
@@ -18,6 +19,22 @@ CellPass::CellPass(std::shared_ptr<const RestShape> shape, Workers workers)
       rows_(shape_->vertex_count() * kRow, 0.0),
       c_(shape_->vertex_count(), 0.0),
       chunk_sums_((shape_->vertex_count() + kChunk - 1) / kChunk) {}
+
+void CellPass::set_bending(double share) {
+  bending_ = share;
+  if (share < 1 && !membrane_) membrane_.emplace(shape_, workers_);
+  if (share >= 1) membrane_.reset();
+  bent_c_.resize(membrane_ ? c_.size() : 0);
+  bent_c_.shrink_to_fit();
+}
+
+/// Makes the E_i^2 of cells begin to end - 1, as Eq. 2 has them, those of set_bending().
+void CellPass::replace_bending(std::size_t begin, std::size_t end) const {
+  for (std::size_t i = begin; i < end; ++i) {
+    const double stretching = membrane_->share(static_cast<std::int32_t>(i));
+    state_.squared[i] = bending_ * state_.squared[i] + (1 - bending_) * stretching;
+  }
+}
 
 double CellPass::evaluate(const Points& x, const LpNorm& norm) {
   state_.rotations = {};  // of the x before
@@ -45,9 +62,11 @@ double CellPass::evaluate_cells(const Points& x, const LpNorm& norm, bool fit) {
       to[0] = from[0], to[1] = from[1], to[2] = from[2];
     }
   });
+  if (membrane_) membrane_->evaluate(x, workers_);
   return sum_of_chunks([&](std::size_t begin, std::size_t end) {
     const std::size_t first = begin / kLanes, last = (end + kLanes - 1) / kLanes;
     evaluate_blocks(blocks_, first, last, rows_.data(), fit, state_);
+    if (membrane_) replace_bending(begin, end);
     return weigh(norm, begin, end);
   });
 }
@@ -78,9 +97,15 @@ double CellPass::sum(const LpNorm& norm) const {
 
 void CellPass::gradient(Points& result) const {
   result.resize(shape_->vertex_count(), 3);
+  if (membrane_)
+    std::transform(c_.begin(), c_.end(), bent_c_.begin(), [this](double c) { return bending_ * c; });
+  const std::vector<double>& c = membrane_ ? bent_c_ : c_;
   workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-    gradient_of_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, state_, c_.data(),
-                       result.data());
+    gradient_of_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, state_, c.data(), result.data());
+  });
+  if (!membrane_) return;
+  workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    membrane_->add_gradient(1 - bending_, c_, begin, end, result);
   });
 }
 
@@ -91,6 +116,7 @@ void CellPass::keep_rotations() const {
   workers_.for_chunks(blocks_.block_count(), kChunk / kLanes,
                       [&](std::size_t, std::size_t begin, std::size_t end) {
                         evaluate_blocks(blocks_, begin, end, rows_.data(), true, state_);
+                        if (membrane_) replace_bending(begin * kLanes, std::min(end * kLanes, c_.size()));
                       });
 }
 
@@ -106,8 +132,8 @@ std::vector<Eigen::Matrix3d> CellPass::rotations() const {
 }
 
 std::size_t CellPass::memory_bytes() const {
-  return blocks_.memory_bytes() + state_.memory_bytes() +
-         (rows_.capacity() + c_.capacity() + chunk_sums_.capacity()) * sizeof(double);
+  return blocks_.memory_bytes() + state_.memory_bytes() + (membrane_ ? membrane_->memory_bytes() : 0) +
+         (rows_.capacity() + c_.capacity() + bent_c_.capacity() + chunk_sums_.capacity()) * sizeof(double);
 }
 
 }  // namespace lpdeform

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/base/workers.h"
 #include "core/energy/cell_blocks.h"
 #include "core/energy/cell_kernel.h"
 #include "core/energy/lp_norm.h"
+#include "core/energy/membrane.h"
 #include "core/energy/rest_shape.h"
 
 namespace lpdeform {
@@ -27,6 +29,16 @@ namespace lpdeform {
 class CellPass {
  public:
   CellPass(std::shared_ptr<const RestShape> shape, Workers workers);
+
+  /// Only for coarse levels: from the next evaluation on, cells keep the share b of their resistance to bending, 0 < b <= 1,
+  /// and all of their resistance to stretching. With b < 1,
+  ///
+  ///   E_i^2 = b (Eq. 2) + (1 - b) / 3 sum_{faces T at i} E_T^2        (membrane.h)
+  ///
+  /// A cell's resistance to bending grows as the square of its edges, beside that to stretching. A coarse level with b =
+  /// its vertices / those of the fine level therefore bends like the fine level. Not for uniform weights, whose cells are
+  /// in other units than faces.
+  void set_bending(double share);
 
   /// f at x, all rotations fitted.
   double evaluate(const Points& x, const LpNorm& norm);
@@ -54,6 +66,7 @@ class CellPass {
   template <typename Body>
   double sum_of_chunks(const Body& body) const;
   double weigh(const LpNorm& norm, std::size_t begin, std::size_t end);
+  void replace_bending(std::size_t begin, std::size_t end) const;
   double evaluate_cells(const Points& x, const LpNorm& norm, bool fit);
   void keep_rotations() const;
 
@@ -61,7 +74,10 @@ class CellPass {
   Workers workers_;
   CellBlocks blocks_;
   mutable BlockState state_;  // its rotations are made when first needed after an evaluation
-  std::vector<double> rows_;  // x, with fillers
+  double bending_ = 1;
+  std::optional<Membrane> membrane_;    // if bending_ < 1
+  mutable std::vector<double> bent_c_;  // bending_ c_i, if bending_ < 1
+  std::vector<double> rows_;            // x, with fillers
   std::vector<double> c_;
   mutable std::vector<double> chunk_sums_;
 };

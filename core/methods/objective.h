@@ -16,6 +16,8 @@ class Objective {
   Objective(std::shared_ptr<const RestShape> shape, Workers workers)
       : cells_(std::move(shape), std::move(workers)) {}
 
+  /// CellPass::set_bending.
+  void set_bending(double share) { cells_.set_bending(share); }
   void set_soft_terms(SoftTerms terms) { soft_ = std::move(terms); }
 
   /// f at x, all rotations fitted.

@@ -85,7 +85,8 @@ void CoarseLevel::find_guides(const RestShape& fine) {
 }
 
 absl::Status CoarseLevel::take_over(const RestShape& fine, const HandleSet& handles,
-                                    const Constraints& constraints, const Material& material) {
+                                    const Constraints& constraints, const Material& material,
+                                    double bending) {
   if (!solver_) solver_ = make_solver_(shape_);
   if (!solver_) return absl::InternalError("The solver of a coarse level could not be made again.");
   const std::size_t n = fine_vertex_.size();
@@ -101,6 +102,8 @@ absl::Status CoarseLevel::take_over(const RestShape& fine, const HandleSet& hand
     }
     coarse.stiffness = std::move(stiffness);
   }
+  bending_ = bending;
+  solver_->set_bending(bending);
   absl::Status status = solver_->set_material(coarse);
   status.Update(solver_->set_handles(
       coarse_handles({fine, *shape_, fine_vertex_, coarse_vertex_}, handles, constraints)));
@@ -132,6 +135,15 @@ Points CoarseLevel::prolong(const RestShape& fine, const Workers& workers) const
     for (std::size_t v = begin; v < end; ++v) place(static_cast<Eigen::Index>(v));
   });
   return result;
+}
+
+bool CoarseLevel::can_bend_like_fine() const {
+  return coarse_vertex_.size() >= kLeastEased && shape_->weight_kind() != WeightKind::kUniform;
+}
+
+void CoarseLevel::bend_like_fine() {
+  const double ratio = static_cast<double>(fine_vertex_.size()) / static_cast<double>(coarse_vertex_.size());
+  solver_->set_bending(bending_ * ratio);
 }
 
 void CoarseLevel::leave() {

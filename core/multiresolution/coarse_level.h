@@ -29,9 +29,16 @@ class CoarseLevel {
 
   /// Restricts the inputs of the fine level to the coarse solver: coarse_handles, and `material`. A coarse cell stands
   /// for m fine cells, and its E_i^2 is a sum over them. If p_i is not 2, s_i is therefore multiplied by (m /
-  /// kRatio)^(1 - p_i / 2) and clamped to the permitted range.
+  /// kRatio)^(1 - p_i / 2) and clamped to the permitted range. `bending` is that of the fine cells
+  /// (CellPass::set_bending); the coarse cells get the same.
   absl::Status take_over(const RestShape& fine, const HandleSet& handles, const Constraints& constraints,
-                         const Material& material);
+                         const Material& material, double bending);
+
+  /// Whether bend_like_fine() pays off: the fine level is large, and its weights are not uniform.
+  bool can_bend_like_fine() const;
+  /// Lets the coarse solver's cells resist bending as the fine level does: multiplies their share by coarse vertices / fine
+  /// vertices, until the next take_over(). Only if can_bend_like_fine().
+  void bend_like_fine();
 
   /// Only between take_over() and leave().
   LevelSolver& solver() { return *solver_; }
@@ -55,6 +62,8 @@ class CoarseLevel {
   void find_guides(const RestShape& fine);
 
   static constexpr std::int32_t kMostKept = 10000;  // vertices of a level that keeps its solver
+  static constexpr std::size_t kLeastEased =
+      30000;  // vertices of a fine level from which on bend_like_fine() pays off
 
   static constexpr std::size_t kGuides = 4;
   struct Guides {
@@ -65,6 +74,7 @@ class CoarseLevel {
   std::vector<double> share_;                              // the number of fine vertices of each coarse one
   std::vector<Guides> guides_;                             // of each fine vertex
   std::shared_ptr<const RestShape> shape_;
+  double bending_ = 1;  // of the fine level
   MakeLevelSolver make_solver_;
   std::unique_ptr<LevelSolver> solver_;  // null if leave() has freed it
 };

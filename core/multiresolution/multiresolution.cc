@@ -9,6 +9,8 @@ namespace {
 
 constexpr double kCoarseTolerance = 1e-4;       // relative, of E^(1/p); the levels differ by more than this
 constexpr double kRoughCoarseTolerance = 1e-3;  // if some p_i < 2 and the first minimum is taken as it comes
+constexpr double kFirstTolerance = 1e-2,
+                 kEasedTolerance = 3e-3;  // before and after cells bend like the fine ones
 constexpr int kCostOfLook = 5;  // looking at the coarse level takes at most one part in this many of the time
 
 }  // namespace
@@ -18,11 +20,16 @@ Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level, 
   objective_ = problem_.objective.reweigh(problem_.norm);
   SolveSettings settings;
   settings.initial = InitialGuess::kLaplacian;
-  const bool is_rough = !is_search_ && problem_.norm.lowest_p() < 2;
-  settings.tolerance = std::max(problem_.tolerance, is_rough ? kRoughCoarseTolerance : kCoarseTolerance);
+  settings.tolerance = std::max(problem_.tolerance, first_tolerance());
   settings.effort = effort;
   if (!level_.solver().start(settings, problem_.stop).ok())
     fine_ = std::make_unique<QuasiNewton>(problem_, x_, Warmth::kCold);
+}
+
+double Multiresolution::first_tolerance() const {
+  if (is_search_) return kCoarseTolerance;
+  if (level_.can_bend_like_fine()) return kFirstTolerance;
+  return problem_.norm.lowest_p() < 2 ? kRoughCoarseTolerance : kCoarseTolerance;
 }
 
 /// The prolonged result of the coarse level, moved to satisfy the constraints. Not always finite.
@@ -65,6 +72,19 @@ std::optional<Points> Multiresolution::intermediate_state(bool is_last) {
   return is_good ? std::make_optional(std::move(found)) : std::nullopt;
 }
 
+/// Lets the coarse level go on from its result with cells that bend like the fine ones. False if it does not.
+bool Multiresolution::begin_to_ease() {
+  if (is_eased_ || !level_.can_bend_like_fine()) return false;
+  is_eased_ = true;
+  level_.bend_like_fine();
+  SolveSettings settings;
+  settings.initial = InitialGuess::kCurrent;
+  settings.method = Method::kQuasiNewton;
+  settings.tolerance = std::max(problem_.tolerance, kEasedTolerance);
+  settings.effort = 0;
+  return level_.solver().start(settings, problem_.stop).ok();
+}
+
 /// Starts QuasiNewton from the better of the guess and the result of the coarse level.
 void Multiresolution::begin_fine() {
   Points found = prolonged();
@@ -86,8 +106,9 @@ StepResult Multiresolution::step() {
     return result;
   }
   if (level_.solver().step()) return {Outcome::kProgress, objective_, 0, objective_};
-  if (is_search_ && !level_.solver().has_found_lower())
+  if (is_search_ && !is_eased_ && !level_.solver().has_found_lower())
     return {Outcome::kBreakdown, objective_, 0, objective_};
+  if (begin_to_ease()) return {Outcome::kProgress, objective_, 0, objective_};
   begin_fine();
   const double sum = problem_.objective.sum(problem_.norm);
   return {Outcome::kProgress, sum, 0, sum};

@@ -10,8 +10,10 @@
 
 namespace lpdeform {
 
-/// Solves the coarse level first, by any method that suits it (which may include a level below it), then runs
-/// QuasiNewton from the prolonged result. One iteration of the coarse level counts as one iteration here. Until the
+/// Solves the coarse level first, by any method that suits it (which may include a level below it). On large meshes the
+/// coarse level then goes on with cells that bend like those of the fine level (CoarseLevel::bend_like_fine). Then runs
+/// QuasiNewton from the prolonged result. Cells that resist bending find the better minima; cells that give way move the
+/// surface to where the fine level wants it, which takes a hundred fine iterations otherwise. One iteration of the coarse level counts as one iteration here. Until the
 /// coarse level has ended, the state is the initial guess. If the prolonged result is not better than the initial
 /// guess, QuasiNewton starts from the guess. The convergence criterion is that of QuasiNewton.
 class Multiresolution : public Minimiser {
@@ -30,8 +32,10 @@ class Multiresolution : public Minimiser {
  private:
   static constexpr int kFirstLook = 8;
 
+  double first_tolerance() const;
   Points prolonged();
   void even_out(Points& found) const;
+  bool begin_to_ease();
   void begin_fine();
 
   Problem problem_;
@@ -39,7 +43,8 @@ class Multiresolution : public Minimiser {
   double objective_ = 0;
   CoarseLevel& level_;
   const bool is_search_;
-  int looked_at_ = 0;  // iterations of the coarse level at the last prolongation
+  bool is_eased_ = false;  // the coarse level goes on with cells that bend like the fine ones
+  int looked_at_ = 0;      // iterations of the coarse level at the last prolongation
   std::chrono::steady_clock::time_point next_look_;
   std::unique_ptr<QuasiNewton> fine_;  // null while the coarse level runs
 };

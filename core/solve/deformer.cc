@@ -100,6 +100,12 @@ absl::Status Deformer::set_handles(const HandleSet& handles) {
   return absl::OkStatus();
 }
 
+void Deformer::set_bending(double share) {
+  impl_->change_inputs();
+  impl_->bending = share;
+  impl_->objective.set_bending(share);
+}
+
 absl::Status Deformer::set_material(const Material& material) {
   if (absl::Status status = check_material(material, impl_->shape->vertex_count()); !status.ok())
     return status;

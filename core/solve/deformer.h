@@ -60,6 +60,11 @@ class Deformer {
   /// Replaces the material. Errors: as check_material. Ends a running solve with kCancelled.
   absl::Status set_material(const Material& material);
 
+  /// Only for coarse levels: cells keep this share of their resistance to bending (CellPass::set_bending), 0 < share <= 1.
+  /// If it is not 1, energies are not those of Eq. 2, and neither certificates nor any method but kQuasiNewton and
+  /// kMultiresolution may be asked for. Ends a running solve with kCancelled.
+  void set_bending(double share);
+
   /// Makes `positions` the current state, from which InitialGuess::kCurrent starts. Errors: as check_positions.
   /// Ends a running solve with kCancelled.
   absl::Status set_positions(const Points& positions);

@@ -30,6 +30,7 @@ class DeformerOfLevel : public LevelSolver {
  public:
   explicit DeformerOfLevel(std::unique_ptr<Deformer> deformer) : deformer_(std::move(deformer)) {}
 
+  void set_bending(double share) override { deformer_->set_bending(share); }
   absl::Status set_material(const Material& material) override { return deformer_->set_material(material); }
   absl::Status set_handles(const HandleSet& handles) override { return deformer_->set_handles(handles); }
   absl::Status start(const SolveSettings& settings, std::stop_token stop) override {
@@ -118,7 +119,7 @@ bool Deformer::Impl::prepare_coarse() {
     CoarseMesh mesh = coarse_mesh ? *std::exchange(coarse_mesh, {}) : CoarseLevel::coarsened(*shape);
     coarse = CoarseLevel::create(*shape, std::move(mesh), make_solver);
   }
-  return coarse && coarse->take_over(*shape, handles, *constraints, effective_material()).ok();
+  return coarse && coarse->take_over(*shape, handles, *constraints, effective_material(), bending).ok();
 }
 
 Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {

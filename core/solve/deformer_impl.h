@@ -102,6 +102,7 @@ struct Deformer::Impl {
   std::optional<CoarseMesh> coarse_mesh;  // of `coarse`, where it was made beforehand
   HandleSet handles;
   Material material;
+  double bending = 1;  // see set_bending()
   std::optional<Constraints> constraints;
   std::shared_ptr<const Points> outside;  // where vertices outside the region are held, in the caller's units
 
