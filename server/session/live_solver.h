@@ -138,7 +138,7 @@ class LiveSolver {
   bool is_alarm_set_ = false;        // set since answered_at_
   bool is_search_due_ = false;       // there are starts to make for the result, from search_from_ on
   Timers::TimePoint search_from_;
-  Timers::TimePoint search_alarm_;  // the latest that was set
+  Timers::TimePoint search_alarm_;  // the next to ring; in the past if none is set
 };
 
 }  // namespace lpdeform

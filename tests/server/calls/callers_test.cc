@@ -110,6 +110,11 @@ class CallersTest : public ServiceTest {
     undo.set_input_seq(100);
     v1::UndoUpdateResponse undone;
     all["undo"] = call(token, &Stub::UndoUpdate, undo, undone);
+    v1::TakeBetterShapeRequest take;
+    take.set_session(name);
+    take.set_writer_token(session.writer_token());
+    v1::TakeBetterShapeResponse taken;
+    all["take"] = call(token, &Stub::TakeBetterShape, take, taken);
     return all;
   }
 
@@ -148,7 +153,7 @@ TEST_F(CallersTest, SomebodyElsesSessionIsNotThere) {
 TEST_F(CallersTest, AViewerSeesTheSubjectsSessionsAndChangesNothing) {
   const auto session = create_as(alice_);
   const auto reasons = refusals(viewer_, session);
-  for (const char* const change : {"acquire", "update", "solve", "snapshot", "undo"})
+  for (const char* const change : {"acquire", "update", "solve", "snapshot", "undo", "take"})
     EXPECT_EQ(reasons.at(change), "READ_ONLY") << change;
   for (const char* const look : {"get", "frames"}) EXPECT_EQ(reasons.at(look), "") << look;
   EXPECT_EQ(reasons.at("ack"), "STREAM_UNKNOWN");
