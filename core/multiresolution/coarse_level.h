@@ -61,9 +61,8 @@ class CoarseLevel {
   bool leaves() const { return shape_->vertex_count() > kMostKept; }
   void find_guides(const RestShape& fine);
 
-  static constexpr std::int32_t kMostKept = 10000;  // vertices of a level that keeps its solver
-  static constexpr std::size_t kLeastEased =
-      30000;  // vertices of a fine level from which on bend_like_fine() pays off
+  static constexpr std::int32_t kMostKept = 10000;   // vertices of a level that keeps its solver
+  static constexpr std::size_t kLeastEased = 30000;  // fine vertices from which on bend_like_fine() pays off
 
   static constexpr std::size_t kGuides = 4;
   struct Guides {

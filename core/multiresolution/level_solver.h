@@ -18,8 +18,8 @@ class LevelSolver {
  public:
   virtual ~LevelSolver() = default;
 
-  virtual void set_bending(double share) = 0;
   virtual absl::Status set_material(const Material& material) = 0;
+  virtual void set_bending(double share) = 0;
   virtual absl::Status set_handles(const HandleSet& handles) = 0;
   virtual absl::Status start(const SolveSettings& settings, std::stop_token stop) = 0;
   virtual bool step() = 0;

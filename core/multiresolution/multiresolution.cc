@@ -9,8 +9,8 @@ namespace {
 
 constexpr double kCoarseTolerance = 1e-4;       // relative, of E^(1/p); the levels differ by more than this
 constexpr double kRoughCoarseTolerance = 1e-3;  // if some p_i < 2 and the first minimum is taken as it comes
-constexpr double kFirstTolerance = 1e-2,
-                 kEasedTolerance = 3e-3;  // before and after cells bend like the fine ones
+constexpr double kFirstTolerance = 1e-2;        // if the cells bend like the fine ones afterwards
+constexpr double kEasedTolerance = 3e-3;        // where they do
 constexpr int kCostOfLook = 5;  // looking at the coarse level takes at most one part in this many of the time
 
 }  // namespace

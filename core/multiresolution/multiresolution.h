@@ -10,12 +10,12 @@
 
 namespace lpdeform {
 
-/// Solves the coarse level first, by any method that suits it (which may include a level below it). On large meshes the
-/// coarse level then goes on with cells that bend like those of the fine level (CoarseLevel::bend_like_fine). Then runs
-/// QuasiNewton from the prolonged result. Cells that resist bending find the better minima; cells that give way move the
-/// surface to where the fine level wants it, which takes a hundred fine iterations otherwise. One iteration of the coarse level counts as one iteration here. Until the
-/// coarse level has ended, the state is the initial guess. If the prolonged result is not better than the initial
-/// guess, QuasiNewton starts from the guess. The convergence criterion is that of QuasiNewton.
+/// Solves the coarse level first, by any method that suits it (which may include a level below it), then runs
+/// QuasiNewton from the prolonged result. On large meshes the coarse level is solved as it is, which finds the better
+/// minima, and goes on with cells that bend like those of the fine level (CoarseLevel::bend_like_fine), which saves fine
+/// iterations. One iteration of the coarse level counts as one iteration here. Until the coarse level has ended, the state
+/// is the initial guess. If the prolonged result is not better than the initial guess, QuasiNewton starts from the guess.
+/// The convergence criterion is that of QuasiNewton.
 class Multiresolution : public Minimiser {
  public:
   /// `level` must already have the handles and the material (take_over), and must outlive this object. If `effort` is not 0,
