@@ -217,7 +217,9 @@ TEST_F(MinimaSearchTest, AMoveAfterASearchThatFoundNothingIsAsWithoutOne) {
     const absl::Status status = searches ? solver->start_search(1) : absl::OkStatus();
     EXPECT_TRUE(status.ok());
     run(*solver);
-    EXPECT_FALSE(solver->better_energy().has_value());
+    // Nothing but what rounding, which differs from build to build, may leave between two ends at one minimum.
+    const double first = solver->summary().energy;
+    EXPECT_GT(solver->better_energy().value_or(first), (1 - 1e-4) * first);
     EXPECT_TRUE(solver->set_handles(lifted_grid(5.1).handles).ok());
     return solver->solve({.max_iterations = most_iterations}).value();
   };
