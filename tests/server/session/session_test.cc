@@ -135,7 +135,7 @@ class SessionTest : public testing::Test {
   /// Keeps the scheduler from running anything until the latch is counted down.
   std::shared_ptr<std::latch> block() {
     const auto are_busy = std::make_shared<std::latch>(scheduler_.threads());
-    auto release = std::make_shared<std::latch>(1);  // whoever waits may do so for longer than a test lasts
+    auto release = std::make_shared<std::latch>(1);  // the others may wait for longer than the test lasts
     for (int k = 0; k < scheduler_.threads(); ++k) {
       scheduler_.wake(std::make_shared<Blocker>([are_busy, release] {
         are_busy->count_down();
