@@ -97,6 +97,23 @@ static class SampleTest
         Send(sample, "OnDisable");
     }
 
+    static void TakingABetterShapeWhereNoneIsKnownIsAWarning()
+    {
+        UnityEngine.Mesh mesh;
+        var sample = Sample(out mesh);
+        sample.TakeBetterShape();
+        Expect(UnityEngine.Debug.Warnings.Count == 0, "without a session there is nothing to take");
+        sample.showBetterShapes = true;
+        Send(sample, "OnEnable");
+        sample.handles[1].transform.position.y = 2;
+        UpdateUntil(sample, () => mesh.vertices[20].y == 2, "the session is live");
+        sample.TakeBetterShape();
+        Expect(UnityEngine.Debug.Warnings.Single().Contains("NO_BETTER_SHAPE"), "the server's answer");
+        sample.handles[1].transform.position.y = 3;
+        UpdateUntil(sample, () => mesh.vertices[20].y == 3, "it goes on");
+        Send(sample, "OnDisable");
+    }
+
     static void DisablingPutsTheMeshBackAndEnablingGoesOnFromThere()
     {
         UnityEngine.Mesh mesh;
@@ -153,6 +170,7 @@ static class SampleTest
     static int Main(string[] arguments)
     {
         var tests = new Action[] { TheMeshFollowsItsHandles, AHandleThatHoldsNothingIsSaidOnceAndNeverMoved, PIsSentAgainToANewSession,
+                                   TakingABetterShapeWhereNoneIsKnownIsAWarning,
                                    DisablingPutsTheMeshBackAndEnablingGoesOnFromThere, AnUpdateWithoutNewsMakesNoGarbage,
                                    ARefusalIsSaidOnceAndShown };
         using (server = new Server(arguments[0]))

@@ -62,4 +62,6 @@ namespace UnityEngine
     public sealed class RangeAttribute : Attribute { public RangeAttribute(float min, float max) { } }
     [AttributeUsage(AttributeTargets.Class)]
     public sealed class RequireComponent : Attribute { public RequireComponent(Type type) { } }
+    [AttributeUsage(AttributeTargets.Method)]
+    public sealed class ContextMenu : Attribute { public ContextMenu(string itemName) { } }
 }

@@ -29,6 +29,9 @@ public sealed class LpdeformMesh : MonoBehaviour
     public string address = "localhost:50051";
     [Range(1, 8)] public float p = 2;
     public bool showDistortion = true;
+    /// A shape of lower energy that the server finds while nothing moves is shown at once. Otherwise the log says that there is
+    /// one, and "Take the better shape" in the component's menu shows it.
+    public bool showBetterShapes;
     public HandleObject[] handles = new HandleObject[0];
 
     Client client;
@@ -40,6 +43,7 @@ public sealed class LpdeformMesh : MonoBehaviour
     Vector3[] positions, normals;
     Color32[] colours;
     float sentP;
+    bool? sentShowBetterShapes;
 
     /// The session's state for the Inspector: "Live", or "Refused: " and the reason.
     public string status = "";
@@ -48,6 +52,7 @@ public sealed class LpdeformMesh : MonoBehaviour
     void OnEnable()
     {
         sentP = 0;  // a new session knows nothing
+        sentShowBetterShapes = null;
         status = "";
         said = null;
         var present = GetComponent<MeshFilter>().mesh;  // this object's own copy
@@ -114,6 +119,11 @@ public sealed class LpdeformMesh : MonoBehaviour
                 session.Set(p: p);
                 sentP = p;
             }
+            if (showBetterShapes != sentShowBetterShapes)
+            {
+                session.SetSolver(new SolverSettings { Search = new MinimaSearch { Show = showBetterShapes } });
+                sentShowBetterShapes = showBetterShapes;
+            }
             Frame frame;
             var buffers = new FrameBuffers { Positions = Floats(positions), Normals = Floats(normals), Colours = Bytes(colours) };
             if (session.TryGetFrame(buffers, out frame)) Show();
@@ -121,6 +131,21 @@ public sealed class LpdeformMesh : MonoBehaviour
         catch (LpdeformException error)
         {
             Debug.LogWarning("lpdeform: " + error.Message + " (" + error.Reason + ")", this);  // about a change; each error comes once
+        }
+    }
+
+    /// Shows the shape of lower energy that the log has announced. Waits for the server's answer.
+    [ContextMenu("Take the better shape")]
+    public void TakeBetterShape()
+    {
+        if (session == null) return;
+        try
+        {
+            session.TakeBetterShape();
+        }
+        catch (LpdeformException error)
+        {
+            Debug.LogWarning("lpdeform: " + error.Message + " (" + error.Reason + ")", this);
         }
     }
 
