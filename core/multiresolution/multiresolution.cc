@@ -61,7 +61,7 @@ std::optional<Points> Multiresolution::intermediate_state(bool is_last) {
   const int done = level_.solver().iterations();
   const auto begun = std::chrono::steady_clock::now();
   const bool is_due = done != looked_at_ && begun >= next_look_;
-  if (done < kFirstLook || !(is_due || is_last)) return std::nullopt;
+  if ((done < kFirstLook && !is_eased_) || !(is_due || is_last)) return std::nullopt;
   looked_at_ = done;
   level_.solver().catch_up(is_last);
   Points found = prolonged();

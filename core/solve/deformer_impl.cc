@@ -215,7 +215,8 @@ void Deformer::Impl::catch_up(bool is_last) {
   if (!minimiser) return;
   const std::optional<Points> found = minimiser->intermediate_state(is_last);
   if (!found) return;
-  if (const double sum = objective.sum(*norm); sum < best_sum) {
+  // A later look shows more of the shape to come, even if its kinks cost more than those of an earlier one.
+  if (const double sum = objective.sum(*norm); sum < (best_step ? best_step->sum : best_sum)) {
     if (!best_step) best_step = KnownShape{x, best_sum};
     keep(*found, sum);
   }

@@ -54,9 +54,12 @@ class FrameCall : public WritePump<Reactor, Response> {
  protected:
   Made make(Response& response) final {
     if (!open_.stream) return Made::kNothing;
+    const auto start = std::chrono::steady_clock::now();
     const std::optional<Note> note = open_.stream->next();
     if (!note) return Made::kNothing;
     encode(*note, *open_.stream, open_.session()->vertex_count(), response);
+    is_frame_ = std::holds_alternative<FramePiece>(*note);
+    if (is_frame_) observe(Span::kFrameEncode, std::chrono::steady_clock::now() - start);
     return std::holds_alternative<EndNote>(*note) ? Made::kLastMessage : Made::kMessage;
   }
 
@@ -65,8 +68,17 @@ class FrameCall : public WritePump<Reactor, Response> {
       backend_.forget(this->context(), open_, this->how_ended_locked());
   }
 
+  void on_written(std::chrono::duration<double> took) final {
+    if (is_frame_) observe(Span::kFrameWrite, took);
+  }
+
+  void observe(Span span, std::chrono::duration<double> took) {
+    backend_.metrics->observe(span, took.count());
+  }
+
   Backend& backend_;
   Backend::OpenStream open_;
+  bool is_frame_ = false;  // the message that was made last
   bool is_forgotten_ = false;
 };
 

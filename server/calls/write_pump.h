@@ -42,6 +42,7 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
   void OnWriteDone(bool ok) final {
     const std::scoped_lock lock(mutex_);
     is_writing_ = false;
+    if (ok) on_written(std::chrono::steady_clock::now() - write_began_);
     if (!ok) is_cancelled_ = was_cut_ = true;
     pump_locked();
   }
@@ -70,6 +71,9 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
 
   /// A message has been made, so there may be room for more. Called with the lock held.
   virtual void on_made() {}
+
+  /// gRPC takes the next message. `took`: since it was given this one. Called with the lock held.
+  virtual void on_written(std::chrono::duration<double> took) { (void)took; }
 
   void refuse_locked(const absl::Status& status) {
     if (refusal_.ok()) refusal_ = status;

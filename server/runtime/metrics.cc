@@ -81,6 +81,10 @@ constexpr std::array kSpans{
     Entry{"lpdeform_frame_to_stream_seconds",
           "From the publication of a frame until a stream begins to send it: its credit, its pace and its "
           "turn."},
+    Entry{"lpdeform_frame_encode_seconds",
+          "Duration of making a message of a frame, on a stream of one session."},
+    Entry{"lpdeform_frame_write_seconds",
+          "From handing a message of a frame to gRPC until gRPC takes the next one."},
     Entry{"lpdeform_solve_seconds", "Duration of finished solves."},
     Entry{"lpdeform_setup_seconds", "Time that finished solves spent factoring."},
     Entry{"lpdeform_scheduler_queue_seconds", "From when a session is ready to run until it runs."},

@@ -57,6 +57,8 @@ enum class Span {
   kInputToFrame,    // from taking an update to the first frame that answers it
   kInputToSolve,    // the part of that until the solver takes the update over
   kFrameToStream,   // from the publication of a frame until a stream begins to send it
+  kFrameEncode,     // of making one message of a frame
+  kFrameWrite,      // of one message of a frame: from handing it to gRPC until gRPC takes the next
   kSolve,           // of one solve, from its beginning to its result
   kSetup,           // the part of one solve that factors
   kSchedulerQueue,  // how long a session's slice waits for a thread

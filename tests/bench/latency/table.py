@@ -16,7 +16,8 @@ import urllib.request
 from collections.abc import Iterator
 
 SPANS = {"taken": "lpdeform_input_to_solve_seconds", "shown": "lpdeform_input_to_frame_seconds",
-         "sent": "lpdeform_frame_to_stream_seconds"}
+         "sent": "lpdeform_frame_to_stream_seconds", "encoded": "lpdeform_frame_encode_seconds",
+         "written": "lpdeform_frame_write_seconds"}
 ROUNDS = 3
 
 
@@ -78,8 +79,8 @@ def main() -> None:
     parser.add_argument("--beside", type=pathlib.Path)
     options = parser.parse_args()
     servers = {"this": options.programs / "lpdeform-server"} | ({"beside": options.beside} if options.beside else {})
-    print("| vertices | server | median | p99 | until the solver has it | from there until a frame is there | the rest: encoding, "
-          "sockets, client | wait of any frame for its stream |\n|--:|:--|--:|--:|--:|--:|--:|--:|")
+    print("| vertices | server | median | p99 | until the solver has it | from there until a frame is there | wait for its stream | "
+          "encoding | until gRPC takes the next message | the rest: sockets, client |\n|--:|:--|--:|--:|--:|--:|--:|--:|--:|--:|")
     for size in map(int, options.sizes.split(",")):
         rows: dict[str, list[dict[str, float]]] = {name: [] for name in servers}
         for _ in range(ROUNDS):
@@ -88,9 +89,11 @@ def main() -> None:
         for name, runs in rows.items():
             at = {key: statistics.median(run[key] for run in runs) for key in runs[0]}
             cells = [f"{at['vertices']:.0f}", name] + [f"{value:.2f} ms" for value in (
-                at["p50"], at["p99"], at["taken"], at["shown"] - at["taken"], at["mean"] - at["shown"], at["sent"])]
+                at["p50"], at["p99"], at["taken"], at["shown"] - at["taken"], at["sent"], at["encoded"], at["written"],
+                at["mean"] - at["shown"] - at["sent"] - at["encoded"])]
             print("| " + " | ".join(cells) + " |", flush=True)
-    print("\nFrom a move to the frame that answers it, at the client: the median of three runs. The parts are means.")
+    print("\nFrom a move to the frame that answers it, at the client: the median of three runs. The parts are means; those "
+          "after the frame is there are of one message of any frame, and the rest of the way goes on while gRPC writes.")
 
 
 if __name__ == "__main__":
