@@ -31,7 +31,12 @@ void solve(int number, const SolveSettings& settings) {
   }
   (void)deformer->set_material(problem.material);
   const double begun = processor_seconds();
-  const SolveSummary summary = deformer->solve(settings).value();
+  const auto solved = deformer->solve(settings);
+  if (!solved.ok()) {  // conic and local_global take one p only
+    std::fprintf(stderr, "%s: %s\n", problem.name.c_str(), std::string(solved.status().message()).c_str());
+    return;
+  }
+  const SolveSummary& summary = *solved;
   std::printf(
       "{\"problem\": \"%s\", \"vertices\": %td, \"energy\": %.10g, \"stop\": \"%s\", \"starts\": %d, "
       "\"minima\": [",
