@@ -173,7 +173,9 @@ std::int64_t count_boundary_loops(const TriangleMesh& mesh, const EdgeTable& tab
   return std::unique(boundary.begin(), boundary.end()) - boundary.begin();
 }
 
-/// Finds vertices of boundary edges that coincide with other such vertices.
+/// Finds vertices of boundary edges that coincide with other such vertices. Closed surfaces have none, even where they
+/// touch themselves or each other. Open parts that touch at their borders count, even if that is by chance: positions do
+/// not tell them from a seam.
 void check_borders(const TriangleMesh& mesh, const EdgeTable& table, MeshReport& report) {
   std::vector<bool> is_at_border(mesh.vertices.rows());
   table.for_edges([&](std::int32_t low, std::int32_t high, std::span<const HalfEdge> sides) {

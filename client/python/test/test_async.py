@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 import lpdeform
@@ -38,6 +39,25 @@ def test_sessions_are_awaited(server: Server, make_grid: MakeGrid) -> None:
         with pytest.raises(lpdeform.LpdeformError) as caught:
             await session.settle()
         assert caught.value.reason == "SESSION_CLOSED"
+
+    asyncio.run(run())
+
+
+def test_a_split_mesh_is_warned_of(server: Server, make_grid: MakeGrid) -> None:
+    shape = make_grid(4)
+    corners = shape.vertices[shape.faces].reshape(-1, 3)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+
+    async def run() -> None:
+        with pytest.warns(lpdeform.SplitMeshWarning, match="weld=True") as warned:
+            async with lpdeform.open_async(corners, faces, address=server.address):
+                pass
+            await (await lpdeform.open_async(corners, faces, address=server.address)).close()
+        assert [warning.filename for warning in warned] == [__file__, __file__]
+        with pytest.raises(lpdeform.SplitMeshWarning):  # an error by the filter of these tests
+            await lpdeform.open_async(corners, faces, address=server.address)
+        async with lpdeform.open_async(corners, faces, address=server.address, weld=True):
+            pass
 
     asyncio.run(run())
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -155,7 +156,7 @@ def test_welded_copies_come_out_the_same(server: Server, make_grid: MakeGrid) ->
 
 
 def test_a_split_mesh_is_noticed_and_welded_with_a_tolerance(
-    server: Server, make_grid: MakeGrid, caplog: pytest.LogCaptureFixture
+    server: Server, make_grid: MakeGrid
 ) -> None:
     shape = make_grid(6)
     corners = shape.vertices[shape.faces].reshape(-1, 3)
@@ -164,13 +165,20 @@ def test_a_split_mesh_is_noticed_and_welded_with_a_tolerance(
     with lpdeform.open(corners, faces, address=server.address, weld=1e-4) as session:
         assert session.mesh_report.welded_vertices == len(corners) - 36
         assert session.mesh_report.notices == ()
-    assert not caplog.records
-    with lpdeform.open(corners.round(3), faces, address=server.address) as session:
+    with pytest.warns(lpdeform.SplitMeshWarning) as warned:
+        session = lpdeform.open(corners.round(3), faces, address=server.address)
+    with session:
         (notice,) = session.mesh_report.notices
         assert "comes apart where it is split" in notice
         split = next(defect for defect in session.mesh_report.defects if defect.kind == "split_border_vertices")
         assert split.count == len(corners) - 2  # all but two corners of the grid
-    assert notice in caplog.text
+    (warning,) = warned
+    assert str(warning.message).startswith(notice)
+    assert f" {split.count} vertices" in notice
+    assert "weld=True" in str(warning.message)
+    assert warning.filename == __file__
+    with pytest.raises(lpdeform.SplitMeshWarning):  # an error by the filter of these tests
+        lpdeform.open(corners.round(3), faces, address=server.address)
     with pytest.raises(lpdeform.InvalidInput, match="0.002"):
         lpdeform.open(corners, faces, address=server.address, weld=0.002)
 
@@ -184,7 +192,8 @@ def test_a_sphere_of_single_precision_is_noticed_and_welded(server: Server) -> N
     a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[:-1, 1:], corner[1:, 1:]
     faces = np.concatenate([np.stack([a, b, c], axis=-1).reshape(-1, 3), np.stack([c, b, d], axis=-1).reshape(-1, 3)])
     for weld in (False, True):
-        with lpdeform.open(sphere.reshape(-1, 3), faces, address=server.address, weld=weld) as session:
+        expected = nullcontext() if weld else pytest.warns(lpdeform.SplitMeshWarning)
+        with expected, lpdeform.open(sphere.reshape(-1, 3), faces, address=server.address, weld=weld) as session:
             assert len(session.mesh_report.notices) == (not weld)
             split = {defect.kind: defect.count for defect in session.mesh_report.defects}.get("split_border_vertices", 0)
             assert split == (0 if weld else 2 * (rings - 1) + 2 * (segments + 1))

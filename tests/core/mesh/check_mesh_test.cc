@@ -87,6 +87,31 @@ TEST(CheckMesh, FindsNoSplitVerticesAtABorderOfItsOwn) {
   }
 }
 
+TEST(CheckMesh, CountsSplitVerticesOfACubeOfSeparateFaces) {
+  const TriangleMesh cube = box_surface(1, 1, 1), split = split_at_every_corner(cube);
+  EXPECT_EQ(check_mesh(split).split_border_vertices.count, split.vertices.rows());
+  const absl::StatusOr<Weld> weld = weld_by_position(split.vertices);
+  ASSERT_TRUE(weld.ok());
+  EXPECT_EQ(check_mesh(welded(split, *weld)).split_border_vertices.count, 0);
+}
+
+TEST(CheckMesh, FindsNoSplitVerticesWhereClosedPartsTouch) {
+  const TriangleMesh cube = box_surface(1, 1, 1);
+  const Eigen::Index n = cube.vertices.rows(), m = cube.faces.rows();
+  TriangleMesh two{Points(2 * n, 3), Faces(2 * m, 3)};
+  two.vertices << cube.vertices, cube.vertices.rowwise() + Eigen::RowVector3d(1, 0, 0);
+  two.faces << cube.faces, cube.faces.array() + static_cast<std::int32_t>(n);
+  EXPECT_EQ(check_mesh(two).components, 2);
+  EXPECT_EQ(check_mesh(two).split_border_vertices.count, 0);
+}
+
+TEST(CheckMesh, CountsSplitVerticesWhereOpenPartsTouch) {
+  const TriangleMesh two =
+      make_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {2, 0, 0}, {2, 1, 0}}, {{0, 1, 2}, {3, 4, 5}});
+  EXPECT_EQ(check_mesh(two).split_border_vertices.count, 2);
+  EXPECT_THAT(check_mesh(two).split_border_vertices.first, ElementsAre(1, 3));
+}
+
 TEST(CheckMesh, NamesVerticesThatAreNotFinite) {
   TriangleMesh mesh = make_mesh(kCorners, kTetrahedron);
   mesh.vertices(1, 2) = kNan;

@@ -13,7 +13,7 @@ wins. `s.solve()` returns one finished result, with its trace and a bound on its
 
 from lpdeform.access import Tls
 from lpdeform.aio import AsyncSession, join_async, open_async, restore_async
-from lpdeform.errors import Code, InvalidInput, LpdeformError, Timeout, Unavailable
+from lpdeform.errors import Code, InvalidInput, LpdeformError, SplitMeshWarning, Timeout, Unavailable
 from lpdeform.frames import Frame, FrameAssembly, QuantizedSurface
 from lpdeform.opening import join, open, restore
 from lpdeform.reasons import Reason
@@ -78,6 +78,7 @@ __all__ = [
     "SolveProgress",
     "SolveResult",
     "SolverSettings",
+    "SplitMeshWarning",
     "SurfacePoints",
     "Targets",
     "Timeout",

@@ -17,9 +17,9 @@ from lpdeform._snapshot import snapshot
 from lpdeform._solve import solve
 from lpdeform._undo import undo
 from lpdeform.access import Tls, Token
-from lpdeform.errors import LpdeformError
+from lpdeform.errors import LpdeformError, SplitMeshWarning
 from lpdeform.frames import Frame
-from lpdeform.opening import connect, frame_options, join_link, open_link, restore_link
+from lpdeform.opening import connect, frame_options, join_link, open_link, restore_link, warn_of_splits
 from lpdeform.session import Live, deadline_after
 from lpdeform.types import (
     BetterShape,
@@ -167,18 +167,26 @@ class AsyncSession(Live):
 class Opening:
     """A session that is being opened: `session = await opening`, or `async with opening as session`."""
 
-    def __init__(self, make: Callable[[Stop], Link]) -> None:
+    def __init__(self, make: Callable[[Stop], Link], warns: bool = False) -> None:
         self._make = make
+        self._warns = warns
         self._session: AsyncSession | None = None
 
-    async def _open(self) -> AsyncSession:
-        return AsyncSession(await _in_a_thread(self._make))
+    async def _open(self, stacklevel: int) -> AsyncSession:
+        link = await _in_a_thread(self._make)
+        try:
+            if self._warns:
+                warn_of_splits(link.lease.report, stacklevel)
+        except SplitMeshWarning:  # warnings are errors
+            await asyncio.to_thread(link.close)
+            raise
+        return AsyncSession(link)
 
     def __await__(self) -> Generator[Any, None, AsyncSession]:
-        return self._open().__await__()
+        return self._open(stacklevel=2).__await__()
 
     async def __aenter__(self) -> AsyncSession:
-        self._session = await self._open()
+        self._session = await self._open(stacklevel=3)
         return self._session
 
     async def __aexit__(
@@ -227,7 +235,7 @@ def open_async(
             rpc, stop, vertices, faces, normals, handles, settings, weights, free_components, weld, options
         )
 
-    return Opening(make)
+    return Opening(make, warns=True)
 
 
 def join_async(

@@ -1,4 +1,4 @@
-"""The errors that this package raises. proto/errors.md lists the reasons."""
+"""The errors that this package raises, and its warning. proto/errors.md lists the reasons."""
 
 from __future__ import annotations
 
@@ -89,6 +89,10 @@ class Unavailable(LpdeformError, ConnectionError):
 
 class Timeout(LpdeformError, TimeoutError):
     """The result did not come in time."""
+
+
+class SplitMeshWarning(UserWarning):
+    """The mesh comes apart where border vertices in the same place are not welded. Each open() of such a mesh gives one."""
 
 
 _classes: dict[Code, type[LpdeformError]] = {

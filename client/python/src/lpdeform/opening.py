@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import logging
+import warnings
 from collections.abc import Mapping
 from numbers import Real
 
@@ -15,12 +15,10 @@ from lpdeform._link import Link
 from lpdeform._numbers import Copied, indices, numbers
 from lpdeform._rpc import Rpc, Stop, default_address, new_request_id
 from lpdeform.access import Tls, Token
-from lpdeform.errors import LpdeformError, invalid
+from lpdeform.errors import LpdeformError, SplitMeshWarning, invalid
 from lpdeform.session import Session
-from lpdeform.types import Encoding, Field, FreeComponents, Handle, Settings, SolverSettings, Update, WeightKind
+from lpdeform.types import Encoding, Field, FreeComponents, Handle, MeshReport, Settings, SolverSettings, Update, WeightKind
 from lpdeform.v1 import frame_pb2
-
-_log = logging.getLogger("lpdeform")
 
 
 def connect(
@@ -63,8 +61,6 @@ def open_link(
     except BaseException:
         rpc.close()
         raise
-    for notice in lease.report.notices:
-        _log.warning("%s: %s", rpc.address, notice)
     link = Link(rpc, lease, frame_options, original)
     if handles:
         try:
@@ -73,6 +69,13 @@ def open_link(
             link.close()
             raise
     return link
+
+
+def warn_of_splits(report: MeshReport, stacklevel: int) -> None:
+    """stacklevel: as in warnings.warn, counted from the caller of this function."""
+    for notice in report.notices:
+        text = f"{notice} Open it with weld=True, or with a larger tolerance as weld=."
+        warnings.warn(text, SplitMeshWarning, stacklevel=stacklevel + 1)
 
 
 def frame_options(
@@ -141,7 +144,7 @@ def open(  # noqa: A001  (called as lpdeform.open)
     call_timeout: time limit in seconds of every call but solve().
     reconnect_for: seconds after which a session gives up if the server does not return.
     Raises InvalidInput with the first element that cannot be deformed, or with a certificate or token that cannot be used;
-    Unavailable (NO_SERVER) if no server answers.
+    Unavailable (NO_SERVER) if no server answers. Warns with SplitMeshWarning of a mesh that comes apart where it is split.
 
     >>> import lpdeform
     >>> with lpdeform.open([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]) as session:
@@ -156,6 +159,11 @@ def open(  # noqa: A001  (called as lpdeform.open)
     link = open_link(
         rpc, Stop(), vertices, faces, normals, handles, settings, weights, free_components, weld, options
     )
+    try:
+        warn_of_splits(link.lease.report, stacklevel=2)
+    except SplitMeshWarning:  # warnings are errors
+        link.close()
+        raise
     return Session(link)
 
 
