@@ -43,7 +43,7 @@ export class App implements Workbench {
       report: (report) => this.#showReport(report),
       problem: (problem) => this.facts.set({ problem }),
       notice: (text) => this.notify(text),
-      better: () => this.facts.set({ better: this.#better }),
+      better: () => this.#showBetter(),
     },
     (pane) => this.#edit(pane),
   );
@@ -52,11 +52,14 @@ export class App implements Workbench {
 
   constructor() {
     this.#panes.add("first");
-    this.view.watch((view, before) => this.#viewChanged(view, before));
-    this.facts.watch((facts, before) => {
-      if (facts.pointedOut !== before.pointedOut) this.#needsMarks = true;
-      this.requestDraw();
-    });
+    this.view.watchAll((view, before) => this.#viewChanged(view, before));
+    this.facts.watch(
+      ({ pointedOut }) => [pointedOut],
+      () => {
+        this.#needsMarks = true;
+        this.requestDraw();
+      },
+    );
     new ResizeObserver(() => this.requestDraw()).observe(this.stages);
     for (const end of ["keyup", "blur"]) window.addEventListener(end, () => this.#keyUp());
   }
@@ -270,8 +273,9 @@ export class App implements Workbench {
     return false;
   }
 
-  get #better(): number[] {
-    return this.panes.map(({ live }) => live?.better?.savedShare).filter((share) => share !== undefined);
+  #showBetter(): void {
+    const better = this.panes.map(({ live }) => live?.better?.savedShare).filter((share) => share !== undefined);
+    if (!isAlike(better, this.facts.now.better)) this.facts.set({ better });
   }
 
   /** In every pane. */
@@ -402,7 +406,8 @@ export class App implements Workbench {
     this.#panes.show(document, time);
     // The end of a gesture changes nothing, so the server's answer to its last change still holds.
     const problem = document === before ? this.facts.now.problem : undefined;
-    this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem, better: this.#better });
+    this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem });
+    this.#showBetter();
     if (selected !== undefined && !handleOf(document, selected)) this.view.set({ selected: undefined });
     this.requestDraw();
   }

@@ -69,12 +69,15 @@ export class Keeper {
   start(): void {
     const { app } = this;
     if (!this.#store) return;
-    app.facts.watch((facts, before) => {
-      if (facts.mesh !== before.mesh) this.isKeeping = false;
-      if (facts.document !== before.document && facts.mesh === before.mesh) app.facts.set({ restoredFrom: undefined });
-      if (facts.document !== before.document || facts.mesh !== before.mesh || facts.setAside !== before.setAside) this.#soon();
-    });
-    app.view.watch(() => this.#soon());
+    app.facts.watch(
+      ({ document, mesh, setAside }) => [document, mesh, setAside],
+      ([document, mesh, setAside], before) => {
+        if (mesh !== before[1]) this.isKeeping = false;
+        if (document !== before[0] && mesh === before[1]) app.facts.set({ restoredFrom: undefined });
+        if (document !== before[0] || mesh !== before[1] || setAside !== before[2]) this.#soon();
+      },
+    );
+    app.view.watchAll(() => this.#soon());
     app.afterDrawing.add(() => {
       const camera = JSON.stringify(app.panes[0]!.stage.look);
       if (camera !== this.#camera) this.#soon();

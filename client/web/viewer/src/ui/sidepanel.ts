@@ -15,14 +15,16 @@ export function sidePanel(app: App): HTMLElement {
     section("Measures", measures(app), true),
     mesh,
   );
-  app.facts.watch(({ report, seamVertices }, before) => {
-    if (report === before.report) return;
-    const isSplit = report !== undefined && seamVertices > 0 && !app.view.now.isWelded;
-    const count = warningsOf(report).length + (isSplit ? 1 : 0);
-    mesh.classList.toggle("warned", count > 0);
-    if (count > 0) mesh.open = true;
-  });
-  app.view.watch(({ isPanelOpen }) => document.body.classList.toggle("panel-closed", !isPanelOpen));
+  app.facts.watch(
+    ({ report }) => [report],
+    ([report]) => {
+      const isSplit = report !== undefined && app.facts.now.seamVertices > 0 && !app.view.now.isWelded;
+      const count = warningsOf(report).length + (isSplit ? 1 : 0);
+      mesh.classList.toggle("warned", count > 0);
+      if (count > 0) mesh.open = true;
+    },
+  );
+  app.view.watchAll(({ isPanelOpen }) => document.body.classList.toggle("panel-closed", !isPanelOpen));
   return element;
 }
 

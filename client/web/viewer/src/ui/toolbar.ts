@@ -27,7 +27,7 @@ export function toolbar(app: App): HTMLElement {
     element.addEventListener("click", () => app.view.set({ tool, isPanelOpen: app.view.now.isPanelOpen }));
     return element;
   });
-  app.view.watch(({ tool }) => {
+  app.view.watchAll(({ tool }) => {
     for (const element of buttons) element.setAttribute("aria-pressed", String(element.dataset["tool"] === tool));
     if (tool !== "brush" && tool !== "paint") app.facts.set({ pointedOut: nothing });
   });
@@ -88,8 +88,11 @@ function options(app: App): HTMLElement {
     clear,
   );
 
-  app.facts.watch(({ document }) => (clear.disabled = !document.paintedP && !document.stiffness));
-  app.view.watch((view) => {
+  app.facts.watch(
+    ({ document: { paintedP, stiffness } }) => [!paintedP && !stiffness],
+    ([isClear]) => (clear.disabled = isClear),
+  );
+  app.view.watchAll((view) => {
     const { tool } = view;
     mode.show(view.mode);
     gizmo.show(view.gizmo);

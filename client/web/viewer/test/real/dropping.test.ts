@@ -84,7 +84,7 @@ it("a mesh is dropped with its handles and what else lies beside it, in any orde
 it("a large file is told to be opened while it is", async () => {
   await user.page.evaluate(`{
     window.notices = [];
-    window.__lpdeform.app.facts.watch(({ notice }) => notice && window.notices.at(-1) !== notice.text && window.notices.push(notice.text));
+    window.__lpdeform.app.facts.watch(({ notice }) => [notice], ([notice]) => notice && window.notices.at(-1) !== notice.text && window.notices.push(notice.text));
   }`);
   await drop({ "large.off": `${writeOff(mesh)}#${"x".repeat(2e6)}` });
   await isOpen("large.off");
