@@ -80,6 +80,21 @@ it("the focus stays in the list while a handle is selected, renamed, locked and 
   }
 });
 
+it("what is deleted is selected again when that is undone", async () => {
+  const { keyboard } = user.page;
+  await user.page.locator("canvas.stage").focus();
+  await keyboard.press("n");
+  const name = await user.ask<string>("app.view.now.selected");
+  await keyboard.press("Delete");
+  expect(await user.ask<string | undefined>("app.view.now.selected")).toBeUndefined();
+  await keyboard.press("Control+z");
+  expect(await user.ask("app.view.now.selected")).toBe(name);
+  await keyboard.press("Escape");
+  await keyboard.press("Control+Shift+z");
+  expect(await user.ask("document().handles.length")).toBe(1);
+  await keyboard.press("Control+z");
+});
+
 it("and goes to the handle before where the last one is deleted", async () => {
   const bins = user.page.locator(".handles button:last-child");
   await bins.nth(1).focus();
