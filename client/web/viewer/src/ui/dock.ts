@@ -3,7 +3,7 @@ import { placeOf, watchPlaces } from "../app/sides.js";
 import type { Document } from "../model/document.js";
 import { leastP, mostP, steppedP } from "../model/exponent.js";
 import { capital, short } from "../model/words.js";
-import { el, setText, toggle } from "./dom.js";
+import { el, measured, setText, toggle } from "./dom.js";
 
 /** The values in the paper's figures. */
 const stops = [1, 1.5, 2, 6] as const;
@@ -44,13 +44,8 @@ export function dock(app: App): HTMLElement {
     explain();
   });
   watchPlaces(explain);
-  return el(
-    "section",
-    { className: "dock", aria: { label: "p" } },
-    first,
-    second,
-    el("div", { className: "under" }, hint, automatic.element),
-  );
+  const under = el("div", { className: "under" }, hint, automatic.element);
+  return measured(el("section", { className: "dock", aria: { label: "p" } }, first, second, under), "--dock-height");
 }
 
 function pSlider(app: App, field: Field): HTMLElement {

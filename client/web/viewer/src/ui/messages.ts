@@ -166,15 +166,20 @@ function pillText({ kind, title }: Status): string {
   return kind === "live" ? "Live" : kind === "idle" || kind === "opening" ? "Preparing…" : title;
 }
 
+const touches = () => matchMedia("(pointer: coarse)").matches;
+
 /** A hint at the next step, until the user knows the page. */
 function hintOf(app: App): string {
   const { document, status } = app.facts.now;
   const { tool } = app.view.now;
   if (status.kind !== "live") return "";
   if (tool === "brush") return "Paint over the surface: what you paint becomes a handle";
-  if (tool === "lasso" || tool === "box") return "Draw around a part of the surface; hold the space bar to turn the view";
+  if (tool === "lasso" || tool === "box") {
+    const turning = touches() ? "two fingers turn the view" : "hold the space bar to turn the view";
+    return `Draw around a part of the surface; ${turning}`;
+  }
   if (tool === "paint") return "Paint over the surface: low p gathers distortion, stiffness keeps it away";
-  if (document.handles.length === 0) return "Click the surface to place a first handle";
+  if (document.handles.length === 0) return `${touches() ? "Tap" : "Click"} the surface to place a first handle`;
   if (document.handles.length === 1) return "Place a second handle: one stays, the other is dragged";
   return app.history.canUndo ? "" : "Drag the coloured handle and watch the surface follow";
 }

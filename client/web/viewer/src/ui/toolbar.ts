@@ -3,7 +3,7 @@ import { withoutPaint } from "../model/document.js";
 import { nothing } from "../model/pointed.js";
 import type { StrokeMode, Tool } from "../model/view.js";
 import { short } from "../model/words.js";
-import { choice, el, toggle } from "./dom.js";
+import { choice, el, measured, toggle } from "./dom.js";
 import { button, slider } from "./controls.js";
 import { type IconName, icon } from "./icons.js";
 
@@ -33,7 +33,7 @@ export function toolbar(app: App): HTMLElement {
   });
   const fit = button("fit", "Show all of it (F)", () => app.fit());
   const rail = el("nav", { className: "rail", aria: { label: "Tools" } }, ...buttons, el("hr"), fit);
-  return el("div", { className: "tools" }, rail, options(app));
+  return measured(el("div", { className: "tools" }, rail, options(app)), "--tools-height");
 }
 
 function options(app: App): HTMLElement {
