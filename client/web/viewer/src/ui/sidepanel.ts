@@ -7,12 +7,14 @@ import { reportPanel, warningsOf } from "./report.js";
 
 export function sidePanel(app: App): HTMLElement {
   const mesh = section("Mesh", reportPanel(app), false);
+  const numbers = section("Measures", measures(app), true);
+  numbers.classList.add("numbers-section");
   const element = el(
     "aside",
     { className: "panel", aria: { label: "Side panel" } },
     section("Handles", handlesPanel(app), true),
     section("Look", lookPanel(app), true),
-    section("Measures", measures(app), true),
+    numbers,
     mesh,
   );
   app.facts.watch(
@@ -22,6 +24,9 @@ export function sidePanel(app: App): HTMLElement {
       const count = warningsOf(report).length + (isSplit ? 1 : 0);
       mesh.classList.toggle("warned", count > 0);
       if (count > 0) mesh.open = true;
+      if (mesh.contains(document.activeElement)) return; // moving it would take the focus away
+      if (count > 0) element.prepend(mesh);
+      else element.append(mesh);
     },
   );
   app.view.watchAll(({ isPanelOpen }) => document.body.classList.toggle("panel-closed", !isPanelOpen));
