@@ -1,6 +1,7 @@
 import { LpdeformError } from "./errors.js";
 import { checkHold } from "./hold_kinds.js";
 import { checkKeys, checkVector, checkVectors, checkWord, isNumbers, mistyped, refused } from "./key_checks.js";
+import { checkMatrix, checkQuaternion } from "./rotation.js";
 import type * as api from "./types.js";
 
 // The keys of what callers pass in. An unknown key is refused by name, because ignoring it would not do what the caller meant. The
@@ -44,6 +45,8 @@ const change: Keys<api.HandleChange> = { set: true, move: true, remove: true };
 const handle: Keys<api.Handle> = { vertices: true, points: true, motion: true, hold: true, footprint: true };
 const point: Keys<api.SurfacePoint> = { face: true, barycentric: true };
 const rigid: Keys<api.RigidMotion> = { axis: true, angle: true, center: true, translation: true };
+const quaternion: Keys<api.QuaternionMotion> = { quaternion: true, center: true, translation: true };
+const matrix: Keys<api.MatrixMotion> = { matrix: true };
 const targets: Keys<api.TargetPositions> = { targets: true };
 const settings: Keys<api.Settings> = { p: true, stiffness: true, lengthUnit: true, solver: true, region: true };
 const solver: Keys<api.SolverSettings> = {
@@ -146,7 +149,14 @@ function checkMotion(given: api.Motion, owner: string): void {
   const element = `motion of ${owner}`;
   if (typeof given === "string") checkWord(given, { fixed: true }, element);
   else if ("targets" in given) checkKeys(given, targets, element);
-  else {
+  else if ("matrix" in given) {
+    checkKeys(given, matrix, element);
+    checkMatrix(given.matrix, element);
+  } else if ("quaternion" in given) {
+    checkKeys(given, quaternion, element);
+    checkQuaternion(given.quaternion, element);
+    checkVectors(given, ["center", "translation"], element);
+  } else {
     checkKeys(given, rigid, element);
     checkVectors(given, ["axis", "center", "translation"], element);
   }

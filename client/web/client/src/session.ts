@@ -345,6 +345,18 @@ export class Session implements AsyncIterable<Frame> {
     return takeSnapshot(rpc, lease.session, signal);
   }
 
+  /**
+   * Resolves when the server has answered a call that changes nothing. A page can tell by it, sooner than by the silence of the
+   * stream, that a server or a proxy has stopped. Rejects with the server's errors, and with DEADLINE_EXCEEDED.
+   */
+  async ping(options: { signal?: AbortSignal } = {}): Promise<void> {
+    checkCallOptions(options, "signal");
+    const { isClosed, rpc, lease, stop } = this.#link;
+    if (isClosed) throw sessionClosed();
+    const signal = AbortSignal.any([stop.signal, options.signal].filter((one) => one !== undefined));
+    await rpc.call("getSession", { session: lease.session }, signal);
+  }
+
   /** Becomes the writer in place of the present one, as a reader or after a WRITER_REPLACED. */
   takeOver(): Promise<void> {
     return this.#link.takeOver();

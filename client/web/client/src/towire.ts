@@ -21,6 +21,7 @@ import { WeightKind } from "./gen/lpdeform/v1/report_pb.js";
 import { FreeComponents, UpdateSchema, type Update as WireUpdate } from "./gen/lpdeform/v1/service_pb.js";
 import { holdToWire, vector } from "./hold_kinds.js";
 import { bytesOfIndices, bytesOfNumbers, type Packer } from "./packer.js";
+import { rigidOf } from "./rotation.js";
 import type * as api from "./types.js";
 
 // From the values of this library to messages of the contract.
@@ -177,7 +178,7 @@ function motionToWire(motion: api.Motion, packer: Packer): MessageInitShape<type
     const { scalar, buffer } = packer.numbers(motion.targets);
     return { kind: { case: "targets", value: { scalar, positions: buffer } } };
   }
-  const { axis = [0, 0, 1], angle = 0, center = [0, 0, 0], translation = [0, 0, 0] } = motion;
+  const { axis = [0, 0, 1], angle = 0, center = [0, 0, 0], translation = [0, 0, 0] } = rigidOf(motion);
   return {
     kind: {
       case: "rigid",

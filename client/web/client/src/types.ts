@@ -23,13 +23,29 @@ export interface RigidMotion {
   translation?: Vector3;
 }
 
+/** A RigidMotion whose rotation is a quaternion x, y, z, w of any length but 0, as Quaternion.toArray() of three.js has it. */
+export interface QuaternionMotion {
+  quaternion: readonly [number, number, number, number];
+  /** Default: the rest mesh's origin. */
+  center?: Vector3;
+  translation?: Vector3;
+}
+
+/**
+ * x = M p for every vertex of the handle: 16 numbers, column by column, as Matrix4.elements of three.js has them. A rotation and a
+ * translation, to within 1e-5.
+ */
+export interface MatrixMotion {
+  matrix: Float32Array | Float64Array | readonly number[];
+}
+
 /** Absolute positions: x, y, z for each of the handle's vertices or points, in their order. */
 export interface TargetPositions {
   targets: Float32Array | Float64Array | readonly number[];
 }
 
 /** Where a handle moves: "fixed" stays where the rest mesh has it. */
-export type Motion = "fixed" | RigidMotion | TargetPositions;
+export type Motion = "fixed" | RigidMotion | QuaternionMotion | MatrixMotion | TargetPositions;
 
 /** How a handle is held. A target is the place where its motion sends a vertex or point. */
 export type Hold =

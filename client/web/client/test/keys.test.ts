@@ -115,6 +115,7 @@ describe("a call is refused by the name of the option that is not known, before 
     ["double", (session) => session.solve(untyped({ scalar: "double" }))],
     ["deadlineMs", (session) => session.undo(untyped({ deadlineMs: 5 }))],
     ["deadlineMs", (session) => session.redo(untyped({ deadlineMs: 5 }))],
+    ["deadlineMs", (session) => session.ping(untyped({ deadlineMs: 5 }))],
     ["deadlineMs", (session) => session.takeBetterShape(untyped({ deadlineMs: 5 }))],
     ["deadlineMs", (session) => session.snapshot(untyped({ deadlineMs: 5 }))],
   ])("%s of a session's call", async (key, call) => {

@@ -1,8 +1,41 @@
-import { join } from "node:path";
+import { execFileSync } from "node:child_process";
+import { readFileSync } from "node:fs";
+import { dirname, join } from "node:path";
 import { build, type Rollup } from "vite";
 import { expect, test } from "vitest";
 
 // Of the package as its users get it: built, by its name.
+
+const folder = join(import.meta.dirname, "..");
+
+/** The files of the package, as npm makes it. */
+const packed = new Set(
+  (
+    JSON.parse(execFileSync("npm", ["pack", "--dry-run", "--json"], { cwd: folder, encoding: "utf8" })) as [
+      { files: { path: string }[] },
+    ]
+  )[0].files.map(({ path }) => path),
+);
+
+test("the package has its licence, and every file that its README names", () => {
+  const readme = readFileSync(join(folder, "README.md"), "utf8");
+  const links = [...readme.matchAll(/\]\(([^):#]+)\)/g)].map(([, link]) => link!);
+  const examples = [...readme.matchAll(/`((?:\w+\/)*\w+\.ts)`/g)].map(([, name]) => name!);
+  const named = [...links, ...examples.map((name) => (name.includes("/") ? name : `examples/${name}`))];
+  expect(named.length).toBeGreaterThan(6);
+  expect(["LICENSE", ...named].filter((name) => !packed.has(name))).toEqual([]);
+  expect(readFileSync(join(folder, "LICENSE"), "utf8")).toBe(readFileSync(join(folder, "../../../LICENSE"), "utf8"));
+});
+
+test("the package has what the maps of its scripts show, and nothing of the tests", () => {
+  const maps = [...packed].filter((path) => path.endsWith(".map"));
+  expect(maps.length).toBeGreaterThan(20);
+  for (const path of maps) {
+    const { sources } = JSON.parse(readFileSync(join(folder, path), "utf8")) as { sources: string[] };
+    for (const source of sources) expect(packed).toContain(join(dirname(path), source));
+  }
+  expect([...packed].filter((path) => /test|bench|tsconfig/.test(path))).toEqual([]);
+});
 
 /** What a page that does only this has to load, chunk by chunk. */
 async function chunksOf(code: string): Promise<string[]> {

@@ -4,6 +4,8 @@ import { adjacencyOf, meanEdge } from "../src/model/adjacency.js";
 import { isAlike } from "../src/model/alike.js";
 import { blueToRed } from "../src/model/colours.js";
 import { fitPose } from "../src/model/fit.js";
+import { emptyDocument, paint } from "../src/model/document.js";
+import { stepsToKeep } from "../src/model/kept_steps.js";
 import { History } from "../src/model/history.js";
 import { boundsOf } from "../src/model/mesh.js";
 import { follow, placesOf } from "../src/model/places.js";
@@ -160,6 +162,27 @@ describe("poses", () => {
 });
 
 describe("history", () => {
+  it("tells its steps in the middle of a gesture, which goes on", () => {
+    const history = new History(0);
+    for (const value of [1, 2]) history.push(value);
+    history.undo();
+    expect(history.stepsSoFar).toEqual({ past: [0], present: 1, future: [2] });
+    history.during(5);
+    expect(history.stepsSoFar).toEqual({ past: [0, 1], present: 5, future: [] });
+    history.during(6);
+    history.end();
+    expect(history.steps).toEqual({ past: [0, 1], present: 6, future: [] });
+  });
+
+  it("is kept as far back as can be written quickly; what steps share counts once", () => {
+    const painted = (value: number) => paint(emptyDocument, "stiffness", [0], value, 100);
+    const past = [1, 2, 3, 4, 5].map(painted);
+    const present = painted(6);
+    expect(stepsToKeep({ past, present, future: [] }, 350).past).toEqual(past.slice(2));
+    const shared = past.map((_, k) => ({ ...present, p: k }));
+    expect(stepsToKeep({ past: shared, present, future: shared }, 0)).toEqual({ past: shared, present, future: shared });
+  });
+
   it("makes one step of a gesture", () => {
     const history = new History(0);
     for (const value of [1, 2, 3]) history.during(value);

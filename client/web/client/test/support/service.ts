@@ -80,6 +80,15 @@ export class Service {
     await end(this.#server, "SIGKILL");
   }
 
+  /** Stops it until resume() is called; its connections stand. */
+  pause(part: "server" | "envoy"): void {
+    process.kill(this.#pidOf(part), "SIGSTOP");
+  }
+
+  resume(part: "server" | "envoy"): void {
+    process.kill(this.#pidOf(part), "SIGCONT");
+  }
+
   /** Drains it. */
   async stopServer(): Promise<void> {
     await end(this.#server, "SIGTERM");

@@ -2,7 +2,7 @@ import type { MeshReport } from "lpdeform-client";
 import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import { isAlike } from "../model/alike.js";
-import { History } from "../model/history.js";
+import { History, type Steps } from "../model/history.js";
 import { kindOf } from "../model/hold_kinds.js";
 import { boundsOf, type Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
@@ -33,6 +33,8 @@ export class App implements Workbench {
   readonly #asides = new Asides();
   #isBroughtBack = false;
   #isKeyHeld = false;
+  /** The last handle that was selected when it went. */
+  #deselected: string | undefined;
   #asked = 0;
   readonly #pace = new Pace(() => this.requestDraw());
   readonly #editings = new Set<Editing>();
@@ -43,7 +45,7 @@ export class App implements Workbench {
       report: (report) => this.#showReport(report),
       problem: (problem) => this.facts.set({ problem }),
       notice: (text) => this.notify(text),
-      better: () => this.facts.set({ better: this.#better }),
+      better: () => this.#showBetter(),
     },
     (pane) => this.#edit(pane),
   );
@@ -52,11 +54,14 @@ export class App implements Workbench {
 
   constructor() {
     this.#panes.add("first");
-    this.view.watch((view, before) => this.#viewChanged(view, before));
-    this.facts.watch((facts, before) => {
-      if (facts.pointedOut !== before.pointedOut) this.#needsMarks = true;
-      this.requestDraw();
-    });
+    this.view.watchAll((view, before) => this.#viewChanged(view, before));
+    this.facts.watch(
+      ({ pointedOut }) => [pointedOut],
+      () => {
+        this.#needsMarks = true;
+        this.requestDraw();
+      },
+    );
     new ResizeObserver(() => this.requestDraw()).observe(this.stages);
     for (const end of ["keyup", "blur"]) window.addEventListener(end, () => this.#keyUp());
   }
@@ -143,7 +148,7 @@ export class App implements Workbench {
   /** `isBroughtBack`: the user has worked on it before. */
   open(mesh: Mesh, document: Document, isBroughtBack = false, isWelded = true): void {
     for (const editing of this.#editings) editing.release();
-    if (this.isTouched) this.#asides.put({ ...this.#present(), steps: this.history.steps });
+    if (this.isTouched) this.#asides.put(this.#present());
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
     this.#seams = seamsOf(mesh);
@@ -166,7 +171,8 @@ export class App implements Workbench {
   #present(): Kept {
     const { shape, detail, selected, isYUp, pinned, isWelded } = this.view.now;
     const { look } = this.panes[0]!.stage;
-    return { mesh: this.mesh, document: this.document, view: { shape, detail, selected, isYUp, pinned, isWelded }, look };
+    const view = { shape, detail, selected, isYUp, pinned, isWelded };
+    return { mesh: this.mesh, document: this.document, view, look, steps: this.history.stepsSoFar };
   }
 
   /**
@@ -195,9 +201,23 @@ export class App implements Workbench {
     const aside = this.#asides.take(id);
     if (!aside) return;
     this.open(aside.mesh, aside.document, true, aside.view.isWelded);
-    if (aside.steps) this.history.restore(aside.steps);
+    this.#restoreSteps(aside.steps);
     this.view.set({ ...aside.view, tool: "move" });
     this.lookFrom(aside.look);
+  }
+
+  /** Opens work that was kept over a reload. */
+  restore({ mesh, document, view, look, steps }: Kept): void {
+    this.open(mesh, document, true, view.isWelded);
+    this.#restoreSteps(steps);
+    this.view.set(view);
+    this.lookFrom(look);
+  }
+
+  /** Those of the present document. */
+  #restoreSteps(steps: Steps<Document> | undefined): void {
+    if (!steps) return;
+    this.history.restore({ ...steps, present: this.document });
     this.#documentChanged(performance.now());
   }
 
@@ -249,11 +269,22 @@ export class App implements Workbench {
   }
 
   undo(): void {
-    if (this.history.undo()) this.#documentChanged(performance.now());
+    this.#step(() => this.history.undo());
   }
 
   redo(): void {
-    if (this.history.redo()) this.#documentChanged(performance.now());
+    this.#step(() => this.history.redo());
+  }
+
+  /** A handle that comes back is selected again if it was when it went. */
+  #step(take: () => boolean): void {
+    const { handles } = this.document;
+    if (!take()) return;
+    this.#documentChanged(performance.now());
+    if (this.view.now.selected !== undefined) return;
+    const back = this.document.handles.filter(({ name }) => !handles.some((one) => one.name === name));
+    const one = back.find(({ name }) => name === this.#deselected) ?? (back.length === 1 ? back[0] : undefined);
+    if (one) this.view.set({ selected: one.name });
   }
 
   notify(text: string, isBad = false): void {
@@ -270,8 +301,9 @@ export class App implements Workbench {
     return false;
   }
 
-  get #better(): number[] {
-    return this.panes.map(({ live }) => live?.better?.savedShare).filter((share) => share !== undefined);
+  #showBetter(): void {
+    const better = this.panes.map(({ live }) => live?.better?.savedShare).filter((share) => share !== undefined);
+    if (!isAlike(better, this.facts.now.better)) this.facts.set({ better });
   }
 
   /** In every pane. */
@@ -402,8 +434,12 @@ export class App implements Workbench {
     this.#panes.show(document, time);
     // The end of a gesture changes nothing, so the server's answer to its last change still holds.
     const problem = document === before ? this.facts.now.problem : undefined;
-    this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem, better: this.#better });
-    if (selected !== undefined && !handleOf(document, selected)) this.view.set({ selected: undefined });
+    this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem });
+    this.#showBetter();
+    if (selected !== undefined && !handleOf(document, selected)) {
+      this.#deselected = selected;
+      this.view.set({ selected: undefined });
+    }
     this.requestDraw();
   }
 }

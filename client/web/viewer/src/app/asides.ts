@@ -4,17 +4,13 @@ import type { Mesh } from "../model/mesh.js";
 import type { View } from "../model/view.js";
 import type { Look } from "../stage/stage.js";
 
-/** Work without its history. */
+/** Work as it is kept over a reload. */
 export interface Kept {
   mesh: Mesh;
   document: Document;
   view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned" | "isWelded">;
   look: Look;
-}
-
-/** Work that was set aside for other work. */
-export interface Aside extends Kept {
-  /** Undefined if the work was restored by a reload. */
+  /** Work that earlier versions of the page have kept has none. */
   steps?: Steps<Document>;
 }
 
@@ -26,15 +22,15 @@ export interface AsideName {
 
 /** All works that were set aside, the newest first. Only the user removes them. */
 export class Asides {
-  #all: { id: number; work: Aside; isLetGo: boolean }[] = [];
+  #all: { id: number; work: Kept; isLetGo: boolean }[] = [];
   #newest = 0;
 
-  put(work: Aside): void {
+  put(work: Kept): void {
     this.#all.unshift({ id: ++this.#newest, work, isLetGo: false });
   }
 
   /** Takes the work out of the list. */
-  take(id: number): Aside | undefined {
+  take(id: number): Kept | undefined {
     const taken = this.#all.find((one) => one.id === id);
     this.#all = this.#all.filter((one) => one !== taken);
     return taken?.work;

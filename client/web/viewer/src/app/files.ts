@@ -7,6 +7,7 @@ import { writePly } from "../io/ply.js";
 import { readMesh } from "../io/read.js";
 import { writeStl } from "../io/stl.js";
 import { emptyDocument } from "../model/document.js";
+import { guessYUp } from "../model/up.js";
 import { isAtRest, type Mesh, type WrittenMesh } from "../model/mesh.js";
 import { short } from "../model/words.js";
 import type { App } from "./app.js";
@@ -146,11 +147,13 @@ export class Files {
     const mesh = readMesh(name, bytes);
     const { p, secondP } = this.app.document;
     this.app.open(mesh, { ...emptyDocument, p, secondP });
-    this.app.view.set({ tool: "move" });
+    const isYUp = guessYUp(mesh);
+    this.app.view.set({ tool: "move", isYUp });
+    const up = ` Shown with ${isYUp ? "y" : "z"} up, as it seems: “Y is up” in the panel turns it.`;
     const count = (mesh.positions.length / 3).toLocaleString("en");
     const { seamVertices } = this.app.facts.now;
     const welded = `, ${seamVertices.toLocaleString("en")} of them copies along seams, welded: the panel “Mesh” has a switch`;
-    this.app.notify(`${name}: ${count} vertices${seamVertices > 0 ? welded : ""}. Click the surface to place handles.`);
+    this.app.notify(`${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${up}`);
   }
 
   #openHandles(name: string, text: string): void {

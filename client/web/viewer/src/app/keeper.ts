@@ -1,6 +1,7 @@
 import { forget, remember, remembered } from "../io/remember.js";
 import { type AsideWork, Store, type Work } from "../io/store.js";
 import type { Mesh } from "../model/mesh.js";
+import { stepsToKeep } from "../model/kept_steps.js";
 import type { View } from "../model/view.js";
 import type { App } from "./app.js";
 import type { Kept } from "./asides.js";
@@ -69,12 +70,15 @@ export class Keeper {
   start(): void {
     const { app } = this;
     if (!this.#store) return;
-    app.facts.watch((facts, before) => {
-      if (facts.mesh !== before.mesh) this.isKeeping = false;
-      if (facts.document !== before.document && facts.mesh === before.mesh) app.facts.set({ restoredFrom: undefined });
-      if (facts.document !== before.document || facts.mesh !== before.mesh || facts.setAside !== before.setAside) this.#soon();
-    });
-    app.view.watch(() => this.#soon());
+    app.facts.watch(
+      ({ document, mesh, setAside }) => [document, mesh, setAside],
+      ([document, mesh, setAside], before) => {
+        if (mesh !== before[1]) this.isKeeping = false;
+        if (document !== before[0] && mesh === before[1]) app.facts.set({ restoredFrom: undefined });
+        if (document !== before[0] || mesh !== before[1] || setAside !== before[2]) this.#soon();
+      },
+    );
+    app.view.watchAll(() => this.#soon());
     app.afterDrawing.add(() => {
       const camera = JSON.stringify(app.panes[0]!.stage.look);
       if (camera !== this.#camera) this.#soon();
@@ -126,14 +130,14 @@ export class Keeper {
     }
   }
 
-  #show({ document, view, camera, savedAt, meshKey }: Work, mesh: Mesh): void {
+  #show({ document, view, camera, savedAt, meshKey, steps }: Work, mesh: Mesh): void {
     const { app } = this;
     const { selected, pinned, shape, ...look } = view;
     this.#watchOver();
     app.view.set(look);
-    app.open(mesh, document, true, view.isWelded);
-    app.view.set({ selected, pinned, shape: shape ?? "" });
-    app.lookFrom(camera);
+    const { detail, isYUp, isWelded } = { ...app.view.now, ...look };
+    const kept = { selected, pinned, shape: shape ?? "", detail, isYUp, isWelded };
+    app.restore({ mesh, document, view: kept, look: camera, ...(steps && { steps }) });
     app.facts.set({ restoredFrom: savedAt });
     this.#kept.set(mesh, meshKey);
     this.isKeeping = true;
@@ -141,10 +145,10 @@ export class Keeper {
 
   async #showAsides(store: Store, { asides = [] }: Work): Promise<void> {
     const works: Kept[] = [];
-    for (const { meshKey, document, view, camera } of asides) {
+    for (const { meshKey, document, view, camera, steps } of asides) {
       const mesh = await store.mesh(meshKey);
       if (!mesh) continue;
-      works.push({ mesh, document, view, look: camera });
+      works.push({ mesh, document, view, look: camera, ...(steps && { steps }) });
       this.#kept.set(mesh, meshKey);
     }
     this.app.setAside(works);
@@ -174,12 +178,21 @@ export class Keeper {
     const { isDark: _, hasSingleKeys: __, ...view }: View = this.app.view.now;
     const works = this.app.worthKeeping;
     const keys = new Map(works.map(({ mesh }) => [mesh, this.#kept.get(mesh) ?? `${this.#id}/${newId()}`]));
-    const [kept, ...asides] = works.map((one) => ({ ...one, meshKey: keys.get(one.mesh)!, camera: one.look }));
+    const [kept, ...asides] = works.map((one) => ({ ...one, meshKey: keys.get(one.mesh)!, camera: one.look, ...stepsOf(one) }));
     try {
       if (kept) {
-        const { document, camera, meshKey } = kept;
+        const { document, camera, meshKey, steps } = kept;
         const { search: address } = location;
-        const work = { version: 2, id: this.#id, address, savedAt: Date.now(), document, camera, meshKey } as const;
+        const work = {
+          version: 2,
+          id: this.#id,
+          address,
+          savedAt: Date.now(),
+          document,
+          camera,
+          meshKey,
+          ...(steps && { steps }),
+        } as const;
         const newMeshes = [...keys].filter(([mesh]) => !this.#kept.has(mesh));
         await this.#store!.put({ ...work, view: { ...view, ...kept.view }, asides: asides.map(withoutMesh) }, newMeshes);
         if (this.#hasPutOff) {
@@ -198,8 +211,12 @@ export class Keeper {
   }
 }
 
-function withoutMesh({ document, view, camera, meshKey }: AsideWork): AsideWork {
-  return { document, view, camera, meshKey };
+function withoutMesh({ document, steps, view, camera, meshKey }: AsideWork): AsideWork {
+  return { document, view, camera, meshKey, ...(steps && { steps }) };
+}
+
+function stepsOf({ steps }: Kept): Pick<Kept, "steps"> {
+  return steps ? { steps: stepsToKeep(steps) } : {};
 }
 
 function newId(): string {

@@ -39,18 +39,27 @@ export class MeshBuilder {
     this.#beside.add(what);
   }
 
+  /** The polygon to which a corner of the triangles belongs. */
+  #polygonOf(corner: number): number {
+    let [polygon, end] = [0, 0];
+    while ((end += 3 * (this.#corners[polygon]! - 2)) <= corner) ++polygon;
+    return polygon;
+  }
+
   #checkCount(count: number, what: string, where: string): void {
     if (count <= this.most) return;
     throw new FileFault(`${where}: this page takes ${this.most.toLocaleString("en")} ${what} at most.`);
   }
 
-  finish(name: string): Mesh {
+  /** `faceAt`: how to name a polygon of the file, by its index from 0; without it, by that index. */
+  finish(name: string, faceAt = (polygon: number) => `Face ${polygon} of ${name}`): Mesh {
     if (this.vertexCount === 0) throw new FileFault(`${name} has no vertices.`);
     if (this.faces.length === 0) throw new FileFault(`${name} has no faces: a cloud of points cannot be deformed.`);
     for (let k = 0; k < this.faces.length; ++k) {
       const vertex = this.faces[k]!;
       if (Number.isInteger(vertex) && vertex >= 0 && vertex < this.vertexCount) continue;
-      throw new FileFault(`Face ${Math.floor(k / 3)} of ${name} has vertex ${vertex}; there are ${this.vertexCount} vertices.`);
+      const has = Number.isInteger(vertex) ? ` has vertex ${vertex}` : " has a corner that is no whole number";
+      throw new FileFault(`${faceAt(this.#polygonOf(k))}${has}; there are ${this.vertexCount} vertices, counted from 0.`);
     }
     const faces = Uint32Array.from(this.faces);
     const positions = Float32Array.from(this.positions);

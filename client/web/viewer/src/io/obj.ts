@@ -1,5 +1,6 @@
 import { polygonsOf, type Mesh, type WrittenMesh } from "../model/mesh.js";
 import { MeshBuilder } from "./builder.js";
+import { FileFault } from "./fault.js";
 import { cornerOf, logicalLines } from "./obj_lines.js";
 
 /** What a keyword of an OBJ file stands for that a mesh here cannot hold. */
@@ -20,6 +21,7 @@ const beside: Readonly<Record<string, string>> = {
 /** The positions and faces of an OBJ file. Other contents are only named. */
 export function readObj(name: string, text: string): Mesh {
   const builder = new MeshBuilder();
+  let [least, most] = [0, 0];
   for (const { words, number } of logicalLines(text)) {
     const [key, ...values] = words;
     if (key === "v") {
@@ -29,11 +31,32 @@ export function readObj(name: string, text: string): Mesh {
     } else if (key === "f") {
       const corners = values.map((word) => cornerOf(word, builder.vertexCount));
       builder.polygon(corners, `${name}, line ${number}`);
+      least = Math.min(least, ...corners);
+      most = Math.max(most, ...corners);
     } else if (key !== undefined && Object.hasOwn(beside, key)) {
       builder.leftAside(beside[key]!);
     }
   }
+  // NaN fails, too.
+  if (!(least >= 0 && most < builder.vertexCount)) checkCorners(name, text, builder.vertexCount);
   return builder.finish(name);
+}
+
+/** Names a fault as the file counts: lines, faces and vertices from 1. A face may name vertices that come after it. */
+function checkCorners(name: string, text: string, vertexCount: number): void {
+  let [face, before] = [0, 0];
+  for (const { words, number } of logicalLines(text)) {
+    if (words[0] === "v") ++before;
+    if (words[0] !== "f") continue;
+    ++face;
+    const wrong = words.slice(1).find((word) => {
+      const corner = cornerOf(word, before);
+      return !(Number.isInteger(corner) && corner >= 0 && corner < vertexCount);
+    });
+    if (wrong === undefined) continue;
+    const limit = wrong.startsWith("-") ? `${before} vertices come before it` : `there are ${vertexCount} vertices`;
+    throw new FileFault(`${name}, line ${number}: face ${face} has the corner “${wrong}”; ${limit}.`);
+  }
 }
 
 export function writeObj({ positions, faces, corners }: WrittenMesh): string {

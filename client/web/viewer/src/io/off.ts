@@ -8,34 +8,37 @@ const beside = { ST: "texture coordinates", C: "colours of vertices", N: "normal
 export function readOff(name: string, text: string): Mesh {
   const lines = text
     .split(/\r?\n|\r/)
-    .map((line) => line.replace(/#.*/, "").trim())
-    .filter((line) => line !== "");
-  const header = /^((?:ST)?C?N?)OFF\b\s*(.*)$/.exec(lines[0] ?? "");
+    .map((line, k) => ({ text: line.replace(/#.*/, "").trim(), number: k + 1 }))
+    .filter((line) => line.text !== "");
+  const header = /^((?:ST)?C?N?)OFF\b\s*(.*)$/.exec(lines[0]?.text ?? "");
   if (!header) throw new FileFault(`${name} does not begin with OFF.`);
   let next = 1;
-  const counts = (header[2] || lines[next++] || "").split(/\s+/).map(Number);
+  const counts = (header[2] || lines[next++]?.text || "").split(/\s+/).map(Number);
   const [vertexCount = NaN, faceCount = NaN] = counts;
   if (!(vertexCount >= 0 && faceCount >= 0)) throw new FileFault(`${name} does not say how many vertices and faces it has.`);
   const builder = new MeshBuilder();
   for (const [letter, what] of Object.entries(beside)) if (header[1]!.includes(letter)) builder.leftAside(what);
   const line = (what: string) => {
-    const words = lines[next++];
-    if (words === undefined) throw new FileFault(`${name} ends before ${what}.`);
-    return words.split(/\s+/).map(Number);
+    const found = lines[next++];
+    if (!found) throw new FileFault(`${name} ends before ${what}.`);
+    return { where: `${name}, line ${found.number}, ${what}`, numbers: found.text.split(/\s+/).map(Number) };
   };
   for (let v = 0; v < vertexCount; ++v) {
-    const [x = NaN, y = NaN, z = NaN] = line(`vertex ${v}`);
-    builder.vertex(x, y, z, `${name}, vertex ${v}`);
+    const { numbers, where } = line(`vertex ${v}`);
+    const [x = NaN, y = NaN, z = NaN] = numbers;
+    builder.vertex(x, y, z, where);
   }
+  const firstFace = next;
   for (let f = 0; f < faceCount; ++f) {
-    const [count = 0, ...corners] = line(`face ${f}`);
+    const { numbers, where } = line(`face ${f}`);
+    const [count = 0, ...corners] = numbers;
     if (corners.length < count) {
-      throw new FileFault(`${name}, face ${f}: it says that it has ${count} corners, and names ${corners.length}.`);
+      throw new FileFault(`${where}: it says that it has ${count} corners, and names ${corners.length}.`);
     }
-    builder.polygon(corners.slice(0, count), `${name}, face ${f}`);
+    builder.polygon(corners.slice(0, count), where);
     if (corners.length > count) builder.leftAside("colours of faces");
   }
-  return builder.finish(name);
+  return builder.finish(name, (face) => `${name}, line ${lines[firstFace + face]!.number}: face ${face}`);
 }
 
 export function writeOff({ positions, faces, corners }: WrittenMesh): string {

@@ -1,4 +1,5 @@
 import type { Document } from "../model/document.js";
+import type { Steps } from "../model/history.js";
 import type { Mesh, Vector3 } from "../model/mesh.js";
 import type { View } from "../model/view.js";
 
@@ -12,6 +13,8 @@ export interface Work {
   /** As Date.now(). */
   savedAt: number;
   document: Document;
+  /** Steps to undo and redo; earlier versions of the page stored none. */
+  steps?: Steps<Document>;
   view: Partial<View>;
   /** The camera's position and target. */
   camera: { position: Vector3; target: Vector3 };
@@ -21,7 +24,7 @@ export interface Work {
   asides: AsideWork[];
 }
 
-export interface AsideWork extends Pick<Work, "document" | "camera" | "meshKey"> {
+export interface AsideWork extends Pick<Work, "document" | "steps" | "camera" | "meshKey"> {
   view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned" | "isWelded">;
 }
 

@@ -14,7 +14,8 @@ import { changes, exponent, newSession, type Side } from "../model/changes.js";
 import type { Document } from "../model/document.js";
 import type { Mesh } from "../model/mesh.js";
 import { Meter } from "./meter.js";
-import { isPassing, say, type Status, statusAtEnd, statusOf } from "./status.js";
+import { Pulse } from "./pulse.js";
+import { isPassing, notAnswering, say, type Status, statusAtEnd, statusOf } from "./status.js";
 
 export interface LiveWatcher {
   /** A frame waits to be taken. */
@@ -29,6 +30,7 @@ export interface LiveWatcher {
   better(): void;
 }
 
+const live = say("live", "Live");
 /** Frames answer one of the newest inputs, so no more are needed. */
 const mostExponents = 100;
 
@@ -54,6 +56,7 @@ export class Live {
   /** For sessions that cannot be opened or break at once: by the client's rules, in addition to what the server asks for. */
   readonly #backoff = new Backoff();
   readonly #over = new AbortController();
+  readonly #pulse: Pulse;
 
   constructor(
     readonly mesh: Mesh,
@@ -64,6 +67,10 @@ export class Live {
     /** For each vertex a number, the same for vertices that count as one. */
     readonly weld?: Uint32Array,
   ) {
+    this.#pulse = new Pulse(
+      async () => this.#session?.ping(),
+      () => this.#setStatus(this.#pulse.isSilent ? notAnswering : live),
+    );
     void this.#run();
   }
 
@@ -158,6 +165,7 @@ export class Live {
 
   close(): void {
     this.#over.abort();
+    this.#pulse.stop();
     this.#taken?.();
     this.#session?.close().catch(() => undefined); // the session expires by itself if the server is away
     this.#session = undefined;
@@ -266,7 +274,9 @@ export class Live {
 
   #connection(): void {
     const connection = this.#session?.connection;
-    if (connection === "connected") this.#setStatus(say("live", "Live"));
+    if (connection === "connected") this.#pulse.start();
+    else this.#pulse.stop();
+    if (connection === "connected") this.#setStatus(live);
     if (connection === "reconnecting") {
       this.#setStatus(statusOf(this.#session?.interruption ?? new LpdeformError("unavailable", "")));
     }

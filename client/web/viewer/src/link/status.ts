@@ -35,6 +35,14 @@ export function statusOf(error: LpdeformError): Status {
   return { ...say("refused", "The server refuses this mesh", sentence(message)), element };
 }
 
+/** The connection stands, but the server or its proxy has stopped. */
+export const notAnswering: Status = {
+  kind: "away",
+  title: "The server does not answer",
+  text: `${kept} and goes on as soon as it answers.`,
+  element: "",
+};
+
 /** The status when nothing is tried again until the user starts again. */
 export function statusAtEnd(error: LpdeformError): Status {
   if (error.reason !== "FRAME_PARTS" && error.reason !== "FRAME_VERTICES") return statusOf(error);

@@ -91,6 +91,17 @@ export class History<Value> {
     return { past: [...this.#past], present: this.#present, future: [...this.#future] };
   }
 
+  /** The steps as they would be if the gesture under way, if there is one, ended now. It goes on. */
+  get stepsSoFar(): Steps<Value> {
+    const before = this.#before;
+    const isStep = before !== undefined && !this.isSame(before, this.#present);
+    return {
+      past: isStep ? [...this.#past, before] : [...this.#past],
+      present: this.#present,
+      future: isStep ? [] : [...this.#future],
+    };
+  }
+
   restore({ past, present, future }: Steps<Value>): void {
     this.#past = [...past];
     this.#future = [...future];

@@ -1,6 +1,6 @@
-/** Values that views are made from. Watchers are told of every change, once. */
+/** Values that views are made from. Each watcher is told of the changes that it asks for, once each, and of no others. */
 export class State<Values extends object> {
-  readonly #watchers = new Set<(values: Values, before: Values) => void>();
+  readonly #watchers = new Set<() => void>();
   #values: Values;
 
   constructor(values: Values) {
@@ -16,11 +16,33 @@ export class State<Values extends object> {
     const keys = Object.keys(change) as (keyof Values)[];
     if (keys.every((key) => change[key] === before[key])) return;
     this.#values = { ...before, ...change };
-    for (const watcher of this.#watchers) watcher(this.#values, before);
+    for (const watcher of this.#watchers) watcher();
   }
 
-  watch(watcher: (values: Values, before: Values) => void): void {
-    this.#watchers.add(watcher);
-    watcher(this.#values, this.#values);
+  /**
+   * Calls `watcher` at once, and then when a value of what `pick` returns has become another one. `before`: what was picked the
+   * time before; the first time it is what is picked now.
+   */
+  watch<const Picked extends readonly unknown[]>(
+    pick: (values: Values) => Picked,
+    watcher: (picked: Picked, before: Picked) => void,
+  ): void {
+    let last = pick(this.#values);
+    this.#watchers.add(() => {
+      const before = last;
+      const picked = pick(this.#values); // a watcher before this one may have changed them again
+      if (picked.every((value, k) => Object.is(value, before[k]))) return;
+      last = picked;
+      watcher(picked, before);
+    });
+    watcher(last, last);
+  }
+
+  /** Like watch(), for every change. */
+  watchAll(watcher: (values: Values, before: Values) => void): void {
+    this.watch(
+      (values) => [values],
+      ([values], [before]) => watcher(values, before),
+    );
   }
 }

@@ -17,8 +17,12 @@ export interface Look {
 /** Height of a picture on which marks have their full size; on smaller pictures they would hide the surface. */
 const fullSizeHeight = 700;
 
+/** Where small.css puts the controls beside the pictures. */
+const littleRoom = "(max-aspect-ratio: 1/1) and (max-width: 720px), (min-aspect-ratio: 1/1) and (max-height: 560px)";
+
 /** The pixels that the page's controls cover at the edges of a picture of this width. */
 function coveredAt(width: number): { left: number; top: number; bottom: number } {
+  if (matchMedia(littleRoom).matches) return { left: 0, top: 20, bottom: 20 };
   return width > 620 ? { left: 70, top: 50, bottom: 120 } : { left: 40, top: 110, bottom: 165 };
 }
 

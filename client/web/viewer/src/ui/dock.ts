@@ -3,7 +3,7 @@ import { placeOf, watchPlaces } from "../app/sides.js";
 import type { Document } from "../model/document.js";
 import { leastP, mostP, steppedP } from "../model/exponent.js";
 import { capital, short } from "../model/words.js";
-import { el, setText, toggle } from "./dom.js";
+import { el, measured, setText, toggle } from "./dom.js";
 
 /** The values in the paper's figures. */
 const stops = [1, 1.5, 2, 6] as const;
@@ -32,22 +32,20 @@ export function dock(app: App): HTMLElement {
   );
   const hint = el("p", { className: "p-words" });
   const explain = () => setText(hint, wordsOf(app.document, app.view.now.isSplit));
-  app.facts.watch(({ document }) => {
-    automatic.input.checked = document.isAutomatic;
-    explain();
-  });
-  app.view.watch(({ isSplit }) => {
+  app.facts.watch(
+    ({ document: { p, secondP, isAutomatic, paintedP, stiffness } }) => [isAutomatic, p, secondP, paintedP, stiffness],
+    ([isAutomatic]) => {
+      automatic.input.checked = isAutomatic;
+      explain();
+    },
+  );
+  app.view.watchAll(({ isSplit }) => {
     second.hidden = !isSplit;
     explain();
   });
   watchPlaces(explain);
-  return el(
-    "section",
-    { className: "dock", aria: { label: "p" } },
-    first,
-    second,
-    el("div", { className: "under" }, hint, automatic.element),
-  );
+  const under = el("div", { className: "under" }, hint, automatic.element);
+  return measured(el("section", { className: "dock", aria: { label: "p" } }, first, second, under), "--dock-height");
 }
 
 function pSlider(app: App, field: Field): HTMLElement {
@@ -80,17 +78,16 @@ function pSlider(app: App, field: Field): HTMLElement {
     tick.addEventListener("click", () => app.change(set(stop)));
     return tick;
   });
-  app.facts.watch(({ document }, before) => {
-    const p = document[field];
-    const isNew =
-      document === before.document || p !== before.document[field] || document.isAutomatic !== before.document.isAutomatic;
-    if (!isNew) return;
-    input.valueAsNumber = shareOf(p);
-    input.style.setProperty("--share", `${shareOf(p) * 100}%`);
-    input.setAttribute("aria-valuetext", short(p));
-    shown.textContent = document.isAutomatic ? "auto" : short(p);
-    ticks.forEach((tick, k) => tick.setAttribute("aria-pressed", String(!document.isAutomatic && stops[k] === p)));
-  });
+  app.facts.watch(
+    ({ document }) => [document[field], document.isAutomatic],
+    ([p, isAutomatic]) => {
+      input.valueAsNumber = shareOf(p);
+      input.style.setProperty("--share", `${shareOf(p) * 100}%`);
+      input.setAttribute("aria-valuetext", short(p));
+      shown.textContent = isAutomatic ? "auto" : short(p);
+      ticks.forEach((tick, k) => tick.setAttribute("aria-pressed", String(!isAutomatic && stops[k] === p)));
+    },
+  );
   const track = el("div", { className: "p-track" }, input, el("div", { className: "stops" }, ...ticks));
   const side = field === "p" ? "first" : "second";
   const place = el("small");
@@ -100,7 +97,7 @@ function pSlider(app: App, field: Field): HTMLElement {
     place.hidden = !isSplit;
     input.setAttribute("aria-label", isSplit ? `p of the ${placeOf(side)} picture` : "p");
   };
-  app.view.watch(name);
+  app.view.watchAll(name);
   watchPlaces(name);
   return el("div", { className: "p-row" }, el("span", { className: "p-name" }, "p", place), track, shown);
 }

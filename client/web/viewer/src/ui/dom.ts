@@ -60,3 +60,11 @@ export function choice<Value extends string>(
   };
   return { element, show };
 }
+
+/** Tells the style sheets how high the element is, by a property of the page. */
+export function measured<Made extends HTMLElement>(element: Made, property: `--${string}`): Made {
+  new ResizeObserver(() => {
+    document.documentElement.style.setProperty(property, `${element.offsetHeight}px`);
+  }).observe(element);
+  return element;
+}

@@ -51,8 +51,8 @@ export function handlesPanel(app: App): HTMLElement {
     const handle = handleOf(app.document, selected);
     renew(details, handle ? detailsOf(app, handle) : []);
   };
-  app.facts.watch(show);
-  app.view.watch(show);
+  app.facts.watch(({ document }) => [document.handles], show);
+  app.view.watchAll(show);
   details.addEventListener("change", () => queueMicrotask(show));
   return el("div", {}, list, details);
 }

@@ -40,7 +40,7 @@ export function legend(app: App): HTMLElement {
     setText(numbers[1], all.middle);
     setText(numbers[2], all.high);
   };
-  app.view.watch(show);
+  app.view.watchAll(show);
   app.afterDrawing.add(show);
   return element;
 }

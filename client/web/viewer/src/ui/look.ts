@@ -34,7 +34,7 @@ export function lookPanel(app: App): HTMLElement {
     encoding.append(el("option", { value: value!, textContent: text! }));
   }
   encoding.addEventListener("change", () => app.view.set({ encoding: encoding.value as Encoding }));
-  app.view.watch((view) => {
+  app.view.watchAll((view) => {
     colour.show(view.colourBy);
     wireframe.input.checked = view.wireframe;
     ghost.input.checked = view.ghost;

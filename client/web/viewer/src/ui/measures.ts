@@ -74,10 +74,8 @@ export function measures(app: App): HTMLElement {
     }
   };
   app.afterDrawing.add(soon);
-  app.view.watch(soon);
-  app.facts.watch(({ better }, before) => {
-    if (better !== before.better) soon();
-  });
+  app.view.watchAll(soon);
+  app.facts.watch(({ better }) => [better], soon);
   return element;
 }
 

@@ -1,6 +1,6 @@
 import type { Reason } from "lpdeform-client";
 import type { App } from "../app/app.js";
-import { elementsIn, isPassing, sentence, type Status } from "../link/status.js";
+import { elementsIn, isPassing, notAnswering, sentence, type Status } from "../link/status.js";
 import { percent } from "../model/words.js";
 import { el, setText } from "./dom.js";
 import { pointOutNamed } from "./report.js";
@@ -55,24 +55,39 @@ export function messages(app: App, startOver: () => void): HTMLElement {
   const sayAway = () => {
     late = undefined;
     showStatus(app.facts.now.status);
+    showHint();
   };
-  app.facts.watch((facts, before) => {
-    // A short interruption needs no message. Its length does not depend on what else changes meanwhile.
-    if (facts.status.kind !== "away") stopWaiting();
-    else if (before.status.kind === "live") late ??= setTimeout(sayAway, awayMs);
-    if (late === undefined) showStatus(facts.status);
+  const showHint = () => {
+    const { restoredFrom, setAside } = app.facts.now;
     setText(hint, hintOf(app));
-    hint.hidden = hint.textContent === "" || !banner.hidden || facts.restoredFrom !== undefined || facts.setAside.length > 0;
-    if (facts.notice === before.notice) return;
-    clearTimeout(timer);
-    notice.hidden = facts.notice === undefined;
-    if (!facts.notice) return;
-    const { text, isBad, stays } = facts.notice;
-    notice.textContent = text;
-    notice.classList.toggle("bad", isBad);
-    if (!stays) timer = setTimeout(() => (notice.hidden = true), isBad ? 2 * noticeMs : noticeMs);
-  });
-  app.view.watch(() => setText(hint, hintOf(app)));
+    hint.hidden = hint.textContent === "" || !banner.hidden || restoredFrom !== undefined || setAside.length > 0;
+  };
+  app.facts.watch(
+    ({ status, problem }) => [status, problem],
+    ([status], [before]) => {
+      // A short interruption needs no message. Its length does not depend on what else changes meanwhile.
+      if (status.kind !== "away" || status === notAnswering) stopWaiting();
+      else if (before.kind === "live") late ??= setTimeout(sayAway, awayMs);
+      if (late === undefined) showStatus(status);
+      showHint();
+    },
+  );
+  app.facts.watch(
+    ({ document, canUndo, restoredFrom, setAside }) => [document.handles.length, canUndo, restoredFrom, setAside],
+    showHint,
+  );
+  app.facts.watch(
+    ({ notice }) => [notice],
+    ([now]) => {
+      clearTimeout(timer);
+      notice.hidden = now === undefined;
+      if (!now) return;
+      notice.textContent = now.text;
+      notice.classList.toggle("bad", now.isBad);
+      if (!now.stays) timer = setTimeout(() => (notice.hidden = true), now.isBad ? 2 * noticeMs : noticeMs);
+    },
+  );
+  app.view.watchAll(showHint);
   return el("div", { className: "messages" }, pill, banner, restored, asideNote(app), hint, betterButton(app), notice);
 }
 
@@ -80,10 +95,13 @@ export function messages(app: App, startOver: () => void): HTMLElement {
 function betterButton(app: App): HTMLElement {
   const take = el("button", { type: "button", className: "plain better", hidden: true });
   take.addEventListener("click", () => app.takeBetter());
-  app.facts.watch(({ better }) => {
-    take.hidden = better.length === 0;
-    if (better.length > 0) setText(take, betterText(better));
-  });
+  app.facts.watch(
+    ({ better }) => [better],
+    ([better]) => {
+      take.hidden = better.length === 0;
+      if (better.length > 0) setText(take, betterText(better));
+    },
+  );
   return take;
 }
 
@@ -101,10 +119,13 @@ function restoredNote(app: App, startOver: () => void): HTMLElement {
   discard.addEventListener("click", startOver);
   keep.addEventListener("click", () => app.facts.set({ restoredFrom: undefined }));
   const note = el("div", { className: "restored", role: "status", hidden: true }, text, keep, discard);
-  app.facts.watch(({ restoredFrom, mesh }) => {
-    note.hidden = restoredFrom === undefined;
-    if (restoredFrom !== undefined) setText(text, `“${mesh.name}” is here again as you left it ${ago(restoredFrom)}.`);
-  });
+  app.facts.watch(
+    ({ restoredFrom, mesh }) => [restoredFrom, mesh],
+    ([restoredFrom, mesh]) => {
+      note.hidden = restoredFrom === undefined;
+      if (restoredFrom !== undefined) setText(text, `“${mesh.name}” is here again as you left it ${ago(restoredFrom)}.`);
+    },
+  );
   return note;
 }
 
@@ -117,16 +138,18 @@ function asideNote(app: App): HTMLElement {
   back.addEventListener("click", () => app.bringBack(Number(which.value)));
   dismiss.addEventListener("click", () => app.dismissAside(Number(which.value)));
   const note = el("div", { className: "aside", role: "status", hidden: true }, text, which, back, dismiss);
-  app.facts.watch(({ setAside }, before) => {
-    if (setAside === before.setAside && which.childElementCount === setAside.length) return;
-    const [newest] = setAside;
-    note.hidden = newest === undefined;
-    which.hidden = setAside.length < 2;
-    which.replaceChildren(...setAside.map(({ id, name }) => el("option", { value: String(id), textContent: name })));
-    if (!newest) return;
-    const one = `“${newest.name}” was set aside with your work on it.`;
-    setText(text, setAside.length > 1 ? `${setAside.length} were set aside with your work:` : one);
-  });
+  app.facts.watch(
+    ({ setAside }) => [setAside],
+    ([setAside]) => {
+      const [newest] = setAside;
+      note.hidden = newest === undefined;
+      which.hidden = setAside.length < 2;
+      which.replaceChildren(...setAside.map(({ id, name }) => el("option", { value: String(id), textContent: name })));
+      if (!newest) return;
+      const one = `“${newest.name}” was set aside with your work on it.`;
+      setText(text, setAside.length > 1 ? `${setAside.length} were set aside with your work:` : one);
+    },
+  );
   return note;
 }
 
@@ -143,15 +166,20 @@ function pillText({ kind, title }: Status): string {
   return kind === "live" ? "Live" : kind === "idle" || kind === "opening" ? "Preparing…" : title;
 }
 
+const touches = () => matchMedia("(pointer: coarse)").matches;
+
 /** A hint at the next step, until the user knows the page. */
 function hintOf(app: App): string {
   const { document, status } = app.facts.now;
   const { tool } = app.view.now;
   if (status.kind !== "live") return "";
   if (tool === "brush") return "Paint over the surface: what you paint becomes a handle";
-  if (tool === "lasso" || tool === "box") return "Draw around a part of the surface; hold the space bar to turn the view";
+  if (tool === "lasso" || tool === "box") {
+    const turning = touches() ? "two fingers turn the view" : "hold the space bar to turn the view";
+    return `Draw around a part of the surface; ${turning}`;
+  }
   if (tool === "paint") return "Paint over the surface: low p gathers distortion, stiffness keeps it away";
-  if (document.handles.length === 0) return "Click the surface to place a first handle";
+  if (document.handles.length === 0) return `${touches() ? "Tap" : "Click"} the surface to place a first handle`;
   if (document.handles.length === 1) return "Place a second handle: one stays, the other is dragged";
   return app.history.canUndo ? "" : "Drag the coloured handle and watch the surface follow";
 }

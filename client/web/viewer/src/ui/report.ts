@@ -1,6 +1,7 @@
 import type { Defect, MeshReport } from "lpdeform-client";
 import type { App } from "../app/app.js";
 import { elementsIn } from "../link/status.js";
+import type { Mesh } from "../model/mesh.js";
 import { cornersOf, nothing, type PointedOut, within } from "../model/pointed.js";
 import { el, setText, toggle } from "./dom.js";
 import { icon } from "./icons.js";
@@ -48,10 +49,9 @@ export function reportPanel(app: App): HTMLElement {
     const fate = isWelded ? "They move as one." : "The surface tears there.";
     setText(seams, `${seamVertices.toLocaleString("en")} ${copies} along seams of textures or normals. ${fate}`);
   };
-  app.facts.watch(showSeams);
-  app.view.watch(showSeams);
-  app.facts.watch(({ report, mesh }, before) => {
-    if (report === before.report && mesh === before.mesh && summary.textContent !== "") return;
+  app.facts.watch(({ seamVertices }) => [seamVertices], showSeams);
+  app.view.watchAll(showSeams);
+  const showReport = (report: MeshReport | undefined, { name }: Mesh) => {
     const defects = defectsOf(report);
     const parts = report && [
       `${report.vertices.toLocaleString("en")} vertices, ${report.faces.toLocaleString("en")} faces`,
@@ -60,11 +60,15 @@ export function reportPanel(app: App): HTMLElement {
         ? `${report.boundaryLoops} ${report.boundaryLoops === 1 ? "hole or border" : "holes or borders"}`
         : "closed",
     ];
-    summary.textContent = parts ? `${mesh.name}: ${parts.join(", ")}.` : mesh.name;
+    summary.textContent = parts ? `${name}: ${parts.join(", ")}.` : name;
     list.replaceChildren(...defects.map((defect) => warning(app, defect)));
     const isTorn = app.facts.now.seamVertices > 0 && !app.seams;
     if (report && defects.length === 0 && !isTorn) list.append(el("li", { className: "good" }, "Nothing wrong with it."));
-  });
+  };
+  app.facts.watch(
+    ({ report, mesh }) => [report, mesh],
+    ([report, mesh]) => showReport(report, mesh),
+  );
   return el("div", {}, summary, list, seamBox);
 }
 

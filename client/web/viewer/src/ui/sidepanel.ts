@@ -7,22 +7,29 @@ import { reportPanel, warningsOf } from "./report.js";
 
 export function sidePanel(app: App): HTMLElement {
   const mesh = section("Mesh", reportPanel(app), false);
+  const numbers = section("Measures", measures(app), true);
+  numbers.classList.add("numbers-section");
   const element = el(
     "aside",
     { className: "panel", aria: { label: "Side panel" } },
     section("Handles", handlesPanel(app), true),
     section("Look", lookPanel(app), true),
-    section("Measures", measures(app), true),
+    numbers,
     mesh,
   );
-  app.facts.watch(({ report, seamVertices }, before) => {
-    if (report === before.report) return;
-    const isSplit = report !== undefined && seamVertices > 0 && !app.view.now.isWelded;
-    const count = warningsOf(report).length + (isSplit ? 1 : 0);
-    mesh.classList.toggle("warned", count > 0);
-    if (count > 0) mesh.open = true;
-  });
-  app.view.watch(({ isPanelOpen }) => document.body.classList.toggle("panel-closed", !isPanelOpen));
+  app.facts.watch(
+    ({ report }) => [report],
+    ([report]) => {
+      const isSplit = report !== undefined && app.facts.now.seamVertices > 0 && !app.view.now.isWelded;
+      const count = warningsOf(report).length + (isSplit ? 1 : 0);
+      mesh.classList.toggle("warned", count > 0);
+      if (count > 0) mesh.open = true;
+      if (mesh.contains(document.activeElement)) return; // moving it would take the focus away
+      if (count > 0) element.prepend(mesh);
+      else element.append(mesh);
+    },
+  );
+  app.view.watchAll(({ isPanelOpen }) => document.body.classList.toggle("panel-closed", !isPanelOpen));
   return element;
 }
 

@@ -14,7 +14,7 @@ export function startTheme(app: App): void {
   // The picture shows its focus to users of the keyboard.
   window.addEventListener("keydown", ({ key }) => key === "Tab" && document.body.classList.add("by-keyboard"));
   window.addEventListener("pointerdown", () => document.body.classList.remove("by-keyboard"));
-  app.view.watch(({ isDark }, before) => {
+  app.view.watchAll(({ isDark }, before) => {
     document.documentElement.dataset["theme"] = isDark ? "dark" : "light";
     if (isDark !== before.isDark) remember(key, isDark ? "dark" : "light");
   });

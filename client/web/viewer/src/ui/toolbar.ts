@@ -3,7 +3,7 @@ import { withoutPaint } from "../model/document.js";
 import { nothing } from "../model/pointed.js";
 import type { StrokeMode, Tool } from "../model/view.js";
 import { short } from "../model/words.js";
-import { choice, el, toggle } from "./dom.js";
+import { choice, el, measured, toggle } from "./dom.js";
 import { button, slider } from "./controls.js";
 import { type IconName, icon } from "./icons.js";
 
@@ -27,13 +27,13 @@ export function toolbar(app: App): HTMLElement {
     element.addEventListener("click", () => app.view.set({ tool, isPanelOpen: app.view.now.isPanelOpen }));
     return element;
   });
-  app.view.watch(({ tool }) => {
+  app.view.watchAll(({ tool }) => {
     for (const element of buttons) element.setAttribute("aria-pressed", String(element.dataset["tool"] === tool));
     if (tool !== "brush" && tool !== "paint") app.facts.set({ pointedOut: nothing });
   });
   const fit = button("fit", "Show all of it (F)", () => app.fit());
   const rail = el("nav", { className: "rail", aria: { label: "Tools" } }, ...buttons, el("hr"), fit);
-  return el("div", { className: "tools" }, rail, options(app));
+  return measured(el("div", { className: "tools" }, rail, options(app)), "--tools-height");
 }
 
 function options(app: App): HTMLElement {
@@ -88,8 +88,11 @@ function options(app: App): HTMLElement {
     clear,
   );
 
-  app.facts.watch(({ document }) => (clear.disabled = !document.paintedP && !document.stiffness));
-  app.view.watch((view) => {
+  app.facts.watch(
+    ({ document: { paintedP, stiffness } }) => [!paintedP && !stiffness],
+    ([isClear]) => (clear.disabled = isClear),
+  );
+  app.view.watchAll((view) => {
     const { tool } = view;
     mode.show(view.mode);
     gizmo.show(view.gizmo);

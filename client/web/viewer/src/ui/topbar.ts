@@ -36,12 +36,15 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
     () => files.choose(),
   );
 
-  app.facts.watch(({ canUndo, canRedo, mesh }) => {
-    undo.disabled = !canUndo;
-    redo.disabled = !canRedo;
-    setText(own, mesh.name);
-  });
-  app.view.watch((view) => {
+  app.facts.watch(
+    ({ canUndo, canRedo, mesh }) => [canUndo, canRedo, mesh],
+    ([canUndo, canRedo, mesh]) => {
+      undo.disabled = !canUndo;
+      redo.disabled = !canRedo;
+      setText(own, mesh.name);
+    },
+  );
+  app.view.watchAll((view) => {
     own.hidden = view.shape !== "";
     shapes.value = view.shape;
     details.value = view.detail;

@@ -84,7 +84,7 @@ it("a mesh is dropped with its handles and what else lies beside it, in any orde
 it("a large file is told to be opened while it is", async () => {
   await user.page.evaluate(`{
     window.notices = [];
-    window.__lpdeform.app.facts.watch(({ notice }) => notice && window.notices.at(-1) !== notice.text && window.notices.push(notice.text));
+    window.__lpdeform.app.facts.watch(({ notice }) => [notice], ([notice]) => notice && window.notices.at(-1) !== notice.text && window.notices.push(notice.text));
   }`);
   await drop({ "large.off": `${writeOff(mesh)}#${"x".repeat(2e6)}` });
   await isOpen("large.off");
@@ -101,7 +101,7 @@ it("what cannot be opened is refused by name, and what is there stays", async ()
   await drop({ "a.off": writeOff(mesh), "b.obj": writeObj(mesh) });
   await refusal("One mesh at a time: a.off, b.obj are 2.");
   await drop({ "short.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n" });
-  await refusal("short.off, face 0: it says that it has 4 corners, and names 3.");
+  await refusal("short.off, line 6, face 0: it says that it has 4 corners, and names 3.");
   await user.page.evaluate(() => {
     const file = new File([], "huge.stl"); // as if it were
     Object.defineProperty(file, "size", { value: 6e8 });

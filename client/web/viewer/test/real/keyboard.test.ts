@@ -51,6 +51,21 @@ it("I opens and closes the side panel", async () => {
   expect(await user.ask("app.view.now.isPanelOpen")).toBe(true);
 });
 
+it("what is deleted is selected again when that is undone", async () => {
+  const { keyboard } = user.page;
+  await user.page.locator("canvas.stage").focus();
+  await keyboard.press("n");
+  const name = await user.ask<string>("app.view.now.selected");
+  await keyboard.press("Delete");
+  expect(await user.ask<string | undefined>("app.view.now.selected")).toBeUndefined();
+  await keyboard.press("Control+z");
+  expect(await user.ask("app.view.now.selected")).toBe(name);
+  await keyboard.press("Escape");
+  await keyboard.press("Control+Shift+z");
+  expect(await user.ask("document().handles.length")).toBe(1);
+  await keyboard.press("Control+z");
+});
+
 it("the focus stays in the list while a handle is selected, renamed, locked and set", async () => {
   const rows = user.page.locator(".handles li");
   await rows.nth(0).getByLabel("Name").focus();

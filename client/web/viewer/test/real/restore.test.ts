@@ -84,6 +84,25 @@ it("a reload brings handles, groups, p, painting, both panes and the view back, 
   expect(await note().isHidden()).toBe(true);
 });
 
+it("what was done before a reload is undone after it, and done again", async () => {
+  const states = [await work()];
+  await bend();
+  states.push(await work());
+  await user.page.getByRole("button", { name: "6", exact: true }).first().click();
+  states.push(await work());
+  await user.page.keyboard.press("Control+z");
+  await reload();
+  expect(await work()).toEqual(states[1]);
+  await user.page.keyboard.press("Control+Shift+z");
+  expect(await work()).toEqual(states[2]);
+  for (const state of [states[1], states[0]]) {
+    await user.page.keyboard.press("Control+z");
+    expect(await work()).toEqual(state);
+  }
+  expect(await user.ask("app.history.canUndo")).toBe(false);
+  await user.settled();
+});
+
 it("a mesh from a file comes back, and is deleted on demand, for good", async () => {
   const tower = blockSurface(2, 2, 6, () => true);
   await user.openFiles({ name: "tower.off", content: writeOff(tower) });

@@ -70,6 +70,32 @@ describe("the page says plainly, and goes on by itself when", () => {
     await user.page.locator(".banner").waitFor({ state: "hidden" });
   });
 
+  it.each(["server", "envoy"] as const)("the %s is stopped, within two seconds, also during a drag", async (part) => {
+    const service = await start();
+    const user = await visit(service);
+    await user.settled();
+    const { mouse } = user.page;
+    const { x, y } = await user.vertexOnPage(await user.ask<number>("document().handles[1].vertices[0]"));
+    for (const isDragging of [false, true]) {
+      if (isDragging) {
+        await mouse.move(x, y);
+        await mouse.down();
+      }
+      const stoppedAt = performance.now();
+      service.pause(part);
+      let isOver = false;
+      const said = banner(user, "The server does not answer", 20_000).finally(() => (isOver = true));
+      for (let k = 0; isDragging && !isOver; ++k) await mouse.move(x + 60 * Math.sin(k / 20), y + 5);
+      await said;
+      expect(performance.now() - stoppedAt).toBeLessThan(2000);
+      expect(await user.page.locator(".pill").textContent()).toBe("The server does not answer");
+      service.resume(part);
+      await mouse.up();
+      await user.page.locator(".banner").waitFor({ state: "hidden" });
+      await user.settled();
+    }
+  });
+
   it("a change is refused, also where that is said as the drag ends", async () => {
     const service = await start();
     const user = await visit(service);

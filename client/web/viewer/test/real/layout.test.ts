@@ -1,0 +1,97 @@
+import { join } from "node:path";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { Service } from "../../../client/test/support/service.js";
+import { User } from "./user.js";
+
+// At every size, nothing that is pressed or read covers anything else.
+
+let service: Service;
+let user: User;
+
+beforeAll(async () => {
+  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
+  user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
+  await user.settled();
+  await user.ask(`app.change({ ...window.__lpdeform.document(), secondP: 3 })`);
+});
+
+afterAll(async () => {
+  expect(user.errors).toEqual([]);
+  await user.close();
+  await service.stop();
+});
+
+const sizes: (readonly [number, number])[] = [
+  [360, 640],
+  [390, 844],
+  [414, 896],
+  [600, 960],
+  [640, 360],
+  [768, 1024],
+  [844, 390],
+  [932, 430],
+  [1024, 600],
+  [1024, 768],
+  [1280, 720],
+  [1280, 800],
+  [1440, 900],
+  [1920, 1080],
+  [2560, 1440],
+  [3840, 2160],
+];
+const states = [false, true].flatMap((isSplit) =>
+  [false, true].flatMap((isPanelOpen) => (["move", "paint", "lasso"] as const).map((tool) => ({ isSplit, isPanelOpen, tool }))),
+);
+
+/** Where room is little, these leave the pictures free. */
+const beside = [".topbar", ".rail", ".options", ".dock", ".panel"];
+const isLittle = (width: number, height: number) => (width <= 720 && width <= height) || (height <= 560 && height <= width);
+
+/** What stands over the pictures or beside them, and must not meet. */
+const parts = [
+  ".topbar",
+  ".topbar > *",
+  ".rail",
+  ".options",
+  ".legend",
+  ".dock",
+  ".pill",
+  ".banner",
+  ".hint",
+  ".notice",
+  ".panel",
+];
+
+/** Pairs that overlap by more than a pixel of rounding, and what is cut off by the window. */
+function faults([parts, beside]: readonly (readonly string[])[]): string[] {
+  const boxes = [".pane", ...parts!].flatMap((part) =>
+    [...document.querySelectorAll<HTMLElement>(part)]
+      .map((element) => ({ part, element, box: element.getBoundingClientRect() }))
+      .filter(({ element, box }) => box.width * box.height > 0 && element.checkVisibility({ visibilityProperty: true })),
+  );
+  const found: string[] = [];
+  boxes.forEach(({ part, box, element }, k) => {
+    if (box.left < -1 || box.top < -1 || box.right > innerWidth + 1 || box.bottom > innerHeight + 1)
+      found.push(`${part} is cut off`);
+    for (const other of boxes.slice(k + 1)) {
+      if (part === ".pane" && !beside!.includes(other.part)) continue;
+      if (element.contains(other.element) || other.element.contains(element)) continue;
+      const wide = Math.min(box.right, other.box.right) - Math.max(box.left, other.box.left);
+      const high = Math.min(box.bottom, other.box.bottom) - Math.max(box.top, other.box.top);
+      if (wide > 1 && high > 1) found.push(`${part} and ${other.part} by ${Math.round(wide)} x ${Math.round(high)}`);
+    }
+  });
+  return found;
+}
+
+it.each(sizes)("nothing covers anything at %d x %d", async (width, height) => {
+  await user.page.setViewportSize({ width, height });
+  const found: Record<string, string[]> = {};
+  for (const state of states) {
+    await user.ask(`app.view.set(${JSON.stringify(state)})`);
+    await user.page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
+    const all = await user.page.evaluate(faults, [parts, isLittle(width, height) ? beside : []]);
+    if (all.length > 0) found[JSON.stringify(state)] = all;
+  }
+  expect(found).toEqual({});
+});

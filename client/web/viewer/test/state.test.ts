@@ -1,0 +1,92 @@
+import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import { Pulse } from "../src/link/pulse.js";
+import { State } from "../src/model/state.js";
+
+describe("a watcher", () => {
+  const values = { pointer: 0, work: { p: 1, handles: "a" } };
+
+  it("is told at once, and then of what it picks and of nothing else", () => {
+    const state = new State(values);
+    const told: unknown[] = [];
+    state.watch(
+      ({ work }) => [work.p],
+      ([p], [before]) => told.push([p, before]),
+    );
+    for (let pointer = 1; pointer < 100; ++pointer) state.set({ pointer });
+    state.set({ work: { p: 1, handles: "b" } });
+    expect(told).toEqual([[1, 1]]);
+    state.set({ work: { p: 2, handles: "b" } });
+    expect(told.slice(1)).toEqual([[2, 1]]);
+  });
+
+  it("is told once, of the newest, where a watcher before it changes the same again", () => {
+    const state = new State(values);
+    const told: number[] = [];
+    state.watch(
+      ({ pointer }) => [pointer],
+      ([pointer]) => pointer === 1 && state.set({ pointer: 2 }),
+    );
+    state.watch(
+      ({ pointer }) => [pointer],
+      ([pointer]) => told.push(pointer),
+    );
+    state.set({ pointer: 1 });
+    expect(told).toEqual([0, 2]);
+  });
+
+  it("of everything is told of each change", () => {
+    const state = new State(values);
+    const told: number[][] = [];
+    state.watchAll((now, before) => told.push([before.pointer, now.pointer]));
+    state.set({ pointer: 1 });
+    state.set({ pointer: 1 });
+    expect(told).toEqual([
+      [0, 0],
+      [0, 1],
+    ]);
+  });
+});
+
+describe("the pulse", () => {
+  beforeEach(() => void vi.useFakeTimers());
+  afterEach(() => void vi.useRealTimers());
+
+  const after = (milliseconds: number) => vi.advanceTimersByTimeAsync(milliseconds);
+
+  it("is silent within 1.5 seconds once the server has stopped, and not when it answers again", async () => {
+    const answers: (() => void)[] = [];
+    let isStopped = false;
+    const told: boolean[] = [];
+    const pulse: Pulse = new Pulse(
+      () => (isStopped ? new Promise((resolve) => answers.push(resolve)) : Promise.resolve()),
+      () => told.push(pulse.isSilent),
+    );
+    pulse.start();
+    await after(10_000);
+    expect(told).toEqual([]);
+    isStopped = true;
+    await after(1500);
+    expect(told).toEqual([true]);
+    await after(10_000);
+    expect(answers).toHaveLength(1); // it does not pile up calls
+    isStopped = false;
+    answers[0]!();
+    await after(10_000);
+    expect(told).toEqual([true, false]);
+    pulse.stop();
+  });
+
+  it("takes a refusal for an answer, and asks nothing once it is stopped", async () => {
+    const ask = vi.fn<() => Promise<void>>(() => Promise.reject(new Error("no")));
+    const changed = vi.fn();
+    const pulse = new Pulse(ask, changed);
+    pulse.start();
+    await after(3000);
+    expect(ask.mock.calls.length).toBeGreaterThan(3);
+    pulse.stop();
+    const { length } = ask.mock.calls;
+    await after(3000);
+    expect(ask).toHaveBeenCalledTimes(length);
+    expect(changed).not.toHaveBeenCalled();
+  });
+});
