@@ -11,7 +11,6 @@ namespace {
 constexpr std::size_t kChunk = 4096;  // vertices
 constexpr int kPasses = 12;
 constexpr double kRefined = 1e-12;  // refinement ends when the correction's share of the result is <= this
-constexpr std::size_t kUsualBytes = 1000;   // of a factor, per vertex of a surface
 constexpr std::size_t kBytesPerEntry = 40;  // per matrix entry: the value and its places in the factor
 constexpr double kSlowest = 0.3;            // the largest ratio of a correction to the previous one
 
@@ -39,19 +38,15 @@ absl::StatusOr<Metric> Metric::create(std::shared_ptr<const RestShape> shape, co
   const auto supernodes = analyse_supernodes(matrix);
   if (!supernodes.ok()) return supernodes.status();
   if (admit) {
-    const std::size_t factor = *supernodes ? entry_count(**supernodes) * sizeof(float)
-                                           : kUsualBytes * static_cast<std::size_t>(shape->vertex_count());
-    absl::Status status = admit(factor + kBytesPerEntry * matrix.rows.size());
+    absl::Status status =
+        admit(entry_count(*supernodes) * sizeof(float) + kBytesPerEntry * matrix.rows.size());
     if (!status.ok()) return status;
   }
   return Metric(std::move(shape), std::move(matrix), *supernodes);
 }
 
-Metric::Metric(std::shared_ptr<const RestShape> shape, LowerMatrix matrix,
-               const std::optional<SupernodePattern>& supernodes)
-    : shape_(std::move(shape)), matrix_(std::move(matrix)) {
-  if (supernodes) single_.emplace(matrix_, *supernodes);
-}
+Metric::Metric(std::shared_ptr<const RestShape> shape, LowerMatrix matrix, const SupernodePattern& supernodes)
+    : shape_(std::move(shape)), matrix_(std::move(matrix)), single_(matrix_, supernodes) {}
 
 bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held,
                     const std::vector<MatrixEntry>& entries, const Workers& workers, Precision precision) {
@@ -74,7 +69,7 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
   precision_ = precision;
   is_single_current_ = is_double_current_ = false;
   ++version_;
-  if (precision == Precision::kSingle && single_ && single_->factor(matrix_, workers)) {
+  if (precision == Precision::kSingle && single_.factor(matrix_, workers)) {
     double_.reset();  // takes several times the memory
     copy_ = {};
     return is_good_ = is_single_current_ = true;
@@ -83,10 +78,7 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
 }
 
 bool Metric::factor_double() const {
-  if (!double_ && single_)
-    double_.emplace(matrix_, single_->result().new_to_old());
-  else if (!double_)
-    double_.emplace(matrix_);
+  if (!double_) double_.emplace(matrix_, single_.result().new_to_old());
   copy_.clear();
   return is_double_current_ = double_->factor(matrix_);
 }
@@ -194,7 +186,7 @@ void Metric::solve_single(const Points& b, Points& x, const Workers& workers, do
 }
 
 const SingleFactor& Metric::single() const {
-  if (is_single_current_) return single_->result();
+  if (is_single_current_) return single_.result();
   if (copy_.empty()) double_->copy_to(copy_);
   return copy_;
 }
@@ -210,8 +202,8 @@ void Metric::precondition(const Points& b, Points& x, const Workers& workers) co
 }
 
 std::size_t Metric::memory_bytes() const {
-  return (single_ ? single_->memory_bytes() : 0) + (double_ ? double_->memory_bytes() : 0) +
-         copy_.memory_bytes() + cell_weights_.capacity() * sizeof(double) + is_held_.capacity() +
+  return single_.memory_bytes() + (double_ ? double_->memory_bytes() : 0) + copy_.memory_bytes() +
+         cell_weights_.capacity() * sizeof(double) + is_held_.capacity() +
          entries_.capacity() * sizeof(MatrixEntry) + matrix_.columns.capacity() * sizeof(std::int32_t) +
          matrix_.rows.capacity() * sizeof(std::int32_t) + matrix_.values.capacity() * sizeof(double);
 }

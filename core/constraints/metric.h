@@ -44,8 +44,7 @@ class Metric {
   using Admission = std::function<absl::Status(std::size_t bytes)>;
 
   /// Errors: FACTOR_TOO_LARGE (analyse_supernodes), and those of `admit`, which is called with an estimate of
-  /// memory_bytes() in single precision. If the backend has no supernodes, the estimate is what a typical triangulated
-  /// surface needs.
+  /// memory_bytes() in single precision.
   static absl::StatusOr<Metric> create(std::shared_ptr<const RestShape> shape, const Admission& admit = {});
 
   /// `is_held` has one entry per vertex. Cell weights are clipped from below at 1e-8 of the largest, so that the
@@ -91,8 +90,7 @@ class Metric {
   std::size_t memory_bytes() const;
 
  private:
-  Metric(std::shared_ptr<const RestShape> shape, LowerMatrix matrix,
-         const std::optional<SupernodePattern>& supernodes);
+  Metric(std::shared_ptr<const RestShape> shape, LowerMatrix matrix, const SupernodePattern& supernodes);
   double edge_weight(std::int32_t i, std::int32_t k) const {
     return 2 * (cell_weights_[i] + cell_weights_[shape_->neighbours()[k]]) * shape_->weights()[k];
   }
@@ -113,7 +111,7 @@ class Metric {
   bool is_good_ = false;
   std::uint64_t version_ = 0;
   LowerMatrix matrix_;
-  std::optional<SingleCholesky> single_;      // empty if the backend has no supernodes
+  SingleCholesky single_;
   Precision precision_ = Precision::kSingle;  // the requested one
   bool is_single_current_ = false;
   mutable std::optional<SparseCholesky> double_;  // made when first needed

@@ -42,7 +42,7 @@ struct IntrinsicDelaunay {
 /// motions have no energy. On a mesh far from Delaunay, a cell's chords may then join vertices that are far apart on
 /// the mesh. A strip may break up into cells that share too few vertices to resist every bend: a strip sheared 20-fold
 /// along itself becomes a chain without torsion, where a lift that costs 0.2 with clamped cotangents has E = 3e-20.
-/// Measured benefit: core/README.md. Preparing the shape takes several times as long as with cotangent weights.
+/// Measured benefit: core/rooms.md. Preparing the shape takes several times as long as with cotangent weights.
 IntrinsicDelaunay intrinsic_delaunay(const TriangleMesh& mesh);
 
 }  // namespace lpdeform

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -33,11 +32,11 @@ struct SupernodePattern {
   std::vector<std::int32_t> rows;
 };
 
-/// A fill-reducing ordering and the factor's pattern in that order, found by the backend. Empty if the backend has no
-/// supernodes (Eigen). INVALID_ARGUMENT (FACTOR_TOO_LARGE) if the factor has more than `most` entries; the default is
-/// the backend's limit. A triangulated surface of millions of vertices stays below it; a surface that is glued together
+/// A fill-reducing ordering and the factor's pattern in that order, found by CHOLMOD or in supernodes.h, as the build
+/// chooses. INVALID_ARGUMENT (FACTOR_TOO_LARGE) if the factor has more than `most` entries; the default is
+/// CHOLMOD's limit. A triangulated surface of millions of vertices stays below it; a surface that is glued together
 /// at random reaches it with 300,000 vertices.
-absl::StatusOr<std::optional<SupernodePattern>> analyse_supernodes(
+absl::StatusOr<SupernodePattern> analyse_supernodes(
     const LowerMatrix& pattern, std::size_t most = std::numeric_limits<std::int32_t>::max());
 
 /// The number of entries that the supernodes hold, including explicit zeros.

@@ -164,8 +164,7 @@ struct Cholmod {
 
 }  // namespace
 
-absl::StatusOr<std::optional<SupernodePattern>> analyse_supernodes(const LowerMatrix& pattern,
-                                                                   std::size_t most) {
+absl::StatusOr<SupernodePattern> analyse_supernodes(const LowerMatrix& pattern, std::size_t most) {
   Cholmod cholmod;
   cholmod.common.supernodal = CHOLMOD_SUPERNODAL;
   const bool is_counted = cholmod.analyse(pattern, nullptr);

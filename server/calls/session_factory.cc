@@ -13,7 +13,7 @@ namespace {
 constexpr std::uint32_t kFacesPerVertex = 3;
 
 /// The estimate of a session's memory until the true value is known: about what a triangulated surface needs,
-/// factored by CHOLMOD.
+/// with its factor.
 constexpr std::size_t kBytesPerVertex = 2600, kBytesPerFace = 100;
 
 std::size_t estimate(const v1::Mesh& mesh) {

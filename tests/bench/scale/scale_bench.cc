@@ -2,6 +2,7 @@
 //
 //   scale_bench make MESH.ply VERTICES                      the creature with about so many vertices
 //   scale_bench solve MESH.ply P[,P...] THREADS SECONDS [ENERGY[,ENERGY...]]     a line of JSON for each p
+//   scale_bench double MESH.ply THREADS     a line of JSON: what factors in double precision, with the factorisation's backend
 //
 // Every solve is cold, from the Laplacian deformation, and goes on to its first minimum or to the time limit. "to" are the
 // seconds of solving until E^(1/p) is within 5 %, 1 % and 0.1 % of the lowest that it found, or that of ENERGY where it
@@ -16,6 +17,7 @@
 
 #include "absl/strings/str_split.h"
 #include "core/io/mesh_io.h"
+#include "core/linalg/cholesky.h"
 #include "tests/bench/creature_pose.h"
 
 namespace {
@@ -91,6 +93,52 @@ void solve(const TriangleMesh& mesh, double p, int threads, double limit, double
   std::fflush(stdout);
 }
 
+/// Seconds of: ten iterations of local_global at p = 2, the certificate at p = 2 after 100 iterations, and ten
+/// iterations with up to 20 points inside faces.
+void in_double_precision(const TriangleMesh& mesh, int threads) {
+  const HandleSet handles = creature_turn(mesh);
+  const auto shape = RestShape::create(mesh, WeightKind::kCotangent, Workers(threads)).value();
+  const auto seconds_of = [&](double p, const HandleSet& held, const SolveSettings& settings,
+                              bool is_certificate) {
+    auto deformer = Deformer::create(shape, {.threads = threads}).value();
+    (void)deformer->set_handles(held);
+    (void)deformer->set_material(Material::uniform(p));
+    Clock::time_point start = Clock::now();
+    (void)deformer->solve(settings).value();
+    if (!is_certificate) return seconds_since(start);
+    start = Clock::now();
+    (void)deformer->start_certificate();
+    while (deformer->step()) continue;
+    return seconds_since(start);
+  };
+  SolveSettings settings;
+  settings.initial = InitialGuess::kLaplacian;
+  settings.effort = 0;
+  settings.max_iterations = 10;
+  HandleSet points = handles;
+  std::vector<char> is_held(static_cast<std::size_t>(mesh.vertices.rows()));
+  for (const auto& [name, handle] : handles.handles()) {
+    for (const std::int32_t v : handle.vertices) is_held[v] = true;
+  }
+  Handle inside;
+  const std::int32_t stride = static_cast<std::int32_t>(mesh.faces.rows()) / 20;
+  for (std::int32_t f = stride / 2; f < mesh.faces.rows(); f += stride) {
+    const auto corners = mesh.faces.row(f);
+    if (is_held[corners[0]] || is_held[corners[1]] || is_held[corners[2]]) continue;
+    inside.points.push_back({f, Eigen::Vector3d::Constant(1.0 / 3)});
+  }
+  (void)points.set("points", inside);
+  std::printf("{\"vertices\": %d, \"threads\": %d, \"backend\": \"%s\"",
+              static_cast<int>(mesh.vertices.rows()), threads, cholesky_backend());
+  settings.method = Method::kLocalGlobal;
+  print_seconds("local_global", seconds_of(2, handles, settings, false));
+  settings.method = Method::kQuasiNewton;
+  print_seconds("points_in_faces", seconds_of(2, points, settings, false));
+  settings.max_iterations = 100;
+  print_seconds("certificate_p_2", seconds_of(2, handles, settings, true));
+  std::printf("}\n");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -101,10 +149,15 @@ int main(int argc, char** argv) {
     const absl::Status status = write_mesh(argv[2], file, file.mesh.vertices, Field());
     return status.ok() ? 0 : (std::fprintf(stderr, "%s\n", std::string(status.message()).c_str()), 1);
   }
+  if (verb == "double" && argc == 4) {
+    const auto file = read_mesh(argv[2]);
+    if (!file.ok()) return std::fprintf(stderr, "%s\n", std::string(file.status().message()).c_str()), 1;
+    return in_double_precision(file->mesh, std::atoi(argv[3])), 0;
+  }
   if (verb != "solve" || argc < 6 || argc > 7) {
-    std::fprintf(
-        stderr,
-        "usage: scale_bench make MESH VERTICES | solve MESH P[,P...] THREADS SECONDS [ENERGY[,ENERGY...]]\n");
+    std::fprintf(stderr,
+                 "usage: scale_bench make MESH VERTICES | double MESH THREADS | solve MESH P[,P...] THREADS "
+                 "SECONDS [ENERGY[,ENERGY...]]\n");
     return 2;
   }
   const auto file = read_mesh(argv[2]);

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <string_view>
-
 #include "tests/core/poses.h"
 
 namespace lpdeform {
@@ -141,17 +139,16 @@ TEST_F(MetricTest, SolvesWhereSinglePrecisionDoesNotCarryTheMatrix) {
 
 TEST_F(MetricTest, GivesTheDoubleFactorBackWhenItIsNotWanted) {
   ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
-  const bool has_single = std::string_view(cholesky_backend()).starts_with("CHOLMOD");
   const std::size_t before = metric.memory_bytes();
   ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), Metric::Precision::kDouble));
-  EXPECT_EQ(metric.memory_bytes() > before, has_single);
+  EXPECT_GT(metric.memory_bytes(), before);
   Points b = Points::Random(shape->vertex_count(), 3), exact, refined, x;
   clear_held(b);
   metric.solve(b, exact, Workers(1));
   metric.precondition(b, x, Workers(1));
   EXPECT_LT((x - exact).norm(), 1e-5 * exact.norm());
   ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
-  EXPECT_EQ(metric.memory_bytes() == before, has_single);
+  EXPECT_EQ(metric.memory_bytes(), before);
   metric.solve(b, refined, Workers(1));
   EXPECT_LT((refined - exact).norm(), 1e-11 * exact.norm());
 }
