@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/workers.h"
+#include "server/given/surface.h"
 #include "server/runtime/random_name.h"
 
 namespace lpdeform {
@@ -31,17 +32,7 @@ absl::Status make_mesh(const v1::CreateSessionRequest& request, Decoder& decoder
   if (!normals.ok()) return normals.status();
   const auto weld = decoder.weld(request.weld(), mesh->vertices);
   if (!weld.ok()) return weld.status();
-
-  auto shape = RestShape::create(*weld ? welded(*mesh, **weld) : *mesh, *weights, workers);
-  // If possible, an error names the client's vertices.
-  if (!shape.ok() && *weld) {
-    if (absl::Status status = deformable(check_mesh(*mesh)); !status.ok()) return status;
-  }
-  if (!shape.ok()) return shape.status();
-  parts.shape = *std::move(shape);
-  parts.mesh =
-      std::make_shared<const DrawMesh>(parts.shape, *weld, std::move(mesh->faces), *std::move(normals));
-  return absl::OkStatus();
+  return make_surface({*std::move(mesh), *std::move(normals), *weld, *weights}, workers, parts);
 }
 
 }  // namespace
@@ -73,15 +64,8 @@ absl::Status SessionFactory::make_shape(const v1::CreateSessionRequest& request,
   if (absl::Status status = make_mesh(request, decoder, Workers(threads()), parts); !status.ok())
     return status;
   const std::size_t held = parts.shape->memory_bytes() + parts.mesh->memory_bytes();
-  auto deformer = Deformer::create(parts.shape, {.free_components = parts.free_components,
-                                                 .threads = threads(),
-                                                 .admit = [&parts, held](std::size_t bytes) {
-                                                   return parts.memory.grow_to(held + bytes);
-                                                 }});
-  if (!deformer.ok()) return deformer.status();
-  parts.deformer = *std::move(deformer);
-  parts.features = std::make_shared<const ShapeFeatures>(parts.shape, Workers(threads()));
-  return absl::OkStatus();
+  const auto admit = [&parts, held](std::size_t bytes) { return parts.memory.grow_to(held + bytes); };
+  return make_deformer(threads(), admit, parts);
 }
 
 /// `surface`: the present positions of the client's vertices.

@@ -3,20 +3,18 @@
 #include "server/wire/decode.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "server/given/given.h"
 #include "server/wire/decode_parts.h"
 
 namespace lpdeform {
 namespace {
 
 constexpr std::size_t kMostInlineBytes = 1u << 20;
-constexpr std::uint32_t kMostIterations = std::numeric_limits<int>::max();
 
 absl::StatusOr<Method> decode_method(v1::Method method) {
   switch (method) {
@@ -75,24 +73,17 @@ absl::StatusOr<SolveSettings> decode_solver(const v1::SolverSettings& message) {
   settings.initial = *initial;
   if (message.has_search()) {
     const v1::MinimaSearch& search = message.search();
-    if (search.effort() > SolveSettings::kHighestEffort) {
-      return make_fault({Reason::kEffortOutOfRange, "effort",
-                         absl::StrCat("0 <= effort <= ", SolveSettings::kHighestEffort)},
-                        absl::StrCat("effort is ", search.effort(), "."));
-    }
-    if (search.has_effort()) settings.effort = static_cast<int>(search.effort());
+    const auto effort = given_effort(search.effort());
+    if (!effort.ok()) return effort.status();
+    if (search.has_effort()) settings.effort = *effort;
     settings.standing.shows = search.show();
     if (search.least_share() != 0) settings.standing.least_share = search.least_share();
   }
   if (message.tolerance() != 0) settings.tolerance = message.tolerance();
   if (message.time_limit_seconds() != 0) settings.time_limit_seconds = message.time_limit_seconds();
-  if (message.max_iterations() > kMostIterations) {
-    return make_fault({Reason::kIterationsOutOfRange, "max_iterations",
-                       absl::StrCat("0 <= max_iterations <= ", kMostIterations)},
-                      absl::StrCat("The number of iterations is ", message.max_iterations(), ", over ",
-                                   kMostIterations, "."));
-  }
-  if (message.max_iterations() != 0) settings.max_iterations = static_cast<int>(message.max_iterations());
+  const auto iterations = given_iterations(message.max_iterations());
+  if (!iterations.ok()) return iterations.status();
+  if (*iterations != 0) settings.max_iterations = *iterations;
   return settings;
 }
 
@@ -161,18 +152,9 @@ absl::StatusOr<StreamOptions> decode_frame_options(const v1::FrameOptions& messa
   options.with_distortion = !message.without_distortion();
   options.with_normals = message.with_normals();
   options.with_certificate = message.certify();
-  if (message.credit() > StreamOptions::kMostCredit) {
-    return make_fault(
-        {Reason::kCreditOutOfRange, "credit", absl::StrCat("credit <= ", StreamOptions::kMostCredit)},
-        absl::StrCat("A credit of ", message.credit(), " is over ", StreamOptions::kMostCredit, "."));
-  }
   if (message.credit() != 0) options.credit = message.credit();
-  if (!(message.max_frames_per_second() >= 0) || std::isinf(message.max_frames_per_second())) {
-    return make_fault(
-        {Reason::kFrameRateOutOfRange, "max_frames_per_second", "finite and >= 0"},
-        absl::StrCat("The frame rate is ", message.max_frames_per_second(), ", not finite and >= 0."));
-  }
   options.max_frames_per_second = message.max_frames_per_second();
+  if (absl::Status status = check_stream_options(options); !status.ok()) return status;
   return options;
 }
 

@@ -14,6 +14,7 @@
 #include "core/mesh/weld.h"
 #include "core/solve/deformer.h"
 #include "lpdeform/v1/service.pb.h"
+#include "server/given/given.h"
 #include "server/runtime/upload.h"
 #include "server/session/frame_stream.h"
 #include "server/session/update.h"
@@ -91,14 +92,13 @@ class Decoder {
   absl::StatusOr<Handle> group(const v1::Handle& message, const std::string& name);
   using OutOfRange = std::function<absl::Status(std::uint32_t index)>;
   absl::StatusOr<std::vector<std::int32_t>> indices(const v1::Buffer& buffer, std::string_view what,
-                                                    std::uint64_t& room, const OutOfRange& out_of_range);
+                                                    GivenRoom& room, const OutOfRange& out_of_range);
   absl::StatusOr<std::vector<SurfacePoint>> surface_points(const v1::SurfacePoints& message,
                                                            const std::string& name);
   absl::StatusOr<std::vector<std::int32_t>> region(const v1::RegionOfInterest& message);
   absl::StatusOr<HandleMotion> motion(const v1::Motion& message);
   absl::StatusOr<Field> field(const v1::Field& message, std::string_view what, Field Material::*part);
   absl::Status resize(const v1::Resize& message, Update& out) const;
-  Field for_client(Field found) const;
   struct PackedPoints {
     Scalar scalar;
     Bytes bytes;
@@ -107,17 +107,15 @@ class Decoder {
   };
   absl::StatusOr<PackedPoints> points(v1::Scalar scalar, const v1::Buffer& buffer, std::string_view what);
 
-  absl::Status take_room(std::uint64_t& room, std::uint64_t count, std::string_view what) const;
-
   Uploads& uploads_;
   const std::uint32_t vertex_count_;
   const ShapeFeatures* const features_;
   const Weld* const weld_;
   const std::string owner_;
   const StoredBlobs* stored_ = nullptr;  // set for stored messages
-  std::uint64_t room_for_vertices_;
-  std::uint64_t room_for_targets_;
-  std::uint64_t room_for_region_;
+  GivenRoom room_for_vertices_;
+  GivenRoom room_for_targets_;
+  GivenRoom room_for_region_;
 };
 
 /// CREDIT_OUT_OF_RANGE, FRAME_RATE_OUT_OF_RANGE, ENUM_UNKNOWN.

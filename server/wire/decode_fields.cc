@@ -7,17 +7,12 @@
 #include "core/base/check.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
-#include "core/resize/resize.h"
+#include "server/given/given.h"
 #include "server/wire/decode.h"
 #include "server/wire/decode_parts.h"
 #include "server/wire/vectors.h"
 
 namespace lpdeform {
-
-/// Converts a field found on the welded shape to the client's vertices.
-Field Decoder::for_client(Field found) const {
-  return weld_ == nullptr || found.size() == 1 ? std::move(found) : scattered(found, *weld_);
-}
 
 absl::StatusOr<Field> Decoder::field(const v1::Field& message, std::string_view what, Field Material::*part) {
   if (message.value_case() == v1::Field::kUniform) return Field(Field::Constant(1, message.uniform()));
@@ -28,8 +23,7 @@ absl::StatusOr<Field> Decoder::field(const v1::Field& message, std::string_view 
       return make_fault({Reason::kFieldMissing, std::string(what), ""},
                         absl::StrCat("The stored ", std::string(what), " has no values."));
     }
-    const auto material = automatic_material(features_->joint(), strength);
-    return for_client(*material.*part);
+    return automatic_field(*features_, weld_, strength, part);
   }
   if (message.value_case() != v1::Field::kPerVertex) {
     return make_fault({Reason::kFieldMissing, std::string(what), ""},
@@ -43,8 +37,7 @@ absl::StatusOr<Field> Decoder::field(const v1::Field& message, std::string_view 
     return wrong_size(what, data->view.size(), absl::StrCat("a multiple of ", bytes_of(*scalar)));
   }
   const std::size_t count = data->view.size() / bytes_of(*scalar);
-  if (count != 1 && count != vertex_count_)
-    return wrong_field_size(what, static_cast<std::int64_t>(count), vertex_count_);
+  if (absl::Status status = check_field_size(what, count, vertex_count_); !status.ok()) return status;
   Field field(static_cast<Eigen::Index>(count));
   unpack(*scalar, data->view, field);
   return field;
@@ -52,24 +45,11 @@ absl::StatusOr<Field> Decoder::field(const v1::Field& message, std::string_view 
 
 absl::Status Decoder::resize(const v1::Resize& message, Update& out) const {
   LPDEFORM_CHECK(features_ != nullptr);
-  Scaling scaling;
-  scaling.scale = decode_vector(message.scale());
-  scaling.origin = message.has_origin() ? decode_vector(message.origin()) : box_middle(features_->shape());
-  if (message.has_x_axis() || message.has_y_axis()) {
-    const auto axes = axes_of(decode_vector(message.x_axis()), decode_vector(message.y_axis()));
-    if (!axes.ok()) return axes.status();
-    scaling.axes = *axes;
-  }
-  auto inputs = resize_inputs(*features_, scaling);
-  if (!inputs.ok()) return inputs.status();
-  if (weld_ != nullptr) {
-    for (std::int32_t& vertex : inputs->handle.vertices)
-      vertex = weld_->first_copy[vertex];  // holds all copies
-  }
-  out.handles.push_back({"resize", std::move(inputs->handle)});
-  if (!out.settings.p) out.settings.p = for_client(std::move(inputs->material.p));
-  if (!out.settings.stiffness) out.settings.stiffness = for_client(std::move(inputs->material.stiffness));
-  return absl::OkStatus();
+  GivenResize given{decode_vector(message.scale())};
+  if (message.has_origin()) given.origin = decode_vector(message.origin());
+  if (message.has_x_axis() || message.has_y_axis())
+    given.axes.emplace(decode_vector(message.x_axis()), decode_vector(message.y_axis()));
+  return add_resize(*features_, weld_, given, out);
 }
 
 }  // namespace lpdeform

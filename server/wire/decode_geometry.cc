@@ -86,17 +86,9 @@ absl::StatusOr<Points> Decoder::normals(const v1::Normals& message) {
   if (!message.has_data()) return Points(0, 3);
   const auto packed = points(message.scalar(), message.data(), "normals");
   if (!packed.ok()) return packed.status();
-  if (packed->count != vertex_count_) {
-    return make_fault(
-        {Reason::kNormalsSize, "normals", absl::StrCat(vertex_count_, " normals")},
-        absl::StrCat("There are ", packed->count, " normals for ", vertex_count_, " vertices."));
-  }
+  if (absl::Status status = check_normal_count(packed->count, vertex_count_); !status.ok()) return status;
   Points normals = packed->unpack();
-  for (Eigen::Index v = 0; v < normals.rows(); ++v) {
-    if (normals.row(v).allFinite()) continue;
-    return make_fault({Reason::kNormalsNotFinite, absl::StrCat("vertex ", v), "finite numbers"},
-                      absl::StrCat("The normal of vertex ", v, " has a NaN or infinite number."));
-  }
+  if (absl::Status status = check_normals(normals); !status.ok()) return status;
   return normals;
 }
 

@@ -12,17 +12,6 @@
 
 namespace lpdeform {
 
-absl::Status Decoder::take_room(std::uint64_t& room, std::uint64_t count, std::string_view what) const {
-  if (count <= room) {
-    room -= count;
-    return absl::OkStatus();
-  }
-  return make_fault(
-      {Reason::kHandleTooManyVertices, std::string(what), absl::StrCat(vertex_count_, " in all")},
-      absl::StrCat("The update has more ", std::string(what), " than the mesh's ", vertex_count_,
-                   " vertices."));
-}
-
 absl::StatusOr<HandleMotion> Decoder::motion(const v1::Motion& message) {
   if (message.has_fixed()) return Fixed{};
   if (message.has_rigid()) {
@@ -35,21 +24,20 @@ absl::StatusOr<HandleMotion> Decoder::motion(const v1::Motion& message) {
   }
   const auto targets = points(message.targets().scalar(), message.targets().positions(), "target positions");
   if (!targets.ok()) return targets.status();
-  if (absl::Status status = take_room(room_for_targets_, targets->count, "target positions"); !status.ok())
+  if (absl::Status status = room_for_targets_.take(targets->count, "target positions"); !status.ok())
     return status;
   return TargetPositions{targets->unpack()};
 }
 
 absl::StatusOr<std::vector<std::int32_t>> Decoder::indices(const v1::Buffer& buffer, std::string_view what,
-                                                           std::uint64_t& room,
-                                                           const OutOfRange& out_of_range) {
+                                                           GivenRoom& room, const OutOfRange& out_of_range) {
   const auto data = bytes(buffer, what);
   if (!data.ok()) return data.status();
   if (data->view.size() % sizeof(std::uint32_t) != 0) {
     return wrong_size(what, data->view.size(), "a multiple of 4");
   }
   const std::size_t count = data->view.size() / sizeof(std::uint32_t);
-  if (absl::Status status = take_room(room, count, what); !status.ok()) return status;
+  if (absl::Status status = room.take(count, what); !status.ok()) return status;
   for (std::size_t k = 0; k < count; ++k) {
     if (packed_index(data->view, k) > kMostIndex) return out_of_range(packed_index(data->view, k));
   }
@@ -67,11 +55,8 @@ absl::StatusOr<std::vector<SurfacePoint>> Decoder::surface_points(const v1::Surf
   if (!faces.ok()) return faces.status();
   const auto coordinates = points(message.scalar(), message.barycentric(), "barycentric coordinates");
   if (!coordinates.ok()) return coordinates.status();
-  if (coordinates->count != faces->size()) {
-    return make_fault({Reason::kHandlePointCount, "barycentric", absl::StrCat(3 * faces->size(), " numbers")},
-                      absl::StrCat("There are ", 3 * coordinates->count, " barycentric coordinates for ",
-                                   faces->size(), " points; each takes three."));
-  }
+  if (absl::Status status = check_point_count(3 * coordinates->count, faces->size()); !status.ok())
+    return status;
   const Points barycentric = coordinates->unpack();
   std::vector<SurfacePoint> result(faces->size());
   for (std::size_t k = 0; k < result.size(); ++k) {

@@ -95,7 +95,11 @@ namespace Lpdeform
         public const string NoFrame = "NO_FRAME";
         public const string NoHandles = "NO_HANDLES";
         public const string NoNormals = "NO_NORMALS";
+        public const string NoPlotter = "NO_PLOTTER";
+        public const string NoRemote = "NO_REMOTE";
         public const string NoServer = "NO_SERVER";
+        public const string NoSnapshot = "NO_SNAPSHOT";
+        public const string NoSolver = "NO_SOLVER";
         public const string OriginNotAllowed = "ORIGIN_NOT_ALLOWED";
         public const string OutOfMemory = "OUT_OF_MEMORY";
         public const string PageSize = "PAGE_SIZE";

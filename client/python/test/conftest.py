@@ -1,4 +1,4 @@
-"""A real server for each test file that needs one, and shapes to deform."""
+"""The places where sessions are, which is this process or a real server, and shapes to deform."""
 
 from __future__ import annotations
 
@@ -65,6 +65,26 @@ def server() -> Iterator[Server]:
         running.stop()
 
 
+class Place(NamedTuple):
+    """Where sessions are opened."""
+
+    address: str | None
+    """None: in this process."""
+
+
+@pytest.fixture(params=["here", "on_a_server"], scope="module")
+def place(request: pytest.FixtureRequest) -> Place:
+    if request.param == "here":
+        return Place(None)
+    server: Server = request.getfixturevalue("server")
+    return Place(server.address)
+
+
+@pytest.fixture(autouse=True)
+def no_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("LPDEFORM_ADDRESS", raising=False)
+
+
 class Grid(NamedTuple):
     """A flat square of side x side vertices, one unit apart, in the plane z = 0."""
 
@@ -95,7 +115,15 @@ def shape(make_grid: Callable[[int], Grid]) -> Grid:
 
 
 @pytest.fixture
-def session(server: Server, shape: Grid) -> Iterator[lpdeform.Session]:
+def session(place: Place, shape: Grid) -> Iterator[lpdeform.Session]:
+    with lpdeform.open(shape.vertices, shape.faces, address=place.address) as made:
+        made.set_handle("left", shape.left)
+        made.set_handle("right", shape.right)
+        yield made
+
+
+@pytest.fixture
+def remote_session(server: Server, shape: Grid) -> Iterator[lpdeform.Session]:
     with lpdeform.open(shape.vertices, shape.faces, address=server.address) as made:
         made.set_handle("left", shape.left)
         made.set_handle("right", shape.right)

@@ -198,7 +198,8 @@ class _Calls(grpc.GenericRpcHandler):
 
 
 def test_calls_of_one_client_say_the_same_name_for_a_proxy() -> None:
-    from lpdeform._rpc import Rpc, Stop
+    from lpdeform._rpc import Rpc
+    from lpdeform._stop import Stop
 
     server, calls = grpc.server(futures.ThreadPoolExecutor(1)), _Calls()
     server.add_generic_rpc_handlers((calls,))

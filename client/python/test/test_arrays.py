@@ -23,7 +23,8 @@ from lpdeform import (
 )
 from lpdeform._numbers import crc32c, indices, numbers
 from lpdeform._rpc import Packer
-from lpdeform._wire import checked_update, settings_to_wire
+from lpdeform._checks import checked_update
+from lpdeform._wire import settings_to_wire
 from lpdeform.opening import _weld_of
 from lpdeform.types import Field
 from lpdeform.v1 import data_pb2, handle_pb2

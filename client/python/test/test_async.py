@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lpdeform
-from conftest import PATIENCE, Grid, Server
+from conftest import PATIENCE, Grid, Place
 
 MakeGrid = Callable[[int], Grid]
 
@@ -18,24 +18,24 @@ def handles(shape: Grid) -> dict[str, lpdeform.Handle]:
     return {"left": lpdeform.Handle(shape.left), "right": lpdeform.Handle(shape.right)}
 
 
-def test_sessions_are_awaited(server: Server, make_grid: MakeGrid) -> None:
+def test_sessions_are_awaited(place: Place, make_grid: MakeGrid) -> None:
     shape = make_grid(12)
 
     async def run() -> None:
         async with lpdeform.open_async(
-            shape.vertices, shape.faces, address=server.address, handles=handles(shape)
+            shape.vertices, shape.faces, address=place.address, handles=handles(shape)
         ) as session:
             frame = await session.move("right", translation=[0, 0, 3])
             assert frame.positions[11, 2] == 3
             told: list[lpdeform.SolveProgress] = []
             result = await session.solve(certify=True, on_progress=told.append)
             assert result.energy == pytest.approx(frame.energy, rel=1e-6)
-            async with lpdeform.join_async(session.name, address=server.address) as reader:
+            async with lpdeform.join_async(session.name, address=place.address) as reader:
                 async for seen in reader:
                     if seen.is_final:
                         break
                 await reader.take_over()
-            assert "12" in repr(session)
+            assert "144 vertices" in repr(session)
         with pytest.raises(lpdeform.LpdeformError) as caught:
             await session.settle()
         assert caught.value.reason == "SESSION_CLOSED"
@@ -43,30 +43,30 @@ def test_sessions_are_awaited(server: Server, make_grid: MakeGrid) -> None:
     asyncio.run(run())
 
 
-def test_a_split_mesh_is_warned_of(server: Server, make_grid: MakeGrid) -> None:
+def test_a_split_mesh_is_warned_of(place: Place, make_grid: MakeGrid) -> None:
     shape = make_grid(4)
     corners = shape.vertices[shape.faces].reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)
 
     async def run() -> None:
         with pytest.warns(lpdeform.SplitMeshWarning, match="weld=True") as warned:
-            async with lpdeform.open_async(corners, faces, address=server.address):
+            async with lpdeform.open_async(corners, faces, address=place.address):
                 pass
-            await (await lpdeform.open_async(corners, faces, address=server.address)).close()
+            await (await lpdeform.open_async(corners, faces, address=place.address)).close()
         assert [warning.filename for warning in warned] == [__file__, __file__]
         with pytest.raises(lpdeform.SplitMeshWarning):  # an error by the filter of these tests
-            await lpdeform.open_async(corners, faces, address=server.address)
-        async with lpdeform.open_async(corners, faces, address=server.address, weld=True):
+            await lpdeform.open_async(corners, faces, address=place.address)
+        async with lpdeform.open_async(corners, faces, address=place.address, weld=True):
             pass
 
     asyncio.run(run())
 
 
-def test_the_loop_goes_on_while_a_result_is_waited_for(server: Server, make_grid: MakeGrid) -> None:
+def test_the_loop_goes_on_while_a_result_is_waited_for(place: Place, make_grid: MakeGrid) -> None:
     shape = make_grid(60)
 
     async def run() -> None:
-        session = await lpdeform.open_async(shape.vertices, shape.faces, address=server.address, p=1.0)
+        session = await lpdeform.open_async(shape.vertices, shape.faces, address=place.address, p=1.0)
         session.set_handles(handles(shape))
         moving = asyncio.create_task(session.move("right", axis=[1, 0, 0], angle=2.0))
         turns = 0
@@ -80,11 +80,11 @@ def test_the_loop_goes_on_while_a_result_is_waited_for(server: Server, make_grid
     asyncio.run(run())
 
 
-def test_many_sessions_in_one_loop(server: Server, make_grid: MakeGrid) -> None:
+def test_many_sessions_in_one_loop(place: Place, make_grid: MakeGrid) -> None:
     shape = make_grid(8)
 
     async def one(height: float) -> float:
-        async with lpdeform.open_async(shape.vertices, shape.faces, address=server.address) as session:
+        async with lpdeform.open_async(shape.vertices, shape.faces, address=place.address) as session:
             session.set_handles(handles(shape))
             frame = await session.move("right", translation=[0, 0, height])
             return float(frame.positions[7, 2])
@@ -95,13 +95,13 @@ def test_many_sessions_in_one_loop(server: Server, make_grid: MakeGrid) -> None:
     asyncio.run(run())
 
 
-def test_errors_and_time_limits_are_raised(server: Server, make_grid: MakeGrid) -> None:
+def test_errors_and_time_limits_are_raised(place: Place, make_grid: MakeGrid) -> None:
     shape = make_grid(8)
 
     async def run() -> None:
         with pytest.raises(lpdeform.Unavailable):
             await lpdeform.open_async(shape.vertices, shape.faces, address="127.0.0.1:1")
-        async with lpdeform.open_async(shape.vertices, shape.faces, address=server.address) as session:
+        async with lpdeform.open_async(shape.vertices, shape.faces, address=place.address) as session:
             session.set_handle("bad", [64])
             with pytest.raises(lpdeform.InvalidInput, match="HANDLE_VERTEX_OUT_OF_RANGE"):
                 await session.settle(PATIENCE)
@@ -113,11 +113,11 @@ def test_errors_and_time_limits_are_raised(server: Server, make_grid: MakeGrid) 
     asyncio.run(run())
 
 
-def test_cancelling_ends_a_solve_and_leaves_the_session(server: Server, make_grid: MakeGrid) -> None:
+def test_cancelling_ends_a_solve_and_leaves_the_session(place: Place, make_grid: MakeGrid) -> None:
     shape = make_grid(60)
 
     async def run() -> None:
-        async with lpdeform.open_async(shape.vertices, shape.faces, address=server.address, p=1.0) as session:
+        async with lpdeform.open_async(shape.vertices, shape.faces, address=place.address, p=1.0) as session:
             session.set_handles(handles(shape))
             session.set(solver=lpdeform.SolverSettings(initial="rest", tolerance=1e-14, max_iterations=10**6))
             session.drag("right", axis=[1, 0, 0], angle=2.5)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import lpdeform
-from conftest import PATIENCE, Server
+from conftest import PATIENCE, Place
 
 
 def box(side: int, height: int) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
@@ -34,10 +34,10 @@ def box(side: int, height: int) -> tuple[np.ndarray, np.ndarray]:  # type: ignor
     return vertices, inverse.reshape(-1, 3)
 
 
-def bend(server: Server, **search: float) -> lpdeform.Session:
+def bend(place: Place, **search: float) -> lpdeform.Session:
     """A box whose top is turned by 80 degrees. The first minimum that the solver comes to is 2 % above another one."""
     vertices, faces = box(4, 20)
-    session = lpdeform.open(vertices, faces, address=server.address)
+    session = lpdeform.open(vertices, faces, address=place.address)
     settings = lpdeform.MinimaSearch(least_share=0.001, **search)  # type: ignore[arg-type]
     session.set(p=1.5, solver=lpdeform.SolverSettings(search=settings))
     turn = lpdeform.RigidMotion((1, 0, 0), np.radians(80), (2, 2, 10))
@@ -58,8 +58,8 @@ def better(session: lpdeform.Session) -> bool:
     return session.notice is not None and session.notice.reason == "better_shape"
 
 
-def test_a_session_in_which_nothing_changes_announces_a_better_shape_which_is_taken_once(server: Server) -> None:
-    with bend(server, effort=2) as session:
+def test_a_session_in_which_nothing_changes_announces_a_better_shape_which_is_taken_once(place: Place) -> None:
+    with bend(place, effort=2) as session:
         first = session.settle(PATIENCE)
         until(lambda: better(session))
         notice = session.notice
@@ -75,16 +75,16 @@ def test_a_session_in_which_nothing_changes_announces_a_better_shape_which_is_ta
         assert caught.value.reason == "NO_BETTER_SHAPE"
 
 
-def test_a_better_shape_is_not_announced_any_more_once_a_frame_answers_a_later_change(server: Server) -> None:
-    with bend(server, effort=2) as session:
+def test_a_better_shape_is_not_announced_any_more_once_a_frame_answers_a_later_change(place: Place) -> None:
+    with bend(place, effort=2) as session:
         session.settle(PATIENCE)
         until(lambda: better(session))
         session.move("top", axis=(1, 0, 0), angle=0.1, timeout=PATIENCE)
         assert not better(session)
 
 
-def test_a_better_shape_is_not_announced_any_more_after_a_solve(server: Server) -> None:
-    with bend(server, effort=2) as session:
+def test_a_better_shape_is_not_announced_any_more_after_a_solve(place: Place) -> None:
+    with bend(place, effort=2) as session:
         session.settle(PATIENCE)
         until(lambda: better(session))
         known = []
@@ -96,8 +96,8 @@ def test_a_better_shape_is_not_announced_any_more_after_a_solve(server: Server) 
         assert not better(session)
 
 
-def test_a_better_shape_is_shown_at_once_if_that_is_asked_for(server: Server) -> None:
-    with bend(server, effort=2, show=True) as session:
+def test_a_better_shape_is_shown_at_once_if_that_is_asked_for(place: Place) -> None:
+    with bend(place, effort=2, show=True) as session:
         first = session.settle(PATIENCE)
         shown = session.next_frame(PATIENCE)
         assert shown.is_final
@@ -106,22 +106,22 @@ def test_a_better_shape_is_shown_at_once_if_that_is_asked_for(server: Server) ->
         assert not better(session)
 
 
-def test_a_solve_says_which_minima_it_has_seen(server: Server) -> None:
-    with bend(server, effort=1) as session:
+def test_a_solve_says_which_minima_it_has_seen(place: Place) -> None:
+    with bend(place, effort=1) as session:
         result = session.solve()
         assert result.further_starts == 8
         assert result.energy == min(result.minima)
         starts = f"looked for lower minima from 8 further starts, of which {len(result.minima) - 1} converged; minima of "
         assert result.searched.startswith(starts)
-    with bend(server, effort=0) as session:
+    with bend(place, effort=0) as session:
         result = session.solve(certify=True)
         assert (result.minima, result.further_starts) == ((result.energy,), 0)
         assert result.searched == "no other minima were looked for (effort 0)"
         assert repr(result).endswith(" for its rotations; no other minima were looked for (effort 0)>")
 
 
-def test_what_was_searched_is_said_without_a_word_too_much(server: Server) -> None:
-    with bend(server, effort=0) as session:
+def test_what_was_searched_is_said_without_a_word_too_much(place: Place) -> None:
+    with bend(place, effort=0) as session:
         solved = session.solve()
 
     def said(**facts: object) -> str:
@@ -140,19 +140,19 @@ def test_what_was_searched_is_said_without_a_word_too_much(server: Server) -> No
     assert limited == "the solve ended before a first minimum, and no other was looked for"
 
 
-def test_a_search_out_of_range_is_refused_by_name(server: Server) -> None:
+def test_a_search_out_of_range_is_refused_by_name(place: Place) -> None:
     for search, reason in (({"effort": 1001}, "EFFORT_OUT_OF_RANGE"), ({"least_share": 2.0}, "LEAST_SHARE_OUT_OF_RANGE")):
         vertices, faces = box(1, 1)
-        with lpdeform.open(vertices, faces, address=server.address) as session:
+        with lpdeform.open(vertices, faces, address=place.address) as session:
             session.set(solver=lpdeform.SolverSettings(search=lpdeform.MinimaSearch(**search)))  # type: ignore[arg-type]
             with pytest.raises(lpdeform.InvalidInput) as caught:
                 session.settle(PATIENCE)
             assert caught.value.reason == reason
 
 
-def test_a_search_that_no_message_can_hold_raises_at_once_and_the_session_goes_on(server: Server) -> None:
+def test_a_search_that_no_message_can_hold_raises_at_once_and_the_session_goes_on(place: Place) -> None:
     vertices, faces = box(1, 1)
-    with lpdeform.open(vertices, faces, address=server.address) as session:
+    with lpdeform.open(vertices, faces, address=place.address) as session:
         for solver in (
             lpdeform.SolverSettings(search=lpdeform.MinimaSearch(effort=-1)),
             lpdeform.SolverSettings(search=lpdeform.MinimaSearch(effort=2**32)),
@@ -165,9 +165,9 @@ def test_a_search_that_no_message_can_hold_raises_at_once_and_the_session_goes_o
         assert session.settle(PATIENCE).is_final
 
 
-def test_readers_may_not_take_it_and_closed_sessions_neither(server: Server) -> None:
-    with bend(server) as session:
-        with lpdeform.join(session.name, address=server.address) as reader:
+def test_readers_may_not_take_it_and_closed_sessions_neither(place: Place) -> None:
+    with bend(place) as session:
+        with lpdeform.join(session.name, address=place.address) as reader:
             with pytest.raises(lpdeform.LpdeformError) as caught:
                 reader.take_better_shape()
             assert caught.value.reason == "NOT_THE_WRITER"
@@ -176,10 +176,10 @@ def test_readers_may_not_take_it_and_closed_sessions_neither(server: Server) -> 
     assert caught.value.reason == "SESSION_CLOSED"
 
 
-def test_it_is_asked_for_from_asyncio_as_well(server: Server) -> None:
+def test_it_is_asked_for_from_asyncio_as_well(place: Place) -> None:
     async def ask() -> str:
         vertices, faces = box(1, 1)
-        async with lpdeform.open_async(vertices, faces, address=server.address) as session:
+        async with lpdeform.open_async(vertices, faces, address=place.address) as session:
             with pytest.raises(lpdeform.LpdeformError) as caught:
                 await session.take_better_shape()
         return caught.value.reason

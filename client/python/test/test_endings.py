@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import lpdeform
-from conftest import PATIENCE, Grid, Server, settle_all
+from conftest import PATIENCE, Grid, Place, Server, settle_all
+from lpdeform.frames import FrameHeader
 from lpdeform.v1 import frame_pb2, service_pb2
 
 MakeGrid = Callable[[int], Grid]
@@ -30,8 +31,9 @@ def test_frames_come_to_who_iterates_until_it_is_closed(session: lpdeform.Sessio
 
 
 def test_what_the_server_says_about_itself_is_logged_and_there_while_its_stream_lasts(
-    session: lpdeform.Session, server: Server, caplog: pytest.LogCaptureFixture
+    remote_session: lpdeform.Session, server: Server, caplog: pytest.LogCaptureFixture
 ) -> None:
+    session = remote_session
     session.settle(PATIENCE)
     assert session.notice is None
     link = session._link
@@ -58,7 +60,8 @@ def test_what_the_server_says_about_itself_is_logged_and_there_while_its_stream_
     assert session.notice is None
 
 
-def test_a_better_shape_is_announced_until_a_frame_shows_it_or_a_later_update(session: lpdeform.Session) -> None:
+def test_a_better_shape_is_announced_until_a_frame_shows_it_or_a_later_update(remote_session: lpdeform.Session) -> None:
+    session = remote_session
     settle_all(session)
     link = session._link
     stream = link._stream
@@ -72,7 +75,7 @@ def test_a_better_shape_is_announced_until_a_frame_shows_it_or_a_later_update(se
         say(service_pb2.NOTICE_REASON_BETTER_SHAPE, input_seq=7, energy=3.0, saved_share=0.25)
         assert session.notice == lpdeform.Notice("better_shape", "Of its own.", 7, 3.0, 0.25)
         with link.changed:
-            stream.shown(lpdeform.Frame(frame_pb2.FrameHeader(input_seq=input_seq, energy=energy)))
+            stream.shown(lpdeform.Frame(FrameHeader(input_seq=input_seq, energy=energy)))
         return session.notice and session.notice.reason
 
     assert after_frame(8, 9.0) is None
@@ -101,8 +104,9 @@ def test_no_time_takes_what_is_there_and_nothing_else(session: lpdeform.Session)
 
 
 def test_a_solve_without_time_says_so_and_sends_nothing(
-    session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch
+    remote_session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    session = remote_session
     settle_all(session)
     with monkeypatch.context() as patched:
         patched.setattr("lpdeform._rpc.Rpc.solve", lambda *_: pytest.fail("it was sent"))
@@ -127,7 +131,7 @@ def test_a_timeout_that_is_none_is_refused_and_nothing_is_sent(session: lpdeform
     assert session.newest_input == newest
 
 
-def test_a_closed_session_says_so_and_is_gone_from_the_server(session: lpdeform.Session, server: Server) -> None:
+def test_a_closed_session_says_so_and_is_gone_from_the_server(session: lpdeform.Session, place: Place) -> None:
     session.close()
     session.close()
     for call in (session.poll, session.settle, session.solve, session.take_over, lambda: session.remove("left")):
@@ -135,12 +139,12 @@ def test_a_closed_session_says_so_and_is_gone_from_the_server(session: lpdeform.
             call()
         assert caught.value.reason == "SESSION_CLOSED"
     with pytest.raises(lpdeform.LpdeformError) as caught:
-        lpdeform.join(session.name, address=server.address)
+        lpdeform.join(session.name, address=place.address)
     assert caught.value.reason == "SESSION_UNKNOWN"
 
 
-def test_a_session_that_nobody_has_any_more_is_closed(server: Server, shape: Grid) -> None:
-    session = lpdeform.open(shape.vertices, shape.faces, address=server.address)
+def test_a_session_that_nobody_has_any_more_is_closed(place: Place, shape: Grid) -> None:
+    session = lpdeform.open(shape.vertices, shape.faces, address=place.address)
     session.set_handle("left", shape.left)
     session.settle(PATIENCE)
     link, name = session._link, session.name
@@ -149,7 +153,7 @@ def test_a_session_that_nobody_has_any_more_is_closed(server: Server, shape: Gri
     deadline = time.monotonic() + PATIENCE
     while True:
         try:
-            lpdeform.join(name, address=server.address).close()
+            lpdeform.join(name, address=place.address).close()
         except lpdeform.LpdeformError as error:
             assert error.reason == "SESSION_UNKNOWN"
             break
@@ -159,12 +163,13 @@ def test_a_session_that_nobody_has_any_more_is_closed(server: Server, shape: Gri
 
 @pytest.mark.parametrize("raised", [MemoryError("no room"), ValueError("no number")])
 def test_an_exception_on_a_thread_of_ours_ends_the_session_with_its_text(
-    session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch, raised: Exception
+    remote_session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch, raised: Exception
 ) -> None:
+    session = remote_session
     def fails(*_: object) -> None:
         raise raised
 
-    monkeypatch.setattr("lpdeform.frames.FrameAssembly.add", fails)
+    monkeypatch.setattr("lpdeform._assembly.FrameAssembly.add", fails)
     with pytest.raises(lpdeform.LpdeformError, match=str(raised)) as caught:
         session.settle(PATIENCE)
     assert (caught.value.code, caught.value.reason) == (lpdeform.Code.INTERNAL, "EXCEPTION")
@@ -177,8 +182,9 @@ def test_an_exception_on_a_thread_of_ours_ends_the_session_with_its_text(
     ("lpdeform._sending._can_send", RuntimeError("no work")),
 ])  # fmt: skip
 def test_an_exception_on_the_thread_that_sends_ends_the_session_with_its_text(
-    session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch, where: str, raised: Exception
+    remote_session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch, where: str, raised: Exception
 ) -> None:
+    session = remote_session
     def fails(*_: object) -> None:
         raise raised
 
@@ -194,8 +200,9 @@ def test_an_exception_on_the_thread_that_sends_ends_the_session_with_its_text(
 
 
 def test_what_interrupts_a_solve_leaves_the_session_as_it_was(
-    session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch
+    remote_session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    session = remote_session
     def interrupts(*_: object) -> None:
         raise KeyboardInterrupt
 
@@ -211,7 +218,8 @@ def test_what_interrupts_a_solve_leaves_the_session_as_it_was(
     assert result.positions[11, 2] == 1
 
 
-def test_a_stream_of_another_mesh_ends_the_session(session: lpdeform.Session, shape: Grid) -> None:
+def test_a_stream_of_another_mesh_ends_the_session(remote_session: lpdeform.Session, shape: Grid) -> None:
+    session = remote_session
     link = session._link
     report = dataclasses.replace(link.lease.report, vertices=len(shape.vertices) - 1)
     link.lease = dataclasses.replace(link.lease, report=report)
@@ -230,10 +238,10 @@ def test_the_timeout_of_a_solve_counts_while_another_runs(session: lpdeform.Sess
     session.solve(timeout=PATIENCE)
 
 
-def test_progress_is_told_and_a_deadline_kept(server: Server, make_grid: MakeGrid) -> None:
+def test_progress_is_told_and_a_deadline_kept(place: Place, make_grid: MakeGrid) -> None:
     shape = make_grid(100)
     handles = {"left": lpdeform.Handle(shape.left), "right": lpdeform.Handle(shape.right)}
-    with lpdeform.open(shape.vertices, shape.faces, address=server.address, handles=handles, p=1.0) as session:
+    with lpdeform.open(shape.vertices, shape.faces, address=place.address, handles=handles, p=1.0) as session:
         session.drag("right", axis=[1, 0, 0], angle=2.5, translation=[-40, 0, 20])
         told: list[lpdeform.SolveProgress] = []
         result = session.solve(on_progress=told.append)

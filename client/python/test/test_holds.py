@@ -6,7 +6,8 @@ from typing import get_args
 
 import lpdeform
 import pytest
-from lpdeform._holds import checked_hold, hold_from_wire, hold_to_wire
+from lpdeform._holds import checked_hold
+from lpdeform._wire_holds import hold_from_wire, hold_to_wire
 from lpdeform.types import Hold
 from lpdeform.v1.handle_pb2 import Handle
 
@@ -29,6 +30,15 @@ def test_each_kind_has_a_field_of_its_own_and_a_name_in_the_package() -> None:
         assert getattr(lpdeform, kind.__name__) is kind
         assert kind.__name__ in lpdeform.__all__
     assert fields == {None, *(field.name for field in Handle.DESCRIPTOR.oneofs_by_name["hold"].fields)}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_is_known_to_the_solver_in_this_process(kind: type[Hold]) -> None:
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    with lpdeform.open(corners, [[0, 1, 2]]) as session:
+        session.set_handle("base", [0])
+        session.set_handle("it", [1, 2], hold=kind())
+        session.solve()
 
 
 def test_what_is_no_hold_is_refused() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lpdeform
-from conftest import PATIENCE, Grid, Server
+from conftest import PATIENCE, Grid, Place, Server
 
 MakeGrid = Callable[[int], Grid]
 
@@ -20,15 +20,16 @@ def shape(make_grid: MakeGrid) -> Grid:
 
 
 @pytest.fixture
-def session(server: Server, shape: Grid) -> Iterator[lpdeform.Session]:
+def session(place: Place, shape: Grid) -> Iterator[lpdeform.Session]:
     handles = {"left": lpdeform.Handle(shape.left), "right": lpdeform.Handle(shape.right)}
-    with lpdeform.open(shape.vertices, shape.faces, address=server.address, handles=handles, p=2) as made:
+    with lpdeform.open(shape.vertices, shape.faces, address=place.address, handles=handles, p=2) as made:
         yield made
 
 
 def test_after_kill_9_the_session_is_recreated_and_shows_the_same_surface(
-    session: lpdeform.Session, server: Server
+    remote_session: lpdeform.Session, server: Server
 ) -> None:
+    session = remote_session
     before = session.move("right", translation=[0, 0, 5])
     name = session.name
     server.kill()
@@ -43,8 +44,9 @@ def test_after_kill_9_the_session_is_recreated_and_shows_the_same_surface(
 
 
 def test_what_is_moved_while_the_server_is_away_comes_when_it_is_back(
-    session: lpdeform.Session, server: Server
+    remote_session: lpdeform.Session, server: Server
 ) -> None:
+    session = remote_session
     session.move("right", translation=[0, 0, 5])
     server.stop()
     for height in (6, 7, 8, 9):
@@ -55,7 +57,8 @@ def test_what_is_moved_while_the_server_is_away_comes_when_it_is_back(
     assert session.interruption is not None
 
 
-def test_a_solve_under_way_begins_again(session: lpdeform.Session, server: Server) -> None:
+def test_a_solve_under_way_begins_again(remote_session: lpdeform.Session, server: Server) -> None:
+    session = remote_session
     session.move("right", translation=[0, 0, 5])
     results: list[lpdeform.SolveResult] = []
     session.drag("right", axis=[1, 0, 0], angle=2.0)
@@ -89,7 +92,8 @@ def test_a_server_away_for_too_long_is_given_up(server: Server, shape: Grid) -> 
     server.start()
 
 
-def test_a_joined_session_that_the_server_lost_is_over(session: lpdeform.Session, server: Server) -> None:
+def test_a_joined_session_that_the_server_lost_is_over(remote_session: lpdeform.Session, server: Server) -> None:
+    session = remote_session
     session.move("right", translation=[0, 0, 1])
     with lpdeform.join(session.name, address=server.address) as reader:
         reader.next_frame(PATIENCE)

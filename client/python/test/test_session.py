@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lpdeform
-from conftest import PATIENCE, Grid, Server
+from conftest import PATIENCE, Grid, Place
 
 MakeGrid = Callable[[int], Grid]
 
@@ -43,10 +43,10 @@ def test_the_live_result_is_that_of_a_solve_with_a_certificate(session: lpdeform
     assert result.stop_reason == "converged"
 
 
-def test_certified_streams_send_the_gap_of_a_result_that_stands(server: Server, shape: Grid) -> None:
+def test_certified_streams_send_the_gap_of_a_result_that_stands(place: Place, shape: Grid) -> None:
     handles = {"left": lpdeform.Handle(shape.left), "right": lpdeform.Handle(shape.right)}
     with lpdeform.open(
-        shape.vertices, shape.faces, address=server.address, handles=handles, certify=True
+        shape.vertices, shape.faces, address=place.address, handles=handles, certify=True
     ) as session:
         frame = session.move("right", translation=[0, 0, 2])
         while frame.optimality_gap is None:
@@ -55,9 +55,9 @@ def test_certified_streams_send_the_gap_of_a_result_that_stands(server: Server, 
 
 
 @pytest.mark.parametrize("encoding", ["float64", "float32", "quantized", "compressed"])
-def test_every_encoding_carries_the_same_surface(server: Server, shape: Grid, encoding: str) -> None:
+def test_every_encoding_carries_the_same_surface(place: Place, shape: Grid, encoding: str) -> None:
     with lpdeform.open(
-        shape.vertices, shape.faces, address=server.address, encoding=encoding, with_normals=True  # type: ignore[arg-type]
+        shape.vertices, shape.faces, address=place.address, encoding=encoding, with_normals=True  # type: ignore[arg-type]
     ) as session:
         session.set_handle("left", shape.left)
         session.set_handle("right", shape.right)
@@ -74,18 +74,18 @@ def test_every_encoding_carries_the_same_surface(server: Server, shape: Grid, en
 
 
 def test_compressed_frames_are_refused_where_nothing_reads_them(
-    server: Server, shape: Grid, monkeypatch: pytest.MonkeyPatch
+    place: Place, shape: Grid, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("lpdeform._codec._decoder", lambda: None)
     with pytest.raises(lpdeform.LpdeformError) as caught:
-        lpdeform.open(shape.vertices, shape.faces, address=server.address, encoding="compressed")
+        lpdeform.open(shape.vertices, shape.faces, address=place.address, encoding="compressed")
     assert caught.value.reason == "NO_DECODER"
 
 
-def test_large_meshes_and_targets_go_up_in_parts(server: Server, make_grid: MakeGrid) -> None:
+def test_large_meshes_and_targets_go_up_in_parts(place: Place, make_grid: MakeGrid) -> None:
     shape = make_grid(250)  # 62,500 vertices: 3 MB of mesh, 1.5 MB of targets, frames of several parts
     settings = lpdeform.SolverSettings(max_iterations=1)
-    with lpdeform.open(shape.vertices, shape.faces, address=server.address, solver=settings) as session:
+    with lpdeform.open(shape.vertices, shape.faces, address=place.address, solver=settings) as session:
         targets = shape.vertices + [0, 0, 3]
         session.set_handle("all", np.arange(62_500), lpdeform.Targets(targets))
         frame = session.settle(PATIENCE)
@@ -141,11 +141,11 @@ def test_a_resizing_scales_and_spares(session: lpdeform.Session) -> None:
     assert np.ptp(frame.positions[:, 0]) == pytest.approx(22, rel=1e-5)
 
 
-def test_welded_copies_come_out_the_same(server: Server, make_grid: MakeGrid) -> None:
+def test_welded_copies_come_out_the_same(place: Place, make_grid: MakeGrid) -> None:
     shape = make_grid(6)
     corners = shape.vertices[shape.faces].reshape(-1, 3)  # every triangle has its own three vertices
     faces = np.arange(len(corners)).reshape(-1, 3)
-    with lpdeform.open(corners, faces, address=server.address, weld=True) as session:
+    with lpdeform.open(corners, faces, address=place.address, weld=True) as session:
         assert session.mesh_report.welded_vertices == len(corners) - 36
         session.set_handle("left", corners[:, 0] < 0.5)
         session.set_handle("right", corners[:, 0] > 4.5)
@@ -156,17 +156,17 @@ def test_welded_copies_come_out_the_same(server: Server, make_grid: MakeGrid) ->
 
 
 def test_a_split_mesh_is_noticed_and_welded_with_a_tolerance(
-    server: Server, make_grid: MakeGrid
+    place: Place, make_grid: MakeGrid
 ) -> None:
     shape = make_grid(6)
     corners = shape.vertices[shape.faces].reshape(-1, 3)
     corners[:, 2] = np.arange(len(corners)) % 2 * 1e-5  # copies are apart
     faces = np.arange(len(corners)).reshape(-1, 3)
-    with lpdeform.open(corners, faces, address=server.address, weld=1e-4) as session:
+    with lpdeform.open(corners, faces, address=place.address, weld=1e-4) as session:
         assert session.mesh_report.welded_vertices == len(corners) - 36
         assert session.mesh_report.notices == ()
     with pytest.warns(lpdeform.SplitMeshWarning) as warned:
-        session = lpdeform.open(corners.round(3), faces, address=server.address)
+        session = lpdeform.open(corners.round(3), faces, address=place.address)
     with session:
         (notice,) = session.mesh_report.notices
         assert "comes apart where it is split" in notice
@@ -178,12 +178,12 @@ def test_a_split_mesh_is_noticed_and_welded_with_a_tolerance(
     assert "weld=True" in str(warning.message)
     assert warning.filename == __file__
     with pytest.raises(lpdeform.SplitMeshWarning):  # an error by the filter of these tests
-        lpdeform.open(corners.round(3), faces, address=server.address)
+        lpdeform.open(corners.round(3), faces, address=place.address)
     with pytest.raises(lpdeform.InvalidInput, match="0.002"):
-        lpdeform.open(corners, faces, address=server.address, weld=0.002)
+        lpdeform.open(corners, faces, address=place.address, weld=0.002)
 
 
-def test_a_sphere_of_single_precision_is_noticed_and_welded(server: Server) -> None:
+def test_a_sphere_of_single_precision_is_noticed_and_welded(place: Place) -> None:
     rings, segments = 8, 16
     latitude = np.linspace(0, np.pi, rings + 1, dtype=np.float32)[:, None]
     longitude = np.linspace(0, 2 * np.pi, segments + 1, dtype=np.float32)[None, :]
@@ -193,7 +193,7 @@ def test_a_sphere_of_single_precision_is_noticed_and_welded(server: Server) -> N
     faces = np.concatenate([np.stack([a, b, c], axis=-1).reshape(-1, 3), np.stack([c, b, d], axis=-1).reshape(-1, 3)])
     for weld in (False, True):
         expected = nullcontext() if weld else pytest.warns(lpdeform.SplitMeshWarning)
-        with expected, lpdeform.open(sphere.reshape(-1, 3), faces, address=server.address, weld=weld) as session:
+        with expected, lpdeform.open(sphere.reshape(-1, 3), faces, address=place.address, weld=weld) as session:
             assert len(session.mesh_report.notices) == (not weld)
             split = {defect.kind: defect.count for defect in session.mesh_report.defects}.get("split_border_vertices", 0)
             assert split == (0 if weld else 2 * (rings - 1) + 2 * (segments + 1))
@@ -253,11 +253,11 @@ def test_what_cannot_be_sent_is_refused_at_once(session: lpdeform.Session) -> No
     assert session.newest_input == newest
 
 
-def test_meshes_that_cannot_be_deformed_name_the_element(server: Server, shape: Grid) -> None:
+def test_meshes_that_cannot_be_deformed_name_the_element(place: Place, shape: Grid) -> None:
     broken = shape.vertices.copy()
     broken[17, 1] = np.nan
     with pytest.raises(lpdeform.InvalidInput) as caught:
-        lpdeform.open(broken, shape.faces, address=server.address)
+        lpdeform.open(broken, shape.faces, address=place.address)
     assert (caught.value.reason, caught.value.element) == ("MESH_NOT_FINITE", "vertex 17")
     for vertices, faces, options in (
         (shape.vertices[:, :2], shape.faces, {}),
@@ -269,7 +269,7 @@ def test_meshes_that_cannot_be_deformed_name_the_element(server: Server, shape: 
         (shape.vertices, shape.faces, {"weld": [0, 1]}),
     ):
         with pytest.raises(lpdeform.InvalidInput):
-            lpdeform.open(vertices, faces, address=server.address, **options)  # type: ignore[arg-type]
+            lpdeform.open(vertices, faces, address=place.address, **options)  # type: ignore[arg-type]
 
 
 def test_nobody_there_is_said_at_once(shape: Grid) -> None:
@@ -279,16 +279,16 @@ def test_nobody_there_is_said_at_once(shape: Grid) -> None:
     assert caught.value.reason == "NO_SERVER"
 
 
-def test_a_component_without_a_handle_is_named_until_it_has_one(server: Server, shape: Grid) -> None:
+def test_a_component_without_a_handle_is_named_until_it_has_one(place: Place, shape: Grid) -> None:
     vertices = np.concatenate([shape.vertices, shape.vertices + [100, 0, 0]])
     faces = np.concatenate([shape.faces, shape.faces + 144])
-    with lpdeform.open(vertices, faces, address=server.address) as session:
+    with lpdeform.open(vertices, faces, address=place.address) as session:
         session.set_handle("one", [0, 1, 2])
         error = refused(session)
         assert (error.code, error.reason) == (lpdeform.Code.FAILED_PRECONDITION, "COMPONENT_WITHOUT_HANDLE")
         session.set_handle("other", [144, 145, 146])
         assert session.settle(PATIENCE).is_final
-    with lpdeform.open(vertices, faces, address=server.address, free_components="stay") as session:
+    with lpdeform.open(vertices, faces, address=place.address, free_components="stay") as session:
         session.set_handle("one", [0, 1, 2])
         assert session.settle(PATIENCE).is_final
 
@@ -303,8 +303,8 @@ def test_a_drag_faster_than_the_server_ends_where_it_was_left(session: lpdeform.
     assert taken <= 500
 
 
-def test_a_reader_who_never_asks_holds_up_nobody(session: lpdeform.Session, server: Server) -> None:
-    with lpdeform.join(session.name, address=server.address) as idle:
+def test_a_reader_who_never_asks_holds_up_nobody(session: lpdeform.Session, place: Place) -> None:
+    with lpdeform.join(session.name, address=place.address) as idle:
         assert idle.next_frame(PATIENCE).positions.shape == (144, 3)
         for step in range(20):
             session.move("right", translation=[0, 0, step / 10])
@@ -313,9 +313,9 @@ def test_a_reader_who_never_asks_holds_up_nobody(session: lpdeform.Session, serv
             pass
 
 
-def test_readers_watch_and_may_take_over(session: lpdeform.Session, server: Server) -> None:
+def test_readers_watch_and_may_take_over(session: lpdeform.Session, place: Place) -> None:
     session.move("right", translation=[0, 0, 1])
-    with lpdeform.join(session.name, address=server.address) as reader:
+    with lpdeform.join(session.name, address=place.address) as reader:
         assert reader.next_frame(PATIENCE).input_seq == session.newest_input
         with pytest.raises(lpdeform.LpdeformError) as caught:
             reader.remove("left")
@@ -333,5 +333,5 @@ def test_readers_watch_and_may_take_over(session: lpdeform.Session, server: Serv
         session.take_over()
         assert session.move("right", translation=[0, 0, 3]).positions[11, 2] == 3
     with pytest.raises(lpdeform.LpdeformError) as caught:
-        lpdeform.join("sessions/" + 32 * "0", address=server.address)
+        lpdeform.join("sessions/" + 32 * "0", address=place.address)
     assert caught.value.reason == "SESSION_UNKNOWN"

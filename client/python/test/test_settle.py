@@ -10,16 +10,16 @@ from collections.abc import Callable, Iterator
 import pytest
 
 import lpdeform
-from conftest import PATIENCE, Grid, Server
+from conftest import PATIENCE, Grid, Place, Server
 
 MakeGrid = Callable[[int], Grid]
 
 
 @pytest.fixture
-def session(server: Server, make_grid: MakeGrid) -> Iterator[lpdeform.Session]:
+def session(place: Place, make_grid: MakeGrid) -> Iterator[lpdeform.Session]:
     shape = make_grid(10)
     handles = {"left": lpdeform.Handle(shape.left), "right": lpdeform.Handle(shape.right)}
-    with lpdeform.open(shape.vertices, shape.faces, address=server.address, handles=handles, p=2) as made:
+    with lpdeform.open(shape.vertices, shape.faces, address=place.address, handles=handles, p=2) as made:
         yield made
 
 
@@ -32,7 +32,8 @@ def test_a_result_that_was_polled_is_returned_at_once(session: lpdeform.Session)
         assert session.settle(0) is frame
 
 
-def test_it_stays_while_the_server_is_away(session: lpdeform.Session, server: Server) -> None:
+def test_it_stays_while_the_server_is_away(remote_session: lpdeform.Session, server: Server) -> None:
+    session = remote_session
     frame = session.move("right", translation=[0, 0, 1])
     server.kill()
     assert session.settle(0) is frame
@@ -87,12 +88,12 @@ def test_every_thread_that_waits_gets_it(session: lpdeform.Session) -> None:
     assert [one.input_seq for one in results] == 4 * [number]
 
 
-def test_every_task_that_waits_gets_it(server: Server, make_grid: MakeGrid) -> None:
+def test_every_task_that_waits_gets_it(place: Place, make_grid: MakeGrid) -> None:
     shape = make_grid(10)
 
     async def settled() -> list[lpdeform.Frame]:
         handles = {"left": lpdeform.Handle(shape.left)}
-        async with lpdeform.open_async(shape.vertices, shape.faces, address=server.address, handles=handles) as session:
+        async with lpdeform.open_async(shape.vertices, shape.faces, address=place.address, handles=handles) as session:
             frames = list(await asyncio.gather(*(session.settle(PATIENCE) for _ in range(4))))
             return [*frames, await session.settle(0)]
 
@@ -101,10 +102,10 @@ def test_every_task_that_waits_gets_it(server: Server, make_grid: MakeGrid) -> N
 
 
 def test_a_new_writer_waits_for_a_frame_that_knows_of_the_other_one(
-    session: lpdeform.Session, server: Server
+    session: lpdeform.Session, place: Place
 ) -> None:
     session.move("right", translation=[0, 0, 1])
-    with lpdeform.join(session.name, address=server.address, as_writer=True) as other:
+    with lpdeform.join(session.name, address=place.address, as_writer=True) as other:
         theirs = other.move("right", translation=[0, 0, 3])
     session.take_over()
     assert session.settle(PATIENCE).positions[9, 2] == theirs.positions[9, 2]

@@ -18,7 +18,8 @@ from lpdeform import Settings, Update
 from lpdeform._lease import Original, create_session
 from lpdeform._link import Link
 from lpdeform._recovery import RecoveryRules
-from lpdeform._rpc import Packer, Rpc, Stop
+from lpdeform._rpc import Packer, Rpc
+from lpdeform._stop import Stop
 from lpdeform.errors import Code, LpdeformError, make
 from lpdeform.types import Removal
 from lpdeform.v1 import frame_pb2, report_pb2, service_pb2

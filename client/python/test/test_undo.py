@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import lpdeform
-from conftest import PATIENCE, Grid, Server, settle_all
+from conftest import PATIENCE, Grid, Place, Server, settle_all
 from lpdeform.v1 import service_pb2
 
 
@@ -44,7 +44,8 @@ def test_a_drag_is_one_step_and_begins_step_begins_another(session: lpdeform.Ses
     assert session.settle(PATIENCE).positions[11, 2] == 2
 
 
-def test_every_kind_of_handle_comes_back_and_is_there_after_kill_9(session: lpdeform.Session, server: Server) -> None:
+def test_every_kind_of_handle_comes_back_and_is_there_after_kill_9(remote_session: lpdeform.Session, server: Server) -> None:
+    session = remote_session
     lift = lpdeform.RigidMotion(axis=(0, 0, 1), angle=0.25, center=(1, 2, 0), translation=(0, 0, 2))
     kept = {
         "soft": lpdeform.Handle([50], lift, lpdeform.Soft(0.5), footprint=1.5),
@@ -78,8 +79,9 @@ def test_a_session_opens_at_once_after_a_restart_though_another_has_just_failed_
 
 @pytest.mark.parametrize("has_lost", [False, True])
 def test_a_server_that_went_away_is_asked_again_and_gets_what_it_has_lost(
-    session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch, has_lost: bool
+    remote_session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch, has_lost: bool
 ) -> None:
+    session = remote_session
     session.settle(PATIENCE)
     session.move("right", translation=[0, 0, 2])
     call, asked = session._link.rpc.call, []
@@ -107,8 +109,9 @@ def test_a_server_that_went_away_is_asked_again_and_gets_what_it_has_lost(
 
 
 def test_a_session_recreated_takes_back_what_came_after_that_and_not_all_its_handles(
-    session: lpdeform.Session, server: Server
+    remote_session: lpdeform.Session, server: Server
 ) -> None:
+    session = remote_session
     session.move("right", translation=[0, 0, 2])
     before = session.name
     server.kill()
@@ -123,8 +126,9 @@ def test_a_session_recreated_takes_back_what_came_after_that_and_not_all_its_han
 
 
 def test_an_undo_that_was_taken_and_not_answered_is_no_fewer_steps_to_a_session_recreated(
-    session: lpdeform.Session, server: Server, monkeypatch: pytest.MonkeyPatch
+    remote_session: lpdeform.Session, server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    session = remote_session
     session.move("right", translation=[0, 0, 2])
     server.kill()
     server.start()
@@ -145,12 +149,12 @@ def test_an_undo_that_was_taken_and_not_answered_is_no_fewer_steps_to_a_session_
     assert session.settle(PATIENCE).positions[11, 2] == 2
 
 
-def test_nothing_to_undo_readers_and_closed_sessions_are_said(server: Server, shape: Grid) -> None:
-    with lpdeform.open(shape.vertices, shape.faces, address=server.address) as session:
+def test_nothing_to_undo_readers_and_closed_sessions_are_said(place: Place, shape: Grid) -> None:
+    with lpdeform.open(shape.vertices, shape.faces, address=place.address) as session:
         assert refused(session.undo) == "NOTHING_TO_UNDO"
         session.set_handle("left", shape.left)
         assert session.settle(PATIENCE).is_final  # the session goes on
-        with lpdeform.join(session.name, address=server.address) as reader:
+        with lpdeform.join(session.name, address=place.address) as reader:
             assert refused(reader.undo) == "NOT_THE_WRITER"
     for call in (session.undo, session.redo, session.snapshot):
         assert refused(call) == "SESSION_CLOSED"
@@ -165,7 +169,8 @@ def test_a_change_that_is_refused_before_an_undo_is_said_by_it(session: lpdeform
     assert session.move("right", translation=[0, 0, 1]).positions[11, 2] == 1
 
 
-def test_a_session_leaves_as_a_file_and_comes_back_the_same(session: lpdeform.Session, server: Server) -> None:
+def test_a_session_leaves_as_a_file_and_comes_back_the_same(remote_session: lpdeform.Session, server: Server) -> None:
+    session = remote_session
     before = session.move("right", translation=[0, 0, 2])
     session.set(p=1.5)
     file = session.snapshot()
@@ -190,7 +195,8 @@ def test_a_session_leaves_as_a_file_and_comes_back_the_same(session: lpdeform.Se
         assert abs(after[0, 2]) > 0.1  # and one that was removed
 
 
-def test_files_that_are_no_snapshots_are_refused_by_name(session: lpdeform.Session, server: Server) -> None:
+def test_files_that_are_no_snapshots_are_refused_by_name(remote_session: lpdeform.Session, server: Server) -> None:
+    session = remote_session
     file = session.snapshot()
     damaged = bytearray(file)
     damaged[len(file) // 2] ^= 1
@@ -199,8 +205,9 @@ def test_files_that_are_no_snapshots_are_refused_by_name(session: lpdeform.Sessi
 
 
 def test_snapshots_with_parts_that_are_missing_are_no_files(
-    session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch
+    remote_session: lpdeform.Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    session = remote_session
     part = service_pb2.SnapshotSessionResponse(size_bytes=10, offset=0, data=b"12345")
     for parts in ([], [part], [part, part]):
         monkeypatch.setattr("lpdeform._rpc.Rpc.snapshot", lambda *_, parts=parts: iter(parts))

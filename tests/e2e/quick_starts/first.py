@@ -6,4 +6,4 @@ z, x = np.divmod(np.arange(22), 2)
 vertices = np.stack([x, 0 * x, z / 10], axis=1)
 faces = np.concatenate([[[k, k + 1, k + 3], [k, k + 3, k + 2]] for k in range(0, 20, 2)])
 QUICK_START
-print(f"{frame.positions[20, 2] - 1:g}")
+print(f"{result.positions[20, 2] - 1:g}")

@@ -1,4 +1,4 @@
-"""L_p shape deformation on an lpdeform server: NumPy arrays in, NumPy arrays out.
+"""L_p shape deformation, in this process or on a server: NumPy arrays in, NumPy arrays out.
 
     import lpdeform
 
@@ -7,14 +7,20 @@
         s.set_handle("tip", vertices[:, 2] > 0.9)
         frame = s.move("tip", translation=[0, 0, 1])                   # frame.positions, frame.distortion
 
+`lpdeform.deform(vertices, faces, handles, p=1.5)` is one finished result in one call. Both are in this process; with `address=` they are
+on a server.
+
 To drag, call `s.drag("tip", ...)` on every mouse move and `s.poll()` once per picture: in both directions the newest value
 wins. `s.solve()` returns one finished result, with its trace and a bound on its distance from the optimum.
 """
 
+from typing import TYPE_CHECKING
+
+from lpdeform._deform import deform
 from lpdeform.access import Tls
 from lpdeform.aio import AsyncSession, join_async, open_async, restore_async
 from lpdeform.errors import Code, InvalidInput, LpdeformError, SplitMeshWarning, Timeout, Unavailable
-from lpdeform.frames import Frame, FrameAssembly, QuantizedSurface
+from lpdeform.frames import Frame, QuantizedSurface
 from lpdeform.opening import join, open, restore
 from lpdeform.reasons import Reason
 from lpdeform.session import Session
@@ -45,7 +51,20 @@ from lpdeform.types import (
     Update,
 )
 
+if TYPE_CHECKING:
+    from lpdeform._assembly import FrameAssembly
+
 __version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> object:
+    """FrameAssembly reads a server's messages, which need lpdeform[remote]."""
+    if name == "FrameAssembly":
+        from lpdeform._assembly import FrameAssembly
+
+        return FrameAssembly
+    raise AttributeError(f"module 'lpdeform' has no attribute {name!r}")
+
 
 __all__ = [
     "AsyncSession",
@@ -85,6 +104,7 @@ __all__ = [
     "Tls",
     "Unavailable",
     "Update",
+    "deform",
     "join",
     "join_async",
     "open",

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Protocol
 
-from lpdeform import _wire
-from lpdeform._link import Link
-from lpdeform._rpc import Packer, Stop
-from lpdeform.errors import Code, LpdeformError, is_undecided, make, session_closed
-from lpdeform.v1 import service_pb2
+from lpdeform._ledger import Ledger
+from lpdeform._stop import Stop
+from lpdeform.errors import Code, LpdeformError, make, session_closed
+
+
+class Changing(Protocol):
+    """What this needs of a session."""
+
+    changed: threading.Condition
+    ledger: Ledger
+    is_closing: bool
+    is_solving: bool
 
 
 @contextmanager
-def alone(link: Link, timeout: float, stop: Stop) -> Iterator[None]:
+def alone(link: Changing, timeout: float, stop: Stop) -> Iterator[None]:
     """Waits until nothing is under way, and lets nothing begin meanwhile.
 
     Raises Timeout SOLVE_UNDER_WAY after `timeout` seconds, SESSION_CLOSED, and CANCELLED.
@@ -43,42 +52,3 @@ def alone(link: Link, timeout: float, stop: Stop) -> Iterator[None]:
         with link.changed:
             link.is_solving = False
             link.changed.notify_all()
-
-
-def send_restore(link: Link, stop: Stop) -> None:
-    """Restores the state of a lost session in the recreated one, by an update of its own: a refused update must not affect it."""
-    while link.ledger.has_restore:
-        send_next(link, stop)
-
-
-def send_waiting(link: Link, stop: Stop) -> None:
-    """Sends everything that waits. Raises the server's errors."""
-    while link.ledger.has_waiting:
-        send_next(link, stop)
-
-
-def send_next(link: Link, stop: Stop) -> None:
-    """Sends the next update by a unary call, not on the stream."""
-    with link.changed:
-        update = link.ledger.send_next()
-        lease = link.lease
-    packer = Packer(link.rpc, stop)
-    try:
-        request = service_pb2.UpdateHandlesRequest(
-            session=lease.session,
-            writer_token=lease.writer_token,
-            update=_wire.update_to_wire(update.update, update.seq, packer),
-        )
-        response = link.rpc.call("UpdateHandles", request, service_pb2.UpdateHandlesResponse, stop)
-    except BaseException as error:
-        with link.changed:
-            is_refused = isinstance(error, LpdeformError) and not is_undecided(error)
-            if is_refused and update.seq != link.ledger.newest_accepted:
-                link.ledger.refuse(update.seq)
-            else:
-                link.ledger.connection_lost()
-        raise
-    finally:
-        packer.discard()
-    with link.changed:
-        link.ledger.accept(update.seq, response.result.kept)

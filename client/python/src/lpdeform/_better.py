@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lpdeform._link import Link
-from lpdeform._rpc import Stop
+from lpdeform._stop import Stop
 from lpdeform.errors import LpdeformError, session_closed
 from lpdeform.types import BetterShape
 from lpdeform.v1 import service_pb2

@@ -1,4 +1,4 @@
-"""How a handle is held: everything that this library knows of each kind beside its class in types.py.
+"""How a handle is held: what is checked of each kind. Its class is in types.py, its message in _wire_holds.py.
 
 mypy refuses a kind of types.Hold without its case here; what comes from the server, test_holds.py covers.
 """
@@ -9,9 +9,8 @@ from typing import NoReturn
 
 from lpdeform import types
 from lpdeform._numbers import number
-from lpdeform._vectors import checked_vector, vector_from_wire, vector_to_wire
+from lpdeform._vectors import checked_vector
 from lpdeform.errors import invalid
-from lpdeform.v1 import handle_pb2
 
 
 def checked_hold(hold: types.Hold, what: str) -> types.Hold:
@@ -28,41 +27,9 @@ def checked_hold(hold: types.Hold, what: str) -> types.Hold:
         case types.PlaneLock():
             return types.PlaneLock(checked_vector(hold.normal, f"normal of {what}"))
         case _:
-            _refuse_type(hold, what)
+            refuse_type(hold, what)
 
 
-def hold_to_wire(hold: types.Hold, message: handle_pb2.Handle) -> None:
-    """Sets the field of the kind; none for Exact."""
-    match hold:
-        case types.Exact():
-            pass
-        case types.Soft():
-            message.soft.weight = hold.weight
-        case types.Orientation():
-            message.orientation.weight = hold.weight
-        case types.AxisLock():
-            message.axis_lock.axis.CopyFrom(vector_to_wire(hold.axis))
-        case types.PlaneLock():
-            message.plane_lock.normal.CopyFrom(vector_to_wire(hold.normal))
-        case _:
-            _refuse_type(hold, "the handle")
-
-
-def hold_from_wire(message: handle_pb2.Handle) -> types.Hold:
-    """Exact where there is none, or one of a newer server."""
-    match message.WhichOneof("hold"):
-        case "soft":
-            return types.Soft(message.soft.weight)
-        case "orientation":
-            return types.Orientation(message.orientation.weight)
-        case "axis_lock":
-            return types.AxisLock(vector_from_wire(message.axis_lock.axis))
-        case "plane_lock":
-            return types.PlaneLock(vector_from_wire(message.plane_lock.normal))
-        case _:
-            return types.Exact()
-
-
-def _refuse_type(hold: NoReturn, what: str) -> NoReturn:
+def refuse_type(hold: NoReturn, what: str) -> NoReturn:
     """Of callers without a type checker. To mypy, a kind that gets here is one whose case is missing."""
     raise invalid(f"The hold of {what} is of type {type(hold).__name__}.", "HOLD_TYPE", what)

@@ -8,7 +8,8 @@ from google.protobuf.message import Message
 
 from lpdeform import _wire
 from lpdeform._numbers import Copied
-from lpdeform._rpc import Packer, Response, Rpc, Stop
+from lpdeform._rpc import Packer, Response, Rpc
+from lpdeform._stop import Stop
 from lpdeform.errors import Code, LpdeformError, is_undecided, make
 from lpdeform.types import MeshReport, Settings
 from lpdeform.v1 import report_pb2, service_pb2

@@ -176,6 +176,10 @@ class Ledger:
         self._epoch = epoch
 
     @property
+    def accepted_settings(self) -> Settings:
+        return self._accepted.update.settings
+
+    @property
     def newest_accepted(self) -> int:
         return self._accepted.seq
 

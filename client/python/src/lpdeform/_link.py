@@ -11,15 +11,19 @@ from typing import Any
 import grpc
 
 from lpdeform import _wire
+from lpdeform._assembly import FrameAssembly
 from lpdeform._box import FrameBox
+from lpdeform._checks import checked_update
 from lpdeform._lease import Lease, Original, Snapshot, check_vertex_count, create_session, join_session, restore_session
 from lpdeform._ledger import Ledger
 from lpdeform._recovery import Answer, Backoff, Ending, Judge, Next, RecoveryRules
-from lpdeform._rpc import Rpc, Stop, new_request_id
+from lpdeform._rpc import Rpc, new_request_id
+from lpdeform._stop import Stop
 from lpdeform._sending import requests
+from lpdeform._status import from_call, from_fault
 from lpdeform._stream import Stream
-from lpdeform.errors import Code, LpdeformError, again, exception, from_call, from_fault, make, session_closed
-from lpdeform.frames import Frame, FrameAssembly
+from lpdeform.errors import Code, LpdeformError, again, exception, make, session_closed
+from lpdeform.frames import Frame
 from lpdeform.types import Connection, Notice, Update
 from lpdeform.v1 import frame_pb2, service_pb2
 
@@ -45,6 +49,8 @@ class Link:
         self.changed = threading.Condition()
         self.is_solving = False
         self.is_closing = False
+        self.is_live = True
+        """Whether frames are wanted; otherwise no stream is opened."""
         self.lease = lease
         self.interruption: LpdeformError | None = None
         self.options = options
@@ -67,7 +73,7 @@ class Link:
 
     def update(self, update: Update) -> int:
         report = self.lease.report
-        checked = _wire.checked_update(update, report.vertices, report.faces)
+        checked = checked_update(update, report.vertices, report.faces)
         with self.changed:
             if self.is_closing:
                 raise session_closed()
@@ -86,7 +92,7 @@ class Link:
 
     def start_stream(self) -> None:
         with self.changed:
-            if self._thread is not None or self.is_closing or self._over is not None:
+            if not self.is_live or self._thread is not None or self.is_closing or self._over is not None:
                 return
             self._last_open = time.monotonic()
             self._thread = threading.Thread(target=self._run, name="lpdeform session", daemon=True)

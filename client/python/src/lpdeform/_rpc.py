@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import os
 import secrets
-import threading
 import time
 from collections.abc import Iterator
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import grpc
 from google.protobuf.message import Message
 
 from lpdeform._numbers import crc32c
 from lpdeform._recovery import Backoff
+from lpdeform._status import from_call
+from lpdeform._stop import Ended, Stop
 from lpdeform.access import Caller, Tls, Token, is_header_text, open_channel
-from lpdeform.errors import Code, LpdeformError, from_call, make
+from lpdeform.errors import Code, LpdeformError, make
 from lpdeform.v1 import data_pb2, service_pb2
 
 Response = TypeVar("Response", bound=Message)
@@ -40,43 +41,6 @@ _channel_options = [
 
 def default_address() -> str:
     return os.environ.get("LPDEFORM_ADDRESS") or "localhost:50051"
-
-
-class Ended(Protocol):
-    def cancel(self) -> Any: ...
-
-
-class Stop:
-    """Ends the calls that were made with it, from any thread."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._calls: set[Ended] = set()
-        self._came = threading.Event()
-        self.is_set = False
-
-    def set(self) -> None:
-        with self._lock:
-            self.is_set = True
-            calls = list(self._calls)
-        self._came.set()
-        for call in calls:
-            call.cancel()
-
-    def add(self, call: Ended) -> None:
-        with self._lock:
-            self._calls.add(call)
-            is_set = self.is_set
-        if is_set:
-            call.cancel()
-
-    def remove(self, call: Ended) -> None:
-        with self._lock:
-            self._calls.discard(call)
-
-    def wait(self, seconds: float) -> bool:
-        """Waits; returns True as soon as it is set, False after that time."""
-        return self._came.wait(seconds)
 
 
 class Rpc:

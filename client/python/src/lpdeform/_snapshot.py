@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from lpdeform._alone import alone, send_waiting
+from lpdeform._alone import alone
 from lpdeform._link import Link
-from lpdeform._rpc import Stop
+from lpdeform._sending_alone import send_waiting
+from lpdeform._stop import Stop
 from lpdeform.errors import Code, LpdeformError, make
 from lpdeform.v1 import service_pb2
 

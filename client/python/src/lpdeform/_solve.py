@@ -4,59 +4,33 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import grpc
-import numpy as np
-import numpy.typing as npt
 
 from lpdeform import _wire
-from lpdeform._alone import alone, send_restore
+from lpdeform._alone import alone
+from lpdeform._assembly import FrameAssembly, method_name, stop_reason_name
 from lpdeform._lease import Lease
 from lpdeform._ledger import Ledger, NumberedUpdate
 from lpdeform._link import Link
-from lpdeform._numbers import Copied, numbers
 from lpdeform._recovery import Answer, Backoff, answer_of
-from lpdeform._rpc import Packer, Stop
+from lpdeform._rpc import Packer
+from lpdeform._sending_alone import send_restore
+from lpdeform._solving import SolveOptions
+from lpdeform._status import from_call
+from lpdeform._stop import Stop
 from lpdeform.errors import (
     Code,
     LpdeformError,
     Unavailable,
-    from_call,
-    invalid,
     is_session_lost,
     is_undecided,
     make,
 )
-from lpdeform.frames import Frame, FrameAssembly, method_name, stop_reason_name
+from lpdeform.frames import Frame
 from lpdeform.types import IterationRecord, SolveProgress, SolveResult
 from lpdeform.v1 import data_pb2, service_pb2
-
-
-@dataclass(frozen=True, eq=False)
-class SolveOptions:
-    certify: bool = False
-    trace: bool = False
-    with_normals: bool = False
-    initial_positions: Copied | None = None
-    on_progress: Callable[[SolveProgress], None] | None = None
-    timeout: float | None = None
-
-
-def checked_positions(values: npt.ArrayLike | None, vertex_count: int) -> Copied | None:
-    """Checked here, so that only the update can be what the server finds invalid."""
-    if values is None:
-        return None
-    positions = numbers(values, "initial positions", 3)
-    if len(positions) != vertex_count:
-        text = f"There are {len(positions)} initial positions for {vertex_count} vertices."
-        raise invalid(text, "POSITIONS_SIZE", "", f"positions = {vertex_count}")
-    bad = np.flatnonzero(~np.isfinite(positions).all(axis=1))
-    if bad.size:
-        text = f"The initial position of vertex {bad[0]} is not finite."
-        raise invalid(text, "POSITIONS_NOT_FINITE", f"vertex {bad[0]}")
-    return positions
 
 
 def solve(link: Link, options: SolveOptions, stop: Stop) -> SolveResult:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 
 from lpdeform import _wire
-from lpdeform._alone import alone, send_restore, send_waiting
+from lpdeform._alone import alone
 from lpdeform._ledger import NumberedUpdate
 from lpdeform._link import Link
 from lpdeform._recovery import Backoff
-from lpdeform._rpc import Stop
+from lpdeform._sending_alone import send_restore, send_waiting
+from lpdeform._stop import Stop
 from lpdeform.errors import Code, LpdeformError, Unavailable, make, session_closed
 from lpdeform.v1 import service_pb2
 

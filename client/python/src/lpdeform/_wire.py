@@ -1,24 +1,18 @@
-"""Converts values to messages of the contract in two steps: they are checked and copied at once, and packed when they are
-sent."""
+"""Converts values, which were checked and copied by _checks, to messages of the contract, and back."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
-from typing import Any, TypeVar
+from collections.abc import Iterable
 
 import numpy as np
 import numpy.typing as npt
 
 from lpdeform import types
-from lpdeform._holds import checked_hold, hold_from_wire, hold_to_wire
-from lpdeform._numbers import Copied, count, indices, is_single_precision, number, numbers
+from lpdeform._numbers import Copied, is_single_precision
 from lpdeform._rpc import Packer
-from lpdeform._vectors import checked_vector, vector_from_wire, vector_to_wire
-from lpdeform.errors import invalid
+from lpdeform._wire_holds import hold_from_wire, hold_to_wire, vector_from_wire, vector_to_wire
+from lpdeform.types import FrameOptions
 from lpdeform.v1 import data_pb2, frame_pb2, handle_pb2, report_pb2, service_pb2
-
-T = TypeVar("T")
 
 _methods: dict[types.Method, handle_pb2.Method] = {
     "auto": handle_pb2.METHOD_UNSPECIFIED,
@@ -51,136 +45,6 @@ _encodings: dict[types.Encoding, frame_pb2.Encoding] = {
 }
 
 
-def named(table: Mapping[Any, T], name: object, what: str) -> T:
-    if name not in table:
-        known = ", ".join(table)
-        raise invalid(f"There is no {what} {name!r}: there are {known}.", "NAME_UNKNOWN", what, known)
-    return table[name]
-
-
-# Check and copy.
-
-
-def checked_update(update: types.Update, vertices: int, faces: int) -> types.Update:
-    """For a mesh with this many vertices and faces."""
-    handles = {
-        _checked_name(name): _checked_change(str(name), change, vertices, faces) for name, change in update.handles.items()
-    }
-    resize = None if update.resize is None else _checked_resize(update.resize)
-    return types.Update(handles, checked_settings(update.settings, vertices), resize, bool(update.begins_step))
-
-
-def _checked_resize(resize: types.Resize) -> types.Resize:
-    scale = checked_vector(resize.scale, "resize.scale")
-    origin = None if resize.origin is None else checked_vector(resize.origin, "resize.origin")
-    if resize.axes is None:
-        return types.Resize(scale, origin)
-    first, second = resize.axes
-    return types.Resize(scale, origin, (checked_vector(first, "resize.axes[0]"), checked_vector(second, "resize.axes[1]")))
-
-
-def _checked_name(name: object) -> str:
-    """Raises an error for half a surrogate pair, "\\ud800": a message with it could not be parsed."""
-    text = str(name)
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        what = f"handle {text!r}"
-        raise invalid(f"The name of {what} cannot be said in UTF-8.", "NAME_ENCODING", what, "UTF-8") from None
-    return text
-
-
-def _checked_change(name: str, change: types.Change, vertices: int, faces: int) -> types.Change:
-    what = f"handle {name!r}"
-    if isinstance(change, types.Handle):
-        points = change.points
-        if points is not None:
-            points = types.SurfacePoints(
-                indices(points.faces, f"faces of the points of {what}", mask_length=faces),
-                numbers(points.barycentric, f"barycentric coordinates of {what}", 3),
-            )
-        return replace(
-            change,
-            vertices=indices(change.vertices, f"vertices of {what}", mask_length=vertices),
-            points=points,
-            motion=_checked_motion(change.motion, what),
-            hold=checked_hold(change.hold, what),
-            footprint=number(change.footprint, f"footprint of {what}"),
-        )
-    if isinstance(change, types.Removal):
-        return change
-    return _checked_motion(change, what)
-
-
-def _checked_motion(motion: types.Motion, what: str) -> types.Motion:
-    if isinstance(motion, types.Targets):
-        return types.Targets(numbers(motion.positions, f"targets of {what}", 3))
-    if isinstance(motion, types.RigidMotion):
-        return types.RigidMotion(
-            checked_vector(motion.axis, f"axis of {what}"),
-            number(motion.angle, f"angle of {what}"),
-            checked_vector(motion.center, f"center of {what}"),
-            checked_vector(motion.translation, f"translation of {what}"),
-        )
-    if isinstance(motion, types.Fixed):
-        return motion
-    raise invalid(f"The motion of {what} is of type {type(motion).__name__}.", "MOTION_TYPE", what)
-
-
-def checked_settings(settings: types.Settings, vertices: int) -> types.Settings:
-    """For a mesh with this many vertices."""
-    return replace(
-        settings,
-        length_unit=None if settings.length_unit is None else number(settings.length_unit, "length_unit"),
-        solver=None if settings.solver is None else _checked_solver(settings.solver),
-        p=_checked_field(settings.p, "p", vertices),
-        stiffness=_checked_field(settings.stiffness, "stiffness", vertices),
-        region=None if settings.region is None else indices(settings.region, "region", mask_length=vertices),
-    )
-
-
-def _checked_solver(solver: types.SolverSettings) -> types.SolverSettings:
-    named(_methods, solver.method, "method")
-    named(_guesses, solver.initial, "initial guess")
-    return replace(
-        solver,
-        tolerance=number(solver.tolerance, "tolerance"),
-        max_iterations=count(solver.max_iterations, "max_iterations", 2**31 - 1),
-        time_limit=number(solver.time_limit, "time_limit"),
-        search=None if solver.search is None else _checked_search(solver.search),
-    )
-
-
-def _checked_search(search: types.MinimaSearch) -> types.MinimaSearch:
-    return types.MinimaSearch(
-        None if search.effort is None else count(search.effort, "effort", 1000),
-        bool(search.show),
-        number(search.least_share, "least_share"),
-    )
-
-
-def _checked_field(value: types.Field | None, what: str, vertices: int) -> types.Field | None:
-    if value is None:
-        return None
-    if isinstance(value, types.Automatic):
-        return types.Automatic(number(value.strength, f"strength of {what}"))
-    if np.ndim(value) == 0 and not isinstance(value, (str, bytes, bool, np.bool_)):
-        try:
-            return float(value)  # type: ignore[arg-type]
-        except (TypeError, ValueError):
-            raise invalid(f"{what} is of type {type(value).__name__}.", "ARRAY_TYPE", what) from None
-    array = numbers(value, what)
-    if array.size == 1:
-        return float(array[0])
-    if array.size != vertices:
-        text = f"{what} has {array.size} values, neither one nor {vertices}, one for each vertex."
-        raise invalid(text, "FIELD_SIZE", what, f"values = {vertices}")
-    return array
-
-
-# Pack.
-
-
 def scalar_of(array: Copied) -> data_pb2.Scalar:
     return data_pb2.SCALAR_FLOAT32 if is_single_precision(array) else data_pb2.SCALAR_FLOAT64
 
@@ -209,29 +73,26 @@ def normals_to_wire(normals: Copied, packer: Packer) -> data_pb2.Normals:
     return data_pb2.Normals(scalar=scalar_of(normals), data=_packed(normals, packer))
 
 
-def weights_to_wire(weights: str) -> report_pb2.WeightKind:
-    return named(_weights, weights, "weights")
+def weights_to_wire(weights: types.WeightKind) -> report_pb2.WeightKind:
+    return _weights[weights]
 
 
-def free_components_to_wire(free_components: str) -> service_pb2.FreeComponents:
-    return named(_free_components, free_components, "free_components")
+def free_components_to_wire(free_components: types.FreeComponents) -> service_pb2.FreeComponents:
+    return _free_components[free_components]
 
 
-def frame_options_to_wire(
-    encoding: str, lowest_encoding: str | None, credit: int, with_distortion: bool, with_normals: bool,
-    max_frames_per_second: float, certify: bool,
-) -> frame_pb2.FrameOptions:  # fmt: skip
-    asked = named(_encodings, encoding, "encoding")
-    lowest = asked if lowest_encoding is None else max(asked, named(_encodings, lowest_encoding, "encoding"))
+def frame_options_to_wire(options: FrameOptions) -> frame_pb2.FrameOptions:
+    asked = _encodings[options.encoding]
+    lowest = asked if options.lowest_encoding is None else max(asked, _encodings[options.lowest_encoding])
     return frame_pb2.FrameOptions(
-        credit=credit,
-        scalar=data_pb2.SCALAR_FLOAT64 if encoding == "float64" else data_pb2.SCALAR_FLOAT32,
-        without_distortion=not with_distortion,
-        max_frames_per_second=max_frames_per_second,
-        with_normals=with_normals,
+        credit=options.credit,
+        scalar=data_pb2.SCALAR_FLOAT64 if options.encoding == "float64" else data_pb2.SCALAR_FLOAT32,
+        without_distortion=not options.with_distortion,
+        max_frames_per_second=options.max_frames_per_second,
+        with_normals=options.with_normals,
         encoding=asked,
         lowest_encoding=lowest,
-        certify=certify,
+        certify=options.certify,
     )
 
 
@@ -294,8 +155,9 @@ def _change_to_wire(name: str, change: types.Change, packer: Packer) -> handle_p
 
 def _handle_to_wire(handle: types.Handle, packer: Packer) -> handle_pb2.Handle:
     message = handle_pb2.Handle(motion=_motion_to_wire(handle.motion, packer), footprint_radius=handle.footprint)
-    if handle.points is None or np.size(handle.vertices):
-        message.vertices.CopyFrom(_packed(handle.vertices, packer))
+    vertices = np.asarray(handle.vertices)  # indices, by now
+    if handle.points is None or vertices.size:
+        message.vertices.CopyFrom(_packed(vertices, packer))
     if handle.points is not None:
         barycentric = np.asarray(handle.points.barycentric)
         points = handle_pb2.SurfacePoints(
@@ -355,18 +217,7 @@ def report_from_wire(report: report_pb2.MeshReport) -> types.MeshReport:
         boundary_loops=report.boundary_loops,
         defects=defects,
         welded_vertices=report.welded_vertices,
-        notices=_mesh_notices(defects),
-    )
-
-
-def _mesh_notices(defects: Iterable[types.Defect]) -> tuple[str, ...]:
-    """The same texts as in client/cpp/mesh_notices.h."""
-    return tuple(
-        f"The mesh comes apart where it is split: {defect.count} vertices at its borders lie in the same place as others "
-        f"(vertices {', '.join(map(str, defect.first))}{', ...' if defect.count > len(defect.first) else ''}). "
-        "Weld it by position to hold it together there."
-        for defect in defects
-        if defect.kind == "split_border_vertices" and defect.count > 0
+        notices=types.mesh_notices(defects),
     )
 
 

@@ -9,8 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-import grpc
-
 from lpdeform.errors import Code, invalid, make
 
 _SCHEMES = ("unix:", "unix-abstract:", "dns:", "ipv4:", "ipv6:", "xds:", "vsock:")
@@ -74,6 +72,8 @@ def is_header_text(text: str) -> bool:
 
 def open_channel(address: str, tls: Tls | bool, options: list[tuple[str, int]]) -> Any:
     """Raises InvalidInput if a text of `tls` cannot be used: gRPC would only report that it cannot connect."""
+    import grpc
+
     _check_address(address)
     if tls is False:
         return grpc.insecure_channel(address, options=options)

@@ -10,16 +10,15 @@ from typing import Any, TypeVar
 
 import numpy.typing as npt
 
-from lpdeform._better import take_better_shape
-from lpdeform._link import Link
-from lpdeform._rpc import Stop
-from lpdeform._snapshot import snapshot
-from lpdeform._solve import solve
-from lpdeform._undo import undo
+from lpdeform._groups import handles_of
+from lpdeform._meshes import mesh_arrays
+from lpdeform._opened import Opened
+from lpdeform._progress import told_by
+from lpdeform._stop import Stop
 from lpdeform.access import Tls, Token
 from lpdeform.errors import LpdeformError, SplitMeshWarning
 from lpdeform.frames import Frame
-from lpdeform.opening import connect, frame_options, join_link, open_link, restore_link, warn_of_splits
+from lpdeform.opening import checked_mesh, frame_options, reach, warn_of_splits
 from lpdeform.session import Live, deadline_after
 from lpdeform.types import (
     BetterShape,
@@ -27,11 +26,13 @@ from lpdeform.types import (
     Field,
     FreeComponents,
     Handle,
+    Mesh,
     Motion,
     Settings,
     SolveProgress,
     SolveResult,
     SolverSettings,
+    Triangles,
     Vector3,
     WeightKind,
 )
@@ -115,34 +116,36 @@ class AsyncSession(Live):
         with_normals: bool = False,
         initial_positions: npt.ArrayLike | None = None,
         on_progress: Callable[[SolveProgress], None] | None = None,
+        progress: bool | Callable[[SolveProgress], None] | None = None,
         timeout: float | None = None,
     ) -> SolveResult:
-        """Like Session.solve(); `on_progress` is called in the event loop."""
+        """Like Session.solve(); functions are called in the event loop."""
         loop = asyncio.get_running_loop()
+        with told_by(progress if progress is not None else on_progress) as told:
 
-        def report(progress: SolveProgress) -> None:
-            if on_progress is not None:
-                loop.call_soon_threadsafe(on_progress, progress)
+            def report(newest: SolveProgress) -> None:
+                if told is not None:
+                    loop.call_soon_threadsafe(told, newest)
 
-        told = None if on_progress is None else report
-        options = self._solve_options(certify, trace, with_normals, initial_positions, told, timeout)
-        return await _in_a_thread(lambda stop: solve(self._link, options, stop))
+            told_here = None if told is None else report
+            options = self._solve_options(certify, trace, with_normals, initial_positions, told_here, timeout)
+            return await _in_a_thread(lambda stop: self._link.solve(options, stop))
 
     async def undo(self) -> int:
         """Like Session.undo()."""
-        return await _in_a_thread(lambda stop: undo(self._link, False, stop))
+        return await _in_a_thread(lambda stop: self._link.undo(False, stop))
 
     async def redo(self) -> int:
         """Like Session.redo()."""
-        return await _in_a_thread(lambda stop: undo(self._link, True, stop))
+        return await _in_a_thread(lambda stop: self._link.undo(True, stop))
 
     async def take_better_shape(self) -> BetterShape:
         """Like Session.take_better_shape()."""
-        return await _in_a_thread(lambda stop: take_better_shape(self._link, stop))
+        return await _in_a_thread(self._link.take_better_shape)
 
     async def snapshot(self) -> bytes:
         """Like Session.snapshot()."""
-        return await _in_a_thread(lambda stop: snapshot(self._link, stop))
+        return await _in_a_thread(self._link.snapshot)
 
     async def take_over(self) -> None:
         """Like Session.take_over()."""
@@ -167,20 +170,20 @@ class AsyncSession(Live):
 class Opening:
     """A session that is being opened: `session = await opening`, or `async with opening as session`."""
 
-    def __init__(self, make: Callable[[Stop], Link], warns: bool = False) -> None:
+    def __init__(self, make: Callable[[Stop], Opened], warns: bool = False) -> None:
         self._make = make
         self._warns = warns
         self._session: AsyncSession | None = None
 
     async def _open(self, stacklevel: int) -> AsyncSession:
-        link = await _in_a_thread(self._make)
+        opened = await _in_a_thread(self._make)
         try:
             if self._warns:
-                warn_of_splits(link.lease.report, stacklevel)
+                warn_of_splits(opened.report, stacklevel)
         except SplitMeshWarning:  # warnings are errors
-            await asyncio.to_thread(link.close)
+            await asyncio.to_thread(opened.close)
             raise
-        return AsyncSession(link)
+        return AsyncSession(opened)
 
     def __await__(self) -> Generator[Any, None, AsyncSession]:
         return self._open(stacklevel=2).__await__()
@@ -197,8 +200,8 @@ class Opening:
 
 
 def open_async(
-    vertices: npt.ArrayLike,
-    faces: npt.ArrayLike,
+    vertices: Mesh,
+    faces: Triangles | None = None,
     *,
     address: str | None = None,
     token: Token = None,
@@ -229,11 +232,11 @@ def open_async(
     )
     settings = Settings(p, stiffness, length_unit, solver, region)
 
-    def make(stop: Stop) -> Link:
-        rpc = connect(address, call_timeout, reconnect_for, token, tls)
-        return open_link(
-            rpc, stop, vertices, faces, normals, handles, settings, weights, free_components, weld, options
-        )
+    def make(stop: Stop) -> Opened:
+        place = reach(address, token, tls, call_timeout, reconnect_for)
+        points, triangles = mesh_arrays(vertices, faces)
+        given = checked_mesh(points, triangles, normals, settings, weights, free_components, weld)
+        return place.open(given, handles_of(handles or {}, given.vertices), options, stop)
 
     return Opening(make, warns=True)
 
@@ -260,7 +263,7 @@ def join_async(
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
     )
     return Opening(
-        lambda stop: join_link(connect(address, call_timeout, reconnect_for, token, tls), stop, name, as_writer, options)
+        lambda stop: reach(address, token, tls, call_timeout, reconnect_for).join(name, as_writer, options, stop)
     )
 
 
@@ -285,5 +288,5 @@ def restore_async(
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
     )
     return Opening(
-        lambda stop: restore_link(connect(address, call_timeout, reconnect_for, token, tls), stop, snapshot, options)
+        lambda stop: reach(address, token, tls, call_timeout, reconnect_for).restore(snapshot, options, stop)
     )

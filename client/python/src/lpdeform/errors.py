@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum
-from typing import Any, cast
+from typing import cast
 
 from lpdeform.reasons import Reason
-from lpdeform.v1 import google_rpc_pb2, service_pb2
 
 
 class Code(str, Enum):
@@ -146,45 +145,27 @@ def again(error: LpdeformError) -> LpdeformError:
     )
 
 
-def from_fault(fault: service_pb2.Fault) -> LpdeformError:
-    metadata = {name: value for name, value in (("element", fault.element), ("limit", fault.limit)) if value}
+def from_status(
+    code: int, text: str, reason: str, element: str, limit: str, retry_after_ms: int = 0, input_seq: int = 0
+) -> LpdeformError:
+    """The error of a status as the server and the solver in this process say it; `code` is its number in google.rpc.Code."""
+    metadata = {name: value for name, value in (("element", element), ("limit", limit)) if value}
     return make(
-        _by_number.get(fault.code, Code.UNKNOWN),
-        fault.text,
-        cast(Reason, fault.reason),
-        fault.element,
-        fault.limit,
+        _by_number.get(code, Code.UNKNOWN),
+        text,
+        cast(Reason, reason),
+        element,
+        limit,
         metadata=metadata,
-        input_seq=fault.input_seq,
-        retry_after=fault.retry_after_ms / 1000,
+        input_seq=input_seq,
+        retry_after=retry_after_ms / 1000,
     )
 
 
-def from_call(error: Any, address: str) -> LpdeformError:
-    """The error of a grpc.RpcError, from its google.rpc.Status if the server sent one."""
-    code = Code[error.code().name] if error.code().name in Code.__members__ else Code.UNKNOWN
-    info, retry = google_rpc_pb2.ErrorInfo(), google_rpc_pb2.RetryInfo()
-    for key, value in error.trailing_metadata() or ():
-        if key != "grpc-status-details-bin" or not isinstance(value, bytes):
-            continue
-        for detail in google_rpc_pb2.Status.FromString(value).details:
-            if detail.type_url.endswith("/google.rpc.ErrorInfo"):
-                info.ParseFromString(detail.value)
-            elif detail.type_url.endswith("/google.rpc.RetryInfo"):
-                retry.ParseFromString(detail.value)
-    message = error.details() or "The call failed."
-    if code is Code.UNAVAILABLE and not info.reason:
-        message, info.reason = f"No lpdeform server answers at {address}: {message}", "NO_SERVER"
-    metadata = dict(info.metadata)
-    return make(
-        code,
-        message,
-        cast(Reason, info.reason),
-        metadata.get("element", ""),
-        metadata.get("limit", ""),
-        metadata=metadata,
-        retry_after=retry.retry_delay.seconds + retry.retry_delay.nanos / 1e9,
-    )
+def about(error: LpdeformError, input_seq: int) -> LpdeformError:
+    """The error as one about this update."""
+    error.input_seq = input_seq
+    return error
 
 
 def is_session_lost(error: LpdeformError) -> bool:

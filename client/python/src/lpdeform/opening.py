@@ -2,29 +2,71 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import warnings
 from collections.abc import Mapping
+from importlib.util import find_spec
 from numbers import Real
+from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
 
-from lpdeform import _codec, _wire
-from lpdeform._lease import Lease, Original, Snapshot, create_session, join_session, restore_session, route_of
-from lpdeform._link import Link
+from lpdeform._checks import checked_settings, named
+from lpdeform._groups import handles_of
+from lpdeform._meshes import mesh_arrays
 from lpdeform._numbers import Copied, indices, numbers
-from lpdeform._rpc import Rpc, Stop, default_address, new_request_id
+from lpdeform._opened import Connecting, Given, Reaching
+from lpdeform._stop import Stop
 from lpdeform.access import Tls, Token
-from lpdeform.errors import LpdeformError, SplitMeshWarning, invalid
+from lpdeform.errors import Code, SplitMeshWarning, invalid, make
 from lpdeform.session import Session
-from lpdeform.types import Encoding, Field, FreeComponents, Handle, MeshReport, Settings, SolverSettings, Update, WeightKind
-from lpdeform.v1 import frame_pb2
+from lpdeform.types import (
+    Encoding,
+    Field,
+    FrameOptions,
+    FreeComponents,
+    Handle,
+    Mesh,
+    MeshReport,
+    Settings,
+    SolverSettings,
+    Triangles,
+    WeightKind,
+)
 
 
-def connect(
-    address: str | None, call_timeout: float, reconnect_for: float, token: Token, tls: Tls | bool
-) -> Rpc:
-    return Rpc(address or default_address(), call_timeout, reconnect_for, token, tls)
+def _is_missing(module: str) -> bool:
+    if module in sys.modules:
+        return sys.modules[module] is None
+    try:
+        return find_spec(module) is None
+    except (ImportError, ValueError):
+        return True
+
+
+def reach(
+    address: str | None, token: Token, tls: Tls | bool, call_timeout: float = 30.0, reconnect_for: float = 120.0
+) -> Connecting:
+    """This process, or a server if there is an address."""
+    address = address or os.environ.get("LPDEFORM_ADDRESS")
+    if address:
+        if _is_missing("grpc") or _is_missing("google.protobuf"):
+            text = "A session on a server needs grpcio and protobuf: pip install lpdeform[remote]"
+            raise make(Code.UNIMPLEMENTED, text, "NO_REMOTE", "address", "pip install lpdeform[remote]")
+        from lpdeform._remote import Remote
+
+        return Remote(Reaching(address, token, tls, call_timeout, reconnect_for))
+    if token is not None or tls is not False:
+        what = "token" if token is not None else "tls"
+        raise invalid(f"{what} is for a session on a server, and there is no address.", "ARGUMENT_MISSING", "address")
+    if _is_missing("lpdeform._core"):
+        text = "This wheel of lpdeform has no solver, so that a session needs the address of a server."
+        raise make(Code.UNIMPLEMENTED, text, "NO_SOLVER", "address")
+    from lpdeform._local import Local
+
+    return Local(call_timeout)
 
 
 def _weld_of(weld: npt.ArrayLike | float | bool) -> Copied | float | None:
@@ -33,42 +75,27 @@ def _weld_of(weld: npt.ArrayLike | float | bool) -> Copied | float | None:
     return float(weld) if isinstance(weld, Real) else indices(weld, "weld")
 
 
-def open_link(
-    rpc: Rpc,
-    stop: Stop,
+def checked_mesh(
     vertices: npt.ArrayLike,
     faces: npt.ArrayLike,
     normals: npt.ArrayLike | None,
-    handles: Mapping[str, Handle] | None,
     settings: Settings,
     weights: WeightKind,
     free_components: FreeComponents,
     weld: npt.ArrayLike | float | bool,
-    frame_options: frame_pb2.FrameOptions,
-) -> Link:
+) -> Given:
+    named(get_args(WeightKind), weights, "weights")
+    named(get_args(FreeComponents), free_components, "free_components")
     rest = numbers(vertices, "vertices", 3)
-    original = Original(
+    return Given(
         vertices=rest,
         faces=indices(faces, "faces", 3),
         normals=None if normals is None else numbers(normals, "normals", 3),
         weld=_weld_of(weld),
-        weights=_wire.weights_to_wire(weights),
-        free_components=_wire.free_components_to_wire(free_components),
-        settings=_wire.checked_settings(settings, len(rest)),
+        weights=weights,
+        free_components=free_components,
+        settings=checked_settings(settings, len(rest)),
     )
-    try:
-        lease = create_session(rpc, original, new_request_id(), stop)
-    except BaseException:
-        rpc.close()
-        raise
-    link = Link(rpc, lease, frame_options, original)
-    if handles:
-        try:
-            link.update(Update(dict(handles)))
-        except BaseException:
-            link.close()
-            raise
-    return link
 
 
 def warn_of_splits(report: MeshReport, stacklevel: int) -> None:
@@ -86,19 +113,23 @@ def frame_options(
     with_normals: bool,
     max_frames_per_second: float,
     certify: bool,
-) -> frame_pb2.FrameOptions:
+) -> FrameOptions:
     if not 0 <= credit <= 8:
         raise invalid(f"The credit is {credit}.", "CREDIT_OUT_OF_RANGE", "credit", "0 <= credit <= 8")
+    for one in (encoding, lowest_encoding or encoding):
+        named(get_args(Encoding), one, "encoding")
     if "compressed" in (encoding, lowest_encoding):
+        from lpdeform import _codec
+
         _codec.require_decoder()
-    return _wire.frame_options_to_wire(
+    return FrameOptions(
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
     )
 
 
 def open(  # noqa: A001  (called as lpdeform.open)
-    vertices: npt.ArrayLike,
-    faces: npt.ArrayLike,
+    vertices: Mesh,
+    faces: Triangles | None = None,
     *,
     address: str | None = None,
     token: Token = None,
@@ -125,8 +156,9 @@ def open(  # noqa: A001  (called as lpdeform.open)
 ) -> Session:
     """Creates a session from a triangle mesh; the order of vertices is never changed.
 
-    vertices: n x 3, in any unit. faces: m x 3, 0-based, counter-clockwise seen from outside.
-    address: "host:port" or "unix:/path"; by default the environment variable LPDEFORM_ADDRESS, or localhost:50051.
+    vertices: n x 3, in any unit; or a mesh of trimesh, meshio, PyVista or Polyscope, and then without `faces`. faces: m x 3, 0-based, counter-clockwise seen from outside.
+    address: of a server, "host:port" or "unix:/path"; by default the environment variable LPDEFORM_ADDRESS. Without either, the
+        session is in this process.
     token: a bearer token, or a function that returns the newest one, called on any thread when a call begins.
     tls: True, or a Tls with certificates.
     handles: the handles to begin with. p, stiffness, length_unit, solver, region: as in Settings.
@@ -155,16 +187,16 @@ def open(  # noqa: A001  (called as lpdeform.open)
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
     )
     settings = Settings(p, stiffness, length_unit, solver, region)
-    rpc = connect(address, call_timeout, reconnect_for, token, tls)
-    link = open_link(
-        rpc, Stop(), vertices, faces, normals, handles, settings, weights, free_components, weld, options
-    )
+    place = reach(address, token, tls, call_timeout, reconnect_for)
+    points, triangles = mesh_arrays(vertices, faces)
+    given = checked_mesh(points, triangles, normals, settings, weights, free_components, weld)
+    opened = place.open(given, handles_of(handles or {}, given.vertices), options, Stop())
     try:
-        warn_of_splits(link.lease.report, stacklevel=2)
+        warn_of_splits(opened.report, stacklevel=2)
     except SplitMeshWarning:  # warnings are errors
-        link.close()
+        opened.close()
         raise
-    return Session(link)
+    return Session(opened)
 
 
 def join(
@@ -191,31 +223,7 @@ def join(
     options = frame_options(
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
     )
-    rpc = connect(address, call_timeout, reconnect_for, token, tls)
-    return Session(join_link(rpc, Stop(), name, as_writer, options))
-
-
-def join_link(rpc: Rpc, stop: Stop, name: str, as_writer: bool, options: frame_pb2.FrameOptions) -> Link:
-    try:
-        return Link(rpc, _join_where_it_is(rpc, stop, name, as_writer), options, None)
-    except BaseException:
-        rpc.close()
-        raise
-
-
-def _join_where_it_is(rpc: Rpc, stop: Stop, name: str, as_writer: bool) -> Lease:
-    """With several servers behind a proxy, uses the route of the server that has the session."""
-    try:
-        lease = join_session(rpc, name, as_writer, stop)
-        if lease.route:
-            rpc.go_by(lease.route)
-        return lease
-    except LpdeformError as error:
-        route = route_of(error)
-        if not route or route == rpc.route:
-            raise
-        rpc.go_by(route)
-        return join_session(rpc, name, as_writer, stop)
+    return Session(reach(address, token, tls, call_timeout, reconnect_for).join(name, as_writer, options, Stop()))
 
 
 def restore(
@@ -243,14 +251,4 @@ def restore(
     options = frame_options(
         encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
     )
-    rpc = connect(address, call_timeout, reconnect_for, token, tls)
-    return Session(restore_link(rpc, Stop(), snapshot, options))
-
-
-def restore_link(rpc: Rpc, stop: Stop, snapshot: bytes, options: frame_pb2.FrameOptions) -> Link:
-    original = Snapshot(bytes(snapshot))
-    try:
-        return Link(rpc, restore_session(rpc, original, new_request_id(), stop), options, original)
-    except BaseException:
-        rpc.close()
-        raise
+    return Session(reach(address, token, tls, call_timeout, reconnect_for).restore(snapshot, options, Stop()))

@@ -12,11 +12,10 @@ from typing import Any, TypeVar
 
 import numpy.typing as npt
 
-from lpdeform._better import take_better_shape
-from lpdeform._link import Link
-from lpdeform._snapshot import snapshot
-from lpdeform._solve import SolveOptions, checked_positions, solve
-from lpdeform._undo import undo
+from lpdeform._groups import chosen
+from lpdeform._opened import Opened
+from lpdeform._progress import told_by
+from lpdeform._solving import SolveOptions, checked_positions
 from lpdeform.errors import LpdeformError, invalid, session_closed
 from lpdeform.frames import Frame
 from lpdeform.types import (
@@ -24,6 +23,7 @@ from lpdeform.types import (
     Change,
     Connection,
     Field,
+    Group,
     Handle,
     Hold,
     Exact,
@@ -46,7 +46,7 @@ from lpdeform.types import (
 
 Self = TypeVar("Self", bound="Live")
 _no_motion = Fixed()
-_links: weakref.WeakSet[Link] = weakref.WeakSet()
+_links: weakref.WeakSet[Opened] = weakref.WeakSet()
 
 
 @atexit.register
@@ -55,7 +55,7 @@ def _close_all() -> None:
         link.close()
 
 
-def _abandon(link: Link) -> None:
+def _abandon(link: Opened) -> None:
     """Closes the link of a session without references. The garbage collector may run on any thread, so it must not wait here."""
     threading.Thread(target=link.close, daemon=True).start()
 
@@ -64,7 +64,7 @@ class Live:
     """The functions of sessions that do not wait. Changes that come faster than the connection takes them are coalesced: the
     newest value of each handle and each setting wins."""
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: Opened) -> None:
         self._link = link
         _links.add(link)
         finalizer: Any = weakref.finalize(self, _abandon, link)
@@ -73,17 +73,17 @@ class Live:
     @property
     def name(self) -> str:
         """"sessions/<32 hexadecimal digits>"; it changes when the session has to be recreated."""
-        return self._link.lease.session
+        return self._link.name
 
     @property
     def address(self) -> str:
-        """The server's address."""
-        return self._link.rpc.address
+        """The server's address, or "this process"."""
+        return self._link.address
 
     @property
     def mesh_report(self) -> MeshReport:
         """What the server reported of the mesh."""
-        return self._link.lease.report
+        return self._link.report
 
     @property
     def connection(self) -> Connection:
@@ -122,7 +122,8 @@ class Live:
         change, and without changes that were coalesced with it. Raises at once if the session is closed (SESSION_CLOSED), for a
         reader (NOT_THE_WRITER), and for arrays of the wrong type or shape.
         """
-        return self._link.update(Update(handles or {}, settings or Settings(), resize, begins_step))
+        changes = {name: chosen(change, self._link.vertices) for name, change in (handles or {}).items()}
+        return self._link.update(Update(changes, settings or Settings(), resize, begins_step))
 
     def set_handles(self, handles: Mapping[str, Handle]) -> int:
         """Adds handles, or replaces those with the same names. Raises as update()."""
@@ -131,14 +132,15 @@ class Live:
     def set_handle(
         self,
         name: str,
-        vertices: npt.ArrayLike = (),
+        vertices: Group = (),
         motion: Motion = _no_motion,
         *,
         hold: Hold = Exact(),
         points: SurfacePoints | None = None,
         footprint: float = 0.0,
     ) -> int:
-        """Adds a handle, or replaces the one with this name. Raises as update()."""
+        """Adds a handle, or replaces the one with this name. `vertices`: indices, a boolean mask over all n vertices, or a
+        function that gets the n x 3 rest vertices and returns either. Raises as update()."""
         return self.update({name: Handle(vertices, motion, hold, points, footprint)})
 
     def drag(
@@ -197,7 +199,7 @@ class Live:
 
 
 class Session(Live):
-    """A mesh that is deformed on a server; open() and join() make sessions. Every function may be called from any thread.
+    """A mesh that is deformed, in this process or on a server; open() and join() make sessions. Every function may be called from any thread.
 
     Frames come over a stream. If it breaks, the session reconnects with growing pauses: to the same session if the server still
     has it, otherwise to a new one that it creates from its own copy of mesh, handles and settings. Frames of an older epoch or an
@@ -269,18 +271,21 @@ class Session(Live):
         with_normals: bool = False,
         initial_positions: npt.ArrayLike | None = None,
         on_progress: Callable[[SolveProgress], None] | None = None,
+        progress: bool | Callable[[SolveProgress], None] | None = None,
         timeout: float | None = None,
     ) -> SolveResult:
         """Solves for the present handles and settings, and returns the finished result in float64.
 
-        `on_progress` is called at most ten times per second. If the server goes away, the solve starts again, for as long as the
+        `progress`: a function that is called at most ten times per second, or True for a bar, by tqdm if it is installed; `on_progress`
+        is the same for a function. If the server goes away, the solve starts again, for as long as the
         stream would. `timeout`: seconds in all, including the wait for another solve; None is without limit; with 0 nothing is
         sent. Changes made during the solve wait and are sent after it. Raises the server's errors, and Timeout: SOLVE_UNDER_WAY
         if the time was spent waiting, SOLVE_TIME_PASSED if no time was left to begin. Raises SESSION_CLOSED (FAILED_PRECONDITION)
         if close() is called meanwhile.
         """
-        options = self._solve_options(certify, trace, with_normals, initial_positions, on_progress, timeout)
-        return solve(self._link, options, self._link.stop)
+        with told_by(progress if progress is not None else on_progress) as told:
+            options = self._solve_options(certify, trace, with_normals, initial_positions, told, timeout)
+            return self._link.solve(options, self._link.stop)
 
     def undo(self) -> int:
         """Undoes the newest step of the handles on the server, and returns the number of the update that the undo is.
@@ -291,11 +296,11 @@ class Session(Live):
         Raises FAILED_PRECONDITION NOTHING_TO_UNDO (also for steps before the session had to be recreated), NOT_THE_WRITER for a
         reader, the server's error about an earlier change, Timeout.
         """
-        return undo(self._link, False, self._link.stop)
+        return self._link.undo(False, self._link.stop)
 
     def redo(self) -> int:
         """Redoes the step that was undone last. Raises as undo(), and NOTHING_TO_REDO."""
-        return undo(self._link, True, self._link.stop)
+        return self._link.undo(True, self._link.stop)
 
     def take_better_shape(self) -> BetterShape:
         """Shows the better shape that the notice "better_shape" has announced, as a new final frame for the same update.
@@ -304,7 +309,7 @@ class Session(Live):
         taken, which a frame then shows. Raises FAILED_PRECONDITION NO_BETTER_SHAPE if none is known for the newest update, as
         after solve(), which makes the session forget it and search again; NOT_THE_WRITER for a reader.
         """
-        return take_better_shape(self._link, self._link.stop)
+        return self._link.take_better_shape(self._link.stop)
 
     def snapshot(self) -> bytes:
         """The session as a file for restore(): mesh, handles, settings, steps to undo, and the present surface.
@@ -312,7 +317,7 @@ class Session(Live):
         The file includes all earlier changes. Waits until all its parts have come; changes made meanwhile are sent afterwards.
         Raises the server's error about an earlier change, RESOURCE_EXHAUSTED, Timeout.
         """
-        return snapshot(self._link, self._link.stop)
+        return self._link.snapshot(self._link.stop)
 
     def take_over(self) -> None:
         """Becomes the writer in place of the present one, as a reader or after a WRITER_REPLACED."""

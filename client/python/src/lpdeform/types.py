@@ -5,21 +5,66 @@ Vertices may be given as indices or as a boolean mask over all vertices: `vertic
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple, Union
+from typing import Any, Literal, NamedTuple, Protocol, Union
 
 import numpy as np
 import numpy.typing as npt
 
+from lpdeform._picture import plot, table_of
+
 Vector3 = Union[Sequence[float], npt.NDArray[Any]]
 Floats = npt.NDArray[np.floating[Any]]
+Group = Union[npt.ArrayLike, Callable[[npt.NDArray[Any]], npt.ArrayLike]]
+"""Vertices: indices, a boolean mask over all vertices, or a function that gets the n x 3 vertices and returns either."""
+Triangles = Union[npt.ArrayLike, Sequence[Any]]
+"""m x 3 indices; PyVista's faces, with 3 before each triangle; or meshio's cells."""
 Method = Literal["auto", "quasi_newton", "line_search", "local_global", "conic", "multiresolution"]
 InitialGuess = Literal["current", "laplacian", "rest"]
 WeightKind = Literal["cotangent", "uniform", "intrinsic_delaunay"]
 FreeComponents = Literal["error", "stay", "follow"]
 Encoding = Literal["float64", "float32", "quantized", "compressed"]
 Connection = Literal["idle", "connected", "reconnecting", "closed"]
+
+
+class VerticesMesh(Protocol):
+    """A mesh of trimesh."""
+
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+
+class PointsMesh(Protocol):
+    """A mesh of meshio or PyVista."""
+
+    @property
+    def points(self) -> Any: ...
+
+
+class BufferMesh(Protocol):
+    """A mesh of Polyscope."""
+
+    def get_buffer(self, buffer_name: str) -> Any: ...
+
+
+Mesh = Union[npt.ArrayLike, VerticesMesh, PointsMesh, BufferMesh]
+"""n x 3 vertices, or a mesh with its faces."""
+
+
+@dataclass(frozen=True)
+class FrameOptions:
+    """What frames a session is sent: the arguments of open()."""
+
+    encoding: Encoding = "float32"
+    lowest_encoding: Encoding | None = None
+    credit: int = 0
+    with_distortion: bool = True
+    with_normals: bool = False
+    max_frames_per_second: float = 0.0
+    certify: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,7 +144,7 @@ class SurfacePoints:
 class Handle:
     """A group of vertices, or of points inside faces, that the user holds. A vertex belongs to one handle at most."""
 
-    vertices: npt.ArrayLike = ()
+    vertices: Group = ()
     motion: Motion = Fixed()
     hold: Hold = Exact()
     points: SurfacePoints | None = None
@@ -237,6 +282,17 @@ class MeshReport:
     split."""
 
 
+def mesh_notices(defects: Iterable[Defect]) -> tuple[str, ...]:
+    """The same texts as in client/cpp/mesh_notices.h."""
+    return tuple(
+        f"The mesh comes apart where it is split: {defect.count} vertices at its borders lie in the same place as others "
+        f"(vertices {', '.join(map(str, defect.first))}{', ...' if defect.count > len(defect.first) else ''}). "
+        "Weld it by position to hold it together there."
+        for defect in defects
+        if defect.kind == "split_border_vertices" and defect.count > 0
+    )
+
+
 @dataclass(frozen=True)
 class Notice:
     """What a server says about itself, or about the session's surface; nothing has failed."""
@@ -312,6 +368,21 @@ class SolveResult:
     effort: int
     """The effort of the search: the one asked for, or the default."""
     trace: tuple[IterationRecord, ...]
+    p: float | Floats | None = None
+    """The p that was used: one number, or one per vertex; None if a server computed it from the geometry."""
+    faces: npt.NDArray[Any] | None = None
+    """m x 3: the triangles that were given, for plot(). None in a session that was joined or restored."""
+
+    def plot(
+        self, faces: npt.ArrayLike | None = None, *, backend: Literal["pyvista", "matplotlib"] | None = None, show: bool = True
+    ) -> Any:
+        """The surface, coloured by distortion up to its 95th percentile. Returns a pyvista.Plotter or a Matplotlib figure,
+        whichever library is there; `backend` chooses. Raises UNIMPLEMENTED (NO_PLOTTER) if neither is."""
+        return plot(self, self.faces if faces is None else np.asarray(faces), backend, show)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        return table_of(self)
 
     @property
     def searched(self) -> str:

@@ -1,0 +1,68 @@
+"""Vertices and triangles of what other libraries call a mesh. None of them is imported: their attributes tell them apart."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lpdeform import types
+from lpdeform.errors import invalid
+
+
+def mesh_arrays(vertices: types.Mesh, faces: types.Triangles | None) -> tuple[Any, Any]:
+    """The arrays of a mesh, or those that were given. Other polygons of a mesh are refused."""
+    if faces is None:
+        return _points_of(vertices), _triangles_of(vertices)
+    if isinstance(faces, (list, tuple)) and len(faces) > 0 and hasattr(faces[0], "type"):
+        return vertices, _of_cells(faces)  # the cells of a mesh of meshio
+    return vertices, _without_counts(faces)
+
+
+def _points_of(mesh: Any) -> Any:
+    for name in ("vertices", "points"):  # trimesh; meshio and PyVista
+        if hasattr(mesh, name):
+            return getattr(mesh, name)
+    if hasattr(mesh, "get_buffer"):  # Polyscope
+        return _buffer(mesh, "vertexPositions").reshape(-1, 3)
+    text = f"There are no faces, and a {type(mesh).__name__} is no mesh of trimesh, meshio, PyVista or Polyscope."
+    raise invalid(text, "ARGUMENT_MISSING", "faces")
+
+
+def _triangles_of(mesh: Any) -> Any:
+    if hasattr(mesh, "cells") and not hasattr(mesh, "faces"):  # meshio
+        return _of_cells(mesh.cells)
+    if hasattr(mesh, "faces"):  # trimesh and PyVista
+        return _without_counts(mesh.faces)
+    if hasattr(mesh, "get_buffer"):
+        return _buffer(mesh, "triangleVertexInds").reshape(-1, 3)
+    raise invalid(f"A {type(mesh).__name__} has no triangles.", "ARGUMENT_MISSING", "faces")
+
+
+def _of_cells(cells: Any) -> Any:
+    """Blocks of cells of meshio. Lines and single vertices are no part of a surface."""
+    blocks = [block for block in cells if block.type not in ("line", "vertex")]
+    for block in blocks:
+        if block.type != "triangle":
+            text = f"The mesh has cells of type {block.type}: only triangles can be deformed."
+            raise invalid(text, "ARRAY_SHAPE", "cells", "triangle")
+    return np.concatenate([np.zeros((0, 3), np.int64), *(np.asarray(block.data) for block in blocks)])
+
+
+def _without_counts(faces: Any) -> Any:
+    """PyVista writes faces one after another, with the number of corners before each."""
+    array = np.asarray(faces)
+    if array.ndim != 1 or array.size == 0 or array.dtype.kind not in "iu":
+        return faces
+    is_counted = array.size % 4 == 0 and bool((array[::4] == 3).all())
+    if is_counted and array.size != 12:  # 12 numbers may be the four triangles of a tetrahedron
+        return array.reshape(-1, 4)[:, 1:]
+    if array.size % 3 != 0:
+        text = "The faces are a flat array whose polygons are not all triangles."
+        raise invalid(text, "ARRAY_SHAPE", "faces", "(k, 3), or 3 before each triangle")
+    return faces
+
+
+def _buffer(mesh: Any, name: str) -> Any:
+    buffer = mesh.get_buffer(name)
+    return np.asarray([buffer.get_value(k) for k in range(buffer.size())])
