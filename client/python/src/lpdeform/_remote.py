@@ -21,6 +21,7 @@ from lpdeform._undo import undo
 from lpdeform.errors import LpdeformError
 from lpdeform.types import Automatic, BetterShape, Floats, FrameOptions, Handle, MeshReport, SolveResult, Update
 
+
 class RemoteLink(Link):
     """A link with its calls."""
 
