@@ -96,8 +96,10 @@ def one_block(line, info, body):
     if not directive:
         return [Block(line, info, "\n".join(body) + "\n")]
     if directive[1] not in ("code-block", "code-cell"):
-        if directive[1] in ("code", "sourcecode", "literalinclude", "parsed-literal", "doctest", "eval-rst"):
+        if directive[1] in ("code", "sourcecode", "literalinclude", "parsed-literal", "doctest"):
             raise WrongPage(f"line {line}: {directive[1]} is not run")
+        if directive[1] == "eval-rst" and not all(re.match(r"\.\. auto|   :|$", one) for one in body):
+            raise WrongPage(f"line {line}: eval-rst may only name what autodoc is to document")
         if any(re.match(r" *(```|~~~|:::|    )", one) for one in body):
             raise WrongPage(f"line {line}: code within {directive[1]} is not run")
         return []
