@@ -19,6 +19,7 @@ import dataclasses
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -244,6 +245,8 @@ def environment_of(addresses):
     own["LPDEFORM_ADDRESS"] = addresses["localhost:50051"]
     own["MPLBACKEND"] = "agg"
     own["CMAKE_PREFIX_PATH"] = str(BUILD.parent / "docs" / "client")
+    if shutil.which("ccache"):  # a page that has not changed is not compiled again
+        own["CMAKE_CXX_COMPILER_LAUNCHER"] = "ccache"
     return own
 
 
