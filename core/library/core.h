@@ -11,9 +11,10 @@
 /// Deforms triangle meshes by handles, so that the L_p distortion energy of Gao, Zhang and Lai, "L_p shape deformation"
 /// (Science China Information Sciences 55, 2012, doi 10.1007/s11432-012-4574-y), is least:
 ///
-///   E = sum_i s_i E_i^p,   E_i^2 = min over rotations R of sum_j w_ij |(x_i - x_j) - R (p_i - p_j)|^2
+///   E = sum_i s_i l^2 (E_i / l)^p,   E_i^2 = min over rotations R of sum_j w_ij |(x_i - x_j) - R (p_i - p_j)|^2
 ///
-/// with p = 2 that of Sorkine and Alexa, "As-rigid-as-possible surface modeling" (2007).
+/// with the stiffness s_i and the length unit l of Settings. With p = 2 it is that of Sorkine and Alexa,
+/// "As-rigid-as-possible surface modeling" (2007).
 ///
 ///   using namespace lpdeform::core;
 ///   auto result = deform(mesh, {{"base", {.vertices = base}},

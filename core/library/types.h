@@ -163,7 +163,7 @@ struct SolveResult {
   std::vector<double> distortion = {};  // E_i >= 0 of each vertex, a length
   StopReason stop_reason = StopReason::kRunning;
   int iterations = 0;
-  double energy = 0;       // E = sum of s_i E_i^p, with the soft terms (Eq. 3 of the paper)
+  double energy = 0;       // E of core.h, with the soft terms
   double soft_energy = 0;  // the part of the soft terms
   /// (E - lower bound) / E of the convex problem with the rotations held; empty if it was not asked for.
   std::optional<double> optimality_gap = {};
