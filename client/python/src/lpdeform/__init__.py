@@ -14,11 +14,11 @@ To drag, call `s.drag("tip", ...)` on every mouse move and `s.poll()` once per p
 wins. `s.solve()` returns one finished result, with its trace and a bound on its distance from the optimum.
 """
 
+import importlib
 from typing import TYPE_CHECKING
 
 from lpdeform._deform import deform
 from lpdeform.access import Tls
-from lpdeform.aio import AsyncSession, join_async, open_async, restore_async
 from lpdeform.errors import Code, InvalidInput, LpdeformError, SplitMeshWarning, Timeout, Unavailable
 from lpdeform.frames import Frame, QuantizedSurface
 from lpdeform.opening import join, open, restore
@@ -53,16 +53,22 @@ from lpdeform.types import (
 
 if TYPE_CHECKING:
     from lpdeform._assembly import FrameAssembly
+    from lpdeform.aio import AsyncSession, join_async, open_async, restore_async
 
 __version__ = "0.1.0"
+_when_asked_for = {
+    "AsyncSession": "aio",
+    "FrameAssembly": "_assembly",  # reads a server's messages, which need lpdeform[remote]
+    "join_async": "aio",
+    "open_async": "aio",
+    "restore_async": "aio",
+}
 
 
 def __getattr__(name: str) -> object:
-    """FrameAssembly reads a server's messages, which need lpdeform[remote]."""
-    if name == "FrameAssembly":
-        from lpdeform._assembly import FrameAssembly
-
-        return FrameAssembly
+    """What not every program needs: asyncio alone takes a third of the time that an import takes."""
+    if name in _when_asked_for:
+        return getattr(importlib.import_module(f"lpdeform.{_when_asked_for[name]}"), name)
     raise AttributeError(f"module 'lpdeform' has no attribute {name!r}")
 
 

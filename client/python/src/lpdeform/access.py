@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import ssl
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -107,6 +105,8 @@ def _bytes(text: str | bytes | None) -> bytes | None:
 
 
 def _check_certificates(name: str, text: bytes) -> None:
+    import ssl
+
     try:
         ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).load_verify_locations(cadata=text.decode("ascii", errors="ignore"))
     except (ssl.SSLError, ValueError) as error:
@@ -114,6 +114,9 @@ def _check_certificates(name: str, text: bytes) -> None:
 
 
 def _check_own(chain: bytes, key: bytes) -> None:
+    import ssl
+    import tempfile
+
     if b"PRIVATE KEY-----" not in key:
         raise invalid("private_key is no private key in PEM.", "TLS_PRIVATE_KEY", "private_key", "PEM, without a password")
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
