@@ -244,7 +244,7 @@ def environment_of(addresses):
     own["PYTHONPATH"] = str(ROOT / "build" / "docs-tools")
     own["LPDEFORM_ADDRESS"] = addresses["localhost:50051"]
     own["MPLBACKEND"] = "agg"
-    own["CMAKE_PREFIX_PATH"] = str(BUILD.parent / "docs" / "client")
+    own["CMAKE_PREFIX_PATH"] = str(BUILD.parent / "docs" / "installed")
     if shutil.which("ccache"):  # a page that has not changed is not compiled again
         own["CMAKE_CXX_COMPILER_LAUNCHER"] = "ccache"
     return own
