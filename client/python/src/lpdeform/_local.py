@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import logging
 import os
 import threading
@@ -16,7 +15,7 @@ import numpy as np
 from lpdeform._alone import alone
 from lpdeform._box import FrameBox
 from lpdeform._checks import checked_update
-from lpdeform._core import Session, Stream, create, end_threads, forget_threads
+from lpdeform._core import Session, Stream, create, forget_threads
 from lpdeform._ledger import Ledger, NumberedUpdate
 from lpdeform._notices import Notices
 from lpdeform._numbers import Copied
@@ -47,7 +46,6 @@ _interrupt_seconds = 0.05
 _log = logging.getLogger("lpdeform")
 _sessions: weakref.WeakValueDictionary[str, Session] = weakref.WeakValueDictionary()
 
-atexit.register(end_threads)  # after the sessions of session.py are closed, which register later
 os.register_at_fork(after_in_child=forget_threads)
 
 

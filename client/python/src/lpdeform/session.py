@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import sys
 import threading
 import time
 import weakref
@@ -53,6 +54,9 @@ _links: weakref.WeakSet[Opened] = weakref.WeakSet()
 def _close_all() -> None:
     for link in list(_links):
         link.close()
+    core = sys.modules.get("lpdeform._core")
+    if core is not None:
+        core.end_threads()
 
 
 def _abandon(link: Opened) -> None:
