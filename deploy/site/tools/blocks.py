@@ -240,7 +240,7 @@ def services(texts):
 
 def environment_of(addresses):
     own = dict(os.environ)
-    own["PATH"] = os.pathsep.join([str(BUILD / "bin"), str(PYTHON.parent), str(NODE.parent), own["PATH"]])
+    own["PATH"] = os.pathsep.join([str(BUILD / "bin"), str(NODE.parent), own["PATH"], str(PYTHON.parent)])
     own["PYTHONPATH"] = str(ROOT / "build" / "docs-tools")
     own["LPDEFORM_ADDRESS"] = addresses["localhost:50051"]
     own["MPLBACKEND"] = "agg"
