@@ -242,7 +242,6 @@ def environment_of(addresses):
     own = dict(os.environ)
     own["PATH"] = os.pathsep.join([str(BUILD / "bin"), str(NODE.parent), own["PATH"], str(PYTHON.parent)])
     own["PYTHONPATH"] = str(ROOT / "build" / "docs-tools")
-    own["LPDEFORM_ADDRESS"] = addresses["localhost:50051"]
     own["MPLBACKEND"] = "agg"
     own["CMAKE_PREFIX_PATH"] = str(BUILD.parent / "docs" / "installed")
     if shutil.which("ccache"):  # a page that has not changed is not compiled again
