@@ -11,6 +11,7 @@ import time
 import grpc
 
 import lpdeform
+import lpdeform._rpc
 from lpdeform.v1 import handle_pb2, service_pb2
 
 from machines import PATIENCE

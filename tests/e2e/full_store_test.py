@@ -21,7 +21,7 @@ import urllib.request
 import grpc
 
 import programs
-from lpdeform import errors
+from lpdeform import _status
 from lpdeform.v1 import data_pb2, handle_pb2, service_pb2
 
 SERVICE = "/lpdeform.v1.DeformService/"
@@ -130,7 +130,7 @@ class FullDisk(OfServers):
         with self.assertRaises(grpc.RpcError) as caught:
             client.create(height)
         self.assertEqual(caught.exception.code(), grpc.StatusCode.RESOURCE_EXHAUSTED, caught.exception)
-        error = errors.from_call(caught.exception, "")
+        error = _status.from_call(caught.exception, "")
         self.assertEqual(error.reason, "STORE_FULL")
         self.assertGreaterEqual(error.retry_after, 1)
         self.assertNotIn(self.disk, str(caught.exception), "where the store is, is nobody's business")

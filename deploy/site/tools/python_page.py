@@ -6,6 +6,7 @@ import inspect
 import lpdeform
 
 GROUPS = {
+    "In one call": ("deform",),
     "Open a session": ("open", "join", "restore", "open_async", "join_async", "restore_async", "Tls"),
     "Sessions": ("Session", "AsyncSession"),
     "Handles": ("Handle", "Fixed", "RigidMotion", "Targets", "Resize", "Exact", "Soft", "Orientation", "AxisLock", "PlaneLock",
@@ -13,7 +14,7 @@ GROUPS = {
     "Settings": ("Settings", "SolverSettings", "MinimaSearch", "Automatic"),
     "Results": ("Frame", "SolveResult", "IterationRecord", "SolveProgress", "MeshReport", "Defect", "Notice", "BetterShape",
                 "QuantizedSurface", "FrameAssembly"),
-    "Errors": ("LpdeformError", "InvalidInput", "Unavailable", "Timeout", "Code", "Reason"),
+    "Errors": ("LpdeformError", "InvalidInput", "Unavailable", "Timeout", "Code", "Reason", "SplitMeshWarning"),
 }
 HEAD = """# Python
 
