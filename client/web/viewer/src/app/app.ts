@@ -268,23 +268,19 @@ export class App implements Workbench {
     return this.cancelGesture() || held.includes(true);
   }
 
-  undo(): void {
-    this.#step(() => this.history.undo());
-  }
-
-  redo(): void {
-    this.#step(() => this.history.redo());
-  }
-
   /** A handle that comes back is selected again if it was when it went. */
-  #step(take: () => boolean): void {
+  undo(): void {
     const { handles } = this.document;
-    if (!take()) return;
+    if (!this.history.undo()) return;
     this.#documentChanged(performance.now());
     if (this.view.now.selected !== undefined) return;
     const back = this.document.handles.filter(({ name }) => !handles.some((one) => one.name === name));
     const one = back.find(({ name }) => name === this.#deselected) ?? (back.length === 1 ? back[0] : undefined);
     if (one) this.view.set({ selected: one.name });
+  }
+
+  redo(): void {
+    if (this.history.redo()) this.#documentChanged(performance.now());
   }
 
   notify(text: string, isBad = false): void {
