@@ -80,12 +80,19 @@ struct Session::Impl {
   HandleSet handles;
   bool is_changed = false;  // the deformer has other handles
 
-  absl::Status set_all(HandleSet wanted) {
-    const auto vertices = static_cast<std::int32_t>(mesh.vertices.rows());
-    absl::Status status = check_handles(wanted, vertices, static_cast<std::int32_t>(mesh.faces.rows()));
-    if (!status.ok()) return status;
+  absl::Status check(const HandleSet& wanted) const {
+    return check_handles(wanted, static_cast<std::int32_t>(mesh.vertices.rows()),
+                         static_cast<std::int32_t>(mesh.faces.rows()));
+  }
+
+  void take(HandleSet wanted) {
     handles = std::move(wanted);
     is_changed = true;
+  }
+
+  absl::Status set_all(HandleSet wanted) {
+    absl::Status status = check(wanted);
+    if (status.ok()) take(std::move(wanted));
     return status;
   }
 
@@ -173,13 +180,14 @@ Result<void> Session::set(const Settings& settings) {
   if (settings.stiffness) material.stiffness = converted(*settings.stiffness);
   if (settings.length_unit) material.length_unit = *settings.length_unit;
   HandleSet wanted = impl_->handles;
+  absl::Status status;
   if (settings.region) {
-    const absl::Status status = impl_->set_region(wanted, *settings.region);
-    if (!status.ok()) return error_of(status);
+    status = impl_->set_region(wanted, *settings.region);
+    status.Update(impl_->check(wanted));
   }
-  const absl::Status status = impl_->deformer->set_material(material);
-  if (!status.ok()) return error_of(status);
-  return result_of(settings.region ? impl_->set_all(std::move(wanted)) : absl::OkStatus());
+  if (status.ok()) status = impl_->deformer->set_material(material);
+  if (status.ok() && settings.region) impl_->take(std::move(wanted));
+  return result_of(status);
 }
 
 Result<void> Session::set_positions(const std::vector<double>& positions) {

@@ -166,6 +166,12 @@ def slow() -> tuple[Grid, lpdeform.Session]:
     return shape, session
 
 
+@pytest.mark.parametrize("timeout", [-1.0, float("nan")])
+def test_a_time_that_is_none_is_refused(shape: Grid, timeout: float) -> None:
+    with pytest.raises(lpdeform.InvalidInput, match="SECONDS_OUT_OF_RANGE"):
+        lpdeform.deform(shape.vertices, shape.faces, {"left": shape.left}, timeout=timeout)
+
+
 def test_an_interrupt_ends_a_solve_soon_and_the_session_goes_on() -> None:
     shape, session = slow()
     with session:

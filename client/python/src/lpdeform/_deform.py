@@ -15,6 +15,7 @@ from lpdeform._solving import SolveOptions, checked_positions
 from lpdeform._stop import Stop
 from lpdeform.access import Tls, Token
 from lpdeform.opening import checked_mesh, reach, warn_of_splits
+from lpdeform.session import deadline_after
 from lpdeform.types import Field, FrameOptions, FreeComponents, Settings, SolveProgress, SolverSettings, WeightKind
 
 
@@ -76,6 +77,8 @@ def deform(
     given = checked_mesh(points, triangles, normals, settings, weights, free_components, weld)
     held = handles_of(handles or {}, given.vertices)
     initial = checked_positions(initial_positions, len(given.vertices))
+    if timeout is not None:
+        deadline_after(timeout)
     stop = Stop()
     link = reach(address, token, tls).open(given, held, FrameOptions(), stop, False)
     try:

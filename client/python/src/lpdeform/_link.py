@@ -12,8 +12,7 @@ import grpc
 
 from lpdeform import _wire
 from lpdeform._assembly import FrameAssembly
-from lpdeform._box import FrameBox
-from lpdeform._checks import checked_update
+from lpdeform._following import Following
 from lpdeform._lease import Lease, Original, Snapshot, check_vertex_count, create_session, join_session, restore_session
 from lpdeform._ledger import Ledger
 from lpdeform._recovery import Answer, Backoff, Ending, Judge, Next, RecoveryRules
@@ -24,71 +23,59 @@ from lpdeform._status import from_call, from_fault
 from lpdeform._stream import Stream
 from lpdeform.errors import Code, LpdeformError, again, exception, make, session_closed
 from lpdeform.frames import Frame
-from lpdeform.types import Connection, Notice, Update
+from lpdeform.types import Connection, MeshReport, Notice, Update
 from lpdeform.v1 import frame_pb2, service_pb2
 
 _closing_seconds = 3.0
 _log = logging.getLogger("lpdeform")
 
 
-class Link:
+class Link(Following):
     """One thread reads a stream and opens the next one. A thread of gRPC runs requests(), which sends. Calls come on any thread.
 
     `changed` guards all state. No call to the server is made while it is held.
     """
 
     def __init__(
-        self, rpc: Rpc, lease: Lease, options: frame_pb2.FrameOptions, original: Original | Snapshot | None
+        self,
+        rpc: Rpc,
+        lease: Lease,
+        options: frame_pb2.FrameOptions,
+        original: Original | Snapshot | None,
+        is_live: bool = True,
     ) -> None:
+        ledger = Ledger(begins_bare=not isinstance(original, Snapshot))
+        super().__init__(ledger, lease.epoch, lease.input_seq, is_live)
         self.rpc = rpc
         self.original = original
-        self.box = FrameBox()
-        self.stop = Stop()
-        self.ledger = Ledger(begins_bare=not isinstance(original, Snapshot))
         self.judge = Judge()
-        self.changed = threading.Condition()
-        self.is_solving = False
-        self.is_closing = False
-        self.is_live = True
-        """Whether frames are wanted; otherwise no stream is opened."""
         self.lease = lease
-        self.interruption: LpdeformError | None = None
         self.options = options
         self.is_recreated = False
         """Whether the session was lost and all its handles were sent again in one update."""
         self._request_id = new_request_id()
         self._renewing = threading.Lock()
-        self._over: LpdeformError | None = None
-        self._thread: threading.Thread | None = None
         self._stream: Stream | None = None
         self._stream_count = 0
         self._last_open = 0.0
         self._is_to_reopen = False
         self._is_taking_over = False
         self._rules = RecoveryRules(original is not None, rpc.reconnect_for)
-        self.ledger.count_from(lease.input_seq)
-        self.ledger.begin_epoch(lease.epoch)
+
+    @property
+    def report(self) -> MeshReport:
+        return self.lease.report
+
+    @property
+    def is_writer(self) -> bool:
+        return bool(self.lease.writer_token)
 
     # Calls from users, on their own threads.
 
     def update(self, update: Update) -> int:
-        report = self.lease.report
-        checked = checked_update(update, report.vertices, report.faces)
-        with self.changed:
-            if self.is_closing:
-                raise session_closed()
-            if self._over is not None:
-                raise again(self._over)
-            self.require_writer()
-            seq = self.ledger.add(checked)
-            self.changed.notify_all()
+        seq = self.enter(update)
         self.start_stream()
         return seq
-
-    def require_writer(self) -> None:
-        if not self.lease.writer_token:
-            text = "A reader cannot change the session: take_over() first."
-            raise make(Code.FAILED_PRECONDITION, text, "NOT_THE_WRITER")
 
     def start_stream(self) -> None:
         with self.changed:
@@ -108,22 +95,6 @@ class Link:
             return None
         self._acknowledge(taken.frame.frame_seq, taken.stream)
         return taken.frame
-
-    def take_result(self) -> Frame | None:
-        """The frame taken last, by any caller, if it is the finished result of the newest update.
-
-        Raises the refusal first if the last frame is the result only because a newer update has been refused meanwhile.
-        """
-        self.take()
-        last = self.box.last_final
-        if last is None or not self.is_result(last):
-            return None
-        self.box.raise_problem()
-        return last
-
-    def is_result(self, frame: Frame) -> bool:
-        with self.changed:
-            return frame.is_final and frame.input_seq >= self.ledger.newest
 
     def no_frame(self) -> LpdeformError:
         with self.changed:

@@ -13,16 +13,15 @@ from typing import Any
 import numpy as np
 
 from lpdeform._alone import alone
-from lpdeform._box import FrameBox
-from lpdeform._checks import checked_update
 from lpdeform._core import Session, Stream, create, forget_threads
+from lpdeform._following import Following
 from lpdeform._ledger import Ledger, NumberedUpdate
 from lpdeform._notices import Notices
 from lpdeform._numbers import Copied
 from lpdeform._opened import Connecting, Given
 from lpdeform._solving import SolveOptions
 from lpdeform._stop import Stop
-from lpdeform.errors import Code, LpdeformError, about, again, exception, is_taken_all_the_same, make, session_closed
+from lpdeform.errors import Code, LpdeformError, about, exception, is_taken_all_the_same, make, session_closed
 from lpdeform.frames import Frame, FrameHeader, QuantizedSurface, sealed
 from lpdeform.types import (
     BetterShape,
@@ -49,7 +48,7 @@ _sessions: weakref.WeakValueDictionary[str, Session] = weakref.WeakValueDictiona
 os.register_at_fork(after_in_child=forget_threads)
 
 
-class LocalLink:
+class LocalLink(Following):
     """One thread takes frames from the session. Calls come on any thread. `changed` guards all state; the session is not called
     while it is held."""
 
@@ -63,29 +62,26 @@ class LocalLink:
         is_live: bool = True,
     ) -> None:
         """`given`: what the session was made of, by its owner. `writer`: token, epoch and newest update; the token is empty for a reader."""
-        self.box = FrameBox()
-        self.changed = threading.Condition()
-        self.ledger = Ledger()
-        self.stop = Stop()
-        self.is_solving = False
-        self.is_closing = False
-        self.interruption: LpdeformError | None = None
-        self.report = _report_of(session)
+        self._token, epoch, newest = writer
+        super().__init__(Ledger(), epoch, newest, is_live)
+        self._report = _report_of(session)
         self.name = session.name
         self.address = ADDRESS
         self._session = session
-        self._token, epoch, newest = writer
         self._options = options
         self._call_timeout = call_timeout
         self._given = given
-        self._is_live = is_live
         self._sending = threading.Lock()
         self._notices = Notices()
-        self._over: LpdeformError | None = None
-        self._thread: threading.Thread | None = None
         self._stream: Stream | None = None
-        self.ledger.count_from(newest)
-        self.ledger.begin_epoch(epoch)
+
+    @property
+    def report(self) -> MeshReport:
+        return self._report
+
+    @property
+    def is_writer(self) -> bool:
+        return bool(self._token)
 
     @property
     def vertices(self) -> Copied | None:
@@ -98,23 +94,11 @@ class LocalLink:
     # Changes.
 
     def update(self, update: Update) -> int:
-        checked = checked_update(update, self.report.vertices, self.report.faces)
-        with self.changed:
-            if self.is_closing:
-                raise session_closed()
-            if self._over is not None:
-                raise again(self._over)
-            self._require_writer()
-            seq = self.ledger.add(checked)
-        if self._is_live:  # otherwise solve() sends it, and raises what is wrong
+        seq = self.enter(update)
+        if self.is_live:  # otherwise solve() sends it, and raises what is wrong
             self._send_waiting(self.box.put_problem)
             self._start_stream()
         return seq
-
-    def _require_writer(self) -> None:
-        if not self._token:
-            text = "A reader cannot change the session: take_over() first."
-            raise make(Code.FAILED_PRECONDITION, text, "NOT_THE_WRITER")
 
     def _send_waiting(self, refused: Any = None) -> None:
         """Gives the session what waits, in order. With `refused`, calls it with an error instead of raising it, and leaves
@@ -146,7 +130,7 @@ class LocalLink:
 
     def _start_stream(self) -> None:
         with self.changed:
-            if not self._is_live or self._thread is not None or self.is_closing or self._over is not None:
+            if not self.is_live or self._thread is not None or self.is_closing or self._over is not None:
                 return
             self._stream = self._session.open_stream(self._token, self._options)
             self._thread = threading.Thread(
@@ -216,19 +200,6 @@ class LocalLink:
             stream.acknowledge(taken.frame.frame_seq)
         return taken.frame
 
-    def take_result(self) -> Frame | None:
-        """As Link.take_result()."""
-        self.take()
-        last = self.box.last_final
-        if last is None or not self.is_result(last):
-            return None
-        self.box.raise_problem()
-        return last
-
-    def is_result(self, frame: Frame) -> bool:
-        with self.changed:
-            return frame.is_final and frame.input_seq >= self.ledger.newest
-
     def no_frame(self) -> LpdeformError:
         return make(Code.DEADLINE_EXCEEDED, "No new frame came in time.", "NO_FRAME")
 
@@ -285,7 +256,7 @@ class LocalLink:
             self._notices.better = None
 
     def undo(self, redo: bool, stop: Stop) -> int:
-        self._require_writer()
+        self.require_writer()
         try:
             with alone(self, self._call_timeout, stop):
                 self._send_waiting()
@@ -299,7 +270,7 @@ class LocalLink:
         return seq
 
     def take_better_shape(self, stop: Stop) -> BetterShape:
-        self._require_writer()
+        self.require_writer()
         if self.is_closing:
             raise session_closed()
         try:
@@ -374,12 +345,7 @@ class Local(Connecting):
         )
         _sessions[session.name] = session
         link = LocalLink(session, session.lease(), options, self._call_timeout, given, is_live)
-        if handles:
-            try:
-                link.update(Update(dict(handles)))
-            except BaseException:
-                link.close()
-                raise
+        link.begin_with(handles)
         return link
 
     def join(self, name: str, as_writer: bool, options: FrameOptions, stop: Stop) -> LocalLink:

@@ -19,7 +19,7 @@ from lpdeform._solving import SolveOptions
 from lpdeform._stop import Stop
 from lpdeform._undo import undo
 from lpdeform.errors import LpdeformError
-from lpdeform.types import Automatic, BetterShape, Floats, FrameOptions, Handle, MeshReport, SolveResult, Update
+from lpdeform.types import Automatic, BetterShape, Floats, FrameOptions, Handle, SolveResult
 
 
 class RemoteLink(Link):
@@ -32,10 +32,6 @@ class RemoteLink(Link):
     @property
     def address(self) -> str:
         return self.rpc.address
-
-    @property
-    def report(self) -> MeshReport:
-        return self.lease.report
 
     def solve(self, options: SolveOptions, stop: Stop) -> SolveResult:
         result = solve(self, options, stop)
@@ -92,14 +88,8 @@ class Remote(Connecting):
         except BaseException:
             self._rpc.close()
             raise
-        link = RemoteLink(self._rpc, lease, _wire.frame_options_to_wire(options), original)
-        link.is_live = is_live
-        if handles:
-            try:
-                link.update(Update(dict(handles)))
-            except BaseException:
-                link.close()
-                raise
+        link = RemoteLink(self._rpc, lease, _wire.frame_options_to_wire(options), original, is_live)
+        link.begin_with(handles)
         return link
 
     def join(self, name: str, as_writer: bool, options: FrameOptions, stop: Stop) -> RemoteLink:

@@ -76,6 +76,23 @@ describe("the pulse", () => {
     pulse.stop();
   });
 
+  it("asks nothing while something comes from the server, and is not silent as soon as something does", async () => {
+    const ask = vi.fn<() => Promise<void>>(() => new Promise(() => undefined));
+    const told: boolean[] = [];
+    const pulse: Pulse = new Pulse(ask, () => told.push(pulse.isSilent));
+    pulse.start();
+    for (let k = 0; k < 50; ++k) {
+      await after(100);
+      pulse.heard();
+    }
+    expect(ask).not.toHaveBeenCalled();
+    await after(1500);
+    expect(told).toEqual([true]);
+    pulse.heard();
+    expect(told).toEqual([true, false]);
+    pulse.stop();
+  });
+
   it("takes a refusal for an answer, and asks nothing once it is stopped", async () => {
     const ask = vi.fn<() => Promise<void>>(() => Promise.reject(new Error("no")));
     const changed = vi.fn();

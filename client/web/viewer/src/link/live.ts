@@ -234,6 +234,7 @@ export class Live {
       for await (const frame of session) {
         if (this.#over.signal.aborted) break;
         hadFrames = true;
+        this.#pulse.heard();
         this.#waiting = frame;
         const taken = new Promise<void>((resolve) => (this.#taken = resolve));
         this.watcher.frame();

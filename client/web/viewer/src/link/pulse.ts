@@ -30,6 +30,12 @@ export class Pulse {
     this.#timer = setInterval(() => this.#beat(), beatMs);
   }
 
+  /** Something else came from the server: there is no need to ask for a while. */
+  heard(): void {
+    this.#beats = 0;
+    this.#set(false);
+  }
+
   /** Until start(), it asks nothing and is not silent. */
   stop(): void {
     clearInterval(this.#timer);
