@@ -20,8 +20,7 @@ nb_execution_timeout = 120
 nb_merge_streams = True
 
 autodoc_member_order = "bysource"
-autodoc_typehints = "signature"
-autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike"}
+autodoc_typehints = "none"  # they are long unions; the comments say shapes and units
 autodoc_default_options = {"members": True, "show-inheritance": False}
 python_use_unqualified_type_names = True
 

@@ -47,11 +47,9 @@ def deform(
 
     vertices: n x 3, in any unit of length; or a mesh of trimesh, meshio, PyVista or Polyscope, and then without `faces`.
     faces: m x 3 indices from 0, counter-clockwise seen from outside.
-    handles: by name, what is held and where it goes. A handle is one of
-        - a lpdeform.Handle;
-        - (group, motion): a motion is a RigidMotion, or k x 3 target positions for the k vertices of the group;
-        - a group alone, which stays where it is.
-        A group is indices, a boolean mask of length n, or a function that gets the n x 3 vertices and returns either.
+    handles: by name, what is held and where it goes. A handle is a lpdeform.Handle; or (group, motion), where a motion is a
+        RigidMotion, or k x 3 target positions for the k vertices of the group; or a group alone, which stays where it is. A group
+        is indices, a boolean mask of length n, or a function that gets the n x 3 vertices and returns either.
     p: 1 to 64, one number or n; stiffness: 1e-6 to 1e6, one number or n. Either may be lpdeform.Automatic().
     certify: whether to compute optimality_gap, a bound on the distance from the optimum for the result's rotations.
     progress: True for a bar, by tqdm if it is installed; or a function, called with the SolveProgress at most ten times a second.
