@@ -34,6 +34,12 @@ export function merged(older: Update, newer: Update): Update {
   return { handles, settings, ...(resize && { resize }), ...(beginsStep && { beginsStep }) };
 }
 
+/** Both as one update, whichever came first; of equal numbers, `one` is the older. */
+function joined(one: NumberedUpdate, other: NumberedUpdate): NumberedUpdate {
+  const [older, newer] = other.seq < one.seq ? [other, one] : [one, other];
+  return { seq: newer.seq, update: merged(older.update, newer.update) };
+}
+
 /** The state after all motions and removals have been carried out. */
 function settled(state: Update): Update {
   const kept = Object.entries(state.handles ?? {}).filter(([, change]) => "set" in change);
@@ -77,8 +83,11 @@ export class Ledger {
   #accepted: NumberedUpdate = { seq: 0, update: {} };
   /** Accepted since the server last stored something, as sent. */
   #unkept: NumberedUpdate = { seq: 0, update: {} };
+  /** What the server may have lost, with what it has accepted since. */
   #restore: NumberedUpdate | undefined;
   #inFlight: NumberedUpdate[] = [];
+  /** The restores under way, with what to send if they have to be sent again. */
+  readonly #restores = new Map<NumberedUpdate, NumberedUpdate>();
   /** Updates that were answered, and whether they were stored. */
   readonly #answered = new Map<NumberedUpdate, boolean>();
   #waiting: NumberedUpdate | undefined;
@@ -119,10 +128,11 @@ export class Ledger {
   sendNext(): NumberedUpdate {
     const next = this.#restore ?? this.#waiting;
     if (!next) throw new Error("nothing waits");
-    if (this.#restore) this.#restore = undefined;
-    else this.#waiting = undefined;
     const sent = { ...next }; // each sending is an object of its own
     this.#inFlight.push(sent);
+    if (this.#restore) this.#restores.set(sent, sent);
+    if (this.#restore) this.#restore = undefined;
+    else this.#waiting = undefined;
     return sent;
   }
 
@@ -159,22 +169,22 @@ export class Ledger {
       this.#inFlight.shift();
       const isKept = this.#answered.get(sent)!;
       this.#answered.delete(sent);
+      this.#restores.delete(sent);
       this.#takeOn(sent, isKept);
     }
   }
 
   #takeOn({ seq, update }: NumberedUpdate, isKept: boolean): void {
     if (!isKept) {
-      const unkept = withoutOldRemovals(merged(this.#unkept.update, update));
-      this.#unkept = { seq: Math.max(this.#unkept.seq, seq), update: unkept };
+      const { seq: newest, update: unkept } = joined(this.#unkept, { seq, update });
+      this.#unkept = { seq: newest, update: withoutOldRemovals(unkept) };
     } else if (seq >= this.#unkept.seq) {
       this.#unkept = { seq: 0, update: {} };
     }
-    const accepted = merged(this.#accepted.update, update);
-    this.#accepted = {
-      seq: Math.max(this.#accepted.seq, seq),
-      update: this.beginsBare ? settled(accepted) : withoutOldRemovals(accepted),
-    };
+    if (this.#restore) this.#restore = joined(this.#restore, { seq, update });
+    for (const [sent, again] of this.#restores) this.#restores.set(sent, joined(again, { seq, update }));
+    const { seq: newest, update: accepted } = joined(this.#accepted, { seq, update });
+    this.#accepted = { seq: newest, update: this.beginsBare ? settled(accepted) : withoutOldRemovals(accepted) };
   }
 
   /** A number for a change that the server computes itself. */
@@ -190,6 +200,7 @@ export class Ledger {
   /** The server has refused the update from sendNext(). */
   refuse(sent: NumberedUpdate): void {
     this.#inFlight = this.#inFlight.filter((one) => one !== sent);
+    this.#restores.delete(sent);
     this.#takeAnswered();
   }
 
@@ -221,12 +232,11 @@ export class Ledger {
   connectionLost(): void {
     let again: NumberedUpdate | undefined;
     for (const sent of this.#inFlight) {
-      if (sent.seq === this.#accepted.seq)
-        this.#restore = sent; // an unanswered restore stays separate
+      const restore = this.#restores.get(sent); // an unanswered restore stays separate
+      if (restore) this.#restore = this.#restore ? joined(restore, this.#restore) : restore;
       else again = { seq: sent.seq, update: merged(again?.update ?? {}, sent.update) };
     }
-    this.#inFlight = [];
-    this.#answered.clear();
+    this.#forgetInFlight();
     if (!again) return;
     this.#waiting = this.#waiting
       ? { seq: this.#waiting.seq, update: merged(again.update, this.#waiting.update) }
@@ -243,9 +253,14 @@ export class Ledger {
   dropUnaccepted(): void {
     this.#restore = undefined;
     this.#unkept = { seq: 0, update: {} };
-    this.#inFlight = [];
-    this.#answered.clear();
+    this.#forgetInFlight();
     this.#waiting = undefined;
+  }
+
+  #forgetInFlight(): void {
+    this.#inFlight = [];
+    this.#restores.clear();
+    this.#answered.clear();
   }
 
   /** Later numbers are higher than `seq`, the newest that the server knows. */

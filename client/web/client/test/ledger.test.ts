@@ -225,4 +225,63 @@ describe("ledger", () => {
     ledger.resumedAt(1);
     expect(ledger.hasWaiting).toBe(false);
   });
+
+  describe("a stream that says, late, that the server had nothing yet", () => {
+    /** An update that adds the tip was accepted; one that moves it is under way; the state is to be sent again. */
+    function restoringUnderMove() {
+      const ledger = new Ledger();
+      ledger.add({ handles: { tip: { set: { vertices: [1] } } } });
+      ledger.accept(ledger.sendNext());
+      ledger.add({ handles: { tip: { move: at(5) } } });
+      const moved = ledger.sendNext();
+      ledger.resumedAt(0);
+      return { ledger, moved };
+    }
+    const there = { tip: { set: { vertices: [1], motion: at(5) } } };
+
+    test("does not undo the move that was accepted meanwhile", () => {
+      const { ledger, moved } = restoringUnderMove();
+      ledger.accept(moved);
+      const restore = ledger.sendNext();
+      expect(restore).toMatchObject({ seq: 2, update: { handles: there } });
+      ledger.accept(restore);
+      ledger.sessionLost();
+      expect(ledger.sendNext()).toMatchObject({ seq: 2, update: { handles: there } });
+    });
+
+    test("sends everything even if the move was stored, by a server that never had the rest", () => {
+      const { ledger, moved } = restoringUnderMove();
+      ledger.accept(moved, true);
+      expect(ledger.sendNext()).toMatchObject({ seq: 2, update: { handles: there } });
+    });
+
+    test("keeps what waits on top of a restore whose answer never came", () => {
+      const { ledger, moved } = restoringUnderMove();
+      ledger.accept(moved);
+      ledger.sendNext();
+      ledger.add({ settings: { p: 3 } });
+      ledger.connectionLost();
+      expect(ledger.sendNext()).toMatchObject({ seq: 2, update: { handles: there } });
+      expect(ledger.sendNext()).toMatchObject({ seq: 3, update: { handles: {}, settings: { p: 3 } } });
+    });
+  });
+
+  test("has moves that were sent again under those that were sent before them and answered late", () => {
+    const ledger = new Ledger();
+    ledger.add({ handles: { tip: { set: { vertices: [1] } } } });
+    ledger.accept(ledger.sendNext(), true);
+    ledger.add({ handles: { tip: { move: at(1) } } });
+    ledger.accept(ledger.sendNext());
+    ledger.add({ handles: { tip: { move: at(2) } } });
+    const newer = ledger.sendNext();
+    ledger.resumedAt(1);
+    const restore = ledger.sendNext();
+    expect(restore).toMatchObject({ seq: 2, update: { handles: { tip: { move: at(1) } } } });
+    ledger.accept(newer);
+    ledger.connectionLost();
+    expect(ledger.sendNext()).toMatchObject({ seq: 3, update: { handles: { tip: { move: at(2) } } } });
+    ledger.accept(restore);
+    ledger.sessionLost();
+    expect(ledger.sendNext().update.handles).toEqual({ tip: { set: { vertices: [1], motion: at(2) } } });
+  });
 });
