@@ -21,7 +21,7 @@ def grid(columns: int, rows: int) -> tuple[Vertices, Faces]:
 def box(nx: int, ny: int, nz: int) -> tuple[Vertices, Faces]:
     """The closed surface of a box of nx x ny x nz cells."""
     sizes = (nx, ny, nz)
-    squares = []
+    squares: list[npt.NDArray[np.int_]] = []
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
         i, j = (one.reshape(-1) for one in np.meshgrid(np.arange(sizes[u]), np.arange(sizes[v])))

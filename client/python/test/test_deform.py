@@ -9,10 +9,15 @@ import sys
 import textwrap
 import threading
 import time
+from importlib import import_module
+from importlib.util import find_spec
 from types import SimpleNamespace
 
+import meshio
 import numpy as np
+import polyscope
 import pytest
+import trimesh
 
 import lpdeform
 from conftest import PATIENCE, Grid, Place, grid
@@ -94,35 +99,47 @@ def test_errors_name_element_and_limit(place: Place, shape: Grid) -> None:
     assert free.value.reason == "COMPONENT_WITHOUT_HANDLE"
 
 
-class Buffer:
-    def __init__(self, values: np.ndarray) -> None:  # type: ignore[type-arg]
-        self._values = values
+def poly_data(shape: Grid) -> object:
+    """A mesh of PyVista, or, where PyVista is not there, an object with the attributes of one."""
+    if find_spec("pyvista"):
+        return import_module("pyvista").PolyData.from_regular_faces(shape.vertices, shape.faces)
+    counted = np.column_stack([np.full(len(shape.faces), 3), shape.faces]).ravel()
+    return SimpleNamespace(points=shape.vertices.astype(np.float32), faces=counted)
 
-    def size(self) -> int:
-        return len(self._values)
 
-    def get_value(self, k: int) -> object:
-        return self._values[k]
+def unstructured_grid(shape: Grid, corners: int = 3) -> object:
+    counted = np.column_stack([np.full(len(shape.faces), 3), shape.faces]).ravel()
+    types = np.full(len(shape.faces), 5, np.uint8)
+    if corners == 4:
+        counted, types = np.concatenate([[4, 0, 1, 13, 12], counted]), np.concatenate([[np.uint8(9)], types])
+    if find_spec("pyvista"):
+        return import_module("pyvista").UnstructuredGrid(counted, types, shape.vertices)
+    return SimpleNamespace(points=shape.vertices, cells=counted, celltypes=types)
+
+
+def polyscope_mesh(vertices: object, faces: object) -> object:
+    polyscope.set_use_prefs_file(False)
+    polyscope.init("openGL_mock")
+    return polyscope.register_surface_mesh("mesh", vertices, faces)
 
 
 def meshes(shape: Grid) -> dict[str, object]:
-    """Objects with the attributes that the libraries' meshes have."""
-    counted = np.column_stack([np.full(len(shape.faces), 3), shape.faces]).ravel()
-    buffers = {"vertexPositions": Buffer(shape.vertices), "triangleVertexInds": Buffer(shape.faces.ravel())}
-    cells = [
-        SimpleNamespace(type="line", data=np.array([[0, 1]])),
-        SimpleNamespace(type="triangle", data=shape.faces[:100]),
-        SimpleNamespace(type="triangle", data=shape.faces[100:]),
-    ]
+    cells = [("vertex", [[0]]), ("line", [[0, 1]]), ("triangle", shape.faces[:100]), ("triangle", shape.faces[100:])]
+    solid = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
     return {
-        "trimesh": SimpleNamespace(vertices=shape.vertices, faces=shape.faces),
-        "meshio": SimpleNamespace(points=shape.vertices, cells=cells),
-        "pyvista": SimpleNamespace(points=shape.vertices.astype(np.float32), faces=counted),
-        "polyscope": SimpleNamespace(get_buffer=buffers.__getitem__),
+        "trimesh": solid,
+        "trimesh_scene": trimesh.Scene([solid]),
+        "meshio": meshio.Mesh(shape.vertices, cells),
+        "pyvista": poly_data(shape),
+        "pyvista_grid": unstructured_grid(shape),
+        "polyscope": polyscope_mesh(shape.vertices, shape.faces),
     }
 
 
-@pytest.mark.parametrize("library", ["trimesh", "meshio", "pyvista", "polyscope"])
+LIBRARIES = ["trimesh", "trimesh_scene", "meshio", "pyvista", "pyvista_grid", "polyscope"]
+
+
+@pytest.mark.parametrize("library", LIBRARIES)
 def test_meshes_of_other_libraries_are_taken_as_they_are(shape: Grid, library: str) -> None:
     handles = {"left": shape.left, "right": (shape.right, shape.vertices[shape.right] + [0, 0, 2])}
     result = lpdeform.deform(meshes(shape)[library], handles=handles)  # type: ignore[arg-type]
@@ -139,8 +156,14 @@ def test_parts_of_other_libraries_meshes_are_taken_as_faces(shape: Grid) -> None
 
 
 def test_what_is_no_triangle_mesh_is_refused_by_name(shape: Grid) -> None:
-    quads = SimpleNamespace(points=shape.vertices, cells=[SimpleNamespace(type="quad", data=np.array([[0, 1, 2, 3]]))])
-    for mesh, said in ((quads, "quad"), (SimpleNamespace(), "SimpleNamespace"), (shape.vertices, "ndarray")):
+    refused = (
+        (meshio.Mesh(shape.vertices, [("quad", [[0, 1, 2, 3]])]), "quad"),
+        (unstructured_grid(shape, corners=4), "type 9"),
+        (polyscope_mesh(shape.vertices, [[0, 1, 13, 12]]), "no triangles"),
+        (SimpleNamespace(), "SimpleNamespace"),
+        (shape.vertices, "ndarray"),
+    )
+    for mesh, said in refused:
         with pytest.raises(lpdeform.InvalidInput, match=said):
             lpdeform.open(mesh)  # type: ignore[arg-type]
 

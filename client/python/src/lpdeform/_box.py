@@ -29,7 +29,7 @@ class FrameBox:
         self._newest: Taken | None = None
         self.last_final: Frame | None = None
         """The frame that take() returned last, if it is final."""
-        self.takes = 0
+        self.takes: int = 0
         """How often take() returned or raised something."""
         self._epoch = 0
         self._input_seq = 0

@@ -9,10 +9,14 @@ import numpy as np
 from lpdeform import types
 from lpdeform.errors import invalid
 
+_vtk_triangle = 5
+
 
 def mesh_arrays(vertices: types.Mesh, faces: types.Triangles | None) -> tuple[Any, Any]:
     """The arrays of a mesh, or those that were given. Other polygons of a mesh are refused."""
     if faces is None:
+        if hasattr(vertices, "geometry") and hasattr(vertices, "to_mesh"):
+            vertices = vertices.to_mesh()  # a scene of trimesh: all its meshes as one, each where it stands
         return _points_of(vertices), _triangles_of(vertices)
     if isinstance(faces, (list, tuple)) and len(faces) > 0 and hasattr(faces[0], "type"):
         return vertices, _of_cells(faces)  # the cells of a mesh of meshio
@@ -24,18 +28,23 @@ def _points_of(mesh: Any) -> Any:
         if hasattr(mesh, name):
             return getattr(mesh, name)
     if hasattr(mesh, "get_buffer"):  # Polyscope
-        return _buffer(mesh, "vertexPositions").reshape(-1, 3)
+        return np.asarray([_coordinates(one) for one in _buffer(mesh, "vertexPositions")]).reshape(-1, 3)
     text = f"There are no faces, and a {type(mesh).__name__} is no mesh of trimesh, meshio, PyVista or Polyscope."
     raise invalid(text, "ARGUMENT_MISSING", "faces")
 
 
 def _triangles_of(mesh: Any) -> Any:
+    if hasattr(mesh, "celltypes"):  # PyVista's UnstructuredGrid
+        return _of_celltypes(mesh.cells, np.asarray(mesh.celltypes))
     if hasattr(mesh, "cells") and not hasattr(mesh, "faces"):  # meshio
         return _of_cells(mesh.cells)
     if hasattr(mesh, "faces"):  # trimesh and PyVista
         return _without_counts(mesh.faces)
     if hasattr(mesh, "get_buffer"):
-        return _buffer(mesh, "triangleVertexInds").reshape(-1, 3)
+        corners = _buffer(mesh, "triangleVertexInds")
+        if 3 * mesh.n_faces() != len(corners):
+            raise invalid("The mesh of Polyscope has faces that are no triangles.", "ARRAY_SHAPE", "faces", "triangles")
+        return np.asarray(corners).reshape(-1, 3)
     raise invalid(f"A {type(mesh).__name__} has no triangles.", "ARGUMENT_MISSING", "faces")
 
 
@@ -47,6 +56,15 @@ def _of_cells(cells: Any) -> Any:
             text = f"The mesh has cells of type {block.type}: only triangles can be deformed."
             raise invalid(text, "ARRAY_SHAPE", "cells", "triangle")
     return np.concatenate([np.zeros((0, 3), np.int64), *(np.asarray(block.data) for block in blocks)])
+
+
+def _of_celltypes(cells: Any, types: Any) -> Any:
+    """Cells of VTK, one after another, each after the number of its corners. Its type 5 is a triangle."""
+    if not bool((types == _vtk_triangle).all()):
+        other = int(types[types != _vtk_triangle][0])
+        text = f"The mesh has cells of VTK's type {other}: only triangles (type {_vtk_triangle}) can be deformed."
+        raise invalid(text, "ARRAY_SHAPE", "cells", "triangle")
+    return np.asarray(cells).reshape(-1, 4)[:, 1:]
 
 
 def _without_counts(faces: Any) -> Any:
@@ -63,6 +81,11 @@ def _without_counts(faces: Any) -> Any:
     return faces
 
 
-def _buffer(mesh: Any, name: str) -> Any:
+def _buffer(mesh: Any, name: str) -> list[Any]:
     buffer = mesh.get_buffer(name)
-    return np.asarray([buffer.get_value(k) for k in range(buffer.size())])
+    return [buffer.get_value(k) for k in range(buffer.size())]
+
+
+def _coordinates(point: Any) -> Any:
+    """Polyscope has points in a type of its own."""
+    return point.as_tuple() if hasattr(point, "as_tuple") else point

@@ -17,7 +17,7 @@ class Stop:
         self._lock = threading.Lock()
         self._calls: set[Ended] = set()
         self._came = threading.Event()
-        self.is_set = False
+        self.is_set: bool = False
 
     def set(self) -> None:
         with self._lock:
