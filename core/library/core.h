@@ -52,6 +52,9 @@ class Session {
   void remove(std::string_view name);
   /// Errors: FIELD_SIZE, P_OUT_OF_RANGE, STIFFNESS_OUT_OF_RANGE, LENGTH_UNIT_OUT_OF_RANGE, REGION_VERTEX_OUT_OF_RANGE.
   Result<void> set(const Settings& settings);
+  /// p and stiffness from the geometry, for set(): joints bend, parts stay rigid. `strength` is 0 (p = 2 and stiffness 1
+  /// everywhere) to 1. Errors: STRENGTH_OUT_OF_RANGE.
+  Result<Settings> automatic(double strength = 1) const;
   /// Makes this the present shape. Errors: POSITIONS_SIZE, POSITIONS_NOT_FINITE.
   Result<void> set_positions(const std::vector<double>& positions);
 
@@ -73,6 +76,10 @@ class Session {
   explicit Session(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
+
+/// Makes one vertex of vertices that lie in the same place, as along the seams of a mesh made for drawing. `tolerance` is a
+/// share of the bounding box's diagonal, 0 to 1e-3; 0 is 1e-6. Errors: MESH_SIZE, WELD_TOLERANCE, WELD_TOO_DENSE.
+Result<WeldedMesh> weld(const Mesh& mesh, double tolerance = 0);
 
 /// Reads OFF, OBJ, PLY or STL, by the extension of `path`. Polygons become triangles. Errors: MESH_FILE_NOT_FOUND,
 /// MESH_FORMAT_UNKNOWN, MESH_SYNTAX.

@@ -2,11 +2,13 @@
 #include <optional>
 #include <utility>
 
+#include "core/analysis/automatic_material.h"
 #include "core/base/fault.h"
 #include "core/base/workers.h"
 #include "core/io/mesh_io.h"
 #include "core/library/convert.h"
 #include "core/library/core.h"
+#include "core/mesh/weld.h"
 #include "core/solve/deformer.h"
 
 namespace lpdeform::core {
@@ -25,6 +27,10 @@ Result<void> result_of(const absl::Status& status) {
 
 std::vector<double> numbers_of(const auto& matrix) {
   return {matrix.data(), matrix.data() + matrix.size()};
+}
+
+Mesh given_back(const TriangleMesh& mesh) {
+  return {numbers_of(mesh.vertices), {mesh.faces.data(), mesh.faces.data() + mesh.faces.size()}};
 }
 
 lpdeform::WeightKind converted_weights(WeightKind kind) {
@@ -190,6 +196,12 @@ Result<void> Session::set(const Settings& settings) {
   return result_of(status);
 }
 
+Result<Settings> Session::automatic(double strength) const {
+  const auto material = automatic_material(impl_->deformer->shape(), strength);
+  if (!material.ok()) return error_of(material.status());
+  return Settings{.p = numbers_of(material->p), .stiffness = numbers_of(material->stiffness)};
+}
+
 Result<void> Session::set_positions(const std::vector<double>& positions) {
   const auto own = points_of(positions, impl_->deformer->shape().vertex_count());
   return result_of(own.ok() ? impl_->deformer->set_positions(*own) : own.status());
@@ -238,11 +250,18 @@ Result<SolveResult> deform(const Mesh& mesh, const Handles& handles, const Setti
   return session->solve(options);
 }
 
+Result<WeldedMesh> weld(const Mesh& mesh, double tolerance) {
+  const auto own = converted(mesh);
+  if (!own.ok()) return error_of(own.status());
+  const auto weld = weld_by_position(own->vertices, tolerance);
+  if (!weld.ok()) return error_of(weld.status());
+  return WeldedMesh{given_back(welded(*own, *weld)), {weld->to_welded.begin(), weld->to_welded.end()}};
+}
+
 Result<Mesh> read_mesh(const std::string& path) {
   const auto file = lpdeform::read_mesh(path);
   if (!file.ok()) return error_of(file.status());
-  const Faces& faces = file->mesh.faces;
-  return Mesh{numbers_of(file->mesh.vertices), {faces.data(), faces.data() + faces.size()}};
+  return given_back(file->mesh);
 }
 
 Result<void> write_mesh(const std::string& path, const Mesh& mesh) {

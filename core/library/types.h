@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -171,11 +173,30 @@ struct SolveResult {
   double solve_seconds = 0;
 };
 
+/// A mesh in which vertices that lie in the same place are one: see weld().
+struct WeldedMesh {
+  Mesh mesh = {};                             // what to open; the faces are in the order given
+  std::vector<std::uint32_t> vertex_of = {};  // for each vertex that was given, which one of `mesh` it is
+
+  /// Numbers of the vertices of `mesh`, one or more for each, as those of the vertices that were given: positions or
+  /// distortion for drawing.
+  std::vector<double> spread(const std::vector<double>& numbers) const {
+    const std::size_t width = numbers.size() / std::max<std::size_t>(mesh.vertices.size() / 3, 1);
+    std::vector<double> all;
+    all.reserve(width * vertex_of.size());
+    for (const std::uint32_t vertex : vertex_of) {
+      const auto from = numbers.begin() + static_cast<std::ptrdiff_t>(width * vertex);
+      all.insert(all.end(), from, from + static_cast<std::ptrdiff_t>(width));
+    }
+    return all;
+  }
+};
+
 /// What to know about a mesh before deforming it.
 struct MeshReport {
   std::int64_t vertices = 0, faces = 0, components = 0;
   std::int64_t unreferenced_vertices = 0;  // stay where they are
-  /// Vertices at a border that lie in the same place as others at a border. The surface splits open there: merge them
+  /// Vertices at a border that lie in the same place as others at a border. The surface splits open there: weld() the mesh
   /// before.
   std::int64_t split_border_vertices = 0;
 };

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <lpdeform/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -14,7 +15,8 @@
 namespace lpdeform::core {
 namespace {
 
-constexpr std::uint32_t kSide = 12;  // vertices along each side of the sheet
+constexpr std::uint32_t kSide = 12;    // vertices along each side of the sheet
+constexpr std::uint32_t kAround = 24;  // vertices around the dumbbell
 
 std::uint32_t at(std::uint32_t x, std::uint32_t y) {
   return y * kSide + x;
@@ -29,6 +31,26 @@ Mesh sheet() {
       if (x + 1 == kSide || y + 1 == kSide) continue;
       for (const std::uint32_t v :
            {at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y), at(x + 1, y + 1), at(x, y + 1)})
+        mesh.faces.push_back(v);
+    }
+  }
+  return mesh;
+}
+
+/// Two balls with a thin neck between them: a surface of revolution about z.
+Mesh dumbbell() {
+  constexpr std::uint32_t kAlong = 61;
+  Mesh mesh;
+  for (std::uint32_t k = 0; k < kAlong; ++k) {
+    const double z = -3.0 + 6.0 * k / (kAlong - 1), from_ball = std::abs(z) - 1.9;
+    const double ball = 1.21 - from_ball * from_ball;
+    const double radius = std::max(0.25, ball > 0 ? std::sqrt(ball) : 0.0);
+    for (std::uint32_t a = 0; a < kAround; ++a) {
+      const double angle = 2 * 3.14159265358979 * a / kAround;
+      mesh.vertices.insert(mesh.vertices.end(), {radius * std::cos(angle), radius * std::sin(angle), z});
+      if (k + 1 == kAlong) continue;
+      const std::uint32_t here = k * kAround + a, next = k * kAround + (a + 1) % kAround;
+      for (const std::uint32_t v : {here, next, next + kAround, here, next + kAround, here + kAround})
         mesh.faces.push_back(v);
     }
   }
@@ -242,6 +264,60 @@ TEST(CoreLibrary, CountsVerticesWhereTheSurfaceSplitsOpen) {
   const auto whole = Session::open(sheet());
   ASSERT_TRUE(whole);
   EXPECT_EQ(whole->report().split_border_vertices, 0);
+}
+
+TEST(CoreLibrary, ASplitMeshDeformsAsOneWhenItIsWelded) {
+  const Mesh whole = sheet();
+  Mesh split;  // three vertices of its own for each face
+  for (const std::uint32_t v : whole.faces) {
+    split.faces.push_back(static_cast<std::uint32_t>(split.faces.size()));
+    split.vertices.insert(split.vertices.end(), {whole.vertices[3 * v], whole.vertices[3 * v + 1], 0.0});
+  }
+  const auto welded = weld(split);
+  ASSERT_TRUE(welded);
+  EXPECT_EQ(welded->mesh.vertices.size(), whole.vertices.size());
+  EXPECT_EQ(welded->vertex_of.size(), whole.faces.size());
+  for (std::size_t k = 0; k < split.faces.size(); ++k) EXPECT_EQ(welded->mesh.faces[k], welded->vertex_of[k]);
+
+  Handle left, right{.motion = RigidMotion{.translation = {0, 0, 3}}};
+  for (std::uint32_t v = 0; v < kSide * kSide; ++v) {
+    if (welded->mesh.vertices[3 * v] == 0) left.vertices.push_back(v);
+    if (welded->mesh.vertices[3 * v] == kSide - 1) right.vertices.push_back(v);
+  }
+  const auto result = deform(welded->mesh, {{"left", left}, {"right", right}});
+  ASSERT_TRUE(result);
+  const std::vector<double> drawn = welded->spread(result->positions);
+  ASSERT_EQ(drawn.size(), split.vertices.size());
+  for (std::size_t k = 0; k < whole.faces.size(); ++k) {
+    for (std::size_t d = 0; d < 3; ++d)
+      EXPECT_EQ(drawn[3 * k + d], result->positions[3 * welded->vertex_of[k] + d]);
+  }
+  EXPECT_EQ(welded->spread(result->distortion).size(), whole.faces.size());
+}
+
+TEST(CoreLibrary, SaysWhyItCannotWeld) {
+  EXPECT_EQ(weld(sheet(), 0.5).error().reason, "WELD_TOLERANCE");
+  EXPECT_EQ(weld({{0, 0}, {}}).error().reason, "MESH_SIZE");
+  const auto nothing = weld(Mesh{});
+  ASSERT_TRUE(nothing);
+  EXPECT_TRUE(nothing->spread({}).empty());
+}
+
+TEST(CoreLibrary, FindsPAndStiffnessFromTheGeometry) {
+  auto session = Session::open(dumbbell());
+  ASSERT_TRUE(session);
+  const auto found = session->automatic();
+  ASSERT_TRUE(found);
+  const auto& p = std::get<std::vector<double>>(*found->p);
+  const auto& stiffness = std::get<std::vector<double>>(*found->stiffness);
+  const std::size_t neck = p.size() / 2, ball = 11 * kAround;
+  EXPECT_GT(p[neck], p[ball] + 0.2);
+  EXPECT_LT(stiffness[neck], stiffness[ball] / 2);
+  EXPECT_TRUE(session->set(*found));
+  const auto off = session->automatic(0);
+  ASSERT_TRUE(off);
+  for (const double one : std::get<std::vector<double>>(*off->p)) EXPECT_EQ(one, 2);
+  EXPECT_EQ(session->automatic(1.5).error().reason, "STRENGTH_OUT_OF_RANGE");
 }
 
 TEST(CoreLibrary, WritesAMeshThatItReads) {
