@@ -134,7 +134,7 @@ absl::Status stretch(client::Client& server, const Scaling& plain, std::optional
   if (!result.ok()) return result.status();
 
   const Points scaled = plain((*shape)->positions());
-  const Points spared = points_of(result->positions)(weld.first_copy, Eigen::all);
+  const Points spared = rows_of(points_of(result->positions), weld.first_copy);
   mesh.vertices =
       scattered(with_extents(**shape, plain.axes, blended(**shape, shares, scaled, spared), scaled), weld);
   resized.distortion = Eigen::Map<const Field>(result->distortion.data(),

@@ -153,7 +153,7 @@ HeldPositions held_rows(const std::vector<char>& is_held, const Points& position
     if (is_held[i]) result.vertices.push_back(static_cast<std::int32_t>(i));
   }
   result.vertices.shrink_to_fit();
-  result.positions = positions(result.vertices, Eigen::all);
+  result.positions = rows_of(positions, result.vertices);
   return result;
 }
 

@@ -90,10 +90,6 @@ class Reader {
   Drawn drawn_;
 };
 
-Points rows_of(const Points& points, const std::vector<std::int32_t>& rows) {
-  return points(rows, Eigen::all);
-}
-
 /// Draw vertices of the same vertex are copies; with `weld`, so are draw vertices at the same position.
 Weld weld_of(const Drawn& drawn, const Points& rest, std::optional<double> weld) {
   if (weld) return weld_by_position(rest, *weld).value();

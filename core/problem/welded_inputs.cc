@@ -88,7 +88,7 @@ absl::StatusOr<Handle> merged_handle(std::string_view name, const Handle& split,
       return copies_differ(absl::StrCat("target positions in ", in_quotes(name)), holder.copy, copy);
     }
   }
-  if (targets != nullptr) handle.motion = TargetPositions{targets->positions(rows, Eigen::all)};
+  if (targets != nullptr) handle.motion = TargetPositions{rows_of(targets->positions, rows)};
   return handle;
 }
 

@@ -39,7 +39,7 @@ Faces drawable(const Faces& faces, const Points& positions) {
     }
     if (is_drawable) kept.push_back(f);
   }
-  return faces(kept, Eigen::all);
+  return rows_of(faces, kept);
 }
 
 /// The vertices that faces use; other vertices may have any coordinates.
