@@ -2,7 +2,7 @@ import * as three from "three";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
-import { linesOf, nothing, type PointedOut, trianglesOf } from "../model/pointed.js";
+import { linesOf, type PointedOut, trianglesOf } from "../model/pointed.js";
 
 /** Highlighted edges and faces. They are drawn through whatever is in front of them, so that they can be found. */
 export class Highlight {
@@ -25,12 +25,14 @@ export class Highlight {
       object.renderOrder = 1;
       this.object.add(object);
     }
-    this.show(nothing, new Uint32Array(0), "#ffffff");
+    this.#lines.visible = this.#faces.visible = false;
   }
 
   show(pointed: PointedOut, meshFaces: Uint32Array, colour: string): void {
+    const before = this.#ends.length + this.#corners.length;
     this.#ends = linesOf(pointed, meshFaces);
     this.#corners = trianglesOf(pointed, meshFaces);
+    if (before + this.#ends.length + this.#corners.length === 0) return;
     this.#lines.visible = this.#ends.length > 0;
     this.#faces.visible = this.#corners.length > 0;
     this.#lineMaterial.color.set(colour);
@@ -49,6 +51,7 @@ export class Highlight {
       this.#lines.geometry.dispose();
       this.#lines.geometry = new LineSegmentsGeometry().setPositions(ends);
     }
+    if (!this.#faces.visible) return;
     const corners = this.#faces.geometry.attributes["position"] as three.BufferAttribute;
     this.#corners.forEach((vertex, k) => (corners.array as Float32Array).set(at(vertex), 3 * k));
     corners.needsUpdate = true;

@@ -1,10 +1,12 @@
 import * as three from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { derivedOf } from "../model/derived.js";
 import { boundsOf, type Mesh, type Vector3 } from "../model/mesh.js";
 import { Backdrop } from "./backdrop.js";
 import { Gizmo } from "./gizmo.js";
 import { Highlight } from "./highlight.js";
 import { Marks } from "./marks.js";
+import { PointedMarks } from "./pointed_marks.js";
 import { isSoftware } from "./software.js";
 import { Surface } from "./surface.js";
 
@@ -31,6 +33,7 @@ export class Stage {
   readonly canvas = document.createElement("canvas");
   readonly camera = new three.PerspectiveCamera(32, 1, 0.01, 1000);
   readonly marks = new Marks();
+  readonly pointed = new PointedMarks();
   readonly highlight = new Highlight();
   readonly gizmo: Gizmo;
   surface: Surface | undefined;
@@ -50,7 +53,7 @@ export class Stage {
     this.canvas.addEventListener("webglcontextrestored", changed);
     this.camera.up.set(0, 0, 1);
     this.gizmo = new Gizmo(this.camera, this.canvas, changed);
-    this.#scene.add(this.#backdrop.object, this.marks.object, this.highlight.object, this.gizmo.object);
+    this.#scene.add(this.#backdrop.object, this.marks.object, this.pointed.object, this.highlight.object, this.gizmo.object);
   }
 
   /** Called after all other listeners to the canvas are set: what they take does not turn the view. */
@@ -69,6 +72,8 @@ export class Stage {
     this.surface?.group.removeFromParent();
     this.surface?.dispose();
     this.surface = surface;
+    this.marks.attach(surface.ahead);
+    this.pointed.attach(surface);
     this.#scene.add(surface.group);
   }
 
@@ -78,7 +83,8 @@ export class Stage {
 
   /** Shows everything, from the front and a little above. */
   fit({ positions, mesh }: Surface, isYUp: boolean): void {
-    const { min, max, center, diagonal } = boundsOf(positions, mesh.faces);
+    const isAtRest = positions === mesh.positions;
+    const { min, max, center, diagonal } = isAtRest ? derivedOf(mesh).bounds : boundsOf(positions, mesh.faces);
     const away = isYUp ? new three.Vector3(0.62, 0.42, 1) : new three.Vector3(0.62, -1, 0.42);
     const { camera } = this;
     camera.up.set(0, isYUp ? 1 : 0, isYUp ? 0 : 1);
@@ -206,7 +212,9 @@ export class Stage {
     this.camera.aspect = width / Math.max(height, 1);
     const covered = coveredAt(width);
     this.camera.setViewOffset(width, height, -covered.left / 2, (covered.bottom - covered.top) / 2, width, height);
-    this.marks.scale(ratio * Math.min(Math.max(height / fullSizeHeight, 0.6), 1));
+    const scale = ratio * Math.min(Math.max(height / fullSizeHeight, 0.6), 1);
+    this.marks.scale(scale);
+    this.pointed.scale(scale);
     this.highlight.resize(width, height);
     return true;
   }
@@ -246,6 +254,7 @@ export class Stage {
     this.#controls?.dispose();
     this.gizmo.dispose();
     this.highlight.dispose();
+    this.pointed.dispose();
     this.surface?.dispose();
     this.#renderer.dispose();
     this.#renderer.forceContextLoss(); // browsers allow only a few, and remove the oldest
