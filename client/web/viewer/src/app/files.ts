@@ -5,7 +5,6 @@ import { openedMesh } from "../io/opened.js";
 import { rewriteObj } from "../io/obj_rewrite.js";
 import { writeOff } from "../io/off.js";
 import { writePly } from "../io/ply.js";
-import { writeStl } from "../io/stl.js";
 import { emptyDocument } from "../model/document.js";
 import { derivedOf } from "../model/derived.js";
 import { isAtRest, type Mesh, type WrittenMesh } from "../model/mesh.js";
@@ -96,7 +95,7 @@ export class Files {
       if (format === "ply") save(name, writePly(deformed, distortion, this.app.red));
       if (format === "obj") save(name, obj ? rewriteObj({ ...mesh, obj }, positions) : writeObj(deformed));
       if (format === "off") save(name, writeOff(deformed));
-      if (format === "stl") save(name, writeStl(deformed));
+      if (format === "stl") save(name, (await import("../io/write_stl.js")).writeStl(deformed));
       const lost = lostIn(mesh, format);
       if (lost.length > 0) {
         const better = obj ? " Saved as OBJ, they stay." : "";

@@ -3,8 +3,8 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { derivedOf } from "../model/derived.js";
 import { boundsOf, type Mesh, type Vector3 } from "../model/mesh.js";
 import { Backdrop } from "./backdrop.js";
-import { Gizmo } from "./gizmo.js";
 import { Highlight } from "./highlight.js";
+import { LateGizmo } from "./late_gizmo.js";
 import { Marks } from "./marks.js";
 import { PointedMarks } from "./pointed_marks.js";
 import { isSoftware } from "./software.js";
@@ -34,8 +34,8 @@ export class Stage {
   readonly camera = new three.PerspectiveCamera(32, 1, 0.01, 1000);
   readonly marks = new Marks();
   readonly pointed = new PointedMarks();
-  readonly highlight = new Highlight();
-  readonly gizmo: Gizmo;
+  readonly highlight: Highlight;
+  readonly gizmo: LateGizmo;
   surface: Surface | undefined;
   readonly #backdrop = new Backdrop();
   readonly #renderer: three.WebGLRenderer;
@@ -52,7 +52,8 @@ export class Stage {
     this.#renderer = new three.WebGLRenderer({ canvas: this.canvas, antialias: !isSoftware, alpha: false });
     this.canvas.addEventListener("webglcontextrestored", changed);
     this.camera.up.set(0, 0, 1);
-    this.gizmo = new Gizmo(this.camera, this.canvas, changed);
+    this.highlight = new Highlight(changed);
+    this.gizmo = new LateGizmo(this.camera, this.canvas, changed, () => this.#restartControls());
     this.#scene.add(this.#backdrop.object, this.marks.object, this.pointed.object, this.highlight.object, this.gizmo.object);
   }
 
@@ -64,6 +65,14 @@ export class Stage {
     controls.addEventListener("change", this.changed);
     this.gizmo.onDragging = (isDragging) => (controls.enabled = !isDragging);
     this.#controls = controls;
+  }
+
+  #restartControls(): void {
+    if (!this.#controls) return;
+    const { look } = this;
+    this.#controls.dispose();
+    this.startControls(); // it turns the camera to the origin
+    this.lookFrom(look);
   }
 
   /** `faces`: the faces to shade smoothly, if these are not the mesh's own. */
@@ -88,11 +97,7 @@ export class Stage {
     const away = isYUp ? new three.Vector3(0.62, 0.42, 1) : new three.Vector3(0.62, -1, 0.42);
     const { camera } = this;
     camera.up.set(0, isYUp ? 1 : 0, isYUp ? 0 : 1);
-    // OrbitControls reads the camera's up when it is made.
-    if (this.#controls) {
-      this.#controls.dispose();
-      this.startControls();
-    }
+    this.#restartControls(); // OrbitControls reads the camera's up when it is made
     camera.position.copy(away.normalize());
     camera.lookAt(0, 0, 0);
     this.target.set(...center);
