@@ -6,6 +6,7 @@ import { Matrix4 } from "three";
 import { type Ahead, aheadOf } from "../model/ahead.js";
 import { type Document, pField } from "../model/document.js";
 import { boundsOf, centroid, type Mesh } from "../model/mesh.js";
+import { Progress } from "../model/progress.js";
 import { pullOf } from "../model/pull.js";
 import { cornersOf, type PointedOut } from "../model/pointed.js";
 import type { Seams } from "../model/seams.js";
@@ -42,6 +43,7 @@ export class Pane {
   readonly stage: Stage;
   readonly overlay = new Overlay();
   readonly trail = new EnergyTrail();
+  readonly progress = new Progress();
   /** Aborts when the pane is closed. */
   readonly over = new AbortController();
   live: Live | undefined;
@@ -74,6 +76,7 @@ export class Pane {
     this.frame = this.#onScreenNext = this.#pull = undefined;
     this.statistics = nothing;
     this.trail.reset();
+    this.progress.reset();
     const worker = this.#intakeWorker;
     const watcher: LiveWatcher = {
       prepare: worker && ((frame) => this.#prepare(worker, frame)),
@@ -118,6 +121,7 @@ export class Pane {
     this.stage.highlight.move(frame.positions);
     this.statistics = intake?.statistics ?? energyStatistics(frame.distortion);
     this.trail.add(frame.iteration, frame.energy ** (1 / this.live!.exponentOf(frame)));
+    this.progress.add(frame);
     this.#isDirty = true;
     return true;
   }

@@ -133,6 +133,11 @@ export class Live {
     return this.#exponents.findLast(({ seq }) => seq <= inputSeq)?.p ?? 2;
   }
 
+  /** The number of the newest change; 0 if there is none. */
+  get newestInput(): number {
+    return this.#newest;
+  }
+
   /** Whether there are changes that no picture answers yet. */
   get isSettling(): boolean {
     return this.#newest > this.#drawn;
