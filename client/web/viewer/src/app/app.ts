@@ -372,11 +372,18 @@ export class App implements Workbench {
     if (this.#needsMarks) this.#mark();
     const { document, problem } = this.facts.now;
     for (const pane of this.panes) pane.lookAhead(document, problem === undefined);
-    const isAtRest = this.#pace.isAtRest(now);
+    const isAtRest = !this.#isMoving && this.#pace.isAtRest(now);
     const drawn = this.panes.map((pane) => pane.draw(isAtRest, this.#pace.quality));
     if (drawn.includes(true)) this.#pace.drew(now);
     for (const after of this.afterDrawing) after(now);
     if (this.panes.some((pane) => pane.isWaitingForScreen)) this.requestDraw();
+  }
+
+  /** Whether a frame will come that moves the surface: a fine picture before it would only delay it. */
+  get #isMoving(): boolean {
+    const { status, problem, document } = this.facts.now;
+    const isSolving = status.kind === "live" && problem === undefined && document.handles.length > 0;
+    return isSolving && this.panes.some(({ live }) => live?.isSettling);
   }
 
   #mark(): void {

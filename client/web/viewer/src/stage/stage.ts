@@ -24,8 +24,8 @@ const littleRoom = "(max-aspect-ratio: 1/1) and (max-width: 720px), (min-aspect-
 
 /** The pixels that the page's controls cover at the edges of a picture of this width. */
 function coveredAt(width: number): { left: number; top: number; bottom: number } {
-  if (matchMedia(littleRoom).matches) return { left: 0, top: 20, bottom: 20 };
-  return width > 620 ? { left: 70, top: 50, bottom: 120 } : { left: 40, top: 110, bottom: 165 };
+  if (matchMedia(littleRoom).matches) return { left: 0, top: 48, bottom: 16 };
+  return width > 620 ? { left: 70, top: 98, bottom: 120 } : { left: 40, top: 110, bottom: 165 };
 }
 
 /** One picture of a surface: canvas, camera, and what is drawn. It draws only when it is told to. */
