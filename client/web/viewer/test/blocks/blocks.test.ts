@@ -1,5 +1,5 @@
 // How long the viewer keeps the page's main thread busy without a break, at 100,000 vertices and more: npm run blocks.
-// SECONDS (default 8) of each drag. Measures, does not judge.
+// SECONDS (default 8) of each drag; FILES: the folder of another build of the page. Measures, does not judge.
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
