@@ -2,6 +2,7 @@ import "./style/index.css";
 import { App } from "./app/app.js";
 import { Files } from "./app/files.js";
 import { Keeper } from "./app/keeper.js";
+import { followSolving } from "./app/solving.js";
 import { startShortcuts } from "./app/shortcuts.js";
 import { exposeForTests } from "./app/testing.js";
 import { canDraw } from "./stage/software.js";
@@ -39,6 +40,7 @@ async function start(): Promise<void> {
     dropHere,
   );
   startTheme(app);
+  followSolving(app);
   startShortcuts(app, files, help);
   exposeForTests(app);
   const keeper = new Keeper(app, wantsBack);

@@ -1,12 +1,13 @@
 import type { MeshReport } from "lpdeform-client";
-import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
+import { type Adjacency, adjacencyOf } from "../model/adjacency.js";
+import { derivedOf, shownOf } from "../model/derived.js";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import { isAlike } from "../model/alike.js";
 import { History, type Steps } from "../model/history.js";
 import { kindOf } from "../model/hold_kinds.js";
-import { boundsOf, type Mesh } from "../model/mesh.js";
+import type { Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
-import { type Seams, seamsOf } from "../model/seams.js";
+import type { Seams } from "../model/seams.js";
 import { nothing } from "../model/pointed.js";
 import { State } from "../model/state.js";
 import { firstView, type View } from "../model/view.js";
@@ -139,7 +140,7 @@ export class App implements Workbench {
 
   #openPanes(): void {
     const { mesh, seams } = this;
-    this.adjacency = adjacencyOf(mesh.positions.length / 3, seams?.faces ?? mesh.faces);
+    this.adjacency = shownOf(mesh, seams?.faces ?? mesh.faces).adjacency;
     for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, seams);
     this.#needsMarks = true;
     this.#documentChanged(performance.now());
@@ -151,9 +152,10 @@ export class App implements Workbench {
     if (this.isTouched) this.#asides.put(this.#present());
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
-    this.#seams = seamsOf(mesh);
-    this.edge = meanEdge(adjacencyOf(mesh.positions.length / 3, mesh.faces), mesh.positions);
-    this.diagonal = boundsOf(mesh.positions, mesh.faces).diagonal;
+    const { seams, edge, bounds } = derivedOf(mesh);
+    this.#seams = seams;
+    this.edge = edge;
+    this.diagonal = bounds.diagonal;
     this.view.set({ selected: undefined, shape: "", pinned: undefined, isWelded });
     this.facts.set({
       mesh,
@@ -368,11 +370,20 @@ export class App implements Workbench {
     if (isNew || this.#needsColours) for (const pane of this.panes) pane.colour(this.document, this.view.now, this.red);
     this.#needsColours = false;
     if (this.#needsMarks) this.#mark();
-    const isAtRest = this.#pace.isAtRest(now);
+    const { document, problem } = this.facts.now;
+    for (const pane of this.panes) pane.lookAhead(document, problem === undefined);
+    const isAtRest = !this.#isMoving && this.#pace.isAtRest(now);
     const drawn = this.panes.map((pane) => pane.draw(isAtRest, this.#pace.quality));
     if (drawn.includes(true)) this.#pace.drew(now);
     for (const after of this.afterDrawing) after(now);
     if (this.panes.some((pane) => pane.isWaitingForScreen)) this.requestDraw();
+  }
+
+  /** Whether a frame will come that moves the surface: a fine picture before it would only delay it. */
+  get #isMoving(): boolean {
+    const { status, problem, document } = this.facts.now;
+    const isSolving = status.kind === "live" && problem === undefined && document.handles.length > 0;
+    return isSolving && this.panes.some(({ live }) => live?.isSettling);
   }
 
   #mark(): void {

@@ -4,6 +4,7 @@ import { type Document, emptyDocument } from "../model/document.js";
 import type { Mesh } from "../model/mesh.js";
 import { nothing, type PointedOut } from "../model/pointed.js";
 import type { AsideName } from "./asides.js";
+import type { Solving } from "./solving.js";
 
 /** What the page shows besides the pictures. */
 export interface Facts {
@@ -11,6 +12,8 @@ export interface Facts {
   mesh: Mesh;
   report: MeshReport | undefined;
   status: Status;
+  /** How the solve goes on for which the user waits. */
+  solving: Solving;
   /** Why the newest change cannot be shown. */
   problem: LpdeformError | undefined;
   /** One line that disappears by itself, or stays until its cause is over. */
@@ -36,6 +39,7 @@ export const firstFacts: Facts = {
   mesh: noMesh,
   report: undefined,
   status: say("idle", ""),
+  solving: undefined,
   problem: undefined,
   notice: undefined,
   better: [],

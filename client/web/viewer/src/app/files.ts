@@ -1,13 +1,12 @@
 import { FileFault } from "../io/fault.js";
 import { readHandleFile, writeHandleFile } from "../io/handlefile.js";
 import { writeObj } from "../io/obj.js";
+import { openedMesh } from "../io/opened.js";
 import { rewriteObj } from "../io/obj_rewrite.js";
 import { writeOff } from "../io/off.js";
 import { writePly } from "../io/ply.js";
-import { readMesh } from "../io/read.js";
-import { writeStl } from "../io/stl.js";
 import { emptyDocument } from "../model/document.js";
-import { guessYUp } from "../model/up.js";
+import { derivedOf } from "../model/derived.js";
 import { isAtRest, type Mesh, type WrittenMesh } from "../model/mesh.js";
 import { short } from "../model/words.js";
 import type { App } from "./app.js";
@@ -76,9 +75,8 @@ export class Files {
     }
     const done = file.size > largeBytes ? this.app.notifyWhile(`Opening ${file.name}…`) : () => undefined;
     try {
-      if (file.size > largeBytes) await new Promise((seen) => setTimeout(seen, 50));
       if (isHandles(file)) this.#openHandles(file.name, await file.text());
-      else this.#openMesh(file.name, new Uint8Array(await file.arrayBuffer()));
+      else this.#openMesh(await openedMesh(file));
     } finally {
       done();
     }
@@ -97,7 +95,7 @@ export class Files {
       if (format === "ply") save(name, writePly(deformed, distortion, this.app.red));
       if (format === "obj") save(name, obj ? rewriteObj({ ...mesh, obj }, positions) : writeObj(deformed));
       if (format === "off") save(name, writeOff(deformed));
-      if (format === "stl") save(name, writeStl(deformed));
+      if (format === "stl") save(name, (await import("../io/write_stl.js")).writeStl(deformed));
       const lost = lostIn(mesh, format);
       if (lost.length > 0) {
         const better = obj ? " Saved as OBJ, they stay." : "";
@@ -143,11 +141,11 @@ export class Files {
     return this.app.mesh.name.replace(/\.[^.]*$/, "") || "mesh";
   }
 
-  #openMesh(name: string, bytes: Uint8Array): void {
-    const mesh = readMesh(name, bytes);
+  #openMesh(mesh: Mesh): void {
+    const { name } = mesh;
     const { p, secondP } = this.app.document;
     this.app.open(mesh, { ...emptyDocument, p, secondP });
-    const isYUp = guessYUp(mesh);
+    const { isYUp } = derivedOf(mesh);
     this.app.view.set({ tool: "move", isYUp });
     const up = ` Shown with ${isYUp ? "y" : "z"} up, as it seems: “Y is up” in the panel turns it.`;
     const count = (mesh.positions.length / 3).toLocaleString("en");

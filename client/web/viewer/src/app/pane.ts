@@ -2,16 +2,22 @@ import type { Frame, LpdeformError, MeshReport } from "lpdeform-client";
 import { Live, type LiveWatcher } from "../link/live.js";
 import { say, type Status } from "../link/status.js";
 import type { Side } from "../model/changes.js";
+import { Matrix4 } from "three";
+import { type Ahead, aheadOf } from "../model/ahead.js";
 import { type Document, pField } from "../model/document.js";
 import { boundsOf, centroid, type Mesh } from "../model/mesh.js";
+import { Progress } from "../model/progress.js";
+import { pullOf } from "../model/pull.js";
 import { cornersOf, type PointedOut } from "../model/pointed.js";
 import type { Seams } from "../model/seams.js";
 import { type EnergyStatistics, energyStatistics } from "../model/statistics.js";
 import type { View } from "../model/view.js";
-import { vertexNormals } from "../stage/drawmesh.js";
+import { vertexNormals } from "../model/normals.js";
+import { type Intake, IntakeWorker } from "../stage/intake.js";
 import { Overlay } from "../stage/overlay.js";
 import { Stage } from "../stage/stage.js";
-import type { Scale } from "../stage/surface.js";
+import { motionBetween } from "../stage/ahead.js";
+import type { Scale, Surface } from "../stage/surface.js";
 import { EnergyTrail } from "./energy_trail.js";
 
 export interface PaneWatcher {
@@ -23,6 +29,12 @@ export interface PaneWatcher {
   better(): void;
 }
 
+/** A handle that is ahead of the frame, and how far vertices go along with it, once that is known. */
+interface Pull {
+  pulled: readonly number[];
+  shares: Float32Array | undefined;
+}
+
 const nothing: EnergyStatistics = { max: 0, red: 0, top5Share: 0 };
 
 /** One of the pictures side by side: a stage, and the session that supplies it. */
@@ -31,13 +43,18 @@ export class Pane {
   readonly stage: Stage;
   readonly overlay = new Overlay();
   readonly trail = new EnergyTrail();
+  readonly progress = new Progress();
   /** Aborts when the pane is closed. */
   readonly over = new AbortController();
   live: Live | undefined;
   frame: Frame | undefined;
   statistics = nothing;
   #isDirty = true;
+  #intakeWorker: IntakeWorker | undefined;
+  /** What is drawn of frames that are not drawn yet. */
+  #intakes = new WeakMap<Frame, Intake>();
   #onScreenNext: Frame | undefined;
+  #pull: Pull | undefined;
 
   constructor(
     readonly side: Side,
@@ -53,11 +70,16 @@ export class Pane {
 
   open(mesh: Mesh, document: Document, view: View, seams: Seams | undefined): void {
     this.live?.close();
+    this.#intakeWorker?.stop();
     this.stage.open(mesh, seams?.faces);
-    this.frame = this.#onScreenNext = undefined;
+    this.#intakeWorker = IntakeWorker.start(this.stage.surface!.intakeMesh);
+    this.frame = this.#onScreenNext = this.#pull = undefined;
     this.statistics = nothing;
     this.trail.reset();
+    this.progress.reset();
+    const worker = this.#intakeWorker;
     const watcher: LiveWatcher = {
+      prepare: worker && ((frame) => this.#prepare(worker, frame)),
       frame: () => this.watcher.changed(),
       status: (status) => this.watcher.status(status),
       report: (report) => this.watcher.report(report),
@@ -68,6 +90,11 @@ export class Pane {
     this.live = new Live(mesh, document, this.side, view.encoding, watcher, seams?.groups);
     this.watcher.better();
     this.#isDirty = true;
+  }
+
+  async #prepare(worker: IntakeWorker, frame: Frame): Promise<void> {
+    const intake = await worker.take(frame);
+    if (intake) this.#intakes.set(frame, intake);
   }
 
   get status(): Status {
@@ -88,13 +115,49 @@ export class Pane {
       return false;
     }
     this.frame = this.#onScreenNext = frame;
-    this.stage.surface.move(frame.positions);
+    const intake = this.#intakes.get(frame);
+    this.stage.surface.move(frame.positions, intake);
     this.stage.marks.move(frame.positions);
     this.stage.highlight.move(frame.positions);
-    this.statistics = energyStatistics(frame.distortion);
+    this.statistics = intake?.statistics ?? energyStatistics(frame.distortion);
     this.trail.add(frame.iteration, frame.energy ** (1 / this.live!.exponentOf(frame)));
+    this.progress.add(frame);
     this.#isDirty = true;
     return true;
+  }
+
+  /**
+   * Lets the surface follow the handles from the frame that is drawn to where they are in the document, until the next frame.
+   * `mayMove`: whether the server takes the document.
+   */
+  lookAhead(document: Document, mayMove: boolean): void {
+    const { surface } = this.stage;
+    const of = this.frame && this.live?.answered;
+    if (!surface || !of) return;
+    const ahead = mayMove && this.live?.status.kind === "live" ? aheadOf(of, document) : undefined;
+    if (ahead && ahead.pulled !== this.#pull?.pulled) this.#findPull(surface, ahead);
+    const motion = ahead && this.#pull?.shares ? motionBetween(ahead.from, ahead.to) : new Matrix4();
+    if (motion.equals(surface.ahead.value)) return;
+    surface.ahead.value.copy(motion);
+    this.#isDirty = true;
+  }
+
+  #findPull(surface: Surface, { pulled, held }: Ahead): void {
+    const pull: Pull = { pulled, shares: undefined };
+    this.#pull = pull;
+    this.#showPull(surface, undefined);
+    const { positions } = surface.mesh;
+    if (!this.#intakeWorker) return this.#showPull(surface, pullOf(positions, surface.adjacency, pulled, held));
+    void this.#intakeWorker.pull({ pulled, held }).then((shares) => {
+      if (this.#pull === pull && this.stage.surface === surface) this.#showPull(surface, shares);
+    });
+  }
+
+  #showPull(surface: Surface, shares: Float32Array | undefined): void {
+    if (this.#pull) this.#pull.shares = shares;
+    surface.pull(shares);
+    this.stage.marks.pull(shares);
+    this.watcher.changed();
   }
 
   colour(document: Document, view: View, red: number): void {
@@ -109,11 +172,14 @@ export class Pane {
   }
 
   mark(document: Document, view: View, pointedOut: PointedOut, colour: string): void {
-    const { surface, marks, highlight } = this.stage;
+    const { surface, marks, pointed, highlight } = this.stage;
     if (!surface) return;
     const { positions, mesh } = surface;
-    marks.show(document.handles, mesh.faces, view.selected, cornersOf(pointedOut, mesh.faces), colour);
-    marks.move(positions);
+    if (marks.show(document.handles, mesh.faces, view.selected)) {
+      marks.move(positions);
+      marks.pull(this.#pull?.shares);
+    }
+    pointed.show(cornersOf(pointedOut, mesh.faces), colour);
     highlight.show(pointedOut, mesh.faces, colour);
     highlight.move(positions);
     this.#isDirty = true;
@@ -181,6 +247,7 @@ export class Pane {
   close(): void {
     this.over.abort();
     this.live?.close();
+    this.#intakeWorker?.stop();
     this.stage.dispose();
     this.element.remove();
   }

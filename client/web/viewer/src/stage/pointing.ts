@@ -1,6 +1,6 @@
 import * as three from "three";
 import type { Vector3 } from "../model/mesh.js";
-import { type Hit, raycast } from "../model/raycast.js";
+import type { Hit } from "../model/raycast.js";
 import type { Stage } from "./stage.js";
 
 /** What pointing at a stage does. Positions are pixels from the canvas's upper left corner; times are those of the events. */
@@ -85,7 +85,7 @@ export class Pointing {
       ray,
       get hit() {
         found ??= {
-          hit: surface && raycast(surface.positions, surface.mesh.faces, ray.origin.toArray(), ray.direction.toArray()),
+          hit: surface?.hit(ray.origin.toArray(), ray.direction.toArray()),
         };
         return found.hit;
       },

@@ -1,5 +1,6 @@
 import * as three from "three";
 import { stops } from "../model/colours.js";
+import { type Ahead, place } from "./ahead.js";
 
 // Lit from the camera and from above, in sRGB throughout: without conversions the surface has the legend's
 // colours.
@@ -23,8 +24,9 @@ varying vec3 vNormal;
 varying vec3 vToEye;
 #endif
 ${light}
+${place}
 void main() {
-  vec4 seen = modelViewMatrix * vec4(position, 1.0);
+  vec4 seen = modelViewMatrix * vec4(placed(), 1.0);
   vValue = value;
 #ifdef PER_VERTEX
   vec3 toEye = normalize(-seen.xyz);
@@ -79,7 +81,7 @@ void main() {
  * `isPerVertex`: lighting is computed per vertex instead of per pixel. If the processor draws, that takes half the time, and it
  * is visible only on coarse meshes. `isClosed`: the inside is never visible, so it is not drawn.
  */
-export function surfaceMaterial(isPerVertex: boolean, isClosed: boolean): three.ShaderMaterial {
+export function surfaceMaterial(isPerVertex: boolean, isClosed: boolean, ahead: Ahead): three.ShaderMaterial {
   return new three.ShaderMaterial({
     vertexShader,
     fragmentShader,
@@ -89,6 +91,7 @@ export function surfaceMaterial(isPerVertex: boolean, isClosed: boolean): three.
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
     uniforms: {
+      ahead,
       red: { value: 1 },
       low: { value: 0 },
       logarithmic: { value: 0 },

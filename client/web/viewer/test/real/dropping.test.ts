@@ -6,7 +6,7 @@ import { Service } from "../../../client/test/support/service.js";
 import { writeObj } from "../../src/io/obj.js";
 import { writeOff } from "../../src/io/off.js";
 import { writePly } from "../../src/io/ply.js";
-import { writeStl } from "../../src/io/stl.js";
+import { writeStl } from "../../src/io/write_stl.js";
 import { blockSurface } from "../../src/model/block.js";
 import { User } from "./user.js";
 
