@@ -31,6 +31,7 @@ bool share_bytes(const Layout& a, const Layout& b) {
 Places::Places(const Document& document, const DrawList& list) : document_(document) {
   find_meshes(list);
   find_uses(list);
+  find_views();
 }
 
 void Places::find_meshes(const DrawList& list) {
@@ -82,27 +83,35 @@ void Places::add_use(const Json& value) {
   if (value.is_number_unsigned()) used_elsewhere_.insert(value.get<std::size_t>());
 }
 
-bool Places::has_bytes_alone(std::size_t accessor) const {
+void Places::find_views() {
   const Json& root = document_.root;
-  const Json& object = root["accessors"][accessor];
-  if (object["componentType"] != kFloat || value_of(object, "sparse") != nullptr) return false;
-  const std::size_t own_view = object["bufferView"].get<std::size_t>();
-  const Layout own = layout_of(document_, accessor);
   for (std::size_t k = 0; k < count_of(root, "bufferViews"); ++k) {
     const Json& view = item(root, "bufferViews", k);
     const std::string part = part_name(root, "bufferViews", k);
-    const std::uint64_t begin = whole(view, "byteOffset", 0, part),
-                        length = whole(view, "byteLength", 0, part);
-    const bool is_there = needed_index(root, view, "buffer", "buffers", part) == own.buffer &&
-                          overlap(own.begin, own.end(), begin, begin + length);
-    if (is_there && (k != own_view || other_views_.contains(k))) return false;
+    const std::uint64_t begin = whole(view, "byteOffset", 0, part);
+    views_.push_back({needed_index(root, view, "buffer", "buffers", part), begin,
+                      begin + whole(view, "byteLength", 0, part)});
   }
   for (std::size_t k = 0; k < count_of(root, "accessors"); ++k) {
     const Json* const view = value_of(root["accessors"][k], "bufferView");
-    if (k == accessor || view == nullptr || *view != own_view) continue;
-    if (share_bytes(own, layout_of(document_, k))) return false;
+    if (view != nullptr && view->is_number_unsigned())
+      accessors_of_view_[view->get<std::size_t>()].push_back(k);
   }
-  return true;
+}
+
+bool Places::has_bytes_alone(std::size_t accessor) const {
+  const Json& object = document_.root["accessors"][accessor];
+  if (object["componentType"] != kFloat || value_of(object, "sparse") != nullptr) return false;
+  const std::size_t own_view = object["bufferView"].get<std::size_t>();
+  const Layout own = layout_of(document_, accessor);
+  for (std::size_t k = 0; k < views_.size(); ++k) {
+    const auto& [buffer, begin, end] = views_[k];
+    const bool is_there = buffer == own.buffer && overlap(own.begin, own.end(), begin, end);
+    if (is_there && (k != own_view || other_views_.contains(k))) return false;
+  }
+  return std::ranges::none_of(accessors_of_view_.at(own_view), [&](std::size_t other) {
+    return other != accessor && share_bytes(own, layout_of(document_, other));
+  });
 }
 
 bool Places::take(std::size_t accessor) {

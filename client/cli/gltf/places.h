@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <map>
 #include <set>
 #include <vector>
 
@@ -26,10 +28,17 @@ class Places {
   void find_uses(const DrawList& list);
   void find_uses_within(const Json& value);
   void add_use(const Json& value);
+  void find_views();
   bool has_bytes_alone(std::size_t accessor) const;
 
   const Document& document_;
   std::set<std::size_t> meshes_elsewhere_, used_elsewhere_, taken_;
+  struct View {
+    std::size_t buffer = 0;
+    std::uint64_t begin = 0, end = 0;
+  };
+  std::vector<View> views_;
+  std::map<std::size_t, std::vector<std::size_t>> accessors_of_view_;
   std::set<std::size_t> other_views_;  // views that something else than an accessor's "bufferView" names
 };
 

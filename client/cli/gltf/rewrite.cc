@@ -1,6 +1,7 @@
 #include "client/cli/gltf/rewrite.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -54,6 +55,13 @@ Weld weld_of(const Points& points, const std::optional<double>& tolerance) {
   return *std::move(weld);
 }
 
+bool share_accessor(const Attributes& a, const Attributes& b) {
+  const std::array<std::optional<std::size_t>, 3> own{a.position, a.normal, a.tangent};
+  const std::array<std::optional<std::size_t>, 3> others{b.position, b.normal, b.tangent};
+  return std::ranges::any_of(
+      others, [&](const auto& one) { return one && std::ranges::find(own, one) != own.end(); });
+}
+
 class Rewriter {
  public:
   Rewriter(const Document& document, const DrawList& list, const Points& positions,
@@ -64,9 +72,7 @@ class Rewriter {
         positions_(positions),
         weld_(weld_of(rest_, weld)),
         places_(document, list),
-        out_(document) {
-    for (const Block& block : list.blocks) ++uses_[block.attributes.position];
-  }
+        out_(document) {}
 
   Document write(bool adds_normals) {
     const auto has = [&](auto attribute) {
@@ -77,7 +83,7 @@ class Rewriter {
     if (has(&Attributes::tangent)) tangents_ = turned(true);
     for (const Block& block : list_.blocks) {
       const bool is_new = adds_normals && !block.attributes.normal;
-      if (!is_new && is_alone(block) && rows_of(positions_, block) == rows_of(rest_, block)) continue;
+      if (!is_new && !is_touched(block)) continue;
       write_positions(block);
       if (block.attributes.normal || is_new) write_normals(block);
       if (block.attributes.tangent) write_tangents(block);
@@ -86,12 +92,12 @@ class Rewriter {
   }
 
  private:
-  /// Whether no other block shares its mesh or positions.
-  bool is_alone(const Block& block) const {
-    const auto same = [&](const Block& other) {
-      return other.mesh == block.mesh && other.node != block.node;
-    };
-    return uses_.at(block.attributes.position) == 1 && std::ranges::none_of(list_.blocks, same);
+  /// Whether it has moved, or another with which it shares an accessor.
+  bool is_touched(const Block& block) const {
+    return std::ranges::any_of(list_.blocks, [&](const Block& other) {
+      return share_accessor(block.attributes, other.attributes) &&
+             rows_of(positions_, other) != rows_of(rest_, other);
+    });
   }
 
   Points turned(bool are_tangents) const {
@@ -223,7 +229,6 @@ class Rewriter {
   Places places_;
   Document out_;
   Points normals_, tangents_;
-  std::map<std::size_t, int> uses_;
   std::map<std::size_t, std::size_t> mesh_of_node_;
 };
 
