@@ -1,10 +1,11 @@
 #include "client/cli/gltf/rewrite.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <set>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/gltf/accessors.h"
@@ -55,11 +56,12 @@ Weld weld_of(const Points& points, const std::optional<double>& tolerance) {
   return *std::move(weld);
 }
 
-bool share_accessor(const Attributes& a, const Attributes& b) {
-  const std::array<std::optional<std::size_t>, 3> own{a.position, a.normal, a.tangent};
-  const std::array<std::optional<std::size_t>, 3> others{b.position, b.normal, b.tangent};
-  return std::ranges::any_of(
-      others, [&](const auto& one) { return one && std::ranges::find(own, one) != own.end(); });
+std::vector<std::size_t> accessors_of(const Attributes& attributes) {
+  std::vector<std::size_t> accessors{attributes.position};
+  for (const auto& other : {attributes.normal, attributes.tangent}) {
+    if (other) accessors.push_back(*other);
+  }
+  return accessors;
 }
 
 class Rewriter {
@@ -81,9 +83,11 @@ class Rewriter {
     };
     if (adds_normals || has(&Attributes::normal)) normals_ = turned(false);
     if (has(&Attributes::tangent)) tangents_ = turned(true);
+    const std::set<std::size_t> touched = find_touched();
+    const auto is_touched = [&](std::size_t accessor) { return touched.contains(accessor); };
     for (const Block& block : list_.blocks) {
       const bool is_new = adds_normals && !block.attributes.normal;
-      if (!is_new && !is_touched(block)) continue;
+      if (!is_new && std::ranges::none_of(accessors_of(block.attributes), is_touched)) continue;
       write_positions(block);
       if (block.attributes.normal || is_new) write_normals(block);
       if (block.attributes.tangent) write_tangents(block);
@@ -92,12 +96,14 @@ class Rewriter {
   }
 
  private:
-  /// Whether it has moved, or another with which it shares an accessor.
-  bool is_touched(const Block& block) const {
-    return std::ranges::any_of(list_.blocks, [&](const Block& other) {
-      return share_accessor(block.attributes, other.attributes) &&
-             rows_of(positions_, other) != rows_of(rest_, other);
-    });
+  /// The accessors of blocks that have moved.
+  std::set<std::size_t> find_touched() const {
+    std::set<std::size_t> touched;
+    for (const Block& block : list_.blocks) {
+      if (rows_of(positions_, block) == rows_of(rest_, block)) continue;
+      for (const std::size_t accessor : accessors_of(block.attributes)) touched.insert(accessor);
+    }
+    return touched;
   }
 
   Points turned(bool are_tangents) const {

@@ -59,8 +59,9 @@ class Rewriter {
       this.positions,
       this.mesh.faces.map((vertex) => this.#smooth[vertex]!),
     );
+    const touched = new Set(this.#blocks.filter((block) => this.#hasMoved(block)).flatMap(accessorsOf));
     for (const block of this.#blocks) {
-      if (!this.#blocks.some((other) => shareAccessor(block, other) && this.#hasMoved(other))) continue;
+      if (!accessorsOf(block).some((accessor) => touched.has(accessor))) continue;
       this.#put(block, "POSITION", block.position, this.#newPositions(block), 3);
       const { normal, tangent } = block;
       const toWorld = new Matrix3().setFromMatrix4(block.placement);
@@ -157,9 +158,8 @@ class Rewriter {
   }
 }
 
-function shareAccessor(a: Block, b: Block): boolean {
-  const own = [a.position, a.normal, a.tangent];
-  return [b.position, b.normal, b.tangent].some((accessor) => accessor !== undefined && own.includes(accessor));
+function accessorsOf({ position, normal, tangent }: Block): number[] {
+  return [position, normal, tangent].filter((accessor) => accessor !== undefined);
 }
 
 /** Positions must have “min” and “max”; other accessors may. */

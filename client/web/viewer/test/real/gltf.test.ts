@@ -5,6 +5,7 @@ import { join } from "node:path";
 import { promisify } from "node:util";
 import { afterAll, beforeAll, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
+import { readGltfDocument } from "../../src/io/gltf_document.js";
 import { readMesh } from "../../src/io/read.js";
 import { faultsOf } from "../gltf_validator.js";
 import { columns, makeGlb, rows } from "../made_glb.js";
@@ -64,4 +65,16 @@ it("a GLB that is opened in the page, bent and saved has everything that it had"
     const [first, last] = [row(k)[0]!, row(k).at(-1)!];
     expect([...after.positions.slice(3 * first, 3 * first + 3)]).toEqual([...after.positions.slice(3 * last, 3 * last + 3)]);
   }
+});
+
+it("a glTF is opened together with the file that it names, and not without it", async () => {
+  const { json, buffer } = readGltfDocument("tube.glb", makeGlb(), new Map());
+  const buffers = [{ byteLength: buffer.length, uri: "tube%20data.bin" }];
+  const gltf = { name: "tube.gltf", content: JSON.stringify({ ...json, buffers }) };
+  const notice = (words: string) => user.page.locator(".notice", { hasText: words }).waitFor();
+  await user.openFiles(gltf);
+  await notice("Buffer 0 of tube.gltf is not in the file; open it together with the glTF");
+  await user.openFiles({ name: "tube data.bin", content: Buffer.from(buffer) }, gltf);
+  await notice(`tube.gltf: ${3 * (rows + 1) * (columns + 1)} vertices, ${3 * (rows + 1)} of them copies along seams, welded`);
+  expect(user.errors).toEqual([]);
 });
