@@ -27,7 +27,8 @@ namespace {
 
 /// All inputs of the command, read and checked before any work is done.
 struct Inputs {
-  MeshFile file;
+  InputMesh file;
+  std::optional<double> weld;
   client::Update update;
   client::FieldValue p;
   std::optional<std::vector<double>> initial_positions;
@@ -36,7 +37,7 @@ struct Inputs {
 
 absl::Status read_initial(const DeformOptions& options, Inputs& inputs) {
   if (options.initial == "laplacian" || options.initial == "rest") return absl::OkStatus();
-  const absl::StatusOr<MeshFile> initial = read_mesh_file(options.initial);
+  const absl::StatusOr<InputMesh> initial = read_mesh_file(options.initial);
   if (!initial.ok()) return initial.status();
   const Eigen::Index given = initial->mesh.vertices.rows(), wanted = inputs.file.mesh.vertices.rows();
   if (given != wanted) {
@@ -80,11 +81,13 @@ absl::StatusOr<Inputs> read_inputs(const DeformOptions& options) {
   if (status.ok() && options.normals) status = check_normals_have_output(options.out);
   if (status.ok() && options.report) status = check_folder(*options.report);
   if (!status.ok()) return status;
-  absl::StatusOr<MeshFile> file = read_deformable(options.mesh);
+  absl::StatusOr<InputMesh> file = read_deformable(options.mesh);
   if (!file.ok()) return file.status();
+  print_left(*file);
+  const std::optional<double> weld = welding(*file, options.weld, options.no_weld);
   auto style = picture_style(options.picture);
   if (!style.ok()) return style.status();
-  Inputs inputs{*std::move(file), {}, {}, {}, *std::move(style)};
+  Inputs inputs{*std::move(file), weld, {}, {}, {}, *std::move(style)};
   const std::int64_t vertex_count = inputs.file.mesh.vertices.rows();
 
   absl::StatusOr<HandleFile> held = read_handles(options.handles, vertex_count);
@@ -93,8 +96,8 @@ absl::StatusOr<Inputs> read_inputs(const DeformOptions& options) {
     inputs.update.settings.region = client::RegionOfInterest{std::move(held->region)};
   for (NamedHandle& handle : held->handles)
     inputs.update.handles.emplace(std::move(handle.name), std::move(handle.handle));
-  status = read_material(options.material, inputs.file, std::move(held->groups), options.weld,
-                         inputs.update.settings);
+  status =
+      read_material(options.material, inputs.file, std::move(held->groups), weld, inputs.update.settings);
   if (!status.ok()) return status;
   inputs.p = *inputs.update.settings.p;
   status = read_initial(options, inputs);
@@ -121,7 +124,7 @@ absl::StatusOr<Solved> solve_on(const std::string& address, const DeformOptions&
   absl::StatusOr<client::Session> session =
       server->open(to_client(inputs.file.mesh), {.weights = options.weights,
                                                  .free_components = options.free_components,
-                                                 .weld = by_position(options.weld)});
+                                                 .weld = by_position(inputs.weld)});
   if (!session.ok()) return session.status();
   progress.clear();
   print_notices(session->mesh_report());
@@ -148,8 +151,8 @@ absl::Status write_results(const DeformOptions& options, const Inputs& inputs, c
     absl::Status written =
         options.normals
             ? write_output_with_normals(path, inputs.file, positions, field, points_of(solved.result.normals),
-                                        options.weld, inputs.style)
-            : write_output(path, inputs.file, positions, field, options.weld, inputs.style);
+                                        inputs.weld, inputs.style)
+            : write_output(path, inputs.file, positions, field, inputs.weld, inputs.style);
     if (!written.ok()) return written;
     std::printf("wrote %s\n", path.c_str());
   }

@@ -28,8 +28,9 @@ struct DeformOptions {
   std::optional<std::uint32_t> effort;
   std::optional<double> time_limit_seconds;
   int threads = 0;             // for a server in this process; 0: all cores
-  std::optional<double> weld;  // tolerance, 0: the default; not set: no weld
-  bool normals = false;        // write normals to .obj and .ply
+  std::optional<double> weld;  // tolerance, 0: the default; not set: no weld, except of glTF
+  bool no_weld = false;        // not of glTF either
+  bool normals = false;        // write normals also where the mesh file has none
   bool certify = false;        // print the optimality gap
   std::vector<std::filesystem::path> out;
   PictureOptions picture;

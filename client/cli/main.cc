@@ -103,9 +103,9 @@ void add_material_options(CLI::App& app, DeformOptions& options) {
   app.add_option("--stiffness-field", material.stiffness_field,
                  "A stiffness for each vertex, 1e-6 to 1e6: a file with one number per line (1 everywhere)")
       ->option_text("FILE");
-  app.add_option(
-         "--p-group", material.p_groups,
-         "A p for the vertices of a group of the handle file or of an OBJ mesh; may be given several times")
+  app.add_option("--p-group", material.p_groups,
+                 "A p for the vertices of a group of the handle file or of an OBJ or glTF mesh; may be given "
+                 "several times")
       ->allow_extra_args(false)
       ->option_text("NAME=P");
   app.add_option("--stiffness-group", material.stiffness_groups,
@@ -183,13 +183,17 @@ void add_picture_options(CLI::App& app, PictureOptions& picture) {
       ->option_text("E");
 }
 
-void add_weld(CLI::App& app, std::optional<double>& weld) {
-  app.add_option(
-         "--weld", weld,
-         "Weld vertices in the same place, for meshes split along seams of texture or normals. TOLERANCE is "
-         "their largest distance as a share of the bounding box's diagonal, 0 to 0.001 (1e-6)")
-      ->check(within(0, 1e-3))
-      ->option_text("[TOLERANCE]");
+void add_weld(CLI::App& app, std::optional<double>& weld, bool& no_weld) {
+  CLI::Option* const option =
+      app.add_option("--weld", weld,
+                     "Weld vertices in the same place, for meshes split along seams of texture or normals. "
+                     "TOLERANCE is "
+                     "their largest distance as a share of the bounding box's diagonal, 0 to 0.001 (1e-6)")
+          ->check(within(0, 1e-3))
+          ->option_text("[TOLERANCE]");
+  app.add_flag("--no-weld", no_weld,
+               "Keep vertices in the same place apart also in glTF, which is welded otherwise")
+      ->excludes(option);
 }
 
 /// A number after --weld is its tolerance. Without a number the tolerance is the default, and the next
@@ -248,7 +252,7 @@ void add_needed_server(CLI::App& app, ServerAccess& access) {
 void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand("deform", "Deform a mesh by its handles and write the result");
   const auto options = std::make_shared<DeformOptions>();
-  app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required()->option_text(" ");
+  app.add_option("MESH", options->mesh, "GLB, glTF, OFF, OBJ, PLY or STL")->required()->option_text(" ");
   app.add_option("--handles", options->handles,
                  "The handle file: which vertices are held and where they move; JSON, see below; required")
       ->required()
@@ -258,15 +262,15 @@ void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
   app.add_option(
          "--out", options->out,
          "Where to write the result; may be given several times. The ending decides: .ply with distortion "
-         "and colours, .obj, .off, or a picture as .png")
+         "and colours, .glb, .gltf, .obj, .off, or a picture as .png")
       ->allow_extra_args(false)
       ->option_text("FILE");
   add_picture_options(app, options->picture);
-  add_weld(app, options->weld);
+  add_weld(app, options->weld, options->no_weld);
   app.add_flag(
       "--normals", options->normals,
-      "Write normals to .obj and .ply, one of which must be among the outputs. Normals of an OBJ input "
-      "are turned with the surface, so its hard edges stay hard");
+      "Write normals to .glb, .gltf, .obj and .ply, one of which must be among the outputs. Normals of a "
+      "glTF or OBJ input are turned with the surface, so its hard edges stay hard");
   app.add_flag(
       "--certify", options->certify,
       "Print a bound on how far the result is from the best one for its rotations (also in a report)");
@@ -292,7 +296,7 @@ void add_deform(CLI::App& program, std::function<ExitStatus()>& command) {
 void add_info(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand("info", "Print what a mesh consists of and its defects");
   const auto options = std::make_shared<InfoOptions>();
-  app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required()->option_text(" ");
+  app.add_option("MESH", options->mesh, "GLB, glTF, OFF, OBJ, PLY or STL")->required()->option_text(" ");
   app.add_flag("--json", options->is_json, "Print the object \"mesh\" of a report");
   app.callback([&command, options] { command = [options] { return run_info(*options); }; });
 }
@@ -307,8 +311,9 @@ void add_resize(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::App& app = *program.add_subcommand(
       "resize", "Scale a mesh by different factors along its axes; salient parts keep their shape");
   const auto options = std::make_shared<ResizeOptions>();
-  app.add_option("MESH", options->mesh, "OFF, OBJ, PLY or STL")->required()->option_text(" ");
-  app.add_option("OUT", options->out, "Where to write the result: .ply, .obj, .off, or a picture as .png")
+  app.add_option("MESH", options->mesh, "GLB, glTF, OFF, OBJ, PLY or STL")->required()->option_text(" ");
+  app.add_option("OUT", options->out,
+                 "Where to write the result: .ply, .glb, .gltf, .obj, .off, or a picture as .png")
       ->required()
       ->option_text(" ");
   add_vector(app, "--scale", options->scale, "Factors along the three axes, each 0.01 to 100; required")
@@ -319,7 +324,7 @@ void add_resize(CLI::App& program, std::function<ExitStatus()>& command) {
   add_vector(app, "--x-axis", options->x_axis, "The direction of the first factor (1,0,0)");
   add_vector(app, "--y-axis", options->y_axis, "The direction of the second factor (0,1,0)");
   add_picture_options(app, options->picture);
-  add_weld(app, options->weld);
+  add_weld(app, options->weld, options->no_weld);
   CLI::Option* const threads =
       app.add_option("--threads", options->threads, "The number of cores to use at most (all)")
           ->check(CLI::Range(1, 1024))

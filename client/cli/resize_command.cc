@@ -181,8 +181,10 @@ absl::StatusOr<Resized> resize_on(const std::string& address, const ServerAccess
 ExitStatus run_resize(const ResizeOptions& options) {
   Interrupt interrupt;
   if (absl::Status status = check_outputs(std::array{options.out}); !status.ok()) return complain(status);
-  absl::StatusOr<MeshFile> file = read_deformable(options.mesh);
+  absl::StatusOr<InputMesh> file = read_deformable(options.mesh);
   if (!file.ok()) return complain(file.status());
+  print_left(*file);
+  const std::optional<double> weld = welding(*file, options.weld, options.no_weld);
   const absl::StatusOr<PictureStyle> style = picture_style(options.picture);
   if (!style.ok()) return complain(style.status());
   const absl::StatusOr<Scaling> scaling = read_scaling(options, file->mesh);
@@ -195,11 +197,11 @@ ExitStatus run_resize(const ResizeOptions& options) {
     local = *std::move(started);
   }
   const absl::StatusOr<Resized> resized = resize_on(local ? local->address() : *options.server.address,
-                                                    options.server, *scaling, options.weld, *file, interrupt);
+                                                    options.server, *scaling, weld, *file, interrupt);
   if (interrupt.happened()) return kInterrupted;
   if (!resized.ok()) return complain(resized.status());
-  const absl::Status written = write_output(options.out, *file, resized->file.mesh.vertices,
-                                            resized->distortion, options.weld, *style);
+  const absl::Status written =
+      write_output(options.out, *file, resized->file.mesh.vertices, resized->distortion, weld, *style);
   if (!written.ok()) return complain(written);
   std::printf("wrote %s\n", options.out.c_str());
   return exit_status_of(resized->stop_reason, false, false);

@@ -17,7 +17,8 @@ struct ResizeOptions {
   std::vector<double> scale = {1, 1, 1};  // along the axes, each 0.01 to 100
   std::vector<double> origin;             // x, y, z; empty: the middle of the mesh's bounding box
   std::vector<double> x_axis, y_axis;     // both or none
-  std::optional<double> weld;             // tolerance, 0: the default; not set: no weld
+  std::optional<double> weld;             // tolerance, 0: the default; not set: no weld, except of glTF
+  bool no_weld = false;                   // not of glTF either
   int threads = 0;                        // for a server in this process; 0: all cores
   PictureOptions picture;
   ServerAccess server;

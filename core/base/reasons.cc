@@ -100,6 +100,7 @@ constexpr Row kRows[] = {
     {"MESH_SIZE", absl::StatusCode::kInvalidArgument},
     {"MESH_SYNTAX", absl::StatusCode::kInvalidArgument},
     {"MESH_TOO_LARGE", absl::StatusCode::kInvalidArgument},
+    {"MESH_UNSUPPORTED", absl::StatusCode::kInvalidArgument},
     {"MESSAGE_UNREADABLE", absl::StatusCode::kInvalidArgument},
     {"METHOD_NEEDS_EXACT_HANDLES", absl::StatusCode::kInvalidArgument},
     {"METHOD_NEEDS_P", absl::StatusCode::kInvalidArgument},

@@ -98,6 +98,7 @@ enum class Reason {
   kMeshSize,
   kMeshSyntax,
   kMeshTooLarge,
+  kMeshUnsupported,
   kMessageUnreadable,
   kMethodNeedsExactHandles,
   kMethodNeedsP,

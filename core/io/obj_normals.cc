@@ -112,12 +112,20 @@ Points normals_at(const Drawn& drawn, const Points& rest, const Points& position
   return carried.at(rows_of(positions, drawn.vertices));
 }
 
+/// What the first line of a text ends with.
+std::string_view line_end_of(std::string_view text) {
+  const std::size_t end = text.find('\n');
+  if (end == std::string_view::npos) return text.find('\r') == std::string_view::npos ? "\n" : "\r";
+  return end > 0 && text[end - 1] == '\r' ? "\r\n" : "\n";
+}
+
 /// Copies the source line by line, with new coordinates in its v lines. Its vn lines are left out; new vn lines go
 /// before the first f line.
 class Writer {
  public:
   Writer(std::string_view source, const Points& positions, const Drawn& drawn, const Points& normals)
       : source_(source),
+        line_end_(line_end_of(source)),
         positions_(positions),
         drawn_(drawn),
         normals_(normals),
@@ -157,7 +165,7 @@ class Writer {
     for (Eigen::Index n = 0; corner_ == 0 && n < normals_.rows(); ++n) {
       text_ += "vn ";
       append_point<float>(text_, normals_, n);
-      text_ += '\n';
+      text_ += line_end_;
     }
     for (std::string_view word = scanner_.next_on_line(); !word.empty(); word = scanner_.next_on_line()) {
       const std::size_t first = word.find('/'), second = word.find('/', first + 1);
@@ -170,7 +178,7 @@ class Writer {
     }
   }
 
-  const std::string_view source_;
+  const std::string_view source_, line_end_;
   const Points& positions_;
   const Drawn& drawn_;
   const Points& normals_;

@@ -4,6 +4,7 @@ import json
 import math
 import os
 import random
+import struct
 import subprocess
 
 import programs
@@ -106,6 +107,56 @@ class Files(OnShapes):
         self.assertEqual(len(normals), len(posed))
         for normal in normals:
             self.assertAlmostEqual(math.hypot(*normal), 1, delta=1e-6)
+
+    def split_glb(self, name):
+        """The bar as a GLB with a vertex for each corner of each face, drawn at twice its size."""
+        points, faces = read_off(self.at("bar.off")), read_off_faces(self.at("bar.off"))
+        corners = [points[v] for face in faces for v in face]
+        data = b"".join(struct.pack("<3f", *(x / 2 for x in corner)) for corner in corners)
+        bounds = [[pick(corner[k] / 2 for corner in corners) for k in range(3)] for pick in (min, max)]
+        text = json.dumps({
+            "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "scale": [2, 2, 2], "name": "bar"}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}], "extras": {"kept": [1, "two"]}}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": len(corners), "type": "VEC3", "min": bounds[0],
+                           "max": bounds[1]}],
+            "bufferViews": [{"buffer": 0, "byteLength": len(data)}], "buffers": [{"byteLength": len(data)}]}).encode()
+        text += b" " * (-len(text) % 4)
+        with open(self.at(name), "wb") as file:
+            file.write(b"glTF" + struct.pack("<2I", 2, 28 + len(text) + len(data)) + struct.pack("<I", len(text)) + b"JSON" + text)
+            file.write(struct.pack("<I", len(data)) + b"BIN\0" + data)
+        copies = {v: [k for k, corner in enumerate(v for face in faces for v in face) if corner == v] for v in range(len(points))}
+        return self.at(name), copies
+
+    def test_a_glb_is_welded_and_comes_back_with_all_that_it_had(self):
+        source, copies = self.split_glb("split.glb")
+        handles = json.loads(read_text(self.at("bar.json")))
+        for handle in handles["handles"]:
+            handle["vertices"] = [copies[v][0] for v in handle["vertices"]]
+        handles = self.write("glb.json", json.dumps(handles))
+        out, positions = self.at("posed.glb"), self.at("posed.off")
+        done = run("deform", source, "--handles", handles, "--out", out, "--out", positions)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.deform("--out", self.at("whole.off"))
+        whole, posed = read_off(self.at("whole.off")), read_off(positions)
+        for v, same in copies.items():
+            self.assertEqual(len({posed[copy] for copy in same}), 1)
+            for axis in range(3):
+                self.assertAlmostEqual(posed[same[0]][axis], whole[v][axis], delta=0.02)
+        before, after = (json.loads(read_bytes(path)[20:].split(b"BIN\0")[0][:-4]) for path in (source, out))
+        for file in (before, after):
+            del file["accessors"][0]["min"], file["accessors"][0]["max"]
+        self.assertEqual(before, after)
+        again = run("info", out)
+        self.assertEqual(again.returncode, 0, again.stderr)
+        self.assertIn('node "bar"', again.stdout)
+        apart = run("deform", source, "--handles", handles, "--no-weld", "--out", out)
+        self.assertEqual(apart.returncode, 2, "each face is a component of its own")
+
+    def test_a_glb_that_breaks_off_is_refused(self):
+        source, _ = self.split_glb("whole.glb")
+        with open(self.at("cut.glb"), "wb") as file:
+            file.write(read_bytes(source)[:1000])
+        self.assertIn("GLB", self.refused(2, "info", self.at("cut.glb")))
 
     def test_normals_that_no_output_holds_are_refused(self):
         out = self.at("no_normals.off")

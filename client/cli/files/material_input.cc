@@ -82,12 +82,15 @@ bool paints_anything(const std::vector<VertexGroup>& groups, const MaterialOptio
 
 }  // namespace
 
-absl::Status read_material(const MaterialOptions& options, const MeshFile& file,
+absl::Status read_material(const MaterialOptions& options, const InputMesh& file,
                            std::vector<VertexGroup> groups, std::optional<double> welding,
                            client::Settings& into) {
   const std::int64_t vertex_count = file.mesh.vertices.rows();
   if (absl::Status status = read_base(options, vertex_count, into); !status.ok()) return status;
   for (VertexGroup& group : obj_groups(file.obj_source)) groups.push_back(std::move(group));
+  if (file.gltf) {
+    for (auto& [name, vertices] : file.gltf->groups()) groups.push_back({name, std::move(vertices), {}, {}});
+  }
   const bool paints = paints_anything(groups, options);
   if (!paints && !options.automatic) return absl::OkStatus();
 

@@ -7,8 +7,8 @@
 
 #include "absl/status/status.h"
 #include "client/cli/files/handle_file.h"
+#include "client/cli/files/mesh_input.h"
 #include "client/cpp/types.h"
-#include "core/io/mesh_io.h"
 
 namespace lpdeform::cli {
 
@@ -24,11 +24,11 @@ struct MaterialOptions {
 };
 
 /// Reads the inputs that `options` name and sets p, and stiffness unless it stays 1. `groups`: those of the
-/// handle file; those of an OBJ mesh are added. The server finds the automatic fields. Only if groups are
+/// handle file; those of an OBJ or glTF mesh are added. The server finds the automatic fields. Only if groups are
 /// painted over them, they are found here, by the same code. `welding`: the tolerance if vertices are welded
 /// by position; a group that names one copy of a vertex then has all copies. Errors: those of read_field and
 /// painting.h.
-absl::Status read_material(const MaterialOptions& options, const MeshFile& file,
+absl::Status read_material(const MaterialOptions& options, const InputMesh& file,
                            std::vector<VertexGroup> groups, std::optional<double> welding,
                            client::Settings& into);
 

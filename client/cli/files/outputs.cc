@@ -1,6 +1,7 @@
 #include "client/cli/files/outputs.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <string>
 #include <system_error>
@@ -36,6 +37,21 @@ bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b
   return whole(a) == whole(b);
 }
 
+constexpr std::array<std::string_view, 6> kEndings{".glb", ".gltf", ".ply", ".obj", ".off", ".png"};
+
+bool holds_normals(const std::filesystem::path& path) {
+  return ending_of(path) == ".obj" || ending_of(path) == ".ply" || gltf::packing_of(path).has_value();
+}
+
+/// A glTF input with new positions; from another format, a new glTF with the mesh alone.
+absl::Status write_gltf(const std::filesystem::path& path, const InputMesh& file, const Points& positions,
+                        std::optional<double> weld, bool adds_normals) {
+  absl::StatusOr<gltf::Gltf> source = file.gltf ? *file.gltf : gltf::Gltf::of_mesh(file.mesh);
+  if (!source.ok()) return source.status();
+  const auto bytes = source->bytes(positions, *gltf::packing_of(path), weld, adds_normals);
+  return bytes.ok() ? write_text(path, *bytes) : said_of(path.string(), bytes.status());
+}
+
 }  // namespace
 
 absl::StatusOr<PictureStyle> picture_style(const PictureOptions& options) {
@@ -54,10 +70,10 @@ absl::StatusOr<PictureStyle> picture_style(const PictureOptions& options) {
 
 absl::Status check_outputs(std::span<const std::filesystem::path> paths) {
   for (const std::filesystem::path& path : paths) {
-    const std::string ending = ending_of(path);
-    if (ending != ".ply" && ending != ".obj" && ending != ".off" && ending != ".png") {
-      return make_fault({Reason::kOutFormatUnknown, path.string(), "ending = .ply, .obj, .off or .png"},
-                        absl::StrCat("\"", path.string(), "\" ends in none of .ply, .obj, .off and .png."));
+    if (std::ranges::find(kEndings, ending_of(path)) == kEndings.end()) {
+      return make_fault(
+          {Reason::kOutFormatUnknown, path.string(), "ending = .glb, .gltf, .ply, .obj, .off or .png"},
+          absl::StrCat("\"", path.string(), "\" ends in none of .glb, .gltf, .ply, .obj, .off and .png."));
     }
     absl::Status folder = check_folder(path);
     if (!folder.ok()) return folder;
@@ -80,15 +96,13 @@ absl::Status check_apart(std::span<const NamedFile> written, std::span<const Nam
 }
 
 absl::Status check_normals_have_output(std::span<const std::filesystem::path> paths) {
-  const bool has_output = std::ranges::any_of(paths, [](const std::filesystem::path& path) {
-    return ending_of(path) == ".obj" || ending_of(path) == ".ply";
-  });
-  if (has_output) return absl::OkStatus();
-  return make_fault({Reason::kOutWithoutNormals, "--normals", "an output that ends in .obj or .ply"},
-                    "--normals is given, but no --out ends in .obj or .ply, which hold normals.");
+  if (std::ranges::any_of(paths, holds_normals)) return absl::OkStatus();
+  return make_fault(
+      {Reason::kOutWithoutNormals, "--normals", "an output that ends in .glb, .gltf, .obj or .ply"},
+      "--normals is given, but no --out ends in .glb, .gltf, .obj or .ply, which hold normals.");
 }
 
-absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
+absl::Status write_output(const std::filesystem::path& path, const InputMesh& file, const Points& positions,
                           const Field& distortion, std::optional<double> weld, const PictureStyle& style) {
   const std::string ending = ending_of(path);
   if (ending == ".png") {
@@ -96,16 +110,18 @@ absl::Status write_output(const std::filesystem::path& path, const MeshFile& fil
     with_colours.distortion = distortion;
     return render_png(path, file.mesh.faces, positions, with_colours);
   }
+  if (gltf::packing_of(path)) return write_gltf(path, file, positions, weld, false);
   if (ending == ".obj" && has_obj_normals(file))
     return write_text(path, obj_text_with_normals(file, positions, weld));
   return write_mesh(path, file, positions, distortion);
 }
 
-absl::Status write_output_with_normals(const std::filesystem::path& path, const MeshFile& file,
+absl::Status write_output_with_normals(const std::filesystem::path& path, const InputMesh& file,
                                        const Points& positions, const Field& distortion,
                                        const Points& normals, std::optional<double> weld,
                                        const PictureStyle& style) {
   const std::string ending = ending_of(path);
+  if (gltf::packing_of(path)) return write_gltf(path, file, positions, weld, true);
   if (ending == ".obj") return write_text(path, obj_text_with_normals(file, positions, weld));
   if (ending == ".ply") return write_mesh(path, file, positions, distortion, normals);
   return write_output(path, file, positions, distortion, weld, style);

@@ -8,8 +8,8 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/cli/files/mesh_input.h"
 #include "client/cli/render/render.h"
-#include "core/io/mesh_io.h"
 
 namespace lpdeform::cli {
 
@@ -23,8 +23,8 @@ struct PictureOptions {
 /// Errors: those of read_mesh; MESH_EMPTY if no face of the camera's mesh is visible.
 absl::StatusOr<PictureStyle> picture_style(const PictureOptions& options);
 
-/// INVALID_ARGUMENT if one of `paths` cannot be written: its ending is not .ply, .obj, .off or .png
-/// (OUT_FORMAT_UNKNOWN), or its folder does not exist (FILE_NOT_WRITTEN). Check this before the solve, not
+/// INVALID_ARGUMENT if one of `paths` cannot be written: its ending is not .glb, .gltf, .ply, .obj,
+/// .off or .png (OUT_FORMAT_UNKNOWN), or its folder does not exist (FILE_NOT_WRITTEN). Check this before the solve, not
 /// after it.
 absl::Status check_outputs(std::span<const std::filesystem::path> paths);
 
@@ -37,17 +37,17 @@ struct NamedFile {
 /// INVALID_ARGUMENT OUT_TWICE if two of `written` are the same file, or if one of them is also in `read`.
 absl::Status check_apart(std::span<const NamedFile> written, std::span<const NamedFile> read);
 
-/// INVALID_ARGUMENT OUT_WITHOUT_NORMALS if none of `paths` can hold normals; .obj and .ply can.
+/// INVALID_ARGUMENT OUT_WITHOUT_NORMALS if none of `paths` can hold normals; .glb, .gltf, .obj and .ply can.
 absl::Status check_normals_have_output(std::span<const std::filesystem::path> paths);
 
-/// Writes `positions` with the faces of `file`: .ply with distortion and colours; .obj, which keeps
+/// Writes `positions` with the faces of `file`: .glb and .gltf, which keep everything else of a glTF input; .ply with distortion and colours; .obj, which keeps
 /// everything else of an OBJ input and turns its normals with the surface; .off; or a picture as .png.
 /// `distortion` may be empty. `weld`: see obj_text_with_normals.
-absl::Status write_output(const std::filesystem::path& path, const MeshFile& file, const Points& positions,
+absl::Status write_output(const std::filesystem::path& path, const InputMesh& file, const Points& positions,
                           const Field& distortion, std::optional<double> weld, const PictureStyle& style);
 
-/// The same with normals in .obj and .ply, even if the input had none. `normals`: one per vertex, for .ply.
-absl::Status write_output_with_normals(const std::filesystem::path& path, const MeshFile& file,
+/// The same with normals in .glb, .gltf, .obj and .ply, even if the input had none. `normals`: one per vertex, for .ply.
+absl::Status write_output_with_normals(const std::filesystem::path& path, const InputMesh& file,
                                        const Points& positions, const Field& distortion,
                                        const Points& normals, std::optional<double> weld,
                                        const PictureStyle& style);

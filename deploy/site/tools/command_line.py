@@ -9,7 +9,7 @@ import sys
 
 INTRODUCTION = """# Command line
 
-`lpdeform` deforms meshes from the shell. It reads OFF, OBJ, PLY and STL files, and writes meshes and pictures. It solves in its own
+`lpdeform` deforms meshes from the shell. It reads GLB, glTF, OFF, OBJ, PLY and STL files, and writes meshes and pictures. It solves in its own
 process, or on a server if `--server` is given. This page is what `lpdeform --help` and the `--help` of each command print.
 
 """

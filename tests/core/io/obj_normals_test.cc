@@ -2,6 +2,8 @@
 
 #include <sstream>
 
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "tests/core/mesh_support.h"
 
 namespace lpdeform {
@@ -43,6 +45,7 @@ std::vector<std::array<double, 3>> corner_normals(const std::string& text) {
   return corners;
 }
 
+using testing::AnyOf;
 using testing::Each;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -74,6 +77,16 @@ TEST(ObjNormals, KeepEverythingElseOfTheSource) {
   const MeshFile again = obj(text);
   EXPECT_TRUE(same_bits(again.mesh.vertices, 2 * file.mesh.vertices));
   EXPECT_TRUE(same_faces(again.mesh.faces, file.mesh.faces));
+}
+
+TEST(ObjNormals, HaveTheLineEndsOfTheSource) {
+  for (const std::string& end : {std::string("\n"), std::string("\r\n"), std::string("\r")}) {
+    const std::string source = absl::StrReplaceAll(std::string(kCorner), {{"\n", end}});
+    const MeshFile file = obj(source);
+    const std::string text = obj_text_with_normals(file, 2 * file.mesh.vertices, std::nullopt);
+    EXPECT_THAT(absl::StrReplaceAll(text, {{end, ""}}), Not(AnyOf(HasSubstr("\n"), HasSubstr("\r"))));
+    EXPECT_THAT(text, HasSubstr(absl::StrCat(end, "vn ")));
+  }
 }
 
 TEST(ObjNormals, OfCornersWithoutOneAreSmooth) {

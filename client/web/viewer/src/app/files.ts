@@ -1,4 +1,6 @@
 import { FileFault } from "../io/fault.js";
+import { newGlb } from "../io/gltf.js";
+import { rewriteGlb } from "../io/gltf_rewrite.js";
 import { readHandleFile, writeHandleFile } from "../io/handlefile.js";
 import { writeObj } from "../io/obj.js";
 import { openedMesh } from "../io/opened.js";
@@ -22,14 +24,14 @@ const mostBytes = 500e6;
 const largeBytes = 2e6;
 
 const isHandles = ({ name }: File) => /\.json$/i.test(name);
-const isMesh = ({ name }: File) => /\.(off|obj|ply|stl)$/i.test(name);
+const isMesh = ({ name }: File) => /\.(glb|gltf|off|obj|ply|stl)$/i.test(name);
 
 interface Exported {
   positions: Float32Array | Float64Array;
   distortion: Float32Array | Float64Array;
 }
 
-export type MeshFormat = "ply" | "obj" | "off" | "stl";
+export type MeshFormat = "glb" | "ply" | "obj" | "off" | "stl";
 
 /** Opens and saves files. */
 export class Files {
@@ -37,7 +39,7 @@ export class Files {
 
   constructor(readonly app: App) {
     this.#input.type = "file";
-    this.#input.accept = ".off,.obj,.ply,.stl,.json";
+    this.#input.accept = ".glb,.gltf,.bin,.off,.obj,.ply,.stl,.json";
     this.#input.multiple = true;
     this.#input.addEventListener("change", () => {
       void this.open([...(this.#input.files ?? [])]);
@@ -50,7 +52,10 @@ export class Files {
     this.#input.click();
   }
 
-  /** Opens a mesh, handles, or both, in any order. Files beside a mesh, such as materials, are ignored. */
+  /**
+   * Opens a mesh, handles, or both, in any order. Files beside a mesh, such as materials, are ignored, except those that a glTF
+   * names.
+   */
   async open(files: readonly File[]): Promise<void> {
     const meshes = files.filter(isMesh);
     if (meshes.length > 1) {
@@ -60,7 +65,8 @@ export class Files {
     const known = [...meshes, ...files.filter(isHandles)];
     for (const file of known.length > 0 ? known : files) {
       try {
-        await this.#openFile(file);
+        const isGltf = /\.gltf$/i.test(file.name);
+        await this.#openFile(file, isGltf ? files.filter((other) => other !== file) : []);
       } catch (error) {
         const isFault = error instanceof FileFault;
         this.app.notify(isFault ? error.message : `${file.name} cannot be opened: ${(error as Error).message}`, true);
@@ -69,14 +75,14 @@ export class Files {
     }
   }
 
-  async #openFile(file: File): Promise<void> {
+  async #openFile(file: File, beside: readonly File[]): Promise<void> {
     if (file.size > mostBytes) {
       throw new FileFault(`${file.name} has ${short(file.size)}B; this page reads files of ${short(mostBytes)}B at most.`);
     }
     const done = file.size > largeBytes ? this.app.notifyWhile(`Opening ${file.name}…`) : () => undefined;
     try {
       if (isHandles(file)) this.#openHandles(file.name, await file.text());
-      else this.#openMesh(await openedMesh(file));
+      else this.#openMesh(await openedMesh(file, beside));
     } finally {
       done();
     }
@@ -89,16 +95,17 @@ export class Files {
     for (const pane of panes) {
       const { mesh } = pane.stage.surface!;
       const { positions, distortion } = await this.#exactly(pane);
-      const { faces, corners, obj } = mesh;
+      const { faces, corners, obj, gltf } = mesh;
       const deformed: WrittenMesh = { positions, faces, ...(corners && { corners }) };
       const name = `${stem}-deformed${panes.length > 1 ? `-${pane.side}` : ""}.${format}`;
+      if (format === "glb") save(name, gltf ? rewriteGlb({ ...mesh, gltf }, positions) : newGlb(deformed));
       if (format === "ply") save(name, writePly(deformed, distortion, this.app.red));
       if (format === "obj") save(name, obj ? rewriteObj({ ...mesh, obj }, positions) : writeObj(deformed));
       if (format === "off") save(name, writeOff(deformed));
       if (format === "stl") save(name, (await import("../io/write_stl.js")).writeStl(deformed));
       const lost = lostIn(mesh, format);
       if (lost.length > 0) {
-        const better = obj ? " Saved as OBJ, they stay." : "";
+        const better = obj || gltf ? ` Saved as ${obj ? "OBJ" : "GLB"}, they stay.` : "";
         this.app.notify(`${name} does not have what the original file also had: ${lost.join(", ")}.${better}`);
       }
     }
@@ -180,9 +187,9 @@ export class Files {
 }
 
 /** What a file had that this format cannot hold, in words. */
-function lostIn({ beside = [], corners, obj }: Mesh, format: MeshFormat): readonly string[] {
-  if (format === "obj" && obj) return [];
-  return format === "stl" && corners ? [...beside, "faces of more than three corners"] : beside;
+function lostIn({ beside = [], corners, obj, gltf }: Mesh, format: MeshFormat): readonly string[] {
+  if ((format === "obj" && obj) || (format === "glb" && gltf)) return [];
+  return (format === "stl" || format === "glb") && corners ? [...beside, "faces of more than three corners"] : beside;
 }
 
 function save(name: string, content: Blob | string | Uint8Array<ArrayBuffer>): void {

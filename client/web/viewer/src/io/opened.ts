@@ -5,7 +5,7 @@ import { FileFault } from "./fault.js";
 import { readMesh } from "./read.js";
 
 /** What a worker is asked to do: to read a file, or to find what is derived of a mesh. */
-export type Asked = { file: File } | { mesh: Mesh };
+export type Asked = { file: File; beside: readonly File[] } | { mesh: Mesh };
 /** What it answers: the mesh, which it has read, and what is derived of it, without classes. Or why it cannot. */
 export type Answer =
   | { mesh: Mesh | undefined; derived: Omit<Derived, "seams"> & { seams: Pick<Seams, "groups" | "faces"> | undefined } }
@@ -15,14 +15,25 @@ export type Answer =
 /** Below this size the page is as quick by itself. */
 const smallBytes = 200_000;
 
-/** Reads a mesh file and finds what is needed to show it; for a large one in a worker. Rejects with a FileFault. */
-export async function openedMesh(file: File): Promise<Mesh> {
-  const answer = file.size > smallBytes ? await askWorker({ file }) : undefined;
+/**
+ * Reads a mesh file and finds what is needed to show it; for a large one in a worker. `beside`: files that were opened with it.
+ * Rejects with a FileFault.
+ */
+export async function openedMesh(file: File, beside: readonly File[]): Promise<Mesh> {
+  const isLarge = [file, ...beside].some(({ size }) => size > smallBytes);
+  const answer = isLarge ? await askWorker({ file, beside }) : undefined;
   if (answer?.mesh) {
     know(answer.mesh, withClasses(answer));
     return answer.mesh;
   }
-  return readMesh(file.name, new Uint8Array(await file.arrayBuffer()));
+  return meshOf(file, beside);
+}
+
+/** Reads a mesh file on this thread. */
+export async function meshOf(file: File, beside: readonly File[]): Promise<Mesh> {
+  const bytesOf = async (one: File) => new Uint8Array(await one.arrayBuffer());
+  const others = await Promise.all(beside.map(async (one) => [one.name, await bytesOf(one)] as const));
+  return readMesh(file.name, await bytesOf(file), new Map(others));
 }
 
 /** Finds what is needed to show a mesh; for a large one in a worker. */

@@ -1,7 +1,6 @@
 import { derive } from "../model/derived.js";
 import { FileFault } from "./fault.js";
-import type { Answer, Asked } from "./opened.js";
-import { readMesh } from "./read.js";
+import { type Answer, type Asked, meshOf } from "./opened.js";
 
 // A worker that reads one file, or finds what is derived of one mesh, and ends.
 const scope = globalThis as unknown as Pick<Worker, "postMessage"> & { onmessage: (event: MessageEvent<Asked>) => void };
@@ -14,7 +13,7 @@ scope.onmessage = ({ data }) =>
   );
 
 async function answer(asked: Asked): Promise<Answer> {
-  const mesh = "mesh" in asked ? asked.mesh : readMesh(asked.file.name, new Uint8Array(await asked.file.arrayBuffer()));
+  const mesh = "mesh" in asked ? asked.mesh : await meshOf(asked.file, asked.beside);
   const { seams, ...derived } = derive(mesh);
   return {
     mesh: "mesh" in asked ? undefined : mesh,

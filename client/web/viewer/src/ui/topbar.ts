@@ -32,7 +32,7 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
   const open = labelled(
     "open",
     "Open",
-    "A mesh (OFF, OBJ, PLY, STL) or a handle file; dropping it onto the page does the same (O)",
+    "A mesh (GLB, glTF, OFF, OBJ, PLY, STL) or a handle file; dropping it onto the page does the same (O)",
     () => files.choose(),
   );
 
@@ -72,6 +72,7 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
 function exportMenu(files: Files): HTMLElement {
   return menu(icon("save"), "Save", "Save or export", [
     ["Mesh as PLY, with distortion", () => void files.exportMesh("ply")],
+    ["Mesh as GLB", () => void files.exportMesh("glb")],
     ["Mesh as OBJ", () => void files.exportMesh("obj")],
     ["Mesh as OFF", () => void files.exportMesh("off")],
     ["Mesh as STL", () => void files.exportMesh("stl")],
