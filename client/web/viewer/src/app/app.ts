@@ -147,7 +147,7 @@ export class App implements Workbench {
 
   /** `isBroughtBack`: the user has worked on it before. */
   open(mesh: Mesh, document: Document, isBroughtBack = false, isWelded = true): void {
-    for (const editing of this.#editings) editing.release();
+    this.endAll();
     if (this.isTouched) this.#asides.put(this.#present());
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
@@ -266,6 +266,11 @@ export class App implements Workbench {
   cancelAll(): boolean {
     const held = [...this.#editings].map((editing) => editing.cancel());
     return this.cancelGesture() || held.includes(true);
+  }
+
+  /** Ends drags by the pointer in every picture: what they have moved becomes a step. */
+  endAll(): void {
+    for (const editing of this.#editings) editing.release();
   }
 
   /** A handle that comes back is selected again if it was when it went. */

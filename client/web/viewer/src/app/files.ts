@@ -14,6 +14,7 @@ import type { App } from "./app.js";
 import { sentence } from "../link/status.js";
 import type { Pane } from "./pane.js";
 import { pictureOf } from "./picture.js";
+import { openProject, saveProject } from "./projects.js";
 
 /** Time limit for the result that is exported. */
 const solveMs = 60_000;
@@ -23,6 +24,7 @@ const mostBytes = 500e6;
 const largeBytes = 2e6;
 
 const isHandles = ({ name }: File) => /\.json$/i.test(name);
+const isProject = ({ name }: File) => /\.lpdeform$/i.test(name);
 const isMesh = ({ name }: File) => /\.(off|obj|ply|stl)$/i.test(name);
 
 interface Exported {
@@ -38,7 +40,7 @@ export class Files {
 
   constructor(readonly app: App) {
     this.#input.type = "file";
-    this.#input.accept = ".off,.obj,.ply,.stl,.json";
+    this.#input.accept = ".off,.obj,.ply,.stl,.json,.lpdeform";
     this.#input.multiple = true;
     this.#input.addEventListener("change", () => {
       void this.open([...(this.#input.files ?? [])]);
@@ -51,14 +53,18 @@ export class Files {
     this.#input.click();
   }
 
-  /** Opens a mesh, handles, or both, in any order. Files beside a mesh, such as materials, are ignored. */
+  /** Opens a project, or a mesh, handles, or both, in any order. Files beside a mesh, such as materials, are ignored. */
   async open(files: readonly File[]): Promise<void> {
     const meshes = files.filter(isMesh);
     if (meshes.length > 1) {
       const names = meshes.map(({ name }) => name).join(", ");
       return this.app.notify(`One mesh at a time: ${names} are ${meshes.length}.`, true);
     }
-    const known = [...meshes, ...files.filter(isHandles)];
+    const projects = files.filter(isProject);
+    if (projects.length > 0 && files.length > 1) {
+      return this.app.notify(`A project is opened alone: ${projects[0]!.name} is one of ${files.length} files.`, true);
+    }
+    const known = [...projects, ...meshes, ...files.filter(isHandles)];
     for (const file of known.length > 0 ? known : files) {
       try {
         await this.#openFile(file);
@@ -77,7 +83,8 @@ export class Files {
     const done = file.size > largeBytes ? this.app.notifyWhile(`Opening ${file.name}…`) : () => undefined;
     try {
       if (file.size > largeBytes) await new Promise((seen) => setTimeout(seen, 50));
-      if (isHandles(file)) this.#openHandles(file.name, await file.text());
+      if (isProject(file)) await this.#openProject(file);
+      else if (isHandles(file)) this.#openHandles(file.name, await file.text());
       else this.#openMesh(file.name, new Uint8Array(await file.arrayBuffer()));
     } finally {
       done();
@@ -130,6 +137,17 @@ export class Files {
       if (blob) save(`${this.#stem}.png`, blob);
       else this.app.notify("The browser makes no picture of this size: make the window smaller.", true);
     });
+  }
+
+  /** Everything that is needed to go on: mesh, handles, fields, settings and camera. */
+  async saveProject(): Promise<void> {
+    save(`${this.#stem}.lpdeform`, await saveProject(this.app));
+  }
+
+  async #openProject(file: File): Promise<void> {
+    await openProject(this.app, file.name, new Uint8Array(await file.arrayBuffer()));
+    const count = this.app.document.handles.length;
+    this.app.notify(`${file.name}: “${this.app.mesh.name}” with ${count === 1 ? "a handle" : `${count} handles`}.`);
   }
 
   saveHandles(): void {

@@ -48,17 +48,18 @@ export function startShortcuts(app: App, files: Files, help: HTMLDialogElement):
     )
       return;
     const isHandled =
-      event.ctrlKey || event.metaKey ? withControl(app, event) : !event.altKey && alone(app, files, help, event, target);
+      event.ctrlKey || event.metaKey ? withControl(app, files, event) : !event.altKey && alone(app, files, help, event, target);
     if (isHandled) event.preventDefault();
   });
 }
 
-function withControl(app: App, event: KeyboardEvent): boolean {
+function withControl(app: App, files: Files, event: KeyboardEvent): boolean {
   const { key, shiftKey } = event;
   if (key in arrows) return !(event.target as HTMLElement).matches("input") && turnOrShift(app, event);
   const letter = key.toLowerCase();
   if (letter === "z" && !shiftKey) app.undo();
   else if ((letter === "z" && shiftKey) || letter === "y") app.redo();
+  else if (letter === "s" && !shiftKey) event.repeat || void files.saveProject();
   else return false;
   return true;
 }

@@ -50,6 +50,7 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
       ["D", "Dark or light"],
       ["I", "The side panel"],
       ["O", "Open a file"],
+      ["Ctrl+S", "Save the project: mesh, handles, fields, settings, camera"],
       ["?", "This help"],
     ],
   ],
