@@ -9,6 +9,7 @@ import { el } from "./dom.js";
 import { icon } from "./icons.js";
 import { slider } from "./controls.js";
 import { type HandleRow, handleRow } from "./handle_row.js";
+import { poseFields } from "./pose_fields.js";
 
 /** The handles with their names and colours, and the settings of the selected handle. */
 export function handlesPanel(app: App): HTMLElement {
@@ -54,7 +55,7 @@ export function handlesPanel(app: App): HTMLElement {
   app.facts.watch(({ document }) => [document.handles], show);
   app.view.watchAll(show);
   details.addEventListener("change", () => queueMicrotask(show));
-  return el("div", {}, list, details);
+  return el("div", {}, list, poseFields(app), details);
 }
 
 /** Moves the focus to the control with the same name. */
