@@ -371,6 +371,7 @@ export class App implements Workbench {
       isNew = pane.takeFrame() || isNew;
     }
     if (isNew || this.#needsColours) for (const pane of this.panes) pane.colour(this.document, this.view.now, this.red);
+    if (isNew || this.#needsColours) for (const editing of this.#editings) editing.refresh();
     this.#needsColours = false;
     if (this.#needsMarks) this.#mark();
     const isAtRest = this.#pace.isAtRest(now);

@@ -10,7 +10,7 @@ import {
   shifted,
 } from "../model/document.js";
 import { isAtRest, type Vector3 } from "../model/mesh.js";
-import { nothing, ofVertices, type PointedOut } from "../model/pointed.js";
+import { nothing, ofVertices } from "../model/pointed.js";
 import { follow, placesOf } from "../model/places.js";
 import { add, type Pose, subtract } from "../model/pose.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../model/selection.js";
@@ -18,11 +18,13 @@ import { vertexNormals } from "../stage/drawmesh.js";
 import { onPlane, type PointerAt, Pointing, type PointingTarget, type Stroke, viewProjection } from "../stage/pointing.js";
 import { KeyPointer } from "./key_pointer.js";
 import type { Pane } from "./pane.js";
+import { Readout } from "./readout.js";
 import type { Workbench } from "./workbench.js";
 
 /** The tools: what pointing at a pane does to the work. */
 export class Editing implements PointingTarget {
   readonly #pointing: Pointing;
+  readonly #readout: Readout;
 
   constructor(
     readonly work: Workbench,
@@ -33,8 +35,9 @@ export class Editing implements PointingTarget {
     gizmo.onEnd = () => work.endGesture();
     gizmo.onCancel = () => work.cancelGesture();
     this.#pointing = new Pointing(pane.stage, this);
+    this.#readout = new Readout(work, pane);
     new KeyPointer(pane, {
-      hover: (event) => this.work.facts.set({ pointedOut: this.#underCross(event) }),
+      hover: (event) => this.#hoverByKey(event),
       press: (event) => this.#workAt(this.#pointing.at(event)),
     });
     const setViewOnly = (event: KeyboardEvent, isDown: boolean) => {
@@ -57,7 +60,13 @@ export class Editing implements PointingTarget {
     this.cancel();
   }
 
+  /** The surface may have moved. */
+  refresh(): void {
+    this.#readout.refresh();
+  }
+
   press(at: PointerAt): Stroke | undefined {
+    this.#readout.hide();
     switch (this.work.view.now.tool) {
       case "move":
         return this.#pressHandle(at);
@@ -80,14 +89,16 @@ export class Editing implements PointingTarget {
   }
 
   hover(at: PointerAt | undefined): void {
+    this.#readout.point(at);
     const { tool } = this.work.view.now;
     if (tool !== "brush" && tool !== "paint") return;
     this.work.facts.set({ pointedOut: at?.hit ? ofVertices(this.#dabAt(at)) : nothing });
   }
 
-  #underCross(event: PointerEvent | undefined): PointedOut {
+  #hoverByKey(event: PointerEvent | undefined): void {
     const at = event && this.#pointing.at(event);
-    return at?.hit ? ofVertices(this.#dabAt(at)) : nothing;
+    this.work.facts.set({ pointedOut: at?.hit ? ofVertices(this.#dabAt(at)) : nothing });
+    this.#readout.point(at, true);
   }
 
   /** A press by key: uses the tool at one place. */

@@ -101,7 +101,7 @@ export class Files {
       const { faces, corners, obj } = mesh;
       const deformed: WrittenMesh = { positions, faces, ...(corners && { corners }) };
       const name = `${stem}-deformed${panes.length > 1 ? `-${pane.side}` : ""}.${format}`;
-      if (format === "ply") save(name, writePly(deformed, distortion, this.app.red));
+      if (format === "ply") save(name, writePly(deformed, distortion, this.app.red, this.app.view.now.palette));
       if (format === "obj") save(name, obj ? rewriteObj({ ...mesh, obj }, positions) : writeObj(deformed));
       if (format === "off") save(name, writeOff(deformed));
       if (format === "stl") save(name, writeStl(deformed));

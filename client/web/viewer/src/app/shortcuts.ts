@@ -108,6 +108,7 @@ function actions(app: App, files: Files, help: HTMLDialogElement, event: Keyboar
     r: () => view.set({ gizmo: "rotate", tool: "move" }),
     s: () => view.set({ isSplit: !now.isSplit }),
     t: () => view.set({ gizmo: "translate", tool: "move" }),
+    v: () => view.set({ hasReadout: !now.hasReadout }),
     w: () => view.set({ wireframe: !now.wireframe }),
     Delete: () => removeSelected(app),
     Backspace: () => removeSelected(app),

@@ -1,4 +1,5 @@
 import type { Encoding } from "lpdeform-client";
+import type { PaletteName } from "./palettes.js";
 import type { Detail } from "./shapes.js";
 
 export type Tool = "move" | "brush" | "lasso" | "box" | "paint";
@@ -23,6 +24,9 @@ export interface View {
   paintP: number;
   paintStiffness: number;
   colourBy: ColourBy;
+  palette: PaletteName;
+  /** Whether the values of the vertex under the pointer are shown. */
+  hasReadout: boolean;
   wireframe: boolean;
   ghost: boolean;
   /** The distortion in full red, if the scale is pinned. */
@@ -51,6 +55,8 @@ export const firstView: View = {
   paintP: 1,
   paintStiffness: 10,
   colourBy: "distortion",
+  palette: "blueToRed",
+  hasReadout: true,
   wireframe: false,
   ghost: false,
   pinned: undefined,

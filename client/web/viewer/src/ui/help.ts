@@ -46,6 +46,7 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
       ["F", "Show all of it"],
       ["W  G", "Wireframe, the original as a ghost"],
       ["C", "Next colours"],
+      ["V", "Values of the vertex under the pointer or the cross"],
       ["P", "Pin the colours' scale"],
       ["D", "Dark or light"],
       ["I", "The side panel"],
@@ -77,7 +78,7 @@ export function helpSheet(app: App): HTMLDialogElement {
       "p",
       {},
       "Handles hold parts of the surface. Drag one and everything between them follows, with the least Lₚ distortion: low p gathers it in creases, high p spreads it. " +
-        "Blue is undistorted, red most distorted. Drag beside the shape to turn it, scroll or pinch to zoom, right-drag or two fingers to shift. On a touch screen one finger works the tool, two the view.",
+        "The legend tells the colours, from undistorted to most distorted. Drag beside the shape to turn it, scroll or pinch to zoom, right-drag or two fingers to shift. On a touch screen one finger works the tool, two the view.",
     ),
     el(
       "div",
