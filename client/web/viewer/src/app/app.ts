@@ -8,6 +8,7 @@ import { boundsOf, type Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
 import { type Seams, seamsOf } from "../model/seams.js";
 import { nothing } from "../model/pointed.js";
+import { gridStep } from "../model/snap.js";
 import { State } from "../model/state.js";
 import { firstView, type View } from "../model/view.js";
 import type { Look, Stage } from "../stage/stage.js";
@@ -384,13 +385,14 @@ export class App implements Workbench {
   #mark(): void {
     this.#needsMarks = false;
     const { pointedOut, document } = this.facts.now;
-    const { tool, isDark, selected, gizmo } = this.view.now;
+    const { tool, isDark, selected, gizmo, axes, snapping } = this.view.now;
     const colour = tool === "paint" ? "#ffffff" : isDark ? "#ffe066" : "#d6006d";
     const handle = handleOf(document, selected);
     const pose = tool === "move" && handle && !handle.isLocked && !handle.targets ? handle.pose : undefined;
+    const step = snapping === "grid" ? gridStep(this.diagonal) : undefined;
     for (const pane of this.panes) {
       pane.mark(document, this.view.now, pointedOut, colour);
-      pane.stage.gizmo.show(pose, handle && kindOf(handle.hold).isTurnedOnly ? "rotate" : gizmo);
+      pane.stage.gizmo.show(pose, handle && kindOf(handle.hold).isTurnedOnly ? "rotate" : gizmo, axes, step);
     }
   }
 
@@ -412,6 +414,9 @@ export class App implements Workbench {
   }
 
   #viewChanged(view: View, before: View): void {
+    if (view.selected !== before.selected && view.alsoSelected === before.alsoSelected && view.alsoSelected.length > 0) {
+      return this.view.set({ alsoSelected: [] }); // this is called again
+    }
     if (view.isSplit !== before.isSplit) {
       if (view.isSplit && !this.#addSecondPane()) return;
       if (!view.isSplit) this.#panes.removeSecond();

@@ -1,25 +1,20 @@
-import {
-  addHandle,
-  changeHandle,
-  extendHandle,
-  type Handle,
-  handleOf,
-  ownersOf,
-  paint,
-  releaseVertices,
-  shifted,
-} from "../model/document.js";
+import { addHandle, extendHandle, type Handle, handleOf, ownersOf, paint, releaseVertices } from "../model/document.js";
 import { isAtRest, type Vector3 } from "../model/mesh.js";
 import { nothing, ofVertices } from "../model/pointed.js";
 import { follow, placesOf } from "../model/places.js";
 import { add, type Pose, subtract } from "../model/pose.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../model/selection.js";
+import { posedTogether, selecting, selectionOf, shiftedTogether, toggled } from "../model/together.js";
 import { vertexNormals } from "../stage/drawmesh.js";
 import { onPlane, type PointerAt, Pointing, type PointingTarget, type Stroke, viewProjection } from "../stage/pointing.js";
 import { KeyPointer } from "./key_pointer.js";
 import type { Pane } from "./pane.js";
+import { DragSnap } from "./drag_snap.js";
 import { Readout } from "./readout.js";
 import type { Workbench } from "./workbench.js";
+
+/** A press that has had its effect. */
+const stays: Stroke = { move: () => undefined, end: () => undefined, cancel: () => undefined };
 
 /** The tools: what pointing at a pane does to the work. */
 export class Editing implements PointingTarget {
@@ -140,7 +135,12 @@ export class Editing implements PointingTarget {
   #pressHandle(at: PointerAt): Stroke | undefined {
     const handle = this.#handleAt(at);
     if (!handle) return undefined;
-    this.work.view.set({ selected: handle.name });
+    const { view } = this.work;
+    if (at.control) {
+      view.set(toggled(view.now, handle.name));
+      return stays;
+    }
+    view.set(selecting(view.now, handle.name));
     return this.work.canShift(handle) ? this.#drag(handle, at) : undefined;
   }
 
@@ -182,14 +182,13 @@ export class Editing implements PointingTarget {
     const { work, pane } = this;
     const grip = start.hit?.point ?? add(handle.pose.center, handle.pose.translation);
     const from = onPlane(pane.stage, start.ray, grip) ?? grip;
-    const { name } = handle;
-    const show = (delta: Vector3, time: number) => {
-      work.during(changeHandle(work.document, name, shifted(handle, delta)), time);
-    };
+    const all = selectionOf(work.document, work.view.now);
+    const show = (delta: Vector3, time: number) => work.during(shiftedTogether(work.document, all, delta), time);
+    const snap = new DragSnap(work, pane, handle, grip);
     return {
       move: (at) => {
         const to = onPlane(pane.stage, at.ray, grip);
-        if (to) show(subtract(to, from), at.time);
+        if (to) show(snap.apply(subtract(to, from), at), at.time);
       },
       end: () => work.endGesture(),
       cancel: () => work.cancelGesture(),
@@ -198,8 +197,8 @@ export class Editing implements PointingTarget {
 
   #pose(pose: Pose): void {
     const { work } = this;
-    const { selected } = work.view.now;
-    if (selected !== undefined) work.during(changeHandle(work.document, selected, { pose }), performance.now());
+    const selection = selectionOf(work.document, work.view.now);
+    if (selection.length > 0) work.during(posedTogether(work.document, selection, pose), performance.now());
   }
 
   #brushStroke(start: PointerAt): Stroke {

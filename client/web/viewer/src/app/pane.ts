@@ -7,6 +7,7 @@ import { boundsOf, centroid, type Mesh } from "../model/mesh.js";
 import { cornersOf, type PointedOut } from "../model/pointed.js";
 import type { Seams } from "../model/seams.js";
 import { type EnergyStatistics, energyStatistics } from "../model/statistics.js";
+import { selectionOf } from "../model/together.js";
 import type { View } from "../model/view.js";
 import { vertexNormals } from "../stage/drawmesh.js";
 import { Overlay } from "../stage/overlay.js";
@@ -112,7 +113,8 @@ export class Pane {
     const { surface, marks, highlight } = this.stage;
     if (!surface) return;
     const { positions, mesh } = surface;
-    marks.show(document.handles, mesh.faces, view.selected, cornersOf(pointedOut, mesh.faces), colour);
+    const selected = selectionOf(document, view).map(({ name }) => name);
+    marks.show(document.handles, mesh.faces, selected, cornersOf(pointedOut, mesh.faces), colour);
     marks.move(positions);
     highlight.show(pointedOut, mesh.faces, colour);
     highlight.move(positions);

@@ -1,8 +1,12 @@
 import type { Encoding } from "lpdeform-client";
 import type { PaletteName } from "./palettes.js";
+import type { Snapping } from "./snap.js";
 import type { Detail } from "./shapes.js";
 
 export type Tool = "move" | "brush" | "lasso" | "box" | "paint";
+
+/** Along which axes the gizmo moves and turns: those of the mesh, of the handle, or of the picture. */
+export type GizmoAxes = "world" | "local" | "view";
 
 /** What the colours show. */
 export type ColourBy = "distortion" | "p" | "stiffness" | "normals" | "plain";
@@ -15,7 +19,11 @@ export interface View {
   tool: Tool;
   mode: StrokeMode;
   selected: string | undefined;
+  /** Other handles that are moved together with the selected one. Selecting another handle empties the list. */
+  alsoSelected: readonly string[];
   gizmo: "translate" | "rotate";
+  axes: GizmoAxes;
+  snapping: Snapping;
   /** Of the brush, as a share of the mesh's diagonal. */
   radius: number;
   /** Whether lasso and box also take vertices that face away. */
@@ -48,7 +56,10 @@ export const firstView: View = {
   tool: "move",
   mode: "new",
   selected: undefined,
+  alsoSelected: [],
   gizmo: "translate",
+  axes: "world",
+  snapping: "none",
   radius: 0.05,
   isThrough: true,
   paintField: "p",

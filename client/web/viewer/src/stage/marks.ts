@@ -42,7 +42,7 @@ export class Marks {
   show(
     handles: readonly Handle[],
     faces: Uint32Array,
-    selected: string | undefined,
+    selected: readonly string[],
     pointedOut: readonly number[],
     pointedColour: string,
   ): void {
@@ -65,7 +65,7 @@ export class Marks {
       const places = placesOf(vertices, points, faces);
       const count = places.corners.length / 3;
       const small = count > 400 ? 4 : count > 60 ? 5 : count > 4 ? 8 : 11;
-      add(places, colour, name === selected ? small + 1.5 : small);
+      add(places, colour, selected.includes(name) ? small + 1.5 : small);
     }
     add(placesOf(pointedOut, [], faces), pointedColour, 9);
     this.#places = { corners, weights };

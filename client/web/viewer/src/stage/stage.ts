@@ -216,6 +216,7 @@ export class Stage {
   }
 
   draw(): void {
+    this.gizmo.follow();
     this.#renderer.render(this.#scene, this.camera);
   }
 

@@ -20,9 +20,11 @@ export function handlesPanel(app: App): HTMLElement {
   let shown = "";
   const show = () => {
     const { handles } = app.document;
-    const { selected } = app.view.now;
+    const { selected, alsoSelected } = app.view.now;
+    const isTogether = (name: string) => alsoSelected.includes(name) || (name === selected && alsoSelected.length > 0);
     const now = JSON.stringify([
       selected,
+      alsoSelected,
       handles.map(({ name, colour, vertices, isLocked, hold, footprint, pose }) => [
         name,
         colour,
@@ -41,7 +43,7 @@ export function handlesPanel(app: App): HTMLElement {
       rows.push(handleRow(app));
       list.append(rows.at(-1)!.element);
     }
-    handles.forEach((handle, k) => rows[k]!.show(handle, handle.name === selected));
+    handles.forEach((handle, k) => rows[k]!.show(handle, handle.name === selected, isTogether(handle.name)));
     for (const { element } of rows.splice(handles.length)) {
       const isFocused = element.contains(document.activeElement);
       element.remove();

@@ -63,6 +63,8 @@ export function poseFields(app: App): HTMLElement {
   const element = el(
     "div",
     { className: "pose" },
+    el("span"),
+    ...axes.map((axis) => el("span", { className: "axis-name", textContent: axis })),
     el("span", {}, "Moved"),
     ...moved.map(({ element }) => element),
     el("span", {}, "Turned °"),

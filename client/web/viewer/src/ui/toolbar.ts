@@ -5,6 +5,7 @@ import type { StrokeMode, Tool } from "../model/view.js";
 import { short } from "../model/words.js";
 import { choice, el, measured, toggle } from "./dom.js";
 import { button, slider } from "./controls.js";
+import { gizmoOptions } from "./gizmo_options.js";
 import { type IconName, icon } from "./icons.js";
 
 const tools: readonly (readonly [Tool, IconName, string, string])[] = [
@@ -75,10 +76,12 @@ function options(app: App): HTMLElement {
   );
   const clear = el("button", { type: "button", className: "plain", textContent: "Clear painting" });
   clear.addEventListener("click", () => app.change(withoutPaint(app.document)));
+  const moving = gizmoOptions(app);
   const element = el(
     "div",
     { className: "options" },
     gizmo.element,
+    moving,
     mode.element,
     field.element,
     size.element,
@@ -100,7 +103,7 @@ function options(app: App): HTMLElement {
     size.show(view.radius, view.radius === 0 ? "1 vertex" : `${short(100 * view.radius)} %`);
     p.show(view.paintP, short(view.paintP));
     stiffness.show(Math.log10(view.paintStiffness), short(view.paintStiffness));
-    gizmo.element.hidden = tool !== "move";
+    gizmo.element.hidden = moving.hidden = tool !== "move";
     mode.element.hidden = tool === "paint" || tool === "move";
     field.element.hidden = clear.hidden = tool !== "paint";
     size.element.hidden = tool === "lasso" || tool === "box";

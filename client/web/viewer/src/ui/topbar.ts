@@ -56,7 +56,7 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
   return el(
     "header",
     { className: "topbar" },
-    el("h1", {}, logo(), el("span", {}, "lpdeform")),
+    el("h1", { aria: { label: "lpdeform" } }, logo(), el("span", {}, "lpdeform")),
     el("div", { className: "cluster" }, shapes, details),
     open,
     el("div", { className: "cluster" }, undo, redo),
