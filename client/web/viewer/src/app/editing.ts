@@ -1,4 +1,4 @@
-import { addHandle, extendHandle, type Handle, handleOf, ownersOf, paint, releaseVertices } from "../model/document.js";
+import { addHandle, extendHandle, type Handle, handleOf, ownersOf, releaseVertices } from "../model/document.js";
 import { isAtRest, type Vector3 } from "../model/mesh.js";
 import { nothing, ofVertices } from "../model/pointed.js";
 import { follow, placesOf } from "../model/places.js";
@@ -10,6 +10,7 @@ import { onPlane, type PointerAt, Pointing, type PointingTarget, type Stroke, vi
 import { KeyPointer } from "./key_pointer.js";
 import type { Pane } from "./pane.js";
 import { DragSnap } from "./drag_snap.js";
+import { PaintStroke } from "./paint_stroke.js";
 import { Readout } from "./readout.js";
 import type { Workbench } from "./workbench.js";
 
@@ -66,8 +67,9 @@ export class Editing implements PointingTarget {
       case "move":
         return this.#pressHandle(at);
       case "brush":
-      case "paint":
         return at.hit && this.#brushStroke(at);
+      case "paint":
+        return at.hit && this.#paintStroke(at);
       case "lasso":
         return this.#outlineStroke(at, (outline) => outline);
       case "box":
@@ -104,7 +106,7 @@ export class Editing implements PointingTarget {
       return false;
     }
     if (work.view.now.tool === "paint") {
-      this.#paint(this.#dabAt(at));
+      this.#paintStroke(at).end();
       return false;
     }
     const mode = modeOf(at, work);
@@ -214,19 +216,14 @@ export class Editing implements PointingTarget {
       move: touch,
       end: () => {
         work.facts.set({ pointedOut: nothing });
-        if (work.view.now.tool === "paint") this.#paint([...touched]);
-        else this.#select([...touched], modeOf(start, work));
+        this.#select([...touched], modeOf(start, work));
       },
       cancel: () => work.facts.set({ pointedOut: nothing }),
     };
   }
 
-  #paint(vertices: number[]): void {
-    const { work } = this;
-    const { paintField, paintP, paintStiffness } = work.view.now;
-    const value = paintField === "p" ? paintP : paintStiffness;
-    work.change(paint(work.document, paintField, vertices, value, work.mesh.positions.length / 3));
-    work.view.set({ colourBy: paintField });
+  #paintStroke(start: PointerAt): Stroke {
+    return new PaintStroke(this.work, this.pane, (at) => this.#dabAt(at), start);
   }
 
   #outlineStroke(start: PointerAt, toPolygon: (outline: number[]) => number[]): Stroke {

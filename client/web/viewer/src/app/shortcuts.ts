@@ -2,6 +2,7 @@ import { changeHandle, handleOf, removeHandle } from "../model/document.js";
 import { steppedP } from "../model/exponent.js";
 import { gridStep, type Snapping, turnStep } from "../model/snap.js";
 import { turned } from "../model/pose.js";
+import type { PaintMode } from "../model/soft_paint.js";
 import { posedTogether, selectionOf, shiftedTogether } from "../model/together.js";
 import type { ColourBy, GizmoAxes, Tool } from "../model/view.js";
 import type { App } from "./app.js";
@@ -10,6 +11,7 @@ import type { Files } from "./files.js";
 const tools: readonly Tool[] = ["move", "brush", "lasso", "box", "paint"];
 const colours: readonly ColourBy[] = ["distortion", "p", "stiffness", "normals", "plain"];
 const snappings: readonly Snapping[] = ["none", "grid", "vertices"];
+const paintModes: readonly PaintMode[] = ["set", "erase", "smooth"];
 const allAxes: readonly GizmoAxes[] = ["world", "local", "view"];
 const nudges: Record<string, readonly [number, number, number]> = {
   ArrowLeft: [-1, 0, 0],
@@ -115,6 +117,7 @@ function actions(app: App, files: Files, help: HTMLDialogElement, event: Keyboar
     s: () => view.set({ isSplit: !now.isSplit }),
     t: () => view.set({ gizmo: "translate", tool: "move" }),
     x: () => view.set({ axes: after(allAxes, now.axes) }),
+    e: () => view.set({ paintMode: now.tool === "paint" ? after(paintModes, now.paintMode) : now.paintMode, tool: "paint" }),
     v: () => view.set({ hasReadout: !now.hasReadout }),
     w: () => view.set({ wireframe: !now.wireframe }),
     Delete: () => removeSelected(app),

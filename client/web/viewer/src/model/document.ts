@@ -150,6 +150,12 @@ export function paint(
   return { ...document, stiffness, isAutomatic: false };
 }
 
+/** Without one of the painted fields. */
+export function withoutField(document: Document, field: "paintedP" | "stiffness"): Document {
+  const { [field]: _, ...rest } = document;
+  return rest;
+}
+
 export function withoutPaint(document: Document): Document {
   const { paintedP: _, stiffness: __, ...rest } = document;
   return rest;

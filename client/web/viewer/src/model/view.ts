@@ -1,6 +1,7 @@
 import type { Encoding } from "lpdeform-client";
 import type { PaletteName } from "./palettes.js";
 import type { Snapping } from "./snap.js";
+import type { PaintField, PaintMode } from "./soft_paint.js";
 import type { Detail } from "./shapes.js";
 
 export type Tool = "move" | "brush" | "lasso" | "box" | "paint";
@@ -28,7 +29,10 @@ export interface View {
   radius: number;
   /** Whether lasso and box also take vertices that face away. */
   isThrough: boolean;
-  paintField: "p" | "stiffness";
+  paintField: PaintField;
+  paintMode: PaintMode;
+  /** Of the edge of the painting brush: 0 is hard, 1 is soft up to its middle. */
+  softness: number;
   paintP: number;
   paintStiffness: number;
   colourBy: ColourBy;
@@ -63,6 +67,8 @@ export const firstView: View = {
   radius: 0.05,
   isThrough: true,
   paintField: "p",
+  paintMode: "set",
+  softness: 0,
   paintP: 1,
   paintStiffness: 10,
   colourBy: "distortion",

@@ -12,6 +12,7 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
       ["2", "Brush: paint a handle"],
       ["3  4", "Lasso, box: draw around vertices"],
       ["5", "p brush: paint p or stiffness"],
+      ["E", "The p brush, and then what it does: paint, erase, smooth"],
       ["[  ]", "Smaller, larger brush"],
       ["Shift", "with a stroke: add to the selected handle"],
       ["Alt", "with a stroke: release vertices"],
