@@ -1,5 +1,6 @@
 import type { MeshReport } from "lpdeform-client";
 import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
+import { type AxisView, directionOf, viewAfter } from "../model/axis_views.js";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import { isAlike } from "../model/alike.js";
 import { History, type Steps } from "../model/history.js";
@@ -8,6 +9,7 @@ import { boundsOf, type Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
 import { type Seams, seamsOf } from "../model/seams.js";
 import { nothing } from "../model/pointed.js";
+import { subtract } from "../model/pose.js";
 import { gridStep } from "../model/snap.js";
 import { State } from "../model/state.js";
 import { firstView, type View } from "../model/view.js";
@@ -334,6 +336,17 @@ export class App implements Workbench {
   /** Changes the view by keys, in the picture with the focus or else the first; the other one follows. */
   changeView(change: (stage: Stage) => void): void {
     this.#panes.changeView(change);
+  }
+
+  lookAlong(view: AxisView): void {
+    const { isYUp } = this.view.now;
+    this.changeView((stage) => stage.lookAlong(directionOf(view, isYUp), directionOf("front", isYUp)));
+  }
+
+  /** The view along the next of the mesh's axes. */
+  lookAlongNext(): void {
+    const { position, target } = this.panes[0]!.stage.look;
+    this.lookAlong(viewAfter(subtract(position, target), this.view.now.isYUp));
   }
 
   lookFrom(look: Look): void {

@@ -103,6 +103,7 @@ function actions(app: App, files: Files, help: HTMLDialogElement, event: Keyboar
     ",": () => stepP(-0.1),
     ".": () => stepP(0.1),
     a: () => app.change({ ...app.document, isAutomatic: !app.document.isAutomatic }),
+    b: () => app.lookAlongNext(),
     c: () => view.set({ colourBy: after(colours, now.colourBy) }),
     d: () => view.set({ isDark: !now.isDark }),
     f: () => app.fit(),

@@ -49,6 +49,7 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
       ["Ctrl+← →", "Turn the view; with Shift, shift it"],
       ["+  -", "Zoom"],
       ["F", "Show all of it"],
+      ["B", "Look from the front, right, top, back, left, bottom"],
       ["W  G", "Wireframe, the original as a ghost"],
       ["C", "Next colours"],
       ["V", "Values of the vertex under the pointer or the cross"],

@@ -3,6 +3,7 @@ import type { App } from "../app/app.js";
 import { remember, remembered } from "../io/remember.js";
 import { type PaletteName, palettes } from "../model/palettes.js";
 import type { ColourBy } from "../model/view.js";
+import { axisButtons } from "./axis_buttons.js";
 import { choice, el, toggle } from "./dom.js";
 
 const paletteKey = "lpdeform-palette";
@@ -59,6 +60,7 @@ export function lookPanel(app: App): HTMLElement {
     { className: "look" },
     colour.element,
     el("div", { className: "toggles" }, wireframe.element, ghost.element, pin.element, up.element, readout.element),
+    axisButtons(app),
     palette,
     el("label", { className: "pair" }, el("span", {}, "Frames"), encoding),
   );
