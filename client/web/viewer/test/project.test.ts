@@ -5,6 +5,7 @@ import { type Project, readProject, writeProject } from "../src/io/project.js";
 import { readMesh } from "../src/io/read.js";
 import { writeObj } from "../src/io/obj.js";
 import { addHandle, changeHandle, type Document, paint } from "../src/model/document.js";
+import { keyPoseOf } from "../src/model/key_poses.js";
 import { quaternionOf } from "../src/model/pose.js";
 import { shapeKinds } from "../src/model/shapes.js";
 import { firstView } from "../src/model/view.js";
@@ -26,7 +27,8 @@ function worked(): Document {
   const pose = { rotation: quaternionOf([1, 2, 3], 0.7), translation: [0.1, -0.2, 0.3], center: [0.5, 0.5, 5] } as const;
   const moved = changeHandle(shape.document, "Top", { pose, hold: { kind: "soft", weight: 3 }, colour: "#123abc" });
   const painted = paint(paint(moved, "p", [40, 41], 1.2, vertexCount), "stiffness", [50], 0.1, vertexCount);
-  return { ...painted, p: 1.35, secondP: 8, isAutomatic: true };
+  const made = { ...painted, p: 1.35, secondP: 8, isAutomatic: true };
+  return { ...made, keyPoses: [keyPoseOf(made)] };
 }
 
 const project: Project = { mesh: shape.mesh, document: worked(), view, look };
@@ -128,6 +130,10 @@ describe("a project", () => {
     ["a hold", (head) => (head["handles"].handles[1].soft = -1), "“soft” of handle “Top” is -1"],
     ["colour", (head) => (head["marks"][0].colour = "url(x)"), "handle “Base” has no colour"],
     ["marks", (head) => (head["marks"] = []), "handle “Base” has no colour"],
+    ["poses", (head) => (head["poses"] = {}), "“poses” is not a list"],
+    ["the p of a pose", (head) => (head["poses"][0].p = 99), "pose 1 has no name of its own, no p"],
+    ["a pose's rotation", (head) => (head["poses"][0].handles[1].pose.rotation = [2, 0, 0, 0]), "pose 1 has"],
+    ["two poses of a name", (head) => head["poses"].push(head["poses"][0]), "pose 2 has no name of its own"],
     ["view", (head) => (head["view"].colourBy = "smell"), '“colourBy” of the view is "smell"'],
     ["shape", (head) => (head["view"].shape = "__proto__"), "“shape” of the view"],
     ["camera", (head) => (head["camera"].position = [0, 0]), "the camera has no place"],

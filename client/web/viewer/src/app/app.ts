@@ -2,8 +2,10 @@ import type { MeshReport } from "lpdeform-client";
 import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
 import { type AxisView, directionOf, viewAfter } from "../model/axis_views.js";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
+import type { Shape } from "../model/blend.js";
 import { isAlike } from "../model/alike.js";
 import { History, type Steps } from "../model/history.js";
+import { keyPoseOf } from "../model/key_poses.js";
 import { kindOf } from "../model/hold_kinds.js";
 import { boundsOf, type Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
@@ -353,7 +355,28 @@ export class App implements Workbench {
     this.#panes.lookFrom(look);
   }
 
+  /** Adds the present pose to those that are kept. */
+  keepPose(): void {
+    const { document } = this;
+    const pose = keyPoseOf(document);
+    this.change({ ...document, keyPoses: [...(document.keyPoses ?? []), pose] });
+    this.notify(`“${pose.name}” is kept.`);
+  }
+
   // The panes.
+
+  /** Shows a shape in the first picture in place of the server's frames, until endPreview(). */
+  preview(shape: Shape): void {
+    this.panes[0]!.preview(shape);
+    this.#needsColours = true;
+    this.requestDraw();
+  }
+
+  endPreview(withNextFrame: boolean): void {
+    this.panes[0]!.endPreview(withNextFrame);
+    this.#needsColours = true;
+    this.requestDraw();
+  }
 
   /** The distortion in full red, the same in both panes so that they can be compared. */
   get red(): number {

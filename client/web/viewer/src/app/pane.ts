@@ -1,6 +1,7 @@
 import type { Frame, LpdeformError, MeshReport } from "lpdeform-client";
 import { Live, type LiveWatcher } from "../link/live.js";
 import { say, type Status } from "../link/status.js";
+import type { Shape } from "../model/blend.js";
 import type { Side } from "../model/changes.js";
 import { type Document, pField } from "../model/document.js";
 import { boundsOf, centroid, type Mesh } from "../model/mesh.js";
@@ -39,6 +40,9 @@ export class Pane {
   statistics = nothing;
   #isDirty = true;
   #onScreenNext: Frame | undefined;
+  /** Shown in place of the frames. */
+  #preview: Shape | undefined;
+  #endsWithFrame = false;
 
   constructor(
     readonly side: Side,
@@ -55,7 +59,7 @@ export class Pane {
   open(mesh: Mesh, document: Document, view: View, seams: Seams | undefined): void {
     this.live?.close();
     this.stage.open(mesh, seams?.faces);
-    this.frame = this.#onScreenNext = undefined;
+    this.frame = this.#onScreenNext = this.#preview = undefined;
     this.statistics = nothing;
     this.trail.reset();
     const watcher: LiveWatcher = {
@@ -76,7 +80,7 @@ export class Pane {
   }
 
   get distortion(): Float32Array {
-    return this.frame?.distortion ?? new Float32Array((this.stage.surface?.mesh.positions.length ?? 0) / 3);
+    return (this.#preview ?? this.frame)?.distortion ?? new Float32Array((this.stage.surface?.mesh.positions.length ?? 0) / 3);
   }
 
   /** Takes the newest frame if there is one. Returns true if the surface has changed. */
@@ -89,13 +93,34 @@ export class Pane {
       return false;
     }
     this.frame = this.#onScreenNext = frame;
-    this.stage.surface.move(frame.positions);
-    this.stage.marks.move(frame.positions);
-    this.stage.highlight.move(frame.positions);
-    this.statistics = energyStatistics(frame.distortion);
+    if (this.#endsWithFrame) this.#preview = undefined;
+    if (!this.#preview) this.#move(frame.positions);
     this.trail.add(frame.iteration, frame.energy ** (1 / this.live!.exponentOf(frame)));
     this.#isDirty = true;
     return true;
+  }
+
+  /** Shows a shape in place of the frames, which go on being taken. */
+  preview(shape: Shape): void {
+    this.#preview = shape;
+    this.#endsWithFrame = false;
+    this.#move(shape.positions);
+  }
+
+  /** Shows frames again: from the next one on, or at once. */
+  endPreview(withNextFrame: boolean): void {
+    this.#endsWithFrame = withNextFrame;
+    if (!this.#preview || withNextFrame) return;
+    this.#preview = undefined;
+    if (this.stage.surface) this.#move(this.frame?.positions ?? this.stage.surface.mesh.positions);
+  }
+
+  #move(positions: Float32Array): void {
+    this.stage.surface!.move(positions);
+    this.stage.marks.move(positions);
+    this.stage.highlight.move(positions);
+    this.statistics = energyStatistics(this.distortion);
+    this.#isDirty = true;
   }
 
   colour(document: Document, view: View, red: number): void {

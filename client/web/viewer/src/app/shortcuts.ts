@@ -109,6 +109,7 @@ function actions(app: App, files: Files, help: HTMLDialogElement, event: Keyboar
     f: () => app.fit(),
     g: () => view.set({ ghost: !now.ghost }),
     i: () => view.set({ isPanelOpen: !now.isPanelOpen }),
+    k: () => app.keepPose(),
     l: () => toggleLock(app),
     m: () => view.set({ snapping: after(snappings, now.snapping) }),
     n: () => selectNext(app),

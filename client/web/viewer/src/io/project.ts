@@ -6,6 +6,8 @@ import { type Detail, shapeKinds } from "../model/shapes.js";
 import type { ColourBy, View } from "../model/view.js";
 import { FileFault } from "./fault.js";
 import { gunzip, gzip } from "./gzip.js";
+import { isPlace } from "./places.js";
+import { readKeyPoses } from "./project_poses.js";
 import { handlesJson, readHandles } from "./handlefile.js";
 import { readStoredMesh, storedMesh } from "./project_mesh.js";
 import { isObject, joinSections, splitSections } from "./sections.js";
@@ -65,7 +67,7 @@ const viewKeys = Object.keys(viewChecks) as (keyof ProjectView)[];
 /** A gzip file of one line of JSON and arrays; the line's "handles" is a handle file of the command line. */
 export async function writeProject({ mesh, document, view, look }: Project): Promise<Uint8Array<ArrayBuffer>> {
   const { head, arrays } = storedMesh(mesh);
-  const { p, secondP, isAutomatic, handles } = document;
+  const { p, secondP, isAutomatic, handles, keyPoses } = document;
   const all = {
     format,
     version,
@@ -74,6 +76,7 @@ export async function writeProject({ mesh, document, view, look }: Project): Pro
     secondP,
     isAutomatic,
     handles: handlesJson(document, mesh.name),
+    poses: keyPoses ?? [],
     marks: handles.map(({ colour, isLocked }) => ({ colour, isLocked })),
     view: Object.fromEntries(viewKeys.map((key) => [key, view[key]])),
     camera: look,
@@ -111,8 +114,10 @@ function documentOf(head: Record<string, unknown>, mesh: Mesh, file: string): Do
   if (!isBoolean(isAutomatic)) throw new FileFault(`In ${file}, “isAutomatic” is neither true nor false.`);
   const settings = { ...emptyDocument, p: p as number, secondP: secondP as number };
   const document = withoutMarks(handles, settings, mesh, file);
+  const keyPoses = readKeyPoses(head["poses"], file);
   return {
     ...document,
+    ...(keyPoses.length > 0 && { keyPoses }),
     isAutomatic: isAutomatic as boolean,
     handles: document.handles.map((handle, k) => ({ ...handle, ...markOf(marks, k, handle.name, file) })),
   };
@@ -151,8 +156,4 @@ function lookOf(json: unknown, file: string): Project["look"] {
   if (isPlace(position) && isPlace(target) && position.some((value, axis) => value !== target[axis]))
     return { position, target };
   throw new FileFault(`In ${file}, the camera has no place, or nothing to look at.`);
-}
-
-function isPlace(json: unknown): json is Vector3 {
-  return Array.isArray(json) && json.length === 3 && json.every((value) => Number.isFinite(value) && Math.abs(value) < 1e19);
 }

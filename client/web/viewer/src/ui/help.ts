@@ -30,6 +30,7 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
       ["Ctrl+A", "Select all that are not locked"],
       ["← → ↑ ↓", "Move it by steps, Page Up and Page Down along z; with rings, turn it"],
       ["Delete", "Delete it"],
+      ["K", "Keep the present pose, in the panel “Poses”"],
       ["L", "Lock it against dragging"],
       ["Ctrl+Z", "Undo; Ctrl+Shift+Z redo"],
     ],
