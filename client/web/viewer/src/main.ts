@@ -27,7 +27,7 @@ async function start(): Promise<void> {
   const help = helpSheet(app);
   const dropHere = document.createElement("div");
   dropHere.className = "drop-here";
-  dropHere.textContent = "Drop a mesh or a handle file";
+  dropHere.textContent = "Drop a mesh, a project or a handle file";
   root.append(
     topbar(app, files, () => help.showModal()),
     app.stages,

@@ -1,14 +1,19 @@
 import type { MeshReport } from "lpdeform-client";
 import { type Adjacency, adjacencyOf } from "../model/adjacency.js";
+import { type AxisView, directionOf, viewAfter } from "../model/axis_views.js";
 import { derivedOf, shownOf } from "../model/derived.js";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
+import type { Shape } from "../model/blend.js";
 import { isAlike } from "../model/alike.js";
 import { History, type Steps } from "../model/history.js";
+import { keyPoseOf } from "../model/key_poses.js";
 import { kindOf } from "../model/hold_kinds.js";
 import type { Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
 import type { Seams } from "../model/seams.js";
 import { nothing } from "../model/pointed.js";
+import { subtract } from "../model/pose.js";
+import { gridStep } from "../model/snap.js";
 import { State } from "../model/state.js";
 import { firstView, type View } from "../model/view.js";
 import type { Look, Stage } from "../stage/stage.js";
@@ -148,7 +153,7 @@ export class App implements Workbench {
 
   /** `isBroughtBack`: the user has worked on it before. */
   open(mesh: Mesh, document: Document, isBroughtBack = false, isWelded = true): void {
-    for (const editing of this.#editings) editing.release();
+    this.endAll();
     if (this.isTouched) this.#asides.put(this.#present());
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
@@ -270,6 +275,11 @@ export class App implements Workbench {
     return this.cancelGesture() || held.includes(true);
   }
 
+  /** Ends drags by the pointer in every picture: what they have moved becomes a step. */
+  endAll(): void {
+    for (const editing of this.#editings) editing.release();
+  }
+
   /** A handle that comes back is selected again if it was when it went. */
   undo(): void {
     const { handles } = this.document;
@@ -332,11 +342,43 @@ export class App implements Workbench {
     this.#panes.changeView(change);
   }
 
+  lookAlong(view: AxisView): void {
+    const { isYUp } = this.view.now;
+    this.changeView((stage) => stage.lookAlong(directionOf(view, isYUp), directionOf("front", isYUp)));
+  }
+
+  /** The view along the next of the mesh's axes. */
+  lookAlongNext(): void {
+    const { position, target } = this.panes[0]!.stage.look;
+    this.lookAlong(viewAfter(subtract(position, target), this.view.now.isYUp));
+  }
+
   lookFrom(look: Look): void {
     this.#panes.lookFrom(look);
   }
 
+  /** Adds the present pose to those that are kept. */
+  keepPose(): void {
+    const { document } = this;
+    const pose = keyPoseOf(document);
+    this.change({ ...document, keyPoses: [...(document.keyPoses ?? []), pose] });
+    this.notify(`“${pose.name}” is kept.`);
+  }
+
   // The panes.
+
+  /** Shows a shape in the first picture in place of the server's frames, until endPreview(). */
+  preview(shape: Shape): void {
+    this.panes[0]!.preview(shape);
+    this.#needsColours = true;
+    this.requestDraw();
+  }
+
+  endPreview(withNextFrame: boolean): void {
+    this.panes[0]!.endPreview(withNextFrame);
+    this.#needsColours = true;
+    this.requestDraw();
+  }
 
   /** The distortion in full red, the same in both panes so that they can be compared. */
   get red(): number {
@@ -368,6 +410,7 @@ export class App implements Workbench {
       isNew = pane.takeFrame() || isNew;
     }
     if (isNew || this.#needsColours) for (const pane of this.panes) pane.colour(this.document, this.view.now, this.red);
+    if (isNew || this.#needsColours) for (const editing of this.#editings) editing.refresh();
     this.#needsColours = false;
     if (this.#needsMarks) this.#mark();
     const { document, problem } = this.facts.now;
@@ -389,13 +432,14 @@ export class App implements Workbench {
   #mark(): void {
     this.#needsMarks = false;
     const { pointedOut, document } = this.facts.now;
-    const { tool, isDark, selected, gizmo } = this.view.now;
+    const { tool, isDark, selected, gizmo, axes, snapping } = this.view.now;
     const colour = tool === "paint" ? "#ffffff" : isDark ? "#ffe066" : "#d6006d";
     const handle = handleOf(document, selected);
     const pose = tool === "move" && handle && !handle.isLocked && !handle.targets ? handle.pose : undefined;
+    const step = snapping === "grid" ? gridStep(this.diagonal) : undefined;
     for (const pane of this.panes) {
       pane.mark(document, this.view.now, pointedOut, colour);
-      pane.stage.gizmo.show(pose, handle && kindOf(handle.hold).isTurnedOnly ? "rotate" : gizmo);
+      pane.stage.gizmo.show(pose, handle && kindOf(handle.hold).isTurnedOnly ? "rotate" : gizmo, axes, step);
     }
   }
 
@@ -417,6 +461,9 @@ export class App implements Workbench {
   }
 
   #viewChanged(view: View, before: View): void {
+    if (view.selected !== before.selected && view.alsoSelected === before.alsoSelected && view.alsoSelected.length > 0) {
+      return this.view.set({ alsoSelected: [] }); // this is called again
+    }
     if (view.isSplit !== before.isSplit) {
       if (view.isSplit && !this.#addSecondPane()) return;
       if (!view.isSplit) this.#panes.removeSecond();

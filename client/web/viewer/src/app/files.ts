@@ -15,6 +15,7 @@ import type { App } from "./app.js";
 import { sentence } from "../link/status.js";
 import type { Pane } from "./pane.js";
 import { pictureOf } from "./picture.js";
+import { openProject, saveProject } from "./projects.js";
 
 /** Time limit for the result that is exported. */
 const solveMs = 60_000;
@@ -24,6 +25,7 @@ const mostBytes = 500e6;
 const largeBytes = 2e6;
 
 const isHandles = ({ name }: File) => /\.json$/i.test(name);
+const isProject = ({ name }: File) => /\.lpdeform$/i.test(name);
 const isMesh = ({ name }: File) => /\.(glb|gltf|off|obj|ply|stl)$/i.test(name);
 
 interface Exported {
@@ -39,7 +41,7 @@ export class Files {
 
   constructor(readonly app: App) {
     this.#input.type = "file";
-    this.#input.accept = ".glb,.gltf,.bin,.off,.obj,.ply,.stl,.json";
+    this.#input.accept = ".glb,.gltf,.bin,.off,.obj,.ply,.stl,.json,.lpdeform";
     this.#input.multiple = true;
     this.#input.addEventListener("change", () => {
       void this.open([...(this.#input.files ?? [])]);
@@ -53,8 +55,8 @@ export class Files {
   }
 
   /**
-   * Opens a mesh, handles, or both, in any order. Files beside a mesh, such as materials, are ignored, except those that a glTF
-   * names.
+   * Opens a project, or a mesh, handles, or both, in any order. Files beside a mesh, such as materials, are ignored, except those
+   * that a glTF names.
    */
   async open(files: readonly File[]): Promise<void> {
     const meshes = files.filter(isMesh);
@@ -62,7 +64,11 @@ export class Files {
       const names = meshes.map(({ name }) => name).join(", ");
       return this.app.notify(`One mesh at a time: ${names} are ${meshes.length}.`, true);
     }
-    const known = [...meshes, ...files.filter(isHandles)];
+    const projects = files.filter(isProject);
+    if (projects.length > 0 && files.length > 1) {
+      return this.app.notify(`A project is opened alone: ${projects[0]!.name} is one of ${files.length} files.`, true);
+    }
+    const known = [...projects, ...meshes, ...files.filter(isHandles)];
     for (const file of known.length > 0 ? known : files) {
       try {
         const isGltf = /\.gltf$/i.test(file.name);
@@ -81,7 +87,8 @@ export class Files {
     }
     const done = file.size > largeBytes ? this.app.notifyWhile(`Opening ${file.name}…`) : () => undefined;
     try {
-      if (isHandles(file)) this.#openHandles(file.name, await file.text());
+      if (isProject(file)) await this.#openProject(file);
+      else if (isHandles(file)) this.#openHandles(file.name, await file.text());
       else this.#openMesh(await openedMesh(file, beside));
     } finally {
       done();
@@ -99,7 +106,7 @@ export class Files {
       const deformed: WrittenMesh = { positions, faces, ...(corners && { corners }) };
       const name = `${stem}-deformed${panes.length > 1 ? `-${pane.side}` : ""}.${format}`;
       if (format === "glb") save(name, gltf ? rewriteGlb({ ...mesh, gltf }, positions) : newGlb(deformed));
-      if (format === "ply") save(name, writePly(deformed, distortion, this.app.red));
+      if (format === "ply") save(name, writePly(deformed, distortion, this.app.red, this.app.view.now.palette));
       if (format === "obj") save(name, obj ? rewriteObj({ ...mesh, obj }, positions) : writeObj(deformed));
       if (format === "off") save(name, writeOff(deformed));
       if (format === "stl") save(name, (await import("../io/write_stl.js")).writeStl(deformed));
@@ -135,6 +142,17 @@ export class Files {
       if (blob) save(`${this.#stem}.png`, blob);
       else this.app.notify("The browser makes no picture of this size: make the window smaller.", true);
     });
+  }
+
+  /** Everything that is needed to go on: mesh, handles, fields, settings and camera. */
+  async saveProject(): Promise<void> {
+    save(`${this.#stem}.lpdeform`, await saveProject(this.app));
+  }
+
+  async #openProject(file: File): Promise<void> {
+    await openProject(this.app, file.name, new Uint8Array(await file.arrayBuffer()));
+    const count = this.app.document.handles.length;
+    this.app.notify(`${file.name}: “${this.app.mesh.name}” with ${count === 1 ? "a handle" : `${count} handles`}.`);
   }
 
   saveHandles(): void {

@@ -1,6 +1,7 @@
 import type { Frame, LpdeformError, MeshReport } from "lpdeform-client";
 import { Live, type LiveWatcher } from "../link/live.js";
 import { say, type Status } from "../link/status.js";
+import type { Shape } from "../model/blend.js";
 import type { Side } from "../model/changes.js";
 import { Matrix4 } from "three";
 import { type Ahead, aheadOf } from "../model/ahead.js";
@@ -11,6 +12,7 @@ import { pullOf } from "../model/pull.js";
 import { cornersOf, type PointedOut } from "../model/pointed.js";
 import type { Seams } from "../model/seams.js";
 import { type EnergyStatistics, energyStatistics } from "../model/statistics.js";
+import { selectionOf } from "../model/together.js";
 import type { View } from "../model/view.js";
 import { vertexNormals } from "../model/normals.js";
 import { type Intake, IntakeWorker } from "../stage/intake.js";
@@ -55,6 +57,9 @@ export class Pane {
   #intakes = new WeakMap<Frame, Intake>();
   #onScreenNext: Frame | undefined;
   #pull: Pull | undefined;
+  /** Shown in place of the frames. */
+  #preview: Shape | undefined;
+  #endsWithFrame = false;
 
   constructor(
     readonly side: Side,
@@ -73,7 +78,7 @@ export class Pane {
     this.#intakeWorker?.stop();
     this.stage.open(mesh, seams?.faces);
     this.#intakeWorker = IntakeWorker.start(this.stage.surface!.intakeMesh);
-    this.frame = this.#onScreenNext = this.#pull = undefined;
+    this.frame = this.#onScreenNext = this.#pull = this.#preview = undefined;
     this.statistics = nothing;
     this.trail.reset();
     this.progress.reset();
@@ -102,7 +107,7 @@ export class Pane {
   }
 
   get distortion(): Float32Array {
-    return this.frame?.distortion ?? new Float32Array((this.stage.surface?.mesh.positions.length ?? 0) / 3);
+    return (this.#preview ?? this.frame)?.distortion ?? new Float32Array((this.stage.surface?.mesh.positions.length ?? 0) / 3);
   }
 
   /** Takes the newest frame if there is one. Returns true if the surface has changed. */
@@ -115,11 +120,8 @@ export class Pane {
       return false;
     }
     this.frame = this.#onScreenNext = frame;
-    const intake = this.#intakes.get(frame);
-    this.stage.surface.move(frame.positions, intake);
-    this.stage.marks.move(frame.positions);
-    this.stage.highlight.move(frame.positions);
-    this.statistics = intake?.statistics ?? energyStatistics(frame.distortion);
+    if (this.#endsWithFrame) this.#preview = undefined;
+    if (!this.#preview) this.#move(frame.positions, this.#intakes.get(frame));
     this.trail.add(frame.iteration, frame.energy ** (1 / this.live!.exponentOf(frame)));
     this.progress.add(frame);
     this.#isDirty = true;
@@ -134,7 +136,8 @@ export class Pane {
     const { surface } = this.stage;
     const of = this.frame && this.live?.answered;
     if (!surface || !of) return;
-    const ahead = mayMove && this.live?.status.kind === "live" ? aheadOf(of, document) : undefined;
+    const isFollowing = mayMove && !this.#preview && this.live?.status.kind === "live";
+    const ahead = isFollowing ? aheadOf(of, document) : undefined;
     if (ahead && ahead.pulled !== this.#pull?.pulled) this.#findPull(surface, ahead);
     const motion = ahead && this.#pull?.shares ? motionBetween(ahead.from, ahead.to) : new Matrix4();
     if (motion.equals(surface.ahead.value)) return;
@@ -160,6 +163,29 @@ export class Pane {
     this.watcher.changed();
   }
 
+  /** Shows a shape in place of the frames, which go on being taken. */
+  preview(shape: Shape): void {
+    this.#preview = shape;
+    this.#endsWithFrame = false;
+    this.#move(shape.positions);
+  }
+
+  /** Shows frames again: from the next one on, or at once. */
+  endPreview(withNextFrame: boolean): void {
+    this.#endsWithFrame = withNextFrame;
+    if (!this.#preview || withNextFrame) return;
+    this.#preview = undefined;
+    if (this.stage.surface) this.#move(this.frame?.positions ?? this.stage.surface.mesh.positions);
+  }
+
+  #move(positions: Float32Array, intake?: Intake): void {
+    this.stage.surface!.move(positions, intake);
+    this.stage.marks.move(positions);
+    this.stage.highlight.move(positions);
+    this.statistics = intake?.statistics ?? energyStatistics(this.distortion);
+    this.#isDirty = true;
+  }
+
   colour(document: Document, view: View, red: number): void {
     const { surface } = this.stage;
     if (!surface) return;
@@ -175,7 +201,8 @@ export class Pane {
     const { surface, marks, pointed, highlight } = this.stage;
     if (!surface) return;
     const { positions, mesh } = surface;
-    if (marks.show(document.handles, mesh.faces, view.selected)) {
+    const selected = selectionOf(document, view).map(({ name }) => name);
+    if (marks.show(document.handles, mesh.faces, selected)) {
       marks.move(positions);
       marks.pull(this.#pull?.shares);
     }

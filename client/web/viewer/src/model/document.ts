@@ -1,5 +1,6 @@
 import type { Hold, SurfacePoint } from "lpdeform-client";
 import { groupColours } from "./colours.js";
+import type { KeyPose } from "./key_poses.js";
 import { fitPose } from "./fit.js";
 import { centroid, type Vector3 } from "./mesh.js";
 import { about, add, type Pose } from "./pose.js";
@@ -31,6 +32,8 @@ export interface Document {
   readonly paintedP?: Float32Array;
   /** One per vertex. */
   readonly stiffness?: Float32Array;
+  /** Poses to come back to, and to play. */
+  readonly keyPoses?: readonly KeyPose[];
   /** The vertices that may move; from a file. */
   readonly region?: readonly number[];
 }
@@ -148,6 +151,12 @@ export function paint(
   const stiffness = document.stiffness?.slice() ?? new Float32Array(vertexCount).fill(1);
   for (const vertex of vertices) stiffness[vertex] = value;
   return { ...document, stiffness, isAutomatic: false };
+}
+
+/** Without one of the painted fields. */
+export function withoutField(document: Document, field: "paintedP" | "stiffness"): Document {
+  const { [field]: _, ...rest } = document;
+  return rest;
 }
 
 export function withoutPaint(document: Document): Document {

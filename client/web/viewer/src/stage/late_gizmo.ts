@@ -41,6 +41,10 @@ export class LateGizmo {
     else if (pose) this.#loading ??= this.#load();
   }
 
+  follow(): void {
+    this.#gizmo?.follow();
+  }
+
   dispose(): void {
     this.#isOver = true;
     this.#gizmo?.dispose();

@@ -60,10 +60,10 @@ export class Marks {
   }
 
   /** `faces`: of the mesh. Returns true if other points are marked than before, which are not at their places yet. */
-  show(handles: readonly Handle[], faces: Uint32Array, selected: string | undefined): boolean {
+  show(handles: readonly Handle[], faces: Uint32Array, selected: readonly string[]): boolean {
     const shown = [
       faces,
-      selected,
+      ...selected,
       ...handles.flatMap(({ name, vertices, points, colour }) => [name, vertices, points, colour]),
     ];
     if (shown.length === this.#shown.length && shown.every((one, k) => one === this.#shown[k])) return false;
@@ -87,7 +87,7 @@ export class Marks {
       const places = placesOf(vertices, points, faces);
       const count = places.corners.length / 3;
       const small = count > 400 ? 4 : count > 60 ? 5 : count > 4 ? 8 : 11;
-      add(places, colour, name === selected ? small + 1.5 : small);
+      add(places, colour, selected.includes(name) ? small + 1.5 : small);
     }
     this.#places = { corners, weights };
     const geometry = new three.BufferGeometry();

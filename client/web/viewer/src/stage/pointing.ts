@@ -19,6 +19,8 @@ export interface PointerAt {
   isTouch: boolean;
   shift: boolean;
   alt: boolean;
+  /** Control, or Command on a Mac. */
+  control: boolean;
   ray: three.Ray;
   hit: Hit | undefined;
 }
@@ -82,6 +84,7 @@ export class Pointing {
       isTouch: event instanceof PointerEvent && event.pointerType === "touch",
       shift: event.shiftKey,
       alt: event.altKey,
+      control: event.ctrlKey || event.metaKey,
       ray,
       get hit() {
         found ??= {

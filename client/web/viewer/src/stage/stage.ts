@@ -164,6 +164,18 @@ export class Stage {
     this.lookFrom({ position: middle.addScaledVector(towards, distance).toArray(), target });
   }
 
+  /** Looks from this direction at the middle of the surface, all of which is in sight. `front`: what is below where up is unclear. */
+  lookAlong(direction: Vector3, front: Vector3): void {
+    const { camera, surface } = this;
+    if (!surface) return;
+    const { min, max, center } = boundsOf(surface.positions, surface.mesh.faces);
+    const away = new three.Vector3(...direction).addScaledVector(new three.Vector3(...front), 1e-4).normalize();
+    camera.position.copy(away);
+    camera.lookAt(0, 0, 0);
+    const position = new three.Vector3(...center).addScaledVector(away, this.#distanceFor(min, max, center));
+    this.lookFrom({ position: position.toArray(), target: center });
+  }
+
   /** Turns like dragging the surface to the right and up by this many radians. */
   turn(right: number, up: number): void {
     const { camera, target } = this;
@@ -229,6 +241,7 @@ export class Stage {
   }
 
   draw(): void {
+    this.gizmo.follow();
     this.#renderer.render(this.#scene, this.camera);
   }
 

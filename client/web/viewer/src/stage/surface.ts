@@ -5,11 +5,11 @@ import { blockBoxes, type FaceBlocks } from "../model/face_blocks.js";
 import type { Mesh } from "../model/mesh.js";
 import { Pairs } from "../model/pairs.js";
 import { type Hit, raycast } from "../model/raycast.js";
-import type { ColourBy } from "../model/view.js";
+import type { ColourBy, View } from "../model/view.js";
 import { DrawMesh } from "./drawmesh.js";
 import type { Intake, IntakeMesh } from "./intake.js";
 import { isSoftware } from "./software.js";
-import { colourByNormal, surfaceMaterial } from "./surface_material.js";
+import { colourByNormal, paint, surfaceMaterial } from "./surface_material.js";
 
 /** The value for each colour. */
 export interface Scale {
@@ -157,7 +157,8 @@ export class Surface {
     colourByNormal(this.#material, by === "normals", this.#isPerVertex);
   }
 
-  show({ wireframe, ghost, isDark }: { wireframe: boolean; ghost: boolean; isDark: boolean }): void {
+  show({ wireframe, ghost, isDark, palette }: Pick<View, "wireframe" | "ghost" | "isDark" | "palette">): void {
+    paint(this.#material, palette);
     if (wireframe) this.#findEdges();
     this.#wire.visible = wireframe;
     this.#ghost.visible = ghost;

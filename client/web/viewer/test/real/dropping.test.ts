@@ -45,10 +45,10 @@ async function drop(files: Record<string, string | Uint8Array>): Promise<void> {
       y: 400,
       data: { items: [], files: paths, dragOperationsMask: 1 },
     });
-    if (type === "dragOver") await user.page.getByText("Drop a mesh or a handle file").waitFor();
+    if (type === "dragOver") await user.page.getByText("Drop a mesh, a project or a handle file").waitFor();
   }
   await devtools.detach();
-  await user.page.getByText("Drop a mesh or a handle file").waitFor({ state: "hidden" });
+  await user.page.getByText("Drop a mesh, a project or a handle file").waitFor({ state: "hidden" });
 }
 
 const isOpen = (name: string) => user.until(`window.__lpdeform.app.mesh.name === "${name}"`);
