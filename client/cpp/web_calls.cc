@@ -1,5 +1,6 @@
 #include "client/cpp/web_calls.h"
 
+#include <algorithm>
 #include <condition_variable>
 #include <mutex>
 #include <optional>
@@ -12,6 +13,8 @@ namespace lpdeform::client {
 namespace {
 
 constexpr char kService[] = "/lpdeform.v1.DeformService/";
+/// Longer deadlines are as good as none. The header of a deadline has room for eight digits.
+constexpr std::chrono::milliseconds kLongest = std::chrono::hours(24);
 
 /// One call: what has come of its answer.
 struct Answer {
@@ -71,11 +74,11 @@ std::shared_ptr<HttpCall> Calls::start(const std::string& method,
   HttpRequest http{.path = absl::StrCat(kService, method),
                    .headers = headers_of(caller_),
                    .body = framed(request.SerializeAsString()),
-                   .limit = limit};
+                   .limit = std::min(limit, kLongest)};
   http.headers.emplace_back("content-type", "application/grpc-web+proto");
   http.headers.emplace_back("accept", "application/grpc-web+proto");
   http.headers.emplace_back("x-grpc-web", "1");
-  if (limit.count() > 0) http.headers.emplace_back("grpc-timeout", absl::StrCat(limit.count(), "m"));
+  if (limit.count() > 0) http.headers.emplace_back("grpc-timeout", absl::StrCat(http.limit.count(), "m"));
   const auto answer = std::make_shared<Answer>();
   answer->events = std::move(events);
   return http_->post(std::move(http), http_events(answer));
