@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "client/cpp/rpc.h"
+#include "client/cpp/caller.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
 

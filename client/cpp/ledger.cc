@@ -50,6 +50,16 @@ void merge_resize(Update& older, Update& newer) {
   older.resize.swap(newer.resize);
 }
 
+bool only_moves(const NumberedUpdate& numbered) {
+  const Update& update = numbered.update;
+  const Settings& settings = update.settings;
+  const bool sets =
+      settings.p || settings.stiffness || settings.length_unit || settings.solver || settings.region;
+  return !sets && !update.resize && !update.begins_step &&
+         std::ranges::all_of(update.handles,
+                             [](const auto& entry) { return std::holds_alternative<Motion>(entry.second); });
+}
+
 }  // namespace
 
 void merge(Update& older, Update newer) {
@@ -72,6 +82,13 @@ std::uint64_t Ledger::add(Update update) {
   merge(waiting_->update, std::move(update));
   waiting_->seq = seq;
   return seq;
+}
+
+bool Ledger::can_send() const {
+  if (!has_waiting() || in_flight_.size() >= kWindow) return false;
+  if (order_ == Order::kWritten || in_flight_.empty()) return true;
+  return in_flight_.size() < kUnorderedWindow && only_moves(restore_ ? *restore_ : *waiting_) &&
+         std::ranges::all_of(in_flight_, only_moves);
 }
 
 NumberedUpdate Ledger::send_next() {

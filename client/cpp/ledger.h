@@ -8,6 +8,12 @@
 
 namespace lpdeform::client {
 
+/// In which order the updates that are in flight reach the server.
+enum class Order {
+  kWritten,  // as they were sent
+  kAny,      // they may overtake each other
+};
+
 /// Merges `newer` into `older`: the newest value of each handle and each setting wins. If `older` adds a handle and
 /// `newer` moves it, the added handle gets the motion.
 void merge(Update& older, Update newer);
@@ -24,17 +30,21 @@ struct NumberedUpdate {
 class Ledger {
  public:
   static constexpr std::size_t kWindow = 4;
+  /// The same if updates may overtake each other on their way. Then there are several only if all of them merely move
+  /// handles: such updates may come in any order, since each handle keeps its newest value.
+  static constexpr std::size_t kUnorderedWindow = 2;
   /// The most removed handles that are remembered. If there are more, all are forgotten.
   static constexpr std::size_t kMostRemovals = 8192;
 
   /// `begins_bare`: a session that is created again has only the handles of this ledger. Otherwise it also has the
   /// handles that it is created with.
-  explicit Ledger(bool begins_bare = true) : begins_bare_(begins_bare) {}
+  explicit Ledger(bool begins_bare = true, Order order = Order::kWritten)
+      : begins_bare_(begins_bare), order_(order) {}
 
   /// Adds an update; returns its number.
   std::uint64_t add(Update update);
 
-  bool can_send() const { return (restore_ || waiting_) && in_flight_.size() < kWindow; }
+  bool can_send() const;
   bool has_waiting() const { return restore_ || waiting_; }
   /// Whether send_next() returns the state of a lost session.
   bool has_restore() const { return restore_.has_value(); }
@@ -86,6 +96,7 @@ class Ledger {
   void merge_accepted(NumberedUpdate update, bool is_kept);
 
   const bool begins_bare_;
+  const Order order_;
   std::uint64_t next_seq_ = 1;
   std::uint64_t epoch_ = 0;
   NumberedUpdate accepted_;  // if begins_bare_, handles only as Handle, never as Motion or Removal

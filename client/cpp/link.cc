@@ -38,7 +38,7 @@ Link::Link(std::shared_ptr<Rpc> rpc, ClientOptions client_options, OpenOptions o
       options_(std::move(options)),
       copy_(std::move(copy)),
       lease_(std::move(lease)),
-      ledger_(copy_.is_bare),
+      ledger_(copy_.is_bare, rpc_->order()),
       rules_(bool{copy_}, client_options_.reconnect_for),
       request_id_(new_request_id()) {
   ledger_.count_from(lease_.input_seq);

@@ -11,18 +11,15 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cpp/address.h"
+#include "client/cpp/caller.h"
 #include "client/cpp/status_details.h"
 #include "client/cpp/tls_texts.h"
-#include "client/cpp/upload.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
 #include "lpdeform/v1/service.grpc.pb.h"
 
 namespace lpdeform::client {
 
-bool is_header_text(std::string_view text) {
-  return std::ranges::all_of(text, [](char letter) { return letter >= 0x20 && letter <= 0x7e; });
-}
 namespace {
 
 using Stub = v1::DeformService::Stub;
@@ -101,18 +98,8 @@ absl::Status no_server(const std::string& address, const std::string& problem) {
                                                                    problem.empty() ? "." : ": ", problem));
 }
 
-/// What every call sends about its caller.
-struct Caller {
-  std::function<std::string()> token;
-  std::string route = new_request_id();
-};
-
-/// Adds token and route to a call. A token that cannot be a header is left out; the server then reports that there is
-/// none.
 void introduce(const Caller& caller, grpc::ClientContext& context) {
-  const std::string text = caller.token ? caller.token() : "";
-  if (!text.empty() && is_header_text(text)) context.AddMetadata("authorization", "Bearer " + text);
-  context.AddMetadata("lpdeform-session", caller.route);
+  for (const auto& [name, value] : headers_of(caller)) context.AddMetadata(name, value);
 }
 
 std::shared_ptr<grpc::ChannelCredentials> credentials_of(const std::optional<Tls>& tls) {

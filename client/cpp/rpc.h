@@ -5,17 +5,14 @@
 #include <memory>
 #include <stop_token>
 #include <string>
-#include <string_view>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/cpp/client.h"
+#include "client/cpp/ledger.h"
 #include "lpdeform/v1/service.pb.h"
 
 namespace lpdeform::client {
-
-/// Whether `text` is printable ASCII, as headers must be. gRPC aborts the process on any other header.
-bool is_header_text(std::string_view text);
 
 /// One Deform call. Call read() on one thread and write() on one other thread; cancel() on any thread, any number of
 /// times.
@@ -31,7 +28,8 @@ class DeformCall {
   virtual absl::Status finish() = 0;
 };
 
-/// The server's calls over one channel; hides gRPC. Thread-safe. Each call waits, unless its comment says otherwise for
+/// The server's calls over one channel; hides what carries them: gRPC (rpc.cc) or gRPC-Web (web_rpc.cc), of which one is
+/// linked. Thread-safe. Each call waits, unless its comment says otherwise for
 /// at most the call timeout (DeleteSession: two seconds), and ends with CANCELLED when `stop` is requested.
 class Rpc {
  public:
@@ -86,6 +84,8 @@ class Rpc {
                              const std::function<absl::Status(const v1::SolveResponse&)>& on_response) = 0;
 
   virtual std::unique_ptr<DeformCall> deform() = 0;
+  /// Of the updates that deform() writes.
+  virtual Order order() const { return Order::kWritten; }
 
   enum class Connected { kWas, kCame, kIsNot };
   /// Waits until there is a connection, for at most `longest`. Use this instead of a plain pause: gRPC works on a

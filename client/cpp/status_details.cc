@@ -1,10 +1,12 @@
 #include "client/cpp/status_details.h"
 
-#include <google/protobuf/unknown_field_set.h>
+#include <google/protobuf/io/coded_stream.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <optional>
+#include <vector>
 
 #include "absl/strings/cord.h"
 #include "absl/strings/match.h"
@@ -16,8 +18,7 @@
 namespace lpdeform::client {
 namespace {
 
-using google::protobuf::UnknownField;
-using google::protobuf::UnknownFieldSet;
+using google::protobuf::io::CodedInputStream;
 
 // Field numbers of google/rpc/status.proto, google/rpc/error_details.proto and google/protobuf/any.proto. They never
 // change. Reading them by number means that users of this library do not need Google's common protos.
@@ -31,14 +32,53 @@ constexpr char kRetryPayload[] = "lpdeform/retry_after_ms";
 /// One day. Longer pauses are as good as for ever, and would overflow a clock.
 constexpr std::uint64_t kMostSeconds = 24 * 60 * 60;
 
+/// A field of a serialised message: a number, or bytes.
+struct Field {
+  int number = 0;
+  std::optional<std::uint64_t> varint;
+  std::string bytes;
+};
+
+/// Reads the rest of a field after its tag; false if it is malformed. Fields of a fixed size are skipped.
+bool read_field(CodedInputStream& input, std::uint32_t tag, Field& field) {
+  constexpr std::uint32_t kVarint = 0, kFixed64 = 1, kBytes = 2, kFixed32 = 5;
+  std::uint64_t number = 0;
+  std::uint32_t size = 0;
+  field.number = static_cast<int>(tag >> 3);
+  switch (tag & 7) {
+    case kVarint:
+      if (!input.ReadVarint64(&number)) return false;
+      field.varint = number;
+      return true;
+    case kFixed64:
+      return input.Skip(8);
+    case kBytes:
+      return input.ReadVarint32(&size) && input.ReadString(&field.bytes, static_cast<int>(size));
+    case kFixed32:
+      return input.Skip(4);
+    default:
+      return false;
+  }
+}
+
+/// The fields of a serialised message; empty if `message` is malformed. By hand, because the lite library has no other
+/// way to read fields by number.
+std::vector<Field> fields_of(const std::string& message) {
+  CodedInputStream input(reinterpret_cast<const std::uint8_t*>(message.data()),
+                         static_cast<int>(message.size()));
+  std::vector<Field> fields;
+  while (const std::uint32_t tag = input.ReadTag()) {
+    if (!read_field(input, tag, fields.emplace_back())) return {};
+  }
+  if (!input.ConsumedEntireMessage()) return {};
+  return fields;
+}
+
 /// Calls `visit` for each length-delimited field of a serialised message. Does nothing if `message` is malformed.
 void for_each_field(const std::string& message,
                     const std::function<void(int number, const std::string& bytes)>& visit) {
-  UnknownFieldSet fields;
-  if (!fields.ParseFromString(message)) return;
-  for (int k = 0; k < fields.field_count(); ++k) {
-    const UnknownField& field = fields.field(k);
-    if (field.type() == UnknownField::TYPE_LENGTH_DELIMITED) visit(field.number(), field.length_delimited());
+  for (const Field& field : fields_of(message)) {
+    if (!field.varint) visit(field.number, field.bytes);
   }
 }
 
@@ -63,16 +103,13 @@ void read_error_info(const std::string& error_info, Fault& fault) {
 std::chrono::milliseconds read_retry_info(const std::string& retry_info) {
   std::uint64_t milliseconds = 0;
   for_each_field(retry_info, [&](int number, const std::string& duration) {
-    UnknownFieldSet fields;
-    if (number != kRetryDelay || !fields.ParseFromString(duration)) return;
-    for (int k = 0; k < fields.field_count(); ++k) {
-      const UnknownField& field = fields.field(k);
-      if (field.type() != UnknownField::TYPE_VARINT) continue;
-      const auto value = static_cast<std::int64_t>(field.varint());
+    if (number != kRetryDelay) return;
+    for (const Field& field : fields_of(duration)) {
+      const auto value = static_cast<std::int64_t>(field.varint.value_or(0));
       if (value < 0) continue;
       const auto positive = static_cast<std::uint64_t>(value);
-      if (field.number() == kDurationSeconds) milliseconds += 1000 * std::min(positive, kMostSeconds);
-      if (field.number() == kDurationNanos)
+      if (field.number == kDurationSeconds) milliseconds += 1000 * std::min(positive, kMostSeconds);
+      if (field.number == kDurationNanos)
         milliseconds += std::min<std::uint64_t>(positive, 999'999'999) / 1'000'000;
     }
   });

@@ -9,12 +9,28 @@
 #include <string>
 
 #include "server/server.h"
+#ifdef LPDEFORM_DEPLOY_WEB
+#include "tests/client/web_front.h"
+#endif
 
 namespace lpdeform::client {
 
-/// A server on a socket in its own folder. It can be stopped and restarted at the same address.
+/// A server on a socket in its own folder. It can be stopped and restarted at the same address. In programs that test
+/// gRPC-Web, it has a port instead, and clients reach it through the project's Envoy.
 class InProcessServer {
  public:
+#ifdef LPDEFORM_DEPLOY_WEB
+  InProcessServer() {
+    start_again();
+    if (!server_) return;
+    front_ = std::make_unique<WebFront>(server_->address());
+    front_->wait_for_server();
+  }
+
+  std::string address() const {
+    return front_->address();
+  }
+#else
   InProcessServer() {
     std::string name = (std::filesystem::temp_directory_path() / "lpdeform-test-XXXXXX").string();
     EXPECT_NE(mkdtemp(name.data()), nullptr);
@@ -27,22 +43,38 @@ class InProcessServer {
     std::filesystem::remove_all(folder_);
   }
 
-  void stop() { server_.reset(); }
+  std::string address() const {
+    return "unix:" + (folder_ / "socket").string();
+  }
+#endif
+
+  void stop() {
+    server_.reset();
+  }
 
   void start_again() {
     ServerOptions options;
-    options.address = address();
+    options.address = listening();
     options.threads = 2;
     auto server = Server::start(options);
     ASSERT_TRUE(server.ok()) << server.status();
     server_ = *std::move(server);
   }
 
-  std::string address() const { return "unix:" + (folder_ / "socket").string(); }
-
  private:
+#ifdef LPDEFORM_DEPLOY_WEB
+  std::string listening() const {
+    return front_ ? front_->server() : "127.0.0.1:0";
+  }
+  std::unique_ptr<Server> server_;
+  std::unique_ptr<WebFront> front_;
+#else
+  std::string listening() const {
+    return address();
+  }
   std::filesystem::path folder_;
   std::unique_ptr<Server> server_;
+#endif
 };
 
 }  // namespace lpdeform::client

@@ -33,6 +33,42 @@ double translation_x(const Motion& motion) {
   return std::get<RigidMotion>(motion).translation[0];
 }
 
+TEST(Ledger, SendsOnlyMovesBesideEachOtherIfUpdatesMayOvertake) {
+  Ledger ledger(true, Order::kAny);
+  ledger.add(moving("tip", 1));
+  ledger.send_next();
+  ledger.add(moving("tip", 2));
+  EXPECT_TRUE(ledger.can_send());
+  ledger.send_next();
+  ledger.add(moving("tip", 3));
+  EXPECT_FALSE(ledger.can_send()) << "two are under way";
+  ledger.accept(1);
+  EXPECT_TRUE(ledger.can_send());
+  ledger.add(adding("base", {0}));
+  EXPECT_FALSE(ledger.can_send()) << "a handle is set";
+  ledger.accept(2);
+  EXPECT_TRUE(ledger.can_send());
+  ledger.send_next();
+  ledger.add(moving("base", 1));
+  EXPECT_FALSE(ledger.can_send()) << "the handle that it moves may not be there yet";
+}
+
+TEST(Ledger, WaitsForStepsAndSettingsIfUpdatesMayOvertake) {
+  Update step = moving("tip", 1);
+  step.begins_step = true;
+  Update resize;
+  resize.resize = Resize{.scale = {2, 1, 1}};
+  for (const Update& alone : {step, with_p(2), removing("tip"), resize}) {
+    Ledger ledger(true, Order::kAny);
+    ledger.add(moving("tip", 0));
+    ledger.send_next();
+    ledger.add(alone);
+    EXPECT_FALSE(ledger.can_send());
+    ledger.accept(1);
+    EXPECT_TRUE(ledger.can_send());
+  }
+}
+
 TEST(Ledger, MergesWhatWaitsWithTheNewestValueWinning) {
   Ledger ledger;
   ledger.add(moving("tip", 1));
