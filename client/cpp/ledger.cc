@@ -76,6 +76,12 @@ void merge(Update& older, Update newer) {
   older.begins_step = older.begins_step || newer.begins_step;
 }
 
+void join(NumberedUpdate& one, NumberedUpdate other) {
+  if (other.seq < one.seq) std::swap(one, other);
+  merge(one.update, std::move(other.update));
+  one.seq = other.seq;
+}
+
 std::uint64_t Ledger::add(Update update) {
   const std::uint64_t seq = next_seq_++;
   if (!waiting_) waiting_.emplace();
@@ -93,6 +99,7 @@ bool Ledger::can_send() const {
 
 NumberedUpdate Ledger::send_next() {
   auto& source = restore_ ? restore_ : waiting_;
+  if (restore_) restores_.insert_or_assign(restore_->seq, *restore_);
   in_flight_.push_back(std::move(*source));
   source.reset();
   return in_flight_.back();
@@ -106,6 +113,7 @@ void Ledger::accept(std::uint64_t seq, bool is_kept) {
   }
   NumberedUpdate update = std::move(*sent);
   in_flight_.erase(sent);
+  restores_.erase(seq);
   merge_accepted(std::move(update), is_kept);
 }
 
@@ -119,14 +127,14 @@ void Ledger::accept_change(NumberedUpdate change, bool is_kept) {
 
 void Ledger::merge_accepted(NumberedUpdate update, bool is_kept) {
   if (!is_kept) {
-    merge(unkept_.update, update.update);
-    unkept_.seq = std::max(unkept_.seq, update.seq);
+    join(unkept_, update);
   } else if (update.seq >= unkept_.seq) {
     unkept_ = {};
   }
   forget_removals(unkept_.update);
-  accepted_.seq = std::max(accepted_.seq, update.seq);
-  merge(accepted_.update, std::move(update.update));
+  if (restore_) join(*restore_, update);
+  for (auto& [seq, again] : restores_) join(again, update);
+  join(accepted_, std::move(update));
   if (begins_bare_) {
     settle_changes(accepted_.update);
   } else {
@@ -140,6 +148,7 @@ void Ledger::resumed_at(std::uint64_t seq) {
 
 void Ledger::refuse(std::uint64_t seq) {
   std::erase_if(in_flight_, [seq](const NumberedUpdate& sent) { return sent.seq == seq; });
+  restores_.erase(seq);
 }
 
 void Ledger::reopened(std::uint64_t epoch, std::uint64_t seq) {
@@ -151,8 +160,11 @@ void Ledger::reopened(std::uint64_t epoch, std::uint64_t seq) {
 void Ledger::connection_lost() {
   std::optional<NumberedUpdate> again;
   for (NumberedUpdate& sent : in_flight_) {
-    if (sent.seq == accepted_.seq) {  // an unanswered restore stays on its own
-      restore_ = std::move(sent);
+    const auto again_restored = restores_.find(sent.seq);
+    if (again_restored != restores_.end()) {  // an unanswered restore stays on its own
+      NumberedUpdate restored = std::move(again_restored->second);
+      if (restore_) join(restored, *std::move(restore_));
+      restore_ = std::move(restored);
       continue;
     }
     if (!again) again.emplace();
@@ -160,6 +172,7 @@ void Ledger::connection_lost() {
     again->seq = std::max(again->seq, sent.seq);
   }
   in_flight_.clear();
+  restores_.clear();
   if (!again) return;
   if (waiting_) {
     merge(again->update, std::move(waiting_->update));
@@ -177,6 +190,7 @@ void Ledger::drop_unaccepted() {
   restore_.reset();
   unkept_ = {};
   in_flight_.clear();
+  restores_.clear();
   waiting_.reset();
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <optional>
 
 #include "client/cpp/types.h"
@@ -23,6 +24,9 @@ struct NumberedUpdate {
   std::uint64_t seq = 0;
   Update update;
 };
+
+/// Merges `other` into `one`, whichever came first; of equal numbers, `one` is the older.
+void join(NumberedUpdate& one, NumberedUpdate other);
 
 /// The writer's record of updates: accepted ones (merged; all that is needed to create the session again), those in
 /// flight (at most kWindow), and those that wait (merged into one). Its size is bounded by that of the handles and
@@ -101,8 +105,10 @@ class Ledger {
   std::uint64_t epoch_ = 0;
   NumberedUpdate accepted_;  // if begins_bare_, handles only as Handle, never as Motion or Removal
   NumberedUpdate unkept_;    // accepted since the server last kept an update; changes as they were sent
-  std::optional<NumberedUpdate> restore_;
+  std::optional<NumberedUpdate> restore_;  // what the server may have lost, with what it has accepted since
   std::deque<NumberedUpdate> in_flight_;
+  std::map<std::uint64_t, NumberedUpdate>
+      restores_;  // in flight, by number; what to send if they are sent again
   std::optional<NumberedUpdate> waiting_;
 };
 

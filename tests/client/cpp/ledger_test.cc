@@ -69,6 +69,54 @@ TEST(Ledger, WaitsForStepsAndSettingsIfUpdatesMayOvertake) {
   }
 }
 
+TEST(Ledger, KeepsTheNewestMotionHoweverAnswersOvertakeEachOther) {
+  Ledger ledger(true, Order::kAny);
+  ledger.add(adding("tip", {1}));
+  ledger.send_next();
+  ledger.accept(1);
+  ledger.add(moving("tip", 1));
+  ledger.send_next();
+  ledger.add(moving("tip", 2));
+  ledger.send_next();
+  ledger.accept(3);
+  ledger.accept(2);
+  ledger.session_lost();
+  const NumberedUpdate restored = ledger.send_next();
+  EXPECT_EQ(restored.seq, 3u);
+  EXPECT_EQ(translation_x(std::get<Handle>(restored.update.handles.at("tip")).motion), 2);
+}
+
+TEST(Ledger, ARestoreHasWhatIsAcceptedWhileItWaitsAndWhileItIsUnderWay) {
+  Ledger ledger(true, Order::kAny);
+  ledger.add(adding("tip", {1}));
+  ledger.send_next();
+  ledger.accept(1);
+  ledger.add(moving("tip", 5));
+  ledger.send_next();
+  ledger.resumed_at(0);
+  ledger.accept(2);
+  const NumberedUpdate restored = ledger.send_next();
+  EXPECT_EQ(restored.seq, 2u);
+  EXPECT_EQ(translation_x(std::get<Handle>(restored.update.handles.at("tip")).motion), 5);
+  ledger.accept(2);
+
+  ledger.add(moving("tip", 6));
+  ledger.send_next();
+  ledger.accept(3, true);
+  ledger.add(moving("tip", 7));
+  ledger.send_next();
+  ledger.accept(4);
+  ledger.resumed_at(3);
+  EXPECT_EQ(ledger.send_next().seq, 4u);
+  ledger.add(moving("tip", 8));
+  ledger.send_next();
+  ledger.accept(5);
+  ledger.connection_lost();
+  const NumberedUpdate again = ledger.send_next();
+  EXPECT_EQ(again.seq, 5u);
+  EXPECT_EQ(translation_x(std::get<Motion>(again.update.handles.at("tip"))), 8);
+}
+
 TEST(Ledger, MergesWhatWaitsWithTheNewestValueWinning) {
   Ledger ledger;
   ledger.add(moving("tip", 1));
