@@ -4,7 +4,9 @@ import { type Document, emptyDocument } from "../model/document.js";
 import type { Mesh } from "../model/mesh.js";
 import { nothing, type PointedOut } from "../model/pointed.js";
 import type { AsideName } from "./asides.js";
-import type { Solving } from "./solving.js";
+
+/** What the page says of the solve: nothing, how much of the energy's descent is left, or that it has just ended. */
+export type Solving = { left: number } | "ended" | undefined;
 
 /** What the page shows besides the pictures. */
 export interface Facts {

@@ -1,7 +1,5 @@
 import type { App } from "./app.js";
-
-/** What the page says of the solve: nothing, how much of the energy's descent is left, or that it has just ended. */
-export type Solving = { left: number } | "ended" | undefined;
+import type { Solving } from "./facts.js";
 
 /** A solve that is over sooner is not worth a word. */
 const leastMs = 400;

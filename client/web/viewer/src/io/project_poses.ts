@@ -1,5 +1,5 @@
 import { leastP, mostP } from "../model/exponent.js";
-import type { KeyPose } from "../model/key_poses.js";
+import type { KeyPose } from "../model/document.js";
 import type { Quaternion } from "../model/pose.js";
 import { FileFault } from "./fault.js";
 import { isPlace } from "./places.js";

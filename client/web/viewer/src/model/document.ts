@@ -1,6 +1,5 @@
 import type { Hold, SurfacePoint } from "lpdeform-client";
 import { groupColours } from "./colours.js";
-import type { KeyPose } from "./key_poses.js";
 import { fitPose } from "./fit.js";
 import { centroid, type Vector3 } from "./mesh.js";
 import { about, add, type Pose } from "./pose.js";
@@ -18,6 +17,13 @@ export interface Handle {
   readonly footprint: number;
   /** Whether it is protected against dragging. */
   readonly isLocked: boolean;
+}
+
+/** Where every handle is, and p, to come back to and to play. */
+export interface KeyPose {
+  readonly name: string;
+  readonly p: number;
+  readonly handles: readonly Pick<Handle, "name" | "pose" | "targets">[];
 }
 
 /** Everything that undo restores and that a server could lose. Immutable. */

@@ -1,12 +1,5 @@
-import { changeHandle, type Document, type Handle, handleOf } from "./document.js";
+import { changeHandle, type Document, type Handle, handleOf, type KeyPose } from "./document.js";
 import { about, add, axisAngle, conjugate, type Pose, product, quaternionOf } from "./pose.js";
-
-/** Where every handle is, and p, to come back to and to play. */
-export interface KeyPose {
-  readonly name: string;
-  readonly p: number;
-  readonly handles: readonly Pick<Handle, "name" | "pose" | "targets">[];
-}
 
 /** The document as it is, under the first free name of the form "Pose 2". */
 export function keyPoseOf({ keyPoses = [], handles, p }: Document): KeyPose {

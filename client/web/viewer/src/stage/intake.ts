@@ -1,4 +1,3 @@
-import type { Frame } from "lpdeform-client";
 import type { Adjacency } from "../model/adjacency.js";
 import type { Drawn } from "../model/drawn.js";
 import { blockBoxes } from "../model/face_blocks.js";
@@ -33,7 +32,13 @@ export interface PullRequest {
   held: readonly number[];
 }
 
-export type IntakeRequest = IntakeMesh | { frame: Pick<Frame, "positions" | "distortion"> } | { pull: PullRequest };
+/** What is taken of a frame. */
+export interface TakenFrame {
+  readonly positions: Float32Array;
+  readonly distortion: Float32Array;
+}
+
+export type IntakeRequest = IntakeMesh | { frame: TakenFrame } | { pull: PullRequest };
 export type IntakeAnswer = Intake | { pull: Float32Array };
 
 /** Finds what is drawn of frames, in new arrays. */
@@ -51,7 +56,7 @@ export class Taking {
     return pullOf(positions, adjacency, pulled, held);
   }
 
-  take({ positions, distortion }: Pick<Frame, "positions" | "distortion">): Intake {
+  take({ positions, distortion }: TakenFrame): Intake {
     const draw = this.#draw;
     const { faces, order } = this.mesh;
     draw.take(positions);
@@ -98,7 +103,7 @@ export class IntakeWorker {
   }
 
   /** Undefined if the worker is broken or stopped. */
-  take({ positions, distortion }: Frame): Promise<Intake | undefined> {
+  take({ positions, distortion }: TakenFrame): Promise<Intake | undefined> {
     if (this.#isBroken) return Promise.resolve(undefined);
     this.#worker.postMessage({ frame: { positions, distortion } });
     return new Promise((answer) => (this.#frame = answer));

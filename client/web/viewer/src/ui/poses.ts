@@ -1,6 +1,7 @@
 import type { App } from "../app/app.js";
 import { Player } from "../app/player.js";
-import { atPose, type KeyPose } from "../model/key_poses.js";
+import type { KeyPose } from "../model/document.js";
+import { atPose } from "../model/key_poses.js";
 import { button } from "./controls.js";
 import { el, setText } from "./dom.js";
 
