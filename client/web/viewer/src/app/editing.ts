@@ -1,26 +1,28 @@
-import { addHandle, extendHandle, type Handle, handleOf, ownersOf, releaseVertices } from "../model/document.js";
+import {
+  addHandle,
+  changeHandle,
+  extendHandle,
+  type Handle,
+  handleOf,
+  ownersOf,
+  paint,
+  releaseVertices,
+  shifted,
+} from "../model/document.js";
 import { isAtRest, type Vector3 } from "../model/mesh.js";
-import { nothing, ofVertices } from "../model/pointed.js";
+import { nothing, ofVertices, type PointedOut } from "../model/pointed.js";
 import { follow, placesOf } from "../model/places.js";
 import { add, type Pose, subtract } from "../model/pose.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../model/selection.js";
-import { posedTogether, selecting, selectionOf, shiftedTogether, toggled } from "../model/together.js";
-import { vertexNormals } from "../model/normals.js";
+import { vertexNormals } from "../stage/drawmesh.js";
 import { onPlane, type PointerAt, Pointing, type PointingTarget, type Stroke, viewProjection } from "../stage/pointing.js";
 import { KeyPointer } from "./key_pointer.js";
 import type { Pane } from "./pane.js";
-import { DragSnap } from "./drag_snap.js";
-import { PaintStroke } from "./paint_stroke.js";
-import { Readout } from "./readout.js";
 import type { Workbench } from "./workbench.js";
-
-/** A press that has had its effect. */
-const stays: Stroke = { move: () => undefined, end: () => undefined, cancel: () => undefined };
 
 /** The tools: what pointing at a pane does to the work. */
 export class Editing implements PointingTarget {
   readonly #pointing: Pointing;
-  readonly #readout: Readout;
 
   constructor(
     readonly work: Workbench,
@@ -31,9 +33,8 @@ export class Editing implements PointingTarget {
     gizmo.onEnd = () => work.endGesture();
     gizmo.onCancel = () => work.cancelGesture();
     this.#pointing = new Pointing(pane.stage, this);
-    this.#readout = new Readout(work, pane);
     new KeyPointer(pane, {
-      hover: (event) => this.#hoverByKey(event),
+      hover: (event) => this.work.facts.set({ pointedOut: this.#underCross(event) }),
       press: (event) => this.#workAt(this.#pointing.at(event)),
     });
     const setViewOnly = (event: KeyboardEvent, isDown: boolean) => {
@@ -56,20 +57,13 @@ export class Editing implements PointingTarget {
     this.cancel();
   }
 
-  /** The surface may have moved. */
-  refresh(): void {
-    this.#readout.refresh();
-  }
-
   press(at: PointerAt): Stroke | undefined {
-    this.#readout.hide();
     switch (this.work.view.now.tool) {
       case "move":
         return this.#pressHandle(at);
       case "brush":
-        return at.hit && this.#brushStroke(at);
       case "paint":
-        return at.hit && this.#paintStroke(at);
+        return at.hit && this.#brushStroke(at);
       case "lasso":
         return this.#outlineStroke(at, (outline) => outline);
       case "box":
@@ -86,16 +80,14 @@ export class Editing implements PointingTarget {
   }
 
   hover(at: PointerAt | undefined): void {
-    this.#readout.point(at);
     const { tool } = this.work.view.now;
     if (tool !== "brush" && tool !== "paint") return;
     this.work.facts.set({ pointedOut: at?.hit ? ofVertices(this.#dabAt(at)) : nothing });
   }
 
-  #hoverByKey(event: PointerEvent | undefined): void {
+  #underCross(event: PointerEvent | undefined): PointedOut {
     const at = event && this.#pointing.at(event);
-    this.work.facts.set({ pointedOut: at?.hit ? ofVertices(this.#dabAt(at)) : nothing });
-    this.#readout.point(at, true);
+    return at?.hit ? ofVertices(this.#dabAt(at)) : nothing;
   }
 
   /** A press by key: uses the tool at one place. */
@@ -106,7 +98,7 @@ export class Editing implements PointingTarget {
       return false;
     }
     if (work.view.now.tool === "paint") {
-      this.#paintStroke(at).end();
+      this.#paint(this.#dabAt(at));
       return false;
     }
     const mode = modeOf(at, work);
@@ -137,12 +129,7 @@ export class Editing implements PointingTarget {
   #pressHandle(at: PointerAt): Stroke | undefined {
     const handle = this.#handleAt(at);
     if (!handle) return undefined;
-    const { view } = this.work;
-    if (at.control) {
-      view.set(toggled(view.now, handle.name));
-      return stays;
-    }
-    view.set(selecting(view.now, handle.name));
+    this.work.view.set({ selected: handle.name });
     return this.work.canShift(handle) ? this.#drag(handle, at) : undefined;
   }
 
@@ -184,13 +171,14 @@ export class Editing implements PointingTarget {
     const { work, pane } = this;
     const grip = start.hit?.point ?? add(handle.pose.center, handle.pose.translation);
     const from = onPlane(pane.stage, start.ray, grip) ?? grip;
-    const all = selectionOf(work.document, work.view.now);
-    const show = (delta: Vector3, time: number) => work.during(shiftedTogether(work.document, all, delta), time);
-    const snap = new DragSnap(work, pane, handle, grip);
+    const { name } = handle;
+    const show = (delta: Vector3, time: number) => {
+      work.during(changeHandle(work.document, name, shifted(handle, delta)), time);
+    };
     return {
       move: (at) => {
         const to = onPlane(pane.stage, at.ray, grip);
-        if (to) show(snap.apply(subtract(to, from), at), at.time);
+        if (to) show(subtract(to, from), at.time);
       },
       end: () => work.endGesture(),
       cancel: () => work.cancelGesture(),
@@ -199,8 +187,8 @@ export class Editing implements PointingTarget {
 
   #pose(pose: Pose): void {
     const { work } = this;
-    const selection = selectionOf(work.document, work.view.now);
-    if (selection.length > 0) work.during(posedTogether(work.document, selection, pose), performance.now());
+    const { selected } = work.view.now;
+    if (selected !== undefined) work.during(changeHandle(work.document, selected, { pose }), performance.now());
   }
 
   #brushStroke(start: PointerAt): Stroke {
@@ -216,14 +204,19 @@ export class Editing implements PointingTarget {
       move: touch,
       end: () => {
         work.facts.set({ pointedOut: nothing });
-        this.#select([...touched], modeOf(start, work));
+        if (work.view.now.tool === "paint") this.#paint([...touched]);
+        else this.#select([...touched], modeOf(start, work));
       },
       cancel: () => work.facts.set({ pointedOut: nothing }),
     };
   }
 
-  #paintStroke(start: PointerAt): Stroke {
-    return new PaintStroke(this.work, this.pane, (at) => this.#dabAt(at), start);
+  #paint(vertices: number[]): void {
+    const { work } = this;
+    const { paintField, paintP, paintStiffness } = work.view.now;
+    const value = paintField === "p" ? paintP : paintStiffness;
+    work.change(paint(work.document, paintField, vertices, value, work.mesh.positions.length / 3));
+    work.view.set({ colourBy: paintField });
   }
 
   #outlineStroke(start: PointerAt, toPolygon: (outline: number[]) => number[]): Stroke {

@@ -11,9 +11,6 @@ export function rewriteObj({ obj, positions: drawn, exact, faces }: Mesh & { obj
   const normals: number[][] = [];
   const pairs = new Map<string, number>();
   const newNormals: string[] = [];
-  const source = new TextDecoder().decode(obj);
-  const separator = source.includes("\n") ? "\n" : "\r";
-  const before = source.includes("\r\n") ? "\r" : "";
   const out: string[] = [];
   let vertexCount = 0;
   let firstFace: number | undefined;
@@ -28,13 +25,13 @@ export function rewriteObj({ obj, positions: drawn, exact, faces }: Mesh & { obj
     const key = `${corner} ${at}`;
     let number = pairs.get(key);
     if (number === undefined) {
-      number = newNormals.push(`vn ${turner.turned(corner, from).map(shortest).join(" ")}${before}`);
+      number = newNormals.push(`vn ${turner.turned(corner, from).map(shortest).join(" ")}`);
       pairs.set(key, number);
     }
     return `${vertex}/${texture}/${number}`;
   };
 
-  for (const { text, words } of logicalLines(source)) {
+  for (const { text, words } of logicalLines(new TextDecoder().decode(obj))) {
     const [key, ...values] = words;
     const end = text.endsWith("\r") ? "\r" : "";
     if (key === "v") {
@@ -51,7 +48,7 @@ export function rewriteObj({ obj, positions: drawn, exact, faces }: Mesh & { obj
     }
   }
   if (firstFace !== undefined) out.splice(firstFace, 1, ...newNormals);
-  return out.join(separator);
+  return out.join("\n");
 }
 
 /** Enough digits for a direction. */

@@ -11,45 +11,31 @@ const samePlace = 1e-6;
 export class Seams {
   /** How many vertices are copies of an earlier one. */
   readonly copyCount: number;
-  #members: Map<number, number[]> | undefined;
+  /** The faces of the mesh, with the first vertex of each place. */
+  readonly faces: Uint32Array;
+  readonly #members = new Map<number, number[]>();
 
-  /**
-   * `groups`: for each vertex the first vertex in the same place, which may be the vertex itself. `faces`: those of the mesh, with
-   * the first vertex of each place.
-   */
+  /** `groups`: for each vertex the first vertex in the same place, which may be the vertex itself. */
   constructor(
     readonly groups: Uint32Array,
-    readonly faces: Uint32Array,
+    faces: Uint32Array,
   ) {
+    this.faces = faces.map((vertex) => groups[vertex]!);
     let copyCount = 0;
-    for (let vertex = 0; vertex < groups.length; ++vertex) if (groups[vertex] !== vertex) ++copyCount;
+    groups.forEach((first, vertex) => {
+      if (first === vertex) return;
+      ++copyCount;
+      const members = this.#members.get(first);
+      if (members) members.push(vertex);
+      else this.#members.set(first, [first, vertex]);
+    });
     this.copyCount = copyCount;
-  }
-
-  static of(groups: Uint32Array, meshFaces: Uint32Array): Seams {
-    return new Seams(
-      groups,
-      meshFaces.map((vertex) => groups[vertex]!),
-    );
   }
 
   /** The vertices and all their copies, in order. */
   withCopies(vertices: readonly number[]): number[] {
-    const members = (this.#members ??= this.#findMembers());
-    const all = vertices.flatMap((vertex) => members.get(this.groups[vertex]!) ?? [vertex]);
+    const all = vertices.flatMap((vertex) => this.#members.get(this.groups[vertex]!) ?? [vertex]);
     return [...new Set(all)];
-  }
-
-  /** For the first vertex of a place all that are there, where there are several. */
-  #findMembers(): Map<number, number[]> {
-    const found = new Map<number, number[]>();
-    this.groups.forEach((first, vertex) => {
-      if (first === vertex) return;
-      const members = found.get(first);
-      if (members) members.push(vertex);
-      else found.set(first, [first, vertex]);
-    });
-    return found;
   }
 }
 
@@ -71,7 +57,7 @@ export function seamsOf(mesh: Mesh): Seams | undefined {
   });
   if (!isAny) return undefined;
   for (let vertex = 0; vertex < groups.length; ++vertex) groups[vertex] = first(vertex);
-  return Seams.of(groups, mesh.faces);
+  return new Seams(groups, mesh.faces);
 }
 
 /** The vertices of edges that belong to one face only, ascending. */

@@ -1,9 +1,6 @@
 import * as three from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
-import type { Vector3 } from "../model/mesh.js";
-import { conjugate, isAtRest, noRotation, type Pose, product, type Quaternion } from "../model/pose.js";
-import { onGrid, onTurnedGrid, turnStep } from "../model/snap.js";
-import type { GizmoAxes } from "../model/view.js";
+import { isAtRest, type Pose, type Quaternion } from "../model/pose.js";
 
 /** Arrows and rings on the selected handle. */
 export class Gizmo {
@@ -17,14 +14,8 @@ export class Gizmo {
   readonly #controls: TransformControls;
   #pose: Pose | undefined;
   #isCancelled = false;
-  #axes: GizmoAxes = "world";
-  #step: number | undefined;
-  /** How the gizmo's axes are turned at the start of a drag. */
-  #frame = noRotation;
-  readonly #camera: three.Camera;
 
   constructor(camera: three.Camera, canvas: HTMLCanvasElement, changed: () => void) {
-    this.#camera = camera;
     this.#controls = new TransformControls(camera, canvas);
     this.object.add(this.#controls.getHelper(), this.#anchor);
     removeBackwardArrows(this.#controls.getHelper());
@@ -63,35 +54,21 @@ export class Gizmo {
     return true;
   }
 
-  /** Undefined: no handle is selected, or it cannot be moved. `step`: of the grid to which it keeps, if there is one. */
-  show(pose: Pose | undefined, mode: "translate" | "rotate", axes: GizmoAxes = "world", step?: number): void {
+  /** Undefined: no handle is selected, or it cannot be moved. */
+  show(pose: Pose | undefined, mode: "translate" | "rotate"): void {
     this.#controls.setMode(mode);
     if (this.isDragging) return;
     this.#pose = pose;
-    this.#axes = axes;
-    this.#step = step;
-    this.#controls.setRotationSnap(step === undefined ? null : (turnStep * Math.PI) / 180);
     if (!pose) {
       this.#controls.detach();
       return;
     }
-    const { center, translation } = pose;
+    const { center, translation, rotation } = pose;
     this.#anchor.position.set(center[0] + translation[0], center[1] + translation[1], center[2] + translation[2]);
-    this.#turnAnchor();
-    if (this.#controls.object !== this.#anchor) this.#controls.attach(this.#anchor);
-    this.#controls.setSpace(axes === "world" ? "world" : "local");
-  }
-
-  /** Before each picture: the axes of the picture turn with the view. */
-  follow(): void {
-    if (this.#pose && this.#axes === "view" && !this.isDragging) this.#turnAnchor();
-  }
-
-  #turnAnchor(): void {
-    if (this.#axes === "view") this.#anchor.quaternion.copy(this.#camera.quaternion);
-    else this.#anchor.quaternion.set(...this.#pose!.rotation);
-    this.#frame = this.#anchor.quaternion.toArray() as unknown as Quaternion;
+    this.#anchor.quaternion.set(...rotation);
     this.#anchor.updateMatrixWorld();
+    if (this.#controls.object !== this.#anchor) this.#controls.attach(this.#anchor);
+    this.#controls.setSpace("world");
   }
 
   dispose(): void {
@@ -100,20 +77,11 @@ export class Gizmo {
 
   #moved(): void {
     if (!this.#pose) return;
-    const { center, translation: before, rotation: from } = this.#pose;
+    const { center } = this.#pose;
     const { position, quaternion } = this.#anchor;
-    const to: Vector3 = [position.x - center[0], position.y - center[1], position.z - center[2]];
-    const translation = this.#step === undefined ? to : this.#snapped(before, to, this.#step);
-    position.set(center[0] + translation[0], center[1] + translation[1], center[2] + translation[2]);
-    // The anchor is turned as the gizmo's axes are; what the drag has added to that turns the handle.
-    const added = product(quaternion.toArray() as unknown as Quaternion, conjugate(this.#frame));
-    const pose: Pose = { center, translation, rotation: product(added, from) };
+    const translation = [position.x - center[0], position.y - center[1], position.z - center[2]] as const;
+    const pose: Pose = { center, translation, rotation: quaternion.toArray() as unknown as Quaternion };
     this.onPose(isAtRest(pose) ? { ...pose, translation: [0, 0, 0] } : pose);
-  }
-
-  #snapped(before: Vector3, to: Vector3, step: number): Vector3 {
-    if (this.#controls.mode !== "translate") return before;
-    return this.#axes === "world" ? onGrid(before, to, step) : onTurnedGrid(before, to, step, this.#frame);
   }
 }
 
