@@ -54,6 +54,8 @@ def deform(
     certify: whether to compute optimality_gap, a bound on the distance from the optimum for the result's rotations.
     progress: True for a bar, by tqdm if it is installed; or a function, called with the SolveProgress at most ten times a second.
     timeout: seconds; None is without limit.
+    solver: method, accuracy and search. Below p = 2 the solve goes on from other starts after its first minimum, and returns
+        the lowest. That takes several times as long. SolverSettings(search=MinimaSearch(effort=0)) takes the first minimum.
     address: of a server, as in open(); without one, and without LPDEFORM_ADDRESS, the mesh is deformed in this process.
     Everything else is as in open() and Session.solve(). Ctrl-C ends the solve within one iteration.
 
