@@ -11,9 +11,10 @@ import zipfile
 
 def faults(wheel: str) -> list[str]:
     with zipfile.ZipFile(wheel) as files:
-        names = [name for name in files.namelist() if ".dist-info/" not in name and "/licences/" not in name]
+        entries = [name for name in files.namelist() if not name.endswith("/")]
+        names = [name for name in entries if ".dist-info/" not in name and "/licences/" not in name]
         page = files.read("lpdeform/licences/README.txt").decode()
-        texts = {name.rpartition("/")[2]: files.read(name) for name in files.namelist() if "/licences/" in name}
+        texts = {name.rpartition("/")[2]: files.read(name) for name in entries if "/licences/" in name}
     patterns = [one for one in re.findall(r"lpdeform(?:\.libs)?/[^\s,]*", page) if not one.endswith(".txt")]
     patterns = [one + "*" if one.endswith("/") else one for one in patterns] + ["lpdeform/py.typed"]
     unnamed = [name for name in names if not any(fnmatch.fnmatchcase(name, one) for one in patterns)]
