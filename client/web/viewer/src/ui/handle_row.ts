@@ -1,6 +1,7 @@
 import type { App } from "../app/app.js";
 import { groupColours } from "../model/colours.js";
 import { changeHandle, type Handle, nameFault, removeHandle } from "../model/document.js";
+import { toggled } from "../model/together.js";
 import { short } from "../model/words.js";
 import { button } from "./controls.js";
 import { el, setText } from "./dom.js";
@@ -8,7 +9,7 @@ import { icon } from "./icons.js";
 
 export interface HandleRow {
   element: HTMLElement;
-  show(handle: Handle, isSelected: boolean): void;
+  show(handle: Handle, isSelected: boolean, isTogether: boolean): void;
 }
 
 /** A line of the list: colour, name, count, padlock, bin. It stays when its contents change, so it keeps the focus. */
@@ -23,20 +24,23 @@ export function handleRow(app: App): HandleRow {
   const field = el("input", { className: "name", spellcheck: false, aria: { label: "Name" } });
   field.addEventListener("focus", () => app.view.set({ selected: shown!.name }));
   field.addEventListener("change", () => rename(app, shown!.name, field));
+  const together = button("together", "", () => app.view.set(toggled(app.view.now, shown!.name)));
   const lock = button("unlock", "", () => change(({ isLocked }) => ({ isLocked: !isLocked })));
   const remove = button("trash", "", () => app.change(removeHandle(app.document, shown!.name)));
   const count = el("span", { className: "count", title: "Vertices" });
-  const element = el("li", {}, dot, field, count, lock, remove);
+  const element = el("li", {}, dot, field, count, together, lock, remove);
   element.addEventListener("click", (event) => {
-    if (event.target === element) app.view.set({ selected: shown!.name });
+    if (event.ctrlKey || event.metaKey) event.target === element && app.view.set(toggled(app.view.now, shown!.name));
+    else if (event.target === element) app.view.set({ selected: shown!.name });
   });
 
-  const show = (handle: Handle, isSelected: boolean) => {
+  const show = (handle: Handle, isSelected: boolean, isTogether: boolean) => {
     const { name, colour, vertices, points, isLocked } = handle;
     if (name !== shown?.name) {
       field.value = name;
       element.dataset["handle"] = name;
       dot.setAttribute("aria-label", `Colour of ${name}`);
+      entitle(together, `Move ${name} together with the selected handle (Ctrl+click)`);
       entitle(remove, `Delete ${name} (Delete)`);
     }
     if (isLocked !== shown?.isLocked) {
@@ -45,7 +49,9 @@ export function handleRow(app: App): HandleRow {
     }
     dot.style.setProperty("--colour", colour);
     setText(count, points ? `${points.length} pts` : short(vertices.length));
-    element.classList.toggle("selected", isSelected);
+    element.classList.toggle("selected", isSelected || isTogether);
+    together.setAttribute("aria-pressed", String(isTogether));
+    together.disabled = isSelected && !isTogether;
     shown = handle;
   };
   return { element, show };

@@ -48,9 +48,9 @@ export class User {
 
   static async open(
     url: string,
-    { width = 1280, height = 800, hasTouch = false, colorScheme = "light" as "light" | "dark" } = {},
+    { width = 1280, height = 800, hasTouch = false, colorScheme = "light" as "light" | "dark", args = launch.args } = {},
   ): Promise<User> {
-    const browser = await chromium.launch(launch);
+    const browser = await chromium.launch({ ...launch, args });
     // What the tests ask of the page is evaluated, which its policy forbids; troubles.test.ts keeps the policy.
     const context = await browser.newContext({
       viewport: { width, height },
