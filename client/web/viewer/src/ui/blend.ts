@@ -13,7 +13,7 @@ export function blendPanel(app: App): HTMLElement {
   const status = el("p", { className: "quiet", role: "status" });
   const said = el("p", { className: "quiet" });
   const on = toggle(
-    "Prepare shapes",
+    "Prepare blending",
     false,
     (isOn) => blend.switch(isOn),
     "Solves for several p while nothing else is done, in a session of its own",

@@ -28,7 +28,7 @@ afterEach(async () => {
 
 const status = () => user.page.locator(".blend [role=status]");
 const blend = () => user.page.getByRole("slider", { name: "Blend p" });
-const prepare = () => user.page.getByRole("checkbox", { name: "Prepare shapes" }).setChecked(true, { force: true });
+const prepare = () => user.page.getByRole("checkbox", { name: "Prepare blending" }).setChecked(true, { force: true });
 const shown = () => user.page.evaluate<number[]>("[...window.__lpdeform.app.panes[0].stage.surface.positions]");
 const far = (a: readonly number[], b: readonly number[]) => Math.max(...a.map((value, k) => Math.abs(value - b[k]!)));
 
