@@ -2,7 +2,7 @@ import type { Reason } from "lpdeform-client";
 import type { App } from "../app/app.js";
 import { elementsIn, isPassing, notAnswering, sentence, type Status } from "../link/status.js";
 import { percent } from "../model/words.js";
-import { el, setText } from "./dom.js";
+import { el, measured, setText } from "./dom.js";
 import { statusPill } from "./pill.js";
 import { pointOutNamed } from "./report.js";
 
@@ -28,7 +28,7 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     show,
   );
   const notice = el("div", { className: "notice", role: "status", hidden: true });
-  const hint = el("div", { className: "hint" });
+  const hint = measured(el("div", { className: "hint" }), "--hint-height");
   const restored = restoredNote(app, startOver);
   let element = "";
   let timer: ReturnType<typeof setTimeout> | undefined;
