@@ -34,3 +34,23 @@ it("stays within 0 and 1 where nothing goes down, and over more frames than it k
   expect(left.every((share) => share >= 0 && share <= 1)).toBe(true);
   expect(left.at(-1)).toBeLessThan(0.001);
 });
+
+it("is not taken in by coarse levels, whose frames repeat an energy, nor by the steep beginning after them", () => {
+  const progress = new Progress();
+  const coarse = [140, 70, 70, 70, 70, 74, 74, 74];
+  coarse.forEach((energy, k) => {
+    progress.add({ inputSeq: 1, iteration: 20 * k, energy });
+    expect(progress.left).toBe(1);
+  });
+  const [start, end] = [150, 150 + 640];
+  const descent = (iteration: number) => 50 + 24 / (1 + (iteration - start) / 8); // goes down ever more slowly
+  const still = (iteration: number) => (descent(iteration) - descent(end)) / (74 - descent(end));
+  const left: number[] = [];
+  for (let iteration = start + 4; iteration < end; iteration += 6) {
+    progress.add({ inputSeq: 1, iteration, energy: descent(iteration) });
+    left.push(progress.left);
+    if (still(iteration) > 0.005) expect(progress.left).toBeGreaterThan(still(iteration) / 5);
+  }
+  expect(left).toEqual(left.toSorted((a, b) => b - a));
+  expect(left.at(-1)).toBeLessThan(0.03);
+});

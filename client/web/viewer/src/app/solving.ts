@@ -1,3 +1,4 @@
+import { percent } from "../model/words.js";
 import type { App } from "./app.js";
 import type { Solving } from "./facts.js";
 
@@ -5,6 +6,8 @@ import type { Solving } from "./facts.js";
 const leastMs = 400;
 /** How long the end is shown. */
 const endMs = 2500;
+/** The least that is said to be left before the end. */
+const leastLeft = 0.001;
 
 /** Follows the solves of all panes in `facts.solving`. */
 export function followSolving(app: App): void {
@@ -41,12 +44,12 @@ function leftOf(app: App): number | undefined {
   if (!isLive(app) || app.document.handles.length === 0) return undefined;
   const lefts = app.panes
     .filter(({ frame, live }) => live?.isSettling || (frame && !frame.isFinal))
-    .map(({ progress, live }) => (live?.isSettling ? 1 : progress.left));
+    .map(({ progress, live }) => (live?.isSettling ? 1 : Math.max(progress.left, leastLeft)));
   return lefts.length > 0 ? Math.max(...lefts) : undefined;
 }
 
-/** To the per cent that is shown. */
+/** As it is shown. */
 function isSame(a: Solving, b: Solving): boolean {
   if (typeof a !== "object" || typeof b !== "object") return a === b;
-  return Math.round(100 * a.left) === Math.round(100 * b.left);
+  return percent(a.left) === percent(b.left);
 }
