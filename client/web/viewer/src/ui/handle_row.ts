@@ -1,7 +1,7 @@
 import type { App } from "../app/app.js";
 import { groupColours } from "../model/colours.js";
 import { changeHandle, type Handle, nameFault, removeHandle } from "../model/document.js";
-import { toggled } from "../model/together.js";
+import { selecting, toggled } from "../model/together.js";
 import { short } from "../model/words.js";
 import { button } from "./controls.js";
 import { el, setText } from "./dom.js";
@@ -12,7 +12,7 @@ export interface HandleRow {
   show(handle: Handle, isSelected: boolean, isTogether: boolean): void;
 }
 
-/** A line of the list: colour, name, count, padlock, bin. It stays when its contents change, so it keeps the focus. */
+/** A line of the list: colour, link, name, count, padlock, bin. It stays when its contents change, so it keeps the focus. */
 export function handleRow(app: App): HandleRow {
   let shown: Handle | undefined;
   const change = (part: (handle: Handle) => Partial<Handle>) =>
@@ -22,13 +22,16 @@ export function handleRow(app: App): HandleRow {
     change(({ colour }) => ({ colour: groupColours[(groupColours.indexOf(colour) + 1) % groupColours.length]! })),
   );
   const field = el("input", { className: "name", spellcheck: false, aria: { label: "Name" } });
-  field.addEventListener("focus", () => app.view.set({ selected: shown!.name }));
+  field.addEventListener("focus", () => app.view.set(selecting(app.view.now, shown!.name)));
   field.addEventListener("change", () => rename(app, shown!.name, field));
-  const together = button("together", "", () => app.view.set(toggled(app.view.now, shown!.name)));
+  const together = button("together", "", () => {
+    if (together.ariaDisabled !== "true") app.view.set(toggled(app.view.now, shown!.name));
+  });
   const lock = button("unlock", "", () => change(({ isLocked }) => ({ isLocked: !isLocked })));
   const remove = button("trash", "", () => app.change(removeHandle(app.document, shown!.name)));
   const count = el("span", { className: "count", title: "Vertices" });
-  const element = el("li", {}, dot, field, count, together, lock, remove);
+  // The link comes before the name: Tab reaches it while another handle is selected.
+  const element = el("li", {}, dot, together, field, count, lock, remove);
   element.addEventListener("click", (event) => {
     if (event.ctrlKey || event.metaKey) event.target === element && app.view.set(toggled(app.view.now, shown!.name));
     else if (event.target === element) app.view.set({ selected: shown!.name });
@@ -51,7 +54,7 @@ export function handleRow(app: App): HandleRow {
     setText(count, points ? `${points.length} pts` : short(vertices.length));
     element.classList.toggle("selected", isSelected || isTogether);
     together.setAttribute("aria-pressed", String(isTogether));
-    together.disabled = isSelected && !isTogether;
+    together.ariaDisabled = String(isSelected && !isTogether); // it keeps the focus that comes over the name
     shown = handle;
   };
   return { element, show };

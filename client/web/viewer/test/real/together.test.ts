@@ -102,3 +102,23 @@ it("Ctrl and a click on a handle select it, too, and a click without Ctrl select
   await user.page.locator('[data-handle="Feet"] .name').click();
   expect(await selection()).toBe("Feet ");
 });
+
+it("Tab reaches what selects a handle, too, and goes on over its name without leaving the others", async () => {
+  await user.page.locator('[data-handle="Tail"] .name').focus();
+  const label = () => user.page.evaluate("document.activeElement.getAttribute('aria-label')");
+  const wanted = "Move Head together with the selected handle (Ctrl+click)";
+  for (let k = 0; k < 8 && (await label()) !== wanted; ++k) await press("Tab");
+  expect(await label()).toBe(wanted);
+  await press("Enter");
+  expect(await selection()).toBe("Tail Head");
+  await press("Tab");
+  expect(await label()).toBe("Name");
+  expect(await selection()).toBe("Head Tail");
+  await user.page.locator("canvas.stage").focus();
+  await press("Escape");
+  await user.page.locator('[data-handle="Head"] .name').focus();
+  await press("Shift+Tab");
+  expect(await label()).toBe(wanted);
+  await press("Enter"); // the only one that is selected stays so
+  expect(await selection()).toBe("Head ");
+});
