@@ -19,6 +19,9 @@ export interface Look {
 /** Height of a picture on which marks have their full size; on smaller pictures they would hide the surface. */
 const fullSizeHeight = 700;
 
+/** Of a picture at rest that the processor draws; more would take seconds. */
+const mostPixels = 16e6;
+
 /** Where small.css puts the controls beside the pictures. */
 const littleRoom = "(max-aspect-ratio: 1/1) and (max-width: 720px), (min-aspect-ratio: 1/1) and (max-height: 560px)";
 
@@ -220,7 +223,8 @@ export class Stage {
    * up to 1, makes it coarser still. Returns true if the size has changed.
    */
   resize(width: number, height: number, isMoving: boolean, quality = 1): boolean {
-    const ratio = isSoftware ? (isMoving ? quality : 2) : Math.min(devicePixelRatio, 2);
+    const fine = Math.min(2, Math.max(1, Math.sqrt(mostPixels / (width * height))));
+    const ratio = isSoftware ? (isMoving ? quality : fine) : Math.min(devicePixelRatio, 2);
     if (ratio === this.#pixelRatio && width === this.#size[0] && height === this.#size[1]) return false;
     this.#pixelRatio = ratio;
     this.#size = [width, height];
