@@ -3,6 +3,7 @@ import { LpdeformError } from "./errors.js";
 import { WireFrame } from "./frame.js";
 import { Scalar } from "./gen/lpdeform/v1/data_pb.js";
 import { Encoding, type FrameHeader, type FramePart } from "./gen/lpdeform/v1/frame_pb.js";
+import type { Packed } from "./unpack.js";
 
 type Numbers = Float32Array | Float64Array | Uint16Array | Int16Array;
 
@@ -17,10 +18,11 @@ export class FrameAssembly {
   #withDistortion = 0; // how many vertices with distortion have come
   #withNormals = 0;
 
-  /** `isDouble`: raw numbers are doubles. */
+  /** `isDouble`: raw numbers are doubles. `isPacked`: quantized frames are left as they come, for an Unpacker. */
   constructor(
     readonly vertexCount: number,
     readonly isDouble = false,
+    readonly isPacked = false,
   ) {}
 
   /** The frame, if this part completes it. */
@@ -32,7 +34,8 @@ export class FrameAssembly {
         `The part of frame ${part.frameSeq} from vertex ${part.firstVertex} on does not follow what came before.`,
       );
     }
-    if (frame.quantized) this.#appendQuantized(frame.quantized, part);
+    if (frame.packed) this.#appendPacked(frame.packed, part);
+    else if (frame.quantized) this.#appendQuantized(frame.quantized, part);
     else this.#appendRaw(frame, part);
     frame.wireBytes += part.positions.byteLength + part.distortion.byteLength + part.normals.byteLength;
     this.#received += part.vertexCount;
@@ -61,13 +64,14 @@ export class FrameAssembly {
     const frame = new WireFrame(header);
     if (this.#isCompressed || header.encoding === Encoding.QUANTIZED) {
       const { origin, extent, distortionExtent = 0 } = header.quantization ?? {};
-      frame.quantized = {
-        vertices: new Uint16Array(0),
-        normals: new Int16Array(0),
+      const quantization = {
         origin: [origin?.x ?? 0, origin?.y ?? 0, origin?.z ?? 0],
         extent: [extent?.x ?? 0, extent?.y ?? 0, extent?.z ?? 0],
         distortionExtent,
-      };
+      } as const;
+      const { vertexCount } = this;
+      frame.quantized = { vertices: new Uint16Array(0), normals: new Int16Array(0), ...quantization };
+      if (this.isPacked) frame.packed = { vertexCount, isCompressed: this.#isCompressed, quantization, parts: [] };
     } else if ((header.scalar === Scalar.FLOAT64) !== this.isDouble || header.encoding > Encoding.COMPRESSED) {
       throw misfit("A frame comes in an encoding that was not asked for.");
     }
@@ -90,6 +94,16 @@ export class FrameAssembly {
     if (normals.length > 0) raw.normals = this.#join(raw.normals, numbers(normals), normals, 3, part);
   }
 
+  /** Copies the part: to give its bytes to a worker is to give the whole message. */
+  #appendPacked({ isCompressed, parts }: Packed, part: FramePart): void {
+    const { firstVertex, vertexCount, positions, normals } = part;
+    for (const bytes of [positions, normals]) {
+      const isRight = bytes.length === 8 * vertexCount || (bytes === normals && bytes.length === 0);
+      if (!isCompressed && !isRight) throw wrongSize(part);
+    }
+    parts.push({ firstVertex, vertexCount, vertices: positions.slice(), normals: normals.slice() });
+  }
+
   #appendQuantized(quantized: NonNullable<WireFrame["quantized"]>, part: FramePart): void {
     const bytesOf = (bytes: Uint8Array) => (this.#isCompressed ? decompress(bytes, part.vertexCount) : bytes);
     const vertices = bytesOf(part.positions);
@@ -107,7 +121,7 @@ export class FrameAssembly {
   #join<Array extends Numbers>(whole: Array, values: Array, bytes: Uint8Array, width: number, part: FramePart): Array {
     const isWhole = bytes.byteLength === values.byteLength;
     if (!isWhole || values.length !== width * part.vertexCount) {
-      throw misfit(`A part of frame ${part.frameSeq} has the wrong number of bytes for ${part.vertexCount} vertices.`);
+      throw wrongSize(part);
     }
     if (part.vertexCount === this.vertexCount) return values;
     const all =
@@ -115,6 +129,10 @@ export class FrameAssembly {
     all.set(values, width * part.firstVertex);
     return all;
   }
+}
+
+function wrongSize({ frameSeq, vertexCount }: FramePart): LpdeformError {
+  return misfit(`A part of frame ${frameSeq} has the wrong number of bytes for ${vertexCount} vertices.`);
 }
 
 function misfit(text: string): LpdeformError {

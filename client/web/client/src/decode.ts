@@ -59,6 +59,7 @@ let decoder: Decoder | undefined;
 
 /** Loads meshoptimizer's decoder, only if it is needed. Await it before the first compressed frame. */
 export async function loadDecompressor(): Promise<void> {
+  if (decoder) return;
   const { MeshoptDecoder } = await import("meshoptimizer/decoder");
   await MeshoptDecoder.ready;
   decoder = MeshoptDecoder;

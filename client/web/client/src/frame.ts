@@ -2,6 +2,7 @@ import { distortionOf, normalsOf, positionsOf } from "./decode.js";
 import { methodName, stopReasonFromWire } from "./fromwire.js";
 import type { FrameHeader } from "./gen/lpdeform/v1/frame_pb.js";
 import type { DoubleSurface, Frame, QuantizedSurface, StopReason } from "./types.js";
+import type { Packed, Unpacked } from "./unpack.js";
 
 type Surface<Numbers> = Record<"positions" | "distortion" | "normals", Numbers>;
 
@@ -27,6 +28,8 @@ export class WireFrame implements Frame {
   /** Doubles only if FrameAssembly was told to expect them. */
   raw: Surface<Float32Array | Float64Array> = { positions: none, distortion: none, normals: none };
   quantized: QuantizedSurface | undefined;
+  /** As it came, if it has to be unpacked before anybody sees it. */
+  packed: Packed | undefined;
   readonly #decoded: Partial<Surface<Float32Array>> = {};
 
   constructor(header: FrameHeader) {
@@ -42,6 +45,12 @@ export class WireFrame implements Frame {
     this.optimalityGap = header.certificate?.relativeGap;
     this.solveSeconds = header.solveSeconds;
     this.method = methodName(header.method);
+  }
+
+  take({ quantized, ...decoded }: Unpacked): void {
+    this.packed = undefined;
+    this.quantized = quantized;
+    Object.assign(this.#decoded, decoded);
   }
 
   get positions(): Float32Array {

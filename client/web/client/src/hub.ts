@@ -124,6 +124,13 @@ export class Lane {
     this.sink.ended(error);
   }
 
+  /** A frame that came on it does not fit. */
+  misfit(error: LpdeformError): void {
+    if (this.#abort.signal.aborted) return;
+    this.close();
+    this.ended(error);
+  }
+
   /** One call at a time, for the newest frame. */
   async #sendAcks(): Promise<void> {
     let sent = "";

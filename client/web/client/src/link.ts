@@ -1,5 +1,6 @@
 import { FrameAssembly } from "./assembly.js";
 import { FrameBox } from "./box.js";
+import type { WireFrame } from "./frame.js";
 import { fromFault, LpdeformError, sessionClosed } from "./errors.js";
 import { noticeFromWire } from "./fromwire.js";
 import { Scalar } from "./gen/lpdeform/v1/data_pb.js";
@@ -15,6 +16,7 @@ import type { Rpc } from "./rpc.js";
 import { sendUpdate } from "./sendupdate.js";
 import type { BetterShape, Connection, Frame, Notice, Update } from "./types.js";
 import { newRequestId } from "./requestid.js";
+import { type Unpacker, unpackerFor } from "./unpack.js";
 import { isUndecided } from "./verdict.js";
 import { Pauses } from "./waiting.js";
 
@@ -39,6 +41,8 @@ export class Link {
   #lease: Lease;
   #lane: Lane | undefined;
   #assembly = new FrameAssembly(0);
+  /** Set if frames are unpacked before they are taken. */
+  #unpacker: Unpacker | undefined;
   #goAway: GoAway | undefined;
   /** Set while no stream is open: the server may continue from an older state. Updates wait until it says which. */
   #mayHaveGoneBack = false;
@@ -180,7 +184,9 @@ export class Link {
     const lane = this.rpc.hub.subscribe(session, this.frameOptions, {
       opened: (opened) => {
         checkVertexCount(opened.vertexCount, this.#lease.report.vertices);
-        this.#assembly = new FrameAssembly(opened.vertexCount, this.frameOptions.scalar === Scalar.FLOAT64);
+        this.#unpacker = unpackerFor(opened.vertexCount);
+        const isDouble = this.frameOptions.scalar === Scalar.FLOAT64;
+        this.#assembly = new FrameAssembly(opened.vertexCount, isDouble, this.#unpacker !== undefined);
         this.#clearNotices(); // they were about an earlier stream
         this.#resumed(Number(opened.epoch), Number(opened.inputSeq));
         this.#openedAt = performance.now();
@@ -190,11 +196,16 @@ export class Link {
       },
       part: (part) => {
         const frame = this.#assembly.add(part);
-        if (frame) this.#rules.frameFitted();
-        if (frame) this.ledger.show(frame.epoch, frame.inputSeq);
-        if (frame && this.#notices.shown(frame)) this.#tellNotice();
-        if (!frame || this.box.put(frame, lane.streamId)) return;
-        lane.acknowledge(frame.frameSeq, lane.streamId); // dropped, but its credit must be returned
+        if (!frame) return;
+        const { streamId } = lane;
+        if (!frame.packed || !this.#unpacker) return this.#takeFrame(frame, lane, streamId);
+        void this.#unpacker.unpack(frame.packed).then(
+          (unpacked) => {
+            frame.take(unpacked);
+            if (this.#lane === lane && this.#lease.session === session) this.#takeFrame(frame, lane, streamId);
+          },
+          (error) => lane.misfit(error as LpdeformError),
+        );
       },
       fault: (fault) => {
         const error = fromFault(fault);
@@ -217,6 +228,15 @@ export class Link {
       },
     });
     this.#lane = lane;
+  }
+
+  /** `streamId`: of the stream on which it came. */
+  #takeFrame(frame: WireFrame, lane: Lane, streamId: string): void {
+    this.#rules.frameFitted();
+    this.ledger.show(frame.epoch, frame.inputSeq);
+    if (this.#notices.shown(frame)) this.#tellNotice();
+    if (this.box.put(frame, streamId)) return;
+    lane.acknowledge(frame.frameSeq, streamId); // dropped, but its credit must be returned
   }
 
   /** The server's newest update is `inputSeq`. */

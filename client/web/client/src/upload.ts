@@ -23,7 +23,7 @@ export class Uploads {
   async add(bytes: Uint8Array): Promise<string> {
     const { upload, maxPartBytes } = await this.rpc.call(
       "createUpload",
-      { requestId: `${this.id}-${++this.#count}`, sizeBytes: BigInt(bytes.byteLength), crc32c: crc32c(bytes) },
+      { requestId: `${this.id}-${++this.#count}`, sizeBytes: BigInt(bytes.byteLength), crc32c: await crc32c(bytes) },
       this.signal,
     );
     this.#names.push(upload);

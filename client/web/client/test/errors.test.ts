@@ -39,8 +39,18 @@ test("what is no gRPC-Web is an error and not a hang", async () => {
   });
 });
 
-test("the checksum is CRC-32C", () => {
-  expect(crc32c(new TextEncoder().encode("123456789"))).toBe(0xe3069283);
+test("the checksum is CRC-32C, of any number of bytes", async () => {
+  expect(await crc32c(new TextEncoder().encode("123456789"))).toBe(0xe3069283);
+  expect(await crc32c(new Uint8Array(0))).toBe(0);
+  expect(await crc32c(new Uint8Array(32))).toBe(0x8a9136aa); // RFC 3720, B.4
+  // In several steps, and beginning anywhere in memory, as bit by bit.
+  const bytes = Uint8Array.from({ length: 1_100_003 }, (_, k) => (k * k) >> 5).subarray(3);
+  let rest = 0xffffffff;
+  for (const byte of bytes) {
+    rest ^= byte;
+    for (let bit = 0; bit < 8; ++bit) rest = rest & 1 ? (rest >>> 1) ^ 0x82f63b78 : rest >>> 1;
+  }
+  expect(await crc32c(bytes)).toBe(~rest >>> 0);
 });
 
 test("pauses grow to two seconds and are spread", () => {

@@ -2,6 +2,7 @@ import "./style/index.css";
 import { App } from "./app/app.js";
 import { Files } from "./app/files.js";
 import { Keeper } from "./app/keeper.js";
+import { followSolving } from "./app/solving.js";
 import { startShortcuts } from "./app/shortcuts.js";
 import { exposeForTests } from "./app/testing.js";
 import { canDraw } from "./stage/software.js";
@@ -26,7 +27,7 @@ async function start(): Promise<void> {
   const help = helpSheet(app);
   const dropHere = document.createElement("div");
   dropHere.className = "drop-here";
-  dropHere.textContent = "Drop a mesh or a handle file";
+  dropHere.textContent = "Drop a mesh, a project or a handle file";
   root.append(
     topbar(app, files, () => help.showModal()),
     app.stages,
@@ -39,6 +40,7 @@ async function start(): Promise<void> {
     dropHere,
   );
   startTheme(app);
+  followSolving(app);
   startShortcuts(app, files, help);
   exposeForTests(app);
   const keeper = new Keeper(app, wantsBack);

@@ -5,7 +5,7 @@ import { writeObj } from "../src/io/obj.js";
 import { writeOff } from "../src/io/off.js";
 import { writePly } from "../src/io/ply.js";
 import { readMesh } from "../src/io/read.js";
-import { writeStl } from "../src/io/stl.js";
+import { writeStl } from "../src/io/write_stl.js";
 import { emptyDocument } from "../src/model/document.js";
 import { type HoldKind, holdKinds } from "../src/model/hold_kinds.js";
 import { shapeKinds } from "../src/model/shapes.js";

@@ -2,7 +2,7 @@ import { cornersOf, linesOf, trianglesOf, within } from "../src/model/pointed.js
 import { describe, expect, it } from "vitest";
 import { adjacencyOf, meanEdge } from "../src/model/adjacency.js";
 import { isAlike } from "../src/model/alike.js";
-import { blueToRed } from "../src/model/colours.js";
+import { colourIn } from "../src/model/palettes.js";
 import { fitPose } from "../src/model/fit.js";
 import { emptyDocument, paint } from "../src/model/document.js";
 import { stepsToKeep } from "../src/model/kept_steps.js";
@@ -261,9 +261,9 @@ describe("history", () => {
 });
 
 it("has the colours of the command line's pictures", () => {
-  expect(blueToRed(0)).toEqual([38, 70, 200]);
-  expect(blueToRed(0.5)).toEqual([90, 195, 95]);
-  expect(blueToRed(7)).toEqual([215, 40, 35]);
+  expect(colourIn("blueToRed", 0)).toEqual([38, 70, 200]);
+  expect(colourIn("blueToRed", 0.5)).toEqual([90, 195, 95]);
+  expect(colourIn("blueToRed", 7)).toEqual([215, 40, 35]);
 });
 
 it("knows each neighbour once", () => {

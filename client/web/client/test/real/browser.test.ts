@@ -111,6 +111,34 @@ test.each([1, 2])(
   60_000,
 );
 
+test("frames of many vertices are unpacked in a worker, those of few in the page", async () => {
+  const page = await browser.newPage();
+  await page.goto(service.url);
+  await page.waitForFunction(() => window.views);
+  const lift = (side: number, encoding: "quantized" | "compressed") =>
+    page.evaluate(([side, encoding]) => window.lift(side, encoding), [side, encoding] as const);
+  expect(await lift(20, "quantized")).toBeCloseTo(2, 3);
+  expect(page.workers()).toHaveLength(0);
+  expect(await lift(150, "quantized")).toBeCloseTo(2, 2);
+  expect(await lift(150, "compressed")).toBeCloseTo(2, 2);
+  expect(page.workers()).toHaveLength(1);
+  await page.close();
+  // A page that can have no worker gets the same.
+  const bare = await browser.newPage();
+  await bare.addInitScript(() => {
+    window.Worker = class {
+      constructor() {
+        throw new DOMException("no workers here", "SecurityError");
+      }
+    } as unknown as typeof Worker;
+  });
+  await bare.goto(service.url);
+  await bare.waitForFunction(() => window.views);
+  const height = await bare.evaluate(() => window.lift(150, "compressed"));
+  expect(height).toBeCloseTo(2, 2);
+  await bare.close();
+}, 120_000);
+
 test("a page of another address is told what lets it in, and is let in by that", async () => {
   const context = await browser.newContext({ bypassCSP: true }); // pages that Envoy serves may call no other
   const page = await context.newPage();

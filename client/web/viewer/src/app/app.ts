@@ -1,13 +1,19 @@
 import type { MeshReport } from "lpdeform-client";
-import { type Adjacency, adjacencyOf, meanEdge } from "../model/adjacency.js";
+import { type Adjacency, adjacencyOf } from "../model/adjacency.js";
+import { type AxisView, directionOf, viewAfter } from "../model/axis_views.js";
+import { derivedOf, shownOf } from "../model/derived.js";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
+import type { Shape } from "../model/blend.js";
 import { isAlike } from "../model/alike.js";
 import { History, type Steps } from "../model/history.js";
+import { keyPoseOf } from "../model/key_poses.js";
 import { kindOf } from "../model/hold_kinds.js";
-import { boundsOf, type Mesh } from "../model/mesh.js";
+import type { Mesh } from "../model/mesh.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
-import { type Seams, seamsOf } from "../model/seams.js";
+import type { Seams } from "../model/seams.js";
 import { nothing } from "../model/pointed.js";
+import { subtract } from "../model/pose.js";
+import { gridStep } from "../model/snap.js";
 import { State } from "../model/state.js";
 import { firstView, type View } from "../model/view.js";
 import type { Look, Stage } from "../stage/stage.js";
@@ -139,7 +145,7 @@ export class App implements Workbench {
 
   #openPanes(): void {
     const { mesh, seams } = this;
-    this.adjacency = adjacencyOf(mesh.positions.length / 3, seams?.faces ?? mesh.faces);
+    this.adjacency = shownOf(mesh, seams?.faces ?? mesh.faces).adjacency;
     for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, seams);
     this.#needsMarks = true;
     this.#documentChanged(performance.now());
@@ -147,13 +153,14 @@ export class App implements Workbench {
 
   /** `isBroughtBack`: the user has worked on it before. */
   open(mesh: Mesh, document: Document, isBroughtBack = false, isWelded = true): void {
-    for (const editing of this.#editings) editing.release();
+    this.endAll();
     if (this.isTouched) this.#asides.put(this.#present());
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
-    this.#seams = seamsOf(mesh);
-    this.edge = meanEdge(adjacencyOf(mesh.positions.length / 3, mesh.faces), mesh.positions);
-    this.diagonal = boundsOf(mesh.positions, mesh.faces).diagonal;
+    const { seams, edge, bounds } = derivedOf(mesh);
+    this.#seams = seams;
+    this.edge = edge;
+    this.diagonal = bounds.diagonal;
     this.view.set({ selected: undefined, shape: "", pinned: undefined, isWelded });
     this.facts.set({
       mesh,
@@ -268,6 +275,11 @@ export class App implements Workbench {
     return this.cancelGesture() || held.includes(true);
   }
 
+  /** Ends drags by the pointer in every picture: what they have moved becomes a step. */
+  endAll(): void {
+    for (const editing of this.#editings) editing.release();
+  }
+
   /** A handle that comes back is selected again if it was when it went. */
   undo(): void {
     const { handles } = this.document;
@@ -330,11 +342,43 @@ export class App implements Workbench {
     this.#panes.changeView(change);
   }
 
+  lookAlong(view: AxisView): void {
+    const { isYUp } = this.view.now;
+    this.changeView((stage) => stage.lookAlong(directionOf(view, isYUp), directionOf("front", isYUp)));
+  }
+
+  /** The view along the next of the mesh's axes. */
+  lookAlongNext(): void {
+    const { position, target } = this.panes[0]!.stage.look;
+    this.lookAlong(viewAfter(subtract(position, target), this.view.now.isYUp));
+  }
+
   lookFrom(look: Look): void {
     this.#panes.lookFrom(look);
   }
 
+  /** Adds the present pose to those that are kept. */
+  keepPose(): void {
+    const { document } = this;
+    const pose = keyPoseOf(document);
+    this.change({ ...document, keyPoses: [...(document.keyPoses ?? []), pose] });
+    this.notify(`“${pose.name}” is kept.`);
+  }
+
   // The panes.
+
+  /** Shows a shape in the first picture in place of the server's frames, until endPreview(). */
+  preview(shape: Shape): void {
+    this.panes[0]!.preview(shape);
+    this.#needsColours = true;
+    this.requestDraw();
+  }
+
+  endPreview(withNextFrame: boolean): void {
+    this.panes[0]!.endPreview(withNextFrame);
+    this.#needsColours = true;
+    this.requestDraw();
+  }
 
   /** The distortion in full red, the same in both panes so that they can be compared. */
   get red(): number {
@@ -366,25 +410,36 @@ export class App implements Workbench {
       isNew = pane.takeFrame() || isNew;
     }
     if (isNew || this.#needsColours) for (const pane of this.panes) pane.colour(this.document, this.view.now, this.red);
+    if (isNew || this.#needsColours) for (const editing of this.#editings) editing.refresh();
     this.#needsColours = false;
     if (this.#needsMarks) this.#mark();
-    const isAtRest = this.#pace.isAtRest(now);
+    const { document, problem } = this.facts.now;
+    for (const pane of this.panes) pane.lookAhead(document, problem === undefined);
+    const isAtRest = !this.#isMoving && this.#pace.isAtRest(now);
     const drawn = this.panes.map((pane) => pane.draw(isAtRest, this.#pace.quality));
     if (drawn.includes(true)) this.#pace.drew(now);
     for (const after of this.afterDrawing) after(now);
     if (this.panes.some((pane) => pane.isWaitingForScreen)) this.requestDraw();
   }
 
+  /** Whether a frame will come that moves the surface: a fine picture before it would only delay it. */
+  get #isMoving(): boolean {
+    const { status, problem, document } = this.facts.now;
+    const isSolving = status.kind === "live" && problem === undefined && document.handles.length > 0;
+    return isSolving && this.panes.some(({ live }) => live?.isSettling);
+  }
+
   #mark(): void {
     this.#needsMarks = false;
     const { pointedOut, document } = this.facts.now;
-    const { tool, isDark, selected, gizmo } = this.view.now;
+    const { tool, isDark, selected, gizmo, axes, snapping } = this.view.now;
     const colour = tool === "paint" ? "#ffffff" : isDark ? "#ffe066" : "#d6006d";
     const handle = handleOf(document, selected);
     const pose = tool === "move" && handle && !handle.isLocked && !handle.targets ? handle.pose : undefined;
+    const step = snapping === "grid" ? gridStep(this.diagonal) : undefined;
     for (const pane of this.panes) {
       pane.mark(document, this.view.now, pointedOut, colour);
-      pane.stage.gizmo.show(pose, handle && kindOf(handle.hold).isTurnedOnly ? "rotate" : gizmo);
+      pane.stage.gizmo.show(pose, handle && kindOf(handle.hold).isTurnedOnly ? "rotate" : gizmo, axes, step);
     }
   }
 
@@ -406,6 +461,9 @@ export class App implements Workbench {
   }
 
   #viewChanged(view: View, before: View): void {
+    if (view.selected !== before.selected && view.alsoSelected === before.alsoSelected && view.alsoSelected.length > 0) {
+      return this.view.set({ alsoSelected: [] }); // this is called again
+    }
     if (view.isSplit !== before.isSplit) {
       if (view.isSplit && !this.#addSecondPane()) return;
       if (!view.isSplit) this.#panes.removeSecond();

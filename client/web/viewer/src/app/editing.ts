@@ -1,28 +1,26 @@
-import {
-  addHandle,
-  changeHandle,
-  extendHandle,
-  type Handle,
-  handleOf,
-  ownersOf,
-  paint,
-  releaseVertices,
-  shifted,
-} from "../model/document.js";
+import { addHandle, extendHandle, type Handle, handleOf, ownersOf, releaseVertices } from "../model/document.js";
 import { isAtRest, type Vector3 } from "../model/mesh.js";
-import { nothing, ofVertices, type PointedOut } from "../model/pointed.js";
+import { nothing, ofVertices } from "../model/pointed.js";
 import { follow, placesOf } from "../model/places.js";
 import { add, type Pose, subtract } from "../model/pose.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../model/selection.js";
-import { vertexNormals } from "../stage/drawmesh.js";
+import { posedTogether, selecting, selectionOf, shiftedTogether, toggled } from "../model/together.js";
+import { vertexNormals } from "../model/normals.js";
 import { onPlane, type PointerAt, Pointing, type PointingTarget, type Stroke, viewProjection } from "../stage/pointing.js";
 import { KeyPointer } from "./key_pointer.js";
 import type { Pane } from "./pane.js";
+import { DragSnap } from "./drag_snap.js";
+import { PaintStroke } from "./paint_stroke.js";
+import { Readout } from "./readout.js";
 import type { Workbench } from "./workbench.js";
+
+/** A press that has had its effect. */
+const stays: Stroke = { move: () => undefined, end: () => undefined, cancel: () => undefined };
 
 /** The tools: what pointing at a pane does to the work. */
 export class Editing implements PointingTarget {
   readonly #pointing: Pointing;
+  readonly #readout: Readout;
 
   constructor(
     readonly work: Workbench,
@@ -33,8 +31,9 @@ export class Editing implements PointingTarget {
     gizmo.onEnd = () => work.endGesture();
     gizmo.onCancel = () => work.cancelGesture();
     this.#pointing = new Pointing(pane.stage, this);
+    this.#readout = new Readout(work, pane);
     new KeyPointer(pane, {
-      hover: (event) => this.work.facts.set({ pointedOut: this.#underCross(event) }),
+      hover: (event) => this.#hoverByKey(event),
       press: (event) => this.#workAt(this.#pointing.at(event)),
     });
     const setViewOnly = (event: KeyboardEvent, isDown: boolean) => {
@@ -57,13 +56,20 @@ export class Editing implements PointingTarget {
     this.cancel();
   }
 
+  /** The surface may have moved. */
+  refresh(): void {
+    this.#readout.refresh();
+  }
+
   press(at: PointerAt): Stroke | undefined {
+    this.#readout.hide();
     switch (this.work.view.now.tool) {
       case "move":
         return this.#pressHandle(at);
       case "brush":
-      case "paint":
         return at.hit && this.#brushStroke(at);
+      case "paint":
+        return at.hit && this.#paintStroke(at);
       case "lasso":
         return this.#outlineStroke(at, (outline) => outline);
       case "box":
@@ -80,14 +86,16 @@ export class Editing implements PointingTarget {
   }
 
   hover(at: PointerAt | undefined): void {
+    this.#readout.point(at);
     const { tool } = this.work.view.now;
     if (tool !== "brush" && tool !== "paint") return;
     this.work.facts.set({ pointedOut: at?.hit ? ofVertices(this.#dabAt(at)) : nothing });
   }
 
-  #underCross(event: PointerEvent | undefined): PointedOut {
+  #hoverByKey(event: PointerEvent | undefined): void {
     const at = event && this.#pointing.at(event);
-    return at?.hit ? ofVertices(this.#dabAt(at)) : nothing;
+    this.work.facts.set({ pointedOut: at?.hit ? ofVertices(this.#dabAt(at)) : nothing });
+    this.#readout.point(at, true);
   }
 
   /** A press by key: uses the tool at one place. */
@@ -98,7 +106,7 @@ export class Editing implements PointingTarget {
       return false;
     }
     if (work.view.now.tool === "paint") {
-      this.#paint(this.#dabAt(at));
+      this.#paintStroke(at).end();
       return false;
     }
     const mode = modeOf(at, work);
@@ -129,7 +137,12 @@ export class Editing implements PointingTarget {
   #pressHandle(at: PointerAt): Stroke | undefined {
     const handle = this.#handleAt(at);
     if (!handle) return undefined;
-    this.work.view.set({ selected: handle.name });
+    const { view } = this.work;
+    if (at.control) {
+      view.set(toggled(view.now, handle.name));
+      return stays;
+    }
+    view.set(selecting(view.now, handle.name));
     return this.work.canShift(handle) ? this.#drag(handle, at) : undefined;
   }
 
@@ -171,14 +184,13 @@ export class Editing implements PointingTarget {
     const { work, pane } = this;
     const grip = start.hit?.point ?? add(handle.pose.center, handle.pose.translation);
     const from = onPlane(pane.stage, start.ray, grip) ?? grip;
-    const { name } = handle;
-    const show = (delta: Vector3, time: number) => {
-      work.during(changeHandle(work.document, name, shifted(handle, delta)), time);
-    };
+    const all = selectionOf(work.document, work.view.now);
+    const show = (delta: Vector3, time: number) => work.during(shiftedTogether(work.document, all, delta), time);
+    const snap = new DragSnap(work, pane, handle, grip);
     return {
       move: (at) => {
         const to = onPlane(pane.stage, at.ray, grip);
-        if (to) show(subtract(to, from), at.time);
+        if (to) show(snap.apply(subtract(to, from), at), at.time);
       },
       end: () => work.endGesture(),
       cancel: () => work.cancelGesture(),
@@ -187,8 +199,8 @@ export class Editing implements PointingTarget {
 
   #pose(pose: Pose): void {
     const { work } = this;
-    const { selected } = work.view.now;
-    if (selected !== undefined) work.during(changeHandle(work.document, selected, { pose }), performance.now());
+    const selection = selectionOf(work.document, work.view.now);
+    if (selection.length > 0) work.during(posedTogether(work.document, selection, pose), performance.now());
   }
 
   #brushStroke(start: PointerAt): Stroke {
@@ -204,19 +216,14 @@ export class Editing implements PointingTarget {
       move: touch,
       end: () => {
         work.facts.set({ pointedOut: nothing });
-        if (work.view.now.tool === "paint") this.#paint([...touched]);
-        else this.#select([...touched], modeOf(start, work));
+        this.#select([...touched], modeOf(start, work));
       },
       cancel: () => work.facts.set({ pointedOut: nothing }),
     };
   }
 
-  #paint(vertices: number[]): void {
-    const { work } = this;
-    const { paintField, paintP, paintStiffness } = work.view.now;
-    const value = paintField === "p" ? paintP : paintStiffness;
-    work.change(paint(work.document, paintField, vertices, value, work.mesh.positions.length / 3));
-    work.view.set({ colourBy: paintField });
+  #paintStroke(start: PointerAt): Stroke {
+    return new PaintStroke(this.work, this.pane, (at) => this.#dabAt(at), start);
   }
 
   #outlineStroke(start: PointerAt, toPolygon: (outline: number[]) => number[]): Stroke {

@@ -5,12 +5,17 @@ import type { Mesh } from "../model/mesh.js";
 import { nothing, type PointedOut } from "../model/pointed.js";
 import type { AsideName } from "./asides.js";
 
+/** What the page says of the solve: nothing, how much of the energy's descent is left, or that it has just ended. */
+export type Solving = { left: number } | "ended" | undefined;
+
 /** What the page shows besides the pictures. */
 export interface Facts {
   document: Document;
   mesh: Mesh;
   report: MeshReport | undefined;
   status: Status;
+  /** How the solve goes on for which the user waits. */
+  solving: Solving;
   /** Why the newest change cannot be shown. */
   problem: LpdeformError | undefined;
   /** One line that disappears by itself, or stays until its cause is over. */
@@ -36,6 +41,7 @@ export const firstFacts: Facts = {
   mesh: noMesh,
   report: undefined,
   status: say("idle", ""),
+  solving: undefined,
   problem: undefined,
   notice: undefined,
   better: [],

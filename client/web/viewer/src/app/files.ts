@@ -1,19 +1,21 @@
 import { FileFault } from "../io/fault.js";
+import { newGlb } from "../io/gltf.js";
+import { rewriteGlb } from "../io/gltf_rewrite.js";
 import { readHandleFile, writeHandleFile } from "../io/handlefile.js";
 import { writeObj } from "../io/obj.js";
+import { openedMesh } from "../io/opened.js";
 import { rewriteObj } from "../io/obj_rewrite.js";
 import { writeOff } from "../io/off.js";
 import { writePly } from "../io/ply.js";
-import { readMesh } from "../io/read.js";
-import { writeStl } from "../io/stl.js";
 import { emptyDocument } from "../model/document.js";
-import { guessYUp } from "../model/up.js";
+import { derivedOf } from "../model/derived.js";
 import { isAtRest, type Mesh, type WrittenMesh } from "../model/mesh.js";
 import { short } from "../model/words.js";
 import type { App } from "./app.js";
 import { sentence } from "../link/status.js";
 import type { Pane } from "./pane.js";
 import { pictureOf } from "./picture.js";
+import { openProject, saveProject } from "./projects.js";
 
 /** Time limit for the result that is exported. */
 const solveMs = 60_000;
@@ -23,14 +25,15 @@ const mostBytes = 500e6;
 const largeBytes = 2e6;
 
 const isHandles = ({ name }: File) => /\.json$/i.test(name);
-const isMesh = ({ name }: File) => /\.(off|obj|ply|stl)$/i.test(name);
+const isProject = ({ name }: File) => /\.lpdeform$/i.test(name);
+const isMesh = ({ name }: File) => /\.(glb|gltf|off|obj|ply|stl)$/i.test(name);
 
 interface Exported {
   positions: Float32Array | Float64Array;
   distortion: Float32Array | Float64Array;
 }
 
-export type MeshFormat = "ply" | "obj" | "off" | "stl";
+export type MeshFormat = "glb" | "ply" | "obj" | "off" | "stl";
 
 /** Opens and saves files. */
 export class Files {
@@ -38,7 +41,7 @@ export class Files {
 
   constructor(readonly app: App) {
     this.#input.type = "file";
-    this.#input.accept = ".off,.obj,.ply,.stl,.json";
+    this.#input.accept = ".glb,.gltf,.bin,.off,.obj,.ply,.stl,.json,.lpdeform";
     this.#input.multiple = true;
     this.#input.addEventListener("change", () => {
       void this.open([...(this.#input.files ?? [])]);
@@ -51,17 +54,25 @@ export class Files {
     this.#input.click();
   }
 
-  /** Opens a mesh, handles, or both, in any order. Files beside a mesh, such as materials, are ignored. */
+  /**
+   * Opens a project, or a mesh, handles, or both, in any order. Files beside a mesh, such as materials, are ignored, except those
+   * that a glTF names.
+   */
   async open(files: readonly File[]): Promise<void> {
     const meshes = files.filter(isMesh);
     if (meshes.length > 1) {
       const names = meshes.map(({ name }) => name).join(", ");
       return this.app.notify(`One mesh at a time: ${names} are ${meshes.length}.`, true);
     }
-    const known = [...meshes, ...files.filter(isHandles)];
+    const projects = files.filter(isProject);
+    if (projects.length > 0 && files.length > 1) {
+      return this.app.notify(`A project is opened alone: ${projects[0]!.name} is one of ${files.length} files.`, true);
+    }
+    const known = [...projects, ...meshes, ...files.filter(isHandles)];
     for (const file of known.length > 0 ? known : files) {
       try {
-        await this.#openFile(file);
+        const isGltf = /\.gltf$/i.test(file.name);
+        await this.#openFile(file, isGltf ? files.filter((other) => other !== file) : []);
       } catch (error) {
         const isFault = error instanceof FileFault;
         this.app.notify(isFault ? error.message : `${file.name} cannot be opened: ${(error as Error).message}`, true);
@@ -70,15 +81,15 @@ export class Files {
     }
   }
 
-  async #openFile(file: File): Promise<void> {
+  async #openFile(file: File, beside: readonly File[]): Promise<void> {
     if (file.size > mostBytes) {
       throw new FileFault(`${file.name} has ${short(file.size)}B; this page reads files of ${short(mostBytes)}B at most.`);
     }
     const done = file.size > largeBytes ? this.app.notifyWhile(`Opening ${file.name}…`) : () => undefined;
     try {
-      if (file.size > largeBytes) await new Promise((seen) => setTimeout(seen, 50));
-      if (isHandles(file)) this.#openHandles(file.name, await file.text());
-      else this.#openMesh(file.name, new Uint8Array(await file.arrayBuffer()));
+      if (isProject(file)) await this.#openProject(file);
+      else if (isHandles(file)) this.#openHandles(file.name, await file.text());
+      else this.#openMesh(await openedMesh(file, beside));
     } finally {
       done();
     }
@@ -91,16 +102,17 @@ export class Files {
     for (const pane of panes) {
       const { mesh } = pane.stage.surface!;
       const { positions, distortion } = await this.#exactly(pane);
-      const { faces, corners, obj } = mesh;
+      const { faces, corners, obj, gltf } = mesh;
       const deformed: WrittenMesh = { positions, faces, ...(corners && { corners }) };
       const name = `${stem}-deformed${panes.length > 1 ? `-${pane.side}` : ""}.${format}`;
-      if (format === "ply") save(name, writePly(deformed, distortion, this.app.red));
+      if (format === "glb") save(name, gltf ? rewriteGlb({ ...mesh, gltf }, positions) : newGlb(deformed));
+      if (format === "ply") save(name, writePly(deformed, distortion, this.app.red, this.app.view.now.palette));
       if (format === "obj") save(name, obj ? rewriteObj({ ...mesh, obj }, positions) : writeObj(deformed));
       if (format === "off") save(name, writeOff(deformed));
-      if (format === "stl") save(name, writeStl(deformed));
+      if (format === "stl") save(name, (await import("../io/write_stl.js")).writeStl(deformed));
       const lost = lostIn(mesh, format);
       if (lost.length > 0) {
-        const better = obj ? " Saved as OBJ, they stay." : "";
+        const better = obj || gltf ? ` Saved as ${obj ? "OBJ" : "GLB"}, they stay.` : "";
         this.app.notify(`${name} does not have what the original file also had: ${lost.join(", ")}.${better}`);
       }
     }
@@ -132,6 +144,17 @@ export class Files {
     });
   }
 
+  /** Everything that is needed to go on: mesh, handles, fields, settings and camera. */
+  async saveProject(): Promise<void> {
+    save(`${this.#stem}.lpdeform`, await saveProject(this.app));
+  }
+
+  async #openProject(file: File): Promise<void> {
+    await openProject(this.app, file.name, new Uint8Array(await file.arrayBuffer()));
+    const count = this.app.document.handles.length;
+    this.app.notify(`${file.name}: “${this.app.mesh.name}” with ${count === 1 ? "a handle" : `${count} handles`}.`);
+  }
+
   saveHandles(): void {
     if (this.app.document.handles.length === 0) {
       return this.app.notify("There are no handles to save: click the surface to place one.", true);
@@ -143,11 +166,11 @@ export class Files {
     return this.app.mesh.name.replace(/\.[^.]*$/, "") || "mesh";
   }
 
-  #openMesh(name: string, bytes: Uint8Array): void {
-    const mesh = readMesh(name, bytes);
+  #openMesh(mesh: Mesh): void {
+    const { name } = mesh;
     const { p, secondP } = this.app.document;
     this.app.open(mesh, { ...emptyDocument, p, secondP });
-    const isYUp = guessYUp(mesh);
+    const { isYUp } = derivedOf(mesh);
     this.app.view.set({ tool: "move", isYUp });
     const up = ` Shown with ${isYUp ? "y" : "z"} up, as it seems: “Y is up” in the panel turns it.`;
     const count = (mesh.positions.length / 3).toLocaleString("en");
@@ -182,9 +205,9 @@ export class Files {
 }
 
 /** What a file had that this format cannot hold, in words. */
-function lostIn({ beside = [], corners, obj }: Mesh, format: MeshFormat): readonly string[] {
-  if (format === "obj" && obj) return [];
-  return format === "stl" && corners ? [...beside, "faces of more than three corners"] : beside;
+function lostIn({ beside = [], corners, obj, gltf }: Mesh, format: MeshFormat): readonly string[] {
+  if ((format === "obj" && obj) || (format === "glb" && gltf)) return [];
+  return (format === "stl" || format === "glb") && corners ? [...beside, "faces of more than three corners"] : beside;
 }
 
 function save(name: string, content: Blob | string | Uint8Array<ArrayBuffer>): void {

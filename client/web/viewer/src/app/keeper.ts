@@ -1,4 +1,5 @@
 import { forget, remember, remembered } from "../io/remember.js";
+import { prepare } from "../io/opened.js";
 import { type AsideWork, Store, type Work } from "../io/store.js";
 import type { Mesh } from "../model/mesh.js";
 import { stepsToKeep } from "../model/kept_steps.js";
@@ -58,6 +59,7 @@ export class Keeper {
       if (when === "never") forget(restoringKey(work.id));
       if (when === "later") await this.#putOff();
       if (when !== "now") return false;
+      await prepare(mesh);
       this.#show(work, mesh);
       await this.#showAsides(store, work);
       return true;

@@ -1,4 +1,4 @@
-import { stops } from "../model/colours.js";
+import { palettes } from "../model/palettes.js";
 import { short } from "../model/words.js";
 import type { App } from "./app.js";
 
@@ -30,6 +30,7 @@ export function legendCanvas(app: App, ratio: number): HTMLCanvasElement | undef
   context.font = "600 12px system-ui, sans-serif";
   context.fillText(all.title, 24, 20);
   const colours = context.createLinearGradient(24, 0, 240, 0);
+  const { stops } = palettes[app.view.now.palette];
   stops.forEach(([r, g, b], k) => colours.addColorStop(k / (stops.length - 1), `rgb(${r}, ${g}, ${b})`));
   context.font = "11px system-ui, sans-serif";
   [all.low, all.middle, all.high].forEach((text, k) => {

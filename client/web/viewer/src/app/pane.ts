@@ -1,17 +1,25 @@
 import type { Frame, LpdeformError, MeshReport } from "lpdeform-client";
 import { Live, type LiveWatcher } from "../link/live.js";
 import { say, type Status } from "../link/status.js";
+import type { Shape } from "../model/blend.js";
 import type { Side } from "../model/changes.js";
+import { Matrix4 } from "three";
+import { type Ahead, aheadOf } from "../model/ahead.js";
 import { type Document, pField } from "../model/document.js";
 import { boundsOf, centroid, type Mesh } from "../model/mesh.js";
+import { Progress } from "../model/progress.js";
+import { pullOf } from "../model/pull.js";
 import { cornersOf, type PointedOut } from "../model/pointed.js";
 import type { Seams } from "../model/seams.js";
 import { type EnergyStatistics, energyStatistics } from "../model/statistics.js";
+import { selectionOf } from "../model/together.js";
 import type { View } from "../model/view.js";
-import { vertexNormals } from "../stage/drawmesh.js";
+import { vertexNormals } from "../model/normals.js";
+import { type Intake, IntakeWorker } from "../stage/intake.js";
 import { Overlay } from "../stage/overlay.js";
 import { Stage } from "../stage/stage.js";
-import type { Scale } from "../stage/surface.js";
+import { motionBetween } from "../stage/ahead.js";
+import type { Scale, Surface } from "../stage/surface.js";
 import { EnergyTrail } from "./energy_trail.js";
 
 export interface PaneWatcher {
@@ -23,6 +31,12 @@ export interface PaneWatcher {
   better(): void;
 }
 
+/** A handle that is ahead of the frame, and how far vertices go along with it, once that is known. */
+interface Pull {
+  pulled: readonly number[];
+  shares: Float32Array | undefined;
+}
+
 const nothing: EnergyStatistics = { max: 0, red: 0, top5Share: 0 };
 
 /** One of the pictures side by side: a stage, and the session that supplies it. */
@@ -31,13 +45,21 @@ export class Pane {
   readonly stage: Stage;
   readonly overlay = new Overlay();
   readonly trail = new EnergyTrail();
+  readonly progress = new Progress();
   /** Aborts when the pane is closed. */
   readonly over = new AbortController();
   live: Live | undefined;
   frame: Frame | undefined;
   statistics = nothing;
   #isDirty = true;
+  #intakeWorker: IntakeWorker | undefined;
+  /** What is drawn of frames that are not drawn yet. */
+  #intakes = new WeakMap<Frame, Intake>();
   #onScreenNext: Frame | undefined;
+  #pull: Pull | undefined;
+  /** Shown in place of the frames. */
+  #preview: Shape | undefined;
+  #endsWithFrame = false;
 
   constructor(
     readonly side: Side,
@@ -53,11 +75,16 @@ export class Pane {
 
   open(mesh: Mesh, document: Document, view: View, seams: Seams | undefined): void {
     this.live?.close();
+    this.#intakeWorker?.stop();
     this.stage.open(mesh, seams?.faces);
-    this.frame = this.#onScreenNext = undefined;
+    this.#intakeWorker = IntakeWorker.start(this.stage.surface!.intakeMesh);
+    this.frame = this.#onScreenNext = this.#pull = this.#preview = undefined;
     this.statistics = nothing;
     this.trail.reset();
+    this.progress.reset();
+    const worker = this.#intakeWorker;
     const watcher: LiveWatcher = {
+      prepare: worker && ((frame) => this.#prepare(worker, frame)),
       frame: () => this.watcher.changed(),
       status: (status) => this.watcher.status(status),
       report: (report) => this.watcher.report(report),
@@ -70,12 +97,17 @@ export class Pane {
     this.#isDirty = true;
   }
 
+  async #prepare(worker: IntakeWorker, frame: Frame): Promise<void> {
+    const intake = await worker.take(frame);
+    if (intake) this.#intakes.set(frame, intake);
+  }
+
   get status(): Status {
     return this.live?.status ?? say("idle", "");
   }
 
   get distortion(): Float32Array {
-    return this.frame?.distortion ?? new Float32Array((this.stage.surface?.mesh.positions.length ?? 0) / 3);
+    return (this.#preview ?? this.frame)?.distortion ?? new Float32Array((this.stage.surface?.mesh.positions.length ?? 0) / 3);
   }
 
   /** Takes the newest frame if there is one. Returns true if the surface has changed. */
@@ -88,13 +120,70 @@ export class Pane {
       return false;
     }
     this.frame = this.#onScreenNext = frame;
-    this.stage.surface.move(frame.positions);
-    this.stage.marks.move(frame.positions);
-    this.stage.highlight.move(frame.positions);
-    this.statistics = energyStatistics(frame.distortion);
+    if (this.#endsWithFrame) this.#preview = undefined;
+    if (!this.#preview) this.#move(frame.positions, this.#intakes.get(frame));
     this.trail.add(frame.iteration, frame.energy ** (1 / this.live!.exponentOf(frame)));
+    this.progress.add(frame);
     this.#isDirty = true;
     return true;
+  }
+
+  /**
+   * Lets the surface follow the handles from the frame that is drawn to where they are in the document, until the next frame.
+   * `mayMove`: whether the server takes the document.
+   */
+  lookAhead(document: Document, mayMove: boolean): void {
+    const { surface } = this.stage;
+    const of = this.frame && this.live?.answered;
+    if (!surface || !of) return;
+    const isFollowing = mayMove && !this.#preview && this.live?.status.kind === "live";
+    const ahead = isFollowing ? aheadOf(of, document) : undefined;
+    if (ahead && ahead.pulled !== this.#pull?.pulled) this.#findPull(surface, ahead);
+    const motion = ahead && this.#pull?.shares ? motionBetween(ahead.from, ahead.to) : new Matrix4();
+    if (motion.equals(surface.ahead.value)) return;
+    surface.ahead.value.copy(motion);
+    this.#isDirty = true;
+  }
+
+  #findPull(surface: Surface, { pulled, held }: Ahead): void {
+    const pull: Pull = { pulled, shares: undefined };
+    this.#pull = pull;
+    this.#showPull(surface, undefined);
+    const { positions } = surface.mesh;
+    if (!this.#intakeWorker) return this.#showPull(surface, pullOf(positions, surface.adjacency, pulled, held));
+    void this.#intakeWorker.pull({ pulled, held }).then((shares) => {
+      if (this.#pull === pull && this.stage.surface === surface) this.#showPull(surface, shares);
+    });
+  }
+
+  #showPull(surface: Surface, shares: Float32Array | undefined): void {
+    if (this.#pull) this.#pull.shares = shares;
+    surface.pull(shares);
+    this.stage.marks.pull(shares);
+    this.watcher.changed();
+  }
+
+  /** Shows a shape in place of the frames, which go on being taken. */
+  preview(shape: Shape): void {
+    this.#preview = shape;
+    this.#endsWithFrame = false;
+    this.#move(shape.positions);
+  }
+
+  /** Shows frames again: from the next one on, or at once. */
+  endPreview(withNextFrame: boolean): void {
+    this.#endsWithFrame = withNextFrame;
+    if (!this.#preview || withNextFrame) return;
+    this.#preview = undefined;
+    if (this.stage.surface) this.#move(this.frame?.positions ?? this.stage.surface.mesh.positions);
+  }
+
+  #move(positions: Float32Array, intake?: Intake): void {
+    this.stage.surface!.move(positions, intake);
+    this.stage.marks.move(positions);
+    this.stage.highlight.move(positions);
+    this.statistics = intake?.statistics ?? energyStatistics(this.distortion);
+    this.#isDirty = true;
   }
 
   colour(document: Document, view: View, red: number): void {
@@ -109,11 +198,15 @@ export class Pane {
   }
 
   mark(document: Document, view: View, pointedOut: PointedOut, colour: string): void {
-    const { surface, marks, highlight } = this.stage;
+    const { surface, marks, pointed, highlight } = this.stage;
     if (!surface) return;
     const { positions, mesh } = surface;
-    marks.show(document.handles, mesh.faces, view.selected, cornersOf(pointedOut, mesh.faces), colour);
-    marks.move(positions);
+    const selected = selectionOf(document, view).map(({ name }) => name);
+    if (marks.show(document.handles, mesh.faces, selected)) {
+      marks.move(positions);
+      marks.pull(this.#pull?.shares);
+    }
+    pointed.show(cornersOf(pointedOut, mesh.faces), colour);
     highlight.show(pointedOut, mesh.faces, colour);
     highlight.move(positions);
     this.#isDirty = true;
@@ -181,6 +274,7 @@ export class Pane {
   close(): void {
     this.over.abort();
     this.live?.close();
+    this.#intakeWorker?.stop();
     this.stage.dispose();
     this.element.remove();
   }

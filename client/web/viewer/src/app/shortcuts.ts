@@ -1,12 +1,18 @@
-import { changeHandle, handleOf, removeHandle, shifted } from "../model/document.js";
+import { changeHandle, handleOf, removeHandle } from "../model/document.js";
 import { steppedP } from "../model/exponent.js";
+import { gridStep, type Snapping, turnStep } from "../model/snap.js";
 import { turned } from "../model/pose.js";
-import type { ColourBy, Tool } from "../model/view.js";
+import type { PaintMode } from "../model/soft_paint.js";
+import { posedTogether, selectionOf, shiftedTogether } from "../model/together.js";
+import type { ColourBy, GizmoAxes, Tool } from "../model/view.js";
 import type { App } from "./app.js";
 import type { Files } from "./files.js";
 
 const tools: readonly Tool[] = ["move", "brush", "lasso", "box", "paint"];
 const colours: readonly ColourBy[] = ["distortion", "p", "stiffness", "normals", "plain"];
+const snappings: readonly Snapping[] = ["none", "grid", "vertices"];
+const paintModes: readonly PaintMode[] = ["set", "erase", "smooth"];
+const allAxes: readonly GizmoAxes[] = ["world", "local", "view"];
 const nudges: Record<string, readonly [number, number, number]> = {
   ArrowLeft: [-1, 0, 0],
   ArrowRight: [1, 0, 0],
@@ -48,17 +54,19 @@ export function startShortcuts(app: App, files: Files, help: HTMLDialogElement):
     )
       return;
     const isHandled =
-      event.ctrlKey || event.metaKey ? withControl(app, event) : !event.altKey && alone(app, files, help, event, target);
+      event.ctrlKey || event.metaKey ? withControl(app, files, event) : !event.altKey && alone(app, files, help, event, target);
     if (isHandled) event.preventDefault();
   });
 }
 
-function withControl(app: App, event: KeyboardEvent): boolean {
+function withControl(app: App, files: Files, event: KeyboardEvent): boolean {
   const { key, shiftKey } = event;
   if (key in arrows) return !(event.target as HTMLElement).matches("input") && turnOrShift(app, event);
   const letter = key.toLowerCase();
   if (letter === "z" && !shiftKey) app.undo();
   else if ((letter === "z" && shiftKey) || letter === "y") app.redo();
+  else if (letter === "a" && !shiftKey) selectAll(app);
+  else if (letter === "s" && !shiftKey) event.repeat || void files.saveProject();
   else return false;
   return true;
 }
@@ -95,23 +103,34 @@ function actions(app: App, files: Files, help: HTMLDialogElement, event: Keyboar
     ",": () => stepP(-0.1),
     ".": () => stepP(0.1),
     a: () => app.change({ ...app.document, isAutomatic: !app.document.isAutomatic }),
-    c: () => view.set({ colourBy: colours[(colours.indexOf(now.colourBy) + 1) % colours.length]! }),
+    b: () => app.lookAlongNext(),
+    c: () => view.set({ colourBy: after(colours, now.colourBy) }),
     d: () => view.set({ isDark: !now.isDark }),
     f: () => app.fit(),
     g: () => view.set({ ghost: !now.ghost }),
     i: () => view.set({ isPanelOpen: !now.isPanelOpen }),
+    k: () => app.keepPose(),
     l: () => toggleLock(app),
+    m: () => view.set({ snapping: after(snappings, now.snapping) }),
     n: () => selectNext(app),
     o: () => files.choose(),
     p: () => app.togglePin(),
     r: () => view.set({ gizmo: "rotate", tool: "move" }),
     s: () => view.set({ isSplit: !now.isSplit }),
     t: () => view.set({ gizmo: "translate", tool: "move" }),
+    x: () => view.set({ axes: after(allAxes, now.axes) }),
+    e: () => view.set({ paintMode: now.tool === "paint" ? after(paintModes, now.paintMode) : now.paintMode, tool: "paint" }),
+    v: () => view.set({ hasReadout: !now.hasReadout }),
     w: () => view.set({ wireframe: !now.wireframe }),
     Delete: () => removeSelected(app),
     Backspace: () => removeSelected(app),
     Escape: () => view.set({ selected: undefined }),
   };
+}
+
+/** The next of the values, and the first after the last. */
+function after<Value>(values: readonly Value[], value: Value): Value {
+  return values[(values.indexOf(value) + 1) % values.length]!;
 }
 
 function turnOrShift(app: App, { key, shiftKey }: KeyboardEvent): boolean {
@@ -123,13 +142,21 @@ function turnOrShift(app: App, { key, shiftKey }: KeyboardEvent): boolean {
 }
 
 function removeSelected(app: App): void {
-  const { selected } = app.view.now;
-  if (handleOf(app.document, selected)) app.change(removeHandle(app.document, selected!));
+  const names = selectionOf(app.document, app.view.now).map(({ name }) => name);
+  if (names.length > 0) app.change(names.reduce(removeHandle, app.document));
 }
 
 function toggleLock(app: App): void {
   const handle = handleOf(app.document, app.view.now.selected);
   if (handle) app.change(changeHandle(app.document, handle.name, { isLocked: !handle.isLocked }));
+}
+
+/** All but the locked ones. */
+function selectAll(app: App): void {
+  const [selected, ...alsoSelected] = app.document.handles.filter(({ isLocked }) => !isLocked).map(({ name }) => name);
+  app.view.set({ selected, alsoSelected, tool: "move" });
+  const count = selected === undefined ? 0 : 1 + alsoSelected.length;
+  if (count > 1) app.notify(`${count} handles are selected: they move together.`);
 }
 
 function selectNext(app: App): void {
@@ -138,19 +165,24 @@ function selectNext(app: App): void {
   if (handles.length > 0) app.view.set({ selected: handles[(at + 1) % handles.length]!.name, tool: "move" });
 }
 
-/** Moves along the mesh's axes by a hundredth of its diagonal; rotates by three degrees if the handle has rings. */
+/**
+ * Moves along the mesh's axes by a hundredth of its diagonal; rotates by three degrees if the handle has rings. On a grid, by its
+ * steps.
+ */
 function nudge(app: App, direction: readonly [number, number, number], event: KeyboardEvent): boolean {
-  const handle = handleOf(app.document, app.view.now.selected);
+  const selection = selectionOf(app.document, app.view.now);
+  const [handle] = selection;
   if (!handle) return false;
-  const share = event.shiftKey ? 0.1 : 1;
+  const isOnGrid = app.view.now.snapping === "grid";
+  const share = event.shiftKey && !isOnGrid ? 0.1 : 1;
   const isTurn = app.view.now.gizmo === "rotate" && !handle.isLocked;
   if (isTurn && !handle.targets) {
-    const pose = turned(handle.pose, direction, share * nudgeRadians);
-    app.byKey(changeHandle(app.document, handle.name, { pose }), event);
+    const pose = turned(handle.pose, direction, isOnGrid ? (turnStep * Math.PI) / 180 : share * nudgeRadians);
+    app.byKey(posedTogether(app.document, selection, pose), event);
   } else if (!isTurn && app.canShift(handle)) {
-    const step = share * nudgeShare * app.diagonal;
+    const step = isOnGrid ? gridStep(app.diagonal) : share * nudgeShare * app.diagonal;
     const [x, y, z] = direction;
-    app.byKey(changeHandle(app.document, handle.name, shifted(handle, [step * x, step * y, step * z])), event);
+    app.byKey(shiftedTogether(app.document, selection, [step * x, step * y, step * z]), event);
   }
   return true;
 }

@@ -42,7 +42,7 @@ export function exposeForTests(app: App): void {
       };
     },
     vertexOnPage: (vertex: number, pane = 0) =>
-      onPage(paneAt(pane), paneAt(pane).stage.surface!.positions.slice(3 * vertex, 3 * vertex + 3)),
+      onPage(paneAt(pane), Float32Array.from(paneAt(pane).stage.surface!.placeOf(vertex).toArray())),
     pointOnPage: (point: readonly number[], pane = 0) => onPage(paneAt(pane), Float32Array.from(point)),
     /** Where the gizmo is. */
     anchorOnPage: (pane = 0) =>

@@ -28,12 +28,23 @@ export function readHandleFile(
   } catch (error) {
     throw new FileFault(`The handle file is not JSON: ${(error as Error).message}.`);
   }
+  const result = readHandles(json, document, mesh, withCopies);
+  if (result.handles.length === 0) throw new FileFault("The handle file has no handle.");
+  return result;
+}
+
+/** Like readHandleFile(), from its JSON, which may have no handles. */
+export function readHandles(
+  json: unknown,
+  document: Document,
+  mesh: Mesh,
+  withCopies = (vertices: number[]): number[] => vertices,
+): Document {
   const file = objectOf(json, "the handle file");
   checkKeys(file, ["handles", "region", "groups", "mesh", "note"], "the handle file");
   const vertexCount = mesh.positions.length / 3;
   let result: Document = { ...withoutPaint(document), handles: [], isAutomatic: false };
   for (const one of arrayOf(file["handles"], "“handles”")) result = withHandle(result, one, mesh);
-  if (result.handles.length === 0) throw new FileFault("The handle file has no handle.");
   if (file["region"] !== undefined) {
     result = { ...result, region: vertexNumbers(file["region"], "“region”", vertexCount) };
   } else {
@@ -174,14 +185,18 @@ function withGroup(
 
 /** A handle file with the document's handles, and its painting as groups. */
 export function writeHandleFile(document: Document, meshName: string): string {
+  return `${JSON.stringify(handlesJson(document, meshName))}\n`;
+}
+
+/** The JSON of such a file. */
+export function handlesJson(document: Document, meshName: string): object {
   const groups = [...paintedGroups("p", document.paintedP, NaN), ...paintedGroups("stiffness", document.stiffness, 1)];
-  const file = {
+  return {
     mesh: meshName,
     handles: document.handles.map(handleJson),
     ...(document.region && { region: document.region }),
     ...(groups.length > 0 && { groups }),
   };
-  return `${JSON.stringify(file)}\n`;
 }
 
 function handleJson({ name, vertices, points, pose, targets, hold, footprint }: Handle): object {

@@ -11,6 +11,9 @@ export function rewriteObj({ obj, positions: drawn, exact, faces }: Mesh & { obj
   const normals: number[][] = [];
   const pairs = new Map<string, number>();
   const newNormals: string[] = [];
+  const source = new TextDecoder().decode(obj);
+  const separator = source.includes("\n") ? "\n" : "\r";
+  const before = source.includes("\r\n") ? "\r" : "";
   const out: string[] = [];
   let vertexCount = 0;
   let firstFace: number | undefined;
@@ -25,13 +28,13 @@ export function rewriteObj({ obj, positions: drawn, exact, faces }: Mesh & { obj
     const key = `${corner} ${at}`;
     let number = pairs.get(key);
     if (number === undefined) {
-      number = newNormals.push(`vn ${turner.turned(corner, from).map(shortest).join(" ")}`);
+      number = newNormals.push(`vn ${turner.turned(corner, from).map(shortest).join(" ")}${before}`);
       pairs.set(key, number);
     }
     return `${vertex}/${texture}/${number}`;
   };
 
-  for (const { text, words } of logicalLines(new TextDecoder().decode(obj))) {
+  for (const { text, words } of logicalLines(source)) {
     const [key, ...values] = words;
     const end = text.endsWith("\r") ? "\r" : "";
     if (key === "v") {
@@ -48,7 +51,7 @@ export function rewriteObj({ obj, positions: drawn, exact, faces }: Mesh & { obj
     }
   }
   if (firstFace !== undefined) out.splice(firstFace, 1, ...newNormals);
-  return out.join("\n");
+  return out.join(separator);
 }
 
 /** Enough digits for a direction. */

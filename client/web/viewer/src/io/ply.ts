@@ -1,4 +1,4 @@
-import { blueToRed } from "../model/colours.js";
+import { colourIn, type PaletteName } from "../model/palettes.js";
 import { polygonsOf, type Mesh, type WrittenMesh } from "../model/mesh.js";
 import { MeshBuilder } from "./builder.js";
 import { FileFault } from "./fault.js";
@@ -180,6 +180,7 @@ export function writePly(
   { positions, faces, corners }: WrittenMesh,
   distortion: Float32Array | Float64Array,
   red: number,
+  palette: PaletteName = "blueToRed",
 ): Uint8Array<ArrayBuffer> {
   const isDouble = positions instanceof Float64Array;
   const size = isDouble ? 8 : 4;
@@ -210,7 +211,7 @@ export function writePly(
     const value = distortion[v] ?? 0;
     for (let axis = 0; axis < 3; ++axis) set(at + size * axis, positions[3 * v + axis]!);
     set(at + 3 * size, value);
-    blueToRed(red > 0 ? value / red : 0).forEach((channel, k) => view.setUint8(at + 4 * size + k, channel));
+    colourIn(palette, red > 0 ? value / red : 0).forEach((channel, k) => view.setUint8(at + 4 * size + k, channel));
   }
   for (const polygon of polygonsOf({ faces, ...(corners && { corners }) })) {
     if (isLong) view.setUint32(at, polygon.length, true);

@@ -1,13 +1,17 @@
 import type { Mesh } from "../model/mesh.js";
 import { FileFault } from "./fault.js";
+import { readGltf } from "./gltf.js";
 import { readObj } from "./obj.js";
 import { readOff } from "./off.js";
 import { readPly } from "./ply.js";
 import { readStl } from "./stl.js";
 
-/** Reads a mesh file by the ending of its name. Throws a FileFault. */
-export function readMesh(name: string, bytes: Uint8Array): Mesh {
+/** Reads a mesh file by the ending of its name. `beside`: what was opened with it, by name. Throws a FileFault. */
+export function readMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<string, Uint8Array>): Mesh {
   switch (name.toLowerCase().split(".").at(-1)) {
+    case "glb":
+    case "gltf":
+      return readGltf(name, bytes, beside);
     case "off":
       return readOff(name, text(bytes));
     case "obj":
@@ -17,7 +21,7 @@ export function readMesh(name: string, bytes: Uint8Array): Mesh {
     case "stl":
       return readStl(name, bytes);
     default:
-      throw new FileFault(`${name} is not a mesh that can be read: OFF, OBJ, PLY and STL can.`);
+      throw new FileFault(`${name} is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY and STL can.`);
   }
 }
 

@@ -1,6 +1,4 @@
-import * as three from "three";
-import { STLExporter } from "three/examples/jsm/exporters/STLExporter.js";
-import type { Mesh, WrittenMesh } from "../model/mesh.js";
+import type { Mesh } from "../model/mesh.js";
 import { MeshBuilder } from "./builder.js";
 import { FileFault } from "./fault.js";
 
@@ -62,13 +60,4 @@ class Welder {
   end(): void {
     if (this.#face.length > 0) throw new FileFault(`${this.name} ends within triangle ${this.builder.faces.length / 3}.`);
   }
-}
-
-/** Binary, in float32, as STL is. */
-export function writeStl({ positions, faces }: WrittenMesh): Uint8Array<ArrayBuffer> {
-  const geometry = new three.BufferGeometry();
-  geometry.setAttribute("position", new three.BufferAttribute(positions, 3));
-  geometry.setIndex(new three.BufferAttribute(faces, 1));
-  const { buffer } = new STLExporter().parse(new three.Mesh(geometry), { binary: true });
-  return new Uint8Array(buffer as ArrayBuffer);
 }

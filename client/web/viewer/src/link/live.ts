@@ -18,6 +18,8 @@ import { Pulse } from "./pulse.js";
 import { isPassing, notAnswering, say, type Status, statusAtEnd, statusOf } from "./status.js";
 
 export interface LiveWatcher {
+  /** Prepares a frame elsewhere before it waits to be taken. Undefined: the page takes it as it is. */
+  prepare?(frame: Frame): Promise<void> | undefined;
   /** A frame waits to be taken. */
   frame(): void;
   status(status: Status): void;
@@ -33,6 +35,7 @@ export interface LiveWatcher {
 const live = say("live", "Live");
 /** Frames answer one of the newest inputs, so no more are needed. */
 const mostExponents = 100;
+const mostSent = 1000;
 
 /**
  * A document on the server, and its surface as it comes. The server may go away at any time; the document is sent again when
@@ -41,10 +44,14 @@ const mostExponents = 100;
  */
 export class Live {
   readonly meter = new Meter();
+  /** The document that the newest frame answers. */
+  answered: Document | undefined;
   status: Status = say("idle", "");
   #session: Session | undefined;
   #told = newSession;
   #waiting: Frame | undefined;
+  /** Whether frames are prepared elsewhere; a frame that was not cannot be taken in the place of one that was. */
+  #isPrepared = false;
   #taken: (() => void) | undefined;
   #inputs: { seq: number; time: number; sent: number }[] = [];
   #said: Notice | undefined;
@@ -53,6 +60,8 @@ export class Live {
   #drawn = 0;
   /** p for each input that changed it. */
   #exponents: { seq: number; p: number }[] = [];
+  /** The documents of the newest updates, from the one that the newest frame answers on. */
+  #sent: { seq: number; document: Document }[] = [];
   /** For sessions that cannot be opened or break at once: by the client's rules, in addition to what the server asks for. */
   readonly #backoff = new Backoff();
   readonly #over = new AbortController();
@@ -85,9 +94,16 @@ export class Live {
     const frame = this.#waiting;
     if (!frame) return undefined;
     this.#waiting = undefined;
-    const newer = this.#poll();
+    const newer = this.#isPrepared ? undefined : this.#poll();
     this.#taken?.();
+    this.#answer(newer ?? frame);
     return newer ?? frame;
+  }
+
+  #answer({ inputSeq }: Frame): void {
+    const newest = this.#sent.findLastIndex(({ seq }) => seq <= inputSeq);
+    if (newest > 0) this.#sent.splice(0, newest);
+    if (newest >= 0) this.answered = this.#sent[0]!.document;
   }
 
   /** A frame that has come since. */
@@ -115,6 +131,11 @@ export class Live {
   /** p of the input that the frame answers; see exponent(). */
   exponentOf({ inputSeq }: Frame): number {
     return this.#exponents.findLast(({ seq }) => seq <= inputSeq)?.p ?? 2;
+  }
+
+  /** The number of the newest change; 0 if there is none. */
+  get newestInput(): number {
+    return this.#newest;
   }
 
   /** Whether there are changes that no picture answers yet. */
@@ -179,6 +200,8 @@ export class Live {
       this.#told = newSession;
       this.#inputs = [];
       this.#exponents = [];
+      this.#sent = [];
+      this.answered = undefined;
       this.#newest = this.#drawn = 0;
       this.watcher.report(session.meshReport);
       session.on("problem", (error) => this.watcher.problem(error));
@@ -235,6 +258,10 @@ export class Live {
         if (this.#over.signal.aborted) break;
         hadFrames = true;
         this.#pulse.heard();
+        const prepared = this.watcher.prepare?.(frame);
+        this.#isPrepared = prepared !== undefined;
+        await prepared;
+        if (this.#over.signal.aborted) break;
         this.#waiting = frame;
         const taken = new Promise<void>((resolve) => (this.#taken = resolve));
         this.watcher.frame();
@@ -260,6 +287,8 @@ export class Live {
     try {
       this.#newest = session.update(update);
       this.#noteExponent(this.#newest);
+      this.#sent.push({ seq: this.#newest, document: this.document });
+      if (this.#sent.length > mostSent) this.#sent.shift();
       if (isInput) this.#inputs.push({ seq: this.#newest, time, sent: performance.now() });
     } catch (thrown) {
       this.watcher.problem(thrown as LpdeformError);

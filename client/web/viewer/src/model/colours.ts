@@ -9,14 +9,6 @@ export const stops: readonly Rgb[] = [
   [215, 40, 35],
 ];
 
-/** The colour for t from 0 to 1; values outside are clamped. */
-export function blueToRed(t: number): Rgb {
-  const scaled = Math.min(Math.max(t, 0), 1) * (stops.length - 1);
-  const stop = Math.min(Math.floor(scaled), stops.length - 2);
-  const [low, high] = [stops[stop]!, stops[stop + 1]!];
-  return [0, 1, 2].map((k) => Math.round(low[k]! + (high[k]! - low[k]!) * (scaled - stop))) as unknown as Rgb;
-}
-
 /** Distinct for most eyes, on light and on dark; groups use them in turn. */
 export const groupColours: readonly string[] = [
   "#ff7a1a",

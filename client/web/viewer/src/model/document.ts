@@ -19,6 +19,13 @@ export interface Handle {
   readonly isLocked: boolean;
 }
 
+/** Where every handle is, and p, to come back to and to play. */
+export interface KeyPose {
+  readonly name: string;
+  readonly p: number;
+  readonly handles: readonly Pick<Handle, "name" | "pose" | "targets">[];
+}
+
 /** Everything that undo restores and that a server could lose. Immutable. */
 export interface Document {
   readonly handles: readonly Handle[];
@@ -31,6 +38,8 @@ export interface Document {
   readonly paintedP?: Float32Array;
   /** One per vertex. */
   readonly stiffness?: Float32Array;
+  /** Poses to come back to, and to play. */
+  readonly keyPoses?: readonly KeyPose[];
   /** The vertices that may move; from a file. */
   readonly region?: readonly number[];
 }
@@ -148,6 +157,12 @@ export function paint(
   const stiffness = document.stiffness?.slice() ?? new Float32Array(vertexCount).fill(1);
   for (const vertex of vertices) stiffness[vertex] = value;
   return { ...document, stiffness, isAutomatic: false };
+}
+
+/** Without one of the painted fields. */
+export function withoutField(document: Document, field: "paintedP" | "stiffness"): Document {
+  const { [field]: _, ...rest } = document;
+  return rest;
 }
 
 export function withoutPaint(document: Document): Document {

@@ -16,6 +16,8 @@ export interface Mesh {
   beside?: readonly string[];
   /** The OBJ file itself, so that its other contents can be saved with it. */
   obj?: Uint8Array;
+  /** The GLB file itself, for the same. */
+  gltf?: Uint8Array;
 }
 
 /** A mesh to be written, in the precision of its numbers. */

@@ -66,15 +66,21 @@ export function subtract(a: Vector3, b: Vector3): Vector3 {
   return [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 }
 
+/** The inverse. */
+export function conjugate([x, y, z, w]: Quaternion): Quaternion {
+  return [-x, -y, -z, w];
+}
+
 /** The product that applies the second rotation first, normalised so that errors do not accumulate. */
-function product([ax, ay, az, aw]: Quaternion, [bx, by, bz, bw]: Quaternion): Quaternion {
+export function product([ax, ay, az, aw]: Quaternion, [bx, by, bz, bw]: Quaternion): Quaternion {
   const [x, y, z] = add(cross([ax, ay, az], [bx, by, bz]), [aw * bx + bw * ax, aw * by + bw * ay, aw * bz + bw * az]);
   const w = aw * bw - ax * bx - ay * by - az * bz;
   const length = Math.hypot(x, y, z, w);
   return [x / length, y / length, z / length, w / length];
 }
 
-function rotate([x, y, z, w]: Quaternion, v: Vector3): Vector3 {
+/** The vector, turned. */
+export function rotate([x, y, z, w]: Quaternion, v: Vector3): Vector3 {
   const t = cross([x, y, z], v).map((value) => 2 * value) as unknown as Vector3;
   return add(add(v, [w * t[0], w * t[1], w * t[2]]), cross([x, y, z], t));
 }

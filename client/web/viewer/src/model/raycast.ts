@@ -1,3 +1,5 @@
+import { type FaceBlocks, visitFaces } from "./face_blocks.js";
+
 export interface Hit {
   face: number;
   distance: number;
@@ -6,55 +8,70 @@ export interface Hit {
   vertex: number;
 }
 
-/** Where a ray first meets the surface, from either side. Tests every face: about 3 ms for 100,000 faces. */
+/**
+ * Where a ray first meets the surface, from either side. With `blocks`, of the same positions, it tests few faces; otherwise
+ * all of them, about 3 ms for 100,000 faces.
+ */
 export function raycast(
   positions: Float32Array,
   faces: Uint32Array,
   origin: readonly [number, number, number],
   direction: readonly [number, number, number],
+  blocks?: FaceBlocks,
 ): Hit | undefined {
-  const [ox, oy, oz] = origin;
-  const [dx, dy, dz] = direction;
-  let nearest = Infinity;
-  let face = -1;
-  for (let f = 0; f < faces.length; f += 3) {
-    const a = 3 * faces[f]!;
-    const b = 3 * faces[f + 1]!;
-    const c = 3 * faces[f + 2]!;
-    const ax = positions[a]!;
-    const ay = positions[a + 1]!;
-    const az = positions[a + 2]!;
-    const ux = positions[b]! - ax;
-    const uy = positions[b + 1]! - ay;
-    const uz = positions[b + 2]! - az;
-    const vx = positions[c]! - ax;
-    const vy = positions[c + 1]! - ay;
-    const vz = positions[c + 2]! - az;
-    const px = dy * vz - dz * vy;
-    const py = dz * vx - dx * vz;
-    const pz = dx * vy - dy * vx;
-    const determinant = ux * px + uy * py + uz * pz;
-    if (determinant === 0) continue;
-    const inverse = 1 / determinant;
-    const sx = ox - ax;
-    const sy = oy - ay;
-    const sz = oz - az;
-    const s = (sx * px + sy * py + sz * pz) * inverse;
-    if (s < 0 || s > 1) continue;
-    const qx = sy * uz - sz * uy;
-    const qy = sz * ux - sx * uz;
-    const qz = sx * uy - sy * ux;
-    const t = (dx * qx + dy * qy + dz * qz) * inverse;
-    if (t < 0 || s + t > 1) continue;
-    const along = (vx * qx + vy * qy + vz * qz) * inverse;
-    if (along > 0 && along < nearest) {
-      nearest = along;
-      face = f / 3;
-    }
-  }
+  let [nearest, face] = [Infinity, -1];
+  const test = (one: number) => {
+    const along = distanceTo(positions, faces, 3 * one, origin, direction);
+    // Of two faces at the same distance, the first of the mesh.
+    if (!(along < nearest || (along === nearest && one < face))) return;
+    nearest = along;
+    face = one;
+  };
+  if (blocks) visitFaces(blocks, origin, direction, () => nearest, test);
+  else for (let one = 0; 3 * one < faces.length; ++one) test(one);
   if (face < 0) return undefined;
-  const point: [number, number, number] = [ox + nearest * dx, oy + nearest * dy, oz + nearest * dz];
+  const point = origin.map((from, axis) => from + nearest * direction[axis]!) as [number, number, number];
   return { face, distance: nearest, point, vertex: nearestCorner(positions, faces, face, point) };
+}
+
+/** Along the ray to the face whose corners begin at `f`; NaN if it misses the face. */
+function distanceTo(
+  positions: Float32Array,
+  faces: Uint32Array,
+  f: number,
+  [ox, oy, oz]: readonly [number, number, number],
+  [dx, dy, dz]: readonly [number, number, number],
+): number {
+  const a = 3 * faces[f]!;
+  const b = 3 * faces[f + 1]!;
+  const c = 3 * faces[f + 2]!;
+  const ax = positions[a]!;
+  const ay = positions[a + 1]!;
+  const az = positions[a + 2]!;
+  const ux = positions[b]! - ax;
+  const uy = positions[b + 1]! - ay;
+  const uz = positions[b + 2]! - az;
+  const vx = positions[c]! - ax;
+  const vy = positions[c + 1]! - ay;
+  const vz = positions[c + 2]! - az;
+  const px = dy * vz - dz * vy;
+  const py = dz * vx - dx * vz;
+  const pz = dx * vy - dy * vx;
+  const determinant = ux * px + uy * py + uz * pz;
+  if (determinant === 0) return NaN;
+  const inverse = 1 / determinant;
+  const sx = ox - ax;
+  const sy = oy - ay;
+  const sz = oz - az;
+  const s = (sx * px + sy * py + sz * pz) * inverse;
+  if (s < 0 || s > 1) return NaN;
+  const qx = sy * uz - sz * uy;
+  const qy = sz * ux - sx * uz;
+  const qz = sx * uy - sy * ux;
+  const t = (dx * qx + dy * qy + dz * qz) * inverse;
+  if (t < 0 || s + t > 1) return NaN;
+  const along = (vx * qx + vy * qy + vz * qz) * inverse;
+  return along > 0 ? along : NaN;
 }
 
 function nearestCorner(positions: Float32Array, faces: Uint32Array, face: number, point: readonly number[]): number {

@@ -11,31 +11,45 @@ const samePlace = 1e-6;
 export class Seams {
   /** How many vertices are copies of an earlier one. */
   readonly copyCount: number;
-  /** The faces of the mesh, with the first vertex of each place. */
-  readonly faces: Uint32Array;
-  readonly #members = new Map<number, number[]>();
+  #members: Map<number, number[]> | undefined;
 
-  /** `groups`: for each vertex the first vertex in the same place, which may be the vertex itself. */
+  /**
+   * `groups`: for each vertex the first vertex in the same place, which may be the vertex itself. `faces`: those of the mesh, with
+   * the first vertex of each place.
+   */
   constructor(
     readonly groups: Uint32Array,
-    faces: Uint32Array,
+    readonly faces: Uint32Array,
   ) {
-    this.faces = faces.map((vertex) => groups[vertex]!);
     let copyCount = 0;
-    groups.forEach((first, vertex) => {
-      if (first === vertex) return;
-      ++copyCount;
-      const members = this.#members.get(first);
-      if (members) members.push(vertex);
-      else this.#members.set(first, [first, vertex]);
-    });
+    for (let vertex = 0; vertex < groups.length; ++vertex) if (groups[vertex] !== vertex) ++copyCount;
     this.copyCount = copyCount;
+  }
+
+  static of(groups: Uint32Array, meshFaces: Uint32Array): Seams {
+    return new Seams(
+      groups,
+      meshFaces.map((vertex) => groups[vertex]!),
+    );
   }
 
   /** The vertices and all their copies, in order. */
   withCopies(vertices: readonly number[]): number[] {
-    const all = vertices.flatMap((vertex) => this.#members.get(this.groups[vertex]!) ?? [vertex]);
+    const members = (this.#members ??= this.#findMembers());
+    const all = vertices.flatMap((vertex) => members.get(this.groups[vertex]!) ?? [vertex]);
     return [...new Set(all)];
+  }
+
+  /** For the first vertex of a place all that are there, where there are several. */
+  #findMembers(): Map<number, number[]> {
+    const found = new Map<number, number[]>();
+    this.groups.forEach((first, vertex) => {
+      if (first === vertex) return;
+      const members = found.get(first);
+      if (members) members.push(vertex);
+      else found.set(first, [first, vertex]);
+    });
+    return found;
   }
 }
 
@@ -57,7 +71,7 @@ export function seamsOf(mesh: Mesh): Seams | undefined {
   });
   if (!isAny) return undefined;
   for (let vertex = 0; vertex < groups.length; ++vertex) groups[vertex] = first(vertex);
-  return new Seams(groups, mesh.faces);
+  return Seams.of(groups, mesh.faces);
 }
 
 /** The vertices of edges that belong to one face only, ascending. */

@@ -7,9 +7,10 @@ const baseDepth = 0.01;
 
 /**
  * Whether a mesh from a file has its y axis up rather than z. What stands has a flat base and no such top; if the shape does not
- * say, the file does: programs write OBJ with y up, and the other formats mostly with z up.
+ * say, the file does: programs write OBJ with y up, and the other formats mostly with z up. In glTF y is up.
  */
 export function guessYUp({ name, positions, faces }: Pick<Mesh, "name" | "positions" | "faces">): boolean {
+  if (/\.(glb|gltf)$/i.test(name)) return true;
   const [y, z] = [baseShare(positions, faces, 1), baseShare(positions, faces, 2)];
   if (Math.abs(y - z) >= leastShare) return y > z;
   return /\.obj$/i.test(name);

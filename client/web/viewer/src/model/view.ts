@@ -1,7 +1,13 @@
 import type { Encoding } from "lpdeform-client";
+import type { PaletteName } from "./palettes.js";
+import type { Snapping } from "./snap.js";
+import type { PaintField, PaintMode } from "./soft_paint.js";
 import type { Detail } from "./shapes.js";
 
 export type Tool = "move" | "brush" | "lasso" | "box" | "paint";
+
+/** Along which axes the gizmo moves and turns: those of the mesh, of the handle, or of the picture. */
+export type GizmoAxes = "world" | "local" | "view";
 
 /** What the colours show. */
 export type ColourBy = "distortion" | "p" | "stiffness" | "normals" | "plain";
@@ -14,15 +20,25 @@ export interface View {
   tool: Tool;
   mode: StrokeMode;
   selected: string | undefined;
+  /** Other handles that are moved together with the selected one. Selecting another handle empties the list. */
+  alsoSelected: readonly string[];
   gizmo: "translate" | "rotate";
+  axes: GizmoAxes;
+  snapping: Snapping;
   /** Of the brush, as a share of the mesh's diagonal. */
   radius: number;
   /** Whether lasso and box also take vertices that face away. */
   isThrough: boolean;
-  paintField: "p" | "stiffness";
+  paintField: PaintField;
+  paintMode: PaintMode;
+  /** Of the edge of the painting brush: 0 is hard, 1 is soft up to its middle. */
+  softness: number;
   paintP: number;
   paintStiffness: number;
   colourBy: ColourBy;
+  palette: PaletteName;
+  /** Whether the values of the vertex under the pointer are shown. */
+  hasReadout: boolean;
   wireframe: boolean;
   ghost: boolean;
   /** The distortion in full red, if the scale is pinned. */
@@ -44,13 +60,20 @@ export const firstView: View = {
   tool: "move",
   mode: "new",
   selected: undefined,
+  alsoSelected: [],
   gizmo: "translate",
+  axes: "world",
+  snapping: "none",
   radius: 0.05,
   isThrough: true,
   paintField: "p",
+  paintMode: "set",
+  softness: 0,
   paintP: 1,
   paintStiffness: 10,
   colourBy: "distortion",
+  palette: "blueToRed",
+  hasReadout: true,
   wireframe: false,
   ghost: false,
   pinned: undefined,

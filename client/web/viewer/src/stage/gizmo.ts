@@ -1,6 +1,9 @@
 import * as three from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
-import { isAtRest, type Pose, type Quaternion } from "../model/pose.js";
+import type { Vector3 } from "../model/mesh.js";
+import { conjugate, isAtRest, noRotation, type Pose, product, type Quaternion } from "../model/pose.js";
+import { onGrid, onTurnedGrid, turnStep } from "../model/snap.js";
+import type { GizmoAxes } from "../model/view.js";
 
 /** Arrows and rings on the selected handle. */
 export class Gizmo {
@@ -14,8 +17,14 @@ export class Gizmo {
   readonly #controls: TransformControls;
   #pose: Pose | undefined;
   #isCancelled = false;
+  #axes: GizmoAxes = "world";
+  #step: number | undefined;
+  /** How the gizmo's axes are turned at the start of a drag. */
+  #frame = noRotation;
+  readonly #camera: three.Camera;
 
   constructor(camera: three.Camera, canvas: HTMLCanvasElement, changed: () => void) {
+    this.#camera = camera;
     this.#controls = new TransformControls(camera, canvas);
     this.object.add(this.#controls.getHelper(), this.#anchor);
     removeBackwardArrows(this.#controls.getHelper());
@@ -54,21 +63,35 @@ export class Gizmo {
     return true;
   }
 
-  /** Undefined: no handle is selected, or it cannot be moved. */
-  show(pose: Pose | undefined, mode: "translate" | "rotate"): void {
+  /** Undefined: no handle is selected, or it cannot be moved. `step`: of the grid to which it keeps, if there is one. */
+  show(pose: Pose | undefined, mode: "translate" | "rotate", axes: GizmoAxes = "world", step?: number): void {
     this.#controls.setMode(mode);
     if (this.isDragging) return;
     this.#pose = pose;
+    this.#axes = axes;
+    this.#step = step;
+    this.#controls.setRotationSnap(step === undefined ? null : (turnStep * Math.PI) / 180);
     if (!pose) {
       this.#controls.detach();
       return;
     }
-    const { center, translation, rotation } = pose;
+    const { center, translation } = pose;
     this.#anchor.position.set(center[0] + translation[0], center[1] + translation[1], center[2] + translation[2]);
-    this.#anchor.quaternion.set(...rotation);
-    this.#anchor.updateMatrixWorld();
+    this.#turnAnchor();
     if (this.#controls.object !== this.#anchor) this.#controls.attach(this.#anchor);
-    this.#controls.setSpace("world");
+    this.#controls.setSpace(axes === "world" ? "world" : "local");
+  }
+
+  /** Before each picture: the axes of the picture turn with the view. */
+  follow(): void {
+    if (this.#pose && this.#axes === "view" && !this.isDragging) this.#turnAnchor();
+  }
+
+  #turnAnchor(): void {
+    if (this.#axes === "view") this.#anchor.quaternion.copy(this.#camera.quaternion);
+    else this.#anchor.quaternion.set(...this.#pose!.rotation);
+    this.#frame = this.#anchor.quaternion.toArray() as unknown as Quaternion;
+    this.#anchor.updateMatrixWorld();
   }
 
   dispose(): void {
@@ -77,11 +100,20 @@ export class Gizmo {
 
   #moved(): void {
     if (!this.#pose) return;
-    const { center } = this.#pose;
+    const { center, translation: before, rotation: from } = this.#pose;
     const { position, quaternion } = this.#anchor;
-    const translation = [position.x - center[0], position.y - center[1], position.z - center[2]] as const;
-    const pose: Pose = { center, translation, rotation: quaternion.toArray() as unknown as Quaternion };
+    const to: Vector3 = [position.x - center[0], position.y - center[1], position.z - center[2]];
+    const translation = this.#step === undefined ? to : this.#snapped(before, to, this.#step);
+    position.set(center[0] + translation[0], center[1] + translation[1], center[2] + translation[2]);
+    // The anchor is turned as the gizmo's axes are; what the drag has added to that turns the handle.
+    const added = product(quaternion.toArray() as unknown as Quaternion, conjugate(this.#frame));
+    const pose: Pose = { center, translation, rotation: product(added, from) };
     this.onPose(isAtRest(pose) ? { ...pose, translation: [0, 0, 0] } : pose);
+  }
+
+  #snapped(before: Vector3, to: Vector3, step: number): Vector3 {
+    if (this.#controls.mode !== "translate") return before;
+    return this.#axes === "world" ? onGrid(before, to, step) : onTurnedGrid(before, to, step, this.#frame);
   }
 }
 

@@ -1,17 +1,19 @@
 import * as three from "three";
 import type { Handle } from "../model/document.js";
+import { type Ahead, place } from "./ahead.js";
 import { follow, type Places, placesOf } from "../model/places.js";
 
 const vertexShader = `
 attribute vec3 colour;
 attribute float size;
+${place}
 uniform float pixelRatio;
 varying vec3 vColour;
 varying float vRing;
 void main() {
   vColour = colour;
   vRing = smoothstep(6.5, 8.5, size);
-  vec4 seen = modelViewMatrix * vec4(position, 1.0);
+  vec4 seen = modelViewMatrix * vec4(placed(), 1.0);
   seen.xyz *= 0.996; // before the surface that it lies on, in the same place of the picture
   gl_Position = projectionMatrix * seen;
   gl_PointSize = size * pixelRatio;
@@ -26,11 +28,16 @@ void main() {
   gl_FragColor = vec4(mix(vColour, vec3(1.0), vRing * smoothstep(0.62, 0.72, far)), 1.0);
 }`;
 
-/** Points on the surface: handles in their colours, and highlighted vertices. */
+/** Points on the surface: handles in their colours. */
 export class Marks {
   readonly object: three.Points;
-  readonly #material = new three.ShaderMaterial({ vertexShader, fragmentShader, uniforms: { pixelRatio: { value: 1 } } });
+  readonly #material = new three.ShaderMaterial({
+    vertexShader,
+    fragmentShader,
+    uniforms: { pixelRatio: { value: 1 }, ahead: { value: new three.Matrix4() } },
+  });
   #places: Places = { corners: [], weights: [] };
+  #shown: readonly unknown[] = [];
 
   constructor() {
     this.object = new three.Points(new three.BufferGeometry(), this.#material);
@@ -38,14 +45,29 @@ export class Marks {
     this.object.renderOrder = 1;
   }
 
-  /** `faces`: of the mesh; `pointedOut`: highlighted vertices. */
-  show(
-    handles: readonly Handle[],
-    faces: Uint32Array,
-    selected: string | undefined,
-    pointedOut: readonly number[],
-    pointedColour: string,
-  ): void {
+  /** `ahead`: the uniform of the surface on which they lie. */
+  attach(ahead: Ahead): void {
+    this.#material.uniforms["ahead"] = ahead;
+  }
+
+  /** Marks those vertices as pulled along by what is ahead. */
+  pull(shares: Float32Array | undefined): void {
+    const pull = this.object.geometry.attributes["pull"] as three.BufferAttribute | undefined;
+    if (!pull) return;
+    const { corners } = this.#places;
+    for (let k = 0; k < pull.count; ++k) pull.array[k] = shares?.[corners[3 * k]!] ?? 0;
+    pull.needsUpdate = true;
+  }
+
+  /** `faces`: of the mesh. Returns true if other points are marked than before, which are not at their places yet. */
+  show(handles: readonly Handle[], faces: Uint32Array, selected: readonly string[]): boolean {
+    const shown = [
+      faces,
+      ...selected,
+      ...handles.flatMap(({ name, vertices, points, colour }) => [name, vertices, points, colour]),
+    ];
+    if (shown.length === this.#shown.length && shown.every((one, k) => one === this.#shown[k])) return false;
+    this.#shown = shown;
     const corners: number[] = [];
     const weights: number[] = [];
     const colours: number[] = [];
@@ -65,16 +87,17 @@ export class Marks {
       const places = placesOf(vertices, points, faces);
       const count = places.corners.length / 3;
       const small = count > 400 ? 4 : count > 60 ? 5 : count > 4 ? 8 : 11;
-      add(places, colour, name === selected ? small + 1.5 : small);
+      add(places, colour, selected.includes(name) ? small + 1.5 : small);
     }
-    add(placesOf(pointedOut, [], faces), pointedColour, 9);
     this.#places = { corners, weights };
     const geometry = new three.BufferGeometry();
     geometry.setAttribute("position", new three.BufferAttribute(new Float32Array(corners.length), 3));
     geometry.setAttribute("colour", new three.BufferAttribute(new Float32Array(colours), 3));
+    geometry.setAttribute("pull", new three.BufferAttribute(new Float32Array(sizes.length), 1));
     geometry.setAttribute("size", new three.BufferAttribute(new Float32Array(sizes), 1));
     this.object.geometry.dispose();
     this.object.geometry = geometry;
+    return true;
   }
 
   /** Follows the surface. */

@@ -1,6 +1,6 @@
 import * as three from "three";
 import type { Vector3 } from "../model/mesh.js";
-import { type Hit, raycast } from "../model/raycast.js";
+import type { Hit } from "../model/raycast.js";
 import type { Stage } from "./stage.js";
 
 /** What pointing at a stage does. Positions are pixels from the canvas's upper left corner; times are those of the events. */
@@ -19,6 +19,8 @@ export interface PointerAt {
   isTouch: boolean;
   shift: boolean;
   alt: boolean;
+  /** Control, or Command on a Mac. */
+  control: boolean;
   ray: three.Ray;
   hit: Hit | undefined;
 }
@@ -82,10 +84,11 @@ export class Pointing {
       isTouch: event instanceof PointerEvent && event.pointerType === "touch",
       shift: event.shiftKey,
       alt: event.altKey,
+      control: event.ctrlKey || event.metaKey,
       ray,
       get hit() {
         found ??= {
-          hit: surface && raycast(surface.positions, surface.mesh.faces, ray.origin.toArray(), ray.direction.toArray()),
+          hit: surface?.hit(ray.origin.toArray(), ray.direction.toArray()),
         };
         return found.hit;
       },

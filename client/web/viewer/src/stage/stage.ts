@@ -1,10 +1,12 @@
 import * as three from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { derivedOf } from "../model/derived.js";
 import { boundsOf, type Mesh, type Vector3 } from "../model/mesh.js";
 import { Backdrop } from "./backdrop.js";
-import { Gizmo } from "./gizmo.js";
 import { Highlight } from "./highlight.js";
+import { LateGizmo } from "./late_gizmo.js";
 import { Marks } from "./marks.js";
+import { PointedMarks } from "./pointed_marks.js";
 import { isSoftware } from "./software.js";
 import { Surface } from "./surface.js";
 
@@ -17,13 +19,16 @@ export interface Look {
 /** Height of a picture on which marks have their full size; on smaller pictures they would hide the surface. */
 const fullSizeHeight = 700;
 
+/** Of a picture at rest that the processor draws; more would take seconds. */
+const mostPixels = 16e6;
+
 /** Where small.css puts the controls beside the pictures. */
 const littleRoom = "(max-aspect-ratio: 1/1) and (max-width: 720px), (min-aspect-ratio: 1/1) and (max-height: 560px)";
 
 /** The pixels that the page's controls cover at the edges of a picture of this width. */
 function coveredAt(width: number): { left: number; top: number; bottom: number } {
-  if (matchMedia(littleRoom).matches) return { left: 0, top: 20, bottom: 20 };
-  return width > 620 ? { left: 70, top: 50, bottom: 120 } : { left: 40, top: 110, bottom: 165 };
+  if (matchMedia(littleRoom).matches) return { left: 0, top: 48, bottom: 16 };
+  return width > 620 ? { left: 70, top: 98, bottom: 120 } : { left: 40, top: 110, bottom: 165 };
 }
 
 /** One picture of a surface: canvas, camera, and what is drawn. It draws only when it is told to. */
@@ -31,8 +36,9 @@ export class Stage {
   readonly canvas = document.createElement("canvas");
   readonly camera = new three.PerspectiveCamera(32, 1, 0.01, 1000);
   readonly marks = new Marks();
-  readonly highlight = new Highlight();
-  readonly gizmo: Gizmo;
+  readonly pointed = new PointedMarks();
+  readonly highlight: Highlight;
+  readonly gizmo: LateGizmo;
   surface: Surface | undefined;
   readonly #backdrop = new Backdrop();
   readonly #renderer: three.WebGLRenderer;
@@ -49,8 +55,9 @@ export class Stage {
     this.#renderer = new three.WebGLRenderer({ canvas: this.canvas, antialias: !isSoftware, alpha: false });
     this.canvas.addEventListener("webglcontextrestored", changed);
     this.camera.up.set(0, 0, 1);
-    this.gizmo = new Gizmo(this.camera, this.canvas, changed);
-    this.#scene.add(this.#backdrop.object, this.marks.object, this.highlight.object, this.gizmo.object);
+    this.highlight = new Highlight(changed);
+    this.gizmo = new LateGizmo(this.camera, this.canvas, changed, () => this.#restartControls());
+    this.#scene.add(this.#backdrop.object, this.marks.object, this.pointed.object, this.highlight.object, this.gizmo.object);
   }
 
   /** Called after all other listeners to the canvas are set: what they take does not turn the view. */
@@ -63,12 +70,22 @@ export class Stage {
     this.#controls = controls;
   }
 
+  #restartControls(): void {
+    if (!this.#controls) return;
+    const { look } = this;
+    this.#controls.dispose();
+    this.startControls(); // it turns the camera to the origin
+    this.lookFrom(look);
+  }
+
   /** `faces`: the faces to shade smoothly, if these are not the mesh's own. */
   open(mesh: Mesh, faces?: Uint32Array): void {
     const surface = new Surface(mesh, faces); // made before the old one is removed, because there may be no memory for it
     this.surface?.group.removeFromParent();
     this.surface?.dispose();
     this.surface = surface;
+    this.marks.attach(surface.ahead);
+    this.pointed.attach(surface);
     this.#scene.add(surface.group);
   }
 
@@ -78,15 +95,12 @@ export class Stage {
 
   /** Shows everything, from the front and a little above. */
   fit({ positions, mesh }: Surface, isYUp: boolean): void {
-    const { min, max, center, diagonal } = boundsOf(positions, mesh.faces);
+    const isAtRest = positions === mesh.positions;
+    const { min, max, center, diagonal } = isAtRest ? derivedOf(mesh).bounds : boundsOf(positions, mesh.faces);
     const away = isYUp ? new three.Vector3(0.62, 0.42, 1) : new three.Vector3(0.62, -1, 0.42);
     const { camera } = this;
     camera.up.set(0, isYUp ? 1 : 0, isYUp ? 0 : 1);
-    // OrbitControls reads the camera's up when it is made.
-    if (this.#controls) {
-      this.#controls.dispose();
-      this.startControls();
-    }
+    this.#restartControls(); // OrbitControls reads the camera's up when it is made
     camera.position.copy(away.normalize());
     camera.lookAt(0, 0, 0);
     this.target.set(...center);
@@ -153,6 +167,18 @@ export class Stage {
     this.lookFrom({ position: middle.addScaledVector(towards, distance).toArray(), target });
   }
 
+  /** Looks from this direction at the middle of the surface, all of which is in sight. `front`: what is below where up is unclear. */
+  lookAlong(direction: Vector3, front: Vector3): void {
+    const { camera, surface } = this;
+    if (!surface) return;
+    const { min, max, center } = boundsOf(surface.positions, surface.mesh.faces);
+    const away = new three.Vector3(...direction).addScaledVector(new three.Vector3(...front), 1e-4).normalize();
+    camera.position.copy(away);
+    camera.lookAt(0, 0, 0);
+    const position = new three.Vector3(...center).addScaledVector(away, this.#distanceFor(min, max, center));
+    this.lookFrom({ position: position.toArray(), target: center });
+  }
+
   /** Turns like dragging the surface to the right and up by this many radians. */
   turn(right: number, up: number): void {
     const { camera, target } = this;
@@ -197,7 +223,8 @@ export class Stage {
    * up to 1, makes it coarser still. Returns true if the size has changed.
    */
   resize(width: number, height: number, isMoving: boolean, quality = 1): boolean {
-    const ratio = isSoftware ? (isMoving ? quality : 2) : Math.min(devicePixelRatio, 2);
+    const fine = Math.min(2, Math.max(1, Math.sqrt(mostPixels / (width * height))));
+    const ratio = isSoftware ? (isMoving ? quality : fine) : Math.min(devicePixelRatio, 2);
     if (ratio === this.#pixelRatio && width === this.#size[0] && height === this.#size[1]) return false;
     this.#pixelRatio = ratio;
     this.#size = [width, height];
@@ -206,7 +233,9 @@ export class Stage {
     this.camera.aspect = width / Math.max(height, 1);
     const covered = coveredAt(width);
     this.camera.setViewOffset(width, height, -covered.left / 2, (covered.bottom - covered.top) / 2, width, height);
-    this.marks.scale(ratio * Math.min(Math.max(height / fullSizeHeight, 0.6), 1));
+    const scale = ratio * Math.min(Math.max(height / fullSizeHeight, 0.6), 1);
+    this.marks.scale(scale);
+    this.pointed.scale(scale);
     this.highlight.resize(width, height);
     return true;
   }
@@ -216,6 +245,7 @@ export class Stage {
   }
 
   draw(): void {
+    this.gizmo.follow();
     this.#renderer.render(this.#scene, this.camera);
   }
 
@@ -246,6 +276,7 @@ export class Stage {
     this.#controls?.dispose();
     this.gizmo.dispose();
     this.highlight.dispose();
+    this.pointed.dispose();
     this.surface?.dispose();
     this.#renderer.dispose();
     this.#renderer.forceContextLoss(); // browsers allow only a few, and remove the oldest

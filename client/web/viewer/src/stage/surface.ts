@@ -1,10 +1,15 @@
 import * as three from "three";
+import type { Adjacency } from "../model/adjacency.js";
+import { derivedOf, shownOf } from "../model/derived.js";
+import { blockBoxes, type FaceBlocks } from "../model/face_blocks.js";
 import type { Mesh } from "../model/mesh.js";
 import { Pairs } from "../model/pairs.js";
-import type { ColourBy } from "../model/view.js";
+import { type Hit, raycast } from "../model/raycast.js";
+import type { ColourBy, View } from "../model/view.js";
 import { DrawMesh } from "./drawmesh.js";
+import type { Intake, IntakeMesh } from "./intake.js";
 import { isSoftware } from "./software.js";
-import { colourByNormal, surfaceMaterial } from "./surface_material.js";
+import { colourByNormal, paint, surfaceMaterial } from "./surface_material.js";
 
 /** The value for each colour. */
 export interface Scale {
@@ -21,9 +26,18 @@ export class Surface {
   readonly group = new three.Group();
   /** The positions of the mesh's vertices, as drawn. */
   positions: Float32Array;
+  readonly #faces: Uint32Array;
   readonly #draw: DrawMesh;
+  /** The motion of a handle since the frame; each vertex goes along as far as pull() has said. */
+  readonly ahead = { value: new three.Matrix4() };
+  #pull: Float32Array | undefined;
+  #drawnOf: Uint32Array | undefined;
+  /** Of the present positions, once they are needed. */
+  #blocks: FaceBlocks | undefined;
   readonly #geometry = new three.BufferGeometry();
   readonly #values: Float32Array;
+  readonly #pulls: Float32Array;
+  #intake: Intake | undefined;
   readonly #isPerVertex: boolean;
   readonly #material: three.ShaderMaterial;
   readonly #wire = new three.LineSegments(
@@ -36,16 +50,19 @@ export class Surface {
     readonly mesh: Mesh,
     faces = mesh.faces,
   ) {
+    this.#faces = faces;
     this.positions = mesh.positions;
-    this.#draw = new DrawMesh({ ...mesh, faces });
+    this.#draw = new DrawMesh({ positions: mesh.positions, faces }, shownOf(mesh, faces).drawn);
     this.#values = new Float32Array(this.#draw.source.length);
+    this.#pulls = new Float32Array(this.#draw.source.length);
     this.#isPerVertex = isSoftware && mesh.positions.length > 3 * denseVertices;
-    this.#material = surfaceMaterial(this.#isPerVertex, this.#draw.isClosed);
+    this.#material = surfaceMaterial(this.#isPerVertex, this.#draw.isClosed, this.ahead);
     const geometry = this.#geometry;
     geometry.setIndex(new three.BufferAttribute(this.#draw.indices, 1));
     geometry.setAttribute("position", live(this.#draw.positions, 3));
     geometry.setAttribute("normal", live(this.#draw.normals, 3));
     geometry.setAttribute("value", live(this.#values, 1));
+    geometry.setAttribute("pull", live(this.#pulls, 1));
     this.#ghost = this.#makeGhost();
     const drawn = new three.Mesh(geometry, this.#material);
     for (const object of [drawn, this.#wire, this.#ghost]) {
@@ -55,18 +72,82 @@ export class Surface {
     this.#wire.visible = this.#ghost.visible = false;
   }
 
-  /** Positions of the mesh's vertices; the array is kept. */
-  move(positions: Float32Array): void {
+  /** Where a ray first meets the surface. */
+  hit(origin: readonly [number, number, number], direction: readonly [number, number, number]): Hit | undefined {
+    const { positions, mesh } = this;
+    const { order } = derivedOf(mesh);
+    this.#blocks ??= { order, boxes: blockBoxes(positions, mesh.faces, order) };
+    return raycast(positions, mesh.faces, origin, direction, this.#blocks);
+  }
+
+  /** For each vertex of the mesh one of those that are drawn; 2^32 - 1 if there is none. */
+  get drawnOf(): Uint32Array {
+    if (this.#drawnOf) return this.#drawnOf;
+    const drawn = new Uint32Array(this.mesh.positions.length / 3).fill(0xffffffff);
+    this.#draw.source.forEach((vertex, k) => (drawn[vertex] = k));
+    return (this.#drawnOf = drawn);
+  }
+
+  get adjacency(): Adjacency {
+    return shownOf(this.mesh, this.#faces).adjacency;
+  }
+
+  /** Gives a geometry the vertices of this one. */
+  share(geometry: three.BufferGeometry): void {
+    for (const name of ["position", "pull"]) geometry.setAttribute(name, this.#geometry.attributes[name]!);
+  }
+
+  /** `shares`: for each vertex of the mesh, how far it goes along with what is ahead; undefined: none does. */
+  pull(shares: Float32Array | undefined): void {
+    this.#pull = shares;
+    if (!shares) {
+      this.ahead.value.identity();
+      return;
+    }
+    this.#draw.spread(shares, this.#pulls);
+    this.#show("pull", this.#pulls);
+  }
+
+  /** Where a vertex is drawn. */
+  placeOf(vertex: number): three.Vector3 {
+    const at = new three.Vector3().fromArray(this.positions, 3 * vertex);
+    return at.clone().lerp(at.applyMatrix4(this.ahead.value), this.#pull?.[vertex] ?? 0);
+  }
+
+  /** For an IntakeWorker. */
+  get intakeMesh(): IntakeMesh {
+    const { positions, faces } = this.mesh;
+    const { adjacency, drawn } = shownOf(this.mesh, this.#faces);
+    return { positions, faces, drawn, adjacency, order: derivedOf(this.mesh).order };
+  }
+
+  /** Positions of the mesh's vertices; the array is kept. `intake`: what is drawn of them, if that was found elsewhere. */
+  move(positions: Float32Array, intake?: Intake): void {
     this.positions = positions;
-    this.#draw.take(positions);
-    this.#geometry.attributes["position"]!.needsUpdate = true;
-    this.#geometry.attributes["normal"]!.needsUpdate = true;
+    this.#intake = intake;
+    this.#blocks = intake && { order: derivedOf(this.mesh).order, boxes: intake.boxes };
+    if (intake) {
+      this.#draw.positions = intake.positions;
+      this.#draw.normals = intake.normals;
+    } else {
+      this.#draw.take(positions);
+    }
+    this.#show("position", this.#draw.positions);
+    this.#show("normal", this.#draw.normals);
+  }
+
+  #show(name: "position" | "normal" | "value" | "pull", array: Float32Array): void {
+    const attribute = this.#geometry.attributes[name] as three.BufferAttribute;
+    attribute.array = array;
+    attribute.needsUpdate = true;
   }
 
   colour(by: ColourBy, values: Float32Array | undefined, { low, red, isLogarithmic }: Scale): void {
-    if (values) {
+    if (values && by === "distortion" && this.#intake) {
+      this.#show("value", this.#intake.distortion);
+    } else if (values) {
       this.#draw.spread(values, this.#values);
-      this.#geometry.attributes["value"]!.needsUpdate = true;
+      this.#show("value", this.#values);
     }
     const uniforms = this.#material.uniforms;
     uniforms["low"]!.value = low;
@@ -76,7 +157,8 @@ export class Surface {
     colourByNormal(this.#material, by === "normals", this.#isPerVertex);
   }
 
-  show({ wireframe, ghost, isDark }: { wireframe: boolean; ghost: boolean; isDark: boolean }): void {
+  show({ wireframe, ghost, isDark, palette }: Pick<View, "wireframe" | "ghost" | "isDark" | "palette">): void {
+    paint(this.#material, palette);
     if (wireframe) this.#findEdges();
     this.#wire.visible = wireframe;
     this.#ghost.visible = ghost;

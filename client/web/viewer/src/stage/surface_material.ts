@@ -1,5 +1,6 @@
 import * as three from "three";
-import { stops } from "../model/colours.js";
+import { type PaletteName, palettes } from "../model/palettes.js";
+import { type Ahead, place } from "./ahead.js";
 
 // Lit from the camera and from above, in sRGB throughout: without conversions the surface has the legend's
 // colours.
@@ -23,8 +24,9 @@ varying vec3 vNormal;
 varying vec3 vToEye;
 #endif
 ${light}
+${place}
 void main() {
-  vec4 seen = modelViewMatrix * vec4(position, 1.0);
+  vec4 seen = modelViewMatrix * vec4(placed(), 1.0);
   vValue = value;
 #ifdef PER_VERTEX
   vec3 toEye = normalize(-seen.xyz);
@@ -52,7 +54,7 @@ varying vec3 vNormal;
 varying vec3 vToEye;
 #endif
 ${light}
-vec3 blueToRed(float t) {
+vec3 colourFor(float t) {
   float scaled = clamp(t, 0.0, 1.0) * 4.0;
   if (scaled < 1.0) return mix(stops[0], stops[1], scaled);
   if (scaled < 2.0) return mix(stops[1], stops[2], scaled - 1.0);
@@ -62,7 +64,7 @@ vec3 blueToRed(float t) {
 
 void main() {
   float share = logarithmic > 0.5 ? log(vValue / low) / log(red / low) : (vValue - low) / max(red - low, 1e-30);
-  vec3 colour = colourful > 0.5 ? blueToRed(red > low ? share : 0.0) : plain;
+  vec3 colour = colourful > 0.5 ? colourFor(red > low ? share : 0.0) : plain;
 #ifdef PER_VERTEX
   vec2 brightness = vLit;
 #else
@@ -79,7 +81,7 @@ void main() {
  * `isPerVertex`: lighting is computed per vertex instead of per pixel. If the processor draws, that takes half the time, and it
  * is visible only on coarse meshes. `isClosed`: the inside is never visible, so it is not drawn.
  */
-export function surfaceMaterial(isPerVertex: boolean, isClosed: boolean): three.ShaderMaterial {
+export function surfaceMaterial(isPerVertex: boolean, isClosed: boolean, ahead: Ahead): three.ShaderMaterial {
   return new three.ShaderMaterial({
     vertexShader,
     fragmentShader,
@@ -89,12 +91,13 @@ export function surfaceMaterial(isPerVertex: boolean, isClosed: boolean): three.
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
     uniforms: {
+      ahead,
       red: { value: 1 },
       low: { value: 0 },
       logarithmic: { value: 0 },
       colourful: { value: 1 },
       plain: { value: new three.Vector3(0.72, 0.75, 0.8) },
-      stops: { value: stops.map(([r, g, b]) => new three.Vector3(r / 255, g / 255, b / 255)) },
+      stops: { value: vectorsOf("blueToRed") },
     },
   });
 }
@@ -105,4 +108,13 @@ export function colourByNormal(material: three.ShaderMaterial, isOn: boolean, is
   if (JSON.stringify(defines) === JSON.stringify(material.defines)) return;
   material.defines = defines;
   material.needsUpdate = true;
+}
+
+/** Which colours values have. */
+export function paint(material: three.ShaderMaterial, palette: PaletteName): void {
+  material.uniforms["stops"]!.value = vectorsOf(palette);
+}
+
+function vectorsOf(palette: PaletteName): three.Vector3[] {
+  return palettes[palette].stops.map(([r, g, b]) => new three.Vector3(r / 255, g / 255, b / 255));
 }

@@ -4,6 +4,7 @@ import type { Document } from "../model/document.js";
 import { leastP, mostP, steppedP } from "../model/exponent.js";
 import { capital, short } from "../model/words.js";
 import { el, measured, setText, toggle } from "./dom.js";
+import { numberField } from "./number_field.js";
 
 /** The values in the paper's figures. */
 const stops = [1, 1.5, 2, 6] as const;
@@ -56,7 +57,6 @@ function pSlider(app: App, field: Field): HTMLElement {
     step: "0.002",
     aria: { label: "p" },
   });
-  const shown = el("output");
   const set = (p: number) => ({ ...app.document, [field]: p, isAutomatic: false });
   input.addEventListener("input", (event) => app.during(set(pAt(input.valueAsNumber)), event.timeStamp));
   input.addEventListener("change", () => app.endGesture());
@@ -66,6 +66,15 @@ function pSlider(app: App, field: Field): HTMLElement {
     event.preventDefault();
     const p = steppedP(app.document[field], step);
     if (p !== app.document[field] || app.document.isAutomatic) app.byKey(set(p), event);
+  });
+  const number = numberField({
+    label: "Value of p",
+    title: `p as a number from ${leastP} to ${mostP}: Enter takes it, arrow keys change it`,
+    range: [leastP, mostP],
+    step: () => 0.01,
+    entered: (p) => app.change(set(p)),
+    stepped: (p, event) => app.byKey(set(steppedP(p, 0)), event),
+    refused: (why) => app.notify(why, true),
   });
   const ticks = stops.map((stop) => {
     const tick = el("button", {
@@ -84,7 +93,7 @@ function pSlider(app: App, field: Field): HTMLElement {
       input.valueAsNumber = shareOf(p);
       input.style.setProperty("--share", `${shareOf(p) * 100}%`);
       input.setAttribute("aria-valuetext", short(p));
-      shown.textContent = isAutomatic ? "auto" : short(p);
+      number.show(p, isAutomatic ? "auto" : undefined);
       ticks.forEach((tick, k) => tick.setAttribute("aria-pressed", String(!isAutomatic && stops[k] === p)));
     },
   );
@@ -95,11 +104,13 @@ function pSlider(app: App, field: Field): HTMLElement {
     const { isSplit } = app.view.now;
     setText(place, isSplit ? placeOf(side) : "");
     place.hidden = !isSplit;
-    input.setAttribute("aria-label", isSplit ? `p of the ${placeOf(side)} picture` : "p");
+    const picture = isSplit ? ` of the ${placeOf(side)} picture` : "";
+    input.setAttribute("aria-label", `p${picture}`);
+    number.element.setAttribute("aria-label", `Value of p${picture}`);
   };
   app.view.watchAll(name);
   watchPlaces(name);
-  return el("div", { className: "p-row" }, el("span", { className: "p-name" }, "p", place), track, shown);
+  return el("div", { className: "p-row" }, el("span", { className: "p-name" }, "p", place), track, number.element);
 }
 
 function wordsOf({ p, secondP, isAutomatic, paintedP, stiffness }: Document, isSplit: boolean): string {

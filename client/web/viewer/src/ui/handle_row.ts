@@ -1,6 +1,7 @@
 import type { App } from "../app/app.js";
 import { groupColours } from "../model/colours.js";
 import { changeHandle, type Handle, nameFault, removeHandle } from "../model/document.js";
+import { selecting, toggled } from "../model/together.js";
 import { short } from "../model/words.js";
 import { button } from "./controls.js";
 import { el, setText } from "./dom.js";
@@ -8,10 +9,10 @@ import { icon } from "./icons.js";
 
 export interface HandleRow {
   element: HTMLElement;
-  show(handle: Handle, isSelected: boolean): void;
+  show(handle: Handle, isSelected: boolean, isTogether: boolean): void;
 }
 
-/** A line of the list: colour, name, count, padlock, bin. It stays when its contents change, so it keeps the focus. */
+/** A line of the list: colour, link, name, count, padlock, bin. It stays when its contents change, so it keeps the focus. */
 export function handleRow(app: App): HandleRow {
   let shown: Handle | undefined;
   const change = (part: (handle: Handle) => Partial<Handle>) =>
@@ -21,22 +22,28 @@ export function handleRow(app: App): HandleRow {
     change(({ colour }) => ({ colour: groupColours[(groupColours.indexOf(colour) + 1) % groupColours.length]! })),
   );
   const field = el("input", { className: "name", spellcheck: false, aria: { label: "Name" } });
-  field.addEventListener("focus", () => app.view.set({ selected: shown!.name }));
+  field.addEventListener("focus", () => app.view.set(selecting(app.view.now, shown!.name)));
   field.addEventListener("change", () => rename(app, shown!.name, field));
+  const together = button("together", "", () => {
+    if (together.ariaDisabled !== "true") app.view.set(toggled(app.view.now, shown!.name));
+  });
   const lock = button("unlock", "", () => change(({ isLocked }) => ({ isLocked: !isLocked })));
   const remove = button("trash", "", () => app.change(removeHandle(app.document, shown!.name)));
   const count = el("span", { className: "count", title: "Vertices" });
-  const element = el("li", {}, dot, field, count, lock, remove);
+  // The link comes before the name: Tab reaches it while another handle is selected.
+  const element = el("li", {}, dot, together, field, count, lock, remove);
   element.addEventListener("click", (event) => {
-    if (event.target === element) app.view.set({ selected: shown!.name });
+    if (event.ctrlKey || event.metaKey) event.target === element && app.view.set(toggled(app.view.now, shown!.name));
+    else if (event.target === element) app.view.set({ selected: shown!.name });
   });
 
-  const show = (handle: Handle, isSelected: boolean) => {
+  const show = (handle: Handle, isSelected: boolean, isTogether: boolean) => {
     const { name, colour, vertices, points, isLocked } = handle;
     if (name !== shown?.name) {
       field.value = name;
       element.dataset["handle"] = name;
       dot.setAttribute("aria-label", `Colour of ${name}`);
+      entitle(together, `Move ${name} together with the selected handle (Ctrl+click)`);
       entitle(remove, `Delete ${name} (Delete)`);
     }
     if (isLocked !== shown?.isLocked) {
@@ -45,7 +52,9 @@ export function handleRow(app: App): HandleRow {
     }
     dot.style.setProperty("--colour", colour);
     setText(count, points ? `${points.length} pts` : short(vertices.length));
-    element.classList.toggle("selected", isSelected);
+    element.classList.toggle("selected", isSelected || isTogether);
+    together.setAttribute("aria-pressed", String(isTogether));
+    together.ariaDisabled = String(isSelected && !isTogether); // it keeps the focus that comes over the name
     shown = handle;
   };
   return { element, show };

@@ -9,6 +9,7 @@ import { el } from "./dom.js";
 import { icon } from "./icons.js";
 import { slider } from "./controls.js";
 import { type HandleRow, handleRow } from "./handle_row.js";
+import { poseFields } from "./pose_fields.js";
 
 /** The handles with their names and colours, and the settings of the selected handle. */
 export function handlesPanel(app: App): HTMLElement {
@@ -19,9 +20,11 @@ export function handlesPanel(app: App): HTMLElement {
   let shown = "";
   const show = () => {
     const { handles } = app.document;
-    const { selected } = app.view.now;
+    const { selected, alsoSelected } = app.view.now;
+    const isTogether = (name: string) => alsoSelected.includes(name) || (name === selected && alsoSelected.length > 0);
     const now = JSON.stringify([
       selected,
+      alsoSelected,
       handles.map(({ name, colour, vertices, isLocked, hold, footprint, pose }) => [
         name,
         colour,
@@ -40,7 +43,7 @@ export function handlesPanel(app: App): HTMLElement {
       rows.push(handleRow(app));
       list.append(rows.at(-1)!.element);
     }
-    handles.forEach((handle, k) => rows[k]!.show(handle, handle.name === selected));
+    handles.forEach((handle, k) => rows[k]!.show(handle, handle.name === selected, isTogether(handle.name)));
     for (const { element } of rows.splice(handles.length)) {
       const isFocused = element.contains(document.activeElement);
       element.remove();
@@ -54,7 +57,7 @@ export function handlesPanel(app: App): HTMLElement {
   app.facts.watch(({ document }) => [document.handles], show);
   app.view.watchAll(show);
   details.addEventListener("change", () => queueMicrotask(show));
-  return el("div", {}, list, details);
+  return el("div", {}, list, poseFields(app), details);
 }
 
 /** Moves the focus to the control with the same name. */

@@ -1,10 +1,8 @@
 import type { App } from "../app/app.js";
 import { legendOf } from "../app/legend.js";
-import { stops } from "../model/colours.js";
+import { gradientOf } from "../model/palettes.js";
 import { el, setText } from "./dom.js";
 import { icon } from "./icons.js";
-
-const gradient = stops.map(([r, g, b]) => `rgb(${r}, ${g}, ${b})`).join(", ");
 
 /** The scale at the lower left, with a pin that keeps it. */
 export function legend(app: App): HTMLElement {
@@ -21,7 +19,7 @@ export function legend(app: App): HTMLElement {
     icon("pin"),
   );
   pin.addEventListener("click", () => app.togglePin());
-  const bar = el("div", { className: "legend-bar", style: `background: linear-gradient(90deg, ${gradient})` });
+  const bar = el("div", { className: "legend-bar" });
   const element = el(
     "aside",
     { className: "legend" },
@@ -41,6 +39,10 @@ export function legend(app: App): HTMLElement {
     setText(numbers[2], all.high);
   };
   app.view.watchAll(show);
+  app.view.watch(
+    ({ palette }) => [palette],
+    ([palette]) => (bar.style.background = gradientOf(palette)),
+  );
   app.afterDrawing.add(show);
   return element;
 }

@@ -1,7 +1,12 @@
 import type { Encoding } from "lpdeform-client";
 import type { App } from "../app/app.js";
+import { remember, remembered } from "../io/remember.js";
+import { type PaletteName, palettes } from "../model/palettes.js";
 import type { ColourBy } from "../model/view.js";
+import { axisButtons } from "./axis_buttons.js";
 import { choice, el, toggle } from "./dom.js";
+
+const paletteKey = "lpdeform-palette";
 
 /** What is drawn, and how frames are sent. */
 export function lookPanel(app: App): HTMLElement {
@@ -25,6 +30,13 @@ export function lookPanel(app: App): HTMLElement {
     "Keep the colours' scale as it is (P)",
   );
   const up = toggle("Y is up", false, (isOn) => app.view.set({ isYUp: isOn }), "For meshes whose y axis points up");
+  const readout = toggle(
+    "Values",
+    true,
+    (isOn) => app.view.set({ hasReadout: isOn }),
+    "Distortion and p of the vertex under the pointer, or under the cross (V)",
+  );
+  const palette = paletteChoice(app);
   const encoding = el("select", { aria: { label: "How frames are sent" } });
   for (const [value, text] of [
     ["float32", "exact, 16 bytes per vertex"],
@@ -40,13 +52,38 @@ export function lookPanel(app: App): HTMLElement {
     ghost.input.checked = view.ghost;
     pin.input.checked = view.pinned !== undefined;
     up.input.checked = view.isYUp;
+    readout.input.checked = view.hasReadout;
     encoding.value = view.encoding;
   });
   return el(
     "div",
     { className: "look" },
     colour.element,
-    el("div", { className: "toggles" }, wireframe.element, ghost.element, pin.element, up.element),
+    el("div", { className: "toggles" }, wireframe.element, ghost.element, pin.element, up.element, readout.element),
+    axisButtons(app),
+    palette,
     el("label", { className: "pair" }, el("span", {}, "Frames"), encoding),
   );
+}
+
+/** The user's last choice is that of the next visit. */
+function paletteChoice(app: App): HTMLElement {
+  const select = el("select", { aria: { label: "Palette" } });
+  const names = Object.keys(palettes) as PaletteName[];
+  for (const name of names) select.append(el("option", { value: name, textContent: palettes[name].label }));
+  const last = names.find((name) => name === remembered(paletteKey));
+  if (last) app.view.set({ palette: last });
+  select.addEventListener("change", () => {
+    const palette = select.value as PaletteName;
+    app.view.set({ palette });
+    remember(paletteKey, palette);
+  });
+  app.view.watch(
+    ({ palette }) => [palette],
+    ([palette]) => {
+      select.value = palette;
+      select.title = palettes[palette].title;
+    },
+  );
+  return el("label", { className: "pair" }, el("span", {}, "Palette"), select);
 }

@@ -1,7 +1,7 @@
 import type { App } from "../app/app.js";
 import type { Pane } from "../app/pane.js";
 import { placeOf } from "../app/sides.js";
-import { blueToRed } from "../model/colours.js";
+import { colourIn } from "../model/palettes.js";
 import { histogram } from "../model/statistics.js";
 import { lowerText, short } from "../model/words.js";
 import { el, setText } from "./dom.js";
@@ -159,7 +159,7 @@ function showPlots(app: App, energy: HTMLCanvasElement, histograms: readonly His
         }));
   plotLines(energy, lines, app.panes[0]!.trail.starts, short);
   const most = red > 0 ? Math.max(...app.panes.map(({ statistics }) => statistics.max)) : 0;
-  const colourAt = (share: number) => `rgb(${blueToRed(red > 0 ? (share * most) / red : 0).join(",")})`;
+  const colourAt = (share: number) => `rgb(${colourIn(app.view.now.palette, red > 0 ? (share * most) / red : 0).join(",")})`;
   const counts = app.panes.map(({ distortion }) =>
     most > 0 ? histogram(distortion, most, binCount) : new Float64Array(binCount),
   );

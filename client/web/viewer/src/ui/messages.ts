@@ -2,7 +2,8 @@ import type { Reason } from "lpdeform-client";
 import type { App } from "../app/app.js";
 import { elementsIn, isPassing, notAnswering, sentence, type Status } from "../link/status.js";
 import { percent } from "../model/words.js";
-import { el, setText } from "./dom.js";
+import { el, measured, setText } from "./dom.js";
+import { statusPill } from "./pill.js";
 import { pointOutNamed } from "./report.js";
 
 /** How long a line stays. */
@@ -15,7 +16,7 @@ const quiet = new Set<Reason>(["SUPERSEDED", "NO_HANDLES"]);
 
 /** The pill of the connection, the banner while something is wrong, and lines that come and go. */
 export function messages(app: App, startOver: () => void): HTMLElement {
-  const pill = el("div", { className: "pill", role: "status" });
+  const pill = statusPill(app);
   const title = el("strong");
   const text = el("span");
   const show = el("button", { type: "button", className: "plain", textContent: "Show where" });
@@ -27,7 +28,7 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     show,
   );
   const notice = el("div", { className: "notice", role: "status", hidden: true });
-  const hint = el("div", { className: "hint" });
+  const hint = measured(el("div", { className: "hint" }), "--hint-height");
   const restored = restoredNote(app, startOver);
   let element = "";
   let timer: ReturnType<typeof setTimeout> | undefined;
@@ -35,8 +36,7 @@ export function messages(app: App, startOver: () => void): HTMLElement {
   show.addEventListener("click", () => pointOutNamed(app, element));
 
   const showStatus = (status: Status) => {
-    setText(pill, pillText(status));
-    pill.dataset["kind"] = status.kind;
+    pill.show(status);
     const problem = app.facts.now.problem;
     const isProblem = problem !== undefined && !quiet.has(problem.reason) && status.kind === "live";
     const isWrong = isPassing(status) || status.kind === "refused";
@@ -88,7 +88,7 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     },
   );
   app.view.watchAll(showHint);
-  return el("div", { className: "messages" }, pill, banner, restored, asideNote(app), hint, betterButton(app), notice);
+  return el("div", { className: "messages" }, pill.element, banner, restored, asideNote(app), hint, betterButton(app), notice);
 }
 
 /** There while the server knows a shape of lower energy; takes those of all panes. */
@@ -160,10 +160,6 @@ function ago(time: number): string {
   const words = new Intl.RelativeTimeFormat("en");
   if (minutes < 120) return words.format(-minutes, "minute");
   return minutes < 48 * 60 ? words.format(-Math.round(minutes / 60), "hour") : words.format(-Math.round(minutes / 1440), "day");
-}
-
-function pillText({ kind, title }: Status): string {
-  return kind === "live" ? "Live" : kind === "idle" || kind === "opening" ? "Preparing…" : title;
 }
 
 const touches = () => matchMedia("(pointer: coarse)").matches;

@@ -1,8 +1,10 @@
 import type { App } from "../app/app.js";
+import { blendPanel } from "./blend.js";
 import { el } from "./dom.js";
 import { handlesPanel } from "./handles.js";
 import { lookPanel } from "./look.js";
 import { measures } from "./measures.js";
+import { posesPanel } from "./poses.js";
 import { reportPanel, warningsOf } from "./report.js";
 
 export function sidePanel(app: App): HTMLElement {
@@ -13,7 +15,9 @@ export function sidePanel(app: App): HTMLElement {
     "aside",
     { className: "panel", aria: { label: "Side panel" } },
     section("Handles", handlesPanel(app), true),
+    section("Poses", posesPanel(app), false),
     section("Look", lookPanel(app), true),
+    section("Blend through p", blendPanel(app), false),
     numbers,
     mesh,
   );

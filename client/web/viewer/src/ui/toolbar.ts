@@ -1,10 +1,12 @@
 import type { App } from "../app/app.js";
 import { withoutPaint } from "../model/document.js";
 import { nothing } from "../model/pointed.js";
+import type { PaintMode } from "../model/soft_paint.js";
 import type { StrokeMode, Tool } from "../model/view.js";
 import { short } from "../model/words.js";
 import { choice, el, measured, toggle } from "./dom.js";
 import { button, slider } from "./controls.js";
+import { gizmoOptions } from "./gizmo_options.js";
 import { type IconName, icon } from "./icons.js";
 
 const tools: readonly (readonly [Tool, IconName, string, string])[] = [
@@ -62,6 +64,18 @@ function options(app: App): HTMLElement {
     ],
     (chosen) => app.view.set({ paintField: chosen, colourBy: chosen }),
   );
+  const painting = choice<PaintMode>(
+    "What painting does",
+    [
+      ["set", "Paint"],
+      ["erase", "Erase"],
+      ["smooth", "Smooth"],
+    ],
+    (paintMode) => app.view.set({ paintMode }),
+  );
+  painting.element.title = "Bring the value on, take what is painted away, or even it out (E)";
+  const soft = slider("Soft", 0, 1, 0.05, (softness) => app.view.set({ softness }));
+  soft.element.title = "How much of the brush, from its edge, works less and less";
   const size = slider("Size", 0, 0.25, 0.005, (radius) => app.view.set({ radius }));
   const p = slider("p", 1, 10, 0.1, (paintP) => app.view.set({ paintP }));
   const stiffness = slider("Stiffness", -2, 2, 0.05, (power) =>
@@ -75,13 +89,17 @@ function options(app: App): HTMLElement {
   );
   const clear = el("button", { type: "button", className: "plain", textContent: "Clear painting" });
   clear.addEventListener("click", () => app.change(withoutPaint(app.document)));
+  const moving = gizmoOptions(app);
   const element = el(
     "div",
     { className: "options" },
     gizmo.element,
+    moving,
     mode.element,
     field.element,
+    painting.element,
     size.element,
+    soft.element,
     p.element,
     stiffness.element,
     through.element,
@@ -97,15 +115,17 @@ function options(app: App): HTMLElement {
     mode.show(view.mode);
     gizmo.show(view.gizmo);
     field.show(view.paintField);
+    painting.show(view.paintMode);
+    soft.show(view.softness, `${Math.round(100 * view.softness)} %`);
     size.show(view.radius, view.radius === 0 ? "1 vertex" : `${short(100 * view.radius)} %`);
     p.show(view.paintP, short(view.paintP));
     stiffness.show(Math.log10(view.paintStiffness), short(view.paintStiffness));
-    gizmo.element.hidden = tool !== "move";
+    gizmo.element.hidden = moving.hidden = tool !== "move";
     mode.element.hidden = tool === "paint" || tool === "move";
-    field.element.hidden = clear.hidden = tool !== "paint";
+    field.element.hidden = painting.element.hidden = soft.element.hidden = clear.hidden = tool !== "paint";
     size.element.hidden = tool === "lasso" || tool === "box";
-    p.element.hidden = tool !== "paint" || view.paintField !== "p";
-    stiffness.element.hidden = tool !== "paint" || view.paintField !== "stiffness";
+    p.element.hidden = tool !== "paint" || view.paintField !== "p" || view.paintMode !== "set";
+    stiffness.element.hidden = tool !== "paint" || view.paintField !== "stiffness" || view.paintMode !== "set";
     through.element.hidden = tool !== "lasso" && tool !== "box";
     through.input.checked = view.isThrough;
   });

@@ -32,7 +32,7 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
   const open = labelled(
     "open",
     "Open",
-    "A mesh (OFF, OBJ, PLY, STL) or a handle file; dropping it onto the page does the same (O)",
+    "A mesh (GLB, glTF, OFF, OBJ, PLY, STL), a project, or a handle file; dropping it onto the page does the same (O)",
     () => files.choose(),
   );
 
@@ -56,7 +56,7 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
   return el(
     "header",
     { className: "topbar" },
-    el("h1", {}, logo(), el("span", {}, "lpdeform")),
+    el("h1", { aria: { label: "lpdeform" } }, logo(), el("span", {}, "lpdeform")),
     el("div", { className: "cluster" }, shapes, details),
     open,
     el("div", { className: "cluster" }, undo, redo),
@@ -71,7 +71,9 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
 
 function exportMenu(files: Files): HTMLElement {
   return menu(icon("save"), "Save", "Save or export", [
+    ["Project, to go on with (Ctrl+S)", () => void files.saveProject()],
     ["Mesh as PLY, with distortion", () => void files.exportMesh("ply")],
+    ["Mesh as GLB", () => void files.exportMesh("glb")],
     ["Mesh as OBJ", () => void files.exportMesh("obj")],
     ["Mesh as OFF", () => void files.exportMesh("off")],
     ["Mesh as STL", () => void files.exportMesh("stl")],

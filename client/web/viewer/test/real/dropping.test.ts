@@ -6,7 +6,7 @@ import { Service } from "../../../client/test/support/service.js";
 import { writeObj } from "../../src/io/obj.js";
 import { writeOff } from "../../src/io/off.js";
 import { writePly } from "../../src/io/ply.js";
-import { writeStl } from "../../src/io/stl.js";
+import { writeStl } from "../../src/io/write_stl.js";
 import { blockSurface } from "../../src/model/block.js";
 import { User } from "./user.js";
 
@@ -45,10 +45,10 @@ async function drop(files: Record<string, string | Uint8Array>): Promise<void> {
       y: 400,
       data: { items: [], files: paths, dragOperationsMask: 1 },
     });
-    if (type === "dragOver") await user.page.getByText("Drop a mesh or a handle file").waitFor();
+    if (type === "dragOver") await user.page.getByText("Drop a mesh, a project or a handle file").waitFor();
   }
   await devtools.detach();
-  await user.page.getByText("Drop a mesh or a handle file").waitFor({ state: "hidden" });
+  await user.page.getByText("Drop a mesh, a project or a handle file").waitFor({ state: "hidden" });
 }
 
 const isOpen = (name: string) => user.until(`window.__lpdeform.app.mesh.name === "${name}"`);
@@ -97,7 +97,7 @@ it("a large file is told to be opened while it is", async () => {
 it("what cannot be opened is refused by name, and what is there stays", async () => {
   const before = await user.ask("document()");
   await drop({ "notes.txt": "hello" });
-  await refusal("notes.txt is not a mesh that can be read: OFF, OBJ, PLY and STL can.");
+  await refusal("notes.txt is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY and STL can.");
   await drop({ "a.off": writeOff(mesh), "b.obj": writeObj(mesh) });
   await refusal("One mesh at a time: a.off, b.obj are 2.");
   await drop({ "short.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n" });

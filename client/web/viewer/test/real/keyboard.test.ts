@@ -26,7 +26,7 @@ const focused = () =>
 
 it("Tab goes round the whole page, and back", async () => {
   const canFocus = await user.page.evaluate<number>(
-    "[...document.querySelectorAll('a[href], button, input, select, textarea, canvas[tabindex]')].filter((one) => one.checkVisibility() && !one.disabled && one.tabIndex >= 0 && one.type !== 'file').length",
+    "[...document.querySelectorAll('a[href], button, input, select, textarea, summary, canvas[tabindex]')].filter((one) => one.checkVisibility() && !one.disabled && one.tabIndex >= 0 && one.type !== 'file').length",
   );
   for (const key of ["Tab", "Shift+Tab"]) {
     await user.page.locator("canvas.stage").focus();

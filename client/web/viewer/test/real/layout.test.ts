@@ -12,7 +12,6 @@ beforeAll(async () => {
   service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
   user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
   await user.settled();
-  await user.ask(`app.change({ ...window.__lpdeform.document(), secondP: 3 })`);
 });
 
 afterAll(async () => {
@@ -44,7 +43,7 @@ const states = [false, true].flatMap((isSplit) =>
 );
 
 /** Where room is little, these leave the pictures free. */
-const beside = [".topbar", ".rail", ".options", ".dock", ".panel"];
+const beside = [".topbar", ".rail", ".options", ".dock", ".panel", ".hint", ".legend"];
 const isLittle = (width: number, height: number) => (width <= 720 && width <= height) || (height <= 560 && height <= width);
 
 /** What stands over the pictures or beside them, and must not meet. */
@@ -84,8 +83,51 @@ function faults([parts, beside]: readonly (readonly string[])[]): string[] {
   return found;
 }
 
+/** By how much what stands over the picture covers the shape that has just been opened, by name. */
+function covering(): string[] {
+  const { app, vertexOnPage } = (window as any).__lpdeform;
+  const count = app.mesh.positions.length / 3;
+  const places: { x: number; y: number }[] = Array.from({ length: count }, (_, vertex) => vertexOnPage(vertex));
+  const shape = {
+    left: Math.min(...places.map(({ x }) => x)),
+    right: Math.max(...places.map(({ x }) => x)),
+    top: Math.min(...places.map(({ y }) => y)),
+    bottom: Math.max(...places.map(({ y }) => y)),
+  };
+  const pane = document.querySelector(".pane")!.getBoundingClientRect();
+  const found: string[] = [];
+  if (shape.bottom - shape.top < 0.2 * pane.height) found.push("the shape is small");
+  if (shape.left < pane.left || shape.right > pane.right || shape.top < pane.top || shape.bottom > pane.bottom)
+    found.push("the shape is cut off");
+  for (const part of [".hint", ".legend", ".pill", ".rail", ".options", ".dock"]) {
+    const box = document.querySelector(part)!.getBoundingClientRect();
+    const within = (place: { x: number; y: number }) =>
+      place.x > box.left && place.x < box.right && place.y > box.top && place.y < box.bottom;
+    const covered = places.filter(within).length;
+    if (covered > 0) found.push(`${part} covers ${covered} of ${count} vertices`);
+  }
+  return found;
+}
+
+it.each(sizes)("nothing covers the first shape at %d x %d, and the hint is there", async (width, height) => {
+  await user.page.setViewportSize({ width, height });
+  const found: Record<string, string[]> = {};
+  for (const shape of ["bar", "creature", "sheet"]) {
+    await user.ask(`app.startOver("${shape}", "coarse")`);
+    await user.ask("app.view.set({ isSplit: false, isPanelOpen: false, tool: 'move' })");
+    await user.until(`!document.querySelector(".hint").hidden`);
+    await user.page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
+    await user.ask("app.fit()");
+    await user.page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
+    const all = await user.page.evaluate(covering);
+    if (all.length > 0) found[shape] = all;
+  }
+  expect(found).toEqual({});
+});
+
 it.each(sizes)("nothing covers anything at %d x %d", async (width, height) => {
   await user.page.setViewportSize({ width, height });
+  await user.ask(`app.change({ ...window.__lpdeform.document(), secondP: 3 })`);
   const found: Record<string, string[]> = {};
   for (const state of states) {
     await user.ask(`app.view.set(${JSON.stringify(state)})`);

@@ -297,7 +297,8 @@ describe("the look", () => {
 
   it.each(["light", "dark"])("can be read when it is %s", async (theme) => {
     await user.ask(`app.view.set({ isDark: ${theme === "dark"} })`);
-    for (const summary of await user.page.locator(".panel details:not([open]) > summary").all()) await summary.click();
+    const closed = user.page.locator(".panel details:not([open]) > summary");
+    while ((await closed.count()) > 0) await closed.first().click();
     // Also what is there at times.
     await user.ask("app.notify('A line.', true)");
     await user.ask("app.facts.set({ problem: { reason: 'X', message: 'a sentence', element: 'vertex 1' }, restoredFrom: 1 })");

@@ -48,9 +48,9 @@ export class User {
 
   static async open(
     url: string,
-    { width = 1280, height = 800, hasTouch = false, colorScheme = "light" as "light" | "dark" } = {},
+    { width = 1280, height = 800, hasTouch = false, colorScheme = "light" as "light" | "dark", args = launch.args } = {},
   ): Promise<User> {
-    const browser = await chromium.launch(launch);
+    const browser = await chromium.launch({ ...launch, args });
     // What the tests ask of the page is evaluated, which its policy forbids; troubles.test.ts keeps the policy.
     const context = await browser.newContext({
       viewport: { width, height },
@@ -140,10 +140,13 @@ export class User {
     return [r!, g!, b!];
   }
 
-  /** What of the picture has colours that mean much distortion (yellow to red) and little (blue), in shares of the coloured. */
+  /** What of the surface has colours that mean much distortion (yellow to red) and little (blue), in shares of the coloured. */
   async colours(): Promise<{ warm: number; cold: number; coloured: number }> {
     const box = await this.page.locator("canvas.stage").first().boundingBox();
-    const png = await this.page.screenshot({ clip: box!, scale: "css" });
+    const withRest = await this.#drawSurfaceAlone();
+    const style = "#app > :not(.stages), .pane > :not(canvas) { visibility: hidden !important; }";
+    const png = await this.page.screenshot({ clip: box!, scale: "css", style });
+    await withRest();
     const { pixels, channels } = decodePng(png);
     let [warm, cold, coloured] = [0, 0, 0];
     for (let at = 0; at < pixels.length; at += channels) {
@@ -154,6 +157,26 @@ export class User {
       if (b > r + 60) ++cold;
     }
     return { warm: warm / coloured, cold: cold / coloured, coloured };
+  }
+
+  /** In the first picture, until the returned function is called: handles and arrows have colours of their own. */
+  async #drawSurfaceAlone(): Promise<() => Promise<void>> {
+    const rest = await this.page.evaluateHandle(() => {
+      const { stage } = (window as any).__lpdeform.app.panes[0];
+      const objects = [stage.marks, stage.pointed, stage.highlight, stage.gizmo].map(({ object }) => object);
+      const scene = objects[0].parent;
+      scene.remove(...objects);
+      stage.resize(stage.width, stage.height, false);
+      stage.draw();
+      return { scene, objects };
+    });
+    return () =>
+      rest.evaluate(({ scene, objects }) => {
+        const { app } = (window as any).__lpdeform;
+        scene.add(...objects);
+        app.panes[0].invalidate();
+        app.requestDraw();
+      });
   }
 }
 

@@ -13,6 +13,8 @@ declare global {
   interface Window {
     views?: View[];
     watch(name: string, credit: number): Promise<Watched[]>;
+    /** The height of the right edge of a mesh of so many vertices a side that was lifted by 2, in this encoding. */
+    lift(side: number, encoding: "quantized" | "compressed"): Promise<number>;
     /** Opens a session there and closes it; what it was told where that failed. */
     tryAt(url: string): Promise<Refused | undefined>;
   }
@@ -34,6 +36,16 @@ window.tryAt = async (url) => {
     const { code, reason, element, limit, message } = thrown as LpdeformError;
     return { code, reason, element, limit, message };
   }
+};
+
+window.lift = async (side, encoding) => {
+  const { mesh, handles } = grid(side);
+  const session = await openSession(mesh, { encoding, settings: { p: 2 } });
+  session.setHandles(handles);
+  session.move("right", { translation: [0, 0, 2] });
+  const { positions } = await session.settle();
+  await session.close();
+  return positions[3 * (side - 1) + 2]!;
 };
 
 window.watch = async (name, credit) => {

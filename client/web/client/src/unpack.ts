@@ -1,0 +1,113 @@
+import { decompress, distortionOf, loadDecompressor, normalsOf, positionsOf, uint16View } from "./decode.js";
+import { LpdeformError } from "./errors.js";
+import type { QuantizedSurface } from "./types.js";
+
+/** The vertices of a part of a frame: blocks of four 16-bit integers each, compressed or not. */
+export interface PackedPart {
+  firstVertex: number;
+  vertexCount: number;
+  vertices: Uint8Array;
+  /** Empty if the frame has none. */
+  normals: Uint8Array;
+}
+
+/** A quantized frame as it came. */
+export interface Packed {
+  vertexCount: number;
+  isCompressed: boolean;
+  quantization: Omit<QuantizedSurface, "vertices" | "normals">;
+  parts: PackedPart[];
+}
+
+export interface Unpacked {
+  quantized: QuantizedSurface;
+  positions: Float32Array;
+  distortion: Float32Array;
+  normals: Float32Array;
+}
+
+/** Needs loadDecompressor() for compressed frames. Throws a LpdeformError (FRAME_PARTS) if a block cannot be read. */
+export function unpack({ vertexCount, isCompressed, quantization, parts }: Packed): Unpacked {
+  const hasNormals = parts.some(({ normals }) => normals.length > 0);
+  const vertices = new Uint16Array(4 * vertexCount);
+  const normals = new Uint16Array(hasNormals ? 4 * vertexCount : 0);
+  for (const part of parts) {
+    const numbers = (block: Uint8Array) => uint16View(isCompressed ? decompress(block, part.vertexCount) : block);
+    vertices.set(numbers(part.vertices), 4 * part.firstVertex);
+    if (hasNormals) normals.set(numbers(part.normals), 4 * part.firstVertex);
+  }
+  const quantized = { ...quantization, vertices, normals: new Int16Array(normals.buffer) };
+  return {
+    quantized,
+    positions: positionsOf(quantized),
+    distortion: distortionOf(quantized),
+    normals: normalsOf(quantized),
+  };
+}
+
+export interface UnpackRequest {
+  id: number;
+  packed: Packed;
+}
+
+export type UnpackAnswer = { id: number; unpacked: Unpacked } | { id: number; fault: string };
+
+/**
+ * Unpacks frames in a worker of the page, in the order in which they are given; or in the page itself if it can have none, or if
+ * the worker cannot be loaded.
+ */
+export class Unpacker {
+  #worker: Worker | undefined;
+  #lastId = 0;
+  readonly #waiting = new Map<
+    number,
+    { packed: Packed; done: (unpacked: Unpacked) => void; failed: (error: unknown) => void }
+  >();
+
+  constructor() {
+    try {
+      this.#worker = new Worker(new URL("./unpack_worker.js", import.meta.url), { type: "module" });
+      this.#worker.onmessage = ({ data }: MessageEvent<UnpackAnswer>) => this.#take(data);
+      this.#worker.onerror = () => this.#goOnInPage();
+    } catch {
+      this.#worker = undefined;
+    }
+  }
+
+  /** Rejects with a LpdeformError (FRAME_PARTS) if a block cannot be read. */
+  unpack(packed: Packed): Promise<Unpacked> {
+    if (!this.#worker) return unpackInPage(packed);
+    const id = ++this.#lastId;
+    this.#worker.postMessage({ id, packed } satisfies UnpackRequest);
+    return new Promise((done, failed) => this.#waiting.set(id, { packed, done, failed }));
+  }
+
+  #take(answer: UnpackAnswer): void {
+    const waiting = this.#waiting.get(answer.id);
+    this.#waiting.delete(answer.id);
+    if ("unpacked" in answer) waiting?.done(answer.unpacked);
+    else waiting?.failed(new LpdeformError("data_loss", answer.fault, { reason: "FRAME_PARTS" }));
+  }
+
+  #goOnInPage(): void {
+    this.#worker?.terminate();
+    this.#worker = undefined;
+    for (const { packed, done, failed } of this.#waiting.values()) unpackInPage(packed).then(done, failed);
+    this.#waiting.clear();
+  }
+}
+
+async function unpackInPage(packed: Packed): Promise<Unpacked> {
+  if (packed.isCompressed) await loadDecompressor();
+  return unpack(packed);
+}
+
+/** From this number of vertices on, a page is busy for some milliseconds with unpacking a frame. */
+const largeVertices = 20_000;
+let shared: Unpacker | undefined;
+
+/** The page's unpacker, for frames of so many vertices; undefined for small ones, and outside of pages. */
+export function unpackerFor(vertexCount: number): Unpacker | undefined {
+  if (vertexCount < largeVertices || typeof Worker === "undefined") return undefined;
+  return (shared ??= new Unpacker());
+}

@@ -1,0 +1,58 @@
+import { nothing, ofVertices } from "../model/pointed.js";
+import { type Brush, paintSoftly, strengthAt } from "../model/soft_paint.js";
+import type { PointerAt, Stroke } from "../stage/pointing.js";
+import type { Pane } from "./pane.js";
+import type { Workbench } from "./workbench.js";
+
+/** A stroke of the brush that paints p or stiffness. It is seen while it goes on, and is one step when it ends. */
+export class PaintStroke implements Stroke {
+  /** For each vertex the most that any place of the stroke has worked on it. */
+  readonly #strengths = new Map<number, number>();
+  readonly #before;
+  readonly #brush: Brush;
+
+  /** `dabAt`: the vertices under the brush. */
+  constructor(
+    readonly work: Workbench,
+    readonly pane: Pane,
+    readonly dabAt: (at: PointerAt) => readonly number[],
+    start: PointerAt,
+  ) {
+    const { paintField, paintMode, paintP, paintStiffness } = work.view.now;
+    this.#before = work.document;
+    this.#brush = { field: paintField, mode: paintMode, value: paintField === "p" ? paintP : paintStiffness };
+    work.view.set({ colourBy: paintField });
+    this.move(start);
+  }
+
+  move(at: PointerAt): void {
+    if (!at.hit) return;
+    const { work } = this;
+    const dab = this.dabAt(at);
+    for (const vertex of dab) {
+      const strength = this.#strengthOf(vertex, at.hit.point);
+      if (strength > (this.#strengths.get(vertex) ?? 0)) this.#strengths.set(vertex, strength);
+    }
+    work.facts.set({ pointedOut: ofVertices(dab) });
+    const count = work.mesh.positions.length / 3;
+    const { adjacency, seams } = work;
+    work.during(paintSoftly(this.#before, this.#strengths, this.#brush, count, adjacency, seams?.groups), at.time);
+  }
+
+  #strengthOf(vertex: number, point: readonly number[]): number {
+    const { radius, softness } = this.work.view.now;
+    const { positions } = this.pane.stage.surface!;
+    const far = Math.hypot(...point.map((value, axis) => positions[3 * vertex + axis]! - value));
+    return radius === 0 ? 1 : strengthAt(far / (radius * this.work.diagonal), softness);
+  }
+
+  end(): void {
+    this.work.facts.set({ pointedOut: nothing });
+    this.work.endGesture();
+  }
+
+  cancel(): void {
+    this.work.facts.set({ pointedOut: nothing });
+    this.work.cancelGesture();
+  }
+}

@@ -1,0 +1,181 @@
+import { Matrix4, Quaternion, Vector3 } from "three";
+import { countOf, readNumbers } from "./gltf_accessors.js";
+import { type GltfDocument, indexOf, listOf, nameOf, type Part, partOf, refuse } from "./gltf_document.js";
+
+/** Vertices that one node draws: the elements of one set of accessors, which several primitives of its mesh may share. */
+export interface Block {
+  node: number;
+  mesh: number;
+  primitives: number[];
+  position: number;
+  normal: number | undefined;
+  tangent: number | undefined;
+  /** From the mesh's coordinates to where it is drawn. */
+  placement: Matrix4;
+  /** Its vertices in the mesh of all blocks. */
+  first: number;
+  count: number;
+}
+
+/** What the scene draws as triangles. */
+export interface DrawList {
+  blocks: Block[];
+  vertexCount: number;
+  /** Three vertices of all blocks each. */
+  faces: number[];
+  /** What is drawn otherwise, in words. */
+  left: Set<string>;
+}
+
+const [triangles, strip, fan] = [4, 5, 6];
+const most = 5_000_000;
+
+/** As the command line reads it (client/cli/gltf/gltf.h). Throws a FileFault that names the part. */
+export function readBlocks(document: GltfDocument): DrawList {
+  const { json } = document;
+  for (const name of (json["extensionsRequired"] ?? []) as unknown[]) {
+    if (!/_materials_|_texture_|_lights_|_animation_|_audio|_xmp|KHR_mesh_quantization|draco|meshopt/.test(String(name))) {
+      refuse(`the extension ${String(name)}`, "is required by the file and not known here");
+    }
+  }
+  listOf(json, "bufferViews").forEach((view, k) => {
+    const name = Object.keys(partOf(view["extensions"])).find((key) => key.endsWith("_meshopt_compression"));
+    if (name) refuse(nameOf(json, "bufferViews", k), `is compressed by ${name}, which is not read`);
+  });
+  const list: DrawList = { blocks: [], vertexCount: 0, faces: [], left: new Set() };
+  const worlds = nodesOf(json);
+  for (const node of worlds.keys()) {
+    if (listOf(json, "nodes")[node]!["mesh"] !== undefined) readNode(document, node, worlds, list);
+  }
+  if (list.faces.length === 0) refuse("the scene", "has no triangles that could be deformed");
+  return list;
+}
+
+/** The nodes of the scene, each before its children, with their transforms. */
+function nodesOf(json: Part): Map<number, Matrix4> {
+  const nodes = listOf(json, "nodes");
+  const childrenOf = (part: Part, key: string, name: string) => {
+    const children = part[key] ?? [];
+    if (!Array.isArray(children)) refuse(name, `has “${key}” that are no list`);
+    return children.map((child) => indexOf(json, child, "nodes", name));
+  };
+  const scenes = listOf(json, "scenes");
+  const scene = scenes.length > 0 ? indexOf(json, json["scene"] ?? 0, "scenes", "the file") : -1;
+  const inner = new Set(nodes.flatMap((node, k) => childrenOf(node, "children", nameOf(json, "nodes", k))));
+  const roots =
+    scene >= 0 ? childrenOf(scenes[scene]!, "nodes", `scene ${scene}`) : [...nodes.keys()].filter((k) => !inner.has(k));
+  const found = new Map<number, Matrix4>();
+  const open = roots.map((node) => [node, new Matrix4()] as const).reverse();
+  for (let next = open.pop(); next; next = open.pop()) {
+    const [node, above] = next;
+    const name = nameOf(json, "nodes", node);
+    if (found.has(node)) refuse(name, "is reached twice: nodes must be trees");
+    const toWorld = new Matrix4().multiplyMatrices(above, ownTransform(nodes[node]!, name));
+    found.set(node, toWorld);
+    open.push(
+      ...childrenOf(nodes[node]!, "children", name)
+        .map((child) => [child, toWorld] as const)
+        .reverse(),
+    );
+  }
+  return found;
+}
+
+function ownTransform(node: Part, name: string): Matrix4 {
+  const numbers = (key: string, otherwise: readonly number[]) => {
+    const list = node[key] ?? otherwise;
+    const isRight = Array.isArray(list) && list.length === otherwise.length && list.every(Number.isFinite);
+    return isRight ? (list as number[]) : refuse(name, `has a “${key}” that is no list of ${otherwise.length} numbers`);
+  };
+  if (node["matrix"] !== undefined) return new Matrix4().fromArray(numbers("matrix", new Matrix4().elements));
+  const [translation, rotation, scale] = [
+    numbers("translation", [0, 0, 0]),
+    numbers("rotation", [0, 0, 0, 1]),
+    numbers("scale", [1, 1, 1]),
+  ];
+  const turn = new Quaternion().fromArray(rotation).normalize();
+  return new Matrix4().compose(new Vector3().fromArray(translation), turn, new Vector3().fromArray(scale));
+}
+
+/** A mesh with a skin stands where its joints place it if they all agree, as in the pose of binding. */
+function skinPlacement(document: GltfDocument, node: Part, worlds: Map<number, Matrix4>, name: string): Matrix4 {
+  const { json } = document;
+  const skin = listOf(json, "skins")[indexOf(json, node["skin"], "skins", name)]!;
+  const joints = Array.isArray(skin["joints"]) ? (skin["joints"] as unknown[]) : [];
+  const accessor = skin["inverseBindMatrices"];
+  const inverse = accessor === undefined ? undefined : readNumbers(document, indexOf(json, accessor, "accessors", name), 16);
+  const placed = joints.map((joint, k) => {
+    const bind = inverse && inverse.length >= 16 * (k + 1) ? new Matrix4().fromArray(inverse, 16 * k) : new Matrix4();
+    return new Matrix4().multiplyMatrices(worlds.get(joint as number) ?? new Matrix4(), bind);
+  });
+  const [first] = placed;
+  const size = Math.hypot(...(first?.elements ?? [0]));
+  const areSame = placed.every(({ elements }) =>
+    elements.every((value, k) => Math.abs(value - first!.elements[k]!) <= 1e-3 * size),
+  );
+  return first && areSame ? first : new Matrix4();
+}
+
+function readNode(document: GltfDocument, node: number, worlds: Map<number, Matrix4>, list: DrawList): void {
+  const { json } = document;
+  const object = listOf(json, "nodes")[node]!;
+  const name = nameOf(json, "nodes", node);
+  if (partOf(object["extensions"])["EXT_mesh_gpu_instancing"])
+    refuse(name, "draws by EXT_mesh_gpu_instancing, which is not read");
+  const mesh = indexOf(json, object["mesh"], "meshes", name);
+  const placement = object["skin"] === undefined ? worlds.get(node)! : skinPlacement(document, object, worlds, name);
+  const size = Math.hypot(...placement.elements.slice(0, 11));
+  if (!(Math.abs(placement.determinant()) > 1e-12 * size ** 3)) {
+    list.left.add(`what ${name} draws, which its scale flattens`);
+    return;
+  }
+  const primitives = listOf(listOf(json, "meshes")[mesh]!, "primitives");
+  const own: Block[] = [];
+  primitives.forEach((primitive, k) => {
+    const part = `primitive ${k} of ${nameOf(json, "meshes", mesh)}`;
+    if (partOf(primitive["extensions"])["KHR_draco_mesh_compression"]) {
+      refuse(part, "is compressed by KHR_draco_mesh_compression, which is not read");
+    }
+    const mode = (primitive["mode"] ?? triangles) as number;
+    const attributes = partOf(primitive["attributes"]);
+    const accessor = (key: string) =>
+      attributes[key] === undefined ? undefined : indexOf(json, attributes[key], "accessors", part);
+    const [position, normal, tangent] = [accessor("POSITION"), accessor("NORMAL"), accessor("TANGENT")];
+    if (position === undefined || ![triangles, strip, fan].includes(mode)) {
+      list.left.add("points and lines");
+      return;
+    }
+    let block = own.find((other) => other.position === position && other.normal === normal && other.tangent === tangent);
+    if (block) block.primitives.push(k);
+    else {
+      const count = countOf(document, position);
+      if (normal !== undefined && countOf(document, normal) !== count) refuse(part, "has attributes of different lengths");
+      if (tangent !== undefined && countOf(document, tangent) !== count) refuse(part, "has attributes of different lengths");
+      block = { node, mesh, primitives: [k], position, normal, tangent, placement, first: list.vertexCount, count };
+      own.push(block);
+      list.vertexCount += count;
+      if (list.vertexCount > most) refuse("the scene", `has more than ${most} vertices, which this page takes at most`);
+    }
+    addTriangles(cornersOf(document, primitive, block.count, part), mode, block, list);
+  });
+  list.blocks.push(...own);
+}
+
+function cornersOf(document: GltfDocument, primitive: Part, count: number, part: string): ArrayLike<number> {
+  if (primitive["indices"] === undefined) return Array.from({ length: count }, (_, k) => k);
+  const corners = readNumbers(document, indexOf(document.json, primitive["indices"], "accessors", part), 1);
+  const wrong = corners.findIndex((corner) => !(Number.isInteger(corner) && corner >= 0 && corner < count));
+  if (wrong >= 0) refuse(part, `names by index ${wrong} vertex ${corners[wrong]} of ${count}`);
+  return corners;
+}
+
+function addTriangles(corners: ArrayLike<number>, mode: number, { placement, first }: Block, { faces }: DrawList): void {
+  const isMirrored = placement.determinant() < 0;
+  for (let k = 0; k + 2 < corners.length; k += mode === triangles ? 3 : 1) {
+    const [a, b, c] = [corners[mode === fan ? 0 : k]!, corners[k + 1]!, corners[k + 2]!];
+    if (mode !== triangles && (a === b || b === c || c === a)) continue; // strips are joined by such triangles
+    const isTurned = isMirrored !== (mode === strip && k % 2 === 1);
+    faces.push(first + a, first + (isTurned ? c : b), first + (isTurned ? b : c));
+  }
+  if (faces.length > 3 * most) refuse("the scene", `has more than ${most} triangles, which this page takes at most`);
+}

@@ -1,0 +1,66 @@
+import { type Mesh, polygonsOf } from "../model/mesh.js";
+import { MeshBuilder } from "./builder.js";
+import { FileFault } from "./fault.js";
+import { readGltf } from "./gltf.js";
+import { readObj } from "./obj.js";
+import { isObject, type Sections } from "./sections.js";
+
+/** Where each part of a mesh goes in a project. One that is missing does not compile. */
+const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source" } = {
+  name: "head",
+  positions: "array",
+  exact: "array",
+  faces: "array",
+  corners: "array",
+  beside: "head",
+  obj: "source",
+  gltf: "source",
+};
+
+interface Stored {
+  head: object;
+  arrays: Sections;
+}
+
+/** The file that the mesh came from, if the mesh has it, or otherwise its arrays. */
+export function storedMesh(mesh: Mesh): Stored {
+  const { name, beside = [], exact, positions, faces, corners } = mesh;
+  const source = (Object.keys(parts) as (keyof Mesh)[]).find((part) => parts[part] === "source" && mesh[part]);
+  if (source) return { head: { name, source }, arrays: { [source]: mesh[source] as Uint8Array } };
+  return {
+    head: { name, beside },
+    arrays: { positions: exact ?? positions, faces, ...(corners && { corners }) },
+  };
+}
+
+/** Throws a FileFault that names `file` and the place. */
+export function readStoredMesh(json: unknown, arrays: Sections, file: string): Mesh {
+  const { name, source, beside } = isObject(json) ? json : {};
+  if (typeof name !== "string" || name.length > 1000) throw new FileFault(`In ${file}, the mesh has no name.`);
+  if (source === "obj" && arrays["obj"] instanceof Uint8Array) {
+    const { obj } = arrays;
+    return { ...readObj(name, new TextDecoder().decode(obj)), obj };
+  }
+  if (source === "gltf" && arrays["gltf"] instanceof Uint8Array) return readGltf(name, arrays["gltf"]);
+  const { positions, faces, corners } = arrays;
+  const isOfNumbers = positions instanceof Float32Array || positions instanceof Float64Array;
+  if (!isOfNumbers || positions.length % 3 !== 0) throw new FileFault(`In ${file}, the mesh has no positions.`);
+  if (!(faces instanceof Uint32Array) || faces.length % 3 !== 0) throw new FileFault(`In ${file}, the mesh has no faces.`);
+  const builder = new MeshBuilder();
+  for (let k = 0; k < positions.length; k += 3) {
+    builder.vertex(positions[k]!, positions[k + 1]!, positions[k + 2]!, `Vertex ${k / 3} of ${file}`);
+  }
+  let face = 0;
+  for (const polygon of polygonsOf({ faces, ...(corners && { corners: cornersOf(corners, faces, file) }) })) {
+    builder.polygon(polygon, `Face ${face++} of ${file}`);
+  }
+  if (Array.isArray(beside)) for (const what of beside) if (typeof what === "string") builder.leftAside(what);
+  return { ...builder.finish(file), name };
+}
+
+function cornersOf(corners: Sections[string], faces: Uint32Array, file: string): Uint32Array {
+  let triangles = 0;
+  for (const count of corners) triangles += count < 3 ? NaN : count - 2;
+  if (corners instanceof Uint32Array && 3 * triangles === faces.length) return corners;
+  throw new FileFault(`In ${file}, the numbers of corners do not fit the faces.`);
+}

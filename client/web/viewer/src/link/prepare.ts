@@ -1,0 +1,36 @@
+import { openSession } from "lpdeform-client";
+import type { Shape } from "../model/blend.js";
+import { changes, newSession } from "../model/changes.js";
+import type { Document } from "../model/document.js";
+import type { Mesh } from "../model/mesh.js";
+
+/**
+ * The shapes of a document at these values of p, in this order, each solved from the one before, in a session of its own. `weld`: as
+ * in Live. Throws an LpdeformError.
+ */
+export async function* shapesAt(
+  mesh: Mesh,
+  document: Document,
+  ps: readonly number[],
+  weld: Uint32Array | undefined,
+  signal: AbortSignal,
+): AsyncGenerator<[number, Shape]> {
+  const { positions, exact, faces } = mesh;
+  const session = await openSession(
+    { vertices: exact ?? positions, faces },
+    { freeComponents: "follow", signal, ...(weld && { weld }) },
+  );
+  try {
+    let told = newSession;
+    for (const p of ps) {
+      const asked = { ...document, p };
+      const update = changes(told, asked);
+      if (update) session.update(update);
+      told = asked;
+      const { positions, distortion } = await session.settle({ signal });
+      yield [p, { positions, distortion }];
+    }
+  } finally {
+    void session.close().catch(() => undefined); // it expires by itself if the server is away
+  }
+}

@@ -1,0 +1,87 @@
+import { join } from "node:path";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { Service } from "../../../client/test/support/service.js";
+import { ringObj, ringVertex } from "../support/ring.js";
+import { User } from "./user.js";
+
+// A mesh of more than 20,000 vertices: read and taken in workers, and ahead of the server's frames while a handle is dragged.
+
+const [around, across] = [220, 100];
+let service: Service;
+
+beforeAll(async () => {
+  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
+});
+
+afterAll(async () => {
+  await service.stop();
+});
+
+const withoutWorkers = () => {
+  window.Worker = class {
+    constructor() {
+      throw new DOMException("no workers here", "SecurityError");
+    }
+  } as unknown as typeof Worker;
+};
+
+it.each([true, false])("follows a handle between frames; with workers: %s", async (hasWorkers) => {
+  const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`);
+  if (!hasWorkers) await user.page.evaluate(withoutWorkers);
+  await user.settled();
+  await user.openFiles({ name: "ring.obj", content: ringObj(around, across) });
+  await user.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
+  const onRing = (turn: number) => user.vertexOnPage(ringVertex(around, across, turn, 0.2));
+  for (const turn of [0.62, 0.88]) {
+    const { x, y } = await onRing(turn);
+    await user.page.mouse.click(x, y);
+  }
+  await user.settled();
+  const workers = user.page.workers().map((worker) => /\/(\w+)_worker/.exec(worker.url())![1]);
+  expect(workers.sort()).toEqual(hasWorkers ? ["intake", "unpack"] : []); // the one that has read the file has ended
+  const [from, far] = await Promise.all([onRing(0.88), onRing(0.4)]);
+
+  // No frame is taken: what moves is ahead of them.
+  await user.ask("app.panes[0].takeFrame = () => false");
+  const { mouse } = user.page;
+  await mouse.move(from.x, from.y);
+  await mouse.down();
+  for (let step = 1; step <= 10; ++step) await mouse.move(from.x + 6 * step, from.y - 3 * step);
+  const vertex = ringVertex(around, across, 0.88, 0.2);
+  const at = `window.__lpdeform.vertexOnPage(${vertex})`;
+  await user.until(`Math.hypot(${at}.x - ${from.x + 60}, ${at}.y - ${from.y - 30}) < 2`);
+  // As long as frames are due it is not drawn finely, which a picture at rest is half a second later.
+  await new Promise((later) => setTimeout(later, 1000));
+  const ratio = `(({ width, clientWidth }) => width / clientWidth)(window.__lpdeform.app.panes[0].stage.canvas)`;
+  expect(await user.page.evaluate(ratio)).toBeLessThanOrEqual(1);
+  const other = await onRing(0.4);
+  expect(Math.hypot(other.x - far.x, other.y - far.y)).toBeGreaterThan(1); // goes along a little
+  expect(Math.hypot(other.x - far.x, other.y - far.y)).toBeLessThan(40);
+  const fixed = await onRing(0.62);
+
+  // Frames correct it, and what is held stays where it is in both.
+  await user.page.evaluate("delete window.__lpdeform.app.panes[0].takeFrame");
+  await mouse.up();
+  await user.settled();
+  await user.until(`${ratio} === 2`);
+  const [after, still] = await Promise.all([onRing(0.88), onRing(0.62)]);
+  expect(Math.hypot(after.x - from.x - 60, after.y - from.y + 30)).toBeLessThan(2);
+  expect(Math.hypot(still.x - fixed.x, still.y - fixed.y)).toBeLessThan(1);
+  expect(await user.ask("app.panes[0].stage.surface.ahead.value.toArray()")).toEqual([
+    ...[1, 0, 0, 0],
+    ...[0, 1, 0, 0],
+    ...[0, 0, 1, 0],
+    ...[0, 0, 0, 1],
+  ]);
+  expect(user.errors).toEqual([]);
+  await user.close();
+});
+
+it("names what is wrong with a large file that a worker reads", async () => {
+  const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`);
+  await user.settled();
+  await user.openFiles({ name: "ring.obj", content: `${ringObj(around, across)}f 1 2 99999\n` });
+  await user.page.getByText(`face ${2 * around * across + 1} has the corner “99999”`).waitFor();
+  expect(user.errors).toEqual([]);
+  await user.close();
+});
