@@ -118,7 +118,8 @@ void Ledger::accept(std::uint64_t seq, bool is_kept) {
 }
 
 void Ledger::show(std::uint64_t epoch, std::uint64_t seq) {
-  if (epoch == epoch_ && !in_flight_.empty() && in_flight_.front().seq == seq) accept(seq);
+  const bool is_first = epoch == epoch_ && !in_flight_.empty() && in_flight_.front().seq == seq;
+  if (is_first && !restores_.contains(seq)) accept(seq);
 }
 
 void Ledger::accept_change(NumberedUpdate change, bool is_kept) {

@@ -63,7 +63,7 @@ class Ledger {
   void refuse(std::uint64_t seq);
   /// A frame shows the update of this number. If it is of the present epoch, the update is ours, so the server has taken it,
   /// though its answer may still be on its way. Earlier updates without an answer may have been refused: then nothing changes
-  /// until they are answered.
+  /// until they are answered. A restore has the number of an update that was accepted before: no frame shows that it came.
   void show(std::uint64_t epoch, std::uint64_t seq);
 
   /// For a change that the server makes itself (undo): its number, and later the change.

@@ -131,9 +131,10 @@ class Ledger:
         """A frame shows the update of this number.
 
         If it is of the present epoch, the update is ours, so the server has taken it, though its answer may still be on its
-        way. Earlier updates without an answer may have been refused: then nothing changes until they are answered.
+        way. Earlier updates without an answer may have been refused: then nothing changes until they are answered. A restore has
+        the number of an update that was accepted before: no frame shows that it came.
         """
-        if epoch == self._epoch and self._in_flight and self._in_flight[0].seq == seq:
+        if epoch == self._epoch and self._in_flight and self._in_flight[0].seq == seq > self._accepted.seq:
             self.accept(seq)
 
     def take_number(self) -> int:

@@ -38,6 +38,8 @@ export interface LaneSink {
   ended(error?: LpdeformError): void;
   /** Whether nothing is to be sent, and no caller waits for a frame. */
   isQuiet(): boolean;
+  /** The stream is asked for, for the first time or again; `opened` answers the newest request. */
+  asked(): void;
   /** The stream pauses; `opened` comes when it continues. */
   resting(): void;
 }
@@ -228,7 +230,10 @@ class SharedStream {
     const call = new AbortController();
     this.#call = call;
     const lanes = [...this.lanes];
-    for (const lane of lanes) lane.forgetStream();
+    for (const lane of lanes) {
+      lane.forgetStream();
+      lane.sink.asked();
+    }
     const request: MessageInitShape<typeof StreamSessionsRequestSchema> = {
       streams: lanes.map(({ session, options }) => ({ session, options })),
     };

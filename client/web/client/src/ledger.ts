@@ -157,11 +157,11 @@ export class Ledger {
   /**
    * A frame shows the update of this number. If it is of the present epoch, the update is ours, so the server has taken it,
    * though its answer may still be on its way. Earlier updates without an answer may have been refused: then nothing changes
-   * until they are answered.
+   * until they are answered. A restore has the number of an update that was accepted before: no frame shows that it came.
    */
   show(epoch: number, seq: number): void {
     const [first] = this.#inFlight;
-    if (epoch === this.#epoch && first?.seq === seq) this.accept(first);
+    if (epoch === this.#epoch && first?.seq === seq && !this.#restores.has(first)) this.accept(first);
   }
 
   #takeAnswered(): void {
@@ -216,11 +216,19 @@ export class Ledger {
    * The same for a session that is now at `epoch`. A newer epoch means that another server has the session. Its newest update
    * may have come by a single call, so earlier updates may be missing. Therefore everything that was not stored is sent again;
    * values that the server has already do no harm.
+   *
+   * `asked`: newestAccepted when the stream was asked for. In the same epoch a server that has at least this has lost nothing:
+   * what it accepted afterwards was answered before the word came that the stream is open.
    */
-  reopened(epoch: number, seq: number): void {
+  reopened(epoch: number, seq: number, asked = Infinity): void {
     const isAnother = epoch > this.#epoch;
     this.#epoch = Math.max(epoch, this.#epoch);
-    this.resumedAt(isAnother ? 0 : seq);
+    if (isAnother || seq < asked) this.resumedAt(isAnother ? 0 : seq);
+  }
+
+  /** The newest update that the server has accepted; 0 if there is none. */
+  get newestAccepted(): number {
+    return this.#accepted.seq;
   }
 
   /** The session was just created, joined or taken over. */

@@ -54,6 +54,8 @@ export class Link {
   #isSending = false;
   #requestId = newRequestId();
   #making: Promise<void> | undefined;
+  /** The newest update that was accepted when the stream was asked for the last time. */
+  #asked = 0;
   /** When the present stream was opened. */
   #openedAt: number | undefined;
   #downSince: number | undefined;
@@ -182,6 +184,7 @@ export class Link {
     this.#goAway = undefined;
     const { session } = this.#lease;
     const lane = this.rpc.hub.subscribe(session, this.frameOptions, {
+      asked: () => (this.#asked = this.ledger.newestAccepted),
       opened: (opened) => {
         checkVertexCount(opened.vertexCount, this.#lease.report.vertices);
         this.#unpacker = unpackerFor(opened.vertexCount);
@@ -244,7 +247,7 @@ export class Link {
     this.#mayHaveGoneBack = false;
     this.box.beginEpoch(epoch);
     this.ledger.countFrom(inputSeq);
-    this.ledger.reopened(epoch, inputSeq);
+    this.ledger.reopened(epoch, inputSeq, this.#asked);
   }
 
   /** `session`: the session that the stream was for. */

@@ -285,3 +285,32 @@ describe("ledger", () => {
     expect(ledger.sendNext().update.handles).toEqual({ tip: { set: { vertices: [1], motion: at(2) } } });
   });
 });
+
+describe("when a stream has been opened", () => {
+  /** Two updates were accepted, the second after the stream was asked for. */
+  function accepted(): [Ledger, number] {
+    const ledger = new Ledger();
+    ledger.beginEpoch(1);
+    ledger.add({ handles: { tip: { set: { vertices: [1] } } } });
+    ledger.accept(ledger.sendNext());
+    const asked = ledger.newestAccepted;
+    ledger.add({ handles: { tip: { move: at(1) } } });
+    ledger.accept(ledger.sendNext());
+    return [ledger, asked];
+  }
+
+  test("what was accepted since it was asked for is not lost, though the server did not have it then", () => {
+    const [ledger, asked] = accepted();
+    ledger.reopened(1, 1, asked);
+    expect(ledger.hasRestore).toBe(false);
+  });
+
+  test.each([
+    ["a server that has less than was accepted before", 1, 0],
+    ["a server that has just got the session", 2, 2],
+  ])("%s gets everything again", (_, epoch, seq) => {
+    const [ledger, asked] = accepted();
+    ledger.reopened(epoch, seq, asked);
+    expect(ledger.sendNext()).toMatchObject({ seq: 2, update: { handles: { tip: { set: { motion: at(1) } } } } });
+  });
+});
