@@ -45,6 +45,58 @@ def meshes():
     write("mesh", "stl_ascii", b"\3solid strip\n" + facets.encode() + b"endsolid strip\n")
 
 
+def gltfs():
+    """The first byte says how it is written. A strip under a turned and a mirrored node, with indices; normals that are not floats; a
+    sparse accessor without a bufferView; no indices at all."""
+    positions = b"".join(struct.pack("<3f", *vertex) for vertex in VERTICES)
+    indices = b"".join(struct.pack("<3H", *face) for face in FACES)
+    normals = b"".join(struct.pack("<4b", 0, 0, 127, 0) for _ in VERTICES)
+    buffer = positions + indices + normals
+    views = [{"buffer": 0, "byteOffset": 0, "byteLength": len(positions)},
+             {"buffer": 0, "byteOffset": len(positions), "byteLength": len(indices)},
+             {"buffer": 0, "byteOffset": len(positions) + len(indices), "byteLength": len(normals), "byteStride": 4}]
+    bounds = {"min": [0, 0, 0], "max": [5, 1, 0.5]}
+    places = {"bufferView": 0, "componentType": 5126, "count": len(VERTICES), "type": "VEC3", **bounds}
+    accessors = [places, {"bufferView": 1, "componentType": 5123, "count": 3 * len(FACES), "type": "SCALAR"},
+                 {"bufferView": 2, "componentType": 5120, "normalized": True, "count": len(VERTICES), "type": "VEC3"}]
+    document = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}], "materials": [{"name": "skin"}],
+        "nodes": [{"mesh": 0, "name": "strip", "rotation": [0, 0, 0.6, 0.8], "children": [2]}, {"mesh": 0, "scale": [-1, 1, 2]}, {}],
+        "meshes": [{"name": "strip", "primitives": [{"attributes": {"POSITION": 0, "NORMAL": 2}, "indices": 1, "material": 0}]}],
+        "accessors": accessors, "bufferViews": views, "buffers": [{"byteLength": len(buffer)}]}
+
+    def glb(root, binary):
+        text = json.dumps(root).encode()
+        text += b" " * (-len(text) % 4)
+        binary += bytes(-len(binary) % 4)
+        chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+    def inside(root):
+        uri = "data:application/octet-stream;base64," + base64.b64encode(buffer).decode()
+        return json.dumps({**root, "buffers": [{"byteLength": len(buffer), "uri": uri}]}).encode()
+
+    write("gltf", "glb", b"\0" + glb(document, buffer))
+    write("gltf", "gltf", b"\7" + inside(document))
+    sparse = {"componentType": 5126, "count": len(VERTICES), "type": "VEC3", **bounds, "sparse": {
+        "count": 2, "indices": {"bufferView": 1, "componentType": 5123}, "values": {"bufferView": 0}}}
+    write("gltf", "sparse", b"\2" + inside({**document, "accessors": [sparse, *accessors[1:]]}))
+    without = {**document, "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": mode} for mode in (4, 5, 6)]}]}
+    write("gltf", "modes", b"\4" + glb(without, buffer))
+
+
+def answers():
+    """The first byte is the size of the pieces."""
+    def block(kind, content):
+        return struct.pack(">BI", kind, len(content)) + content
+
+    good = block(0, b"\x08\x01") + block(0, b"") + block(0x80, b"grpc-status: 0\r\n")
+    write("answer", "good", b"\1" + good)
+    write("answer", "error", b"\3" + block(0x80, b"Grpc-Status:5\r\ngrpc-message:no%20session\r\ngrpc-status-details-bin:CAUSAmhp\r\n"))
+    write("answer", "compressed", b"\xff" + block(1, b"x"))
+    write("answer", "large", b"\x10" + struct.pack(">BI", 0, 5 << 20))
+
+
 def quoted(data):
     return '"' + "".join(f"\\{byte:03o}" for byte in data) + '"'
 
@@ -106,5 +158,7 @@ def frames():
 
 
 meshes()
+gltfs()
+answers()
 schedules()
 frames()

@@ -22,6 +22,7 @@ void raise(const std::exception_ptr& thrown, void*) {
 }  // namespace
 
 NB_MODULE(_core, module) {
+  nb::set_leak_warnings(false);  // a daemon thread, or the child of a fork, may end with the process
   nb::register_exception_translator(raise);
   nb::class_<LocalStream>(module, "Stream")
       .def("next", &LocalStream::next)

@@ -39,7 +39,7 @@ def alone(link: Changing, timeout: float, stop: Stop) -> Iterator[None]:
         if stop.is_set:
             raise make(Code.CANCELLED, "The call was ended.")
         if not is_quiet:
-            text = "Another solve, or an update that the server has not answered, is under way."
+            text = "Another solve, or an update that has no answer yet, is under way."
             raise make(Code.DEADLINE_EXCEEDED, text, "SOLVE_UNDER_WAY")
         link.is_solving = True
     try:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from lpdeform import types
 from lpdeform._holds import checked_hold
-from lpdeform._numbers import count, indices, number, numbers
+from lpdeform._numbers import Copied, count, indices, number, numbers
 from lpdeform._vectors import checked_vector
 from lpdeform.errors import invalid
 
@@ -21,6 +21,13 @@ def named(known: Collection[str], name: object, what: str) -> None:
     if name not in known:
         names = ", ".join(known)
         raise invalid(f"There is no {what} {name!r}: there are {names}.", "NAME_UNKNOWN", what, names)
+
+
+def typed(value: object, kind: type[object], what: str) -> None:
+    """Raises ARRAY_TYPE unless `value` is of this kind, or None."""
+    if value is not None and not isinstance(value, kind):
+        names = {"Mapping": "a dict"}.get(kind.__name__, kind.__name__)
+        raise invalid(f"The {what} argument is of type {type(value).__name__} and not {names}.", "ARRAY_TYPE", what, names)
 
 
 def checked_update(update: types.Update, vertices: int, faces: int) -> types.Update:
@@ -97,11 +104,21 @@ def checked_settings(settings: types.Settings, vertices: int) -> types.Settings:
         solver=None if settings.solver is None else _checked_solver(settings.solver),
         p=_checked_field(settings.p, "p", vertices),
         stiffness=_checked_field(settings.stiffness, "stiffness", vertices),
-        region=None if settings.region is None else indices(settings.region, "region", mask_length=vertices),
+        region=None if settings.region is None else _checked_region(settings.region, vertices),
     )
 
 
+def _checked_region(region: npt.ArrayLike, vertices: int) -> Copied:
+    """No indices at all mean the whole mesh. A mask without a vertex means nothing that could be meant."""
+    chosen = indices(region, "region", mask_length=vertices)
+    if chosen.size == 0 and np.asarray(region).dtype.kind == "b" and np.size(region) > 0:
+        raise invalid("The region is a mask that holds no vertex.", "REGION_EMPTY", "region", "at least one vertex")
+    return chosen
+
+
 def _checked_solver(solver: types.SolverSettings) -> types.SolverSettings:
+    typed(solver, types.SolverSettings, "solver")
+    typed(solver.search, types.MinimaSearch, "search")
     named(get_args(types.Method), solver.method, "method")
     named(get_args(types.InitialGuess), solver.initial, "initial guess")
     return replace(

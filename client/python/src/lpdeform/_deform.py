@@ -84,6 +84,6 @@ def deform(
     try:
         warn_of_splits(link.report, stacklevel=2)
         with told_by(progress) as on_progress:
-            return link.solve(SolveOptions(certify, trace, with_normals, initial, on_progress, timeout), stop)
+            return link.solve(SolveOptions(bool(certify), bool(trace), bool(with_normals), initial, on_progress, timeout), stop)
     finally:
         link.close()

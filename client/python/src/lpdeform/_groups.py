@@ -19,23 +19,37 @@ Changed = TypeVar("Changed", bound=types.Change)
 
 
 def handles_of(given: Mapping[str, Given], vertices: Copied) -> dict[str, types.Handle]:
-    return {str(name): _handle_of(one, vertices) for name, one in given.items()}
+    if not isinstance(given, Mapping):
+        text = f"The handles are of type {type(given).__name__} and not a dict of names."
+        raise invalid(text, "ARRAY_TYPE", "handles", "a dict")
+    return {str(name): _handle_of(str(name), one, vertices) for name, one in given.items()}
 
 
-def _handle_of(given: Any, vertices: Copied) -> types.Handle:
+def _handle_of(name: str, given: Any, vertices: Copied) -> types.Handle:
     if isinstance(given, types.Handle):
         return chosen(given, vertices)
     if _is_pair(given):
         group, motion = given
-        moved = motion if isinstance(motion, (types.Fixed, types.RigidMotion, types.Targets)) else types.Targets(motion)
-        return chosen(types.Handle(group, moved), vertices)
+        return chosen(types.Handle(group, _motion_of(name, motion)), vertices)
     return chosen(types.Handle(given), vertices)
 
 
 def _is_pair(given: Any) -> bool:
-    if not isinstance(given, tuple) or len(given) != 2:
-        return False
-    return isinstance(given[1], (types.Fixed, types.RigidMotion, types.Targets)) or np.ndim(given[1]) == 2
+    """A tuple whose first part is a group by itself. A tuple of two indices is a group."""
+    return isinstance(given, tuple) and len(given) == 2 and (callable(given[0]) or not np.isscalar(given[0]))
+
+
+def _motion_of(name: str, motion: Any) -> types.Motion:
+    if isinstance(motion, (types.Fixed, types.RigidMotion, types.Targets)):
+        return motion
+    try:
+        positions = np.asarray(motion, dtype=np.float64)
+    except (TypeError, ValueError):
+        positions = np.zeros(0)
+    if positions.ndim != 2:
+        text = f"The motion of handle {name!r} is neither a RigidMotion, Fixed or Targets, nor k x 3 target positions."
+        raise invalid(text, "MOTION_TYPE", f"handle {name!r}", "a motion, or k x 3 numbers")
+    return types.Targets(motion)
 
 
 def chosen(change: Changed, vertices: Copied | None) -> Changed:

@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 
 from lpdeform._alone import alone
+from lpdeform._box import FrameBox
 from lpdeform._core import Session, Stream, create, forget_threads
 from lpdeform._following import Following
 from lpdeform._ledger import Ledger, NumberedUpdate
 from lpdeform._notices import Notices
 from lpdeform._numbers import Copied
 from lpdeform._opened import Connecting, Given
-from lpdeform._solving import SolveOptions
+from lpdeform._solving import SolveOptions, solve_took_too_long
 from lpdeform._stop import Stop
 from lpdeform.errors import Code, LpdeformError, about, exception, is_taken_all_the_same, make, session_closed
 from lpdeform.frames import Frame, FrameHeader, QuantizedSurface, sealed
@@ -43,9 +44,20 @@ _closing_seconds = 3.0
 _interrupt_seconds = 0.05
 """How often a wait looks for Ctrl-C."""
 _log = logging.getLogger("lpdeform")
+_sessions_of_parent: list[Session] = []
 _sessions: weakref.WeakValueDictionary[str, Session] = weakref.WeakValueDictionary()
 
-os.register_at_fork(after_in_child=forget_threads)
+_links: weakref.WeakSet[LocalLink] = weakref.WeakSet()
+
+
+def _forget_parent() -> None:
+    """In the child of a fork: neither the threads of the parent's sessions are there, nor those that hold their locks."""
+    forget_threads()
+    for link in list(_links):
+        link.leave_to_parent()
+
+
+os.register_at_fork(after_in_child=_forget_parent)
 
 
 class LocalLink(Following):
@@ -74,6 +86,20 @@ class LocalLink(Following):
         self._sending = threading.Lock()
         self._notices = Notices()
         self._stream: Stream | None = None
+        _links.add(self)
+
+    def leave_to_parent(self) -> None:
+        """Closes the child's copy of a session, with new locks."""
+        _sessions_of_parent.append(self._session)  # its end would wait for threads
+        self.changed = threading.Condition()
+        self._sending = threading.Lock()
+        self.stop = Stop()
+        self.stop.set()
+        self.box = FrameBox()
+        self.box.finish(session_closed())
+        self._stream = self._thread = None
+        self.is_solving = False
+        self.is_closing = True
 
     @property
     def report(self) -> MeshReport:
@@ -241,7 +267,7 @@ class LocalLink(Following):
                 if stop.is_set:
                     raise make(Code.CANCELLED, "The call was ended.")
                 if deadline is not None and now >= deadline:
-                    raise make(Code.DEADLINE_EXCEEDED, f"The solve took longer than {options.timeout} seconds.")
+                    raise solve_took_too_long(options.timeout)
                 if told is not None and now >= looked + 0.1 and (newest := job.progress()) is not None:
                     looked = now
                     told(SolveProgress(*newest))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,9 +19,20 @@ def mesh_arrays(vertices: types.Mesh, faces: types.Triangles | None) -> tuple[An
         if hasattr(vertices, "geometry") and hasattr(vertices, "to_mesh"):
             vertices = vertices.to_mesh()  # a scene of trimesh: all its meshes as one, each where it stands
         return _points_of(vertices), _triangles_of(vertices)
-    if isinstance(faces, (list, tuple)) and len(faces) > 0 and hasattr(faces[0], "type"):
-        return vertices, _of_cells(faces)  # the cells of a mesh of meshio
+    if isinstance(faces, Mapping):
+        text = "The faces are a dict: with a mesh of another library, give handles by name, as handles=."
+        raise invalid(text, "ARRAY", "faces", "(k, 3)")
+    if isinstance(faces, (list, tuple)) and len(faces) > 0:
+        if hasattr(faces[0], "type"):
+            return vertices, _of_cells(faces)  # the cells of a mesh of meshio
+        if all(isinstance(one, tuple) and len(one) == 2 and isinstance(one[0], str) for one in faces):
+            return vertices, _of_cells([_Block(*one) for one in faces])  # as meshio takes them
     return vertices, _without_counts(faces)
+
+
+class _Block(NamedTuple):
+    type: str
+    data: Any
 
 
 def _points_of(mesh: Any) -> Any:
@@ -39,7 +51,7 @@ def _triangles_of(mesh: Any) -> Any:
     if hasattr(mesh, "cells") and not hasattr(mesh, "faces"):  # meshio
         return _of_cells(mesh.cells)
     if hasattr(mesh, "faces"):  # trimesh and PyVista
-        return _without_counts(mesh.faces)
+        return _without_counts(mesh.faces, hasattr(mesh, "points"))
     if hasattr(mesh, "get_buffer"):
         corners = _buffer(mesh, "triangleVertexInds")
         if 3 * mesh.n_faces() != len(corners):
@@ -67,18 +79,34 @@ def _of_celltypes(cells: Any, types: Any) -> Any:
     return np.asarray(cells).reshape(-1, 4)[:, 1:]
 
 
-def _without_counts(faces: Any) -> Any:
-    """PyVista writes faces one after another, with the number of corners before each."""
-    array = np.asarray(faces)
+def _without_counts(faces: Any, is_counted: bool = False) -> Any:
+    """PyVista writes faces one after another, with the number of corners before each. `is_counted`: it is known that these do."""
+    try:
+        array = np.asarray(faces)
+    except (TypeError, ValueError):
+        return faces  # refused later, with what is wrong
     if array.ndim != 1 or array.size == 0 or array.dtype.kind not in "iu":
         return faces
-    is_counted = array.size % 4 == 0 and bool((array[::4] == 3).all())
-    if is_counted and array.size != 12:  # 12 numbers may be the four triangles of a tetrahedron
-        return array.reshape(-1, 4)[:, 1:]
+    if array.size % 4 == 0 and bool((array[::4] == 3).all()):
+        counted = array.reshape(-1, 4)[:, 1:]
+        if is_counted or array.size != 12:
+            return counted
+        # 12 numbers may also be four triangles, as of a tetrahedron.
+        may_be, may_be_plain = _have_three_corners(counted), _have_three_corners(array.reshape(-1, 3))
+        if may_be and not may_be_plain:
+            return counted
+        if may_be and set(array.tolist()) != {0, 1, 2, 3}:
+            text = "The faces are 12 numbers, which may be four triangles, or three with the number of corners before each."
+            raise invalid(text, "ARRAY_SHAPE", "faces", "(k, 3)")
+        return faces
     if array.size % 3 != 0:
         text = "The faces are a flat array whose polygons are not all triangles."
         raise invalid(text, "ARRAY_SHAPE", "faces", "(k, 3), or 3 before each triangle")
     return faces
+
+
+def _have_three_corners(triangles: Any) -> bool:
+    return all(len(set(triangle)) == 3 for triangle in triangles.tolist())
 
 
 def _buffer(mesh: Any, name: str) -> list[Any]:

@@ -16,43 +16,57 @@ _most_index = 2**32 - 1
 
 def _array(values: npt.ArrayLike, what: str) -> Copied:
     try:
-        return np.asarray(values)
+        array = np.asarray(values)
     except (TypeError, ValueError) as cause:
-        raise invalid(f"The {what} are no array: {cause}.", "ARRAY", what) from cause
+        raise invalid(f"{_capital(what)}: no array: {cause}.", "ARRAY", what) from cause
+    if np.ma.is_masked(values):
+        raise invalid(f"{_capital(what)}: some entries are masked.", "ARRAY_TYPE", what, "no masked entries")
+    return array
+
+
+def _capital(what: str) -> str:
+    return what[:1].upper() + what[1:]
 
 
 def numbers(values: npt.ArrayLike, what: str, width: int = 1) -> Copied:
     """A copy of shape (k,) or (k, width): float32 if the values are float32, otherwise float64."""
     array = _array(values, what)
     if array.dtype.kind not in "fiu":
-        raise invalid(f"The {what} are of type {array.dtype} and not numbers.", "ARRAY_TYPE", what, "float32 or float64")
+        raise invalid(f"{_capital(what)}: of type {array.dtype} and not numbers.", "ARRAY_TYPE", what, "float32 or float64")
     copied = np.array(array, dtype="<f4" if array.dtype.itemsize == 4 and array.dtype.kind == "f" else "<f8", order="C")
     return _shaped(copied, what, width)
 
 
-def indices(values: npt.ArrayLike, what: str, width: int = 1, mask_length: int | None = None) -> Copied:
-    """A copy as uint32. A boolean mask of `mask_length` becomes the indices where it is true; None: no mask is allowed."""
+def indices(
+    values: npt.ArrayLike, what: str, width: int = 1, mask_length: int | None = None, below: int | None = None
+) -> Copied:
+    """A copy as uint32. A boolean mask of `mask_length` becomes the indices where it is true; None: no mask is allowed. `below`: how
+    many there are to choose from, for the text of an error."""
     array = _array(values, what)
     if array.dtype.kind == "b" and array.ndim == 1 and mask_length is not None:
         if array.size != mask_length:
-            raise invalid(
-                f"The {what} are a mask of {array.size} and not {mask_length}.", "MASK_SIZE", what, f"length = {mask_length}"
-            )
+            text = f"{_capital(what)}: a mask of length {array.size} and not {mask_length}."
+            raise invalid(text, "MASK_SIZE", what, f"length = {mask_length}")
         array = np.flatnonzero(array)
+    elif mask_length is not None and array.dtype.kind in "iu" and array.shape == (mask_length,) and _is_mask(array):
+        raise invalid(f"{_capital(what)}: 0 and 1 for all {mask_length}; a mask has booleans.", "ARRAY_TYPE", what, "booleans, or indices")
     if array.size == 0:
         array = array.astype(np.int64)
     if array.dtype.kind not in "iu":
-        raise invalid(f"The {what} are of type {array.dtype} and not integers.", "ARRAY_TYPE", what, "integers")
+        raise invalid(f"{_capital(what)}: of type {array.dtype} and not integers.", "ARRAY_TYPE", what, "integers")
     outside = (array < 0) | (array > _most_index)
     if outside.any():
         first = int(np.flatnonzero(outside.reshape(-1))[0])
-        raise invalid(
-            f"Of the {what}, number {first} is {array.reshape(-1)[first]}, which is no index.",
-            "INDEX_OUT_OF_RANGE",
-            f"{what}, number {first}",
-            f"0 <= index <= {_most_index}",
-        )
+        element = f"{what}, number {first}" if width == 1 else f"{what}, row {first // width}"
+        limit = f"0 <= index <= {_most_index}" if below is None else f"0 <= index < {below}"
+        text = f"{_capital(element)} has {array.reshape(-1)[first]}, which is no index."
+        raise invalid(text, "INDEX_OUT_OF_RANGE", element, limit)
     return _shaped(np.array(array, dtype="<u4", order="C"), what, width)
+
+
+def _is_mask(array: Copied) -> bool:
+    """Three or more indices that are all 0 or 1 would repeat one."""
+    return array.size > 2 and bool(((array == 0) | (array == 1)).all())
 
 
 def number(value: float, what: str) -> float:
@@ -85,7 +99,7 @@ def _shaped(array: Copied, what: str, width: int) -> Copied:
     if width > 1 and array.ndim == 1 and array.size % width == 0:
         return array.reshape(-1, width)
     wanted = "(k,)" if width == 1 else f"(k, {width})"
-    raise invalid(f"The {what} are of shape {array.shape} and not {wanted}.", "ARRAY_SHAPE", what, wanted)
+    raise invalid(f"{_capital(what)}: of shape {array.shape} and not {wanted}.", "ARRAY_SHAPE", what, wanted)
 
 
 def is_single_precision(array: Copied) -> bool:

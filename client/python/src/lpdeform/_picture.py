@@ -45,7 +45,7 @@ class Solved(Protocol):
 def table_of(result: Solved) -> str:
     """HTML."""
     gap = "not asked for" if result.optimality_gap is None else f"{result.optimality_gap:.2g} for its rotations"
-    p = "computed by the server" if result.p is None else _range_of(np.atleast_1d(np.asarray(result.p, float)))
+    p = "computed from the shape by the server" if result.p is None else _range_of(np.atleast_1d(np.asarray(result.p, float)))
     rows = {
         "vertices": str(len(result.positions)),
         "p": p,
@@ -68,7 +68,10 @@ def _range_of(values: Any) -> str:
 def plot(result: Solved, faces: Copied | None, backend: str | None, show: bool) -> Any:
     if faces is None:
         raise make(Code.INVALID_ARGUMENT, "The result does not know its faces: give them.", "ARGUMENT_MISSING", "faces")
-    for name in ("pyvista", "matplotlib") if backend is None else (backend,):
+    if backend is not None and backend not in _plots:
+        text = f"There is no backend {backend!r}: there are {', '.join(_plots)}."
+        raise make(Code.INVALID_ARGUMENT, text, "NAME_UNKNOWN", "backend", ", ".join(_plots))
+    for name in _plots if backend is None else (backend,):
         if find_spec(name) is not None:
             return _plots[name](result, np.asarray(faces), show)
     text = "A picture needs PyVista or Matplotlib: pip install pyvista, or pip install matplotlib"

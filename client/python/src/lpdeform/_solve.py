@@ -17,7 +17,7 @@ from lpdeform._link import Link
 from lpdeform._recovery import Answer, Backoff, answer_of
 from lpdeform._rpc import Packer
 from lpdeform._sending_alone import send_restore
-from lpdeform._solving import SolveOptions
+from lpdeform._solving import SolveOptions, solve_took_too_long
 from lpdeform._status import from_call
 from lpdeform._stop import Stop
 from lpdeform.errors import (
@@ -140,7 +140,10 @@ def _run(
             builder.take(response)
         return builder.finish()
     except grpc.RpcError as error:
-        raise from_call(error, link.rpc.address) from None
+        why = from_call(error, link.rpc.address)
+        if timeout is not None and why.code is Code.DEADLINE_EXCEEDED and not why.reason:
+            why = solve_took_too_long(options.timeout)
+        raise why from None
     finally:
         if call is not None:
             call.cancel()  # an interrupt in a notebook; without effect on a finished call

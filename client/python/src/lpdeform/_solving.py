@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lpdeform._numbers import Copied, numbers
-from lpdeform.errors import invalid
+from lpdeform.errors import Code, LpdeformError, invalid, make
 from lpdeform.types import SolveProgress
 
 
@@ -21,6 +21,11 @@ class SolveOptions:
     initial_positions: Copied | None = None
     on_progress: Callable[[SolveProgress], None] | None = None
     timeout: float | None = None
+
+
+def solve_took_too_long(timeout: float | None) -> LpdeformError:
+    text = f"The solve took longer than {timeout} seconds."
+    return make(Code.DEADLINE_EXCEEDED, text, "SOLVE_TIME_PASSED", "timeout", f"{timeout} s")
 
 
 def checked_positions(values: npt.ArrayLike | None, vertex_count: int) -> Copied | None:

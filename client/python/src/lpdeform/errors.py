@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum
-from typing import cast
+from typing import Any, cast
 
 from lpdeform.reasons import Reason
 
@@ -74,8 +74,17 @@ class LpdeformError(Exception):
         self.input_seq = input_seq
         self.retry_after = retry_after
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For other processes, as multiprocessing hands errors on."""
+        numbers = {"metadata": self.metadata, "input_seq": self.input_seq, "retry_after": self.retry_after}
+        return _remade, (type(self), (self.code, self.args[0], self.reason, self.element, self.limit), numbers)
+
     def __str__(self) -> str:
         return f"{self.args[0]} ({self.reason})" if self.reason else str(self.args[0])
+
+
+def _remade(kind: type[LpdeformError], what: tuple[Any, ...], numbers: Mapping[str, Any]) -> LpdeformError:
+    return kind(*what, **numbers)
 
 
 class InvalidInput(LpdeformError, ValueError):

@@ -13,10 +13,10 @@ from typing import get_args
 import numpy as np
 import numpy.typing as npt
 
-from lpdeform._checks import checked_settings, named
+from lpdeform._checks import checked_settings, named, typed
 from lpdeform._groups import handles_of
 from lpdeform._meshes import mesh_arrays
-from lpdeform._numbers import Copied, indices, numbers
+from lpdeform._numbers import Copied, count, indices, number, numbers
 from lpdeform._opened import Connecting, Given, Reaching
 from lpdeform._stop import Stop
 from lpdeform.access import Tls, Token
@@ -50,6 +50,10 @@ def reach(
     address: str | None, token: Token, tls: Tls | bool, call_timeout: float = 30.0, reconnect_for: float = 120.0
 ) -> Connecting:
     """This process, or a server if there is an address."""
+    typed(address, str, "address")
+    for name, seconds in (("call_timeout", call_timeout), ("reconnect_for", reconnect_for)):
+        if not number(seconds, name) >= 0:
+            raise invalid(f"The {name} is {seconds} seconds.", "SECONDS_OUT_OF_RANGE", name, f"0 <= {name}")
     address = address or os.environ.get("LPDEFORM_ADDRESS")
     if address:
         if _is_missing("grpc") or _is_missing("google.protobuf"):
@@ -89,7 +93,7 @@ def checked_mesh(
     rest = numbers(vertices, "vertices", 3)
     return Given(
         vertices=rest,
-        faces=indices(faces, "faces", 3),
+        faces=indices(faces, "faces", 3, below=len(rest)),
         normals=None if normals is None else numbers(normals, "normals", 3),
         weld=_weld_of(weld),
         weights=weights,
@@ -101,7 +105,7 @@ def checked_mesh(
 def warn_of_splits(report: MeshReport, stacklevel: int) -> None:
     """stacklevel: as in warnings.warn, counted from the caller of this function."""
     for notice in report.notices:
-        text = f"{notice} Open it with weld=True, or with a larger tolerance as weld=."
+        text = f"{notice} weld=True does, or a larger tolerance as weld=."
         warnings.warn(text, SplitMeshWarning, stacklevel=stacklevel + 1)
 
 
@@ -114,7 +118,8 @@ def frame_options(
     max_frames_per_second: float,
     certify: bool,
 ) -> FrameOptions:
-    if not 0 <= credit <= 8:
+    credit = count(credit, "credit", 8)
+    if credit > 8:
         raise invalid(f"The credit is {credit}.", "CREDIT_OUT_OF_RANGE", "credit", "0 <= credit <= 8")
     for one in (encoding, lowest_encoding or encoding):
         named(get_args(Encoding), one, "encoding")
@@ -123,7 +128,13 @@ def frame_options(
 
         _codec.require_decoder()
     return FrameOptions(
-        encoding, lowest_encoding, credit, with_distortion, with_normals, max_frames_per_second, certify
+        encoding,
+        lowest_encoding,
+        credit,
+        bool(with_distortion),
+        bool(with_normals),
+        number(max_frames_per_second, "max_frames_per_second"),
+        bool(certify),
     )
 
 

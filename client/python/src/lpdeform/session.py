@@ -8,11 +8,13 @@ import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator, Mapping
+from numbers import Real
 from types import TracebackType
 from typing import Any, TypeVar
 
 import numpy.typing as npt
 
+from lpdeform._checks import typed
 from lpdeform._groups import chosen
 from lpdeform._opened import Opened
 from lpdeform._progress import told_by
@@ -86,7 +88,7 @@ class Live:
 
     @property
     def mesh_report(self) -> MeshReport:
-        """What the server reported of the mesh."""
+        """What was found of the mesh when the session was opened."""
         return self._link.report
 
     @property
@@ -126,6 +128,9 @@ class Live:
         change, and without changes that were coalesced with it. Raises at once if the session is closed (SESSION_CLOSED), for a
         reader (NOT_THE_WRITER), and for arrays of the wrong type or shape.
         """
+        typed(handles, Mapping, "handles")
+        typed(settings, Settings, "settings")
+        typed(resize, Resize, "resize")
         changes = {name: chosen(change, self._link.vertices) for name, change in (handles or {}).items()}
         return self._link.update(Update(changes, settings or Settings(), resize, begins_step))
 
@@ -199,7 +204,7 @@ class Live:
         if timeout is not None:
             deadline_after(timeout)
         positions = checked_positions(initial_positions, self.mesh_report.vertices)
-        return SolveOptions(certify, trace, with_normals, positions, on_progress, timeout)
+        return SolveOptions(bool(certify), bool(trace), bool(with_normals), positions, on_progress, timeout)
 
 
 class Session(Live):
@@ -284,7 +289,7 @@ class Session(Live):
         is the same for a function. If the server goes away, the solve starts again, for as long as the
         stream would. `timeout`: seconds in all, including the wait for another solve; None is without limit; with 0 nothing is
         sent. Changes made during the solve wait and are sent after it. Raises the server's errors, and Timeout: SOLVE_UNDER_WAY
-        if the time was spent waiting, SOLVE_TIME_PASSED if no time was left to begin. Raises SESSION_CLOSED (FAILED_PRECONDITION)
+        if the time was spent waiting, SOLVE_TIME_PASSED if the solve was not finished in time. Raises SESSION_CLOSED (FAILED_PRECONDITION)
         if close() is called meanwhile.
         """
         with told_by(progress if progress is not None else on_progress) as told:
@@ -346,7 +351,7 @@ class Session(Live):
 
 def deadline_after(timeout: float) -> float:
     """On the clock of time.monotonic()."""
-    if not timeout >= 0:
+    if not isinstance(timeout, Real) or not timeout >= 0:
         raise invalid(f"The timeout is {timeout} seconds.", "SECONDS_OUT_OF_RANGE", "timeout", "0 <= timeout")
     return time.monotonic() + timeout
 

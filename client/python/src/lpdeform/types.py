@@ -160,7 +160,7 @@ class Removal:
 
 @dataclass(frozen=True)
 class Automatic:
-    """p or stiffness from the shape's geometry, computed by the server: joints are soft, parts are rigid."""
+    """p or stiffness from the shape's geometry, computed where the session is: joints are soft, parts are rigid."""
 
     strength: float = 1.0
     """0 to 1; 0 is p = 2 and stiffness 1 everywhere."""
@@ -194,7 +194,7 @@ class MinimaSearch:
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """How a solve is made and when it stops. This is a single setting and is replaced as a whole. 0 takes the server's
+    """How a solve is made and when it stops. This is a single setting and is replaced as a whole. 0 takes the
     default."""
 
     method: Method = "auto"
@@ -245,7 +245,7 @@ Change = Union[Handle, Fixed, RigidMotion, Targets, Removal]
 
 @dataclass(frozen=True, eq=False)
 class Update:
-    """A change of handles and settings; the server accepts or refuses it as a whole."""
+    """A change of handles and settings, accepted or refused as a whole."""
 
     handles: Mapping[str, Change] = field(default_factory=dict)
     settings: Settings = Settings()
@@ -266,7 +266,7 @@ class Defect:
 
 @dataclass(frozen=True)
 class MeshReport:
-    """What the server reported of the mesh."""
+    """What was found of the mesh."""
 
     vertices: int
     faces: int
