@@ -17,6 +17,8 @@ namespace {
 constexpr long kConnectMs = 5000;
 /// The thread looks after timeouts at least this often; everything else wakes it.
 constexpr int kGlanceMs = 1000;
+/// What libcurl's callbacks return to end a request; they are called with one byte or more.
+constexpr std::size_t kStop = 0;
 /// Connections that are kept for later requests.
 constexpr long kMostIdle = 8;
 
@@ -60,6 +62,8 @@ class Exchange {
     curl_easy_setopt(easy, CURLOPT_HEADERFUNCTION, &Exchange::take_header);
     curl_easy_setopt(easy, CURLOPT_WRITEDATA, this);
     curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, &Exchange::take_bytes);
+    // For Schannel, which otherwise refuses certificates that do not say who could revoke them, as self-made ones.
+    curl_easy_setopt(easy, CURLOPT_SSL_OPTIONS, static_cast<long>(CURLSSLOPT_REVOKE_BEST_EFFORT));
     if (tls) set_tls(*tls);
     return easy;
   }
@@ -93,19 +97,27 @@ class Exchange {
   static std::size_t take_header(char* data, std::size_t, std::size_t count, void* self) {
     const absl::string_view line = absl::StripAsciiWhitespace(absl::string_view(data, count));
     const HttpEvents& events = static_cast<Exchange*>(self)->events_;
+    Taking taking = Taking::kTaken;
     if (line.substr(0, 5) == "HTTP/") {
       const std::size_t space = line.find(' ');
-      events.header(":status", space == line.npos ? "" : std::string(line.substr(space + 1, 3)));
+      taking = events.header(":status", space == line.npos ? "" : std::string(line.substr(space + 1, 3)));
     } else if (const std::size_t colon = line.find(':'); colon != line.npos) {
-      events.header(absl::AsciiStrToLower(line.substr(0, colon)),
-                    std::string(absl::StripAsciiWhitespace(line.substr(colon + 1))));
+      taking = events.header(absl::AsciiStrToLower(line.substr(0, colon)),
+                             std::string(absl::StripAsciiWhitespace(line.substr(colon + 1))));
     }
-    return count;
+    return taking == Taking::kTaken ? count : kStop;
   }
 
   static std::size_t take_bytes(char* data, std::size_t, std::size_t count, void* self) {
-    const bool is_taken = static_cast<Exchange*>(self)->events_.bytes(std::string_view(data, count));
-    return is_taken ? count : CURL_WRITEFUNC_PAUSE;
+    switch (static_cast<Exchange*>(self)->events_.bytes(std::string_view(data, count))) {
+      case Taking::kTaken:
+        return count;
+      case Taking::kLater:
+        return CURL_WRITEFUNC_PAUSE;
+      case Taking::kRefused:
+        break;
+    }
+    return kStop;
   }
 
   const HttpRequest request_;
@@ -189,8 +201,9 @@ class CurlHttp final : public Http {
   };
 
   void run() {
-    while (!is_over_) {
+    for (;;) {
       for (const Commands::Command& command : commands_->take()) command();
+      if (is_over_) break;
       int running = 0;
       curl_multi_perform(multi_, &running);
       end_finished();
