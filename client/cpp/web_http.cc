@@ -3,12 +3,18 @@
 #include <curl/curl.h>
 
 #include <algorithm>
+#include <initializer_list>
 #include <map>
 #include <mutex>
 #include <thread>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#ifdef _WIN32
+#include "client/cpp/web_schannel.h"
+#else
+#include <unistd.h>
+#endif
 
 namespace lpdeform::client {
 namespace {
@@ -28,6 +34,27 @@ struct Easy {
 struct List {
   void operator()(curl_slist* list) const { curl_slist_free_all(list); }
 };
+
+#ifndef _WIN32
+/// The first of these that is there; empty if none is.
+std::string first_there(std::initializer_list<const char*> paths) {
+  for (const char* const path : paths) {
+    if (access(path, R_OK) == 0) return path;
+  }
+  return "";
+}
+
+/// The authorities that the system trusts. Without them, libcurl's own choice stays, if it has one.
+void trust_the_system(CURL* easy) {
+  const std::string file = first_there({"/etc/ssl/certs/ca-certificates.crt",  // Debian, Arch
+                                        "/etc/pki/tls/certs/ca-bundle.crt",    // Fedora
+                                        "/etc/ssl/ca-bundle.pem",              // SUSE
+                                        "/etc/ssl/cert.pem"});                 // macOS, Alpine
+  const std::string folder = first_there({"/system/etc/security/cacerts"});    // Android
+  if (!file.empty()) curl_easy_setopt(easy, CURLOPT_CAINFO, file.c_str());
+  if (!folder.empty()) curl_easy_setopt(easy, CURLOPT_CAPATH, folder.c_str());
+}
+#endif
 
 std::unique_ptr<curl_slist, List> header_list(const HttpRequest& request) {
   curl_slist* list = curl_slist_append(nullptr, "Expect:");  // no pause before large bodies
@@ -65,13 +92,27 @@ class Exchange {
     // For Schannel, which otherwise refuses certificates that do not say who could revoke them, as self-made ones.
     curl_easy_setopt(easy, CURLOPT_SSL_OPTIONS, static_cast<long>(CURLSSLOPT_REVOKE_BEST_EFFORT));
     if (tls) set_tls(*tls);
+    const bool has_own_roots = tls && !tls->root_certificates.empty();  // which libcurl itself looks at
+    if (!origin.starts_with("https://") || has_own_roots) return easy;
+#ifndef _WIN32
+    trust_the_system(easy);
+#else
+    host_ = host_of(origin);
+    curl_easy_setopt(easy, CURLOPT_PREREQDATA, this);
+    curl_easy_setopt(easy, CURLOPT_PREREQFUNCTION, &Exchange::check_server);
+#endif
     return easy;
   }
 
-  CURL* easy() const { return easy_.get(); }
+  CURL* easy() const {
+    return easy_.get();
+  }
 
   void end(CURLcode code) {
     if (code == CURLE_OK) return events_.end(absl::OkStatus());
+#ifdef _WIN32
+    if (!objection_.empty()) return events_.end(absl::UnavailableError(objection_));
+#endif
     const std::string text = error_[0] != '\0' ? error_ : curl_easy_strerror(code);
     curl_off_t sent_after = 0;
     if (easy_) curl_easy_getinfo(easy_.get(), CURLINFO_PRETRANSFER_TIME_T, &sent_after);
@@ -79,7 +120,9 @@ class Exchange {
       return events_.end(absl::DeadlineExceededError(absl::StrCat("No answer came in time: ", text)));
     events_.end(absl::UnavailableError(text));
   }
-  void end_cancelled() { events_.end(absl::CancelledError("The call was cancelled.")); }
+  void end_cancelled() {
+    events_.end(absl::CancelledError("The call was cancelled."));
+  }
 
  private:
   void set_tls(const Tls& tls) {
@@ -93,6 +136,28 @@ class Exchange {
     curl_blob blob{const_cast<char*>(text.data()), text.size(), CURL_BLOB_COPY};
     curl_easy_setopt(easy_.get(), option, &blob);
   }
+
+#ifdef _WIN32
+  static std::string host_of(const std::string& origin) {
+    const std::size_t start = origin.find("//") + 2;
+    std::string host = origin.substr(start, origin.rfind(':') - start);
+    return host.front() == '[' ? host.substr(1, host.size() - 2) : host;
+  }
+
+  /// Before the request goes out on a connection.
+  static int check_server(void* self, char*, char*, int, int) {
+    Exchange& exchange = *static_cast<Exchange*>(self);
+    long made = 0;
+    curl_easy_getinfo(exchange.easy(), CURLINFO_NUM_CONNECTS, &made);
+    if (made == 0) return CURL_PREREQFUNC_OK;  // a connection that was looked at before
+    curl_tlssessioninfo* tls = nullptr;
+    curl_easy_getinfo(exchange.easy(), CURLINFO_TLS_SSL_PTR, &tls);
+    exchange.objection_ = tls == nullptr || tls->internals == nullptr
+                              ? "There is no TLS to this server."
+                              : why_not_trusted(tls->internals, exchange.host_);
+    return exchange.objection_.empty() ? CURL_PREREQFUNC_OK : CURL_PREREQFUNC_ABORT;
+  }
+#endif
 
   static std::size_t take_header(char* data, std::size_t, std::size_t count, void* self) {
     const absl::string_view line = absl::StripAsciiWhitespace(absl::string_view(data, count));
@@ -125,6 +190,9 @@ class Exchange {
   std::unique_ptr<CURL, Easy> easy_;
   const std::unique_ptr<curl_slist, List> headers_;
   char error_[CURL_ERROR_SIZE] = "";
+#ifdef _WIN32
+  std::string host_, objection_;
+#endif
 };
 
 /// The commands for the thread, which outlive it, because calls may.
