@@ -36,6 +36,15 @@ std::string percent_decoded(std::string_view text) {
   return out;
 }
 
+absl::Status too_long(std::string_view what, std::size_t size, std::size_t most) {
+  return absl::ResourceExhaustedError(
+      absl::StrCat(std::string(what), " of ", size, " bytes came; the limit is ", most, "."));
+}
+
+absl::Status after_the_trailers() {
+  return absl::InternalError("Something came after the trailers.");
+}
+
 /// As gRPC prescribes for answers that do not come from gRPC.
 absl::StatusCode code_of_http(std::string_view status) {
   if (status == "400") return absl::StatusCode::kInternal;
@@ -55,30 +64,40 @@ std::string framed(std::string_view message) {
   return out.append(message);
 }
 
-void AnswerReader::header(std::string_view name, std::string_view value) {
+absl::Status AnswerReader::header(std::string_view name, std::string_view value) {
+  header_bytes_ += name.size() + value.size();
+  if (header_bytes_ > kMostHeaderBytes) return too_long("Headers", header_bytes_, kMostHeaderBytes);
   if (name == ":status") fields_.clear();  // after an interim answer
   fields_.insert_or_assign(std::string(name), std::string(value));
+  return absl::OkStatus();
 }
 
 absl::Status AnswerReader::bytes(std::string_view bytes, const std::function<void(std::string)>& take) {
-  if (!is_grpc_web()) return absl::OkStatus();  // a page about an error, for people
+  if (!is_grpc_web()) {  // a page about an error, for people
+    page_bytes_ += bytes.size();
+    return page_bytes_ <= kMostMessageBytes ? absl::OkStatus()
+                                            : too_long("A page", page_bytes_, kMostMessageBytes);
+  }
   waiting_.append(bytes);
+  if (has_trailers_ && !bytes.empty()) return after_the_trailers();
   std::string_view left = waiting_;
   while (left.size() >= kPrefixBytes) {
     const auto kind = static_cast<std::uint8_t>(left[0]);
     const std::size_t size = length_in(left);
     if ((kind & kCompressed) != 0) return absl::UnimplementedError("A compressed message came.");
-    if (size > kMostMessageBytes)
-      return absl::ResourceExhaustedError(
-          absl::StrCat("A message of ", size, " bytes came; the limit is ", kMostMessageBytes, "."));
+    const bool is_end = (kind & kTrailers) != 0;
+    if (is_end && size > kMostHeaderBytes) return too_long("Trailers", size, kMostHeaderBytes);
+    if (size > kMostMessageBytes) return too_long("A message", size, kMostMessageBytes);
     if (left.size() < kPrefixBytes + size) break;
     const std::string_view content = left.substr(kPrefixBytes, size);
-    if ((kind & kTrailers) != 0) {
-      read_trailers(content);
-    } else {
-      take(std::string(content));
-    }
     left.remove_prefix(kPrefixBytes + size);
+    if (!is_end) {
+      take(std::string(content));
+      continue;
+    }
+    read_trailers(content);
+    has_trailers_ = true;
+    if (!left.empty()) return after_the_trailers();
   }
   waiting_.erase(0, waiting_.size() - left.size());
   return absl::OkStatus();

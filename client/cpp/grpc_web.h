@@ -18,12 +18,15 @@ class AnswerReader {
  public:
   /// As gRPC's own limit of received messages.
   static constexpr std::size_t kMostMessageBytes = 4 << 20;
+  /// Limit of all headers together, and of the block of trailers. Envoy's own is 60 KiB.
+  static constexpr std::size_t kMostHeaderBytes = 64 << 10;
 
-  /// `name` in lower case; ":status" is the HTTP status.
-  void header(std::string_view name, std::string_view value);
+  /// `name` in lower case; ":status" is the HTTP status. RESOURCE_EXHAUSTED for headers of over kMostHeaderBytes.
+  absl::Status header(std::string_view name, std::string_view value);
 
   /// The next bytes of the body, cut anywhere. Calls `take` for each message that is complete. RESOURCE_EXHAUSTED for a
-  /// message of over kMostMessageBytes, UNIMPLEMENTED for a compressed one.
+  /// message or a page of over kMostMessageBytes and for trailers of over kMostHeaderBytes, UNIMPLEMENTED for what is compressed,
+  /// INTERNAL for bytes after the trailers. Do not go on after an error.
   absl::Status bytes(std::string_view bytes, const std::function<void(std::string message)>& take);
 
   /// Whether something answered that speaks gRPC-Web.
@@ -37,6 +40,8 @@ class AnswerReader {
   void read_trailers(std::string_view block);
 
   std::string waiting_;  // of the frame that is not complete
+  std::size_t header_bytes_ = 0, page_bytes_ = 0;
+  bool has_trailers_ = false;
   std::map<std::string, std::string, std::less<>> fields_;
 };
 

@@ -24,19 +24,23 @@ struct Answer {
 };
 
 HttpEvents http_events(const std::shared_ptr<Answer>& answer) {
-  return {.header = [answer](std::string_view name,
-                             std::string_view value) { answer->reader.header(name, value); },
-          .bytes =
-              [answer](std::string_view bytes) {
-                if (answer->events.has_room && !answer->events.has_room()) return false;
-                if (answer->broken.ok()) answer->broken = answer->reader.bytes(bytes, answer->events.message);
-                return true;
-              },
-          .end =
-              [answer](const absl::Status& transport) {
-                if (!answer->broken.ok()) return answer->events.end(answer->broken);
-                answer->events.end(transport.ok() ? answer->reader.status() : transport);
-              }};
+  const auto taken = [answer](absl::Status read) {
+    answer->broken.Update(std::move(read));
+    return answer->broken.ok() ? Taking::kTaken : Taking::kRefused;
+  };
+  return {
+      .header = [answer, taken](std::string_view name,
+                                std::string_view value) { return taken(answer->reader.header(name, value)); },
+      .bytes =
+          [answer, taken](std::string_view bytes) {
+            if (answer->events.has_room && !answer->events.has_room()) return Taking::kLater;
+            return taken(answer->reader.bytes(bytes, answer->events.message));
+          },
+      .end =
+          [answer](const absl::Status& transport) {
+            if (!answer->broken.ok()) return answer->events.end(answer->broken);
+            answer->events.end(transport.ok() ? answer->reader.status() : transport);
+          }};
 }
 
 /// The end of a call that a thread waits for.

@@ -3,12 +3,18 @@
 #include <curl/curl.h>
 
 #include <algorithm>
+#include <initializer_list>
 #include <map>
 #include <mutex>
 #include <thread>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#ifdef _WIN32
+#include "client/cpp/web_schannel.h"
+#else
+#include <unistd.h>
+#endif
 
 namespace lpdeform::client {
 namespace {
@@ -17,6 +23,8 @@ namespace {
 constexpr long kConnectMs = 5000;
 /// The thread looks after timeouts at least this often; everything else wakes it.
 constexpr int kGlanceMs = 1000;
+/// What libcurl's callbacks return to end a request; they are called with one byte or more.
+constexpr std::size_t kStop = 0;
 /// Connections that are kept for later requests.
 constexpr long kMostIdle = 8;
 
@@ -26,6 +34,27 @@ struct Easy {
 struct List {
   void operator()(curl_slist* list) const { curl_slist_free_all(list); }
 };
+
+#ifndef _WIN32
+/// The first of these that is there; empty if none is.
+std::string first_there(std::initializer_list<const char*> paths) {
+  for (const char* const path : paths) {
+    if (access(path, R_OK) == 0) return path;
+  }
+  return "";
+}
+
+/// The authorities that the system trusts. Without them, libcurl's own choice stays, if it has one.
+void trust_the_system(CURL* easy) {
+  const std::string file = first_there({"/etc/ssl/certs/ca-certificates.crt",  // Debian, Arch
+                                        "/etc/pki/tls/certs/ca-bundle.crt",    // Fedora
+                                        "/etc/ssl/ca-bundle.pem",              // SUSE
+                                        "/etc/ssl/cert.pem"});                 // macOS, Alpine
+  const std::string folder = first_there({"/system/etc/security/cacerts"});    // Android
+  if (!file.empty()) curl_easy_setopt(easy, CURLOPT_CAINFO, file.c_str());
+  if (!folder.empty()) curl_easy_setopt(easy, CURLOPT_CAPATH, folder.c_str());
+}
+#endif
 
 std::unique_ptr<curl_slist, List> header_list(const HttpRequest& request) {
   curl_slist* list = curl_slist_append(nullptr, "Expect:");  // no pause before large bodies
@@ -60,14 +89,30 @@ class Exchange {
     curl_easy_setopt(easy, CURLOPT_HEADERFUNCTION, &Exchange::take_header);
     curl_easy_setopt(easy, CURLOPT_WRITEDATA, this);
     curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, &Exchange::take_bytes);
+    // For Schannel, which otherwise refuses certificates that do not say who could revoke them, as self-made ones.
+    curl_easy_setopt(easy, CURLOPT_SSL_OPTIONS, static_cast<long>(CURLSSLOPT_REVOKE_BEST_EFFORT));
     if (tls) set_tls(*tls);
+    const bool has_own_roots = tls && !tls->root_certificates.empty();  // which libcurl itself looks at
+    if (!origin.starts_with("https://") || has_own_roots) return easy;
+#ifndef _WIN32
+    trust_the_system(easy);
+#else
+    host_ = host_of(origin);
+    curl_easy_setopt(easy, CURLOPT_PREREQDATA, this);
+    curl_easy_setopt(easy, CURLOPT_PREREQFUNCTION, &Exchange::check_server);
+#endif
     return easy;
   }
 
-  CURL* easy() const { return easy_.get(); }
+  CURL* easy() const {
+    return easy_.get();
+  }
 
   void end(CURLcode code) {
     if (code == CURLE_OK) return events_.end(absl::OkStatus());
+#ifdef _WIN32
+    if (!objection_.empty()) return events_.end(absl::UnavailableError(objection_));
+#endif
     const std::string text = error_[0] != '\0' ? error_ : curl_easy_strerror(code);
     curl_off_t sent_after = 0;
     if (easy_) curl_easy_getinfo(easy_.get(), CURLINFO_PRETRANSFER_TIME_T, &sent_after);
@@ -75,7 +120,9 @@ class Exchange {
       return events_.end(absl::DeadlineExceededError(absl::StrCat("No answer came in time: ", text)));
     events_.end(absl::UnavailableError(text));
   }
-  void end_cancelled() { events_.end(absl::CancelledError("The call was cancelled.")); }
+  void end_cancelled() {
+    events_.end(absl::CancelledError("The call was cancelled."));
+  }
 
  private:
   void set_tls(const Tls& tls) {
@@ -90,22 +137,52 @@ class Exchange {
     curl_easy_setopt(easy_.get(), option, &blob);
   }
 
+#ifdef _WIN32
+  static std::string host_of(const std::string& origin) {
+    const std::size_t start = origin.find("//") + 2;
+    std::string host = origin.substr(start, origin.rfind(':') - start);
+    return host.front() == '[' ? host.substr(1, host.size() - 2) : host;
+  }
+
+  /// Before the request goes out on a connection.
+  static int check_server(void* self, char*, char*, int, int) {
+    Exchange& exchange = *static_cast<Exchange*>(self);
+    long made = 0;
+    curl_easy_getinfo(exchange.easy(), CURLINFO_NUM_CONNECTS, &made);
+    if (made == 0) return CURL_PREREQFUNC_OK;  // a connection that was looked at before
+    curl_tlssessioninfo* tls = nullptr;
+    curl_easy_getinfo(exchange.easy(), CURLINFO_TLS_SSL_PTR, &tls);
+    exchange.objection_ = tls == nullptr || tls->internals == nullptr
+                              ? "There is no TLS to this server."
+                              : why_not_trusted(tls->internals, exchange.host_);
+    return exchange.objection_.empty() ? CURL_PREREQFUNC_OK : CURL_PREREQFUNC_ABORT;
+  }
+#endif
+
   static std::size_t take_header(char* data, std::size_t, std::size_t count, void* self) {
     const absl::string_view line = absl::StripAsciiWhitespace(absl::string_view(data, count));
     const HttpEvents& events = static_cast<Exchange*>(self)->events_;
+    Taking taking = Taking::kTaken;
     if (line.substr(0, 5) == "HTTP/") {
       const std::size_t space = line.find(' ');
-      events.header(":status", space == line.npos ? "" : std::string(line.substr(space + 1, 3)));
+      taking = events.header(":status", space == line.npos ? "" : std::string(line.substr(space + 1, 3)));
     } else if (const std::size_t colon = line.find(':'); colon != line.npos) {
-      events.header(absl::AsciiStrToLower(line.substr(0, colon)),
-                    std::string(absl::StripAsciiWhitespace(line.substr(colon + 1))));
+      taking = events.header(absl::AsciiStrToLower(line.substr(0, colon)),
+                             std::string(absl::StripAsciiWhitespace(line.substr(colon + 1))));
     }
-    return count;
+    return taking == Taking::kTaken ? count : kStop;
   }
 
   static std::size_t take_bytes(char* data, std::size_t, std::size_t count, void* self) {
-    const bool is_taken = static_cast<Exchange*>(self)->events_.bytes(std::string_view(data, count));
-    return is_taken ? count : CURL_WRITEFUNC_PAUSE;
+    switch (static_cast<Exchange*>(self)->events_.bytes(std::string_view(data, count))) {
+      case Taking::kTaken:
+        return count;
+      case Taking::kLater:
+        return CURL_WRITEFUNC_PAUSE;
+      case Taking::kRefused:
+        break;
+    }
+    return kStop;
   }
 
   const HttpRequest request_;
@@ -113,6 +190,9 @@ class Exchange {
   std::unique_ptr<CURL, Easy> easy_;
   const std::unique_ptr<curl_slist, List> headers_;
   char error_[CURL_ERROR_SIZE] = "";
+#ifdef _WIN32
+  std::string host_, objection_;
+#endif
 };
 
 /// The commands for the thread, which outlive it, because calls may.
@@ -189,8 +269,9 @@ class CurlHttp final : public Http {
   };
 
   void run() {
-    while (!is_over_) {
+    for (;;) {
       for (const Commands::Command& command : commands_->take()) command();
+      if (is_over_) break;
       int running = 0;
       curl_multi_perform(multi_, &running);
       end_finished();

@@ -22,12 +22,19 @@ struct HttpRequest {
   std::chrono::milliseconds limit{0};
 };
 
+/// What a request does with bytes of its answer.
+enum class Taking {
+  kTaken,
+  kLater,   // there is no room: the same bytes come again after HttpCall::resume()
+  kRefused  // the request ends with UNAVAILABLE
+};
+
 /// What becomes of a request. All are called on the thread of Http, must not wait, and may start other requests.
 struct HttpEvents {
-  /// A header of the answer; the name is in lower case. First comes ":status", with the HTTP status.
-  std::function<void(std::string_view name, std::string_view value)> header;
-  /// Bytes of the answer's body. False if there is no room: the same bytes come again after resume().
-  std::function<bool(std::string_view bytes)> bytes;
+  /// A header of the answer; the name is in lower case. First comes ":status", with the HTTP status. Not kLater.
+  std::function<Taking(std::string_view name, std::string_view value)> header;
+  /// Bytes of the answer's body.
+  std::function<Taking(std::string_view bytes)> bytes;
   /// Last, and once. OK if the whole answer came; UNAVAILABLE if the connection failed, DEADLINE_EXCEEDED after the
   /// limit, CANCELLED after cancel().
   std::function<void(const absl::Status& status)> end;

@@ -15,7 +15,7 @@ namespace lpdeform::client {
 template <typename T>
 class Inbox {
  public:
-  /// From so many bytes on there is no room, until the reader has taken some.
+  /// From so many bytes on, those of the items' own objects included, there is no room until the reader has taken some.
   static constexpr std::size_t kMostBytes = 8 << 20;
 
   bool has_room() {
@@ -24,11 +24,12 @@ class Inbox {
     return !is_full_;
   }
 
+  /// `bytes`: what `item` holds besides its own object.
   void put(T item, std::size_t bytes) {
     const std::scoped_lock lock(mutex_);
     if (end_) return;
-    items_.emplace_back(std::move(item), bytes);
-    bytes_ += bytes;
+    items_.emplace_back(std::move(item), sizeof(T) + bytes);
+    bytes_ += sizeof(T) + bytes;
     changed_.notify_all();
   }
 

@@ -20,11 +20,16 @@ namespace lpdeform::client {
 class InProcessServer {
  public:
 #ifdef LPDEFORM_DEPLOY_WEB
-  InProcessServer() {
+  explicit InProcessServer(Transport transport = Transport::kPlain) {
     start_again();
     if (!server_) return;
-    front_ = std::make_unique<WebFront>(server_->address());
+    front_ = std::make_unique<WebFront>(server_->address(), transport);
     front_->wait_for_server();
+  }
+
+  /// Those that a client has to trust, in PEM; empty without TLS.
+  std::string root_certificates() const {
+    return front_->root_certificates();
   }
 
   std::string address() const {

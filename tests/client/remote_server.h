@@ -17,12 +17,14 @@
 
 namespace lpdeform::client {
 
+enum class Transport { kPlain, kTls };
+
 /// The InProcessServer of programs that cannot have one, because they are for another system: it is in the program
 /// serve_tests, which has started this one. LPDEFORM_TEST_PORT is serve_tests' port on this machine.
 class InProcessServer {
  public:
-  InProcessServer() {
-    const std::string said = ask("/open");
+  explicit InProcessServer(Transport transport = Transport::kPlain) {
+    const std::string said = ask(transport == Transport::kTls ? "/open?tls=1" : "/open");
     id_ = said.substr(0, said.find(' '));
     address_ = said.substr(said.find(' ') + 1);
   }
@@ -33,6 +35,7 @@ class InProcessServer {
   void stop() { ask("/stop?id=" + id_); }
   void start_again() { ask("/start?id=" + id_); }
   std::string address() const { return address_; }
+  std::string root_certificates() const { return ask("/roots?id=" + id_); }
 
  private:
   /// The body of the answer to a GET request.

@@ -1,5 +1,6 @@
 // Servers behind Envoys for a test program of another system, which has remote_server.h:   serve_tests PROGRAM ARGUMENT...
-// Runs the program with LPDEFORM_TEST_PORT in its environment, and ends as it does.
+// Runs the program with LPDEFORM_TEST_PORT in its environment, and ends as it does. An argument "@server" is replaced by the
+// address of a server of its own.
 
 #include <stdlib.h>
 #include <sys/wait.h>
@@ -18,12 +19,13 @@
 namespace {
 
 using lpdeform::client::InProcessServer;
+using lpdeform::client::Transport;
 
 /// Servers by their numbers.
 class Servers {
  public:
-  std::string open() {
-    auto server = std::make_unique<InProcessServer>();
+  std::string open(Transport transport) {
+    auto server = std::make_unique<InProcessServer>(transport);
     const std::scoped_lock lock(mutex_);
     const std::string id = std::to_string(++count_);
     const std::string address = server->address();
@@ -67,13 +69,26 @@ int main(int count, char** arguments) {
     response.set_content(body, "text/plain");
   };
   const auto id_of = [](const httplib::Request& request) { return request.get_param_value("id"); };
-  control.Get("/open", [&](const auto&, auto& response) { text(response, servers.open()); });
+  control.Get("/open", [&](const auto& request, auto& response) {
+    text(response, servers.open(request.has_param("tls") ? Transport::kTls : Transport::kPlain));
+  });
+  control.Get("/roots", [&](const auto& request, auto& response) {
+    text(response, servers.at(id_of(request)).root_certificates());
+  });
   control.Get("/close", [&](const auto& request, auto&) { servers.close(id_of(request)); });
   control.Get("/stop", [&](const auto& request, auto&) { servers.at(id_of(request)).stop(); });
   control.Get("/start", [&](const auto& request, auto&) { servers.at(id_of(request)).start_again(); });
   const int port = control.bind_to_any_port("127.0.0.1");
   std::thread serving([&] { control.listen_after_bind(); });
   setenv("LPDEFORM_TEST_PORT", std::to_string(port).c_str(), 1);
+  std::unique_ptr<InProcessServer> own;
+  std::string address;
+  for (int k = 1; k < count; ++k) {
+    if (std::string(arguments[k]) != "@server") continue;
+    if (!own) own = std::make_unique<InProcessServer>();
+    address = own->address();
+    arguments[k] = address.data();
+  }
   const int status = run(arguments + 1);
   control.stop();
   serving.join();

@@ -8,31 +8,47 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <regex>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <httplib.h>
 
 namespace lpdeform::client {
 
+/// Whether Envoy has TLS.
+enum class Transport { kPlain, kTls };
+
 /// The project's Envoy (deploy/web) in front of one address. It ends with this process.
 class WebFront {
  public:
-  /// `server`: HOST:PORT, behind it.
-  explicit WebFront(const std::string& server) : server_(server) {
+  /// `server`: HOST:PORT, behind it. With TLS, Envoy's certificate has signed itself, for localhost and not 127.0.0.1.
+  explicit WebFront(const std::string& server, Transport transport = Transport::kPlain)
+      : server_(server), transport_(transport) {
     std::string name = (std::filesystem::temp_directory_path() / "lpdeform-web-XXXXXX").string();
     EXPECT_NE(mkdtemp(name.data()), nullptr);
     folder_ = name;
-    const std::string admin = folder_ + "/admin", log = folder_ + "/log";
+    const std::string admin = folder_ + "/admin";
+    std::vector<std::string> arguments{"web",  "--web",        "127.0.0.1:0",   "--server",
+                                       server, "--files",      "none",          "--admin-file",
+                                       admin,  "--access-log", folder_ + "/log"};
+    if (transport == Transport::kTls) {
+      make_certificate();
+      arguments.insert(arguments.end(), {"--tls-cert", certificate_file(), "--tls-key", key_file()});
+    }
+    std::vector<char*> words;
+    for (std::string& argument : arguments) words.push_back(argument.data());
+    words.push_back(nullptr);
     process_ = fork();
     if (process_ == 0) {
       prctl(PR_SET_PDEATHSIG, SIGTERM);
-      execl(LPDEFORM_DEPLOY_WEB, "web", "--web", "127.0.0.1:0", "--server", server.c_str(), "--files", "none",
-            "--admin-file", admin.c_str(), "--access-log", log.c_str(), nullptr);
+      execv(LPDEFORM_DEPLOY_WEB, words.data());
       _exit(127);
     }
     find(admin);
@@ -47,8 +63,13 @@ class WebFront {
   WebFront& operator=(const WebFront&) = delete;
 
   const std::string& server() const { return server_; }
-  /// Where clients connect: http://HOST:PORT.
+  /// Where clients connect: http://127.0.0.1:PORT or https://localhost:PORT.
   const std::string& address() const { return address_; }
+  /// Envoy's certificate, which signs itself, in PEM; empty without TLS.
+  std::string root_certificates() const {
+    std::ifstream file(certificate_file());
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  }
 
   /// Waits until Envoy passes calls to the server.
   void wait_for_server() const {
@@ -70,6 +91,17 @@ class WebFront {
     return true;
   }
 
+  std::string certificate_file() const { return folder_ + "/certificate.pem"; }
+  std::string key_file() const { return folder_ + "/key.pem"; }
+
+  void make_certificate() const {
+    const std::string command =
+        "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 "
+        "-subj '/CN=Test of lpdeform' -addext subjectAltName=DNS:localhost -keyout " +
+        key_file() + " -out " + certificate_file() + " 2>/dev/null";
+    EXPECT_EQ(std::system(command.c_str()), 0) << command;
+  }
+
   void find(const std::string& admin_file) {
     ASSERT_TRUE(eventually([&] {
       std::string admin;
@@ -77,14 +109,16 @@ class WebFront {
       admin_ = "http://" + admin;
       const auto page = httplib::Client(admin_).Get("/listeners");
       std::smatch found;
-      if (!page || !std::regex_search(page->body, found, std::regex("web::(127[.]0[.]0[.]1:[1-9][0-9]*)")))
+      if (!page || !std::regex_search(page->body, found, std::regex("web::(127[.]0[.]0[.]1:([1-9][0-9]*))")))
         return false;
-      address_ = "http://" + found.str(1);
+      address_ =
+          transport_ == Transport::kTls ? "https://localhost:" + found.str(2) : "http://" + found.str(1);
       return true;
     })) << "deploy/web does not start; deploy/install web brings what it needs";
   }
 
   const std::string server_;
+  const Transport transport_;
   std::string folder_, admin_, address_;
   pid_t process_ = -1;
 };

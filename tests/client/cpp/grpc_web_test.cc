@@ -19,8 +19,8 @@ std::string trailers(const std::string& block) {
 
 /// Reads `body` in pieces of `piece` bytes.
 std::vector<std::string> read(AnswerReader& reader, const std::string& body, std::size_t piece) {
-  reader.header(":status", "200");
-  reader.header("content-type", "application/grpc-web+proto");
+  EXPECT_TRUE(reader.header(":status", "200").ok());
+  EXPECT_TRUE(reader.header("content-type", "application/grpc-web+proto").ok());
   std::vector<std::string> messages;
   for (std::size_t k = 0; k < body.size(); k += piece) {
     const absl::Status read = reader.bytes(std::string_view(body).substr(k, piece), [&](std::string message) {
@@ -57,10 +57,10 @@ TEST(GrpcWeb, ReadsTheFaultOfTheDetails) {
 
 TEST(GrpcWeb, TakesTheStatusFromTheHeadersIfThereIsNoBody) {
   AnswerReader reader;
-  reader.header(":status", "200");
-  reader.header("content-type", "application/grpc-web+proto");
-  reader.header("grpc-status", "14");
-  reader.header("grpc-message", "no healthy upstream");
+  EXPECT_TRUE(reader.header(":status", "200").ok());
+  EXPECT_TRUE(reader.header("content-type", "application/grpc-web+proto").ok());
+  EXPECT_TRUE(reader.header("grpc-status", "14").ok());
+  EXPECT_TRUE(reader.header("grpc-message", "no healthy upstream").ok());
   EXPECT_EQ(reader.status(), absl::UnavailableError("no healthy upstream"));
 }
 
@@ -72,34 +72,64 @@ TEST(GrpcWeb, AnAnswerWithoutItsEndIsUnavailable) {
 
 TEST(GrpcWeb, APageIsNoAnswerAndItsBytesAreNotRead) {
   AnswerReader reader;
-  reader.header(":status", "200");
-  reader.header("content-type", "text/html");
+  EXPECT_TRUE(reader.header(":status", "200").ok());
+  EXPECT_TRUE(reader.header("content-type", "text/html").ok());
   EXPECT_TRUE(reader.bytes("\xff\xff\xff\xff\xff", [](std::string) { FAIL(); }).ok());
   EXPECT_EQ(reader.status().code(), absl::StatusCode::kUnimplemented);
-  reader.header(":status", "503");
+  EXPECT_TRUE(reader.header(":status", "503").ok());
   EXPECT_EQ(reader.status().code(), absl::StatusCode::kUnavailable);
-  reader.header(":status", "401");
+  EXPECT_TRUE(reader.header(":status", "401").ok());
   EXPECT_EQ(reader.status().code(), absl::StatusCode::kUnauthenticated);
 }
 
 TEST(GrpcWeb, RefusesWhatIsTooLongOrCompressed) {
   const auto refused_with = [](const std::string& start) {
     AnswerReader reader;
-    reader.header(":status", "200");
-    reader.header("content-type", "application/grpc-web+proto");
+    EXPECT_TRUE(reader.header(":status", "200").ok());
+    EXPECT_TRUE(reader.header("content-type", "application/grpc-web+proto").ok());
     return reader.bytes(start, [](std::string) { FAIL(); }).code();
   };
   EXPECT_EQ(refused_with(std::string("\0\x00\x40\x00\x01", 5)), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(refused_with(std::string("\0\xff\xff\xff\xff", 5)), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(refused_with(std::string("\x80\xff\xff\xff\xff", 5)), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(refused_with(std::string("\x80\x00\x01\x00\x01", 5)), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(refused_with(std::string("\x01\0\0\0\0", 5)), absl::StatusCode::kUnimplemented);
+}
+
+TEST(GrpcWeb, RefusesHeadersWithoutEnd) {
+  AnswerReader reader;
+  absl::Status read;
+  std::size_t count = 0;
+  for (; read.ok() && count < 100'000; ++count) read = reader.header("x-" + std::to_string(count), "value");
+  EXPECT_EQ(read.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_LT(count, AnswerReader::kMostHeaderBytes / 8);
+}
+
+TEST(GrpcWeb, RefusesWhatComesAfterTheTrailers) {
+  const std::string end = trailers("grpc-status: 0\r\n");
+  for (const std::string& more : {framed("two"), end, std::string("x")}) {
+    for (const std::size_t piece : {std::size_t{1}, std::size_t{1000}}) {
+      AnswerReader reader;
+      EXPECT_TRUE(reader.header(":status", "200").ok());
+      EXPECT_TRUE(reader.header("content-type", "application/grpc-web+proto").ok());
+      std::vector<std::string> messages;
+      absl::Status status;
+      const std::string body = framed("one") + end + more;
+      for (std::size_t k = 0; k < body.size() && status.ok(); k += piece) {
+        status = reader.bytes(std::string_view(body).substr(k, piece),
+                              [&](std::string message) { messages.push_back(std::move(message)); });
+      }
+      EXPECT_EQ(status.code(), absl::StatusCode::kInternal);
+      EXPECT_EQ(messages, std::vector<std::string>{"one"});
+    }
+  }
 }
 
 TEST(GrpcWeb, ACodeThatDoesNotExistIsUnknown) {
   for (const char* code : {"17", "-1", "99999"}) {
     AnswerReader reader;
-    reader.header(":status", "200");
-    reader.header("grpc-status", code);
+    EXPECT_TRUE(reader.header(":status", "200").ok());
+    EXPECT_TRUE(reader.header("grpc-status", code).ok());
     EXPECT_EQ(reader.status().code(), absl::StatusCode::kUnknown) << code;
   }
 }
