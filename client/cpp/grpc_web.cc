@@ -107,8 +107,10 @@ void AnswerReader::read_trailers(std::string_view block) {
   for (const absl::string_view line : absl::StrSplit(absl::string_view(block.data(), block.size()), "\r\n")) {
     const std::size_t colon = line.find(':');
     if (colon == line.npos) continue;
-    fields_.insert_or_assign(absl::AsciiStrToLower(line.substr(0, colon)),
-                             std::string(absl::StripAsciiWhitespace(line.substr(colon + 1))));
+    const std::string name = absl::AsciiStrToLower(line.substr(0, colon));
+    if (!absl::StartsWith(name, "grpc-"))
+      continue;  // the rest of the answer is of the type that its headers said
+    fields_.insert_or_assign(name, std::string(absl::StripAsciiWhitespace(line.substr(colon + 1))));
   }
 }
 

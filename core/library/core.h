@@ -22,7 +22,8 @@
 ///                        {.p = 1.5});
 ///   use(result.value().positions);
 ///
-/// Errors are Result values with a reason, an element and a limit. No function throws.
+/// Errors are Result values with a reason, an element and a limit. No function throws but value() of a Result that is an error, and
+/// what a function of the caller throws.
 namespace lpdeform::core {
 
 /// Solves once. Errors: those of Session::open, set_handles, set and solve.

@@ -238,7 +238,8 @@ SolveResult Session::result() const {
           summary.soft_energy,
           summary.optimality_gap,
           summary.setup_seconds,
-          summary.solve_seconds};
+          summary.solve_seconds,
+          deformer.shape().report().split_border_vertices.count};
 }
 
 Result<SolveResult> deform(const Mesh& mesh, const Handles& handles, const Settings& settings,

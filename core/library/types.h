@@ -171,6 +171,8 @@ struct SolveResult {
   std::optional<double> optimality_gap = {};
   double setup_seconds = 0;
   double solve_seconds = 0;
+  /// Border vertices in the same place as another one. Where there are any, the mesh comes apart: see weld().
+  std::int64_t split_border_vertices = 0;
 };
 
 /// A mesh in which vertices that lie in the same place are one: see weld().

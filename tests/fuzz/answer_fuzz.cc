@@ -22,9 +22,9 @@ struct Read {
 
 Read read(std::string_view body, std::size_t piece) {
   lpdeform::client::AnswerReader reader;
-  reader.header(":status", "200");
-  reader.header("content-type", "application/grpc-web+proto");
   Read out;
+  out.ended = reader.header(":status", "200");
+  out.ended.Update(reader.header("content-type", "application/grpc-web+proto"));
   for (; !body.empty() && out.ended.ok(); body.remove_prefix(std::min(piece, body.size())))
     out.ended = reader.bytes(body.substr(0, piece),
                              [&](std::string message) { out.messages.push_back(std::move(message)); });

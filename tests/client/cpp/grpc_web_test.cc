@@ -125,6 +125,13 @@ TEST(GrpcWeb, RefusesWhatComesAfterTheTrailers) {
   }
 }
 
+TEST(GrpcWeb, TrailersDoNotChangeTheTypeOfTheAnswer) {
+  AnswerReader reader;
+  read(reader, trailers("content-type: text/html\r\ngrpc-status: 0\r\n"), 1);
+  EXPECT_TRUE(reader.is_grpc_web());
+  EXPECT_TRUE(reader.status().ok());
+}
+
 TEST(GrpcWeb, ACodeThatDoesNotExistIsUnknown) {
   for (const char* code : {"17", "-1", "99999"}) {
     AnswerReader reader;

@@ -19,8 +19,9 @@ Changed = TypeVar("Changed", bound=types.Change)
 
 
 def handles_of(given: Mapping[str, Given], vertices: Copied) -> dict[str, types.Handle]:
-    if not isinstance(given, Mapping):
-        text = f"The handles are of type {type(given).__name__} and not a dict of names."
+    wanted: object = given  # of callers without a type checker
+    if not isinstance(wanted, Mapping):
+        text = f"The handles are of type {type(wanted).__name__} and not a dict of names."
         raise invalid(text, "ARRAY_TYPE", "handles", "a dict")
     return {str(name): _handle_of(str(name), one, vertices) for name, one in given.items()}
 

@@ -45,7 +45,7 @@ def indices(
     array = _array(values, what)
     if array.dtype.kind == "b" and array.ndim == 1 and mask_length is not None:
         if array.size != mask_length:
-            text = f"{_capital(what)}: a mask of length {array.size} and not {mask_length}."
+            text = f"{_capital(what)}: a mask of {array.size} and not {mask_length}."
             raise invalid(text, "MASK_SIZE", what, f"length = {mask_length}")
         array = np.flatnonzero(array)
     elif mask_length is not None and array.dtype.kind in "iu" and array.shape == (mask_length,) and _is_mask(array):

@@ -351,7 +351,8 @@ class Session(Live):
 
 def deadline_after(timeout: float) -> float:
     """On the clock of time.monotonic()."""
-    if not isinstance(timeout, Real) or not timeout >= 0:
+    given: object = timeout  # of callers without a type checker
+    if not isinstance(given, Real) or not timeout >= 0:
         raise invalid(f"The timeout is {timeout} seconds.", "SECONDS_OUT_OF_RANGE", "timeout", "0 <= timeout")
     return time.monotonic() + timeout
 
