@@ -1,6 +1,6 @@
-/* What libcurl calls of macOS' frameworks, for compilers that do not bring them (client/c/engine/CMakeLists.txt). */
+/* What libcurl calls of macOS' SystemConfiguration, as CFTimeZone.h. */
 #pragma once
 
-typedef const struct __CFDictionary* CFDictionaryRef;
+#include <CoreFoundation/CFTimeZone.h>
+
 extern CFDictionaryRef SCDynamicStoreCopyProxies(const void* store);
-extern void CFRelease(const void* object);
