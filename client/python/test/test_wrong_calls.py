@@ -148,3 +148,14 @@ def test_in_the_child_of_a_fork_sessions_of_the_parent_are_closed() -> None:
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
     assert s.move("a", translation=[0, 0, 1]).is_final
     s.close()
+
+
+def test_deform_takes_vertices_as_they_are_and_leaves_them_so() -> None:
+    from lpdeform.opening import checked_mesh
+
+    given = checked_mesh(V, F, None, lpdeform.Settings(), "cotangent", "error", False, copies=False)
+    assert np.shares_memory(given.vertices, V) and not np.shares_memory(given.faces, F)
+    kept = V.copy()
+    kept.setflags(write=False)
+    result = deform(kept, F, H)
+    assert not np.shares_memory(result.positions, kept) and np.array_equal(kept, V)

@@ -28,13 +28,15 @@ def _capital(what: str) -> str:
     return what[:1].upper() + what[1:]
 
 
-def numbers(values: npt.ArrayLike, what: str, width: int = 1) -> Copied:
-    """A copy of shape (k,) or (k, width): float32 if the values are float32, otherwise float64."""
+def numbers(values: npt.ArrayLike, what: str, width: int = 1, copies: bool = True) -> Copied:
+    """A copy of shape (k,) or (k, width): float32 if the values are float32, otherwise float64. `copies`: False if the values may be
+    used as they are where their type and order allow it."""
     array = _array(values, what)
     if array.dtype.kind not in "fiu":
         raise invalid(f"{_capital(what)}: of type {array.dtype} and not numbers.", "ARRAY_TYPE", what, "float32 or float64")
-    copied = np.array(array, dtype="<f4" if array.dtype.itemsize == 4 and array.dtype.kind == "f" else "<f8", order="C")
-    return _shaped(copied, what, width)
+    kind = "<f4" if array.dtype.itemsize == 4 and array.dtype.kind == "f" else "<f8"
+    taken = np.array(array, dtype=kind, order="C") if copies else np.asarray(array, dtype=kind, order="C")
+    return _shaped(taken, what, width)
 
 
 def indices(

@@ -87,10 +87,12 @@ def checked_mesh(
     weights: WeightKind,
     free_components: FreeComponents,
     weld: npt.ArrayLike | float | bool,
+    copies: bool = True,
 ) -> Given:
+    """`copies`: whether the vertices may change while the session is there."""
     named(get_args(WeightKind), weights, "weights")
     named(get_args(FreeComponents), free_components, "free_components")
-    rest = numbers(vertices, "vertices", 3)
+    rest = numbers(vertices, "vertices", 3, copies)
     return Given(
         vertices=rest,
         faces=indices(faces, "faces", 3, below=len(rest)),
