@@ -52,7 +52,8 @@ def deform(
         is indices, a boolean mask of length n, or a function that gets the n x 3 vertices and returns either.
     p: 1 to 64, one number or n; stiffness: 1e-6 to 1e6, one number or n. Either may be lpdeform.Automatic().
     certify: whether to compute optimality_gap, a bound on the distance from the optimum for the result's rotations.
-    progress: True for a bar, by tqdm if it is installed; or a function, called with the SolveProgress at most ten times a second, and not in the first tenth.
+    progress: True for a bar, by tqdm if it is installed; or a function, called with the SolveProgress at most ten times a second, and
+        not in the first tenth of one.
     timeout: seconds; None is without limit.
     solver: method, accuracy and search. Below p = 2 the solve goes on from other starts after its first minimum, and returns
         the lowest. That takes several times as long. SolverSettings(search=MinimaSearch(effort=0)) takes the first minimum.
