@@ -165,7 +165,8 @@ class CrowdedSolveTest : public SolveByManualTimeTest {
 };
 
 TEST_F(CrowdedSolveTest, SaysThatItIsThereWhileItWaitsForAThreadAndIsSetUp) {
-  const TriangleMesh large = box_surface(40, 40, 160);  // set up in some 100 ms, so that the clock below gets its turn on busy cores
+  const TriangleMesh large =
+      box_surface(40, 40, 160);  // set up in some 100 ms, so that the clock below gets its turn on busy cores
   std::vector<v1::SolveRequest> requests;
   for (int k = 0; k < 3; ++k) {
     requests.push_back(solve_request(create(large)));
