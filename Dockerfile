@@ -1,14 +1,14 @@
 # The server and the command line in one image, Envoy and the viewer in another (--target web). The steps are those of the
 # README, by the same scripts.
 
-FROM debian:12 AS build
+FROM debian:13 AS build
 WORKDIR /src
 COPY deploy deploy
 RUN deploy/install build run
 COPY . .
 RUN deploy/up --server-only --build-only
 
-FROM debian:12 AS build-web
+FROM debian:13 AS build-web
 WORKDIR /src
 COPY deploy deploy
 COPY client/web/package.json client/web/package-lock.json client/web/
@@ -19,7 +19,7 @@ COPY proto proto
 COPY client/web client/web
 RUN PATH=/src/build/web-tools/bin:$PATH npm run build --prefix client/web
 
-FROM debian:12 AS web
+FROM debian:13 AS web
 COPY deploy/install deploy/packages.txt /opt/lpdeform/deploy/
 RUN /opt/lpdeform/deploy/install web-run && rm -rf /var/lib/apt/lists/* && \
     groupadd --gid 10001 lpdeform && useradd --uid 10001 --gid 10001 --no-create-home --shell /usr/sbin/nologin lpdeform
@@ -35,7 +35,7 @@ HEALTHCHECK --interval=15s --timeout=5s --start-period=10s \
 ENTRYPOINT ["deploy/web", "--health", "0.0.0.0:8081"]
 CMD ["--web", "0.0.0.0:8080", "--server", "lpdeform:50051"]
 
-FROM debian:12
+FROM debian:13
 COPY deploy/install deploy/packages.txt /opt/lpdeform/deploy/
 RUN /opt/lpdeform/deploy/install run && rm -rf /var/lib/apt/lists/* && \
     groupadd --gid 10001 lpdeform && useradd --uid 10001 --gid 10001 --no-create-home --shell /usr/sbin/nologin lpdeform

@@ -159,3 +159,10 @@ def test_deform_takes_vertices_as_they_are_and_leaves_them_so() -> None:
     kept.setflags(write=False)
     result = deform(kept, F, H)
     assert not np.shares_memory(result.positions, kept) and np.array_equal(kept, V)
+
+
+def test_faces_may_lie_in_records_as_a_ply_file_has_them() -> None:
+    records = np.zeros(len(F), np.dtype([("count", "u1"), ("corners", "<i4", 3)]))
+    records["corners"] = F
+    assert not records["corners"].flags.aligned
+    assert deform(V, records["corners"], H).energy == deform(V, F, H).energy

@@ -56,6 +56,7 @@ def indices(
         array = array.astype(np.int64)
     if array.dtype.kind not in "iu":
         raise invalid(f"{_capital(what)}: of type {array.dtype} and not integers.", "ARRAY_TYPE", what, "integers")
+    array = np.require(array, requirements="A")  # NumPy 2.1 crashes where it compares others with a number beyond their type
     outside = (array < 0) | (array > _most_index)
     if outside.any():
         first = int(np.flatnonzero(outside.reshape(-1))[0])
