@@ -14,29 +14,28 @@ ULpdeformComponent::ULpdeformComponent() {
 void ULpdeformComponent::BeginPlay() {
   Super::BeginPlay();
   VertexIds.Reset();  // of a play before
-  std::vector<float> Positions;
-  std::vector<uint32_t> Indices;
+  LpdeformShape Shape;
   GetDynamicMesh()->ProcessMesh([&](const FDynamicMesh3& Mesh) {
     TArray<uint32> Numbers;
     Numbers.SetNumZeroed(Mesh.MaxVertexID());
     for (const int32 Id : Mesh.VertexIndicesItr()) {
       Numbers[Id] = static_cast<uint32>(VertexIds.Add(Id));
       const FVector3d At = Mesh.GetVertex(Id);
-      for (const double Coordinate : {At.X, At.Y, At.Z}) Positions.push_back(static_cast<float>(Coordinate));
+      for (const double Coordinate : {At.X, At.Y, At.Z}) Shape.positions.push_back(static_cast<float>(Coordinate));
     }
     for (const int32 Id : Mesh.TriangleIndicesItr()) {
       const FIndex3i Corners = Mesh.GetTriangle(Id);
-      for (const int32 Corner : {Corners.A, Corners.B, Corners.C}) Indices.push_back(Numbers[Corner]);
+      for (const int32 Corner : {Corners.A, Corners.B, Corners.C}) Shape.indices.push_back(Numbers[Corner]);
     }
   });
   try {
-    Follower = std::make_unique<LpdeformFollower>(TCHAR_TO_UTF8(*Address), Positions, Indices);
+    Follower = std::make_unique<LpdeformFollower>(LpdeformServer{TCHAR_TO_UTF8(*Address)}, kUnrealSpace, Shape);
   } catch (const std::exception& Error) {  // needs bEnableExceptions in the module's rules
     UE_LOG(LogTemp, Warning, TEXT("lpdeform: %s"), UTF8_TO_TCHAR(Error.what()));
     return;
   }
   Follower->set(P, bShowBetterShapes);
-  for (FLpdeformHandle& Handle : Handles) Hold(Handle, Positions);
+  for (FLpdeformHandle& Handle : Handles) Hold(Handle, Shape.positions);
   SetComponentTickEnabled(true);
 }
 
