@@ -8,24 +8,21 @@
 #include <utility>
 #include <vector>
 
-/// An engine's coordinates and colours. The fields are those of lpdeform_options.
+/// An engine's coordinates. The fields are those of lpdeform_options.
 struct LpdeformSpace {
   lpdeform_handedness handedness;
   lpdeform_up up;
   lpdeform_winding winding;
   double units_per_metre;
-  lpdeform_format colours;  // RGBA8 or BGRA8
 };
 
-/// Centimetres, and FColor. Unreal's normal of A, B, C is (C - A) x (B - A).
-inline constexpr LpdeformSpace kUnrealSpace{LPDEFORM_LEFT_HANDED, LPDEFORM_Z_UP, LPDEFORM_COUNTER_CLOCKWISE,
-                                            100, LPDEFORM_BGRA8};
-inline constexpr LpdeformSpace kGodotSpace{LPDEFORM_RIGHT_HANDED, LPDEFORM_Y_UP, LPDEFORM_CLOCKWISE, 1,
-                                           LPDEFORM_RGBA8};
+/// Unreal's normal of A, B, C is (C - A) x (B - A).
+inline constexpr LpdeformSpace kUnrealSpace{LPDEFORM_LEFT_HANDED, LPDEFORM_Z_UP, LPDEFORM_COUNTER_CLOCKWISE, 100};
+inline constexpr LpdeformSpace kGodotSpace{LPDEFORM_RIGHT_HANDED, LPDEFORM_Y_UP, LPDEFORM_CLOCKWISE, 1};
 
 struct LpdeformServer {
-  std::string address;  // as lpdeform_connection.address
-  std::string token;    // may be empty
+  std::string address = {};  // as lpdeform_connection.address
+  std::string token = {};    // may be empty
   bool tls = false;
 };
 
@@ -40,8 +37,7 @@ struct LpdeformShape {
 /// at most about two seconds. The constructor throws std::runtime_error; later errors are texts.
 class LpdeformFollower {
  public:
-  LpdeformFollower(const LpdeformServer& server, const LpdeformSpace& space, const LpdeformShape& shape)
-      : colour_format_(space.colours) {
+  LpdeformFollower(const LpdeformServer& server, const LpdeformSpace& space, const LpdeformShape& shape) {
     lpdeform_connection connection{};
     connection.struct_size = sizeof connection;
     connection.address = server.address.c_str();
@@ -126,7 +122,7 @@ class LpdeformFollower {
     buffers.struct_size = sizeof buffers;
     buffers.positions = {positions_.data(), positions_.size() * sizeof(float), 0, 0, LPDEFORM_FLOAT32, 0};
     buffers.normals = {normals_.data(), normals_.size() * sizeof(float), 0, 0, LPDEFORM_FLOAT32, 0};
-    buffers.colours = {colours_.data(), colours_.size(), 0, 0, colour_format_, 0};
+    buffers.colours = {colours_.data(), colours_.size(), 0, 0, LPDEFORM_RGBA8, 0};
     const lpdeform_code code = lpdeform_poll(session_, &buffers, &frame_, &error_);
     if (code != LPDEFORM_NO_FRAME) said(code);
     return code == LPDEFORM_OK;
@@ -184,7 +180,6 @@ class LpdeformFollower {
     return frame;
   }();
   lpdeform_notice noticed_ = LPDEFORM_NOTICE_NONE;
-  lpdeform_format colour_format_;
   lpdeform_client* client_ = nullptr;
   lpdeform_session* session_ = nullptr;
   std::string problem_;
