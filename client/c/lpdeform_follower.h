@@ -17,7 +17,8 @@ struct LpdeformSpace {
 };
 
 /// Unreal's normal of A, B, C is (C - A) x (B - A).
-inline constexpr LpdeformSpace kUnrealSpace{LPDEFORM_LEFT_HANDED, LPDEFORM_Z_UP, LPDEFORM_COUNTER_CLOCKWISE, 100};
+inline constexpr LpdeformSpace kUnrealSpace{LPDEFORM_LEFT_HANDED, LPDEFORM_Z_UP, LPDEFORM_COUNTER_CLOCKWISE,
+                                            100};
 inline constexpr LpdeformSpace kGodotSpace{LPDEFORM_RIGHT_HANDED, LPDEFORM_Y_UP, LPDEFORM_CLOCKWISE, 1};
 
 struct LpdeformServer {

@@ -40,9 +40,27 @@ func until(holds: Callable, what: String) -> void:
 	var end := Time.get_ticks_msec() + 1000 * SECONDS
 	while not holds.call():
 		if Time.get_ticks_msec() > end:
-			expect(false, "not within %d seconds: %s" % [SECONDS, what])
+			expect(false, "not within %d seconds: %s; %s" % [SECONDS, what, conditions()])
 			return
 		await process_frame
+
+
+## What the meshes and their handles are in, for the text of a failure.
+func conditions() -> String:
+	var text := ""
+	for bar: LpdeformMesh in root.find_children("*", "MeshInstance3D", true, false):
+		text += "%s is %s" % [bar.get_path(), bar.state]
+		for handle: LpdeformHandle in bar._held:
+			var held: Variant = bar._held[handle]
+			text += ", %s holds %d and is at %s (sent %s, rest %s)" % [held.name, held.count, handle.transform, held.sent, held.rest]
+		if bar._session and bar.mesh:
+			var off := 0.0
+			var shown := vertices(bar.mesh)
+			var known: PackedVector3Array = bar._session.positions()
+			for vertex in shown.size():
+				off = maxf(off, shown[vertex].distance_to(known[vertex]))
+			text += ", what is shown is %f off the newest frame" % off
+	return text
 
 
 ## The sample without what moves its head.

@@ -56,7 +56,8 @@ class UnrealComponent : public testing::Test {
   }
 
   FVector3f normal(int vertex) {
-    return component_.mesh.mesh.Attributes()->PrimaryNormals()->GetElement(vertex - 1);  // vertices begin with 1
+    return component_.mesh.mesh.Attributes()->PrimaryNormals()->GetElement(vertex -
+                                                                           1);  // vertices begin with 1
   }
 
   FVector vertex(int number) const { return component_.mesh.mesh.GetVertex(number); }
@@ -82,7 +83,7 @@ TEST_F(UnrealComponent, FollowsItsHandles) {
   EXPECT_GT(component_.times_drawn, 0);
   EXPECT_TRUE(component_.draws_normals);
   EXPECT_FALSE(component_.draws_colours);
-  EXPECT_NEAR(normal(1).Z, 1, 0.1);  // the base looks up still
+  EXPECT_NEAR(normal(1).Z, 1, 0.1);    // the base looks up still
   EXPECT_NEAR(normal(22).Y, -1, 0.1);  // the tip has turned
   EXPECT_TRUE(unreal_logs.empty());
   component_.EndPlay(EEndPlayReason::Destroyed);
@@ -110,7 +111,9 @@ TEST_F(UnrealComponent, KeepsHardEdgesAndShowsDistortion) {
   UE::Geometry::FDynamicMeshColorOverlay& colours = *mesh.Attributes()->PrimaryColors();
   ASSERT_EQ(colours.MaxElementID(), normals.MaxElementID());
   for (const int32 triangle : mesh.TriangleIndicesItr()) EXPECT_TRUE(colours.IsSetTriangle(triangle));
-  const auto redness = [&](int32 element) { return colours.GetElement(element).X - colours.GetElement(element).Z; };
+  const auto redness = [&](int32 element) {
+    return colours.GetElement(element).X - colours.GetElement(element).Z;
+  };
   bool is_red = false;
   for (const int32 element : colours.ElementIndicesItr()) is_red = is_red || redness(element) > 0.4F;
   EXPECT_TRUE(is_red);

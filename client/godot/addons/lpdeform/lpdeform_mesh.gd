@@ -7,6 +7,9 @@ extends MeshInstance3D
 ## It is live in the game, and in the editor if [member live_in_editor] is on. Nothing here waits for the network. While the server
 ## cannot be reached, the last shape stays.
 
+## Of this add-on.
+const VERSION := "0.1.0"
+
 ## The mesh has another shape now.
 signal deformed
 ## Something went wrong; the text is also in the output.

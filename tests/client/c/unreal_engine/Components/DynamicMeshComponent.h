@@ -42,8 +42,15 @@ struct FComponentReference {
 };
 
 enum class EDynamicMeshChangeType { GeneralEdit, MeshChange, MeshReplacementChange, MeshVertexChange };
-enum class EDynamicMeshAttributeChangeFlags { Unknown = 0, MeshTopology = 1, VertexPositions = 2, NormalsTangents = 4, VertexColors = 8 };
-inline EDynamicMeshAttributeChangeFlags operator|(EDynamicMeshAttributeChangeFlags a, EDynamicMeshAttributeChangeFlags b) {
+enum class EDynamicMeshAttributeChangeFlags {
+  Unknown = 0,
+  MeshTopology = 1,
+  VertexPositions = 2,
+  NormalsTangents = 4,
+  VertexColors = 8
+};
+inline EDynamicMeshAttributeChangeFlags operator|(EDynamicMeshAttributeChangeFlags a,
+                                                  EDynamicMeshAttributeChangeFlags b) {
   return static_cast<EDynamicMeshAttributeChangeFlags>(static_cast<int>(a) | static_cast<int>(b));
 }
 

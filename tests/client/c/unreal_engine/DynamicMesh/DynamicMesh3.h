@@ -30,7 +30,9 @@ class TDynamicMeshOverlay {
     return numbers;
   }
   Value GetElement(int32 element) const { return elements_.at(static_cast<std::size_t>(element)); }
-  void SetElement(int32 element, const Value& value) { elements_.at(static_cast<std::size_t>(element)) = value; }
+  void SetElement(int32 element, const Value& value) {
+    elements_.at(static_cast<std::size_t>(element)) = value;
+  }
   int32 GetParentVertex(int32 element) const { return parents_.at(static_cast<std::size_t>(element)); }
   bool IsSetTriangle(int32 triangle) const { return triangles_.count(triangle) != 0; }
   FIndex3i GetTriangle(int32 triangle) const { return triangles_.at(triangle); }
