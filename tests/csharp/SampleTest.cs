@@ -1,4 +1,4 @@
-// The sample for Unity against a real server, with its messages called as Unity does: SampleTest.exe SERVER.
+// The component of the package for Unity and its sample, against a real server, with its messages called as Unity does: SampleTest.exe SERVER.
 
 using System;
 using System.Diagnostics;
@@ -16,9 +16,9 @@ static class SampleTest
         if (!holds) throw new Exception("not so: " + claim + "; " + string.Join(" | ", UnityEngine.Debug.Warnings));
     }
 
-    static void Send(LpdeformMesh sample, string message)
+    static void Send(object sample, string message)
     {
-        typeof(LpdeformMesh).GetMethod(message, BindingFlags.Instance | BindingFlags.NonPublic).Invoke(sample, null);
+        sample.GetType().GetMethod(message, BindingFlags.Instance | BindingFlags.NonPublic).Invoke(sample, null);
     }
 
     static void UpdateUntil(LpdeformMesh sample, Func<bool> holds, string claim)
@@ -167,12 +167,37 @@ static class SampleTest
         Send(sample, "OnDisable");
     }
 
+    static void TheSwingingBarSwings()
+    {
+        GameObject.All.Clear();
+        UnityEngine.Debug.Warnings.Clear();
+        var swing = new SwingingBar { address = server.Address };
+        Send(swing, "Start");
+        var bar = GameObject.All[0];
+        var deforms = bar.GetComponent<LpdeformMesh>();
+        var mesh = bar.GetComponent<MeshFilter>().mesh;
+        var rest = (Vector3[])mesh.vertices.Clone();
+        Expect(bar.active[0] && mesh.triangles.Max() == rest.Length - 1, "it is whole");
+        for (int k = 0; k < mesh.triangles.Length; k += 3)
+        {
+            Vector3 a = rest[mesh.triangles[k]], u = rest[mesh.triangles[k + 1]] - a, v = rest[mesh.triangles[k + 2]] - a;
+            Expect((u.y * v.z - u.z * v.y) * a.x + (u.x * v.y - u.y * v.x) * a.z > 0, "triangle " + k / 3 + " looks out");
+        }
+        Send(deforms, "OnEnable");
+        int top = Array.FindIndex(rest, at => at.y == 2);
+        Time.time = (float)Math.PI / 4;  // where the head is farthest to the right
+        Send(swing, "Update");
+        UpdateUntil(deforms, () => Math.Abs(mesh.vertices[top].x - rest[top].x - Math.Sin(0.9)) < 1e-4, "the head swings");
+        Expect(UnityEngine.Debug.Warnings.Count == 0, "no warnings");
+        Send(deforms, "OnDisable");
+    }
+
     static int Main(string[] arguments)
     {
         var tests = new Action[] { TheMeshFollowsItsHandles, AHandleThatHoldsNothingIsSaidOnceAndNeverMoved, PIsSentAgainToANewSession,
                                    TakingABetterShapeWhereNoneIsKnownIsAWarning,
                                    DisablingPutsTheMeshBackAndEnablingGoesOnFromThere, AnUpdateWithoutNewsMakesNoGarbage,
-                                   ARefusalIsSaidOnceAndShown };
+                                   ARefusalIsSaidOnceAndShown, TheSwingingBarSwings };
         using (server = new Server(arguments[0]))
         {
             foreach (var test in tests)

@@ -1,6 +1,4 @@
-// A sample for Unity: fits a MeshFilter to the handles around it. Add the package (client/csharp/package.json) to the project and
-// put liblpdeform_client.so below Assets/Plugins. Add this to an object with a MeshFilter whose mesh is readable, and give it
-// handles.
+// Fits a MeshFilter to the handles around it: add this to an object with a MeshFilter whose mesh is readable, and give it handles.
 // The tests compile it against declarations of the parts of UnityEngine that it uses; they do not run it inside Unity.
 
 using System;

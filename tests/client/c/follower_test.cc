@@ -1,6 +1,6 @@
-// The part of the Unreal sample that knows no engine, against a real server.
+// The part of the engines' components that knows no engine, against a real server.
 
-#include "client/unreal/lpdeform_follower.h"
+#include "client/c/lpdeform_follower.h"
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ double unreal_normal_z(const std::vector<float>& positions, std::uint32_t a, std
   return edge(c, 0) * edge(b, 1) - edge(c, 1) * edge(b, 0);
 }
 
-TEST(UnrealFollower, FollowsAHandleInCentimetres) {
+TEST(Follower, FollowsAHandleInCentimetres) {
   const client::InProcessServer server;
   // A strip in the plane z = 0 that looks up.
   std::vector<float> positions;
@@ -37,7 +37,7 @@ TEST(UnrealFollower, FollowsAHandleInCentimetres) {
     for (const std::uint32_t corner : {0U, 3U, 2U, 0U, 1U, 3U}) indices.push_back(k + corner);
   }
   ASSERT_GT(unreal_normal_z(positions, indices[0], indices[1], indices[2]), 0);
-  LpdeformFollower follower(server.address(), positions, indices);
+  LpdeformFollower follower({server.address()}, kUnrealSpace, {positions, {}, indices});
   EXPECT_TRUE(follower.hold("base", {0, 1}));
   EXPECT_TRUE(follower.hold("tip", {20, 21}));
   EXPECT_TRUE(follower.move("tip", {0, 0, 0, 1}, {0, 0, 200}));
@@ -61,9 +61,9 @@ TEST(UnrealFollower, FollowsAHandleInCentimetres) {
 }
 
 /// A bar of which one end is turned by 80 degrees. The first minimum that the solver comes to is 2.8 % above another one.
-class UnrealFollowerOfABentBar : public testing::Test {
+class FollowerOfABentBar : public testing::Test {
  protected:
-  UnrealFollowerOfABentBar() {
+  FollowerOfABentBar() {
     const TriangleMesh bar = box_surface(6, 6, 40);
     std::vector<float> positions;
     std::vector<std::uint32_t> bottom, top;
@@ -73,7 +73,8 @@ class UnrealFollowerOfABentBar : public testing::Test {
       if (bar.vertices(v, 2) == 40) top.push_back(v);
     }
     const std::vector<std::uint32_t> indices(bar.faces.data(), bar.faces.data() + bar.faces.size());
-    follower_ = std::make_unique<LpdeformFollower>(server_.address(), positions, indices);
+    follower_ = std::make_unique<LpdeformFollower>(LpdeformServer{server_.address()}, kUnrealSpace,
+                                                   LpdeformShape{positions, {}, indices});
     EXPECT_TRUE(follower_->hold("bottom", bottom));
     EXPECT_TRUE(follower_->hold("top", top));
     // About the line through (300, 300, 2000) along x.
@@ -95,7 +96,7 @@ class UnrealFollowerOfABentBar : public testing::Test {
   std::unique_ptr<LpdeformFollower> follower_;
 };
 
-TEST_F(UnrealFollowerOfABentBar, ShowsABetterShapeWhereThatIsAskedFor) {
+TEST_F(FollowerOfABentBar, ShowsABetterShapeWhereThatIsAskedFor) {
   EXPECT_TRUE(follower_->set(1.5, true));
   const auto is_result = [this] {
     return follower_->frame().is_final == 1 && follower_->frame().input_seq == 4;
@@ -106,7 +107,7 @@ TEST_F(UnrealFollowerOfABentBar, ShowsABetterShapeWhereThatIsAskedFor) {
   EXPECT_EQ(follower_->notice(), "");
 }
 
-TEST_F(UnrealFollowerOfABentBar, SaysOnceThatABetterShapeIsKnown) {
+TEST_F(FollowerOfABentBar, SaysOnceThatABetterShapeIsKnown) {
   EXPECT_TRUE(follower_->set(1.5, false));
   std::string said;
   ASSERT_TRUE(tick_until([&] { return !(said = follower_->notice()).empty(); })) << follower_->problem();

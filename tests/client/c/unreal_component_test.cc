@@ -6,7 +6,8 @@
 #include <string>
 #include <thread>
 
-#include "client/unreal/LpdeformComponent.h"
+#include "DynamicMesh/MeshNormals.h"
+#include "client/unreal/Source/LpdeformUnreal/Public/LpdeformComponent.h"
 #include "tests/client/in_process_server.h"
 
 namespace lpdeform {
@@ -29,6 +30,7 @@ class UnrealComponent : public testing::Test {
       mesh.AppendTriangle(k, k + 3, k + 2);
       mesh.AppendTriangle(k, k + 1, k + 3);
     }
+    UE::Geometry::FMeshNormals::mesh = &mesh;
     hold("base", base_, 0);
     hold("tip", tip_, 1000);
   }
@@ -53,6 +55,11 @@ class UnrealComponent : public testing::Test {
     return true;
   }
 
+  FVector3f normal(int vertex) {
+    return component_.mesh.mesh.Attributes()->PrimaryNormals()->GetElement(vertex -
+                                                                           1);  // vertices begin with 1
+  }
+
   FVector vertex(int number) const { return component_.mesh.mesh.GetVertex(number); }
 
   client::InProcessServer server_;
@@ -74,9 +81,42 @@ TEST_F(UnrealComponent, FollowsItsHandles) {
   EXPECT_NEAR(vertex(22).Y, 50, 1e-2);
   EXPECT_NEAR(vertex(21).Z, 150, 1e-2);
   EXPECT_GT(component_.times_drawn, 0);
+  EXPECT_TRUE(component_.draws_normals);
+  EXPECT_FALSE(component_.draws_colours);
+  EXPECT_NEAR(normal(1).Z, 1, 0.1);    // the base looks up still
+  EXPECT_NEAR(normal(22).Y, -1, 0.1);  // the tip has turned
   EXPECT_TRUE(unreal_logs.empty());
   component_.EndPlay(EEndPlayReason::Destroyed);
   component_.TickComponent(0.016F, LEVELTICK_All, nullptr);  // the engine may tick once more
+}
+
+TEST_F(UnrealComponent, KeepsHardEdgesAndShowsDistortion) {
+  // Vertex 1 has a normal of its own in its second triangle, as along a hard edge.
+  UE::Geometry::FDynamicMesh3& mesh = component_.mesh.mesh;
+  mesh.EnableAttributes();
+  UE::Geometry::FDynamicMeshNormalOverlay& normals = *mesh.Attributes()->PrimaryNormals();
+  UE::Geometry::FMeshNormals::InitializeOverlayToPerVertexNormals(&normals);
+  const int32 other = normals.AppendElement(FVector3f(-1, 0, 0));
+  normals.set_parent(other, 1);
+  const UE::Geometry::FIndex3i corners = normals.GetTriangle(1);
+  normals.SetTriangle(1, {other, corners.B, corners.C});
+  component_.bShowDistortion = true;
+  component_.BeginPlay();
+  tip_.transform = {FQuat(), FVector(1000, 50, 200)};
+  EXPECT_TRUE(tick_until([this] { return vertex(21).Z == 200; }));
+  EXPECT_NEAR(normal(1).Z, 1, 0.1);
+  EXPECT_NEAR(normals.GetElement(other).X, -1, 0.1);
+  EXPECT_TRUE(component_.draws_normals);
+  EXPECT_TRUE(component_.draws_colours);
+  UE::Geometry::FDynamicMeshColorOverlay& colours = *mesh.Attributes()->PrimaryColors();
+  ASSERT_EQ(colours.MaxElementID(), normals.MaxElementID());
+  for (const int32 triangle : mesh.TriangleIndicesItr()) EXPECT_TRUE(colours.IsSetTriangle(triangle));
+  const auto redness = [&](int32 element) {
+    return colours.GetElement(element).X - colours.GetElement(element).Z;
+  };
+  bool is_red = false;
+  for (const int32 element : colours.ElementIndicesItr()) is_red = is_red || redness(element) > 0.4F;
+  EXPECT_TRUE(is_red);
 }
 
 TEST_F(UnrealComponent, SaysWhatIsRefusedOnceAndRests) {

@@ -12,8 +12,10 @@
 
 using int32 = std::int32_t;
 using uint32 = std::uint32_t;
+using uint8 = std::uint8_t;
 using TCHAR = char;
 
+#define LPDEFORMUNREAL_API
 #define TEXT(text) text
 #define TCHAR_TO_UTF8(text) (text)
 #define UTF8_TO_TCHAR(text) (text)
@@ -58,8 +60,15 @@ class TArray {
     return Num() - 1;
   }
   int32 Num() const { return static_cast<int32>(items_.size()); }
-  T& operator[](int32 index) { return items_[static_cast<std::size_t>(index)]; }
-  const T& operator[](int32 index) const { return items_[static_cast<std::size_t>(index)]; }
+  // With an index of any type, as in Unreal.
+  template <typename Index>
+  T& operator[](Index index) {
+    return items_[static_cast<std::size_t>(index)];
+  }
+  template <typename Index>
+  const T& operator[](Index index) const {
+    return items_[static_cast<std::size_t>(index)];
+  }
   auto begin() { return items_.begin(); }
   auto end() { return items_.end(); }
 
@@ -83,6 +92,15 @@ struct FVector {
   }
 };
 using FVector3d = FVector;
+
+struct FVector3f {
+  FVector3f(float x, float y, float z) : X(x), Y(y), Z(z) {}
+  float X, Y, Z;
+};
+struct FVector4f {
+  FVector4f(float x, float y, float z, float w) : X(x), Y(y), Z(z), W(w) {}
+  float X, Y, Z, W;
+};
 
 /// Of length 1. A * B turns by B first.
 struct FQuat {

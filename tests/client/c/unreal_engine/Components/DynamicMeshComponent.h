@@ -42,7 +42,17 @@ struct FComponentReference {
 };
 
 enum class EDynamicMeshChangeType { GeneralEdit, MeshChange, MeshReplacementChange, MeshVertexChange };
-enum class EDynamicMeshAttributeChangeFlags { Unknown, MeshTopology, VertexPositions };
+enum class EDynamicMeshAttributeChangeFlags {
+  Unknown = 0,
+  MeshTopology = 1,
+  VertexPositions = 2,
+  NormalsTangents = 4,
+  VertexColors = 8
+};
+inline EDynamicMeshAttributeChangeFlags operator|(EDynamicMeshAttributeChangeFlags a,
+                                                  EDynamicMeshAttributeChangeFlags b) {
+  return static_cast<EDynamicMeshAttributeChangeFlags>(static_cast<int>(a) | static_cast<int>(b));
+}
 
 class UDynamicMesh {
  public:
@@ -58,7 +68,12 @@ class UDynamicMesh {
 class UDynamicMeshComponent : public USceneComponent {
  public:
   UDynamicMesh* GetDynamicMesh() { return &mesh; }
-  void FastNotifyPositionsUpdated(bool = false, bool = false, bool = false) { ++times_drawn; }
+  void FastNotifyPositionsUpdated(bool with_normals = false, bool with_colours = false, bool = false) {
+    ++times_drawn;
+    draws_normals = with_normals;
+    draws_colours = with_colours;
+  }
   UDynamicMesh mesh;
   int times_drawn = 0;
+  bool draws_normals = false, draws_colours = false;
 };

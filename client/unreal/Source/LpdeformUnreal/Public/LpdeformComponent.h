@@ -1,9 +1,4 @@
-// A sample for Unreal Engine 5: a UDynamicMeshComponent that follows handles over an lpdeform server. Put it with
-// lpdeform_follower.h into a module that depends on "GeometryFramework" and "GeometryCore", add lpdeform.h's folder to its
-// PublicIncludePaths and liblpdeform_client to its PublicAdditionalLibraries.
-//
-// Compiled and tested here with a little of the engine in its place (tests/client/c/unreal_engine), against a real server; not compiled
-// and not run with the engine.
+// A UDynamicMeshComponent that follows handles over an lpdeform server. ../../../README.md says what was tried.
 #pragma once
 
 #include <memory>
@@ -31,7 +26,7 @@ struct FLpdeformHandle {
 };
 
 UCLASS(ClassGroup = "Lpdeform", meta = (BlueprintSpawnableComponent))
-class ULpdeformComponent : public UDynamicMeshComponent {
+class LPDEFORMUNREAL_API ULpdeformComponent : public UDynamicMeshComponent {
   GENERATED_BODY()
 
  public:
@@ -47,16 +42,23 @@ class ULpdeformComponent : public UDynamicMeshComponent {
   /** Show such a shape at once. Otherwise a line of the log says that it is known. */
   UPROPERTY(EditAnywhere, Category = "Lpdeform")
   bool bShowBetterShapes = false;
+  /** Write the distortion to the mesh's colours, from blue (none) to red. Counts from the next BeginPlay. */
+  UPROPERTY(EditAnywhere, Category = "Lpdeform")
+  bool bShowDistortion = false;
 
   void BeginPlay() override;
   void EndPlay(const EEndPlayReason::Type Reason) override;
   void TickComponent(float Seconds, ELevelTick Tick, FActorComponentTickFunction* Function) override;
 
  private:
+  LpdeformShape Read();
   void Hold(FLpdeformHandle& Handle, const std::vector<float>& Positions);
   void Move(FLpdeformHandle& Handle);
   void Show();
 
+  // A vertex of the follower is an element of the mesh's normals: a vertex of the mesh has several where there is a hard edge.
   std::unique_ptr<LpdeformFollower> Follower;
-  TArray<int32> VertexIds;  // of the follower's vertices, in the dynamic mesh
+  TArray<int32> ElementIds;  // of the follower's vertices, in the normals
+  TArray<int32> VertexIds;   // and in the mesh
+  TArray<int32> ColorIds;    // and in the colours, if they are shown
 };

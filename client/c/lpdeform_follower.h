@@ -8,33 +8,60 @@
 #include <utility>
 #include <vector>
 
-/// The part of the Unreal sample that knows no engine: a session whose vertices are in Unreal's coordinates (left-handed, z up,
-/// centimetres; triangles counter-clockwise seen from outside), in C++17 around lpdeform.h. Errors are std::runtime_error in the
-/// constructor alone; on the game thread they are texts.
+/// An engine's coordinates. The fields are those of lpdeform_options.
+struct LpdeformSpace {
+  lpdeform_handedness handedness;
+  lpdeform_up up;
+  lpdeform_winding winding;
+  double units_per_metre;
+};
+
+/// Unreal's normal of A, B, C is (C - A) x (B - A).
+inline constexpr LpdeformSpace kUnrealSpace{LPDEFORM_LEFT_HANDED, LPDEFORM_Z_UP, LPDEFORM_COUNTER_CLOCKWISE,
+                                            100};
+inline constexpr LpdeformSpace kGodotSpace{LPDEFORM_RIGHT_HANDED, LPDEFORM_Y_UP, LPDEFORM_CLOCKWISE, 1};
+
+struct LpdeformServer {
+  std::string address = {};  // as lpdeform_connection.address
+  std::string token = {};    // may be empty
+  bool tls = false;
+};
+
+/// Coordinates are those of the engine. Vertices in the same place deform as one.
+struct LpdeformShape {
+  std::vector<float> positions;        // x, y, z of each vertex
+  std::vector<float> normals;          // the same at rest, or empty: frames then have smooth normals
+  std::vector<std::uint32_t> indices;  // three per triangle
+};
+
+/// A session for an engine's component, in C++17 around lpdeform.h. No function waits for the network, except the destructor, for
+/// at most about two seconds. The constructor throws std::runtime_error; later errors are texts.
 class LpdeformFollower {
  public:
-  /// x, y, z of each vertex, three indices a triangle; vertices at one position are one.
-  LpdeformFollower(const std::string& address, const std::vector<float>& positions,
-                   const std::vector<std::uint32_t>& indices) {
+  LpdeformFollower(const LpdeformServer& server, const LpdeformSpace& space, const LpdeformShape& shape) {
     lpdeform_connection connection{};
     connection.struct_size = sizeof connection;
-    connection.address = address.c_str();
+    connection.address = server.address.c_str();
+    connection.token = server.token.empty() ? nullptr : server.token.c_str();
+    connection.tls = server.tls ? 1 : 0;
     if (lpdeform_connect(&connection, &client_, &error_) != LPDEFORM_OK)
       throw std::runtime_error(error_.message);
     lpdeform_mesh mesh{};
     mesh.struct_size = sizeof mesh;
-    mesh.vertex_count = static_cast<std::uint32_t>(positions.size() / 3);
-    mesh.positions.data = positions.data();
-    mesh.positions.bytes = positions.size() * sizeof(float);
-    mesh.indices = indices.data();
-    mesh.index_count = static_cast<std::uint32_t>(indices.size());
+    mesh.vertex_count = static_cast<std::uint32_t>(shape.positions.size() / 3);
+    mesh.positions.data = shape.positions.data();
+    mesh.positions.bytes = shape.positions.size() * sizeof(float);
+    if (!shape.normals.empty()) mesh.normals.data = shape.normals.data();
+    mesh.normals.bytes = shape.normals.size() * sizeof(float);
+    mesh.indices = shape.indices.data();
+    mesh.index_count = static_cast<std::uint32_t>(shape.indices.size());
     mesh.weld_by_position = 1;
     lpdeform_options options{};
     options.struct_size = sizeof options;
-    options.handedness = LPDEFORM_LEFT_HANDED;
-    options.up = LPDEFORM_Z_UP;
-    options.units_per_metre = 100;
-    options.winding = LPDEFORM_COUNTER_CLOCKWISE;  // Unreal's normal of A, B, C is (C - A) x (B - A)
+    options.handedness = space.handedness;
+    options.up = space.up;
+    options.winding = space.winding;
+    options.units_per_metre = space.units_per_metre;
     options.free_components = LPDEFORM_FREE_COMPONENTS_FOLLOW;
     options.with_normals = 1;
     if (lpdeform_open(client_, &mesh, &options, &session_, &error_) != LPDEFORM_OK) {
@@ -42,9 +69,9 @@ class LpdeformFollower {
       lpdeform_disconnect(client_);
       throw std::runtime_error(why);
     }
-    positions_.resize(positions.size());
-    normals_.resize(positions.size());
-    colours_.resize(4 * (positions.size() / 3));
+    positions_ = shape.positions;
+    normals_.resize(positions_.size());
+    colours_.resize(4 * (positions_.size() / 3));
   }
 
   ~LpdeformFollower() {
@@ -63,6 +90,11 @@ class LpdeformFollower {
     handle.vertices = vertices.data();
     handle.vertex_count = static_cast<std::uint32_t>(vertices.size());
     return said(lpdeform_set_handle(session_, &handle, nullptr, &error_));
+  }
+
+  /// Removes the handle. False: problem() says why.
+  bool let_go(const std::string& name) {
+    return said(lpdeform_remove_handle(session_, name.c_str(), nullptr, &error_));
   }
 
   /// Where the handle is, relative to the mesh at rest: a rotation about the origin (x, y, z, w), then a shift. Does not wait.
@@ -91,7 +123,7 @@ class LpdeformFollower {
     buffers.struct_size = sizeof buffers;
     buffers.positions = {positions_.data(), positions_.size() * sizeof(float), 0, 0, LPDEFORM_FLOAT32, 0};
     buffers.normals = {normals_.data(), normals_.size() * sizeof(float), 0, 0, LPDEFORM_FLOAT32, 0};
-    buffers.colours = {colours_.data(), colours_.size(), 0, 0, LPDEFORM_BGRA8, 0};  // as FColor
+    buffers.colours = {colours_.data(), colours_.size(), 0, 0, LPDEFORM_RGBA8, 0};
     const lpdeform_code code = lpdeform_poll(session_, &buffers, &frame_, &error_);
     if (code != LPDEFORM_NO_FRAME) said(code);
     return code == LPDEFORM_OK;
@@ -105,6 +137,13 @@ class LpdeformFollower {
   const lpdeform_frame& frame() const { return frame_; }
 
   lpdeform_state state() const { return lpdeform_session_state(session_, nullptr); }
+
+  /// Why the server cannot be reached for now; empty if it can be, or if no attempt has failed yet.
+  std::string trouble() {
+    return lpdeform_session_state(session_, &error_) == LPDEFORM_STATE_LIVE || error_.code == LPDEFORM_OK
+               ? ""
+               : text();
+  }
 
   /// There is nothing more to come; problem() then says why.
   bool is_over() {
@@ -125,9 +164,11 @@ class LpdeformFollower {
 
  private:
   bool said(lpdeform_code code) {
-    if (code != LPDEFORM_OK) problem_ = std::string(error_.message) + " (" + error_.reason + ")";
+    if (code != LPDEFORM_OK) problem_ = text();
     return code == LPDEFORM_OK;
   }
+
+  std::string text() const { return std::string(error_.message) + " (" + error_.reason + ")"; }
 
   lpdeform_error error_ = [] {
     lpdeform_error error{};
