@@ -5,7 +5,6 @@ import os
 import signal
 import sys
 import tempfile
-import time
 import types
 import typing
 import unittest
@@ -34,7 +33,7 @@ class AddOn(unittest.TestCase):
 
     def setUp(self):
         stage.clear()
-        bpy.context.preferences.addons["lpdeform_addon"].preferences.address = self.server.address
+        stage.preferences().address = self.server.address
         self.tube = stage.tube(at=(1, 2, 3))
         self.tube.rotation_euler = (0.3, 0, 0)
         self.rest = stage.at_rest(self.tube)
@@ -166,8 +165,7 @@ class AddOn(unittest.TestCase):
         self.assertGreater(np.abs(painted - even).max(), 0.01)
         stage.activate(self.tube)
         bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
-        group.add(np.arange(len(self.rest)).tolist(), 0.0, "REPLACE")  # painted away
-        self.tube.data.update_tag()  # as a stroke does
+        self.change_weights(gain=0.0)
         stage.turn(lambda: not live.of(self.tube)._weights["p"].any())
         stage.settle(self.tube)
         self.assertEqual(set(live.of(self.tube).fields["p"].tolist()), {2.0})
@@ -181,30 +179,42 @@ class AddOn(unittest.TestCase):
         stage.activate(self.tube)
         bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
         stage.settle(self.tube)
-        now = [time.monotonic()]
-        with mock.patch.object(live.surface, "group_weights", wraps=live.surface.group_weights) as reads, \
-                mock.patch.object(live, "_now", lambda: now[0]):
+        with mock.patch.object(live.surface, "group_weights", wraps=live.surface.group_weights) as reads:
 
-            def reads_after(seconds):
-                """Of this group, so often as Blender's timer looks in that time."""
+            def reads_in(ticks):
+                """Of this group."""
                 before = [call.args[1] for call in reads.call_args_list].count("soft")
-                for _ in range(int(30 * seconds)):
-                    now[0] += 1 / 30
+                for _ in range(ticks):
                     bpy.context.view_layer.update()
                     live.tick()
                 return [call.args[1] for call in reads.call_args_list].count("soft") - before
 
-            reads_after(1)  # as the mode began
-            self.assertEqual(reads_after(10), 0)
-            for _ in range(30):  # a stroke of a second
+            self.assertEqual(reads_in(300), 0)
+            for _ in range(30):  # dabs of a stroke
                 group.add([0], 0.5, "ADD")
                 self.tube.data.update_tag()
-                self.assertEqual(reads_after(1 / 30), 0)
-            self.assertEqual(reads_after(10), 1)
-            self.assertEqual(live.of(self.tube)._weights["p"][0], 1.0)
+                self.assertEqual(reads_in(10), 0)
+            self.change_weights(gain=0.5)  # as the end of a stroke, an operator that makes a step for undo
+            self.assertEqual(reads_in(300), 1)
+            self.assertEqual(live.of(self.tube)._weights["p"][0], 0.5)
             live.of(self.tube).show(self.tube)  # a frame changes the mesh, and no weight
-            self.assertEqual(reads_after(10), 0)
+            self.assertEqual(reads_in(300), 0)
         bpy.ops.object.mode_set(mode="OBJECT")
+
+    def test_weights_that_an_operator_changes_in_object_mode_are_read(self):
+        self.held()
+        group = self.tube.vertex_groups.new(name="soft")
+        group.add(np.arange(len(self.rest)).tolist(), 1.0, "REPLACE")
+        self.tube.lpdeform.p_group, self.tube.lpdeform.p_painted = "soft", 1.0
+        stage.settle(self.tube)
+        stage.activate(self.tube)
+        self.change_weights(gain=0.25)
+        stage.turn(lambda: np.allclose(live.of(self.tube)._weights["p"], 0.25))
+
+    def change_weights(self, gain):
+        """By an operator that a person starts: such operators make a step for undo."""
+        bpy.context.view_layer.objects.active = self.tube
+        self.assertEqual(bpy.ops.object.vertex_group_levels("EXEC_DEFAULT", True, gain=gain), {"FINISHED"})
 
     def test_stiffness_is_a_property_and_a_group(self):
         _, tip = self.held()
@@ -584,7 +594,7 @@ class AddOn(unittest.TestCase):
                 file.write(stage.token_of("an artist", signer) + "\n")
             server = stage.RunningServer("--tls-cert", cert, "--tls-key", key, "--token-keys", public)
             self.addCleanup(server.end)
-            preferences = bpy.context.preferences.addons["lpdeform_addon"].preferences
+            preferences = stage.preferences()
             preferences.address, preferences.use_tls, preferences.root_certificates = server.address, True, cert
             try:
                 stage.activate(self.tube)
@@ -629,6 +639,25 @@ class AddOn(unittest.TestCase):
         stage.settle(self.tube)
         stage.turn(lambda: live.message(self.tube) == "")
 
+    def test_another_machine_needs_leave_to_go_online(self):
+        stage.add_handle(self.tube, self.top)
+        PREFERENCES.address = "server.example:50051"
+        stage.activate(self.tube)
+        with mock.patch.object(client.bpy, "app", types.SimpleNamespace(online_access=False)), \
+                self.assertRaisesRegex(RuntimeError, "Blender may not go online, and server.example:50051 is another machine"):
+            bpy.ops.lpdeform.start()
+        self.assertIsNone(self.tube.data.shape_keys)
+
+    def test_an_extension_brings_its_packages_and_an_older_add_on_that_of_lpdeform(self):
+        import google.protobuf
+        import grpc
+
+        if stage.IS_EXTENSION:
+            for module in (grpc, google.protobuf, client.lpdeform):
+                self.assertIn("/extensions/.local/lib/", module.__file__)
+        else:
+            self.assertRegex(client.lpdeform.__file__, r"/lpdeform_addon/wheels/lpdeform-[0-9.]+-py3-none-any\.whl/")
+
     def test_meshes_that_cannot_be_deformed_are_named(self):
         flat = bpy.data.meshes.new("flat")
         flat.from_pydata([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [], [(0, 1, 2)])
@@ -648,8 +677,7 @@ class AddOn(unittest.TestCase):
         _, tip = self.held()
         self.shift(tip, 0.4, 0, 0)
         stage.settle(self.tube)
-        path = os.path.join(os.environ["BLENDER_USER_CONFIG"], "saved.blend")
-        os.makedirs(os.path.dirname(path), exist_ok=True)
+        path = os.path.join(bpy.app.tempdir, "saved.blend")
         bpy.ops.wm.save_as_mainfile(filepath=path)
         bpy.ops.wm.open_mainfile(filepath=path)
         self.assertEqual(live._running, {})

@@ -33,16 +33,18 @@ def bend(ob):
 def material(name, colour=(0.8, 0.8, 0.8), roughness=0.5, attribute="", glow=0.0):
     """Of one colour, or of a colour attribute; with a glow of 1 it is seen as it is, whatever the light."""
     made = bpy.data.materials.new(name)
-    made.use_nodes = True
+    if bpy.app.version < (5, 0, 0):
+        made.use_nodes = True
     nodes, links = made.node_tree.nodes, made.node_tree.links
     surface_of = nodes["Principled BSDF"].inputs
     surface_of["Base Color"].default_value = (*colour, 1)
     surface_of["Roughness"].default_value = roughness
-    surface_of["Specular"].default_value = 0.3 if glow == 0 else 0.0
+    specular, emission = ("Specular IOR Level", "Emission Color") if bpy.app.version >= (4, 0, 0) else ("Specular", "Emission")
+    surface_of[specular].default_value = 0.3 if glow == 0 else 0.0
     if attribute:
         source = nodes.new("ShaderNodeVertexColor")
         source.layer_name = attribute
-        links.new(source.outputs["Color"], surface_of["Base Color" if glow == 0 else "Emission"])
+        links.new(source.outputs["Color"], surface_of["Base Color" if glow == 0 else emission])
     if glow > 0:
         surface_of["Base Color"].default_value = (0, 0, 0, 1)
         surface_of["Emission Strength"].default_value = glow

@@ -43,7 +43,7 @@ class Seams(unittest.TestCase):
         self.server = stage.RunningServer()
         self.addCleanup(self.server.end)
         stage.clear()
-        bpy.context.preferences.addons["lpdeform_addon"].preferences.address = self.server.address
+        stage.preferences().address = self.server.address
         self.tube = stage.tube()
         split_around(self.tube, 2.0)
         self.rest = stage.at_rest(self.tube)

@@ -17,6 +17,8 @@ import bpy
 import numpy as np
 
 ADD_ON, SERVER, PICTURES = sys.argv[sys.argv.index("--") + 1 :]
+IS_EXTENSION = bpy.app.version >= (4, 2, 0)
+MODULE = "bl_ext.user_default.lpdeform" if IS_EXTENSION else "lpdeform_addon"
 PATIENCE = 60.0  # seconds that anything may take; never reached where all is well
 
 
@@ -51,12 +53,18 @@ def token_of(subject, key):
     return (text + b"." + signature).decode()
 
 
-def install(with_its_own_modules_first=False):
-    bpy.ops.preferences.addon_install(filepath=ADD_ON)
-    if with_its_own_modules_first:
-        sys.path.insert(0, os.path.join(bpy.utils.user_resource("SCRIPTS", path="addons"), "lpdeform_addon", "modules"))
-    bpy.ops.preferences.addon_enable(module="lpdeform_addon")
-    return bpy.context.preferences.addons["lpdeform_addon"].preferences
+def install():
+    """Enables the add-on, for `from lpdeform_addon import ...`, and returns its preferences."""
+    if IS_EXTENSION:  # tests/blender/run has installed it
+        sys.modules["lpdeform_addon"] = sys.modules[MODULE]
+    else:
+        bpy.ops.preferences.addon_install(filepath=ADD_ON)
+        bpy.ops.preferences.addon_enable(module=MODULE)
+    return preferences()
+
+
+def preferences():
+    return bpy.context.preferences.addons[MODULE].preferences
 
 
 def clear():

@@ -12,10 +12,9 @@ bl_info = {
     "category": "Mesh",
 }
 
-# Packages that are packed with the add-on. Those of Blender's own Python take precedence.
-_modules = str(Path(__file__).parent / "modules")
-if _modules not in sys.path:
-    sys.path.append(_modules)
+# Blender 4.2 and newer install the wheels of an extension. Older ones import the package lpdeform from its wheel as it is.
+if not __package__.startswith("bl_ext."):
+    sys.path.extend(map(str, (Path(__file__).parent / "wheels").glob("lpdeform-*.whl")))
 
 from . import live, operators, panel, properties  # noqa: E402  (need the path)
 

@@ -19,8 +19,17 @@ def require() -> None:
     if lpdeform is None:
         raise NotReady(
             f"The Python package of lpdeform cannot be used ({_missing}). With Debian's Blender install python3-grpcio and "
-            "python3-protobuf; otherwise use the add-on that is packed with --with-grpc."
+            "python3-protobuf; otherwise use Blender 4.2 or newer and the extension that client/blender/package --for packs."
         )
+    if not getattr(bpy.app, "online_access", True) and not _is_on_this_machine(address()):
+        raise NotReady(
+            f"Blender may not go online, and {address()} is another machine. Allow online access in Preferences > System, or use a server "
+            "on this machine."
+        )
+
+
+def _is_on_this_machine(server: str) -> bool:
+    return server.startswith(("localhost:", "127.", "[::1]:", "unix:"))
 
 
 def _preference(name: str):

@@ -1,6 +1,5 @@
 """Meshes that follow their handles: one session for each, and the timer that updates them."""
 
-import time
 from typing import NamedTuple
 
 import bpy
@@ -12,9 +11,6 @@ from .client import NotReady, access, address, lpdeform, require
 from .told import Told
 
 _interval = 1 / 30  # seconds between two updates
-_stroke_pause = 0.2  # seconds without a change of weights, after which they are read; reading them loops over all vertices
-
-_now = time.monotonic
 _running: dict = {}
 """The live meshes, by the names of their objects."""
 _showing: set = set()
@@ -61,6 +57,8 @@ class LiveMesh:
         self._mode = ob.mode
         self._open(ob)
         self.had_keys = ob.data.shape_keys is not None
+        self.is_baked = False
+        """Whether this is turned frame by frame; the timer leaves it alone then."""
         self.muted = surface.add_live_key(ob)
 
     def _open(self, ob) -> None:
@@ -72,7 +70,9 @@ class LiveMesh:
         self._told = Told()
         self.fields = {}
         self._weights = {}
-        self._painted = None
+        self._is_touched = False
+        self._operator = 0
+        """The newest operator when the mesh was last seen untouched, or its weights were read."""
         self.frame = self.result = None
 
     @property
@@ -141,18 +141,31 @@ class LiveMesh:
         if was != ob.mode:
             self._weights = {}  # read again
         self._tell(ob)
+        self._take(ob, self.session.poll)
+
+    def finished(self, ob, seconds: float):
+        """The finished result for all that was sent, and shows it; None if it has not come in this time. Raises the server's
+        errors."""
         try:
-            frame = self.session.poll()
+            return self._take(ob, lambda: self.session.settle(seconds))
+        except lpdeform.Timeout:
+            return None
+
+    def _take(self, ob, ask):
+        """Shows the frame that `ask` returns, if it is a new one."""
+        try:
+            frame = ask()
         except lpdeform.LpdeformError as error:
             if error.code.name not in _taken_all_the_same:
                 self._told.refused()
             raise
-        if frame is not None:
+        if frame is not None and frame is not self.frame:
             self._told.answered(frame.input_seq)
             self.frame = frame
             if self.result is None or frame.input_seq > self.result.input_seq:
                 self.result = None
                 self.show(ob)
+        return frame
 
     def solve(self, ob, on_progress, timeout: float) -> None:
         """Solves to the end, with a bound, and shows the result. Raises the server's errors, Timeout, and NotReady."""
@@ -190,6 +203,7 @@ class LiveMesh:
         """Called after an undo or redo of Blender: handles may have changed, and the shown positions are older than the last
         frame."""
         self.vertices_changed(ob)
+        self._weights = {}  # read again
         if self.shown is not None and len(ob.data.vertices) == len(self._rest):
             self.show(ob)
 
@@ -202,10 +216,9 @@ class LiveMesh:
         bpy.context.view_layer.update()
         _showing.discard(self.name)
 
-    def mesh_changed(self, ob) -> None:
-        """Called when the mesh was changed by others. In weight paint mode that is a stroke."""
-        if ob.mode == "WEIGHT_PAINT":
-            self._painted = _now()
+    def mesh_changed(self) -> None:
+        """Called when the mesh was changed by others, as by each dab of a brush."""
+        self._is_touched = True
 
     def _look_again(self, ob) -> None:
         """Called when the mesh at rest may have changed, or welding was switched."""
@@ -268,13 +281,23 @@ class LiveMesh:
         return present
 
     def _read_weights(self, ob) -> None:
+        """Reading loops over all vertices. So it is done when an operator that has touched the mesh ends: a stroke is one."""
         settings = ob.lpdeform
-        is_painted = self._painted is not None and _now() - self._painted >= _stroke_pause
         names = {name: getattr(settings, f"{name}_group") for name in _settings}
+        operator = _newest_operator()
+        is_painted = self._is_touched and operator != self._operator
         if is_painted or self._weights.get("names") != names:
             self._weights = {name: surface.group_weights(ob, group) for name, group in names.items()}
             self._weights["names"] = names
-            self._painted = None
+            self._is_touched = False
+        if not self._is_touched:
+            self._operator = operator
+
+
+def _newest_operator() -> int:
+    """Names the operator that was the last to make a step for undo. Blender keeps the last 32 of them."""
+    ended = bpy.context.window_manager.operators
+    return ended[-1].as_pointer() if len(ended) else 0
 
 
 def between(plain: float, painted: float, weights):
@@ -325,8 +348,9 @@ def _open_session(ob, rest, faces):
         raise NotReady(f"{what}: {error}") from error
 
 
-def stop(ob, keep_as: str = "") -> None:
-    """Ends live deformation. The mesh returns to rest, or keeps the present pose as a shape key of this name."""
+def stop(ob, keep_as: str = "", stay_muted: bool = False) -> None:
+    """Ends live deformation. The mesh returns to rest, or keeps the present pose as a shape key of this name. `stay_muted`: the basis
+    is kept, and other shape keys stay as they are while it is live."""
     running = _running.pop(ob.name, None)
     if running is None:
         return
@@ -335,13 +359,15 @@ def stop(ob, keep_as: str = "") -> None:
     if keep_as and key is not None:
         key.name = keep_as
     else:
-        surface.drop_live_key(ob, running.muted, running.had_keys)
+        surface.drop_live_key(ob, [] if stay_muted else running.muted, running.had_keys or stay_muted)
     ob.data.update_tag()
 
 
 def tick():
     """Updates every live mesh; Blender's timer calls it."""
     for name, running in list(_running.items()):
+        if running.is_baked:
+            continue
         ob = bpy.data.objects.get(name)
         if ob is None or surface.live_key(ob) is None:
             _forget(name, "Ended: the mesh, or its shape key lpdeform, is gone.")
@@ -388,7 +414,7 @@ def _after_changes(_scene, graph) -> None:
         one = update.id.original
         running = _running.get(one.name) if isinstance(one, bpy.types.Object) and update.is_updated_geometry else None
         if running is not None and one.name not in _showing:
-            running.mesh_changed(one)
+            running.mesh_changed()
 
 
 @persistent

@@ -1,9 +1,9 @@
 """What buttons do."""
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
-from . import handles, live, surface
+from . import bake, handles, live, surface
 from .client import NotReady, lpdeform
 
 
@@ -199,4 +199,89 @@ class Apply(bpy.types.Operator):
         return {"FINISHED"}
 
 
-register, unregister = bpy.utils.register_classes_factory((AddHandle, RemoveHandle, PutBack, Start, Stop, Solve, TakeBetter, Apply))
+class Bake(bpy.types.Operator):
+    """Solve every frame of the scene, end live deformation, and keep the results as shape keys with keyframes, so that a render
+    follows. Escape changes nothing"""
+
+    bl_idname = "lpdeform.bake"
+    bl_label = "Bake frames"
+    bl_options = {"UNDO"}
+
+    first: IntProperty(name="First", options={"SKIP_SAVE"}, description="The first frame; if not given, the scene's")
+    last: IntProperty(name="Last", options={"SKIP_SAVE"}, description="The last frame; if not given, the scene's")
+    step: IntProperty(name="Step", min=1, options={"SKIP_SAVE"}, description="From frame to frame; if not given, the scene's")
+
+    @classmethod
+    def poll(cls, context):
+        ob = mesh_of(context)
+        return live.of(ob) is not None and ob.mode != "EDIT"
+
+    def execute(self, context):
+        """Waits for all frames."""
+        try:
+            self._begin(context)
+            while not self._baking.step():
+                pass
+        except (NotReady, lpdeform.LpdeformError) as error:
+            return self._fail(context, str(error))
+        return self._finish(context)
+
+    def invoke(self, context, event):
+        """Goes on beside Blender's window until it is finished, or Escape is pressed."""
+        try:
+            self._begin(context)
+        except NotReady as error:
+            return self._fail(context, str(error))
+        self._timer = context.window_manager.event_timer_add(0.01, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC":
+            return self._fail(context, "")
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        try:
+            is_finished = self._baking.step()
+        except (NotReady, lpdeform.LpdeformError) as error:
+            return self._fail(context, str(error))
+        context.window_manager.progress_update(self._baking.done)
+        context.workspace.status_text_set(None if is_finished else self._baking.said)
+        return self._finish(context) if is_finished else {"RUNNING_MODAL"}
+
+    def cancel(self, context):
+        """Blender ends the operator, as before another file is opened."""
+        self._fail(context, "")
+
+    def _begin(self, context) -> None:
+        scene = context.scene
+        self._baking = self._timer = None
+        first, last, step = (
+            getattr(self, name) if self.properties.is_property_set(name) else of_scene
+            for name, of_scene in (("first", scene.frame_start), ("last", scene.frame_end), ("step", scene.frame_step))
+        )
+        self._baking = bake.Baking(mesh_of(context), range(first, last + 1, step))
+        context.window_manager.progress_begin(0, len(range(first, last + 1, step)))
+
+    def _finish(self, context):
+        self._baking.finish()
+        self._end(context)
+        self.report({"INFO"}, f"{self._baking.done} frames are kept as shape keys")
+        return {"FINISHED"}
+
+    def _fail(self, context, why: str):
+        if self._baking is not None:
+            self._baking.cancel()
+            self._end(context)
+        if why:
+            self.report({"ERROR"}, f"{why} Nothing was baked.")
+        return {"CANCELLED"}
+
+    def _end(self, context) -> None:
+        context.window_manager.progress_end()
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            context.workspace.status_text_set(None)
+
+
+register, unregister = bpy.utils.register_classes_factory((AddHandle, RemoveHandle, PutBack, Start, Stop, Solve, TakeBetter, Apply, Bake))

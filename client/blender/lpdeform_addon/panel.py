@@ -51,6 +51,7 @@ class MainPanel(bpy.types.Panel):
             column.operator("lpdeform.solve", icon="SHADERFX")
             column.operator("lpdeform.stop", icon="X")
             column.operator("lpdeform.apply", icon="SHAPEKEY_DATA")
+            column.operator("lpdeform.bake", icon="RENDER_ANIMATION")
             if running.notice:
                 _say(layout, context, running.notice, "TIME")
             if running.has_better:

@@ -16,7 +16,7 @@ _ramp = np.array([[0.02, 0.08, 0.55], [0.0, 0.45, 0.75], [0.1, 0.65, 0.15], [0.9
 def rest_positions(ob) -> np.ndarray:
     """n x 3, in the object's own space: positions of the basis, if there are shape keys."""
     keys = ob.data.shape_keys
-    source = keys.reference_key.data if keys is not None else ob.data.vertices
+    source = _points(keys.reference_key) if keys is not None else ob.data.vertices
     positions = np.empty(3 * len(ob.data.vertices), np.float32)
     source.foreach_get("co", positions)
     return positions.reshape(-1, 3)
@@ -151,9 +151,18 @@ def drop_live_key(ob, muted: list, had_keys: bool) -> None:
         ob.shape_key_clear()
 
 
+def set_positions(key, positions: np.ndarray) -> None:
+    _points(key).foreach_set("co", np.ascontiguousarray(positions, np.float32).reshape(-1))
+
+
 def show_positions(ob, positions: np.ndarray) -> None:
-    live_key(ob).data.foreach_set("co", np.ascontiguousarray(positions, np.float32).reshape(-1))
+    set_positions(live_key(ob), positions)
     ob.data.update_tag()
+
+
+def _points(key):
+    """Blender 4.1 and newer copy an array from and to these at once. Older ones have only `data`, which takes each vertex by itself."""
+    return key.points if hasattr(key, "points") else key.data
 
 
 def colours(distortion: np.ndarray, limit: float) -> np.ndarray:
