@@ -1,4 +1,4 @@
-#include "client/cli/gltf/rewrite.h"
+#include "core/gltf/rewrite.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "client/cli/gltf/accessors.h"
-#include "client/cli/gltf/places.h"
 #include "core/base/check.h"
+#include "core/gltf/accessors.h"
+#include "core/gltf/places.h"
 #include "core/io/byte_order.h"
 #include "core/mesh/carried_normals.h"
 

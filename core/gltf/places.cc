@@ -1,11 +1,11 @@
-#include "client/cli/gltf/places.h"
+#include "core/gltf/places.h"
 
 #include <algorithm>
 #include <array>
 #include <string_view>
 #include <utility>
 
-#include "client/cli/gltf/accessors.h"
+#include "core/gltf/accessors.h"
 
 namespace lpdeform::gltf {
 namespace {

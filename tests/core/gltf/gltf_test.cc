@@ -1,12 +1,12 @@
-#include "client/cli/gltf/gltf.h"
+#include "core/gltf/gltf.h"
 
 #include <Eigen/Geometry>
 #include <random>
 
-#include "client/cli/gltf/uris.h"
 #include "core/base/fault.h"
+#include "core/gltf/uris.h"
 #include "core/mesh/report.h"
-#include "tests/client/cli/gltf/made_gltf.h"
+#include "tests/core/gltf/made_gltf.h"
 #include "tests/core/mesh_support.h"
 
 namespace lpdeform::gltf {

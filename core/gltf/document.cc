@@ -1,10 +1,10 @@
-#include "client/cli/gltf/document.h"
+#include "core/gltf/document.h"
 
 #include <algorithm>
 #include <array>
 
 #include "absl/strings/str_cat.h"
-#include "client/cli/gltf/uris.h"
+#include "core/gltf/uris.h"
 #include "core/io/whole_file.h"
 
 namespace lpdeform::gltf {

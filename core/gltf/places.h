@@ -6,7 +6,7 @@
 #include <set>
 #include <vector>
 
-#include "client/cli/gltf/draw_list.h"
+#include "core/gltf/draw_list.h"
 
 namespace lpdeform::gltf {
 

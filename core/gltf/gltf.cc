@@ -1,4 +1,4 @@
-#include "client/cli/gltf/gltf.h"
+#include "core/gltf/gltf.h"
 
 #include <algorithm>
 #include <cctype>
@@ -6,10 +6,10 @@
 #include <set>
 #include <utility>
 
-#include "client/cli/gltf/document.h"
-#include "client/cli/gltf/draw_list.h"
-#include "client/cli/gltf/packing.h"
-#include "client/cli/gltf/rewrite.h"
+#include "core/gltf/document.h"
+#include "core/gltf/draw_list.h"
+#include "core/gltf/packing.h"
+#include "core/gltf/rewrite.h"
 #include "core/io/byte_order.h"
 #include "core/io/whole_file.h"
 

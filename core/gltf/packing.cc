@@ -1,11 +1,11 @@
-#include "client/cli/gltf/packing.h"
+#include "core/gltf/packing.h"
 
 #include <algorithm>
 #include <cctype>
 #include <optional>
 #include <utility>
 
-#include "client/cli/gltf/uris.h"
+#include "core/gltf/uris.h"
 #include "core/io/whole_file.h"
 
 namespace lpdeform::gltf {

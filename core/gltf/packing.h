@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "client/cli/gltf/document.h"
+#include "core/gltf/document.h"
 
 namespace lpdeform::gltf {
 

@@ -1,4 +1,4 @@
-#include "client/cli/gltf/json_parts.h"
+#include "core/gltf/json_parts.h"
 
 #include <algorithm>
 #include <cmath>

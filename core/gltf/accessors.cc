@@ -1,4 +1,4 @@
-#include "client/cli/gltf/accessors.h"
+#include "core/gltf/accessors.h"
 
 #include <algorithm>
 #include <limits>

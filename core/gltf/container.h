@@ -20,7 +20,7 @@ struct Container {
   std::vector<Chunk> others;
 };
 
-/// Views into `bytes`. A file that begins with "glTF" is a GLB. Throws a Refusal (client/cli/gltf/json_parts.h).
+/// Views into `bytes`. A file that begins with "glTF" is a GLB. Throws a Refusal (core/gltf/json_parts.h).
 Container parse_container(std::string_view bytes);
 
 /// A GLB file.

@@ -11,7 +11,7 @@
 namespace lpdeform::gltf {
 
 // Read parts of a glTF's JSON, with errors that name the part. A function that cannot return its value throws a Refusal; the
-// functions of client/cli/gltf/gltf.h catch it.
+// functions of core/gltf/gltf.h catch it.
 
 /// Keeps the order of keys, so that a written file reads like the one that it was made from.
 using Json = nlohmann::ordered_json;

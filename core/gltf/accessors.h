@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/gltf/document.h"
+#include "core/gltf/document.h"
 
 namespace lpdeform::gltf {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "client/cli/gltf/document.h"
+#include "core/gltf/document.h"
 
 namespace lpdeform::gltf {
 

@@ -1,4 +1,4 @@
-#include "client/cli/gltf/uris.h"
+#include "core/gltf/uris.h"
 
 #include <algorithm>
 #include <cctype>

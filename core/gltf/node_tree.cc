@@ -1,9 +1,9 @@
-#include "client/cli/gltf/node_tree.h"
+#include "core/gltf/node_tree.h"
 
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
-#include "client/cli/gltf/accessors.h"
+#include "core/gltf/accessors.h"
 
 namespace lpdeform::gltf {
 namespace {

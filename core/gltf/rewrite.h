@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "client/cli/gltf/draw_list.h"
+#include "core/gltf/draw_list.h"
 
 namespace lpdeform::gltf {
 

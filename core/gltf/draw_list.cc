@@ -1,11 +1,11 @@
-#include "client/cli/gltf/draw_list.h"
+#include "core/gltf/draw_list.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
-#include "client/cli/gltf/accessors.h"
-#include "client/cli/gltf/node_tree.h"
+#include "core/gltf/accessors.h"
+#include "core/gltf/node_tree.h"
 
 namespace lpdeform::gltf {
 namespace {

@@ -1,9 +1,9 @@
-#include "client/cli/gltf/container.h"
+#include "core/gltf/container.h"
 
 #include <cstdint>
 
 #include "absl/strings/str_cat.h"
-#include "client/cli/gltf/json_parts.h"
+#include "core/gltf/json_parts.h"
 #include "core/io/byte_order.h"
 
 namespace lpdeform::gltf {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/cli/gltf/container.h"
+#include "core/gltf/container.h"
 
 namespace lpdeform::gltf {
 

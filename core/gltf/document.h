@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "client/cli/gltf/container.h"
-#include "client/cli/gltf/json_parts.h"
+#include "core/gltf/container.h"
+#include "core/gltf/json_parts.h"
 
 namespace lpdeform::gltf {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/gltf/document.h"
+#include "core/gltf/document.h"
 #include "core/mesh/mesh.h"
 
 namespace lpdeform::gltf {
