@@ -27,7 +27,7 @@ namespace {
 
 /// All inputs of the command, read and checked before any work is done.
 struct Inputs {
-  InputMesh file;
+  AnyMeshFile file;
   std::optional<double> weld;
   client::Update update;
   client::FieldValue p;
@@ -37,7 +37,7 @@ struct Inputs {
 
 absl::Status read_initial(const DeformOptions& options, Inputs& inputs) {
   if (options.initial == "laplacian" || options.initial == "rest") return absl::OkStatus();
-  const absl::StatusOr<InputMesh> initial = read_mesh_file(options.initial);
+  const absl::StatusOr<AnyMeshFile> initial = read_mesh_file(options.initial);
   if (!initial.ok()) return initial.status();
   const Eigen::Index given = initial->mesh.vertices.rows(), wanted = inputs.file.mesh.vertices.rows();
   if (given != wanted) {
@@ -81,7 +81,7 @@ absl::StatusOr<Inputs> read_inputs(const DeformOptions& options) {
   if (status.ok() && options.normals) status = check_normals_have_output(options.out);
   if (status.ok() && options.report) status = check_folder(*options.report);
   if (!status.ok()) return status;
-  absl::StatusOr<InputMesh> file = read_deformable(options.mesh);
+  absl::StatusOr<AnyMeshFile> file = read_deformable(options.mesh);
   if (!file.ok()) return file.status();
   print_left(*file);
   const std::optional<double> weld = welding(*file, options.weld, options.no_weld);
@@ -147,12 +147,12 @@ absl::Status write_results(const DeformOptions& options, const Inputs& inputs, c
   const auto& distortion = solved.result.distortion;
   const Field field =
       Eigen::Map<const Field>(distortion.data(), static_cast<Eigen::Index>(distortion.size()));
+  const Beside beside{.distortion = field,
+                      .normals = points_of(solved.result.normals),
+                      .adds_normals = options.normals,
+                      .weld = inputs.weld};
   for (const std::filesystem::path& path : options.out) {
-    absl::Status written =
-        options.normals
-            ? write_output_with_normals(path, inputs.file, positions, field, points_of(solved.result.normals),
-                                        inputs.weld, inputs.style)
-            : write_output(path, inputs.file, positions, field, inputs.weld, inputs.style);
+    absl::Status written = write_output(path, inputs.file, positions, beside, inputs.style);
     if (!written.ok()) return written;
     std::printf("wrote %s\n", path.c_str());
   }

@@ -19,7 +19,7 @@ void print_parts(const gltf::Gltf& file) {
 }  // namespace
 
 ExitStatus run_info(const InfoOptions& options) {
-  const absl::StatusOr<InputMesh> file = read_mesh_file(options.mesh);
+  const absl::StatusOr<AnyMeshFile> file = read_mesh_file(options.mesh);
   if (!file.ok()) return complain(file.status());
   print_left(*file);
   const absl::StatusOr<Weld> weld = weld_of(file->mesh, welding(*file, std::nullopt, false));

@@ -84,7 +84,7 @@ absl::Status check_plain(const HandleFile& file) {
 }
 
 absl::StatusOr<PaperPose> read_pose(const fs::path& mesh, const fs::path& handles, std::string name) {
-  absl::StatusOr<InputMesh> file = read_deformable(mesh);
+  absl::StatusOr<AnyMeshFile> file = read_deformable(mesh);
   if (!file.ok()) return file.status();
   const absl::StatusOr<HandleFile> held = read_handles(handles, file->mesh.vertices.rows());
   if (!held.ok()) return held.status();

@@ -181,7 +181,7 @@ absl::StatusOr<Resized> resize_on(const std::string& address, const ServerAccess
 ExitStatus run_resize(const ResizeOptions& options) {
   Interrupt interrupt;
   if (absl::Status status = check_outputs(std::array{options.out}); !status.ok()) return complain(status);
-  absl::StatusOr<InputMesh> file = read_deformable(options.mesh);
+  absl::StatusOr<AnyMeshFile> file = read_deformable(options.mesh);
   if (!file.ok()) return complain(file.status());
   print_left(*file);
   const std::optional<double> weld = welding(*file, options.weld, options.no_weld);
@@ -200,8 +200,8 @@ ExitStatus run_resize(const ResizeOptions& options) {
                                                     options.server, *scaling, weld, *file, interrupt);
   if (interrupt.happened()) return kInterrupted;
   if (!resized.ok()) return complain(resized.status());
-  const absl::Status written =
-      write_output(options.out, *file, resized->file.mesh.vertices, resized->distortion, weld, *style);
+  const absl::Status written = write_output(options.out, *file, resized->file.mesh.vertices,
+                                            {.distortion = resized->distortion, .weld = weld}, *style);
   if (!written.ok()) return complain(written);
   std::printf("wrote %s\n", options.out.c_str());
   return exit_status_of(resized->stop_reason, false, false);

@@ -19,8 +19,7 @@ absl::Status write_shape(const ShapeOptions& options) {
   if (!status.ok()) return status;
   const absl::StatusOr<GeneratedShape> shape = generate_shape(options.name, options.detail);
   if (!shape.ok()) return shape.status();
-  status =
-      write_output(options.out, {{shape->mesh, ""}, {}}, shape->mesh.vertices, Field(), std::nullopt, {});
+  status = write_output(options.out, {{shape->mesh, ""}, {}}, shape->mesh.vertices, {}, {});
   if (!status.ok()) return status;
   std::printf("%s: %td vertices, %td faces\n", options.out.c_str(), shape->mesh.vertices.rows(),
               shape->mesh.faces.rows());

@@ -149,4 +149,19 @@ SolveSettings converted(const SolveOptions& options) {
   return settings;
 }
 
+Error error_of(const absl::Status& status) {
+  Fault fault = fault_of(status);
+  return {std::move(fault.reason), std::move(fault.element), std::move(fault.limit),
+          std::string(status.message())};
+}
+
+Result<void> result_of(const absl::Status& status) {
+  if (status.ok()) return {};
+  return error_of(status);
+}
+
+Mesh given_back(const TriangleMesh& mesh) {
+  return {numbers_of(mesh.vertices), {mesh.faces.data(), mesh.faces.data() + mesh.faces.size()}};
+}
+
 }  // namespace lpdeform::core

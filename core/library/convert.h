@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/library/result.h"
 #include "core/library/types.h"
 #include "core/mesh/mesh.h"
 #include "core/problem/handles.h"
@@ -19,5 +20,14 @@ absl::StatusOr<HandleMotion> converted(std::string_view name, const Motion& moti
 absl::StatusOr<Points> points_of(const std::vector<double>& numbers, std::int32_t vertex_count);
 Field converted(const FieldValue& value);
 SolveSettings converted(const SolveOptions& options);
+
+/// The values of the rooms below as the public ones.
+Error error_of(const absl::Status& status);
+Result<void> result_of(const absl::Status& status);
+Mesh given_back(const TriangleMesh& mesh);
+
+std::vector<double> numbers_of(const auto& matrix) {
+  return {matrix.data(), matrix.data() + matrix.size()};
+}
 
 }  // namespace lpdeform::core

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/library/mesh_file.h"
 #include "core/library/result.h"
 #include "core/library/types.h"
 
@@ -82,12 +83,12 @@ class Session {
 /// share of the bounding box's diagonal, 0 to 1e-3; 0 is 1e-6. Errors: MESH_SIZE, WELD_TOLERANCE, WELD_TOO_DENSE.
 Result<WeldedMesh> weld(const Mesh& mesh, double tolerance = 0);
 
-/// Reads OFF, OBJ, PLY or STL, by the extension of `path`. Polygons become triangles. Errors: MESH_FILE_NOT_FOUND,
-/// MESH_FORMAT_UNKNOWN, MESH_SYNTAX.
+/// The mesh alone of a file. Errors: those of MeshFile::read().
 Result<Mesh> read_mesh(const std::string& path);
 
-/// Writes OFF, OBJ or PLY, by the extension of `path`, completely or not at all. Errors: MESH_SIZE, FILE_NOT_WRITTEN,
-/// MESH_FORMAT_UNKNOWN.
+/// A file with this mesh and nothing else: GLB, glTF, OFF, OBJ or PLY, by the ending of `path`, completely or not at all. Errors:
+/// MESH_SIZE, and those of MeshFile::write(); for GLB and glTF also MESH_EMPTY, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE and
+/// MESH_NO_AREA.
 Result<void> write_mesh(const std::string& path, const Mesh& mesh);
 
 /// "0.1.0": the version of the library that the program runs with.

@@ -3,9 +3,7 @@
 #include <utility>
 
 #include "core/analysis/automatic_material.h"
-#include "core/base/fault.h"
 #include "core/base/workers.h"
-#include "core/io/mesh_io.h"
 #include "core/library/convert.h"
 #include "core/library/core.h"
 #include "core/mesh/weld.h"
@@ -13,25 +11,6 @@
 
 namespace lpdeform::core {
 namespace {
-
-Error error_of(const absl::Status& status) {
-  Fault fault = fault_of(status);
-  return {std::move(fault.reason), std::move(fault.element), std::move(fault.limit),
-          std::string(status.message())};
-}
-
-Result<void> result_of(const absl::Status& status) {
-  if (status.ok()) return {};
-  return error_of(status);
-}
-
-std::vector<double> numbers_of(const auto& matrix) {
-  return {matrix.data(), matrix.data() + matrix.size()};
-}
-
-Mesh given_back(const TriangleMesh& mesh) {
-  return {numbers_of(mesh.vertices), {mesh.faces.data(), mesh.faces.data() + mesh.faces.size()}};
-}
 
 lpdeform::WeightKind converted_weights(WeightKind kind) {
   switch (kind) {
@@ -257,20 +236,6 @@ Result<WeldedMesh> weld(const Mesh& mesh, double tolerance) {
   const auto weld = weld_by_position(own->vertices, tolerance);
   if (!weld.ok()) return error_of(weld.status());
   return WeldedMesh{given_back(welded(*own, *weld)), {weld->to_welded.begin(), weld->to_welded.end()}};
-}
-
-Result<Mesh> read_mesh(const std::string& path) {
-  const auto file = lpdeform::read_mesh(path);
-  if (!file.ok()) return error_of(file.status());
-  return given_back(file->mesh);
-}
-
-Result<void> write_mesh(const std::string& path, const Mesh& mesh) {
-  auto own = converted(mesh);
-  if (!own.ok()) return error_of(own.status());
-  MeshFile file;
-  file.mesh = *std::move(own);
-  return result_of(lpdeform::write_mesh(path, file, file.mesh.vertices, Field()));
 }
 
 const char* version() {

@@ -84,8 +84,10 @@ absl::Status deformable(const MeshReport& report) {
   }
   if (report.zero_area_faces.count == report.faces) {
     return make_fault(
-        {Reason::kMeshNoArea, "face 0", "area > 0 on at least one face"},
-        absl::StrCat("All ", report.faces, " faces have zero area; at least one must have some."));
+        {Reason::kMeshNoArea, "face 0", "height > 1e-12 of the longest edge on at least one face"},
+        absl::StrCat("All ", report.faces,
+                     " faces have zero area to rounding: the height of each is less than ",
+                     "1e-12 of its longest edge. At least one must have more."));
   }
   return absl::OkStatus();
 }

@@ -64,7 +64,7 @@ const std::vector<Defect>& all_defects();
 MeshReport check_mesh(const TriangleMesh& mesh);
 
 /// INVALID_ARGUMENT with the first offending element if the mesh cannot be deformed. Reasons: MESH_EMPTY,
-/// MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, MESH_NO_AREA (every face has zero area).
+/// MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, MESH_NO_AREA (every face has zero area to rounding, see topology.h).
 absl::Status deformable(const MeshReport& report);
 
 /// The connected component of each vertex, numbered from 0 by lowest vertex; -1 for unreferenced vertices. Requires

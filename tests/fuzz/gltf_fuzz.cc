@@ -4,8 +4,8 @@
 #include <optional>
 #include <string_view>
 
-#include "client/cli/gltf/gltf.h"
 #include "core/base/check.h"
+#include "core/gltf/gltf.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace lpdeform;

@@ -82,7 +82,7 @@ bool paints_anything(const std::vector<VertexGroup>& groups, const MaterialOptio
 
 }  // namespace
 
-absl::Status read_material(const MaterialOptions& options, const InputMesh& file,
+absl::Status read_material(const MaterialOptions& options, const AnyMeshFile& file,
                            std::vector<VertexGroup> groups, std::optional<double> welding,
                            client::Settings& into) {
   const std::int64_t vertex_count = file.mesh.vertices.rows();

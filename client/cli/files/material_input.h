@@ -28,7 +28,7 @@ struct MaterialOptions {
 /// painted over them, they are found here, by the same code. `welding`: the tolerance if vertices are welded
 /// by position; a group that names one copy of a vertex then has all copies. Errors: those of read_field and
 /// painting.h.
-absl::Status read_material(const MaterialOptions& options, const InputMesh& file,
+absl::Status read_material(const MaterialOptions& options, const AnyMeshFile& file,
                            std::vector<VertexGroup> groups, std::optional<double> welding,
                            client::Settings& into);
 

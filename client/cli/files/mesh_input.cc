@@ -7,7 +7,6 @@
 #include "absl/strings/str_cat.h"
 #include "client/cpp/mesh_notices.h"
 #include "core/base/fault.h"
-#include "core/base/reasons.h"
 
 namespace lpdeform::cli {
 
@@ -16,35 +15,25 @@ absl::Status said_of(const std::string& what, const absl::Status& error) {
   return carry_fault(error.code(), fault_of(error), absl::StrCat(what, ": ", error.message()));
 }
 
-absl::StatusOr<InputMesh> read_mesh_file(const std::filesystem::path& path) {
-  if (gltf::packing_of(path)) {
-    auto read = gltf::Gltf::read(path);
-    if (!read.ok()) return said_of(path.string(), read.status());
-    return InputMesh{{read->mesh(), ""}, *std::move(read)};
-  }
-  if (!mesh_format(path).ok()) {
-    return make_fault(
-        {Reason::kMeshFormatUnknown, path.string(), "one of .glb, .gltf, .off, .obj, .ply, .stl"},
-        absl::StrCat("The name ", path.string(), " ends in none of .glb, .gltf, .off, .obj, .ply and .stl."));
-  }
-  absl::StatusOr<MeshFile> file = read_mesh(path);
+absl::StatusOr<AnyMeshFile> read_mesh_file(const std::filesystem::path& path) {
+  absl::StatusOr<AnyMeshFile> file = read_any_mesh(path);
   if (!file.ok()) return said_of(path.string(), file.status());
-  return InputMesh{*std::move(file), {}};
+  return file;
 }
 
-std::optional<double> welding(const InputMesh& file, std::optional<double> asked, bool is_off) {
-  if (asked || is_off || !file.gltf) return asked;
+std::optional<double> welding(const AnyMeshFile& file, std::optional<double> asked, bool is_off) {
+  if (asked || is_off || !file.splits_vertices()) return asked;
   return 0;
 }
 
-void print_left(const InputMesh& file) {
+void print_left(const AnyMeshFile& file) {
   if (!file.gltf) return;
   for (const std::string& notice : file.gltf->notices())
     std::fprintf(stderr, "lpdeform: %s\n", notice.c_str());
 }
 
-absl::StatusOr<InputMesh> read_deformable(const std::filesystem::path& path) {
-  absl::StatusOr<InputMesh> file = read_mesh_file(path);
+absl::StatusOr<AnyMeshFile> read_deformable(const std::filesystem::path& path) {
+  absl::StatusOr<AnyMeshFile> file = read_mesh_file(path);
   if (!file.ok()) return file;
   const absl::Status verdict = deformable(check_mesh(file->mesh));
   if (!verdict.ok()) return said_of(path.string(), verdict);

@@ -7,10 +7,9 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "client/cli/gltf/gltf.h"
 #include "client/cpp/types.h"
 #include "core/energy/weights.h"
-#include "core/io/mesh_io.h"
+#include "core/gltf/any_mesh.h"
 #include "core/mesh/report.h"
 #include "core/mesh/weld.h"
 
@@ -20,24 +19,18 @@ namespace lpdeform::cli {
 /// already.
 absl::Status said_of(const std::string& what, const absl::Status& error);
 
-/// A mesh, and what its file has beside it that an output in the same format keeps.
-struct InputMesh : MeshFile {
-  std::optional<gltf::Gltf> gltf;  // if it is a GLB or glTF file
-};
+/// As read_any_mesh; errors name the file.
+absl::StatusOr<AnyMeshFile> read_mesh_file(const std::filesystem::path& path);
 
-/// As read_mesh and Gltf::read; errors name the file.
-absl::StatusOr<InputMesh> read_mesh_file(const std::filesystem::path& path);
-
-/// Reads and checks a mesh file that must be fit for deformation. Errors: those of read_mesh, Gltf::read and
-/// deformable.
-absl::StatusOr<InputMesh> read_deformable(const std::filesystem::path& path);
+/// Reads and checks a mesh file that must be fit for deformation. Errors: those of read_any_mesh and deformable.
+absl::StatusOr<AnyMeshFile> read_deformable(const std::filesystem::path& path);
 
 /// Whether vertices are welded, and how: with the tolerance that was asked for; else, unless `is_off`, with the
 /// default tolerance (0) if the file is one whose format splits vertices, as glTF does.
-std::optional<double> welding(const InputMesh& file, std::optional<double> asked, bool is_off);
+std::optional<double> welding(const AnyMeshFile& file, std::optional<double> asked, bool is_off);
 
 /// Prints to stderr what of a glTF is not deformed, one line each.
-void print_left(const InputMesh& file);
+void print_left(const AnyMeshFile& file);
 
 /// What a session on a server would report of `mesh`. The mesh need not be fit for deformation.
 MeshReport full_report(const TriangleMesh& mesh, WeightKind weights);

@@ -43,15 +43,6 @@ bool holds_normals(const std::filesystem::path& path) {
   return ending_of(path) == ".obj" || ending_of(path) == ".ply" || gltf::packing_of(path).has_value();
 }
 
-/// A glTF input with new positions; from another format, a new glTF with the mesh alone.
-absl::Status write_gltf(const std::filesystem::path& path, const InputMesh& file, const Points& positions,
-                        std::optional<double> weld, bool adds_normals) {
-  absl::StatusOr<gltf::Gltf> source = file.gltf ? *file.gltf : gltf::Gltf::of_mesh(file.mesh);
-  if (!source.ok()) return source.status();
-  const auto bytes = source->bytes(positions, *gltf::packing_of(path), weld, adds_normals);
-  return bytes.ok() ? write_text(path, *bytes) : said_of(path.string(), bytes.status());
-}
-
 }  // namespace
 
 absl::StatusOr<PictureStyle> picture_style(const PictureOptions& options) {
@@ -102,29 +93,15 @@ absl::Status check_normals_have_output(std::span<const std::filesystem::path> pa
       "--normals is given, but no --out ends in .glb, .gltf, .obj or .ply, which hold normals.");
 }
 
-absl::Status write_output(const std::filesystem::path& path, const InputMesh& file, const Points& positions,
-                          const Field& distortion, std::optional<double> weld, const PictureStyle& style) {
-  const std::string ending = ending_of(path);
-  if (ending == ".png") {
-    PictureStyle with_colours = style;
-    with_colours.distortion = distortion;
-    return render_png(path, file.mesh.faces, positions, with_colours);
+absl::Status write_output(const std::filesystem::path& path, const AnyMeshFile& file, const Points& positions,
+                          const Beside& beside, const PictureStyle& style) {
+  if (ending_of(path) != ".png") {
+    const absl::Status status = write_any_mesh(path, file, positions, beside);
+    return status.ok() ? status : said_of(path.string(), status);
   }
-  if (gltf::packing_of(path)) return write_gltf(path, file, positions, weld, false);
-  if (ending == ".obj" && has_obj_normals(file))
-    return write_text(path, obj_text_with_normals(file, positions, weld));
-  return write_mesh(path, file, positions, distortion);
-}
-
-absl::Status write_output_with_normals(const std::filesystem::path& path, const InputMesh& file,
-                                       const Points& positions, const Field& distortion,
-                                       const Points& normals, std::optional<double> weld,
-                                       const PictureStyle& style) {
-  const std::string ending = ending_of(path);
-  if (gltf::packing_of(path)) return write_gltf(path, file, positions, weld, true);
-  if (ending == ".obj") return write_text(path, obj_text_with_normals(file, positions, weld));
-  if (ending == ".ply") return write_mesh(path, file, positions, distortion, normals);
-  return write_output(path, file, positions, distortion, weld, style);
+  PictureStyle with_colours = style;
+  with_colours.distortion = beside.distortion;
+  return render_png(path, file.mesh.faces, positions, with_colours);
 }
 
 }  // namespace lpdeform::cli

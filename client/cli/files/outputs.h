@@ -40,16 +40,8 @@ absl::Status check_apart(std::span<const NamedFile> written, std::span<const Nam
 /// INVALID_ARGUMENT OUT_WITHOUT_NORMALS if none of `paths` can hold normals; .glb, .gltf, .obj and .ply can.
 absl::Status check_normals_have_output(std::span<const std::filesystem::path> paths);
 
-/// Writes `positions` with the faces of `file`: .glb and .gltf, which keep everything else of a glTF input; .ply with distortion and colours; .obj, which keeps
-/// everything else of an OBJ input and turns its normals with the surface; .off; or a picture as .png.
-/// `distortion` may be empty. `weld`: see obj_text_with_normals.
-absl::Status write_output(const std::filesystem::path& path, const InputMesh& file, const Points& positions,
-                          const Field& distortion, std::optional<double> weld, const PictureStyle& style);
-
-/// The same with normals in .glb, .gltf, .obj and .ply, even if the input had none. `normals`: one per vertex, for .ply.
-absl::Status write_output_with_normals(const std::filesystem::path& path, const InputMesh& file,
-                                       const Points& positions, const Field& distortion,
-                                       const Points& normals, std::optional<double> weld,
-                                       const PictureStyle& style);
+/// Writes `positions`: a mesh file as write_any_mesh() does, or a picture as .png, coloured by the distortion.
+absl::Status write_output(const std::filesystem::path& path, const AnyMeshFile& file, const Points& positions,
+                          const Beside& beside, const PictureStyle& style);
 
 }  // namespace lpdeform::cli

@@ -1,8 +1,10 @@
-// lpdeform._core: sessions in this process. lpdeform/_local.py is its only user.
+// lpdeform._core: sessions in this process, for lpdeform/_local.py, and mesh files, for lpdeform/mesh_files.py.
 
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/unique_ptr.h>
 
+#include "client/python/native/mesh_file.h"
 #include "client/python/native/session.h"
 
 namespace {
@@ -50,6 +52,17 @@ NB_MODULE(_core, module) {
   module.def("create", &LocalSession::create, nb::arg("vertices"), nb::arg("faces"),
              nb::arg("normals").none(), nb::arg("weld").none(), nb::arg("weights"),
              nb::arg("free_components"), nb::arg("settings"));
+  nb::class_<LocalMeshFile>(module, "MeshFile")
+      .def("vertices", &LocalMeshFile::vertices)
+      .def("faces", &LocalMeshFile::faces)
+      .def_prop_ro("splits_vertices", &LocalMeshFile::splits_vertices)
+      .def("groups", &LocalMeshFile::groups)
+      .def("parts", &LocalMeshFile::parts)
+      .def("notices", &LocalMeshFile::notices)
+      .def("write", &LocalMeshFile::write, nb::arg("path"), nb::arg("positions"), nb::arg("adds_normals"),
+           nb::arg("weld").none());
+  module.def("read_mesh_file", &read_mesh_file);
+  module.def("write_mesh_file", &write_mesh_file);
   module.def("end_threads", &end_threads);
   module.def("forget_threads", &forget_threads);
 }

@@ -25,7 +25,7 @@ from lpdeform._numbers import crc32c, indices, numbers
 from lpdeform._rpc import Packer
 from lpdeform._checks import checked_update
 from lpdeform._wire import settings_to_wire
-from lpdeform.opening import _weld_of
+from lpdeform.opening import weld_of
 from lpdeform.types import Field
 from lpdeform.v1 import data_pb2, handle_pb2
 
@@ -147,7 +147,7 @@ def test_a_field_of_another_size_is_refused_with_both(size: int) -> None:
     [(True, 0.0), (np.True_, 0.0), (False, None), (np.False_, None), (0, 0.0), (0.0, 0.0), (1e-6, 1e-6), (np.float32(0.5), 0.5)],
 )
 def test_a_weld_by_position_is_a_yes_or_a_tolerance(weld: float, tolerance: float | None) -> None:
-    assert _weld_of(weld) == tolerance
+    assert weld_of(weld, []) == tolerance
 
 
 def test_arrays_are_copied() -> None:

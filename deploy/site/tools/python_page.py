@@ -14,6 +14,7 @@ GROUPS = {
     "Settings": ("Settings", "SolverSettings", "MinimaSearch", "Automatic"),
     "Results": ("Frame", "SolveResult", "IterationRecord", "SolveProgress", "MeshReport", "Defect", "Notice", "BetterShape",
                 "QuantizedSurface", "FrameAssembly"),
+    "Mesh files": ("read_mesh", "write_mesh", "MeshFile", "MeshPart"),
     "Errors": ("LpdeformError", "InvalidInput", "Unavailable", "Timeout", "Code", "Reason", "SplitMeshWarning"),
 }
 HEAD = """# Python

@@ -21,6 +21,7 @@ from lpdeform._deform import deform
 from lpdeform.access import Tls
 from lpdeform.errors import Code, InvalidInput, LpdeformError, SplitMeshWarning, Timeout, Unavailable
 from lpdeform.frames import Frame, QuantizedSurface
+from lpdeform.mesh_files import MeshFile, MeshPart, read_mesh, write_mesh
 from lpdeform.opening import join, open, restore
 from lpdeform.reasons import Reason
 from lpdeform.session import Session
@@ -87,6 +88,8 @@ __all__ = [
     "InvalidInput",
     "IterationRecord",
     "LpdeformError",
+    "MeshFile",
+    "MeshPart",
     "MeshReport",
     "MinimaSearch",
     "Notice",
@@ -115,6 +118,8 @@ __all__ = [
     "join_async",
     "open",
     "open_async",
+    "read_mesh",
     "restore",
     "restore_async",
+    "write_mesh",
 ]

@@ -14,7 +14,7 @@ from lpdeform._progress import told_by
 from lpdeform._solving import SolveOptions, checked_positions
 from lpdeform._stop import Stop
 from lpdeform.access import Tls, Token
-from lpdeform.opening import checked_mesh, reach, warn_of_splits
+from lpdeform.opening import checked_mesh, reach, warn_of_splits, weld_of
 from lpdeform.session import deadline_after
 from lpdeform.types import Field, FrameOptions, FreeComponents, Settings, SolveProgress, SolverSettings, WeightKind
 
@@ -32,7 +32,7 @@ def deform(
     normals: npt.ArrayLike | None = None,
     weights: WeightKind = "cotangent",
     free_components: FreeComponents = "error",
-    weld: npt.ArrayLike | float | bool = False,
+    weld: npt.ArrayLike | float | bool | None = None,
     initial_positions: npt.ArrayLike | None = None,
     certify: bool = True,
     trace: bool = True,
@@ -45,7 +45,7 @@ def deform(
 ) -> types.SolveResult:
     """Deforms a triangle mesh, and returns the finished result in float64.
 
-    vertices: n x 3, in any unit of length; or a mesh of trimesh, meshio, PyVista or Polyscope, and then without `faces`.
+    vertices: n x 3, in any unit of length; or a MeshFile, or a mesh of trimesh, meshio, PyVista or Polyscope, and then without `faces`.
     faces: m x 3 indices from 0, counter-clockwise seen from outside.
     handles: by name, what is held and where it goes. A handle is a lpdeform.Handle; or (group, motion), where a motion is a
         RigidMotion, or k x 3 target positions for the k vertices of the group; or a group alone, which stays where it is. A group
@@ -75,7 +75,7 @@ def deform(
     """
     points, triangles = mesh_arrays(vertices, faces)
     settings = Settings(p, stiffness, length_unit, solver, region)
-    given = checked_mesh(points, triangles, normals, settings, weights, free_components, weld, copies=False)
+    given = checked_mesh(points, triangles, normals, settings, weights, free_components, weld_of(weld, vertices), copies=False)
     held = handles_of(handles or {}, given.vertices)
     initial = checked_positions(initial_positions, len(given.vertices))
     if timeout is not None:

@@ -18,7 +18,7 @@ from lpdeform._stop import Stop
 from lpdeform.access import Tls, Token
 from lpdeform.errors import LpdeformError, SplitMeshWarning
 from lpdeform.frames import Frame
-from lpdeform.opening import checked_mesh, frame_options, reach, warn_of_splits
+from lpdeform.opening import checked_mesh, frame_options, reach, warn_of_splits, weld_of
 from lpdeform.session import Live, deadline_after
 from lpdeform.types import (
     BetterShape,
@@ -215,7 +215,7 @@ def open_async(
     normals: npt.ArrayLike | None = None,
     weights: WeightKind = "cotangent",
     free_components: FreeComponents = "error",
-    weld: npt.ArrayLike | float | bool = False,
+    weld: npt.ArrayLike | float | bool | None = None,
     encoding: Encoding = "float32",
     lowest_encoding: Encoding | None = None,
     credit: int = 0,
@@ -235,7 +235,7 @@ def open_async(
     def make(stop: Stop) -> Opened:
         place = reach(address, token, tls, call_timeout, reconnect_for)
         points, triangles = mesh_arrays(vertices, faces)
-        given = checked_mesh(points, triangles, normals, settings, weights, free_components, weld)
+        given = checked_mesh(points, triangles, normals, settings, weights, free_components, weld_of(weld, vertices))
         return place.open(given, handles_of(handles or {}, given.vertices), options, stop)
 
     return Opening(make, warns=True)

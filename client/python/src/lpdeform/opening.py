@@ -21,6 +21,7 @@ from lpdeform._opened import Connecting, Given, Reaching
 from lpdeform._stop import Stop
 from lpdeform.access import Tls, Token
 from lpdeform.errors import Code, SplitMeshWarning, invalid, make
+from lpdeform.mesh_files import MeshFile
 from lpdeform.session import Session
 from lpdeform.types import (
     Encoding,
@@ -73,7 +74,10 @@ def reach(
     return Local(call_timeout)
 
 
-def _weld_of(weld: npt.ArrayLike | float | bool) -> Copied | float | None:
+def weld_of(weld: npt.ArrayLike | float | bool | None, mesh: Mesh) -> Copied | float | None:
+    """As Given has it."""
+    if weld is None:
+        weld = isinstance(mesh, MeshFile) and mesh.splits_vertices
     if isinstance(weld, (bool, np.bool_)):
         return 0.0 if weld else None
     return float(weld) if isinstance(weld, Real) else indices(weld, "weld")
@@ -86,7 +90,7 @@ def checked_mesh(
     settings: Settings,
     weights: WeightKind,
     free_components: FreeComponents,
-    weld: npt.ArrayLike | float | bool,
+    weld: Copied | float | None,
     copies: bool = True,
 ) -> Given:
     """`copies`: whether the vertices may change while the session is there."""
@@ -97,7 +101,7 @@ def checked_mesh(
         vertices=rest,
         faces=indices(faces, "faces", 3, below=len(rest)),
         normals=None if normals is None else numbers(normals, "normals", 3),
-        weld=_weld_of(weld),
+        weld=weld,
         weights=weights,
         free_components=free_components,
         settings=checked_settings(settings, len(rest)),
@@ -156,7 +160,7 @@ def open(  # noqa: A001  (called as lpdeform.open)
     normals: npt.ArrayLike | None = None,
     weights: WeightKind = "cotangent",
     free_components: FreeComponents = "error",
-    weld: npt.ArrayLike | float | bool = False,
+    weld: npt.ArrayLike | float | bool | None = None,
     encoding: Encoding = "float32",
     lowest_encoding: Encoding | None = None,
     credit: int = 0,
@@ -169,7 +173,7 @@ def open(  # noqa: A001  (called as lpdeform.open)
 ) -> Session:
     """Creates a session from a triangle mesh; the order of vertices is never changed.
 
-    vertices: n x 3, in any unit; or a mesh of trimesh, meshio, PyVista or Polyscope, and then without `faces`. faces: m x 3, 0-based, counter-clockwise seen from outside.
+    vertices: n x 3, in any unit; or a MeshFile, or a mesh of trimesh, meshio, PyVista or Polyscope, and then without `faces`. faces: m x 3, 0-based, counter-clockwise seen from outside.
     address: of a server, "host:port" or "unix:/path"; by default the environment variable LPDEFORM_ADDRESS. Without either, the
         session is in this process.
     token: a bearer token, or a function that returns the newest one, called on any thread when a call begins.
@@ -179,7 +183,7 @@ def open(  # noqa: A001  (called as lpdeform.open)
     free_components: what happens to a connected component that no handle holds: "error" (raised), "stay", "follow".
     weld: True if vertices in the same place are copies of one. Or the largest distance of copies as a share of the bounding box's
         diagonal, at most 1e-3. Or one number per vertex, which is the same for copies. True and 0 mean 1e-6, because copies may
-        differ by rounding. False: no weld.
+        differ by rounding. False: no weld. By default a MeshFile of a GLB or glTF file is welded, and everything else is not.
     encoding: how frames are sent: "float64", "float32" (16 bytes per vertex), "quantized" (8 bytes, off by half of 1/65535 of the
         frame's extent), "compressed" (the same precision, 3 to 5 bytes; needs the system's meshoptimizer).
     lowest_encoding: the least precise encoding that the server may use to keep its limit of bytes per second.
@@ -202,7 +206,7 @@ def open(  # noqa: A001  (called as lpdeform.open)
     settings = Settings(p, stiffness, length_unit, solver, region)
     place = reach(address, token, tls, call_timeout, reconnect_for)
     points, triangles = mesh_arrays(vertices, faces)
-    given = checked_mesh(points, triangles, normals, settings, weights, free_components, weld)
+    given = checked_mesh(points, triangles, normals, settings, weights, free_components, weld_of(weld, vertices))
     opened = place.open(given, handles_of(handles or {}, given.vertices), options, Stop())
     try:
         warn_of_splits(opened.report, stacklevel=2)

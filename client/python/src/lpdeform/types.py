@@ -29,7 +29,7 @@ Connection = Literal["idle", "connected", "reconnecting", "closed"]
 
 
 class VerticesMesh(Protocol):
-    """A mesh of trimesh."""
+    """A MeshFile, or a mesh of trimesh."""
 
     @property
     def vertices(self) -> Any: ...

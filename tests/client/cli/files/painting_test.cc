@@ -93,7 +93,7 @@ TEST(Painting, NamesWhatIsWrongWithAGroup) {
 
 TEST(Painting, GivesAllCopiesOfAVertexTheSameWhereTheyAreWelded) {
   const TriangleMesh mesh = necked_bar(4, 20, 2, 4);
-  const InputMesh split{{split_at_every_corner(mesh), ""}, {}};
+  const AnyMeshFile split{{split_at_every_corner(mesh), ""}, {}};
   const Weld weld = weld_by_position(split.mesh.vertices).value();
   MaterialOptions options;
   options.automatic = 1;

@@ -21,12 +21,15 @@ import { openProject, saveProject } from "./projects.js";
 const solveMs = 60_000;
 /** Limit of a file's size: browsers cannot hold longer texts. */
 const mostBytes = 500e6;
+/** Of an FBX, COLLADA or 3MF file: the page stands still while it is read. */
+const mostForeignBytes = 100e6;
 /** Above this size, reading a file takes so long that the user is told. */
 const largeBytes = 2e6;
 
 const isHandles = ({ name }: File) => /\.json$/i.test(name);
 const isProject = ({ name }: File) => /\.lpdeform$/i.test(name);
-const isMesh = ({ name }: File) => /\.(glb|gltf|off|obj|ply|stl)$/i.test(name);
+const isForeign = ({ name }: File) => /\.(fbx|dae|3mf)$/i.test(name);
+const isMesh = (file: File) => /\.(glb|gltf|off|obj|ply|stl)$/i.test(file.name) || isForeign(file);
 
 interface Exported {
   positions: Float32Array | Float64Array;
@@ -41,7 +44,7 @@ export class Files {
 
   constructor(readonly app: App) {
     this.#input.type = "file";
-    this.#input.accept = ".glb,.gltf,.bin,.off,.obj,.ply,.stl,.json,.lpdeform";
+    this.#input.accept = ".glb,.gltf,.bin,.off,.obj,.ply,.stl,.fbx,.dae,.3mf,.json,.lpdeform";
     this.#input.multiple = true;
     this.#input.addEventListener("change", () => {
       void this.open([...(this.#input.files ?? [])]);
@@ -89,10 +92,24 @@ export class Files {
     try {
       if (isProject(file)) await this.#openProject(file);
       else if (isHandles(file)) this.#openHandles(file.name, await file.text());
+      else if (isForeign(file)) await this.#openForeign(file);
       else this.#openMesh(await openedMesh(file, beside));
     } finally {
       done();
     }
+  }
+
+  async #openForeign(file: File): Promise<void> {
+    if (file.size > mostForeignBytes) {
+      throw new FileFault(
+        `${file.name} has ${short(file.size)}B; this page reads such files of ${short(mostForeignBytes)}B at most.`,
+      );
+    }
+    const { glbOf } = await import("../io/foreign.js");
+    const { glb, left } = await glbOf(file);
+    this.#openMesh(await openedMesh(glb, []));
+    const gone = left.length > 0 ? ` Its ${left.join(" and ")} are not taken over.` : "";
+    this.app.notify(`${file.name} is opened as ${glb.name}.${gone}`);
   }
 
   /** In the doubles of the server's result, which are more precise than the drawn surface. */

@@ -30,7 +30,7 @@ export interface DrawList {
 const [triangles, strip, fan] = [4, 5, 6];
 const most = 5_000_000;
 
-/** As the command line reads it (client/cli/gltf/gltf.h). Throws a FileFault that names the part. */
+/** As the command line reads it (core/gltf/gltf.h). Throws a FileFault that names the part. */
 export function readBlocks(document: GltfDocument): DrawList {
   const { json } = document;
   for (const name of (json["extensionsRequired"] ?? []) as unknown[]) {

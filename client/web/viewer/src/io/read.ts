@@ -21,7 +21,7 @@ export function readMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<s
     case "stl":
       return readStl(name, bytes);
     default:
-      throw new FileFault(`${name} is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY and STL can.`);
+      throw new FileFault(`${name} is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY, STL, FBX, DAE and 3MF can.`);
   }
 }
 

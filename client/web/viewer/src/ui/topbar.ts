@@ -32,7 +32,7 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
   const open = labelled(
     "open",
     "Open",
-    "A mesh (GLB, glTF, OFF, OBJ, PLY, STL), a project, or a handle file; dropping it onto the page does the same (O)",
+    "A mesh (GLB, glTF, OFF, OBJ, PLY, STL, FBX, DAE, 3MF), a project, or a handle file; dropping it onto the page does the same (O)",
     () => files.choose(),
   );
 

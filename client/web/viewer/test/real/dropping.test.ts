@@ -97,7 +97,7 @@ it("a large file is told to be opened while it is", async () => {
 it("what cannot be opened is refused by name, and what is there stays", async () => {
   const before = await user.ask("document()");
   await drop({ "notes.txt": "hello" });
-  await refusal("notes.txt is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY and STL can.");
+  await refusal("notes.txt is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY, STL, FBX, DAE and 3MF can.");
   await drop({ "a.off": writeOff(mesh), "b.obj": writeObj(mesh) });
   await refusal("One mesh at a time: a.off, b.obj are 2.");
   await drop({ "short.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n" });

@@ -1,0 +1,109 @@
+import { strToU8, zipSync } from "three/addons/libs/fflate.module.js";
+
+// A tube along z, of radius 1 and height 8, in the three formats, as small as each allows. Rows of `columns` vertices; the first row
+// is at the origin.
+
+export const [rows, columns] = [16, 12];
+const points = Array.from({ length: (rows + 1) * columns }, (_, k) => {
+  const angle = (2 * Math.PI * (k % columns)) / columns;
+  return [Math.cos(angle), Math.sin(angle), (8 * Math.floor(k / columns)) / rows];
+});
+const triangles = Array.from({ length: rows * columns }, (_, k) => {
+  const row = Math.floor(k / columns) * columns;
+  const [a, b] = [row + (k % columns), row + ((k + 1) % columns)];
+  return [
+    [a, b, b + columns],
+    [a, b + columns, a + columns],
+  ];
+}).flat();
+
+/** COLLADA with z up, a colour, and a texture at an address on the net. */
+export function makeDae(): string {
+  return `<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+  <asset><unit name="meter" meter="1"/><up_axis>Z_UP</up_axis></asset>
+  <library_images><image id="image" name="image"><init_from>http://textures.example/a.png</init_from></image></library_images>
+  <library_effects><effect id="red-fx"><profile_COMMON>
+    <newparam sid="surface"><surface type="2D"><init_from>image</init_from></surface></newparam>
+    <newparam sid="sampler"><sampler2D><source>surface</source></sampler2D></newparam>
+    <technique sid="standard"><lambert><diffuse><texture texture="sampler" texcoord="UV"/></diffuse></lambert></technique>
+  </profile_COMMON></effect></library_effects>
+  <library_materials><material id="red" name="red"><instance_effect url="#red-fx"/></material></library_materials>
+  <library_geometries><geometry id="tube" name="tube"><mesh>
+    <source id="places"><float_array id="numbers" count="${3 * points.length}">${points.flat().join(" ")}</float_array>
+      <technique_common><accessor source="#numbers" count="${points.length}" stride="3">
+        <param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>
+      </accessor></technique_common></source>
+    <vertices id="vertices"><input semantic="POSITION" source="#places"/></vertices>
+    <triangles count="${triangles.length}" material="red"><input semantic="VERTEX" source="#vertices" offset="0"/>
+      <p>${triangles.flat().join(" ")}</p></triangles>
+  </mesh></geometry></library_geometries>
+  <library_visual_scenes><visual_scene id="scene"><node id="node" name="pipe">
+    <translate>0 0 5</translate>
+    <instance_geometry url="#tube"><bind_material><technique_common>
+      <instance_material symbol="red" target="#red"/>
+    </technique_common></bind_material></instance_geometry>
+  </node></visual_scene></library_visual_scenes>
+  <scene><instance_visual_scene url="#scene"/></scene>
+</COLLADA>`;
+}
+
+/** FBX 7.4 as text, with y up: z of the tube is y of the file. */
+export function makeFbx(): string {
+  const places = points.flatMap(([x, y, z]) => [x, z, -y!]);
+  const corners = triangles.flatMap(([a, b, c]) => [a, b, -c! - 1]); // the last corner of each face is turned about
+  return `; FBX 7.4.0 project file
+FBXHeaderExtension:  {
+	FBXHeaderVersion: 1003
+	FBXVersion: 7400
+}
+GlobalSettings:  {
+	Version: 1000
+	Properties70:  {
+		P: "UpAxis", "int", "Integer", "",1
+		P: "UnitScaleFactor", "double", "Number", "",1
+	}
+}
+Objects:  {
+	Geometry: 1001, "Geometry::tube", "Mesh" {
+		Vertices: *${places.length} {
+			a: ${places.join(",")}
+		}
+		PolygonVertexIndex: *${corners.length} {
+			a: ${corners.join(",")}
+		}
+		GeometryVersion: 124
+	}
+	Model: 1002, "Model::pipe", "Mesh" {
+		Version: 232
+		Properties70:  {
+			P: "Lcl Translation", "Lcl Translation", "", "A",0,5,0
+		}
+	}
+}
+Connections:  {
+	C: "OO",1002,0
+	C: "OO",1001,1002
+}
+`;
+}
+
+/** 3MF, which is a ZIP file. `padding`: bytes of zeros beside. */
+export function make3mf(padding = 0): Uint8Array {
+  const model = `<?xml version="1.0" encoding="UTF-8"?>
+<model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>
+  <object id="1" type="model" name="pipe"><mesh>
+    <vertices>${points.map(([x, y, z]) => `<vertex x="${x}" y="${y}" z="${z! + 5}"/>`).join("")}</vertices>
+    <triangles>${triangles.map(([a, b, c]) => `<triangle v1="${a}" v2="${b}" v3="${c}"/>`).join("")}</triangles>
+  </mesh></object></resources><build><item objectid="1"/></build></model>`;
+  return zipSync({
+    "[Content_Types].xml": strToU8(
+      `<?xml version="1.0"?><Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>`,
+    ),
+    "_rels/.rels": strToU8(
+      `<?xml version="1.0"?><Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Target="/3D/model.model" Id="rel0" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>`,
+    ),
+    "3D/model.model": strToU8(model),
+    ...(padding > 0 && { "3D/zeros": new Uint8Array(padding) }),
+  });
+}

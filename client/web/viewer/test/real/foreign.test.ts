@@ -1,0 +1,136 @@
+import { mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { type Page } from "playwright-core";
+import { build } from "vite";
+import { afterAll, beforeAll, describe, expect, it } from "vitest";
+import { Service } from "../../../client/test/support/service.js";
+import { readMesh } from "../../src/io/read.js";
+import { faultsOf } from "../gltf_validator.js";
+import { columns, make3mf, makeDae, makeFbx } from "../made_foreign.js";
+import { User } from "./user.js";
+
+const dist = join(import.meta.dirname, "../../dist");
+const files = {
+  "tube.dae": Buffer.from(makeDae()),
+  "tube.fbx": Buffer.from(makeFbx()),
+  "tube.3mf": Buffer.from(make3mf()),
+};
+
+let service: Service;
+let user: User;
+
+beforeAll(async () => {
+  service = await Service.start({ files: dist });
+  user = await User.open(`${service.url}/?shape=bar&detail=coarse&encoding=float32`);
+  await user.settled();
+});
+
+afterAll(async () => {
+  await user.close();
+  await service.stop();
+});
+
+const notice = (words: string) => user.page.locator(".notice", { hasText: words }).first().waitFor({ timeout: 15_000 });
+
+describe("the viewer", () => {
+  it("loads the readers of other formats with the first such file, and not before", async () => {
+    const loaded = () =>
+      user.page.evaluate(() =>
+        performance
+          .getEntriesByType("resource")
+          .map(({ name }) => name)
+          .join(),
+      );
+    expect(await loaded()).not.toMatch(/foreign|FBX|Collada|3MF/);
+    await user.openFiles({ name: "tube.fbx", content: files["tube.fbx"] });
+    await notice("tube.fbx is opened as tube.glb.");
+    expect(await loaded()).toMatch(/FBXLoader/);
+    expect(await loaded()).not.toMatch(/Collada|3MFLoader/);
+  });
+
+  it.each(["tube.dae", "tube.fbx", "tube.3mf"] as const)(
+    "opens %s upright and where it stands, bends it, and saves it as a GLB",
+    async (name) => {
+      await user.openFiles({ name, content: files[name] });
+      await notice(`${name} is opened as tube.glb.`);
+      await user.settled();
+      const positions = await user.positions();
+      const heights = positions.filter((_, k) => k % 3 === 1);
+      expect(Math.min(...heights)).toBeCloseTo(5, 4);
+      expect(Math.max(...heights)).toBeCloseTo(13, 4);
+      const where = (height: number) => heights.flatMap((y, v) => (Math.abs(y - height) < 1e-4 ? [v] : []));
+      const handles = [
+        { name: "base", vertices: where(5) },
+        { name: "tip", vertices: where(13), translate: [2, 0, 0] },
+      ];
+      await user.openFiles({ name: "tube.json", content: JSON.stringify({ handles }) });
+      await user.settled();
+      const saved = new Uint8Array(await user.save("Mesh as GLB"));
+      expect(await faultsOf(saved)).toEqual([]);
+      const bent = readMesh("a.glb", saved);
+      const top = where(13).map((v) => bent.positions[3 * v]!);
+      expect((Math.min(...top) + Math.max(...top)) / 2).toBeCloseTo(2, 3);
+      expect(new Set(where(13).map((v) => bent.positions.subarray(3 * v, 3 * v + 3).join())).size).toBe(columns);
+      expect(new TextDecoder().decode(saved)).toContain('"pipe"');
+      expect(user.errors).toEqual([]);
+    },
+  );
+
+  it("loads nothing that a file names, and says what is left out", async () => {
+    const asked: string[] = [];
+    user.page.on("request", (request) => asked.push(request.url()));
+    await user.openFiles({ name: "tube.dae", content: files["tube.dae"] });
+    await notice("Its textures are not taken over.");
+    expect(asked.filter((url) => url.includes("example") || url.includes("a.png"))).toEqual([]);
+  });
+
+  it.each([
+    ["a.fbx", "", "a.fbx cannot be read as FBX"],
+    ["a.fbx", "; FBX 6.1.0 project file\nFBXVersion: 6100\n", "a.fbx cannot be read as FBX"],
+    ["a.dae", "<COLLADA", "a.dae cannot be read as COLLADA: its XML is broken"],
+    ["a.dae", '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"></COLLADA>', "a.dae"],
+    ["a.3mf", "PK", "a.3mf cannot be read as 3MF"],
+    ["a.3mf", Buffer.from(make3mf(501e6)), "a.3mf cannot be read as 3MF: unpacked it has 501"],
+  ])("refuses %s with a sentence", async (name, content, words) => {
+    await user.openFiles({ name, content });
+    await notice(words);
+    expect(user.errors).toEqual([]);
+  });
+});
+
+describe("hostile files", () => {
+  let folder: string;
+  let bare: Service;
+  let page: Page;
+
+  beforeAll(async () => {
+    folder = mkdtempSync(join(tmpdir(), "lpdeform-foreign-"));
+    const root = join(import.meta.dirname, "foreign_page");
+    await build({ root, base: "./", logLevel: "error", configFile: false, build: { outDir: folder, target: "es2022" } });
+    bare = await Service.start({ files: folder });
+    page = await (await user.browser.newContext({ bypassCSP: true })).newPage();
+    await page.goto(bare.url);
+    await page.waitForFunction(() => window.mutate);
+  });
+
+  afterAll(async () => {
+    await bare.stop();
+    rmSync(folder, { recursive: true });
+  });
+
+  it("are read or refused by a sentence about the file, however they are damaged", async () => {
+    for (const [name, content] of Object.entries(files)) {
+      expect(await page.evaluate(([name, bytes]) => window.convert(name, bytes), [name, [...content]] as const)).toMatch(
+        /vertices$/,
+      );
+      const { read, refused } = await page.evaluate(([name, bytes]) => window.mutate(name, bytes, 7, 150), [
+        name,
+        [...content],
+      ] as const);
+      console.log(`${name}: of 150 damaged copies ${read} were read and ${refused} refused`);
+      expect(refused).toBeGreaterThan(0);
+      expect(read + refused).toBe(150);
+    }
+  });
+});

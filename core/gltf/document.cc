@@ -1,0 +1,101 @@
+#include "core/gltf/document.h"
+
+#include <algorithm>
+#include <array>
+
+#include "absl/strings/str_cat.h"
+#include "core/gltf/uris.h"
+#include "core/io/whole_file.h"
+
+namespace lpdeform::gltf {
+namespace {
+
+void check_version(const Json& root) {
+  const Json* const asset = value_of(root, "asset");
+  const Json* const version = asset != nullptr ? value_of(*asset, "version") : nullptr;
+  if (version == nullptr || !version->is_string())
+    refuse("the JSON", "has no \"asset\" with a \"version\", as every glTF has");
+  const auto& text = version->get_ref<const std::string&>();
+  if (!text.starts_with("2."))
+    refuse_unsupported("the file", absl::StrCat("is glTF ", text.substr(0, 20), "; glTF 2 is read"));
+}
+
+/// Extensions that leave the places of vertices alone; all else that is required could move them.
+bool is_harmless(std::string_view extension) {
+  constexpr std::array<std::string_view, 7> kParts{
+      "_materials_", "_texture_", "_lights_", "_animation_", "_audio", "_xmp", "KHR_mesh_quantization"};
+  return std::ranges::any_of(
+      kParts, [&](std::string_view part) { return extension.find(part) != std::string_view::npos; });
+}
+
+void check_extensions(const Json& root) {
+  for (std::size_t k = 0; k < count_of(root, "extensionsRequired"); ++k) {
+    const Json& name = root["extensionsRequired"][k];
+    if (!name.is_string()) refuse("\"extensionsRequired\"", "has an item that is no text");
+    const auto& text = name.get_ref<const std::string&>();
+    const bool has_own_message =
+        text == "KHR_draco_mesh_compression" || text.ends_with("_meshopt_compression");
+    if (!is_harmless(text) && !has_own_message)
+      refuse_unsupported(absl::StrCat("the extension ", text.substr(0, 60)),
+                         "is required by the file and not known here");
+  }
+}
+
+/// Meshopt compresses views of buffers; Draco compresses primitives, see draw_list.cc.
+void check_views(const Json& root) {
+  for (std::size_t k = 0; k < count_of(root, "bufferViews"); ++k) {
+    const Json* const extensions = value_of(item(root, "bufferViews", k), "extensions");
+    for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"}) {
+      if (extensions != nullptr && value_of(*extensions, name) != nullptr)
+        refuse_unsupported(part_name(root, "bufferViews", k),
+                           absl::StrCat("is compressed by ", name, ", which is not read"));
+    }
+  }
+}
+
+std::string bytes_of_uri(const std::string& uri, const std::filesystem::path& folder,
+                         const std::string& part) {
+  if (is_data_uri(uri)) {
+    auto data = data_of(uri);
+    if (!data) refuse(part, "has a data URI that is not in base64");
+    return *std::move(data);
+  }
+  const auto file = file_within(folder, uri);
+  if (!file)
+    refuse(part,
+           absl::StrCat("is at \"", uri.substr(0, 80), "\", which is no file within the folder of the glTF"));
+  auto bytes = read_whole_file(*file);
+  if (!bytes.ok()) refuse(part, absl::StrCat("is in the file ", file->string(), ", which cannot be read"));
+  return *std::move(bytes);
+}
+
+std::string read_buffer(const Json& root, std::size_t k, const Container& container,
+                        const std::filesystem::path& folder) {
+  const Json& buffer = item(root, "buffers", k);
+  const std::string part = part_name(root, "buffers", k);
+  const std::uint64_t length = whole(buffer, "byteLength", 0, part);
+  const Json* const uri = value_of(buffer, "uri");
+  if (uri == nullptr && (k > 0 || !container.binary))
+    refuse(part, "has no bytes: neither a URI nor a chunk BIN");
+  if (uri != nullptr && !uri->is_string()) refuse(part, "has a URI that is no text");
+  std::string bytes =
+      uri == nullptr ? std::string(*container.binary) : bytes_of_uri(uri->get<std::string>(), folder, part);
+  if (bytes.size() < length) refuse(part, absl::StrCat("has ", bytes.size(), " bytes in place of ", length));
+  bytes.resize(length);
+  return bytes;
+}
+
+}  // namespace
+
+Document parse_document(std::string_view bytes, const std::filesystem::path& folder) {
+  Container container = parse_container(bytes);
+  Document document{parse_json(container.json), {}, std::move(container.others), folder};
+  check_version(document.root);
+  check_extensions(document.root);
+  check_views(document.root);
+  for (std::size_t k = 0; k < count_of(document.root, "buffers"); ++k)
+    document.buffers.push_back(read_buffer(document.root, k, container, folder));
+  return document;
+}
+
+}  // namespace lpdeform::gltf
