@@ -28,15 +28,10 @@ afterAll(async () => {
 
 /** Since the page was asked for, in seconds. */
 const now = () => user.page.evaluate<number>("performance.now() / 1000");
-/** What browser, server and Envoy have computed so far, in seconds of one core: what else runs here hardly counts. */
-async function computed(): Promise<number> {
-  const { processInfo } = await browser.send("SystemInfo.getProcessInfo");
-  return processInfo.reduce((sum, { cpuTime }) => sum + cpuTime, up.cpuSeconds("server") + up.cpuSeconds("envoy"));
-}
 const mostSeconds = 10;
 
 it("somebody who opens the page and drags what it points out has a deformed surface, with nothing to do before", async () => {
-  const before = await computed();
+  const before = await up.computedWith(browser);
   await user.page.goto(up.url);
   await user.settled();
   const shown = await now();
@@ -56,7 +51,7 @@ it("somebody who opens the page and drags what it points out has a deformed surf
   await user.page.mouse.down();
   await user.page.mouse.move(x + 30, y - 20);
   await user.until("window.__lpdeform.meter().inputs > 0"); // the answer is on the screen, the button still down
-  const [follows, work] = [await now(), (await computed()) - before];
+  const [follows, work] = [await now(), (await up.computedWith(browser)) - before];
   await user.page.mouse.move(x + 60, y - 40);
   await user.page.mouse.up();
   await user.settled();

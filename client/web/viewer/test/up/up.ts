@@ -2,6 +2,7 @@ import { type ChildProcess, spawn } from "node:child_process";
 import { once } from "node:events";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
+import type { CDPSession } from "playwright-core";
 import { cpuSecondsOf, root } from "../../../client/test/support/service.js";
 
 const parts = { server: "lpdeform-server", envoy: "envoy" };
@@ -51,6 +52,12 @@ export class Up {
   /** What it has computed so far, on all cores together. */
   cpuSeconds(part: keyof typeof parts): number {
     return cpuSecondsOf(this.#pidOf(part));
+  }
+
+  /** The same of server, Envoy and this browser, in seconds of one core: what else runs here hardly counts. */
+  async computedWith(browser: CDPSession): Promise<number> {
+    const { processInfo } = await browser.send("SystemInfo.getProcessInfo");
+    return processInfo.reduce((sum, { cpuTime }) => sum + cpuTime, this.cpuSeconds("server") + this.cpuSeconds("envoy"));
   }
 
   /** As Ctrl-C does. */
