@@ -66,18 +66,25 @@ export class PointedMarks {
   }
 
   dispose(): void {
-    this.object.geometry.dispose();
+    this.#dropGeometry();
     (this.object.material as three.Material).dispose();
   }
 
   #clear(room: number): void {
     this.#shown = [];
     this.#count = 0;
-    this.object.geometry.dispose();
+    this.#dropGeometry();
     this.object.geometry = new three.BufferGeometry();
     this.object.geometry.setIndex(new three.BufferAttribute(new Uint32Array(room), 1).setUsage(three.DynamicDrawUsage));
     this.#surface?.share(this.object.geometry);
     this.object.geometry.setDrawRange(0, 0);
+  }
+
+  /** Without what it shares with the surface, whose buffers would be deleted with it. */
+  #dropGeometry(): void {
+    const { geometry } = this.object;
+    for (const name of Object.keys(geometry.attributes)) geometry.deleteAttribute(name);
+    geometry.dispose();
   }
 
   #add(vertices: readonly number[]): void {
