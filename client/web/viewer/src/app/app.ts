@@ -9,12 +9,14 @@ import { History, type Steps } from "../model/history.js";
 import { keyPoseOf } from "../model/key_poses.js";
 import { kindOf } from "../model/hold_kinds.js";
 import type { Mesh } from "../model/mesh.js";
+import { Mirror, mirrorAxes, type Symmetry } from "../model/mirror.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
 import type { Seams } from "../model/seams.js";
 import { nothing } from "../model/pointed.js";
 import { subtract } from "../model/pose.js";
 import { gridStep } from "../model/snap.js";
 import { State } from "../model/state.js";
+import { symmetric } from "../model/symmetric.js";
 import { firstView, type View } from "../model/view.js";
 import type { Look, Stage } from "../stage/stage.js";
 import { Asides, type Kept } from "./asides.js";
@@ -36,6 +38,7 @@ export class App implements Workbench {
   /** Called after each picture that was drawn. */
   readonly afterDrawing = new Set<(now: number) => void>();
   #seams: Seams | undefined;
+  #mirror: { of: readonly unknown[]; mirror: Mirror } | undefined;
   readonly #asides = new Asides();
   #isBroughtBack = false;
   #isKeyHeld = false;
@@ -232,16 +235,39 @@ export class App implements Workbench {
     this.facts.set({ setAside: this.#asides.names });
   }
 
-  /** Makes a step that can be undone. */
-  change(document: Document): void {
-    this.history.push(document);
+  change(document: Document, isWhole = false): void {
+    this.history.push(isWhole ? document : this.#symmetric(document));
     this.#documentChanged(performance.now());
   }
 
-  /** A part of a gesture, from an input at `time`; endGesture() makes a step of all parts. */
-  during(document: Document, time: number): void {
-    this.history.during(document);
+  during(document: Document, time: number, isWhole = false): void {
+    this.history.during(isWhole ? document : this.#symmetric(document));
     this.#documentChanged(time);
+  }
+
+  get mirror(): Mirror | undefined {
+    const { symmetry } = this.view.now;
+    if (symmetry === "none" || this.mesh === noMesh) return undefined;
+    const { mesh, adjacency, edge } = this;
+    const of = [mesh, adjacency, symmetry] as const;
+    if (!this.#mirror?.of.every((one, k) => one === of[k])) {
+      const { bounds } = derivedOf(mesh);
+      this.#mirror = { of, mirror: new Mirror(mesh, bounds, mirrorAxes[symmetry], edge || this.diagonal, adjacency) };
+    }
+    return this.#mirror.mirror;
+  }
+
+  /** Leading are the handles that are selected. */
+  #symmetric(document: Document): Document {
+    const { mirror } = this;
+    const { selected, alsoSelected } = this.view.now;
+    return mirror ? symmetric(this.document, document, mirror, [selected ?? "", ...alsoSelected]) : document;
+  }
+
+  /** What is not symmetric yet stays as it is until it is worked on. */
+  setSymmetry(symmetry: Symmetry): void {
+    this.view.set({ symmetry });
+    if (symmetry !== "none") this.notify(`What is done on one side of the plane across ${symmetry} is done on the other.`);
   }
 
   endGesture(): void {
@@ -439,6 +465,7 @@ export class App implements Workbench {
     const step = snapping === "grid" ? gridStep(this.diagonal) : undefined;
     for (const pane of this.panes) {
       pane.mark(document, this.view.now, pointedOut, colour);
+      pane.stage.plane.show(this.mirror?.axis, derivedOf(this.mesh).bounds);
       pane.stage.gizmo.show(pose, handle && kindOf(handle.hold).isTurnedOnly ? "rotate" : gizmo, axes, step);
     }
   }

@@ -182,7 +182,10 @@ export class Files {
   #openHandles(name: string, text: string): void {
     const { app } = this;
     const { seams } = app;
-    app.change(readHandleFile(text, app.document, app.mesh, (vertices) => seams?.withCopies(vertices) ?? vertices));
+    app.change(
+      readHandleFile(text, app.document, app.mesh, (vertices) => seams?.withCopies(vertices) ?? vertices),
+      true,
+    );
     app.view.set({ selected: app.document.handles.at(-1)!.name });
     app.notify(`${name}: ${app.document.handles.length} handles.`);
   }

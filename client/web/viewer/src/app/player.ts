@@ -49,7 +49,7 @@ export class Player {
   }
 
   #show(document: Document, time: number): void {
-    this.app.during(document, time);
+    this.app.during(document, time, true);
     this.#shown = document;
   }
 

@@ -1,5 +1,6 @@
 import { changeHandle, handleOf, removeHandle } from "../model/document.js";
 import { steppedP } from "../model/exponent.js";
+import type { Symmetry } from "../model/mirror.js";
 import { gridStep, type Snapping, turnStep } from "../model/snap.js";
 import { turned } from "../model/pose.js";
 import type { PaintMode } from "../model/soft_paint.js";
@@ -11,6 +12,7 @@ import type { Files } from "./files.js";
 const tools: readonly Tool[] = ["move", "brush", "lasso", "box", "paint"];
 const colours: readonly ColourBy[] = ["distortion", "p", "stiffness", "normals", "plain"];
 const snappings: readonly Snapping[] = ["none", "grid", "vertices"];
+const symmetries: readonly Symmetry[] = ["none", "x", "y", "z"];
 const paintModes: readonly PaintMode[] = ["set", "erase", "smooth"];
 const allAxes: readonly GizmoAxes[] = ["world", "local", "view"];
 const nudges: Record<string, readonly [number, number, number]> = {
@@ -121,6 +123,7 @@ function actions(app: App, files: Files, help: HTMLDialogElement, event: Keyboar
     x: () => view.set({ axes: after(allAxes, now.axes) }),
     e: () => view.set({ paintMode: now.tool === "paint" ? after(paintModes, now.paintMode) : now.paintMode, tool: "paint" }),
     v: () => view.set({ hasReadout: !now.hasReadout }),
+    y: () => app.setSymmetry(after(symmetries, now.symmetry)),
     w: () => view.set({ wireframe: !now.wireframe }),
     Delete: () => removeSelected(app),
     Backspace: () => removeSelected(app),

@@ -1,6 +1,7 @@
 import type { Encoding } from "lpdeform-client";
 import type { PaletteName } from "./palettes.js";
 import type { Snapping } from "./snap.js";
+import type { Symmetry } from "./mirror.js";
 import type { PaintField, PaintMode } from "./soft_paint.js";
 import type { Detail } from "./shapes.js";
 
@@ -25,6 +26,8 @@ export interface View {
   gizmo: "translate" | "rotate";
   axes: GizmoAxes;
   snapping: Snapping;
+  /** Across which plane selecting, painting and moving handles is done on both sides. */
+  symmetry: Symmetry;
   /** Of the brush, as a share of the mesh's diagonal. */
   radius: number;
   /** Whether lasso and box also take vertices that face away. */
@@ -64,6 +67,7 @@ export const firstView: View = {
   gizmo: "translate",
   axes: "world",
   snapping: "none",
+  symmetry: "none",
   radius: 0.05,
   isThrough: true,
   paintField: "p",

@@ -6,6 +6,7 @@ import { Backdrop } from "./backdrop.js";
 import { Highlight } from "./highlight.js";
 import { LateGizmo } from "./late_gizmo.js";
 import { Marks } from "./marks.js";
+import { MirrorPlane } from "./mirror_plane.js";
 import { PointedMarks } from "./pointed_marks.js";
 import { isSoftware } from "./software.js";
 import { Surface } from "./surface.js";
@@ -37,6 +38,7 @@ export class Stage {
   readonly camera = new three.PerspectiveCamera(32, 1, 0.01, 1000);
   readonly marks = new Marks();
   readonly pointed = new PointedMarks();
+  readonly plane = new MirrorPlane();
   readonly highlight: Highlight;
   readonly gizmo: LateGizmo;
   surface: Surface | undefined;
@@ -57,7 +59,8 @@ export class Stage {
     this.camera.up.set(0, 0, 1);
     this.highlight = new Highlight(changed);
     this.gizmo = new LateGizmo(this.camera, this.canvas, changed, () => this.#restartControls());
-    this.#scene.add(this.#backdrop.object, this.marks.object, this.pointed.object, this.highlight.object, this.gizmo.object);
+    this.#scene.add(this.#backdrop.object, this.marks.object, this.pointed.object, this.highlight.object);
+    this.#scene.add(this.plane.object, this.gizmo.object);
   }
 
   /** Called after all other listeners to the canvas are set: what they take does not turn the view. */
@@ -277,6 +280,7 @@ export class Stage {
     this.gizmo.dispose();
     this.highlight.dispose();
     this.pointed.dispose();
+    this.plane.dispose();
     this.surface?.dispose();
     this.#renderer.dispose();
     this.#renderer.forceContextLoss(); // browsers allow only a few, and remove the oldest

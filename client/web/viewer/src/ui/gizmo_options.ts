@@ -1,4 +1,5 @@
 import type { App } from "../app/app.js";
+import type { Symmetry } from "../model/mirror.js";
 import { gridStep, type Snapping, turnStep } from "../model/snap.js";
 import type { GizmoAxes } from "../model/view.js";
 import { short } from "../model/words.js";
@@ -34,4 +35,17 @@ export function gizmoOptions(app: App): HTMLElement {
     snapping.value = view.snapping;
   });
   return el("div", { className: "moving" }, axesChoice, snapping);
+}
+
+/** Across which plane work is done on both sides. */
+export function symmetryChoice(app: App): HTMLElement {
+  const select = el("select", {
+    title: "Selecting, painting and moving handles on both sides of a plane through the mesh's middle (Y)",
+    aria: { label: "Symmetry" },
+  });
+  select.append(el("option", { value: "none", textContent: "No symmetry" }));
+  for (const axis of ["x", "y", "z"]) select.append(el("option", { value: axis, textContent: `Symmetric across ${axis}` }));
+  select.addEventListener("change", () => app.setSymmetry(select.value as Symmetry));
+  app.view.watchAll(({ symmetry }) => (select.value = symmetry));
+  return select;
 }

@@ -14,6 +14,7 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
       ["5", "p brush: paint p or stiffness"],
       ["E", "The p brush, and then what it does: paint, erase, smooth"],
       ["[  ]", "Smaller, larger brush"],
+      ["Y", "Work on both sides of a plane across x, y, z, or on one side"],
       ["Shift", "with a stroke: add to the selected handle"],
       ["Alt", "with a stroke: release vertices"],
     ],

@@ -6,7 +6,7 @@ import type { StrokeMode, Tool } from "../model/view.js";
 import { short } from "../model/words.js";
 import { choice, el, measured, toggle } from "./dom.js";
 import { button, slider } from "./controls.js";
-import { gizmoOptions } from "./gizmo_options.js";
+import { gizmoOptions, symmetryChoice } from "./gizmo_options.js";
 import { type IconName, icon } from "./icons.js";
 
 const tools: readonly (readonly [Tool, IconName, string, string])[] = [
@@ -103,6 +103,7 @@ function options(app: App): HTMLElement {
     p.element,
     stiffness.element,
     through.element,
+    symmetryChoice(app),
     clear,
   );
 
