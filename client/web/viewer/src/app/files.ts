@@ -159,7 +159,7 @@ export class Files {
     if (this.app.document.handles.length === 0) {
       return this.app.notify("There are no handles to save: click the surface to place one.", true);
     }
-    save(`${this.#stem}-handles.json`, writeHandleFile(this.app.document, this.app.mesh.name));
+    save(`${this.#stem}-handles.json`, writeHandleFile(this.app.document, this.app.mesh));
   }
 
   get #stem(): string {

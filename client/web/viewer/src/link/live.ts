@@ -280,7 +280,7 @@ export class Live {
 
   #tell(time: number): void {
     const session = this.#session;
-    const update = session && changes(this.#told, this.document, this.side);
+    const update = session && changes(this.#told, this.document, this.mesh, this.side);
     if (!session || !update) return;
     const isInput = this.#told !== newSession;
     this.#told = this.document;

@@ -24,7 +24,7 @@ export async function* shapesAt(
     let told = newSession;
     for (const p of ps) {
       const asked = { ...document, p };
-      const update = changes(told, asked);
+      const update = changes(told, asked, mesh);
       if (update) session.update(update);
       told = asked;
       const { positions, distortion } = await session.settle({ signal });

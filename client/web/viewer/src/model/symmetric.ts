@@ -70,10 +70,11 @@ function mirroredHold({ hold }: Handle, mirror: Mirror): Handle["hold"] {
 }
 
 /** The pose as seen in the mirror. */
-function mirrored({ rotation, translation, center }: Pose, mirror: Mirror): Pose {
+function mirrored({ rotation, translation, center, ...scale }: Pose, mirror: Mirror): Pose {
   const [x, y, z, w] = rotation;
   const [mx, my, mz] = mirror.turned([x, y, z]);
   return {
+    ...scale,
     rotation: [-mx || 0, -my || 0, -mz || 0, w], // an axis of rotation is turned round, too
     translation: mirror.turned(translation),
     center: mirror.reflected(center),

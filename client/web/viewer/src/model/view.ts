@@ -7,7 +7,9 @@ import type { Detail } from "./shapes.js";
 
 export type Tool = "move" | "brush" | "lasso" | "box" | "paint";
 
-/** Along which axes the gizmo moves and turns: those of the mesh, of the handle, or of the picture. */
+export type GizmoMode = "translate" | "rotate" | "scale";
+
+/** Along which axes the gizmo moves and turns: those of the mesh, of the handle, or of the picture. It scales along the handle's. */
 export type GizmoAxes = "world" | "local" | "view";
 
 /** What the colours show. */
@@ -23,7 +25,7 @@ export interface View {
   selected: string | undefined;
   /** Other handles that are moved together with the selected one. Selecting another handle empties the list. */
   alsoSelected: readonly string[];
-  gizmo: "translate" | "rotate";
+  gizmo: GizmoMode;
   axes: GizmoAxes;
   snapping: Snapping;
   /** Across which plane selecting, painting and moving handles is done on both sides. */

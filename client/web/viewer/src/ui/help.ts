@@ -22,14 +22,14 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
   [
     "Handles",
     [
-      ["T  R", "Arrows, rings on the selected handle"],
+      ["T  R  Z", "Arrows, rings, cubes on the selected handle: move, turn, scale it"],
       ["X", "Their axes: of the mesh, of the handle, of the picture"],
       ["M", "Keep to a grid, or to vertices, while dragging"],
       ["Enter", "A cross in the picture: arrows move it, Enter places a handle"],
       ["N", "Select the next handle"],
       ["Ctrl", "with a click on a handle: select it, too; they move together"],
       ["Ctrl+A", "Select all that are not locked"],
-      ["← → ↑ ↓", "Move it by steps, Page Up and Page Down along z; with rings, turn it"],
+      ["← → ↑ ↓", "Move it by steps, Page Up and Page Down along z; with rings, turn it; with cubes, scale it"],
       ["Delete", "Delete it"],
       ["K", "Keep the present pose, in the panel “Poses”"],
       ["L", "Lock it against dragging"],

@@ -2,7 +2,7 @@ import type { App } from "../app/app.js";
 import { withoutPaint } from "../model/document.js";
 import { nothing } from "../model/pointed.js";
 import type { PaintMode } from "../model/soft_paint.js";
-import type { StrokeMode, Tool } from "../model/view.js";
+import type { GizmoMode, StrokeMode, Tool } from "../model/view.js";
 import { short } from "../model/words.js";
 import { choice, el, measured, toggle } from "./dom.js";
 import { button, slider } from "./controls.js";
@@ -48,11 +48,12 @@ function options(app: App): HTMLElement {
     ],
     (chosen) => app.view.set({ mode: chosen }),
   );
-  const gizmo = choice<"translate" | "rotate">(
-    "Arrows or rings",
+  const gizmo = choice<GizmoMode>(
+    "Arrows, rings or cubes",
     [
       ["translate", "Move"],
       ["rotate", "Turn"],
+      ["scale", "Scale"],
     ],
     (chosen) => app.view.set({ gizmo: chosen }),
   );
