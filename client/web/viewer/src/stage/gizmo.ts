@@ -5,6 +5,9 @@ import { conjugate, isAtRest, noRotation, noScale, type Pose, product, type Quat
 import { onGrid, onTurnedGrid, scaleStep, turnStep } from "../model/snap.js";
 import type { GizmoAxes, GizmoMode } from "../model/view.js";
 
+/** Of the pointer to the right and up, for a scale of e along all axes. */
+const pixelsPerE = 200;
+
 /** Arrows, rings or cubes on the selected handle. */
 export class Gizmo {
   /** Called with each pose during a drag. */
@@ -22,12 +25,24 @@ export class Gizmo {
   /** How the gizmo's axes are turned at the start of a drag. */
   #frame = noRotation;
   readonly #camera: three.Camera;
+  /** Where it was pressed, and where it is, in pixels of the page. */
+  #pointer: [readonly [number, number], readonly [number, number]] = [
+    [0, 0],
+    [0, 0],
+  ];
 
   constructor(camera: three.Camera, canvas: HTMLCanvasElement, changed: () => void) {
     this.#camera = camera;
     this.#controls = new TransformControls(camera, canvas);
     this.object.add(this.#controls.getHelper(), this.#anchor);
     removeBackwardArrows(this.#controls.getHelper());
+    for (const kind of ["pointerdown", "pointermove"] as const) {
+      const follow = ({ clientX, clientY }: PointerEvent) => {
+        const at = [clientX, clientY] as const;
+        this.#pointer = [kind === "pointerdown" ? at : this.#pointer[0], at];
+      };
+      canvas.addEventListener(kind, follow, { capture: true });
+    }
     // The browser has taken the pointer; three.js listens only for a pointer that is released.
     canvas.addEventListener("pointercancel", () => this.cancel());
     this.#controls.setSize(0.72);
@@ -104,7 +119,9 @@ export class Gizmo {
     if (!this.#pose) return;
     const { center, translation: before, rotation: from } = this.#pose;
     const { position, quaternion, scale } = this.#anchor;
-    if (this.#controls.mode === "scale") return this.onPose(scaled(this.#pose, scale.toArray()));
+    if (this.#controls.mode === "scale") {
+      return this.onPose(scaled(this.#pose, this.#controls.axis === "XYZ" ? this.#grown() : scale.toArray()));
+    }
     const to: Vector3 = [position.x - center[0], position.y - center[1], position.z - center[2]];
     const translation = this.#step === undefined ? to : this.#snapped(before, to, this.#step);
     position.set(center[0] + translation[0], center[1] + translation[1], center[2] + translation[2]);
@@ -112,6 +129,15 @@ export class Gizmo {
     const added = product(quaternion.toArray() as unknown as Quaternion, conjugate(this.#frame));
     const pose: Pose = { ...this.#pose, translation, rotation: product(added, from) };
     this.onPose(isAtRest(pose) ? { ...pose, translation: [0, 0, 0] } : pose);
+  }
+
+  /** Where three.js would scale by the distance from the middle, in which the pointer has taken the cube. */
+  #grown(): Vector3 {
+    const [[x0, y0], [x1, y1]] = this.#pointer;
+    const factor = Math.exp((x1 - x0 + y0 - y1) / pixelsPerE);
+    const [x, y, z] = this.#pose!.scale ?? noScale;
+    const kept = (value: number) => (this.#step === undefined ? value : Math.max(Math.round(value / scaleStep), 1) * scaleStep);
+    return [kept(factor * x), kept(factor * y), kept(factor * z)];
   }
 
   #snapped(before: Vector3, to: Vector3, step: number): Vector3 {
