@@ -260,7 +260,7 @@ export class Editing implements PointingTarget {
     const inside = insidePolygon(project(positions, viewProjection(stage), stage.width, stage.height), polygon);
     if (this.work.view.now.isThrough) return this.#withCopies(inside);
     const normals = vertexNormals(positions, mesh.faces);
-    return this.#withCopies(facing(inside, positions, normals, stage.camera.position.toArray()));
+    return this.#withCopies(facing(inside, positions, normals, stage.eye));
   }
 
   #select(vertices: readonly number[], mode: "new" | "add" | "release"): void {

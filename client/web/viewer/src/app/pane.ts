@@ -194,6 +194,7 @@ export class Pane {
     surface.colour(view.colourBy, values, scale);
     surface.show(view);
     this.stage.darken(view.isDark);
+    this.stage.drawParallel(view.isParallel);
     this.#isDirty = true;
   }
 

@@ -120,6 +120,7 @@ function actions(app: App, files: Files, help: HTMLDialogElement, event: Keyboar
     o: () => files.choose(),
     p: () => app.togglePin(),
     r: () => view.set({ gizmo: "rotate", tool: "move" }),
+    q: () => view.set({ isParallel: !now.isParallel }),
     s: () => view.set({ isSplit: !now.isSplit }),
     t: () => view.set({ gizmo: "translate", tool: "move" }),
     z: () => view.set({ gizmo: "scale", tool: "move" }),

@@ -50,6 +50,8 @@ export interface View {
   pinned: number | undefined;
   isSplit: boolean;
   isYUp: boolean;
+  /** Whether it is drawn without perspective. */
+  isParallel: boolean;
   /** Whether vertices in the same place along seams count as one; see Seams. */
   isWelded: boolean;
   isDark: boolean;
@@ -85,6 +87,7 @@ export const firstView: View = {
   pinned: undefined,
   isSplit: false,
   isYUp: false,
+  isParallel: false,
   isWelded: true,
   isDark: true,
   isPanelOpen: true,

@@ -9,6 +9,12 @@ vec3 placed() {
   return mix(position, (ahead * vec4(position, 1.0)).xyz, pull);
 }`;
 
+/** For points on the surface: before it, in the same place of the picture. */
+export const before = `
+vec4 before(vec4 seen) {
+  return isOrthographic ? seen + vec4(0.0, 0.0, 0.014 / projectionMatrix[1][1], 0.0) : vec4(0.996 * seen.xyz, 1.0);
+}`;
+
 /** A uniform for it. */
 export interface Ahead {
   value: three.Matrix4;

@@ -24,7 +24,7 @@ export class Gizmo {
   #step: number | undefined;
   /** How the gizmo's axes are turned at the start of a drag. */
   #frame = noRotation;
-  readonly #camera: three.Camera;
+  #camera: three.Camera;
   /** Where it was pressed, and where it is, in pixels of the page. */
   #pointer: [readonly [number, number], readonly [number, number]] = [
     [0, 0],
@@ -97,6 +97,11 @@ export class Gizmo {
     this.#turnAnchor();
     if (this.#controls.object !== this.#anchor) this.#controls.attach(this.#anchor);
     this.#controls.setSpace(this.#axes === "world" ? "world" : "local");
+  }
+
+  lookThrough(camera: three.Camera): void {
+    this.#camera = camera;
+    this.#controls.camera = camera;
   }
 
   /** Before each picture: the axes of the picture turn with the view. */

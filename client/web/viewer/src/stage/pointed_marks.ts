@@ -1,14 +1,13 @@
 import * as three from "three";
-import { place } from "./ahead.js";
+import { before, place } from "./ahead.js";
 import type { Surface } from "./surface.js";
 
 const vertexShader = `
 ${place}
+${before}
 uniform float size;
 void main() {
-  vec4 seen = modelViewMatrix * vec4(placed(), 1.0);
-  seen.xyz *= 0.996; // before the surface that it lies on, in the same place of the picture
-  gl_Position = projectionMatrix * seen;
+  gl_Position = projectionMatrix * before(modelViewMatrix * vec4(placed(), 1.0));
   gl_PointSize = size;
 }`;
 

@@ -29,12 +29,12 @@ void main() {
   vec4 seen = modelViewMatrix * vec4(placed(), 1.0);
   vValue = value;
 #ifdef PER_VERTEX
-  vec3 toEye = normalize(-seen.xyz);
+  vec3 toEye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-seen.xyz);
   vec3 facing = normalize(normalMatrix * normal);
   vLit = lit(dot(facing, toEye) < -0.1 ? -facing : facing, toEye);
 #else
   vNormal = normalMatrix * normal;
-  vToEye = -seen.xyz;
+  vToEye = isOrthographic ? vec3(0.0, 0.0, 1.0) : -seen.xyz;
 #endif
   gl_Position = projectionMatrix * seen;
 }`;

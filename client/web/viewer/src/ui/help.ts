@@ -52,6 +52,7 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
       ["+  -", "Zoom"],
       ["F", "Show all of it"],
       ["B", "Look from the front, right, top, back, left, bottom"],
+      ["Q", "Without perspective"],
       ["W  G", "Wireframe, the original as a ghost"],
       ["C", "Next colours"],
       ["V", "Values of the vertex under the pointer or the cross"],
