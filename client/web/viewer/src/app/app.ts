@@ -55,6 +55,10 @@ export class App implements Workbench {
       problem: (problem) => this.facts.set({ problem }),
       notice: (text) => this.notify(text),
       better: () => this.#showBetter(),
+      dressed: () => {
+        this.#needsColours = true;
+        this.requestDraw();
+      },
     },
     (pane) => this.#edit(pane),
   );
@@ -243,6 +247,11 @@ export class App implements Workbench {
   during(document: Document, time: number, isWhole = false): void {
     this.history.during(isWhole ? document : this.#symmetric(document));
     this.#documentChanged(time);
+  }
+
+  /** Whether the file of the mesh has materials that are shown. */
+  get isTextured(): boolean {
+    return this.mesh.gltf !== undefined && this.mesh.beside?.includes("materials") === true;
   }
 
   get mirror(): Mirror | undefined {

@@ -6,12 +6,11 @@ import { gridStep, scaleStep, type Snapping, turnStep } from "../model/snap.js";
 import { noScale, scaled, turned } from "../model/pose.js";
 import type { PaintMode } from "../model/soft_paint.js";
 import { posedTogether, selectionOf, shiftedTogether } from "../model/together.js";
-import type { ColourBy, GizmoAxes, Tool } from "../model/view.js";
+import { colourings, type GizmoAxes, type Tool } from "../model/view.js";
 import type { App } from "./app.js";
 import type { Files } from "./files.js";
 
 const tools: readonly Tool[] = ["move", "brush", "lasso", "box", "paint"];
-const colours: readonly ColourBy[] = ["distortion", "p", "stiffness", "normals", "plain"];
 const snappings: readonly Snapping[] = ["none", "grid", "vertices"];
 const symmetries: readonly Symmetry[] = ["none", "x", "y", "z"];
 const paintModes: readonly PaintMode[] = ["set", "erase", "smooth"];
@@ -108,7 +107,13 @@ function actions(app: App, files: Files, help: HTMLDialogElement, event: Keyboar
     ".": () => stepP(0.1),
     a: () => app.change({ ...app.document, isAutomatic: !app.document.isAutomatic }),
     b: () => app.lookAlongNext(),
-    c: () => view.set({ colourBy: after(colours, now.colourBy) }),
+    c: () =>
+      view.set({
+        colourBy: after(
+          colourings.filter((one) => one !== "texture" || app.isTextured),
+          now.colourBy,
+        ),
+      }),
     d: () => view.set({ isDark: !now.isDark }),
     f: () => app.fit(),
     g: () => view.set({ ghost: !now.ghost }),

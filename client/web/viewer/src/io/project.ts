@@ -4,7 +4,7 @@ import { leastP, mostP } from "../model/exponent.js";
 import type { Mesh, Vector3 } from "../model/mesh.js";
 import type { Pose } from "../model/pose.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
-import type { ColourBy, View } from "../model/view.js";
+import { type ColourBy, colourings, type View } from "../model/view.js";
 import { FileFault } from "./fault.js";
 import { gunzip, gzip } from "./gzip.js";
 import { isPlace } from "./places.js";
@@ -58,7 +58,7 @@ const viewChecks: { readonly [K in keyof ProjectView]: (value: unknown) => boole
   pinned: (value) => value === undefined || (typeof value === "number" && value > 0 && value < Infinity),
   isWelded: isBoolean,
   isSplit: isBoolean,
-  colourBy: oneOf<ColourBy>("distortion", "p", "stiffness", "normals", "plain"),
+  colourBy: oneOf<ColourBy>(...colourings),
   wireframe: isBoolean,
   ghost: isBoolean,
   encoding: oneOf<Encoding>("float32", "quantized", "compressed"),

@@ -13,7 +13,10 @@ export type GizmoMode = "translate" | "rotate" | "scale";
 export type GizmoAxes = "world" | "local" | "view";
 
 /** What the colours show. */
-export type ColourBy = "distortion" | "p" | "stiffness" | "normals" | "plain";
+export type ColourBy = "distortion" | "p" | "stiffness" | "normals" | "clay" | "texture" | "plain";
+
+/** In the order of the page. */
+export const colourings: readonly ColourBy[] = ["distortion", "p", "stiffness", "normals", "clay", "texture", "plain"];
 
 /** What a selecting stroke does: make a new handle, add to the selected one, or release vertices. */
 export type StrokeMode = "new" | "add" | "release";

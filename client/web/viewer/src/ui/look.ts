@@ -17,6 +17,8 @@ export function lookPanel(app: App): HTMLElement {
       ["p", "p"],
       ["stiffness", "Stiffness"],
       ["normals", "Normals"],
+      ["clay", "Clay"],
+      ["texture", "Texture"],
       ["plain", "Plain"],
     ],
     (colourBy) => app.view.set({ colourBy }),
@@ -62,6 +64,14 @@ export function lookPanel(app: App): HTMLElement {
     parallel.input.checked = view.isParallel;
     encoding.value = view.encoding;
   });
+  const texture = colour.element.querySelector<HTMLButtonElement>('[data-value="texture"]')!;
+  app.facts.watch(
+    ({ mesh }) => [mesh],
+    () => {
+      texture.disabled = !app.isTextured;
+      texture.title = app.isTextured ? "" : "A GLB or glTF with materials has textures";
+    },
+  );
   return el(
     "div",
     { className: "look" },
