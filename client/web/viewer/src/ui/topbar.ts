@@ -78,6 +78,8 @@ function exportMenu(files: Files): HTMLElement {
     ["Mesh as OFF", () => void files.exportMesh("off")],
     ["Mesh as STL", () => void files.exportMesh("stl")],
     ["Picture as PNG", () => files.exportPicture()],
+    ["Poses as GLB, with morph targets", () => void files.exportPoses("glb")],
+    ["Poses as video", () => void files.exportPoses("video")],
     ["Handles as JSON", () => files.saveHandles()],
   ]);
 }
